@@ -1,0 +1,32 @@
+"""Kinematics of serial arms given by Denavit–Hartenberg tables: pure functions of arrays.
+
+>>> import kin
+>>> robot = kin.get_robot("pioneer5")
+>>> kin.fk(robot, robot.home)[:3, 3].round(3).tolist()
+[0.03, 0.154, -0.2]
+"""
+
+from kin._version import __version__
+from kin.catalog import builtin_robots, get_robot, load_folder, load_robot, parse_robot
+from kin.errors import InputError, KinematicsError, RobotFileError, UnknownRobotError
+from kin.fk import fk, jacobian, link_frames, manipulability
+from kin.robot import Joint, Robot
+
+__all__ = [
+    "InputError",
+    "Joint",
+    "KinematicsError",
+    "Robot",
+    "RobotFileError",
+    "UnknownRobotError",
+    "__version__",
+    "builtin_robots",
+    "fk",
+    "get_robot",
+    "jacobian",
+    "link_frames",
+    "load_folder",
+    "load_robot",
+    "manipulability",
+    "parse_robot",
+]

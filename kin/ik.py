@@ -1,0 +1,1 @@
+"""Inverse kinematics with reasons. (types first; the pipeline follows)"""

@@ -1,0 +1,186 @@
+"""A robot arm as a table of Denavit–Hartenberg rows.
+
+Each row carries four numbers and moves one frame to the next. Two orders of the same four elementary motions
+are in use, and they are *not* the same arm when fed the same table:
+
+- ``standard`` (distal, Denavit & Hartenberg 1955): ``A = Rz(θ) Tz(d) Tx(a) Rx(α)``; frame i sits at the far
+  end of link i and joint i turns about z of frame i−1.
+- ``modified`` (proximal, Craig 1986): ``A = Rx(α) Tx(a) Rz(θ) Tz(d)``; frame i sits on joint i and joint i
+  turns about z of frame i itself.
+
+A revolute joint adds its value to θ, a prismatic one to d; a ``fixed`` row moves nothing (a tool, an adapter).
+``T_base_tool = base · A_1 … A_m · tool``. Lengths are metres and angles radians.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kin.errors import InputError
+from kin.transforms import Array, finite_array
+
+Convention = Literal["standard", "modified"]
+Kind = Literal["revolute", "prismatic", "fixed"]
+KIND_CODES: dict[Kind, float] = {"fixed": 0.0, "revolute": 1.0, "prismatic": 2.0}
+ROW_WIDTH = 8
+HEADER_WIDTH = 27
+
+Matrix = tuple[tuple[float, ...], ...]
+IDENTITY: Matrix = tuple(tuple(float(i == j) for j in range(4)) for i in range(4))
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """One DH row. `limits` is (lower, upper) in radians or metres, None for a fixed row."""
+
+    name: str
+    theta: float = 0.0
+    d: float = 0.0
+    a: float = 0.0
+    alpha: float = 0.0
+    kind: Kind = "revolute"
+    limits: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A serial arm: frozen, hashable, comparable by value; derived arrays are computed once and read-only.
+
+    Attributes:
+        id: short name used in addresses, e.g. ``"pioneer5"``.
+        rows: all DH rows from base to tool, fixed ones included.
+        home: one value per moving joint, inside the limits.
+        base, tool: constant transforms before the first and after the last row, as nested tuples.
+        units: the length unit of the robot's own table ("mm", "cm" or "m"), for showing it as its source does.
+    """
+
+    id: str
+    name: str
+    source: str
+    convention: Convention
+    rows: tuple[Joint, ...]
+    home: tuple[float, ...]
+    description: str = ""
+    units: str = "m"
+    base: Matrix = field(default=IDENTITY, repr=False)
+    tool: Matrix = field(default=IDENTITY, repr=False)
+
+    @cached_property
+    def joints(self) -> tuple[Joint, ...]:
+        """The moving rows, in order: q[i] belongs to joints[i]."""
+        return tuple(row for row in self.rows if row.kind != "fixed")
+
+    @property
+    def n(self) -> int:
+        """Number of moving joints."""
+        return len(self.joints)
+
+    @cached_property
+    def q_shape(self) -> tuple[int]:
+        """Shape of one configuration."""
+        return (self.n,)
+
+    @cached_property
+    def joint_rows(self) -> tuple[int, ...]:
+        """Row index of each moving joint."""
+        return tuple(i for i, row in enumerate(self.rows) if row.kind != "fixed")
+
+    @cached_property
+    def lower(self) -> Array:
+        """Lower limits ``(n,)``, −inf where there is none."""
+        return _frozen([-math.inf if j.limits is None else j.limits[0] for j in self.joints])
+
+    @cached_property
+    def upper(self) -> Array:
+        """Upper limits ``(n,)``, +inf where there is none."""
+        return _frozen([math.inf if j.limits is None else j.limits[1] for j in self.joints])
+
+    @cached_property
+    def revolute(self) -> NDArray[np.bool_]:
+        """Which joints turn ``(n,)``."""
+        mask = np.array([j.kind == "revolute" for j in self.joints])
+        mask.flags.writeable = False
+        return mask
+
+    @cached_property
+    def q_home(self) -> Array:
+        """The home configuration ``(n,)``."""
+        return _frozen(self.home)
+
+    @cached_property
+    def T_world_base(self) -> Array:
+        """The constant transform before the first row ``(4, 4)``."""
+        return _frozen(self.base)
+
+    @cached_property
+    def T_last_tool(self) -> Array:
+        """The constant transform after the last row ``(4, 4)``."""
+        return _frozen(self.tool)
+
+    @cached_property
+    def model(self) -> Array:
+        """The whole arm as one flat array for the compiled kernels; layout in :mod:`kin.kernels`."""
+        header = [float(len(self.rows)), float(self.n), float(self.convention == "modified")]
+        header += self.T_world_base[:3].ravel().tolist() + self.T_last_tool[:3].ravel().tolist()
+        q_index = 0
+        body: list[float] = []
+        for row in self.rows:
+            ca, sa = exact_cos_sin(row.alpha)
+            body += [row.theta, row.d, row.a, ca, sa, KIND_CODES[row.kind]]
+            body += [float(q_index) if row.kind != "fixed" else -1.0, 0.0]
+            q_index += row.kind != "fixed"
+        return _frozen(header + body)
+
+    @cached_property
+    def reach(self) -> float:
+        """An upper bound in metres of the tool's distance from the base origin, prismatic strokes included."""
+        total = float(np.linalg.norm(self.T_last_tool[:3, 3]))
+        for row in self.rows:
+            stroke = max(map(abs, row.limits)) if row.kind == "prismatic" and row.limits else 0.0
+            total += math.hypot(row.a, abs(row.d) + stroke)
+        return total
+
+    def check_q(self, q: ArrayLike, field: str = "q") -> Array:
+        """`q` as a finite array ``(..., n)``; raises `InputError` naming the joint count otherwise."""
+        try:
+            return finite_array(field, q, (self.n,))
+        except InputError as error:
+            if error.field == field:
+                unit = "radians" if self.revolute.all() else "radians or metres"
+                raise InputError(field, error.value.strip("'"), f"{self.n} joint values in {unit}") from None
+            raise
+
+    def in_limits(self, q: Array, slack: float = 0.0) -> NDArray[np.bool_]:
+        """Whether configurations ``(..., n)`` respect the joint limits: ``(...)`` booleans."""
+        return np.asarray(((q >= self.lower - slack) & (q <= self.upper + slack)).all(axis=-1))
+
+    def clip(self, q: Array) -> Array:
+        """Configurations ``(..., n)`` moved to the nearest limit, joint by joint."""
+        return np.clip(q, self.lower, self.upper)
+
+    def random_q(self, rng: np.random.Generator, size: int | tuple[int, ...] = ()) -> Array:
+        """Uniform configurations inside the limits, ``(*size, n)``; an unlimited joint draws from ±π."""
+        shape = (size,) if isinstance(size, int) else size
+        lower = np.where(np.isfinite(self.lower), self.lower, -math.pi)
+        upper = np.where(np.isfinite(self.upper), self.upper, math.pi)
+        return rng.uniform(lower, upper, (*shape, self.n))
+
+
+def exact_cos_sin(angle: float) -> tuple[float, float]:
+    """Cosine and sine that are exact at multiples of 90°, where DH twists live (cos(π/2) is 6e-17 in floats)."""
+    quarter = angle / (math.pi / 2)
+    if abs(quarter - round(quarter)) < 1e-15 * max(1.0, abs(quarter)):
+        return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[round(quarter) % 4]
+    return math.cos(angle), math.sin(angle)
+
+
+def _frozen(values: ArrayLike) -> Array:
+    array = np.array(values, dtype=np.float64)
+    array.flags.writeable = False
+    return array

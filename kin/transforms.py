@@ -1,0 +1,155 @@
+"""Rigid transforms as plain arrays.
+
+A transform is a float64 array ``(..., 4, 4)``; there is no pose class. ``T_a_b`` maps coordinates in frame b
+to coordinates in frame a, so ``T_a_c = T_a_b @ T_b_c``. Quaternions are ``wxyz`` (scalar first), and they are
+used only at the edges (REST, screen).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kin.errors import InputError
+from kin.tolerances import TOLERANCES
+
+Array = NDArray[np.float64]
+
+
+def finite_array(field: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array:
+    """`value` as a finite, C-contiguous float64 array whose trailing axes match `shape` (None: any length).
+
+    Raises:
+        InputError: naming `field`, for anything that is not numbers of that shape, NaN and infinity included.
+    """
+    expected = f"finite numbers of shape (…, {', '.join('any' if s is None else str(s) for s in shape)})"
+    try:
+        array = np.ascontiguousarray(value, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(field, value, expected) from None
+    tail = array.shape[-len(shape) :] if array.ndim >= len(shape) else ()
+    if len(tail) != len(shape) or any(s is not None and s != t for s, t in zip(shape, tail, strict=True)):
+        raise InputError(field, f"shape {array.shape}", expected)
+    if not np.isfinite(array).all():
+        index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        where = field + "".join(f"[{i}]" for i in index)
+        raise InputError(where, float(array[index]), "a finite number")
+    return array
+
+
+def as_transform(value: ArrayLike, field: str = "target") -> Array:
+    """One rigid transform ``(4, 4)``, its rotation re-orthonormalised.
+
+    Raises:
+        InputError: wrong shape, not finite, last row not ``0 0 0 1``, or a rotation off by more than
+            ``TOLERANCES.rotation_matrix`` (reflections included).
+    """
+    T = finite_array(field, value, (4, 4))
+    if T.ndim != 2:
+        raise InputError(field, f"shape {T.shape}", "one 4×4 matrix")
+    if np.abs(T[3] - (0.0, 0.0, 0.0, 1.0)).max() > TOLERANCES.rotation_matrix:
+        raise InputError(f"{field}[3]", T[3].tolist(), "the last row 0, 0, 0, 1")
+    R = T[:3, :3]
+    if np.abs(R).max() > 2.0 or np.abs(R.T @ R - np.eye(3)).max() > TOLERANCES.rotation_matrix:
+        raise InputError(f"{field} rotation", R.tolist(), "an orthonormal rotation matrix (RᵀR = I)")
+    if np.linalg.det(R) < 0:
+        raise InputError(f"{field} rotation", R.tolist(), "a right-handed rotation (det R = +1)")
+    out = np.eye(4)
+    # One Newton step of the polar decomposition: quadratic, so 1e-6 becomes 1e-12 and a clean R is unchanged.
+    once = 1.5 * R - 0.5 * (R @ (R.T @ R))
+    out[:3, :3] = 1.5 * once - 0.5 * (once @ (once.T @ once))
+    out[:3, 3] = T[:3, 3]
+    return out
+
+
+def from_position_wxyz(position: ArrayLike, wxyz: ArrayLike | None = None) -> Array:
+    """Transform ``(4, 4)`` from a position ``(3,)`` in metres and a quaternion ``(4,)`` (scalar first).
+
+    The quaternion is normalised. Raises `InputError` for a zero or non-finite one.
+    """
+    T = np.eye(4)
+    p = finite_array("position", position, (3,))
+    if p.ndim != 1:
+        raise InputError("position", f"shape {p.shape}", "three numbers x, y, z in metres")
+    T[:3, 3] = p
+    if wxyz is not None:
+        q = finite_array("wxyz", wxyz, (4,))
+        if q.ndim != 1:
+            raise InputError("wxyz", f"shape {q.shape}", "four numbers w, x, y, z")
+        T[:3, :3] = rotation_from_wxyz(q)
+    return T
+
+
+def rotation_from_wxyz(wxyz: Array) -> Array:
+    """Rotation matrix ``(3, 3)`` of a quaternion ``(4,)``; raises `InputError` when it has no direction."""
+    scale = float(np.abs(wxyz).max())
+    if not scale > 1e-12:
+        raise InputError("wxyz", wxyz.tolist(), "a quaternion that is not zero")
+    w, x, y, z = (wxyz / scale / np.linalg.norm(wxyz / scale)).tolist()
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def wxyz_from_rotation(R: Array) -> Array:
+    """Unit quaternion ``(..., 4)``, scalar first and never negative, of rotations ``(..., 3, 3)``.
+
+    Shepperd's method: the largest of the four squares is taken first, so no cancellation anywhere.
+    """
+    R = np.asarray(R, dtype=np.float64)
+    m00, m11, m22 = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
+    squares = np.stack(
+        [1 + m00 + m11 + m22, 1 + m00 - m11 - m22, 1 - m00 + m11 - m22, 1 - m00 - m11 + m22], axis=-1
+    )
+    a, b, c = R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]
+    d, e, f = R[..., 1, 0] + R[..., 0, 1], R[..., 0, 2] + R[..., 2, 0], R[..., 2, 1] + R[..., 1, 2]
+    s0, s1, s2, s3 = np.moveaxis(squares, -1, 0)
+    rows = np.stack(
+        [
+            np.stack([s0, a, b, c], axis=-1),
+            np.stack([a, s1, d, e], axis=-1),
+            np.stack([b, d, s2, f], axis=-1),
+            np.stack([c, e, f, s3], axis=-1),
+        ],
+        axis=-2,
+    )
+    best = np.argmax(squares, axis=-1)
+    q = np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :]
+    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    return np.asarray(np.where(q[..., :1] < 0, -q, q))
+
+
+def rotation_angle(R_a: Array, R_b: Array) -> float:
+    """Angle in radians between two rotations ``(3, 3)``, accurate from 0 to π.
+
+    ``2 atan2(|R_a − R_b|, …)`` through the quaternion of the difference: acos of the trace would lose half
+    of the digits near zero.
+    """
+    q = wxyz_from_rotation(R_a.T @ R_b)
+    return 2.0 * math.atan2(float(np.linalg.norm(q[1:])), float(q[0]))
+
+
+def vector_angle(a: Array, b: Array) -> float:
+    """Angle in radians between two vectors ``(3,)``, accurate from 0 to π."""
+    return math.atan2(float(np.linalg.norm(np.cross(a, b))), float(np.dot(a, b)))
+
+
+def frame_from_approach(approach: ArrayLike) -> Array:
+    """Some rotation ``(3, 3)`` whose z axis is the direction `approach` ``(3,)``; x is as level as possible."""
+    z = finite_array("approach", approach, (3,))
+    if z.ndim != 1:
+        raise InputError("approach", f"shape {z.shape}", "three numbers: the direction of the tool's z axis")
+    scale = float(np.abs(z).max())
+    if not scale > 1e-12:
+        raise InputError("approach", z.tolist(), "a direction that is not zero")
+    z = z / scale
+    z /= np.linalg.norm(z)
+    x = np.cross((0.0, 0.0, 1.0) if abs(z[2]) < 0.9 else (0.0, 1.0, 0.0), z)
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])
