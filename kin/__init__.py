@@ -10,23 +10,33 @@ from kin._version import __version__
 from kin.catalog import builtin_robots, get_robot, load_folder, load_robot, parse_robot
 from kin.errors import InputError, KinematicsError, RobotFileError, UnknownRobotError
 from kin.fk import fk, jacobian, link_frames, manipulability
+from kin.ik import IKResult, IKSolution, LimitViolation, Redundancy, Status, ik_branches, solve_ik
 from kin.robot import Joint, Robot
+from kin.warmup import warm_up
 
 __all__ = [
+    "IKResult",
+    "IKSolution",
     "InputError",
     "Joint",
     "KinematicsError",
+    "LimitViolation",
+    "Redundancy",
     "Robot",
     "RobotFileError",
+    "Status",
     "UnknownRobotError",
     "__version__",
     "builtin_robots",
     "fk",
     "get_robot",
+    "ik_branches",
     "jacobian",
     "link_frames",
     "load_folder",
     "load_robot",
     "manipulability",
     "parse_robot",
+    "solve_ik",
+    "warm_up",
 ]

@@ -72,7 +72,7 @@ def load_folder(folder: Path) -> dict[str, Robot]:
 def load_robot(path: Path | str) -> Robot:
     """The robot described by a TOML file; raises `RobotFileError` for anything wrong with it."""
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        text = Path(path).read_text(encoding="utf-8-sig")  # editors on Windows put a mark in front
     except (OSError, UnicodeDecodeError) as error:
         raise RobotFileError(str(path), "file", str(error), "a readable UTF-8 text file") from error
     return parse_robot(text, str(path))
@@ -82,7 +82,7 @@ def parse_robot(text: str, file: str = "robot") -> Robot:
     """The robot described by TOML text; `file` is the name used in messages."""
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # TOMLDecodeError is a ValueError; so is an endless integer
         raise RobotFileError(file, "file", str(error), "valid TOML") from None
     return _Reader(file).robot(data)
 
@@ -152,7 +152,7 @@ class _Reader:
                 raise self.refuse(where + "limits", pair, "lower below upper")
             limits = (low, high)
         elif kind != "fixed":
-            # A joint with no stated stop: one whole turn, or one metre, either way round zero is what fits a slider.
+            # No stated stop: one whole turn about zero, or one metre of stroke, is what fits a slider.
             limits = (-math.pi, math.pi) if kind == "revolute" else (0.0, 1.0)
         return Joint(
             name=self.text(data, "name", f"joint {index + 1}", where),

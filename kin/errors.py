@@ -6,6 +6,8 @@ which field was wrong, what it was, and what would be valid, so that a message c
 
 from __future__ import annotations
 
+from reprlib import Repr
+
 
 class KinematicsError(ValueError):
     """Base of all errors raised by :mod:`kin`."""
@@ -48,6 +50,17 @@ class UnknownRobotError(KinematicsError):
 
 
 def shorten(value: object, length: int = 80) -> str:
-    """`repr` of a value cut to a length that fits a message, whatever the caller sent."""
-    text = repr(value)
+    """`repr` of a value cut to a length that fits a message, whatever the caller sent.
+
+    Only the head of a container is looked at, so that refusing a huge or bottomless value costs nothing.
+    """
+    try:
+        text = _REPR.repr(value)
+    except ValueError:  # an integer of more digits than Python agrees to print
+        text = f"<{type(value).__name__} too long to print>"
     return text if len(text) <= length else text[: length - 1] + "…"
+
+
+_REPR = Repr()
+_REPR.maxlist = _REPR.maxtuple = _REPR.maxdict = _REPR.maxset = 40
+_REPR.maxstring = _REPR.maxother = _REPR.maxlong = 200

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kin import kernels
+from kin.errors import InputError
 from kin.robot import Robot
 from kin.transforms import Array
 
@@ -47,6 +48,8 @@ def jacobian(robot: Robot, q: ArrayLike, frame: Literal["base", "tool"] = "base"
     Rows 0–2 are the linear velocity of the tool point (m/s per rad/s or m/s), rows 3–5 the angular velocity,
     both expressed in the base frame, or in the tool's own frame with ``frame="tool"``.
     """
+    if frame not in ("base", "tool"):
+        raise InputError("frame", frame, 'one of "base", "tool"')
     q = _writable(robot.check_q(q))
     J = kernels.jacobian_many(robot.model, q.reshape(-1, robot.n)).reshape(*q.shape[:-1], 6, robot.n)
     if frame == "tool":
@@ -61,6 +64,8 @@ def manipulability(robot: Robot, q: ArrayLike, part: Part = "all") -> Array:
     √det(J Jᵀ) for six or more joints, √det(Jᵀ J) for fewer (Yoshikawa, Int. J. Robotics Research 4(2), 1985).
     ``part`` takes only the three linear (m) or angular rows. Zero at a singularity.
     """
+    if part not in tuple(_PARTS):
+        raise InputError("part", part, "one of " + ", ".join(f'"{name}"' for name in _PARTS))
     first, last = _PARTS[part]
     J = jacobian(robot, q)
     values = kernels.manipulability_many(J.reshape(-1, 6, robot.n), first, last)

@@ -28,7 +28,6 @@ _WIDTH = 8
 _EPS = 2.220446049250313e-16
 
 jit = njit(cache=True, nogil=True, error_model="numpy")
-inline = njit(cache=True, nogil=True, error_model="numpy", inline="always")
 
 
 @jit

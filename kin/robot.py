@@ -72,6 +72,13 @@ class Robot:
     tool: Matrix = field(default=IDENTITY, repr=False)
 
     @cached_property
+    def _hash(self) -> int:
+        return hash((self.id, self.convention, self.rows, self.home, self.base, self.tool))
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
     def joints(self) -> tuple[Joint, ...]:
         """The moving rows, in order: q[i] belongs to joints[i]."""
         return tuple(row for row in self.rows if row.kind != "fixed")

@@ -26,7 +26,7 @@ class Tolerances:
     merge: float = 1e-7
     geometry: float = 1e-9
     rotation_matrix: float = 1e-6
-    singular: float = 1e-9
+    singular: float = 1e-11
 
 
 TOLERANCES = Tolerances()

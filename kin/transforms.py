@@ -8,6 +8,7 @@ used only at the edges (REST, screen).
 from __future__ import annotations
 
 import math
+from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,8 +27,14 @@ def finite_array(field: str, value: ArrayLike, shape: tuple[int | None, ...]) ->
     """
     expected = f"finite numbers of shape (…, {', '.join('any' if s is None else str(s) for s in shape)})"
     try:
-        array = np.ascontiguousarray(value, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
+        raw = np.asarray(value)
+        # Text of digits and complex numbers would convert without a word: look before converting.
+        if raw.dtype.kind not in "biuf":
+            raw = _numbers(field, value, expected)
+        array = np.ascontiguousarray(raw, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError, RecursionError) as error:
+        if isinstance(error, InputError):
+            raise
         raise InputError(field, value, expected) from None
     tail = array.shape[-len(shape) :] if array.ndim >= len(shape) else ()
     if len(tail) != len(shape) or any(s is not None and s != t for s, t in zip(shape, tail, strict=True)):
@@ -37,6 +44,23 @@ def finite_array(field: str, value: ArrayLike, shape: tuple[int | None, ...]) ->
         where = field + "".join(f"[{i}]" for i in index)
         raise InputError(where, float(array[index]), "a finite number")
     return array
+
+
+def _numbers(field: str, value: ArrayLike, expected: str) -> Array:
+    """`value`, which numpy does not take for real numbers, as float64; `InputError` at its first item that is none."""
+    items = np.asarray(value, dtype=object)
+    if items.ndim == 0 or any(isinstance(item, list | tuple | np.ndarray) for item in items.flat):
+        raise InputError(field, value, expected)
+    out = np.empty(items.shape)
+    for index in np.ndindex(items.shape):
+        item = items[index]
+        try:
+            if not isinstance(item, Real):
+                raise TypeError
+            out[index] = float(item)
+        except (TypeError, OverflowError):
+            raise InputError(field + "".join(f"[{i}]" for i in index), item, "a finite number") from None
+    return out
 
 
 def as_transform(value: ArrayLike, field: str = "target") -> Array:

@@ -1,0 +1,379 @@
+"""The equations of the source chapter: as printed, corrected, and compared with the arm itself.
+
+The chapter describes two arms by DH tables, multiplies the row matrices out by hand, and prints the twelve
+entries of the product, ``T_base_tool = [n o a p]``: the tool's x, y and z axes in the columns n, o, a, and its
+position in p. Equations (4)-(15) are the 5-DOF Pioneer arm, (17)-(28) the 7-DOF redundant arm. Whoever types
+them in gets an arm that is sometimes 97 cm away from the real one, for seven of the 24 are misprinted:
+
+- (6) and (27) carry one term too many, or lack one;
+- (13) and (22) have one cosine where a sine must be, or the other way round;
+- (25), and (28) which is built on it, have three wrong signs;
+- (19) has five wrong letters.
+
+(3), the matrix as a whole, is garbled in the stored text; its entries are the equations that follow it.
+
+A misprint betrays itself without any reference: the columns n, o, a of a true rotation are orthonormal, and
+those of the printed ones are not. Here each equation is kept as text in a small notation, and *that text* is
+what gets evaluated, so that what is shown and what is computed cannot drift apart::
+
+    -d6*c1*s23*c4*s5 - d6*s1*s4*s5 + …      with c1 = cos θ1, s23 = sin(θ2 + θ3), d6 from the arm's own table
+
+``C`` and ``S`` abbreviate what the chapter writes out each time, see `ABBREVIATIONS`. The arm as printed turns
+joints 1 and 2 about one line, hence they are the cosine and sine of θ1 + θ2.
+
+>>> [e.number for e in equations("pioneer5") if e.verdict == "wrong"]
+[6, 13]
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kin.catalog import get_robot
+from kin.errors import InputError
+from kin.robot import Robot
+from kin.transforms import Array
+
+Verdict = Literal["right", "wrong", "garbled"]
+Form = Literal["printed", "corrected"]
+
+ABBREVIATIONS = {"C": "c1*c2 - s1*s2", "S": "c1*s2 + s1*c2"}
+
+# What the chapter calls d1, a2 …, as (row, column) of the arm's table. Its d7 is the row "End" after row 7.
+LENGTHS: dict[str, dict[str, tuple[int, Literal["d", "a"]]]] = {
+    "pioneer5": {"d1": (0, "d"), "a1": (0, "a"), "a2": (1, "a"), "d4": (3, "d"), "d6": (5, "d")},
+    "redundant7": {"d1": (0, "d"), "d3": (2, "d"), "d5": (4, "d"), "d7": (7, "d")},
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Equation:
+    """One printed equation.
+
+    Attributes:
+        number: as in the chapter.
+        robot_id: the built-in robot it describes.
+        entry: which entry of ``[n o a p]``, e.g. ``"p_x"``; ``"T"`` for the whole matrix.
+        verdict: whether the printed form equals the DH product for every q.
+        printed, corrected: right-hand sides in the module's notation; empty where the text is garbled.
+        note: what is wrong with the printed form, empty when nothing is.
+        largest: largest difference from the DH product inside the joint limits, in metres for ``p``, else a pure
+            number; 0 for a right equation.
+        largest_at: a configuration inside the limits where it is reached, in degrees; empty for a right equation.
+    """
+
+    number: int
+    robot_id: str
+    entry: str
+    verdict: Verdict
+    printed: str
+    corrected: str
+    note: str = ""
+    largest: float = 0.0
+    largest_at: tuple[float, ...] = ()
+
+    @property
+    def index(self) -> tuple[int, int]:
+        """Row and column of the entry in T_base_tool; raises ValueError for the garbled whole."""
+        column, row = self.entry.split("_")
+        return "xyz".index(row), "noap".index(column)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Comparison:
+    """One equation at given configurations: each array is ``(...)``; `difference` is printed − dh.
+
+    Metres for ``p``, pure numbers for ``n``, ``o``, ``a``. `dh` comes from the product of the table's rows.
+    """
+
+    number: int
+    entry: str
+    printed: Array
+    corrected: Array
+    dh: Array
+    difference: Array
+
+
+def equations(robot_id: str) -> tuple[Equation, ...]:
+    """The chapter's equations about a built-in robot, in order; none for an arm it prints no equations of.
+
+    Raises:
+        UnknownRobotError: no built-in robot has this id.
+    """
+    get_robot(robot_id)
+    return tuple(e for e in EQUATIONS if e.robot_id == robot_id)
+
+
+def compare(robot_id: str, q: ArrayLike) -> list[Comparison]:
+    """Every equation that can be evaluated, at configurations ``(..., n)``, beside the DH product.
+
+    Raises:
+        UnknownRobotError: no built-in robot has this id.
+        InputError: q is not finite numbers ``(..., n)``.
+    """
+    # Late, so that looking at the equations' texts does not wait for compiled kernels.
+    from kin.fk import fk
+
+    robot = get_robot(robot_id)
+    q = robot.check_q(q)
+    T = fk(robot, q)
+    values = symbols(robot, q)
+    out = []
+    for equation in equations(robot_id):
+        if equation.verdict == "garbled":
+            continue
+        printed = evaluate(equation.printed, values)
+        corrected = evaluate(equation.corrected, values)
+        dh = T[(..., *equation.index)]
+        out.append(Comparison(equation.number, equation.entry, printed, corrected, dh, printed - dh))
+    return out
+
+
+def matrix(robot_id: str, q: ArrayLike, form: Form = "printed") -> Array:
+    """``[n o a p]`` put together from the chapter's equations, ``(..., 4, 4)`` for configurations ``(..., n)``.
+
+    With the printed forms this is *not* a rigid transform: that is how the misprints show.
+
+    Raises:
+        InputError: bad q or form, or an arm the chapter prints no equations of.
+        UnknownRobotError: no built-in robot has this id.
+    """
+    if form not in ("printed", "corrected"):
+        raise InputError("form", form, 'one of "printed", "corrected"')
+    robot = get_robot(robot_id)
+    q = robot.check_q(q)
+    if robot_id not in LENGTHS:
+        raise InputError("robot", robot_id, "one of " + ", ".join(LENGTHS))
+    values = symbols(robot, q)
+    T = np.zeros((*q.shape[:-1], 4, 4))
+    T[..., 3, 3] = 1.0
+    for equation in equations(robot_id):
+        if equation.verdict != "garbled":
+            text = equation.printed if form == "printed" else equation.corrected
+            T[(..., *equation.index)] = evaluate(text, values)
+    return T
+
+
+def symbols(robot: Robot, q: Array) -> dict[str, Array]:
+    """Values ``(...)`` of the notation's names at configurations ``(..., n)``: c1, s1, …, c23, s23, d1, a2, C, S."""
+    values: dict[str, Array] = {}
+    for i in range(robot.n):
+        values[f"c{i + 1}"], values[f"s{i + 1}"] = np.cos(q[..., i]), np.sin(q[..., i])
+    if robot.n > 2:
+        values["c23"], values["s23"] = np.cos(q[..., 1] + q[..., 2]), np.sin(q[..., 1] + q[..., 2])
+    for name, (row, column) in LENGTHS.get(robot.id, {}).items():
+        values[name] = np.float64(getattr(robot.rows[row], column))  # type: ignore[assignment]  # broadcasts
+    for name, text in ABBREVIATIONS.items():
+        values[name] = evaluate(text, values)
+    return values
+
+
+def evaluate(text: str, values: Mapping[str, Array]) -> Array:
+    """Value of an expression for given values of its names, broadcast together."""
+    return np.asarray(_value(parse(text), values))
+
+
+@lru_cache(maxsize=256)
+def parse(text: str) -> ast.expr:
+    """The tree of an expression: names, ``+``, ``-``, ``*`` and brackets, as python's own syntax nodes.
+
+    Raises:
+        ValueError: anything else in it. The texts are never run as code, only walked.
+    """
+    try:
+        tree = ast.parse(text, mode="eval").body
+    except SyntaxError as error:
+        raise ValueError(f"not an expression of the chapter's notation: {text!r} ({error.msg})") from None
+    for node in ast.walk(tree):
+        if not isinstance(node, _ALLOWED):
+            raise ValueError(f"not in the chapter's notation: {type(node).__name__} in {text!r}")
+    return tree
+
+
+_ALLOWED = (ast.BinOp, ast.UnaryOp, ast.Name, ast.Load, ast.Add, ast.Sub, ast.Mult, ast.USub)
+
+
+def _value(node: ast.expr, values: Mapping[str, Array]) -> Array:
+    match node:
+        case ast.Name(id=name):
+            return values[name]
+        case ast.UnaryOp(op=ast.USub(), operand=inner):
+            return -_value(inner, values)
+        case ast.BinOp(left=left, op=ast.Add(), right=right):
+            return _value(left, values) + _value(right, values)
+        case ast.BinOp(left=left, op=ast.Sub(), right=right):
+            return _value(left, values) - _value(right, values)
+        case ast.BinOp(left=left, op=ast.Mult(), right=right):
+            return _value(left, values) * _value(right, values)
+    raise ValueError(f"not in the chapter's notation: {ast.dump(node)}")
+
+
+def _right(number: int, robot_id: str, entry: str, text: str) -> Equation:
+    return Equation(number, robot_id, entry, "right", text, text)
+
+
+_PIONEER = "pioneer5"
+_REDUNDANT = "redundant7"
+_AZ_7 = "-s7*c6*(s3*c4*c5 + c3*s5) + s7*s6*s3*s4 - c7*(s3*c4*s5 - c3*c5)"
+
+EQUATIONS: tuple[Equation, ...] = (
+    Equation(
+        3,
+        _PIONEER,
+        "T",
+        "garbled",
+        "",
+        "",
+        "The matrix as a whole cannot be read in the stored text; its entries follow as (4) to (15).",
+    ),
+    _right(
+        4,
+        _PIONEER,
+        "p_x",
+        "-d6*c1*s23*c4*s5 - d6*s1*s4*s5 + d6*c1*c23*c5 + d4*c1*c23 + a2*c1*c2 + a1*c1",
+    ),
+    _right(
+        5,
+        _PIONEER,
+        "p_y",
+        "-d6*s1*s23*c4*s5 + d6*c1*s4*s5 + d6*s1*c23*c5 + d4*s1*c23 + a2*s1*c2 + a1*s1",
+    ),
+    Equation(
+        6,
+        _PIONEER,
+        "p_z",
+        "wrong",
+        "-d6*c23*c4*s5 - d6*s23*c5 - d4*s23*c5 - d4*s23 - a2*s2 + d1",
+        "-d6*c23*c4*s5 - d6*s23*c5 - d4*s23 - a2*s2 + d1",
+        "The term -d4*s23*c5 does not belong there.",
+        largest=0.0,
+        largest_at=(),
+    ),
+    _right(7, _PIONEER, "n_x", "c1*s23*c4*c5 + s1*s4*c5 + c1*c23*s5"),
+    _right(8, _PIONEER, "n_y", "s1*s23*c4*c5 - c1*s4*c5 + s1*c23*s5"),
+    _right(9, _PIONEER, "n_z", "c23*c4*c5 - s23*s5"),
+    _right(10, _PIONEER, "o_x", "-c1*s23*s4 + s1*c4"),
+    _right(11, _PIONEER, "o_y", "-s1*s23*s4 - c1*c4"),
+    _right(12, _PIONEER, "o_z", "-c23*s4"),
+    Equation(
+        13,
+        _PIONEER,
+        "a_x",
+        "wrong",
+        "-c1*s23*c4*s5 - s1*s4*c5 + c1*c23*c5",
+        "-c1*s23*c4*s5 - s1*s4*s5 + c1*c23*c5",
+        "In the second term c5 must be s5.",
+        largest=0.0,
+        largest_at=(),
+    ),
+    _right(14, _PIONEER, "a_y", "-s1*s23*c4*s5 + c1*s4*s5 + s1*c23*c5"),
+    _right(15, _PIONEER, "a_z", "-c23*c4*s5 - s23*c5"),
+    _right(
+        17,
+        _REDUNDANT,
+        "n_x",
+        "(c7*c6*c5 - s7*s5)*(c3*c4*C - s4*S) + (c7*s5*c6 + s7*c5)*(-s3*C) + s6*c7*(-c3*s4*C - c4*S)",
+    ),
+    _right(
+        18,
+        _REDUNDANT,
+        "n_y",
+        "(c7*c6*c5 - s7*s5)*(c3*c4*S + s4*C) + (c7*s5*c6 + s7*c5)*(-s3*S) + s6*c7*(-c3*s4*S + c4*C)",
+    ),
+    Equation(
+        19,
+        _REDUNDANT,
+        "n_z",
+        "wrong",
+        "c7*c6*s3*c4*s5 - c7*c6*s5*c3 + c7*s6*s3*c3 + c7*s6*s3*s4 + s7*c3*c5 - s7*s3*c4*s5",
+        "-c7*c6*(s3*c4*c5 + c3*s5) + c7*s6*s3*s4 - s7*(c3*c5 - s3*c4*s5)",
+        "Five slips: in the first term the sign and s5 for c5, a third term that does not belong there, and "
+        "the signs of the last two.",
+        largest=0.0,
+        largest_at=(),
+    ),
+    _right(
+        20,
+        _REDUNDANT,
+        "o_x",
+        "c6*(-c3*s4*C - c4*S) - s6*c5*(c3*c4*C - s4*S) - s6*s5*(-s3*C)",
+    ),
+    _right(
+        21,
+        _REDUNDANT,
+        "o_y",
+        "c6*(-c3*s4*S + c4*C) - s6*c5*(c3*c4*S + s4*C) - s6*s5*(-s3*S)",
+    ),
+    Equation(
+        22,
+        _REDUNDANT,
+        "o_z",
+        "wrong",
+        "s6*s3*c4*c5 + s5*c3*s6 + s3*c4*c6",
+        "s6*(s3*c4*c5 + c3*s5) + c6*s3*s4",
+        "In the last term c4 must be s4.",
+        largest=0.0,
+        largest_at=(),
+    ),
+    _right(
+        23,
+        _REDUNDANT,
+        "a_x",
+        "(s7*c6*c5 + c7*s5)*(c3*c4*C - s4*S) + (s7*s5*c6 - c7*c5)*(-s3*C) + s6*s7*(-c3*s4*C - c4*S)",
+    ),
+    _right(
+        24,
+        _REDUNDANT,
+        "a_y",
+        "(s7*c6*c5 + c7*s5)*(c3*c4*S + s4*C) + (s7*c6*s5 - c7*c5)*(-s3*S) + s7*s6*(-c3*s4*S + c4*C)",
+    ),
+    Equation(
+        25,
+        _REDUNDANT,
+        "a_z",
+        "wrong",
+        "s7*c6*s3*c4*c5 - s7*c6*s5*c3 + s7*s6*s4*s3 + c7*c4*s3*s5 - c3*c5*c7",
+        _AZ_7,
+        "Three signs: the first and the last two terms.",
+        largest=0.0,
+        largest_at=(),
+    ),
+    _right(
+        26,
+        _REDUNDANT,
+        "p_x",
+        "d7*(s7*c6*c5 + c7*s5)*(c3*c4*C - s4*S) + d7*(s7*s5*c6 - c7*c5)*(-s3*C)"
+        " + (d7*s7*s6 + d5)*(-c3*s4*C - c4*S) - d3*S",
+    ),
+    Equation(
+        27,
+        _REDUNDANT,
+        "p_y",
+        "wrong",
+        "d7*(s7*c6*c5 + s5*c7)*(c3*c4*S + s4*C) + d7*(s7*s5*c6 - c7*c5)*(-s3*S)"
+        " + (d7*s7*s6 + d5)*(-c3*s4*S + c4*C)",
+        "d7*(s7*c6*c5 + s5*c7)*(c3*c4*S + s4*C) + d7*(s7*s5*c6 - c7*c5)*(-s3*S)"
+        " + (d7*s7*s6 + d5)*(-c3*s4*S + c4*C) + d3*C",
+        "The last term, d3*C, is missing.",
+        largest=0.0,
+        largest_at=(),
+    ),
+    Equation(
+        28,
+        _REDUNDANT,
+        "p_z",
+        "wrong",
+        "d7*s7*s3*c6*c5*c4 - d7*s7*s5*c6*c3 + d7*s7*s6*s4*s3 + d7*s5*s3*c7*c4 - d7*c7*c5*c3 + d5*s4*s3 + d1",
+        f"d1 + d5*s3*s4 + d7*({_AZ_7})",
+        "The same three signs as in (25), of which this is d7 times the whole.",
+        largest=0.0,
+        largest_at=(),
+    ),
+)

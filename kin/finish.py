@@ -1,0 +1,78 @@
+"""One compiled pass over raw candidates: images inside the limits, residuals by FK, distances to the seed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kin.kernels import fk_into, jit
+from kin.solvers.common import APPROACH, POSE, nearest_image
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+_LIMIT = TOLERANCES.limit
+POSITION_ERROR, ROTATION_ERROR, DISTANCE, OVERRUN, ROLL = range(5)
+
+
+@jit
+def residuals(T: Array, target: Array, task: int) -> tuple[float, float, float]:
+    """(position error, rotation error of the task, roll about the target's approach axis), m and rad."""
+    p = 0.0
+    chord = 0.0
+    trace = 0.0
+    for r in range(3):
+        p += (T[r, 3] - target[r, 3]) ** 2
+        for c in range(3):
+            chord += (T[r, c] - target[r, c]) ** 2
+            trace += T[r, c] * target[r, c]
+    # |R − S|_F = 2√2 sin(θ/2) and 1 + tr = 4 cos²(θ/2): exact from 0 to π.
+    angle = 2.0 * math.atan2(math.sqrt(chord / 8.0), 0.5 * math.sqrt(max(0.0, 1.0 + trace)))
+    ax, ay, az = T[0, 2], T[1, 2], T[2, 2]
+    bx, by, bz = target[0, 2], target[1, 2], target[2, 2]
+    x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    tilt = math.atan2(math.sqrt(x * x + y * y + z * z), ax * bx + ay * by + az * bz)
+    nx, ny, nz = target[0, 0], target[1, 0], target[2, 0]
+    across = T[0, 0] * (by * nz - bz * ny) + T[1, 0] * (bz * nx - bx * nz) + T[2, 0] * (bx * ny - by * nx)
+    roll = math.atan2(across, T[0, 0] * nx + T[1, 0] * ny + T[2, 0] * nz)
+    rotation = angle if task == POSE else (tilt if task == APPROACH else 0.0)
+    return math.sqrt(p), rotation, roll
+
+
+@jit
+def finish(
+    model: Array, target: Array, task: int, seed: Array, lower: Array, upper: Array, turns: Array, respect: bool,
+    q: Array, stats: Array,
+) -> None:  # fmt: skip
+    """Bring each row of q ``(k, n)`` to its best image, in place, and fill stats ``(k, 5)``; NaN rows stay NaN.
+
+    `turns` is 2π for a revolute joint and 0 for a prismatic one, which has no images.
+    """
+    T = np.empty((4, 4))
+    for k in range(q.shape[0]):
+        if math.isnan(q[k, 0]):
+            stats[k] = np.nan
+            continue
+        distance = 0.0
+        overrun = 0.0
+        for i in range(q.shape[1]):
+            x = q[k, i]
+            low, high = (lower[i], upper[i]) if respect else (-math.inf, math.inf)
+            if turns[i] > 0.0:
+                x = nearest_image(x, seed[i], low, high)
+            if x < lower[i]:
+                if lower[i] - x <= _LIMIT:
+                    x = lower[i]
+                else:
+                    overrun += lower[i] - x
+            elif x > upper[i]:
+                if x - upper[i] <= _LIMIT:
+                    x = upper[i]
+                else:
+                    overrun += x - upper[i]
+            q[k, i] = x
+            distance += (x - seed[i]) ** 2
+        fk_into(model, q[k], T)
+        stats[k, 0], stats[k, 1], stats[k, 4] = residuals(T, target, task)
+        stats[k, 2] = math.sqrt(distance)
+        stats[k, 3] = overrun

@@ -1,0 +1,261 @@
+"""The redundant arm as printed: seven joints, of which 1 and 2 turn about the same vertical line.
+
+Only θ12 = θ1 + θ2 matters, so the arm is redundant in a trivial way: it turns joint 1 one way and joint 2 the
+other, and nothing else moves. The forearm starts horizontally, along u = (−sin θ12, cos θ12, 0):
+
+- w = W − S, k = w·u = (|w|² + d3² − d5²)/(2 d3), azimuth(u) = atan2(wy, wx) ± acos(k / hypot(wx, wy)): 2 branches;
+- R02ᵀ (w − d3 u)/d5 = (c3 s4, s3 s4, c4): θ3, θ4, 2 branches;
+- R04ᵀ R = Rz(θ5) Ry(θ6) Rz(θ7): 2 branches.
+
+Eight branches, each with the family θ2 = θ12 + 2πk − θ1: intervals of θ1. Singular: s4 = 0, s6 = 0, and w
+vertical. With only a point and an approach direction to meet, the roll φ about that direction is free too, and
+R47 is affine in cos φ, sin φ: its feasible arcs are exact.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from kin.kernels import jit
+from kin.robot import Robot
+from kin.solvers.common import (
+    APPROACH,
+    POSE,
+    TURN,
+    Candidates,
+    Problem,
+    chain_of,
+    extend_arcs,
+    inverse,
+    is_zero,
+    lay_probes,
+    merged,
+    misfit_of,
+    nearest_in_arcs,
+    screw_z,
+    split_sum,
+    to_canonical,
+    wrap,
+    zyz,
+    zyz_breaks,
+)
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+NAME = "collinear7"
+TITLE = "closed form, joints 1 and 2 on one line"
+PARAMETER = ("theta1", "θ1")
+BRANCHES = tuple(
+    f"shoulder {s} · elbow {e} · wrist {w}"
+    for s in ("left", "right")
+    for e in ("up", "down")
+    for w in ("no-flip", "flip")
+)
+_REACH = TOLERANCES.closure_position * 0.1
+
+
+class Geometry(NamedTuple):
+    """The arm in canonical form: joint values are q = θ − offset."""
+
+    inverse_base: Array
+    inverse_tool: Array
+    offset: Array
+    d3: float
+    d5: float
+    tool_on_axis: bool
+
+
+def match(robot: Robot) -> Geometry | None:
+    """The geometry if axes 1 and 2 are one line, 3 leaves it squarely and 5-6-7 meet in a point."""
+    chain = chain_of(robot) if robot.n == 7 else None
+    chain = chain.twisted((0, -1, -1, 1, -1, 1)) if chain else None
+    if chain is None or not is_zero(*chain.a, chain.d[3], chain.d[5]):
+        return None
+    d3, d5 = float(chain.d[2]), float(chain.d[4])
+    if min(d3, d5) < TOLERANCES.geometry:
+        return None
+    tool = screw_z(0.0, float(chain.d[6])) @ chain.tool
+    base = chain.base @ screw_z(0.0, float(chain.d[0] + chain.d[1]))
+    inverse_tool = inverse(tool)
+    # The wrist centre in the tool frame: it must stay when the tool rolls about its approach axis.
+    on_axis = is_zero(inverse_tool[0, 3], inverse_tool[1, 3])
+    return Geometry(inverse(base), inverse_tool, chain.theta, d3, d5, on_axis)
+
+
+@jit
+def _roll_parts(T: Array, inverse_base: Array, inverse_tool: Array, parts: Array) -> None:
+    """parts[0:3] ← C0, C1, C2: the canonical rotation of T turned by φ about its approach axis is
+    C0 + C1 cos φ + C2 sin φ."""
+    column, M = np.zeros((4, 4)), np.empty((4, 4))
+    for part in range(3):
+        for r in range(3):
+            column[r, 0] = 0.0 if part == 0 else (T[r, 0] if part == 1 else T[r, 1])
+            column[r, 1] = 0.0 if part == 0 else (T[r, 1] if part == 1 else -T[r, 0])
+            column[r, 2] = T[r, 2] if part == 0 else 0.0
+        to_canonical(column, inverse_base, inverse_tool, M)
+        parts[part] = M[:3, :3]
+
+
+@jit
+def _combine(parts: Array, phi: float, out: Array) -> None:
+    c, s = math.cos(phi), math.sin(phi)
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = parts[0, i, j] + c * parts[1, i, j] + s * parts[2, i, j]
+
+
+@jit
+def _wrist(R02: Array, t3: float, t4: float, R: Array, out: Array) -> None:
+    """out ← R04ᵀ R with R04 = R02 Rz(θ3) Ry(θ4), for any 3×3 array R."""
+    c3, s3, c4, s4 = math.cos(t3), math.sin(t3), math.cos(t4), math.sin(t4)
+    for j in range(3):
+        a = R02[0, 0] * R[0, j] + R02[1, 0] * R[1, j] + R02[2, 0] * R[2, j]
+        b = R02[0, 1] * R[0, j] + R02[1, 1] * R[1, j] + R02[2, 1] * R[2, j]
+        z = R02[0, 2] * R[0, j] + R02[1, 2] * R[1, j] + R02[2, 2] * R[2, j]
+        x = c3 * a + s3 * b
+        out[0, j] = c4 * x - s4 * z
+        out[1, j] = c3 * b - s3 * a
+        out[2, j] = s4 * x + c4 * z
+
+
+@jit
+def _best_roll(
+    bent: Array, s6: float, wish: float, probes: Array, n_probes: int, near: Array, low: Array, high: Array,
+    R47: Array, angles: Array, rolls: Array,
+) -> float:  # fmt: skip
+    """The feasible roll nearest to `wish`, or the least bad one; `bent` holds R47's three parts."""
+    best = math.inf
+    phi = wish
+    count = 0
+    for j in range(n_probes):
+        _combine(bent, probes[j], R47)
+        zyz(R47, s6, near, low, high, 4, angles)
+        misfit = misfit_of(angles, low, high, 4, 7)
+        if misfit == 0.0:
+            count = extend_arcs(rolls, 0, count, 0, probes, j, n_probes)
+        elif misfit < best and count == 0:
+            best, phi = misfit, probes[j]
+    return nearest_in_arcs(rolls, 0, count, wish) if count > 0 else phi
+
+
+@jit
+def _solve(
+    T: Array, inverse_base: Array, inverse_tool: Array, offset: Array, d3: float, d5: float, free_roll: bool,
+    value: float, respect: bool, seed: Array, wish: float, lower: Array, upper: Array, arcs: Array, out: Array,
+) -> tuple[float, int]:  # fmt: skip
+    """Branches with θ1, θ2 (and the roll) near the seed. Returns (gap, number of arcs)."""
+    M = np.empty((4, 4))
+    R02, R47 = np.empty((3, 3)), np.empty((3, 3))
+    parts, bent = np.empty((3, 3, 3)), np.empty((3, 3, 3))
+    angles = np.empty(7)
+    breaks, probes, rolls = np.empty(64), np.empty(130), np.empty((64, 3))
+    near, low, high = seed + offset, lower + offset, upper + offset
+    out[:] = np.nan
+    to_canonical(T, inverse_base, inverse_tool, M)
+    x, y, z = M[0, 3], M[1, 3], M[2, 3]
+    h = math.hypot(x, y)
+    k = (x * x + y * y + z * z + d3 * d3 - d5 * d5) / (2.0 * d3)
+    if h < 1e-12 and abs(k) < 1e-12:
+        azimuth, spread = near[0] + near[1] + 0.5 * math.pi, 0.0
+    elif abs(k) - h > _REACH:
+        return abs(k) - h, 0
+    else:
+        azimuth = math.atan2(y, x)
+        spread = merged(math.atan2(math.sqrt(max((h - k) * (h + k), 0.0)), k))
+    if free_roll:
+        _roll_parts(T, inverse_base, inverse_tool, parts)
+    found = 0
+    for si in range(2):
+        if si == 1 and spread == 0.0:
+            break
+        t12 = azimuth + (spread if si == 0 else -spread) - 0.5 * math.pi
+        c, s = math.cos(t12), math.sin(t12)
+        R02[0, 0], R02[0, 1], R02[0, 2] = c, 0.0, -s
+        R02[1, 0], R02[1, 1], R02[1, 2] = s, 0.0, c
+        R02[2, 0], R02[2, 1], R02[2, 2] = 0.0, -1.0, 0.0
+        v1, v2, v3 = c * x + s * y, -z, c * y - s * x - d3
+        side = math.hypot(v1, v2)
+        straight = side < 1e-11 * d5
+        t1 = split_sum(t12, near[0], low[0], high[0], near[1], low[1], high[1])
+        if not math.isnan(value):
+            t1 = value + offset[0]
+        for ei in range(1 if straight else 2):
+            sign = 1.0 if ei == 0 else -1.0
+            angles[0], angles[1] = t1, t12 - t1
+            angles[2] = near[2] if straight else math.atan2(sign * v2, sign * v1)
+            angles[3] = math.atan2(sign * side, v3)
+            if straight and v3 > 0.0 and not free_roll:
+                # Elbow straight: θ3 and θ5 turn about one line, so θ3 is chosen where θ5 and θ7 can follow.
+                _wrist(R02, 0.0, 0.0, M, R47)
+                zyz(R47, 1.0, near, low, high, 4, angles)
+                angles[2] = split_sum(angles[4], near[2], low[2], high[2], near[4], low[4], high[4])
+            n_probes = 0
+            if free_roll:
+                for part in range(3):
+                    _wrist(R02, angles[2], angles[3], parts[part], bent[part])
+                if respect:
+                    count = zyz_breaks(bent[0], bent[1], bent[2], low, high, 4, breaks, 0)
+                    n_probes = lay_probes(breaks, count, probes)
+            for wi in range(2):
+                s6 = 1.0 if wi == 0 else -1.0
+                branch = 4 * si + 2 * ei + wi
+                if free_roll:
+                    phi = _best_roll(bent, s6, wish, probes, n_probes, near, low, high, R47, angles, rolls)
+                    _combine(bent, phi, R47)
+                else:
+                    _wrist(R02, angles[2], angles[3], M, R47)
+                zyz(R47, s6, near, low, high, 4, angles)
+                for i in range(7):
+                    out[branch, i] = wrap(angles[i] - offset[i])
+                # θ1 spans more than a turn: the value in use keeps its turn.
+                out[branch, 0] = t1 - offset[0]
+                out[branch, 7] = t1 - offset[0]
+                if misfit_of(angles, low, high, 2, 7) == 0.0:
+                    found = _theta1_intervals(t12, offset, low, high, branch, arcs, found)
+    return 0.0, found
+
+
+@jit
+def _theta1_intervals(
+    t12: float, offset: Array, low: Array, high: Array, branch: int, arcs: Array, found: int
+) -> int:
+    """Append [lo1, hi1] ∩ [θ12 + 2πk − hi2, θ12 + 2πk − lo2] for every whole turn k that leaves something."""
+    first = math.ceil((low[0] + low[1] - t12) / TURN - 1e-12)
+    last = math.floor((high[0] + high[1] - t12) / TURN + 1e-12)
+    for turn in range(int(max(first, -8)), int(min(last, 8)) + 1):
+        total = t12 + TURN * turn
+        a = max(low[0], total - high[1])
+        b = min(high[0], total - low[1])
+        if a <= b and found < arcs.shape[0]:
+            arcs[found, 0], arcs[found, 1], arcs[found, 2] = branch, a - offset[0], b - offset[0]
+            found += 1
+    return found
+
+
+def solve(geometry: Geometry, problem: Problem) -> Candidates:
+    """All branches, with θ1 and θ2 (and the roll, for an approach task) as near the seed as the limits allow."""
+    g = geometry
+    free_roll = problem.task == APPROACH
+    out = np.empty((8, 8))
+    arcs = np.empty((64, 3))
+    gap, count = _solve(
+        problem.T, g.inverse_base, g.inverse_tool, g.offset, g.d3, g.d5, free_roll, problem.value,
+        problem.respect_limits, problem.seed, problem.seed_roll, problem.lower, problem.upper, arcs, out,
+    )  # fmt: skip
+    obstacle = ""
+    if gap > 0.0:
+        obstacle = "with this orientation the horizontal upper arm and the forearm do not meet the wrist centre"
+    return Candidates(q=out[:, :7], parameter=out[:, 7], arcs=arcs[:count], gap=gap, obstacle=obstacle)
+
+
+def handles(geometry: Geometry, task: int) -> bool:
+    """Poses, and an approach direction when it passes through the wrist centre."""
+    return task == POSE or (task == APPROACH and geometry.tool_on_axis)
+
+
+def branch_name(index: int, q: Array) -> str:
+    """Name of a branch: the side of w on which u lies, and the signs of s4 and s6."""
+    return BRANCHES[index]

@@ -1,0 +1,399 @@
+"""Pieces every closed form shares: angle extraction, sums of two angles, limits, and feasible arcs.
+
+Three ideas carry all the solvers:
+
+- **Z-Y-Z with a known first angle.** A rotation ``Rz(A) Ry(B) Rz(C)`` gives A from its third column up to the
+  sign of sin B. B and C are then computed *given* A, so that the product reproduces the rotation to rounding
+  error however small sin B is. Only when sin B vanishes is A free; then just A ± C matters and the sum is
+  split as near the seed as the limits allow.
+- **Images.** A joint whose limits span more than a turn has several values θ + 2πk for one posture.
+- **Arcs.** If a rotation depends on a free angle ψ as ``M0 + M1 cos ψ + M2 sin ψ``, the values of ψ where one
+  of its three angles meets a limit are roots of ``a cos ψ + b sin ψ + c = 0``. Between neighbouring roots
+  nothing changes, so one test per arc decides it: the feasible set is exact, not sampled (Shimizu et al., IEEE
+  Trans. Robotics 24(5), 2008).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from kin.kernels import jit
+from kin.robot import Robot, exact_cos_sin
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+TURN = 2.0 * math.pi
+_SINGULAR = TOLERANCES.singular
+_LIMIT = TOLERANCES.limit
+_MERGE = TOLERANCES.merge
+
+POSE, APPROACH, POSITION = 0, 1, 2
+TASK_CODES = {"pose": POSE, "approach": APPROACH, "position": POSITION}
+
+
+@jit
+def wrap(angle: float) -> float:
+    """The same angle in (−π, π]."""
+    return angle - TURN * math.ceil((angle - math.pi) / TURN)
+
+
+@jit
+def merged(angle: float) -> float:
+    """A double root as one: below `TOLERANCES.merge` the angle is rounding error under a square root."""
+    return 0.0 if angle < _MERGE else angle
+
+
+@jit
+def nearest_image(x: float, near: float, low: float, high: float) -> float:
+    """The image x + 2πk closest to `near` among those inside [low, high], else the least far outside."""
+    y = x + TURN * float(np.round((near - x) / TURN))
+    if y > high + _LIMIT:
+        below = x + TURN * math.floor((high + _LIMIT - x) / TURN)
+        if below >= low - _LIMIT or low - below < below + TURN - high:
+            return below
+        return below + TURN
+    if y < low - _LIMIT:
+        above = x + TURN * math.ceil((low - _LIMIT - x) / TURN)
+        if above <= high + _LIMIT or above - high < low - (above - TURN):
+            return above
+        return above - TURN
+    return y
+
+
+@jit
+def excess(x: float, low: float, high: float) -> float:
+    """How far the best image of the angle x is outside [low, high]; 0.0 inside (with the limit slack)."""
+    y = nearest_image(x, 0.5 * (low + high), low, high)
+    if y < low - _LIMIT:
+        return low - y
+    if y > high + _LIMIT:
+        return y - high
+    return 0.0
+
+
+@jit
+def split_sum(
+    total: float, near_a: float, low_a: float, high_a: float, near_c: float, low_c: float, high_c: float
+) -> float:
+    """A of the pair A + C = total (mod 2π) nearest to (near_a, near_c) inside both limits.
+
+    For each whole turn the pairs form a line, and the box cuts a segment out of it: the foot of the
+    perpendicular, clamped. When no turn fits, A stays within its own limits and C is left outside.
+    """
+    best = min(max(near_a, low_a), high_a)
+    best_cost = math.inf
+    middle = np.round((near_a + near_c - total) / TURN)
+    for step in range(-3, 4):
+        s = total + TURN * (middle + step)
+        low = max(low_a, s - high_c)
+        high = min(high_a, s - low_c)
+        if low > high + _LIMIT:
+            continue
+        a = min(max(near_a + 0.5 * (s - near_a - near_c), low), max(low, high))
+        cost = (a - near_a) ** 2 + (s - a - near_c) ** 2
+        if cost < best_cost:
+            best, best_cost = a, cost
+    return best
+
+
+@jit
+def zyz(M: Array, sign: float, near: Array, low: Array, high: Array, first: int, out: Array) -> None:
+    """out[first:first+3] ← (A, B, C) with ``M = Rz(A) Ry(B) Rz(C)`` and sin B of the given sign.
+
+    `near`, `low`, `high` (indexed like `out`) only matter when sin B = 0 and A is free.
+    """
+    x = M[0, 2]
+    y = M[1, 2]
+    if math.hypot(x, y) < _SINGULAR:
+        k = first + 2
+        if M[2, 2] > 0.0:
+            total = math.atan2(M[1, 0], M[0, 0])
+            A = split_sum(total, near[first], low[first], high[first], near[k], low[k], high[k])
+        else:
+            total = math.atan2(-M[1, 0], -M[0, 0])
+            A = split_sum(total, near[first], low[first], high[first], -near[k], -high[k], -low[k])
+    else:
+        A = math.atan2(sign * y, sign * x)
+    c = math.cos(A)
+    s = math.sin(A)
+    out[first] = A
+    out[first + 1] = math.atan2(c * x + s * y, M[2, 2])
+    out[first + 2] = math.atan2(c * M[1, 0] - s * M[0, 0], c * M[1, 1] - s * M[0, 1])
+
+
+@jit
+def add_roots(a: float, b: float, c: float, breaks: Array, count: int) -> int:
+    """Append the roots of ``a cos ψ + b sin ψ + c = 0`` in (−π, π]; returns the new count.
+
+    A root that is missed by rounding error only (|c| a hair above the amplitude) is kept as the touching point.
+    """
+    amplitude = math.hypot(a, b)
+    if amplitude < 1e-15 or abs(c) > amplitude * (1.0 + 1e-9):
+        return count
+    centre = math.atan2(b, a)
+    offset = math.acos(min(1.0, max(-1.0, -c / amplitude)))
+    breaks[count] = wrap(centre + offset)
+    breaks[count + 1] = wrap(centre - offset)
+    return count + 2
+
+
+@jit
+def zyz_breaks(
+    M0: Array, M1: Array, M2: Array, low: Array, high: Array, first: int, breaks: Array, count: int
+) -> int:
+    """Append every ψ where an angle of ``Rz(A) Ry(B) Rz(C) = M0 + M1 cos ψ + M2 sin ψ`` may meet a limit.
+
+    Third column (cA sB, sA sB, cB), third row (−sB cC, sB sC, cB): A and C are of the tan type, B of the cos
+    type. The extremes of cos B join them: there A and C may jump by π, and a limit of B may just be touched.
+    Angles whose limits span a whole turn never bind.
+    """
+    for side in range(2):
+        if high[first] - low[first] < TURN:
+            t = low[first] if side == 0 else high[first]
+            c, s = math.cos(t), math.sin(t)
+            count = add_roots(
+                M1[1, 2] * c - M1[0, 2] * s,
+                M2[1, 2] * c - M2[0, 2] * s,
+                M0[1, 2] * c - M0[0, 2] * s,
+                breaks,
+                count,
+            )
+        if high[first + 1] - low[first + 1] < TURN:
+            t = low[first + 1] if side == 0 else high[first + 1]
+            count = add_roots(M1[2, 2], M2[2, 2], M0[2, 2] - math.cos(t), breaks, count)
+        if high[first + 2] - low[first + 2] < TURN:
+            t = low[first + 2] if side == 0 else high[first + 2]
+            c, s = math.cos(t), math.sin(t)
+            count = add_roots(
+                M1[2, 1] * c + M1[2, 0] * s,
+                M2[2, 1] * c + M2[2, 0] * s,
+                M0[2, 1] * c + M0[2, 0] * s,
+                breaks,
+                count,
+            )
+    if math.hypot(M1[2, 2], M2[2, 2]) > 1e-15:
+        extreme = math.atan2(M2[2, 2], M1[2, 2])
+        breaks[count] = extreme
+        breaks[count + 1] = wrap(extreme + math.pi)
+        count += 2
+    return count
+
+
+@jit
+def circular_clamp(value: float, low: float, high: float) -> float:
+    """The angle of the arc [low, high] (low ≤ high, any turn) nearest to `value`, a hair inside its ends."""
+    inset = min(1e-7, 0.5 * (high - low))
+    middle = 0.5 * (low + high)
+    v = middle + wrap(value - middle)
+    return min(max(v, low + inset), high - inset)
+
+
+@jit
+def to_canonical(T: Array, inverse_base: Array, inverse_tool: Array, out: Array) -> None:
+    """out ← base⁻¹ · T · tool⁻¹ for 4×4 arrays."""
+    for r in range(3):
+        x = inverse_base[r, 0] * T[0, 0] + inverse_base[r, 1] * T[1, 0] + inverse_base[r, 2] * T[2, 0]
+        y = inverse_base[r, 0] * T[0, 1] + inverse_base[r, 1] * T[1, 1] + inverse_base[r, 2] * T[2, 1]
+        z = inverse_base[r, 0] * T[0, 2] + inverse_base[r, 1] * T[1, 2] + inverse_base[r, 2] * T[2, 2]
+        p = (
+            inverse_base[r, 0] * T[0, 3]
+            + inverse_base[r, 1] * T[1, 3]
+            + inverse_base[r, 2] * T[2, 3]
+            + inverse_base[r, 3]
+        )
+        for c in range(3):
+            out[r, c] = x * inverse_tool[0, c] + y * inverse_tool[1, c] + z * inverse_tool[2, c]
+        out[r, 3] = x * inverse_tool[0, 3] + y * inverse_tool[1, 3] + z * inverse_tool[2, 3] + p
+
+
+@jit
+def misfit_of(angles: Array, low: Array, high: Array, first: int, last: int) -> float:
+    """Sum over the angles first…last−1 of how far outside its limits each one is."""
+    total = 0.0
+    for i in range(first, last):
+        total += excess(angles[i], low[i], high[i])
+    return total
+
+
+@jit
+def lay_probes(breaks: Array, count: int, probes: Array) -> int:
+    """probes ← point, middle, point, middle, … round the circle: each break and the middle of each arc.
+
+    Sorted; probes[even] are breaks. With no break at all one probe stands for the whole circle.
+    """
+    if count == 0:
+        probes[0] = 0.0
+        return 1
+    order = np.sort(breaks[:count])
+    n = 0
+    for i in range(count):
+        after = order[i + 1] if i + 1 < count else order[0] + 2.0 * math.pi
+        probes[n] = order[i]
+        probes[n + 1] = 0.5 * (order[i] + after)
+        n += 2
+    return n
+
+
+@jit
+def extend_arcs(arcs: Array, first: int, found: int, branch: int, probes: Array, j: int, n: int) -> int:
+    """Add the piece that probe j stands for to the branch's arcs, growing the last one where they touch."""
+    if n == 1:
+        low, high = -math.pi, math.pi
+    elif j % 2 == 0:
+        low, high = probes[j], probes[j]
+    else:
+        low = probes[j - 1]
+        high = probes[j + 1] if j + 1 < n else probes[0] + 2.0 * math.pi
+    if found > first and low <= arcs[found - 1, 2]:
+        arcs[found - 1, 2] = max(high, arcs[found - 1, 2])
+        return found
+    arcs[found, 0] = branch
+    arcs[found, 1] = low
+    arcs[found, 2] = high
+    return found + 1
+
+
+@jit
+def nearest_in_arcs(arcs: Array, first: int, found: int, wish: float) -> float:
+    best = wish
+    best_distance = math.inf
+    for i in range(first, found):
+        v = circular_clamp(wish, arcs[i, 1], arcs[i, 2])
+        distance = abs(wrap(v - wish))
+        if distance < best_distance:
+            best, best_distance = v, distance
+    return best
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """What a solver is asked: a target, and how to choose what it leaves free.
+
+    Attributes:
+        T: target pose T_base_tool ``(4, 4)``.
+        task: POSE or APPROACH.
+        value: the redundancy parameter, NaN to let the solver choose it near the seed.
+        respect_limits: choose free parameters so that the limits hold, where that is possible.
+        seed, lower, upper: ``(n,)``.
+        seed_roll: angle about the target's z axis from its x axis to the seed tool's (tasks with a free roll).
+    """
+
+    T: Array
+    task: int
+    value: float
+    respect_limits: bool
+    seed: Array
+    lower: Array
+    upper: Array
+    seed_roll: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Candidates:
+    """What a solver answers: one configuration per branch, not verified, not filtered, not sorted.
+
+    Attributes:
+        q: ``(branches, n)``, NaN where the branch does not exist.
+        parameter: ``(branches,)`` redundancy value used, NaN where there is none.
+        arcs: ``(k, 3)`` rows (branch, low, high): feasible redundancy values under the limits.
+        gap: metres by which the geometry does not close when no branch exists.
+        obstacle: a clause that says what does not fit then.
+    """
+
+    q: Array
+    parameter: Array
+    arcs: Array
+    gap: float = 0.0
+    obstacle: str = ""
+
+
+class Chain:
+    """A robot of revolute joints rewritten as ``base · Z1 X1 Z2 X2 … Zn · tool``, whatever its convention.
+
+    ``Zi = Rz(q_i + theta_i) Tz(d_i)`` and ``Xi = Tx(a_i) Rx(alpha_i)``; both conventions, fixed rows at either
+    end and constant tools reduce to it, so each closed form is matched once.
+    """
+
+    def __init__(self, base: Array, theta: Array, d: Array, a: Array, alpha: Array, tool: Array) -> None:
+        self.base, self.theta, self.d, self.a, self.alpha, self.tool = base, theta, d, a, alpha, tool
+
+    def twisted(self, pattern: tuple[int, ...]) -> Chain | None:
+        """The same arm with the twists ``pattern`` (in quarter turns, one per joint but the last), or None.
+
+        ``Tx(a) Rx(90°) = Rz(π) Tx(−a) Rx(−90°) Rz(π)``: a twist of the wrong sign is exchanged for half turns
+        of its two neighbours.
+        """
+        theta, a, alpha = self.theta.copy(), self.a.copy(), self.alpha.copy()
+        for i, quarter in enumerate(pattern):
+            wanted = quarter * math.pi / 2
+            if abs(wrap(alpha[i] - wanted)) < TOLERANCES.geometry:
+                continue
+            if quarter == 0 or abs(wrap(alpha[i] + wanted)) >= TOLERANCES.geometry:
+                return None
+            theta[i] += math.pi
+            theta[i + 1] += math.pi
+            a[i] = -a[i]
+            alpha[i] = wanted
+        return Chain(self.base, theta, self.d, a, alpha, self.tool)
+
+
+def chain_of(robot: Robot) -> Chain | None:
+    """The robot as a `Chain`, or None if it has prismatic joints or a fixed offset in the middle."""
+    if not robot.revolute.all():
+        return None
+    base, tool = robot.T_world_base.copy(), np.eye(4)
+    theta, d, a, alpha = (np.zeros(robot.n) for _ in range(4))
+    joint = -1
+    for row in robot.rows:
+        z_part, x_part = (row.theta, row.d), (row.a, row.alpha)
+        parts = (
+            [("z", z_part), ("x", x_part)] if robot.convention == "standard" else [("x", x_part), ("z", z_part)]
+        )
+        for axis, (first, second) in parts:
+            moving = axis == "z" and row.kind != "fixed"
+            constant = screw_z(first, second) if axis == "z" else screw_x(first, second)
+            if moving:
+                joint += 1
+                theta[joint], d[joint] = first, second
+            elif joint < 0:
+                base = base @ constant
+            elif joint == robot.n - 1:
+                tool = tool @ constant
+            elif axis == "z":
+                if first or second:
+                    if a[joint] or alpha[joint]:
+                        return None
+                    theta[joint] += first
+                    d[joint] += second
+            else:
+                a[joint] += first
+                alpha[joint] += second
+    return Chain(base, theta, d, a, alpha, tool @ robot.T_last_tool)
+
+
+def screw_z(theta: float, d: float) -> Array:
+    """``Rz(theta) Tz(d)``."""
+    c, s = exact_cos_sin(theta)
+    return np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, d], [0, 0, 0, 1.0]])
+
+
+def screw_x(a: float, alpha: float) -> Array:
+    """``Tx(a) Rx(alpha)``."""
+    c, s = exact_cos_sin(alpha)
+    return np.array([[1, 0, 0, a], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1.0]])
+
+
+def inverse(T: Array) -> Array:
+    """Inverse of a rigid transform ``(4, 4)``."""
+    out = np.eye(4)
+    out[:3, :3] = T[:3, :3].T
+    out[:3, 3] = -T[:3, :3].T @ T[:3, 3]
+    return out
+
+
+def is_zero(*values: float) -> bool:
+    """Whether all lengths vanish within the geometric tolerance."""
+    return all(abs(v) < TOLERANCES.geometry for v in values)

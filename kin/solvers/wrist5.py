@@ -1,0 +1,234 @@
+"""The Pioneer family: a turning base, a planar two-link elbow and a two-axis wrist, five joints.
+
+Five joints meet five demands: the tool point p and the approach direction a (the tool's z axis). The roll about
+a is then whatever it is. With w = p − d6 a the wrist centre, r = hypot(wx, wy), ρ = ±r − a1, h = −wz (from the
+shoulder's height), D² = ρ² + h²:
+
+- θ1 = atan2(±wy, ±wx), shoulder in front or at the back;
+- tan²(θ3/2) = ((a2+d4)² − D²)/(D² − (a2−d4)²), elbow up or down; θ2 = atan2(h, ρ) − atan2(d4 s3, a2 + d4 c3);
+- u = R03ᵀ a = (−c4 s5, −s4 s5, c5): θ4 = atan2(∓u2, ∓u1), then θ5 = atan2(−(c4u1 + s4u2), u3).
+
+Eight branches, four when one shoulder side is out of reach. Singular: s3 = 0 (roots merge); s5 = 0 (θ4 free);
+the wrist centre on axis 1: θ1 is free, u is affine in cos θ1, sin θ1, and the feasible θ1 are exact arcs.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from kin.kernels import jit
+from kin.robot import Robot
+from kin.solvers.common import (
+    APPROACH,
+    POSE,
+    TURN,
+    Candidates,
+    Problem,
+    add_roots,
+    chain_of,
+    extend_arcs,
+    inverse,
+    is_zero,
+    lay_probes,
+    merged,
+    misfit_of,
+    nearest_in_arcs,
+    screw_x,
+    screw_z,
+    to_canonical,
+    wrap,
+)
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+NAME = "wrist5"
+TITLE = "closed form, elbow arm with a two-axis wrist"
+PARAMETER = ("theta1", "θ1")
+_REACH = TOLERANCES.closure_position * 0.1
+_SINGULAR = TOLERANCES.singular
+
+
+class Geometry(NamedTuple):
+    """The arm in canonical form: joint values are q = θ − offset."""
+
+    inverse_base: Array
+    offset: Array
+    a1: float
+    a2: float
+    d4: float
+    d6: float
+
+
+def match(robot: Robot) -> Geometry | None:
+    """The geometry if axes 2 and 3 are parallel, square to axis 1, and 3-4, 4-5 intersect squarely."""
+    chain = chain_of(robot) if robot.n == 5 else None
+    chain = chain.twisted((-1, 0, -1, 1)) if chain else None
+    if chain is None or not is_zero(*chain.a[2:], chain.d[1] + chain.d[2]):
+        return None
+    theta, d = chain.theta, chain.d
+    a1, a2, d4 = float(chain.a[0]), float(chain.a[1]), float(d[3])
+    if min(abs(a2), d4) < TOLERANCES.geometry:
+        return None
+    tool = screw_x(0.0, math.pi / 2) @ screw_z(0.0, float(d[4])) @ chain.tool
+    if abs(tool[2, 2] + 1.0) < TOLERANCES.geometry:
+        theta[4] += math.pi
+        tool = screw_x(0.0, math.pi / 2) @ screw_z(math.pi, float(d[4])) @ chain.tool
+    if not is_zero(tool[0, 3], tool[1, 3], tool[2, 2] - 1.0):
+        return None
+    # In the formulas θ3 = 0 is the straight elbow, a quarter turn from where the common normals align.
+    theta[2] += math.pi / 2
+    base = chain.base @ screw_z(0.0, float(d[0]))
+    if a2 < 0:
+        # A negative length is two half turns: Tx(−a) = Rz(π) Tx(a) Rz(−π).
+        theta[1] += math.pi
+        theta[2] -= math.pi
+        a2 = -a2
+    return Geometry(inverse(base), theta, a1, a2, d4, float(tool[2, 3]))
+
+
+@jit
+def _wrist(
+    t1: float, t23: float, a: Array, flip: float, near4: float, low4: float, high4: float, out: Array
+) -> None:
+    """out[3], out[4] ← θ4, θ5 that point the tool along a, given θ1 and θ2 + θ3."""
+    c1, s1, c23, s23 = math.cos(t1), math.sin(t1), math.cos(t23), math.sin(t23)
+    level = c1 * a[0] + s1 * a[1]
+    u1 = s23 * level + c23 * a[2]
+    u2 = s1 * a[0] - c1 * a[1]
+    u3 = c23 * level - s23 * a[2]
+    singular = math.hypot(u1, u2) < _SINGULAR
+    t4 = min(max(near4, low4), high4) if singular else math.atan2(-flip * u2, -flip * u1)
+    out[3] = t4
+    out[4] = math.atan2(-(math.cos(t4) * u1 + math.sin(t4) * u2), u3)
+
+
+@jit
+def _base_breaks(t23: float, a: Array, low: Array, high: Array, breaks: Array) -> int:
+    """θ1 where a limit of θ1, θ4 or θ5 may be met when the wrist centre is on axis 1."""
+    c23, s23 = math.cos(t23), math.sin(t23)
+    count = 0
+    for side in range(2):
+        if high[0] - low[0] < TURN:
+            breaks[count] = wrap(low[0] if side == 0 else high[0])
+            count += 1
+        if high[3] - low[3] < TURN:
+            t = low[3] if side == 0 else high[3]
+            c, s = math.cos(t), math.sin(t)
+            count = add_roots(
+                -a[1] * c - s23 * a[0] * s, a[0] * c - s23 * a[1] * s, -c23 * a[2] * s, breaks, count
+            )
+        if high[4] - low[4] < TURN:
+            t = low[4] if side == 0 else high[4]
+            count = add_roots(c23 * a[0], c23 * a[1], -s23 * a[2] - math.cos(t), breaks, count)
+    extreme = math.atan2(a[1], a[0])
+    breaks[count] = extreme
+    breaks[count + 1] = wrap(extreme + math.pi)
+    return count + 2
+
+
+@jit
+def _free_base(
+    t23: float, a: Array, flip: float, value: float, branch: int, near: Array, low: Array, high: Array,
+    breaks: Array, probes: Array, arcs: Array, found: int, angles: Array,
+) -> tuple[float, int]:  # fmt: skip
+    """θ1 for a wrist centre on axis 1: the feasible one nearest to the seed's; appends the feasible arcs."""
+    n_probes = lay_probes(breaks, _base_breaks(t23, a, low, high, breaks), probes)
+    first = found
+    best = math.inf
+    t1 = near[0]
+    for j in range(n_probes):
+        angles[0] = probes[j]
+        _wrist(probes[j], t23, a, flip, near[3], low[3], high[3], angles)
+        misfit = misfit_of(angles, low, high, 0, 1) + misfit_of(angles, low, high, 3, 5)
+        if misfit == 0.0 and found < arcs.shape[0]:
+            found = extend_arcs(arcs, first, found, branch, probes, j, n_probes)
+        elif misfit < best and found == first:
+            best, t1 = misfit, probes[j]
+    if not math.isnan(value):
+        t1 = value
+    elif found > first:
+        t1 = nearest_in_arcs(arcs, first, found, near[0])
+    return t1, found
+
+
+@jit
+def _solve(
+    T: Array, inverse_base: Array, offset: Array, a1: float, a2: float, d4: float, d6: float, value: float,
+    seed: Array, lower: Array, upper: Array, arcs: Array, out: Array,
+) -> tuple[float, int]:  # fmt: skip
+    """The branches, see `solve`. Returns (gap, number of arcs)."""
+    M, eye = np.empty((4, 4)), np.eye(4)
+    angles = np.empty(5)
+    breaks, probes = np.empty(32), np.empty(66)
+    near, low, high = seed + offset, lower + offset, upper + offset
+    out[:] = np.nan
+    to_canonical(T, inverse_base, eye, M)
+    a = M[:3, 2].copy()
+    wx, wy = M[0, 3] - d6 * a[0], M[1, 3] - d6 * a[1]
+    h = d6 * a[2] - M[2, 3]
+    r = math.hypot(wx, wy)
+    on_axis = r < _SINGULAR
+    gap = math.inf
+    found = 0
+    for si in range(1 if on_axis else 2):
+        shoulder = 1.0 if si == 0 else -1.0
+        rho = shoulder * r - a1
+        D2 = rho * rho + h * h
+        D = math.sqrt(D2)
+        miss = max(D - (a2 + d4), abs(a2 - d4) - D)
+        gap = min(gap, miss)
+        if miss > _REACH:
+            continue
+        far, near_by = (a2 + d4) ** 2 - D2, D2 - (a2 - d4) ** 2
+        bend = merged(2.0 * math.atan2(math.sqrt(max(far, 0.0)), math.sqrt(max(near_by, 0.0))))
+        for ei in range(2 if bend > 0.0 else 1):
+            t3 = bend if ei == 0 else -bend
+            t2 = math.atan2(h, rho) - math.atan2(d4 * math.sin(t3), a2 + d4 * math.cos(t3))
+            for wi in range(2):
+                flip = 1.0 if wi == 0 else -1.0
+                branch = 4 * si + 2 * ei + wi
+                t1 = math.atan2(shoulder * wy, shoulder * wx)
+                if on_axis:
+                    given = value if math.isnan(value) else value + offset[0]
+                    t1, found = _free_base(
+                        t2 + t3, a, flip, given, branch, near, low, high, breaks, probes, arcs, found, angles
+                    )
+                    out[branch, 5] = wrap(t1 - offset[0])
+                angles[0], angles[1], angles[2] = t1, t2, t3
+                _wrist(t1, t2 + t3, a, flip, near[3], low[3], high[3], angles)
+                for i in range(5):
+                    out[branch, i] = wrap(angles[i] - offset[i])
+    return gap, found
+
+
+def solve(geometry: Geometry, problem: Problem) -> Candidates:
+    """All branches that bring the tool point and the approach direction to the target's."""
+    g = geometry
+    out = np.empty((8, 6))
+    arcs = np.empty((128, 3))
+    gap, count = _solve(
+        problem.T, g.inverse_base, g.offset, g.a1, g.a2, g.d4, g.d6, problem.value, problem.seed,
+        problem.lower, problem.upper, arcs, out,
+    )  # fmt: skip
+    arcs = arcs[:count]
+    arcs[:, 1:] -= g.offset[0]
+    obstacle = "" if gap <= _REACH else "the wrist centre is out of the elbow's reach for this approach direction"
+    return Candidates(q=out[:, :5], parameter=out[:, 5], arcs=arcs, gap=max(gap, 0.0), obstacle=obstacle)
+
+
+def handles(geometry: Geometry, task: int) -> bool:
+    """A point and an approach direction; for a whole pose the pipeline judges the roll that results."""
+    return task in (POSE, APPROACH)
+
+
+def branch_name(index: int, q: Array) -> str:
+    """Name of a branch. The elbow is "up" when it is above the line from the shoulder to the wrist centre."""
+    back, negative, flip = index & 4, index & 2, index & 1
+    return (
+        f"shoulder {'back' if back else 'front'}"
+        f" · elbow {'up' if bool(back) == bool(negative) else 'down'}"
+        f" · wrist {'flip' if flip else 'no-flip'}"
+    )
