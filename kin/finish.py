@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kin.kernels import fk_into, jit
 from kin.solvers.common import APPROACH, POSE, nearest_image
@@ -12,6 +13,7 @@ from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 _LIMIT = TOLERANCES.limit
+_MERGE = TOLERANCES.merge
 POSITION_ERROR, ROTATION_ERROR, DISTANCE, OVERRUN, ROLL = range(5)
 
 
@@ -76,3 +78,25 @@ def finish(
         stats[k, 0], stats[k, 1], stats[k, 4] = residuals(T, target, task)
         stats[k, 2] = math.sqrt(distance)
         stats[k, 3] = overrun
+
+
+@jit
+def select(q: Array, key: Array) -> tuple[NDArray[np.int64], int]:
+    """Rows of q ``(k, n)`` with a finite key, by rising key, equal postures once: (rows, how many)."""
+    kept = np.empty(q.shape[0], dtype=np.int64)
+    count = 0
+    for i in np.argsort(key, kind="mergesort"):
+        if not math.isfinite(key[i]):
+            continue
+        new = True
+        for k in range(count):
+            gap = 0.0
+            for j in range(q.shape[1]):
+                gap = max(gap, abs(q[i, j] - q[kept[k], j]))
+            if gap <= _MERGE:
+                new = False
+                break
+        if new:
+            kept[count] = i
+            count += 1
+    return kept, count

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from kin import explain
 from kin.errors import InputError
-from kin.finish import DISTANCE, OVERRUN, POSITION_ERROR, ROLL, ROTATION_ERROR, finish
+from kin.finish import DISTANCE, OVERRUN, POSITION_ERROR, ROLL, ROTATION_ERROR, finish, select
 from kin.fk import fk
 from kin.robot import Robot
 from kin.solvers import Match, solver_for
@@ -323,10 +323,7 @@ class _Query:
         compromise: str | None = None,
     ) -> tuple[IKSolution, ...]:  # fmt: skip
         """The chosen rows as named solutions, by rising key, each posture once."""
-        kept: list[int] = []
-        for i in sorted(np.flatnonzero(rows).tolist(), key=lambda i: float(key[i])):
-            if all(np.abs(q[i] - q[j]).max() > TOLERANCES.merge for j in kept):
-                kept.append(i)
+        kept, count = select(q, np.where(rows, key, math.inf))
         return tuple(
             self.solution(
                 q[i],
@@ -335,7 +332,7 @@ class _Query:
                 self.parameter(match, candidates, q, i),
                 compromise,
             )
-            for i in kept
+            for i in kept[:count].tolist()
         )
 
     def parameter(self, match: Match, candidates: Candidates, q: Array, row: int) -> float:
