@@ -1,0 +1,350 @@
+"""What the service says: results of the core as plain dicts, the same for REST and for ``kinboard … --json``.
+
+The types are the contract: REST publishes them as its OpenAPI schemas (the string under a field is its
+description), mypy holds the functions below to them, and nothing is validated again while answering, so ten
+thousand poses cost little more than printing their digits. Metres, radians and ``wxyz`` quaternions throughout.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import Literal, TypeVar, cast
+
+import numpy as np
+from typing_extensions import TypedDict
+
+from kin import IKResult, IKSolution, Joint, Robot, fk, jacobian, link_frames, manipulability
+from kin.transforms import Array, wxyz_from_rotation
+
+Matrix = list[list[float]]
+Task = Literal["pose", "approach", "position"]
+T = TypeVar("T")
+
+
+def documented(cls: type[T]) -> type[T]:
+    """Lets REST take field descriptions from the strings under the fields.
+
+    Read by pydantic when it builds schemas; set by name, so that the command line never has to import pydantic.
+    """
+    setattr(cls, "__pydantic_config__", {"use_attribute_docstrings": True})  # noqa: B010
+    return cls
+
+
+@documented
+class Pose(TypedDict):
+    """A rigid transform, given twice: as a matrix, and as a position with a quaternion."""
+
+    matrix: Matrix
+    """4×4 homogeneous transform in the base frame, row by row; the last column is the position in metres."""
+    position: list[float]
+    """x, y, z in metres, in the base frame."""
+    wxyz: list[float]
+    """Unit quaternion w, x, y, z (scalar first, w never negative)."""
+
+
+@documented
+class Frame(TypedDict):
+    """The frame at the end of one DH row."""
+
+    name: str
+    """Name of the row of the DH table the frame follows."""
+    pose: Pose
+    """Where it is, in the base frame."""
+
+
+@documented
+class FkAnswer(TypedDict):
+    """Forward kinematics of one configuration."""
+
+    pose: Pose
+    """Pose of the tool in the base frame."""
+    in_limits: bool
+    """Whether every joint is inside its limits. Forward kinematics answers either way."""
+    frames: list[Frame] | None
+    """Frame after every DH row, base to tool, fixed rows included; null unless asked for with `frames`."""
+
+
+@documented
+class Manipulability(TypedDict):
+    """Yoshikawa's manipulability: the product of the singular values of the Jacobian; 0 at a singularity."""
+
+    all: float
+    """Of all six rows (metres and radians mixed)."""
+    linear: float
+    """Of the three linear rows (m³ for an arm whose joints all turn)."""
+    angular: float
+    """Of the three angular rows (no unit)."""
+
+
+@documented
+class JacobianAnswer(TypedDict):
+    """The Jacobian of one configuration and what it says about moving from there."""
+
+    jacobian: Matrix
+    """6×n, row by row: rows 0–2 give the tool point's linear velocity (m per rad, or m per m for a sliding
+    joint), rows 3–5 its angular velocity (rad per rad, or 0)."""
+    manipulability: Manipulability
+    """How far from a singularity."""
+    singular_values: list[float]
+    """Of the whole Jacobian, largest first (min(6, n) values; metres and radians mixed)."""
+
+
+@documented
+class Solution(TypedDict):
+    """One joint configuration, with its errors measured by forward kinematics."""
+
+    q: list[float]
+    """Joint values, base to tool, in radians (metres for sliding joints)."""
+    branch: str
+    """Which of the arm's postures this is, in words."""
+    position_error: float
+    """Distance of the tool point from the target, in metres."""
+    rotation_error: float
+    """Rotation left to the target in radians: the whole angle for task pose, the angle between the approach
+    axes for task approach, 0 for task position."""
+    in_limits: bool
+    """Whether every joint is inside its limits."""
+    distance: float
+    """Distance from the seed in joint space (2-norm, radians)."""
+    redundancy: float | None
+    """Value of the arm's free parameter in this solution, in radians; null if it has none."""
+    compromise: str | None
+    """null for an exact answer; "roll" if the rotation about the approach axis was given up; "rotation" if only
+    the point is kept and the whole rotation error is as small as it gets; "closest" for the nearest there is."""
+
+
+@documented
+class Violation(TypedDict):
+    """A joint that would have to go beyond its stop."""
+
+    joint: int
+    """Index into q, from 0."""
+    name: str
+    """Name of the joint."""
+    value: float
+    """The value the joint would need, in radians (metres)."""
+    limit: float
+    """The stop that value breaks, in radians (metres)."""
+
+
+@documented
+class RedundancyAnswer(TypedDict):
+    """The freedom the task leaves over."""
+
+    name: str
+    """Short name of the free parameter, such as "psi" or "theta1"."""
+    label: str
+    """The same for people."""
+    value: float
+    """Its value in the first solution, in radians."""
+    intervals: list[list[float]]
+    """Every [lower, upper] range of values, in radians, for which the target can be reached."""
+
+
+@documented
+class IkAnswer(TypedDict):
+    """Inverse kinematics of one target. A target out of reach is an answer too: read `status`."""
+
+    status: Literal["solved", "approximate", "limits", "unreachable"]
+    """"solved": at least one exact answer. "approximate": the arm cannot do the whole task; `solutions` are the
+    best compromises. "limits": postures exist, but each needs a joint beyond its stop. "unreachable": none."""
+    reason: str
+    """One sentence for people, in degrees and millimetres."""
+    task: Task
+    """What was asked of the tool."""
+    solver: str
+    """Name of the method that answered."""
+    solutions: list[Solution]
+    """Nearest to the seed first; empty for "limits" and "unreachable"."""
+    closest: Solution | None
+    """The closest configuration inside the limits when there is no exact answer; null when solved."""
+    violations: list[Violation]
+    """For "limits": the joints in the way, in the posture that breaks the fewest stops the least."""
+    distance: float
+    """How far out of reach the target is, in metres; 0 within reach."""
+    redundancy: RedundancyAnswer | None
+    """The freedom left over, null if there is none."""
+
+
+@documented
+class JointAnswer(TypedDict):
+    """A joint that moves: q[index] belongs to it."""
+
+    index: int
+    """Index into q, from 0."""
+    name: str
+    """Name of the joint, and of its row in the DH table."""
+    kind: Literal["revolute", "prismatic"]
+    """Whether the joint turns or slides."""
+    unit: Literal["rad", "m"]
+    """Unit of its value: radians if it turns, metres if it slides."""
+    limits: list[float] | None
+    """[lower, upper] in that unit; null if it has no stops."""
+    home: float
+    """Its value in the home configuration, in that unit."""
+
+
+@documented
+class RowAnswer(TypedDict):
+    """One row of the DH table. A moving joint adds its value to theta (revolute) or to d (prismatic)."""
+
+    name: str
+    """Name of the row."""
+    kind: Literal["revolute", "prismatic", "fixed"]
+    """What the row's joint does; a fixed row moves nothing (a tool, an adapter)."""
+    theta: float
+    """Rotation about z in radians, without the joint's value."""
+    d: float
+    """Translation along z in metres, without the joint's value."""
+    a: float
+    """Translation along x in metres."""
+    alpha: float
+    """Rotation about x in radians."""
+
+
+@documented
+class RobotAnswer(TypedDict):
+    """Everything that defines an arm: T_base_tool = base · A_1 … A_m · tool, with one A per DH row."""
+
+    id: str
+    """Short name used in addresses."""
+    name: str
+    """Name for people."""
+    description: str
+    """What kind of arm it is."""
+    n: int
+    """Number of moving joints, the length of q."""
+    convention: Literal["standard", "modified"]
+    """How a DH row is read. standard: Rz(θ) Tz(d) Tx(a) Rx(α). modified (Craig): Rx(α) Tx(a) Rz(θ) Tz(d)."""
+    reach: float
+    """An upper bound of the tool's distance from the base origin, in metres."""
+
+    source: str
+    """Where the numbers come from."""
+    units: str
+    """Length unit of the arm's own table, for showing it as its source does. Everything here is in metres."""
+    rows: list[RowAnswer]
+    """The DH table, base to tool, fixed rows included."""
+    joints: list[JointAnswer]
+    """The moving rows, in the order of q."""
+    home: list[float]
+    """The home configuration, one value per moving joint, in radians (metres)."""
+    base: Matrix
+    """Constant 4×4 transform before the first row."""
+    tool: Matrix
+    """Constant 4×4 transform after the last row."""
+
+
+def robot_answer(robot: Robot) -> RobotAnswer:
+    """Everything that defines an arm."""
+    rows: list[RowAnswer] = [
+        {"name": r.name, "kind": r.kind, "theta": r.theta, "d": r.d, "a": r.a, "alpha": r.alpha}
+        for r in robot.rows
+    ]
+    return {
+        "id": robot.id,
+        "name": robot.name,
+        "description": robot.description,
+        "n": robot.n,
+        "convention": robot.convention,
+        "reach": robot.reach,
+        "source": robot.source,
+        "units": robot.units,
+        "rows": rows,
+        "joints": [_joint(i, joint, robot.home[i]) for i, joint in enumerate(robot.joints)],
+        "home": list(robot.home),
+        "base": robot.T_world_base.tolist(),
+        "tool": robot.T_last_tool.tolist(),
+    }
+
+
+def poses(T: Array) -> list[Pose]:
+    """Transforms ``(k, 4, 4)`` one by one."""
+    columns = zip(T.tolist(), T[:, :3, 3].tolist(), wxyz_from_rotation(T[:, :3, :3]).tolist(), strict=True)
+    return [{"matrix": matrix, "position": position, "wxyz": wxyz} for matrix, position, wxyz in columns]
+
+
+def fk_answers(robot: Robot, q: Array, frames: bool = False) -> list[FkAnswer]:
+    """Forward kinematics of configurations ``(k, n)`` in radians (metres)."""
+    tools = poses(fk(robot, q))
+    inside: list[bool] = robot.in_limits(q).tolist()
+    if not frames:
+        return [{"pose": pose, "in_limits": ok, "frames": None} for pose, ok in zip(tools, inside, strict=True)]
+    names = [row.name for row in robot.rows]
+    flat = iter(poses(link_frames(robot, q).reshape(-1, 4, 4)))
+    return [
+        {"pose": pose, "in_limits": ok, "frames": [{"name": name, "pose": next(flat)} for name in names]}
+        for pose, ok in zip(tools, inside, strict=True)
+    ]
+
+
+def jacobian_answers(robot: Robot, q: Array, frame: Literal["base", "tool"] = "base") -> list[JacobianAnswer]:
+    """Jacobians of configurations ``(k, n)`` in radians (metres), in the base or the tool frame."""
+    J = jacobian(robot, q, frame)
+    columns = zip(
+        J.tolist(),
+        manipulability(robot, q, "all").tolist(),
+        manipulability(robot, q, "linear").tolist(),
+        manipulability(robot, q, "angular").tolist(),
+        np.linalg.svd(J, compute_uv=False).tolist(),
+        strict=True,
+    )
+    return [
+        {
+            "jacobian": rows,
+            "manipulability": {"all": whole, "linear": linear, "angular": angular},
+            "singular_values": values,
+        }
+        for rows, whole, linear, angular, values in columns
+    ]
+
+
+def ik_answer(result: IKResult) -> IkAnswer:
+    """One result of `kin.solve_ik`."""
+    free = result.redundancy
+    return {
+        "status": result.status.value,
+        "reason": result.reason,
+        "task": cast(Task, result.task),
+        "solver": result.solver,
+        "solutions": [_solution(solution) for solution in result.solutions],
+        "closest": None if result.closest is None else _solution(result.closest),
+        "violations": [
+            {"joint": v.joint, "name": v.name, "value": v.value, "limit": v.limit} for v in result.violations
+        ],
+        "distance": result.distance,
+        "redundancy": None
+        if free is None
+        else {
+            "name": free.name,
+            "label": free.label,
+            "value": free.value,
+            "intervals": [list(interval) for interval in free.intervals],
+        },
+    }
+
+
+def _solution(solution: IKSolution) -> Solution:
+    return {
+        "q": solution.q.tolist(),
+        "branch": solution.branch,
+        "position_error": solution.position_error,
+        "rotation_error": solution.rotation_error,
+        "in_limits": solution.in_limits,
+        "distance": solution.distance,
+        "redundancy": solution.redundancy,
+        "compromise": solution.compromise,
+    }
+
+
+def _joint(index: int, joint: Joint, home: float) -> JointAnswer:
+    # JSON has no infinity: a joint without stops says null.
+    bounded = joint.limits is not None and all(map(isfinite, joint.limits))
+    return {
+        "index": index,
+        "name": joint.name,
+        "kind": "prismatic" if joint.kind == "prismatic" else "revolute",
+        "unit": "m" if joint.kind == "prismatic" else "rad",
+        "limits": list(joint.limits) if joint.limits is not None and bounded else None,
+        "home": home,
+    }

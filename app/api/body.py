@@ -1,0 +1,88 @@
+"""Reading a request body with care: typed, bounded while it arrives, and parsed without Python's recursion.
+
+FastAPI reads the whole body whatever its size and parses it with `json.loads`, whose depth is bounded only by the
+interpreter's stack. `JsonRoute` replaces those two steps and nothing else. NaN and Infinity are let through
+here: a schema then refuses them by the name of their field.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine
+from email.message import Message
+from typing import Any
+
+from fastapi import Request, Response
+from fastapi.routing import APIRoute
+from pydantic_core import from_json
+
+from app.api.problems import ProblemError, show
+
+
+class JsonRequest(Request):
+    """A request whose body is JSON of at most ``settings.max_body`` bytes."""
+
+    async def body(self) -> bytes:
+        """The body; raises 413 as soon as more than the limit is announced or has arrived."""
+        if not hasattr(self, "_body"):
+            limit = self.app.state.settings.max_body
+            announced = self.headers.get("content-length", "")
+            if announced.isdecimal() and int(announced[:20]) > limit:
+                raise _too_large(limit)
+            chunks: list[bytes] = []
+            size = 0
+            async for chunk in self.stream():
+                size += len(chunk)
+                if size > limit:
+                    raise _too_large(limit)
+                chunks.append(chunk)
+            self._body = b"".join(chunks)
+        return self._body
+
+    async def json(self) -> Any:
+        """The parsed body; raises 400 naming the place where it stops being JSON."""
+        if not hasattr(self, "_json"):
+            try:
+                self._json = from_json(await self.body())
+            except ValueError as error:
+                hint = "Check quotes, commas and brackets there; JSON keys need double quotes."
+                raise ProblemError(400, "malformed-json", f"The body is not valid JSON: {error}.", hint) from None
+        return self._json
+
+    async def require_json(self) -> None:
+        """Raises 415 for a body that does not say it is JSON."""
+        if not await self.body():
+            return
+        given = self.headers.get("content-type", "")
+        message = Message()
+        message["content-type"] = given or "none/none"
+        subtype = message.get_content_subtype()
+        if message.get_content_maintype() != "application" or (
+            subtype != "json" and not subtype.endswith("+json")
+        ):
+            detail = f"The body's Content-Type is {show(given) if given else 'missing'}."
+            hint = "Send the header Content-Type: application/json (curl: -H 'Content-Type: application/json')."
+            raise ProblemError(415, "unsupported-media-type", detail, hint)
+
+
+class JsonRoute(APIRoute):
+    """A route that reads its body as `JsonRequest` does."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """FastAPI's handler, fed with our kind of request."""
+        handle = super().get_route_handler()
+        if self.body_field is None:
+            return handle
+
+        async def careful(request: Request) -> Response:
+            request = JsonRequest(request.scope, request.receive)
+            await request.require_json()
+            return await handle(request)
+
+        return careful
+
+
+def _too_large(limit: int) -> ProblemError:
+    detail = f"The request body is larger than {limit} bytes."
+    hint = "Split it into several requests, or ask the operator to raise KINBOARD_MAX_BODY."
+    # Closing is what stops the rest from being read.
+    return ProblemError(413, "body-too-large", detail, hint, headers={"Connection": "close"})

@@ -1,0 +1,67 @@
+"""Forward kinematics: joint values in, pose of the tool out."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Body, Response
+from pydantic import Field
+from typing_extensions import TypedDict
+
+from app.answers import FkAnswer, documented, fk_answers
+from app.api import schemas
+from app.api.body import JsonRoute
+from app.api.schemas import POST_REFUSALS, Configurations, RobotDep, SettingsDep, example, one_or_all
+
+router = APIRouter(tags=["kinematics"], route_class=JsonRoute)
+
+EXAMPLES = {
+    "one": example("One configuration", {"q": [1.5708, 0.5236, 1.0472, 0.5236, 0.5236]}),
+    "frames": example(
+        "With the frame of every link", {"q": [1.5708, 0.5236, 1.0472, 0.5236, 0.5236], "frames": True}
+    ),
+    "many": example(
+        "Several configurations",
+        {"q": [[0.0, 0.0, 0.0, 0.0, 0.5], [1.2, 0.4, 0.9, 0.3, 0.6], [3.0, 1, 1, 1, 0.3]]},
+    ),
+}
+
+
+class FkRequest(schemas.Body):
+    """Which configurations to put the arm in."""
+
+    q: Configurations = Field(
+        description="Joint values from base to tool, in radians (metres for sliding joints): "
+        "one configuration of n numbers, or a list of configurations."
+    )
+    frames: bool = Field(
+        False,
+        strict=True,
+        description="Whether to return the frame after every DH row as well, not only the tool's.",
+    )
+
+
+@documented
+class FkAnswers(TypedDict):
+    """Answers to a list of configurations."""
+
+    results: list[FkAnswer]
+    """One per configuration, in the same order."""
+
+
+@router.post(
+    "/robots/{robot_id}/fk",
+    summary="Forward kinematics",
+    response_model=FkAnswer | FkAnswers,
+    responses=POST_REFUSALS,
+)
+def forward_kinematics(
+    robot: RobotDep, settings: SettingsDep, body: Annotated[FkRequest, Body(openapi_examples=EXAMPLES)]
+) -> Response:
+    """Pose of the tool for joint values, as a 4×4 matrix and as position with quaternion.
+
+    One configuration gets one answer; a list gets `{"results": [...]}` in the same order. Joint values outside the
+    limits are answered too, with `in_limits` false.
+    """
+    q, single = schemas.as_configurations(robot, body.q, settings)
+    return one_or_all(lambda some: fk_answers(robot, q[some], body.frames), len(q), single)

@@ -1,0 +1,59 @@
+"""The Jacobian: how the tool moves when the joints do."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Body, Response
+from pydantic import Field
+from typing_extensions import TypedDict
+
+from app.answers import JacobianAnswer, documented, jacobian_answers
+from app.api import schemas
+from app.api.body import JsonRoute
+from app.api.schemas import POST_REFUSALS, Configurations, RobotDep, SettingsDep, example, one_or_all
+
+router = APIRouter(tags=["kinematics"], route_class=JsonRoute)
+
+EXAMPLES = {
+    "one": example("One configuration", {"q": [1.5708, 0.5236, 1.0472, 0.5236, 0.5236]}),
+    "tool": example("In the tool's own frame", {"q": [1.5708, 0.5236, 1.0472, 0.5236, 0.5236], "frame": "tool"}),
+    "many": example("Several configurations", {"q": [[0.0, 0.0, 0.0, 0.0, 0.5], [1.2, 0.4, 0.9, 0.3, 0.6]]}),
+}
+
+
+class JacobianRequest(schemas.Body):
+    """Where to evaluate the Jacobian, and in which frame."""
+
+    q: Configurations = Field(
+        description="Joint values from base to tool, in radians (metres for sliding joints): "
+        "one configuration of n numbers, or a list of configurations."
+    )
+    frame: Literal["base", "tool"] = Field(
+        "base", description="The frame the velocities of the tool point are expressed in."
+    )
+
+
+@documented
+class JacobianAnswers(TypedDict):
+    """Answers to a list of configurations."""
+
+    results: list[JacobianAnswer]
+    """One per configuration, in the same order."""
+
+
+@router.post(
+    "/robots/{robot_id}/jacobian",
+    summary="Jacobian and manipulability",
+    response_model=JacobianAnswer | JacobianAnswers,
+    responses=POST_REFUSALS,
+)
+def geometric_jacobian(
+    robot: RobotDep, settings: SettingsDep, body: Annotated[JacobianRequest, Body(openapi_examples=EXAMPLES)]
+) -> Response:
+    """The geometric 6×n Jacobian (linear rows first), its singular values and Yoshikawa's manipulability.
+
+    One configuration gets one answer; a list gets `{"results": [...]}` in the same order.
+    """
+    q, single = schemas.as_configurations(robot, body.q, settings)
+    return one_or_all(lambda some: jacobian_answers(robot, q[some], body.frame), len(q), single)

@@ -1,0 +1,238 @@
+"""Every refusal in one shape: RFC 9457 problem documents, ``application/problem+json``.
+
+``type`` is the stable name a program can test, ``detail`` the sentence to show, ``hint`` what to do about it and
+``errors`` the fields that were wrong. A target out of reach is not a problem but an answer (see `app.api.ik`).
+
+Each kind of problem is one row of `KINDS`; a route raises `ProblemError`, and `install_problem_handlers` turns
+that, the framework's own refusals and the core's misuse errors into documents.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import HTTPException, RequestValidationError
+from pydantic import BaseModel, ConfigDict, Field
+from pydantic_core import to_json
+from starlette.exceptions import HTTPException as StarletteHTTPException
+from starlette.responses import Response
+
+from kin import InputError, UnknownRobotError
+from kin.errors import shorten
+
+MEDIA_TYPE = "application/problem+json"
+TAGS = {"one", "many"}  # names of union members, which pydantic puts into error locations
+SHOWN = 10  # most field errors one document lists
+DOCS_HINT = "The /docs page shows the schema of every request, with an example that works."
+
+# kind → title; the kind is the last part of `type`.
+KINDS = {
+    "bad-request": "The request cannot be read",
+    "malformed-json": "The body is not valid JSON",
+    "unknown-robot": "There is no such robot",
+    "not-found": "There is nothing at this address",
+    "method-not-allowed": "This address does not take this method",
+    "body-too-large": "The request body is too large",
+    "batch-too-large": "The request holds too many items",
+    "unsupported-media-type": "The body must be JSON",
+    "invalid-input": "The request holds a value that is not usable",
+    "internal-error": "Something went wrong on our side",
+    "http-error": "The request was refused",
+}
+
+
+class FieldError(BaseModel):
+    """One value that was not usable."""
+
+    field: str = Field(description="Where it is in the request, e.g. `q[2]` or `target.wxyz`.", examples=["q[2]"])
+    value: str = Field(description="What was given, shortened.", examples=['"ninety"'])
+    expected: str = Field(description="What would be valid.", examples=["a valid number"])
+
+
+class Problem(BaseModel):
+    """Why a request was refused (RFC 9457)."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {
+                "type": "urn:kinboard:problem:invalid-input",
+                "title": KINDS["invalid-input"],
+                "status": 422,
+                "detail": 'q[2]: got "ninety", expected a valid number',
+                "hint": DOCS_HINT,
+                "errors": [{"field": "q[2]", "value": '"ninety"', "expected": "a valid number"}],
+            }
+        }
+    )
+
+    type: str = Field(description="Stable name of the kind of problem, for programs.")
+    title: str = Field(description="The kind of problem in words.")
+    status: int = Field(description="The HTTP status code.")
+    detail: str = Field(description="What was wrong this time, in one sentence.")
+    hint: str = Field(description="What to do about it.")
+    errors: list[FieldError] = Field(description="The values that were wrong; empty if none in particular.")
+
+
+class ProblemError(HTTPException):
+    """A refusal. `kind` is a row of `KINDS`."""
+
+    def __init__(
+        self,
+        status: int,
+        kind: str,
+        detail: str,
+        hint: str = DOCS_HINT,
+        errors: Sequence[FieldError] = (),
+        headers: dict[str, str] | None = None,
+    ) -> None:
+        super().__init__(status, detail, headers)
+        self.problem = Problem(
+            type=f"urn:kinboard:problem:{kind}",
+            title=KINDS[kind],
+            status=status,
+            detail=detail,
+            hint=hint,
+            errors=list(errors),
+        )
+
+
+def invalid(*errors: FieldError, hint: str = DOCS_HINT) -> ProblemError:
+    """422: the first error in words, all of them (up to `SHOWN`) in `errors`."""
+    first = errors[0]
+    more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+    detail = f"{first.field}: got {first.value}, expected {first.expected}{more}"
+    return ProblemError(422, "invalid-input", detail, hint, errors[:SHOWN])
+
+
+def install_problem_handlers(app: FastAPI) -> None:
+    """Makes every refusal of `app`, unhandled errors included, a problem document, and says so in its OpenAPI."""
+    app.add_exception_handler(StarletteHTTPException, _http_error)
+    app.add_exception_handler(RequestValidationError, _validation_error)
+    app.add_exception_handler(UnknownRobotError, _unknown_robot)
+    app.add_exception_handler(InputError, _input_error)
+    app.add_exception_handler(Exception, _internal_error)
+    plain = app.openapi
+
+    def openapi() -> dict[str, Any]:
+        return _with_problem_media_type(plain())
+
+    app.openapi = openapi  # type: ignore[method-assign]  # FastAPI's own way to adjust the document
+
+
+def show(value: object) -> str:
+    """A value as its sender wrote it, in JSON, shortened; of long lists and of objects only their make-up."""
+    if isinstance(value, list | tuple):
+        if len(value) <= 8 and not any(isinstance(item, list | dict) for item in value):
+            return "[" + ", ".join(show(item) for item in value) + "]"
+        return f"a list of {len(value)}"
+    if isinstance(value, dict):
+        return "an object with " + (shorten_text(", ".join(list(map(str, value))[:10])) or "nothing in it")
+    if value is None or isinstance(value, str | bool | int | float):
+        return shorten_text(json.dumps(value, ensure_ascii=False))
+    return shorten(value)
+
+
+def shorten_text(text: str, length: int = 80) -> str:
+    """Text cut to a length that fits a message."""
+    return text if len(text) <= length else text[: length - 1] + "…"
+
+
+def _respond(error: ProblemError) -> Response:
+    content = to_json(error.problem)
+    return Response(content, error.status_code, dict(error.headers or {}), MEDIA_TYPE)
+
+
+async def _http_error(request: Request, error: Exception) -> Response:
+    if isinstance(error, ProblemError):
+        return _respond(error)
+    assert isinstance(error, StarletteHTTPException)
+    path = shorten_text(request.url.path)
+    headers = dict(error.headers or {})
+    if error.status_code == 404:
+        return _respond(
+            ProblemError(404, "not-found", f"Nothing answers at {path}.", "See /docs for what there is.")
+        )
+    if error.status_code == 405:
+        hint = f"It takes {headers['Allow']}." if "Allow" in headers else DOCS_HINT
+        detail = f"{path} does not take {request.method}."
+        return _respond(ProblemError(405, "method-not-allowed", detail, hint, headers=headers))
+    kind = "bad-request" if error.status_code == 400 else "http-error"
+    detail = str(error.detail) or HTTPStatus(error.status_code).phrase
+    return _respond(ProblemError(error.status_code, kind, detail, headers=headers))
+
+
+async def _validation_error(request: Request, error: Exception) -> Response:
+    assert isinstance(error, RequestValidationError)
+    return _respond(invalid(*(field_error(item) for item in error.errors())))
+
+
+async def _unknown_robot(request: Request, error: Exception) -> Response:
+    assert isinstance(error, UnknownRobotError)
+    known = ", ".join(error.known)
+    field = FieldError(field="robot_id", value=show(error.robot_id), expected=f"one of {known}")
+    detail = f"There is no robot {field.value}."
+    hint = f"Known robots: {known}. GET /api/v1/robots describes them."
+    return _respond(ProblemError(404, "unknown-robot", detail, hint, [field]))
+
+
+async def _input_error(request: Request, error: Exception) -> Response:
+    assert isinstance(error, InputError)
+    return _respond(invalid(from_input_error(error)))
+
+
+async def _internal_error(request: Request, error: Exception) -> Response:
+    # What happened belongs into the log (the server re-raises after this answer), not to the client.
+    detail = "The request was understood, but answering it failed."
+    hint = "Please report it with the request you sent; the server's log has the cause."
+    return _respond(ProblemError(500, "internal-error", detail, hint))
+
+
+def from_input_error(error: InputError, prefix: str = "") -> FieldError:
+    """A misuse error of the core as a field error."""
+    return FieldError(field=prefix + error.field, value=error.value, expected=error.expected)
+
+
+def field_error(item: dict[str, Any]) -> FieldError:
+    """One of pydantic's errors in our words."""
+    field = ""
+    for part in item["loc"][1:]:
+        if part not in TAGS:
+            field += f"[{part}]" if isinstance(part, int) else f".{part}" if field else str(part)
+    cause = item.get("ctx", {}).get("error")
+    if isinstance(cause, InputError):
+        found = from_input_error(cause, f"{field}." if field else "")
+        given = item["input"]
+        return found.model_copy(update={"value": show(given[cause.field])}) if cause.field in given else found
+    value = show(item["input"])
+    expected = item["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
+    if item["type"] == "missing":
+        value = "nothing"
+        expected = "a value" if field else "a JSON object in the body"
+    elif item["type"] in ("model_attributes_type", "model_type", "dict_type"):
+        expected = "a JSON object"
+    elif item["type"] == "list_type":
+        expected = "a list"
+    elif item["type"] == "too_short":
+        expected = _items("at least", item["ctx"]["min_length"])
+    elif item["type"] == "too_long":
+        expected = _items("at most", item["ctx"]["max_length"])
+    return FieldError(field=field or "body", value=value, expected=expected)
+
+
+def _items(how: str, count: int) -> str:
+    return f"{how} {count} item" + "s" * (count != 1)
+
+
+def _with_problem_media_type(document: dict[str, Any]) -> dict[str, Any]:
+    """FastAPI files every response model under application/json: move those of refusals to their own type."""
+    for path in document.get("paths", {}).values():
+        for operation in path.values():
+            for status, response in operation.get("responses", {}).items():
+                content = response.get("content", {})
+                if status[0] in "45" and "application/json" in content:
+                    content[MEDIA_TYPE] = content.pop("application/json")
+    return document

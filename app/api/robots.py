@@ -1,0 +1,34 @@
+"""Which arms there are, and everything that defines one."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Response
+from typing_extensions import TypedDict
+
+from app.answers import RobotAnswer, documented, robot_answer
+from app.api.body import JsonRoute
+from app.api.schemas import RobotDep, StoreDep, refusals, reply
+
+router = APIRouter(tags=["robots"], route_class=JsonRoute)
+
+
+@documented
+class RobotList(TypedDict):
+    """The robots this service offers."""
+
+    robots: list[RobotAnswer]
+    """In the order they are offered."""
+
+
+@router.get("/robots", summary="List the robots", response_model=RobotList, responses=refusals(500))
+async def list_robots(store: StoreDep) -> Response:
+    """Every arm with its DH table, joints and limits. Its `id` goes into the other addresses."""
+    return reply({"robots": [robot_answer(robot) for robot in store.robots]})
+
+
+@router.get(
+    "/robots/{robot_id}", summary="Describe a robot", response_model=RobotAnswer, responses=refusals(404, 422, 500)
+)
+async def describe_robot(robot: RobotDep) -> Response:
+    """DH table, joints with their limits, home configuration and source of one arm, in radians and metres."""
+    return reply(robot_answer(robot))

@@ -1,0 +1,165 @@
+"""What requests share: numbers, configurations, the robot of the address, and the answer as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any
+
+import numpy as np
+from fastapi import Depends, Path, Request, Response
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
+from pydantic_core import to_json
+
+from app.api.problems import FieldError, Problem, ProblemError, invalid, show
+from app.settings import Settings
+from app.store import Store
+from kin import InputError, Robot
+from kin.transforms import Array
+
+LARGEST = 1e6
+AT_ONCE = 256  # answers alive at a time
+
+# A number beyond a million metres or radians is a mistake, and its square may not even be a number.
+Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False, strict=True)]
+
+
+def numbers(count: int) -> Any:
+    """Field constraints of a list of exactly `count` numbers; the first wrong item ends the search."""
+    return Field(min_length=count, max_length=count, fail_fast=True)
+
+
+Vector3 = Annotated[list[Number], numbers(3)]
+Vector4 = Annotated[list[Number], numbers(4)]
+Configuration = Annotated[list[Number], Field(min_length=1, fail_fast=True)]
+
+
+def one_or_many(value: object) -> str:
+    """Whether a list holds one configuration or several: told by its first item, so errors speak of one case."""
+    return "many" if isinstance(value, list) and value and isinstance(value[0], list) else "one"
+
+
+Configurations = Annotated[
+    Annotated[Configuration, Tag("one")]
+    | Annotated[list[Configuration], Field(min_length=1, fail_fast=True), Tag("many")],
+    Discriminator(one_or_many),
+]
+
+
+class Body(BaseModel):
+    """A request body: unknown fields are refused by name, as a misspelt option must not be ignored."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    @model_validator(mode="before")
+    @classmethod
+    def no_strangers(cls, data: Any) -> Any:
+        """Refuses a field the schema does not have, listing those it has."""
+        if isinstance(data, dict):
+            for name, value in data.items():
+                if name not in cls.model_fields:
+                    raise InputError(str(name)[:80], value, "only the fields " + ", ".join(cls.model_fields))
+        return data
+
+
+async def _store(request: Request) -> Store:
+    store = request.app.state.store
+    assert isinstance(store, Store)
+    return store
+
+
+async def _settings(request: Request) -> Settings:
+    settings = request.app.state.settings
+    assert isinstance(settings, Settings)
+    return settings
+
+
+StoreDep = Annotated[Store, Depends(_store)]
+SettingsDep = Annotated[Settings, Depends(_settings)]
+
+
+async def _robot(
+    store: StoreDep,
+    robot_id: Annotated[
+        str, Path(description="Id of the robot, as listed by GET /robots.", examples=["pioneer5"])
+    ],
+) -> Robot:
+    return store.get(robot_id)
+
+
+RobotDep = Annotated[Robot, Depends(_robot)]
+
+_REFUSALS: dict[int, str] = {
+    400: "The body is not valid JSON.",
+    404: "There is no such robot; the document lists those there are.",
+    413: "The body, or the batch in it, is larger than this service accepts.",
+    415: "The body does not say it is JSON.",
+    422: "A value is not usable; the document names the field, the value and what is valid.",
+    500: "Answering failed.",
+}
+
+
+def refusals(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    """The documented refusals of an operation."""
+    return {status: {"model": Problem, "description": _REFUSALS[status]} for status in statuses}
+
+
+POST_REFUSALS = refusals(*_REFUSALS)
+
+
+def example(summary: str, value: dict[str, Any]) -> dict[str, Any]:
+    """A named request example of the OpenAPI document."""
+    return {"summary": summary, "value": value}
+
+
+def reply(content: object) -> Response:
+    """`content` as JSON, written by compiled code without validating it again."""
+    return Response(_json(content), media_type="application/json")
+
+
+def _json(content: object) -> bytes:
+    return to_json(content, inf_nan_mode="null")
+
+
+def one_or_all(answers: Callable[[slice], Sequence[object]], count: int, single: bool) -> Response:
+    """The answer itself when one thing was asked, ``{"results": [...]}`` in the same order when a list was.
+
+    `answers` gives those of a range of the questions. A range is written out before the next is answered: a
+    hundred thousand live lists would cost more in garbage collection than in work.
+    """
+    if single:
+        return reply(answers(slice(0, 1))[0])
+    ranges = (slice(start, start + AT_ONCE) for start in range(0, count, AT_ONCE))
+    parts = [_json(list(answers(each)))[1:-1] for each in ranges]
+    return Response(b'{"results":[' + b",".join(parts) + b"]}", media_type="application/json")
+
+
+def check_batch(field: str, count: int, settings: Settings) -> None:
+    """Raises 413 for more items than one request may hold."""
+    if count > settings.max_batch:
+        error = FieldError(field=field, value=f"a list of {count}", expected=f"at most {settings.max_batch} items")
+        detail = f"{field} holds {count} items; one request may hold {settings.max_batch}."
+        hint = "Split the list into several requests."
+        raise ProblemError(413, "batch-too-large", detail, hint, [error])
+
+
+def as_configurations(
+    robot: Robot, q: list[float] | list[list[float]], settings: Settings, field: str = "q"
+) -> tuple[Array, bool]:
+    """Configurations as ``(k, n)`` and whether it was a single one.
+
+    Raises:
+        ProblemError: 413 for too many; 422 naming the one whose number of values is not the robot's.
+    """
+    single = not isinstance(q[0], list)
+    rows: list[Any] = [q] if single else q
+    check_batch(field, len(rows), settings)
+    for i, row in enumerate(rows):
+        if len(row) != robot.n:
+            joints = ", ".join(joint.name for joint in robot.joints)
+            error = FieldError(
+                field=field if single else f"{field}[{i}]",
+                value=f"{len(row)} values: {show(row)}" if len(row) <= 8 else f"{len(row)} values",
+                expected=f"{robot.n} values in radians (metres for sliding joints)",
+            )
+            raise invalid(error, hint=f"The joints of {robot.id} are: {joints}.")
+    return np.array(rows, dtype=np.float64), single

@@ -1,0 +1,202 @@
+"""The command line: ``kinboard`` serves the dashboard; ``fk``, ``ik`` and ``robots`` answer without a server.
+
+People read and type degrees and millimetres, ``--rad`` makes both radians and metres; ``--json`` always prints
+radians and metres, in the shapes REST answers with. Exit codes: 0 answered, 1 no exact answer (``ik``) or the
+service could not start, 2 bad input.
+
+Nothing heavy is imported before the arguments are known, and each command imports only what it needs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import os
+import sys
+from collections.abc import Callable, Sequence
+
+UNITS_NOTE = "degrees and millimetres, or radians and metres with --rad"
+DESCRIPTION = "Kinematics of robot arms: a dashboard in the browser, a REST interface, this command line."
+EPILOG = """examples:
+  kinboard                                    serve the dashboard on http://localhost:8000/
+  kinboard fk pioneer5 90 30 60 30 30
+  kinboard ik pioneer5 --position 45 191 -211 --approach -0.31 -0.164 -0.936
+  kinboard robots pioneer5 --json"""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs one command and returns its exit code; `argv` without the program's name."""
+    words = list(sys.argv[1:] if argv is None else argv)
+    if not words or (words[0].startswith("-") and words[0] not in ("-h", "--help", "--version")):
+        words.insert(0, "serve")
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # a terminal without θ or · still gets its answer
+    try:
+        arguments = _parser().parse_args([_not_an_option(word) for word in words])
+    except SystemExit as stop:  # argparse has printed its message, or the help
+        return stop.code if isinstance(stop.code, int) else 2
+    command: Callable[[argparse.Namespace], int] = arguments.command
+    try:
+        code = command(arguments)
+        sys.stdout.flush()
+    except BrokenPipeError:  # the reader has seen enough, as in `kinboard robots | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    return code
+
+
+def _serve(arguments: argparse.Namespace) -> int:
+    from pydantic import ValidationError
+
+    from app.settings import Settings
+
+    given = {name: getattr(arguments, name) for name in ("host", "port", "root_path", "robots")}
+    try:
+        settings = Settings(**{name: value for name, value in given.items() if value is not None})
+    except ValidationError as error:
+        for item in error.errors():
+            name = str(item["loc"][0]) if item["loc"] else "settings"
+            where = (
+                f"--{name.replace('_', '-')} or KINBOARD_{name.upper()}"
+                if name in given
+                else f"KINBOARD_{name.upper()}"
+            )
+            print(f"kinboard: {where}: got {item['input']!r}: {item['msg']}", file=sys.stderr)
+        return 2
+    from app.main import run
+
+    return run(settings, open_browser=arguments.open)
+
+
+def _fk(arguments: argparse.Namespace) -> int:
+    _do_without_compiler()
+    from app import commands
+
+    return _refusing_misuse(commands.fk, arguments)
+
+
+def _ik(arguments: argparse.Namespace) -> int:
+    from app import commands
+
+    return _refusing_misuse(commands.ik, arguments)
+
+
+def _robots(arguments: argparse.Namespace) -> int:
+    _do_without_compiler()
+    from app import commands
+
+    return _refusing_misuse(commands.robots, arguments)
+
+
+def _refusing_misuse(command: Callable[[argparse.Namespace], int], arguments: argparse.Namespace) -> int:
+    from kin import KinematicsError
+
+    try:
+        return command(arguments)
+    except KinematicsError as error:
+        print(f"kinboard: {error}", file=sys.stderr)
+        return 2
+
+
+def _do_without_compiler() -> None:
+    """Lets the kernels of this process run as plain Python.
+
+    One pose takes that a tenth of a millisecond; numba's machinery for loading compiled code takes half a second.
+    """
+    if "numba" not in sys.modules:
+        os.environ.setdefault("NUMBA_DISABLE_JIT", "1")
+
+
+class _Version(argparse.Action):
+    """Prints the version, which is only looked up when it is asked for."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        _do_without_compiler()
+        from kin import __version__
+
+        print(f"kinboard {__version__}")
+        parser.exit()
+
+
+def _number(text: str) -> float:
+    value = float(text.replace("−", "-"))
+    if not abs(value) <= 1e6:
+        raise argparse.ArgumentTypeError(f"{text.strip()!r} is not a number between -1e6 and 1e6")
+    return value
+
+
+_number.__name__ = "number"  # argparse says "invalid number value"
+
+
+def _not_an_option(word: str) -> str:
+    """Negative numbers such as -1e-3 look like options to argparse; a leading space tells it otherwise."""
+    try:
+        float(word)
+    except ValueError:
+        return word
+    return f" {word}" if word.startswith("-") else word
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="kinboard",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
+    common = argparse.ArgumentParser(add_help=False)
+    common.add_argument("--robots", metavar="FOLDER", help="folder with further robot files (*.toml)")
+    answers = argparse.ArgumentParser(add_help=False)
+    answers.add_argument("--json", action="store_true", help="print the answer as JSON, in radians and metres")
+    unit = answers.add_mutually_exclusive_group()
+    unit.add_argument(
+        "--deg", dest="rad", action="store_false", default=False, help="degrees and millimetres (default)"
+    )
+    unit.add_argument(
+        "--rad", dest="rad", action="store_true", default=False, help="radians and metres, typed and printed"
+    )
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+
+    serve = commands.add_parser("serve", parents=[common], help="serve the dashboard and REST (default)")
+    serve.add_argument("--host", help="address to listen on (default 127.0.0.1)")
+    serve.add_argument("--port", type=int, help="port to listen on (default 8000; 0 takes any free one)")
+    serve.add_argument("--root-path", metavar="PREFIX", help="path prefix a reverse proxy serves us under")
+    serve.add_argument("--open", action="store_true", help="open the dashboard in the browser")
+    serve.set_defaults(command=_serve)
+
+    fk = commands.add_parser("fk", parents=[common, answers], help="pose of the tool for joint values")
+    fk.add_argument("robot", metavar="ROBOT", help="id of the robot; `kinboard robots` lists them")
+    fk.add_argument("q", type=_number, nargs="+", metavar="Q", help=f"joint values, {UNITS_NOTE}")
+    fk.add_argument("--frames", action="store_true", help="also the frame after every DH row")
+    fk.set_defaults(command=_fk)
+
+    ik = commands.add_parser("ik", parents=[common, answers], help="joint values for a pose of the tool")
+    ik.add_argument("robot", metavar="ROBOT", help="id of the robot; `kinboard robots` lists them")
+    xyz = ("X", "Y", "Z")
+    ik.add_argument(
+        "--position", type=_number, nargs=3, required=True, metavar=xyz, help="millimetres (--rad: metres)"
+    )
+    turn = ik.add_mutually_exclusive_group()
+    turn.add_argument("--wxyz", type=_number, nargs=4, metavar=("W", *xyz), help="orientation as a quaternion")
+    turn.add_argument("--approach", type=_number, nargs=3, metavar=xyz, help="direction of the tool's z axis")
+    tasks = ("pose", "approach", "position")
+    ik.add_argument("--task", choices=tasks, help="what must be met (default: all that is given)")
+    ik.add_argument(
+        "--seed", type=_number, nargs="+", metavar="Q", help=f"stay near this configuration; {UNITS_NOTE}"
+    )
+    ik.add_argument(
+        "--redundancy", type=_number, metavar="VALUE", help="value of the arm's free parameter, an angle"
+    )
+    ik.add_argument("--all", action="store_true", help="all solutions, not only the nearest")
+    ik.add_argument("--ignore-limits", action="store_true", help="also solutions beyond the joint limits")
+    ik.set_defaults(command=_ik)
+
+    robots = commands.add_parser("robots", parents=[common, answers], help="list the robots, or describe one")
+    robots.add_argument("robot", nargs="?", metavar="ROBOT", help="describe this one")
+    robots.set_defaults(command=_robots)
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

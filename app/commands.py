@@ -1,0 +1,202 @@
+"""What ``kinboard fk``, ``ik`` and ``robots`` do: ask the core, print for people or as JSON.
+
+Each command takes the parsed arguments of :mod:`app.cli`, prints its answer and returns the exit code: 0, or 1
+when ``ik`` has no exact answer. Misuse raises `kin.KinematicsError`.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import sys
+from argparse import Namespace
+from pathlib import Path
+
+import numpy as np
+
+from app.answers import RobotAnswer, Solution, Task, fk_answers, ik_answer, robot_answer
+from app.store import Store
+from kin import InputError, Robot, solve_ik
+from kin.transforms import Array, frame_from_approach, from_position_wxyz
+
+
+def fk(arguments: Namespace) -> int:
+    robot = _store(arguments).get(arguments.robot)
+    q = _configuration(robot, arguments.q, "q", arguments.rad)
+    answer = fk_answers(robot, q[None], arguments.frames)[0]
+    if arguments.json:
+        return _print_json(answer)
+    units = Units(robot, arguments.rad)
+    rows = [
+        [
+            joint.name,
+            units.joint(i, q[i]),
+            " … ".join(units.joint(i, stop) for stop in joint.limits or ()),
+            "" if robot.lower[i] <= q[i] <= robot.upper[i] else "beyond its stop",
+        ]
+        for i, joint in enumerate(robot.joints)
+    ]
+    print(f"{robot.name} ({robot.id})\n")
+    print(_table(["joint", "value", "limits", ""], rows))
+    frames = [("tool", answer["pose"])] + [(frame["name"], frame["pose"]) for frame in answer["frames"] or ()]
+    rows = [
+        [name, *(units.length(x) for x in pose["position"]), *(f"{_clean(w, 5)}" for w in pose["wxyz"])]
+        for name, pose in frames
+    ]
+    print("\n" + _table(["frame", *(f"{axis} {units.of_length}" for axis in "xyz"), *"wxyz"], rows))
+    return 0
+
+
+def ik(arguments: Namespace) -> int:
+    robot = _store(arguments).get(arguments.robot)
+    angle, length = (1.0, 1.0) if arguments.rad else (math.pi / 180, 1e-3)
+    T = from_position_wxyz([x * length for x in arguments.position], arguments.wxyz)
+    if arguments.approach is not None:
+        T[:3, :3] = frame_from_approach(arguments.approach)
+    task: Task = arguments.task or ("pose" if arguments.wxyz else "approach" if arguments.approach else "position")
+    if task == "pose" and not arguments.wxyz:
+        raise InputError("--task", task, "--wxyz besides --position for a pose")
+    if task == "approach" and not (arguments.approach or arguments.wxyz):
+        raise InputError("--task", task, "--approach or --wxyz besides --position for an approach")
+    result = solve_ik(
+        robot,
+        T,
+        task=task,
+        q_seed=None if arguments.seed is None else _configuration(robot, arguments.seed, "--seed", arguments.rad),
+        respect_limits=not arguments.ignore_limits,
+        max_solutions=None if arguments.all else 1,
+        redundancy=None if arguments.redundancy is None else arguments.redundancy * angle,
+    )
+    answer = ik_answer(result)
+    code = 0 if answer["status"] == "solved" else 1
+    if arguments.json:
+        _print_json(answer)
+        return code
+    units = Units(robot, arguments.rad)
+    print(answer["reason"] + "\n")
+    closest = answer["closest"] if not answer["solutions"] else None
+    listed = [(str(k + 1), s) for k, s in enumerate(answer["solutions"])] + (
+        [("closest", closest)] if closest else []
+    )
+    print(_table(*_solutions(units, listed)))
+    free = answer["redundancy"]
+    if free is not None:
+        ranges = ", ".join(" … ".join(units.angle(x) for x in interval) for interval in free["intervals"])
+        print(f"\n{free['label']} = {units.angle(free['value'])}, possible: {ranges}")
+    if not arguments.rad and np.abs(T[:3, 3]).max() < 5e-3:
+        print("note: --position is read in millimetres; --rad makes it metres", file=sys.stderr)
+    return code
+
+
+def robots(arguments: Namespace) -> int:
+    store = _store(arguments)
+    if arguments.robot is not None:
+        robot = store.get(arguments.robot)
+        answer = robot_answer(robot)
+        if arguments.json:
+            return _print_json(answer)
+        print(f"{robot.name} ({robot.id})\n{robot.description}\n{robot.source}\n")
+        print(_dh_table(answer, Units(robot, arguments.rad)))
+        return 0
+    answers = [robot_answer(robot) for robot in store.robots]
+    if arguments.json:
+        return _print_json({"robots": answers})
+    rows = [
+        [s["id"], str(s["n"]), s["convention"], f"{_clean(s['reach'] * 1e3, 0)} mm", s["name"]] for s in answers
+    ]
+    print(_table(["robot", "joints", "convention", "reach at most", "name"], rows))
+    return 0
+
+
+class Units:
+    """How values are shown: degrees and millimetres, or radians and metres."""
+
+    def __init__(self, robot: Robot, rad: bool) -> None:
+        self.rad = rad
+        self.of_length = "m" if rad else "mm"
+        self._revolute: list[bool] = robot.revolute.tolist()
+
+    def angle(self, value: float) -> str:
+        """An angle given in radians."""
+        return f"{_clean(value, 6)} rad" if self.rad else f"{_clean(math.degrees(value), 3)}°"
+
+    def length(self, value: float) -> str:
+        """A length given in metres, without its unit."""
+        return _clean(value, 6) if self.rad else _clean(value * 1e3, 3)
+
+    def joint(self, index: int, value: float) -> str:
+        """The value of a joint."""
+        return self.angle(value) if self._revolute[index] else f"{self.length(value)} {self.of_length}"
+
+
+def _solutions(units: Units, listed: list[tuple[str, Solution]]) -> tuple[list[str], list[list[str]]]:
+    """Head and rows of the table of solutions."""
+    count = len(listed[0][1]["q"]) if listed else 0
+    head = ["", *(f"q{i + 1}" for i in range(count)), "point error", "rotation error", "posture"]
+    rows = [
+        [
+            name,
+            *(units.joint(i, value) for i, value in enumerate(solution["q"])),
+            f"{units.length(solution['position_error'])} {units.of_length}",
+            units.angle(solution["rotation_error"]),
+            solution["branch"] + ("" if solution["in_limits"] else " (beyond the limits)"),
+        ]
+        for name, solution in listed
+    ]
+    return head, rows
+
+
+def _dh_table(answer: RobotAnswer, units: Units) -> str:
+    limits = {joint["name"]: (joint["index"], joint["limits"]) for joint in answer["joints"]}
+    rows = []
+    for row in answer["rows"]:
+        index, stops = limits.get(row["name"], (0, None))
+        cells = [
+            units.angle(row["theta"]),
+            units.length(row["d"]),
+            units.length(row["a"]),
+            units.angle(row["alpha"]),
+        ]
+        rows.append([row["name"], row["kind"], *cells, " … ".join(units.joint(index, x) for x in stops or ())])
+    length = units.of_length
+    head = ["row", "kind", "theta", f"d {length}", f"a {length}", "alpha", "limits"]
+    return f"DH table, {answer['convention']} convention\n\n" + _table(head, rows)
+
+
+def _table(head: list[str], rows: list[list[str]]) -> str:
+    """Columns under their heads, numbers to the right."""
+    lines = [head, *rows]
+    widths = [max(len(line[k]) for line in lines) for k in range(len(head))]
+    numeric = [all(not row[k] or row[k][:1] in "-0123456789" for row in rows) for k in range(len(head))]
+    return "\n".join(
+        "  ".join(
+            cell.rjust(width) if right else cell.ljust(width)
+            for cell, width, right in zip(line, widths, numeric, strict=True)
+        ).rstrip()
+        for line in lines
+    )
+
+
+def _clean(value: float, digits: int) -> str:
+    """Fixed digits without a minus before zero."""
+    return f"{round(value, digits) + 0.0:.{digits}f}"
+
+
+def _print_json(answer: object) -> int:
+    print(json.dumps(answer, ensure_ascii=False, allow_nan=False))
+    return 0
+
+
+def _store(arguments: Namespace) -> Store:
+    folder = arguments.robots or os.environ.get("KINBOARD_ROBOTS")
+    return Store(Path(folder) if folder else None)
+
+
+def _configuration(robot: Robot, values: list[float], field: str, rad: bool) -> Array:
+    """Typed joint values as ``(n,)`` in radians (metres); raises `InputError` for a wrong number of them."""
+    if len(values) != robot.n:
+        joints = ", ".join(joint.name for joint in robot.joints)
+        raise InputError(field, f"{len(values)} values", f"{robot.n}, one for each of: {joints}")
+    scale = np.where(robot.revolute, math.pi / 180, 1e-3)
+    return robot.check_q(np.array(values) * (1.0 if rad else scale), field)

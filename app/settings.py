@@ -1,0 +1,24 @@
+"""Settings of the service: command-line flags over ``KINBOARD_…`` environment variables over these defaults."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import Field
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+
+class Settings(BaseSettings):
+    """Everything an operator can set. Each field is also an environment variable, e.g. ``KINBOARD_PORT``."""
+
+    model_config = SettingsConfigDict(env_prefix="KINBOARD_", frozen=True)
+
+    host: str = Field("127.0.0.1", description="Address to listen on.")
+    port: int = Field(8000, ge=0, le=65535, description="Port to listen on; 0 takes any free one.")
+    root_path: str = Field("", description="Path prefix a reverse proxy serves us under, e.g. /kinboard.")
+    robots: Path | None = Field(None, description="Folder with further robot files (*.toml).")
+    max_batch: int = Field(10_000, ge=1, description="Most configurations or targets one request may hold.")
+    max_body: int = Field(8 * 1024 * 1024, ge=1024, description="Largest request body in bytes.")
+    allowed_origins: tuple[str, ...] = Field(
+        (), description="Origins, besides our own, whose pages may open the viewer's websocket."
+    )

@@ -1,0 +1,261 @@
+"""The command line: what it prints, and with which exit code it ends."""
+
+import json
+import math
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import kin
+from app import cli
+from app.settings import Settings
+
+ROOT = Path(__file__).parents[2]
+PIONEER = kin.get_robot("pioneer5")
+
+
+def run(capsys, *words):
+    """Exit code, standard output and standard error of one command."""
+    code = cli.main([str(word) for word in words])
+    out, err = capsys.readouterr()
+    assert "Traceback" not in err
+    return code, out, err
+
+
+def answer(capsys, *words, code=0):
+    got, out, err = run(capsys, *words, "--json")
+    assert (got, err) == (code, "")
+    return json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
+
+
+# -- fk --------------------------------------------------------------------------------------------------------
+
+
+def test_fk_reads_degrees_and_answers_as_rest_does(capsys, client):
+    q = [math.radians(x) for x in (90, 30, 60, 30, 30)]
+    got = answer(capsys, "fk", "pioneer5", 90, 30, 60, 30, 30, "--frames")
+    assert got == client.post("/api/v1/robots/pioneer5/fk", json={"q": q, "frames": True}).json()
+    assert got["pose"]["matrix"] == kin.fk(PIONEER, q).tolist()
+
+
+def test_fk_in_radians(capsys):
+    got = answer(capsys, "fk", "pioneer5", 1.5, 0.5, 1, 0.5, 0.5, "--rad")
+    assert got["pose"]["matrix"] == kin.fk(PIONEER, [1.5, 0.5, 1, 0.5, 0.5]).tolist()
+
+
+@pytest.mark.parametrize("words", [("-90", "-.5", "-1e-3", "−10", "+5"), ("-90.", "-0.5", "-1E-3", "-1e1", "5")])
+def test_negative_numbers_are_numbers(capsys, words):
+    q = np.radians([-90, -0.5, -0.001, -10, 5])
+    assert np.allclose(answer(capsys, "fk", "pioneer5", *words)["pose"]["matrix"], kin.fk(PIONEER, q), atol=1e-15)
+
+
+def test_fk_for_people_is_in_degrees_and_millimetres(capsys):
+    code, out, err = run(capsys, "fk", "pioneer5", 90, 30, 160, 30, 30, "--frames")
+    assert (code, err) == (0, "")
+    x, y, z = kin.fk(PIONEER, np.radians([90, 30, 160, 30, 30]))[:3, 3] * 1e3
+    tool = next(line for line in out.splitlines() if line.startswith("tool"))
+    assert [float(word) for word in tool.split()[1:4]] == pytest.approx([x, y, z], abs=5e-4)
+    assert re.search(r"^pivoting elbow +160\.000° +0\.000° … 150\.000° +beyond its stop$", out, re.MULTILINE)
+    assert re.search(r"^rotating elbow +30\.000° +0\.000° … 150\.000°$", out, re.MULTILINE)
+    assert all(f"\n{row.name} " in out for row in PIONEER.rows)
+
+
+def test_a_sliding_joint_is_typed_in_millimetres(capsys, tmp_path):
+    (tmp_path / "slider.toml").write_text(
+        'id = "slider"\nname = "Slider"\nsource = "this test"\nconvention = "standard"\n'
+        'units = { length = "mm", angle = "deg" }\n'
+        '[[rows]]\nname = "turn"\na = 100\n[[rows]]\nname = "slide"\nkind = "prismatic"\nlimits = [0, 250]\n',
+        encoding="utf-8",
+    )
+    got = answer(capsys, "fk", "slider", 90, 120, "--robots", tmp_path)
+    assert got["pose"]["position"] == pytest.approx([0, 0.1, 0.12], abs=1e-15)
+    code, out, _ = run(capsys, "fk", "slider", 90, 120, "--robots", tmp_path)
+    assert code == 0
+    assert re.search(r"^slide +120\.000 mm +0\.000 mm … 250\.000 mm$", out, re.MULTILINE)
+    assert "slider" in run(capsys, "robots", "--robots", tmp_path)[1]
+
+
+# -- ik --------------------------------------------------------------------------------------------------------
+
+
+def test_ik_leads_back_to_the_pose_fk_printed(capsys):
+    T = kin.fk(PIONEER, np.radians([80, 30, 50, 30, 25]))
+    where = [f"{x * 1e3:.9f}" for x in T[:3, 3]]
+    got = answer(capsys, "ik", "pioneer5", "--position", *where, "--approach", *T[:3, 2])
+    assert got["task"] == "approach"
+    assert got["status"] == "solved"
+    assert np.allclose(np.degrees(got["solutions"][0]["q"]), [80, 30, 50, 30, 25], atol=1e-6)
+
+
+def test_ik_prints_degrees_and_says_reached(capsys):
+    words = ("--position", 45, 191, -211, "--approach", -0.31, -0.164, -0.936)
+    code, out, err = run(capsys, "ik", "pioneer5", *words)
+    assert (code, err) == (0, "")
+    assert out.startswith("Reached")
+    typed = re.findall(r"(-?\d+\.\d+)°", out.splitlines()[-1])[:5]
+    T = kin.fk(PIONEER, np.radians([float(x) for x in typed]))
+    assert T[:3, 3] * 1e3 == pytest.approx([45, 191, -211], abs=0.02)
+    assert "shoulder front" in out
+
+
+def test_ik_with_options_asks_the_core_the_same(capsys):
+    robot = kin.get_robot("redundant7-craig")
+    T = kin.fk(robot, robot.q_home)
+    wxyz = kin.transforms.wxyz_from_rotation(T[:3, :3])
+    seed = (10, 20, 0, 60, 0, 40, -90)
+    options = ("--wxyz", *wxyz, "--seed", *seed, "--redundancy", -20, "--all", "--ignore-limits")
+    got = answer(capsys, "ik", robot.id, "--position", *(T[:3, 3] * 1e3), *options)
+    result = kin.solve_ik(robot, T, q_seed=np.radians(seed), redundancy=math.radians(-20), respect_limits=False)
+    assert len(got["solutions"]) == len(result.solutions) > 1
+    assert np.allclose([s["q"] for s in got["solutions"]], [s.q for s in result.solutions], atol=1e-9)
+    code, out, _ = run(capsys, "ik", robot.id, "--position", *(T[:3, 3] * 1e3), *options)
+    assert code == 0
+    assert f"{result.redundancy.label} = -20.000°" in out
+    one = answer(capsys, "ik", robot.id, "--position", *(T[:3, 3] * 1e3), *options[:-2])
+    assert len(one["solutions"]) == 1
+
+
+@pytest.mark.parametrize(
+    ("position", "extra", "status", "said"),
+    [
+        ((2000, 0, 0), (), "unreachable", "Out of reach"),
+        ((45, 191, 100), ("--approach", 0, 0, 1), "limits", "pivoting wrist"),
+        ((45, 191, -211), ("--wxyz", 0, 0.9, 0.4, -0.2), "approximate", "5 joints"),
+    ],
+)
+def test_no_exact_answer_is_exit_code_1_and_a_reason(capsys, position, extra, status, said):
+    words = ("ik", "pioneer5", "--position", *position, *extra)
+    assert answer(capsys, *words, code=1)["status"] == status
+    code, out, err = run(capsys, *words)
+    assert (code, err) == (1, "")
+    assert said in out
+
+
+def test_a_target_typed_in_metres_is_pointed_out(capsys):
+    _, _, err = run(capsys, "ik", "pioneer5", "--position", 0.045, 0.191, -0.211)
+    assert "millimetres" in err
+    assert run(capsys, "ik", "pioneer5", "--position", 0.045, 0.191, -0.211, "--rad")[::2] == (0, "")
+
+
+# -- robots and the rest ---------------------------------------------------------------------------------------
+
+
+def test_robots_lists_all_and_describes_one(capsys, client):
+    code, out, _ = run(capsys, "robots")
+    assert code == 0
+    assert [line.split()[0] for line in out.splitlines()[1:]] == list(kin.builtin_robots())
+    assert answer(capsys, "robots") == client.get("/api/v1/robots").json()
+    assert answer(capsys, "robots", "redundant7") == client.get("/api/v1/robots/redundant7").json()
+    code, out, _ = run(capsys, "robots", "pioneer5")
+    assert re.search(
+        r"^rotating base +revolute +0\.000° +130\.000 +70\.000 +-90\.000° +0\.000° … 180\.000°$", out, re.M
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("fk", "puma", 1), "expected one of pioneer5"),
+        (("fk", "pioneer5", 1, 2), "one for each of: rotating base"),
+        (("fk", "pioneer5", 1, 2, 3, 4, "x"), "invalid number value: 'x'"),
+        (("fk", "pioneer5", 1, 2, 3, 4, "nan"), "'nan' is not a number"),
+        (("fk", "pioneer5", 1, 2, 3, 4, "-inf"), "'-inf' is not a number"),
+        (("fk", "pioneer5", 1, 2, 3, 4, "1e308"), "between -1e6 and 1e6"),
+        (("fk", "pioneer5"), "required"),
+        (("ik", "pioneer5"), "--position"),
+        (("ik", "pioneer5", "--position", 1, 2), "expected 3 arguments"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--wxyz", 0, 0, 0, 0), "not zero"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--approach", 0, 0, 0), "not zero"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--task", "pose"), "--wxyz"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--task", "approach"), "--approach"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--seed", 1), "--seed"),
+        (("robots", "puma"), "expected one of pioneer5"),
+        (("robots", "--robots", "/no/such/folder"), "existing folder"),
+        (("dance",), "invalid choice: 'dance'"),
+        (("serve", "--port", "http"), "invalid int value"),
+        (("serve", "--port", "99999"), "--port or KINBOARD_PORT: got 99999"),
+    ],
+)
+def test_bad_input_is_exit_code_2_and_one_clear_message(capsys, words, said):
+    code, out, err = run(capsys, *words)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert len(err.splitlines()) <= 6
+
+
+def test_a_bad_environment_variable_is_named(capsys, monkeypatch):
+    monkeypatch.setenv("KINBOARD_MAX_BATCH", "-1")
+    code, _, err = run(capsys, "serve")
+    assert code == 2
+    assert "KINBOARD_MAX_BATCH: got '-1'" in err
+
+
+@pytest.fixture
+def served(monkeypatch):
+    """What the command line would have served, instead of serving it."""
+    import app.main
+
+    calls = []
+    monkeypatch.setattr(
+        app.main, "run", lambda settings, open_browser: calls.append((settings, open_browser)) or 0
+    )
+    return calls
+
+
+@pytest.mark.parametrize("words", [(), ("serve",)])
+def test_serving_is_the_default(served, words):
+    assert cli.main(words) == 0
+    assert served == [(Settings(), False)]
+
+
+@pytest.mark.parametrize("first", [(), ("serve",)])
+def test_flags_reach_the_settings_and_win_over_the_environment(served, monkeypatch, first, tmp_path):
+    monkeypatch.setenv("KINBOARD_PORT", "1234")
+    monkeypatch.setenv("KINBOARD_HOST", "0.0.0.0")
+    words = (*first, "--port", "0", "--open", "--root-path", "/arms", "--robots", str(tmp_path))
+    assert cli.main(words) == 0
+    settings, opened = served[0]
+    assert (settings.port, settings.host, settings.root_path, settings.robots) == (0, "0.0.0.0", "/arms", tmp_path)
+    assert opened is True
+
+
+def test_version_and_help(capsys):
+    assert run(capsys, "--version") == (0, f"kinboard {kin.__version__}\n", "")
+    code, out, _ = run(capsys, "--help")
+    assert code == 0
+    assert "kinboard fk pioneer5 90 30 60 30 30" in out
+
+
+def test_the_program_itself():
+    """A process of its own, without the compiler: the same digits, and a start that does not load the server."""
+    words = [
+        sys.executable,
+        "-X",
+        "importtime",
+        "-m",
+        "app.cli",
+        "fk",
+        "pioneer5",
+        "90",
+        "-30",
+        "60",
+        "30",
+        "30",
+        "--json",
+    ]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, timeout=60, check=True)
+    T = kin.fk(PIONEER, np.radians([90, -30, 60, 30, 30]))
+    assert np.allclose(json.loads(done.stdout)["pose"]["matrix"], T, rtol=0, atol=1e-15)
+    imported = {line.rsplit("|", 1)[1].strip() for line in done.stderr.splitlines() if "|" in line}
+    assert "kin.fk" in imported
+    assert not imported & {"fastapi", "pydantic", "viser", "uvicorn"}
+
+
+def test_a_reader_that_leaves_early_is_no_error():
+    words = f"{sys.executable} -m app.cli robots --json | true"
+    done = subprocess.run(words, cwd=ROOT, shell=True, capture_output=True, text=True, timeout=60, check=True)
+    assert done.stderr == ""
