@@ -1,0 +1,117 @@
+"""A robot's rows regrouped for the screen: one node per moving joint, each the parent of the next.
+
+With nodes nested like the arm itself, moving a revolute joint means assigning one quaternion, whichever
+convention the table uses:
+
+    T_base_tool = G_1 M(q_1) G_2 M(q_2) … G_n M(q_n) E
+
+M(q) turns about z (or slides along z); the constants G_k collect everything between two motions. In a standard
+row the motion comes first, ``M · Rz(θ) Tz(d) Tx(a) Rx(α)``; in a modified one it stands in the middle,
+``Rx(α) Tx(a) · M · Rz(θ) Tz(d)``. Rz and Tz about the same axis commute, so M may be pulled to the front of both.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from kin import Robot
+from kin.robot import Joint, exact_cos_sin
+from kin.transforms import Array, wxyz_from_rotation
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """A rigid piece: what moves with one joint, up to the next one.
+
+    Attributes:
+        index: number of the moving joint it hangs on, −1 for the base.
+        joint: that joint's row, None for the base.
+        T_parent_axis: G_k ``(4, 4)``; z is the joint's axis, in coordinates of the previous link.
+        path: centre line ``(k, 3)`` from the axis to the next joint (or the tool), in the link's coordinates.
+        frames: (row number, T_link_frame) of each DH row's frame that rides on this link.
+    """
+
+    index: int
+    joint: Joint | None
+    T_parent_axis: Array
+    path: Array
+    frames: tuple[tuple[int, Array], ...]
+
+    def pose(self, value: float) -> tuple[Array, Array]:
+        """Position ``(3,)`` and wxyz ``(4,)`` in the parent link, for a joint value in radians or metres."""
+        G = self.T_parent_axis
+        if self.joint is not None and self.joint.kind == "prismatic":
+            return G[:3, 3] + G[:3, 2] * value, wxyz_from_rotation(G[:3, :3])
+        return G[:3, 3], turn(wxyz_from_rotation(G[:3, :3]), value)
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """All links from the base on, and the tool's place on the last one."""
+
+    links: tuple[Link, ...]
+    T_last_tool: Array
+
+
+def chain(robot: Robot) -> Chain:
+    """The robot's rows regrouped into links."""
+    links: list[Link] = []
+    joint: Joint | None = None
+    start, T = np.eye(4), robot.T_world_base.copy()
+    path: list[Array] = [T[:3, 3].copy()]
+    frames: list[tuple[int, Array]] = []
+
+    def close() -> None:
+        links.append(Link(len(links) - 1, joint, start, np.array(path), tuple(frames)))
+
+    for number, row in enumerate(robot.rows):
+        for step in _steps(row, robot.convention == "modified"):
+            if step is None:
+                close()
+                joint, start, T = row, T, np.eye(4)
+                path, frames = [np.zeros(3)], []
+                continue
+            T = T @ step
+            if np.linalg.norm(T[:3, 3] - path[-1]) > 1e-6:
+                path.append(T[:3, 3].copy())
+        frames.append((number, T))
+    T = T @ robot.T_last_tool
+    if np.linalg.norm(T[:3, 3] - path[-1]) > 1e-6:
+        path.append(T[:3, 3].copy())
+    close()
+    return Chain(tuple(links), T)
+
+
+def _steps(row: Joint, modified: bool) -> list[Array | None]:
+    """The row's elementary motions in order; None stands for the joint's own motion."""
+    motion: list[Array | None] = [] if row.kind == "fixed" else [None]
+    about_z: list[Array | None] = [_rotation(2, row.theta), _translation(2, row.d)]
+    about_x: list[Array | None] = [_translation(0, row.a), _rotation(0, row.alpha)]
+    if modified:
+        return [about_x[1], about_x[0], *motion, *about_z]
+    return [*motion, *about_z, *about_x]
+
+
+def _rotation(axis: int, angle: float) -> Array:
+    c, s = exact_cos_sin(angle)
+    T = np.eye(4)
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    T[i, i] = T[j, j] = c
+    T[i, j], T[j, i] = -s, s
+    return T
+
+
+def _translation(axis: int, length: float) -> Array:
+    T = np.eye(4)
+    T[axis, 3] = length
+    return T
+
+
+def turn(wxyz: Array, angle: float) -> Array:
+    """`wxyz` followed by a turn of `angle` about its own z axis."""
+    c, s = math.cos(angle / 2), math.sin(angle / 2)
+    w, x, y, z = wxyz.tolist()
+    return np.array([w * c - z * s, x * c + y * s, y * c - x * s, z * c + w * s])

@@ -1,0 +1,88 @@
+"""Easing: the shown configuration glides to the solved one instead of jumping there.
+
+A gizmo drag gives at most twenty solutions a second; a screen shows sixty pictures. Between two solutions the
+shown configuration moves along a straight line in joint space (the way joints really move), fast first and
+slower towards the end, and ends *exactly* on the solution. A new solution restarts from wherever the arm is
+shown, so easing never delays a solve. Joint space also keeps every picture a configuration inside the limits.
+"""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+
+from kin.transforms import Array
+
+FRAME = 1 / 60
+SHORTEST = 0.05  # one browser event to the next: dragging then looks continuous
+LONGEST = 0.6
+SPEED = 6.0  # rad/s of the joint that travels furthest (m/s × 4 for a prismatic one)
+
+
+class Motion:
+    """Where the shown configuration is at a given time.
+
+    Args:
+        q: where to begin ``(n,)``.
+        weights: radians per unit of each joint, so that metres and radians can share one speed.
+    """
+
+    def __init__(self, q: Array, weights: Array) -> None:
+        self._weights = weights
+        self._start = self._goal = np.array(q)
+        self._begun = self._duration = 0.0
+        self.moving = False
+
+    @property
+    def goal(self) -> Array:
+        """Where the motion ends ``(n,)``."""
+        return self._goal
+
+    def aim(self, goal: Array, now: float, ease: bool = True) -> None:
+        """Head for `goal` from the configuration shown at time `now` (seconds)."""
+        self._start = self.at(now)
+        self._goal = np.array(goal)
+        travel = float((np.abs(self._goal - self._start) * self._weights).max())
+        self._duration = min(max(SHORTEST, travel / SPEED), LONGEST) if ease else 0.0
+        self._begun = now
+        self.moving = True
+
+    def at(self, now: float) -> Array:
+        """The configuration to show at time `now`; clears `moving` on arrival."""
+        left = 1.0 - (now - self._begun) / self._duration if self._duration > 0 else 0.0
+        if not self.moving or left <= 0.0:
+            self.moving = False
+            return self._goal
+        return self._goal + (self._start - self._goal) * min(left, 1.0) ** 2
+
+
+class Pace:
+    """How often moving arms may be redrawn, shared by all visitors of a server.
+
+    A picture costs about a third of a millisecond of processor time. Thirty visitors dragging at sixty pictures
+    a second would fill a core and make everybody late, so visitors share a budget: few get smooth easing, many
+    get fewer pictures, and beyond that each solution is shown at once.
+    """
+
+    def __init__(self, pictures_per_second: float = 900.0) -> None:
+        self._budget = pictures_per_second
+        self._moving: set[int] = set()
+        self._lock = threading.Lock()
+
+    def moving(self, visitor: int, is_moving: bool) -> None:
+        """Tell whether this visitor's arm is moving."""
+        if (visitor in self._moving) == is_moving:
+            return
+        with self._lock:
+            (self._moving.add if is_moving else self._moving.discard)(visitor)
+
+    @property
+    def interval(self) -> float:
+        """Seconds between two pictures of one visitor."""
+        return max(FRAME, len(self._moving) / self._budget)
+
+    @property
+    def eases(self) -> bool:
+        """Whether easing is worth it: it is not, once it would show less than one picture per event."""
+        return self.interval < SHORTEST

@@ -1,0 +1,80 @@
+"""One slider per joint, with exact entry, limits, and the unit of the visitor's choice."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import viser
+
+from app.viewer.panel import Post, assign, listen
+from kin import InputError, Robot
+from kin.robot import Joint
+from kin.transforms import Array
+
+
+def label(robot: Robot, index: int) -> str:
+    """A joint's name on screen: its number, and its name unless that only repeats the number."""
+    name = robot.joints[index].name
+    number = str(index + 1)
+    return f"Joint {number}" if name.lower() == f"joint {number}" else f"{number} {name}"
+
+
+def scale(joint: Joint, degrees: bool) -> tuple[float, int, str]:
+    """Screen units per internal unit, decimals shown, and the unit's name."""
+    if joint.kind == "prismatic":
+        return 1000.0, 2, "mm"
+    return (180 / math.pi, 2, "°") if degrees else (1.0, 4, "rad")
+
+
+class JointSliders:
+    """The sliders of one robot in one unit; rebuilt when either changes.
+
+    Posts ``("joint", i, degrees)`` with the slider's value in screen units.
+    """
+
+    def __init__(
+        self, gui: viser.GuiApi, folder: viser.GuiFolderHandle, robot: Robot, q: Array, degrees: bool, post: Post
+    ) -> None:
+        self.robot = robot
+        self._degrees = degrees
+        self._sliders: list[viser.GuiSliderHandle[float]] = []
+        with folder:
+            for i, joint in enumerate(robot.joints):
+                factor, decimals, unit = scale(joint, degrees)
+                low, high = joint.limits or (-math.pi, math.pi)
+                bounds = (round(low * factor, decimals), round(high * factor, decimals))
+                slider = gui.add_slider(
+                    label(robot, i),
+                    min=bounds[0],
+                    max=bounds[1],
+                    step=10.0**-decimals,
+                    initial_value=min(max(round(float(q[i]) * factor, decimals), bounds[0]), bounds[1]),
+                    hint=f"{joint.name}: {bounds[0]:g} … {bounds[1]:g} {unit}",
+                )
+                listen(slider, post, ("joint", robot.id, i, degrees))
+                self._sliders.append(slider)
+
+    def read(self, index: int, value: object) -> float:
+        """A slider's value as radians or metres, inside the limits; raises `InputError` for anything else."""
+        if not isinstance(value, int | float) or not math.isfinite(value):
+            raise InputError(f"joint {index + 1}", value, "a finite number")
+        joint = self.robot.joints[index]
+        raw = float(value) / scale(joint, self._degrees)[0]
+        return float(np.clip(raw, self.robot.lower[index], self.robot.upper[index]))
+
+    def show(self, q: Array, held: int | None = None) -> None:
+        """Set every slider but the one in the visitor's hand, which would jump back under the pointer.
+
+        That one is set too if what was typed into it lies beyond a stop.
+        """
+        for i, slider in enumerate(self._sliders):
+            if i != held or not slider.min <= slider.value <= slider.max:
+                factor, decimals, _ = scale(self.robot.joints[i], self._degrees)
+                value = round(float(q[i]) * factor, decimals)
+                assign(slider, min(max(value, slider.min), slider.max))
+
+    def remove(self) -> None:
+        """Take the sliders out of the panel."""
+        for slider in self._sliders:
+            slider.remove()

@@ -1,0 +1,109 @@
+"""The status line: one sentence about the last request, told by words, a symbol and a colour together."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from html import escape
+from typing import Literal
+
+import viser
+
+from kin import IKResult
+
+Kind = Literal["reached", "compromise", "limits", "unreachable", "hand", "error"]
+
+# Symbol and colour of each kind; the colours are Okabe and Ito's, and the symbol alone tells them apart too.
+LOOKS: dict[Kind, tuple[str, str]] = {
+    "reached": ("✓", "#009e73"),
+    "compromise": ("≈", "#b87a00"),
+    "limits": ("!", "#d55e00"),
+    "unreachable": ("✕", "#c2185b"),
+    "hand": ("↻", "#0072b2"),
+    "error": ("?", "#6b4c9a"),
+}
+
+
+@dataclass(frozen=True)
+class Notice:
+    """What the visitor is told: a headline and a sentence."""
+
+    kind: Kind
+    title: str
+    detail: str = ""
+
+
+def notice(result: IKResult) -> Notice:
+    """The answer to a target, in words for people (degrees and millimetres)."""
+    kind, title = _headline(result)
+    return Notice(kind, title, _without_repeating(title, result.reason))
+
+
+def _headline(result: IKResult) -> tuple[Kind, str]:
+    if result.status == "solved":
+        return "reached", "Reached"
+    if result.status == "approximate":
+        best = result.best
+        error = best.rotation_error if best is not None else 0.0
+        name = "roll" if best is not None and best.compromise == "roll" else "rotation"
+        return "compromise", f"Reached with {name} error {angle(error)}"
+    if result.status == "limits":
+        numbers = [str(v.joint + 1) for v in result.violations]
+        which = "joint " + numbers[0] if len(numbers) == 1 else "joints " + ", ".join(numbers)
+        return "limits", f"Out of limits: {which}" if numbers else "Out of limits"
+    if result.distance > 0.0:
+        return "unreachable", f"Out of reach by {millimetres(result.distance)}"
+    return "unreachable", "Not attainable here"
+
+
+def _without_repeating(title: str, reason: str) -> str:
+    """The reason without its opening words when the headline has just said them."""
+    opening, colon, rest = reason.partition(": ")
+    if colon and opening.split()[0] == title.split()[0]:
+        return rest[:1].upper() + rest[1:]
+    return reason
+
+
+def angle(radians: float) -> str:
+    """An error angle for people: never rounded down to a zero that it is not."""
+    degrees = math.degrees(abs(radians))
+    return "< 0.1°" if 0.0 < degrees < 0.1 else f"{degrees:.1f}°"
+
+
+def millimetres(metres: float) -> str:
+    """A distance for people, in millimetres."""
+    mm = 1000.0 * metres
+    if mm < 0.1:
+        return "< 0.1 mm"
+    return f"{mm:.1f} mm" if mm < 10.0 else f"{mm:.0f} mm"
+
+
+def html(shown: Notice) -> str:
+    """The notice as a block whose height does not depend on its text, so that nothing below it jumps."""
+    symbol, color = LOOKS[shown.kind]
+    return (
+        f'<div role="status" aria-live="polite" data-status="{shown.kind}" style="display:flex;gap:.6em;'
+        f"margin:.15em 1em .35em;padding:.5em .65em;min-height:6.4em;box-sizing:border-box;"
+        f"border-radius:.4em;font-size:.85em;line-height:1.3;background:{color}1f;"
+        f'border-left:.28em solid {color}">'
+        f'<span aria-hidden="true" style="flex:none;width:1.5em;height:1.5em;line-height:1.5em;border-radius:50%;'
+        f'text-align:center;font-weight:700;color:#fff;background:{color}">{symbol}</span>'
+        f'<span style="min-width:0"><b style="display:block;line-height:1.5">{escape(shown.title)}</b>'
+        f'<span title="{escape(shown.detail, quote=True)}" style="display:-webkit-box;-webkit-line-clamp:3;'
+        f'-webkit-box-orient:vertical;overflow:hidden;font-size:.92em;opacity:.85">{escape(shown.detail)}</span>'
+        "</span></div>"
+    )
+
+
+class StatusLine:
+    """Shows one notice at a time."""
+
+    def __init__(self, gui: viser.GuiApi, first: Notice) -> None:
+        self._shown = first
+        self._html = gui.add_html(html(first))
+
+    def show(self, shown: Notice) -> None:
+        """Replace the notice."""
+        if shown != self._shown:
+            self._shown = shown
+            self._html.content = html(shown)

@@ -1,0 +1,77 @@
+"""The viewer door: a viser server on the loopback interface, one session per connected browser tab."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import logging
+import threading
+
+import viser
+
+from app.settings import Settings
+from app.store import Store
+from app.viewer.motion import Pace
+from app.viewer.panel.view import configure_theme
+from app.viewer.session import Session
+
+log = logging.getLogger(__name__)
+
+PATIENCE = 5.0
+
+
+class ViewerServer:
+    """Serves the 3-D page. Bound to 127.0.0.1: the public port bridges to it and decides who may come in."""
+
+    def __init__(self, store: Store, settings: Settings) -> None:
+        self._store = store
+        self._settings = settings
+        self._server: viser.ViserServer | None = None
+        self._sessions: dict[int, Session] = {}
+        self._lock = threading.Lock()
+        self._pace = Pace()
+
+    def start(self) -> int:
+        """Start listening on a free port of 127.0.0.1 and return that port."""
+        if self._server is not None:
+            raise RuntimeError("the viewer is already running")
+        with contextlib.redirect_stdout(io.StringIO()):  # viser prints an address that no visitor should use
+            server = viser.ViserServer(host="127.0.0.1", port=0, label="Kinboard", verbose=False)
+        self._server = server
+        configure_theme(server.gui, dark=False)
+        server.scene.configure_default_lights(enabled=True, cast_shadow=True)
+        server.on_client_connect(self._welcome)
+        server.on_client_disconnect(self._farewell)
+        return server.get_port()
+
+    def stop(self) -> None:
+        """End every session and the server; returns when their threads are gone."""
+        server, self._server = self._server, None
+        if server is None:
+            return
+        with self._lock:
+            sessions, self._sessions = list(self._sessions.values()), {}
+        for session in sessions:
+            session.end()
+        with contextlib.redirect_stdout(io.StringIO()):
+            server.stop()
+        for session in sessions:
+            if not session.join(PATIENCE):
+                log.error("a visitor's worker did not end within %s s", PATIENCE)
+
+    @property
+    def visitors(self) -> int:
+        """How many tabs are connected."""
+        return len(self._sessions)
+
+    async def _welcome(self, client: viser.ClientHandle) -> None:
+        session = Session(client, self._store, self._pace)
+        with self._lock:
+            self._sessions[client.client_id] = session
+        session.start()
+
+    async def _farewell(self, client: viser.ClientHandle) -> None:
+        with self._lock:
+            session = self._sessions.pop(client.client_id, None)
+        if session is not None:
+            session.end()

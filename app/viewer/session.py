@@ -1,0 +1,317 @@
+"""One visitor: their arm, their panel, and the one thread that touches both.
+
+Callbacks of the browser post into the inbox and return. The worker takes everything that is new, acts on it, and
+sends one consistent picture. While the arm is in motion it wakes up for the next picture too; otherwise it
+sleeps. Nothing here is locked, because nothing here is shared.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Hashable
+from typing import cast
+
+import numpy as np
+import viser
+
+import kin
+from app.store import Store
+from app.viewer import camera
+from app.viewer.inbox import Inbox
+from app.viewer.motion import Motion, Pace
+from app.viewer.panel import assign, listen, listen_click
+from app.viewer.panel.joints import JointSliders
+from app.viewer.panel.readout import PoseReadout
+from app.viewer.panel.status import Notice, StatusLine, notice
+from app.viewer.panel.target import TASKS, TargetChoice, Task, default_task
+from app.viewer.panel.view import ViewOptions, ViewState, configure_theme
+from app.viewer.scene import ArmScene
+from kin import Robot
+from kin.transforms import Array, from_position_wxyz
+
+log = logging.getLogger(__name__)
+
+READOUT_INTERVAL = 0.05
+NARROW = 700  # pixels
+# Phase (start, update, end), position (m) and wxyz of the gizmo.
+GizmoEvent = tuple[str, list[float], list[float]]
+WELCOME = Notice("hand", "Ready", "Drag the gizmo at the tool, or move a joint.")
+BY_HAND = Notice("hand", "Moved by joints", "The target follows the tool.")
+
+
+class Session:
+    """The state of one visitor.
+
+    `start`, `post`, `end` and `join` may be called by any thread; everything else belongs to the worker.
+    """
+
+    def __init__(self, client: viser.ClientHandle, store: Store, pace: Pace) -> None:
+        self._client = client
+        self._store = store
+        self._pace = pace
+        self._inbox = Inbox()
+        self._thread = threading.Thread(target=self._run, name=f"visitor-{client.client_id}", daemon=True)
+        self._rng = np.random.default_rng()
+        self._degrees = True
+        self._view = ViewState()
+        self._dragging = False
+        # The pose asked for with the gizmo, for as long as it is the arm's task; None: the gizmo follows the tool.
+        self._target: Array | None = None
+        self._reached = False
+        self._read_at = 0.0
+        self._arms = 0
+        # Made by the worker when it builds the page.
+        self._robot: Robot
+        self._task: Task
+        self._motion: Motion
+        self._scene: ArmScene
+        self._status: StatusLine
+        self._readout: PoseReadout
+        self._robot_choice: viser.GuiDropdownHandle[str]
+        self._joint_folder: viser.GuiFolderHandle
+        self._sliders: JointSliders
+        self._target_choice: TargetChoice
+
+    def start(self) -> None:
+        """Build the visitor's page and begin to answer."""
+        self._thread.start()
+
+    def post(self, key: Hashable, value: object = None) -> None:
+        """Tell the worker that the visitor did something."""
+        self._inbox.post(key, value)
+
+    def end(self) -> None:
+        """Let the worker finish."""
+        self._inbox.close()
+
+    def join(self, timeout: float | None = None) -> bool:
+        """Wait for the worker to finish; whether it did."""
+        self._thread.join(timeout)
+        return not self._thread.is_alive()
+
+    # The worker
+
+    def _run(self) -> None:
+        try:
+            self._guard(self._build)
+            while (batch := self._inbox.take(self._pace.interval if self._moving else None)) is not None:
+                self._guard(lambda batch=batch: self._step(batch))  # type: ignore[misc]
+        finally:
+            self._pace.moving(self._client.client_id, False)
+
+    @property
+    def _moving(self) -> bool:
+        return hasattr(self, "_motion") and self._motion.moving
+
+    def _guard(self, act: Callable[[], None]) -> None:
+        """Run one step; an error is logged and shown, and the session lives on."""
+        try:
+            act()
+        except Exception as error:
+            if self._inbox.closed:
+                log.debug("visitor %s left in mid-motion: %s", self._client.client_id, error)
+                return
+            log.exception("visitor %s", self._client.client_id)
+            self._show_error(error)
+
+    def _show_error(self, error: Exception) -> None:
+        expected = isinstance(error, kin.KinematicsError)
+        detail = str(error) if expected else f"{type(error).__name__}; the server's log has the details."
+        try:
+            self._status.show(Notice("error", "Not understood" if expected else "Something went wrong", detail))
+            self._client.flush()
+        except Exception:
+            log.exception("visitor %s: the error could not be shown", self._client.client_id)
+
+    def _step(self, batch: list[tuple[Hashable, object]]) -> None:
+        with self._client.atomic():
+            for key, value in batch:
+                # Each on its own, so that one bad value does not take the others with it.
+                self._guard(lambda key=key, value=value: self._handle(key, value))  # type: ignore[misc]
+            self._draw(fresh=bool(batch))
+        self._client.flush()
+
+    def _handle(self, key: Hashable, value: object) -> None:
+        match key:
+            case "gizmo":
+                self._on_gizmo(value)
+            case ("joint", str(robot_id), int(index), bool(degrees)):
+                # A late event of sliders that are already replaced says nothing about the present ones.
+                if (robot_id, degrees) == (self._robot.id, self._degrees):
+                    self._on_slider(index, value)
+            case "robot":
+                self._on_robot(str(value))
+            case "task":
+                self._on_task(str(value))
+            case "units":
+                self._on_units(bool(value))
+            case "home":
+                self._go(self._robot.q_home)
+            case "random":
+                self._go(self._robot.random_q(self._rng))
+            case "recall":
+                self._go(self._motion.goal)
+            case ("view", str(name)):
+                self._on_view(name, bool(value))
+            case "camera":
+                camera.aim(self._client.camera, self._scene.body)
+            case _:
+                raise KeyError(key)
+
+    # What the visitor can do
+
+    def _on_gizmo(self, value: object) -> None:
+        phase, position, wxyz = cast(GizmoEvent, value)
+        self._dragging = phase != "end"
+        if phase == "start":
+            return
+        target = from_position_wxyz(position, wxyz)
+        if self._target is None or not np.array_equal(target, self._target):
+            self._solve(target)
+
+    def _on_slider(self, index: int, value: object) -> None:
+        q = self._motion.goal.copy()
+        q[index] = self._sliders.read(index, value)
+        self._target = None
+        self._motion.aim(q, time.perf_counter(), self._pace.eases)
+        self._sliders.show(q, held=index)
+        self._status.show(BY_HAND)
+
+    def _on_robot(self, name: str) -> None:
+        robot = next((r for r in self._store.robots if r.name == name), None)
+        if robot is None:
+            assign(self._robot_choice, self._robot.name)
+            robot = self._store.get(name)  # raises with the list of valid ones
+        if robot == self._robot:
+            return
+        self._sliders.remove()
+        self._scene.remove()
+        self._use(robot)
+        self._status.show(Notice("hand", robot.name, robot.description))
+
+    def _on_task(self, name: str) -> None:
+        if name not in TASKS:
+            self._target_choice.show(self._task)
+            raise kin.InputError("task", name, "one of " + ", ".join(TASKS))
+        self._task = TASKS[name]
+        self._scene.gizmo.disable_rotations = self._task == "position"
+        if self._target is not None:
+            self._solve(self._target)
+
+    def _on_units(self, radians: bool) -> None:
+        self._degrees = not radians
+        self._sliders.remove()
+        self._sliders = self._make_sliders()
+
+    def _on_view(self, name: str, value: bool) -> None:
+        setattr(self._view, name, value)
+        if name == "dark":
+            configure_theme(self._client.gui, value)
+        self._apply_view()
+
+    def _solve(self, T: Array) -> None:
+        """Answer the gizmo's target: seed with where the arm is heading, so that it stays on its branch."""
+        target = T[:3, 3] if self._task == "position" else T
+        result = kin.solve_ik(self._robot, target, task=self._task, q_seed=self._motion.goal)
+        self._target = T
+        if result.best is not None:
+            self._motion.aim(result.best.q, time.perf_counter(), self._pace.eases)
+            self._sliders.show(result.best.q)
+        self._reached = result.status == "solved"
+        self._status.show(notice(result))
+
+    def _go(self, q: Array) -> None:
+        """Head for a configuration, the gizmo following the tool."""
+        self._target = None
+        self._motion.aim(q, time.perf_counter(), self._pace.eases)
+        self._sliders.show(q)
+        self._status.show(BY_HAND)
+
+    # What the visitor sees
+
+    def _build(self) -> None:
+        gui = self._client.gui
+        with self._client.atomic():
+            if self._client.camera.image_width >= NARROW:  # a phone shows the panel as a sheet from below
+                gui.main_panel.dock_right()
+            robot = self._store.robots[0]
+            self._task = default_task(robot)
+            self._status = StatusLine(gui, WELCOME)
+            names = tuple(r.name for r in self._store.robots)
+            self._robot_choice = gui.add_dropdown("Robot", names, initial_value=robot.name)
+            listen(self._robot_choice, self.post, "robot")
+            self._readout = PoseReadout(gui, kin.fk(robot, robot.q_home), self._degrees)
+            tabs = gui.add_tab_group()
+            with tabs.add_tab("Move"):
+                self._joint_folder = gui.add_folder("Joints")
+                buttons = gui.add_button_group("Go to", ("Home", "Random"))
+                listen_click(buttons, self.post, {"Home": "home", "Random": "random"})
+                self._target_choice = TargetChoice(gui, self._task, self.post)
+            with tabs.add_tab("View"):
+                units = gui.add_checkbox("Radians", False, hint="Angles in radians instead of degrees")
+                listen(units, self.post, "units")
+                ViewOptions(gui, self._view, self.post)
+            self._use(robot)
+        self._client.flush()
+
+    def _use(self, robot: Robot) -> None:
+        """Show another robot, at home, in a fitting view."""
+        self._robot = robot
+        self._target = None
+        self._dragging = False
+        weights = np.where(robot.revolute, 1.0, 4.0)
+        self._motion = Motion(robot.q_home, weights)
+        self._arms += 1
+        self._scene = ArmScene(self._client.scene, robot, self._view.dark, f"/arm-{self._arms}")
+        self._task = default_task(robot)
+        self._target_choice.show(self._task)
+        self._listen_gizmo()
+        self._sliders = self._make_sliders()
+        self._apply_view()
+        camera.aim(self._client.camera, self._scene.body)
+
+    def _make_sliders(self) -> JointSliders:
+        return JointSliders(
+            self._client.gui, self._joint_folder, self._robot, self._motion.goal, self._degrees, self.post
+        )
+
+    def _listen_gizmo(self) -> None:
+        @self._scene.gizmo.on_update
+        async def _(event: viser.TransformControlsEvent) -> None:
+            if event.client is not None:
+                gizmo = event.target
+                self.post("gizmo", (event.phase, gizmo.position.tolist(), gizmo.wxyz.tolist()))
+
+    def _apply_view(self) -> None:
+        self._scene.show_frames(self._view.frames)
+        self._scene.show_labels(self._view.labels)
+        self._scene.show_axes(self._view.axes)
+        self._scene.use_dark(self._view.dark)
+
+    def _draw(self, fresh: bool) -> None:
+        """Send the picture of this moment."""
+        now = time.perf_counter()
+        # The first picture after an event already shows motion: half a frame of waiting would be felt as lag.
+        q = self._motion.at(now + self._pace.interval if fresh else now)
+        arrived = not self._motion.moving
+        self._pace.moving(self._client.client_id, not arrived)
+        T = kin.fk(self._robot, q)
+        self._scene.show(q)
+        if self._target is None:
+            if not self._dragging:
+                self._scene.place_gizmo(T)
+            self._scene.show_gap(T[:3, 3], None)
+        elif arrived and self._reached and not self._dragging:
+            # A task that leaves something free is done: from here on the target is where the tool really is.
+            self._target = None
+            self._scene.place_gizmo(T)
+            self._scene.show_gap(T[:3, 3], None)
+        else:
+            target = self._target[:3, 3]
+            far = float(np.linalg.norm(T[:3, 3] - target)) > 5e-4 and not self._reached
+            self._scene.show_gap(T[:3, 3], target if far else None)
+        if arrived or now - self._read_at > READOUT_INTERVAL:
+            self._read_at = now
+            self._readout.show(T, self._degrees)

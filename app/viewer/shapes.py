@@ -1,0 +1,140 @@
+"""The few solids an arm is made of: lathed parts, swept tubes, boxes.
+
+The browser smooths shading over vertices that faces share. So a round side shares them, and an edge that should
+look sharp has its vertices twice.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import trimesh
+from numpy.typing import ArrayLike, NDArray
+
+from kin.transforms import Array, frame_from_approach
+
+Faces = NDArray[np.int64]
+SEGMENTS = 28
+
+
+def lathe(profile: ArrayLike) -> trimesh.Trimesh:
+    """The solid of revolution about z of a profile ``(k, 2)`` of (radius, z), from bottom to top; edges sharp."""
+    points = np.asarray(profile, dtype=float)
+    angles = np.linspace(0.0, 2 * np.pi, SEGMENTS, endpoint=False)
+    ring = np.column_stack([np.cos(angles), np.sin(angles)])
+    vertices: list[Array] = []
+    faces: list[Faces] = []
+    for low, high in pairwise(points):
+        base = len(vertices) * SEGMENTS
+        vertices += [np.column_stack([r * ring, np.full(SEGMENTS, z)]) for r, z in (low, high)]
+        faces.append(_band(base, base + SEGMENTS))
+    return _mesh(np.vstack(vertices), np.vstack(faces))
+
+
+def cylinder(radius: float, low: float, high: float, bevel: float = 0.12) -> trimesh.Trimesh:
+    """A cylinder about z between two heights, its rims bevelled by a share of the radius."""
+    b = min(bevel * radius, 0.4 * (high - low))
+    return lathe(
+        [(0, low), (radius - b, low), (radius, low + b), (radius, high - b), (radius - b, high), (0, high)]
+    )
+
+
+def cone(radius: float, low: float, high: float) -> trimesh.Trimesh:
+    """A cone about z with its tip at `high`."""
+    return lathe([(0, low), (radius, low), (0, high)])
+
+
+def ball(radius: float, center: ArrayLike = (0.0, 0.0, 0.0)) -> trimesh.Trimesh:
+    """A sphere."""
+    return tube(np.asarray([center]), radius)
+
+
+def box(low: ArrayLike, high: ArrayLike) -> trimesh.Trimesh:
+    """A box between two corners, with sharp edges."""
+    solid = trimesh.creation.box(bounds=np.array([low, high], dtype=float))
+    corners = solid.triangles.reshape(-1, 3)
+    return _mesh(corners, np.arange(len(corners), dtype=np.int64).reshape(-1, 3))
+
+
+def tube(path: Array, radius: float) -> trimesh.Trimesh:
+    """A round tube with hemispherical ends along a centre line ``(k, 3)``, its corners rounded.
+
+    One point gives a sphere.
+    """
+    line = _rounded(path, 2.2 * radius) if len(path) > 2 else path
+    ends = np.linspace(np.pi / 2, 0.0, 6)[:-1]
+    if len(line) == 1:
+        up = np.array([0.0, 0.0, 1.0])
+        tangents = np.array([up, up])
+        line = np.vstack([line, line])
+    else:
+        steps = np.diff(line, axis=0)
+        steps /= np.linalg.norm(steps, axis=1, keepdims=True)
+        tangents = np.vstack([steps[:1], steps[:-1] + steps[1:], steps[-1:]])
+        lengths = np.linalg.norm(tangents, axis=1, keepdims=True)
+        # A centre line that doubles back has no mean direction at its turning point.
+        before = np.vstack([steps[:1], steps])
+        tangents = np.where(lengths > 1e-6, tangents / np.maximum(lengths, 1e-6), before)
+    centers, radii = [], []
+    centers += [line[0] - tangents[0] * radius * np.sin(a) for a in ends]
+    radii += [radius * np.cos(a) for a in ends]
+    centers += list(line)
+    radii += [radius] * len(line)
+    centers += [line[-1] + tangents[-1] * radius * np.sin(a) for a in ends[::-1]]
+    radii += [radius * np.cos(a) for a in ends[::-1]]
+    directions = np.vstack([[tangents[0]] * len(ends), tangents, [tangents[-1]] * len(ends)])
+
+    angles = np.linspace(0.0, 2 * np.pi, SEGMENTS, endpoint=False)
+    side = frame_from_approach(directions[0])[:, 0]
+    rings, faces = [], []
+    for k, (center, r, direction) in enumerate(zip(centers, radii, directions, strict=True)):
+        # Parallel transport: carry the side vector along instead of choosing it anew, so the tube does not twist.
+        side = side - direction * (side @ direction)
+        norm = float(np.linalg.norm(side))
+        side = side / norm if norm > 1e-6 else frame_from_approach(direction)[:, 0]
+        other = np.cross(direction, side)
+        rings.append(center + r * (np.outer(np.cos(angles), side) + np.outer(np.sin(angles), other)))
+        if k:
+            faces.append(_band((k - 1) * SEGMENTS, k * SEGMENTS))
+    return _mesh(np.vstack(rings), np.vstack(faces))
+
+
+def merged(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
+    """Several solids as one mesh."""
+    offsets = np.cumsum([0, *(len(p.vertices) for p in parts[:-1])])
+    return _mesh(
+        np.vstack([p.vertices for p in parts]),
+        np.vstack([p.faces + o for p, o in zip(parts, offsets, strict=True)]),
+    )
+
+
+def placed(mesh: trimesh.Trimesh, T: Array) -> trimesh.Trimesh:
+    """A copy of the mesh moved by a transform ``(4, 4)``."""
+    return _mesh(mesh.vertices @ T[:3, :3].T + T[:3, 3], np.asarray(mesh.faces))
+
+
+def _band(low: int, high: int) -> Faces:
+    i = np.arange(SEGMENTS)
+    j = (i + 1) % SEGMENTS
+    return np.vstack(
+        [np.column_stack([low + i, low + j, high + j]), np.column_stack([low + i, high + j, high + i])]
+    )
+
+
+def _rounded(path: Array, radius: float, steps: int = 7) -> Array:
+    """The polyline with each corner replaced by a parabola that touches both sides."""
+    points = [path[0]]
+    for before, corner, after in zip(path[:-2], path[1:-1], path[2:], strict=True):
+        a, b = before - corner, after - corner
+        la, lb = float(np.linalg.norm(a)), float(np.linalg.norm(b))
+        cut = min(radius, 0.45 * la, 0.45 * lb)
+        p, r = corner + a / la * cut, corner + b / lb * cut
+        t = np.linspace(0.0, 1.0, steps)[:, None]
+        points += list((1 - t) ** 2 * p + 2 * t * (1 - t) * corner + t**2 * r)
+    points.append(path[-1])
+    return np.array(points)
+
+
+def _mesh(vertices: Array, faces: Faces) -> trimesh.Trimesh:
+    return trimesh.Trimesh(vertices, faces, process=False)

@@ -1,0 +1,182 @@
+"""A browser tab without a browser: speaks viser's websocket protocol and keeps what a page would show."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+import numpy as np
+import viser
+import zstandard
+from websockets.sync.client import connect
+
+from kin.transforms import from_position_wxyz, wxyz_from_rotation
+
+
+class FakeBrowser:
+    """One visitor. `pump` reads messages; everything shown is in `gui`, `values`, `poses` and `visible`."""
+
+    def __init__(self, port: int, width: int = 1280, height: int = 720) -> None:
+        self._socket = connect(
+            f"ws://127.0.0.1:{port}",
+            subprotocols=[f"viser-v{viser.__version__}"],  # type: ignore[list-item]
+            max_size=None,
+            compression=None,
+        )
+        self.gui: dict[str, dict[str, Any]] = {}
+        self.values: dict[str, Any] = {}
+        self.poses: dict[str, dict[str, tuple[float, ...]]] = {}
+        self.visible: dict[str, bool] = {}
+        self.nodes: dict[str, dict[str, Any]] = {}
+        self.log: list[dict[str, Any]] = []
+        self.send(
+            "ViewerCameraMessage",
+            wxyz=(1, 0, 0, 0),
+            position=(3, 3, 3),
+            fov=1.3,
+            near=0.01,
+            far=1000,
+            image_height=height,
+            image_width=width,
+            look_at=(0, 0, 0),
+            up_direction=(0, 0, 1),
+        )
+
+    def __enter__(self) -> FakeBrowser:
+        self.wait(lambda: any(m["type"] == "TransformControlsMessage" for m in self.nodes.values()))
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._socket.close()
+
+    def close(self) -> None:
+        self._socket.close()
+
+    def send(self, type_: str, **fields: Any) -> None:
+        self._socket.send(msgspec.msgpack.encode({"type": type_, **fields}))
+
+    def send_raw(self, data: bytes | str) -> None:
+        self._socket.send(data)
+
+    # What is shown
+
+    def element(self, label: str) -> str:
+        """The uuid of the input element with this label."""
+        found = [u for u, m in self.gui.items() if m["props"].get("label") == label]
+        assert len(found) == 1, (label, [m["props"].get("label") for m in self.gui.values()])
+        return found[0]
+
+    def value(self, label: str) -> Any:
+        return self.values[self.element(label)]
+
+    @property
+    def html(self) -> str:
+        return " ".join(m["props"].get("content", "") for m in self.gui.values())
+
+    @property
+    def sliders(self) -> list[str]:
+        return [m["props"]["label"] for m in self.gui.values() if m["type"] == "GuiSliderMessage"]
+
+    @property
+    def gizmo(self) -> str:
+        return next(n for n, m in self.nodes.items() if m["type"] == "TransformControlsMessage")
+
+    def gizmo_pose(self) -> np.ndarray:
+        return self.local(self.gizmo)
+
+    def tool_pose(self) -> np.ndarray:
+        """The gripper of the arm, by composing every node above it."""
+        name = next(n for n in self.nodes if n.endswith("/gripper") and not n.startswith(self.gizmo))
+        T = np.eye(4)
+        parts = name.strip("/").split("/")
+        for k in range(len(parts)):
+            T = T @ self.local("/" + "/".join(parts[: k + 1]))
+        return T
+
+    def local(self, name: str) -> np.ndarray:
+        pose = self.poses.get(name, {})
+        return from_position_wxyz(pose.get("position", (0, 0, 0)), pose.get("wxyz", (1, 0, 0, 0)))
+
+    # What the visitor does
+
+    def set(self, label: str, value: Any) -> None:
+        uuid = self.element(label)
+        self.values[uuid] = value
+        self.send("GuiUpdateMessage", uuid=uuid, updates={"value": value})
+
+    def grab(self) -> None:
+        self.send("TransformControlsDragStartMessage", name=self.gizmo, owner=self.nodes[self.gizmo]["owner"])
+
+    def drag(self, T: np.ndarray | None = None, position: Any = None, wxyz: Any = None) -> None:
+        if T is not None:
+            position, wxyz = T[:3, 3].tolist(), wxyz_from_rotation(T[:3, :3]).tolist()
+        self.poses[self.gizmo] = {"position": position, "wxyz": wxyz}
+        self.send(
+            "TransformControlsUpdateMessage",
+            name=self.gizmo,
+            position=position,
+            wxyz=wxyz,
+            owner=self.nodes[self.gizmo]["owner"],
+        )
+
+    def release(self) -> None:
+        self.send("TransformControlsDragEndMessage", name=self.gizmo, owner=self.nodes[self.gizmo]["owner"])
+
+    # Time
+
+    def wait(self, until: Callable[[], bool], timeout: float = 10.0) -> None:
+        """Read messages until a condition holds; fails after `timeout` seconds."""
+        end = time.monotonic() + timeout
+        while not until():
+            left = end - time.monotonic()
+            assert left > 0, f"not seen within {timeout} s; page shows: {self.html[:600]}"
+            self._read(left)
+
+    def settle(self, quiet: float = 0.3, timeout: float = 10.0) -> None:
+        """Read messages until none came for `quiet` seconds."""
+        end = time.monotonic() + timeout
+        while self._read(quiet):
+            assert time.monotonic() < end, f"the page did not come to rest within {timeout} s"
+
+    def _read(self, timeout: float) -> bool:
+        try:
+            data = self._socket.recv(timeout=timeout)
+        except TimeoutError:
+            return False
+        assert isinstance(data, bytes)
+        size, packed = (int.from_bytes(data[i : i + 8], "little") for i in (0, 8))
+        inner = zstandard.ZstdDecompressor().decompress(data[16 : 16 + packed], max_output_size=size)
+        for message in msgspec.msgpack.decode(inner)["messages"]:
+            self._apply(message)
+        return True
+
+    def _apply(self, m: dict[str, Any]) -> None:
+        self.log.append(m)
+        match m["type"]:
+            case "SetPositionMessage":
+                self.poses.setdefault(m["name"], {})["position"] = m["position"]
+            case "SetOrientationMessage":
+                self.poses.setdefault(m["name"], {})["wxyz"] = m["wxyz"]
+            case "SetSceneNodeVisibilityMessage":
+                self.visible[m["name"]] = m["visible"]
+            case "RemoveSceneNodeMessage":
+                # Like the real page, poses stay behind.
+                self.nodes = {
+                    n: v for n, v in self.nodes.items() if n != m["name"] and not n.startswith(m["name"] + "/")
+                }
+            case "GuiUpdateMessage":
+                if m["uuid"] in self.gui:
+                    for key, value in m["updates"].items():
+                        if key == "value":
+                            self.values[m["uuid"]] = value
+                        else:
+                            self.gui[m["uuid"]]["props"][key] = value
+            case "GuiRemoveMessage":
+                self.gui.pop(m["uuid"], None)
+            case kind if kind.startswith("Gui") and "props" in m and "uuid" in m:
+                self.gui[m["uuid"]] = m
+                self.values[m["uuid"]] = m.get("value")
+            case _ if "props" in m and "name" in m:
+                self.nodes[m["name"]] = m
