@@ -182,7 +182,9 @@ def best_of(
     for i in range(starts.shape[0]):
         q[:] = starts[i]
         cost = descend(model, target, task, weight, lower, upper, q)
-        if cost < best:
+        # A later start must be better by more than rounding: of equal minima the one nearest to the seed stays,
+        # so that the arm does not jump about while a target is dragged out of reach.
+        if cost < best * (1.0 - 1e-6) - 1e-12:
             best = cost
             out[:] = q
             if best <= enough:

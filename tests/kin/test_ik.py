@@ -236,6 +236,25 @@ def test_too_far_says_how_far(robot_id, task):
     assert np.isfinite(result.closest.q).all()
 
 
+@pytest.mark.parametrize("robot_id", ROBOTS)
+def test_dragging_out_of_reach_does_not_make_the_arm_jump(robot_id):
+    """Of all equally close postures the one next to the present one is taken, step after step."""
+    robot = kin.get_robot(robot_id)
+    target = kin.fk(robot, robot.home)
+    direction = target[:3, 3] / np.linalg.norm(target[:3, 3])
+    q = np.array(robot.home)
+    steps, refused = [], 0
+    for _ in range(60):
+        target = target.copy()
+        target[:3, 3] += 0.02 * direction
+        result = solve_ik(robot, target, task="approach", q_seed=q)
+        refused += result.status is Status.UNREACHABLE
+        steps.append(np.abs(result.best.q - q).max())
+        q = np.array(result.best.q)
+    assert refused > 20
+    assert max(steps[-20:]) < math.radians(5)
+
+
 def test_too_near_says_so():
     robot = kin.get_robot("redundant7-craig")
     result = solve_ik(robot, (0.0, 0.0, 0.30), task="position")

@@ -1,0 +1,216 @@
+"""The viewer on the public port: its page, and its websocket carried to the internal viser server.
+
+viser listens on a port of its own, reachable from this machine only. Visitors see one port: this module hands
+out viser's page under ``/viewer/`` and carries each websocket's messages both ways, unchanged. The page dials
+its own address without the trailing slash, so both spellings are routes.
+
+A slow visitor must not make us hoard: with ``max_queue=1`` and both pumps waiting for the other side to take a
+message, what waits is left in viser's own windowed buffer, and TCP pushes back from there.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import gzip
+import hashlib
+import http.client
+import logging
+from collections.abc import Iterable
+
+import msgspec
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, RedirectResponse, Response
+from starlette.routing import BaseRoute, Route, WebSocketRoute
+from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed, InvalidHandshake
+from websockets.typing import Subprotocol
+
+from app.security import VIEWER_POLICY, origin_allowed
+
+logger = logging.getLogger("kinboard.bridge")
+
+# What viser's own server accepts from a visitor: a screenshot asked for by the server comes back as one message.
+MAX_MESSAGE = 50 * 1024 * 1024
+
+# Any visitor could have viser open a tunnel to the public internet, or close one; hiding its button is not enough.
+REFUSED_TYPES = frozenset({"ShareUrlRequest", "ShareUrlDisconnect"})
+
+_WARMING_PAGE = (
+    '<!doctype html><html lang="en"><meta charset="utf-8"><meta http-equiv="refresh" content="1">'
+    "<title>Kinboard is warming up</title><p>The viewer is warming up and will appear here in a moment.</p></html>"
+)
+
+# Codes that describe a lost connection and may not travel in a close frame (RFC 6455, 7.4.1).
+_UNSENDABLE = {1005: 1000, 1006: 1011, 1015: 1011}
+
+# Close code and reason.
+_Ending = tuple[int, str]
+
+
+class ViewerBridge:
+    """Routes for ``/viewer``. `port` is that of the internal viser server, None until it listens."""
+
+    def __init__(self, allowed_origins: Iterable[str] = ()) -> None:
+        self.port: int | None = None
+        self._allowed_origins = tuple(allowed_origins)
+        self._page: _Page | None = None
+
+    def routes(self) -> list[BaseRoute]:
+        """The page and the websocket, each with and without the trailing slash."""
+        return [
+            Route("/viewer", _add_slash),
+            Route("/viewer/", self.page),
+            WebSocketRoute("/viewer", self.websocket),
+            WebSocketRoute("/viewer/", self.websocket),
+        ]
+
+    async def page(self, request: Request) -> Response:
+        """viser's page under our content policy; 503 and a page that tries again until viser listens."""
+        if self.port is None:
+            return HTMLResponse(_WARMING_PAGE, status_code=503, headers={"retry-after": "1"})
+        if self._page is None:
+            self._page = await run_in_threadpool(_fetch_page, self.port)
+        return self._page.response(request)
+
+    async def websocket(self, visitor: WebSocket) -> None:
+        """One visitor's connection, from the handshake to whichever side ends first."""
+        if not origin_allowed(visitor.headers, self._allowed_origins):
+            logger.warning("refused a websocket from a page of %.200r", visitor.headers.get("origin"))
+            await visitor.close()  # before the handshake: a 403
+            return
+        if self.port is None:
+            await _turn_away(visitor, "The viewer is warming up.")
+            return
+        try:
+            upstream = await connect(
+                f"ws://127.0.0.1:{self.port}/",
+                subprotocols=[Subprotocol(name) for name in visitor.scope.get("subprotocols", ())] or None,
+                compression=None,
+                max_size=None,
+                max_queue=1,
+                ping_interval=None,
+                open_timeout=5,
+                close_timeout=1,
+                proxy=None,
+            )
+        except (OSError, TimeoutError, InvalidHandshake) as error:
+            logger.warning("the viewer's server does not answer: %s", error)
+            await _turn_away(visitor, "The viewer does not answer.")
+            return
+        async with upstream:
+            await visitor.accept(upstream.subprotocol)
+            await _carry(visitor, upstream)
+
+
+async def _carry(visitor: WebSocket, upstream: ClientConnection) -> None:
+    """Run both pumps until one side ends; then stop the other pump and close both sides with the same code."""
+    pumps = (
+        asyncio.create_task(_to_viser(visitor, upstream)),
+        asyncio.create_task(_to_visitor(upstream, visitor)),
+    )
+    try:
+        ended, _ = await asyncio.wait(pumps, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        for pump in pumps:
+            pump.cancel()
+        await asyncio.gather(*pumps, return_exceptions=True)
+    code, reason = ended.pop().result()
+    pass
+    if visitor.client_state is WebSocketState.CONNECTED:
+        # Whoever left in this very moment has nothing to be told.
+        with contextlib.suppress(WebSocketDisconnect):
+            await visitor.close(code, reason)
+
+
+async def _to_viser(visitor: WebSocket, upstream: ClientConnection) -> _Ending:
+    try:
+        while True:
+            event = await visitor.receive()
+            if event["type"] == "websocket.disconnect":
+                return _sendable(event["code"]), ""
+            data = event.get("bytes")
+            if data is None:
+                return 1003, "binary messages only"
+            if not _is_refused(data):
+                await upstream.send(data)
+    except ConnectionClosed:
+        return _ending_of(upstream)
+
+
+async def _to_visitor(upstream: ClientConnection, visitor: WebSocket) -> _Ending:
+    try:
+        while True:
+            await visitor.send({"type": "websocket.send", "bytes": await upstream.recv(decode=False)})
+    except ConnectionClosed:
+        return _ending_of(upstream)
+    except WebSocketDisconnect:
+        return 1001, ""
+
+
+def _ending_of(upstream: ClientConnection) -> _Ending:
+    return _sendable(upstream.close_code or 1006), upstream.close_reason or ""
+
+
+async def _turn_away(visitor: WebSocket, why: str) -> None:
+    """Close with "try again later": viser's client does so by itself."""
+    await visitor.accept(next(iter(visitor.scope["subprotocols"]), None))
+    await visitor.close(1013, why)
+
+
+def _sendable(code: int) -> int:
+    return _UNSENDABLE.get(code, code)
+
+
+def _is_refused(message: bytes) -> bool:
+    """Whether this is a message no visitor may send; decodes only what holds one of the names at all."""
+    if b"ShareUrl" not in message:
+        return False
+    try:
+        decoded = msgspec.msgpack.decode(message)
+    except msgspec.DecodeError:
+        return True
+    return isinstance(decoded, dict) and decoded.get("type") in REFUSED_TYPES
+
+
+async def _add_slash(request: Request) -> Response:
+    # Relative, so that it holds behind any proxy, whatever it does to host and path.
+    query = f"?{request.url.query}" if request.url.query else ""
+    return RedirectResponse(f"viewer/{query}")
+
+
+class _Page:
+    """viser's single-file client, kept as it came, plain and compressed."""
+
+    def __init__(self, html: bytes) -> None:
+        self._html = html.replace(b"<title>Viser</title>", b"<title>Kinboard viewer</title>", 1)
+        self._gzipped = gzip.compress(self._html, 6)
+        self._headers = {
+            "content-security-policy": VIEWER_POLICY,
+            "cache-control": "no-cache",
+            "etag": f'"{hashlib.sha256(self._html).hexdigest()[:32]}"',
+            "vary": "accept-encoding",
+        }
+
+    def response(self, request: Request) -> Response:
+        if request.headers.get("if-none-match") == self._headers["etag"]:
+            return Response(status_code=304, headers=self._headers)
+        if "gzip" in request.headers.get("accept-encoding", ""):
+            return HTMLResponse(self._gzipped, headers=self._headers | {"content-encoding": "gzip"})
+        return HTMLResponse(self._html, headers=self._headers)
+
+
+def _fetch_page(port: int) -> _Page:
+    # Straight to our own machine: urllib would ask the environment for a proxy first.
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+    try:
+        connection.request("GET", "/")
+        answer = connection.getresponse()
+        html = answer.read()
+    finally:
+        connection.close()
+    if answer.status != 200:
+        raise RuntimeError(f"the viewer's server answered {answer.status} for its page")
+    return _Page(html)

@@ -1,0 +1,184 @@
+"""The service: the only place that joins REST, the viewer and the pages, on one port.
+
+Two doors lead to the same core and do not know each other: ``app.api`` answers programs, ``app.viewer`` draws for
+people. Here they get their addresses: ``/`` the landing page, ``/viewer/`` the viewer, ``/api/v1`` REST,
+``/docs`` its documentation, ``/livez`` and ``/readyz`` for whoever runs the service.
+"""
+
+from __future__ import annotations
+
+import signal
+import socket
+import sys
+import threading
+import webbrowser
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Literal
+
+import uvicorn
+from fastapi import FastAPI, Response
+from pydantic import BaseModel
+from starlette.concurrency import run_in_threadpool
+
+from app.api import build_router, install_problem_handlers
+from app.bridge import MAX_MESSAGE, ViewerBridge
+from app.pages import page_routes
+from app.prefix import PathPrefix, clean_prefix
+from app.security import SecurityHeaders
+from app.settings import Settings
+from app.startup import Startup
+from app.startup import Status as StartupStatus
+from app.store import Store
+from kin import RobotFileError, __version__
+
+
+class Alive(BaseModel):
+    """The process answers."""
+
+    status: Literal["alive"] = "alive"
+
+
+class Readiness(BaseModel):
+    """Whether kernels are compiled and the viewer listens."""
+
+    status: StartupStatus
+
+
+def create_app(settings: Settings, store: Store | None = None) -> FastAPI:
+    """The whole service as one ASGI application.
+
+    Raises:
+        RobotFileError: a file in the operator's folder of robots is wrong.
+    """
+    store = store or Store(settings.robots)
+    bridge = ViewerBridge(settings.allowed_origins)
+    startup = Startup(settings, store, bridge)
+
+    @asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        startup.start()
+        yield
+        await run_in_threadpool(startup.stop)
+
+    app = FastAPI(
+        title="Kinboard",
+        version=__version__,
+        summary="Kinematics of robot arms: forward, inverse, Jacobian.",
+        description="Metres and radians everywhere; quaternions are `wxyz`. "
+        "A target out of reach is an answer with a `status` and a `reason`, not an error.",
+        license_info={"name": "MIT", "identifier": "MIT"},
+        docs_url=None,  # our own page, whose files are ours: it works without internet
+        redoc_url=None,
+        redirect_slashes=False,  # the redirect would name our own host instead of the proxy's
+        lifespan=lifespan,
+    )
+    app.state.store, app.state.settings, app.state.startup = store, settings, startup
+    install_problem_handlers(app)
+    app.include_router(build_router())
+    app.router.routes.extend([*page_routes(), *bridge.routes()])
+
+    @app.get("/livez", tags=["service"], summary="Is the process alive?")
+    async def livez() -> Alive:
+        return Alive()
+
+    @app.get(
+        "/readyz",
+        tags=["service"],
+        summary="Is everything warm?",
+        responses={503: {"model": Readiness, "description": "Still warming up, or the viewer failed."}},
+    )
+    async def readyz(response: Response) -> Readiness:
+        response.headers["cache-control"] = "no-store"
+        response.status_code = 200 if startup.status == "ready" else 503
+        return Readiness(status=startup.status)
+
+    app.add_middleware(SecurityHeaders)
+    app.add_middleware(PathPrefix, prefix=settings.root_path)
+    return app
+
+
+def run(settings: Settings, open_browser: bool = False) -> int:
+    """Serve until Ctrl-C or SIGTERM; returns the exit code: 0, or 1 with a message if it could not start."""
+    try:
+        listener = _listen(settings.host, settings.port)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        print(
+            f"kinboard: cannot listen on {settings.host}:{settings.port}: {reason}.\n"
+            "Choose another port with --port (0 takes any free one).",
+            file=sys.stderr,
+        )
+        return 1
+    with listener:
+        try:
+            app = create_app(settings)
+        except RobotFileError as error:
+            print(f"kinboard: {error}", file=sys.stderr)
+            return 1
+        url = _url(settings, listener.getsockname()[1])
+        server = _Server(server_config(app), url, open_browser)
+        # uvicorn ends in good order and then raises the signal again: for us it is the expected end.
+        before = signal.signal(signal.SIGTERM, lambda *_: None)
+        try:
+            server.run(sockets=[listener])
+        except KeyboardInterrupt:
+            pass
+        finally:
+            signal.signal(signal.SIGTERM, before)
+    return 0 if server.started else 1
+
+
+def server_config(app: FastAPI) -> uvicorn.Config:
+    """How uvicorn must serve `app` for the viewer's websockets to be quick and robust."""
+    return uvicorn.Config(
+        app,
+        lifespan="on",
+        log_level="warning",
+        access_log=False,
+        server_header=False,
+        ws="websockets-sansio",
+        # Compressing a 12 MB point cloud would take half a second; what is worth it, viser compressed already.
+        ws_per_message_deflate=False,
+        ws_max_size=MAX_MESSAGE,
+        ws_ping_interval=20.0,
+        # A slow line may need this long to take a large scene before it gets to answer a ping.
+        ws_ping_timeout=120.0,
+        timeout_graceful_shutdown=2,
+    )
+
+
+class _Server(uvicorn.Server):
+    """Says where we are once connections are really accepted."""
+
+    def __init__(self, config: uvicorn.Config, url: str, open_browser: bool) -> None:
+        super().__init__(config)
+        self._url = url
+        self._open_browser = open_browser
+
+        self._out = sys.stdout  # now: starting viser borrows sys.stdout for a moment, in another thread
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets=sockets)
+        print(f"Kinboard {__version__} is at {self._url}  (Ctrl-C to stop)", file=self._out, flush=True)
+        if self._open_browser:
+            # A terminal browser would not return before it is closed.
+            threading.Thread(target=self._open, name="kinboard-browser", daemon=True).start()
+
+    def _open(self) -> None:
+        if not webbrowser.open(self._url):
+            print("No browser could be opened here: visit the address yourself.", file=self._out, flush=True)
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    family, *_, address = socket.getaddrinfo(host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[
+        0
+    ]
+    dual = family == socket.AF_INET6 and address[0] == "::" and socket.has_dualstack_ipv6()
+    return socket.create_server(address[:2], family=family, backlog=2048, dualstack_ipv6=dual)
+
+
+def _url(settings: Settings, port: int) -> str:
+    """An address that works on this machine, also when listening on all of its addresses."""
+    host = "localhost" if settings.host in ("", "0.0.0.0", "::") else settings.host
+    return f"http://{f'[{host}]' if ':' in host else host}:{port}{clean_prefix(settings.root_path)}/"

@@ -1,0 +1,72 @@
+"""Everything slow about starting, done beside the running server: the viewer, and the compiled kernels.
+
+The page answers at once and says "warming up" until ``/readyz`` does not. Kernels come from numba's cache in
+milliseconds, or are compiled on first use, which takes seconds; no visitor should be the one who waits.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from typing import TYPE_CHECKING, Literal
+
+from app.bridge import ViewerBridge
+from app.settings import Settings
+from app.store import Store
+from kin import warm_up
+
+if TYPE_CHECKING:
+    from app.viewer.server import ViewerServer
+
+logger = logging.getLogger("kinboard.startup")
+
+Status = Literal["warming", "ready", "failed"]
+
+
+class Startup:
+    """Starts the viewer and warms the kernels in a thread of its own; `status` is what ``/readyz`` reports."""
+
+    def __init__(self, settings: Settings, store: Store, bridge: ViewerBridge) -> None:
+        self.status: Status = "warming"
+        self._settings = settings
+        self._store = store
+        self._bridge = bridge
+        self._viewer: ViewerServer | None = None
+        self._stopping = threading.Event()
+        self._viewer_settled = threading.Event()
+        # A daemon: Ctrl-C in the middle of a long compilation must not wait for its end.
+        self._thread = threading.Thread(target=self._run, name="kinboard-startup", daemon=True)
+
+    def start(self) -> None:
+        """Begin; returns at once."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the viewer. A compilation under way is left to end with the process."""
+        self._stopping.set()
+        self._viewer_settled.wait(timeout=5.0)
+        self._bridge.port = None
+        if self._viewer is not None:
+            self._viewer.stop()
+
+    def _run(self) -> None:
+        try:
+            self._start_viewer()
+            if not self._stopping.is_set():
+                warm_up()
+                self.status = "ready"
+        except Exception:
+            # REST goes on; /readyz tells whoever watches the service.
+            logger.exception("the viewer could not be started, or a kernel could not be compiled")
+            self.status = "failed"
+
+    def _start_viewer(self) -> None:
+        try:
+            # viser takes half a second to import: the landing page and REST need not wait for it.
+            from app.viewer.server import ViewerServer
+
+            viewer = ViewerServer(self._store, self._settings)
+            self._bridge.port = viewer.start()
+            self._viewer = viewer
+        finally:
+            self._viewer_settled.set()

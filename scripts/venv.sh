@@ -1,0 +1,46 @@
+# Sourced by serve.sh and test.sh, with $root set: makes $root/.venv and installs Kinboard into it, once.
+
+fail() { echo "kinboard: $*" >&2; exit 1; }
+
+# Debian packages may only be installed by root; anybody else is told what to ask for.
+apt_install() {
+  if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
+    echo "Installing $* with apt…"
+    apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null
+  else
+    return 1
+  fi
+}
+
+find_python() {
+  for candidate in ${PYTHON:-} python3 python3.13 python3.12 python3.11 python; do
+    if command -v "$candidate" >/dev/null && "$candidate" -c \
+      'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' 2>/dev/null; then
+      echo "$candidate"
+      return
+    fi
+  done
+  fail "needs Python 3.11, 3.12 or 3.13 and found none. Install one, or name it: PYTHON=/path/to/python3.12 sh $0"
+}
+
+make_venv() {
+  python=$(find_python) || exit 1
+  if ! "$python" -c 'import venv, ensurepip' 2>/dev/null; then
+    version=$("$python" -c 'import sys; print("%d.%d" % sys.version_info[:2])')
+    apt_install "python$version-venv" ||
+      fail "$python lacks the venv module. On Debian or Ubuntu: sudo apt-get install python$version-venv"
+  fi
+  "$python" -m venv "$root/.venv" || fail "$python could not make $root/.venv"
+}
+
+# $1: what to install, "" or an extra such as "[test]". Done again only when pyproject.toml has changed.
+install_kinboard() {
+  stamp="$root/.venv/installed$1"
+  [ -x "$root/.venv/bin/python" ] || make_venv
+  if [ ! -e "$stamp" ] || [ "$root/pyproject.toml" -nt "$stamp" ]; then
+    echo "Installing Kinboard$1 into .venv (a minute or two, once)…"
+    "$root/.venv/bin/python" -m pip install -q --disable-pip-version-check -e "$root$1" ||
+      fail "the installation failed; its message is above. Remove .venv to begin afresh."
+    touch "$stamp"
+  fi
+}

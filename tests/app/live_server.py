@@ -1,0 +1,39 @@
+"""Serve an app on a real port for the length of a test, with uvicorn set up as in production."""
+
+from __future__ import annotations
+
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import uvicorn
+from fastapi import FastAPI
+
+from app.main import server_config
+
+
+@contextmanager
+def serve(app: FastAPI) -> Iterator[int]:
+    """The port `app` listens on; at the end the server's thread is gone."""
+    listener = socket.create_server(("127.0.0.1", 0))
+    server = uvicorn.Server(server_config(app))
+    thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
+    thread.start()
+    try:
+        wait_for(lambda: server.started)
+        yield listener.getsockname()[1]
+    finally:
+        server.should_exit = True
+        thread.join(10)
+        listener.close()
+        assert not thread.is_alive()
+
+
+def wait_for(condition, seconds: float = 10.0) -> None:
+    """Wait until `condition()` is true; fails the test if it does not become so."""
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, f"not so within {seconds} s"
+        time.sleep(0.01)

@@ -1,0 +1,204 @@
+"""What README, CONTRIBUTING, CHANGELOG and the Dockerfile say is held against the code."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+from fastapi.testclient import TestClient
+
+import kin
+from app.main import create_app
+from app.settings import Settings
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+DOCKERFILE = (ROOT / "Dockerfile").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```$", README, re.DOTALL | re.MULTILINE)
+
+
+def table(text: str, header: str) -> list[list[str]]:
+    """Cells of the table whose first header cell is `header`."""
+    lines = text.splitlines()
+    start = next(i for i, line in enumerate(lines) if line.startswith(f"| {header} |"))
+    rows = []
+    for line in lines[start + 2 :]:
+        if not line.startswith("|"):
+            break
+        rows.append([cell.strip() for cell in line.strip("|").split("|")])
+    return rows
+
+
+def commands() -> list[tuple[str, list[str]]]:
+    """Each `$ command` of the console blocks with the lines shown under it."""
+    found: list[tuple[str, list[str]]] = []
+    for line in "".join(blocks("console")).splitlines():
+        if line.startswith("$ "):
+            found.append((line[2:], []))
+        else:
+            found[-1][1].append(line)
+    return found
+
+
+@pytest.mark.parametrize("code", blocks("python"))
+def test_python_examples_run(code):
+    exec(compile(code, "README.md", "exec"), {})
+
+
+@pytest.mark.parametrize(("command", "shown"), commands(), ids=[command for command, _ in commands()])
+def test_command_line_examples_run_and_print_what_is_shown(command, shown):
+    program, *arguments = shlex.split(command)
+    assert program == "kinboard"
+    done = subprocess.run(
+        [sys.executable, "-m", "app.cli", *arguments], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip()
+    printed = {" ".join(line.split()) for line in done.stdout.splitlines()}
+    for line in shown:
+        assert " ".join(line.split()) in printed
+
+
+def test_rest_examples_are_answered():
+    lines = [line for block in blocks("sh") for line in block.splitlines() if line.startswith("curl ")]
+    client = TestClient(create_app(Settings()))
+    answers = {}
+    for line in lines:
+        words = shlex.split(line)
+        url = urlsplit(next(word for word in words if word.startswith("http://")))
+        assert url.netloc == f"127.0.0.1:{Settings.model_fields['port'].default}"
+        headers = dict([words[words.index("-H") + 1].split(": ", 1)])
+        answer = client.post(url.path, content=words[words.index("-d") + 1], headers=headers)
+        assert answer.status_code == 200, answer.text
+        answers[url.path.rsplit("/", 1)[1]] = answer.json()
+    assert set(answers) == {"fk", "ik"}
+    assert answers["ik"]["status"] == "solved"
+
+
+def test_the_status_table_lists_every_status():
+    assert [row[0].strip("`") for row in table(README, "`status`")] == [status.value for status in kin.Status]
+
+
+def test_the_settings_table_is_the_settings():
+    rows = table(README, "variable")
+    expected = []
+    for name, field in Settings.model_fields.items():
+        default = list(field.default) if isinstance(field.default, tuple) else field.default
+        shown = "" if default in (None, "") else f"`{default}`"
+        expected.append([f"`KINBOARD_{name.upper()}`", shown, field.description])
+    assert rows == expected
+
+
+def test_lists_are_read_from_the_environment_as_told(monkeypatch):
+    name, value = re.search(r"`(KINBOARD_ALLOWED_ORIGINS)='([^']+)'`", README).groups()
+    monkeypatch.setenv(name, value)
+    assert Settings().allowed_origins == tuple(json.loads(value))
+
+
+def test_the_robot_file_is_a_robot():
+    (text,) = blocks("toml")
+    robot = kin.parse_robot(text)
+    assert kin.fk(robot, [0.0, 0.0])[:3, 3].tolist() == [0.5, 0.0, 0.0]
+
+
+def test_the_built_in_arms_are_named():
+    robots = kin.builtin_robots()
+    assert all(f"`{robot_id}`" in README for robot_id in robots)
+    words = {3: "Three", 4: "Four", 5: "Five", 6: "Six", 7: "Seven", 8: "Eight", 9: "Nine", 10: "Ten"}
+    assert f"- {words[len(robots)]} arms are built in" in README
+
+
+def test_the_two_commands_exist_and_ci_runs_the_second():
+    assert blocks("sh")[0] == "sh scripts/serve.sh\n"
+    assert "sh scripts/test.sh\n" in blocks("sh")
+    assert (ROOT / "scripts/serve.sh").is_file()
+    assert (ROOT / ".ci/run").read_text().splitlines()[-1] == "sh scripts/test.sh"
+
+
+@pytest.mark.parametrize("script", ["scripts/serve.sh", "scripts/test.sh", "scripts/venv.sh", ".ci/run"])
+def test_scripts_are_valid_shell(script):
+    subprocess.run(["sh", "-n", ROOT / script], check=True)
+
+
+@pytest.mark.parametrize("document", ["README.md", "CONTRIBUTING.md", "CHANGELOG.md"])
+def test_links_between_files_lead_somewhere(document):
+    text = (ROOT / document).read_text(encoding="utf-8")
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if target.startswith("#"):
+            assert re.search(rf"^#+ {target[1:].replace('-', ' ')}$", text, re.MULTILINE | re.IGNORECASE), target
+        elif "://" not in target:
+            assert (ROOT / target).exists(), target
+
+
+def test_every_place_named_in_the_table_exists():
+    rows = table(CONTRIBUTING, "what")
+    assert len(rows) > 15
+    for what, where in rows:
+        paths = re.findall(r"`([^`]+)`", where)
+        assert paths, what
+        for path in paths:
+            assert (ROOT / path).exists(), f"{what}: {path}"
+
+
+def mapped_files() -> set[str]:
+    """Paths of the map, put together from its indentation."""
+    text = re.search(r"## Map\n\n```\n(.*?)```", CONTRIBUTING, re.DOTALL).group(1)
+    folders: list[str] = []
+    found = set()
+    for line in text.splitlines():
+        name = line.split()[0]
+        depth = (len(line) - len(line.lstrip())) // 2
+        folders[depth:] = [name]
+        found.add("".join(folders))
+    return found
+
+
+def test_the_map_names_every_module_and_nothing_else():
+    mapped = mapped_files()
+    for path in mapped:
+        assert (ROOT / path).exists(), path
+    modules = {
+        path.relative_to(ROOT).as_posix()
+        for package in ("kin", "app")
+        for path in (ROOT / package).rglob("*.py")
+        if path.read_text(encoding="utf-8").strip()  # an empty __init__.py has nothing to explain
+    }
+    assert modules - mapped == set()
+
+
+def test_the_changelog_knows_this_version():
+    text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    headings = re.findall(r"^## \[(.+?)\]", text, re.MULTILINE)
+    assert headings[:2] == ["Unreleased", kin.__version__]
+
+
+def test_the_image_starts_the_way_the_app_does():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert 'CMD ["kinboard", "serve"]' in DOCKERFILE
+    assert "kinboard" in project["scripts"]
+    assert f'image.version="{kin.__version__}"' in DOCKERFILE
+    base = re.search(r"^FROM python:(\d+\.\d+)-slim", DOCKERFILE, re.MULTILINE).group(1)
+    assert f"Python :: {base}" in " ".join(project["classifiers"])
+    variables = set(re.findall(r"\bKINBOARD_([A-Z_]+)=", DOCKERFILE))
+    assert {name.lower() for name in variables} <= set(Settings.model_fields)
+    assert "USER kinboard" in DOCKERFILE
+    assert "/readyz" in DOCKERFILE.split("HEALTHCHECK")[1]
+
+
+def test_the_image_gets_every_file_its_build_copies():
+    ignore = (ROOT / ".dockerignore").read_text().split()
+    for sources in re.findall(r"^COPY (?!--from)(.+) \S+$", DOCKERFILE, re.MULTILINE):
+        for source in sources.split():
+            assert f"!{source}" in ignore
+            assert (ROOT / source).exists()
