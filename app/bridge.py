@@ -118,7 +118,7 @@ async def _carry(visitor: WebSocket, upstream: ClientConnection) -> None:
             pump.cancel()
         await asyncio.gather(*pumps, return_exceptions=True)
     code, reason = ended.pop().result()
-    pass
+    await upstream.close(code, reason)
     if visitor.client_state is WebSocketState.CONNECTED:
         # Whoever left in this very moment has nothing to be told.
         with contextlib.suppress(WebSocketDisconnect):

@@ -162,7 +162,7 @@ def matrix(robot_id: str, q: ArrayLike, form: Form = "printed") -> Array:
 
 
 def symbols(robot: Robot, q: Array) -> dict[str, Array]:
-    """Values ``(...)`` of the notation's names at configurations ``(..., n)``: c1, s1, …, c23, s23, d1, a2, C, S."""
+    """Values ``(...)`` of the notation's names (c1, …, s23, d1, a2, C, S) at configurations ``(..., n)``."""
     values: dict[str, Array] = {}
     for i in range(robot.n):
         values[f"c{i + 1}"], values[f"s{i + 1}"] = np.cos(q[..., i]), np.sin(q[..., i])

@@ -47,7 +47,7 @@ def finite_array(field: str, value: ArrayLike, shape: tuple[int | None, ...]) ->
 
 
 def _numbers(field: str, value: ArrayLike, expected: str) -> Array:
-    """`value`, which numpy does not take for real numbers, as float64; `InputError` at its first item that is none."""
+    """`value`, not an array of real numbers to numpy, as float64; `InputError` at its first item that is none."""
     items = np.asarray(value, dtype=object)
     if items.ndim == 0 or any(isinstance(item, list | tuple | np.ndarray) for item in items.flat):
         raise InputError(field, value, expected)

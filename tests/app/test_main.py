@@ -80,11 +80,16 @@ def test_a_viewer_that_fails_is_never_ready_but_rest_goes_on(monkeypatch, caplog
     assert "no port left" in caplog.text
 
 
-def test_stopping_ends_the_threads_that_starting_began():
-    before = set(threading.enumerate())
+def test_stopping_ends_the_viewer_and_the_thread_that_started_it(monkeypatch):
+    start = ViewerServer.start
+    ports: list[int] = []
+    monkeypatch.setattr(ViewerServer, "start", lambda self: ports.append(start(self)) or ports[-1])
     with TestClient(create_app(Settings())) as client:
         wait_for(lambda: client.get("/readyz").status_code == 200, 120)
-    wait_for(lambda: not [t for t in set(threading.enumerate()) - before if "kinboard" in t.name])
+        socket.create_connection(("127.0.0.1", ports[0])).close()
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection(("127.0.0.1", ports[0]))
+    wait_for(lambda: not [thread for thread in threading.enumerate() if thread.name == "kinboard-startup"])
 
 
 @pytest.mark.parametrize("page", ["/", "/docs"])

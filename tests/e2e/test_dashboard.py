@@ -74,11 +74,19 @@ def browser() -> Iterator[Browser]:
         started.close()
 
 
-@pytest.fixture
-def tab(browser: Browser, address: str) -> Iterator[Tab]:
+@pytest.fixture(scope="module")
+def desktop(browser: Browser, address: str) -> Iterator[Tab]:
+    """One tab for all tests: software rendering compiles its shaders for seconds whenever a page opens."""
     opened = Tab(browser, address, 1280, 720)
     yield opened
     opened.close()
+
+
+@pytest.fixture
+def tab(desktop: Tab) -> Tab:
+    """The tab with the Pioneer arm at home."""
+    desktop.show(PIONEER)
+    return desktop
 
 
 class Tab:
@@ -149,7 +157,7 @@ class Tab:
             ]
         )
 
-    def drag_arrow(self, robot: kin.Robot, T: np.ndarray, axis: int, lengths: float, steps: int = 12) -> None:
+    def drag_arrow(self, robot: kin.Robot, T: np.ndarray, axis: int, lengths: float, steps: int = 6) -> None:
         """Drag an arrow of the gizmo at pose T along its own direction, by a multiple of its length."""
         arrow = 0.26 * body(robot).radius * T[:3, axis]
         at = self.pixel(robot, T[:3, 3] + 0.8 * arrow)
@@ -159,8 +167,18 @@ class Tab:
         self.page.mouse.down()
         for k in range(1, steps + 1):
             self.page.mouse.move(*(at + (to - at) * k / steps).tolist())
-            self.page.wait_for_timeout(40)
+            self.page.wait_for_timeout(60)
         self.page.mouse.up()
+
+    def show(self, robot: kin.Robot) -> None:
+        """The robot at home."""
+        self.page.get_by_role("tab", name="Move").click()
+        if self.row("Robot").locator("input:visible").first.input_value() != robot.name:
+            self.choose("Robot", robot.name)
+            expect(self.page.get_by_role("slider")).to_have_count(robot.n)
+        self.page.get_by_role("button", name="Home").click()
+        self.wait_for_tool(kin.fk(robot, robot.q_home)[:3, 3], within=0.06)
+        self.page.wait_for_timeout(500)
 
     def screenshot(self, name: str) -> None:
         ARTIFACTS.mkdir(exist_ok=True)
@@ -202,12 +220,8 @@ def test_sliders_by_keyboard_mouse_and_number(tab: Tab) -> None:
 
 
 def test_dragging_the_gizmo_moves_the_arm_and_out_of_reach_is_said(tab: Tab) -> None:
-    tab.choose("Robot", SRS.name)
-    expect(tab.status).to_contain_text(SRS.name)
+    tab.show(SRS)
     home = kin.fk(SRS, SRS.q_home)
-    tab.wait_for_tool(home[:3, 3], within=0.06)
-    tab.page.wait_for_timeout(800)
-
     tab.drag_arrow(SRS, home, axis=2, lengths=-0.6)
     expect(tab.status).to_have_attribute("data-status", "reached")
     expect(tab.status).to_contain_text("Reached")
@@ -260,6 +274,9 @@ def test_looks(tab: Tab) -> None:
     tab.page.get_by_role("button", name="Random").click()
     expect(tab.status).to_contain_text("Moved by joints")
     tab.screenshot("random-dark")
+    tab.page.get_by_role("tab", name="View").click()
+    tab.check("Dark page")
+    tab.check("Link frames")
 
 
 def test_nothing_in_the_panel_overlaps(tab: Tab) -> None:
