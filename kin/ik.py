@@ -196,6 +196,8 @@ class _Query:
         self.lower, self.upper = robot.lower.copy(), robot.upper.copy()
         self.turns = np.where(robot.revolute, TURN, 0.0)
         self.match = solver_for(robot)
+        if redundancy is not None and (self.match is None or robot.n < 7):
+            raise InputError("redundancy", redundancy, f"none: {robot.id} has no free parameter to set")
 
     def _target(self, target: ArrayLike) -> Array:
         if self.task == POSITION and np.shape(target) == (3,):

@@ -393,6 +393,7 @@ def test_max_solutions_keeps_the_nearest():
         ({"q_seed": [math.inf] * 5}, "q_seed[0]"),
         ({"max_solutions": 0}, "max_solutions"),
         ({"redundancy": math.nan}, "redundancy"),
+        ({"redundancy": 0.5}, "redundancy"),
     ],
 )
 def test_misuse_names_the_field(arguments, field):
