@@ -53,7 +53,8 @@ def finish(
     T = np.empty((4, 4))
     for k in range(q.shape[0]):
         if math.isnan(q[k, 0]):
-            stats[k] = np.nan
+            for i in range(stats.shape[1]):
+                stats[k, i] = math.nan
             continue
         distance = 0.0
         overrun = 0.0
@@ -82,12 +83,17 @@ def finish(
 
 @jit
 def select(q: Array, key: Array) -> tuple[NDArray[np.int64], int]:
-    """Rows of q ``(k, n)`` with a finite key, by rising key, equal postures once: (rows, how many)."""
+    """Rows of q ``(k, n)`` with a finite key, by rising key, equal ones once: (rows, count); uses up `key`."""
     kept = np.empty(q.shape[0], dtype=np.int64)
     count = 0
-    for i in np.argsort(key, kind="mergesort"):
-        if not math.isfinite(key[i]):
-            continue
+    for _ in range(q.shape[0]):
+        i = -1
+        for k in range(q.shape[0]):
+            if math.isfinite(key[k]) and (i < 0 or key[k] < key[i]):
+                i = k
+        if i < 0:
+            break
+        key[i] = math.inf
         new = True
         for k in range(count):
             gap = 0.0

@@ -66,6 +66,14 @@ def _load(T: Array, model: Array, start: int) -> None:
 
 
 @jit
+def copy_pose(T: Array, out: Array) -> None:
+    """out ← T for 4×4 arrays; written out, as numba takes seconds to compile an array assignment."""
+    for r in range(4):
+        for c in range(4):
+            out[r, c] = T[r, c]
+
+
+@jit
 def _apply_row(T: Array, model: Array, i: int, q: Array) -> None:
     k = _HEADER + _WIDTH * i
     theta = model[k]
@@ -131,7 +139,7 @@ def frames_many(model: Array, q: Array) -> Array:
         _load(T, model, 3)
         for i in range(rows):
             _apply_row(T, model, i, q[j])
-            out[j, i] = T
+            copy_pose(T, out[j, i])
     return out
 
 

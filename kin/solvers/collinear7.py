@@ -28,6 +28,7 @@ from kin.solvers.common import (
     Candidates,
     Problem,
     chain_of,
+    clear,
     extend_arcs,
     inverse,
     is_zero,
@@ -36,6 +37,7 @@ from kin.solvers.common import (
     misfit_of,
     nearest_in_arcs,
     screw_z,
+    shifted,
     split_sum,
     to_canonical,
     wrap,
@@ -96,7 +98,9 @@ def _roll_parts(T: Array, inverse_base: Array, inverse_tool: Array, parts: Array
             column[r, 1] = 0.0 if part == 0 else (T[r, 1] if part == 1 else -T[r, 0])
             column[r, 2] = T[r, 2] if part == 0 else 0.0
         to_canonical(column, inverse_base, inverse_tool, M)
-        parts[part] = M[:3, :3]
+        for r in range(3):
+            for c in range(3):
+                parts[part, r, c] = M[r, c]
 
 
 @jit
@@ -152,8 +156,8 @@ def _solve(
     parts, bent = np.empty((3, 3, 3)), np.empty((3, 3, 3))
     angles = np.empty(7)
     breaks, probes, rolls = np.empty(64), np.empty(130), np.empty((64, 3))
-    near, low, high = seed + offset, lower + offset, upper + offset
-    out[:] = np.nan
+    near, low, high = shifted(seed, offset), shifted(lower, offset), shifted(upper, offset)
+    clear(out)
     to_canonical(T, inverse_base, inverse_tool, M)
     x, y, z = M[0, 3], M[1, 3], M[2, 3]
     h = math.hypot(x, y)

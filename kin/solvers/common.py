@@ -192,6 +192,23 @@ def circular_clamp(value: float, low: float, high: float) -> float:
 
 
 @jit
+def clear(out: Array) -> None:
+    """out ← NaN everywhere ``(k, m)``; written out, as numba takes seconds to compile an array assignment."""
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = math.nan
+
+
+@jit
+def shifted(values: Array, offset: Array) -> Array:
+    """values + offset ``(n,)``."""
+    out = np.empty(values.shape[0])
+    for i in range(values.shape[0]):
+        out[i] = values[i] + offset[i]
+    return out
+
+
+@jit
 def to_canonical(T: Array, inverse_base: Array, inverse_tool: Array, out: Array) -> None:
     """out ← base⁻¹ · T · tool⁻¹ for 4×4 arrays."""
     for r in range(3):
@@ -222,17 +239,24 @@ def misfit_of(angles: Array, low: Array, high: Array, first: int, last: int) -> 
 def lay_probes(breaks: Array, count: int, probes: Array) -> int:
     """probes ← point, middle, point, middle, … round the circle: each break and the middle of each arc.
 
-    Sorted; probes[even] are breaks. With no break at all one probe stands for the whole circle.
+    Sorts `breaks` in place (there are few); probes[even] are breaks. With no break at all one probe stands for the
+    whole circle.
     """
     if count == 0:
         probes[0] = 0.0
         return 1
-    order = np.sort(breaks[:count])
+    for i in range(1, count):
+        moving = breaks[i]
+        j = i - 1
+        while j >= 0 and breaks[j] > moving:
+            breaks[j + 1] = breaks[j]
+            j -= 1
+        breaks[j + 1] = moving
     n = 0
     for i in range(count):
-        after = order[i + 1] if i + 1 < count else order[0] + 2.0 * math.pi
-        probes[n] = order[i]
-        probes[n + 1] = 0.5 * (order[i] + after)
+        after = breaks[i + 1] if i + 1 < count else breaks[0] + TURN
+        probes[n] = breaks[i]
+        probes[n + 1] = 0.5 * (breaks[i] + after)
         n += 2
     return n
 

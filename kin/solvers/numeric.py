@@ -161,7 +161,8 @@ def descend(model: Array, target: Array, task: int, weight: float, lower: Array,
         if not improved:
             break
         gain = cost - better
-        q[:] = trial
+        for i in range(n):
+            q[i] = trial[i]
         cost = better
         damping *= 0.1
         jacobian_into(model, q, J, T, axes)
@@ -180,13 +181,15 @@ def best_of(
     best = math.inf
     q = np.empty(starts.shape[1])
     for i in range(starts.shape[0]):
-        q[:] = starts[i]
+        for j in range(q.shape[0]):
+            q[j] = starts[i, j]
         cost = descend(model, target, task, weight, lower, upper, q)
         # A later start must be better by more than rounding: of equal minima the one nearest to the seed stays,
         # so that the arm does not jump about while a target is dragged out of reach.
         if cost < best * (1.0 - 1e-6) - 1e-12:
             best = cost
-            out[:] = q
+            for j in range(q.shape[0]):
+                out[j] = q[j]
             if best <= enough:
                 break
     return best

@@ -29,6 +29,7 @@ from kin.solvers.common import (
     Candidates,
     Problem,
     chain_of,
+    clear,
     excess,
     extend_arcs,
     inverse,
@@ -38,6 +39,7 @@ from kin.solvers.common import (
     misfit_of,
     nearest_in_arcs,
     screw_z,
+    shifted,
     to_canonical,
     wrap,
     zyz,
@@ -188,8 +190,8 @@ def _solve(
     breaks = np.empty(64)
     probes = np.empty(130)
     misfits = np.empty((130, 4))
-    near, low, high = seed + offset, lower + offset, upper + offset
-    out[:] = np.nan
+    near, low, high = shifted(seed, offset), shifted(lower, offset), shifted(upper, offset)
+    clear(out)
     to_canonical(T, inverse_base, inverse_tool, M)
     code, gap, _, A, rho, bend = _triangle(M, d3, d5, frame)
     if code != 0:

@@ -29,6 +29,7 @@ from kin.solvers.common import (
     Problem,
     add_roots,
     chain_of,
+    clear,
     extend_arcs,
     inverse,
     is_zero,
@@ -38,6 +39,7 @@ from kin.solvers.common import (
     nearest_in_arcs,
     screw_x,
     screw_z,
+    shifted,
     to_canonical,
     wrap,
 )
@@ -49,6 +51,7 @@ TITLE = "closed form, elbow arm with a two-axis wrist"
 PARAMETER = ("theta1", "θ1")
 _REACH = TOLERANCES.closure_position * 0.1
 _SINGULAR = TOLERANCES.singular
+_EYE = np.eye(4)
 
 
 class Geometry(NamedTuple):
@@ -160,13 +163,14 @@ def _solve(
     seed: Array, lower: Array, upper: Array, arcs: Array, out: Array,
 ) -> tuple[float, int]:  # fmt: skip
     """The branches, see `solve`. Returns (gap, number of arcs)."""
-    M, eye = np.empty((4, 4)), np.eye(4)
+    M, a = np.empty((4, 4)), np.empty(3)
     angles = np.empty(5)
     breaks, probes = np.empty(32), np.empty(66)
-    near, low, high = seed + offset, lower + offset, upper + offset
-    out[:] = np.nan
-    to_canonical(T, inverse_base, eye, M)
-    a = M[:3, 2].copy()
+    near, low, high = shifted(seed, offset), shifted(lower, offset), shifted(upper, offset)
+    clear(out)
+    to_canonical(T, inverse_base, _EYE, M)
+    for i in range(3):
+        a[i] = M[i, 2]
     wx, wy = M[0, 3] - d6 * a[0], M[1, 3] - d6 * a[1]
     h = d6 * a[2] - M[2, 3]
     r = math.hypot(wx, wy)

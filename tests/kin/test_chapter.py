@@ -1,0 +1,112 @@
+"""Which printed equations are right, which are wrong, and by how much."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import kin
+from kin import chapter
+
+WRONG = {
+    6: 0.14 * math.cos(math.radians(15)),
+    13: 0.704416,
+    19: 2.3774,
+    22: math.sqrt(2),
+    25: 4 / math.sqrt(3),
+    27: 0.35,
+    28: 0.42 * 4 / math.sqrt(3),
+}
+ARMS = ("pioneer5", "redundant7")
+EVALUABLE = [e for e in chapter.EQUATIONS if e.verdict != "garbled"]
+
+
+def label(equation):
+    return f"({equation.number})"
+
+
+def difference(equation, q):
+    robot = kin.get_robot(equation.robot_id)
+    (row,) = (c for c in chapter.compare(robot.id, q) if c.number == equation.number)
+    return row
+
+
+def test_every_equation_of_the_chapter_is_there():
+    assert [e.number for e in chapter.EQUATIONS] == [*range(3, 16), *range(17, 29)]
+    assert {e.number for e in chapter.EQUATIONS if e.verdict == "wrong"} == set(WRONG)
+    assert [e.number for e in chapter.EQUATIONS if e.verdict == "garbled"] == [3]
+
+
+@pytest.mark.parametrize("equation", EVALUABLE, ids=label)
+def test_corrected_equals_the_dh_product(equation):
+    robot = kin.get_robot(equation.robot_id)
+    row = difference(equation, robot.random_q(np.random.default_rng(equation.number), 20_000))
+    assert row.entry == equation.entry
+    assert np.abs(row.corrected - row.dh).max() < 1e-14
+
+
+@pytest.mark.parametrize("equation", EVALUABLE, ids=label)
+def test_verdict_and_size_of_the_error(equation):
+    """Right ones are right to rounding error; wrong ones come near their known maximum and never exceed it."""
+    robot = kin.get_robot(equation.robot_id)
+    row = difference(equation, robot.random_q(np.random.default_rng(equation.number), 20_000))
+    worst = float(np.abs(row.difference).max())
+    if equation.verdict == "right":
+        assert worst < 1e-14
+        assert equation.printed == equation.corrected
+    else:
+        assert 0.8 * equation.largest < worst <= equation.largest + 1e-12
+        assert equation.note
+
+
+@pytest.mark.parametrize("equation", [e for e in EVALUABLE if e.verdict == "wrong"], ids=label)
+def test_largest_difference_is_where_and_what_is_said(equation):
+    robot = kin.get_robot(equation.robot_id)
+    q = np.radians(equation.largest_at)
+    assert robot.in_limits(q, 1e-9)
+    assert abs(difference(equation, q).difference) == pytest.approx(equation.largest, rel=1e-8)
+    assert equation.largest == pytest.approx(WRONG[equation.number], rel=3e-5)
+    # A maximum: no small step inside the limits makes the difference larger.
+    steps = robot.clip(q + np.random.default_rng(1).normal(scale=1e-3, size=(5000, robot.n)))
+    assert np.abs(difference(equation, steps).difference).max() <= equation.largest + 1e-9
+
+
+@pytest.mark.parametrize(("robot_id", "defect"), [("pioneer5", 1.19), ("redundant7", 2.94)])
+def test_printed_matrix_is_no_rotation(robot_id, defect):
+    """The misprints show without any reference: RᵀR is not I."""
+    q = kin.get_robot(robot_id).random_q(np.random.default_rng(0), 200_000)
+    R = chapter.matrix(robot_id, q)[:, :3, :3]
+    assert np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max() == pytest.approx(defect, rel=0.03)
+    R = chapter.matrix(robot_id, q[:1000], "corrected")[:, :3, :3]
+    assert np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max() < 1e-14
+
+
+@pytest.mark.parametrize("robot_id", ARMS)
+def test_corrected_matrix_is_the_pose(robot_id):
+    robot = kin.get_robot(robot_id)
+    q = robot.random_q(np.random.default_rng(2), (3, 4))
+    assert chapter.matrix(robot_id, q, "corrected") == pytest.approx(kin.fk(robot, q), abs=1e-14)
+
+
+def test_lengths_come_from_the_arm():
+    assert chapter.symbols(kin.get_robot("pioneer5"), np.zeros(5))["d6"] == 0.12
+    assert chapter.equations("redundant7-craig") == ()
+
+
+@pytest.mark.parametrize("text", ["c1**2", "f(c1)", "c1.real", "c1 if c2 else c3", "c1 +", "1", "c1; c2"])
+def test_only_the_notation_is_read(text):
+    with pytest.raises(ValueError, match="notation"):
+        chapter.parse(text)
+
+
+def test_misuse_is_refused():
+    with pytest.raises(kin.InputError, match="form"):
+        chapter.matrix("pioneer5", np.zeros(5), "garbled")
+    with pytest.raises(kin.InputError, match="robot"):
+        chapter.matrix("redundant7-craig", np.zeros(7))
+    with pytest.raises(kin.UnknownRobotError, match="pioneer5"):
+        chapter.equations("puma")
+    with pytest.raises(kin.InputError, match="q"):
+        chapter.compare("pioneer5", [1, 2])

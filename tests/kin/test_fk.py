@@ -1,0 +1,218 @@
+"""Forward kinematics, Jacobian and manipulability: golden data, laws over batch shapes, an independent product."""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import kin
+from kin import InputError
+from kin.robot import Joint, Robot
+
+ROBOTS = tuple(kin.builtin_robots())
+
+
+def rot(axis, angle):
+    c, s = math.cos(angle), math.sin(angle)
+    T = np.eye(4)
+    i, j = {"x": (1, 2), "z": (0, 1)}[axis]
+    T[i, i] = T[j, j] = c
+    T[i, j], T[j, i] = -s, s
+    return T
+
+
+def move(x=0.0, z=0.0):
+    T = np.eye(4)
+    T[0, 3], T[2, 3] = x, z
+    return T
+
+
+def product(robot, q):
+    """The DH product written out, as slow and plain as can be: every frame, then the tool."""
+    values = iter(q)
+    T = np.array(robot.base)
+    frames = []
+    for row in robot.rows:
+        theta, d = row.theta, row.d
+        if row.kind == "revolute":
+            theta += next(values)
+        if row.kind == "prismatic":
+            d += next(values)
+        z, x = rot("z", theta) @ move(z=d), move(x=row.a) @ rot("x", row.alpha)
+        T = T @ (z @ x if robot.convention == "standard" else x @ z)
+        frames.append(T)
+    return np.array(frames), T @ np.array(robot.tool)
+
+
+lengths = st.floats(-1, 1)
+angles = st.floats(-math.pi, math.pi)
+
+
+@st.composite
+def robots(draw):
+    """Any arm: both conventions, all kinds of rows, a moved base and a tool."""
+    rows = draw(
+        st.lists(
+            st.tuples(angles, lengths, lengths, angles, st.sampled_from(["revolute", "prismatic", "fixed"])),
+            min_size=1,
+            max_size=9,
+        )
+    )
+    rows.append((0.0, 0.1, 0.0, 0.0, "revolute"))
+    joints = tuple(
+        Joint(f"{i}", *row[:4], kind=row[4], limits=None if row[4] == "fixed" else (-3.0, 3.0))
+        for i, row in enumerate(rows)
+    )
+    n = sum(row[4] != "fixed" for row in rows)
+    as_rows = lambda T: tuple(map(tuple, T.tolist()))  # noqa: E731
+    return Robot(
+        id="any",
+        name="any",
+        source="drawn",
+        convention=draw(st.sampled_from(["standard", "modified"])),
+        rows=joints,
+        home=(0.0,) * n,
+        base=as_rows(rot("x", draw(angles)) @ move(x=draw(lengths))),
+        tool=as_rows(rot("z", draw(angles)) @ move(z=draw(lengths)) @ rot("x", draw(angles))),
+    )
+
+
+@pytest.mark.parametrize("robot_id", ROBOTS)
+def test_golden_poses_and_frames(robot_id, golden):
+    robot = kin.get_robot(robot_id)
+    cases = golden(robot_id)["random"] + golden(robot_id)["edge"]
+    q = np.array([c["q"] for c in cases])
+    assert np.abs(kin.fk(robot, q) - np.array([c["T"] for c in cases])).max() <= 1e-14
+    assert np.abs(kin.link_frames(robot, q) - np.array([c["frames"] for c in cases])).max() <= 1e-14
+    for case in cases:
+        assert np.abs(kin.fk(robot, case["q"]) - np.array(case["T"])).max() <= 1e-14
+
+
+@given(robot=robots(), data=st.data())
+def test_any_arm_equals_the_product_written_out(robot, data):
+    q = np.array(data.draw(st.lists(st.floats(-3, 3), min_size=robot.n, max_size=robot.n)))
+    frames, T = product(robot, q)
+    assert kin.fk(robot, q) == pytest.approx(T, abs=1e-12)
+    assert kin.link_frames(robot, q) == pytest.approx(frames, abs=1e-12)
+
+
+@given(robot=robots(), data=st.data())
+def test_jacobian_equals_central_differences(robot, data):
+    """Columns of J: how the pose moves, in the base frame and in the tool's own."""
+    q = np.array(data.draw(st.lists(st.floats(-3, 3), min_size=robot.n, max_size=robot.n)))
+    h = 1e-5
+    J = kin.jacobian(robot, q)
+    R = kin.fk(robot, q)[:3, :3]
+    for j in range(robot.n):
+        step = h * np.eye(robot.n)[j]
+        ahead, behind = kin.fk(robot, q + step), kin.fk(robot, q - step)
+        v = (ahead[:3, 3] - behind[:3, 3]) / (2 * h)
+        W = (ahead[:3, :3] - behind[:3, :3]) / (2 * h) @ R.T
+        w = np.array([W[2, 1] - W[1, 2], W[0, 2] - W[2, 0], W[1, 0] - W[0, 1]]) / 2
+        assert J[:, j] == pytest.approx(np.concatenate([v, w]), abs=1e-8)
+    own = kin.jacobian(robot, q, frame="tool")
+    assert own[:3] == pytest.approx(R.T @ J[:3], abs=1e-12)
+    assert own[3:] == pytest.approx(R.T @ J[3:], abs=1e-12)
+
+
+@pytest.mark.parametrize("robot_id", ROBOTS)
+@pytest.mark.parametrize("shape", [(), (1,), (3,), (2, 3), (0,)])
+def test_batch_axes_come_first(robot_id, shape):
+    robot = kin.get_robot(robot_id)
+    q = robot.random_q(np.random.default_rng(4), shape)
+    n, rows = robot.n, len(robot.rows)
+    assert kin.fk(robot, q).shape == (*shape, 4, 4)
+    assert kin.link_frames(robot, q).shape == (*shape, rows, 4, 4)
+    assert kin.jacobian(robot, q).shape == (*shape, 6, n)
+    assert kin.manipulability(robot, q).shape == shape
+    one_by_one = [kin.fk(robot, one) for one in q.reshape(-1, n)]
+    assert np.array_equal(kin.fk(robot, q).reshape(-1, 4, 4), np.array(one_by_one).reshape(-1, 4, 4))
+
+
+@pytest.mark.parametrize("robot_id", ROBOTS)
+def test_poses_are_rigid(robot_id):
+    robot = kin.get_robot(robot_id)
+    R = kin.fk(robot, robot.random_q(np.random.default_rng(5), 2000))[:, :3, :3]
+    assert np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max() < 1e-14
+    assert np.linalg.det(R) == pytest.approx(np.ones(2000))
+
+
+def test_all_kinds_of_arrays_are_taken():
+    robot = kin.get_robot("pioneer5")
+    q = np.array([1, 2, 1, 0, 1])
+    wanted = kin.fk(robot, q.astype(float))
+    read_only = q.astype(float)
+    read_only.flags.writeable = False
+    every_second = np.repeat(q.astype(float), 2)[::2]
+    for form in (q, q.tolist(), tuple(q), q.astype(np.float32), read_only, every_second):
+        assert np.array_equal(kin.fk(robot, form), wanted)
+
+
+@pytest.mark.parametrize("function", [kin.fk, kin.link_frames, kin.jacobian, kin.manipulability])
+@pytest.mark.parametrize(
+    ("q", "field"),
+    [
+        ([0, 0, math.nan, 0, 0], "q[2]"),
+        (np.array([0, 0, 0, 0, math.inf]), "q[4]"),
+        ([[0] * 5, [0, -math.inf, 0, 0, 0]], "q[1][1]"),
+        ([0, 0, 0], "q"),
+        (1.0, "q"),
+        ("home", "q"),
+        (None, "q"),
+        ([1j] * 5, "q"),
+        ([10**400, 0, 0, 0, 0], "q"),
+        ([[0] * 5, [0] * 4], "q"),
+    ],
+)
+def test_misuse_names_the_field(function, q, field):
+    with pytest.raises(InputError) as caught:
+        function(kin.get_robot("pioneer5"), q)
+    assert caught.value.field.startswith(field)
+    assert caught.value.expected
+
+
+@pytest.mark.parametrize("robot_id", ROBOTS)
+@pytest.mark.parametrize(
+    ("part", "rows"), [("all", slice(0, 6)), ("linear", slice(0, 3)), ("angular", slice(3, 6))]
+)
+def test_manipulability_is_the_product_of_singular_values(robot_id, part, rows):
+    robot = kin.get_robot(robot_id)
+    q = robot.random_q(np.random.default_rng(6), 300)
+    wanted = np.linalg.svd(kin.jacobian(robot, q)[:, rows], compute_uv=False).prod(axis=-1)
+    assert kin.manipulability(robot, q, part) == pytest.approx(wanted, rel=1e-9, abs=1e-15)
+
+
+def test_manipulability_vanishes_where_the_arm_is_singular():
+    arm = kin.get_robot("redundant7-craig")
+    assert kin.manipulability(arm, np.zeros(7)) < 1e-15
+    assert kin.manipulability(arm, arm.q_home) > 1e-3
+
+
+def test_pioneer_determinant_has_its_closed_form():
+    """det of the 5 × 5 Jacobian of point and approach direction: −a2 d4 s3 (a1 + a2c2 + d4c23) s5."""
+    robot = kin.get_robot("pioneer5")
+    for q in robot.random_q(np.random.default_rng(8), 200):
+        J = kin.jacobian(robot, q, frame="tool")[:5]  # in the tool frame the roll is the last row
+        _, t2, t3, _, t5 = q
+        wanted = (
+            0.16 * 0.14 * math.sin(t3) * (0.07 + 0.16 * math.cos(t2) + 0.14 * math.cos(t2 + t3)) * math.sin(t5)
+        )
+        assert abs(np.linalg.det(J)) == pytest.approx(abs(wanted), rel=1e-9, abs=1e-15)
+
+
+def test_many_threads_get_the_serial_answers():
+    robot = kin.get_robot("redundant7")
+    batches = [robot.random_q(np.random.default_rng(i), 500) for i in range(40)]
+
+    def work(q):
+        return kin.fk(robot, q), kin.jacobian(robot, q), kin.manipulability(robot, q)
+
+    serial = [work(q) for q in batches]
+    with ThreadPoolExecutor(8) as pool:
+        for one, other in zip(serial, pool.map(work, batches), strict=True):
+            assert all(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
