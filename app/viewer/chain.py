@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -44,8 +45,13 @@ class Link:
         """Position ``(3,)`` and wxyz ``(4,)`` in the parent link, for a joint value in radians or metres."""
         G = self.T_parent_axis
         if self.joint is not None and self.joint.kind == "prismatic":
-            return G[:3, 3] + G[:3, 2] * value, wxyz_from_rotation(G[:3, :3])
-        return G[:3, 3], turn(wxyz_from_rotation(G[:3, :3]), value)
+            return G[:3, 3] + G[:3, 2] * value, self.wxyz
+        return G[:3, 3], turn(self.wxyz, value)
+
+    @cached_property
+    def wxyz(self) -> Array:
+        """Rotation part of `T_parent_axis` ``(4,)``."""
+        return wxyz_from_rotation(self.T_parent_axis[:3, :3])
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,7 +39,7 @@ class ViewerServer:
             server = viser.ViserServer(host="127.0.0.1", port=0, label="Kinboard", verbose=False)
         self._server = server
         configure_theme(server.gui, dark=False)
-        server.scene.configure_default_lights(enabled=True, cast_shadow=True)
+        _light(server.scene)
         server.on_client_connect(self._welcome)
         server.on_client_disconnect(self._farewell)
         return server.get_port()
@@ -75,3 +75,14 @@ class ViewerServer:
             session = self._sessions.pop(client.client_id, None)
         if session is not None:
             session.end()
+
+
+def _light(scene: viser.SceneApi) -> None:
+    """Daylight from above and a little from below.
+
+    Instead of viser's environment map: preparing that takes a machine without a graphics card ten seconds and
+    more, in which the page stands still.
+    """
+    scene.configure_environment_map(None)
+    scene.configure_default_lights(enabled=True, cast_shadow=True)
+    scene.add_light_hemisphere("/sky", sky_color=(255, 255, 255), ground_color=(176, 184, 200), intensity=1.6)

@@ -60,6 +60,8 @@ class Session:
         # The pose asked for with the gizmo, for as long as it is the arm's task; None: the gizmo follows the tool.
         self._target: Array | None = None
         self._reached = False
+        self._sliders_due = False
+        self._held: int | None = None
         self._read_at = 0.0
         self._arms = 0
         # Made by the worker when it builds the page.
@@ -132,6 +134,11 @@ class Session:
                 self._guard(lambda key=key, value=value: self._handle(key, value))  # type: ignore[misc]
             self._draw(fresh=bool(batch))
         self._client.flush()
+        if self._sliders_due:
+            # After the picture: telling seven sliders takes longer than posing seven joints.
+            self._sliders_due = False
+            with self._client.atomic():
+                self._sliders.show(self._motion.goal, self._held)
 
     def _handle(self, key: Hashable, value: object) -> None:
         match key:
@@ -175,8 +182,7 @@ class Session:
         q = self._motion.goal.copy()
         q[index] = self._sliders.read(index, value)
         self._target = None
-        self._motion.aim(q, time.perf_counter(), self._pace.eases)
-        self._sliders.show(q, held=index)
+        self._aim(q, held=index)
         self._status.show(BY_HAND)
 
     def _on_robot(self, name: str) -> None:
@@ -217,17 +223,20 @@ class Session:
         result = kin.solve_ik(self._robot, target, task=self._task, q_seed=self._motion.goal)
         self._target = T
         if result.best is not None:
-            self._motion.aim(result.best.q, time.perf_counter(), self._pace.eases)
-            self._sliders.show(result.best.q)
+            self._aim(result.best.q)
         self._reached = result.status == "solved"
         self._status.show(notice(result))
 
     def _go(self, q: Array) -> None:
         """Head for a configuration, the gizmo following the tool."""
         self._target = None
-        self._motion.aim(q, time.perf_counter(), self._pace.eases)
-        self._sliders.show(q)
+        self._aim(q)
         self._status.show(BY_HAND)
+
+    def _aim(self, q: Array, held: int | None = None) -> None:
+        """Head for a configuration; the sliders follow, but for the one in the visitor's hand."""
+        self._motion.aim(q, time.perf_counter(), self._pace.eases)
+        self._sliders_due, self._held = True, held
 
     # What the visitor sees
 

@@ -83,7 +83,7 @@ def html(shown: Notice) -> str:
     symbol, color = LOOKS[shown.kind]
     return (
         f'<div role="status" aria-live="polite" data-status="{shown.kind}" style="display:flex;gap:.6em;'
-        f"margin:.15em 1em .35em;padding:.5em .65em;min-height:6.4em;box-sizing:border-box;"
+        f"margin:.15em 1em .35em;padding:.5em .65em;min-height:6.1em;box-sizing:border-box;"
         f"border-radius:.4em;font-size:.85em;line-height:1.3;background:{color}1f;"
         f'border-left:.28em solid {color}">'
         f'<span aria-hidden="true" style="flex:none;width:1.5em;height:1.5em;line-height:1.5em;border-radius:50%;'
