@@ -10,7 +10,8 @@ from kin._version import __version__
 from kin.catalog import builtin_robots, get_robot, load_folder, load_robot, parse_robot
 from kin.errors import InputError, KinematicsError, RobotFileError, UnknownRobotError
 from kin.fk import fk, jacobian, link_frames, manipulability
-from kin.ik import IKResult, IKSolution, LimitViolation, Redundancy, Status, ik_branches, solve_ik
+from kin.ik import ik_branches, solve_ik
+from kin.results import IKResult, IKSolution, LimitViolation, Redundancy, Status
 from kin.robot import Joint, Robot
 from kin.warmup import warm_up
 

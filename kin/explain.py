@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kin.fk import fk, link_frames
+from kin.results import IKSolution, LimitViolation
 from kin.robot import Robot
 from kin.transforms import Array
-
-if TYPE_CHECKING:
-    from kin.ik import IKSolution, LimitViolation
 
 _WHAT = {"pose": "pose", "approach": "point and approach direction", "position": "point"}
 
@@ -61,8 +59,6 @@ def _side(robot: Robot, target: Array, q: Array) -> str:
 
     The shoulder is taken on the first joint's axis at the second joint's height.
     """
-    from kin.fk import fk, link_frames
-
     shoulder = link_frames(robot, q)[0, :3, 3]
     axis = robot.T_world_base[:3, 2] if robot.convention == "standard" else link_frames(robot, q)[0, :3, 2]
     foot = robot.T_world_base[:3, 3]

@@ -12,8 +12,6 @@ form: the closest configuration to a target that cannot be met, and point-only t
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from enum import StrEnum
 from typing import Literal
 
 import numpy as np
@@ -23,6 +21,7 @@ from kin import explain
 from kin.errors import InputError
 from kin.finish import DISTANCE, OVERRUN, POSITION_ERROR, ROLL, ROTATION_ERROR, finish, select
 from kin.fk import fk
+from kin.results import IKResult, IKSolution, LimitViolation, Redundancy, Status
 from kin.robot import Robot
 from kin.solvers import Match, solver_for
 from kin.solvers.common import APPROACH, POSE, POSITION, TASK_CODES, TURN, Candidates, Problem, wrap
@@ -34,92 +33,7 @@ Task = Literal["pose", "approach", "position"]
 ORIENTATION_WEIGHT = 0.1
 _STARTS = 24
 _HAIR = 1e-6
-
-
-class Status(StrEnum):
-    """What kind of answer an `IKResult` is."""
-
-    SOLVED = "solved"
-    APPROXIMATE = "approximate"
-    LIMITS = "limits"
-    UNREACHABLE = "unreachable"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class IKSolution:
-    """One configuration, with what forward kinematics says about it.
-
-    Attributes:
-        q: ``(n,)`` joint values, radians or metres, read-only.
-        branch: name of the branch, e.g. ``"shoulder front · elbow up · wrist no-flip"``.
-        position_error: metres between its tool point and the target's.
-        rotation_error: radians; the whole angle for a pose, the angle between the approach directions for an
-            approach, 0 for a position.
-        in_limits: whether every joint is inside its limits.
-        distance: 2-norm of q − seed.
-        redundancy: value of the free parameter that was used, None where there is none.
-        compromise: None for an exact answer; ``"roll"``: point and approach direction are exact, the roll about
-            it is given up; ``"rotation"``: the point is exact, the orientation as near as it gets;
-            ``"closest"``: the nearest configuration there is.
-    """
-
-    q: Array
-    branch: str
-    position_error: float
-    rotation_error: float
-    in_limits: bool
-    distance: float
-    redundancy: float | None = None
-    compromise: str | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class LimitViolation:
-    """A joint that would have to pass its stop: index, name, the value it would need, the stop (rad or m)."""
-
-    joint: int
-    name: str
-    value: float
-    limit: float
-
-
-@dataclass(frozen=True, slots=True)
-class Redundancy:
-    """The free parameter of a redundant answer: id, label, the value used, and all values the limits allow."""
-
-    name: str
-    label: str
-    value: float
-    intervals: tuple[tuple[float, float], ...]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class IKResult:
-    """The answer to one target; see the module docstring.
-
-    Attributes:
-        solutions: sorted by distance to the seed (compromises: by what they give up); empty unless solved or
-            approximate.
-        closest: the configuration inside the limits with the least ``√(|Δp|² + (0.1 m · angle)²)`` found when
-            there is no exact answer; None when there is one.
-        violations: the stops the least offending branch would break (status ``limits``).
-        distance: metres by which the point is out of reach, 0 if the point itself can be reached.
-    """
-
-    status: Status
-    reason: str
-    solutions: tuple[IKSolution, ...]
-    closest: IKSolution | None
-    solver: str
-    task: str
-    violations: tuple[LimitViolation, ...] = ()
-    distance: float = 0.0
-    redundancy: Redundancy | None = None
-
-    @property
-    def best(self) -> IKSolution | None:
-        """The configuration to show: the first solution, else the closest one."""
-        return self.solutions[0] if self.solutions else self.closest
+_FAR = 1e3
 
 
 def solve_ik(
@@ -195,6 +109,10 @@ class _Query:
         self.value = math.nan if redundancy is None else float(redundancy)
         self.lower, self.upper = robot.lower.copy(), robot.upper.copy()
         self.turns = np.where(robot.revolute, TURN, 0.0)
+        # Where a descent may go: inside the limits or, if these are to be ignored, one turn either way.
+        free = robot.revolute & (not respect_limits)
+        self.low = np.where(free, -TURN, np.where(np.isfinite(self.lower), self.lower, -_FAR))
+        self.high = np.where(free, TURN, np.where(np.isfinite(self.upper), self.upper, _FAR))
         self.match = solver_for(robot)
         if redundancy is not None and (self.match is None or robot.n < 7):
             raise InputError("redundancy", redundancy, f"none: {robot.id} has no free parameter to set")
@@ -250,12 +168,10 @@ class _Query:
         )
 
     def descend(self, task: int, starts: Array, weight: float, enough: float = 0.0) -> tuple[Array, float]:
-        """Best configuration inside the limits by numeric descent, and its error E in metres."""
+        """Best configuration by numeric descent, and its error E in metres."""
         out = np.empty(self.robot.n)
-        lower = np.where(np.isfinite(self.lower), self.lower, -1e3)
-        upper = np.where(np.isfinite(self.upper), self.upper, 1e3)
         error = best_of(
-            self.robot.model, self.T, task, weight, lower, upper, np.ascontiguousarray(starts), enough, out
+            self.robot.model, self.T, task, weight, self.low, self.high, np.ascontiguousarray(starts), enough, out
         )
         return out, float(error)
 
@@ -264,7 +180,7 @@ class _Query:
         rows = [self.seed[None]]
         if candidates is not None:
             rows.append(candidates[~np.isnan(candidates[:, 0])])
-        rows.append(spread(self.lower, self.upper, count))
+        rows.append(spread(self.low, self.high, count))
         return np.concatenate(rows)
 
     # -- answers -------------------------------------------------------------------------------------------
@@ -300,7 +216,7 @@ class _Query:
         good = np.zeros(len(q), dtype=bool)
         miss = stats[:, POSITION_ERROR] + stats[:, ROTATION_ERROR] + (stats[:, OVERRUN] if self.respect else 0.0)
         for i in np.flatnonzero(miss < _HAIR).tolist():
-            near = self.descend(self.task, q[i : i + 1], 1.0)[0] if self.respect else q[i]
+            near, _ = self.descend(self.task, q[i : i + 1], 1.0)
             row, row_stats = self.measure(near[None], self.task)
             error = max(row_stats[0, POSITION_ERROR], row_stats[0, ROTATION_ERROR])
             if error <= TOLERANCES.closure_position and (row_stats[0, OVERRUN] == 0.0 or not self.respect):
@@ -416,9 +332,6 @@ class _Query:
         A descent in which a radian weighs a tenth of a millimetre settles the orientation; its approach
         direction then goes through the closed form, which makes the point exact.
         """
-        lower, upper = self.lower, self.upper
-        if not self.respect:
-            self.lower, self.upper = np.full_like(lower, -math.pi), np.full_like(upper, math.pi)
         start, error = self.descend(POSITION, self.starts(candidates), 1.0, enough=1e-9)
         q = start
         if error <= 1e-7:
@@ -426,7 +339,6 @@ class _Query:
                 tries = np.stack([q, start]) if candidates is None else self.starts(candidates, 4)
                 tries = np.concatenate([q[None], tries])
                 q, _ = self.descend(POSE, tries, weight)
-        self.lower, self.upper = lower, upper
         if error > 1e-7:
             return None
         T = fk(self.robot, q)
@@ -452,11 +364,7 @@ class _Query:
 
     def answer_position(self) -> IKResult:
         """Point only: settle the directions by descent from the seed, then list the branches that share them."""
-        lower, upper = self.lower, self.upper
-        if not self.respect:
-            self.lower, self.upper = self.free_limits()
         q, error = self.descend(POSITION, self.starts(count=4 * _STARTS), 1.0, enough=1e-11)
-        self.lower, self.upper = lower, upper
         if error > TOLERANCES.closure_position:
             return self.out_of_reach("", 0.0, None)
         T = fk(self.robot, q)
@@ -486,18 +394,9 @@ class _Query:
             task=self.task_name,
         )
 
-    def free_limits(self) -> tuple[Array, Array]:
-        """Limits for a descent that may ignore the robot's own: a turn either way, prismatic strokes kept."""
-        turn = self.turns > 0.0
-        return np.where(turn, -TURN, self.lower), np.where(turn, TURN, self.upper)
-
     def answer_numeric(self) -> IKResult:
         """A task with no closed form: the descent's best, from many starts."""
-        lower, upper = self.lower, self.upper
-        if not self.respect:
-            self.lower, self.upper = self.free_limits()
         q, _ = self.descend(self.task, self.starts(count=4 * _STARTS), 1.0, enough=1e-11)
-        self.lower, self.upper = lower, upper
         found, stats = self.measure(q[None], self.task)
         if (
             stats[0, POSITION_ERROR] > TOLERANCES.closure_position
