@@ -3,7 +3,7 @@
 >>> import kin
 >>> robot = kin.get_robot("pioneer5")
 >>> kin.fk(robot, robot.home)[:3, 3].round(3).tolist()
-[0.03, 0.154, -0.2]
+[-0.03, 0.157, -0.194]
 """
 
 from kin._version import __version__

@@ -6,9 +6,9 @@ position in p. Equations (4)-(15) are the 5-DOF Pioneer arm, (17)-(28) the 7-DOF
 them in gets an arm that is sometimes 97 cm away from the real one, for seven of the 24 are misprinted:
 
 - (6) and (27) carry one term too many, or lack one;
-- (13) and (22) have one cosine where a sine must be, or the other way round;
+- (13) and (22) have one cosine where a sine must be;
 - (25), and (28) which is built on it, have three wrong signs;
-- (19) has five wrong letters.
+- (19) has five slips: three signs, one letter, and a term too many.
 
 (3), the matrix as a whole, is garbled in the stored text; its entries are the equations that follow it.
 
@@ -372,7 +372,7 @@ EQUATIONS: tuple[Equation, ...] = (
         "wrong",
         "d7*s7*s3*c6*c5*c4 - d7*s7*s5*c6*c3 + d7*s7*s6*s4*s3 + d7*s5*s3*c7*c4 - d7*c7*c5*c3 + d5*s4*s3 + d1",
         f"d1 + d5*s3*s4 + d7*({_AZ_7})",
-        "The same three signs as in (25), of which this is d7 times the whole.",
+        "The same three signs as in (25), which enters here times d7.",
         largest=0.9699484522385713,
         largest_at=(0.0, 0.0, -54.7356, 0.0, -144.7356, 0.0, 215.2644),
     ),

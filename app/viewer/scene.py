@@ -199,7 +199,7 @@ class ArmScene:
             self._scene.add_label(
                 f"{name}/label",
                 text,
-                position=(0.0, 0.0, (1.15 + 0.35 * crowd) * length),
+                position=(0.0, 0.0, (1.15 + 0.6 * crowd) * length),
                 anchor="center-center",
                 visible=True,
             )

@@ -122,6 +122,18 @@ def test_files_that_cannot_be_read(tmp_path):
         kin.load_robot(tmp_path / "latin.toml")
 
 
+def test_a_mark_of_windows_editors_is_no_error(tmp_path):
+    (tmp_path / "arm.toml").write_text(GOOD, encoding="utf-8-sig")
+    assert kin.load_robot(tmp_path / "arm.toml") == kin.parse_robot(GOOD)
+
+
+@pytest.mark.parametrize("text", ["x = " + "9" * 5000, "x = " + "[" * 100_000], ids=["digits", "brackets"])
+def test_toml_without_end_is_refused(text):
+    with pytest.raises(RobotFileError, match="valid TOML") as caught:
+        kin.parse_robot(text, "arm.toml")
+    assert len(str(caught.value)) < 300
+
+
 def test_rows_are_needed_and_not_without_end():
     head = GOOD.split("[[rows]]")[0]
     for text in (head, head + "rows = []", head + '[[rows]]\nkind = "fixed"', head + "[[rows]]\nname='%d'\n" * 40):

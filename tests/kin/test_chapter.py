@@ -33,6 +33,32 @@ def difference(equation, q):
     return row
 
 
+def defect(T):
+    """Largest entry of |RᵀR − I| for each matrix."""
+    R = T[..., :3, :3]
+    return np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-1, -2))
+
+
+def maximum(robot, size):
+    """Largest `size(q)` inside the limits: the best of many random poses, each walked uphill by shrinking steps.
+
+    Going uphill one joint at a time is not enough: for (19) it stops at 2.3746, short of the maximum.
+    """
+    rng = np.random.default_rng(0)
+    q = robot.random_q(rng, 10_000)
+    q = q[np.argsort(size(q))[-100:]]
+    best = size(q)
+    step = 0.6
+    for _ in range(500):
+        moved = rng.random(q.shape) < 0.5
+        there = robot.clip(q + step * moved * rng.normal(size=q.shape))
+        higher = size(there)
+        better = higher > best
+        q[better], best[better] = there[better], higher[better]
+        step *= 0.97
+    return float(best.max())
+
+
 def test_every_equation_of_the_chapter_is_there():
     assert [e.number for e in chapter.EQUATIONS] == [*range(3, 16), *range(17, 29)]
     assert {e.number for e in chapter.EQUATIONS if e.verdict == "wrong"} == set(WRONG)
@@ -68,19 +94,28 @@ def test_largest_difference_is_where_and_what_is_said(equation):
     assert robot.in_limits(q, 1e-9)
     assert abs(difference(equation, q).difference) == pytest.approx(equation.largest, rel=1e-8)
     assert equation.largest == pytest.approx(WRONG[equation.number], rel=3e-5)
-    # A maximum: no small step inside the limits makes the difference larger.
-    steps = robot.clip(q + np.random.default_rng(1).normal(scale=1e-3, size=(5000, robot.n)))
-    assert np.abs(difference(equation, steps).difference).max() <= equation.largest + 1e-9
 
 
-@pytest.mark.parametrize(("robot_id", "defect"), [("pioneer5", 1.19), ("redundant7", 2.94)])
-def test_printed_matrix_is_no_rotation(robot_id, defect):
-    """The misprints show without any reference: RᵀR is not I."""
-    q = kin.get_robot(robot_id).random_q(np.random.default_rng(0), 200_000)
-    R = chapter.matrix(robot_id, q)[:, :3, :3]
-    assert np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max() == pytest.approx(defect, rel=0.03)
-    R = chapter.matrix(robot_id, q[:1000], "corrected")[:, :3, :3]
-    assert np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max() < 1e-14
+@pytest.mark.parametrize("equation", [e for e in EVALUABLE if e.verdict == "wrong"], ids=label)
+def test_a_search_inside_the_limits_finds_that_difference_and_no_larger_one(equation):
+    """The search knows nothing of `largest_at`, so the figure is the maximum over all poses."""
+    robot = kin.get_robot(equation.robot_id)
+
+    def size(q):
+        values = chapter.symbols(robot, q)
+        T = kin.fk(robot, q)
+        return np.abs(chapter.evaluate(equation.printed, values) - T[(..., *equation.index)])
+
+    assert maximum(robot, size) == pytest.approx(equation.largest, abs=1e-7)
+
+
+@pytest.mark.parametrize(("robot_id", "largest"), [("pioneer5", 1.2346318), ("redundant7", 3.0562825)])
+def test_printed_matrix_is_no_rotation(robot_id, largest):
+    """The misprints show without any reference: RᵀR is not I, by as much as this inside the limits."""
+    robot = kin.get_robot(robot_id)
+    assert maximum(robot, lambda q: defect(chapter.matrix(robot_id, q))) == pytest.approx(largest, abs=1e-6)
+    q = robot.random_q(np.random.default_rng(0), 1000)
+    assert defect(chapter.matrix(robot_id, q, "corrected")).max() < 1e-14
 
 
 @pytest.mark.parametrize("robot_id", ARMS)
