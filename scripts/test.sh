@@ -1,5 +1,5 @@
 #!/bin/sh
-# Set everything up in .venv, then run every check. Arguments go to pytest, e.g. -m slow, or tests/kin.
+# Set everything up in .venv, then run every check. Arguments go to pytest, e.g. tests/kin, or -m browser.
 set -eu
 root=$(cd "$(dirname "$0")/.." && pwd)
 . "$root/scripts/venv.sh"
