@@ -149,7 +149,9 @@ class Robot:
         """An upper bound in metres of the tool's distance from the base origin, prismatic strokes included."""
         total = float(np.linalg.norm(self.T_last_tool[:3, 3]))
         for row in self.rows:
-            stroke = max(map(abs, row.limits)) if row.kind == "prismatic" and row.limits else 0.0
+            stroke = 0.0
+            if row.kind == "prismatic":
+                stroke = max(map(abs, row.limits)) if row.limits else math.inf
             total += math.hypot(row.a, abs(row.d) + stroke)
         return total
 

@@ -178,3 +178,12 @@ def test_random_configurations_stay_inside():
     assert robot.in_limits(q).all()
     assert robot.in_limits(robot.clip(q + 10)).all()
     assert not robot.in_limits(q + 10).any()
+
+
+def test_reach_bounds_every_pose_and_is_endless_without_stops():
+    for robot in (*kin.builtin_robots().values(), kin.parse_robot(GOOD)):
+        q = robot.random_q(np.random.default_rng(1), 5000)
+        origin = robot.T_world_base[:3, 3]
+        assert np.linalg.norm(kin.fk(robot, q)[:, :3, 3] - origin, axis=-1).max() <= robot.reach
+    slide = kin.Joint("slide", kind="prismatic", limits=None)
+    assert replace(kin.parse_robot(GOOD), rows=(slide,), home=(0.0,)).reach == math.inf
