@@ -13,11 +13,10 @@ from typing import Literal, TypeVar, cast
 import numpy as np
 from typing_extensions import TypedDict
 
-from kin import IKResult, IKSolution, Joint, Robot, fk, jacobian, link_frames, manipulability
+from kin import IKResult, IKSolution, Joint, Robot, Task, fk, jacobian, link_frames, manipulability
 from kin.transforms import Array, wxyz_from_rotation
 
 Matrix = list[list[float]]
-Task = Literal["pose", "approach", "position"]
 T = TypeVar("T")
 
 

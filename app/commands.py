@@ -15,9 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
-from app.answers import RobotAnswer, Solution, Task, fk_answers, ik_answer, robot_answer
+from app.answers import RobotAnswer, Solution, fk_answers, ik_answer, robot_answer
 from app.store import Store
-from kin import InputError, Robot, solve_ik
+from kin import InputError, Robot, Task, solve_ik
 from kin.transforms import Array, frame_from_approach, from_position_wxyz
 
 

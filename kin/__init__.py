@@ -11,7 +11,7 @@ from kin.catalog import builtin_robots, get_robot, load_folder, load_robot, pars
 from kin.errors import InputError, KinematicsError, RobotFileError, UnknownRobotError
 from kin.fk import fk, jacobian, link_frames, manipulability
 from kin.ik import ik_branches, solve_ik
-from kin.results import IKResult, IKSolution, LimitViolation, Redundancy, Status
+from kin.results import IKResult, IKSolution, LimitViolation, Redundancy, Status, Task
 from kin.robot import Joint, Robot
 from kin.warmup import warm_up
 
@@ -26,6 +26,7 @@ __all__ = [
     "Robot",
     "RobotFileError",
     "Status",
+    "Task",
     "UnknownRobotError",
     "__version__",
     "builtin_robots",

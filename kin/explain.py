@@ -59,10 +59,10 @@ def _side(robot: Robot, target: Array, q: Array) -> str:
 
     The shoulder is taken on the first joint's axis at the second joint's height.
     """
-    shoulder = link_frames(robot, q)[0, :3, 3]
-    axis = robot.T_world_base[:3, 2] if robot.convention == "standard" else link_frames(robot, q)[0, :3, 2]
+    first = link_frames(robot, q)[0]
+    axis = robot.T_world_base[:3, 2] if robot.convention == "standard" else first[:3, 2]
     foot = robot.T_world_base[:3, 3]
-    shoulder = foot + axis * float(axis @ (shoulder - foot))
+    shoulder = foot + axis * float(axis @ (first[:3, 3] - foot))
     reached = float(np.linalg.norm(fk(robot, q)[:3, 3] - shoulder))
     wanted = float(np.linalg.norm(target[:3, 3] - shoulder))
     if wanted > reached + 1e-6:

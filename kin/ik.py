@@ -12,7 +12,6 @@ form: the closest configuration to a target that cannot be met, and point-only t
 from __future__ import annotations
 
 import math
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,7 +20,7 @@ from kin import explain
 from kin.errors import InputError
 from kin.finish import DISTANCE, OVERRUN, POSITION_ERROR, ROLL, ROTATION_ERROR, finish, select
 from kin.fk import fk
-from kin.results import IKResult, IKSolution, LimitViolation, Redundancy, Status
+from kin.results import IKResult, IKSolution, LimitViolation, Redundancy, Status, Task
 from kin.robot import Robot
 from kin.solvers import Match, solver_for
 from kin.solvers.common import APPROACH, POSE, POSITION, TASK_CODES, TURN, Candidates, Problem, wrap
@@ -29,11 +28,9 @@ from kin.solvers.numeric import best_of, spread
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array, as_transform, finite_array
 
-Task = Literal["pose", "approach", "position"]
 ORIENTATION_WEIGHT = 0.1
 _STARTS = 24
 _HAIR = 1e-6
-_FAR = 1e3
 
 
 def solve_ik(
@@ -111,8 +108,8 @@ class _Query:
         self.turns = np.where(robot.revolute, TURN, 0.0)
         # Where a descent may go: inside the limits or, if these are to be ignored, one turn either way.
         free = robot.revolute & (not respect_limits)
-        self.low = np.where(free, -TURN, np.where(np.isfinite(self.lower), self.lower, -_FAR))
-        self.high = np.where(free, TURN, np.where(np.isfinite(self.upper), self.upper, _FAR))
+        self.low = np.where(free, -TURN, self.lower)
+        self.high = np.where(free, TURN, self.upper)
         self.match = solver_for(robot)
         if redundancy is not None and (self.match is None or robot.n < 7):
             raise InputError("redundancy", redundancy, f"none: {robot.id} has no free parameter to set")
@@ -279,7 +276,7 @@ class _Query:
             solver=match.solver.NAME,
             task=self.task_name,
             violations=violations,
-            distance=self.shortfall(closest),
+            distance=self.nearest_to_point(closest)[1],
         )
 
     def given_redundancy(self, match: Match) -> str:
@@ -415,14 +412,7 @@ class _Query:
     def out_of_reach(self, obstacle: str, gap: float, candidates: Array | None) -> IKResult:
         """No configuration: tell a point out of reach from an orientation that cannot be had there."""
         closest = self.closest(candidates)
-        distance = 0.0
-        nearest = closest
-        if closest.position_error > TOLERANCES.closure_position:
-            q, distance = self.descend(POSITION, self.starts(closest.q[None]), 1.0, enough=1e-11)
-            found, stats = self.measure(q[None], self.task)
-            nearest = self.solution(found[0], stats[0], "numeric", compromise="closest")
-            if distance <= 1e-7:
-                distance = 0.0
+        nearest, distance = self.nearest_to_point(closest)
         if self.task == POSITION:
             closest = nearest
         return IKResult(
@@ -441,12 +431,14 @@ class _Query:
         found, stats = self.measure(q[None], self.task)
         return self.solution(found[0], stats[0], "numeric", compromise="closest")
 
-    def shortfall(self, closest: IKSolution) -> float:
-        """Metres by which the target *point* is out of reach inside the limits."""
+    def nearest_to_point(self, closest: IKSolution) -> tuple[IKSolution, float]:
+        """The configuration nearest to the target's point alone, and the metres that are missing there."""
         if closest.position_error <= TOLERANCES.closure_position:
-            return 0.0
-        _, distance = self.descend(POSITION, self.starts(closest.q[None]), 1.0, enough=1e-11)
-        return 0.0 if distance <= 1e-7 else distance
+            return closest, 0.0
+        q, distance = self.descend(POSITION, self.starts(closest.q[None]), 1.0, enough=1e-11)
+        found, stats = self.measure(q[None], self.task)
+        nearest = self.solution(found[0], stats[0], "numeric", compromise="closest")
+        return nearest, 0.0 if distance <= 1e-7 else distance
 
 
 def union(arcs: Array, circular: bool) -> tuple[tuple[float, float], ...]:

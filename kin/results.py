@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Literal
 
 from kin.transforms import Array
+
+Task = Literal["pose", "approach", "position"]
 
 
 class Status(StrEnum):

@@ -28,8 +28,6 @@ from kin.transforms import Array, finite_array
 Convention = Literal["standard", "modified"]
 Kind = Literal["revolute", "prismatic", "fixed"]
 KIND_CODES: dict[Kind, float] = {"fixed": 0.0, "revolute": 1.0, "prismatic": 2.0}
-ROW_WIDTH = 8
-HEADER_WIDTH = 27
 
 Matrix = tuple[tuple[float, ...], ...]
 IDENTITY: Matrix = tuple(tuple(float(i == j) for j in range(4)) for i in range(4))

@@ -8,14 +8,14 @@ from fastapi import APIRouter, Body, Response
 from pydantic import Discriminator, Field, Tag
 from typing_extensions import TypedDict
 
-from app.answers import IkAnswer, Task, documented, ik_answer
+from app.answers import IkAnswer, documented, ik_answer
 from app.api import schemas
 from app.api.body import JsonRoute
 from app.api.problems import FieldError, invalid
 from app.api.schemas import POST_REFUSALS, Configurations, Number, RobotDep, SettingsDep, example, one_or_all
 from app.api.targets import Target
 from app.settings import Settings
-from kin import Robot, solve_ik
+from kin import Robot, Task, solve_ik
 from kin.transforms import Array
 
 router = APIRouter(tags=["kinematics"], route_class=JsonRoute)

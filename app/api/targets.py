@@ -11,11 +11,10 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from app.answers import Task
 from app.api import schemas
 from app.api.problems import FieldError, from_input_error, invalid
 from app.api.schemas import Vector3, Vector4, numbers
-from kin import InputError
+from kin import InputError, Task
 from kin.transforms import Array, as_transform, frame_from_approach, from_position_wxyz
 
 AGREEMENT = 1e-6  # metres, and matrix entries

@@ -25,10 +25,10 @@ from app.viewer.panel import assign, listen, listen_click
 from app.viewer.panel.joints import JointSliders
 from app.viewer.panel.readout import PoseReadout
 from app.viewer.panel.status import Notice, StatusLine, notice
-from app.viewer.panel.target import TASKS, TargetChoice, Task, default_task
+from app.viewer.panel.target import TASKS, TargetChoice, default_task
 from app.viewer.panel.view import ViewOptions, ViewState, configure_theme
 from app.viewer.scene import ArmScene
-from kin import Robot
+from kin import Robot, Task
 from kin.transforms import Array, from_position_wxyz
 
 log = logging.getLogger(__name__)

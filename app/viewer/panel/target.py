@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import viser
 
 from app.viewer.panel import Post, assign, listen, listen_click
-from kin import Robot
-
-Task = Literal["pose", "approach", "position"]
+from kin import Robot, Task
 
 TASKS: dict[str, Task] = {"Full pose": "pose", "Point + approach": "approach", "Point only": "position"}
 HINT = (
