@@ -13,7 +13,20 @@ from typing import Literal, TypeVar, cast
 import numpy as np
 from typing_extensions import TypedDict
 
-from kin import IKResult, IKSolution, Joint, Robot, Task, fk, jacobian, link_frames, manipulability
+from kin import (
+    BlockedBranch,
+    IKResult,
+    IKSolution,
+    Joint,
+    Redundancy,
+    Robot,
+    branch_names,
+    fk,
+    jacobian,
+    link_frames,
+    manipulability,
+)
+from kin.results import Cause, LimitViolation
 from kin.transforms import Array, wxyz_from_rotation
 
 Matrix = list[list[float]]
@@ -89,24 +102,39 @@ class JacobianAnswer(TypedDict):
 
 
 @documented
+class RedundancyAnswer(TypedDict):
+    """A parameter the task leaves free."""
+
+    name: str
+    """Short name of the free parameter, such as "psi" or "theta1"; the one to use in a request's `redundancy`."""
+    label: str
+    """The same for people."""
+    value: float
+    """The value used, in radians."""
+    intervals: list[list[float]]
+    """Every [lower, upper] range of values, in radians, for which the target can be reached inside the limits.
+    Of several free parameters each is told with the others held. Exact, not sampled."""
+
+
+@documented
 class Solution(TypedDict):
     """One joint configuration, with its errors measured by forward kinematics."""
 
     q: list[float]
     """Joint values, base to tool, in radians (metres for sliding joints)."""
     branch: str
-    """Which of the arm's postures this is, in words."""
+    """Which of the arm's postures this is: one of the robot's `branches`, "numeric" if these have no names."""
     position_error: float
-    """Distance of the tool point from the target, in metres."""
+    """Distance of the tool point from the target, in metres; of a mask along its coordinates."""
     rotation_error: float
     """Rotation left to the target in radians: the whole angle for task pose, the angle between the approach
-    axes for task approach, 0 for task position."""
+    axes for task approach, 0 for task position, the length of the masked rotation vector for a mask."""
     in_limits: bool
     """Whether every joint is inside its limits."""
     distance: float
     """Distance from the seed in joint space (2-norm, radians)."""
-    redundancy: float | None
-    """Value of the arm's free parameter in this solution, in radians; null if it has none."""
+    redundancy: list[RedundancyAnswer]
+    """What the task leaves free on this branch: the value used in this solution, and the ranges of the branch."""
     compromise: str | None
     """null for an exact answer; "roll" if the rotation about the approach axis was given up; "rotation" if only
     the point is kept and the whole rotation error is as small as it gets; "closest" for the nearest there is."""
@@ -127,42 +155,67 @@ class Violation(TypedDict):
 
 
 @documented
-class RedundancyAnswer(TypedDict):
-    """The freedom the task leaves over."""
+class Blocked(TypedDict):
+    """A branch that reaches the target only beyond the limits."""
 
-    name: str
-    """Short name of the free parameter, such as "psi" or "theta1"."""
-    label: str
+    branch: str
+    """Name of the branch."""
+    q: list[float]
+    """The configuration it would need, in radians (metres)."""
+    violations: list[Violation]
+    """The stops in its way."""
+
+
+@documented
+class SingularityAnswer(TypedDict):
+    """A way in which a configuration is singular."""
+
+    kind: Literal["elbow", "shoulder", "wrist", "algorithmic", "jacobian"]
+    """Which part of the arm loses a motion; "algorithmic": only the closed form loses a parameter, the arm
+    nothing; "jacobian": told by the least singular value, for arms without a closed form."""
+    meaning: str
     """The same for people."""
-    value: float
-    """Its value in the first solution, in radians."""
-    intervals: list[list[float]]
-    """Every [lower, upper] range of values, in radians, for which the target can be reached."""
+    distance: float
+    """How far away it is, in `unit`."""
+    unit: str
+    """"rad", "m", or "SI" for a singular value."""
 
 
 @documented
 class IkAnswer(TypedDict):
     """Inverse kinematics of one target. A target out of reach is an answer too: read `status`."""
 
-    status: Literal["solved", "approximate", "limits", "unreachable"]
+    status: Literal["solved", "approximate", "limits", "orientation", "unreachable"]
     """"solved": at least one exact answer. "approximate": the arm cannot do the whole task; `solutions` are the
-    best compromises. "limits": postures exist, but each needs a joint beyond its stop. "unreachable": none."""
+    best compromises. "limits": postures exist, but each needs a joint beyond its stop, see `blocked`.
+    "orientation": the point can be reached, not with this orientation; see `nearest_orientation`.
+    "unreachable": the point is `distance` metres out of reach, or the branch asked for does not exist there."""
+    cause: Cause
+    """Why it is not solved, in one or two words; empty when it is. "too far", "too near", "around the axis" and
+    "outside" tell where a point out of reach is."""
     reason: str
-    """One sentence for people, in degrees and millimetres."""
-    task: Task
+    """Status and cause in a sentence for people, in degrees and millimetres."""
+    task: Literal["pose", "approach", "position", "mask"]
     """What was asked of the tool."""
     solver: str
     """Name of the method that answered."""
     solutions: list[Solution]
-    """Nearest to the seed first; empty for "limits" and "unreachable"."""
+    """Nearest to the seed first, or in the order of `prefer`; empty unless "solved" or "approximate"."""
     closest: Solution | None
-    """The closest configuration inside the limits when there is no exact answer; null when solved."""
+    """When there is no exact answer, the configuration inside the limits with the least
+    √(|Δp|² + (0.1 m · angle)²) on the branches asked for; null when solved."""
+    nearest_orientation: Solution | None
+    """For "orientation": the exact point with the least rotation error; null otherwise."""
+    blocked: list[Blocked]
+    """For "limits": every branch that only the limits forbid, the least offending first."""
     violations: list[Violation]
-    """For "limits": the joints in the way, in the posture that breaks the fewest stops the least."""
+    """The stops in the way of the first of `blocked`."""
     distance: float
     """How far out of reach the target is, in metres; 0 within reach."""
-    redundancy: RedundancyAnswer | None
-    """The freedom left over, null if there is none."""
+    redundancy: list[RedundancyAnswer]
+    """What the task leaves free: the values of the first solution, with the ranges of all branches together."""
+    singularities: list[SingularityAnswer]
+    """What is singular about the first solution (or about `closest`)."""
 
 
 @documented
@@ -213,6 +266,8 @@ class RobotAnswer(TypedDict):
     """What kind of arm it is."""
     n: int
     """Number of moving joints, the length of q."""
+    branches: list[str]
+    """Names of the arm's inverse-kinematics branches; empty for an arm without a closed form."""
     convention: Literal["standard", "modified"]
     """How a DH row is read. standard: Rz(θ) Tz(d) Tx(a) Rx(α). modified (Craig): Rx(α) Tx(a) Rz(θ) Tz(d)."""
     reach: float
@@ -245,6 +300,7 @@ def robot_answer(robot: Robot) -> RobotAnswer:
         "name": robot.name,
         "description": robot.description,
         "n": robot.n,
+        "branches": list(branch_names(robot)),
         "convention": robot.convention,
         "reach": robot.reach,
         "source": robot.source,
@@ -300,27 +356,48 @@ def jacobian_answers(robot: Robot, q: Array, frame: Literal["base", "tool"] = "b
 
 def ik_answer(result: IKResult) -> IkAnswer:
     """One result of `kin.solve_ik`."""
-    free = result.redundancy
     return {
         "status": result.status.value,
+        "cause": result.cause,
         "reason": result.reason,
-        "task": cast(Task, result.task),
+        "task": cast(Literal["pose", "approach", "position", "mask"], result.task),
         "solver": result.solver,
         "solutions": [_solution(solution) for solution in result.solutions],
         "closest": None if result.closest is None else _solution(result.closest),
-        "violations": [
-            {"joint": v.joint, "name": v.name, "value": v.value, "limit": v.limit} for v in result.violations
-        ],
+        "nearest_orientation": None
+        if result.nearest_orientation is None
+        else _solution(result.nearest_orientation),
+        "blocked": [_blocked(blocked) for blocked in result.blocked],
+        "violations": [_violation(violation) for violation in result.violations],
         "distance": result.distance,
-        "redundancy": None
-        if free is None
-        else {
-            "name": free.name,
-            "label": free.label,
-            "value": free.value,
-            "intervals": [list(interval) for interval in free.intervals],
-        },
+        "redundancy": [_redundancy(free) for free in result.redundancy],
+        "singularities": [
+            {"kind": s.kind, "meaning": s.meaning, "distance": s.distance, "unit": s.unit}
+            for s in result.singularities
+        ],
     }
+
+
+def _blocked(blocked: BlockedBranch) -> Blocked:
+    return {
+        "branch": blocked.branch,
+        "q": blocked.q.tolist(),
+        "violations": [_violation(violation) for violation in blocked.violations],
+    }
+
+
+def _violation(violation: LimitViolation) -> Violation:
+    return {
+        "joint": violation.joint,
+        "name": violation.name,
+        "value": violation.value,
+        "limit": violation.limit,
+    }
+
+
+def _redundancy(free: Redundancy) -> RedundancyAnswer:
+    intervals = [list(interval) for interval in free.intervals]
+    return {"name": free.name, "label": free.label, "value": free.value, "intervals": intervals}
 
 
 def _solution(solution: IKSolution) -> Solution:
@@ -331,7 +408,7 @@ def _solution(solution: IKSolution) -> Solution:
         "rotation_error": solution.rotation_error,
         "in_limits": solution.in_limits,
         "distance": solution.distance,
-        "redundancy": solution.redundancy,
+        "redundancy": [_redundancy(free) for free in solution.redundancy],
         "compromise": solution.compromise,
     }
 

@@ -128,6 +128,20 @@ def _number(text: str) -> float:
 _number.__name__ = "number"  # argparse says "invalid number value"
 
 
+def _named_number(text: str) -> tuple[str, float]:
+    name, _, value = text.rpartition("=")
+    return name.strip(), _number(value)
+
+
+def _named_numbers(text: str) -> tuple[str, list[float]]:
+    name, _, values = text.rpartition("=")
+    return name.strip(), [_number(value) for value in values.split(":")]
+
+
+_named_number.__name__ = "value"
+_named_numbers.__name__ = "value"
+
+
 def _not_an_option(word: str) -> str:
     """Negative numbers such as -1e-3 look like options to argparse; a leading space tells it otherwise."""
     try:
@@ -171,7 +185,12 @@ def _parser() -> argparse.ArgumentParser:
     fk.add_argument("--frames", action="store_true", help="also the frame after every DH row")
     fk.set_defaults(command=_fk)
 
-    ik = commands.add_parser("ik", parents=[common, answers], help="joint values for a pose of the tool")
+    ik = commands.add_parser(
+        "ik",
+        parents=[common, answers],
+        help="joint values for a pose of the tool",
+        usage="kinboard ik ROBOT --position X Y Z [--wxyz W X Y Z | --approach X Y Z] [options]",
+    )
     ik.add_argument("robot", metavar="ROBOT", help="id of the robot; `kinboard robots` lists them")
     xyz = ("X", "Y", "Z")
     ik.add_argument(
@@ -186,9 +205,38 @@ def _parser() -> argparse.ArgumentParser:
         "--seed", type=_number, nargs="+", metavar="Q", help=f"stay near this configuration; {UNITS_NOTE}"
     )
     ik.add_argument(
-        "--redundancy", type=_number, metavar="VALUE", help="value of the arm's free parameter, an angle"
-    )
+        "--redundancy", type=_named_number, action="append", metavar="[NAME=]VALUE",
+        help="value of a free parameter of the arm, an angle; may be repeated",
+    )  # fmt: skip
+    ik.add_argument(
+        "--branch", action="append", metavar="NAME",
+        help="only this branch: 'elbow up', 'shoulder front · wrist flip', 'seed'; may be repeated",
+    )  # fmt: skip
+    ik.add_argument(
+        "--lock", type=_named_numbers, action="append", metavar="JOINT=VALUE",
+        help=f"keep a joint (counted from 1) at a value; {UNITS_NOTE}",
+    )  # fmt: skip
+    ik.add_argument(
+        "--limit", type=_named_numbers, action="append", metavar="JOINT=LOWER:UPPER",
+        help=f"narrow the limits of a joint (counted from 1); {UNITS_NOTE}",
+    )  # fmt: skip
+    ik.add_argument(
+        "--prefer", choices=("nearest", "limits", "manipulability"), default="nearest",
+        help="how to choose and sort: nearest to the seed (default), farthest from the limits, most manipulable",
+    )  # fmt: skip
+    ik.add_argument(
+        "--mask", nargs="+", choices=("x", "y", "z", "rx", "ry", "rz"), metavar="COORDINATE",
+        help="instead of a task: which of x y z rx ry rz must be met",
+    )  # fmt: skip
+    ik.add_argument(
+        "--mask-frame", choices=("tool", "base"), default="tool",
+        help="frame of the mask's coordinates: the target's own (default) or the base",
+    )  # fmt: skip
     ik.add_argument("--all", action="store_true", help="all solutions, not only the nearest")
+    ik.add_argument(
+        "--images", choices=("nearest", "all"), default="nearest",
+        help="with --all: also every whole-turn image inside the limits",
+    )  # fmt: skip
     ik.add_argument("--ignore-limits", action="store_true", help="also solutions beyond the joint limits")
     ik.set_defaults(command=_ik)
 

@@ -12,12 +12,14 @@ import os
 import sys
 from argparse import Namespace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from app.answers import RobotAnswer, Solution, fk_answers, ik_answer, robot_answer
+from app.answers import Blocked, RobotAnswer, Solution, fk_answers, ik_answer, robot_answer
 from app.store import Store
 from kin import InputError, Robot, Task, solve_ik
+from kin.question import MASK_NAMES
 from kin.transforms import Array, frame_from_approach, from_position_wxyz
 
 
@@ -54,11 +56,7 @@ def ik(arguments: Namespace) -> int:
     T = from_position_wxyz([x * length for x in arguments.position], arguments.wxyz)
     if arguments.approach is not None:
         T[:3, :3] = frame_from_approach(arguments.approach)
-    task: Task = arguments.task or ("pose" if arguments.wxyz else "approach" if arguments.approach else "position")
-    if task == "pose" and not arguments.wxyz:
-        raise InputError("--task", task, "--wxyz besides --position for a pose")
-    if task == "approach" and not (arguments.approach or arguments.wxyz):
-        raise InputError("--task", task, "--approach or --wxyz besides --position for an approach")
+    task = _task(arguments)
     result = solve_ik(
         robot,
         T,
@@ -66,7 +64,14 @@ def ik(arguments: Namespace) -> int:
         q_seed=None if arguments.seed is None else _configuration(robot, arguments.seed, "--seed", arguments.rad),
         respect_limits=not arguments.ignore_limits,
         max_solutions=None if arguments.all else 1,
-        redundancy=None if arguments.redundancy is None else arguments.redundancy * angle,
+        redundancy=_redundancy(arguments, angle),
+        limits=_per_joint(robot, arguments.limit, "--limit", 2, arguments.rad),
+        locked=_per_joint(robot, arguments.lock, "--lock", 1, arguments.rad),
+        branch=arguments.branch,
+        images=arguments.images,
+        prefer=arguments.prefer,
+        mask=None if arguments.mask is None else [name in arguments.mask for name in MASK_NAMES],
+        mask_frame=arguments.mask_frame,
     )
     answer = ik_answer(result)
     code = 0 if answer["status"] == "solved" else 1
@@ -79,11 +84,15 @@ def ik(arguments: Namespace) -> int:
     listed = [(str(k + 1), s) for k, s in enumerate(answer["solutions"])] + (
         [("closest", closest)] if closest else []
     )
-    print(_table(*_solutions(units, listed)))
-    free = answer["redundancy"]
-    if free is not None:
+    if answer["nearest_orientation"]:
+        listed.append(("nearest orientation", answer["nearest_orientation"]))
+    if listed:
+        print(_table(*_solutions(units, listed)))
+    for free in answer["redundancy"]:
         ranges = ", ".join(" … ".join(units.angle(x) for x in interval) for interval in free["intervals"])
-        print(f"\n{free['label']} = {units.angle(free['value'])}, possible: {ranges}")
+        print(f"\n{free['label']} = {units.angle(free['value'])}, possible: {ranges or 'nothing'}")
+    if answer["blocked"]:
+        print("\n" + _table(["branch", "would need"], _needs(units, answer["blocked"])))
     if not arguments.rad and np.abs(T[:3, 3]).max() < 5e-3:
         print("note: --position is read in millimetres; --rad makes it metres", file=sys.stderr)
     return code
@@ -145,6 +154,67 @@ def _solutions(units: Units, listed: list[tuple[str, Solution]]) -> tuple[list[s
         for name, solution in listed
     ]
     return head, rows
+
+
+def _task(arguments: Namespace) -> Task:
+    """The task asked for, or what the target's form implies; a mask goes with "pose"."""
+    if arguments.mask:
+        if arguments.task:
+            raise InputError("--task", arguments.task, "no task besides --mask")
+        if not arguments.wxyz and any(name.startswith("r") for name in arguments.mask):
+            raise InputError("--mask", " ".join(arguments.mask), "--wxyz besides --position for rx, ry or rz")
+        return "pose"
+    implied: Task = "pose" if arguments.wxyz else "approach" if arguments.approach else "position"
+    task: Task = arguments.task or implied
+    if task == "pose" and not arguments.wxyz:
+        raise InputError("--task", task, "--wxyz besides --position for a pose")
+    if task == "approach" and not (arguments.approach or arguments.wxyz):
+        raise InputError("--task", task, "--approach or --wxyz besides --position for an approach")
+    return task
+
+
+def _needs(units: Units, blocked: list[Blocked]) -> list[list[str]]:
+    """What each branch would need beyond the limits."""
+    return [
+        [
+            branch["branch"],
+            ", ".join(
+                f"q{v['joint'] + 1} = {units.joint(v['joint'], v['value'])} "
+                f"(limit {units.joint(v['joint'], v['limit'])})"
+                for v in branch["violations"]
+            ),
+        ]
+        for branch in blocked
+    ]
+
+
+def _redundancy(arguments: Namespace, angle: float) -> float | dict[str, float] | None:
+    """``--redundancy psi=20 --redundancy …`` as values by name in radians; a bare number stays one."""
+    given: list[tuple[str, float]] = arguments.redundancy or []
+    if len(given) == 1 and not given[0][0]:
+        return given[0][1] * angle
+    if any(not name for name, _ in given):
+        raise InputError("--redundancy", given, "NAME=VALUE when more than one is given")
+    return {name: value * angle for name, value in given} or None
+
+
+def _per_joint(
+    robot: Robot, given: list[tuple[str, list[float]]] | None, field: str, count: int, rad: bool
+) -> Any:
+    """``--lock 2=30`` or ``--limit 2=0:30``, joints from 1, as one entry per joint in radians (metres)."""
+    if given is None:
+        return None
+    entries: list[float | list[float] | None] = [None] * robot.n
+    for joint, values in given:
+        if not joint.isdecimal() or not 1 <= int(joint) <= robot.n:
+            raise InputError(field, joint, f"a joint from 1 to {robot.n} before the =")
+        if len(values) != count:
+            raise InputError(field, values, "JOINT=VALUE" if count == 1 else "JOINT=LOWER:UPPER")
+        i = int(joint) - 1
+        scale = 1.0 if rad else math.pi / 180 if robot.revolute[i] else 1e-3
+        scaled = [value * scale for value in values]
+        entries[i] = scaled[0] if count == 1 else scaled
+    return entries
 
 
 def _dh_table(answer: RobotAnswer, units: Units) -> str:

@@ -10,12 +10,14 @@ from kin._version import __version__
 from kin.catalog import builtin_robots, get_robot, load_folder, load_robot, parse_robot
 from kin.errors import InputError, KinematicsError, RobotFileError, UnknownRobotError
 from kin.fk import fk, jacobian, link_frames, manipulability
-from kin.ik import ik_branches, solve_ik
-from kin.results import IKResult, IKSolution, LimitViolation, Redundancy, Status, Task
+from kin.ik import branch_names, branch_of, ik_branches, solve_ik
+from kin.results import BlockedBranch, IKResult, IKSolution, LimitViolation, Redundancy, Status, Task
 from kin.robot import Joint, Robot
+from kin.singularity import Singularity, singularities
 from kin.warmup import warm_up
 
 __all__ = [
+    "BlockedBranch",
     "IKResult",
     "IKSolution",
     "InputError",
@@ -25,10 +27,13 @@ __all__ = [
     "Redundancy",
     "Robot",
     "RobotFileError",
+    "Singularity",
     "Status",
     "Task",
     "UnknownRobotError",
     "__version__",
+    "branch_names",
+    "branch_of",
     "builtin_robots",
     "fk",
     "get_robot",
@@ -39,6 +44,7 @@ __all__ = [
     "load_robot",
     "manipulability",
     "parse_robot",
+    "singularities",
     "solve_ik",
     "warm_up",
 ]

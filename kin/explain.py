@@ -7,11 +7,17 @@ import math
 import numpy as np
 
 from kin.fk import fk, link_frames
-from kin.results import IKSolution, LimitViolation
-from kin.robot import Robot
+from kin.question import Question
+from kin.results import BlockedBranch, Cause, IKSolution, LimitViolation, Redundancy
+from kin.solvers.singular import Singularity
 from kin.transforms import Array
 
-_WHAT = {"pose": "pose", "approach": "point and approach direction", "position": "point"}
+_WHAT = {
+    "pose": "pose",
+    "approach": "point and approach direction",
+    "position": "point",
+    "mask": "set of coordinates",
+}
 
 
 def solved(count: int, task: str, redundant: bool) -> str:
@@ -22,63 +28,133 @@ def solved(count: int, task: str, redundant: bool) -> str:
     return f"Reached: {ways}{family} for this {_WHAT[task]}."
 
 
-def limits(robot: Robot, violations: tuple[LimitViolation, ...], given: str) -> str:
+def singular(found: tuple[Singularity, ...], shown: bool) -> str:
+    """A further sentence if the configuration is singular; `shown`: it is the answer, not the closest one."""
+    real = [s for s in found if s.kind != "algorithmic"]
+    if not real:
+        return ""
+    where = "there" if shown else "at the closest pose"
+    clause = real[0].meaning.partition(": ")[0]
+    return f" Singular {where}: {clause}."
+
+
+def limits(
+    question: Question, blocked: tuple[BlockedBranch, ...], redundancy: tuple[Redundancy, ...], others: int
+) -> str:
     """Which joint would have to go where, for the branch that breaks the limits least."""
-    needs = "; ".join(_need(robot, v) for v in violations)
-    place = f" with the given {given}" if given else ""
-    return f"Out of limits{place}: the least offending branch would need {needs}."
+    first = blocked[0]
+    needs = "; ".join(_need(question, v) for v in first.violations)
+    given = [f.label for f in question.given]
+    place = f" with the given {' and '.join(given)}" if given else ""
+    which = "the least offending branch" if len(blocked) > 1 else "the only branch"
+    text = f"Out of limits{place}: {which} ({first.branch}) would need {needs}."
+    if len(blocked) > 1:
+        rest = len(blocked) - 1
+        text += f" {_count(rest)} other {_plural(rest, 'branch', 'branches')} would need more."
+    if given and any(r.intervals for r in redundancy):
+        free = next(r for r in redundancy if r.intervals)
+        ranges = ", ".join(f"{degrees(a)} … {degrees(b)}" for a, b in free.intervals)
+        text += f" Possible {free.label}: {ranges}."
+    if others:
+        text += f" {_count(others)} {_plural(others, 'configuration', 'configurations')} on another branch fit."
+    return text
 
 
-def approximate(robot: Robot, best: IKSolution, violations: tuple[LimitViolation, ...]) -> str:
+def other_branch(fits: int, exist: int) -> str:
+    """The branch asked for is not there."""
+    if fits:
+        others = f"{_count(fits).lower()} {_plural(fits, 'configuration reaches', 'configurations reach')}"
+        return f"No solution on the chosen branch: {others} this target on other branches."
+    return f"No solution on the chosen branch: other branches ({exist}) exist, but the joint limits forbid them."
+
+
+def approximate(question: Question, best: IKSolution, blocked: tuple[BlockedBranch, ...]) -> str:
     """What an arm with too few joints gave up."""
     if best.compromise == "roll":
         return (
-            f"Reached with roll error {degrees(best.rotation_error)}: {robot.n} joints keep the point and the "
-            "approach direction, not the roll about it."
+            f"Reached with roll error {degrees(best.rotation_error)}: {question.robot.n} joints keep the point "
+            "and the approach direction, not the roll about it."
         )
-    why = f": the approach direction would need {_need(robot, violations[0])}" if violations else ""
+    why = f": the approach direction would need {_need(question, blocked[0].violations[0])}" if blocked else ""
     return f"Point reached, orientation off by {degrees(best.rotation_error)}{why}."
 
 
-def unreachable(
-    robot: Robot, target: Array, q: Array, distance: float, closest: IKSolution, obstacle: str, gap: float
-) -> str:
-    """Too far, too near, or an orientation that cannot be had at this point; q is nearest to the point."""
-    if distance > 0.0:
-        side = _side(robot, target, q)
-        return f"Out of reach by {millimetres(distance)}: the point is {side}."
-    why = f" ({obstacle}, by {millimetres(gap)})" if obstacle and gap > 0.0 else ""
+def mask(closest: IKSolution | None) -> str:
+    """The coordinates of a mask cannot all be met."""
+    if closest is None:
+        return "These coordinates cannot be met together on the chosen branch."
     return (
-        f"This orientation cannot be had at this point{why}; the closest pose is off by "
+        "These coordinates cannot be met together: the closest configuration is off by "
         f"{millimetres(closest.position_error)} and {degrees(closest.rotation_error)}."
     )
 
 
-def _side(robot: Robot, target: Array, q: Array) -> str:
+def orientation(closest: IKSolution | None, oriented: IKSolution | None, obstacle: str, gap: float) -> str:
+    """The point can be reached, but not with this orientation."""
+    why = f" ({obstacle}, by {millimetres(gap)})" if obstacle and gap > 0.0 else ""
+    text = f"This orientation cannot be had at this point{why}"
+    if oriented is not None:
+        text += f"; the nearest attainable one is {degrees(oriented.rotation_error)} away"
+    if closest is not None:
+        text += (
+            f"; the closest pose is off by {millimetres(closest.position_error)} "
+            f"and {degrees(closest.rotation_error)}"
+        )
+    return text + "."
+
+
+def unreachable(question: Question, q: Array, distance: float) -> tuple[Cause, str]:
+    """How far the point is out of reach, and on which side; q ``(n,)`` is nearest to it."""
+    cause = _side(question, q)
+    side = {
+        "too far": "too far away",
+        "too near": "too near to the arm",
+        "around the axis": "in the hole around the first axis",
+    }.get(cause, "outside the workspace the joint limits leave")
+    return cause, f"Out of reach by {millimetres(distance)}: the point is {side}."
+
+
+def _side(question: Question, q: Array) -> Cause:
     """Whether the point is outside the workspace or inside a hole of it, seen from the shoulder.
 
-    The shoulder is taken on the first joint's axis at the second joint's height.
+    The shoulder is taken on the first joint's axis at the second joint's height. In a hole the way out tells which
+    one: straight away from the axis, or away from the shoulder.
     """
+    robot = question.robot
     first = link_frames(robot, q)[0]
     axis = robot.T_world_base[:3, 2] if robot.convention == "standard" else first[:3, 2]
     foot = robot.T_world_base[:3, 3]
     shoulder = foot + axis * float(axis @ (first[:3, 3] - foot))
-    reached = float(np.linalg.norm(fk(robot, q)[:3, 3] - shoulder))
-    wanted = float(np.linalg.norm(target[:3, 3] - shoulder))
-    if wanted > reached + 1e-6:
-        return "too far away"
-    if wanted < reached - 1e-6:
-        return "too near to the arm"
-    return "outside the workspace the joint limits leave"
+    reached = fk(robot, q)[:3, 3] - shoulder
+    wanted = question.T[:3, 3] - shoulder
+    far, near = float(np.linalg.norm(wanted)), float(np.linalg.norm(reached))
+    if far > near + 1e-6:
+        return "too far"
+    out = reached - wanted
+    radial = out - axis * float(axis @ out)
+    away = float(out @ wanted) / far if far > 1e-9 else math.inf
+    off_axis = [float(np.linalg.norm(v - axis * float(axis @ v))) for v in (wanted, reached)]
+    if robot.joints[0].kind == "revolute" and off_axis[1] > off_axis[0] + 1e-6 and np.linalg.norm(radial) > away:
+        return "around the axis"
+    return "too near" if far < near - 1e-6 else "outside"
 
 
-def _need(robot: Robot, violation: LimitViolation) -> str:
-    joint = robot.joints[violation.joint]
+def _need(question: Question, violation: LimitViolation) -> str:
+    joint = question.robot.joints[violation.joint]
     show = degrees if joint.kind == "revolute" else millimetres
+    stop = "locked at" if question.locked[violation.joint] else "limit"
     return (
         f"joint {violation.joint + 1} ({violation.name}) at {show(violation.value)}"
-        f" (limit {show(violation.limit)})"
+        f" ({stop} {show(violation.limit)})"
     )
+
+
+def _count(number: int) -> str:
+    return "One" if number == 1 else str(number)
+
+
+def _plural(number: int, one: str, many: str) -> str:
+    return one if number == 1 else many
 
 
 def degrees(angle: float) -> str:

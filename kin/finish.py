@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kin.kernels import fk_into, jit
-from kin.solvers.common import APPROACH, POSE, nearest_image
+from kin.solvers.common import APPROACH, MASK, POSE, nearest_image, relative_pose
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -18,8 +18,17 @@ POSITION_ERROR, ROTATION_ERROR, DISTANCE, OVERRUN, ROLL = range(5)
 
 
 @jit
-def residuals(T: Array, target: Array, task: int) -> tuple[float, float, float]:
-    """(position error, rotation error of the task, roll about the target's approach axis), m and rad."""
+def residuals(T: Array, target: Array, task: int, mask: Array, e: Array) -> tuple[float, float, float]:
+    """(position error, rotation error of the task, roll about the target's approach axis), m and rad.
+
+    Of a mask only its coordinates count; e ``(6,)`` is scratch.
+    """
+    if task == MASK:
+        relative_pose(T, target, mask[6] == 0.0, e)
+        for i in range(6):
+            e[i] *= mask[i]
+        position = math.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
+        return position, math.sqrt(e[3] * e[3] + e[4] * e[4] + e[5] * e[5]), 0.0
     p = 0.0
     chord = 0.0
     trace = 0.0
@@ -43,14 +52,16 @@ def residuals(T: Array, target: Array, task: int) -> tuple[float, float, float]:
 
 @jit
 def finish(
-    model: Array, target: Array, task: int, seed: Array, lower: Array, upper: Array, turns: Array, respect: bool,
-    q: Array, stats: Array,
+    model: Array, target: Array, task: int, mask: Array, near: Array, seed: Array, lower: Array, upper: Array,
+    turns: Array, respect: bool, q: Array, stats: Array,
 ) -> None:  # fmt: skip
     """Bring each row of q ``(k, n)`` to its best image, in place, and fill stats ``(k, 5)``; NaN rows stay NaN.
 
-    `turns` is 2π for a revolute joint and 0 for a prismatic one, which has no images.
+    The best image is inside the limits and nearest to `near`; the distance is told from `seed`. `turns` is 2π for
+    a joint that has images and 0 for one that has none.
     """
     T = np.empty((4, 4))
+    e = np.empty(6)
     for k in range(q.shape[0]):
         if math.isnan(q[k, 0]):
             for i in range(stats.shape[1]):
@@ -62,7 +73,7 @@ def finish(
             x = q[k, i]
             low, high = (lower[i], upper[i]) if respect else (-math.inf, math.inf)
             if turns[i] > 0.0:
-                x = nearest_image(x, seed[i], low, high)
+                x = nearest_image(x, near[i], low, high)
             if x < lower[i]:
                 if lower[i] - x <= _LIMIT:
                     x = lower[i]
@@ -76,7 +87,7 @@ def finish(
             q[k, i] = x
             distance += (x - seed[i]) ** 2
         fk_into(model, q[k], T)
-        stats[k, 0], stats[k, 1], stats[k, 4] = residuals(T, target, task)
+        stats[k, 0], stats[k, 1], stats[k, 4] = residuals(T, target, task, mask, e)
         stats[k, 2] = math.sqrt(distance)
         stats[k, 3] = overrun
 

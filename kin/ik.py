@@ -6,31 +6,43 @@ every configuration in it has been put through forward kinematics: the errors sh
 A closed form gives all branches; where the arm leaves a parameter free (arm angle, θ1, roll), the solver picks
 for each branch the feasible value nearest to the seed, from exact feasible arcs, so that a pose that can be
 reached inside the limits is found. A numeric descent (:mod:`kin.solvers.numeric`) answers what has no closed
-form: the closest configuration to a target that cannot be met, and point-only tasks.
+form: the closest configuration to a target that cannot be met, and tasks or arms without one.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kin import explain
+from kin import choose, explain, search
+from kin.branches import (
+    Branches,
+    Flags,
+    is_closed,
+    measure,
+    redundancy_of,
+    solution,
+    solve_branches,
+    violations_of,
+)
 from kin.errors import InputError
-from kin.finish import DISTANCE, OVERRUN, POSITION_ERROR, ROLL, ROTATION_ERROR, finish, select
+from kin.finish import DISTANCE, OVERRUN, ROLL, select
 from kin.fk import fk
-from kin.results import IKResult, IKSolution, LimitViolation, Redundancy, Status, Task
+from kin.question import Frame, Images, Limits, Locks, Preference, Question, ask
+from kin.results import BlockedBranch, Cause, IKResult, IKSolution, Redundancy, Status, Task
 from kin.robot import Robot
-from kin.solvers import Match, solver_for
-from kin.solvers.common import APPROACH, POSE, POSITION, TASK_CODES, TURN, Candidates, Problem, wrap
-from kin.solvers.numeric import best_of, spread
+from kin.singularity import Singularity, singularities
+from kin.solvers import solver_for
+from kin.solvers.common import APPROACH, MASK, POSE, POSITION, Problem
 from kin.tolerances import TOLERANCES
-from kin.transforms import Array, as_transform, finite_array
+from kin.transforms import Array
 
-ORIENTATION_WEIGHT = 0.1
-_STARTS = 24
-_HAIR = 1e-6
+_MOST_IMAGES = 4096
 
 
 def solve_ik(
@@ -38,10 +50,17 @@ def solve_ik(
     target: ArrayLike,
     *,
     task: Task = "pose",
+    mask: Sequence[bool] | None = None,
+    mask_frame: Frame = "tool",
     q_seed: ArrayLike | None = None,
     respect_limits: bool = True,
+    limits: Limits | None = None,
+    locked: Locks | None = None,
+    branch: str | Sequence[str] | None = None,
+    images: Images = "nearest",
+    prefer: Preference = "nearest",
+    redundancy: float | Mapping[str, float] | None = None,
     max_solutions: int | None = None,
-    redundancy: float | None = None,
 ) -> IKResult:
     """All configurations that bring the tool to `target`, or why there are none.
 
@@ -49,417 +68,386 @@ def solve_ik(
         robot: the arm.
         target: T_base_tool ``(4, 4)``; for ``task="position"`` also just a point ``(3,)`` in metres.
         task: ``"pose"`` (all six), ``"approach"`` (point and direction of the tool's z axis) or ``"position"``.
+        mask: instead of a task, which of the six coordinates x, y, z, rx, ry, rz of the error must vanish; the
+            last three are the rotation vector from the target to the tool.
+        mask_frame: whether they are told in the target's own frame (``"tool"``) or in the ``"base"`` frame.
         q_seed: ``(n,)`` configuration to stay near; the home pose by default.
         respect_limits: leave out configurations outside the joint limits (each joint at its best whole turn).
-        max_solutions: at most this many, the nearest first.
-        redundancy: value of the arm's free parameter (arm angle ψ or θ1, radians) instead of the solver's choice.
+        limits: n pairs (lower, upper) inside the robot's own limits, None for a joint that keeps its own.
+        locked: n joint values to be kept, None for a joint that may move.
+        branch: only these branches: a name of `branch_names`, parts of one (``"elbow up"``), ``"seed"`` for the
+            branch the seed is on, or several of these.
+        images: ``"all"`` adds every whole-turn image inside the limits to the nearest one of each branch.
+        prefer: of what is free, the value nearest to the seed, farthest from the ``"limits"`` or with the most
+            ``"manipulability"``; answers are sorted by the same.
+        redundancy: values for free parameters by name (``{"psi": 0.3}``), radians, instead of a choice; a bare
+            number is for the first one.
+        max_solutions: at most this many, the best first.
 
     Raises:
         InputError: a malformed target, seed or option. An unreachable target is not an error.
     """
-    return _Query(robot, target, task, q_seed, respect_limits, max_solutions, redundancy).answer()
+    return answer(
+        ask(
+            robot,
+            target,
+            task=task,
+            mask=mask,
+            mask_frame=mask_frame,
+            q_seed=q_seed,
+            respect_limits=respect_limits,
+            limits=limits,
+            locked=locked,
+            branch=branch,
+            images=images,
+            prefer=prefer,
+            redundancy=redundancy,
+            max_solutions=max_solutions,
+        )
+    )
 
 
 def ik_branches(robot: Robot, target: Array, redundancy: float = math.nan) -> Array:
     """All closed-form branches ``(branches, n)`` for one pose, unverified, NaN where a branch does not exist.
 
-    The thin call: no limits, no images, no order. Raises `InputError` for an arm without a closed form.
+    The thin call: no limits, no images, no order; row i is branch i of `branch_names`. Raises `InputError` for an
+    arm without a closed form.
     """
     match = solver_for(robot)
     if match is None:
         raise InputError("robot", robot.id, "an arm with a closed form")
     T = np.ascontiguousarray(target, dtype=np.float64)
     seed = robot.q_home.copy()
-    problem = Problem(T, POSE, redundancy, False, seed, robot.lower.copy(), robot.upper.copy())
+    problem = Problem(T, POSE, (redundancy,), False, seed, robot.lower.copy(), robot.upper.copy())
     return match.solver.solve(match.geometry, problem).q
 
 
-class _Query:
-    """One call of `solve_ik`: the checked question and the steps towards its answer."""
+def branch_names(robot: Robot) -> tuple[str, ...]:
+    """The names of the arm's branches; none for an arm without a closed form."""
+    match = solver_for(robot)
+    return () if match is None else match.solver.BRANCHES
 
-    def __init__(
-        self,
-        robot: Robot,
-        target: ArrayLike,
-        task: str,
-        q_seed: ArrayLike | None,
-        respect_limits: bool,
-        max_solutions: int | None,
-        redundancy: float | None,
-    ) -> None:
-        if task not in TASK_CODES:
-            raise InputError("task", task, "one of " + ", ".join(TASK_CODES))
-        if max_solutions is not None and (isinstance(max_solutions, bool) or max_solutions < 1):
-            raise InputError("max_solutions", max_solutions, "a whole number from 1, or none")
-        if redundancy is not None and not math.isfinite(redundancy):
-            raise InputError("redundancy", redundancy, "a finite angle in radians, or none")
-        self.robot = robot
-        self.task_name = task
-        self.task = TASK_CODES[task]
-        self.T = self._target(target)
-        q = robot.q_home if q_seed is None else robot.check_q(q_seed, "q_seed")
-        if q.ndim != 1:
-            raise InputError("q_seed", f"shape {q.shape}", f"one configuration of {robot.n} values")
-        self.seed = np.array(q)
-        self.respect = respect_limits
-        self.max_solutions = max_solutions
-        self.value = math.nan if redundancy is None else float(redundancy)
-        self.lower, self.upper = robot.lower.copy(), robot.upper.copy()
-        self.turns = np.where(robot.revolute, TURN, 0.0)
-        # Where a descent may go: inside the limits or, if these are to be ignored, one turn either way.
-        free = robot.revolute & (not respect_limits)
-        self.low = np.where(free, -TURN, self.lower)
-        self.high = np.where(free, TURN, self.upper)
-        self.match = solver_for(robot)
-        if redundancy is not None and (self.match is None or robot.n < 7):
-            raise InputError("redundancy", redundancy, f"none: {robot.id} has no free parameter to set")
 
-    def _target(self, target: ArrayLike) -> Array:
-        if self.task == POSITION and np.shape(target) == (3,):
-            T = np.eye(4)
-            T[:3, 3] = finite_array("target", target, (3,))
-        else:
-            T = as_transform(target)
-        far = float(np.abs(T[:3, 3]).max())
-        if far > 1e6:
-            raise InputError("target position", T[:3, 3].tolist(), "coordinates below 1e6 m")
-        return T
+def branch_of(robot: Robot, q: ArrayLike) -> str:
+    """Name of the branch a configuration ``(n,)`` is on; on the border of two the one whose sine is not negative.
 
-    # -- steps ---------------------------------------------------------------------------------------------
+    Raises `InputError` for an arm whose branches have no names.
+    """
+    match = solver_for(robot)
+    if match is None:
+        raise InputError("robot", robot.id, "an arm with a closed form")
+    values = robot.check_q(q)
+    if values.ndim != 1:
+        raise InputError("q", f"shape {values.shape}", f"one configuration of {robot.n} values")
+    return match.solver.BRANCHES[match.solver.branch_of(match.geometry, values)]
 
-    def closed_form(self, T: Array, task: int, seed: Array | None = None) -> tuple[Match, Candidates] | None:
-        """The branches for pose `T` from the arm's closed form, None if it has none for this task."""
-        if self.match is None or not self.match.solver.handles(self.match.geometry, task):
-            return None
-        seed = self.seed if seed is None else seed
-        roll = 0.0
-        if task == APPROACH:
-            x = fk(self.robot, seed)[:3, 0]
-            roll = math.atan2(float(T[:3, 1] @ x), float(T[:3, 0] @ x))
-        problem = Problem(T, task, self.value, self.respect, seed, self.lower, self.upper, roll)
-        return self.match, self.match.solver.solve(self.match.geometry, problem)
 
-    def measure(self, q: Array, task: int) -> tuple[Array, Array]:
-        """Candidates ``(k, n)`` at their best images, with their statistics ``(k, 5)`` by FK."""
-        q = np.ascontiguousarray(q)
-        stats = np.empty((q.shape[0], 5))
-        finish(
-            self.robot.model, self.T, task, self.seed, self.lower, self.upper, self.turns, self.respect, q, stats
+def answer(question: Question) -> IKResult:
+    """The answer to a checked question."""
+    branches = solve_branches(question, question.T, question.code)
+    if branches is None:
+        return _numeric(question)
+    closed = is_closed(branches.stats)
+    good = closed & (branches.stats[:, OVERRUN] == 0.0) if question.respect else closed
+    if not good.any():
+        good = search.polish(question, branches)
+        closed |= good
+    asked = _asked(question, len(closed))
+    if (good & asked).any():
+        return _solved(question, branches, good & asked)
+    if (closed & asked).any():
+        return _blocked(question, branches, closed & asked, good)
+    if closed.any():
+        return _other_branch(question, branches, closed, good)
+    if question.robot.n < 6 and question.code == POSE:
+        return _compromise(question, branches, asked)
+    return _out_of_reach(question, branches)
+
+
+def _asked(question: Question, count: int) -> Flags:
+    return np.array([question.allows(i) for i in range(count)])
+
+
+def _result(
+    question: Question,
+    status: Status,
+    cause: Cause,
+    reason: str,
+    *,
+    solutions: tuple[IKSolution, ...] = (),
+    closest: IKSolution | None = None,
+    solver: str | None = None,
+    blocked: tuple[BlockedBranch, ...] = (),
+    distance: float = 0.0,
+    nearest_orientation: IKSolution | None = None,
+    redundancy: tuple[Redundancy, ...] = (),
+) -> IKResult:
+    """A result, with what is singular about the configuration it shows."""
+    best = solutions[0] if solutions else closest
+    singular: tuple[Singularity, ...] = ()
+    if best is not None:
+        near = singularities(question.robot, best.q)
+        singular = tuple(s for s in near if s.distance <= TOLERANCES.at_singularity)
+    if solver is None:
+        solver = "numeric" if question.match is None else question.match.solver.NAME
+    return IKResult(
+        status=status,
+        cause=cause,
+        reason=reason + explain.singular(singular, shown=bool(solutions)),
+        solutions=solutions[: question.max_solutions],
+        closest=closest,
+        solver=solver,
+        task=question.task,
+        blocked=blocked,
+        distance=distance,
+        nearest_orientation=nearest_orientation,
+        redundancy=redundancy,
+        singularities=singular,
+    )
+
+
+# Closed form
+
+
+def _solved(question: Question, branches: Branches, good: Flags) -> IKResult:
+    key = branches.stats[:, DISTANCE].copy()
+    if question.prefer != "nearest":
+        choose.improve(question, branches, good)
+        key = -choose.scores(question, branches.q)
+    solutions = _wrap_up(question, branches, good, key)
+    every = tuple(np.flatnonzero(good).tolist())
+    best = int(np.argmin(np.where(good, key, math.inf)))
+    redundancy = redundancy_of(question, branches, best, every)
+    if question.all_images:
+        solutions = _with_images(question, solutions)
+    if redundancy and solutions[0].redundancy:
+        redundancy = tuple(
+            replace(r, value=own.value) for r, own in zip(redundancy, solutions[0].redundancy, strict=True)
         )
-        return q, stats
+    return _result(
+        question,
+        Status.SOLVED,
+        "",
+        explain.solved(len(solutions), question.task, bool(redundancy)),
+        solutions=solutions,
+        redundancy=redundancy,
+    )
 
-    def solution(
-        self, q: Array, stats: Array, branch: str, parameter: float = math.nan, compromise: str | None = None
-    ) -> IKSolution:
-        q = q.copy()
-        q.flags.writeable = False
-        return IKSolution(
-            q=q,
-            branch=branch,
-            position_error=float(stats[POSITION_ERROR]),
-            rotation_error=float(stats[ROTATION_ERROR]),
-            in_limits=bool(stats[OVERRUN] == 0.0),
-            distance=float(stats[DISTANCE]),
-            redundancy=None if math.isnan(parameter) else parameter,
-            compromise=compromise,
-        )
 
-    def descend(self, task: int, starts: Array, weight: float, enough: float = 0.0) -> tuple[Array, float]:
-        """Best configuration by numeric descent, and its error E in metres."""
-        out = np.empty(self.robot.n)
-        error = best_of(
-            self.robot.model, self.T, task, weight, self.low, self.high, np.ascontiguousarray(starts), enough, out
-        )
-        return out, float(error)
+def _wrap_up(
+    question: Question, branches: Branches, rows: Flags, key: Array, compromise: str | None = None
+) -> tuple[IKSolution, ...]:
+    """The chosen rows as named solutions, by rising key, each posture once."""
+    kept, count = select(branches.q, np.where(rows, key, math.inf))
+    return tuple(
+        solution(question, branches.q[i], branches.stats[i], i, redundancy_of(question, branches, i), compromise)
+        for i in kept[:count].tolist()
+    )
 
-    def starts(self, candidates: Array | None = None, count: int = _STARTS) -> Array:
-        """Where a descent begins: the seed, the known branches, then points spread over the limits."""
-        rows = [self.seed[None]]
-        if candidates is not None:
-            rows.append(candidates[~np.isnan(candidates[:, 0])])
-        rows.append(spread(self.low, self.high, count))
-        return np.concatenate(rows)
 
-    # -- answers -------------------------------------------------------------------------------------------
-
-    def answer(self) -> IKResult:
-        if self.task == POSITION:
-            return self.answer_position()
-        known = self.closed_form(self.T, self.task)
-        if known is None:
-            return self.answer_numeric()
-        match, candidates = known
-        q, stats = self.measure(candidates.q, self.task)
-        exists = stats[:, POSITION_ERROR] <= TOLERANCES.closure_position
-        exact = exists & (stats[:, ROTATION_ERROR] <= TOLERANCES.closure_rotation)
-        good = exact & (stats[:, OVERRUN] == 0.0) if self.respect else exact
-        if not good.any():
-            good = self.polish(q, stats)
-            exact |= good
-        if good.any():
-            return self.solved(match, candidates, q, stats, good)
-        if exact.any():
-            return self.blocked(match, candidates, q, stats, exact)
-        if self.robot.n < 6 and self.task == POSE:
-            return self.compromise(match, candidates, q, stats, exists)
-        return self.out_of_reach(candidates.obstacle, candidates.gap, candidates.q)
-
-    def polish(self, q: Array, stats: Array) -> np.ndarray:
-        """Descend from the rows that miss by a hair, in place; which of them then are good.
-
-        Where two branches merge, a rounding error of 1e-16 in the target is 1e-8 in an angle: enough to push
-        another joint past its stop or the roll past the closure tolerance.
-        """
-        good = np.zeros(len(q), dtype=bool)
-        miss = stats[:, POSITION_ERROR] + stats[:, ROTATION_ERROR] + (stats[:, OVERRUN] if self.respect else 0.0)
-        for i in np.flatnonzero(miss < _HAIR).tolist():
-            near, _ = self.descend(self.task, q[i : i + 1], 1.0)
-            row, row_stats = self.measure(near[None], self.task)
-            error = max(row_stats[0, POSITION_ERROR], row_stats[0, ROTATION_ERROR])
-            if error <= TOLERANCES.closure_position and (row_stats[0, OVERRUN] == 0.0 or not self.respect):
-                q[i], stats[i], good[i] = row[0], row_stats[0], True
-        return good
-
-    def solved(self, match: Match, candidates: Candidates, q: Array, stats: Array, good: np.ndarray) -> IKResult:
-        solutions = self.wrap_up(match, candidates, q, stats, good, stats[:, DISTANCE])
-        redundancy = self.redundancy(match, candidates, solutions[0])
-        return IKResult(
-            status=Status.SOLVED,
-            reason=explain.solved(len(solutions), self.task_name, redundancy is not None),
-            solutions=solutions[: self.max_solutions],
-            closest=None,
-            solver=match.solver.NAME,
-            task=self.task_name,
-            redundancy=redundancy,
-        )
-
-    def wrap_up(
-        self, match: Match, candidates: Candidates, q: Array, stats: Array, rows: np.ndarray, key: Array,
-        compromise: str | None = None,
-    ) -> tuple[IKSolution, ...]:  # fmt: skip
-        """The chosen rows as named solutions, by rising key, each posture once."""
-        kept, count = select(q, np.where(rows, key, math.inf))
-        return tuple(
-            self.solution(
-                q[i],
-                stats[i],
-                match.solver.branch_name(i, q[i]),
-                self.parameter(match, candidates, q, i),
-                compromise,
+def _with_images(question: Question, solutions: tuple[IKSolution, ...]) -> tuple[IKSolution, ...]:
+    """The solutions and all their whole-turn images inside the limits, in the order that is preferred."""
+    found = []
+    for known in solutions:
+        choices = [
+            _images_of(x, *span)
+            for x, *span in zip(known.q.tolist(), question.lower, question.upper, question.turns, strict=True)
+        ]
+        total = math.prod(len(choice) for choice in choices)
+        if total > _MOST_IMAGES:
+            raise InputError("images", "all", f"limits that leave at most {_MOST_IMAGES} images, not {total}")
+        as_they_are = replace(question, turns=np.zeros(len(choices)))
+        q, stats = measure(as_they_are, np.array([*itertools.product(*choices)]))
+        for row, figures in zip(q, stats, strict=True):
+            image = solution(question, row, figures, -1)
+            free = tuple(
+                replace(r, value=float(row[f.joint])) if f.joint >= 0 else r
+                for r in known.redundancy
+                for f in question.freedoms
+                if f.name == r.name
             )
+            found.append(replace(image, branch=known.branch, redundancy=free, compromise=known.compromise))
+    if question.prefer == "nearest":
+        return tuple(sorted(found, key=lambda s: s.distance))
+    worth = choose.scores(question, np.array([s.q for s in found])).round(12).tolist()
+    order = sorted(range(len(found)), key=lambda i: (-worth[i], found[i].distance))
+    return tuple(found[i] for i in order)
+
+
+def _images_of(x: float, low: float, high: float, turn: float) -> list[float]:
+    """x + k·turn inside [low, high], x first; only x where a joint has no images or no stops."""
+    if turn == 0.0 or not math.isfinite(high - low):
+        return [x]
+    first = math.ceil((low - TOLERANCES.limit - x) / turn)
+    last = math.floor((high + TOLERANCES.limit - x) / turn)
+    if last - first > _MOST_IMAGES:
+        raise InputError("images", "all", f"limits that leave at most {_MOST_IMAGES} images")
+    return [x, *(x + k * turn for k in range(first, last + 1) if k != 0)]
+
+
+def _blocked(question: Question, branches: Branches, rows: Flags, good: Flags) -> IKResult:
+    """Branches exist, but each breaks a limit: name the joints in the way, the least offending branch first."""
+    closest = search.closest(question, branches.q)
+    if closest is not None and not question.given and search.is_exact(question, closest):
+        return _found_by_descent(question, closest)
+    kept, count = select(branches.q, np.where(rows, branches.stats[:, OVERRUN], math.inf))
+    order = kept[:count].tolist()
+    blocked = tuple(
+        BlockedBranch(question.branch_name(i), branches.q[i].copy(), violations_of(question, branches.q[i]))
+        for i in order
+    )
+    redundancy = redundancy_of(question, branches, order[0], tuple(np.flatnonzero(rows).tolist()))
+    others = int(select(branches.q, np.where(good, 0.0, math.inf))[1])
+    return _result(
+        question,
+        Status.LIMITS,
+        "joint limits",
+        explain.limits(question, blocked, redundancy, others),
+        closest=closest,
+        blocked=blocked,
+        distance=search.nearest_to_point(question, closest)[1],
+        redundancy=redundancy,
+    )
+
+
+def _other_branch(question: Question, branches: Branches, closed: Flags, good: Flags) -> IKResult:
+    """The branch that was asked for does not exist at this target; others do."""
+    closest = search.closest(question, branches.q)
+    if closest is not None and not question.given and search.is_exact(question, closest):
+        return _found_by_descent(question, closest)
+    fits, exist = (int(select(branches.q, np.where(rows, 0.0, math.inf))[1]) for rows in (good, closed))
+    reason = explain.other_branch(fits, exist)
+    return _result(question, Status.UNREACHABLE, "branch", reason, closest=closest)
+
+
+def _compromise(question: Question, branches: Branches, asked: Flags) -> IKResult:
+    """An arm with fewer than six joints cannot take every pose: give up as little as possible, and say so.
+
+    First the answers that keep point and approach direction and are off by a roll about it (least roll first),
+    then the one that keeps the point and has the least whole rotation error.
+    """
+    stats = branches.stats
+    approach_q, approach_stats = measure(question, branches.q, code=APPROACH)
+    possible = asked & is_closed(approach_stats)
+    rows = possible & (stats[:, OVERRUN] == 0.0) if question.respect else possible
+    solutions = _wrap_up(question, branches, rows, np.abs(stats[:, ROLL]), "roll")
+    nearest = search.nearest_orientation(question, branches.q if rows.any() else None)
+    if nearest is not None and (question.branches is None or question.allows(question.branch_of(nearest.q))):
+        solutions += (nearest,)
+    if not solutions:
+        return _out_of_reach(question, branches)
+    blocked: tuple[BlockedBranch, ...] = ()
+    if not rows.any() and possible.any():
+        kept, count = select(approach_q, np.where(possible, approach_stats[:, OVERRUN], math.inf))
+        blocked = tuple(
+            BlockedBranch(question.branch_name(i), approach_q[i].copy(), violations_of(question, approach_q[i]))
             for i in kept[:count].tolist()
         )
-
-    def parameter(self, match: Match, candidates: Candidates, q: Array, row: int) -> float:
-        """The redundancy value of a row; a joint's own value follows its whole-turn image."""
-        value = float(candidates.parameter[row])
-        return float(q[row, 0]) if match.solver.PARAMETER[0] == "theta1" and not math.isnan(value) else value
-
-    def redundancy(self, match: Match, candidates: Candidates, best: IKSolution) -> Redundancy | None:
-        if best.redundancy is None:
-            return None
-        name, label = match.solver.PARAMETER
-        circular = name == "psi"
-        return Redundancy(name, label, best.redundancy, union(candidates.arcs[:, 1:], circular))
-
-    def blocked(self, match: Match, candidates: Candidates, q: Array, stats: Array, exact: np.ndarray) -> IKResult:
-        """Branches exist, but each breaks a limit: name the joints of the least offending one."""
-        order = np.where(exact, stats[:, OVERRUN], math.inf)
-        least = int(np.argmin(order))
-        violations = self.violations(q[least])
-        closest = self.closest(candidates.q)
-        return IKResult(
-            status=Status.LIMITS,
-            reason=explain.limits(self.robot, violations, self.given_redundancy(match)),
-            solutions=(),
-            closest=closest,
-            solver=match.solver.NAME,
-            task=self.task_name,
-            violations=violations,
-            distance=self.nearest_to_point(closest)[1],
-        )
-
-    def given_redundancy(self, match: Match) -> str:
-        return "" if math.isnan(self.value) else match.solver.PARAMETER[1]
-
-    def violations(self, q: Array) -> tuple[LimitViolation, ...]:
-        found = []
-        for i, joint in enumerate(self.robot.joints):
-            limit = self.lower[i] if q[i] < self.lower[i] else self.upper[i]
-            if not self.lower[i] <= q[i] <= self.upper[i]:
-                found.append(LimitViolation(i, joint.name, float(q[i]), float(limit)))
-        return tuple(found)
-
-    def compromise(
-        self, match: Match, candidates: Candidates, q: Array, stats: Array, exists: np.ndarray
-    ) -> IKResult:
-        """An arm with fewer than six joints cannot take every pose: give up as little as possible, and say so.
-
-        First the answers that keep point and approach direction and are off by a roll about it (least roll
-        first), then the one that keeps the point and has the least whole rotation error.
-        """
-        approach_q, approach_stats = self.measure(candidates.q, APPROACH)
-        rows = exists & (approach_stats[:, ROTATION_ERROR] <= TOLERANCES.closure_rotation)
-        possible = rows
-        if self.respect:
-            rows = rows & (stats[:, OVERRUN] == 0.0)
-        solutions = self.wrap_up(match, candidates, q, stats, rows, np.abs(stats[:, ROLL]), "roll")
-        nearest = self.least_rotation(candidates.q if rows.any() else None)
-        if nearest is not None:
-            solutions += (nearest,)
-        if not solutions:
-            return self.out_of_reach(candidates.obstacle, candidates.gap, candidates.q)
-        violations: tuple[LimitViolation, ...] = ()
-        if not rows.any() and possible.any():
-            least = int(np.argmin(np.where(possible, approach_stats[:, OVERRUN], math.inf)))
-            violations = self.violations(approach_q[least])
-        return IKResult(
-            status=Status.APPROXIMATE,
-            reason=explain.approximate(self.robot, solutions[0], violations),
-            solutions=solutions[: self.max_solutions],
-            closest=min(solutions, key=lambda s: s.rotation_error),
-            solver=match.solver.NAME,
-            task=self.task_name,
-            violations=violations,
-        )
-
-    def least_rotation(self, candidates: Array | None) -> IKSolution | None:
-        """The configuration with the exact point and the least rotation error, None if the point is out of reach.
-
-        A descent in which a radian weighs a tenth of a millimetre settles the orientation; its approach
-        direction then goes through the closed form, which makes the point exact.
-        """
-        start, error = self.descend(POSITION, self.starts(candidates), 1.0, enough=1e-9)
-        q = start
-        if error <= 1e-7:
-            for weight in (0.1, 1e-2, 1e-4):
-                tries = np.stack([q, start]) if candidates is None else self.starts(candidates, 4)
-                tries = np.concatenate([q[None], tries])
-                q, _ = self.descend(POSE, tries, weight)
-        if error > 1e-7:
-            return None
-        T = fk(self.robot, q)
-        T[:3, 3] = self.T[:3, 3]
-        known = self.closed_form(T, APPROACH, q)
-        if known is not None:
-            match, polished = known
-            found, stats = self.measure(polished.q, POSE)
-            miss = np.abs(found - q).max(axis=1)
-            miss[~(stats[:, POSITION_ERROR] <= TOLERANCES.closure_position)] = math.inf
-            if self.respect:
-                miss[stats[:, OVERRUN] > 0.0] = math.inf
-            best = int(np.argmin(miss))
-            if miss[best] < 0.05:
-                name = match.solver.branch_name(best, found[best])
-                return self.solution(found[best], stats[best], name, compromise="rotation")
-        # At a stop of the wrist the polished direction may leave the limits by a hair: polish the point alone.
-        q, error = self.descend(POSITION, q[None], 1.0)
-        if error > TOLERANCES.closure_position:
-            return None
-        found, stats = self.measure(q[None], POSE)
-        return self.solution(found[0], stats[0], "numeric", compromise="rotation")
-
-    def answer_position(self) -> IKResult:
-        """Point only: settle the directions by descent from the seed, then list the branches that share them."""
-        q, error = self.descend(POSITION, self.starts(count=4 * _STARTS), 1.0, enough=1e-11)
-        if error > TOLERANCES.closure_position:
-            return self.out_of_reach("", 0.0, None)
-        T = fk(self.robot, q)
-        T[:3, 3] = self.T[:3, 3]
-        found, stats = self.measure(q[None], POSITION)
-        names = ["numeric"]
-        known = self.closed_form(T, POSE if self.robot.n >= 6 else APPROACH, q)
-        solver = "numeric"
-        if known is not None:
-            match, candidates = known
-            solver = match.solver.NAME
-            rows, row_stats = self.measure(candidates.q, POSITION)
-            keep = row_stats[:, POSITION_ERROR] <= TOLERANCES.closure_position
-            if self.respect:
-                keep &= row_stats[:, OVERRUN] == 0.0
-            order = sorted(np.flatnonzero(keep).tolist(), key=lambda i: float(row_stats[i, DISTANCE]))
-            if order:
-                found, stats = rows[order], row_stats[order]
-                names = [match.solver.branch_name(i, rows[i]) for i in order]
-        solutions = tuple(self.solution(a, b, name) for a, b, name in zip(found, stats, names, strict=True))
-        return IKResult(
-            status=Status.SOLVED,
-            reason=explain.solved(len(solutions), self.task_name, False),
-            solutions=solutions[: self.max_solutions],
-            closest=None,
-            solver=solver,
-            task=self.task_name,
-        )
-
-    def answer_numeric(self) -> IKResult:
-        """A task with no closed form: the descent's best, from many starts."""
-        q, _ = self.descend(self.task, self.starts(count=4 * _STARTS), 1.0, enough=1e-11)
-        found, stats = self.measure(q[None], self.task)
-        if (
-            stats[0, POSITION_ERROR] > TOLERANCES.closure_position
-            or stats[0, ROTATION_ERROR] > TOLERANCES.closure_rotation
-        ):
-            return self.out_of_reach("", 0.0, None)
-        return IKResult(
-            status=Status.SOLVED,
-            reason=explain.solved(1, self.task_name, False),
-            solutions=(self.solution(found[0], stats[0], "numeric"),),
-            closest=None,
-            solver="numeric",
-            task=self.task_name,
-        )
-
-    def out_of_reach(self, obstacle: str, gap: float, candidates: Array | None) -> IKResult:
-        """No configuration: tell a point out of reach from an orientation that cannot be had there."""
-        closest = self.closest(candidates)
-        nearest, distance = self.nearest_to_point(closest)
-        if self.task == POSITION:
-            closest = nearest
-        return IKResult(
-            status=Status.UNREACHABLE,
-            reason=explain.unreachable(self.robot, self.T, nearest.q, distance, closest, obstacle, gap),
-            solutions=(),
-            closest=closest,
-            solver=self.match.solver.NAME if self.match else "numeric",
-            task=self.task_name,
-            distance=distance,
-        )
-
-    def closest(self, candidates: Array | None) -> IKSolution:
-        """The configuration inside the limits with the least E, ℓ = 0.1 m per radian."""
-        q, _ = self.descend(self.task, self.starts(candidates), ORIENTATION_WEIGHT)
-        found, stats = self.measure(q[None], self.task)
-        return self.solution(found[0], stats[0], "numeric", compromise="closest")
-
-    def nearest_to_point(self, closest: IKSolution) -> tuple[IKSolution, float]:
-        """The configuration nearest to the target's point alone, and the metres that are missing there."""
-        if closest.position_error <= TOLERANCES.closure_position:
-            return closest, 0.0
-        q, distance = self.descend(POSITION, self.starts(closest.q[None]), 1.0, enough=1e-11)
-        found, stats = self.measure(q[None], self.task)
-        nearest = self.solution(found[0], stats[0], "numeric", compromise="closest")
-        return nearest, 0.0 if distance <= 1e-7 else distance
+    return _result(
+        question,
+        Status.APPROXIMATE,
+        "roll" if solutions[0].compromise == "roll" else "rotation",
+        explain.approximate(question, solutions[0], blocked),
+        solutions=solutions,
+        closest=min(solutions, key=lambda s: s.rotation_error),
+        blocked=blocked,
+    )
 
 
-def union(arcs: Array, circular: bool) -> tuple[tuple[float, float], ...]:
-    """Overlapping intervals ``(k, 2)`` joined and sorted; on a circle within (−π, π], split at the seam."""
-    pieces: list[tuple[float, float]] = []
-    for low, high in arcs.tolist():
-        if not circular:
-            pieces.append((low, high))
-        elif high - low >= TURN - 1e-12:
-            return ((-math.pi, math.pi),)
-        else:
-            start = wrap(low)
-            end = start + (high - low)
-            if end > math.pi:
-                pieces += [(start, math.pi), (-math.pi, end - TURN)]
-            else:
-                pieces.append((start, end))
-    joined: list[tuple[float, float]] = []
-    for low, high in sorted(pieces):
-        if joined and low <= joined[-1][1] + 1e-12:
-            joined[-1] = (joined[-1][0], max(high, joined[-1][1]))
-        else:
-            joined.append((low, high))
-    return tuple(joined)
+# Numeric
+
+
+def _numeric(question: Question) -> IKResult:
+    """A task or an arm without closed form: descend from many starts; where branches are known, add their like."""
+    starts = search.starting_points(question, count=4 * search.STARTS)
+    if question.branches is None and question.prefer == "nearest":
+        pool = search.descend(question, question.code, starts, 1.0, enough=1e-11)[0][None]
+    else:
+        pool = search.descend_each(question, question.code, starts, 1.0)[0]
+    q, stats = measure(question, pool)
+    q, stats = _usable(question, q, stats)
+    if not len(q):
+        return _out_of_reach(question, None)
+    related = [_relatives(question, row) for row in q]
+    q = np.concatenate([q, *related])
+    if question.prefer == "nearest":
+        q, stats = measure(question, q)
+        key = stats[:, DISTANCE].copy()
+    else:
+        q, stats = choose.centred(question, q)
+        key = -choose.scores(question, q)
+    # One per branch, the best: a pool of descents is no list of branches.
+    best: dict[int, int] = {}
+    for i in np.argsort(key, kind="stable").tolist():
+        branch = question.branch_of(q[i])
+        if question.allows(branch) and len(_usable(question, q[i : i + 1], stats[i : i + 1])[0]):
+            best.setdefault(branch, i)
+    if not best:
+        exist = len({question.branch_of(row) for row in q})
+        closest = search.closest(question, None)
+        return _result(question, Status.UNREACHABLE, "branch", explain.other_branch(exist, exist), closest=closest)
+    solutions = tuple(solution(question, q[i], stats[i], branch) for branch, i in best.items())
+    if question.all_images:
+        solutions = _with_images(question, solutions)
+    closed_form = question.match if len(related[0]) else None
+    return _result(
+        question,
+        Status.SOLVED,
+        "",
+        explain.solved(len(solutions), question.task, False),
+        solutions=solutions,
+        solver="numeric" if closed_form is None else closed_form.solver.NAME,
+    )
+
+
+def _usable(question: Question, q: Array, stats: Array) -> tuple[Array, Array]:
+    """The rows that meet the task, inside the limits."""
+    rows = is_closed(stats)
+    if question.respect:
+        rows = rows & (stats[:, OVERRUN] == 0.0)
+    return q[rows], stats[rows]
+
+
+def _relatives(question: Question, q: Array) -> Array:
+    """The other branches ``(k, n)`` that take the pose of q ``(n,)``."""
+    T = fk(question.robot, q)
+    if question.code == POSITION:
+        T[:3, 3] = question.T[:3, 3]
+    known = solve_branches(question, T, POSE if question.robot.n >= 6 else APPROACH, q)
+    return np.empty((0, question.robot.n)) if known is None else known.q[~np.isnan(known.q[:, 0])]
+
+
+def _found_by_descent(question: Question, found: IKSolution) -> IKResult:
+    """A descent met the task where every branch of the closed form misses by rounding error."""
+    found = replace(found, compromise=None)
+    return _result(
+        question, Status.SOLVED, "", explain.solved(1, question.task, False), solutions=(found,), solver="numeric"
+    )
+
+
+def _out_of_reach(question: Question, branches: Branches | None) -> IKResult:
+    """No configuration: tell a point out of reach from an orientation that cannot be had there."""
+    candidates = None if branches is None else branches.q
+    closest = search.closest(question, candidates)
+    if closest is not None and not question.given and search.is_exact(question, closest):
+        return _found_by_descent(question, closest)
+    nearest, distance = search.nearest_to_point(question, closest)
+    if question.code == MASK:
+        assert closest is not None or question.branches is not None
+        reason = explain.mask(closest)
+        return _result(question, Status.UNREACHABLE, "outside", reason, closest=closest, distance=distance)
+    if question.code == POSITION and question.branches is None:
+        closest = nearest
+    if distance > 0.0 or question.code == POSITION:
+        cause, reason = explain.unreachable(question, nearest.q, distance)
+        return _result(question, Status.UNREACHABLE, cause, reason, closest=closest, distance=distance)
+    oriented = search.nearest_orientation(question, candidates)
+    gap, obstacle = (branches.gap, branches.obstacle) if branches is not None else (0.0, "")
+    return _result(
+        question,
+        Status.ORIENTATION,
+        "orientation",
+        explain.orientation(closest, oriented, obstacle, gap),
+        closest=closest,
+        nearest_orientation=oriented,
+    )

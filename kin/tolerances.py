@@ -18,6 +18,7 @@ class Tolerances:
         geometry: lengths and twists closer than this to a family's pattern count as that pattern.
         rotation_matrix: how far RᵀR may be from I in a target; beyond it the target is refused.
         singular: below this sine a closed form has lost one angle and takes it from the seed.
+        at_singularity: an answer this near to a singularity (radians, metres) is told to be singular.
     """
 
     closure_position: float = 1e-9
@@ -27,6 +28,7 @@ class Tolerances:
     geometry: float = 1e-9
     rotation_matrix: float = 1e-6
     singular: float = 1e-11
+    at_singularity: float = 1e-4
 
 
 TOLERANCES = Tolerances()

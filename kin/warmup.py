@@ -27,3 +27,5 @@ def warm_up() -> None:
         solve_ik(robot, T, task="pose")
         solve_ik(robot, T, task="approach")
         solve_ik(robot, far, task="pose")
+        solve_ik(robot, T, mask=(True, True, False, False, False, False))
+        solve_ik(robot, T, task="approach", branch="seed", prefer="manipulability")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Body, Response
 from pydantic import Discriminator, Field, Tag
@@ -12,13 +12,40 @@ from app.answers import IkAnswer, documented, ik_answer
 from app.api import schemas
 from app.api.body import JsonRoute
 from app.api.problems import FieldError, invalid
-from app.api.schemas import POST_REFUSALS, Configurations, Number, RobotDep, SettingsDep, example, one_or_all
+from app.api.schemas import (
+    POST_REFUSALS,
+    Configurations,
+    Number,
+    RobotDep,
+    SettingsDep,
+    example,
+    numbers,
+    one_or_all,
+)
 from app.api.targets import Target
 from app.settings import Settings
 from kin import Robot, Task, solve_ik
 from kin.transforms import Array
 
 router = APIRouter(tags=["kinematics"], route_class=JsonRoute)
+
+
+def one_or_many(value: object) -> str:
+    """Whether one thing was sent or a list of them."""
+    return "many" if isinstance(value, list) else "one"
+
+
+Mask = Annotated[list[Annotated[bool, Field(strict=True)]], numbers(6)]
+Pair = Annotated[list[Number], numbers(2)]
+Wish = Annotated[str, Field(max_length=200)]
+Wishes = Annotated[
+    Annotated[Wish, Tag("one")] | Annotated[list[Wish], Field(min_length=1, max_length=16), Tag("many")],
+    Discriminator(one_or_many),
+]
+FreeValues = Annotated[
+    Annotated[Number, Tag("one")] | Annotated[dict[str, Number], Tag("many")],
+    Discriminator(lambda value: "many" if isinstance(value, dict) else "one"),
+]
 
 EXAMPLES = {
     "approach": example(
@@ -33,6 +60,15 @@ EXAMPLES = {
         "Only a point, near a given configuration",
         {"target": {"position": [-0.018, 0.31, -0.181]}, "q_seed": [1.2, 0.5, 0.5, 0.5, 0.5], "max_solutions": 1},
     ),
+    "branch": example(
+        "Only postures with the elbow up, joint 5 locked, joint 3 narrowed; a point, as two joints are then gone",
+        {
+            "target": {"position": [-0.03, 0.157, -0.194]},
+            "branch": "elbow up",
+            "locked": [None, None, None, None, 0.5],
+            "limits": [None, None, [0.0, 2.0], None, None],
+        },
+    ),
     "unreachable": example("Out of reach: still an answer", {"target": {"position": [2.0, 0.0, 0.0]}}),
     "many": example(
         "Several targets",
@@ -42,11 +78,6 @@ EXAMPLES = {
         },
     ),
 }
-
-
-def one_or_many(value: object) -> str:
-    """Whether one target was sent or a list of them."""
-    return "many" if isinstance(value, list) else "one"
 
 
 class IkRequest(schemas.Body):
@@ -74,10 +105,43 @@ class IkRequest(schemas.Body):
     max_solutions: Annotated[int, Field(ge=1, le=10_000, strict=True)] | None = Field(
         None, description="Most solutions per target, nearest to the seed first. By default all."
     )
-    redundancy: Number | None = Field(
+    mask: Mask | None = Field(
         None,
-        description="Value in radians for the arm's free parameter (the arm angle psi, or theta1; see "
-        "`redundancy` in the answers). By default the feasible value nearest to the seed.",
+        description="Instead of a task: which of the six coordinates x, y, z, rx, ry, rz of the error must "
+        "vanish; the last three are the rotation vector from the target to the tool.",
+    )
+    mask_frame: Literal["tool", "base"] = Field(
+        "tool",
+        description="Whether the mask's coordinates are told in the target's own frame or in the base frame.",
+    )
+    limits: list[Pair | None] | None = Field(
+        None,
+        description="Narrower joint limits, one [lower, upper] per joint in radians (metres), inside the robot's "
+        "own; null for a joint that keeps its own.",
+    )
+    locked: list[Number | None] | None = Field(
+        None,
+        description="Joint values to keep, in radians (metres), one per joint; null for a joint that may move.",
+    )
+    branch: Wishes | None = Field(
+        None,
+        description="Only these branches: a name as in `branches` of the robot, parts of one such as `elbow up`, "
+        "`seed` for the branch the seed is on, or a list of these.",
+    )
+    images: Literal["nearest", "all"] = Field(
+        "nearest",
+        description="all: every whole-turn image inside the limits. nearest: of each branch the one nearest to "
+        "the seed.",
+    )
+    prefer: Literal["nearest", "limits", "manipulability"] = Field(
+        "nearest",
+        description="How to choose what is free, and how to sort: nearest to the seed, farthest from the joint "
+        "limits, or most manipulable.",
+    )
+    redundancy: FreeValues | None = Field(
+        None,
+        description="Values in radians for free parameters by name, such as `psi` (see `redundancy` in the "
+        "answers); a bare number is for the first one. By default the feasible value chosen by `prefer`.",
     )
 
 
@@ -108,9 +172,10 @@ def inverse_kinematics(
     targets = [body.target] if isinstance(body.target, Target) else body.target
     schemas.check_batch("target", len(targets), settings)
     # All targets are read before the first is solved: a mistake in the last one costs nothing.
-    questions = [
-        target.resolve(body.task, "target" if single else f"target[{i}]") for i, target in enumerate(targets)
-    ]
+    asked = body.task
+    if body.mask is not None and asked is None:
+        asked = "pose" if any(body.mask[3:]) else None
+    questions = [target.resolve(asked, "target" if single else f"target[{i}]") for i, target in enumerate(targets)]
     seeds = _seeds(robot, body, len(targets), settings)
 
     def answers(some: slice) -> list[IkAnswer]:
@@ -119,9 +184,16 @@ def inverse_kinematics(
                 solve_ik(
                     robot,
                     T,
-                    task=task,
+                    task=task if body.mask is None else body.task or "pose",
+                    mask=body.mask,
+                    mask_frame=body.mask_frame,
                     q_seed=seed,
                     respect_limits=body.respect_limits,
+                    limits=body.limits,
+                    locked=body.locked,
+                    branch=body.branch,
+                    images=body.images,
+                    prefer=body.prefer,
                     max_solutions=body.max_solutions,
                     redundancy=body.redundancy,
                 )

@@ -1,9 +1,10 @@
 """The registry of closed-form solvers: one module, one row each, in order of preference.
 
-A solver module offers ``NAME``, ``TITLE``, ``PARAMETER`` (id and label of its redundancy parameter),
-``match(robot)`` (its geometry, or None if the arm is of another family), ``handles(geometry, task)``,
-``solve(geometry, problem) -> Candidates`` and ``branch_name(index, q)``. It never verifies, filters or sorts:
-:mod:`kin.ik` does that once for all. Which family an arm belongs to is read off its axes, never off its name.
+A solver module offers ``NAME``, ``TITLE``, ``BRANCHES`` (names, one per row of its answers), ``match(robot)`` (its
+geometry, or None if the arm is of another family), ``handles(geometry, task)``, ``freedoms(geometry, task)`` (what
+the task leaves free), ``solve(geometry, problem) -> Candidates``, ``branch_of(geometry, q)`` (a row of `BRANCHES`)
+and ``singularities(geometry, q)``. It never verifies, filters or sorts: :mod:`kin.ik` does that once for all.
+Which family an arm belongs to is read off its axes, never off its name.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from typing import Any, NamedTuple, Protocol, cast
 
 from kin.robot import Robot
 from kin.solvers import collinear7, srs7, wrist5
-from kin.solvers.common import Candidates, Problem
+from kin.solvers.common import Candidates, Freedom, Problem
+from kin.solvers.singular import Singularity
 from kin.transforms import Array
 
 
@@ -22,7 +24,7 @@ class Solver(Protocol):
 
     NAME: str
     TITLE: str
-    PARAMETER: tuple[str, str]
+    BRANCHES: tuple[str, ...]
 
     def match(self, robot: Robot) -> Any: ...
 
@@ -30,7 +32,11 @@ class Solver(Protocol):
 
     def solve(self, geometry: Any, problem: Problem) -> Candidates: ...
 
-    def branch_name(self, index: int, q: Array) -> str: ...
+    def freedoms(self, geometry: Any, task: int) -> tuple[Freedom, ...]: ...
+
+    def branch_of(self, geometry: Any, q: Array) -> int: ...
+
+    def singularities(self, geometry: Any, q: Array) -> tuple[Singularity, ...]: ...
 
 
 class Match(NamedTuple):

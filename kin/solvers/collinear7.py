@@ -26,9 +26,11 @@ from kin.solvers.common import (
     POSE,
     TURN,
     Candidates,
+    Freedom,
     Problem,
     chain_of,
     clear,
+    copy_row,
     extend_arcs,
     inverse,
     is_zero,
@@ -44,12 +46,14 @@ from kin.solvers.common import (
     zyz,
     zyz_breaks,
 )
+from kin.solvers.singular import Singularity, at, off_line, off_square, stretch
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 NAME = "collinear7"
 TITLE = "closed form, joints 1 and 2 on one line"
-PARAMETER = ("theta1", "θ1")
+_THETA1 = Freedom("theta1", "θ1", joint=0)
+_ROLL = Freedom("roll", "roll about the approach axis", circular=True)
 BRANCHES = tuple(
     f"shoulder {s} · elbow {e} · wrist {w}"
     for s in ("left", "right")
@@ -127,35 +131,41 @@ def _wrist(R02: Array, t3: float, t4: float, R: Array, out: Array) -> None:
 
 @jit
 def _best_roll(
-    bent: Array, s6: float, wish: float, probes: Array, n_probes: int, near: Array, low: Array, high: Array,
-    R47: Array, angles: Array, rolls: Array,
-) -> float:  # fmt: skip
-    """The feasible roll nearest to `wish`, or the least bad one; `bent` holds R47's three parts."""
+    bent: Array, s6: float, wish: float, given: bool, branch: int, probes: Array, n_probes: int, near: Array,
+    low: Array, high: Array, R47: Array, angles: Array, rolls: Array, found: int,
+) -> tuple[float, int]:  # fmt: skip
+    """The feasible roll nearest to `wish`, or the least bad one; appends the feasible arcs to `rolls`.
+
+    `bent` holds R47's three parts.
+    """
     best = math.inf
     phi = wish
-    count = 0
+    first = found
     for j in range(n_probes):
         _combine(bent, probes[j], R47)
         zyz(R47, s6, near, low, high, 4, angles)
         misfit = misfit_of(angles, low, high, 4, 7)
-        if misfit == 0.0:
-            count = extend_arcs(rolls, 0, count, 0, probes, j, n_probes)
-        elif misfit < best and count == 0:
+        if misfit == 0.0 and found < rolls.shape[0]:
+            found = extend_arcs(rolls, first, found, branch, probes, j, n_probes)
+        elif misfit < best and found == first and not given:
             best, phi = misfit, probes[j]
-    return nearest_in_arcs(rolls, 0, count, wish) if count > 0 else phi
+    if found > first and not given:
+        phi = nearest_in_arcs(rolls, first, found, wish)
+    return phi, found
 
 
 @jit
 def _solve(
     T: Array, inverse_base: Array, inverse_tool: Array, offset: Array, d3: float, d5: float, free_roll: bool,
-    value: float, respect: bool, seed: Array, wish: float, lower: Array, upper: Array, arcs: Array, out: Array,
-) -> tuple[float, int]:  # fmt: skip
-    """Branches with θ1, θ2 (and the roll) near the seed. Returns (gap, number of arcs)."""
+    value: float, respect: bool, seed: Array, wish: float, given_roll: bool, lower: Array, upper: Array,
+    arcs: Array, rolls: Array, out: Array,
+) -> tuple[float, int, int]:  # fmt: skip
+    """Branches with θ1, θ2 (and the roll) near the seed. Returns (gap, number of arcs, number of roll arcs)."""
     M = np.empty((4, 4))
     R02, R47 = np.empty((3, 3)), np.empty((3, 3))
     parts, bent = np.empty((3, 3, 3)), np.empty((3, 3, 3))
     angles = np.empty(7)
-    breaks, probes, rolls = np.empty(64), np.empty(130), np.empty((64, 3))
+    breaks, probes = np.empty(64), np.empty(130)
     near, low, high = shifted(seed, offset), shifted(lower, offset), shifted(upper, offset)
     clear(out)
     to_canonical(T, inverse_base, inverse_tool, M)
@@ -165,16 +175,15 @@ def _solve(
     if h < 1e-12 and abs(k) < 1e-12:
         azimuth, spread = near[0] + near[1] + 0.5 * math.pi, 0.0
     elif abs(k) - h > _REACH:
-        return abs(k) - h, 0
+        return abs(k) - h, 0, 0
     else:
         azimuth = math.atan2(y, x)
         spread = merged(math.atan2(math.sqrt(max((h - k) * (h + k), 0.0)), k))
     if free_roll:
         _roll_parts(T, inverse_base, inverse_tool, parts)
     found = 0
-    for si in range(2):
-        if si == 1 and spread == 0.0:
-            break
+    turns_found = 0
+    for si in range(1 if spread == 0.0 else 2):
         t12 = azimuth + (spread if si == 0 else -spread) - 0.5 * math.pi
         c, s = math.cos(t12), math.sin(t12)
         R02[0, 0], R02[0, 1], R02[0, 2] = c, 0.0, -s
@@ -207,8 +216,12 @@ def _solve(
                 s6 = 1.0 if wi == 0 else -1.0
                 branch = 4 * si + 2 * ei + wi
                 if free_roll:
-                    phi = _best_roll(bent, s6, wish, probes, n_probes, near, low, high, R47, angles, rolls)
+                    phi, turns_found = _best_roll(
+                        bent, s6, wish, given_roll, branch, probes, n_probes, near, low, high, R47, angles,
+                        rolls, turns_found,
+                    )  # fmt: skip
                     _combine(bent, phi, R47)
+                    out[branch, 8] = wrap(phi)
                 else:
                     _wrist(R02, angles[2], angles[3], M, R47)
                 zyz(R47, s6, near, low, high, 4, angles)
@@ -219,7 +232,13 @@ def _solve(
                 out[branch, 7] = t1 - offset[0]
                 if misfit_of(angles, low, high, 2, 7) == 0.0:
                     found = _theta1_intervals(t12, offset, low, high, branch, arcs, found)
-    return 0.0, found
+            if straight:
+                copy_row(out, 4 * si, 4 * si + 2)
+                copy_row(out, 4 * si + 1, 4 * si + 3)
+    if spread == 0.0:
+        for branch in range(4):
+            copy_row(out, branch, branch + 4)
+    return 0.0, found, turns_found
 
 
 @jit
@@ -243,16 +262,20 @@ def solve(geometry: Geometry, problem: Problem) -> Candidates:
     """All branches, with θ1 and θ2 (and the roll, for an approach task) as near the seed as the limits allow."""
     g = geometry
     free_roll = problem.task == APPROACH
-    out = np.empty((8, 8))
-    arcs = np.empty((64, 3))
-    gap, count = _solve(
-        problem.T, g.inverse_base, g.inverse_tool, g.offset, g.d3, g.d5, free_roll, problem.value,
-        problem.respect_limits, problem.seed, problem.seed_roll, problem.lower, problem.upper, arcs, out,
+    out = np.empty((8, 9))
+    arcs, rolls = np.empty((64, 3)), np.empty((256, 3))
+    given = free_roll and not math.isnan(problem.values[1])
+    gap, count, roll_count = _solve(
+        problem.T, g.inverse_base, g.inverse_tool, g.offset, g.d3, g.d5, free_roll, problem.values[0],
+        problem.respect_limits, problem.seed, problem.values[1] if given else problem.seed_roll, given,
+        problem.lower, problem.upper, arcs, rolls, out,
     )  # fmt: skip
     obstacle = ""
     if gap > 0.0:
         obstacle = "with this orientation the horizontal upper arm and the forearm do not meet the wrist centre"
-    return Candidates(q=out[:, :7], parameter=out[:, 7], arcs=arcs[:count], gap=gap, obstacle=obstacle)
+    if free_roll:
+        return Candidates(out[:, :7], out[:, 7:], (arcs[:count], rolls[:roll_count]), gap, obstacle)
+    return Candidates(out[:, :7], out[:, 7:8], (arcs[:count],), gap, obstacle)
 
 
 def handles(geometry: Geometry, task: int) -> bool:
@@ -260,6 +283,50 @@ def handles(geometry: Geometry, task: int) -> bool:
     return task == POSE or (task == APPROACH and geometry.tool_on_axis)
 
 
-def branch_name(index: int, q: Array) -> str:
-    """Name of a branch: the side of w on which u lies, and the signs of s4 and s6."""
-    return BRANCHES[index]
+def freedoms(geometry: Geometry, task: int) -> tuple[Freedom, ...]:
+    """θ1, which joint 2 undoes; for an approach direction the roll about it as well."""
+    return (_THETA1, _ROLL) if task == APPROACH else (_THETA1,)
+
+
+def branch_of(geometry: Geometry, q: Array) -> int:
+    """The branch a configuration is on: the side of w on which u lies, and the signs of s4 and s6."""
+    t = q + geometry.offset
+    s4 = math.sin(t[3])
+    return 4 * int(math.cos(t[2]) * s4 < 0.0) + 2 * int(s4 < 0.0) + int(math.sin(t[5]) < 0.0)
+
+
+def singularities(geometry: Geometry, q: Array) -> tuple[Singularity, ...]:
+    """How far a configuration ``(7,)`` is from each of the arm's singularities.
+
+    The three are the factors of the determinant without joint 2, d3 d5² s4² c3 s6: there are no others. s4 counts
+    twice, so an elbow nearly straight costs more than a wrist nearly aligned.
+    """
+    g = geometry
+    t = q + g.offset
+    shoulder, elbow, wrist = off_square(t[2]), off_line(t[3]), off_line(t[5])
+    found = (
+        Singularity(
+            "elbow",
+            f"elbow {stretch(t[3])} ({at(4, q[3], elbow)}): the hand cannot shift along the arm",
+            abs(elbow),
+            "rad",
+        ),
+        Singularity(
+            "shoulder",
+            f"forearm in one plane with axis 1 ({at(3, q[2], shoulder)}): the hand cannot shift along the forearm",
+            abs(shoulder),
+            "rad",
+        ),
+        Singularity(
+            "wrist",
+            f"hand in line with the forearm ({at(6, q[5], wrist)}): joints 5 and 7 turn about one line",
+            abs(wrist),
+            "rad",
+        ),
+    )
+    if g.d5 < g.d3 - TOLERANCES.geometry:
+        return found
+    # Only a forearm at least as long as the upper arm gets back to axis 1; then θ3 is square, too.
+    across, along = g.d5 * math.sin(t[3]) * math.cos(t[2]), g.d3 + g.d5 * math.cos(t[3])
+    meaning = "wrist centre on axis 1: the closed form takes θ1 + θ2 from the seed"
+    return (*found, Singularity("algorithmic", meaning, math.hypot(across, along), "m"))

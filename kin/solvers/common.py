@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,8 +31,8 @@ _SINGULAR = TOLERANCES.singular
 _LIMIT = TOLERANCES.limit
 _MERGE = TOLERANCES.merge
 
-POSE, APPROACH, POSITION = 0, 1, 2
-TASK_CODES = {"pose": POSE, "approach": APPROACH, "position": POSITION}
+POSE, APPROACH, POSITION, MASK = 0, 1, 2, 3
+TASK_CODES = {"pose": POSE, "approach": APPROACH, "position": POSITION, "mask": MASK}
 
 
 @jit
@@ -200,6 +201,13 @@ def clear(out: Array) -> None:
 
 
 @jit
+def copy_row(out: Array, source: int, target: int) -> None:
+    """out[target] ← out[source]: two branches that have merged are both there, with the same joints."""
+    for j in range(out.shape[1]):
+        out[target, j] = out[source, j]
+
+
+@jit
 def shifted(values: Array, offset: Array) -> Array:
     """values + offset ``(n,)``."""
     out = np.empty(values.shape[0])
@@ -224,6 +232,39 @@ def to_canonical(T: Array, inverse_base: Array, inverse_tool: Array, out: Array)
         for c in range(3):
             out[r, c] = x * inverse_tool[0, c] + y * inverse_tool[1, c] + z * inverse_tool[2, c]
         out[r, 3] = x * inverse_tool[0, 3] + y * inverse_tool[1, 3] + z * inverse_tool[2, 3] + p
+
+
+@jit
+def relative_pose(T: Array, target: Array, in_tool: bool, e: Array) -> None:
+    """e ← (Δp, φ) ``(6,)``: where T is, seen from the target, in the target's frame or in the base frame.
+
+    φ is the rotation vector of Rₜᵀ R (target's frame) or R Rₜᵀ (base frame), |φ| ≤ π.
+    """
+    for i in range(3):
+        if in_tool:
+            e[i] = 0.0
+            for r in range(3):
+                e[i] += target[r, i] * (T[r, 3] - target[r, 3])
+        else:
+            e[i] = T[i, 3] - target[i, 3]
+    # Twice the vector part of R Rₜᵀ, in the base frame; Rₜᵀ carries it over into the target's frame.
+    x = y = z = trace = 0.0
+    for c in range(3):
+        x += T[2, c] * target[1, c] - T[1, c] * target[2, c]
+        y += T[0, c] * target[2, c] - T[2, c] * target[0, c]
+        z += T[1, c] * target[0, c] - T[0, c] * target[1, c]
+        trace += T[0, c] * target[0, c] + T[1, c] * target[1, c] + T[2, c] * target[2, c]
+    sine = math.sqrt(x * x + y * y + z * z)
+    angle = math.atan2(sine, trace - 1.0)
+    k = angle / sine if sine > 1e-14 else 0.5
+    if sine <= 1e-14 and trace < 0.0:
+        # Exactly opposite: any axis is as good, the target's own x axis is turned about.
+        x, y, z, k = target[0, 0], target[1, 0], target[2, 0], math.pi
+    for i in range(3):
+        if in_tool:
+            e[3 + i] = k * (target[0, i] * x + target[1, i] * y + target[2, i] * z)
+        else:
+            e[3 + i] = k * (x if i == 0 else (y if i == 1 else z))
 
 
 @jit
@@ -292,14 +333,31 @@ def nearest_in_arcs(arcs: Array, first: int, found: int, wish: float) -> float:
     return best
 
 
+class Freedom(NamedTuple):
+    """A parameter that a task leaves free.
+
+    Attributes:
+        name, label: id, and the same for people.
+        joint: index of the joint whose value it is, −1 if it is none.
+        circular: whether its values are angles on a circle, told in (−π, π].
+        rare: free at singular targets only, so that no value can be asked for.
+    """
+
+    name: str
+    label: str
+    joint: int = -1
+    circular: bool = False
+    rare: bool = False
+
+
 @dataclass(frozen=True, slots=True)
 class Problem:
     """What a solver is asked: a target, and how to choose what it leaves free.
 
     Attributes:
         T: target pose T_base_tool ``(4, 4)``.
-        task: POSE or APPROACH.
-        value: the redundancy parameter, NaN to let the solver choose it near the seed.
+        task: POSE, APPROACH or POSITION (a mask has no closed form).
+        values: one per freedom of the task, NaN to let the solver choose it near the seed.
         respect_limits: choose free parameters so that the limits hold, where that is possible.
         seed, lower, upper: ``(n,)``.
         seed_roll: angle about the target's z axis from its x axis to the seed tool's (tasks with a free roll).
@@ -307,7 +365,7 @@ class Problem:
 
     T: Array
     task: int
-    value: float
+    values: tuple[float, ...]
     respect_limits: bool
     seed: Array
     lower: Array
@@ -320,16 +378,17 @@ class Candidates:
     """What a solver answers: one configuration per branch, not verified, not filtered, not sorted.
 
     Attributes:
-        q: ``(branches, n)``, NaN where the branch does not exist.
-        parameter: ``(branches,)`` redundancy value used, NaN where there is none.
-        arcs: ``(k, 3)`` rows (branch, low, high): feasible redundancy values under the limits.
+        q: ``(branches, n)``, NaN where the branch does not exist. Where two have merged, both are there.
+        values: ``(branches, freedoms)``, the value used, NaN where the freedom is not there.
+        arcs: per freedom ``(k, 3)`` rows (branch, low, high): its values that the limits allow, the other
+            freedoms held.
         gap: metres by which the geometry does not close when no branch exists.
         obstacle: a clause that says what does not fit then.
     """
 
     q: Array
-    parameter: Array
-    arcs: Array
+    values: Array
+    arcs: tuple[Array, ...]
     gap: float = 0.0
     obstacle: str = ""
 

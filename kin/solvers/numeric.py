@@ -1,15 +1,16 @@
 """A numeric solver for any chain: bounded Levenberg–Marquardt on the task error, from several starts.
 
-It answers two questions the closed forms do not: what is the *closest* configuration inside the limits when a
-target cannot be met, and where is a tool point when nothing but the point is asked. It minimises
+It answers what the closed forms do not: what is the *closest* configuration inside the limits when a target
+cannot be met, and how to meet a task that has no closed form. It minimises
 
     E(q)² = |Δp|² + (ℓ · angle)²
 
 with Δp the position error in metres, the angle between the orientations (pose) or approach directions
 (approach; ignored for position), and ℓ metres per radian. The angle's gradient is exact at any size: the log of
-a rotation is its own image under the inverse left Jacobian. Joints at a limit whose gradient pushes outwards
-are held (projection), the others take a damped Gauss–Newton step (Nocedal & Wright, Numerical Optimization,
-chapters 10 and 16).
+a rotation is its own image under the inverse left Jacobian. A mask keeps some of the six coordinates (Δp, φ) of
+the error in the target's or the base frame; there that Jacobian has to be applied. Joints at a limit whose
+gradient pushes outwards are held (projection), the others take a damped Gauss–Newton step (Nocedal & Wright,
+Numerical Optimization, chapters 10 and 16).
 """
 
 from __future__ import annotations
@@ -20,15 +21,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kin.kernels import fk_into, jacobian_into, jit
-from kin.solvers.common import APPROACH, POSE
+from kin.solvers.common import APPROACH, MASK, POSE, POSITION, relative_pose
 from kin.transforms import Array
 
 _STEPS = 120
 
 
 @jit
-def _task_error(T: Array, target: Array, task: int, weight: float, e: Array) -> float:
+def _task_error(T: Array, target: Array, task: int, mask: Array, weight: float, e: Array) -> float:
     """e ← weighted error twist (6,) that would move T onto the target; returns half its square."""
+    if task == MASK:
+        relative_pose(T, target, mask[6] == 0.0, e)
+        total = 0.0
+        for r in range(6):
+            e[r] *= -mask[r] if r < 3 else -mask[r] * weight
+            total += e[r] * e[r]
+        return 0.5 * total
     for r in range(3):
         e[r] = target[r, 3] - T[r, 3]
         e[3 + r] = 0.0
@@ -105,7 +113,39 @@ def _solve_spd(H: Array, g: Array, free: NDArray[np.bool_], damping: float, x: A
 
 
 @jit
-def descend(model: Array, target: Array, task: int, weight: float, lower: Array, upper: Array, q: Array) -> float:
+def _mask_rows(T: Array, target: Array, mask: Array, e: Array, J: Array) -> None:
+    """J ← Jacobian of the masked coordinates (Δp, φ) of `relative_pose`; e is scratch.
+
+    φ̇ = J_l⁻¹(φ) ω with J_l⁻¹ = I − ½[φ]× + b [φ]×², b = (1 − (θ/2) cot(θ/2))/θ² (Barfoot, State Estimation for
+    Robotics, section 7.1).
+    """
+    in_tool = mask[6] == 0.0
+    relative_pose(T, target, in_tool, e)
+    x, y, z = e[3], e[4], e[5]
+    theta = math.sqrt(x * x + y * y + z * z)
+    b = 1.0 / 12.0
+    if theta > 1e-4:
+        b = (1.0 - 0.5 * theta / math.tan(0.5 * theta)) / (theta * theta)
+    for j in range(J.shape[1]):
+        for part in range(0, 6, 3):
+            u, v, w = J[part, j], J[part + 1, j], J[part + 2, j]
+            if in_tool:
+                J[part, j] = target[0, 0] * u + target[1, 0] * v + target[2, 0] * w
+                J[part + 1, j] = target[0, 1] * u + target[1, 1] * v + target[2, 1] * w
+                J[part + 2, j] = target[0, 2] * u + target[1, 2] * v + target[2, 2] * w
+        u, v, w = J[3, j], J[4, j], J[5, j]
+        cx, cy, cz = y * w - z * v, z * u - x * w, x * v - y * u
+        J[3, j] = u - 0.5 * cx + b * (y * cz - z * cy)
+        J[4, j] = v - 0.5 * cy + b * (z * cx - x * cz)
+        J[5, j] = w - 0.5 * cz + b * (x * cy - y * cx)
+        for r in range(6):
+            J[r, j] *= mask[r]
+
+
+@jit
+def descend(
+    model: Array, target: Array, task: int, mask: Array, weight: float, lower: Array, upper: Array, q: Array
+) -> float:
     """Move q, in place, to a local minimum of E inside the limits; returns E there (metres)."""
     n = q.shape[0]
     J, T, axes = np.empty((6, n)), np.empty((4, 4)), np.empty((n, 7))
@@ -116,7 +156,7 @@ def descend(model: Array, target: Array, task: int, weight: float, lower: Array,
         q[i] = min(max(q[i], lower[i]), upper[i])
     damping = 1e-6
     jacobian_into(model, q, J, T, axes)
-    cost = _task_error(T, target, task, weight, e)
+    cost = _task_error(T, target, task, mask, weight, e)
     for _ in range(_STEPS):
         if cost < 1e-27:
             break
@@ -126,7 +166,10 @@ def descend(model: Array, target: Array, task: int, weight: float, lower: Array,
                 spin = J[3, j] * T[0, 2] + J[4, j] * T[1, 2] + J[5, j] * T[2, 2]
                 for r in range(3):
                     J[3 + r, j] -= spin * T[r, 2]
-        rows = 3 if task > APPROACH else 6
+        if task == MASK:
+            _mask_rows(T, target, mask, e, J)
+            _task_error(T, target, task, mask, weight, e)
+        rows = 3 if task == POSITION else 6
         for i in range(n):
             g[i] = 0.0
             for r in range(rows):
@@ -151,7 +194,7 @@ def descend(model: Array, target: Array, task: int, weight: float, lower: Array,
             for i in range(n):
                 trial[i] = min(max(q[i] + min(max(step[i], -0.7), 0.7), lower[i]), upper[i])
             fk_into(model, trial, T)
-            better = _task_error(T, target, task, weight, e)
+            better = _task_error(T, target, task, mask, weight, e)
             if better < cost:
                 improved = True
                 break
@@ -166,7 +209,7 @@ def descend(model: Array, target: Array, task: int, weight: float, lower: Array,
         cost = better
         damping *= 0.1
         jacobian_into(model, q, J, T, axes)
-        _task_error(T, target, task, weight, e)
+        _task_error(T, target, task, mask, weight, e)
         if gain < 1e-15 * cost and cost > 1e-20:
             break
     return math.sqrt(2.0 * cost)
@@ -174,7 +217,7 @@ def descend(model: Array, target: Array, task: int, weight: float, lower: Array,
 
 @jit
 def best_of(
-    model: Array, target: Array, task: int, weight: float, lower: Array, upper: Array, starts: Array,
+    model: Array, target: Array, task: int, mask: Array, weight: float, lower: Array, upper: Array, starts: Array,
     enough: float, out: Array,
 ) -> float:  # fmt: skip
     """out ← the best local minimum over the starts ``(k, n)``, stopping at the first with E ≤ `enough`."""
@@ -183,7 +226,7 @@ def best_of(
     for i in range(starts.shape[0]):
         for j in range(q.shape[0]):
             q[j] = starts[i, j]
-        cost = descend(model, target, task, weight, lower, upper, q)
+        cost = descend(model, target, task, mask, weight, lower, upper, q)
         # A later start must be better by more than rounding: of equal minima the one nearest to the seed stays,
         # so that the arm does not jump about while a target is dragged out of reach.
         if cost < best * (1.0 - 1e-6) - 1e-12:
@@ -193,6 +236,16 @@ def best_of(
             if best <= enough:
                 break
     return best
+
+
+@jit
+def each_of(
+    model: Array, target: Array, task: int, mask: Array, weight: float, lower: Array, upper: Array, q: Array,
+    costs: Array,
+) -> None:  # fmt: skip
+    """Move every row of q ``(k, n)`` to a local minimum, in place; costs ``(k,)`` ← E there."""
+    for i in range(q.shape[0]):
+        costs[i] = descend(model, target, task, mask, weight, lower, upper, q[i])
 
 
 def spread(lower: Array, upper: Array, count: int) -> Array:

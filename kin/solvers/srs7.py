@@ -27,9 +27,11 @@ from kin.solvers.common import (
     APPROACH,
     POSE,
     Candidates,
+    Freedom,
     Problem,
     chain_of,
     clear,
+    copy_row,
     excess,
     extend_arcs,
     inverse,
@@ -45,12 +47,14 @@ from kin.solvers.common import (
     zyz,
     zyz_breaks,
 )
+from kin.solvers.singular import Singularity, at, off_line, off_square, stretch
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 NAME = "srs7"
 TITLE = "closed form, S-R-S arm"
-PARAMETER = ("psi", "arm angle ψ")
+_PSI = Freedom("psi", "arm angle ψ", circular=True)
+_THETA7 = Freedom("theta7", "θ7", joint=6)
 BRANCHES = tuple(
     f"shoulder {s} · elbow {e} · wrist {w}"
     for s in ("front", "back")
@@ -245,6 +249,9 @@ def _solve(
                 if free_roll:
                     out[branch, 6] = min(max(seed[6], lower[6]), upper[6])
                 out[branch, 7] = wrap(psi)
+    if bend == 0.0:
+        for branch in (0, 1, 4, 5):
+            copy_row(out, branch, branch + 2)
     return 0, 0.0, found
 
 
@@ -255,13 +262,21 @@ def solve(geometry: Geometry, problem: Problem) -> Candidates:
     arcs = np.empty((256, 3))
     g = geometry
     code, gap, count = _solve(
-        problem.T, g.inverse_base, g.inverse_tool, g.offset, g.d3, g.d5, free_roll, problem.value,
+        problem.T, g.inverse_base, g.inverse_tool, g.offset, g.d3, g.d5, free_roll, problem.values[0],
         problem.respect_limits, problem.seed, problem.lower, problem.upper, arcs, out,
     )  # fmt: skip
+    values, all_arcs = out[:, 7:], [arcs[:count]]
+    if free_roll:
+        # Joint 7 turns the tool about its own axis and nothing else: it stays, or goes where it is asked to be.
+        if not math.isnan(problem.values[1]):
+            out[:, 6] = np.where(np.isnan(out[:, 6]), math.nan, problem.values[1])
+        values = out[:, [7, 6]]
+        spans = [(i, problem.lower[6], problem.upper[6]) for i in range(8) if not math.isnan(out[i, 6])]
+        all_arcs.append(np.array(spans, dtype=np.float64).reshape(-1, 3))
     return Candidates(
         q=out[:, :7],
-        parameter=out[:, 7],
-        arcs=arcs[:count],
+        values=values,
+        arcs=tuple(all_arcs),
         gap=gap,
         obstacle="" if code == 0 else _obstacle(code, g),
     )
@@ -278,6 +293,62 @@ def handles(geometry: Geometry, task: int) -> bool:
     return task == POSE or (task == APPROACH and geometry.tool_on_axis)
 
 
-def branch_name(index: int, q: Array) -> str:
-    """Name of a branch; "shoulder", "elbow" and "wrist" are the signs of θ2, θ4, θ6."""
-    return BRANCHES[index]
+def freedoms(geometry: Geometry, task: int) -> tuple[Freedom, ...]:
+    """The arm angle; for an approach direction joint 7 as well."""
+    return (_PSI, _THETA7) if task == APPROACH else (_PSI,)
+
+
+def branch_of(geometry: Geometry, q: Array) -> int:
+    """The branch a configuration is on: "shoulder", "elbow" and "wrist" are the signs of θ2, θ4, θ6."""
+    s = np.sin(q + geometry.offset)
+    return 4 * int(s[1] < 0.0) + 2 * int(s[3] < 0.0) + int(s[5] < 0.0)
+
+
+def singularities(geometry: Geometry, q: Array) -> tuple[Singularity, ...]:
+    """How far a configuration ``(7,)`` is from each of the arm's singularities.
+
+    √det(J Jᵀ) = d3 d5 |s4| |m|, where m spans the motions that keep the tool still. With s4 ≠ 0 it vanishes for
+    s2 = c3 = 0, for s6 = c5 = 0 and for s2 = s6 = 0 only: s2 = 0 or s6 = 0 alone is no singularity of this arm.
+    """
+    g = geometry
+    t = q + g.offset
+    shoulder, across3, elbow = off_line(t[1]), off_square(t[2]), off_line(t[3])
+    across5, wrist = off_square(t[4]), off_line(t[5])
+    at2, at6 = at(2, q[1], shoulder), at(6, q[5], wrist)
+    side, along = g.d5 * math.sin(t[3]), g.d3 + g.d5 * math.cos(t[3])
+    x = math.cos(t[1]) * math.cos(t[2]) * side + math.sin(t[1]) * along
+    return (
+        Singularity(
+            "elbow",
+            f"elbow {stretch(t[3])} ({at(4, q[3], elbow)}): the hand cannot shift along the arm",
+            abs(elbow),
+            "rad",
+        ),
+        Singularity(
+            "shoulder",
+            f"upper arm on axis 1, axes 2 and 4 square ({at2}, {at(3, q[2], across3)}): "
+            "the hand cannot shift along the forearm",
+            math.hypot(shoulder, across3),
+            "rad",
+        ),
+        Singularity(
+            "wrist",
+            f"hand in line with the forearm, axes 4 and 6 square ({at6}, {at(5, q[4], across5)}): "
+            "the hand cannot shift along the upper arm",
+            math.hypot(wrist, across5),
+            "rad",
+        ),
+        Singularity(
+            "wrist",
+            f"upper arm on axis 1 and hand in line with the forearm ({at2}, {at6}): "
+            "joints 1 and 3 turn about one line, joints 5 and 7 about another",
+            math.hypot(shoulder, wrist),
+            "rad",
+        ),
+        Singularity(
+            "algorithmic",
+            "wrist centre on axis 1: the arm angle ψ loses its reference, the arm no motion",
+            math.hypot(x, math.sin(t[2]) * side),
+            "m",
+        ),
+    )

@@ -26,10 +26,12 @@ from kin.solvers.common import (
     POSE,
     TURN,
     Candidates,
+    Freedom,
     Problem,
     add_roots,
     chain_of,
     clear,
+    copy_row,
     extend_arcs,
     inverse,
     is_zero,
@@ -43,12 +45,19 @@ from kin.solvers.common import (
     to_canonical,
     wrap,
 )
+from kin.solvers.singular import Singularity, at, off_line, stretch
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 NAME = "wrist5"
 TITLE = "closed form, elbow arm with a two-axis wrist"
-PARAMETER = ("theta1", "θ1")
+BRANCHES = tuple(
+    f"shoulder {s} · elbow {e} · wrist {w}"
+    for s, elbows in (("front", ("up", "down")), ("back", ("down", "up")))
+    for e in elbows
+    for w in ("no-flip", "flip")
+)
+_THETA1 = Freedom("theta1", "θ1", joint=0, circular=True, rare=True)
 _REACH = TOLERANCES.closure_position * 0.1
 _SINGULAR = TOLERANCES.singular
 _EYE = np.eye(4)
@@ -205,6 +214,12 @@ def _solve(
                 _wrist(t1, t2 + t3, a, flip, near[3], low[3], high[3], angles)
                 for i in range(5):
                     out[branch, i] = wrap(angles[i] - offset[i])
+        if bend == 0.0:
+            copy_row(out, 4 * si, 4 * si + 2)
+            copy_row(out, 4 * si + 1, 4 * si + 3)
+    if on_axis:
+        for branch in range(4):
+            copy_row(out, branch, branch + 4)
     return gap, found
 
 
@@ -214,13 +229,13 @@ def solve(geometry: Geometry, problem: Problem) -> Candidates:
     out = np.empty((8, 6))
     arcs = np.empty((128, 3))
     gap, count = _solve(
-        problem.T, g.inverse_base, g.offset, g.a1, g.a2, g.d4, g.d6, problem.value, problem.seed,
+        problem.T, g.inverse_base, g.offset, g.a1, g.a2, g.d4, g.d6, problem.values[0], problem.seed,
         problem.lower, problem.upper, arcs, out,
     )  # fmt: skip
     arcs = arcs[:count]
     arcs[:, 1:] -= g.offset[0]
     obstacle = "" if gap <= _REACH else "the wrist centre is out of the elbow's reach for this approach direction"
-    return Candidates(q=out[:, :5], parameter=out[:, 5], arcs=arcs, gap=max(gap, 0.0), obstacle=obstacle)
+    return Candidates(out[:, :5], out[:, 5:], (arcs,), max(gap, 0.0), obstacle)
 
 
 def handles(geometry: Geometry, task: int) -> bool:
@@ -228,11 +243,43 @@ def handles(geometry: Geometry, task: int) -> bool:
     return task in (POSE, APPROACH)
 
 
-def branch_name(index: int, q: Array) -> str:
-    """Name of a branch. The elbow is "up" when it is above the line from the shoulder to the wrist centre."""
-    back, negative, flip = index & 4, index & 2, index & 1
+def freedoms(geometry: Geometry, task: int) -> tuple[Freedom, ...]:
+    """θ1 when the wrist centre is on axis 1, otherwise nothing."""
+    return (_THETA1,)
+
+
+def branch_of(geometry: Geometry, q: Array) -> int:
+    """The branch a configuration is on.
+
+    "Front" is the side of axis 1 the arm faces with the wrist centre before it; the elbow is "up" when it is above
+    the line from the shoulder to the wrist centre; the wrist is the sign of θ5.
+    """
+    t = q + geometry.offset
+    reach = geometry.a1 + geometry.a2 * math.cos(t[1]) + geometry.d4 * math.cos(t[1] + t[2])
+    return 4 * int(reach < 0.0) + 2 * int(math.sin(t[2]) < 0.0) + int(math.sin(t[4]) < 0.0)
+
+
+def singularities(geometry: Geometry, q: Array) -> tuple[Singularity, ...]:
+    """How far a configuration ``(5,)`` is from each of the arm's singularities, as point and approach task.
+
+    The three are the factors of the determinant, −a2 d4 s3 (a1 + a2 c2 + d4 c23) s5: there are no others.
+    """
+    g = geometry
+    t = q + g.offset
+    elbow, wrist = off_line(t[2]), off_line(t[4])
+    reach = g.a1 + g.a2 * math.cos(t[1]) + g.d4 * math.cos(t[1] + t[2])
     return (
-        f"shoulder {'back' if back else 'front'}"
-        f" · elbow {'up' if bool(back) == bool(negative) else 'down'}"
-        f" · wrist {'flip' if flip else 'no-flip'}"
+        Singularity(
+            "elbow",
+            f"elbow {stretch(t[2])} ({at(3, q[2], elbow)}): the wrist centre cannot move along the arm",
+            abs(elbow),
+            "rad",
+        ),
+        Singularity("shoulder", "wrist centre on axis 1: it cannot move sideways", abs(float(reach)), "m"),
+        Singularity(
+            "wrist",
+            f"tool in line with the forearm ({at(5, q[4], wrist)}): it cannot tilt sideways",
+            abs(wrist),
+            "rad",
+        ),
     )

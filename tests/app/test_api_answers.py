@@ -184,11 +184,14 @@ def test_ik_agrees_with_the_core(client, robot):
     assert np.allclose([s["q"] for s in answer["solutions"]], [s.q for s in result.solutions], rtol=0, atol=1e-9)
     assert [s["branch"] for s in answer["solutions"]] == [s.branch for s in result.solutions]
     assert (answer["reason"], answer["solver"]) == (result.reason, result.solver)
-    if result.redundancy is None:
-        assert answer["redundancy"] is None
-    else:
-        assert np.allclose(answer["redundancy"]["intervals"], result.redundancy.intervals, rtol=0, atol=1e-9)
-        assert answer["redundancy"]["value"] == answer["solutions"][0]["redundancy"]
+    assert [free["name"] for free in answer["redundancy"]] == [free.name for free in result.redundancy]
+    for told, free, own in zip(
+        answer["redundancy"], result.redundancy, answer["solutions"][0]["redundancy"], strict=True
+    ):
+        assert np.allclose(told["intervals"], free.intervals, rtol=0, atol=1e-9)
+        assert told["value"] == own["value"]
+        for interval in own["intervals"]:
+            assert any(low - 1e-9 <= interval[0] and interval[1] <= high + 1e-9 for low, high in told["intervals"])
 
 
 @each_robot
@@ -208,14 +211,14 @@ def test_ik_of_a_list_with_one_seed_or_one_each(client, robot):
 def test_the_redundancy_asked_for_is_the_one_used(client, robot_id):
     robot = kin.get_robot(robot_id)
     pose = post(client, robot, "fk", q=list(robot.home))["pose"]
-    free = post(client, robot, "ik", target=pose)["redundancy"]
+    (free,) = post(client, robot, "ik", target=pose)["redundancy"]
     low, high = max(free["intervals"], key=lambda pair: pair[1] - pair[0])
     wanted = low + 0.3 * (high - low)
     answer = post(client, robot, "ik", target=pose, redundancy=wanted)
+    assert answer == post(client, robot, "ik", target=pose, redundancy={free["name"]: wanted})
     assert answer["status"] == "solved"
-    assert answer["redundancy"]["name"] == free["name"]
     for solution in answer["solutions"]:
-        turns = (solution["redundancy"] - wanted) / (2 * np.pi)
+        turns = (solution["redundancy"][0]["value"] - wanted) / (2 * np.pi)
         assert turns == pytest.approx(round(turns), abs=1e-9)
         closes(robot, pose, solution, "pose")
 

@@ -114,7 +114,7 @@ def test_ik_with_options_asks_the_core_the_same(capsys):
     assert np.allclose([s["q"] for s in got["solutions"]], [s.q for s in result.solutions], atol=1e-9)
     code, out, _ = run(capsys, "ik", robot.id, "--position", *(T[:3, 3] * 1e3), *options)
     assert code == 0
-    assert f"{result.redundancy.label} = -20.000°" in out
+    assert f"{result.redundancy[0].label} = -20.000°" in out
     one = answer(capsys, "ik", robot.id, "--position", *(T[:3, 3] * 1e3), *options[:-2])
     assert len(one["solutions"]) == 1
 

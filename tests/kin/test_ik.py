@@ -269,9 +269,14 @@ def test_orientation_that_cannot_be_had():
     T = np.eye(4)
     T[:3, 3] = (1.0, 0.0, 0.30)
     result = solve_ik(robot, T)
-    assert result.status is Status.UNREACHABLE
+    assert result.status is Status.ORIENTATION
+    assert result.cause == "orientation"
     assert result.distance == 0.0
     assert "orientation cannot be had" in result.reason
+    nearest = result.nearest_orientation
+    assert nearest.position_error <= 1e-9
+    assert robot.in_limits(nearest.q)
+    assert f"nearest attainable one is {math.degrees(nearest.rotation_error):.1f}° away" in result.reason
 
 
 @pytest.mark.parametrize(("roll", "mean"), [(1, 0.29), (5, 1.54), (20, 5.50)])
@@ -342,12 +347,13 @@ def test_redundancy_is_reported_and_taken():
     q = np.radians([20, 40, 30, 60, 10, 30, 5])
     target = kin.fk(robot, q)
     result = solve_ik(robot, target, q_seed=q)
-    assert result.redundancy.name == "psi"
-    assert any(low <= result.redundancy.value <= high for low, high in result.redundancy.intervals)
-    given_value = 0.5 * sum(result.redundancy.intervals[0])
+    (free,) = result.redundancy
+    assert free.name == "psi"
+    assert any(low <= free.value <= high for low, high in free.intervals)
+    given_value = 0.5 * sum(free.intervals[0])
     asked = solve_ik(robot, target, q_seed=q, redundancy=given_value)
     assert asked.status is Status.SOLVED
-    assert all(s.redundancy == pytest.approx(given_value) for s in asked.solutions)
+    assert all(s.redundancy[0].value == pytest.approx(given_value) for s in asked.solutions)
 
 
 @pytest.mark.parametrize("robot_id", SEVEN)
@@ -357,7 +363,7 @@ def test_intervals_are_exactly_the_values_that_work(robot_id):
     checked = 0
     for q in robot.random_q(np.random.default_rng(23), 40):
         target = kin.fk(robot, q)
-        intervals = solve_ik(robot, target, q_seed=q).redundancy.intervals
+        intervals = solve_ik(robot, target, q_seed=q).redundancy[0].intervals
         inside = [v for low, high in intervals for v in np.linspace(low, high, 7)[1:-1]]
         assert all(solve_ik(robot, target, redundancy=float(v)).status is Status.SOLVED for v in inside)
         for low, high in intervals:

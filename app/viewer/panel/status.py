@@ -11,13 +11,14 @@ import viser
 
 from kin import IKResult
 
-Kind = Literal["reached", "compromise", "limits", "unreachable", "hand", "error"]
+Kind = Literal["reached", "compromise", "limits", "orientation", "unreachable", "hand", "error"]
 
 # Symbol and colour of each kind; the colours are Okabe and Ito's, and the symbol alone tells them apart too.
 LOOKS: dict[Kind, tuple[str, str]] = {
     "reached": ("✓", "#009e73"),
     "compromise": ("≈", "#b87a00"),
     "limits": ("!", "#d55e00"),
+    "orientation": ("∠", "#a8518a"),
     "unreachable": ("✕", "#c2185b"),
     "hand": ("↻", "#0072b2"),
     "error": ("?", "#6b4c9a"),
@@ -51,9 +52,11 @@ def _headline(result: IKResult) -> tuple[Kind, str]:
         numbers = [str(v.joint + 1) for v in result.violations]
         which = "joint " + numbers[0] if len(numbers) == 1 else "joints " + ", ".join(numbers)
         return "limits", f"Out of limits: {which}" if numbers else "Out of limits"
-    if result.distance > 0.0:
-        return "unreachable", f"Out of reach by {millimetres(result.distance)}"
-    return "unreachable", "Not attainable here"
+    if result.status == "orientation":
+        return "orientation", "Orientation not attainable here"
+    if result.cause == "branch":
+        return "unreachable", "No solution on the chosen branch"
+    return "unreachable", f"Out of reach by {millimetres(result.distance)}"
 
 
 def _without_repeating(title: str, reason: str) -> str:

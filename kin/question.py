@@ -1,0 +1,305 @@
+"""The question put to inverse kinematics, checked once and then only read.
+
+Locked joints are limits of no width; narrowed limits replace the robot's own. From here on nobody asks whether an
+input is sound, and nobody needs to know in which form it came.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kin.errors import InputError
+from kin.results import Task
+from kin.robot import Robot
+from kin.solvers import Match, solver_for
+from kin.solvers.common import APPROACH, MASK, POSE, POSITION, TASK_CODES, TURN, Freedom
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array, as_transform, finite_array
+
+Frame = Literal["tool", "base"]
+Images = Literal["nearest", "all"]
+Preference = Literal["nearest", "limits", "manipulability"]
+Limits = Sequence[Sequence[float] | None]
+Locks = Sequence[float | None]
+PREFERENCES: tuple[Preference, ...] = ("nearest", "limits", "manipulability")
+MASK_NAMES = ("x", "y", "z", "rx", "ry", "rz")
+ALL = (1.0,) * 6
+_FAR = 1e6
+# Masks that are one of the three tasks with a closed form; the first and the last in either frame.
+_CANONICAL: dict[tuple[bool, ...], int] = {
+    (True,) * 6: POSE,
+    (True,) * 5 + (False,): APPROACH,
+    (True,) * 3 + (False,) * 3: POSITION,
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Question:
+    """A checked question.
+
+    Attributes:
+        robot: the arm.
+        T: target pose ``(4, 4)``.
+        task, code: name and code of what must be met.
+        mask: ``(7,)`` weights of the six task coordinates, and 1.0 if they are told in the base frame.
+        seed, lower, upper: ``(n,)``; the limits are those of the question.
+        locked: ``(n,)`` which joints are locked.
+        turns: ``(n,)`` 2π where a joint has whole-turn images, 0.0 where not.
+        low, high: ``(n,)`` where a descent may go.
+        respect: whether answers outside the limits are left out.
+        match: the arm's closed form, None if it has none.
+        freedoms: what the closed form leaves free in this task.
+        values: one per freedom, NaN to let it be chosen.
+        branches: the rows asked for, None for all.
+        all_images, prefer, max_solutions: which answers are wanted.
+    """
+
+    robot: Robot
+    T: Array
+    task: str
+    code: int
+    mask: Array
+    seed: Array
+    lower: Array
+    upper: Array
+    locked: tuple[bool, ...]
+    turns: Array
+    low: Array
+    high: Array
+    respect: bool
+    match: Match | None
+    freedoms: tuple[Freedom, ...]
+    values: tuple[float, ...]
+    branches: frozenset[int] | None
+    all_images: bool
+    prefer: str
+    max_solutions: int | None
+
+    @property
+    def given(self) -> tuple[Freedom, ...]:
+        """The freedoms whose value was asked for."""
+        return tuple(f for f, v in zip(self.freedoms, self.values, strict=True) if not math.isnan(v))
+
+    def allows(self, branch: int) -> bool:
+        """Whether this branch was asked for."""
+        return self.branches is None or branch in self.branches
+
+    def branch_of(self, q: Array) -> int:
+        """Branch of a configuration, −1 if the arm's branches have no names."""
+        return -1 if self.match is None else self.match.solver.branch_of(self.match.geometry, q)
+
+    def branch_name(self, branch: int) -> str:
+        """Name of a branch."""
+        return "numeric" if self.match is None or branch < 0 else self.match.solver.BRANCHES[branch]
+
+    def near(self, seed: Array) -> Question:
+        """The same question near another configuration."""
+        return replace(self, seed=seed)
+
+
+def ask(
+    robot: Robot,
+    target: ArrayLike,
+    *,
+    task: Task = "pose",
+    mask: Sequence[bool] | None = None,
+    mask_frame: Frame = "tool",
+    q_seed: ArrayLike | None = None,
+    respect_limits: bool = True,
+    limits: Limits | None = None,
+    locked: Locks | None = None,
+    branch: str | Sequence[str] | None = None,
+    images: Images = "nearest",
+    prefer: Preference = "nearest",
+    redundancy: float | Mapping[str, float] | None = None,
+    max_solutions: int | None = None,
+) -> Question:
+    """Check every argument of `kin.solve_ik`, which explains them; raises `InputError` naming the wrong one."""
+    if max_solutions is not None and (
+        isinstance(max_solutions, bool) or not isinstance(max_solutions, int | np.integer) or max_solutions < 1
+    ):
+        raise InputError("max_solutions", max_solutions, "a whole number from 1, or none")
+    if images not in ("nearest", "all"):
+        raise InputError("images", images, 'one of "nearest", "all"')
+    if prefer not in PREFERENCES:
+        raise InputError("prefer", prefer, "one of " + ", ".join(f'"{p}"' for p in PREFERENCES))
+    task_name, code, weights = _task(task, mask, mask_frame)
+    T = _target(target, code)
+    if q_seed is None:
+        seed = robot.q_home.copy()
+    else:
+        seed = np.array(robot.check_q(q_seed, "q_seed"))
+        if seed.ndim != 1:
+            raise InputError("q_seed", f"shape {seed.shape}", f"one configuration of {robot.n} values")
+    lower, upper = robot.lower.copy(), robot.upper.copy()
+    locks = (False,) * robot.n
+    if limits is not None or locked is not None:
+        if not respect_limits:
+            raise InputError("respect_limits", False, "true when limits or locked joints are given")
+        if limits is not None:
+            lower, upper = _narrowed(robot, limits)
+        if locked is not None:
+            locks = _locked(robot, locked, lower, upper)
+    match = solver_for(robot)
+    handled = match is not None and match.solver.handles(match.geometry, code)
+    freedoms = match.solver.freedoms(match.geometry, code) if match is not None and handled else ()
+    values = _values(robot, redundancy, freedoms)
+    turns = np.where(robot.revolute, TURN, 0.0)
+    for freedom, value in zip(freedoms, values, strict=True):
+        if freedom.joint >= 0 and not math.isnan(value):
+            turns[freedom.joint] = 0.0
+    anywhere = robot.revolute & (not respect_limits)
+    return Question(
+        robot=robot,
+        T=T,
+        task=task_name,
+        code=code,
+        mask=weights,
+        seed=seed,
+        lower=lower,
+        upper=upper,
+        locked=locks,
+        turns=turns,
+        low=np.where(anywhere, -TURN, lower),
+        high=np.where(anywhere, TURN, upper),
+        respect=respect_limits,
+        match=match,
+        freedoms=freedoms,
+        values=values,
+        branches=None if branch is None else _branches(robot, match, branch, seed),
+        all_images=images == "all",
+        prefer=prefer,
+        max_solutions=max_solutions,
+    )
+
+
+def _task(task: str, mask: Sequence[bool] | None, frame: str) -> tuple[str, int, Array]:
+    """Name, code and mask weights of what must be met."""
+    if task not in TASK_CODES or task == "mask":
+        raise InputError("task", task, 'one of "pose", "approach", "position"')
+    if frame not in ("tool", "base"):
+        raise InputError("mask_frame", frame, 'one of "tool", "base"')
+    if mask is None:
+        return task, TASK_CODES[task], np.array([*ALL, 0.0])
+    if task != "pose":
+        raise InputError("task", task, "no task besides a mask")
+    flags = tuple(mask) if isinstance(mask, Sequence | np.ndarray) and not isinstance(mask, str) else ()
+    if len(flags) != 6 or not all(isinstance(flag, bool | np.bool_) for flag in flags):
+        raise InputError("mask", mask, "six of true or false: " + ", ".join(MASK_NAMES))
+    flags = tuple(bool(flag) for flag in flags)
+    if not any(flags):
+        raise InputError("mask", mask, "at least one of the six to be true")
+    code = _CANONICAL.get(flags, MASK)
+    if code == APPROACH and frame == "base":
+        code = MASK  # free about the base's z axis, not about the tool's
+    name = next(name for name, value in TASK_CODES.items() if value == code)
+    return name, code, np.array([*(float(flag) for flag in flags), float(frame == "base")])
+
+
+def _target(target: ArrayLike, code: int) -> Array:
+    if code == POSITION and np.shape(target) == (3,):
+        T = np.eye(4)
+        T[:3, 3] = finite_array("target", target, (3,))
+    else:
+        T = as_transform(target)
+    if float(np.abs(T[:3, 3]).max()) > _FAR:
+        raise InputError("target position", T[:3, 3].tolist(), "coordinates below 1e6 m")
+    return T
+
+
+def _narrowed(robot: Robot, limits: Limits) -> tuple[Array, Array]:
+    """The limits of the question ``(n,)``, ``(n,)``: the robot's where nothing is given."""
+    lower, upper = robot.lower.copy(), robot.upper.copy()
+    expected = f"{robot.n} pairs (lower, upper), one per joint, or none for a joint's own limits"
+    if not isinstance(limits, Sequence | np.ndarray) or isinstance(limits, str) or len(limits) != robot.n:
+        raise InputError("limits", limits, expected)
+    for i, pair in enumerate(limits):
+        if pair is None:
+            continue
+        field = f"limits[{i}]"
+        low, high = finite_array(field, pair, (2,)).tolist() if np.shape(pair) == (2,) else (math.inf, -math.inf)
+        if low > high:
+            raise InputError(field, pair, "a lower limit and an upper one that is not below it")
+        if low < lower[i] - TOLERANCES.limit or high > upper[i] + TOLERANCES.limit:
+            raise InputError(field, pair, f"limits inside the joint's own, {_span(lower[i], upper[i])}")
+        lower[i], upper[i] = max(low, lower[i]), min(high, upper[i])
+    return lower, upper
+
+
+def _locked(robot: Robot, locked: Locks, lower: Array, upper: Array) -> tuple[bool, ...]:
+    """Which joints are locked; their limits, in place, become the one value."""
+    if not isinstance(locked, Sequence | np.ndarray) or isinstance(locked, str) or len(locked) != robot.n:
+        raise InputError("locked", locked, f"{robot.n} joint values, or none for a joint that may move")
+    for i, value in enumerate(locked):
+        if value is None:
+            continue
+        number = _number(f"locked[{i}]", value, "a finite number, or none for a joint that may move")
+        if not lower[i] - TOLERANCES.limit <= number <= upper[i] + TOLERANCES.limit:
+            raise InputError(f"locked[{i}]", value, f"a value inside the limits, {_span(lower[i], upper[i])}")
+        lower[i] = upper[i] = min(max(number, lower[i]), upper[i])
+    return tuple(value is not None for value in locked)
+
+
+def _span(low: float, high: float) -> str:
+    return f"{low:.6g} to {high:.6g}"
+
+
+def _values(
+    robot: Robot, redundancy: float | Mapping[str, float] | None, freedoms: tuple[Freedom, ...]
+) -> tuple[float, ...]:
+    """The value asked for, of each freedom; NaN where none is."""
+    if redundancy is None:
+        return (math.nan,) * len(freedoms)
+    settable = [f.name for f in freedoms if not f.rare]
+    if not settable:
+        raise InputError("redundancy", redundancy, f"none: {robot.id} has no free parameter to set in this task")
+    if not isinstance(redundancy, Mapping):
+        redundancy = {settable[0]: redundancy}
+    for name, value in redundancy.items():
+        if name not in settable:
+            raise InputError("redundancy", name, "one of " + ", ".join(settable))
+        _number(f"redundancy.{name}", value, "a finite value in radians")
+    return tuple(float(redundancy.get(f.name, math.nan)) for f in freedoms)
+
+
+def _number(field: str, value: object, expected: str) -> float:
+    """One finite number as a float."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number):
+        raise InputError(field, value, expected)
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise InputError(field, value, expected)
+    return number
+
+
+def _branches(robot: Robot, match: Match | None, branch: str | Sequence[str], seed: Array) -> frozenset[int]:
+    """Rows of the branches asked for by whole names, by parts of names, or as the seed's."""
+    if match is None:
+        raise InputError("branch", branch, f"none: the branches of {robot.id} have no names")
+    wishes = [branch] if isinstance(branch, str) else list(branch) if isinstance(branch, Sequence) else []
+    names = match.solver.BRANCHES
+    parts = list(dict.fromkeys(part for name in names for part in name.split(" · ")))
+    rows: set[int] = set()
+    for wish in wishes:
+        words = [w.strip() for w in wish.replace(",", "·").split("·")] if isinstance(wish, str) else [""]
+        if words == ["seed"]:
+            rows.add(match.solver.branch_of(match.geometry, seed))
+            continue
+        if any(word not in parts for word in words):
+            raise InputError("branch", wish, '"seed", or of these, joined by " · ": ' + ", ".join(parts))
+        found = {i for i, name in enumerate(names) if all(word in name.split(" · ") for word in words)}
+        if not found:
+            raise InputError("branch", wish, "parts that go together, as in " + repr(names[0]))
+        rows |= found
+    if not rows:
+        raise InputError("branch", branch, "at least one branch")
+    return frozenset(rows)

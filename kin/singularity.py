@@ -1,0 +1,77 @@
+"""How near a configuration is to losing a direction of motion.
+
+At a singularity the joints together cannot move the tool in some direction, and just beside it a slow motion of
+the tool takes fast joints. For arms with a closed form the singular sets are known exactly, so each is told with
+what aligns there and how far away it is, as an angle or a length. For any other arm one figure stands for all of
+them: the smallest singular value of the Jacobian, the least speed of the tool that one unit of joint speed buys.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kin.errors import InputError
+from kin.fk import fk, jacobian
+from kin.robot import Robot
+from kin.solvers import solver_for
+from kin.solvers.numeric import spread
+from kin.solvers.singular import Singularity
+from kin.transforms import Array
+
+__all__ = ["Singularity", "singularities"]
+
+
+def singularities(robot: Robot, q: ArrayLike) -> tuple[Singularity, ...]:
+    """Every way in which the configuration `q` ``(n,)`` may be singular, the nearest first.
+
+    To put angles and lengths in one order, a length counts as the angle at which it is seen from the arm's reach:
+    metres divided by `Robot.reach`. Of equals, what costs a motion comes before what only the closed form loses.
+
+    An arm of the 5-joint family is judged by its task, the tool's point and approach direction; 7-joint arms by
+    the whole pose. An arm without a closed form has one entry of kind ``"jacobian"``, see `task_jacobian`.
+
+    Raises:
+        InputError: q is not one configuration.
+    """
+    q = robot.check_q(q)
+    if q.ndim != 1:
+        raise InputError("q", f"shape {q.shape}", f"one configuration of {robot.n} values")
+    match = solver_for(robot)
+    if match is None:
+        return (_by_jacobian(robot, q),)
+    found: tuple[Singularity, ...] = match.solver.singularities(match.geometry, q)
+    return tuple(sorted(found, key=lambda s: s.distance / (robot.reach if s.unit == "m" else 1.0)))
+
+
+def task_jacobian(robot: Robot, q: Array) -> Array:
+    """The rows of the Jacobian that `n` joints can be asked for ``(..., m, n)``, at ``(..., n)``.
+
+    Six joints or more: all six. Five: the velocity of the tool point and the turning of the approach direction,
+    about the tool's x and y axes (m = 5). Fewer: the velocity of the tool point (m = 3).
+    """
+    J = jacobian(robot, q)
+    if robot.n >= 6:
+        return J
+    if robot.n < 5:
+        return J[..., :3, :]
+    R_T = np.swapaxes(fk(robot, q)[..., :3, :2], -1, -2)
+    return np.concatenate([J[..., :3, :], R_T @ J[..., 3:, :]], axis=-2)
+
+
+@lru_cache(maxsize=256)
+def _usual_rank(robot: Robot) -> int:
+    """How many directions the arm has almost everywhere: a flat arm, for one, never leaves its plane."""
+    J = task_jacobian(robot, spread(robot.lower, robot.upper, 16))
+    return int(np.linalg.matrix_rank(J, rtol=1e-9).max())
+
+
+def _by_jacobian(robot: Robot, q: Array) -> Singularity:
+    """The last singular value that is not zero everywhere."""
+    J = task_jacobian(robot, q)
+    rank = _usual_rank(robot)
+    least = float(np.linalg.svd(J, compute_uv=False)[rank - 1]) if rank else 0.0
+    meaning = f"smallest singular value of the {J.shape[0]} × {J.shape[1]} Jacobian: the tool's slowest direction"
+    return Singularity("jacobian", meaning, least, "SI")
