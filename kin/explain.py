@@ -143,10 +143,9 @@ def _need(question: Question, violation: LimitViolation) -> str:
     joint = question.robot.joints[violation.joint]
     show = degrees if joint.kind == "revolute" else millimetres
     stop = "locked at" if question.locked[violation.joint] else "limit"
-    return (
-        f"joint {violation.joint + 1} ({violation.name}) at {show(violation.value)}"
-        f" ({stop} {show(violation.limit)})"
-    )
+    number = f"joint {violation.joint + 1}"
+    name = "" if violation.name.lower() == number else f" ({violation.name})"
+    return f"{number}{name} at {show(violation.value)} ({stop} {show(violation.limit)})"
 
 
 def _count(number: int) -> str:

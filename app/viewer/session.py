@@ -23,6 +23,7 @@ from app.viewer.inbox import Inbox
 from app.viewer.motion import Motion, Pace
 from app.viewer.panel import assign, listen, listen_click
 from app.viewer.panel.joints import JointSliders
+from app.viewer.panel.posture import BranchChoice, FreeSliders
 from app.viewer.panel.readout import PoseReadout
 from app.viewer.panel.status import Notice, StatusLine, notice
 from app.viewer.panel.target import TASKS, TargetChoice, default_task
@@ -34,6 +35,7 @@ from kin.transforms import Array, from_position_wxyz
 log = logging.getLogger(__name__)
 
 READOUT_INTERVAL = 0.05
+SMOOTH = 0.6  # rad of one joint in one event: more than that is no motion but another posture
 NARROW = 700  # pixels
 # Phase (start, update, end), position (m) and wxyz of the gizmo.
 GizmoEvent = tuple[str, list[float], list[float]]
@@ -63,6 +65,8 @@ class Session:
         self._sliders_due = False
         self._held: int | None = None
         self._read_at = 0.0
+        self._branch: str | None = None  # as solve_ik takes it
+        self._held_free: str | None = None
         self._arms = 0
         # Made by the worker when it builds the page.
         self._robot: Robot
@@ -75,6 +79,9 @@ class Session:
         self._joint_folder: viser.GuiFolderHandle
         self._sliders: JointSliders
         self._target_choice: TargetChoice
+        self._posture_folder: viser.GuiFolderHandle
+        self._branch_choice: BranchChoice
+        self._free: FreeSliders
 
     def start(self) -> None:
         """Build the visitor's page and begin to answer."""
@@ -139,6 +146,7 @@ class Session:
             self._sliders_due = False
             with self._client.atomic():
                 self._sliders.show(self._motion.goal, self._held)
+                self._show_posture()
 
     def _handle(self, key: Hashable, value: object) -> None:
         match key:
@@ -148,6 +156,12 @@ class Session:
                 # A late event of sliders that are already replaced says nothing about the present ones.
                 if (robot_id, degrees) == (self._robot.id, self._degrees):
                     self._on_slider(index, value)
+            case ("free", str(robot_id), str(name), bool(degrees)):
+                if (robot_id, degrees) == (self._robot.id, self._degrees):
+                    self._on_free(name, value)
+            case ("branch", str(robot_id)):
+                if robot_id == self._robot.id:
+                    self._on_branch(value)
             case "robot":
                 self._on_robot(str(value))
             case "task":
@@ -183,7 +197,52 @@ class Session:
         q[index] = self._sliders.read(index, value)
         self._target = None
         self._aim(q, held=index)
+        self._let_go_of_branch()
         self._status.show(BY_HAND)
+
+    def _on_branch(self, value: object) -> None:
+        """Take the same pose on another branch, and stay there."""
+        self._branch = self._branch_choice.read(value)
+        self._solve(kin.fk(self._robot, self._motion.goal) if self._target is None else self._target)
+
+    def _on_free(self, name: str, value: object) -> None:
+        """Move what is free while the tool stays; where the limits end, the arm stops and the status says why."""
+        wanted = self._free.read(name, value)
+        result = self._self_motion(name, wanted)
+        if result.status != "solved":
+            self._status.show(notice(result))
+            ranges = [r.intervals for r in self._posture().redundancy if r.name == name]
+            inside = [min(max(wanted, low), high) for low, high in (ranges[0] if ranges else ())]
+            if not inside:
+                return
+            result = self._self_motion(name, min(inside, key=lambda v: abs(v - wanted)))
+        else:
+            self._status.show(notice(result))
+        best = result.solutions[0] if result.solutions else None
+        if best is not None:
+            self._target = None
+            self._held_free = name
+            self._aim(best.q)
+
+    def _self_motion(self, name: str, value: float) -> kin.IKResult:
+        """The tool where it is with a free value set: a smooth motion if there is one, else the same branch."""
+        q = self._motion.goal
+        T = kin.fk(self._robot, q)
+        for branch in (None, "seed"):
+            result = kin.solve_ik(
+                self._robot, T, task=self._task, q_seed=q, branch=branch, redundancy={name: value}, max_solutions=1
+            )
+            if result.solutions and float(np.abs(result.solutions[0].q - q).max()) < SMOOTH:
+                break
+        return result
+
+    def _posture(self) -> kin.IKResult:
+        """What is free where the arm is heading, on the branch it is on."""
+        q = self._motion.goal
+        seed = "seed" if kin.branch_names(self._robot) else None
+        return kin.solve_ik(
+            self._robot, kin.fk(self._robot, q), task=self._task, q_seed=q, branch=seed, max_solutions=1
+        )
 
     def _on_robot(self, name: str) -> None:
         robot = next((r for r in self._store.robots if r.name == name), None)
@@ -193,6 +252,8 @@ class Session:
         if robot == self._robot:
             return
         self._sliders.remove()
+        self._branch_choice.remove()
+        self._free.remove()
         self._scene.remove()
         self._use(robot)
         self._status.show(Notice("hand", robot.name, robot.description))
@@ -205,11 +266,13 @@ class Session:
         self._scene.gizmo.disable_rotations = self._task == "position"
         if self._target is not None:
             self._solve(self._target)
+        self._show_posture()
 
     def _on_units(self, radians: bool) -> None:
         self._degrees = not radians
         self._sliders.remove()
         self._sliders = self._make_sliders()
+        self._show_posture()
 
     def _on_view(self, name: str, value: bool) -> None:
         setattr(self._view, name, value)
@@ -220,7 +283,7 @@ class Session:
     def _solve(self, T: Array) -> None:
         """Answer the gizmo's target: seed with where the arm is heading, so that it stays on its branch."""
         target = T[:3, 3] if self._task == "position" else T
-        result = kin.solve_ik(self._robot, target, task=self._task, q_seed=self._motion.goal)
+        result = kin.solve_ik(self._robot, target, task=self._task, q_seed=self._motion.goal, branch=self._branch)
         self._target = T
         if result.best is not None:
             self._aim(result.best.q)
@@ -231,7 +294,14 @@ class Session:
         """Head for a configuration, the gizmo following the tool."""
         self._target = None
         self._aim(q)
+        self._let_go_of_branch()
         self._status.show(BY_HAND)
+
+    def _let_go_of_branch(self) -> None:
+        """A joint moved by hand may leave the branch that was chosen: from then on none is."""
+        if self._branch not in (None, "seed", kin.branch_of(self._robot, self._motion.goal)):
+            self._branch = None
+            self._branch_choice.reset()
 
     def _aim(self, q: Array, held: int | None = None) -> None:
         """Head for a configuration; the sliders follow, but for the one in the visitor's hand."""
@@ -258,6 +328,8 @@ class Session:
                 buttons = gui.add_button_group("Go to", ("Home", "Random"))
                 listen_click(buttons, self.post, {"Home": "home", "Random": "random"})
                 self._target_choice = TargetChoice(gui, self._task, self.post)
+                self._posture_folder = gui.add_folder("Posture")
+                self._free = FreeSliders(gui, self._posture_folder, self.post)
             with tabs.add_tab("View"):
                 units = gui.add_checkbox("Radians", False, hint="Angles in radians instead of degrees")
                 listen(units, self.post, "units")
@@ -278,8 +350,20 @@ class Session:
         self._target_choice.show(self._task)
         self._listen_gizmo()
         self._sliders = self._make_sliders()
+        self._branch = None
+        with self._posture_folder:
+            self._branch_choice = BranchChoice(self._client.gui, robot, self.post)
+        self._show_posture()
         self._apply_view()
         camera.aim(self._client.camera, self._scene.body)
+
+    def _show_posture(self) -> None:
+        """The branch the arm is on, and what is free there."""
+        found = self._posture()
+        if kin.branch_names(self._robot):
+            self._branch_choice.show(kin.branch_of(self._robot, self._motion.goal))
+        self._free.show(found.redundancy, self._robot, self._degrees, self._held_free)
+        self._held_free = None
 
     def _make_sliders(self) -> JointSliders:
         return JointSliders(

@@ -215,7 +215,7 @@ def test_every_robot_can_be_chosen_and_left_again(port: int) -> None:
         for robot in [*STORE.robots[1:], *STORE.robots]:
             choose(tab, robot)
             arrives(tab, kin.fk(robot, robot.q_home), 1e-9)
-            assert len(tab.sliders) == robot.n
+            assert tab.sliders[: robot.n] == [label(robot, i) for i in range(robot.n)]
             assert sum(m["type"] == "TransformControlsMessage" for m in tab.nodes.values()) == 1
 
 
