@@ -17,6 +17,7 @@ from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 Flags = NDArray[np.bool_]
+_NO_LIMIT = 1e6
 
 
 @dataclass(slots=True, eq=False)
@@ -70,7 +71,11 @@ def solve_branches(
     if code == APPROACH:
         x = fk(question.robot, seed)[:3, 0]
         roll = math.atan2(float(T[:3, 1] @ x), float(T[:3, 0] @ x))
-    problem = Problem(T, code, values, question.respect, seed, question.lower, question.upper, roll)
+    lower, upper = question.lower, question.upper
+    if not question.respect:
+        # Limits to be ignored must not even pull what is free away from the seed.
+        lower, upper = np.full_like(lower, -_NO_LIMIT), np.full_like(upper, _NO_LIMIT)
+    problem = Problem(T, code, values, question.respect, seed, lower, upper, roll)
     candidates = match.solver.solve(match.geometry, problem)
     q, stats = measure(question, candidates.q, seed)
     found = candidates
@@ -119,7 +124,7 @@ def redundancy_of(
 ) -> tuple[Redundancy, ...]:
     """What is free on a branch: the value used there, and the ranges of the branches in `rows` (its own if None).
 
-    A joint's own value follows its whole-turn image. With the limits ignored an angle may be anything.
+    A joint's own value follows its whole-turn image. Without limits an angle may be anything.
     """
     found = []
     for k, freedom in enumerate(branches.freedoms):
@@ -130,7 +135,8 @@ def redundancy_of(
             value = float(branches.q[row, freedom.joint])
         arcs = branches.arcs[k]
         mine = arcs[np.isin(arcs[:, 0], (row,) if rows is None else rows)]
-        intervals = union(mine[:, 1:], freedom.circular) if question.respect else ((-math.pi, math.pi),)
+        bounded = question.respect and bool(np.isfinite(mine).all())
+        intervals = union(mine[:, 1:], freedom.circular) if bounded else ((-math.pi, math.pi),)
         found.append(Redundancy(freedom.name, freedom.label, value, intervals))
     return tuple(found)
 

@@ -56,7 +56,8 @@ def limits(
         ranges = ", ".join(f"{degrees(a)} … {degrees(b)}" for a, b in free.intervals)
         text += f" Possible {free.label}: {ranges}."
     if others:
-        text += f" {_count(others)} {_plural(others, 'configuration', 'configurations')} on another branch fit."
+        fits = _plural(others, "configuration on another branch fits", "configurations on other branches fit")
+        text += f" {_count(others)} {fits}."
     return text
 
 

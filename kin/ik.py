@@ -149,7 +149,7 @@ def answer(question: Question) -> IKResult:
         return _numeric(question)
     closed = is_closed(branches.stats)
     good = closed & (branches.stats[:, OVERRUN] == 0.0) if question.respect else closed
-    if not good.any():
+    if not good.any() and not question.given:  # a value that was asked for is not for a descent to change
         good = search.polish(question, branches)
         closed |= good
     asked = _asked(question, len(closed))
@@ -343,13 +343,14 @@ def _compromise(question: Question, branches: Branches, asked: Flags) -> IKResul
             BlockedBranch(question.branch_name(i), approach_q[i].copy(), violations_of(question, approach_q[i]))
             for i in kept[:count].tolist()
         )
+    closest = search.closest(question, branches.q)
     return _result(
         question,
         Status.APPROXIMATE,
         "roll" if solutions[0].compromise == "roll" else "rotation",
         explain.approximate(question, solutions[0], blocked),
         solutions=solutions,
-        closest=min(solutions, key=lambda s: s.rotation_error),
+        closest=min((*solutions, *filter(None, (closest,))), key=search.mismatch),
         blocked=blocked,
     )
 

@@ -23,6 +23,10 @@ from kin.transforms import Array
 
 ORIENTATION_WEIGHT = 0.1
 STARTS = 24
+# What a radian weighs, in metres, and how many of the best descents go on from there. Below _HELD the point is as good
+# as held, so that descents may begin where it is met.
+_HELD = 1e-3
+_WEIGHTS = ((0.1, 24), (1e-2, 12), (_HELD, 12), (1e-4, 6))
 _HAIR = 1e-6
 
 
@@ -91,6 +95,11 @@ def closest(question: Question, candidates: Array | None) -> IKSolution | None:
     return solution(question, found[0], stats[0], compromise="closest")
 
 
+def mismatch(found: IKSolution) -> float:
+    """The distance E in metres that `closest` minimises."""
+    return math.hypot(found.position_error, ORIENTATION_WEIGHT * found.rotation_error)
+
+
 def is_exact(question: Question, found: IKSolution) -> bool:
     """Whether the closest configuration in fact meets the task."""
     return (
@@ -116,16 +125,23 @@ def nearest_to_point(question: Question, known: IKSolution | None) -> tuple[IKSo
 def nearest_orientation(question: Question, candidates: Array | None) -> IKSolution | None:
     """The configuration with the exact point and the least rotation error, None if the point is out of reach.
 
-    A descent in which a radian weighs a tenth of a millimetre settles the orientation; the closed form for that
-    orientation then makes the point exact.
+    A radian weighs less and less against a metre: descents from everywhere, later from where the point is met too,
+    find the valleys; the best of them are followed to where a radian weighs a tenth of a millimetre. The closed form
+    for the orientation found there then makes the point exact.
     """
-    start, error = descend(question, POSITION, starting_points(question, candidates), 1.0, enough=1e-9)
-    if error > 1e-7:
+    q = starting_points(question, candidates)
+    met, errors = descend_each(question, POSITION, q, 1.0)
+    met = met[errors <= 1e-7]
+    for weight, keep in _WEIGHTS:
+        if weight == _HELD:
+            q = np.concatenate([q, met])
+        q, errors = descend_each(question, question.code, q, weight)
+        q = q[np.argsort(errors.round(9), kind="stable")[:keep]]
+    q, errors = descend_each(question, POSITION, np.concatenate([q, met]), 1.0)
+    q = q[errors <= 1e-7]
+    if not len(q):
         return None
-    q = start
-    for weight in (0.1, 1e-2, 1e-4):
-        more = np.stack([q, start]) if candidates is None else starting_points(question, candidates, 4)
-        q, _ = descend(question, question.code, np.concatenate([q[None], more]), weight)
+    q = q[int(np.argmin(measure(question, q)[1][:, ROTATION_ERROR].round(9)))]
     T = fk(question.robot, q)
     T[:3, 3] = question.T[:3, 3]
     known = solve_branches(question, T, APPROACH if question.robot.n < 6 else POSE, q)

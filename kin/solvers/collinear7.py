@@ -302,7 +302,7 @@ def singularities(geometry: Geometry, q: Array) -> tuple[Singularity, ...]:
     twice, so an elbow nearly straight costs more than a wrist nearly aligned.
     """
     g = geometry
-    t = q + g.offset
+    t = (q + g.offset).tolist()
     shoulder, elbow, wrist = off_square(t[2]), off_line(t[3]), off_line(t[5])
     found = (
         Singularity(

@@ -311,7 +311,7 @@ def singularities(geometry: Geometry, q: Array) -> tuple[Singularity, ...]:
     s2 = c3 = 0, for s6 = c5 = 0 and for s2 = s6 = 0 only: s2 = 0 or s6 = 0 alone is no singularity of this arm.
     """
     g = geometry
-    t = q + g.offset
+    t = (q + g.offset).tolist()
     shoulder, across3, elbow = off_line(t[1]), off_square(t[2]), off_line(t[3])
     across5, wrist = off_square(t[4]), off_line(t[5])
     at2, at6 = at(2, q[1], shoulder), at(6, q[5], wrist)

@@ -265,7 +265,7 @@ def singularities(geometry: Geometry, q: Array) -> tuple[Singularity, ...]:
     The three are the factors of the determinant, −a2 d4 s3 (a1 + a2 c2 + d4 c23) s5: there are no others.
     """
     g = geometry
-    t = q + g.offset
+    t = (q + g.offset).tolist()
     elbow, wrist = off_line(t[2]), off_line(t[4])
     reach = g.a1 + g.a2 * math.cos(t[1]) + g.d4 * math.cos(t[1] + t[2])
     return (
@@ -275,7 +275,7 @@ def singularities(geometry: Geometry, q: Array) -> tuple[Singularity, ...]:
             abs(elbow),
             "rad",
         ),
-        Singularity("shoulder", "wrist centre on axis 1: it cannot move sideways", abs(float(reach)), "m"),
+        Singularity("shoulder", "wrist centre on axis 1: it cannot move sideways", abs(reach), "m"),
         Singularity(
             "wrist",
             f"tool in line with the forearm ({at(5, q[4], wrist)}): it cannot tilt sideways",

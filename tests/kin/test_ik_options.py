@@ -1,0 +1,516 @@
+"""What can be asked of inverse kinematics besides a target: branches, limits, locks, images, masks and more."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import kin
+from kin import InputError, Status, solve_ik
+from kin.transforms import rotation_angle, rotation_from_wxyz, vector_angle
+
+ROBOTS = tuple(kin.builtin_robots())
+SEVEN = ("redundant7", "redundant7-craig")
+TASKS = ("pose", "approach", "position")
+
+
+def rotation_vector(R):
+    """Log of a rotation, written apart from the code under test."""
+    angle = rotation_angle(np.eye(3), R)
+    if angle < 1e-12:
+        return np.zeros(3)
+    axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    return angle * axis / np.linalg.norm(axis)
+
+
+def meets(T, target, task):
+    """Whether the tool pose T does what the task asks."""
+    close = np.abs(T[:3, 3] - target[:3, 3]).max() <= 1e-9
+    if task == "pose":
+        return close and rotation_angle(T[:3, :3], target[:3, :3]) <= 1e-9
+    return close and (task == "position" or vector_angle(T[:3, 2], target[:3, 2]) <= 1e-9)
+
+
+# Branches
+
+
+@pytest.mark.parametrize("robot_id", ROBOTS)
+def test_names_belong_to_postures_whatever_the_target(robot_id):
+    """The name of every solution is the name its joints have, and the same for all tasks."""
+    robot = kin.get_robot(robot_id)
+    assert len(set(kin.branch_names(robot))) == 8
+    rng = np.random.default_rng(1)
+    seen = set()
+    for q in robot.random_q(rng, 150):
+        for task in TASKS:
+            for s in solve_ik(robot, kin.fk(robot, q), task=task, respect_limits=False, q_seed=q).solutions:
+                assert s.branch == kin.branch_of(robot, s.q)
+                seen.add(s.branch)
+    assert seen == set(kin.branch_names(robot))
+
+
+@pytest.mark.parametrize("robot_id", ROBOTS)
+@pytest.mark.parametrize("task", TASKS)
+def test_a_filter_leaves_exactly_its_branches(robot_id, task):
+    robot = kin.get_robot(robot_id)
+    for q in robot.random_q(np.random.default_rng(2), 25 if task != "position" else 6):
+        target = kin.fk(robot, q)
+        every = solve_ik(robot, target, task=task, q_seed=q)
+        for wish in ("elbow up", "elbow down", "wrist flip", "seed", kin.branch_of(robot, q)):
+            words = kin.branch_of(robot, q) if wish == "seed" else wish
+            names = [n for n in kin.branch_names(robot) if all(w in n.split(" · ") for w in words.split(" · "))]
+            result = solve_ik(robot, target, task=task, q_seed=q, branch=wish)
+            assert {s.branch for s in result.solutions} <= set(names)
+            if task != "position":  # where two freedoms are left, the choice on a branch depends on the others
+                wanted = [s for s in every.solutions if s.branch in names]
+                assert [s.q.tolist() for s in result.solutions] == [s.q.tolist() for s in wanted]
+            if wish in ("seed", kin.branch_of(robot, q)):
+                assert result.status is Status.SOLVED
+            if not result.solutions and result.closest is not None:
+                assert result.closest.branch in names
+                assert result.cause in ("branch", "joint limits", "outside")
+
+
+def test_several_wishes_are_a_union():
+    robot = kin.get_robot("redundant7-craig")
+    target = kin.fk(robot, robot.home)
+    one, two = ("shoulder front · elbow up · wrist flip", "shoulder back, wrist no-flip")
+    both = {s.branch for s in solve_ik(robot, target, branch=[one, two]).solutions}
+    assert both == {one} | {s.branch for s in solve_ik(robot, target, branch=two).solutions}
+    assert len(both) == 3
+
+
+def test_a_branch_that_is_not_there_is_told_from_one_behind_a_stop():
+    robot = kin.get_robot("pioneer5")
+    target = kin.fk(robot, robot.home)
+    every = {s.branch for s in solve_ik(robot, target, task="approach", respect_limits=False).solutions}
+    missing = next(name for name in kin.branch_names(robot) if name not in every)
+    result = solve_ik(robot, target, task="approach", branch=missing)
+    assert (result.status, result.cause) == (Status.UNREACHABLE, "branch")
+    assert "one configuration reaches this target on other branches" in result.reason
+    behind = next(name for name in every if name != kin.branch_of(robot, robot.home))
+    result = solve_ik(robot, target, task="approach", branch=behind)
+    assert (result.status, result.cause) == (Status.LIMITS, "joint limits")
+    assert [b.branch for b in result.blocked] == [behind]
+    assert "One configuration on another branch fits" in result.reason
+
+
+# Limits and locks
+
+
+@pytest.mark.parametrize("robot_id", ROBOTS)
+@pytest.mark.parametrize("task", TASKS)
+@settings(max_examples=40, deadline=None)
+@given(data=st.data())
+def test_narrowed_and_locked_joints_are_kept(robot_id, task, data):
+    """A configuration made inside any narrowed limits is reached again, and nothing leaves them."""
+    robot = kin.get_robot(robot_id)
+    unit = st.floats(0, 1)
+    width = robot.upper - robot.lower
+    share = np.array(data.draw(st.lists(st.floats(0.02, 1), min_size=robot.n, max_size=robot.n)))
+    low = robot.lower + np.array([data.draw(unit) for _ in range(robot.n)]) * (1 - share) * width
+    high = np.minimum(low + share * width, robot.upper)
+    q = low + np.array([data.draw(unit) for _ in range(robot.n)]) * (high - low)
+    q = np.clip(q, low, high)
+    locked = [float(x) if data.draw(st.booleans()) and i % 2 else None for i, x in enumerate(q)]
+    target = kin.fk(robot, q)
+    result = solve_ik(robot, target, task=task, limits=np.c_[low, high].tolist(), locked=locked)
+    assert result.status is Status.SOLVED, result.reason
+    for s in result.solutions:
+        assert (s.q >= low).all()
+        assert (s.q <= high).all()
+        assert all(value is None or s.q[i] == value for i, value in enumerate(locked))
+        assert meets(kin.fk(robot, s.q), target, task)
+
+
+def test_a_locked_joint_is_named_as_locked():
+    robot = kin.get_robot("pioneer5")
+    target = kin.fk(robot, robot.home)
+    result = solve_ik(robot, target, task="approach", locked=[1.0, None, None, None, None])
+    assert result.status is Status.LIMITS
+    assert "joint 1 (rotating base) at 90.0° (locked at 57.3°)" in result.reason
+
+
+# Images
+
+
+@pytest.mark.parametrize("robot_id", ROBOTS)
+def test_all_golden_images_inside_the_limits(robot_id, golden):
+    """Every whole-turn image, and no other: against the 50-digit sets."""
+    robot = kin.get_robot(robot_id)
+    checked = 0
+    for case in golden(robot_id)["ik"]:
+        wanted = np.array(case["in_limits"]) if "in_limits" in case else None
+        if wanted is None or not len(wanted):
+            continue
+        task = "approach" if robot.n == 5 else "pose"
+        value = None if robot.n == 5 else case.get("theta1", case.get("psi"))
+        result = solve_ik(robot, case["T"], task=task, redundancy=value, images="all")
+        found = np.array([s.q for s in result.solutions])
+        assert len(found) == len(wanted)
+        for q in wanted:
+            assert np.abs(found - q).max(axis=1).min() < 1e-8
+        checked += 1
+    assert checked >= 3
+
+
+@pytest.mark.parametrize("robot_id", SEVEN)
+def test_images_are_whole_turns_of_the_nearest_ones(robot_id):
+    robot = kin.get_robot(robot_id)
+    for q in robot.random_q(np.random.default_rng(4), 20):
+        target = kin.fk(robot, q)
+        nearest = solve_ik(robot, target, q_seed=q)
+        every = solve_ik(robot, target, q_seed=q, images="all")
+        expected = set()
+        for s in nearest.solutions:
+            spans = [
+                [x + 2 * math.pi * k for k in range(-3, 4) if low <= x + 2 * math.pi * k <= high]
+                for x, low, high in zip(s.q, robot.lower, robot.upper, strict=True)
+            ]
+            expected |= {tuple(np.round(image, 9)) for image in itertools.product(*spans)}
+        assert {tuple(np.round(s.q, 9)) for s in every.solutions} == expected
+        assert [s.distance for s in every.solutions] == sorted(s.distance for s in every.solutions)
+        assert all(s.position_error <= 1e-9 and s.rotation_error <= 1e-9 for s in every.solutions)
+
+
+# Masks
+
+MASKS = [m for m in itertools.product((False, True), repeat=6) if any(m)]
+
+
+@pytest.mark.parametrize("robot_id", ROBOTS)
+@pytest.mark.parametrize("frame", ["tool", "base"])
+def test_every_mask_is_met_in_its_frame(robot_id, frame):
+    """All 63 masks: the coordinates asked for vanish, by a logarithm of our own."""
+    robot = kin.get_robot(robot_id)
+    rng = np.random.default_rng(6)
+    for mask in MASKS:
+        q = robot.random_q(rng)
+        target = kin.fk(robot, q)
+        result = solve_ik(robot, target, mask=mask, mask_frame=frame, q_seed=robot.random_q(rng))
+        assert result.status is Status.SOLVED, (mask, result.reason)
+        for s in result.solutions:
+            T = kin.fk(robot, s.q)
+            p = T[:3, 3] - target[:3, 3]
+            if frame == "tool":
+                p = target[:3, :3].T @ p
+                phi = rotation_vector(target[:3, :3].T @ T[:3, :3])
+            else:
+                phi = rotation_vector(T[:3, :3] @ target[:3, :3].T)
+            error = np.concatenate([p, phi])[list(mask)]
+            assert np.abs(error).max() <= 3e-9, (mask, error)
+            assert robot.in_limits(s.q)
+
+
+def test_masks_that_are_tasks_are_answered_as_these():
+    robot = kin.get_robot("redundant7-craig")
+    target = kin.fk(robot, robot.home)
+    for mask, frame, task in (
+        ((True,) * 6, "base", "pose"),
+        ((True,) * 5 + (False,), "tool", "approach"),
+        ((True,) * 3 + (False,) * 3, "base", "position"),
+    ):
+        masked, plain = solve_ik(robot, target, mask=mask, mask_frame=frame), solve_ik(robot, target, task=task)
+        assert masked.task == task
+        assert [s.q.tolist() for s in masked.solutions] == [s.q.tolist() for s in plain.solutions]
+    assert solve_ik(robot, target, mask=(True,) * 5 + (False,), mask_frame="base").task == "mask"
+
+
+def test_a_mask_that_cannot_be_met_says_by_how_much():
+    robot = kin.get_robot("redundant7-craig")
+    T = np.eye(4)
+    T[2, 3] = 3.0
+    result = solve_ik(robot, T, mask=[False, False, True, True, True, False], mask_frame="base")
+    assert result.status is Status.UNREACHABLE
+    assert result.distance == pytest.approx(3.0 - 1.38, abs=2e-3)
+    assert "cannot be met together" in result.reason
+    assert robot.in_limits(result.closest.q)
+
+
+# Preferences and free values
+
+
+@pytest.mark.parametrize("robot_id", SEVEN)
+@pytest.mark.parametrize("task", ["pose", "approach"])
+@pytest.mark.parametrize("prefer", ["limits", "manipulability"])
+def test_the_preferred_value_beats_a_sweep(robot_id, task, prefer):
+    """No value of a fine sweep over the free parameter, on any branch, is better than the one chosen."""
+    robot = kin.get_robot(robot_id)
+
+    def worth(q):
+        if prefer == "manipulability":
+            return float(kin.manipulability(robot, q))
+        return float((np.minimum(q - robot.lower, robot.upper - q) / (0.5 * (robot.upper - robot.lower))).min())
+
+    for q in robot.random_q(np.random.default_rng(8), 4):
+        target = kin.fk(robot, q)
+        result = solve_ik(robot, target, task=task, q_seed=q, prefer=prefer)
+        values = [worth(s.q) for s in result.solutions]
+        assert values == sorted(values, reverse=True)
+        free = result.redundancy[0]
+        swept = [
+            worth(s.q)
+            for low, high in free.intervals
+            for v in np.linspace(low, high, 40)
+            for s in solve_ik(robot, target, task=task, q_seed=q, redundancy={free.name: float(v)}).solutions
+        ]
+        # Of two free values the sweep moves one only, and the search is along one at a time.
+        assert max(swept) <= values[0] + (1e-3 if len(result.redundancy) == 1 else 1e-2) * abs(values[0]) + 1e-9
+        assert meets(kin.fk(robot, result.solutions[0].q), target, task)
+
+
+@pytest.mark.parametrize("robot_id", SEVEN)
+def test_two_free_values_can_both_be_given(robot_id):
+    robot = kin.get_robot(robot_id)
+    for q in robot.random_q(np.random.default_rng(9), 20):
+        target = kin.fk(robot, q)
+        first = solve_ik(robot, target, task="approach", q_seed=q)
+        wish = {
+            r.name: 0.5 * sum(first.solutions[0].redundancy[k].intervals[0])
+            for k, r in enumerate(first.redundancy)
+        }
+        result = solve_ik(
+            robot, target, task="approach", q_seed=q, redundancy=wish, branch=first.solutions[0].branch
+        )
+        assert result.status is Status.SOLVED
+        (s,) = result.solutions
+        assert [r.value for r in s.redundancy] == pytest.approx(list(wish.values()), abs=1e-9)
+        assert meets(kin.fk(robot, s.q), target, "approach")
+
+
+def test_a_given_joint_value_is_not_moved_by_a_whole_turn():
+    """θ1 = −200° is asked for, so θ1 = −200° it is, even though 160° would be nearer to the seed."""
+    robot = kin.get_robot("redundant7")
+    q = np.radians([-200, 30, 20, 40, 50, 60, 70])
+    result = solve_ik(robot, kin.fk(robot, q), redundancy={"theta1": float(q[0])})
+    assert all(s.q[0] == pytest.approx(q[0], abs=1e-12) for s in result.solutions)
+    assert any(np.abs(s.q - q).max() < 1e-9 for s in result.solutions)
+
+
+@pytest.mark.parametrize("robot_id", SEVEN)
+def test_the_ranges_of_a_branch_are_exact(robot_id):
+    """On one branch, just inside each end a value is solved, just outside it is not, narrowed limits included."""
+    robot = kin.get_robot(robot_id)
+    rng = np.random.default_rng(10)
+    ends = 0
+    for _ in range(25):
+        width = robot.upper - robot.lower
+        share = rng.uniform(0.2, 0.7, robot.n)
+        low = robot.lower + rng.random(robot.n) * (1 - share) * width
+        limits = np.c_[low, low + share * width]
+        q = rng.uniform(limits[:, 0], limits[:, 1])
+        target = kin.fk(robot, q)
+
+        def solved(value, branch, target=target, limits=limits):
+            result = solve_ik(robot, target, limits=limits.tolist(), branch=branch, redundancy=float(value))
+            return result.status is Status.SOLVED
+
+        for s in solve_ik(robot, target, limits=limits.tolist()).solutions:
+            (free,) = s.redundancy
+            assert free.intervals
+            for a, b in free.intervals:
+                assert solved(0.5 * (a + b), s.branch)
+                for inside, outside in ((a + 1e-7, a - 1e-6), (b - 1e-7, b + 1e-6)):
+                    if b - a > 1e-6:
+                        assert solved(inside, s.branch)
+                    whole = abs(abs(outside) - math.pi) < 1e-5 and free.name == "psi"
+                    if not whole and not any(x <= outside <= y for x, y in free.intervals):
+                        assert not solved(outside, s.branch)
+                        ends += 1
+    assert ends > 30
+
+
+def test_asking_for_a_forbidden_value_names_the_joint_and_the_possible_ones():
+    robot = kin.get_robot("redundant7-craig")
+    target = kin.fk(robot, robot.home)
+    result = solve_ik(robot, target, redundancy={"psi": math.pi}, q_seed=robot.home, branch="seed")
+    assert result.status is Status.LIMITS
+    assert "with the given arm angle ψ" in result.reason
+    low, high = result.redundancy[0].intervals[0]
+    assert f"Possible arm angle ψ: {math.degrees(low):.1f}° … {math.degrees(high):.1f}°" in result.reason
+
+
+# Reasons
+
+
+@pytest.mark.parametrize("robot_id", ROBOTS)
+def test_every_blocked_branch_says_what_it_would_need(robot_id):
+    """The values named are the ones the branch has, the stops are the ones it breaks, the least offence first."""
+    robot = kin.get_robot(robot_id)
+    rng = np.random.default_rng(12)
+    blocked = 0
+    for _ in range(120):
+        q = rng.uniform(1.6 * robot.lower, 1.6 * robot.upper)
+        target = kin.fk(robot, q)
+        result = solve_ik(robot, target, task="approach" if robot.n == 5 else "pose")
+        if result.status is not Status.LIMITS:
+            continue
+        blocked += 1
+        overruns = []
+        for branch in result.blocked:
+            assert branch.branch == kin.branch_of(robot, branch.q)
+            assert branch.violations
+            beyond = {i for i in range(robot.n) if not robot.lower[i] <= branch.q[i] <= robot.upper[i]}
+            assert {v.joint for v in branch.violations} == beyond
+            for v in branch.violations:
+                assert v.value == branch.q[v.joint]
+                assert v.limit in (robot.lower[v.joint], robot.upper[v.joint])
+            overruns.append(sum(abs(v.value - v.limit) for v in branch.violations))
+        assert overruns == sorted(overruns)
+        assert f"joint {result.violations[0].joint + 1}" in result.reason
+    assert blocked >= 10
+
+
+def test_the_hole_around_the_first_axis_is_named():
+    """A planar two-link arm on a turning base that cannot fold back leaves a hole around axis 1."""
+    robot = kin.parse_robot(
+        """
+        id = "hole"
+        name = "hole"
+        source = "made up"
+        convention = "standard"
+        units = { length = "m", angle = "deg" }
+        home = [0, 0.3]
+        rows = [
+          { name = "turn", d = 0.5, a = 0.2, alpha = -90, limits = [-180, 180] },
+          { name = "lift", kind = "prismatic", alpha = 90, limits = [-0.4, 0.4] },
+        ]
+        """.replace("home = [0, 0.3]\n", "")
+    )
+    T = kin.fk(robot, robot.q_home)
+    point = np.array([0.02, 0.01, T[2, 3]])
+    result = solve_ik(robot, point, task="position")
+    assert (result.status, result.cause) == (Status.UNREACHABLE, "around the axis")
+    assert "hole around the first axis" in result.reason
+
+
+@pytest.mark.parametrize(("degrees", "said"), [(0.0, True), (1.0, False)])
+def test_a_singular_answer_says_which_kind(degrees, said):
+    robot = kin.get_robot("redundant7-craig")
+    q = np.radians([10, 40, 20, 60, 30, degrees, 15])
+    q[4] = math.pi / 2 if said else q[4]
+    result = solve_ik(robot, kin.fk(robot, q), q_seed=q)
+    assert result.status is Status.SOLVED
+    assert ("Singular there" in result.reason) is said
+    assert bool([s for s in result.singularities if s.kind == "wrist"]) is said
+
+
+# Closest and nearest
+
+
+@pytest.mark.parametrize("robot_id", ROBOTS)
+@pytest.mark.parametrize("task", ["pose", "approach"])
+def test_closest_beats_a_dense_search(robot_id, task):
+    """No configuration of a dense cloud, nor what descends from its best ones, is closer than `closest`."""
+    robot = kin.get_robot(robot_id)
+    rng = np.random.default_rng(17)
+    cloud_q = robot.random_q(rng, 30_000)
+    cloud = kin.fk(robot, cloud_q)
+    tried = 0
+    for _ in range(14):
+        target = np.eye(4)
+        target[:3, :3] = rotation_from_wxyz(rng.normal(size=4))
+        target[:3, 3] = rng.uniform(-1, 1, 3) * robot.reach
+        result = solve_ik(robot, target, task=task)
+        if result.status is Status.SOLVED:
+            continue
+        tried += 1
+        metric = _metric(cloud, target, task)
+        mine = math.hypot(result.closest.position_error, 0.1 * result.closest.rotation_error)
+        assert mine <= metric.min() + 1e-9
+        # What the best of the cloud comes to by a random search of our own.
+        q, best = cloud_q[np.argmin(metric)].copy(), metric.min()
+        for step in np.geomspace(0.3, 1e-3, 60):
+            tries = np.clip(q + step * rng.normal(size=(60, robot.n)), robot.lower, robot.upper)
+            values = _metric(kin.fk(robot, tries), target, task)
+            if values.min() < best:
+                q, best = tries[np.argmin(values)], values.min()
+        assert mine <= best + 1e-9
+    assert tried >= 8
+
+
+def _metric(T, target, task):
+    """The stated metric of tool poses ``(k, 4, 4)``."""
+    cosine = 0.5 * (np.einsum("kij,ij->k", T[:, :3, :3], target[:3, :3]) - 1)
+    if task == "approach":
+        cosine = T[:, :3, 2] @ target[:3, 2]
+    return np.hypot(np.linalg.norm(T[:, :3, 3] - target[:3, 3], axis=1), 0.1 * np.arccos(np.clip(cosine, -1, 1)))
+
+
+@pytest.mark.parametrize("robot_id", SEVEN)
+def test_nearest_orientation_beats_a_dense_search(robot_id):
+    """Of thousands of configurations that meet the point, none is nearer in orientation than the one offered."""
+    robot = kin.get_robot(robot_id)
+    rng = np.random.default_rng(19)
+    tried = 0
+    for q in robot.random_q(rng, 40):
+        if tried == 4:
+            break
+        target = kin.fk(robot, q)
+        target[:3, :3] = rotation_from_wxyz(rng.normal(size=4))
+        result = solve_ik(robot, target)
+        if result.status is not Status.ORIENTATION:
+            continue
+        tried += 1
+        nearest = result.nearest_orientation
+        assert nearest.position_error <= 1e-9
+        assert robot.in_limits(nearest.q)
+        found = [
+            rotation_angle(kin.fk(robot, s.q)[:3, :3], target[:3, :3])
+            for seed in robot.random_q(rng, 200)
+            for s in solve_ik(robot, target[:3, 3], task="position", q_seed=seed).solutions
+        ]
+        assert len(found) > 200
+        assert nearest.rotation_error <= min(found) + 1e-6
+    assert tried == 4
+
+
+# Misuse
+
+
+@pytest.mark.parametrize(
+    ("arguments", "field", "said"),
+    [
+        ({"limits": [[0, 1]]}, "limits", "7 pairs"),
+        ({"limits": "wide"}, "limits", "7 pairs"),
+        ({"limits": [None] * 6 + [[1, 0]]}, "limits[6]", "not below"),
+        ({"limits": [None] * 6 + [[0, math.nan]]}, "limits[6][1]", "finite"),
+        ({"limits": [None] * 6 + [5]}, "limits[6]", "lower limit"),
+        ({"limits": [[-9, 9]] + [None] * 6}, "limits[0]", "inside the joint's own"),
+        ({"locked": [0.0]}, "locked", "7 joint values"),
+        ({"locked": ["a"] + [None] * 6}, "locked[0]", "finite number"),
+        ({"locked": [10**400] + [None] * 6}, "locked[0]", "finite number"),
+        ({"locked": [True] + [None] * 6}, "locked[0]", "finite number"),
+        ({"locked": [None, 3.0] + [None] * 5}, "locked[1]", "inside the limits"),
+        ({"locked": [0.0] + [None] * 6, "respect_limits": False}, "respect_limits", "true"),
+        ({"branch": "elbow sideways"}, "branch", "elbow up"),
+        ({"branch": "elbow up · elbow down"}, "branch", "go together"),
+        ({"branch": []}, "branch", "at least one"),
+        ({"branch": 3}, "branch", "at least one"),
+        ({"branch": [3]}, "branch", "elbow up"),
+        ({"images": "some"}, "images", "nearest"),
+        ({"prefer": "beauty"}, "prefer", "manipulability"),
+        ({"mask": [True] * 5}, "mask", "six"),
+        ({"mask": [1, 1, 1, 1, 1, 1]}, "mask", "six"),
+        ({"mask": [False] * 6}, "mask", "at least one"),
+        ({"mask": [True] * 6, "task": "approach"}, "task", "besides a mask"),
+        ({"mask": [True] * 6, "mask_frame": "world"}, "mask_frame", "tool"),
+        ({"task": "mask"}, "task", "pose"),
+        ({"redundancy": {"theta9": 1.0}}, "redundancy", "psi"),
+        ({"redundancy": {"psi": math.inf}}, "redundancy.psi", "finite"),
+        ({"redundancy": {"psi": "up"}}, "redundancy.psi", "finite"),
+        ({"redundancy": 1.0, "task": "position"}, "redundancy", "no free parameter"),
+        ({"max_solutions": 1.5}, "max_solutions", "whole number"),
+    ],
+)
+def test_misuse_names_the_field_and_what_is_valid(arguments, field, said):
+    robot = kin.get_robot("redundant7-craig")
+    with pytest.raises(InputError) as caught:
+        solve_ik(robot, kin.fk(robot, robot.home), **arguments)
+    assert caught.value.field == field
+    assert said in str(caught.value)
