@@ -18,6 +18,7 @@ class Settings(BaseSettings):
     root_path: str = Field("", description="Path prefix a reverse proxy serves us under, e.g. /kinboard.")
     robots: Path | None = Field(None, description="Folder with further robot files (*.toml).")
     max_batch: int = Field(10_000, ge=1, description="Most configurations or targets one request may hold.")
+    max_path: int = Field(1000, ge=1, description="Most waypoints one path may have.")
     max_body: int = Field(8 * 1024 * 1024, ge=1024, description="Largest request body in bytes.")
     allowed_origins: tuple[str, ...] = Field(
         (), description="Origins, besides our own, whose pages may open the viewer's websocket."

@@ -11,6 +11,7 @@ from kin.catalog import builtin_robots, get_robot, load_folder, load_robot, pars
 from kin.errors import InputError, KinematicsError, RobotFileError, UnknownRobotError
 from kin.fk import fk, jacobian, link_frames, manipulability
 from kin.ik import branch_names, branch_of, ik_branches, solve_ik
+from kin.path import PathGap, PathJump, PathResult, solve_path
 from kin.results import BlockedBranch, IKResult, IKSolution, LimitViolation, Redundancy, Status, Task
 from kin.robot import Joint, Robot
 from kin.singularity import Singularity, singularities
@@ -24,6 +25,9 @@ __all__ = [
     "Joint",
     "KinematicsError",
     "LimitViolation",
+    "PathGap",
+    "PathJump",
+    "PathResult",
     "Redundancy",
     "Robot",
     "RobotFileError",
@@ -46,5 +50,6 @@ __all__ = [
     "parse_robot",
     "singularities",
     "solve_ik",
+    "solve_path",
     "warm_up",
 ]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +20,7 @@ from kin.transforms import Array
 
 Flags = NDArray[np.bool_]
 _NO_LIMIT = 1e6
+_EVERYWHERE = ((-math.pi, math.pi),)
 
 
 @dataclass(slots=True, eq=False)
@@ -120,25 +123,28 @@ def solution(
 
 
 def redundancy_of(
-    question: Question, branches: Branches, row: int, rows: tuple[int, ...] | None = None
-) -> tuple[Redundancy, ...]:
-    """What is free on a branch: the value used there, and the ranges of the branches in `rows` (its own if None).
+    question: Question, branches: Branches, rows: list[int], together: list[int] | None = None
+) -> list[tuple[Redundancy, ...]]:
+    """What is free on each branch of `rows`: the value used, and its ranges (or those of all branches in
+    `together`).
 
     A joint's own value follows its whole-turn image. Without limits an angle may be anything.
     """
-    found = []
+    found: list[tuple[Redundancy, ...]] = [()] * len(rows)
     for k, freedom in enumerate(branches.freedoms):
-        value = float(branches.values[row, k])
-        if math.isnan(value):
-            continue
-        if freedom.joint >= 0:
-            value = float(branches.q[row, freedom.joint])
-        arcs = branches.arcs[k]
-        mine = arcs[np.isin(arcs[:, 0], (row,) if rows is None else rows)]
-        bounded = question.respect and bool(np.isfinite(mine).all())
-        intervals = union(mine[:, 1:], freedom.circular) if bounded else ((-math.pi, math.pi),)
-        found.append(Redundancy(freedom.name, freedom.label, value, intervals))
-    return tuple(found)
+        values = branches.values[rows, k] if freedom.joint < 0 else branches.q[rows, freedom.joint]
+        there = ~np.isnan(branches.values[rows, k])
+        pieces: dict[int, list[tuple[float, float]]] = {}
+        for row, low, high in branches.arcs[k].tolist():
+            pieces.setdefault(int(row), []).append((low, high))
+        for i, (row, value) in enumerate(zip(rows, values.tolist(), strict=True)):
+            if there[i]:
+                mine = [piece for r in together or (row,) for piece in pieces.get(r, ())]
+                intervals: tuple[tuple[float, float], ...] = _EVERYWHERE
+                if question.respect and all(map(math.isfinite, itertools.chain(*mine))):
+                    intervals = union(mine, freedom.circular)
+                found[i] += (Redundancy(freedom.name, freedom.label, value, intervals),)
+    return found
 
 
 def violations_of(question: Question, q: Array) -> tuple[LimitViolation, ...]:
@@ -151,14 +157,14 @@ def violations_of(question: Question, q: Array) -> tuple[LimitViolation, ...]:
     return tuple(found)
 
 
-def union(arcs: Array, circular: bool) -> tuple[tuple[float, float], ...]:
-    """Overlapping intervals ``(k, 2)`` joined and sorted; on a circle within (−π, π], split at the seam."""
+def union(arcs: Iterable[tuple[float, float]], circular: bool) -> tuple[tuple[float, float], ...]:
+    """Overlapping intervals joined and sorted; on a circle within (−π, π], split at the seam."""
     pieces: list[tuple[float, float]] = []
-    for low, high in arcs.tolist():
+    for low, high in arcs:
         if not circular:
             pieces.append((low, high))
         elif high - low >= TURN - 1e-12:
-            return ((-math.pi, math.pi),)
+            return _EVERYWHERE
         else:
             start = wrap(low)
             end = start + (high - low)

@@ -42,6 +42,17 @@ def scores(question: Question, q: Array) -> Array:
     return out
 
 
+def ranks(question: Question, q: Array, distance: Array) -> Array:
+    """Place of each configuration ``(k, n)`` in the preferred order ``(k,)``; of equals the nearer comes first."""
+    worth = scores(question, q)
+    finite = worth[np.isfinite(worth)]
+    scale = float(np.abs(finite).max(initial=0.0)) or 1.0
+    order = np.lexsort((distance, -np.round(worth / scale, 7)))
+    out = np.empty(len(q))
+    out[order] = np.arange(len(q))
+    return out
+
+
 def centred(question: Question, q: Array) -> tuple[Array, Array]:
     """Rows ``(k, n)`` at the images the preference wants, with their statistics ``(k, 5)``."""
     near = None

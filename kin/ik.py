@@ -210,14 +210,15 @@ def _result(
 
 
 def _solved(question: Question, branches: Branches, good: Flags) -> IKResult:
-    key = branches.stats[:, DISTANCE].copy()
-    if question.prefer != "nearest":
+    if question.prefer == "nearest":
+        key = branches.stats[:, DISTANCE].copy()
+    else:
         choose.improve(question, branches, good)
-        key = -choose.scores(question, branches.q)
+        key = choose.ranks(question, branches.q, branches.stats[:, DISTANCE])
     solutions = _wrap_up(question, branches, good, key)
-    every = tuple(np.flatnonzero(good).tolist())
+    every = np.flatnonzero(good).tolist()
     best = int(np.argmin(np.where(good, key, math.inf)))
-    redundancy = redundancy_of(question, branches, best, every)
+    redundancy = redundancy_of(question, branches, [best], every)[0]
     if question.all_images:
         solutions = _with_images(question, solutions)
     if redundancy and solutions[0].redundancy:
@@ -239,9 +240,10 @@ def _wrap_up(
 ) -> tuple[IKSolution, ...]:
     """The chosen rows as named solutions, by rising key, each posture once."""
     kept, count = select(branches.q, np.where(rows, key, math.inf))
+    order: list[int] = kept[:count].tolist()
     return tuple(
-        solution(question, branches.q[i], branches.stats[i], i, redundancy_of(question, branches, i), compromise)
-        for i in kept[:count].tolist()
+        solution(question, branches.q[i], branches.stats[i], i, free, compromise)
+        for i, free in zip(order, redundancy_of(question, branches, order), strict=True)
     )
 
 
@@ -269,9 +271,8 @@ def _with_images(question: Question, solutions: tuple[IKSolution, ...]) -> tuple
             found.append(replace(image, branch=known.branch, redundancy=free, compromise=known.compromise))
     if question.prefer == "nearest":
         return tuple(sorted(found, key=lambda s: s.distance))
-    worth = choose.scores(question, np.array([s.q for s in found])).round(12).tolist()
-    order = sorted(range(len(found)), key=lambda i: (-worth[i], found[i].distance))
-    return tuple(found[i] for i in order)
+    order = choose.ranks(question, np.array([s.q for s in found]), np.array([s.distance for s in found]))
+    return tuple(found[i] for i in np.argsort(order).tolist())
 
 
 def _images_of(x: float, low: float, high: float, turn: float) -> list[float]:
@@ -296,7 +297,7 @@ def _blocked(question: Question, branches: Branches, rows: Flags, good: Flags) -
         BlockedBranch(question.branch_name(i), branches.q[i].copy(), violations_of(question, branches.q[i]))
         for i in order
     )
-    redundancy = redundancy_of(question, branches, order[0], tuple(np.flatnonzero(rows).tolist()))
+    redundancy = redundancy_of(question, branches, order[:1], np.flatnonzero(rows).tolist())[0]
     others = int(select(branches.q, np.where(good, 0.0, math.inf))[1])
     return _result(
         question,
@@ -376,7 +377,7 @@ def _numeric(question: Question) -> IKResult:
         key = stats[:, DISTANCE].copy()
     else:
         q, stats = choose.centred(question, q)
-        key = -choose.scores(question, q)
+        key = choose.ranks(question, q, stats[:, DISTANCE])
     # One per branch, the best: a pool of descents is no list of branches.
     best: dict[int, int] = {}
     for i in np.argsort(key, kind="stable").tolist():

@@ -23,8 +23,8 @@ from kin.transforms import Array
 
 ORIENTATION_WEIGHT = 0.1
 STARTS = 24
-# What a radian weighs, in metres, and how many of the best descents go on from there. Below _HELD the point is as good
-# as held, so that descents may begin where it is met.
+# What a radian weighs, in metres, and how many of the best descents go on from there. Below _HELD the point is as
+# good as held, so that descents may begin where it is met.
 _HELD = 1e-3
 _WEIGHTS = ((0.1, 24), (1e-2, 12), (_HELD, 12), (1e-4, 6))
 _HAIR = 1e-6
@@ -126,8 +126,8 @@ def nearest_orientation(question: Question, candidates: Array | None) -> IKSolut
     """The configuration with the exact point and the least rotation error, None if the point is out of reach.
 
     A radian weighs less and less against a metre: descents from everywhere, later from where the point is met too,
-    find the valleys; the best of them are followed to where a radian weighs a tenth of a millimetre. The closed form
-    for the orientation found there then makes the point exact.
+    find the valleys; the best of them are followed to where a radian weighs a tenth of a millimetre. The closed
+    form for the orientation found there then makes the point exact.
     """
     q = starting_points(question, candidates)
     met, errors = descend_each(question, POSITION, q, 1.0)

@@ -11,6 +11,7 @@ import numpy as np
 from kin.catalog import builtin_robots
 from kin.fk import fk, jacobian, link_frames, manipulability
 from kin.ik import solve_ik
+from kin.path import solve_path
 
 
 def warm_up() -> None:
@@ -26,6 +27,8 @@ def warm_up() -> None:
         far[:3, 3] *= 10.0
         solve_ik(robot, T, task="pose")
         solve_ik(robot, T, task="approach")
+        solve_ik(robot, T, task="position")
         solve_ik(robot, far, task="pose")
         solve_ik(robot, T, mask=(True, True, False, False, False, False))
         solve_ik(robot, T, task="approach", branch="seed", prefer="manipulability")
+        solve_path(robot, fk(robot, np.stack([q, q])))

@@ -5,7 +5,7 @@ Routes find the robots and the settings in ``app.state.store`` and ``app.state.s
 
 from fastapi import APIRouter
 
-from app.api import fk, ik, jacobian, robots
+from app.api import fk, ik, jacobian, path, robots
 from app.api.body import JsonRoute
 from app.api.problems import install_problem_handlers
 
@@ -15,6 +15,6 @@ __all__ = ["build_router", "install_problem_handlers"]
 def build_router() -> APIRouter:
     """Every route of the first version of the interface, under /api/v1."""
     router = APIRouter(prefix="/api/v1", route_class=JsonRoute)
-    for module in (robots, fk, ik, jacobian):
+    for module in (robots, fk, ik, path, jacobian):
         router.include_router(module.router)
     return router

@@ -10,6 +10,7 @@ from typing_extensions import TypedDict
 
 from app.answers import IkAnswer, documented, ik_answer
 from app.api import schemas
+from app.api.asked import Asked, one_or_many
 from app.api.body import JsonRoute
 from app.api.problems import FieldError, invalid
 from app.api.schemas import (
@@ -19,29 +20,16 @@ from app.api.schemas import (
     RobotDep,
     SettingsDep,
     example,
-    numbers,
     one_or_all,
 )
 from app.api.targets import Target
 from app.settings import Settings
-from kin import Robot, Task, solve_ik
+from kin import Robot, solve_ik
 from kin.transforms import Array
 
 router = APIRouter(tags=["kinematics"], route_class=JsonRoute)
 
 
-def one_or_many(value: object) -> str:
-    """Whether one thing was sent or a list of them."""
-    return "many" if isinstance(value, list) else "one"
-
-
-Mask = Annotated[list[Annotated[bool, Field(strict=True)]], numbers(6)]
-Pair = Annotated[list[Number], numbers(2)]
-Wish = Annotated[str, Field(max_length=200)]
-Wishes = Annotated[
-    Annotated[Wish, Tag("one")] | Annotated[list[Wish], Field(min_length=1, max_length=16), Tag("many")],
-    Discriminator(one_or_many),
-]
 FreeValues = Annotated[
     Annotated[Number, Tag("one")] | Annotated[dict[str, Number], Tag("many")],
     Discriminator(lambda value: "many" if isinstance(value, dict) else "one"),
@@ -80,19 +68,13 @@ EXAMPLES = {
 }
 
 
-class IkRequest(schemas.Body):
+class IkRequest(Asked):
     """Where the tool should go, and which answers are wanted."""
 
     target: Annotated[
         Annotated[Target, Tag("one")] | Annotated[list[Target], Field(min_length=1, fail_fast=True), Tag("many")],
         Discriminator(one_or_many),
     ] = Field(description="One target, or a list of targets, each answered on its own.")
-    task: Task | None = Field(
-        None,
-        description="pose: the whole pose. approach: the point and the direction of the tool's z axis. "
-        "position: the point alone. By default what each target's form implies: "
-        "`approach` given → approach, `position` alone → position, else pose.",
-    )
     q_seed: Configurations | None = Field(
         None,
         description="Configuration to stay near, in radians (metres for sliding joints); answers are sorted "
@@ -104,29 +86,6 @@ class IkRequest(schemas.Body):
     )
     max_solutions: Annotated[int, Field(ge=1, le=10_000, strict=True)] | None = Field(
         None, description="Most solutions per target, nearest to the seed first. By default all."
-    )
-    mask: Mask | None = Field(
-        None,
-        description="Instead of a task: which of the six coordinates x, y, z, rx, ry, rz of the error must "
-        "vanish; the last three are the rotation vector from the target to the tool.",
-    )
-    mask_frame: Literal["tool", "base"] = Field(
-        "tool",
-        description="Whether the mask's coordinates are told in the target's own frame or in the base frame.",
-    )
-    limits: list[Pair | None] | None = Field(
-        None,
-        description="Narrower joint limits, one [lower, upper] per joint in radians (metres), inside the robot's "
-        "own; null for a joint that keeps its own.",
-    )
-    locked: list[Number | None] | None = Field(
-        None,
-        description="Joint values to keep, in radians (metres), one per joint; null for a joint that may move.",
-    )
-    branch: Wishes | None = Field(
-        None,
-        description="Only these branches: a name as in `branches` of the robot, parts of one such as `elbow up`, "
-        "`seed` for the branch the seed is on, or a list of these.",
     )
     images: Literal["nearest", "all"] = Field(
         "nearest",
@@ -172,10 +131,7 @@ def inverse_kinematics(
     targets = [body.target] if isinstance(body.target, Target) else body.target
     schemas.check_batch("target", len(targets), settings)
     # All targets are read before the first is solved: a mistake in the last one costs nothing.
-    asked = body.task
-    if body.mask is not None and asked is None:
-        asked = "pose" if any(body.mask[3:]) else None
-    questions = [target.resolve(asked, "target" if single else f"target[{i}]") for i, target in enumerate(targets)]
+    questions = [body.resolve(target, "target" if single else f"target[{i}]") for i, target in enumerate(targets)]
     seeds = _seeds(robot, body, len(targets), settings)
 
     def answers(some: slice) -> list[IkAnswer]:
@@ -184,7 +140,7 @@ def inverse_kinematics(
                 solve_ik(
                     robot,
                     T,
-                    task=task if body.mask is None else body.task or "pose",
+                    task=task,
                     mask=body.mask,
                     mask_frame=body.mask_frame,
                     q_seed=seed,

@@ -133,11 +133,12 @@ def one_or_all(answers: Callable[[slice], Sequence[object]], count: int, single:
     return Response(b'{"results":[' + b",".join(parts) + b"]}", media_type="application/json")
 
 
-def check_batch(field: str, count: int, settings: Settings) -> None:
-    """Raises 413 for more items than one request may hold."""
-    if count > settings.max_batch:
-        error = FieldError(field=field, value=f"a list of {count}", expected=f"at most {settings.max_batch} items")
-        detail = f"{field} holds {count} items; one request may hold {settings.max_batch}."
+def check_batch(field: str, count: int, settings: Settings, most: int | None = None) -> None:
+    """Raises 413 for more items than one request may hold (`most`; by default what the settings allow)."""
+    most = settings.max_batch if most is None else most
+    if count > most:
+        error = FieldError(field=field, value=f"a list of {count}", expected=f"at most {most} items")
+        detail = f"{field} holds {count} items; one request may hold {most}."
         hint = "Split the list into several requests."
         raise ProblemError(413, "batch-too-large", detail, hint, [error])
 

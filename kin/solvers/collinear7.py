@@ -61,6 +61,7 @@ BRANCHES = tuple(
     for w in ("no-flip", "flip")
 )
 _REACH = TOLERANCES.closure_position * 0.1
+_MERGE = TOLERANCES.merge
 
 
 class Geometry(NamedTuple):
@@ -185,6 +186,12 @@ def _solve(
     turns_found = 0
     for si in range(1 if spread == 0.0 else 2):
         t12 = azimuth + (spread if si == 0 else -spread) - 0.5 * math.pi
+        v1 = math.cos(t12) * x + math.sin(t12) * y
+        if spread == 0.0 and math.hypot(v1, z) < 100.0 * _MERGE * h and abs(math.sin(near[2])) > 0.0:
+            # Two roots merged: what is between them closes as well. Beside a straight elbow that is every θ3, and
+            # the seed's is taken; the forearm's height, −z = d5 s3 s4, is not free.
+            wanted = -z * math.cos(near[2]) / math.sin(near[2])
+            t12 += min(max((wanted - v1) / h, -_MERGE), _MERGE)
         c, s = math.cos(t12), math.sin(t12)
         R02[0, 0], R02[0, 1], R02[0, 2] = c, 0.0, -s
         R02[1, 0], R02[1, 1], R02[1, 2] = s, 0.0, c
@@ -200,11 +207,6 @@ def _solve(
             angles[0], angles[1] = t1, t12 - t1
             angles[2] = near[2] if straight else math.atan2(sign * v2, sign * v1)
             angles[3] = math.atan2(sign * side, v3)
-            if straight and v3 > 0.0 and not free_roll:
-                # Elbow straight: θ3 and θ5 turn about one line, so θ3 is chosen where θ5 and θ7 can follow.
-                _wrist(R02, 0.0, 0.0, M, R47)
-                zyz(R47, 1.0, near, low, high, 4, angles)
-                angles[2] = split_sum(angles[4], near[2], low[2], high[2], near[4], low[4], high[4])
             n_probes = 0
             if free_roll:
                 for part in range(3):
@@ -223,6 +225,11 @@ def _solve(
                     _combine(bent, phi, R47)
                     out[branch, 8] = wrap(phi)
                 else:
+                    if straight and v3 > 0.0:
+                        # Elbow straight: θ3 and θ5 turn about one line; θ3 is chosen where θ5 and θ7 can follow.
+                        _wrist(R02, 0.0, 0.0, M, R47)
+                        zyz(R47, s6, near, low, high, 4, angles)
+                        angles[2] = split_sum(angles[4], near[2], low[2], high[2], near[4], low[4], high[4])
                     _wrist(R02, angles[2], angles[3], M, R47)
                 zyz(R47, s6, near, low, high, 4, angles)
                 for i in range(7):

@@ -39,6 +39,7 @@ from kin.solvers.common import (
     lay_probes,
     merged,
     misfit_of,
+    nearest_image,
     nearest_in_arcs,
     screw_z,
     shifted,
@@ -62,6 +63,7 @@ BRANCHES = tuple(
     for w in ("no-flip", "flip")
 )
 _REACH = TOLERANCES.closure_position * 0.1
+_CALM = 0.05  # rad; a way shorter than this is calm
 
 
 class Geometry(NamedTuple):
@@ -180,6 +182,40 @@ def _arm_angle(near: Array, frame: Array, d3: float, d5: float) -> float:
 
 
 @jit
+def _travel(angles: Array, near: Array, low: Array, high: Array, joints: int) -> float:
+    """Sum of the squared steps of the first `joints` joints from `near` to `angles`, each at its best image."""
+    total = 0.0
+    for i in range(joints):
+        total += (nearest_image(angles[i], near[i], low[i], high[i]) - near[i]) ** 2
+    return total
+
+
+@jit
+def _calmer(
+    M: Array, frame: Array, A: float, rho: float, d3: float, theta4: float, psi: float, s2: float, s6: float,
+    near: Array, low: Array, high: Array, respect: bool, holds: Array, n_holds: int, joints: int,
+    R03: Array, R47: Array, angles: Array,
+) -> float:  # fmt: skip
+    """ψ itself, or the arm angle that keeps some joint where it is, if that halves the way the joints go.
+
+    Beside s2 = 0 or s6 = 0 an elbow held still makes two joints spin against each other; an elbow that gives
+    way by as little as the target misses the alignment keeps them still. `angles` are those at ψ.
+    """
+    way = _travel(angles, near, low, high, joints)
+    if way < _CALM**2:
+        return psi
+    best = 0.25 * way
+    for j in range(n_holds):
+        _fill(M, frame, A, rho, d3, theta4, holds[j], s2, s6, near, low, high, R03, R47, angles)
+        if respect and misfit_of(angles, low, high, 0, joints) > 0.0:
+            continue
+        way = _travel(angles, near, low, high, joints)
+        if way < best:
+            best, psi = way, holds[j]
+    return psi
+
+
+@jit
 def _solve(
     T: Array, inverse_base: Array, inverse_tool: Array, offset: Array, d3: float, d5: float, free_roll: bool,
     value: float, respect: bool, seed: Array, lower: Array, upper: Array, arcs: Array, out: Array,
@@ -193,6 +229,7 @@ def _solve(
     angles = np.empty(7)
     breaks = np.empty(64)
     probes = np.empty(130)
+    holds = np.empty(64)
     misfits = np.empty((130, 4))
     near, low, high = shifted(seed, offset), shifted(lower, offset), shifted(upper, offset)
     clear(out)
@@ -200,9 +237,14 @@ def _solve(
     code, gap, _, A, rho, bend = _triangle(M, d3, d5, frame)
     if code != 0:
         return code, gap, 0
+    still = shifted(seed, offset)
     if free_roll:
         low[6], high[6] = -1e9, 1e9
+        still[6] += 2.0 * math.pi  # a limit that spans a turn never binds
     wish = _arm_angle(near, frame, d3, d5) if math.isnan(value) else value
+    if bend == 0.0 and math.isnan(value) and math.sin(near[3]) < 0.0:
+        # A straight arm has no elbow side; the seed's, seen from the other sign of θ4, keeps θ3 and θ5 still.
+        wish += math.pi
     found = 0
     for e in range(2):
         theta4 = bend if e == 0 else -bend
@@ -210,10 +252,14 @@ def _solve(
             break
         elbow_misfit = excess(theta4, low[3], high[3])
         n_probes = 0
+        n_holds = 0
+        _rotations(M, frame, A, rho, d3, theta4, 0.0, 0.0, 1.0, A0, B0)
+        _rotations(M, frame, A, rho, d3, theta4, 1.0, 0.0, 0.0, A1, B1)
+        _rotations(M, frame, A, rho, d3, theta4, 0.0, 1.0, 0.0, A2, B2)
+        if math.isnan(value):
+            n_holds = zyz_breaks(A0, A1, A2, near, still, 0, holds, 0)
+            n_holds = zyz_breaks(B0, B1, B2, near, still, 4, holds, n_holds)
         if respect:
-            _rotations(M, frame, A, rho, d3, theta4, 0.0, 0.0, 1.0, A0, B0)
-            _rotations(M, frame, A, rho, d3, theta4, 1.0, 0.0, 0.0, A1, B1)
-            _rotations(M, frame, A, rho, d3, theta4, 0.0, 1.0, 0.0, A2, B2)
             count = zyz_breaks(A0, A1, A2, low, high, 0, breaks, 0)
             count = zyz_breaks(B0, B1, B2, low, high, 4, breaks, count)
             n_probes = lay_probes(breaks, count, probes)
@@ -244,6 +290,16 @@ def _solve(
                 s2 = 1.0 if si == 0 else -1.0
                 s6 = 1.0 if wi == 0 else -1.0
                 _fill(M, frame, A, rho, d3, theta4, psi, s2, s6, near, low, high, R03, R47, angles)
+                if math.isnan(value):
+                    n_all = n_holds
+                    for k in range(first, min(found, first + 16)):
+                        holds[n_all], holds[n_all + 1] = arcs[k, 1], arcs[k, 2]
+                        n_all += 2
+                    psi = _calmer(
+                        M, frame, A, rho, d3, theta4, psi, s2, s6, near, low, high, respect, holds, n_all,
+                        6 if free_roll else 7, R03, R47, angles,
+                    )  # fmt: skip
+                    _fill(M, frame, A, rho, d3, theta4, psi, s2, s6, near, low, high, R03, R47, angles)
                 for i in range(7):
                     out[branch, i] = wrap(angles[i] - offset[i])
                 if free_roll:

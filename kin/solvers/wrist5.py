@@ -21,9 +21,11 @@ import numpy as np
 
 from kin.kernels import jit
 from kin.robot import Robot
+from kin.solvers import point5
 from kin.solvers.common import (
     APPROACH,
     POSE,
+    POSITION,
     TURN,
     Candidates,
     Freedom,
@@ -224,7 +226,12 @@ def _solve(
 
 
 def solve(geometry: Geometry, problem: Problem) -> Candidates:
-    """All branches that bring the tool point and the approach direction to the target's."""
+    """All branches that bring the tool point and the approach direction to the target's.
+
+    Of a point alone θ4 and θ5 are free: that is :mod:`kin.solvers.point5`.
+    """
+    if problem.task == POSITION:
+        return point5.solve(geometry, problem)
     g = geometry
     out = np.empty((8, 6))
     arcs = np.empty((128, 3))
@@ -239,13 +246,13 @@ def solve(geometry: Geometry, problem: Problem) -> Candidates:
 
 
 def handles(geometry: Geometry, task: int) -> bool:
-    """A point and an approach direction; for a whole pose the pipeline judges the roll that results."""
-    return task in (POSE, APPROACH)
+    """A point, with an approach direction or not; for a whole pose the pipeline judges the roll that results."""
+    return task in (POSE, APPROACH, POSITION)
 
 
 def freedoms(geometry: Geometry, task: int) -> tuple[Freedom, ...]:
-    """θ1 when the wrist centre is on axis 1, otherwise nothing."""
-    return (_THETA1,)
+    """θ4 and θ5 for a point alone; otherwise θ1 when the wrist centre is on axis 1, else nothing."""
+    return point5.FREEDOMS if task == POSITION else (_THETA1,)
 
 
 def branch_of(geometry: Geometry, q: Array) -> int:

@@ -34,7 +34,7 @@ def test_every_operation_has_summary_description_and_documented_refusals(documen
                 assert list(response["content"]) == ["application/problem+json"]
                 schema = response["content"]["application/problem+json"]["schema"]
                 assert schema == {"$ref": "#/components/schemas/Problem"}
-    assert seen == 5
+    assert seen == 6
 
 
 def test_every_field_is_described(document):

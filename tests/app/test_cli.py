@@ -120,6 +120,46 @@ def test_ik_with_options_asks_the_core_the_same(capsys):
 
 
 @pytest.mark.parametrize(
+    ("words", "options"),
+    [
+        (("--branch", "elbow up", "--branch", "seed"), {"branch": ["elbow up", "seed"]}),
+        (("--lock", "7=-30"), {"locked": [None] * 6 + [math.radians(-30)]}),
+        (("--limit", "2=0:60", "--limit", "4=-100:100"), {"limits": {1: (0, 60), 3: (-100, 100)}}),
+        (("--images", "all"), {"images": "all"}),
+        (("--prefer", "limits"), {"prefer": "limits"}),
+        (("--redundancy", "psi=20"), {"redundancy": {"psi": math.radians(20)}}),
+        (("--mask", "x", "y", "z", "rz", "--mask-frame", "base"), {"mask": [True] * 3 + [False] * 2 + [True]}),
+    ],
+    ids=lambda words: words[0] if isinstance(words, tuple) else "",
+)
+def test_every_option_of_ik_reaches_the_core(capsys, words, options):
+    robot = kin.get_robot("redundant7-craig")
+    T = kin.fk(robot, robot.q_home)
+    wxyz = kin.transforms.wxyz_from_rotation(T[:3, :3])
+    if "limits" in options:
+        options = {"limits": [np.radians(options["limits"][i]) if i in (1, 3) else None for i in range(7)]}
+    if "mask" in options:
+        options["mask_frame"] = "base"
+    got = answer(capsys, "ik", robot.id, "--position", *(T[:3, 3] * 1e3), "--wxyz", *wxyz, "--all", *words)
+    result = kin.solve_ik(robot, T, **options)
+    assert len(got["solutions"]) == len(result.solutions) > 0
+    assert np.allclose([s["q"] for s in got["solutions"]], [s.q for s in result.solutions], atol=1e-6)
+
+
+def test_blocked_branches_are_printed_with_what_they_need(capsys):
+    words = ("ik", "pioneer5", "--position", 45, 191, 100, "--approach", 0, 0, 1)
+    code, out, _ = run(capsys, *words)
+    assert code == 1
+    result = answer(capsys, *words, code=1)
+    assert len(result["blocked"]) > 1
+    for branch in result["blocked"]:
+        (line,) = [x for x in out.splitlines() if x.startswith(branch["branch"])]
+        for v in branch["violations"]:
+            value, limit = math.degrees(v["value"]), math.degrees(v["limit"])
+            assert f"q{v['joint'] + 1} = {value:.3f}° (limit {limit:.3f}°)" in line
+
+
+@pytest.mark.parametrize(
     ("position", "extra", "status", "said"),
     [
         ((2000, 0, 0), (), "unreachable", "Out of reach"),
@@ -173,6 +213,13 @@ def test_robots_lists_all_and_describes_one(capsys, client):
         (("ik", "pioneer5", "--position", 1, 2, 3, "--task", "pose"), "--wxyz"),
         (("ik", "pioneer5", "--position", 1, 2, 3, "--task", "approach"), "--approach"),
         (("ik", "pioneer5", "--position", 1, 2, 3, "--seed", 1), "--seed"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--lock", "9=1"), "a joint from 1 to 5"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--lock", "1=1:2"), "JOINT=VALUE"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--limit", "1=5"), "JOINT=LOWER:UPPER"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--limit", "1=5:x"), "invalid value"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--branch", "sideways"), "elbow up"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--mask", "rx"), "--wxyz"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--mask", "x", "--task", "pose"), "no task besides"),
         (("robots", "puma"), "expected one of pioneer5"),
         (("robots", "--robots", "/no/such/folder"), "existing folder"),
         (("dance",), "invalid choice: 'dance'"),

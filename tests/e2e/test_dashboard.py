@@ -175,7 +175,8 @@ class Tab:
         self.page.get_by_role("tab", name="Move").click()
         if self.row("Robot").locator("input:visible").first.input_value() != robot.name:
             self.choose("Robot", robot.name)
-            expect(self.page.get_by_role("slider")).to_have_count(robot.n)
+            free = 1 if robot.n > 5 else 0  # the arm angle, or θ1
+            expect(self.page.get_by_role("slider")).to_have_count(robot.n + free)
         self.page.get_by_role("button", name="Home").click()
         self.wait_for_tool(kin.fk(robot, robot.q_home)[:3, 3], within=0.06)
         self.page.wait_for_timeout(500)
@@ -244,6 +245,35 @@ def test_dragging_the_gizmo_moves_the_arm_and_out_of_reach_is_said(tab: Tab) -> 
     tab.wait_for_tool(home[:3, 3], within=0.06)
 
 
+def test_branches_and_the_arm_angle_move_the_arm_and_not_the_tool(tab: Tab) -> None:
+    tab.show(SRS)
+    home = kin.fk(SRS, SRS.q_home)[:3, 3]
+    name = next(n for n in kin.branch_names(SRS) if "back" in n and "elbow up" in n and "no-flip" in n)
+    tab.choose("Branch", "back · up · no-flip")
+    expect(tab.status).to_contain_text("Reached")
+    expect(tab.page.locator("[data-branch]")).to_have_text(f"now: {name}")
+    tab.wait_for_tool(home, within=0.06)
+    tab.type_number("Arm angle ψ", "60")
+    tab.page.wait_for_timeout(900)
+    tab.wait_for_tool(home, within=0.06)
+    q = np.radians([tab.number(f"Joint {i + 1}") for i in range(SRS.n)])
+    assert kin.branch_of(SRS, q) == name
+    assert np.abs(kin.fk(SRS, q)[:3, 3] - home).max() < 5e-4
+    assert abs(q[0]) > 0.2, "the elbow swung out"
+    expect(tab.page.locator("[data-free=psi]")).to_contain_text("feasible: −111.7 … 111.7°")
+    strip = tab.page.locator("[data-free=psi] > div").first.bounding_box()
+    track = tab.row("Arm angle ψ").get_by_role("slider").first.bounding_box()
+    assert strip is not None
+    assert track is not None
+    middle = strip["x"] + strip["width"] * (60 + 180) / 360
+    assert abs(middle - (track["x"] + track["width"] / 2)) < 8, "the strip's mark is under the slider's thumb"
+    tab.screenshot("posture-light")
+    tab.type_number("Arm angle ψ", "150")
+    expect(tab.status).to_have_attribute("data-status", "limits")
+    expect(tab.status).to_contain_text("joint")
+    tab.screenshot("posture-at-the-limit")
+
+
 def test_five_joints_name_the_roll_error(tab: Tab) -> None:
     home = kin.fk(PIONEER, PIONEER.q_home)
     axes = [tab.pixel(PIONEER, home[:3, 3] + 0.05 * home[:3, k]) for k in range(3)]
@@ -281,7 +311,7 @@ def test_looks(tab: Tab) -> None:
 
 def test_nothing_in_the_panel_overlaps(tab: Tab) -> None:
     """At 1280×720 every line of the panel is inside the window and below the one before it."""
-    lines = [tab.status, *(tab.row(label) for label in ("Robot", *slider_labels(), "Go to", "Match", "Target"))]
+    lines = [tab.status, *(tab.row(label) for label in ("Robot", *slider_labels(), *AFTER_JOINTS))]
     boxes = [line.first.bounding_box() for line in lines]
     bottom = 0.0
     for box in boxes:
@@ -291,6 +321,9 @@ def test_nothing_in_the_panel_overlaps(tab: Tab) -> None:
         assert box["x"] + box["width"] <= 1280
         bottom = box["y"] + box["height"]
     assert bottom <= 720
+
+
+AFTER_JOINTS = ("Go to", "Match", "Target", "Branch")
 
 
 def slider_labels() -> list[str]:

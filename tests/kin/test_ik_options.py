@@ -49,7 +49,9 @@ def test_names_belong_to_postures_whatever_the_target(robot_id):
     for q in robot.random_q(rng, 150):
         for task in TASKS:
             for s in solve_ik(robot, kin.fk(robot, q), task=task, respect_limits=False, q_seed=q).solutions:
-                assert s.branch == kin.branch_of(robot, s.q)
+                # On the border of two branches, where the arm is singular, either name is right.
+                border = any(x.distance < 1e-6 for x in kin.singularities(robot, s.q))
+                assert border or s.branch == kin.branch_of(robot, s.q)
                 seen.add(s.branch)
     assert seen == set(kin.branch_names(robot))
 
@@ -251,7 +253,7 @@ def test_the_preferred_value_beats_a_sweep(robot_id, task, prefer):
         target = kin.fk(robot, q)
         result = solve_ik(robot, target, task=task, q_seed=q, prefer=prefer)
         values = [worth(s.q) for s in result.solutions]
-        assert values == sorted(values, reverse=True)
+        assert all(a >= b - 1e-6 * abs(values[0]) for a, b in itertools.pairwise(values))
         free = result.redundancy[0]
         swept = [
             worth(s.q)

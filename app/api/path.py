@@ -1,0 +1,102 @@
+"""Path inverse kinematics: a list of targets in, one joint path through all of them out."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Body, Response
+from pydantic import Field
+
+from app.answers import PathAnswer, path_answer
+from app.api import schemas
+from app.api.asked import Asked
+from app.api.body import JsonRoute
+from app.api.problems import FieldError, invalid
+from app.api.schemas import POST_REFUSALS, Configuration, RobotDep, SettingsDep, example, reply
+from app.api.targets import Target
+from kin import solve_path
+
+router = APIRouter(tags=["kinematics"], route_class=JsonRoute)
+
+EXAMPLES = {
+    "line": example(
+        "Down along a line, from the home configuration",
+        {
+            "targets": [
+                {"position": [-0.03, 0.157, -0.194], "approach": [-0.25, -0.433, -0.866]},
+                {"position": [-0.03, 0.157, -0.204], "approach": [-0.25, -0.433, -0.866]},
+                {"position": [-0.03, 0.157, -0.214], "approach": [-0.25, -0.433, -0.866]},
+            ],
+            "q_start": [1.5708, 0.5236, 1.0472, 0.5236, 0.5236],
+        },
+    ),
+    "points": example(
+        "Three points, the last one out of reach: its neighbours are still exact",
+        {
+            "targets": [
+                {"position": [-0.018, 0.31, -0.181]},
+                {"position": [-0.018, 0.32, -0.171]},
+                {"position": [-0.018, 0.9, -0.171]},
+            ]
+        },
+    ),
+}
+
+
+class PathRequest(Asked):
+    """Where the tool should go, one waypoint after the other."""
+
+    targets: list[Target] = Field(
+        description="The waypoints in order; all of them in a form that allows the same task.", min_length=1
+    )
+    q_start: Configuration | None = Field(
+        None,
+        description="Where the arm is, in radians (metres for sliding joints): the way from there to the first "
+        "waypoint is kept short. Without it the path begins wherever it is best.",
+    )
+    max_step: schemas.Number = Field(
+        0.5,
+        gt=0,
+        description="The most a joint may move between neighbouring waypoints, in radians (4 per metre for a "
+        "sliding joint); a larger step is a jump.",
+    )
+
+
+@router.post(
+    "/robots/{robot_id}/ik/path",
+    summary="Inverse kinematics along a path",
+    response_model=PathAnswer,
+    responses=POST_REFUSALS,
+)
+def path_inverse_kinematics(
+    robot: RobotDep, settings: SettingsDep, body: Annotated[PathRequest, Body(openapi_examples=EXAMPLES)]
+) -> Response:
+    """One continuous joint path through all targets: as few jumps as possible, then as little motion as possible.
+
+    Branches, whole turns and free parameters are chosen for the path as a whole, so that no joint winds up to its
+    stop where another start would have avoided it. Each jump that is left is told with its place and reason; a
+    waypoint that cannot be reached is a gap, and the path holds the closest configuration there.
+    """
+    schemas.check_batch("targets", len(body.targets), settings, settings.max_path)
+    questions = [body.resolve(target, f"targets[{i}]") for i, target in enumerate(body.targets)]
+    task = questions[0][0]
+    for i, (other, _) in enumerate(questions):
+        if other != task:
+            expected = f"a target for task {task}, as the first one, or `task` for all of them"
+            raise invalid(FieldError(field=f"targets[{i}]", value=f"a target for task {other}", expected=expected))
+    q_start = None
+    if body.q_start is not None:
+        q_start = schemas.as_configurations(robot, body.q_start, settings, "q_start")[0][0]
+    result = solve_path(
+        robot,
+        [T for _, T in questions],
+        task=task,
+        mask=body.mask,
+        mask_frame=body.mask_frame,
+        q_start=q_start,
+        limits=body.limits,
+        locked=body.locked,
+        branch=body.branch,
+        max_step=body.max_step,
+    )
+    return reply(path_answer(result))

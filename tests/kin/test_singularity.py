@@ -1,0 +1,545 @@
+"""Singularities: where they are, that they are nowhere else, and that an arm dragged through one neither stops
+nor flips.
+
+A drag is a row of targets, each answer seeding the next, as in the viewer. Two laws judge it:
+
+- a target that a descent from the seed reaches is reached (no freeze);
+- a step, as the 2-norm of the joints' steps, is no longer than twice what that descent shows to be enough, plus
+  0.1 rad (no flip). The descent is a witness written here from `fk` and `jacobian` alone, free to use any branch
+  and any redundancy. Where a joint must whirl, the witness whirls, too. Twice, as the shortest way is not the only
+  wish: an elbow that stays where it is is worth some.
+
+Where the targets come from a joint path that crosses the singularity, a small step exists at every target, and an
+arm that cannot drift off the path must stay within a small multiple of the path's own step.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import kin
+from kin import InputError, Status, singularities, solve_ik
+from kin.solvers import solver_for
+from kin.transforms import vector_angle
+
+ROBOTS = tuple(kin.builtin_robots())
+TASK = {"pioneer5": "approach"}
+SQUARE = math.pi / 2
+BESIDE = (0.0, 1e-9, 1e-6, 1e-3)
+LINES = 2
+
+
+# The singular sets, each as joint values of the built-in arms (their zeros are the canonical ones, or π off)
+
+
+def put(*pairs):
+    """A curve on which joints have given values, up to half turns."""
+
+    def curve(rng, q, inside):
+        for joint, value in pairs:
+            q[joint] = value * rng.choice((-1, 1)) + (0.0 if inside else math.pi * rng.integers(-1, 2))
+        return q
+
+    return curve
+
+
+def pioneer_elbow_inside(rng, q, inside):
+    q[2] = 0.0 if inside else math.pi * rng.integers(-1, 2)
+    return q
+
+
+def pioneer_shoulder(rng, q, inside):
+    """a1 + a2 c2 + d4 c23 = 0, solved for θ2."""
+    g = solver_for(kin.get_robot("pioneer5")).geometry
+    while True:
+        x, y = g.a2 + g.d4 * math.cos(q[2]), g.d4 * math.sin(q[2])
+        if math.hypot(x, y) > g.a1:
+            q[1] = math.acos(-g.a1 / math.hypot(x, y)) - math.atan2(y, x)
+            return q
+        q[2] = rng.uniform(0.0, 2.0)
+
+
+def craig_axis(rng, q, inside):
+    """W over the shoulder: s3 = 0 and c2 d5 s4 + s2 (d3 + d5 c4) = 0."""
+    q[2] = 0.0
+    q[1] = -math.atan2(0.31 * math.sin(q[3]), 0.35 + 0.31 * math.cos(q[3]))
+    return q
+
+
+SINGULAR = {
+    ("pioneer5", "elbow", ""): pioneer_elbow_inside,
+    ("pioneer5", "shoulder", ""): pioneer_shoulder,
+    ("pioneer5", "wrist", ""): put((4, 0.0)),
+    ("redundant7", "elbow", ""): put((3, 0.0)),
+    ("redundant7", "shoulder", ""): put((2, SQUARE)),
+    ("redundant7", "wrist", ""): put((5, 0.0)),
+    ("redundant7-craig", "elbow", ""): put((3, 0.0)),
+    ("redundant7-craig", "shoulder", ""): put((1, 0.0), (2, SQUARE)),
+    ("redundant7-craig", "wrist", "axes 4 and 6"): put((5, 0.0), (4, SQUARE)),
+    ("redundant7-craig", "wrist", "joints 1 and 3"): put((1, 0.0), (5, 0.0)),
+}
+# Where the arm is sound, but the closed form has something to take care of.
+DELICATE = {
+    ("redundant7-craig", "algorithmic", ""): craig_axis,
+    ("redundant7-craig", "θ2 = 0 alone", ""): put((1, 0.0)),
+    ("redundant7-craig", "θ6 = 0 alone", ""): put((5, 0.0)),
+}
+# The Pioneer arm's wrist cannot be straight inside its limits.
+DRAGGED = {key: curve for key, curve in (SINGULAR | DELICATE).items() if key[:2] != ("pioneer5", "wrist")}
+
+
+def ids(curves):
+    return [" ".join(key).strip() for key in curves]
+
+
+def least_sigma(robot, q):
+    """Smallest singular value of the task's Jacobian: six rows, or without the spin about the approach axis."""
+    J = kin.jacobian(robot, q)
+    if robot.n == 5:
+        a = kin.fk(robot, q)[:3, 2]
+        J = np.vstack([J[:3], J[3:] - np.outer(a, a @ J[3:])])
+    return np.linalg.svd(J, compute_uv=False)[min(robot.n, 6) - 1]
+
+
+def anywhere(robot, rng):
+    return rng.uniform(-math.pi, math.pi, robot.n)
+
+
+# Where they are
+
+
+@pytest.mark.parametrize(("robot_id", "kind", "words"), SINGULAR, ids=ids(SINGULAR))
+def test_on_a_singular_set_the_arm_loses_a_motion_and_is_told_so_first(robot_id, kind, words):
+    robot = kin.get_robot(robot_id)
+    rng = np.random.default_rng(1)
+    for _ in range(200):
+        q = SINGULAR[robot_id, kind, words](rng, anywhere(robot, rng), False)
+        first = singularities(robot, q)[0]
+        assert least_sigma(robot, q) <= 1e-12
+        assert first.kind == kind
+        assert words in first.meaning
+        assert first.distance <= 1e-12
+        assert first.unit == ("m" if (robot_id, kind) == ("pioneer5", "shoulder") else "rad")
+
+
+@pytest.mark.parametrize(("robot_id", "kind", "words"), SINGULAR, ids=ids(SINGULAR))
+@pytest.mark.parametrize("off", [1e-6, 1e-3, 0.1])
+def test_distance_is_the_angle_or_the_length_that_is_missing(robot_id, kind, words, off):
+    robot = kin.get_robot(robot_id)
+    rng = np.random.default_rng(2)
+    for _ in range(50):
+        before = anywhere(robot, rng)
+        q = SINGULAR[robot_id, kind, words](rng, before.copy(), False)
+        metres = (robot_id, kind) == ("pioneer5", "shoulder")
+        # Away from the set at right angles: along the joints that were set, or (Pioneer, shoulder) joint 2.
+        push = (np.arange(robot.n) == 1) if metres else (q != before) * rng.normal(size=robot.n)
+        away = q + off * push / np.linalg.norm(push)
+        found = next(s for s in singularities(robot, away) if s.kind == kind and words in s.meaning)
+        wanted = np.linalg.norm(wrist_centre(robot, away)[:2]) if metres else off
+        assert found.distance == pytest.approx(wanted, rel=1e-6, abs=1e-12)
+        if all(s.distance > 1e-3 for s in singularities(robot, away) if s is not found):
+            assert least_sigma(robot, away) > 0.0
+
+
+def wrist_centre(robot, q):
+    T = kin.fk(robot, q)
+    return T[:3, 3] - T[:3, 2] * {"pioneer5": 0.12}.get(robot.id, 0.42)
+
+
+# σ ≥ c · Π distance: c is a third of the least ratio met among 10⁵ configurations crowded round the singular sets.
+# Near a straight elbow of a 7-joint arm σ falls with the square, as s4² does in the determinant.
+FLOOR = {"pioneer5": (0.03, 1), "redundant7": (0.009, 2), "redundant7-craig": (0.002, 2)}
+
+
+@pytest.mark.parametrize("robot_id", ROBOTS)
+@given(data=st.data())
+def test_elsewhere_the_arm_loses_nothing(robot_id, data):
+    """The smallest singular value vanishes with the distances told, hence nowhere else."""
+    robot = kin.get_robot(robot_id)
+    near = st.tuples(st.integers(-2, 2), st.floats(-1.0, 1.0), st.integers(0, 6))
+    joint = st.one_of(
+        st.floats(-math.pi, math.pi), near.map(lambda t: t[0] * SQUARE + math.copysign(10.0 ** -t[2], t[1]))
+    )
+    q = np.array(data.draw(st.lists(joint, min_size=robot.n, max_size=robot.n)))
+    c, elbow_order = FLOOR[robot_id]
+    floor = c
+    for s in singularities(robot, q):
+        if s.kind != "algorithmic":
+            floor *= s.distance ** (elbow_order if s.kind == "elbow" else 1)
+    assert least_sigma(robot, q) >= floor - 1e-14
+
+
+@pytest.mark.parametrize("robot_id", ROBOTS)
+def test_random_configurations_away_from_all_sets_are_regular(robot_id):
+    robot = kin.get_robot(robot_id)
+    rng = np.random.default_rng(3)
+    tried = 0
+    for q in rng.uniform(-math.pi, math.pi, (2000, robot.n)):
+        if min(s.distance for s in singularities(robot, q) if s.kind != "algorithmic") > 0.05:
+            tried += 1
+            assert least_sigma(robot, q) > 1e-6
+    assert tried > 200
+
+
+def test_over_the_shoulder_the_arm_angle_loses_its_reference_and_the_arm_no_motion():
+    robot = kin.get_robot("redundant7-craig")
+    rng = np.random.default_rng(4)
+    for _ in range(100):
+        q = anywhere(robot, rng)
+        on_axis = craig_axis(rng, q.copy(), True)
+        for at in (q, on_axis, on_axis + 1e-3 * np.eye(7)[1]):
+            found = next(s for s in singularities(robot, at) if s.kind == "algorithmic")
+            radius = np.hypot(*wrist_centre(robot, at)[:2])
+            assert found.unit == "m"
+            assert found.distance == pytest.approx(radius, abs=1e-12)
+            assert "the arm no motion" in found.meaning
+        assert singularities(robot, on_axis)[0].kind == "algorithmic"
+        if min(s.distance for s in singularities(robot, on_axis) if s.kind != "algorithmic") > 0.05:
+            assert least_sigma(robot, on_axis) > 1e-6
+
+
+def test_only_a_long_forearm_brings_the_wrist_back_to_a_doubled_axis():
+    """d3 > d5 as printed: never. With a longer forearm: θ3 square and the wrist centre on axis 1."""
+    robot = kin.get_robot("redundant7")
+    assert {s.kind for s in singularities(robot, robot.q_home)} == {"elbow", "shoulder", "wrist"}
+    long = replace(robot, rows=tuple(replace(r, d=0.4) if r.d == 0.31 else r for r in robot.rows))
+    q = long.q_home.copy()
+    q[2], q[3] = SQUARE, math.acos(-0.35 / 0.4)
+    found = {s.kind: s for s in singularities(long, q)}
+    assert np.hypot(*wrist_centre(long, q)[:2]) <= 1e-12
+    assert found["algorithmic"].distance <= 1e-12
+    assert found["shoulder"].distance <= 1e-12
+    assert least_sigma(long, q) <= 1e-12
+    # Listed after what costs a motion.
+    assert [s.kind for s in singularities(long, q)][:2] == ["shoulder", "algorithmic"]
+
+
+# Determinants
+
+
+def test_determinant_of_the_five_joint_arm():
+    """det J5 = −a2 d4 s3 (a1 + a2 c2 + d4 c23) s5, in the tool's frame."""
+    robot = kin.get_robot("pioneer5")
+    a1, a2, d4 = 0.07, 0.16, 0.14
+    for q in np.random.default_rng(5).uniform(-math.pi, math.pi, (200, 5)):
+        J = kin.jacobian(robot, q, frame="tool")[:5]
+        _, c2, c3, _, _ = np.cos(q)
+        _, s2, s3, _, s5 = np.sin(q)
+        wanted = -a2 * d4 * s3 * (a1 + a2 * c2 + d4 * (c2 * c3 - s2 * s3)) * s5
+        assert np.linalg.det(J) == pytest.approx(wanted, abs=1e-15)
+
+
+def test_determinant_of_the_arm_with_a_doubled_axis():
+    """det J without joint 2 = d3 d5² s4² c3 s6."""
+    robot = kin.get_robot("redundant7")
+    d3, d5 = 0.35, 0.31
+    for q in np.random.default_rng(6).uniform(-math.pi, math.pi, (200, 7)):
+        J = kin.jacobian(robot, q)
+        assert np.abs(J[:, 0] - J[:, 1]).max() <= 1e-15
+        wanted = d3 * d5**2 * math.sin(q[3]) ** 2 * math.cos(q[2]) * math.sin(q[5])
+        assert np.linalg.det(np.delete(J, 1, axis=1)) == pytest.approx(wanted, abs=1e-14)
+
+
+def test_manipulability_of_the_srs_arm():
+    """√det(J Jᵀ) = d3 d5 |s4| |m| with m, up to a factor, the motion that keeps the tool still."""
+    robot = kin.get_robot("redundant7-craig")
+    d3, d5 = 0.35, 0.31
+    for q in np.random.default_rng(7).uniform(-math.pi, math.pi, (200, 7)):
+        _, c2, c3, c4, c5, c6, _ = np.cos(q)
+        _, s2, s3, s4, s5, s6, _ = np.sin(q)
+        m = np.array([
+            d5 * s4 * c3 * s6,
+            -d5 * s4 * s3 * s2 * s6,
+            -s6 * (d5 * s4 * c3 * c2 + s2 * (d3 + d5 * c4)),
+            0.0,
+            s2 * (d3 * s4 * c5 * c6 + s6 * (d5 + d3 * c4)),
+            d3 * s4 * s5 * s2 * s6,
+            -d3 * s4 * c5 * s2,
+        ])  # fmt: skip
+        assert np.abs(kin.jacobian(robot, q) @ m).max() <= 1e-15
+        wanted = d3 * d5 * abs(s4) * np.linalg.norm(m)
+        assert kin.manipulability(robot, q) == pytest.approx(wanted, rel=1e-9, abs=1e-14)
+
+
+# What is told
+
+
+@pytest.mark.parametrize("robot_id", ROBOTS)
+def test_nearest_comes_first_a_length_counting_as_its_angle_at_the_arms_reach(robot_id):
+    robot = kin.get_robot(robot_id)
+    for q in robot.random_q(np.random.default_rng(8), 200):
+        order = [s.distance / (robot.reach if s.unit == "m" else 1.0) for s in singularities(robot, q)]
+        assert order == sorted(order)
+
+
+def test_meaning_names_the_joint_values_of_the_singular_posture():
+    robot = kin.get_robot("redundant7")
+    q = robot.q_home.copy()
+    for angle, word in (
+        (0.02, "straight (θ4 = 0°)"),
+        (-3.1, "folded (θ4 = -180°)"),
+        (6.3, "straight (θ4 = 360°)"),
+    ):
+        q[3] = angle
+        elbow = next(s for s in singularities(robot, q) if s.kind == "elbow")
+        assert elbow.meaning.startswith(f"elbow {word}")
+        assert elbow.distance == pytest.approx(min(abs(angle - k * math.pi) for k in range(-2, 3)))
+    # A table with another zero: the clause speaks of the joint's own values.
+    rows = tuple(replace(r, theta=-0.5) if r.name == "joint 4" else r for r in robot.rows)
+    q[3] = 0.5
+    elbow = singularities(replace(robot, rows=rows), q)[0]
+    assert elbow.meaning.startswith("elbow straight (θ4 = 28.648°)")
+    assert elbow.distance <= 1e-15
+
+
+@pytest.mark.parametrize("robot_id", ROBOTS)
+@pytest.mark.parametrize("q", [[0.0], [0.0] * 8, [[0.0] * 7] * 2, [[0.0] * 5], [math.nan] * 7, "home"])
+def test_misuse_is_refused(robot_id, q):
+    with pytest.raises(InputError, match="q"):
+        singularities(kin.get_robot(robot_id), q)
+
+
+# Arms without a closed form
+
+ARM = """
+id = "arm"
+name = "arm"
+source = "this test"
+convention = "standard"
+units = {{ length = "m", angle = "deg" }}
+{rows}
+[home]
+q = {home}
+"""
+
+
+def arm(*rows, home):
+    """A robot of rows (d, a, alpha in degrees), prismatic where d is "slide"."""
+    text = ""
+    for i, (d, a, alpha) in enumerate(rows):
+        text += f'[[rows]]\nname = "{i}"\na = {a}\nalpha = {alpha}\n'
+        text += 'kind = "prismatic"\nlimits = [0, 1]\n' if d == "slide" else f"d = {d}\nlimits = [-180, 180]\n"
+    return kin.parse_robot(ARM.format(rows=text, home=list(home)))
+
+
+def only(robot, q):
+    found = singularities(robot, q)
+    assert len(found) == 1
+    assert (found[0].kind, found[0].unit) == ("jacobian", "SI")
+    return found[0]
+
+
+def test_six_joints_without_a_closed_form_are_told_by_the_whole_jacobian():
+    robot = arm(
+        (0.3, 0, 90), (0, 0.4, 0), (0, 0, 90), (0.3, 0, -90), (0, 0, 90), (0.1, 0, 0), home=[0, 0, 0, 0, 0, 0]
+    )
+    for q in np.random.default_rng(9).uniform(-3, 3, (20, 6)):
+        found = only(robot, q)
+        assert found.distance == pytest.approx(np.linalg.svd(kin.jacobian(robot, q), compute_uv=False)[-1])
+        assert "6 × 6" in found.meaning
+        q[4] = 0.0
+        assert only(robot, q).distance <= 1e-12
+
+
+def test_five_joints_without_a_closed_form_are_told_by_point_and_approach():
+    # Base, three parallel axes, roll: the roll changes nothing about point and approach, so rank 4 is usual.
+    robot = arm((0.1, 0, 90), (0, 0.3, 0), (0, 0.3, 0), (0, 0.05, 90), (0.2, 0, 0), home=[0, 0, 0, 0, 0])
+    assert solver_for(robot) is None
+    q = np.array([0.3, 0.4, 0.5, 0.6, 0.7])
+    found = only(robot, q)
+    assert "5 × 5" in found.meaning
+    assert found.distance > 0.01
+    q[2] = 0.0
+    assert only(robot, q).distance <= 1e-12
+
+
+def test_few_joints_are_told_by_the_point():
+    robot = arm((0.3, 0, 90), (0, 0.4, 0), (0, 0.3, 0), home=[0, 0, 0])
+    q = np.array([0.1, 0.2, 0.9])
+    J = kin.jacobian(robot, q)[:3]
+    assert only(robot, q).distance == pytest.approx(np.linalg.svd(J, compute_uv=False)[-1])
+    q[2] = 0.0
+    assert only(robot, q).distance <= 1e-12
+    assert "3 × 3" in only(robot, q).meaning
+
+
+def test_a_flat_arm_is_not_blamed_for_staying_in_its_plane():
+    robot = arm((0, 0.4, 0), (0, 0.3, 0), (0, 0.2, 0), home=[0, 0, 0])
+    assert only(robot, [0.1, 0.7, -0.4]).distance > 0.05
+    assert only(robot, [0.1, 0.0, 0.0]).distance <= 1e-12
+
+
+def test_sliding_joints_are_counted_in_metres():
+    robot = arm(("slide", 0, 90), ("slide", 0, 90), ("slide", 0, 0), home=[0, 0, 0])
+    found = only(robot, [0.1, 0.2, 0.3])
+    J = kin.jacobian(robot, [0.1, 0.2, 0.3])[:3]
+    assert found.distance == pytest.approx(np.linalg.svd(J, compute_uv=False)[np.linalg.matrix_rank(J) - 1])
+
+
+def test_an_arm_that_moves_no_point_is_always_singular():
+    assert only(arm((0.3, 0, 0), home=[0]), [0.4]).distance == 0.0
+
+
+# Drags
+
+
+def residual(robot, T, q, task):
+    """The twist that is missing, and the Jacobian of the task."""
+    now, J = kin.fk(robot, q), kin.jacobian(robot, q)
+    if task == "approach":
+        a = now[:3, 2]
+        turn = np.cross(a, T[:3, 2])
+        J[3:] -= np.outer(a, a @ J[3:])
+    else:
+        turn = 0.5 * np.cross(now[:3, :3], T[:3, :3], axis=0).sum(axis=1)
+    return np.concatenate([T[:3, 3] - now[:3, 3], turn]), J
+
+
+def enough(robot, T, seed):
+    """The witness: the way (2-norm) to a solution inside the limits near the seed, ∞ if none is found."""
+    task = TASK.get(robot.id, "pose")
+    best = math.inf
+    for damping in (1e-2, 1e-4, 1e-7):
+        q = seed.copy()
+        for _ in range(60):
+            error, J = residual(robot, T, q, task)
+            if np.abs(error).max() < 1e-12:
+                best = min(best, float(np.linalg.norm(q - seed)))
+                break
+            step = J.T @ np.linalg.solve(J @ J.T + damping * np.eye(6), error)
+            q = robot.clip(q + np.clip(step, -0.3, 0.3))
+            damping = max(0.3 * damping, 1e-14)
+    return best
+
+
+def reached(robot, T, q):
+    now = kin.fk(robot, q)
+    gap = vector_angle if robot.id in TASK else (lambda a, b: np.abs(a - b).max())
+    turn = gap(now[:3, 2], T[:3, 2]) if robot.id in TASK else gap(now[:3, :3], T[:3, :3])
+    return np.abs(now[:3, 3] - T[:3, 3]).max() <= 1e-9 and turn <= 1e-9 and robot.in_limits(q).all()
+
+
+def drag(robot, targets, q):
+    """The configurations that a drag from q takes through the targets, as far as they can be reached.
+
+    Every step is judged by the witness.
+    """
+    task = TASK.get(robot.id, "pose")
+    taken = []
+    for T in targets:
+        result = solve_ik(robot, T, task=task, q_seed=q)
+        story = {"seed": q.tolist(), "T": T.tolist(), "answer": result.best.q.tolist(), "status": result.status}
+        if result.status is not Status.SOLVED:
+            assert enough(robot, T, q) == math.inf, f"frozen: {story}"
+            break
+        assert reached(robot, T, result.best.q)
+        step = float(np.linalg.norm(result.best.q - q))
+        if step > 0.1:
+            assert step <= 2.0 * enough(robot, T, q) + 0.1, f"flipped by {step:.3f} rad: {story}"
+        q = result.best.q
+        taken.append(q)
+    return taken
+
+
+def paths(robot, key, count, beside, seed):
+    """Joint paths ``(21, n)`` inside the limits with steps of 0.01 rad that cross a curve in their middle.
+
+    Other singularities and, for the 7-joint arms, the stops are kept away, so that only one thing is tried.
+    """
+    rng = np.random.default_rng(seed)
+    curve = DRAGGED[key]
+    margin = 0.0 if robot.n == 5 else 0.4
+    made = 0
+    while made < count:
+        q = robot.random_q(rng)
+        middle = curve(rng, q.copy(), True)
+        moved = middle != q
+        others = [s for s in singularities(robot, middle) if s.distance > 1e-9 and s.kind != "algorithmic"]
+        if robot.n == 7 and min(s.distance for s in others) < 0.3:
+            continue
+        v = rng.uniform(-1, 1, robot.n)
+        path = middle + beside * moved * rng.normal(size=robot.n)
+        path = path + 0.01 * np.arange(-10, 11)[:, None] * v / np.abs(v).max()
+        if key == ("pioneer5", "elbow", ""):
+            path[:, 2] = np.abs(path[:, 2])  # the straight elbow is its stop: the path turns round there
+        if ((path >= robot.lower + margin) & (path <= robot.upper - margin)).all():
+            made += 1
+            yield path
+
+
+@pytest.mark.parametrize("beside", BESIDE)
+@pytest.mark.parametrize("key", DRAGGED, ids=ids(DRAGGED))
+def test_targets_of_a_joint_path_through_a_singularity_are_followed(key, beside):
+    """Every target is reached. Without a redundancy to drift along, five times the path's own step is enough:
+
+    at the singular pose a joint that has lost its meaning waits, and then has the next step to make as well, while
+    others answer to where it waited.
+    """
+    robot = kin.get_robot(key[0])
+    for path in paths(robot, key, LINES, beside, seed=10):
+        targets = kin.fk(robot, path)
+        for T, known in zip(targets[1:], path[1:], strict=True):
+            assert reached(robot, T, known)
+        taken = drag(robot, targets[1:], path[0])
+        assert len(taken) == len(path) - 1
+        if key[0] != "redundant7-craig":
+            assert np.abs(np.diff([path[0], *taken], axis=0)).max() <= 0.05
+
+
+@pytest.mark.parametrize("key", DRAGGED, ids=ids(DRAGGED))
+def test_no_target_of_a_joint_path_is_missed(key):
+    robot = kin.get_robot(key[0])
+    task = TASK.get(robot.id, "pose")
+    for path in paths(robot, key, LINES, 0.0, seed=11):
+        for before, q in itertools.pairwise(path):
+            result = solve_ik(robot, kin.fk(robot, q), task=task, q_seed=before)
+            assert result.status is Status.SOLVED
+            # The seed is on the path, so a step of 0.01 rad exists; twice that for the joint that waited.
+            assert np.abs(result.best.q - before).max() <= 0.05
+
+
+def line(T, velocity, spin, length):
+    """T moved along a straight line by `length` metres, turning by as many radians per unit of spin."""
+    moved = T.copy()
+    moved[:3, 3] += velocity * length
+    angle = float(np.linalg.norm(spin)) * length
+    if angle:
+        x, y, z = spin / np.linalg.norm(spin)
+        K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        moved[:3, :3] = (np.eye(3) + math.sin(angle) * K + (1 - math.cos(angle)) * K @ K) @ T[:3, :3]
+    return moved
+
+
+@pytest.mark.parametrize("beside", BESIDE)
+@pytest.mark.parametrize("key", DRAGGED, ids=ids(DRAGGED))
+def test_a_straight_drag_through_or_beside_a_singular_pose_neither_freezes_nor_flips(key, beside):
+    """Straight lines of 3 mm a step through the singular pose in the middle or `beside` metres away from it.
+
+    The tool turns steadily on the way. Every second line sets out the way the joints can go, the others anyhow.
+    Each is followed as far as it is within reach.
+    """
+    robot = kin.get_robot(key[0])
+    rng = np.random.default_rng(12)
+    steps = 0
+    for number, path in enumerate(paths(robot, key, LINES, 0.0, seed=13)):
+        T = kin.fk(robot, path[10])
+        twist = kin.jacobian(robot, path[10]) @ (path[10] - path[9]) if number % 2 else rng.normal(size=6)
+        velocity, spin = np.split(twist / np.linalg.norm(twist[:3]), 2)
+        aside = np.cross(velocity, rng.normal(size=3))
+        T[:3, 3] += beside * aside / np.linalg.norm(aside)
+        targets = [line(T, velocity, spin, 0.003 * k) for k in range(-10, 11)]
+        # From the middle backwards as far as reach goes, then forwards through the middle.
+        back = drag(robot, targets[9::-1], path[10])
+        if not back:  # the middle is at the end of reach: the other way, then
+            targets.reverse()
+            back = drag(robot, targets[9::-1], path[10])
+        on = drag(robot, targets[10 - len(back) :], back[-1] if back else path[10])
+        steps += len(back) + len(on)
+    assert steps >= 10
