@@ -413,19 +413,20 @@ def _branch(k: Array, q: Array) -> int:
 
 
 @jit
-def _offer(k: Array, q: Array, near: Array, low: Array, high: Array, best: Array) -> None:
-    """Keep q, at its images nearest to the seed, if it is the best of its branch: least overrun, then distance.
+def _offer(k: Array, q: Array, near: Array, box: Array, best: Array) -> None:
+    """Keep q, at its images nearest to the seed, if it is the best of its branch.
 
-    `best` ``(8, 6)``: five angles and the cost.
+    `best` ``(8, 6)``: five angles and the cost; first counts how far beyond the limits `box` ``(2, 5)`` it is,
+    then the distance.
     """
     row = _branch(k, q) % 8
     cost = 0.0
     for i in range(5):
-        x = nearest_image(q[i], near[i], low[i], high[i])
-        cost += (x - near[i]) ** 2 + _OVER * excess(x, low[i], high[i])
+        x = nearest_image(q[i], near[i], box[0, i], box[1, i])
+        cost += (x - near[i]) ** 2 + _OVER * excess(x, box[0, i], box[1, i])
     if not cost >= best[row, 5]:
         for i in range(5):
-            best[row, i] = nearest_image(q[i], near[i], low[i], high[i])
+            best[row, i] = nearest_image(q[i], near[i], box[0, i], box[1, i])
         best[row, 5] = cost
 
 
@@ -595,7 +596,7 @@ def _into_window(breaks: Array, count: int, low: float, high: float) -> int:
 
 @jit
 def _add_piece(rows: Array, found: int, branch: int, low: float, high: float, sheet: int) -> int:
-    """Append (branch, low, high, sheet), or lengthen the last row if it is its continuation; returns the number."""
+    """Append (branch, low, high, sheet), or lengthen the last row if that goes on here; returns the number."""
     last = found - 1
     if found > 0 and rows[last, 0] == branch and rows[last, 2] == low and rows[last, 3] == sheet:
         rows[last, 2] = high
@@ -822,8 +823,9 @@ def _find_spots(k: Array, planes: Array, n_planes: int, low: Array, high: Array,
 
 @jit
 def _gather(
-    k: Array, spots: Array, n_spots: int, near: Array, low: Array, high: Array, best: Array, ends: Array
-) -> int:
+    k: Array, spots: Array, n_spots: int, near: Array, low: Array, high: Array, box: Array, best: Array,
+    ends: Array,
+) -> int:  # fmt: skip
     """ends ← (θ4, branch) of the spots that are feasible, with the elbow either way; returns their number.
 
     best ``(8, 6)`` ← per branch the one nearest to the seed, and its cost.
@@ -835,7 +837,7 @@ def _gather(
         elbow, j = 1.0 - 2.0 * (i % 2), i // 2
         side = 1.0 if spots[j, 2] >= 0.0 else -1.0
         if count < ends.shape[0] and _fits(k, spots[j, 0], spots[j, 1], side, elbow, near, low, high, q):
-            _offer(k, q, near, low, high, best)
+            _offer(k, q, near, box, best)
             ends[count, 0] = min(max(nearest_image(q[3], 0.5 * (start + stop), start, stop), start), stop)
             ends[count, 1] = _branch(k, q)
             count += 1
@@ -844,8 +846,8 @@ def _gather(
 
 @jit
 def _probe(
-    k: Array, turns: Array, planes: Array, n_planes: int, near: Array, low: Array, high: Array, seen: Array,
-    best: Array,
+    k: Array, turns: Array, planes: Array, n_planes: int, near: Array, low: Array, high: Array, box: Array,
+    seen: Array, best: Array,
 ) -> None:  # fmt: skip
     """seen ← per θ4 in turns, the branches on which some θ5 is feasible, one bit each; best as in `_gather`."""
     breaks, q, rows = np.empty(256), np.empty(5), np.empty((128, 4))
@@ -859,7 +861,7 @@ def _probe(
             half -= min(half, 1e-7)
             for t5 in (middle, min(max(near[4], middle - half), middle + half)):
                 if _fits(k, turns[i], t5, side, elbow, near, low, high, q):
-                    _offer(k, q, near, low, high, best)
+                    _offer(k, q, near, box, best)
         seen[i] = mask
 
 
@@ -884,10 +886,8 @@ def _settle(
         for i in range(5):
             q[i] = best[row, i] if row < 8 else near[i]
         if row < 8:
-            _offer(k, q, near, box[0], box[1], answer)
+            _offer(k, q, near, box, answer)
         for i in range(5):
-            if relaxed > 0.0:
-                q[i] = nearest_image(q[i], near[i], box[0, i], box[1, i])
             q[i] = min(max(q[i], low[i]), high[i])
             floor[i], ceiling[i] = low[i], high[i]
             if row < 8 and (i == 2 or i == 4):
@@ -895,7 +895,7 @@ def _settle(
                 turn = math.floor(q[i] / math.pi)
                 floor[i], ceiling[i] = max(low[i], turn * math.pi), min(high[i], (turn + 1.0) * math.pi)
         if _draw_near(k, aims, floor, ceiling, q):
-            _offer(k, q, near, box[0], box[1], answer)
+            _offer(k, q, near, box, answer)
 
 
 def solve(geometry: Geometry, problem: Problem) -> Candidates:
@@ -994,10 +994,10 @@ def _explore(k: Array, near: Array, limits: Array, box: Array, answer: Array) ->
     spots, found = np.empty((2048, 3)), np.empty((256, 2))
     n_planes = _planes(k, low, high, planes)
     n = _find_spots(k, planes, n_planes, low, high, spots)
-    n = _gather(k, spots, n, near, low, high, best, found)
+    n = _gather(k, spots, n, near, low, high, box, best, found)
     ends = [(t4, int(branch)) for t4, branch in found[:n].tolist()]
     edges = _edges(k, planes[:n_planes].tolist(), *_window(low[3], high[3]))
-    _probe(k, np.array(edges), planes, n_planes, near, low, high, seen, best)
+    _probe(k, np.array(edges), planes, n_planes, near, low, high, box, seen, best)
     masks = seen[: len(edges)].tolist()
     ends += [(t4, b) for t4, mask in zip(edges, masks, strict=True) for b in _BITS if int(mask) >> b & 1]
     ends.sort()
@@ -1006,11 +1006,11 @@ def _explore(k: Array, near: Array, limits: Array, box: Array, answer: Array) ->
         if not marks or t4 - marks[-1] > _SAME:
             marks.append(t4)
     middles = np.array([0.5 * (a + b) for a, b in pairwise(marks)])
-    _probe(k, middles, planes, n_planes, near, low, high, seen, best)
+    _probe(k, middles, planes, n_planes, near, low, high, box, seen, best)
     rows = _merge(ends, marks, [int(mask) for mask in seen[: len(middles)].tolist()])
     wish = float(near[3])
     turns = np.array([_nearest(rows, branch, wish) for branch in sorted({row[0] for row in rows})])
-    _probe(k, turns, planes, n_planes, near, low, high, seen, best)
+    _probe(k, turns, planes, n_planes, near, low, high, box, seen, best)
     _settle(k, best, near, low, high, box, float(limits is not box), answer)
     return rows
 
