@@ -11,15 +11,17 @@ path is chosen at once, as the shortest way through layers.
 - **Way.** A step is a *jump* if some joint moves more than `max_step`. Dynamic programming (Viterbi, IEEE Trans.
   Information Theory 13(2), 1967) finds the way with the fewest jumps and, of these, the least sum of squared joint
   motion. Its time grows linearly with the number of waypoints.
-- **Repair.** Samples may miss a narrow passage, or an angle that a singular pose leaves open. Where the way jumps,
-  motions are continued from both sides, each step to the nearest solution, and join the layers.
+- **Repair.** Samples may miss a narrow passage. Where the way jumps, motions are continued from both sides, each
+  step to the nearest solution, and join the layers. If jumps remain, the grid is made finer.
 - **Smoothing.** Samples make a staircase. Newton steps along the tangents of the task draw the path straight, as
-  if neighbours were joined by springs; the search then chooses between the present path and the steps proposed. A
-  slow drift is dear on a grid, so a second path, searched on a finer grid over every few waypoints, is smoothed
-  too, and the better one is kept: not provably the least of all, but one that cannot be drawn straighter.
+  if neighbours were joined by springs; the search then chooses between the present path and the steps proposed.
+  This also settles the angles that singular poses leave open. A slow drift is dear on a grid, so a second path,
+  searched on a finer grid over every few waypoints, is smoothed too, and the better one is kept: not provably the
+  least of all, but one that cannot be drawn straighter.
 
 Tasks and arms without a closed form get their layers from numeric continuation: descents from many places at one
-end of the path are followed to the other end, and back. There the fewest jumps *found* are told.
+end of the path are followed to the other end, and back. There the fewest jumps *found* are told. Where a closed
+form leaves two values free, continuation comes first too, and samples of both only if jumps remain.
 
 Joints without stops or with more than two turns of travel are followed as a circle; their turns are counted
 afterwards, and rewound only where a stop asks for it.
@@ -729,7 +731,7 @@ def _strided(course: _Course, q: Array) -> list[Array]:
         return []
     anchors = sorted({*range(0, len(q), stride), len(q) - 1})
     chosen = [course.stops[i] for i in anchors]
-    layers = [_sampled(stop.question, stop.relaxed, 0.5 * way.grid) for stop in chosen]
+    layers = [_sampled(stop.question, stop.relaxed, 0.5 * _GRID) for stop in chosen]
     if not all(len(layer) for layer in layers):
         return []
     trellis = _shortest(way, layers, [1, *np.diff(anchors).tolist()], way.ring, way.max_step)
