@@ -26,8 +26,9 @@ nothing changes: a test of each root and of each piece gives the intervals. Noth
 curves cross or where one runs upright, along θ5 (cylindrical algebraic decomposition, Collins 1975). Two planes
 cross in a line, which meets the hyperboloid twice. A plane pC C + pT tx + pR R + p0 = 0 runs upright, that is
 tx²/s5² is stationary along it, where R (pC d6² + p0 C) + pR r² C = 0: a quartic in C; the edge of reach does at
-the roots of a polynomial of degree six. Those points that are inside all limits cut θ4 into pieces, one test per
-piece. Again nothing is sampled: real roots are bracketed by those of the derivative.
+the roots of a polynomial of degree six. Where it meets a stop of θ1 or θ5 the range may end too, as these do not
+see which way the elbow bends. Those points that are inside all limits cut θ4 into pieces, one test per piece.
+Again nothing is sampled: real roots are bracketed by those of the derivative.
 
 **The choice.** Of a branch's feasible configurations the one nearest to the seed is wanted. It is *searched*: from
 the seed itself, and from the best feasible point met, by Newton steps on the nearest-point condition within the
@@ -277,43 +278,38 @@ def _linearise(k: Array, q: Array, J: Array, e: Array) -> float:
 
 
 @jit
-def _solve3(H: Array, g: Array) -> bool:
-    """g ← H⁻¹ g for a symmetric positive 3×3 matrix by elimination, H is used up; False if it is singular."""
-    for i in range(3):
-        if not H[i, i] > 1e-14:
-            return False
-        for r in range(i + 1, 3):
-            factor = H[r, i] / H[i, i]
-            g[r] -= factor * g[i]
-            for c in range(i, 3):
-                H[r, c] -= factor * H[i, c]
-    for i in range(2, -1, -1):
-        for c in range(i + 1, 3):
-            g[i] -= H[i, c] * g[c]
-        g[i] /= H[i, i]
-    return True
-
-
-@jit
 def _foot(q: Array, J: Array, e: Array, aim: Array, low: Array, high: Array, x: Array) -> None:
     """x ← the point of the box nearest to aim with J (x − q) = e, by Newton on the dual: x = clamp(aim + Jᵀ λ)."""
-    H, g, lam = np.empty((3, 3)), np.empty(3), np.zeros(3)
+    u = v = w = 0.0
     for _ in range(12):
-        for r in range(3):
-            g[r] = e[r]
-            for c in range(3):
-                H[r, c] = 1e-12 if r == c else 0.0
+        # What J (x − q) lacks of e, and H = J Jᵀ over the joints that are not at the box.
+        gu, gv, gw = e[0], e[1], e[2]
+        uu = vv = ww = 1e-12
+        uv = uw = vw = 0.0
         for i in range(5):
-            free = aim[i] + J[0, i] * lam[0] + J[1, i] * lam[1] + J[2, i] * lam[2]
+            a, b, c = J[0, i], J[1, i], J[2, i]
+            free = aim[i] + a * u + b * v + c * w
             x[i] = min(max(free, low[i]), high[i])
-            for r in range(3):
-                g[r] -= J[r, i] * (x[i] - q[i])
-                for c in range(3 if x[i] == free else 0):
-                    H[r, c] += J[r, i] * J[c, i]
-        if abs(g[0]) + abs(g[1]) + abs(g[2]) < 1e-15 or not _solve3(H, g):
+            step = x[i] - q[i]
+            gu -= a * step
+            gv -= b * step
+            gw -= c * step
+            if x[i] == free:
+                uu += a * a
+                vv += b * b
+                ww += c * c
+                uv += a * b
+                uw += a * c
+                vw += b * c
+        # The adjugate of H, row by row, over its determinant.
+        au, av, aw = vv * ww - vw * vw, vw * uw - uv * ww, uv * vw - vv * uw
+        det = uu * au + uv * av + uw * aw
+        if abs(gu) + abs(gv) + abs(gw) < 1e-15 or not det > 0.0:
             break
-        for r in range(3):
-            lam[r] += g[r]
+        bv, bw, cw = uu * ww - uw * uw, uv * uw - uu * vw, uu * vv - uv * uv
+        u += (au * gu + av * gv + aw * gw) / det
+        v += (av * gu + bv * gv + bw * gw) / det
+        w += (aw * gu + bw * gv + cw * gw) / det
 
 
 @jit
@@ -648,19 +644,13 @@ def _tilt_arcs(
 
 
 @jit
-def _add(t4: float, t5: float, side: float, low: Array, high: Array, spots: Array, count: int) -> int:
-    """Append (θ4, θ5, side) unless a limit forbids it."""
-    if count < spots.shape[0] and excess(t5, low[4], high[4]) == 0.0 and excess(t4, low[3], high[3]) == 0.0:
-        spots[count, 0], spots[count, 1], spots[count, 2] = t4, t5, side
-        count += 1
-    return count
-
-
-@jit
 def _add_tool(
     k: Array, C: float, tx: float, R: float, m: float, s: float, low: Array, high: Array, spots: Array, count: int
 ) -> int:
-    """Append the configurations at a point of the hyperboloid; m and the sign s of s5 are 0.0 if unknown."""
+    """Append (θ4, θ5, R) at a point of the hyperboloid unless a limit forbids it.
+
+    m and the sign s of s5 are 0.0 if unknown: then either is.
+    """
     d6, m2 = k[D6], (k[RAD] - R) * (k[RAD] + R)
     if m2 < -1e-10 or abs(C) > abs(d6) * (1.0 + 1e-9):
         return count
@@ -669,7 +659,10 @@ def _add_tool(
     for i in range(4):
         a, b = 1.0 - 2.0 * (i // 2), 1.0 - 2.0 * (i % 2)
         if min(a * m, b * s) >= 0.0:
-            count = _add(math.atan2(a * b * off / d6, -b * tx / d6), b * tilt, R, low, high, spots, count)
+            t4, t5 = math.atan2(a * b * off / d6, -b * tx / d6), b * tilt
+            if excess(t5, low[4], high[4]) + excess(t4, low[3], high[3]) == 0.0 and count < spots.shape[0]:
+                spots[count, 0], spots[count, 1], spots[count, 2] = t4, t5, R
+                count += 1
     return count
 
 
@@ -803,7 +796,7 @@ def _reach_spots(
 
 @jit
 def _find_spots(k: Array, planes: Array, n_planes: int, low: Array, high: Array, spots: Array) -> int:
-    """spots ← (θ4, θ5, side) where the shadow on θ4 of the feasible set may end; returns their number."""
+    """spots ← (θ4, θ5, R) where the shadow on θ4 of the feasible set may end; returns their number."""
     roots, levels = np.empty(12), np.empty(8)
     count = _NONE
     for i in range(n_planes):
@@ -902,7 +895,8 @@ def solve(geometry: Geometry, problem: Problem) -> Candidates:
     """Per branch, the configuration that brings the tool point to the target's and is nearest to the seed.
 
     `problem.values` are θ4 and θ5 as joint values, kept exactly where they are numbers. Where nothing fits the
-    limits, the rows hold what breaks them least of what was found; where the point is out of reach they are NaN.
+    limits, the rows hold what breaks them least of what was found. Where the point is out of reach they are NaN
+    and `gap` tells by how far; if only the given values forbid it, `gap` is 0.
 
     Returns:
         Candidates: `values` ``(8, 2)``: θ4, θ5 used; `arcs[0]`: every θ4 inside the limits for which some θ5 (or

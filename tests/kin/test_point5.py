@@ -40,16 +40,18 @@ def postures(point, q4, q5):
     m = d6 * math.sin(q4) * math.sin(q5)
     tx, tz = -d6 * math.cos(q4) * math.sin(q5), d4 + d6 * math.cos(q5)
     found = []
-    if x * x + y * y < m * m:
+    # At an edge of reach a double root may be missed by rounding.
+    square = x * x + y * y - m * m
+    if square < -1e-14:
         return np.empty((0, 5))
     for side in (1.0, -1.0):
-        R = side * math.sqrt(x * x + y * y - m * m)
+        R = side * math.sqrt(max(0.0, square))
         L2, D2 = tx * tx + tz * tz, (R - a1) ** 2 + h * h
         cosine = (D2 - a2 * a2 - L2) / (2 * a2 * math.sqrt(L2))
-        if abs(cosine) > 1:
+        if abs(cosine) > 1 + 1e-13:
             continue
         for elbow in (1.0, -1.0):
-            w = elbow * math.acos(cosine)
+            w = elbow * math.acos(min(1.0, max(-1.0, cosine)))
             t3 = w + math.atan2(tx, tz)
             t2 = math.atan2(h, R - a1) - math.atan2(math.sqrt(L2) * math.sin(w), a2 + math.sqrt(L2) * math.cos(w))
             found.append([math.atan2(y, x) - math.atan2(m, R), t2, t3, q4, q5])
@@ -245,3 +247,90 @@ def test_beyond_reach_is_told_in_metres():
     found = ask((0.070 + straight + 0.25, 0.0, 0.130), ROBOT.lower, ROBOT.upper)
     assert np.isnan(found.q).all()
     assert found.gap == pytest.approx(0.25, abs=1e-12)
+
+
+def whole_turns():
+    """Limits wide enough for every branch, with the arm's edge of reach inside them."""
+    return np.full(5, -math.pi), np.full(5, math.pi)
+
+
+@pytest.mark.parametrize("wide", [False, True])
+def test_a_range_of_theta4_ends_where_it_says(wide):
+    """Each end is reached, and 1e-6 beyond it a fine scan of θ5 finds nothing on any branch that ends there."""
+    rng = np.random.default_rng(21)
+    ends = 0
+    for _ in range(6 if wide else 40):
+        low, high = whole_turns() if wide else random_limits(rng, 0.3)
+        if wide:
+            low[:2], high[:2] = (-1.5, -1.0), (1.5, 2.0)
+        point = kin.fk(ROBOT, rng.uniform(low, high))[:3, 3]
+        rows = ask(point, low, high).arcs[0]
+        for branch, a, b in rows.tolist():
+            for end, beyond in ((a, a - 1e-6), (b, b + 1e-6)):
+                if not low[3] < beyond < high[3] or inside(rows[rows[:, 0] == branch], beyond):
+                    continue
+                ends += 1
+                met = ask(point, low, high, values=(end, math.nan))
+                assert any(fits(point, end, q5, low, high, 1e-6) for q5 in met.values[:, 1] if q5 == q5)
+                for q5 in np.linspace(low[4], high[4], 400).tolist():
+                    for q in postures(point, beyond, q5):
+                        turned = q + 2 * math.pi * np.round((0.5 * (low + high) - q) / (2 * math.pi))
+                        if ((turned > low) & (turned < high)).all():
+                            sines = np.sin(q[[2, 4]])
+                            split = np.abs(sines).min() < 1e-6
+                            assert split or solver_for(ROBOT).solver.branch_of(GEOMETRY, q) != branch
+    assert ends >= 4
+
+
+def test_corners_of_the_limits_and_points_above_the_base_are_met():
+    """Stops met exactly, all at once, and joints locked there: double roots everywhere."""
+    stops = [(a, 0.5 * (a + b), b) for a, b in zip(ROBOT.lower, ROBOT.upper, strict=True)]
+    corners = np.array(np.meshgrid(*stops)).reshape(5, -1).T
+    for i, q in enumerate(corners):
+        point = kin.fk(ROBOT, q)[:3, 3]
+        low, high = ROBOT.lower.copy(), ROBOT.upper.copy()
+        locked = np.array([(i >> j) % 2 == 1 for j in range(5)])
+        low[locked] = high[locked] = q[locked]
+        assert solve_ik(ROBOT, point, task="position").status is Status.SOLVED
+        rows = ask(point, low, high).q
+        assert ((rows >= low - SLACK) & (rows <= high + SLACK)).all(axis=1).any(), np.degrees(q)
+    low, high = whole_turns()
+    for q in np.radians([[0, 0, 90, 0, 90], [30, -60, 45, 180, 60], [10, 20, 30, 40, 0], [0, 0, 0, 0, 0]]):
+        point = kin.fk(ROBOT, q)[:3, 3] * (0.0, 0.0, 1.0) if q[4] > 1.0 else kin.fk(ROBOT, q)[:3, 3]
+        rows = ask(point, low, high).q
+        rows = rows[~np.isnan(rows[:, 0])]
+        assert len(rows)
+        assert np.abs(kin.fk(ROBOT, rows)[:, :3, 3] - point).max() < 1e-9
+
+
+def test_what_breaks_the_limits_least_is_one_joint_here():
+    """θ5 alone would have to pass its stop by 5°; the answer needs no more than that, and meets the point."""
+    q = np.radians([90, 60, 40, 40, 50])
+    point = kin.fk(ROBOT, q)[:3, 3]
+    low, high = ROBOT.lower, np.where(np.arange(5) == 4, ROBOT.upper, q)
+    found = ask(point, low, high)
+    rows = found.q[~np.isnan(found.q[:, 0])]
+    assert len(rows)
+    over = np.maximum(0.0, np.maximum(low - rows, rows - high)).sum(axis=1)
+    assert over.min() <= math.radians(5) + 1e-9
+    assert np.abs(kin.fk(ROBOT, rows)[:, :3, 3] - point).max() < 1e-9
+
+
+def test_equal_questions_get_equal_answers():
+    rng = np.random.default_rng(23)
+    for q in ROBOT.random_q(rng, 20):
+        point = kin.fk(ROBOT, q)[:3, 3]
+        first, again = (ask(point, ROBOT.lower, ROBOT.upper) for _ in range(2))
+        assert np.array_equal(first.q, again.q, equal_nan=True)
+        assert all(np.array_equal(a, b) for a, b in zip(first.arcs, again.arcs, strict=True))
+
+
+def test_gap_is_the_distance_a_dense_search_finds():
+    """Unlimited joints: no posture of a fine grid is nearer than the gap, and some are almost as near."""
+    rng = np.random.default_rng(25)
+    q = rng.uniform(-math.pi, math.pi, (400_000, 5))
+    cloud = kin.fk(ROBOT, q)[:, :3, 3]
+    for point in ((0.9, 0.2, 0.3), (0.0, 0.0, 1.0), (-0.3, 0.5, -0.4)):
+        gap = ask(point, ROBOT.lower, ROBOT.upper).gap
+        nearest = float(np.linalg.norm(cloud - np.array(point), axis=1).min())
+        assert gap <= nearest <= gap + 0.03
