@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from kin.finish import DISTANCE, OVERRUN, POSITION_ERROR, ROTATION_ERROR, finish
+from kin.finish import DISTANCE, OVERRUN, POSITION_ERROR, ROTATION_ERROR, finish, ranges
+from kin.finish import Flags as Flags
 from kin.fk import fk
 from kin.question import Question
 from kin.results import IKSolution, LimitViolation, Redundancy
-from kin.solvers.common import APPROACH, TURN, Freedom, Problem, wrap
+from kin.solvers.common import APPROACH, Freedom, Problem
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
-Flags = NDArray[np.bool_]
 _NO_LIMIT = 1e6
 _EVERYWHERE = ((-math.pi, math.pi),)
 
@@ -71,7 +68,7 @@ def solve_branches(
         values = question.values if code == question.code else (math.nan,) * len(freedoms)
     seed = question.seed if seed is None else seed
     roll = 0.0
-    if code == APPROACH:
+    if code == APPROACH and any(freedom.name == "roll" for freedom in freedoms):
         x = fk(question.robot, seed)[:3, 0]
         roll = math.atan2(float(T[:3, 1] @ x), float(T[:3, 0] @ x))
     lower, upper = question.lower, question.upper
@@ -100,50 +97,70 @@ def measure(
 
 
 def solution(
-    question: Question,
-    q: Array,
-    stats: Array,
-    branch: int | None = None,
-    redundancy: tuple[Redundancy, ...] = (),
-    compromise: str | None = None,
+    question: Question, q: Array, stats: Array, branch: int | None = None, compromise: str | None = None
 ) -> IKSolution:
     """A row as a result; its branch is worked out where it is not known."""
     q = q.copy()
     q.flags.writeable = False
+    return named(question, q, stats.tolist(), question.branch_of(q) if branch is None else branch, (), compromise)
+
+
+def named(
+    question: Question,
+    q: Array,
+    stats: list[float],
+    branch: int,
+    redundancy: tuple[Redundancy, ...],
+    compromise: str | None = None,
+) -> IKSolution:
+    """A read-only row of a known branch as a result."""
     return IKSolution(
-        q=q,
-        branch=question.branch_name(question.branch_of(q) if branch is None else branch),
-        position_error=float(stats[POSITION_ERROR]),
-        rotation_error=float(stats[ROTATION_ERROR]),
-        in_limits=bool(stats[OVERRUN] == 0.0),
-        distance=float(stats[DISTANCE]),
-        redundancy=redundancy,
-        compromise=compromise,
+        q,
+        question.branch_name(branch),
+        stats[POSITION_ERROR],
+        stats[ROTATION_ERROR],
+        stats[OVERRUN] == 0.0,
+        stats[DISTANCE],
+        redundancy,
+        compromise,
     )
 
 
 def redundancy_of(
-    question: Question, branches: Branches, rows: list[int], together: list[int] | None = None
-) -> list[tuple[Redundancy, ...]]:
-    """What is free on each branch of `rows`: the value used, and its ranges (or those of all branches in
-    `together`).
+    question: Question, branches: Branches, rows: list[int], every: Flags
+) -> tuple[list[tuple[Redundancy, ...]], tuple[Redundancy, ...]]:
+    """What is free on each branch of `rows`: the value used, and its ranges; and for the first of them with the
+    ranges of all branches in `every` ``(k,)``.
 
     A joint's own value follows its whole-turn image. Without limits an angle may be anything.
     """
     found: list[tuple[Redundancy, ...]] = [()] * len(rows)
+    together: tuple[Redundancy, ...] = ()
     for k, freedom in enumerate(branches.freedoms):
-        values = branches.values[rows, k] if freedom.joint < 0 else branches.q[rows, freedom.joint]
-        there = ~np.isnan(branches.values[rows, k])
-        pieces: dict[int, list[tuple[float, float]]] = {}
-        for row, low, high in branches.arcs[k].tolist():
-            pieces.setdefault(int(row), []).append((low, high))
-        for i, (row, value) in enumerate(zip(rows, values.tolist(), strict=True)):
-            if there[i]:
-                mine = [piece for r in together or (row,) for piece in pieces.get(r, ())]
-                intervals: tuple[tuple[float, float], ...] = _EVERYWHERE
-                if question.respect and all(map(math.isfinite, itertools.chain(*mine))):
-                    intervals = union(mine, freedom.circular)
-                found[i] += (Redundancy(freedom.name, freedom.label, value, intervals),)
+        there = branches.values[:, k].tolist()
+        values = there if freedom.joint < 0 else branches.q[:, freedom.joint].tolist()
+        rows_here = [i for i, row in enumerate(rows) if there[row] == there[row]]
+        if not rows_here:
+            continue
+        intervals = _intervals(question, branches.arcs[k], rows, every, freedom.circular)
+        for i in rows_here:
+            found[i] += (Redundancy(freedom.name, freedom.label, values[rows[i]], intervals[i]),)
+        if rows_here[0] == 0:
+            together += (Redundancy(freedom.name, freedom.label, values[rows[0]], intervals[-1]),)
+    return found, together
+
+
+def _intervals(
+    question: Question, arcs: Array, rows: list[int], every: Flags, circular: bool
+) -> list[tuple[tuple[float, float], ...]]:
+    """Ranges of each row's branch, and those of all branches in `every`."""
+    out = np.empty((4 * len(arcs) + 2, 3))
+    count = ranges(arcs, np.array(rows), every, circular, out) if question.respect else -1
+    if count < 0:
+        return [_EVERYWHERE] * (len(rows) + 1)
+    found: list[tuple[tuple[float, float], ...]] = [()] * (len(rows) + 1)
+    for row, low, high in out[:count].tolist():
+        found[int(row)] += ((low, high),)
     return found
 
 
@@ -155,27 +172,3 @@ def violations_of(question: Question, q: Array) -> tuple[LimitViolation, ...]:
             limit = question.lower[i] if q[i] < question.lower[i] else question.upper[i]
             found.append(LimitViolation(i, joint.name, float(q[i]), float(limit)))
     return tuple(found)
-
-
-def union(arcs: Iterable[tuple[float, float]], circular: bool) -> tuple[tuple[float, float], ...]:
-    """Overlapping intervals joined and sorted; on a circle within (−π, π], split at the seam."""
-    pieces: list[tuple[float, float]] = []
-    for low, high in arcs:
-        if not circular:
-            pieces.append((low, high))
-        elif high - low >= TURN - 1e-12:
-            return _EVERYWHERE
-        else:
-            start = wrap(low)
-            end = start + (high - low)
-            if end > math.pi:
-                pieces += [(start, math.pi), (-math.pi, end - TURN)]
-            else:
-                pieces.append((start, end))
-    joined: list[tuple[float, float]] = []
-    for low, high in sorted(pieces):
-        if joined and low <= joined[-1][1] + 1e-12:
-            joined[-1] = (joined[-1][0], max(high, joined[-1][1]))
-        else:
-            joined.append((low, high))
-    return tuple(joined)

@@ -8,10 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kin.kernels import fk_into, jit
-from kin.solvers.common import APPROACH, MASK, POSE, nearest_image, relative_pose
+from kin.solvers.common import APPROACH, MASK, POSE, TURN, nearest_image, relative_pose, wrap
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
+Flags = NDArray[np.bool_]
+Whole = NDArray[np.int64]
+_POSITION = TOLERANCES.closure_position
+_ROTATION = TOLERANCES.closure_rotation
 _LIMIT = TOLERANCES.limit
 _MERGE = TOLERANCES.merge
 POSITION_ERROR, ROTATION_ERROR, DISTANCE, OVERRUN, ROLL = range(5)
@@ -93,7 +97,73 @@ def finish(
 
 
 @jit
-def select(q: Array, key: Array) -> tuple[NDArray[np.int64], int]:
+def judge(stats: Array, respect: bool, closed: Flags, good: Flags) -> int:
+    """closed, good ``(k,)`` ← which rows meet the task, and which are inside the limits too; returns how many."""
+    count = 0
+    for k in range(stats.shape[0]):
+        closed[k] = stats[k, POSITION_ERROR] <= _POSITION and stats[k, ROTATION_ERROR] <= _ROTATION
+        good[k] = closed[k] and (stats[k, OVERRUN] == 0.0 or not respect)
+        if good[k]:
+            count += 1
+    return count
+
+
+@jit
+def ranges(arcs: Array, rows: Whole, together: Flags, circular: bool, out: Array) -> int:
+    """out ``(m, 3)`` ← rows (k, low, high): the intervals of branch rows[k], sorted and joined, then those of all
+    branches in `together` (k = len(rows)); returns their number, or −1 if an end is not finite.
+
+    On a circle they are told in (−π, π], one across the seam as two, the whole of it as one.
+    """
+    n = rows.shape[0]
+    total = 0
+    for k in range(n + 1):
+        first = total
+        for i in range(arcs.shape[0]):
+            branch = int(arcs[i, 0])
+            if (k < n and branch != rows[k]) or (k == n and not together[branch]):
+                continue
+            low, high = arcs[i, 1], arcs[i, 2]
+            if not (math.isfinite(low) and math.isfinite(high)):
+                return -1
+            if not circular:
+                total = _put(out, k, first, total, low, high)
+            elif high - low >= TURN - 1e-12:
+                total = _put(out, k, first, total, -math.pi, math.pi)
+            else:
+                start = wrap(low)
+                end = start + (high - low)
+                total = _put(out, k, first, total, start, min(end, math.pi))
+                if end > math.pi:
+                    total = _put(out, k, first, total, -math.pi, end - TURN)
+    return total
+
+
+@jit
+def _put(out: Array, k: int, first: int, total: int, low: float, high: float) -> int:
+    """Insert an interval into the sorted, disjoint ones out[first:total], joining what it touches."""
+    i = first
+    while i < total and out[i, 2] < low - 1e-12:
+        i += 1
+    j = i
+    while j < total and out[j, 1] <= high + 1e-12:
+        low, high = min(low, out[j, 1]), max(high, out[j, 2])
+        j += 1
+    if j == i:
+        for r in range(total, i, -1):
+            out[r, 1], out[r, 2] = out[r - 1, 1], out[r - 1, 2]
+        out[total, 0] = k
+        total += 1
+    else:
+        for r in range(j, total):
+            out[r - (j - i - 1), 1], out[r - (j - i - 1), 2] = out[r, 1], out[r, 2]
+        total -= j - i - 1
+    out[i, 0], out[i, 1], out[i, 2] = k, low, high
+    return total
+
+
+@jit
+def select(q: Array, key: Array) -> tuple[Whole, int]:
     """Rows of q ``(k, n)`` with a finite key, by rising key, equal ones once: (rows, count); uses up `key`."""
     kept = np.empty(q.shape[0], dtype=np.int64)
     count = 0

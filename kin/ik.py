@@ -25,18 +25,19 @@ from kin.branches import (
     Flags,
     is_closed,
     measure,
+    named,
     redundancy_of,
     solution,
     solve_branches,
     violations_of,
 )
 from kin.errors import InputError
-from kin.finish import DISTANCE, OVERRUN, ROLL, select
+from kin.finish import DISTANCE, OVERRUN, ROLL, judge, select
 from kin.fk import fk
 from kin.question import Frame, Images, Limits, Locks, Preference, Question, ask
 from kin.results import BlockedBranch, Cause, IKResult, IKSolution, Redundancy, Status, Task
 from kin.robot import Robot
-from kin.singularity import Singularity, singularities
+from kin.singularity import Singularity, singularities_at
 from kin.solvers import solver_for
 from kin.solvers.common import APPROACH, MASK, POSE, POSITION, Problem
 from kin.tolerances import TOLERANCES
@@ -147,9 +148,9 @@ def answer(question: Question) -> IKResult:
     branches = solve_branches(question, question.T, question.code)
     if branches is None:
         return _numeric(question)
-    closed = is_closed(branches.stats)
-    good = closed & (branches.stats[:, OVERRUN] == 0.0) if question.respect else closed
-    if not good.any() and not question.given:  # a value that was asked for is not for a descent to change
+    closed, good = np.empty(len(branches.q), dtype=bool), np.empty(len(branches.q), dtype=bool)
+    count = judge(branches.stats, question.respect, closed, good)
+    if count == 0 and not question.given:  # a value that was asked for is not for a descent to change
         good = search.polish(question, branches)
         closed |= good
     asked = _asked(question, len(closed))
@@ -165,6 +166,8 @@ def answer(question: Question) -> IKResult:
 
 
 def _asked(question: Question, count: int) -> Flags:
+    if question.branches is None:
+        return np.ones(count, dtype=bool)
     return np.array([question.allows(i) for i in range(count)])
 
 
@@ -186,8 +189,7 @@ def _result(
     best = solutions[0] if solutions else closest
     singular: tuple[Singularity, ...] = ()
     if best is not None:
-        near = singularities(question.robot, best.q)
-        singular = tuple(s for s in near if s.distance <= TOLERANCES.at_singularity)
+        singular = singularities_at(question.robot, best.q, TOLERANCES.at_singularity)
     if solver is None:
         solver = "numeric" if question.match is None else question.match.solver.NAME
     return IKResult(
@@ -211,20 +213,17 @@ def _result(
 
 def _solved(question: Question, branches: Branches, good: Flags) -> IKResult:
     if question.prefer == "nearest":
-        key = branches.stats[:, DISTANCE].copy()
+        key = branches.stats[:, DISTANCE]
     else:
         choose.improve(question, branches, good)
         key = choose.ranks(question, branches.q, branches.stats[:, DISTANCE])
-    solutions = _wrap_up(question, branches, good, key)
-    every = np.flatnonzero(good).tolist()
-    best = int(np.argmin(np.where(good, key, math.inf)))
-    redundancy = redundancy_of(question, branches, [best], every)[0]
+    solutions, redundancy = _wrap_up(question, branches, good, key)
     if question.all_images:
         solutions = _with_images(question, solutions)
-    if redundancy and solutions[0].redundancy:
-        redundancy = tuple(
-            replace(r, value=own.value) for r, own in zip(redundancy, solutions[0].redundancy, strict=True)
-        )
+        if redundancy and solutions[0].redundancy:
+            redundancy = tuple(
+                r._replace(value=own.value) for r, own in zip(redundancy, solutions[0].redundancy, strict=True)
+            )
     return _result(
         question,
         Status.SOLVED,
@@ -237,14 +236,19 @@ def _solved(question: Question, branches: Branches, good: Flags) -> IKResult:
 
 def _wrap_up(
     question: Question, branches: Branches, rows: Flags, key: Array, compromise: str | None = None
-) -> tuple[IKSolution, ...]:
-    """The chosen rows as named solutions, by rising key, each posture once."""
+) -> tuple[tuple[IKSolution, ...], tuple[Redundancy, ...]]:
+    """The chosen rows as named solutions, by rising key, each posture once; and what is free for all together."""
     kept, count = select(branches.q, np.where(rows, key, math.inf))
     order: list[int] = kept[:count].tolist()
+    free, together = redundancy_of(question, branches, order, rows)
+    q = branches.q[order]
+    q.flags.writeable = False
     return tuple(
-        solution(question, branches.q[i], branches.stats[i], i, free, compromise)
-        for i, free in zip(order, redundancy_of(question, branches, order), strict=True)
-    )
+        [
+            named(question, row, figures, i, own, compromise)
+            for row, figures, i, own in zip(q, branches.stats[order].tolist(), order, free, strict=True)
+        ]
+    ), together
 
 
 def _with_images(question: Question, solutions: tuple[IKSolution, ...]) -> tuple[IKSolution, ...]:
@@ -263,7 +267,7 @@ def _with_images(question: Question, solutions: tuple[IKSolution, ...]) -> tuple
         for row, figures in zip(q, stats, strict=True):
             image = solution(question, row, figures, -1)
             free = tuple(
-                replace(r, value=float(row[f.joint])) if f.joint >= 0 else r
+                r._replace(value=float(row[f.joint])) if f.joint >= 0 else r
                 for r in known.redundancy
                 for f in question.freedoms
                 if f.name == r.name
@@ -297,7 +301,7 @@ def _blocked(question: Question, branches: Branches, rows: Flags, good: Flags) -
         BlockedBranch(question.branch_name(i), branches.q[i].copy(), violations_of(question, branches.q[i]))
         for i in order
     )
-    redundancy = redundancy_of(question, branches, order[:1], np.flatnonzero(rows).tolist())[0]
+    redundancy = redundancy_of(question, branches, order[:1], rows)[1]
     others = int(select(branches.q, np.where(good, 0.0, math.inf))[1])
     return _result(
         question,
@@ -331,7 +335,7 @@ def _compromise(question: Question, branches: Branches, asked: Flags) -> IKResul
     approach_q, approach_stats = measure(question, branches.q, code=APPROACH)
     possible = asked & is_closed(approach_stats)
     rows = possible & (stats[:, OVERRUN] == 0.0) if question.respect else possible
-    solutions = _wrap_up(question, branches, rows, np.abs(stats[:, ROLL]), "roll")
+    solutions, _ = _wrap_up(question, branches, rows, np.abs(stats[:, ROLL]), "roll")
     nearest = search.nearest_orientation(question, branches.q if rows.any() else None)
     if nearest is not None and (question.branches is None or question.allows(question.branch_of(nearest.q))):
         solutions += (nearest,)

@@ -9,13 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from functools import lru_cache
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kin.errors import InputError
 from kin.results import Task
+from kin.rigid import straighten
 from kin.robot import Robot
 from kin.solvers import Match, solver_for
 from kin.solvers.common import APPROACH, MASK, POSE, POSITION, TASK_CODES, TURN, Freedom
@@ -31,6 +33,7 @@ PREFERENCES: tuple[Preference, ...] = ("nearest", "limits", "manipulability")
 MASK_NAMES = ("x", "y", "z", "rx", "ry", "rz")
 ALL = (1.0,) * 6
 _FAR = 1e6
+_WHOLE = np.array([*ALL, 0.0])
 # Masks that are one of the three tasks with a closed form; the first and the last in either frame.
 _CANONICAL: dict[tuple[bool, ...], int] = {
     (True,) * 6: POSE,
@@ -131,30 +134,26 @@ def ask(
         raise InputError("prefer", prefer, "one of " + ", ".join(f'"{p}"' for p in PREFERENCES))
     task_name, code, weights = _task(task, mask, mask_frame)
     T = _target(target, code)
-    if q_seed is None:
-        seed = robot.q_home.copy()
-    else:
-        seed = np.array(robot.check_q(q_seed, "q_seed"))
-        if seed.ndim != 1:
-            raise InputError("q_seed", f"shape {seed.shape}", f"one configuration of {robot.n} values")
-    lower, upper = robot.lower.copy(), robot.upper.copy()
-    locks = (False,) * robot.n
+    usual = _usual(robot)
+    seed = usual.home if q_seed is None else _seed(robot, q_seed)
+    lower, upper, locks = usual.lower, usual.upper, usual.locked
     if limits is not None or locked is not None:
         if not respect_limits:
             raise InputError("respect_limits", False, "true when limits or locked joints are given")
         if limits is not None:
             lower, upper = _narrowed(robot, limits)
         if locked is not None:
+            lower, upper = lower.copy(), upper.copy()
             locks = _locked(robot, locked, lower, upper)
     match = solver_for(robot)
     handled = match is not None and match.solver.handles(match.geometry, code)
     freedoms = match.solver.freedoms(match.geometry, code) if match is not None and handled else ()
     values = _values(robot, redundancy, freedoms)
-    turns = np.where(robot.revolute, TURN, 0.0)
+    turns = usual.turns
     for freedom, value in zip(freedoms, values, strict=True):
         if freedom.joint >= 0 and not math.isnan(value):
+            turns = turns.copy()
             turns[freedom.joint] = 0.0
-    anywhere = robot.revolute & (not respect_limits)
     return Question(
         robot=robot,
         T=T,
@@ -166,8 +165,8 @@ def ask(
         upper=upper,
         locked=locks,
         turns=turns,
-        low=np.where(anywhere, -TURN, lower),
-        high=np.where(anywhere, TURN, upper),
+        low=lower if respect_limits else usual.low,
+        high=upper if respect_limits else usual.high,
         respect=respect_limits,
         match=match,
         freedoms=freedoms,
@@ -179,6 +178,37 @@ def ask(
     )
 
 
+class _Usual(NamedTuple):
+    """What most questions about a robot share. The kernels take writable arrays only, so these are, but nobody
+    writes to the arrays of a question."""
+
+    home: Array
+    lower: Array
+    upper: Array
+    low: Array
+    high: Array
+    turns: Array
+    locked: tuple[bool, ...]
+
+
+@lru_cache(maxsize=256)
+def _usual(robot: Robot) -> _Usual:
+    lower, upper, turns = robot.lower.copy(), robot.upper.copy(), np.where(robot.revolute, TURN, 0.0)
+    low, high = np.where(robot.revolute, -TURN, lower), np.where(robot.revolute, TURN, upper)
+    return _Usual(robot.q_home.copy(), lower, upper, low, high, turns, (False,) * robot.n)
+
+
+def _seed(robot: Robot, q_seed: ArrayLike) -> Array:
+    if type(q_seed) is np.ndarray and q_seed.shape == robot.q_shape and q_seed.dtype == np.float64:
+        seed = q_seed.copy()
+        if all(map(math.isfinite, seed.tolist())):
+            return seed
+    seed = np.array(robot.check_q(q_seed, "q_seed"))
+    if seed.ndim != 1:
+        raise InputError("q_seed", f"shape {seed.shape}", f"one configuration of {robot.n} values")
+    return seed
+
+
 def _task(task: str, mask: Sequence[bool] | None, frame: str) -> tuple[str, int, Array]:
     """Name, code and mask weights of what must be met."""
     if task not in TASK_CODES or task == "mask":
@@ -186,7 +216,7 @@ def _task(task: str, mask: Sequence[bool] | None, frame: str) -> tuple[str, int,
     if frame not in ("tool", "base"):
         raise InputError("mask_frame", frame, 'one of "tool", "base"')
     if mask is None:
-        return task, TASK_CODES[task], np.array([*ALL, 0.0])
+        return task, TASK_CODES[task], _WHOLE
     if task != "pose":
         raise InputError("task", task, "no task besides a mask")
     flags = tuple(mask) if isinstance(mask, Sequence | np.ndarray) and not isinstance(mask, str) else ()
@@ -203,12 +233,21 @@ def _task(task: str, mask: Sequence[bool] | None, frame: str) -> tuple[str, int,
 
 
 def _target(target: ArrayLike, code: int) -> Array:
-    if code == POSITION and np.shape(target) == (3,):
+    T = np.empty((4, 4))
+    if (
+        type(target) is np.ndarray
+        and target.shape == (4, 4)
+        and target.dtype == np.float64
+        and target.flags.carray
+    ):
+        if not straighten(target, T):
+            T = as_transform(target)  # which tells what is wrong
+    elif code == POSITION and np.shape(target) == (3,):
         T = np.eye(4)
         T[:3, 3] = finite_array("target", target, (3,))
     else:
         T = as_transform(target)
-    if float(np.abs(T[:3, 3]).max()) > _FAR:
+    if max(abs(T.item(3)), abs(T.item(7)), abs(T.item(11))) > _FAR:
         raise InputError("target position", T[:3, 3].tolist(), "coordinates below 1e6 m")
     return T
 

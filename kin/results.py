@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from kin.solvers.singular import Singularity
 from kin.transforms import Array
@@ -39,8 +39,7 @@ class Status(StrEnum):
     UNREACHABLE = "unreachable"
 
 
-@dataclass(frozen=True, slots=True)
-class Redundancy:
+class Redundancy(NamedTuple):
     """A parameter the task leaves free: id, label, the value used, and all values the limits allow.
 
     Of several free parameters each is told with the others held at their values. An angle that is no joint's value
@@ -53,7 +52,7 @@ class Redundancy:
     intervals: tuple[tuple[float, float], ...]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class IKSolution:
     """One configuration, with what forward kinematics says about it.
 

@@ -8,6 +8,7 @@ them: the smallest singular value of the Jacobian, the least speed of the tool t
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
 import numpy as np
@@ -24,14 +25,15 @@ from kin.transforms import Array
 __all__ = ["Singularity", "singularities"]
 
 
-def singularities(robot: Robot, q: ArrayLike) -> tuple[Singularity, ...]:
+def singularities(robot: Robot, q: ArrayLike, within: float = math.inf) -> tuple[Singularity, ...]:
     """Every way in which the configuration `q` ``(n,)`` may be singular, the nearest first.
 
     To put angles and lengths in one order, a length counts as the angle at which it is seen from the arm's reach:
     metres divided by `Robot.reach`. Of equals, what costs a motion comes before what only the closed form loses.
 
     An arm of the 5-joint family is judged by its task, the tool's point and approach direction; 7-joint arms by
-    the whole pose. An arm without a closed form has one entry of kind ``"jacobian"``, see `task_jacobian`.
+    the whole pose. Only those `within` a distance are told. An arm without a closed form has one entry of kind
+    ``"jacobian"``, see `task_jacobian`.
 
     Raises:
         InputError: q is not one configuration.
@@ -39,10 +41,18 @@ def singularities(robot: Robot, q: ArrayLike) -> tuple[Singularity, ...]:
     q = robot.check_q(q)
     if q.ndim != 1:
         raise InputError("q", f"shape {q.shape}", f"one configuration of {robot.n} values")
+    return singularities_at(robot, q, within)
+
+
+def singularities_at(robot: Robot, q: Array, within: float) -> tuple[Singularity, ...]:
+    """`singularities` of a configuration ``(n,)`` that is known to be sound."""
     match = solver_for(robot)
     if match is None:
-        return (_by_jacobian(robot, q),)
-    found: tuple[Singularity, ...] = match.solver.singularities(match.geometry, q)
+        least = _by_jacobian(robot, q)
+        return (least,) if least.distance <= within else ()
+    found = match.solver.singularities(match.geometry, q, within)
+    if len(found) < 2:
+        return found
     return tuple(sorted(found, key=lambda s: s.distance / (robot.reach if s.unit == "m" else 1.0)))
 
 

@@ -3,12 +3,14 @@
 A solver module offers ``NAME``, ``TITLE``, ``BRANCHES`` (names, one per row of its answers), ``match(robot)`` (its
 geometry, or None if the arm is of another family), ``handles(geometry, task)``, ``freedoms(geometry, task)`` (what
 the task leaves free), ``solve(geometry, problem) -> Candidates``, ``branch_of(geometry, q)`` (a row of `BRANCHES`)
-and ``singularities(geometry, q)``. It never verifies, filters or sorts: :mod:`kin.ik` does that once for all.
+and ``singularities(geometry, q, within)``. It never verifies, filters or sorts: :mod:`kin.ik` does that once for
+all.
 Which family an arm belongs to is read off its axes, never off its name.
 """
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import Any, NamedTuple, Protocol, cast
 
@@ -36,7 +38,7 @@ class Solver(Protocol):
 
     def branch_of(self, geometry: Any, q: Array) -> int: ...
 
-    def singularities(self, geometry: Any, q: Array) -> tuple[Singularity, ...]: ...
+    def singularities(self, geometry: Any, q: Array, within: float = math.inf) -> tuple[Singularity, ...]: ...
 
 
 class Match(NamedTuple):

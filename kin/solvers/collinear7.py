@@ -46,7 +46,7 @@ from kin.solvers.common import (
     zyz,
     zyz_breaks,
 )
-from kin.solvers.singular import Singularity, at, off_line, off_square, stretch
+from kin.solvers.singular import Entry, Singularity, at, off_line, off_square, stretch, those_within
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -302,7 +302,7 @@ def branch_of(geometry: Geometry, q: Array) -> int:
     return 4 * int(math.cos(t[2]) * s4 < 0.0) + 2 * int(s4 < 0.0) + int(math.sin(t[5]) < 0.0)
 
 
-def singularities(geometry: Geometry, q: Array) -> tuple[Singularity, ...]:
+def singularities(geometry: Geometry, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
     """How far a configuration ``(7,)`` is from each of the arm's singularities.
 
     The three are the factors of the determinant without joint 2, d3 d5² s4² c3 s6: there are no others. s4 counts
@@ -311,29 +311,32 @@ def singularities(geometry: Geometry, q: Array) -> tuple[Singularity, ...]:
     g = geometry
     t = (q + g.offset).tolist()
     shoulder, elbow, wrist = off_square(t[2]), off_line(t[3]), off_line(t[5])
-    found = (
-        Singularity(
+    entries: list[Entry] = [
+        (
             "elbow",
-            f"elbow {stretch(t[3])} ({at(4, q[3], elbow)}): the hand cannot shift along the arm",
             abs(elbow),
             "rad",
+            lambda: f"elbow {stretch(t[3])} ({at(4, q[3], elbow)}): the hand cannot shift along the arm",
         ),
-        Singularity(
+        (
             "shoulder",
-            f"forearm in one plane with axis 1 ({at(3, q[2], shoulder)}): the hand cannot shift along the forearm",
             abs(shoulder),
             "rad",
+            lambda: (
+                f"forearm in one plane with axis 1 ({at(3, q[2], shoulder)}): "
+                "the hand cannot shift along the forearm"
+            ),
         ),
-        Singularity(
+        (
             "wrist",
-            f"hand in line with the forearm ({at(6, q[5], wrist)}): joints 5 and 7 turn about one line",
             abs(wrist),
             "rad",
+            lambda: f"hand in line with the forearm ({at(6, q[5], wrist)}): joints 5 and 7 turn about one line",
         ),
-    )
-    if g.d5 < g.d3 - TOLERANCES.geometry:
-        return found
-    # Only a forearm at least as long as the upper arm gets back to axis 1; then θ3 is square, too.
-    across, along = g.d5 * math.sin(t[3]) * math.cos(t[2]), g.d3 + g.d5 * math.cos(t[3])
-    meaning = "wrist centre on axis 1: the closed form takes θ1 + θ2 from the seed"
-    return (*found, Singularity("algorithmic", meaning, math.hypot(across, along), "m"))
+    ]
+    if g.d5 >= g.d3 - TOLERANCES.geometry:
+        # Only a forearm at least as long as the upper arm gets back to axis 1; then θ3 is square, too.
+        across, along = g.d5 * math.sin(t[3]) * math.cos(t[2]), g.d3 + g.d5 * math.cos(t[3])
+        meaning = "wrist centre on axis 1: the closed form takes θ1 + θ2 from the seed"
+        entries.append(("algorithmic", math.hypot(across, along), "m", lambda: meaning))
+    return those_within(within, *entries)

@@ -8,10 +8,12 @@ that a person can picture, which a singular value or a determinant is not.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
 Kind = Literal["elbow", "shoulder", "wrist", "algorithmic", "jacobian"]
+Entry = tuple[Kind, float, str, Callable[[], str]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +33,11 @@ class Singularity:
     meaning: str
     distance: float
     unit: str
+
+
+def those_within(reach: float, *entries: Entry) -> tuple[Singularity, ...]:
+    """The entries (kind, distance, unit, meaning) no farther than `reach`; only these are put in words."""
+    return tuple([Singularity(kind, meaning(), far, unit) for kind, far, unit, meaning in entries if far <= reach])
 
 
 def off_line(t: float) -> float:

@@ -48,7 +48,7 @@ from kin.solvers.common import (
     zyz,
     zyz_breaks,
 )
-from kin.solvers.singular import Singularity, at, off_line, off_square, stretch
+from kin.solvers.singular import Singularity, at, off_line, off_square, stretch, those_within
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -360,7 +360,7 @@ def branch_of(geometry: Geometry, q: Array) -> int:
     return 4 * int(s[1] < 0.0) + 2 * int(s[3] < 0.0) + int(s[5] < 0.0)
 
 
-def singularities(geometry: Geometry, q: Array) -> tuple[Singularity, ...]:
+def singularities(geometry: Geometry, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
     """How far a configuration ``(7,)`` is from each of the arm's singularities.
 
     √det(J Jᵀ) = d3 d5 |s4| |m|, where m spans the motions that keep the tool still. With s4 ≠ 0 it vanishes for
@@ -370,41 +370,48 @@ def singularities(geometry: Geometry, q: Array) -> tuple[Singularity, ...]:
     t = (q + g.offset).tolist()
     shoulder, across3, elbow = off_line(t[1]), off_square(t[2]), off_line(t[3])
     across5, wrist = off_square(t[4]), off_line(t[5])
-    at2, at6 = at(2, q[1], shoulder), at(6, q[5], wrist)
     side, along = g.d5 * math.sin(t[3]), g.d3 + g.d5 * math.cos(t[3])
     x = math.cos(t[1]) * math.cos(t[2]) * side + math.sin(t[1]) * along
-    return (
-        Singularity(
+    return those_within(
+        within,
+        (
             "elbow",
-            f"elbow {stretch(t[3])} ({at(4, q[3], elbow)}): the hand cannot shift along the arm",
             abs(elbow),
             "rad",
+            lambda: f"elbow {stretch(t[3])} ({at(4, q[3], elbow)}): the hand cannot shift along the arm",
         ),
-        Singularity(
+        (
             "shoulder",
-            f"upper arm on axis 1, axes 2 and 4 square ({at2}, {at(3, q[2], across3)}): "
-            "the hand cannot shift along the forearm",
             math.hypot(shoulder, across3),
             "rad",
+            lambda: (
+                f"upper arm on axis 1, axes 2 and 4 square ({at(2, q[1], shoulder)}, {at(3, q[2], across3)}): "
+                "the hand cannot shift along the forearm"
+            ),
         ),
-        Singularity(
+        (
             "wrist",
-            f"hand in line with the forearm, axes 4 and 6 square ({at6}, {at(5, q[4], across5)}): "
-            "the hand cannot shift along the upper arm",
             math.hypot(wrist, across5),
             "rad",
+            lambda: (
+                f"hand in line with the forearm, axes 4 and 6 square ({at(6, q[5], wrist)}, "
+                f"{at(5, q[4], across5)}): the hand cannot shift along the upper arm"
+            ),
         ),
-        Singularity(
+        (
             "wrist",
-            f"upper arm on axis 1 and hand in line with the forearm ({at2}, {at6}): "
-            "joints 1 and 3 turn about one line, joints 5 and 7 about another",
             math.hypot(shoulder, wrist),
             "rad",
+            lambda: (
+                f"upper arm on axis 1 and hand in line with the forearm "
+                f"({at(2, q[1], shoulder)}, {at(6, q[5], wrist)}): "
+                "joints 1 and 3 turn about one line, joints 5 and 7 about another"
+            ),
         ),
-        Singularity(
+        (
             "algorithmic",
-            "wrist centre on axis 1: the arm angle ψ loses its reference, the arm no motion",
             math.hypot(x, math.sin(t[2]) * side),
             "m",
+            lambda: "wrist centre on axis 1: the arm angle ψ loses its reference, the arm no motion",
         ),
     )

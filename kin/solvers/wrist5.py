@@ -47,7 +47,7 @@ from kin.solvers.common import (
     to_canonical,
     wrap,
 )
-from kin.solvers.singular import Singularity, at, off_line, stretch
+from kin.solvers.singular import Singularity, at, off_line, stretch, those_within
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -266,7 +266,7 @@ def branch_of(geometry: Geometry, q: Array) -> int:
     return 4 * int(reach < 0.0) + 2 * int(math.sin(t[2]) < 0.0) + int(math.sin(t[4]) < 0.0)
 
 
-def singularities(geometry: Geometry, q: Array) -> tuple[Singularity, ...]:
+def singularities(geometry: Geometry, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
     """How far a configuration ``(5,)`` is from each of the arm's singularities, as point and approach task.
 
     The three are the factors of the determinant, −a2 d4 s3 (a1 + a2 c2 + d4 c23) s5: there are no others.
@@ -275,18 +275,19 @@ def singularities(geometry: Geometry, q: Array) -> tuple[Singularity, ...]:
     t = (q + g.offset).tolist()
     elbow, wrist = off_line(t[2]), off_line(t[4])
     reach = g.a1 + g.a2 * math.cos(t[1]) + g.d4 * math.cos(t[1] + t[2])
-    return (
-        Singularity(
+    return those_within(
+        within,
+        (
             "elbow",
-            f"elbow {stretch(t[2])} ({at(3, q[2], elbow)}): the wrist centre cannot move along the arm",
             abs(elbow),
             "rad",
+            lambda: f"elbow {stretch(t[2])} ({at(3, q[2], elbow)}): the wrist centre cannot move along the arm",
         ),
-        Singularity("shoulder", "wrist centre on axis 1: it cannot move sideways", abs(reach), "m"),
-        Singularity(
+        ("shoulder", abs(reach), "m", lambda: "wrist centre on axis 1: it cannot move sideways"),
+        (
             "wrist",
-            f"tool in line with the forearm ({at(5, q[4], wrist)}): it cannot tilt sideways",
             abs(wrist),
             "rad",
+            lambda: f"tool in line with the forearm ({at(5, q[4], wrist)}): it cannot tilt sideways",
         ),
     )
