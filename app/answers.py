@@ -200,6 +200,8 @@ class IkAnswer(TypedDict):
     """What was asked of the tool."""
     solver: str
     """Name of the method that answered."""
+    solver_reason: str
+    """Why it was this one."""
     solutions: list[Solution]
     """Nearest to the seed first, or in the order of `prefer`; empty unless "solved" or "approximate"."""
     closest: Solution | None
@@ -447,6 +449,7 @@ def ik_answer(result: IKResult) -> IkAnswer:
         "reason": result.reason,
         "task": cast(Literal["pose", "approach", "position", "mask"], result.task),
         "solver": result.solver,
+        "solver_reason": result.solver_reason,
         "solutions": [_solution(solution) for solution in result.solutions],
         "closest": None if result.closest is None else _solution(result.closest),
         "nearest_orientation": None

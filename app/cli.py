@@ -225,6 +225,10 @@ def _parser() -> argparse.ArgumentParser:
         help="how to choose and sort: nearest to the seed (default), farthest from the limits, most manipulable",
     )  # fmt: skip
     ik.add_argument(
+        "--solver", choices=("auto", "numeric"), default="auto",
+        help="numeric: descend from many starts, even where the arm has a closed form",
+    )  # fmt: skip
+    ik.add_argument(
         "--mask", nargs="+", choices=("x", "y", "z", "rx", "ry", "rz"), metavar="COORDINATE",
         help="instead of a task: which of x y z rx ry rz must be met",
     )  # fmt: skip

@@ -70,6 +70,7 @@ def ik(arguments: Namespace) -> int:
         branch=arguments.branch,
         images=arguments.images,
         prefer=arguments.prefer,
+        solver=arguments.solver,
         mask=None if arguments.mask is None else [name in arguments.mask for name in MASK_NAMES],
         mask_frame=arguments.mask_frame,
     )

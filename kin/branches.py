@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kin.finish import DISTANCE, OVERRUN, POSITION_ERROR, ROTATION_ERROR, finish, ranges
+from kin.finish import POSITION_ERROR, ROTATION_ERROR, finish, ranges
 from kin.finish import Flags as Flags
 from kin.fk import fk
 from kin.question import Question
@@ -102,28 +102,10 @@ def solution(
     """A row as a result; its branch is worked out where it is not known."""
     q = q.copy()
     q.flags.writeable = False
-    return named(question, q, stats.tolist(), question.branch_of(q) if branch is None else branch, (), compromise)
-
-
-def named(
-    question: Question,
-    q: Array,
-    stats: list[float],
-    branch: int,
-    redundancy: tuple[Redundancy, ...],
-    compromise: str | None = None,
-) -> IKSolution:
-    """A read-only row of a known branch as a result."""
-    return IKSolution(
-        q,
-        question.branch_name(branch),
-        stats[POSITION_ERROR],
-        stats[ROTATION_ERROR],
-        stats[OVERRUN] == 0.0,
-        stats[DISTANCE],
-        redundancy,
-        compromise,
-    )
+    branch = question.branch_of(q) if branch is None else branch
+    position, rotation, distance, overrun, _ = stats.tolist()
+    name = question.branch_name(branch)
+    return IKSolution(q, name, position, rotation, overrun == 0.0, distance, (), compromise)
 
 
 def redundancy_of(

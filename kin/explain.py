@@ -28,6 +28,17 @@ def solved(count: int, task: str, redundant: bool) -> str:
     return f"Reached: {ways}{family} for this {_WHAT[task]}."
 
 
+def solver(question: Question, used: str) -> str:
+    """Why the answer comes from the solver it comes from."""
+    match = question.match
+    if match is None:
+        none = "no closed form fits this arm's axes" if question.wanted == "auto" else "asked for"
+        return f"{none}: numeric descent from many starts"
+    if used != match.solver.NAME:
+        return f"the closed form ({match.solver.NAME}) does not cover this task or target: numeric descent"
+    return match.reason
+
+
 def singular(found: tuple[Singularity, ...], shown: bool) -> str:
     """A further sentence if the configuration is singular; `shown`: it is the answer, not the closest one."""
     real = [s for s in found if s.kind != "algorithmic"]

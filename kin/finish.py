@@ -187,3 +187,18 @@ def select(q: Array, key: Array) -> tuple[Whole, int]:
             kept[count] = i
             count += 1
     return kept, count
+
+
+@jit
+def take(q: Array, stats: Array, rows: Flags, key: Array, q_out: Array, stats_out: Array) -> tuple[Whole, int]:
+    """q_out, stats_out ← the flagged rows by rising key, equal ones once: (their indices, count)."""
+    left = np.empty(q.shape[0])
+    for k in range(q.shape[0]):
+        left[k] = key[k] if rows[k] else math.inf
+    kept, count = select(q, left)
+    for k in range(count):
+        for j in range(q.shape[1]):
+            q_out[k, j] = q[kept[k], j]
+        for j in range(stats.shape[1]):
+            stats_out[k, j] = stats[kept[k], j]
+    return kept, count

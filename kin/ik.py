@@ -25,16 +25,15 @@ from kin.branches import (
     Flags,
     is_closed,
     measure,
-    named,
     redundancy_of,
     solution,
     solve_branches,
     violations_of,
 )
 from kin.errors import InputError
-from kin.finish import DISTANCE, OVERRUN, ROLL, judge, select
+from kin.finish import DISTANCE, OVERRUN, ROLL, judge, select, take
 from kin.fk import fk
-from kin.question import Frame, Images, Limits, Locks, Preference, Question, ask
+from kin.question import Frame, Images, Limits, Locks, Preference, Question, Solver, ask
 from kin.results import BlockedBranch, Cause, IKResult, IKSolution, Redundancy, Status, Task
 from kin.robot import Robot
 from kin.singularity import Singularity, singularities_at
@@ -62,6 +61,7 @@ def solve_ik(
     prefer: Preference = "nearest",
     redundancy: float | Mapping[str, float] | None = None,
     max_solutions: int | None = None,
+    solver: Solver = "auto",
 ) -> IKResult:
     """All configurations that bring the tool to `target`, or why there are none.
 
@@ -84,6 +84,7 @@ def solve_ik(
         redundancy: values for free parameters by name (``{"psi": 0.3}``), radians, instead of a choice; a bare
             number is for the first one.
         max_solutions: at most this many, the best first.
+        solver: ``"numeric"`` to do without the arm's closed form.
 
     Raises:
         InputError: a malformed target, seed or option. An unreachable target is not an error.
@@ -104,6 +105,7 @@ def solve_ik(
             prefer=prefer,
             redundancy=redundancy,
             max_solutions=max_solutions,
+            solver=solver,
         )
     )
 
@@ -148,8 +150,10 @@ def answer(question: Question) -> IKResult:
     branches = solve_branches(question, question.T, question.code)
     if branches is None:
         return _numeric(question)
-    closed, good = np.empty(len(branches.q), dtype=bool), np.empty(len(branches.q), dtype=bool)
+    closed, good = np.empty((2, len(branches.q)), dtype=bool)
     count = judge(branches.stats, question.respect, closed, good)
+    if count > 0 and question.branches is None:
+        return _solved(question, branches, good)
     if count == 0 and not question.given:  # a value that was asked for is not for a descent to change
         good = search.polish(question, branches)
         closed |= good
@@ -199,6 +203,7 @@ def _result(
         solutions=solutions[: question.max_solutions],
         closest=closest,
         solver=solver,
+        solver_reason=explain.solver(question, solver),
         task=question.task,
         blocked=blocked,
         distance=distance,
@@ -238,15 +243,19 @@ def _wrap_up(
     question: Question, branches: Branches, rows: Flags, key: Array, compromise: str | None = None
 ) -> tuple[tuple[IKSolution, ...], tuple[Redundancy, ...]]:
     """The chosen rows as named solutions, by rising key, each posture once; and what is free for all together."""
-    kept, count = select(branches.q, np.where(rows, key, math.inf))
+    q, stats = np.empty_like(branches.q), np.empty_like(branches.stats)
+    kept, count = take(branches.q, branches.stats, rows, key, q, stats)
     order: list[int] = kept[:count].tolist()
     free, together = redundancy_of(question, branches, order, rows)
-    q = branches.q[order]
     q.flags.writeable = False
+    assert question.match is not None  # whose branches these are
+    names = question.match.solver.BRANCHES
     return tuple(
         [
-            named(question, row, figures, i, own, compromise)
-            for row, figures, i, own in zip(q, branches.stats[order].tolist(), order, free, strict=True)
+            IKSolution(row, names[i], position, rotation, overrun == 0.0, distance, own, compromise)
+            for row, (position, rotation, distance, overrun, _), i, own in zip(
+                q, stats[:count].tolist(), order, free, strict=False
+            )
         ]
     ), together
 

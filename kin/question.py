@@ -26,6 +26,7 @@ from kin.transforms import Array, as_transform, finite_array
 
 Frame = Literal["tool", "base"]
 Images = Literal["nearest", "all"]
+Solver = Literal["auto", "numeric"]
 Preference = Literal["nearest", "limits", "manipulability"]
 Limits = Sequence[Sequence[float] | None]
 Locks = Sequence[float | None]
@@ -61,6 +62,7 @@ class Question:
         values: one per freedom, NaN to let it be chosen.
         branches: the rows asked for, None for all.
         all_images, prefer, max_solutions: which answers are wanted.
+        wanted: the solver asked for, ``"auto"`` or ``"numeric"`` (then `match` is None).
     """
 
     robot: Robot
@@ -81,6 +83,7 @@ class Question:
     values: tuple[float, ...]
     branches: frozenset[int] | None
     all_images: bool
+    wanted: str
     prefer: str
     max_solutions: int | None
 
@@ -122,6 +125,7 @@ def ask(
     prefer: Preference = "nearest",
     redundancy: float | Mapping[str, float] | None = None,
     max_solutions: int | None = None,
+    solver: Solver = "auto",
 ) -> Question:
     """Check every argument of `kin.solve_ik`, which explains them; raises `InputError` naming the wrong one."""
     if max_solutions is not None and (
@@ -145,7 +149,9 @@ def ask(
         if locked is not None:
             lower, upper = lower.copy(), upper.copy()
             locks = _locked(robot, locked, lower, upper)
-    match = solver_for(robot)
+    if solver not in ("auto", "numeric"):
+        raise InputError("solver", solver, 'one of "auto", "numeric"')
+    match = solver_for(robot) if solver == "auto" else None
     handled = match is not None and match.solver.handles(match.geometry, code)
     freedoms = match.solver.freedoms(match.geometry, code) if match is not None and handled else ()
     values = _values(robot, redundancy, freedoms)
@@ -173,6 +179,7 @@ def ask(
         values=values,
         branches=None if branch is None else _branches(robot, match, branch, seed),
         all_images=images == "all",
+        wanted=solver,
         prefer=prefer,
         max_solutions=max_solutions,
     )

@@ -112,6 +112,7 @@ class IKResult:
         nearest_orientation: the configuration with the exact point and the least rotation error (status
             ``orientation``), None if none was found.
         blocked: every branch that only the limits forbid, the least offending first (status ``limits``).
+        solver, solver_reason: what found the answer, and why it was chosen.
         distance: metres by which the point is out of reach, 0 if the point itself can be reached.
         redundancy: what the task leaves free: the best solution's values, with the ranges of all branches.
         singularities: those the configuration in `best` is at.
@@ -123,6 +124,7 @@ class IKResult:
     solutions: tuple[IKSolution, ...]
     closest: IKSolution | None
     solver: str
+    solver_reason: str
     task: str
     blocked: tuple[BlockedBranch, ...] = ()
     distance: float = 0.0

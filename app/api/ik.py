@@ -102,6 +102,9 @@ class IkRequest(Asked):
         description="Values in radians for free parameters by name, such as `psi` (see `redundancy` in the "
         "answers); a bare number is for the first one. By default the feasible value chosen by `prefer`.",
     )
+    solver: Literal["auto", "numeric"] = Field(
+        "auto", description="numeric: descend from many starts, even where the arm has a closed form."
+    )
 
 
 @documented
@@ -152,6 +155,7 @@ def inverse_kinematics(
                     prefer=body.prefer,
                     max_solutions=body.max_solutions,
                     redundancy=body.redundancy,
+                    solver=body.solver,
                 )
             )
             for (task, T), seed in zip(questions[some], seeds[some], strict=True)

@@ -1,10 +1,10 @@
 """The registry of closed-form solvers: one module, one row each, in order of preference.
 
 A solver module offers ``NAME``, ``TITLE``, ``BRANCHES`` (names, one per row of its answers), ``match(robot)`` (its
-geometry, or None if the arm is of another family), ``handles(geometry, task)``, ``freedoms(geometry, task)`` (what
-the task leaves free), ``solve(geometry, problem) -> Candidates``, ``branch_of(geometry, q)`` (a row of `BRANCHES`)
-and ``singularities(geometry, q, within)``. It never verifies, filters or sorts: :mod:`kin.ik` does that once for
-all.
+geometry, or None if the arm is of another family), ``why(geometry)`` (a clause that says so), ``handles(geometry,
+task)``, ``freedoms(geometry, task)`` (what the task leaves free), ``solve(geometry, problem) -> Candidates``,
+``branch_of(geometry, q)`` (a row of `BRANCHES`) and ``singularities(geometry, q, within)``. It never verifies,
+filters or sorts: :mod:`kin.ik` does that once for all.
 Which family an arm belongs to is read off its axes, never off its name.
 """
 
@@ -30,6 +30,8 @@ class Solver(Protocol):
 
     def match(self, robot: Robot) -> Any: ...
 
+    def why(self, geometry: Any) -> str: ...
+
     def handles(self, geometry: Any, task: int) -> bool: ...
 
     def solve(self, geometry: Any, problem: Problem) -> Candidates: ...
@@ -42,10 +44,11 @@ class Solver(Protocol):
 
 
 class Match(NamedTuple):
-    """A solver together with the geometry it found in a robot."""
+    """A solver together with the geometry it found in a robot, and what it knows the arm by."""
 
     solver: Solver
     geometry: Any
+    reason: str
 
 
 SOLVERS: tuple[Solver, ...] = tuple(cast(Solver, module) for module in (wrist5, srs7, collinear7))
@@ -57,5 +60,5 @@ def solver_for(robot: Robot) -> Match | None:
     for solver in SOLVERS:
         geometry = solver.match(robot)
         if geometry is not None:
-            return Match(solver, geometry)
+            return Match(solver, geometry, solver.why(geometry))
     return None

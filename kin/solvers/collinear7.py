@@ -285,6 +285,11 @@ def solve(geometry: Geometry, problem: Problem) -> Candidates:
     return Candidates(out[:, :7], out[:, 7:8], (arcs[:count],), gap, obstacle)
 
 
+def why(geometry: Geometry) -> str:
+    """What makes an arm one of this family."""
+    return "axes 1 and 2 are one line, axis 3 leaves it squarely, and axes 5, 6, 7 meet in one point"
+
+
 def handles(geometry: Geometry, task: int) -> bool:
     """Poses, and an approach direction when it passes through the wrist centre."""
     return task == POSE or (task == APPROACH and geometry.tool_on_axis)

@@ -152,7 +152,8 @@ def zyz_breaks(
     Angles whose limits span a whole turn never bind.
     """
     for side in range(2):
-        if high[first] - low[first] < TURN:
+        # A joint held still has one stop, not two.
+        if high[first] - low[first] < TURN and (side == 0 or high[first] > low[first]):
             t = low[first] if side == 0 else high[first]
             c, s = math.cos(t), math.sin(t)
             count = add_roots(
@@ -162,10 +163,10 @@ def zyz_breaks(
                 breaks,
                 count,
             )
-        if high[first + 1] - low[first + 1] < TURN:
+        if high[first + 1] - low[first + 1] < TURN and (side == 0 or high[first + 1] > low[first + 1]):
             t = low[first + 1] if side == 0 else high[first + 1]
             count = add_roots(M1[2, 2], M2[2, 2], M0[2, 2] - math.cos(t), breaks, count)
-        if high[first + 2] - low[first + 2] < TURN:
+        if high[first + 2] - low[first + 2] < TURN and (side == 0 or high[first + 2] > low[first + 2]):
             t = low[first + 2] if side == 0 else high[first + 2]
             c, s = math.cos(t), math.sin(t)
             count = add_roots(

@@ -43,6 +43,7 @@ from kin.solvers.common import (
     nearest_in_arcs,
     screw_z,
     shifted,
+    split_sum,
     to_canonical,
     wrap,
     zyz,
@@ -63,6 +64,7 @@ BRANCHES = tuple(
     for w in ("no-flip", "flip")
 )
 _REACH = TOLERANCES.closure_position * 0.1
+_SINGULAR = TOLERANCES.singular
 _CALM = 0.05  # rad; a way shorter than this is calm
 
 
@@ -182,37 +184,56 @@ def _arm_angle(near: Array, frame: Array, d3: float, d5: float) -> float:
 
 
 @jit
-def _travel(angles: Array, near: Array, low: Array, high: Array, joints: int) -> float:
-    """Sum of the squared steps of the first `joints` joints from `near` to `angles`, each at its best image."""
+def _travel(angles: Array, near: Array, low: Array, high: Array, first: int, last: int) -> float:
+    """Sum of the squared steps of joints first…last−1 from `near` to `angles`, each at its best image."""
     total = 0.0
-    for i in range(joints):
+    for i in range(first, last):
         total += (nearest_image(angles[i], near[i], low[i], high[i]) - near[i]) ** 2
     return total
 
 
 @jit
-def _calmer(
-    M: Array, frame: Array, A: float, rho: float, d3: float, theta4: float, psi: float, s2: float, s6: float,
-    near: Array, low: Array, high: Array, respect: bool, holds: Array, n_holds: int, joints: int,
-    R03: Array, R47: Array, angles: Array,
-) -> float:  # fmt: skip
-    """ψ itself, or the arm angle that keeps some joint where it is, if that halves the way the joints go.
+def _weigh(
+    M0: Array, M1: Array, M2: Array, psi: float, near: Array, low: Array, high: Array, first: int, last: int,
+    column: int, angles: Array, misfits: Array, ways: Array, j: int,
+) -> None:  # fmt: skip
+    """misfits, ways [j, column + side] ← how far a spherical joint's angles at ψ are outside the limits, and their
+    squared steps from `near`, for either sign of sin B.
 
-    Beside s2 = 0 or s6 = 0 an elbow held still makes two joints spin against each other; an elbow that gives
-    way by as little as the target misses the alignment keeps them still. `angles` are those at ψ.
+    ``Rz(A) Ry(B) Rz(C) = M0 + M1 cos ψ + M2 sin ψ``; the other sign is A + π, −B, C + π. The steps of the joints
+    first…last−1 count.
     """
-    way = _travel(angles, near, low, high, joints)
-    if way < _CALM**2:
-        return psi
-    best = 0.25 * way
-    for j in range(n_holds):
-        _fill(M, frame, A, rho, d3, theta4, holds[j], s2, s6, near, low, high, R03, R47, angles)
-        if respect and misfit_of(angles, low, high, 0, joints) > 0.0:
-            continue
-        way = _travel(angles, near, low, high, joints)
-        if way < best:
-            best, psi = way, holds[j]
-    return psi
+    c, s = math.cos(psi), math.sin(psi)
+    x = M0[0, 2] + c * M1[0, 2] + s * M2[0, 2]
+    y = M0[1, 2] + c * M1[1, 2] + s * M2[1, 2]
+    z = M0[2, 2] + c * M1[2, 2] + s * M2[2, 2]
+    xx = M0[0, 0] + c * M1[0, 0] + s * M2[0, 0]
+    yx = M0[1, 0] + c * M1[1, 0] + s * M2[1, 0]
+    xy = M0[0, 1] + c * M1[0, 1] + s * M2[0, 1]
+    yy = M0[1, 1] + c * M1[1, 1] + s * M2[1, 1]
+    h = math.sqrt(x * x + y * y)
+    k = first + 2
+    if h < _SINGULAR:
+        sign = 1.0 if z > 0.0 else -1.0
+        total = math.atan2(sign * yx, sign * xx)
+        if z > 0.0:
+            A = split_sum(total, near[first], low[first], high[first], near[k], low[k], high[k])
+        else:
+            A = split_sum(total, near[first], low[first], high[first], -near[k], -high[k], -low[k])
+        ca, sa = math.cos(A), math.sin(A)
+    else:
+        A = math.atan2(y, x)
+        ca, sa = x / h, y / h
+    angles[first] = A
+    angles[first + 1] = math.atan2(h, z)
+    angles[k] = math.atan2(ca * yx - sa * xx, ca * yy - sa * xy)
+    for side in range(2):
+        misfits[j, column + side] = misfit_of(angles, low, high, first, first + 3)
+        ways[j, column + side] = _travel(angles, near, low, high, first, last)
+        if h >= _SINGULAR:
+            angles[first] += math.pi
+            angles[first + 1] = -angles[first + 1]
+            angles[k] += math.pi
 
 
 @jit
@@ -228,21 +249,23 @@ def _solve(
     B0, B1, B2 = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     angles = np.empty(7)
     breaks = np.empty(64)
-    probes = np.empty(130)
-    holds = np.empty(64)
-    misfits = np.empty((130, 4))
+    # Arm angles to look at: stops and the middles between them, then those at which some joint stays where it is.
+    looks = np.empty(160)
+    misfits, ways = np.empty((160, 4)), np.empty((160, 4))
     near, low, high = shifted(seed, offset), shifted(lower, offset), shifted(upper, offset)
     clear(out)
     to_canonical(T, inverse_base, inverse_tool, M)
     code, gap, _, A, rho, bend = _triangle(M, d3, d5, frame)
     if code != 0:
         return code, gap, 0
+    free = math.isnan(value)
     still = shifted(seed, offset)
     if free_roll:
         low[6], high[6] = -1e9, 1e9
         still[6] += 2.0 * math.pi  # a limit that spans a turn never binds
-    wish = _arm_angle(near, frame, d3, d5) if math.isnan(value) else value
-    if bend == 0.0 and math.isnan(value) and math.sin(near[3]) < 0.0:
+    joints = 6 if free_roll else 7
+    wish = _arm_angle(near, frame, d3, d5) if free else value
+    if bend == 0.0 and free and math.sin(near[3]) < 0.0:
         # A straight arm has no elbow side; the seed's, seen from the other sign of θ4, keeps θ3 and θ5 still.
         wish += math.pi
     found = 0
@@ -251,25 +274,23 @@ def _solve(
         if e == 1 and bend == 0.0:
             break
         elbow_misfit = excess(theta4, low[3], high[3])
+        elbow_way = (nearest_image(theta4, near[3], low[3], high[3]) - near[3]) ** 2
         n_probes = 0
-        n_holds = 0
         _rotations(M, frame, A, rho, d3, theta4, 0.0, 0.0, 1.0, A0, B0)
         _rotations(M, frame, A, rho, d3, theta4, 1.0, 0.0, 0.0, A1, B1)
         _rotations(M, frame, A, rho, d3, theta4, 0.0, 1.0, 0.0, A2, B2)
-        if math.isnan(value):
-            n_holds = zyz_breaks(A0, A1, A2, near, still, 0, holds, 0)
-            n_holds = zyz_breaks(B0, B1, B2, near, still, 4, holds, n_holds)
         if respect:
             count = zyz_breaks(A0, A1, A2, low, high, 0, breaks, 0)
             count = zyz_breaks(B0, B1, B2, low, high, 4, breaks, count)
-            n_probes = lay_probes(breaks, count, probes)
-        # Shoulder and wrist do not see each other: each is judged once per probe and sign.
-        for j in range(n_probes):
-            for side in range(2):
-                sign = 1.0 if side == 0 else -1.0
-                _fill(M, frame, A, rho, d3, theta4, probes[j], sign, sign, near, low, high, R03, R47, angles)
-                misfits[j, side] = elbow_misfit + misfit_of(angles, low, high, 0, 3)
-                misfits[j, 2 + side] = misfit_of(angles, low, high, 4, 7)
+            n_probes = lay_probes(breaks, count, looks)
+        n_looks = n_probes
+        if free:
+            n_looks = zyz_breaks(A0, A1, A2, near, still, 0, looks, n_looks)
+            n_looks = zyz_breaks(B0, B1, B2, near, still, 4, looks, n_looks)
+        # Shoulder and wrist do not see each other: each is judged once per arm angle and sign.
+        for j in range(n_looks):
+            _weigh(A0, A1, A2, looks[j], near, low, high, 0, 3, 0, angles, misfits, ways, j)
+            _weigh(B0, B1, B2, looks[j], near, low, high, 4, joints, 2, angles, misfits, ways, j)
         for si in range(2):
             for wi in range(2):
                 branch = 4 * si + 2 * e + wi
@@ -277,29 +298,35 @@ def _solve(
                 first = found
                 best = math.inf
                 for j in range(n_probes):
-                    misfit = misfits[j, si] + misfits[j, 2 + wi]
+                    misfit = elbow_misfit + misfits[j, si] + misfits[j, 2 + wi]
                     if misfit == 0.0 and found < arcs.shape[0]:
-                        found = extend_arcs(arcs, first, found, branch, probes, j, n_probes)
+                        found = extend_arcs(arcs, first, found, branch, looks, j, n_probes)
                     elif misfit < best and found == first:
                         best = misfit
-                        psi = probes[j]
-                if not math.isnan(value):
+                        psi = looks[j]
+                if not free:
                     psi = value
                 elif found > first:
                     psi = nearest_in_arcs(arcs, first, found, wish)
                 s2 = 1.0 if si == 0 else -1.0
                 s6 = 1.0 if wi == 0 else -1.0
                 _fill(M, frame, A, rho, d3, theta4, psi, s2, s6, near, low, high, R03, R47, angles)
-                if math.isnan(value):
-                    n_all = n_holds
-                    for k in range(first, min(found, first + 16)):
-                        holds[n_all], holds[n_all + 1] = arcs[k, 1], arcs[k, 2]
-                        n_all += 2
-                    psi = _calmer(
-                        M, frame, A, rho, d3, theta4, psi, s2, s6, near, low, high, respect, holds, n_all,
-                        6 if free_roll else 7, R03, R47, angles,
-                    )  # fmt: skip
-                    _fill(M, frame, A, rho, d3, theta4, psi, s2, s6, near, low, high, R03, R47, angles)
+                way = _travel(angles, near, low, high, 0, joints)
+                if free and way >= _CALM**2:
+                    # Beside s2 = 0 or s6 = 0 an elbow held still makes two joints spin against each other; one
+                    # that gives way by as little as the target misses the alignment keeps them still. So another
+                    # arm angle is taken if it halves the way the joints go.
+                    least = 0.25 * way
+                    calm = -1
+                    for j in range(n_looks):
+                        between = n_probes > 0 and j % 2 == 1 and j < n_probes
+                        outside = respect and elbow_misfit + misfits[j, si] + misfits[j, 2 + wi] > 0.0
+                        way = elbow_way + ways[j, si] + ways[j, 2 + wi]
+                        if way < least and not between and not outside:
+                            least, calm = way, j
+                    if calm >= 0:
+                        psi = looks[calm]
+                        _fill(M, frame, A, rho, d3, theta4, psi, s2, s6, near, low, high, R03, R47, angles)
                 for i in range(7):
                     out[branch, i] = wrap(angles[i] - offset[i])
                 if free_roll:
@@ -342,6 +369,11 @@ def _obstacle(code: int, g: Geometry) -> str:
     reach = g.d3 + g.d5 if code == 1 else abs(g.d3 - g.d5)
     word = "farther than" if code == 1 else "nearer than"
     return f"with this orientation the wrist centre is {word} {1e3 * reach:.0f} mm from the shoulder"
+
+
+def why(geometry: Geometry) -> str:
+    """What makes an arm one of this family."""
+    return "axes 1, 2, 3 meet in one point and axes 5, 6, 7 in another, with the elbow's axis square to both links"
 
 
 def handles(geometry: Geometry, task: int) -> bool:

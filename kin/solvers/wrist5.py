@@ -240,9 +240,15 @@ def solve(geometry: Geometry, problem: Problem) -> Candidates:
         problem.lower, problem.upper, arcs, out,
     )  # fmt: skip
     arcs = arcs[:count]
-    arcs[:, 1:] -= g.offset[0]
+    if count:
+        arcs[:, 1:] -= g.offset[0]
     obstacle = "" if gap <= _REACH else "the wrist centre is out of the elbow's reach for this approach direction"
     return Candidates(out[:, :5], out[:, 5:], (arcs,), max(gap, 0.0), obstacle)
+
+
+def why(geometry: Geometry) -> str:
+    """What makes an arm one of this family."""
+    return "axes 2 and 3 are parallel and square to axis 1, axes 3 and 4 meet squarely, and so do 4 and 5"
 
 
 def handles(geometry: Geometry, task: int) -> bool:

@@ -184,6 +184,7 @@ def test_ik_agrees_with_the_core(client, robot):
     assert np.allclose([s["q"] for s in answer["solutions"]], [s.q for s in result.solutions], rtol=0, atol=1e-9)
     assert [s["branch"] for s in answer["solutions"]] == [s.branch for s in result.solutions]
     assert (answer["reason"], answer["solver"]) == (result.reason, result.solver)
+    assert answer["solver_reason"] == result.solver_reason
     assert [free["name"] for free in answer["redundancy"]] == [free.name for free in result.redundancy]
     for told, free, own in zip(
         answer["redundancy"], result.redundancy, answer["solutions"][0]["redundancy"], strict=True

@@ -35,6 +35,7 @@ def target_of(robot, q):
         {"redundancy": {"psi": 0.3}},
         {"task": "approach", "redundancy": {"psi": 0.3, "theta7": 1.0}},
         {"mask": [True, True, True, False, False, True], "mask_frame": "base"},
+        {"solver": "numeric"},
     ],
     ids=lambda options: " ".join(options),
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -516,3 +517,38 @@ def test_misuse_names_the_field_and_what_is_valid(arguments, field, said):
         solve_ik(robot, kin.fk(robot, robot.home), **arguments)
     assert caught.value.field == field
     assert said in str(caught.value)
+
+
+# solver=
+
+
+def test_the_closed_form_can_be_switched_off():
+    for robot_id, task in (("pioneer5", "approach"), ("redundant7", "pose"), ("redundant7-craig", "pose")):
+        robot = kin.get_robot(robot_id)
+        for q in robot.random_q(np.random.default_rng(12), 10):
+            target = kin.fk(robot, q)
+            result = solve_ik(robot, target, task=task, solver="numeric")
+            assert (result.status, result.solver) == (Status.SOLVED, "numeric")
+            assert result.solver_reason == "asked for: numeric descent from many starts"
+            assert robot.in_limits(result.solutions[0].q)
+            reached = kin.fk(robot, result.solutions[0].q)
+            assert np.abs(reached[:3, 3] - target[:3, 3]).max() < 1e-9
+    with pytest.raises(kin.InputError, match=r"solver.*\"auto\", \"numeric\""):
+        solve_ik(robot, target, solver="magic")
+
+
+def test_the_choice_of_solver_is_explained():
+    arm = kin.get_robot("redundant7-craig")
+    target = kin.fk(arm, arm.q_home)
+    assert "axes 1, 2, 3 meet in one point" in solve_ik(arm, target).solver_reason
+    masked = solve_ik(arm, target, mask=(True, True, False, False, False, False))
+    assert "(srs7) does not cover this task" in masked.solver_reason or masked.solver == "srs7"
+
+
+def test_results_survive_pickling():
+    """They cross process boundaries."""
+    arm = kin.get_robot("redundant7-craig")
+    result = solve_ik(arm, kin.fk(arm, arm.q_home))
+    again = pickle.loads(pickle.dumps(result))
+    assert [s.q.tolist() for s in again.solutions] == [s.q.tolist() for s in result.solutions]
+    assert (again.reason, again.redundancy) == (result.reason, result.redundancy)
