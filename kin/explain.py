@@ -9,6 +9,7 @@ import numpy as np
 from kin.fk import fk, link_frames
 from kin.question import Question
 from kin.results import BlockedBranch, Cause, IKSolution, LimitViolation, Redundancy
+from kin.robot import Robot
 from kin.solvers.singular import Singularity
 from kin.transforms import Array
 
@@ -152,12 +153,21 @@ def _side(question: Question, q: Array) -> Cause:
 
 
 def _need(question: Question, violation: LimitViolation) -> str:
-    joint = question.robot.joints[violation.joint]
-    show = degrees if joint.kind == "revolute" else millimetres
-    stop = "locked at" if question.locked[violation.joint] else "limit"
-    number = f"joint {violation.joint + 1}"
-    name = "" if violation.name.lower() == number else f" ({violation.name})"
-    return f"{number}{name} at {show(violation.value)} ({stop} {show(violation.limit)})"
+    robot, index = question.robot, violation.joint
+    stop = "locked at" if question.locked[index] else "limit"
+    value, limit = (joint_value(robot, index, x) for x in (violation.value, violation.limit))
+    return f"{joint(robot, index)} at {value} ({stop} {limit})"
+
+
+def joint(robot: Robot, index: int) -> str:
+    """A joint for a sentence: its number, and its name if that is another."""
+    name, number = robot.joints[index].name, f"joint {index + 1}"
+    return number if name.lower() in (number, str(index + 1)) else f"{number} ({name})"
+
+
+def joint_value(robot: Robot, index: int, value: float) -> str:
+    """A joint's value or motion for a sentence."""
+    return degrees(value) if robot.joints[index].kind == "revolute" else millimetres(value)
 
 
 def _count(number: int) -> str:

@@ -104,6 +104,10 @@ class Question:
         """Name of a branch."""
         return "numeric" if self.match is None or branch < 0 else self.match.solver.BRANCHES[branch]
 
+    def without_turns(self) -> Question:
+        """The same question, each joint's value taken as it is and not for its whole-turn images."""
+        return replace(self, turns=np.zeros(self.robot.n))
+
     def near(self, seed: Array) -> Question:
         """The same question near another configuration."""
         return replace(self, seed=seed)
@@ -137,7 +141,7 @@ def ask(
     if prefer not in PREFERENCES:
         raise InputError("prefer", prefer, "one of " + ", ".join(f'"{p}"' for p in PREFERENCES))
     task_name, code, weights = _task(task, mask, mask_frame)
-    T = _target(target, code)
+    T = pose_of(target, code)
     usual = _usual(robot)
     seed = usual.home if q_seed is None else _seed(robot, q_seed)
     lower, upper, locks = usual.lower, usual.upper, usual.locked
@@ -239,7 +243,8 @@ def _task(task: str, mask: Sequence[bool] | None, frame: str) -> tuple[str, int,
     return name, code, np.array([*(float(flag) for flag in flags), float(frame == "base")])
 
 
-def _target(target: ArrayLike, code: int) -> Array:
+def pose_of(target: ArrayLike, code: int, field: str = "target") -> Array:
+    """A target as a pose ``(4, 4)``: for the task POSITION also a point ``(3,)``; `InputError` naming `field`."""
     T = np.empty((4, 4))
     if (
         type(target) is np.ndarray
@@ -248,15 +253,23 @@ def _target(target: ArrayLike, code: int) -> Array:
         and target.flags.carray
     ):
         if not straighten(target, T):
-            T = as_transform(target)  # which tells what is wrong
-    elif code == POSITION and np.shape(target) == (3,):
+            T = as_transform(target, field)  # which tells what is wrong
+    elif code == POSITION and _shape(target) == (3,):
         T = np.eye(4)
-        T[:3, 3] = finite_array("target", target, (3,))
+        T[:3, 3] = finite_array(field, target, (3,))
     else:
-        T = as_transform(target)
+        T = as_transform(target, field)
     if max(abs(T.item(3)), abs(T.item(7)), abs(T.item(11))) > _FAR:
-        raise InputError("target position", T[:3, 3].tolist(), "coordinates below 1e6 m")
+        raise InputError(f"{field} position", T[:3, 3].tolist(), "coordinates below 1e6 m")
     return T
+
+
+def _shape(value: ArrayLike) -> tuple[int, ...]:
+    """The shape of what may be no array at all, then ()."""
+    try:
+        return np.shape(value)
+    except (ValueError, RecursionError):  # rows of different lengths, or a list within itself
+        return ()
 
 
 def _narrowed(robot: Robot, limits: Limits) -> tuple[Array, Array]:
@@ -269,7 +282,7 @@ def _narrowed(robot: Robot, limits: Limits) -> tuple[Array, Array]:
         if pair is None:
             continue
         field = f"limits[{i}]"
-        low, high = finite_array(field, pair, (2,)).tolist() if np.shape(pair) == (2,) else (math.inf, -math.inf)
+        low, high = finite_array(field, pair, (2,)).tolist() if _shape(pair) == (2,) else (math.inf, -math.inf)
         if low > high:
             raise InputError(field, pair, "a lower limit and an upper one that is not below it")
         if low < lower[i] - TOLERANCES.limit or high > upper[i] + TOLERANCES.limit:
@@ -285,7 +298,7 @@ def _locked(robot: Robot, locked: Locks, lower: Array, upper: Array) -> tuple[bo
     for i, value in enumerate(locked):
         if value is None:
             continue
-        number = _number(f"locked[{i}]", value, "a finite number, or none for a joint that may move")
+        number = finite_number(f"locked[{i}]", value, "a finite number, or none for a joint that may move")
         if not lower[i] - TOLERANCES.limit <= number <= upper[i] + TOLERANCES.limit:
             raise InputError(f"locked[{i}]", value, f"a value inside the limits, {_span(lower[i], upper[i])}")
         lower[i] = upper[i] = min(max(number, lower[i]), upper[i])
@@ -310,13 +323,13 @@ def _values(
     for name, value in redundancy.items():
         if name not in settable:
             raise InputError("redundancy", name, "one of " + ", ".join(settable))
-        _number(f"redundancy.{name}", value, "a finite value in radians")
+        finite_number(f"redundancy.{name}", value, "a finite value in radians")
     return tuple(float(redundancy.get(f.name, math.nan)) for f in freedoms)
 
 
-def _number(field: str, value: object, expected: str) -> float:
-    """One finite number as a float."""
-    if isinstance(value, bool) or not isinstance(value, int | float | np.number):
+def finite_number(field: str, value: object, expected: str) -> float:
+    """One finite number as a float; raises `InputError` naming `field`."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         raise InputError(field, value, expected)
     try:
         number = float(value)

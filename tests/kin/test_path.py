@@ -12,6 +12,8 @@ import pytest
 import kin
 from kin import InputError, Status, solve_ik
 from kin.path import solve_path
+from kin.path.waypoint import meeting
+from kin.question import ask
 from kin.transforms import rotation_angle, vector_angle
 
 ROBOTS = tuple(kin.builtin_robots())
@@ -94,7 +96,7 @@ def test_smooth_motions_are_followed_without_a_jump(robot_id):
     robot = kin.get_robot(robot_id)
     rng = np.random.default_rng(41)
     ratios = []
-    for _ in range(20):
+    for _ in range(20 if robot.n == 5 else 8):
         path = wave(robot, rng, 16)
         assert largest(path) < 0.5
         targets = kin.fk(robot, path)
@@ -178,6 +180,15 @@ def test_a_single_waypoint_is_the_solution_nearest_to_the_start():
         assert solve_path(robot, [kin.fk(robot, q)]).gaps == ()
 
 
+def test_what_is_polished_stays_on_its_turn():
+    """A row that misses by 1e-8, with θ7 at 200°: it is corrected there, not at −160°, which home is nearer to."""
+    robot = kin.get_robot(SRS)
+    near = np.radians([10, 40, 20, 60, 30, 50, 200])
+    question = ask(robot, kin.fk(robot, near))
+    rows = near + 1e-8 * np.array([[1, 0, 0, 0, 0, 0, 0]])
+    assert meeting(question, False, rows, near) == pytest.approx(near[None], abs=1e-7)
+
+
 # -- whole turns and stops ----------------------------------------------------------------------------------------
 
 
@@ -202,7 +213,7 @@ def test_a_long_turn_is_started_on_the_right_turn():
 
 def test_a_turn_that_is_too_long_unwinds_once_and_names_joint_7():
     """700° do not fit into 540°: one jump, at the latest where θ7 has come to its stop."""
-    robot, targets = roll_path(0.0, 700.0, 36)
+    robot, targets = roll_path(0.0, 700.0, 29)
     result = solve_path(robot, targets)
     assert_exact(robot, targets, result)
     (jump,) = result.jumps
@@ -211,14 +222,14 @@ def test_a_turn_that_is_too_long_unwinds_once_and_names_joint_7():
     assert jump.step > math.pi / 2
     assert "joint 7 reaches its stop at 270.0°" in jump.reason
     # From −212.9° at best (over all arm angles) the stop is 482.9° away.
-    assert 700 - 540 <= 20 * jump.index <= 483 + 20
-    assert result.reason == f"36 waypoints with one jump: before waypoint {jump.index} (limits)."
+    assert 700 - 540 <= 25 * jump.index <= 483 + 25
+    assert result.reason == f"29 waypoints with one jump: before waypoint {jump.index} (limits)."
     rest = np.delete(np.abs(np.diff(result.q, axis=0)).max(axis=1), jump.index - 1)
     assert rest.max() < 0.5
 
 
 def test_turning_backwards_names_the_other_stop():
-    robot, targets = roll_path(0.0, -600.0, 31)
+    robot, targets = roll_path(0.0, -600.0, 25)
     (jump,) = solve_path(robot, targets, locked=[None, None, 0.0, None, 0.0, None, None], branch="seed").jumps
     assert jump.cause == "limits"
     assert "joint 7 reaches its stop at -270.0°" in jump.reason
@@ -226,16 +237,16 @@ def test_turning_backwards_names_the_other_stop():
 
 def test_every_further_turn_costs_one_more_jump():
     """The arm angle is locked away, so θ7 turns alone: from 0° to 270°, then from −90° on again and again."""
-    robot, targets = roll_path(0.0, 1500.0, 76)
+    robot, targets = roll_path(0.0, 1100.0, 45)
     result = solve_path(robot, targets, locked=[None, None, 0.0, None, 0.0, None, None], branch="seed")
     assert_exact(robot, targets, result)
-    assert len(result.jumps) == math.ceil((1500 - 270) / 360)
+    assert len(result.jumps) == math.ceil((1100 - 270) / 360)
     assert {jump.cause for jump in result.jumps} == {"limits"}
-    assert all(jump.joints == (6,) and jump.step == pytest.approx(math.radians(340)) for jump in result.jumps)
+    assert all(jump.joints == (6,) and jump.step == pytest.approx(math.radians(335)) for jump in result.jumps)
 
 
 def test_joints_without_stops_turn_for_ever():
-    robot, targets = roll_path(0.0, 1000.0, 51)
+    robot, targets = roll_path(0.0, 1000.0, 41)
     endless = limited(robot, (-270, 270), (-110, 110), (-180, 180), (-110, 110), (-180, 180), (-90, 90), None)
     result = solve_path(endless, targets, q_start=np.radians([0, 30, 0, 60, 0, 45, 0]))
     assert_exact(endless, targets, result)
@@ -245,7 +256,7 @@ def test_joints_without_stops_turn_for_ever():
 
 def test_a_joint_of_many_turns_starts_where_the_whole_path_fits():
     """±560° and 1000° to go: the start must be between −560° and −440°, though home is at 0°."""
-    robot, targets = roll_path(-120.0, 1000.0, 51)
+    robot, targets = roll_path(-120.0, 1000.0, 41)
     others = ((-270, 270), (-110, 110), (-180, 180), (-110, 110), (-180, 180), (-90, 90))
     wide = limited(robot, *others, (-560, 560))
     result = solve_path(wide, targets)
@@ -352,6 +363,18 @@ def test_poses_too_far_apart_are_told_as_that():
     assert solve_path(robot, targets, max_step=0.7).continuous
 
 
+def test_only_what_a_mask_asks_for_counts_as_the_tools_motion():
+    """Three waypoints far apart, of which only the height is asked for: 50 mm up, and no way at all."""
+    robot = kin.get_robot("pioneer5")
+    T = kin.fk(robot, robot.home)
+    targets = [T, moved(T, -0.4, 0.3, 0.05), turned(moved(T, 0.5, 0.0, 0.05), 90.0, "x")]
+    height = (False, False, True, False, False, False)
+    result = solve_path(robot, targets, mask=height, mask_frame="base", q_start=robot.home, max_step=0.02)
+    (jump,) = result.jumps
+    assert (jump.index, jump.cause) == (1, "spacing")
+    assert jump.reason.endswith("too far apart for steps of 1.1°: the tool moves by 50.0 mm.")
+
+
 def test_the_end_of_a_branch_is_told():
     """The wrist centre comes in along a ray, from where only the front of the shoulder reaches, to near axis 2.
 
@@ -382,22 +405,22 @@ def test_out_of_reach_and_back(robot_id):
     home = np.array(robot.home)
     T = kin.fk(robot, home)
     outwards = T[:3, 3] / np.linalg.norm(T[:3, 3])
-    ways = 1.5 * robot.reach * np.sin(np.linspace(0, np.pi, 27))
+    ways = 1.5 * robot.reach * np.sin(np.linspace(0, np.pi, 17))
     targets = [T[:3, 3] + w * outwards for w in ways]
     result = solve_path(robot, targets, task="position", q_start=home)
     missing = [gap.index for gap in result.gaps]
     assert missing == list(range(missing[0], missing[-1] + 1))
-    assert 0 < missing[0] < missing[-1] < 26
+    assert 0 < missing[0] < missing[-1] < 16
     for gap in result.gaps:
         assert gap.status is Status.UNREACHABLE
         assert gap.reason.startswith("Out of reach by")
         closest = solve_ik(robot, targets[gap.index], task="position", q_seed=result.q[gap.index])
         assert gap.distance == pytest.approx(closest.distance, abs=1e-6)
         assert result.position_error[gap.index] == pytest.approx(closest.distance, rel=0.05, abs=1.1e-3)
-    rest = [i for i in range(27) if i not in missing]
+    rest = [i for i in range(17) if i not in missing]
     assert result.position_error[rest].max() <= 1e-9
     assert robot.in_limits(result.q).all()
-    assert f"No exact answer at {len(missing)} of 27 waypoints: {missing[0]}" in result.reason
+    assert f"No exact answer at {len(missing)} of 17 waypoints: {missing[0]}" in result.reason
     within = [i for i in missing[1:] if i - 1 in missing]
     assert np.abs(np.diff(result.q, axis=0)[np.array(within) - 1]).max() < 0.5
 
@@ -503,6 +526,18 @@ def test_a_lock_in_the_way_is_told():
     assert "joint 4 (rotating wrist) at 22.5° (locked at 20.0°)" in result.gaps[0].reason
 
 
+def test_a_lock_that_forces_a_jump_is_told():
+    """θ1 is what the arm has free: held where the motion began, the branch comes to its end."""
+    robot = kin.get_robot(PRINTED)
+    path = wave(robot, np.random.default_rng(7), 16)
+    locked = [path[0, 0], *[None] * 6]
+    result = solve_path(robot, kin.fk(robot, path), locked=locked, q_start=path[0], branch="seed")
+    jump = result.jumps[-1]
+    assert jump.cause == "limits"
+    assert 0 not in jump.joints
+    assert jump.reason.endswith(f"joint 1 is locked at {math.degrees(locked[0]):.1f}°.")
+
+
 @pytest.mark.parametrize("branch", ["elbow down", "shoulder back", "shoulder front · elbow up · wrist flip"])
 def test_the_path_stays_on_the_branches_asked_for(branch):
     robot = kin.get_robot(SRS)
@@ -566,8 +601,9 @@ def test_the_free_value_is_the_best_of_a_fine_grid():
     result = solve_path(robot, targets)
     layers = []
     for T in targets:
-        found = [solve_ik(robot, T, redundancy=psi, q_seed=start) for psi in np.radians(np.arange(-180, 180, 1.0))]
-        layers.append(np.array([s.q for r in found if r.status is Status.SOLVED for s in r.solutions]))
+        found = np.concatenate([kin.ik_branches(robot, T, psi) for psi in np.radians(np.arange(-180, 180, 1.0))])
+        found = start + np.remainder(found - start + np.pi, 2 * np.pi) - np.pi
+        layers.append(found[robot.in_limits(found)])
     pairs = ((layers[0][:, None] - layers[1][None]) ** 2).sum(axis=-1)
     assert pairs.size > 100_000
     assert squares(result.q) <= pairs.min() * (1 + 1e-3)
@@ -579,7 +615,7 @@ def test_the_free_value_is_the_best_of_a_fine_grid():
 @pytest.mark.parametrize("robot_id", ROBOTS)
 def test_the_same_question_gets_the_same_path(robot_id):
     robot = kin.get_robot(robot_id)
-    targets = kin.fk(robot, wave(robot, np.random.default_rng(77), 24))
+    targets = kin.fk(robot, wave(robot, np.random.default_rng(77), 12))
     first, second = (solve_path(robot, targets) for _ in range(2))
     assert first.q.tolist() == second.q.tolist()
     assert first.reason == second.reason
@@ -617,7 +653,7 @@ def test_an_arm_of_no_known_family_follows_too():
     assert jump.joints == (2,)
     assert jump.step == pytest.approx(0.6)
     assert jump.cause == "spacing"
-    assert "joint 3 leaps by 150.0 mm" in jump.reason
+    assert "joint 3 leaps by 150.0 mm: there they are too far apart for steps of 125.0 mm" in jump.reason
 
 
 @pytest.mark.parametrize(
@@ -634,6 +670,7 @@ def test_an_arm_of_no_known_family_follows_too():
         ({"targets": [np.eye(4)] * 2 + [np.diag([1.0, 1.0, -1.0, 1.0])]}, "targets[2] rotation"),
         ({"targets": [moved(np.eye(4), 1e9, 0, 0)]}, "targets[0] position"),
         ({"targets": [(0.1, 0.2)], "task": "position"}, "targets[0]"),
+        ({"targets": [[(0.1, 0.2), (0.3,)]], "task": "position"}, "targets[0]"),
         ({"targets": [(0.1, 0.2, math.inf)], "task": "position"}, "targets[0][2]"),
         ({"targets": [(0.1, 0.2, 0.3)]}, "targets[0]"),
         ({"task": "dance"}, "task"),
@@ -652,6 +689,8 @@ def test_an_arm_of_no_known_family_follows_too():
         ({"max_step": True}, "max_step"),
         ({"max_step": "0.5"}, "max_step"),
         ({"max_step": 10**400}, "max_step"),
+        ({"max_step": np.complex128(0.5 + 1j)}, "max_step"),
+        ({"limits": [((0.1, 0.2), 0.3)] + [None] * 4}, "limits[0]"),
     ],
 )
 def test_misuse_names_the_field(arguments, field):
