@@ -1,8 +1,8 @@
 """The command line: ``kinboard`` serves the dashboard; ``fk``, ``ik`` and ``robots`` answer without a server.
 
-People read and type degrees and millimetres, ``--rad`` makes both radians and metres; ``--json`` always prints
-radians and metres, in the shapes REST answers with. Exit codes: 0 answered, 1 no exact answer (``ik``) or the
-service could not start, 2 bad input.
+``bench`` measures against other libraries. People read and type degrees and millimetres, ``--rad`` makes both
+radians and metres; ``--json`` always prints radians and metres, in the shapes REST answers with. Exit codes: 0
+answered, 1 no exact answer (``ik``) or the service could not start, 2 bad input.
 
 Nothing heavy is imported before the arguments are known, and each command imports only what it needs.
 """
@@ -86,6 +86,14 @@ def _robots(arguments: argparse.Namespace) -> int:
     from app import commands
 
     return _refusing_misuse(commands.robots, arguments)
+
+
+def _bench(arguments: argparse.Namespace) -> int:
+    for name in ("OMP", "OPENBLAS", "MKL", "NUMEXPR"):  # read at import: everybody works on one thread
+        os.environ.setdefault(f"{name}_NUM_THREADS", "1")
+    from app.bench import command
+
+    return _refusing_misuse(command.bench, arguments)
 
 
 def _refusing_misuse(command: Callable[[argparse.Namespace], int], arguments: argparse.Namespace) -> int:
@@ -247,6 +255,19 @@ def _parser() -> argparse.ArgumentParser:
     robots = commands.add_parser("robots", parents=[common, answers], help="list the robots, or describe one")
     robots.add_argument("robot", nargs="?", metavar="ROBOT", help="describe this one")
     robots.set_defaults(command=_robots)
+
+    bench = commands.add_parser(
+        "bench", help="measure against other libraries; `pip install 'kinboard[bench]'` brings them"
+    )
+    bench.add_argument("--quick", action="store_true", help="fewer targets and rounds: under two minutes")
+    bench.add_argument("--rows", nargs="+", metavar="ROW", help="only these rows, such as fk ik-pioneer5")
+    bench.add_argument("--peers", nargs="+", metavar="PEER", help="only these libraries, or none")
+    bench.add_argument(
+        "--cpu-time", action="store_true", help="processor time instead of the wall clock's, on a busy machine"
+    )
+    bench.add_argument("--json", metavar="FILE", help="write everything measured to this file")
+    bench.add_argument("--picture", metavar="FILE", help="write the bars to this file (SVG)")
+    bench.set_defaults(command=_bench)
     return parser
 
 

@@ -1,0 +1,118 @@
+"""What ``kinboard bench`` does: run, print the tables, write JSON and a picture."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from argparse import Namespace
+from dataclasses import replace
+from pathlib import Path
+from typing import TextIO
+
+from app.bench import gate, report
+from app.bench.contestants import PEERS, Peer
+from app.bench.rows import ROWS, Row
+from app.bench.run import Settings, run
+from kin import InputError
+from kin.kernels import fk_one
+
+INSTALL = "pip install 'kinboard[bench]'"
+_INTERRUPTED = 130  # what shells expect after Ctrl-C
+
+
+def bench(arguments: Namespace) -> int:
+    """0, or 1 if our own answers are wrong, 2 if it cannot begin, 130 after Ctrl-C.
+
+    The gate is told and fails nothing here: noise alone can do that, which the tests rule out by trying again.
+    """
+    settings = Settings(rows=_rows(arguments.rows), peers=_peers(arguments.peers))
+    if arguments.quick:
+        settings = settings.quick()
+    if arguments.cpu_time:
+        settings = replace(settings, clock=time.process_time_ns)
+    files = [_file(name, getattr(arguments, name)) for name in ("json", "picture")]
+    if not hasattr(fk_one, "py_func"):  # what numba compiles keeps its source
+        return _refuse("NUMBA_DISABLE_JIT is set: this would measure uncompiled code; unset it")
+    missing = [peer.name for peer in settings.peers if not peer.installed]
+    if missing and arguments.peers:
+        return _refuse(f"not installed: {', '.join(missing)}. {INSTALL} brings all of them")
+    if missing:
+        print(f"kinboard: without {', '.join(missing)}, which {INSTALL} brings", file=sys.stderr)
+    progress = _Progress(sys.stderr)
+    try:
+        found = run(settings, progress.say)
+    except KeyboardInterrupt:
+        progress.end()
+        return _refuse("stopped before anything was measured", _INTERRUPTED)
+    progress.end()
+    if not found.rows:
+        return _refuse("nothing was measured", _INTERRUPTED if found.interrupted else 1)
+    verdicts = gate.judge(found)
+    print(report.table(found))
+    print("\n" + report.LEGEND)
+    print("\n" + "\n".join(report.notes(found)))
+    if verdicts:
+        print("\ngate, fastest rounds:\n" + "\n".join(map(str, verdicts)))
+    json_file, picture_file = files
+    if json_file is not None:
+        json_file.write_text(
+            json.dumps(report.as_json(found, verdicts), indent=1, allow_nan=False) + "\n", "utf-8"
+        )
+    if picture_file is not None:
+        picture_file.write_text(report.picture(found), "utf-8")
+    for fault in found.faults:
+        print(f"kinboard: {fault}", file=sys.stderr)
+    if found.interrupted:
+        return _INTERRUPTED
+    return int(bool(found.faults))
+
+
+def _rows(names: list[str] | None) -> tuple[Row, ...]:
+    known = {row.id: row for row in ROWS}
+    for name in names or ():
+        if name not in known:
+            raise InputError("--rows", name, "of " + ", ".join(known))
+    return tuple(row for row in ROWS if not names or row.id in names)
+
+
+def _peers(names: list[str] | None) -> tuple[Peer, ...]:
+    known = {peer.name: peer for peer in PEERS}
+    if names == ["none"]:
+        return ()
+    for name in names or ():
+        if name not in known:
+            raise InputError("--peers", name, "of " + ", ".join(known) + ", or none")
+    return tuple(peer for peer in PEERS if not names or peer.name in names)
+
+
+def _file(name: str, given: str | None) -> Path | None:
+    """A file to be written, refused before the run and not after it."""
+    if given is None:
+        return None
+    path = Path(given)
+    if path.is_dir() or not path.absolute().parent.is_dir():
+        raise InputError(f"--{name}", given, "a file in a folder that exists")
+    return path
+
+
+def _refuse(message: str, code: int = 2) -> int:
+    print(f"kinboard: {message}", file=sys.stderr)
+    return code
+
+
+class _Progress:
+    """One line that is written over on a terminal, lines in a log."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self._on_terminal = stream.isatty()
+
+    def say(self, words: str) -> None:
+        self._stream.write(f"\r\033[K{words}…" if self._on_terminal else f"{words}…\n")
+        self._stream.flush()
+
+    def end(self) -> None:
+        if self._on_terminal:
+            self._stream.write("\r\033[K")
+            self._stream.flush()

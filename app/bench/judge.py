@@ -1,0 +1,113 @@
+"""Whether a contestant did the task: every answer is put through our forward kinematics."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+import kin
+from app.bench.rows import Task
+from kin.transforms import Array
+
+ACCURACY = 1e-6
+"""Metres and radians; an answer farther off is none. Closed forms stay a million times below it."""
+SAME = 1e-6
+"""Radians modulo whole turns, joint by joint, within which two branches are one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """What the judge found over all targets.
+
+    Attributes:
+        success: share of targets with at least one right answer.
+        branches: right and distinct answers per target, on average; None for forward kinematics.
+        position_error, rotation_error: the worst among the right answers, metres and radians.
+        wrong: answers per target that are farther off than `ACCURACY`.
+        same: share of targets whose set of branches is ours; None where the sets cannot be compared.
+    """
+
+    success: float
+    branches: float | None
+    position_error: float
+    rotation_error: float
+    wrong: float
+    same: float | None
+
+
+def judge_poses(task: Task, poses: list[Array]) -> Check:
+    """Forward kinematics: poses ``(4, 4)`` or positions ``(3,)``, one per target, against matrix products."""
+    position, rotation = 0.0, 0.0
+    right = 0
+    for got, T in zip(poses, task.T, strict=True):
+        if got.shape == (3,):
+            p, r = float(np.linalg.norm(got - T[:3, 3])), 0.0
+        else:
+            p, r = float(np.linalg.norm(got[:3, 3] - T[:3, 3])), float(_angle(got[None], T)[0])
+        if max(p, r) <= ACCURACY:
+            right += 1
+            position, rotation = max(position, p), max(rotation, r)
+    count = len(task.T)
+    return Check(right / count, None, position, rotation, (count - right) / count, None)
+
+
+def right_sets(task: Task, answers: list[Array]) -> tuple[list[Array], Check]:
+    """The right and distinct answers ``(k, n)`` of each target, and the check they give, without `same`."""
+    kept: list[Array] = []
+    position, rotation, wrong = 0.0, 0.0, 0
+    for got, T in zip(answers, task.T, strict=True):
+        q = np.asarray(got, dtype=np.float64).reshape(-1, task.robot.n)
+        q = np.ascontiguousarray(q[np.isfinite(q).all(axis=1)])
+        if not len(q):
+            kept.append(q)
+            continue
+        poses = kin.fk(task.robot, q)
+        p = np.linalg.norm(poses[:, :3, 3] - T[:3, 3], axis=1)
+        r = _tilt(poses, T) if task.row.approach else _angle(poses, T)
+        good = (p <= ACCURACY) & (r <= ACCURACY)
+        if task.row.kind == "answer":
+            good &= task.robot.in_limits(q, slack=1e-9)
+        wrong += int((~good).sum())
+        if good.any():
+            position, rotation = max(position, float(p[good].max())), max(rotation, float(r[good].max()))
+        kept.append(_distinct(q[good]))
+    count = len(task.T)
+    success = sum(len(q) > 0 for q in kept) / count
+    return kept, Check(success, sum(map(len, kept)) / count, position, rotation, wrong / count, None)
+
+
+def share_of_same(ours: list[Array], theirs: list[Array]) -> float:
+    """Share of targets with the same set of branches."""
+    return sum(same_set(a, b) for a, b in zip(ours, theirs, strict=True)) / len(ours)
+
+
+def same_set(a: Array, b: Array) -> bool:
+    """Whether two lists of configurations ``(k, n)`` hold the same ones, modulo whole turns."""
+    return len(a) == len(b) and all(bool(_near(b, q).any()) for q in a) and all(bool(_near(a, q).any()) for q in b)
+
+
+def _near(many: Array, one: Array) -> NDArray[np.bool_]:
+    gap = (many - one + math.pi) % (2 * math.pi) - math.pi
+    return np.asarray((np.abs(gap) <= SAME).all(axis=-1))
+
+
+def _distinct(q: Array) -> Array:
+    kept: list[Array] = []
+    for row in q:
+        if not kept or not _near(np.array(kept), row).any():
+            kept.append(row)
+    return np.array(kept).reshape(-1, q.shape[1])
+
+
+def _angle(poses: Array, T: Array) -> Array:
+    """Angles between rotations, from the chord: exact for small ones, where acos is not."""
+    chord = np.linalg.norm(poses[:, :3, :3] - T[:3, :3], axis=(1, 2)) / math.sqrt(8.0)
+    return np.asarray(2.0 * np.arcsin(np.clip(chord, 0.0, 1.0)))
+
+
+def _tilt(poses: Array, T: Array) -> Array:
+    """Angles between the approach directions."""
+    return np.asarray(2.0 * np.arcsin(np.clip(np.linalg.norm(poses[:, :3, 2] - T[:3, 2], axis=1) / 2.0, 0.0, 1.0)))

@@ -1,0 +1,105 @@
+"""The rows of the benchmark: one task each, with targets everybody gets alike."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+import kin
+from app.bench.arms import Arm, arm_of
+from kin.robot import Robot
+from kin.transforms import Array
+
+Kind = Literal["fk", "branches", "answer"]
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One task.
+
+    Attributes:
+        id, title: name on the command line, and for people.
+        robot: id of the arm.
+        kind: ``"fk"``; ``"branches"``, all configurations whatever the limits; ``"answer"``, at least one inside
+            the limits, verified.
+        batch: all targets in one call.
+        approach: point and approach direction only; the roll about the tool's axis is free.
+        lock: of a redundant arm, the joint that solvers for six joints keep at `value`.
+        value: what our own free parameter, and the locked joint, is set to, in radians; NaN for no such thing.
+    """
+
+    id: str
+    title: str
+    robot: str
+    kind: Kind
+    batch: bool = False
+    approach: bool = False
+    lock: int | None = None
+    value: float = math.nan
+
+
+ROWS: tuple[Row, ...] = (
+    Row("fk", "forward kinematics, one pose", "pioneer5", "fk"),
+    Row("fk-batch", "forward kinematics, tool positions of a batch, per pose", "pioneer5", "fk", batch=True),
+    Row("ik-pioneer5", "all branches, point and approach direction", "pioneer5", "branches", approach=True),
+    Row(
+        "ik-pioneer5-batch", "all branches, point and approach direction, batch, per target", "pioneer5",
+        "branches", batch=True, approach=True,
+    ),
+    Row("ik-srs", "all branches of an S-R-S arm at one value of its freedom", "redundant7-craig", "branches",
+        lock=2, value=0.3),
+    Row("ik-srs-batch", "all branches of an S-R-S arm, batch, per target", "redundant7-craig", "branches",
+        batch=True, lock=2, value=0.3),
+    Row("ik-puma560", "all branches, six joints, spherical wrist", "puma560", "branches"),
+    Row("ik-puma560-batch", "all branches, six joints, spherical wrist, batch, per target", "puma560", "branches",
+        batch=True),
+    Row("ik-ur5", "all branches, six joints, three parallel axes", "ur5", "branches"),
+    Row("ik-ur5-batch", "all branches, six joints, three parallel axes, batch, per target", "ur5", "branches",
+        batch=True),
+    Row("ik-iiwa14", "all branches of an S-R-S arm at one value of its freedom", "iiwa14", "branches",
+        lock=2, value=0.3),
+    Row("ik-panda", "all branches at one value of joint 7", "panda", "branches", lock=6, value=0.3),
+    Row("solve-pioneer5", "an answer inside the limits, verified", "pioneer5", "answer", approach=True),
+    Row("solve-redundant7", "an answer inside the limits, verified", "redundant7", "answer"),
+    Row("solve-redundant7-craig", "an answer inside the limits, verified", "redundant7-craig", "answer"),
+    Row("solve-panda", "an answer inside the limits, verified", "panda", "answer"),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """A row with its arm and its targets.
+
+    Attributes:
+        q: ``(N, n)`` the configurations the targets were made from, inside the limits.
+        T: ``(N, 4, 4)`` their poses, by plain matrix products and not by our kernels.
+        arm: the whole arm.
+        six: the arm with six joints, for solvers that know no other; None if there is no such thing.
+    """
+
+    row: Row
+    robot: Robot
+    q: Array
+    T: Array
+    arm: Arm
+    six: Arm | None
+
+
+def prepare(row: Row, size: int, seed: int) -> Task | None:
+    """The row's task with `size` targets; None if the arm is not built in or has no closed form the row needs."""
+    robot = kin.builtin_robots().get(row.robot)
+    if robot is None or (row.kind == "branches" and not kin.branch_names(robot)):
+        return None
+    q = robot.random_q(np.random.default_rng(seed), size)
+    if row.lock is not None:
+        q[:, row.lock] = row.value
+    arm = arm_of(robot)
+    six = arm
+    if row.approach:
+        six = arm.with_roll()
+    elif row.lock is not None:
+        six = arm.locked(row.lock, row.value)
+    return Task(row, robot, q, np.ascontiguousarray(arm.fk(q)), arm, six if six.n == 6 else None)

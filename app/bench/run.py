@@ -1,0 +1,244 @@
+"""One run: prepare the rows, check every contestant, time them all in turns, compare."""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numba
+import numpy as np
+
+import kin
+from app.bench.contestants import FLOOR, KINBOARD, OURS, PEERS, RICH, Contestant, Peer, quiet
+from app.bench.judge import Check, judge_poses, right_sets, share_of_same
+from app.bench.measure import Clock, Turns, measure, ratio
+from app.bench.rows import ROWS, Row, Task, prepare
+from kin.solvers import solver_for
+from kin.transforms import Array
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How much of it, and how carefully.
+
+    Attributes:
+        rows, peers: which; all by default. Ourselves and the floor are always in.
+        targets, batch: targets of a row, and of a row with a batch.
+        rounds: turns each contestant takes.
+        turn: seconds of a turn.
+        seed: of the random targets.
+        clock: nanoseconds; the wall's, so that a library on several threads hides nothing.
+    """
+
+    rows: tuple[Row, ...] = ROWS
+    peers: tuple[Peer, ...] = PEERS
+    targets: int = 64
+    batch: int = 4096
+    rounds: int = 25
+    turn: float = 0.02
+    seed: int = 1
+    clock: Clock = time.perf_counter_ns
+
+    def quick(self) -> Settings:
+        """The same in seconds instead of minutes."""
+        return replace(self, targets=16, batch=512, rounds=7, turn=0.004)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Entry:
+    """One contestant of a row: its check (None for a floor), its times, and their ratios to ours.
+
+    That is to our thin and to our rich call; None where the row has no such call.
+    """
+
+    contestant: Contestant
+    check: Check | None
+    turns: Turns
+    to_thin: float | None = None
+    to_rich: float | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RowReport:
+    """A row's task and its entries, ours first."""
+
+    task: Task
+    entries: tuple[Entry, ...]
+
+    def named(self, name: str) -> Entry | None:
+        """The entry of a contestant."""
+        return next((entry for entry in self.entries if entry.contestant.name == name), None)
+
+    @property
+    def floor(self) -> Entry:
+        """What the row's times are measured against by the gate."""
+        return next(entry for entry in self.entries if entry.contestant.floor)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Report:
+    """What a run found.
+
+    Attributes:
+        rows: those that were measured.
+        skipped: ids of rows whose arm is not built in or lacks the closed form they need.
+        versions: of us and of the peers that took part.
+        missing: peers that are not installed.
+        refused: (row, peer, what it said) of peers that raised where they should have answered.
+        rounds: rounds that all contestants took part in.
+        interrupted: whether somebody ended the run early.
+    """
+
+    settings: Settings
+    rows: tuple[RowReport, ...]
+    skipped: tuple[str, ...]
+    versions: dict[str, str]
+    missing: tuple[str, ...]
+    refused: tuple[tuple[str, str, str], ...]
+    rounds: int
+    interrupted: bool
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """What is wrong with our own answers; nothing, if all is well.
+
+        A numeric search may find nothing; a closed form may not.
+        """
+        found = []
+        for row in self.rows:
+            closed = bool(kin.branch_names(row.task.robot))
+            for entry in row.entries:
+                check = entry.check
+                if check is None or entry.contestant.name not in (OURS, RICH):
+                    continue
+                if check.wrong or (closed and check.success < 1.0):
+                    found.append(f"{row.task.row.id}: {entry.contestant.name} misses targets or answers wrongly")
+        return tuple(found)
+
+
+def run(settings: Settings, say: Say = lambda _: None) -> Report:
+    """Measure; `say` is told what is going on. Ctrl-C during the rounds ends them; what there is is reported."""
+    installed = [peer for peer in settings.peers if peer.installed]
+    refused: list[tuple[str, str, str]] = []
+    prepared: list[tuple[Task, list[tuple[Contestant, Check | None]]]] = []
+    skipped = []
+    for row in settings.rows:
+        say(f"checking {row.id}")
+        task = prepare(row, settings.batch if row.batch else settings.targets, settings.seed)
+        if task is None:
+            skipped.append(row.id)
+            continue
+        prepared.append((task, _checked(task, installed, refused)))
+    turns = [Turns(contestant) for _, checked in prepared for contestant, _ in checked]
+    interrupted = False
+    try:
+        say("finding out how long a turn is")
+        measure(
+            turns, settings.rounds, settings.turn, clock=settings.clock,
+            after_round=lambda done: say(f"round {done} of {settings.rounds}"),
+        )  # fmt: skip
+    except KeyboardInterrupt:
+        interrupted = True
+    rounds = min((len(entry.seconds) for entry in turns), default=0)
+    times = iter(turns)
+    rows = [
+        RowReport(task, tuple(Entry(contestant, check, next(times)) for contestant, check in checked))
+        for task, checked in prepared
+    ]
+    versions = {peer.name: peer.version for peer in (KINBOARD, *installed)}
+    return Report(
+        settings,
+        tuple(_compared(row) for row in rows) if rounds else (),
+        tuple(skipped),
+        versions,
+        tuple(peer.name for peer in settings.peers if not peer.installed),
+        tuple(refused),
+        rounds,
+        interrupted,
+    )
+
+
+def _checked(
+    task: Task, peers: Sequence[Peer], refused: list[tuple[str, str, str]]
+) -> list[tuple[Contestant, Check | None]]:
+    """The contestants of a row, each with what the judge says of its answers to all targets."""
+    found: list[tuple[Contestant, Check | None]] = []
+    ours: list[Array] | None = None
+    for peer in (KINBOARD, *peers, FLOOR):
+        own = peer in (KINBOARD, FLOOR)
+        try:
+            with quiet():
+                for contestant in peer.enter(task):
+                    answers = [
+                        x for arguments in contestant.inputs for x in contestant.read(contestant.call(*arguments))
+                    ]
+                    if contestant.floor:
+                        found.append((contestant, None))
+                    elif task.row.kind == "fk":
+                        found.append((contestant, judge_poses(task, answers)))
+                    else:
+                        sets, check = right_sets(task, answers)
+                        if contestant.name == OURS and _comparable(task):
+                            ours = sets
+                        if ours is not None and not contestant.one:
+                            check = replace(check, same=share_of_same(ours, sets))
+                        found.append((contestant, check))
+        except Exception as error:
+            # Whatever is wrong with another library is told, and ends only its own entry.
+            if own:
+                raise
+            refused.append((task.row.id, peer.name, f"{type(error).__name__}: {error}"))
+    return found
+
+
+def _comparable(task: Task) -> bool:
+    """Whether all contestants ask for the same set: nothing is free, or a joint that can be locked."""
+    if task.row.kind != "branches" or task.row.lock is None:
+        return task.row.kind == "branches"
+    match = solver_for(task.robot)
+    freedoms = () if match is None else match.solver.freedoms(match.geometry, 0)
+    return any(freedom.joint == task.row.lock for freedom in freedoms)
+
+
+def _compared(row: RowReport) -> RowReport:
+    """The row with its ratios to our two calls."""
+    thin, rich = row.named(OURS), row.named(RICH)
+    return RowReport(
+        row.task,
+        tuple(
+            replace(
+                entry,
+                to_thin=None if thin is None else ratio(entry.turns, thin.turns),
+                to_rich=None if rich is None else ratio(entry.turns, rich.turns),
+            )
+            for entry in row.entries
+        ),
+    )
+
+
+def machine() -> dict[str, str]:
+    """What the figures were measured on."""
+    name = platform.processor() or platform.machine()
+    cpuinfo = Path("/proc/cpuinfo")
+    if cpuinfo.exists():
+        for line in cpuinfo.read_text(encoding="utf-8", errors="replace").splitlines():
+            if line.startswith("model name"):
+                name = line.partition(":")[2].strip()
+                break
+    return {
+        "time": time.strftime("%Y-%m-%d %H:%M:%S %z"),
+        "processor": name,
+        "cores": str(os.cpu_count()),
+        "system": f"{platform.system()} {platform.release()}",
+        "python": sys.version.split()[0],
+        "numpy": np.__version__,
+        "numba": numba.__version__,
+        "kinboard": kin.__version__,
+    }

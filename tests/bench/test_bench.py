@@ -1,0 +1,365 @@
+"""The benchmark itself: what it asks, how it judges, how it times, and what it prints."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import tomllib
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import kin
+from app import cli
+from app.bench import command, judge, report
+from app.bench.arms import arm_of, ortho
+from app.bench.contestants import FLOOR, KINBOARD, OURS, PEERS, RICH, Contestant, Peer
+from app.bench.measure import Turns, measure, ratio
+from app.bench.rows import ROWS, prepare
+from app.bench.run import Settings, run
+
+ROOT = Path(__file__).parents[2]
+ROWS_BY_ID = {row.id: row for row in ROWS}
+TURNING = [robot for robot in kin.builtin_robots().values() if robot.revolute.all()]
+BRIEF = replace(Settings(peers=()).quick(), targets=4, batch=8, rounds=3, turn=1e-4)
+
+
+def brief(*ids, peers=()):
+    return replace(BRIEF, rows=tuple(ROWS_BY_ID[name] for name in ids), peers=peers)
+
+
+# -- arms in other forms -----------------------------------------------------------------------------------------
+
+
+def by_screws(arm, q):
+    """The product of exponentials of an arm's axes and offsets, as other libraries read them."""
+    H, P, tool = arm.screws
+    T = np.eye(4)
+    for h, p, angle in zip(H, P, q, strict=False):
+        K = np.array([[0, -h[2], h[1]], [h[2], 0, -h[0]], [-h[1], h[0], 0]])
+        T[:3, 3] += T[:3, :3] @ p
+        T[:3, :3] = T[:3, :3] @ (np.eye(3) + math.sin(angle) * K + (1 - math.cos(angle)) * K @ K)
+    T[:3, 3] += T[:3, :3] @ P[-1]
+    T[:3, :3] = T[:3, :3] @ tool
+    return T
+
+
+@pytest.mark.parametrize("robot", TURNING, ids=lambda robot: robot.id)
+def test_every_form_is_the_same_arm(robot):
+    arm = arm_of(robot)
+    rng = np.random.default_rng(3)
+    q = robot.random_q(rng, 5)
+    T = kin.fk(robot, q)
+    assert np.allclose(arm.fk(q), T, atol=1e-14)
+    assert np.allclose([by_screws(arm, x) for x in q], T, atol=1e-14)
+    for joint in range(robot.n):
+        fewer = np.delete(q[0], joint)
+        assert np.allclose(by_screws(arm.locked(joint, q[0, joint]), fewer), T[0], atol=1e-14)
+    rolled = arm.with_roll().fk(np.append(q[0], 0.7))
+    assert np.allclose(rolled[:3, 2:], T[0, :3, 2:], atol=1e-14)
+    assert rolled[:3, 0] @ T[0, :3, 0] == pytest.approx(math.cos(0.7))
+
+
+def test_an_arm_is_recognised_by_its_axes():
+    pioneer, craig = (arm_of(kin.get_robot(name)) for name in ("pioneer5", "redundant7-craig"))
+    assert pioneer.family == ""
+    assert pioneer.with_roll().family == "spherical_two_parallel"
+    assert craig.locked(2, 0.3).family == "spherical_two_intersecting"
+    assert ortho(craig.locked(2, 0.3)) is None
+
+
+def test_the_upright_arm_has_the_lengths_of_its_table():
+    shape = ortho(arm_of(kin.get_robot("pioneer5")).with_roll())
+    lengths = {"a1": 0.07, "a2": 0.0, "b": 0.0, "c1": 0.13, "c2": 0.16, "c3": 0.14, "c4": 0.0}
+    assert shape.lengths == pytest.approx(lengths, abs=1e-15)
+    assert shape.tool[:3, 3] == pytest.approx([0, 0, 0.12], abs=1e-15)
+
+
+# -- the judge ---------------------------------------------------------------------------------------------------
+
+
+def answers_of(task):
+    (thin,) = [c for c in KINBOARD.enter(task) if c.name == OURS]
+    return [q for arguments in thin.inputs for q in thin.read(thin.call(*arguments))]
+
+
+def test_right_answers_are_accepted_and_whole_turns_are_no_difference():
+    task = prepare(ROWS_BY_ID["ik-pioneer5"], 6, 1)
+    ours = answers_of(task)
+    sets, check = judge.right_sets(task, ours)
+    assert (check.success, check.wrong) == (1.0, 0.0)
+    assert 4 <= check.branches <= 8
+    assert max(check.position_error, check.rotation_error) < 1e-9
+    turned, _ = judge.right_sets(task, [q[::-1] + 2 * math.pi for q in ours])
+    assert judge.share_of_same(sets, turned) == 1.0
+
+
+@pytest.mark.parametrize("off", [3e-6, -0.1])
+def test_an_answer_that_is_off_is_none(off):
+    task = prepare(ROWS_BY_ID["ik-pioneer5"], 6, 1)
+    sets, check = judge.right_sets(task, [q + np.array([0, off, 0, 0, 0]) for q in answers_of(task)])
+    assert check.success == 0.0
+    assert check.wrong >= 4
+    assert not any(len(q) for q in sets)
+
+
+def test_a_missing_branch_and_a_double_one_are_seen():
+    task = prepare(ROWS_BY_ID["ik-srs"], 4, 1)
+    ours = answers_of(task)
+    sets, check = judge.right_sets(task, ours)
+    fewer, less = judge.right_sets(task, [q[1:] for q in ours])
+    assert less.success == 1.0
+    assert less.branches == check.branches - 1
+    assert judge.share_of_same(sets, fewer) == 0.0
+    twice, same = judge.right_sets(task, [np.concatenate([q[1:], q[1:]]) for q in ours])
+    assert same.branches == less.branches
+    assert judge.share_of_same(fewer, twice) == 1.0
+
+
+def test_an_answer_beyond_the_limits_is_none_where_limits_count():
+    row = ROWS_BY_ID["solve-redundant7-craig"]
+    task = prepare(row, 4, 1)
+    beyond = task.q + np.array([0, 2 * math.pi, 0, 0, 0, 0, 0])
+    assert judge.right_sets(task, [q[None] for q in task.q])[1].success == 1.0
+    assert judge.right_sets(task, [q[None] for q in beyond])[1].success == 0.0
+
+
+def test_a_wrong_pose_is_seen():
+    task = prepare(ROWS_BY_ID["fk"], 4, 1)
+    assert judge.judge_poses(task, list(task.T)).success == 1.0
+    shifted = task.T.copy()
+    shifted[0, 0, 3] += 1e-5
+    assert judge.judge_poses(task, list(shifted)).success == 0.75
+    assert judge.judge_poses(task, list(task.T.swapaxes(1, 2))).success == 0.0
+
+
+# -- timing ------------------------------------------------------------------------------------------------------
+
+
+class Machine:
+    """A clock that only moves when somebody works, on a machine that gets slower and slower."""
+
+    def __init__(self):
+        self.now = 0.0
+        self.log = []
+
+    def clock(self):
+        return int(self.now)
+
+    def worker(self, name, cost, per_call=1):
+        def work(target):
+            self.now += cost * (1.0 + self.now / 1e6)
+            self.log.append((name, target))
+
+        return Turns(Contestant(name, work, [(k,) for k in range(5)], lambda _: [], per_call))
+
+
+def test_ratios_survive_a_machine_that_slows_down():
+    machine = Machine()
+    fast, slow = machine.worker("fast", 1000), machine.worker("slow", 3000)
+    measure([fast, slow], 40, 1e-5, clock=machine.clock)
+    assert fast.seconds[-1] > 2 * fast.seconds[0]
+    assert ratio(slow, fast) == pytest.approx(3, rel=0.1)
+    assert fast.best < fast.median
+    assert fast.noise > 0.1
+
+
+def test_contestants_take_turns_and_targets_are_all_used():
+    machine = Machine()
+    workers = [machine.worker(name, 1000, per_call=4) for name in "abc"]
+    measure(workers, 6, 3e-6, clock=machine.clock)
+    assert [len(worker.seconds) for worker in workers] == [6, 6, 6]
+    played = machine.log[-sum(w.calls for w in workers) * 6 :]
+    turns = [name for k, (name, _) in enumerate(played) if k == 0 or played[k - 1][0] != name]
+    assert all(turns.count(name) >= 4 for name in "abc")
+    assert {target for name, target in played if name == "a"} == set(range(5))
+    assert workers[0].seconds[0] == pytest.approx(250e-9, rel=0.5)
+
+
+# -- whole runs --------------------------------------------------------------------------------------------------
+
+
+def test_a_run_without_peers_measures_us_against_the_floor():
+    found = run(brief("fk", "fk-batch", "ik-pioneer5", "ik-srs-batch", "solve-redundant7"))
+    assert [row.task.row.id for row in found.rows] == [
+        "fk",
+        "fk-batch",
+        "ik-pioneer5",
+        "ik-srs-batch",
+        "solve-redundant7",
+    ]
+    assert found.faults == ()
+    assert found.rounds == 3
+    names = [[entry.contestant.name for entry in row.entries] for row in found.rows]
+    assert [OURS in n for n in names] == [True, True, True, True, False]
+    assert [RICH in n for n in names] == [False, False, True, False, True]
+    both = found.rows[2]
+    assert both.named(OURS).to_thin == both.named(RICH).to_rich == 1.0
+    assert both.named(RICH).check.same == 1.0
+    assert both.named(RICH).to_thin > 1.0
+    assert both.floor.to_thin < 1.0
+
+
+def test_an_arm_that_is_not_built_in_is_told():
+    row = replace(ROWS_BY_ID["fk"], id="nowhere", robot="nowhere")
+    found = run(replace(BRIEF, rows=(row, ROWS_BY_ID["fk"])))
+    assert found.skipped == ("nowhere",)
+    assert "nowhere" in "\n".join(report.notes(found))
+
+
+def test_a_library_that_is_missing_or_fails_ends_nothing():
+    def fails(task):
+        raise ValueError("no such arm")
+
+    def errs(task):
+        return [Contestant("errs", lambda q: kin.fk(task.robot, q + 0.1), [(q,) for q in task.q], lambda T: [T])]
+
+    peers = (Peer("absent", "no_such_module", fails), Peer("numpy", "numpy", fails), Peer("numba", "numba", errs))
+    found = run(brief("fk", peers=peers))
+    assert found.missing == ("absent",)
+    assert found.refused == (("fk", "numpy", "ValueError: no such arm"),)
+    assert found.rows[0].named("errs").check.success == 0.0
+    told = "\n".join(report.notes(found))
+    assert "not installed: absent" in told
+    assert "numpy could not take part: ValueError: no such arm" in told
+    assert found.faults == ()
+
+
+def test_our_own_faults_are_ours(monkeypatch):
+    monkeypatch.setattr(kin, "ik_branches", lambda robot, T, value: np.zeros((8, robot.n)))
+    found = run(brief("ik-srs"))
+    assert found.faults == (f"ik-srs: {OURS} misses targets or answers wrongly",)
+
+
+def test_an_interrupted_run_reports_what_there_is():
+    def stop(words):
+        if words.startswith("round 2"):
+            raise KeyboardInterrupt
+
+    found = run(brief("fk"), stop)
+    assert found.interrupted
+    assert found.rounds == 2
+    assert found.rows[0].named(OURS).turns.median > 0
+    assert "interrupted" in "\n".join(report.notes(found))
+
+
+@pytest.mark.parametrize(
+    "row", ["fk", "fk-batch", "ik-pioneer5", "ik-pioneer5-batch", "ik-srs", "solve-redundant7-craig"]
+)
+@pytest.mark.parametrize("peer", [peer for peer in PEERS if peer.installed], ids=lambda peer: peer.name)
+def test_every_installed_peer_solves_the_same_task(peer, row):
+    found = run(brief(row, peers=(peer,)))
+    assert found.refused == ()
+    for entry in found.rows[0].entries:
+        if entry.check is not None and not entry.contestant.one:
+            assert entry.check.success == 1.0
+            assert entry.check.same in (None, 1.0)
+
+
+# -- the command -------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    monkeypatch.setattr(Settings, "quick", lambda self: replace(self, targets=4, batch=8, rounds=3, turn=1e-4))
+
+
+def bench(capsys, *words):
+    code = cli.main(["bench", *map(str, words)])
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+def test_the_command_prints_and_writes_the_same(capsys, quick, tmp_path):
+    files = tmp_path / "bench.json", tmp_path / "bench.svg"
+    words = (
+        "--quick",
+        "--rows",
+        "fk",
+        "ik-pioneer5",
+        "--peers",
+        "none",
+        "--json",
+        files[0],
+        "--picture",
+        files[1],
+    )
+    code, out, err = bench(capsys, *words)
+    assert code == 0
+    assert "round 3 of 3" in err
+    assert "wall clock" in out
+    assert re.search(r"^fk, kinboard: [\d.]+ × empty call, at most \d+: ", out, re.MULTILINE)
+    data = json.loads(files[0].read_text("utf-8"), parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
+    assert [row["id"] for row in data["rows"]] == ["fk", "ik-pioneer5"]
+    assert [verdict["row"] for verdict in data["gate"]] == ["fk", "ik-pioneer5", "ik-pioneer5"]
+    for row in data["rows"]:
+        assert f"{row['id']}: " in out
+        for contestant in row["contestants"]:
+            assert re.search(rf"^{re.escape(contestant['name'])} +\d", out, re.MULTILINE)
+            assert len(contestant["seconds"]) == data["rounds"]
+    drawn = "".join(ET.parse(files[1]).getroot().itertext())
+    assert all(row.title in drawn for row in ROWS if row.id in ("fk", "ik-pioneer5"))
+    assert OURS in drawn
+
+
+def test_processor_time_can_be_asked_for(capsys, quick):
+    code, out, _ = bench(capsys, "--quick", "--rows", "fk", "--peers", "none", "--cpu-time")
+    assert code == 0
+    assert "processor time" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--rows", "juggling"), "expected of fk, fk-batch"),
+        (("--peers", "abacus"), "expected of numpy, pin"),
+        (("--json", "/no/such/folder/x.json"), "folder that exists"),
+        (("--picture", "/"), "folder that exists"),
+    ],
+)
+def test_what_cannot_be_run_is_said_before_the_run(capsys, words, said):
+    code, out, err = bench(capsys, *words)
+    assert (code, out) == (2, "")
+    assert said in err
+
+
+def test_a_peer_that_was_asked_for_must_be_there(capsys, monkeypatch):
+    monkeypatch.setattr(Peer, "installed", property(lambda self: self.module != "eaik"))
+    code, out, err = bench(capsys, "--peers", "eaik", "numpy")
+    assert (code, out) == (2, "")
+    assert "not installed: eaik. pip install 'kinboard[bench]'" in err
+
+
+def test_uncompiled_code_is_not_measured(capsys, monkeypatch):
+    monkeypatch.setattr(command, "fk_one", lambda model, q: None)
+    code, _, err = bench(capsys, "--peers", "none")
+    assert code == 2
+    assert "NUMBA_DISABLE_JIT" in err
+
+
+def test_ctrl_c_before_the_first_round_is_calm(capsys, monkeypatch):
+    def stopped(settings, say):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(command, "run", stopped)
+    code, out, err = bench(capsys, "--peers", "none")
+    assert (code, out) == (130, "")
+    assert err.splitlines()[-1] == "kinboard: stopped before anything was measured"
+
+
+def test_the_extra_brings_every_peer():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extra = {re.match(r"[\w-]+", wanted).group() for wanted in project["optional-dependencies"]["bench"]}
+    assert extra - {"scipy"} == {peer.name for peer in PEERS} - {"numpy"}
+
+
+def test_every_row_has_a_floor_and_us():
+    for row in ROWS:
+        task = prepare(row, 2, 1)
+        if task is not None:
+            assert [c.floor for c in FLOOR.enter(task)] == [True]
+            assert KINBOARD.enter(task)

@@ -1,0 +1,58 @@
+"""The regression gate: our code against a floor of the same run, and the gate itself against slowed code."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+import kin
+from app.bench import contestants, gate
+from app.bench.arms import arm_of
+from app.bench.contestants import KINBOARD
+from app.bench.run import run
+
+pytestmark = pytest.mark.bench
+
+
+def best_of(attempts):
+    """Lowest multiple of each gate over some runs; no more runs than are needed to pass."""
+    best = {}
+    for _ in range(attempts):
+        for verdict in gate.judge(run(gate.quick_settings())):
+            known = best.get(verdict.gate)
+            best[verdict.gate] = verdict if known is None or verdict.multiple < known.multiple else known
+        if all(verdict.passed for verdict in best.values()):
+            break
+    return list(best.values())
+
+
+def test_nothing_has_become_slow():
+    verdicts = best_of(4)
+    assert [verdict.gate for verdict in verdicts] == list(gate.GATES)
+    assert all(verdict.passed for verdict in verdicts), "\n".join(map(str, verdicts))
+
+
+def test_the_gate_notices_slow_code(monkeypatch):
+    """Ten times the work must fail every gate: one that does not is set too high, its code has become faster."""
+    slow = replace(KINBOARD, enter=lambda task: [gate.slowed(c, 10) for c in KINBOARD.enter(task)])
+    monkeypatch.setattr("app.bench.run.KINBOARD", slow)
+    verdicts = gate.judge(run(replace(gate.quick_settings(), rounds=4)))
+    assert [verdict.gate for verdict in verdicts] == list(gate.GATES)
+    assert not any(verdict.passed for verdict in verdicts), "\n".join(map(str, verdicts))
+
+
+def test_the_gate_notices_code_that_is_no_longer_compiled(monkeypatch):
+    rows = tuple(row for row in gate.quick_settings().rows if row.id == "fk")
+    arm = arm_of(kin.get_robot("pioneer5"))
+    monkeypatch.setattr(kin, "fk", lambda robot, q: arm.fk(q))
+    (verdict,) = gate.judge(run(replace(gate.quick_settings(), rows=rows)))
+    assert not verdict.passed, str(verdict)
+    assert "TOO SLOW" in str(verdict)
+
+
+def test_slowing_changes_the_time_and_not_the_answer():
+    calls = []
+    slow = gate.slowed(contestants.Contestant("x", lambda k: calls.append(k) or k, [(1,)], list), 3)
+    assert slow.call(7) == 7
+    assert calls == [7, 7, 7]
