@@ -1,4 +1,4 @@
-"""The command line: ``kinboard`` serves the dashboard; ``fk``, ``ik`` and ``robots`` answer without a server.
+"""The command line: ``kinboard`` serves the dashboard; the others answer without a server.
 
 ``bench`` measures against other libraries. People read and type degrees and millimetres, ``--rad`` makes both
 radians and metres; ``--json`` always prints radians and metres, in the shapes REST answers with. Exit codes: 0
@@ -21,7 +21,8 @@ EPILOG = """examples:
   kinboard                                    serve the dashboard on http://localhost:8000/
   kinboard fk pioneer5 90 30 60 30 30
   kinboard ik pioneer5 --position 45 191 -211 --approach -0.31 -0.164 -0.936
-  kinboard robots pioneer5 --json"""
+  kinboard robots pioneer5 --json
+  kinboard check my-arm.toml"""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -94,6 +95,13 @@ def _bench(arguments: argparse.Namespace) -> int:
     from app.bench import command
 
     return _refusing_misuse(command.bench, arguments)
+
+
+def _check(arguments: argparse.Namespace) -> int:
+    _do_without_compiler()
+    from app import commands
+
+    return _refusing_misuse(commands.check, arguments)
 
 
 def _refusing_misuse(command: Callable[[argparse.Namespace], int], arguments: argparse.Namespace) -> int:
@@ -268,6 +276,10 @@ def _parser() -> argparse.ArgumentParser:
     bench.add_argument("--json", metavar="FILE", help="write everything measured to this file")
     bench.add_argument("--picture", metavar="FILE", help="write the bars to this file (SVG)")
     bench.set_defaults(command=_bench)
+
+    check = commands.add_parser("check", parents=[answers], help="validate a robot file and tell what the arm is")
+    check.add_argument("file", metavar="FILE", help="robot file (*.toml)")
+    check.set_defaults(command=_check)
     return parser
 
 

@@ -1,4 +1,4 @@
-"""What ``kinboard fk``, ``ik`` and ``robots`` do: ask the core, print for people or as JSON.
+"""What ``kinboard fk``, ``ik``, ``robots`` and ``check`` do: ask the core, print for people or as JSON.
 
 Each command takes the parsed arguments of :mod:`app.cli`, prints its answer and returns the exit code: 0, or 1
 when ``ik`` has no exact answer. Misuse raises `kin.KinematicsError`.
@@ -17,8 +17,11 @@ from typing import Any
 import numpy as np
 
 from app.answers import Blocked, RobotAnswer, Solution, fk_answers, ik_answer, robot_answer
+from app.check import CheckAnswer
+from app.check import check as check_robot
 from app.store import Store
-from kin import InputError, Robot, Task, solve_ik
+from kin import InputError, Robot, Task, builtin_robots, load_robot, solve_ik
+from kin.catalog import BUILTIN
 from kin.question import MASK_NAMES
 from kin.transforms import Array, frame_from_approach, from_position_wxyz
 
@@ -117,6 +120,52 @@ def robots(arguments: Namespace) -> int:
     ]
     print(_table(["robot", "joints", "convention", "reach at most", "name"], rows))
     return 0
+
+
+def check(arguments: Namespace) -> int:
+    path = Path(arguments.file)
+    robot = load_robot(path)
+    answer = check_robot(robot, robot.id in builtin_robots() and path.resolve().parent != BUILTIN.resolve())
+    if arguments.json:
+        return _print_json(answer)
+    units = Units(robot, arguments.rad)
+    print(f"{robot.name} ({robot.id})\n{robot.description or 'No description.'}\nsource: {robot.source}\n")
+    rows = [
+        [str(i + 1), joint.name, joint.kind, units.joint(i, low), units.joint(i, high), units.joint(i, home)]
+        for i, (joint, low, high, home) in enumerate(
+            zip(robot.joints, robot.lower, robot.upper, robot.home, strict=True)
+        )
+    ]
+    print(_table(["", "joint", "kind", "lower", "upper", "home"], rows) + "\n")
+    for line in _about(answer, units):
+        print(line)
+    return 0
+
+
+def _about(answer: CheckAnswer, units: Units) -> list[str]:
+    """The lines that say how the axes lie, who solves, and what looks odd."""
+    robot = answer["robot"]
+    lines = []
+    for pair in answer["axes"]:
+        a, b = (j + 1 for j in pair["joints"])
+        apart = "" if pair["distance"] is None else f", {units.length(pair['distance'])} {units.of_length} apart"
+        angle = f" ({units.angle(pair['angle'])})" if pair["relation"] == "oblique" else ""
+        where = "" if pair["relation"] == "same line" else ", intersecting" if pair["intersect"] else apart
+        lines.append(f"axes {a} and {b}: {pair['relation']}{angle}{where}")
+    lines += [f"joints {run[0] + 1} to {run[-1] + 1}: parallel axes" for run in answer["parallel"]]
+    lines += [f"joints {run[0] + 1} to {run[-1] + 1}: axes through one point" for run in answer["spherical"]]
+    count = len(robot["branches"])
+    lines += [
+        "",
+        f"convention  {robot['convention']}",
+        f"joints      {robot['n']}, giving the tool {answer['motions']} independent motions",
+        f"reach       {units.length(robot['reach'])} {units.of_length} at most",
+        f"solver      {answer['solver']}: {answer['reason']}",
+        f"branches    {count if count else 'not known beforehand: a search finds them one by one'}",
+        "",
+        *(f"warning: {text}" for text in answer["warnings"]),
+    ]
+    return lines if answer["warnings"] else [*lines, "No warnings."]
 
 
 class Units:

@@ -9,12 +9,13 @@
 from kin._version import __version__
 from kin.catalog import builtin_robots, get_robot, load_folder, load_robot, parse_robot
 from kin.errors import InputError, KinematicsError, RobotFileError, UnknownRobotError
-from kin.fk import fk, jacobian, link_frames, manipulability
-from kin.ik import branch_names, branch_of, ik_branches, solve_ik
+from kin.fk import fk, fk_positions, jacobian, link_frames, manipulability
+from kin.ik import branch_names, branch_of, solve_ik
 from kin.path import PathGap, PathJump, PathResult, solve_path
 from kin.results import BlockedBranch, IKResult, IKSolution, LimitViolation, Redundancy, Status, Task
 from kin.robot import Joint, Robot
 from kin.singularity import Singularity, singularities
+from kin.thin import ik_branches
 from kin.warmup import warm_up
 
 __all__ = [
@@ -40,6 +41,7 @@ __all__ = [
     "branch_of",
     "builtin_robots",
     "fk",
+    "fk_positions",
     "get_robot",
     "ik_branches",
     "jacobian",

@@ -20,6 +20,11 @@ A file names its own units, so that a table is typed as its source prints it::
     [home]
     q = [90]
 
+Only ``id``, ``name``, ``source``, ``convention``, ``units`` and ``rows`` have to be there; in a row, what is left
+out is zero. Without ``limits`` a revolute joint turns ±180° and a prismatic one slides 0 to 1 m; without ``home``
+the arm starts in the middle of its limits, or bent a little where that would be singular (:mod:`kin.home`).
+``base`` and ``tool`` are tables ``{ xyz = [x, y, z], rpy = [roll, pitch, yaw] }``.
+
 A file with an error is refused with the file, the field, the value and what would be valid.
 """
 
@@ -28,14 +33,17 @@ from __future__ import annotations
 import math
 import re
 import tomllib
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from kin.errors import RobotFileError, UnknownRobotError
+from kin.home import default_home
 from kin.robot import IDENTITY, Joint, Matrix, Robot, exact_cos_sin
 
 BUILTIN = Path(__file__).parent / "robots"
+FIRST = ("pioneer5", "redundant7", "redundant7-craig")  # the chapter's arms lead every list
 LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 ANGLES = {"deg": math.pi / 180, "rad": 1.0}
 KINDS = ("revolute", "prismatic", "fixed")
@@ -46,8 +54,9 @@ _ROW = {"name", "kind", "theta", "d", "a", "alpha", "limits"}
 
 @lru_cache(maxsize=1)
 def builtin_robots() -> dict[str, Robot]:
-    """The robots shipped with the package, by id, in the order of their file names."""
-    return load_folder(BUILTIN)
+    """The robots shipped with the package, by id: the chapter's first, then in the order of their file names."""
+    robots = load_folder(BUILTIN)
+    return {robot_id: robots[robot_id] for robot_id in dict.fromkeys((*FIRST, *robots))}
 
 
 def get_robot(robot_id: str) -> Robot:
@@ -120,7 +129,7 @@ class _Reader:
         for name in names:
             if names.count(name) > 1:
                 raise self.refuse("rows[].name", name, "a different name for each row")
-        return Robot(
+        robot = Robot(
             id=robot_id,
             name=self.text(data, "name"),
             source=self.text(data, "source"),
@@ -132,6 +141,7 @@ class _Reader:
             base=self.transform(data, "base"),
             tool=self.transform(data, "tool"),
         )
+        return robot if "home" in data else replace(robot, home=default_home(robot))
 
     def row(self, index: int, data: object) -> Joint:
         where = f"rows[{index}]."

@@ -9,14 +9,16 @@ one held.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kin import kernels
 from kin.branches import Branches, Flags, is_closed, measure, solve_branches
 from kin.finish import OVERRUN
 from kin.question import Question
-from kin.solvers.common import POSITION
+from kin.solvers.common import POSE, POSITION, wrap
 from kin.transforms import Array
 
 _SAMPLES = 24
@@ -66,10 +68,61 @@ def improve(question: Question, branches: Branches, good: Flags) -> None:
     """Bring every good row of `branches`, in place, to its best free values."""
     branches.q, branches.stats = centred(question, branches.q)
     score = scores(question, branches.q)
-    for row in np.flatnonzero(good & np.array([question.allows(i) for i in range(len(good))])).tolist():
-        for k in range(len(branches.freedoms)):
-            if math.isnan(question.values[k]) and not math.isnan(branches.values[row, k]):
+    rows = np.flatnonzero(good & np.array([question.allows(i) for i in range(len(good))]))
+    for k in range(len(branches.freedoms)):
+        if not math.isnan(question.values[k]):
+            continue
+        there = rows[~np.isnan(branches.values[rows, k])]
+        many = question.match and getattr(question.match.solver, "branches_each", None)
+        if len(branches.freedoms) == 1 and question.code == POSE and many:
+            _improve_together(question, branches, score, there)
+        else:
+            for row in there.tolist():
                 _improve_row(question, branches, score, row, k)
+
+
+def _improve_together(question: Question, branches: Branches, score: Array, rows: NDArray[np.intp]) -> None:
+    """The best value of the one freedom on each of `rows`, all samples of all branches in one thin call."""
+    arcs = branches.arcs[0]
+    arcs = arcs[np.isin(arcs[:, 0], rows)]
+    if not len(arcs):
+        return
+    owner, low, high = arcs[:, 0].astype(np.intp), arcs[:, 1], arcs[:, 2]
+    total = np.bincount(owner, high - low)[owner]
+    count = np.where(high > low, 3 + (_SAMPLES * (high - low) / np.where(total > 0.0, total, 1.0)).astype(int), 1)
+    step = (high - low) / np.maximum(count - 1, 1)
+    grid = np.arange(count.max())
+    values = np.where(grid < count[:, None], low[:, None] + step[:, None] * grid, math.nan)
+    for _ in range(_ZOOMS + 1):
+        reached = _try_all(question, branches, score, owner, np.minimum(values, high[:, None]))
+        best = values[np.arange(len(values)), reached.argmax(axis=1)]
+        values = np.clip(best[:, None] + step[:, None] * np.linspace(-0.8, 0.8, 7), low[:, None], high[:, None])
+        step = 0.27 * step
+
+
+def _try_all(
+    question: Question, branches: Branches, score: Array, owner: NDArray[np.intp], values: Array
+) -> Array:
+    """Scores of the values ``(k, m)`` of branches `owner` ``(k,)``; a row is taken over if one is better."""
+    assert question.match is not None  # whose branches these are
+    solver: Any = question.match.solver
+    flat = np.ascontiguousarray(values.reshape(-1))
+    whose = np.repeat(owner, values.shape[1])
+    out = np.empty((len(flat), len(branches.q), question.robot.n))
+    targets = np.ascontiguousarray(np.broadcast_to(question.T, (len(flat), 4, 4)))
+    solver.branches_each(solver.params(question.match.geometry), targets, flat, question.seed, out)
+    q, stats = centred(question, out[np.arange(len(flat)), whose])
+    fits = is_closed(stats) & ~np.isnan(flat)
+    if question.respect:
+        fits &= stats[:, OVERRUN] == 0.0
+    reached = np.where(fits, scores(question, q), -math.inf)
+    for i in np.argsort(-reached, kind="stable").tolist():
+        row = whose[i]
+        if reached[i] > score[row]:
+            score[row] = reached[i]
+            branches.q[row], branches.stats[row] = q[i], stats[i]
+            branches.values[row, 0] = wrap(flat[i]) if branches.freedoms[0].circular else flat[i]
+    return reached.reshape(values.shape)
 
 
 def _improve_row(question: Question, branches: Branches, score: Array, row: int, k: int) -> None:

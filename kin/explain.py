@@ -147,7 +147,11 @@ def _side(question: Question, q: Array) -> Cause:
     radial = out - axis * float(axis @ out)
     away = float(out @ wanted) / far if far > 1e-9 else math.inf
     off_axis = [float(np.linalg.norm(v - axis * float(axis @ v))) for v in (wanted, reached)]
-    if robot.joints[0].kind == "revolute" and off_axis[1] > off_axis[0] + 1e-6 and np.linalg.norm(radial) > away:
+    if (
+        robot.joints[0].kind == "revolute"
+        and off_axis[1] > off_axis[0] + 1e-6
+        and np.linalg.norm(radial) > away - 1e-9
+    ):
         return "around the axis"
     return "too near" if far < near - 1e-6 else "outside"
 

@@ -7,7 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from kin.kernels import fk_into, jit
+from kin.compiled import jit
+from kin.kernels import fk_into
 from kin.solvers.common import APPROACH, MASK, POSE, TURN, nearest_image, relative_pose, wrap
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array

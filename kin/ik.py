@@ -38,7 +38,7 @@ from kin.results import BlockedBranch, Cause, IKResult, IKSolution, Redundancy, 
 from kin.robot import Robot
 from kin.singularity import Singularity, singularities_at
 from kin.solvers import solver_for
-from kin.solvers.common import APPROACH, MASK, POSE, POSITION, Problem
+from kin.solvers.common import APPROACH, MASK, POSE, POSITION
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -108,21 +108,6 @@ def solve_ik(
             solver=solver,
         )
     )
-
-
-def ik_branches(robot: Robot, target: Array, redundancy: float = math.nan) -> Array:
-    """All closed-form branches ``(branches, n)`` for one pose, unverified, NaN where a branch does not exist.
-
-    The thin call: no limits, no images, no order; row i is branch i of `branch_names`. Raises `InputError` for an
-    arm without a closed form.
-    """
-    match = solver_for(robot)
-    if match is None:
-        raise InputError("robot", robot.id, "an arm with a closed form")
-    T = np.ascontiguousarray(target, dtype=np.float64)
-    seed = robot.q_home.copy()
-    problem = Problem(T, POSE, (redundancy,), False, seed, robot.lower.copy(), robot.upper.copy())
-    return match.solver.solve(match.geometry, problem).q
 
 
 def branch_names(robot: Robot) -> tuple[str, ...]:
@@ -374,10 +359,10 @@ def _compromise(question: Question, branches: Branches, asked: Flags) -> IKResul
 
 def _numeric(question: Question) -> IKResult:
     """A task or an arm without closed form: descend from many starts; where branches are known, add their like."""
-    starts = search.starting_points(question, count=4 * search.STARTS)
     if question.branches is None and question.prefer == "nearest":
-        pool = search.descend(question, question.code, starts, 1.0, enough=1e-11)[0][None]
+        pool = search.solve_numerically(question).q[None]
     else:
+        starts = search.starting_points(question, count=4 * search.STARTS)
         pool = search.descend_each(question, question.code, starts, 1.0)[0]
     q, stats = measure(question, pool)
     q, stats = _usable(question, q, stats)

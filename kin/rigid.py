@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from kin.kernels import jit
+from kin.compiled import jit
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 

@@ -15,7 +15,7 @@ A revolute joint adds its value to θ, a prismatic one to d; a ``fixed`` row mov
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Literal
 
@@ -75,6 +75,10 @@ class Robot:
 
     def __hash__(self) -> int:
         return self._hash
+
+    def __getstate__(self) -> dict[str, object]:
+        """The table alone: what was derived from it, compiled functions among it, is derived anew elsewhere."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
 
     @cached_property
     def joints(self) -> tuple[Joint, ...]:

@@ -3,11 +3,13 @@
 A descent ends in a local minimum, so each search starts from many places: the seed, the branches the closed form
 knows (whatever the limits say), and points spread evenly over the limits. Of equal minima the one whose start
 comes first wins, and the seed comes first: while a target is dragged out of reach the arm does not jump about.
+Once several descents have ended at the best minimum known, the search for a better one is over.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,36 +19,90 @@ from kin.fk import fk
 from kin.question import Question
 from kin.results import IKSolution
 from kin.solvers.common import APPROACH, MASK, POSE, POSITION
-from kin.solvers.numeric import best_of, each_of, spread
+from kin.solvers.numeric import each_of, solve, spread
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 ORIENTATION_WEIGHT = 0.1
 STARTS = 24
-# What a radian weighs, in metres, and how many of the best descents go on from there. Below _HELD the point is as
-# good as held, so that descents may begin where it is met.
-_HELD = 1e-3
-_WEIGHTS = ((0.1, 24), (1e-2, 12), (_HELD, 12), (1e-4, 6))
+# Starts of `solve_numerically` at most, the E in metres that it takes for exact, and what a radian weighs there: a
+# share of the arm's reach, and in metres at least and at most.
+BUDGET = 400
+_EXACT = 1e-10
+_LEVER, _LEAST_LEVER, _MOST_LEVER = 0.3, 0.03, 1.0
+# The closest configuration is the best of so many descents at most, or of fewer once the best was met so often.
+_MOST_STARTS = 64
+_MEETINGS = 12
+# What a radian weighs, in metres, and how many of the best descents go on from there. At _HELD descents also begin
+# where the point is met: it stays as good as met, and the way is not yet as stiff as with less.
+_HELD = 1e-2
+_WEIGHTS = ((0.1, 24), (_HELD, 12), (1e-3, 12), (1e-4, 6))
 _HAIR = 1e-6
+# Minima that close, in metres and radians, are as good as one.
+_ALIKE, _ALIKE_ANGLE = 1e-9, 1e-6
+
+
+class Found(NamedTuple):
+    """What `solve_numerically` found.
+
+    Attributes:
+        q: configuration ``(n,)`` inside the limits.
+        error: its distance E from the target, in metres.
+        starts: how many descents that took.
+    """
+
+    q: Array
+    error: float
+    starts: int
+
+
+def solve_numerically(question: Question, budget: int = BUDGET) -> Found:
+    """The first configuration that meets the task: a descent from the seed, then others from all over the limits.
+
+    Needs no closed form. If none of `budget` starts (at least 1) leads to E ≤ 1e-10 m, the best minimum reached.
+    The same question always gets the same answer.
+    """
+    out = question.seed.copy()
+    weight = min(max(_LEVER * question.robot.reach, _LEAST_LEVER), _MOST_LEVER)
+    error, starts = solve(
+        question.robot.model, question.T, question.code, question.mask, weight, question.low, question.high,
+        question.turns, budget, _EXACT * min(1.0, weight), out,
+    )  # fmt: skip
+    return Found(out, float(error), int(starts))
 
 
 def descend(
     question: Question, code: int, starts: Array, weight: float, enough: float = 0.0
 ) -> tuple[Array, float]:
-    """Best configuration ``(n,)`` over descents from the starts ``(k, n)``, and its error E in metres."""
-    out = np.empty(question.robot.n)
-    error = best_of(
-        question.robot.model, question.T, code, question.mask, weight, question.low, question.high,
-        np.ascontiguousarray(starts), enough, out,
-    )  # fmt: skip
-    return out, float(error)
+    """Best configuration ``(n,)`` over descents from the starts ``(k, n)``, and its error E in metres.
+
+    Over no more starts than it takes to end at E ≤ `enough`, or at the best minimum `_MEETINGS` times.
+    """
+    q, errors = _descend(question, code, starts, weight, enough, _MEETINGS)
+    best = 0
+    for i, error in enumerate(errors.tolist()):
+        # A later start must be better by more than rounding: of equal minima the one nearest to the seed stays, so
+        # that the arm does not jump about while a target is dragged out of reach.
+        if error < errors[best] * (1.0 - 1e-6) - 1e-12:
+            best = i
+    return q[best], float(errors[best])
 
 
 def descend_each(question: Question, code: int, starts: Array, weight: float) -> tuple[Array, Array]:
     """Where each descent ends ``(k, n)``, and its error ``(k,)``."""
+    return _descend(question, code, starts, weight, -1.0, len(starts) + 1)
+
+
+def _descend(
+    question: Question, code: int, starts: Array, weight: float, enough: float, meetings: int
+) -> tuple[Array, Array]:
+    """Where the descents end ``(m, n)``, and their errors ``(m,)``; m < k if the search was over before."""
     q, errors = np.array(starts, order="C"), np.empty(len(starts))
-    each_of(question.robot.model, question.T, code, question.mask, weight, question.low, question.high, q, errors)
-    return q, errors
+    count = each_of(
+        question.robot.model, question.T, code, question.mask, weight, question.low, question.high,
+        question.turns, enough, meetings, q, errors,
+    )  # fmt: skip
+    return q[:count], errors[:count]
 
 
 def starting_points(question: Question, candidates: Array | None = None, count: int = STARTS) -> Array:
@@ -80,7 +136,7 @@ def polish(question: Question, branches: Branches) -> Flags:
 
 def closest(question: Question, candidates: Array | None) -> IKSolution | None:
     """The configuration inside the limits with the least E, ℓ = 0.1 m per radian; None if a branch has none."""
-    starts = starting_points(question, candidates)
+    starts = starting_points(question, candidates, _MOST_STARTS)
     if question.branches is None:
         q, _ = descend(question, question.code, starts, ORIENTATION_WEIGHT)
     else:
@@ -116,10 +172,19 @@ def nearest_to_point(question: Question, known: IKSolution | None) -> tuple[IKSo
     """
     if known is not None and (known.position_error <= TOLERANCES.closure_position or question.code == MASK):
         return known, known.position_error if question.code == MASK else 0.0
-    starts = starting_points(question, None if known is None else known.q[None])
+    starts = starting_points(question, None if known is None else known.q[None], _MOST_STARTS)
     q, distance = descend(question, POSITION, starts, 1.0, enough=1e-11)
     found, stats = measure(question, q[None])
     return solution(question, found[0], stats[0], compromise="closest"), 0.0 if distance <= 1e-7 else distance
+
+
+def _valleys(errors: Array, alike: float) -> list[int]:
+    """Indices of the errors ``(k,)`` by size, of each run of alike ones the first two only.
+
+    Descents that end equally high are mostly in one valley, and one of them would do.
+    """
+    order = np.argsort(errors, kind="stable").tolist()
+    return [i for k, i in enumerate(order) if k < 2 or errors[i] > errors[order[k - 2]] + alike]
 
 
 def nearest_orientation(question: Question, candidates: Array | None) -> IKSolution | None:
@@ -131,14 +196,16 @@ def nearest_orientation(question: Question, candidates: Array | None) -> IKSolut
     """
     q = starting_points(question, candidates)
     met, errors = descend_each(question, POSITION, q, 1.0)
+    if errors.min() > 1e-7 and np.count_nonzero(errors <= errors.min() + _ALIKE) >= _MEETINGS:
+        return None  # as `nearest_to_point` would find
     met = met[errors <= 1e-7]
     for weight, keep in _WEIGHTS:
         if weight == _HELD:
             q = np.concatenate([q, met])
         q, errors = descend_each(question, question.code, q, weight)
-        q = q[np.argsort(errors.round(9), kind="stable")[:keep]]
-    q, errors = descend_each(question, POSITION, np.concatenate([q, met]), 1.0)
-    q = q[errors <= 1e-7]
+        q = q[_valleys(errors, _ALIKE_ANGLE * weight)[:keep]]
+    q, errors = descend_each(question, POSITION, q, 1.0)
+    q = np.concatenate([q[errors <= 1e-7], met])
     if not len(q):
         return None
     q = q[int(np.argmin(measure(question, q)[1][:, ROTATION_ERROR].round(9)))]

@@ -114,7 +114,8 @@ def test_the_robot_file_is_a_robot():
 
 def test_the_built_in_arms_are_named():
     robots = kin.builtin_robots()
-    assert all(f"`{robot_id}`" in README for robot_id in robots)
+    rows = [(robot_id, row[1]) for row in table(README, "arm") for robot_id in re.findall(r"`(.+?)`", row[0])]
+    assert sorted(rows) == sorted((robot.id, str(robot.n)) for robot in robots.values())
     words = {3: "Three", 4: "Four", 5: "Five", 6: "Six", 7: "Seven", 8: "Eight", 9: "Nine", 10: "Ten"}
     assert f"- {words[len(robots)]} arms are built in" in README
 

@@ -14,7 +14,9 @@ ROOT = Path(__file__).parents[1]
 # A name allows what is below it too; "app.viewer" allows app.viewer.session.
 RULES: dict[str, set[str]] = {
     "kin": {"kin", "numpy", "numba"},
-    "kin/kernels.py": {"numpy", "numba", "kin.transforms"},
+    "kin/compiled.py": {"numba"},
+    "kin/simd.py": {"numba", "kin.compiled"},
+    "kin/kernels.py": {"numpy", "kin.compiled", "kin.simd", "kin.transforms"},
     "app": {"kin", "app.answers", "app.settings", "app.store"},
     "app/bench": {"kin", "numpy", "numba", "app.bench"},
     "app/bench/contestants.py": {
@@ -36,7 +38,8 @@ RULES: dict[str, set[str]] = {
     "app/store.py": {"kin"},
     "app/answers.py": {"kin", "numpy", "typing_extensions"},
     "app/cli.py": {"kin", "app.bench.command", "app.commands", "app.main", "app.settings", "pydantic"},
-    "app/commands.py": {"kin", "numpy", "app.answers", "app.store"},
+    "app/check.py": {"kin", "numpy", "typing_extensions", "app.answers"},
+    "app/commands.py": {"kin", "numpy", "app.answers", "app.check", "app.store"},
     "app/prefix.py": {"starlette"},
     "app/security.py": {"starlette"},
     "app/pages.py": {"starlette", "kin"},

@@ -21,7 +21,6 @@ from importlib import metadata
 from typing import Any
 
 import numpy as np
-from numba import TypingError
 
 import kin
 from app.bench import floors
@@ -91,12 +90,11 @@ def _floor(task: Task) -> list[Contestant]:
 def _ours(task: Task) -> list[Contestant]:
     robot, row = task.robot, task.row
     if row.kind == "fk" and row.batch:
-        positions = getattr(kin, "fk_positions", None) or _positions
-        return [Contestant(OURS, positions, [(robot, task.q)], list, len(task.q))]
+        return [Contestant(OURS, kin.fk_positions, [(robot, task.q)], list, len(task.q))]
     if row.kind == "fk":
         return [Contestant(OURS, kin.fk, [(robot, q) for q in task.q], _single)]
     if row.kind == "branches" and row.batch:
-        return [Contestant(OURS, *_thin_batch(task), list, len(task.T))]
+        return [Contestant(OURS, kin.ik_branches, [(robot, task.T, row.value)], list, len(task.T))]
     found = []
     if row.kind == "branches":
         found.append(Contestant(OURS, kin.ik_branches, [(robot, T, row.value) for T in task.T], _single))
@@ -109,24 +107,6 @@ def _ours(task: Task) -> list[Contestant]:
 
     found.append(Contestant(RICH, solve, [(T,) for T in task.T], _solutions))
     return found
-
-
-def _thin_batch(task: Task) -> tuple[Callable[..., Any], list[tuple[Any, ...]]]:
-    """The thin call for all targets at once; one by one where it takes but one."""
-    inputs = [(task.robot, task.T, task.row.value)]
-    try:
-        kin.ik_branches(task.robot, task.T[:2], task.row.value)
-    except TypingError:
-        return _one_by_one, inputs
-    return kin.ik_branches, inputs
-
-
-def _one_by_one(robot: kin.Robot, T: Array, value: float) -> list[Array]:
-    return [kin.ik_branches(robot, target, value) for target in T]
-
-
-def _positions(robot: kin.Robot, q: Array) -> Array:
-    return kin.fk(robot, q)[..., :3, 3]
 
 
 def _solutions(result: kin.IKResult) -> list[Array]:
@@ -306,7 +286,12 @@ def _pinocchio(task: Task) -> list[Contestant]:
 
     if task.row.batch:
         return [Contestant("pinocchio", positions, [(task.q,)], list, len(task.q))]
-    return [Contestant("pinocchio", pose, [(q,) for q in task.q], lambda T: [T.homogeneous])]
+    inputs = [(q,) for q in task.q]
+    return [
+        # A view of its own memory, which the next call writes over; and what a caller can keep.
+        Contestant("pinocchio, its own SE3", pose, inputs, lambda T: [T.homogeneous]),
+        Contestant("pinocchio", lambda q: pose(q).homogeneous, inputs, _single),
+    ]
 
 
 def _toolbox(task: Task) -> list[Contestant]:

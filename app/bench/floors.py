@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from kin.kernels import jit
+from kin.compiled import jit
 from kin.transforms import Array
 
 

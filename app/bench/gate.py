@@ -46,14 +46,14 @@ class Verdict:
 
 
 GATES: tuple[Gate, ...] = (
-    Gate("fk", OURS, 20.0),
-    Gate("fk-batch", OURS, 15.0),
-    Gate("ik-pioneer5", OURS, 100.0),
-    Gate("ik-pioneer5", RICH, 900.0),
-    Gate("ik-pioneer5-batch", OURS, 750.0),
-    Gate("ik-srs", OURS, 140.0),
-    Gate("ik-srs-batch", OURS, 600.0),
-    Gate("solve-redundant7-craig", RICH, 1600.0),
+    Gate("fk", OURS, 10.0),
+    Gate("fk-batch", OURS, 1.5),
+    Gate("ik-pioneer5", OURS, 15.0),
+    Gate("ik-pioneer5", RICH, 700.0),
+    Gate("ik-pioneer5-batch", OURS, 4.0),
+    Gate("ik-srs", OURS, 15.0),
+    Gate("ik-srs-batch", OURS, 2.5),
+    Gate("solve-redundant7-craig", RICH, 1200.0),
 )
 
 

@@ -43,7 +43,7 @@ TRIM_COLOR: Color = (58, 64, 74)
 TOOL_COLOR: Color = (92, 99, 112)
 APPROACH_COLOR: Color = (214, 39, 120)
 PEDESTAL_COLOR: Color = (126, 134, 147)
-PROBES = 1500
+PROBES = 8000
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,19 +89,20 @@ def body(robot: Robot) -> Body:
     links = chain(robot)
     size = _thickness(robot, links)
     grip = _grip_length(links, size, robot)
+    tip = _tip(links, size)
     parts = []
     crowd = 0
     for link in links.links:
         crowd = crowd + 1 if link.index > 0 and np.linalg.norm(link.T_parent_axis[:3, 3]) < 1e-6 else 0
-        last = link is links.links[-1]
-        parts.append(_link_parts(link, size * _taper(link.index, robot.n), crowd, grip if last else 0.0, links))
+        held = grip if all(len(after.path) < 2 for after in links.links[link.index + 2 :]) else 0.0
+        parts.append(_link_parts(link, size * _taper(link.index, robot.n, tip), crowd, held, links))
     reach = _extent(robot)
     floor = min(reach[0][2] - 2.5 * size, robot.T_world_base[2, 3] - 3 * size)
     floor = math.floor(floor / 0.05) * 0.05
     center, radius = _view_sphere(robot, floor, size)
-    return Body(
-        links, tuple(parts), _gripper(size, grip), _pedestal(robot, size, floor), floor, center, radius, size
-    )
+    hand = _gripper(min(size, grip / 2), grip)
+    pedestal = _pedestal(robot, size, floor)
+    return Body(links, tuple(parts), hand, pedestal, floor, center, radius, size)
 
 
 def joint_color(index: int) -> Color:
@@ -113,26 +114,36 @@ def _thickness(robot: Robot, links: Chain) -> float:
     """Tube radius: a fixed share of the reach, but no thicker than short links allow."""
     steps = [np.linalg.norm(np.diff(link.path, axis=0), axis=1) for link in links.links]
     lengths = np.concatenate([*steps, [robot.reach]])
-    shortest = float(lengths[lengths > 1e-6].min(initial=robot.reach))
     size = max(robot.reach, 0.05)
+    shortest = float(lengths[lengths > 0.04 * size].min(initial=robot.reach))  # a shorter step is only a jog
     return max(min(0.032 * size, 0.3 * shortest), 0.014 * size)
 
 
-def _taper(index: int, n: int) -> float:
-    return 1.0 - 0.38 * max(index, 0) / max(n - 1, 1)
+def _tip(links: Chain, size: float) -> float:
+    """Thickness of the last link as a share of the first: slim enough for a flange close to the wrist."""
+    path = links.links[-1].path
+    if len(path) < 2:
+        return 0.62
+    return min(0.62, 0.27 * float(np.linalg.norm(path[1] - path[0])) / size)
+
+
+def _taper(index: int, n: int, tip: float) -> float:
+    return 1.0 - (1.0 - tip) * max(index, 0) / max(n - 1, 1)
 
 
 def _grip_length(links: Chain, size: float, robot: Robot) -> float:
     path = links.links[-1].path
     wanted = min(3.2 * size, 0.11 * max(robot.reach, 0.05))
     if len(path) < 2:
-        return wanted
+        strokes = [j.limits[1] - j.limits[0] for j in robot.joints if j.kind == "prismatic" and j.limits]
+        return min(wanted, 0.4 * min(strokes, default=math.inf))  # room to leave the sleeve it hangs from
     return min(wanted, 0.62 * float(np.linalg.norm(path[-1] - path[-2])))
 
 
 def _link_parts(link: Link, r: float, crowd: int, grip: float, links: Chain) -> tuple[Part, ...]:
+    """A link's meshes. `grip` is the gripper's length if nothing but the gripper follows, 0 otherwise."""
     path = link.path
-    if grip > 0.0 and len(path) > 1:
+    if grip > 0.0 and len(path) > 1 and link is links.links[-1]:
         step = path[-1] - path[-2]
         length = float(np.linalg.norm(step))
         if step @ links.T_last_tool[:3, 2] > 0.9 * length:  # the gripper takes the place of the tube's end
@@ -142,10 +153,17 @@ def _link_parts(link: Link, r: float, crowd: int, grip: float, links: Chain) -> 
         return tuple(parts)
     color = joint_color(link.index)
     if link.joint.kind == "prismatic":
-        return (*parts, *_slide(link, r, color))
+        return (*parts, *_slide(link, r, color, grip))
     along = _leaves_along(link)
     if along:
-        return (*parts, *_collar(r, along, crowd, color))
+        middle = 0.85 * r + (1.75 * r if crowd else 0.15 * r)
+        if link is links.links[-1]:  # the fingers stay free
+            middle = max(min(middle, float(np.linalg.norm(link.path[1])) - 0.45 * grip - 0.85 * r), 0.85 * r)
+        return (*parts, *_collar(r, along, along * middle, color))
+    ahead = float(links.T_last_tool[2, 2])
+    if grip > 0.0 and len(path) < 2 and link is links.links[-1] and abs(ahead) > 0.9:
+        # The joint turns the gripper about the gripper's own axis: its collar sits behind the gripper.
+        return (*parts, *_collar(r, 1, -math.copysign(grip + 0.7 * r, ahead), color))
     return (*parts, *_drum(r, crowd, color))
 
 
@@ -169,25 +187,26 @@ def _drum(r: float, crowd: int, color: Color) -> list[Part]:
     ]
 
 
-def _collar(r: float, along: int, crowd: int, color: Color) -> list[Part]:
+def _collar(r: float, along: int, middle: float, color: Color) -> list[Part]:
+    """A collar around a height of the axis; the link leaves upward or downward."""
     radius, half = r * 1.42, r * 0.85
-    middle = along * (half + (1.75 * r if crowd else 0.15 * r))
     rims = [cylinder(radius * 1.06, middle + s * half - 0.13 * r, middle + s * half + 0.13 * r) for s in (-1, 1)]
     mark = box((radius * 0.8, -0.16 * r, middle - 0.8 * half), (radius * 1.07, 0.16 * r, middle + 0.8 * half))
     # The tube hides the axis on one side; it shows behind the joint, and through the collar as its rims.
-    back = -along * 3.4 * r
+    behind = -along * 3.4 * r
     return [
         Part("housing", cylinder(radius, middle - half, middle + half), color),
         Part("trim", merged([*rims, mark]), TRIM_COLOR),
-        Part("axis", _axis(r, min(back, 0.0), max(back, 0.0), arrow=along < 0), color),
+        Part("axis", _axis(r, min(behind, 0.0), max(behind, 0.0), arrow=along < 0), color),
     ]
 
 
-def _slide(link: Link, r: float, color: Color) -> list[Part]:
+def _slide(link: Link, r: float, color: Color, grip: float) -> list[Part]:
+    """A sleeve, and a bar so long that it is in the sleeve at both ends of the stroke."""
     assert link.joint is not None
     low, high = link.joint.limits or (0.0, 8 * r)
     bar = 0.75 * r
-    back, front = -max(high, 0.0) - 1.2 * r, -min(low, 0.0) + 1.2 * r
+    back, front = -max(high, 0.0) - 1.2 * r, -min(low, 0.0) + (1.2 * r if grip == 0.0 else -0.9 * grip)
     return [
         Part("link-bar", box((-bar, -bar, back), (bar, bar, front)), LINK_COLOR),
         Part("housing", box((-1.3 * r, -1.3 * r, -r), (1.3 * r, 1.3 * r, r)), color, fixed_to_parent=True),

@@ -146,8 +146,11 @@ class ArmScene:
                 position, wxyz = link.pose(q)
                 self._joints.append(self._scene.add_frame(name, show_axes=False, position=position, wxyz=wxyz))
             for part in parts:
+                # On the parent's node there may be a part of the same name already.
                 node = (
-                    self._add(parent, part, link.T_parent_axis) if part.fixed_to_parent else self._add(name, part)
+                    self._add(parent, part, link.T_parent_axis, name=f"{part.name}-{link.index + 1}")
+                    if part.fixed_to_parent
+                    else self._add(name, part)
                 )
                 if part.name == "axis":
                     self._axes.append(node)
@@ -164,10 +167,11 @@ class ArmScene:
         T: Array | None = None,
         opacity: float | None = None,
         visible: bool = True,
+        name: str = "",
     ) -> viser.SceneNodeHandle:
         T = np.eye(4) if T is None else T
         return self._scene.add_mesh_simple(
-            f"{parent}/{part.name}",
+            f"{parent}/{name or part.name}",
             part.mesh.vertices,
             part.mesh.faces,
             color=part.color,

@@ -68,6 +68,7 @@ class Session:
         self._branch: str | None = None  # as solve_ik takes it
         self._held_free: str | None = None
         self._arms = 0
+        self._sheet = False
         # Made by the worker when it builds the page.
         self._robot: Robot
         self._task: Task
@@ -177,7 +178,7 @@ class Session:
             case ("view", str(name)):
                 self._on_view(name, bool(value))
             case "camera":
-                camera.aim(self._client.camera, self._scene.body)
+                camera.aim(self._client.camera, self._scene.body, self._sheet)
             case _:
                 raise KeyError(key)
 
@@ -313,7 +314,9 @@ class Session:
     def _build(self) -> None:
         gui = self._client.gui
         with self._client.atomic():
-            if self._client.camera.image_width >= NARROW:  # a phone shows the panel as a sheet from below
+            # A phone shows the panel as a sheet from below. Asked once: a docked panel makes the picture narrower.
+            self._sheet = self._client.camera.image_width < NARROW
+            if not self._sheet:
                 gui.main_panel.dock_right()
             robot = self._store.robots[0]
             self._task = default_task(robot)
@@ -355,7 +358,7 @@ class Session:
             self._branch_choice = BranchChoice(self._client.gui, robot, self.post)
         self._show_posture()
         self._apply_view()
-        camera.aim(self._client.camera, self._scene.body)
+        camera.aim(self._client.camera, self._scene.body, self._sheet)
 
     def _show_posture(self) -> None:
         """The branch the arm is on, and what is free there."""

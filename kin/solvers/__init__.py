@@ -15,7 +15,7 @@ from functools import lru_cache
 from typing import Any, NamedTuple, Protocol, cast
 
 from kin.robot import Robot
-from kin.solvers import collinear7, srs7, wrist5
+from kin.solvers import collinear7, parallel6, scara4, slide6, srs7, wrist5, wrist6
 from kin.solvers.common import Candidates, Freedom, Problem
 from kin.solvers.singular import Singularity
 from kin.transforms import Array
@@ -51,7 +51,9 @@ class Match(NamedTuple):
     reason: str
 
 
-SOLVERS: tuple[Solver, ...] = tuple(cast(Solver, module) for module in (wrist5, srs7, collinear7))
+SOLVERS: tuple[Solver, ...] = tuple(
+    cast(Solver, module) for module in (wrist5, srs7, collinear7, wrist6, parallel6, slide6, scara4)
+)
 
 
 @lru_cache(maxsize=256)

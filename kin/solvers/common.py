@@ -21,12 +21,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.kernels import jit
+from kin.compiled import jit
 from kin.robot import Robot, exact_cos_sin
+from kin.simd import atan2
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 TURN = 2.0 * math.pi
+_PER_TURN = 1.0 / TURN
 _SINGULAR = TOLERANCES.singular
 _LIMIT = TOLERANCES.limit
 _MERGE = TOLERANCES.merge
@@ -50,15 +52,21 @@ def merged(angle: float) -> float:
 @jit
 def nearest_image(x: float, near: float, low: float, high: float) -> float:
     """The image x + 2πk closest to `near` among those inside [low, high], else the least far outside."""
-    y = x + TURN * float(np.round((near - x) / TURN))
-    if y > high + _LIMIT:
-        below = x + TURN * math.floor((high + _LIMIT - x) / TURN)
-        if below >= low - _LIMIT or low - below < below + TURN - high:
+    y = x + TURN * float(np.round((near - x) * _PER_TURN))
+    if y - high > _LIMIT:
+        turns = math.floor((high + _LIMIT - x) / TURN)
+        below = x + TURN * turns
+        if below - high > _LIMIT:  # the quotient was rounded up to a whole number
+            below = x + TURN * (turns - 1.0)
+        if low - below <= _LIMIT or low - below < below + TURN - high:
             return below
         return below + TURN
-    if y < low - _LIMIT:
-        above = x + TURN * math.ceil((low - _LIMIT - x) / TURN)
-        if above <= high + _LIMIT or above - high < low - (above - TURN):
+    if low - y > _LIMIT:
+        turns = math.ceil((low - _LIMIT - x) / TURN)
+        above = x + TURN * turns
+        if low - above > _LIMIT:
+            above = x + TURN * (turns + 1.0)
+        if above - high <= _LIMIT or above - high < low - (above - TURN):
             return above
         return above - TURN
     return y
@@ -106,9 +114,10 @@ def zyz(M: Array, sign: float, near: Array, low: Array, high: Array, first: int,
 
     `near`, `low`, `high` (indexed like `out`) only matter when sin B = 0 and A is free.
     """
-    x = M[0, 2]
-    y = M[1, 2]
-    if math.hypot(x, y) < _SINGULAR:
+    x = sign * M[0, 2]
+    y = sign * M[1, 2]
+    h = math.sqrt(x * x + y * y)
+    if h < _SINGULAR:
         k = first + 2
         if M[2, 2] > 0.0:
             total = math.atan2(M[1, 0], M[0, 0])
@@ -116,13 +125,16 @@ def zyz(M: Array, sign: float, near: Array, low: Array, high: Array, first: int,
         else:
             total = math.atan2(-M[1, 0], -M[0, 0])
             A = split_sum(total, near[first], low[first], high[first], -near[k], -high[k], -low[k])
+        c = math.cos(A)
+        s = math.sin(A)
+        h = sign * (c * x + s * y)
     else:
-        A = math.atan2(sign * y, sign * x)
-    c = math.cos(A)
-    s = math.sin(A)
+        A = atan2(y, x)
+        c, s = x / h, y / h
+        h *= sign
     out[first] = A
-    out[first + 1] = math.atan2(c * x + s * y, M[2, 2])
-    out[first + 2] = math.atan2(c * M[1, 0] - s * M[0, 0], c * M[1, 1] - s * M[0, 1])
+    out[first + 1] = atan2(h, M[2, 2])
+    out[first + 2] = atan2(c * M[1, 0] - s * M[0, 0], c * M[1, 1] - s * M[0, 1])
 
 
 @jit

@@ -44,7 +44,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from kin.kernels import jit
+from kin.compiled import jit
 from kin.solvers.common import (
     TURN,
     Candidates,

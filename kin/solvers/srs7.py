@@ -21,8 +21,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.kernels import jit
+from kin.compiled import inlined, jit
+from kin.kernels import BLOCK, all_finite_pose
 from kin.robot import Robot
+from kin.simd import WIDE, atan2, sin_cos, widest, wrapped
 from kin.solvers.common import (
     APPROACH,
     POSE,
@@ -168,14 +170,7 @@ def _arm_angle(near: Array, frame: Array, d3: float, d5: float) -> float:
     where ψ's own reference turns round. ``radial = z3 sin β − sign(θ4) x3 cos β`` with β the triangle's angle
     at S also holds for a straight arm.
     """
-    c1, s1, c2, s2 = math.cos(near[0]), math.sin(near[0]), math.cos(near[1]), math.sin(near[1])
-    c3, s3, s4 = math.cos(near[2]), math.sin(near[2]), math.sin(near[3])
-    beta = math.atan2(d5 * abs(s4), d3 + d5 * math.cos(near[3]))
-    k = -math.cos(beta) if s4 >= 0.0 else math.cos(beta)
-    m = math.sin(beta)
-    rx = k * (c1 * c2 * c3 - s1 * s3) + m * c1 * s2
-    ry = k * (s1 * c2 * c3 + c1 * s3) + m * s1 * s2
-    rz = -k * s2 * c3 + m * c2
+    rx, ry, rz = _radial(near, d3, d5)
     along1 = rx * frame[1, 0] + ry * frame[1, 1] + rz * frame[1, 2]
     along2 = rx * frame[2, 0] + ry * frame[2, 1] + rz * frame[2, 2]
     if math.hypot(along1, along2) < 1e-12:
@@ -203,7 +198,7 @@ def _weigh(
     ``Rz(A) Ry(B) Rz(C) = M0 + M1 cos ψ + M2 sin ψ``; the other sign is A + π, −B, C + π. The steps of the joints
     first…last−1 count.
     """
-    c, s = math.cos(psi), math.sin(psi)
+    s, c = sin_cos(psi)
     x = M0[0, 2] + c * M1[0, 2] + s * M2[0, 2]
     y = M0[1, 2] + c * M1[1, 2] + s * M2[1, 2]
     z = M0[2, 2] + c * M1[2, 2] + s * M2[2, 2]
@@ -222,11 +217,11 @@ def _weigh(
             A = split_sum(total, near[first], low[first], high[first], -near[k], -high[k], -low[k])
         ca, sa = math.cos(A), math.sin(A)
     else:
-        A = math.atan2(y, x)
+        A = atan2(y, x)
         ca, sa = x / h, y / h
     angles[first] = A
-    angles[first + 1] = math.atan2(h, z)
-    angles[k] = math.atan2(ca * yx - sa * xx, ca * yy - sa * xy)
+    angles[first + 1] = atan2(h, z)
+    angles[k] = atan2(ca * yx - sa * xx, ca * yy - sa * xy)
     for side in range(2):
         misfits[j, column + side] = misfit_of(angles, low, high, first, first + 3)
         ways[j, column + side] = _travel(angles, near, low, high, first, last)
@@ -374,6 +369,246 @@ def _obstacle(code: int, g: Geometry) -> str:
 def why(geometry: Geometry) -> str:
     """What makes an arm one of this family."""
     return "axes 1, 2, 3 meet in one point and axes 5, 6, 7 in another, with the elbow's axis square to both links"
+
+
+# Thin: all branches of one target or of many at one arm angle, without limits, ranges and a choice. The angles are
+# taken at the end and all together, from pairs (y, x). One branch is enough: the others are its half turns, a sign
+# of θ2 turns θ1 and θ3, one of θ4 turns θ3 and θ5, one of θ6 turns θ5 and θ7.
+
+_PAIRS, _INPUT, _VALUE, _SPECIAL, _SLOTS = 7, 14, 26, 27, 28
+_TOOL, _OFFSET, _LENGTHS = 12, 24, 31
+_UNBOUND = 1e6
+
+
+def params(geometry: Geometry) -> Array:
+    """The arm as the thin kernels read it ``(33,)``: base⁻¹ and tool⁻¹ by rows, offsets, d3, d5."""
+    g = geometry
+    offset = [wrap(t) for t in g.offset.tolist()]
+    return np.array([*g.inverse_base[:3].ravel(), *g.inverse_tool[:3].ravel(), *offset, g.d3, g.d5])
+
+
+@jit
+def _radial(near: Array, d3: float, d5: float) -> tuple[float, float, float]:
+    """The elbow's direction off the line SW at canonical angles, see `_arm_angle`."""
+    c1, s1, c2, s2 = math.cos(near[0]), math.sin(near[0]), math.cos(near[1]), math.sin(near[1])
+    c3, s3, s4 = math.cos(near[2]), math.sin(near[2]), math.sin(near[3])
+    beta = math.atan2(d5 * abs(s4), d3 + d5 * math.cos(near[3]))
+    k = -math.cos(beta) if s4 >= 0.0 else math.cos(beta)
+    m = math.sin(beta)
+    return (
+        k * (c1 * c2 * c3 - s1 * s3) + m * c1 * s2,
+        k * (s1 * c2 * c3 + c1 * s3) + m * s1 * s2,
+        m * c2 - k * s2 * c3,
+    )
+
+
+@inlined
+def _zyz_pairs(
+    m00: float, m01: float, m02: float, m10: float, m11: float, m12: float
+) -> tuple[float, float, float, bool]:
+    """y and x of the third angle of Rz Ry Rz, |sin| of the second, and whether that vanishes; see `zyz`."""
+    h = math.sqrt(m02 * m02 + m12 * m12)
+    c, s = m02 / h, m12 / h
+    return c * m10 - s * m00, c * m11 - s * m01, h, h < _SINGULAR
+
+
+@inlined
+def _pairs(params: Array, rx: float, ry: float, rz: float, count: int, S: Array) -> int:
+    """S[0:14] ← the pairs of `count` targets, from their first three rows in S[14:26] and arm angles in S[26].
+
+    An arm angle of NaN stands for the elbow's direction (rx, ry, rz). S[27] ← 1.0 for the targets beside a
+    singularity, which `_closely` looks at; returns how many these are.
+    """
+    d3, d5 = params[_LENGTHS], params[_LENGTHS + 1]
+    most, least = d3 + d5, abs(d3 - d5)
+    nearest = max(least - _REACH, 1e-12)
+    half = 0.5 / (d3 * d5)
+    b00, b01, b02, b03 = params[0], params[1], params[2], params[3]
+    b10, b11, b12, b13 = params[4], params[5], params[6], params[7]
+    b20, b21, b22, b23 = params[8], params[9], params[10], params[11]
+    t00, t01, t02, t03 = params[12], params[13], params[14], params[15]
+    t10, t11, t12, t13 = params[16], params[17], params[18], params[19]
+    t20, t21, t22, t23 = params[20], params[21], params[22], params[23]
+    found = 0
+    for b in range(count):
+        x, y, z = S[_INPUT, b], S[_INPUT + 4, b], S[_INPUT + 8, b]
+        u0, u1, u2 = b00 * x + b01 * y + b02 * z, b10 * x + b11 * y + b12 * z, b20 * x + b21 * y + b22 * z
+        x, y, z = S[_INPUT + 1, b], S[_INPUT + 5, b], S[_INPUT + 9, b]
+        v0, v1, v2 = b00 * x + b01 * y + b02 * z, b10 * x + b11 * y + b12 * z, b20 * x + b21 * y + b22 * z
+        x, y, z = S[_INPUT + 2, b], S[_INPUT + 6, b], S[_INPUT + 10, b]
+        w0, w1, w2 = b00 * x + b01 * y + b02 * z, b10 * x + b11 * y + b12 * z, b20 * x + b21 * y + b22 * z
+        x, y, z = S[_INPUT + 3, b], S[_INPUT + 7, b], S[_INPUT + 11, b]
+        px = u0 * t03 + v0 * t13 + w0 * t23 + (b00 * x + b01 * y + b02 * z + b03)
+        py = u1 * t03 + v1 * t13 + w1 * t23 + (b10 * x + b11 * y + b12 * z + b13)
+        pz = u2 * t03 + v2 * t13 + w2 * t23 + (b20 * x + b21 * y + b22 * z + b23)
+        # The triangle S–E–W: u = (ux, uy, uz) towards W, e1 and e2 across it.
+        L2 = px * px + py * py + pz * pz
+        far, near_by = most * most - L2, L2 - least * least
+        far = far if far > 0.0 else 0.0
+        near_by = near_by if near_by > 0.0 else 0.0
+        lost = ((most + _REACH) ** 2 < L2) | (nearest * nearest > L2)
+        s4 = half * math.sqrt(far * near_by)
+        c4 = math.nan if lost else 0.5 * half * (near_by - far)
+        inverse_L = 1.0 / math.sqrt(L2)
+        along, rho = (d3 + d5 * c4) * inverse_L, d5 * s4 * inverse_L
+        ux, uy, uz = px * inverse_L, py * inverse_L, pz * inverse_L
+        h = math.sqrt(ux * ux + uy * uy)
+        inverse_h = 1.0 / h
+        e2x, e2y = uy * inverse_h, -ux * inverse_h
+        e1x, e1y = e2y * uz, -e2x * uz
+        along1, along2 = rx * e1x + ry * e1y + rz * h, rx * e2x + ry * e2y
+        amplitude = math.sqrt(along1 * along1 + along2 * along2)
+        s, c = sin_cos(S[_VALUE, b])
+        asked = c == c
+        c = c if asked else along1 / amplitude
+        s = s if asked else along2 / amplitude
+        qx, qy, qz = c * e1x + s * e2x, c * e1y + s * e2y, c * h
+        x0, x1, x2 = rho * ux - along * qx, rho * uy - along * qy, rho * uz - along * qz
+        y0, y1, y2 = s * e1x - c * e2x, s * e1y - c * e2y, s * h
+        z0, z1, z2 = along * ux + rho * qx, along * uy + rho * qy, along * uz + rho * qz
+        S[0, b], S[_PAIRS, b] = z1, z0
+        S[2, b], S[_PAIRS + 2, b], S[1, b], close0 = _zyz_pairs(x0, y0, z0, x1, y1, z1)
+        S[_PAIRS + 1, b] = z2
+        S[3, b], S[_PAIRS + 3, b] = s4, c4
+        # R47 = R04ᵀ R, and R = (u v w)·tool⁻¹ is applied last.
+        f0, f1, f2 = c4 * x0 - s4 * z0, c4 * x1 - s4 * z1, c4 * x2 - s4 * z2
+        g0, g1, g2 = s4 * x0 + c4 * z0, s4 * x1 + c4 * z1, s4 * x2 + c4 * z2
+        fu, fv, fw = f0 * u0 + f1 * u1 + f2 * u2, f0 * v0 + f1 * v1 + f2 * v2, f0 * w0 + f1 * w1 + f2 * w2
+        yu, yv, yw = y0 * u0 + y1 * u1 + y2 * u2, y0 * v0 + y1 * v1 + y2 * v2, y0 * w0 + y1 * w1 + y2 * w2
+        gu, gv, gw = g0 * u0 + g1 * u1 + g2 * u2, g0 * v0 + g1 * v1 + g2 * v2, g0 * w0 + g1 * w1 + g2 * w2
+        m00, m01, m02 = (
+            fu * t00 + fv * t10 + fw * t20,
+            fu * t01 + fv * t11 + fw * t21,
+            fu * t02 + fv * t12 + fw * t22,
+        )
+        m10, m11, m12 = (
+            yu * t00 + yv * t10 + yw * t20,
+            yu * t01 + yv * t11 + yw * t21,
+            yu * t02 + yv * t12 + yw * t22,
+        )
+        S[4, b], S[_PAIRS + 4, b] = m12, m02
+        S[6, b], S[_PAIRS + 6, b], S[5, b], close1 = _zyz_pairs(m00, m01, m02, m10, m11, m12)
+        S[_PAIRS + 5, b] = gu * t02 + gv * t12 + gw * t22
+        close = close0 | close1 | (far < 1e-14 * near_by) | (h < 1e-12) | ((not asked) & (amplitude < 1e-12))
+        special = close & (not lost)
+        S[_SPECIAL, b] = 1.0 if special else 0.0
+        found += 1 if special else 0
+    return found
+
+
+@jit
+def _closely(params: Array, T: Array, value: float, near: Array, out: Array) -> None:
+    """out ``(8, 7)`` ← the branches by `_solve`, which is at home in singularities."""
+    inverse_base, inverse_tool, M, frame = np.empty((4, 4)), np.empty((4, 4)), np.empty((4, 4)), np.empty((3, 3))
+    arcs, rows = np.empty((1, 3)), np.empty((8, 8))
+    offset, lower, upper = np.empty(7), np.empty(7), np.empty(7)
+    for i in range(12):
+        inverse_base[i // 4, i % 4] = params[i]
+        inverse_tool[i // 4, i % 4] = params[_TOOL + i]
+    for i in range(7):
+        offset[i], lower[i], upper[i] = params[_OFFSET + i], -_UNBOUND, _UNBOUND
+    d3, d5 = params[_LENGTHS], params[_LENGTHS + 1]
+    if math.isnan(value):
+        to_canonical(T, inverse_base, inverse_tool, M)
+        code, _, _, _, _, bend = _triangle(M, d3, d5, frame)
+        if code == 0:
+            angles = shifted(near, offset)
+            value = _arm_angle(angles, frame, d3, d5)
+            if bend == 0.0 and math.sin(angles[3]) < 0.0:
+                value += math.pi  # as in `_solve`
+    no = arcs.shape[0] == 0  # a literal False would compile `_solve` once more
+    _solve(T, inverse_base, inverse_tool, offset, d3, d5, no, value, no, near, lower, upper, arcs, rows)
+    for i in range(8):
+        for j in range(7):
+            out[i, j] = rows[i, j]
+
+
+@inlined
+def _angles(params: Array, count: int, S: Array) -> None:
+    """S[0:7], S[7:14] ← the two values of each joint for `count` targets, from the pairs."""
+    widest()
+    for k in range(_PAIRS):
+        # Half a turn apart for an even k (θ1, θ3, θ5, θ7), of either sign for an odd one.
+        sign, half_turn = (1.0, math.pi) if k % 2 == 0 else (-1.0, 0.0)
+        shift, other = -params[_OFFSET + k], wrap(half_turn - params[_OFFSET + k])
+        for b in range(count):
+            angle = atan2(S[k, b], S[_PAIRS + k, b])
+            S[k, b] = wrapped(angle + shift)
+            S[_PAIRS + k, b] = wrapped(sign * angle + other)
+
+
+@inlined
+def _store(S: Array, b: int, out: Array) -> None:
+    """out ``(8, 7)`` ← the branches of target b."""
+    for row in range(8):
+        shoulder, elbow, wrist = row >> 2, (row >> 1) & 1, row & 1
+        out[row, 0] = S[_PAIRS * shoulder, b]
+        out[row, 1] = S[_PAIRS * shoulder + 1, b]
+        out[row, 2] = S[_PAIRS * (shoulder ^ elbow) + 2, b]
+        out[row, 3] = S[_PAIRS * elbow + 3, b]
+        out[row, 4] = S[_PAIRS * (elbow ^ wrist) + 4, b]
+        out[row, 5] = S[_PAIRS * wrist + 5, b]
+        out[row, 6] = S[_PAIRS * wrist + 6, b]
+
+
+@jit
+def branches_each(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
+    """out ``(N, 8, 7)`` ← all branches of each of the targets T ``(N, 4, 4)``; see `branches_one`.
+
+    values: the arm angle for each target ``(N,)``, or one for all ``(1,)``.
+    """
+    widest()
+    S = np.empty((_SLOTS, BLOCK))
+    rx, ry, rz = _radial(shifted(near, params[_OFFSET:_LENGTHS]), params[_LENGTHS], params[_LENGTHS + 1])
+    for first in range(0, T.shape[0], BLOCK):
+        count = min(BLOCK, T.shape[0] - first)
+        for b in range(count):
+            for r in range(3):
+                for c in range(4):
+                    S[_INPUT + 4 * r + c, b] = T[first + b, r, c]
+            value = values[min(first + b, values.shape[0] - 1)]
+            S[_VALUE, b] = value if abs(value) <= WIDE else wrap(value)
+        special = _pairs(params, rx, ry, rz, count, S)
+        _angles(params, count, S)
+        for b in range(count):
+            _store(S, b, out[first + b])
+        if special > 0:
+            for b in range(count):
+                if S[_SPECIAL, b] > 0.0:
+                    i = first + b
+                    _closely(params, T[i], values[min(i, values.shape[0] - 1)], near, out[i])
+
+
+@jit
+def branches_many(params: Array, T: Array, value: float, near: Array, out: Array) -> None:
+    """`branches_each` with one value for all targets."""
+    values = np.empty(1)
+    values[0] = value
+    branches_each(params, T, values, near, out)
+
+
+@jit
+def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
+    """out ``(8, 7)`` ← all branches of the target T ``(4, 4)``, NaN if there is none; False if T is not finite.
+
+    value: the arm angle, NaN for the elbow direction of near ``(7,)``; near also has the angles that are free at a
+    singularity.
+    """
+    S = np.empty((_SLOTS, 1))
+    rx, ry, rz = 0.0, 0.0, 0.0
+    if math.isnan(value):
+        rx, ry, rz = _radial(shifted(near, params[_OFFSET:_LENGTHS]), params[_LENGTHS], params[_LENGTHS + 1])
+    for r in range(3):
+        for c in range(4):
+            S[_INPUT + 4 * r + c, 0] = T[r, c]
+    S[_VALUE, 0] = value if abs(value) <= WIDE else wrap(value)
+    if _pairs(params, rx, ry, rz, S.shape[1], S) > 0:
+        _closely(params, T, value, near, out)
+    else:
+        _angles(params, S.shape[1], S)
+        for b in range(S.shape[1]):
+            _store(S, b, out)
+    return all_finite_pose(T)
 
 
 def handles(geometry: Geometry, task: int) -> bool:

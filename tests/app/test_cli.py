@@ -13,6 +13,7 @@ import pytest
 import kin
 from app import cli
 from app.settings import Settings
+from kin.solvers import solver_for
 
 ROOT = Path(__file__).parents[2]
 PIONEER = kin.get_robot("pioneer5")
@@ -306,3 +307,98 @@ def test_a_reader_that_leaves_early_is_no_error():
     words = f"{sys.executable} -m app.cli robots --json | true"
     done = subprocess.run(words, cwd=ROOT, shell=True, capture_output=True, text=True, timeout=60, check=True)
     assert done.stderr == ""
+
+
+# -- check -----------------------------------------------------------------------------------------------------
+
+
+def test_check_tells_what_an_arm_is(capsys):
+    file = ROOT / "kin" / "robots" / "puma560.toml"
+    code, out, err = run(capsys, "check", file)
+    assert (code, err) == (0, "")
+    assert "PUMA 560 (puma560)" in out
+    assert re.search(r"^3 +elbow +revolute +-225\.000° +45\.000° +-180\.000°$", out, re.M)
+    for line in (
+        "axes 1 and 2: perpendicular, intersecting",
+        "axes 2 and 3: parallel, 431.800 mm apart",
+        "axes 3 and 4: perpendicular, 20.300 mm apart",
+        "joints 2 to 3: parallel axes",
+        "joints 4 to 6: axes through one point",
+        "convention  standard",
+        "No warnings.",
+    ):
+        assert line in out.splitlines()
+    _, out, _ = run(capsys, "check", file, "--rad")
+    assert "axes 2 and 3: parallel, 0.431800 m apart" in out
+    _, out, _ = run(capsys, "check", ROOT / "kin" / "robots" / "scara.toml")
+    assert re.search(r"^3 +quill +prismatic +0\.000 mm +210\.000 mm +150\.000 mm$", out, re.M)
+    assert "joints      4, giving the tool 4 independent motions" in out
+
+
+def test_check_names_the_solver_and_why(capsys):
+    for robot in kin.builtin_robots().values():
+        got = answer(capsys, "check", ROOT / "kin" / "robots" / f"{robot.id}.toml")
+        match = solver_for(robot)
+        assert got["solver"] == ("numeric" if match is None else match.solver.NAME)
+        assert got["reason"]
+        assert got["robot"]["branches"] == list(kin.branch_names(robot))
+        assert got["motions"] == min(robot.n, 6)
+        assert len(got["axes"]) == robot.n - 1
+        assert not any("built-in" in text for text in got["warnings"])
+
+
+ODD = """
+id = "ur5"
+name = "Odd"
+source = "this test"
+convention = "standard"
+units = { length = "m", angle = "rad" }
+[[rows]]
+name = "around"
+alpha = 1.5708
+limits = [-7, 7]
+[[rows]]
+name = "up"
+d = 300
+[[rows]]
+name = "nothing"
+kind = "fixed"
+[[rows]]
+name = "again"
+a = 200
+[[rows]]
+name = "last"
+a = 200
+[home]
+q = [0, 0, 0, 0]
+"""
+
+
+def test_check_tells_what_looks_odd(capsys, tmp_path):
+    file = tmp_path / "odd.toml"
+    file.write_text(ODD, encoding="utf-8")
+    code, out, _ = run(capsys, "check", file)
+    assert code == 0
+    said = [line for line in out.splitlines() if line.startswith("warning: ")]
+    for number, words in enumerate(
+        (
+            '"ur5" is that of a built-in robot',
+            "reaches 700 m",
+            "Joint 1 (around) turns through 802°",
+            "joints 1 and 2 are almost perpendicular",
+            "Joints 2 and 3 turn about the same line",
+            'row "nothing" changes nothing',
+            "near a singularity",
+        )
+    ):
+        assert words in said[number]
+    assert len(said) == 7
+
+
+def test_check_refuses_a_bad_file_as_everywhere(capsys, tmp_path):
+    file = tmp_path / "bad.toml"
+    file.write_text(ODD.replace("a = 200", 'a = "long"', 1), encoding="utf-8")
+    code, out, err = run(capsys, "check", file)
+    assert (code, out) == (2, "")
+    assert err.startswith(f"kinboard: {file}: rows[3].a: got 'long', expected a finite number")
+    assert run(capsys, "check", tmp_path / "none.toml")[0] == 2

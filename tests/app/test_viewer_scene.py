@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import math
+import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -147,6 +148,38 @@ def test_bodies_are_sound_and_stay_above_the_floor(robot: kin.Robot) -> None:
         assert {"housing", "axis"} <= {part.name for part in link}, "each joint shows itself and its axis"
 
 
+@pytest.mark.parametrize("robot", ROBOTS, ids=IDS)
+def test_every_part_has_a_node_of_its_own(server: viser.ViserServer, robot: kin.Robot) -> None:
+    """A second node of one name would take the place of the first: a sleeve that of the housing it is fixed to."""
+    made = body(robot)
+    arm = ArmScene(server.scene, robot)
+    for name in ("housing", "axis", "link", "link-bar"):
+        wanted = sum(part.name == name for parts in made.parts for part in parts)
+        shown = [
+            n for n in server.scene._handle_from_node_name if re.fullmatch(rf"{name}(-\d+)?", n.split("/")[-1])
+        ]
+        assert len(shown) == wanted
+    arm.remove()
+
+
+@pytest.mark.parametrize("robot_id", ["scara", "stanford"])
+def test_a_bar_is_in_its_sleeve_all_along_the_stroke(robot_id: str) -> None:
+    """The sleeve stands at the origin of the joint's axis; the bar reaches from there to the next joint."""
+    robot = Store().get(robot_id)
+    made = body(robot)
+    for link, parts in zip(made.chain.links[1:], made.parts[1:], strict=True):
+        bar = next((part for part in parts if part.name == "link-bar"), None)
+        if bar is None or link.joint is None or link.joint.limits is None:
+            continue
+        low, high = bar.mesh.bounds[:, 2]
+        for q in link.joint.limits:
+            assert low + q < 0.0, "the bar comes out at the back"
+        assert low + link.joint.limits[1] > -0.1 * robot.reach, "and no further than it must"
+        assert high + link.joint.limits[1] > 0.9 * link.joint.limits[1] - 0.1 * robot.reach
+        return
+    pytest.fail("no slide")
+
+
 def test_a_body_is_made_once_for_all_visitors() -> None:
     robot = Store().get("pioneer5")
     assert body(robot) is body(kin.get_robot("pioneer5"))
@@ -175,10 +208,11 @@ def test_surfaces_of_tubes_face_outward() -> None:
     assert np.isfinite(turning_back.vertices).all()
 
 
-@pytest.mark.parametrize("aspect", [0.46, 1.0, 956 / 720, 2.2])
+@pytest.mark.parametrize("aspect", [0.46, 0.9, 1.0, 956 / 720, 2.2])
 @pytest.mark.parametrize("robot", Store().robots, ids=[r.id for r in Store().robots])
 def test_the_default_view_holds_the_arm(robot: kin.Robot, aspect: float) -> None:
-    position, look_at = camera.view(body(robot), aspect)
+    sheet = aspect < 0.6
+    position, look_at = camera.view(body(robot), aspect, sheet)
     forward = (look_at - position) / np.linalg.norm(look_at - position)
     right = np.cross(forward, [0, 0, 1.0])
     right /= np.linalg.norm(right)
@@ -192,8 +226,10 @@ def test_the_default_view_holds_the_arm(robot: kin.Robot, aspect: float) -> None
     assert across.max() < 1.0
     assert np.abs(upward).max() < 1.0
     assert max(across.max(), np.abs(upward).max()) > 0.25, "the arm should not be a speck"
-    if aspect < 0.6:
+    if sheet:
         assert upward.min() > 0.0, "on a phone the panel covers the lower part"
+    else:
+        assert np.array_equal(look_at, body(robot).center)
 
 
 def test_joint_labels_do_not_repeat_their_number() -> None:

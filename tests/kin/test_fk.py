@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from arms import CHAPTER_ARMS
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -85,7 +86,7 @@ def robots(draw):
     )
 
 
-@pytest.mark.parametrize("robot_id", ROBOTS)
+@pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 def test_golden_poses_and_frames(robot_id, golden):
     robot = kin.get_robot(robot_id)
     cases = golden(robot_id)["random"] + golden(robot_id)["edge"]
@@ -133,7 +134,8 @@ def test_batch_axes_come_first(robot_id, shape):
     assert kin.link_frames(robot, q).shape == (*shape, rows, 4, 4)
     assert kin.jacobian(robot, q).shape == (*shape, 6, n)
     assert kin.manipulability(robot, q).shape == shape
-    for function in (kin.fk, kin.link_frames, kin.jacobian, kin.manipulability):
+    assert kin.fk_positions(robot, q).shape == (*shape, 3)
+    for function in (kin.fk, kin.fk_positions, kin.link_frames, kin.jacobian, kin.manipulability):
         batch = function(robot, q)
         for index in np.ndindex(shape):
             assert np.array_equal(batch[index], function(robot, q[index]))
@@ -150,6 +152,39 @@ def test_poses_are_rigid(robot_id):
     assert np.linalg.det(R) == pytest.approx(np.ones(2000))
 
 
+@given(robot=robots(), data=st.data())
+def test_a_batch_gives_the_bits_of_one(robot, data):
+    """Both sides of a block's end, and angles too wide for the polynomials among others."""
+    q = robot.random_q(np.random.default_rng(data.draw(st.integers(0, 99))), data.draw(st.integers(1, 140)))
+    q[:: data.draw(st.integers(1, 70))] *= data.draw(st.sampled_from([1.0, 1e5, 1e9]))
+    batch, points = kin.fk(robot, q), kin.fk_positions(robot, q)
+    for row, T in zip(q, batch, strict=True):
+        assert np.array_equal(kin.fk(robot, row), T)
+    scale = 10.0 + np.abs(q).max()  # metres, of a prismatic joint
+    assert np.abs(points - batch[:, :3, 3]).max() <= 1e-14 * scale
+    assert np.array_equal(points[-1], kin.fk_positions(robot, q[-1]))
+
+
+@pytest.mark.parametrize("robot_id", ROBOTS)
+@pytest.mark.parametrize("angle", [99_999.0, 1e6, 1e15])
+def test_many_turns_are_as_exact_as_none(robot_id, angle):
+    robot = kin.get_robot(robot_id)
+    q = np.where(robot.revolute, angle, 0.1)
+    assert kin.fk(robot, q) == pytest.approx(product(robot, q)[1], abs=1e-9 if angle > 1e6 else 1e-14)
+    assert np.array_equal(kin.fk(robot, np.stack([q] * 3))[1], kin.fk(robot, q))
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+@pytest.mark.parametrize("index", [(0, 0), (70, 4), (129, 2)])
+@pytest.mark.parametrize("function", [kin.fk, kin.fk_positions, kin.jacobian])
+def test_one_bad_value_in_a_batch_is_found(function, index, value):
+    q = np.zeros((130, 5))
+    q[index] = value
+    with pytest.raises(InputError) as caught:
+        function(kin.get_robot("pioneer5"), q)
+    assert caught.value.field == f"q[{index[0]}][{index[1]}]"
+
+
 def test_all_kinds_of_arrays_are_taken():
     robot = kin.get_robot("pioneer5")
     q = np.array([1, 2, 1, 0, 1])
@@ -161,7 +196,7 @@ def test_all_kinds_of_arrays_are_taken():
         assert np.array_equal(kin.fk(robot, form), wanted)
 
 
-@pytest.mark.parametrize("function", [kin.fk, kin.link_frames, kin.jacobian, kin.manipulability])
+@pytest.mark.parametrize("function", [kin.fk, kin.fk_positions, kin.link_frames, kin.jacobian, kin.manipulability])
 @pytest.mark.parametrize(
     ("q", "field"),
     [
@@ -242,7 +277,7 @@ def test_many_threads_get_the_serial_answers():
     batches = [robot.random_q(np.random.default_rng(i), 500) for i in range(40)]
 
     def work(q):
-        return kin.fk(robot, q), kin.jacobian(robot, q), kin.manipulability(robot, q)
+        return kin.fk(robot, q), kin.fk_positions(robot, q), kin.jacobian(robot, q), kin.manipulability(robot, q)
 
     serial = [work(q) for q in batches]
     with ThreadPoolExecutor(8) as pool:

@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from arms import CHAPTER_ARMS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -14,7 +15,6 @@ import kin
 from kin import InputError, Status, solve_ik
 from kin.transforms import rotation_angle, vector_angle
 
-ROBOTS = tuple(kin.builtin_robots())
 SEVEN = ("redundant7", "redundant7-craig")
 ROUND_TRIPS = 20_000
 
@@ -52,7 +52,7 @@ def assert_exact(robot, target, result, task="pose"):
     assert distances == sorted(distances)
 
 
-@pytest.mark.parametrize("robot_id", ROBOTS)
+@pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 def test_all_golden_branches_and_no_others(robot_id, golden):
     """The 50-digit branch sets, complete, for the same value of the free parameter."""
     robot = kin.get_robot(robot_id)
@@ -70,7 +70,7 @@ def test_all_golden_branches_and_no_others(robot_id, golden):
             assert angle_gap(found, q).min() < 1e-9
 
 
-@pytest.mark.parametrize("robot_id", ROBOTS)
+@pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 def test_thin_call_gives_the_same_branches(robot_id, golden):
     robot = kin.get_robot(robot_id)
     case = golden(robot_id)["ik"][0]
@@ -79,7 +79,7 @@ def test_thin_call_gives_the_same_branches(robot_id, golden):
         assert np.nanmin(angle_gap(q, wanted)) < 1e-9
 
 
-@pytest.mark.parametrize("robot_id", ROBOTS)
+@pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 @pytest.mark.parametrize("task", ["pose", "approach"])
 def test_round_trip_leaves_nothing_unsolved(robot_id, task):
     """20 000 random in-limit configurations: each is reached again from an unrelated seed."""
@@ -106,7 +106,7 @@ def test_round_trip_leaves_nothing_unsolved(robot_id, task):
     assert worst_r <= 1e-9
 
 
-@pytest.mark.parametrize("robot_id", ROBOTS)
+@pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 def test_round_trip_of_points(robot_id):
     robot = kin.get_robot(robot_id)
     rng = np.random.default_rng(7)
@@ -119,7 +119,7 @@ def test_round_trip_of_points(robot_id):
             assert robot.in_limits(s.q)
 
 
-@pytest.mark.parametrize("robot_id", ROBOTS)
+@pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 def test_golden_edge_postures_are_reached(robot_id, golden):
     """Zeros, limit corners and singular postures inside the limits: a solution, never NaN."""
     robot = kin.get_robot(robot_id)
@@ -134,7 +134,7 @@ def test_golden_edge_postures_are_reached(robot_id, golden):
     assert tried >= 2
 
 
-@pytest.mark.parametrize("robot_id", ROBOTS)
+@pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 @pytest.mark.parametrize("share", [0.1, 0.4])
 def test_narrowed_limits_still_leave_nothing_unsolved(robot_id, share):
     """Limits cut at random to a part of their range: the feasible arcs are found, however small."""
@@ -156,7 +156,7 @@ def test_narrowed_limits_still_leave_nothing_unsolved(robot_id, share):
             assert robot.in_limits(np.array([s.q for s in result.solutions])).all()
 
 
-@pytest.mark.parametrize("robot_id", ROBOTS)
+@pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 @settings(max_examples=60, deadline=None)
 @given(fractions=st.lists(st.floats(0, 1), min_size=14, max_size=14))
 def test_solutions_are_exact_ordered_and_deterministic(robot_id, fractions):
@@ -171,7 +171,7 @@ def test_solutions_are_exact_ordered_and_deterministic(robot_id, fractions):
     assert [s.q.tolist() for s in again.solutions] == [s.q.tolist() for s in result.solutions]
 
 
-@pytest.mark.parametrize("robot_id", ROBOTS)
+@pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 def test_the_seed_itself_is_found_first(robot_id):
     """Asked for the pose it is in, the arm stays where it is."""
     robot = kin.get_robot(robot_id)
@@ -218,7 +218,7 @@ def test_redundant_limits_name_a_joint_too():
     assert robot.in_limits(result.closest.q)
 
 
-@pytest.mark.parametrize("robot_id", ROBOTS)
+@pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 @pytest.mark.parametrize("task", ["pose", "approach", "position"])
 def test_too_far_says_how_far(robot_id, task):
     """A point far out along x: the distance is the distance to the workspace's rim, section 7 of the facts."""
@@ -236,7 +236,7 @@ def test_too_far_says_how_far(robot_id, task):
     assert np.isfinite(result.closest.q).all()
 
 
-@pytest.mark.parametrize("robot_id", ROBOTS)
+@pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 def test_dragging_out_of_reach_does_not_make_the_arm_jump(robot_id):
     """Of all equally close postures the one next to the present one is taken, step after step."""
     robot = kin.get_robot(robot_id)
@@ -323,7 +323,7 @@ def test_approach_out_of_limits_still_keeps_the_point():
     assert refused >= 1
 
 
-@pytest.mark.parametrize("robot_id", ROBOTS)
+@pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 def test_closest_beats_a_dense_search(robot_id):
     """No random configuration, descended or not, is closer than `closest` in the stated metric."""
     robot = kin.get_robot(robot_id)
@@ -410,7 +410,7 @@ def test_misuse_names_the_field(arguments, field):
 
 
 def test_many_threads_get_the_serial_answers():
-    robots = [kin.get_robot(i) for i in ROBOTS]
+    robots = [kin.get_robot(i) for i in CHAPTER_ARMS]
     rng = np.random.default_rng(9)
     jobs = [(r, kin.fk(r, q)) for r in robots for q in r.random_q(rng, 100)]
     serial = [solve_ik(r, T).best.q.tolist() for r, T in jobs]

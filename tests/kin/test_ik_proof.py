@@ -13,12 +13,12 @@ from multiprocessing import get_context
 
 import numpy as np
 import pytest
+from arms import CHAPTER_ARMS
 
 import kin
 from kin import Status, solve_ik
 from kin.solvers.numeric import spread
 
-ROBOTS = tuple(kin.builtin_robots())
 POSES = int(os.environ.get("KINBOARD_TEST_POSES", "1000000"))
 TASKS = ("pose", "approach", "position")
 
@@ -45,7 +45,7 @@ def newton(robot, target, q, task):
     return None
 
 
-@pytest.mark.parametrize("robot_id", ROBOTS)
+@pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 def test_a_numeric_search_from_many_starts_finds_no_branch_we_miss(robot_id):
     """Every configuration Newton's method ends in is one of ours, at the value it has of what is free."""
     robot = kin.get_robot(robot_id)
@@ -103,7 +103,7 @@ def _round_trips(
 @pytest.mark.slow
 @pytest.mark.parametrize("narrowed", [False, True], ids=["printed limits", "limits cut to 10-40 %"])
 @pytest.mark.parametrize("task", TASKS)
-@pytest.mark.parametrize("robot_id", ROBOTS)
+@pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 def test_a_million_round_trips(robot_id, task, narrowed):
     """0 unsolved, FK closure ≤ 1e-9, typically 1e-14."""
     workers = os.cpu_count() or 1

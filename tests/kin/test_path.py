@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from arms import CHAPTER_ARMS
 
 import kin
 from kin import InputError, Status, solve_ik
@@ -16,7 +17,7 @@ from kin.path.waypoint import meeting
 from kin.question import ask
 from kin.transforms import rotation_angle, vector_angle
 
-ROBOTS = tuple(kin.builtin_robots())
+ROBOTS = CHAPTER_ARMS
 SRS = "redundant7-craig"
 PRINTED = "redundant7"
 

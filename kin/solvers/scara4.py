@@ -1,0 +1,285 @@
+"""SCARA and planar arms: every axis parallel, three joints that turn and at most one that slides.
+
+Seen along the axes such an arm is a planar chain of two links that carries a tool; the slide, wherever it is in
+the chain, only adds to the height z. So the order of the joints (RRPR, RRRP, PRRR, …) makes no difference:
+
+- the angle of the tool ψ is the sum of the joint angles; ψ and the tool's point give the third axis c;
+- tan²(θ2/2) = ((a+b)² − |c|²)/(|c|² − (a−b)²), elbow right or left; θ1 = atan2(cy, cx) − atan2(b s2, a + b c2);
+- θ3 = ψ − θ1 − θ2, and the slide makes up the height.
+
+Two branches. Of the orientations only those turned about the axes can be had: for any other ψ is the nearest in
+angle and the tool's point is kept; without a slide the height must fit. Whether such an answer will do is
+judged by its residual, outside. When only a point or an approach direction is asked for, ψ is free, and the
+values that reach and limits allow are exact arcs. Singular: s2 = 0 only.
+
+Fast path. `params(geometry)` is the arm as one float64 array, C-contiguous and writable. The compiled
+`branches_one(params, T, value, near, out)` writes all branches of the target T ``(4, 4)`` to out ``(2, n)``,
+one row per name in `BRANCHES`, NaN where a branch does not exist, angles in (−π, π]; limits are not asked for.
+near ``(n,)`` decides what is free at a singularity; value is ignored. The same for T ``(N, 4, 4)`` and out
+``(N, 2, n)`` is `branches_many`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from kin.compiled import jit
+from kin.robot import Robot
+from kin.solvers.common import (
+    APPROACH,
+    POSE,
+    POSITION,
+    Candidates,
+    Freedom,
+    Problem,
+    clear,
+    copy_row,
+    is_zero,
+    split_sum,
+    wrap,
+)
+from kin.solvers.links import (
+    axes_of,
+    frame_of,
+    is_finite,
+    planar_free,
+    pose_params,
+    signed_box,
+    square_to,
+    two_links,
+)
+from kin.solvers.singular import Singularity, at, off_line, stretch, those_within
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+NAME = "scara4"
+TITLE = "closed form, all axes parallel"
+BRANCHES = ("elbow right", "elbow left")
+_PSI = Freedom("psi", "tool angle ψ", circular=True)
+_REACH = TOLERANCES.closure_position * 0.1
+_SINGULAR = TOLERANCES.singular
+_FAR = 1e6
+# Layout of params: base⁻¹ (12), tool (12), a, b, then of the joints θ1, θ2, θ3, slide their index in q (−1: none),
+# sign and offset, and the limits that never bind.
+_A, _B, _JOINT, _SIGN, _OFFSET, _LOWER, _UPPER, _SIZE = 24, 25, 26, 30, 34, 38, 42, 46
+
+
+class Geometry(NamedTuple):
+    """The arm in canonical form: θ1, θ2, θ3 and the height are ``sign q + offset``.
+
+    Attributes:
+        params: what the kernels read.
+        order: indices into q of θ1, θ2, θ3 and, if there is one, the slide.
+        sign, offset: ``(4,)``, in that order.
+        a, b: lengths of the two links.
+        upright: whether the tool's z axis is parallel to the arm's axes.
+    """
+
+    params: Array
+    order: tuple[int, ...]
+    sign: Array
+    offset: Array
+    a: float
+    b: float
+    upright: bool
+
+
+def match(robot: Robot) -> Geometry | None:
+    """The geometry if all axes are parallel, three joints turn and at most one slides."""
+    turning = np.flatnonzero(robot.revolute).tolist()
+    if len(turning) != 3 or robot.n > 4:
+        return None
+    z, points, sign, end = axes_of(robot)
+    if not is_zero(*np.cross(z[0], z).ravel()):
+        return None
+    # ψ is the sum of the joint angles: x of this frame is where it is counted from.
+    base = frame_of(square_to(z[0]), z[0], points[turning[0]])
+    x, y, _ = base[:3, :3].T @ (points[turning] - base[:3, 3]).T
+    upper, fore = complex(x[1] - x[0], y[1] - y[0]), complex(x[2] - x[1], y[2] - y[1])
+    if min(abs(upper), abs(fore)) < TOLERANCES.geometry:
+        return None
+    first, second = (math.atan2(link.imag, link.real) for link in (upper, fore))
+    order = (*turning, *(i for i in range(robot.n) if i not in turning))
+    signs = np.append(sign[list(order)], [1.0] * (4 - robot.n))
+    offset = np.array([first, second - first, -second, 0.0])
+    wrist = frame_of(base[:3, 0], z[0], base[:3, 3] + base[:3, 0] * x[2] + base[:3, 1] * y[2])
+    tool = np.linalg.inv(wrist) @ end
+    joints = [*order, *[-1] * (4 - robot.n)]
+    params = np.array(
+        [
+            *pose_params(base, np.eye(4))[:12], *tool[:3].ravel(), abs(upper), abs(fore), *joints, *signs, *offset,
+            *[-_FAR] * 4, *[_FAR] * 4,
+        ]
+    )  # fmt: skip
+    upright = is_zero(abs(tool[2, 2]) - 1.0)
+    return Geometry(params, order, signs, offset, abs(upper), abs(fore), upright)
+
+
+def why(geometry: Geometry) -> str:
+    """What about the axes made the match, in one sentence."""
+    slide = ", one of them of a joint that slides" if len(geometry.order) == 4 else ""
+    return f"all axes are parallel{slide}"
+
+
+def params(geometry: Geometry) -> Array:
+    """The arm as the flat array ``(46,)`` that the kernels read."""
+    return geometry.params
+
+
+@jit
+def _held(params: Array, T: Array, task: int) -> tuple[float, float, float, float]:
+    """(x, y, z, ψ) of a target in the canonical base: the tool's point, and its angle about the axes.
+
+    Of all Rz(ψ) it is the one with the least angle to R Rtoolᵀ (largest trace); with an approach direction
+    only, the one that brings the tool's z axis nearest to it.
+    """
+    p = params
+    x = p[0] * T[0, 3] + p[1] * T[1, 3] + p[2] * T[2, 3] + p[3]
+    y = p[4] * T[0, 3] + p[5] * T[1, 3] + p[6] * T[2, 3] + p[7]
+    z = p[8] * T[0, 3] + p[9] * T[1, 3] + p[10] * T[2, 3] + p[11]
+    cosine = sine = 0.0
+    for j in range(2 if task == APPROACH else 0, 3):
+        x_j = p[0] * T[0, j] + p[1] * T[1, j] + p[2] * T[2, j]
+        y_j = p[4] * T[0, j] + p[5] * T[1, j] + p[6] * T[2, j]
+        cosine += x_j * p[12 + j] + y_j * p[16 + j]
+        sine += y_j * p[12 + j] - x_j * p[16 + j]
+    return x, y, z, math.atan2(sine, cosine)
+
+
+@jit
+def _put(params: Array, out: Array, row: int, t1: float, t2: float, t3: float, z: float) -> None:
+    """out[row] ← joint values of canonical angles and of the tool's height."""
+    out[row, int(params[26])] = wrap(params[30] * (t1 - params[34]))
+    out[row, int(params[27])] = wrap(params[31] * (t2 - params[35]))
+    out[row, int(params[28])] = wrap(params[32] * (t3 - params[36]))
+    if params[29] >= 0.0:
+        out[row, int(params[29])] = params[33] * (z - params[23] - params[37])
+
+
+@jit
+def _box(params: Array, near: Array, lower: Array, upper: Array, out_near: Array, low: Array, high: Array) -> None:
+    """out_near, low, high ``(4,)`` ← seed and limits of θ1, θ2, θ3; the last place is for no joint."""
+    a, b, c = np.zeros(4), np.zeros(4), np.zeros(4)
+    for i in range(3):
+        k = int(params[26 + i])
+        a[i], b[i], c[i] = near[k], lower[k], upper[k]
+    signed_box(a, b, c, params[30:34], params[34:38], out_near, low, high)
+
+
+@jit
+def _branches(
+    params: Array, T: Array, task: int, free: bool, value: float, near: Array, lower: Array, upper: Array,
+    arcs: Array, psis: Array, out: Array,
+) -> tuple[float, int]:  # fmt: skip
+    """Both branches; with ψ free, the one nearest to the seed's or `value`: (gap, number of arcs of ψ).
+
+    psis ``(2,)`` ← ψ of each row if it is free; left alone otherwise.
+    """
+    clear(out)
+    x, y, z, psi = _held(params, T, task)
+    a, b, p, q = params[_A], params[_B], params[15], params[19]
+    if free:
+        box, low, high, angles = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
+        _box(params, near, lower, upper, box, low, high)
+        wish = value if not math.isnan(value) else box[0] + box[1] + box[2]
+        found = min(0, arcs.shape[0])  # a bare 0 would have what it is passed to compiled once more
+        for ei in range(2):
+            up = 1.0 if ei == 0 else -1.0
+            psis[ei], found = planar_free(
+                x, y, p, q, a, b, up, 0.0, 0.0, wish, not math.isnan(value), ei, box, low, high, arcs, found,
+                angles,
+            )  # fmt: skip
+            if not math.isnan(psis[ei]):
+                _put(params, out, ei, angles[0], angles[1], angles[2], z)
+        # How far the circle that the third axis may be on is from the reach of the two links.
+        R, rho = math.hypot(x, y), math.hypot(p, q)
+        return max(abs(R - rho) - a - b, abs(a - b) - R - rho), found
+    c, s = math.cos(psi), math.sin(psi)
+    cx, cy = x - p * c + q * s, y - p * s - q * c
+    miss, bend, _, k1, k2 = two_links(cx, cy, a, b)
+    if miss > _REACH:
+        return miss, 0
+    middle, half = math.atan2(cy, cx), math.atan2(k2, k1)
+    for ei in range(2 if bend > 0.0 else 1):
+        up = 1.0 if ei == 0 else -1.0
+        t1, t2 = middle - up * half, up * bend
+        if cx * cx + cy * cy < _SINGULAR * _SINGULAR:
+            # The third axis on the first: only θ1 + θ3 counts.
+            box, low, high = np.empty(4), np.empty(4), np.empty(4)
+            _box(params, near, lower, upper, box, low, high)
+            t1 = split_sum(psi - t2, box[0], low[0], high[0], box[2], low[2], high[2])
+        _put(params, out, ei, t1, t2, psi - t1 - t2, z)
+    if bend == 0.0:
+        copy_row(out, 0, 1)
+    return miss, 0
+
+
+@jit
+def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
+    """out ``(2, n)`` ← both branches of the target T ``(4, 4)``; False if T is not finite."""
+    lower, upper = params[_LOWER:_UPPER], params[_UPPER:_SIZE]
+    _branches(params, T, POSE, False, value, near, lower, upper, out[:0], params[:0], out)
+    return is_finite(T)
+
+
+@jit
+def branches_many(params: Array, T: Array, value: float, near: Array, out: Array) -> None:
+    """out ``(N, 2, n)`` ← both branches of each of the targets T ``(N, 4, 4)``."""
+    for i in range(T.shape[0]):
+        branches_one(params, T[i], value, near, out[i])
+
+
+def solve(geometry: Geometry, problem: Problem) -> Candidates:
+    """Both branches that bring the tool to the target's point, at the angle ψ asked for or the best free one."""
+    out, arcs, psis = np.empty((2, len(geometry.order))), np.empty((64, 3)), np.full(2, math.nan)
+    free = bool(freedoms(geometry, problem.task))
+    value = problem.values[0] if free else math.nan
+    gap, count = _branches(
+        geometry.params, problem.T, problem.task, free, value, problem.seed, problem.lower, problem.upper, arcs,
+        psis, out,
+    )  # fmt: skip
+    exists = bool((~np.isnan(out[:, 0])).any())
+    obstacle = "" if exists else "the last axis is out of the two links' reach"
+    values, ranges = (psis[:, None], (arcs[:count],)) if free else (np.empty((2, 0)), ())
+    return Candidates(out, values, ranges, 0.0 if exists else max(gap, 0.0), obstacle)
+
+
+def handles(geometry: Geometry, task: int) -> bool:
+    """Points, with an orientation or an approach direction, of which the pipeline judges what tilt is left."""
+    return task in (POSE, APPROACH, POSITION)
+
+
+def freedoms(geometry: Geometry, task: int) -> tuple[Freedom, ...]:
+    """The tool's angle about the axes, for a point alone or for a direction along the axes."""
+    return (_PSI,) if task == POSITION or (task == APPROACH and geometry.upright) else ()
+
+
+def _elbow(geometry: Geometry, q: Array) -> float:
+    """θ2: 0 where the arm is straight."""
+    return float(geometry.sign[1] * q[geometry.order[1]] + geometry.offset[1])
+
+
+def branch_of(geometry: Geometry, q: Array) -> int:
+    """The branch a configuration is on: "right" if the elbow is on the right, seen from above along the arm."""
+    return int(math.sin(_elbow(geometry, q)) < 0.0)
+
+
+def singularities(geometry: Geometry, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
+    """How far a configuration ``(n,)`` is from the arm's singularity: the determinant is a b s2."""
+    joint = geometry.order[1]
+    off = off_line(_elbow(geometry, q))
+    return those_within(
+        within,
+        (
+            "elbow",
+            abs(off),
+            "rad",
+            lambda: (
+                f"elbow {stretch(_elbow(geometry, q))} ({at(joint + 1, q[joint], geometry.sign[1] * off)}): "
+                "the last axis cannot move along the arm"
+            ),
+        ),
+    )

@@ -1,0 +1,452 @@
+"""Elbow arms with a spherical wrist: six joints, axes 2 and 3 parallel, axes 4, 5 and 6 through one point W.
+
+Most industrial arms are of this family: Puma 560, IRB 120, KR 6. The pose fixes W, and W fixes the first three
+joints, whatever the wrist does (Pieper 1968). Seen from the frame that turns with axis 1, the plane the elbow
+moves in lies at the distance L beside the axis, so W = (X, L, −h) there and
+
+- X = ±√(wx² + wy² − L²), shoulder in front or at the back; θ1 = atan2(wy, wx) − atan2(L, X);
+- D² = (X − a1)² + h²; tan²(θ3/2) = ((a2+f)² − D²)/(D² − (a2−f)²), elbow up or down, where f is the distance of W
+  from axis 3; θ2 = atan2(h, X − a1) − atan2(f s3, a2 + f c3);
+- R03ᵀ R = Rz(θ4) Ry(θ5) Rz(θ6): two wrists, (θ4, θ5, θ6) and (θ4 + π, −θ5, θ6 + π).
+
+Eight branches; no angle is taken from a sine or cosine alone, so none loses digits. L, a1, the twist from axis
+3 to axis 4 and the offsets of the elbow may be anything. Singular: s3 = 0 (two elbows merge); X = 0, where two
+shoulders merge, or, if L = 0, W is on axis 1 and θ1 is free: R03ᵀ R is affine in cos θ1, sin θ1 and the
+feasible θ1 are exact arcs; s5 = 0 (only θ4 ± θ6 matters).
+
+Fast path. `params(geometry)` is the arm as one float64 array, C-contiguous and writable. The compiled
+`branches_one(params, T, value, near, out)` writes all branches of the target T ``(4, 4)`` to out ``(8, 6)``,
+one row per name in `BRANCHES`, NaN where a branch does not exist, angles in (−π, π]; limits are not asked for.
+near ``(6,)`` decides what is free at a singularity; value is θ1 where that is free, NaN to let near decide. The
+same for T ``(N, 4, 4)`` and out ``(N, 8, 6)`` is `branches_many`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from kin.compiled import jit
+from kin.robot import Robot
+from kin.simd import atan2
+from kin.solvers.common import (
+    APPROACH,
+    POSE,
+    TURN,
+    Candidates,
+    Freedom,
+    Problem,
+    clear,
+    copy_row,
+    extend_arcs,
+    is_zero,
+    lay_probes,
+    misfit_of,
+    nearest_in_arcs,
+    wrap,
+    zyz,
+    zyz_breaks,
+)
+from kin.solvers.links import (
+    Links,
+    canonical,
+    free_last,
+    is_finite,
+    is_square,
+    links_of,
+    pose_params,
+    rolled,
+    signed_box,
+    two_links,
+)
+from kin.solvers.singular import Singularity, at, off_line, stretch, those_within
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+NAME = "wrist6"
+TITLE = "closed form, elbow arm with a spherical wrist"
+BRANCHES = tuple(
+    f"shoulder {s} · elbow {e} · wrist {w}"
+    for s in ("front", "back")
+    for e in ("up", "down")
+    for w in ("no-flip", "flip")
+)
+_THETA1 = Freedom("theta1", "θ1", joint=0, circular=True, rare=True)
+_THETA6 = Freedom("theta6", "θ6", joint=5)
+_REACH = TOLERANCES.closure_position * 0.1
+_SINGULAR = TOLERANCES.singular
+_MERGE = TOLERANCES.merge
+_ROUNDING, _HAIR = 1e-14, 3e-7  # metres in a target's coordinates; the root of that
+_FAR = 1e6
+# Layout of params: base⁻¹ and tool⁻¹ (24), signs, offsets, shape (see `pack`), then limits that never bind.
+_SHAPE, _LOWER, _UPPER, _SIZE = 36, 45, 51, 57
+
+
+class Geometry(NamedTuple):
+    """The arm in canonical form: angles are θ = sign q + offset.
+
+    Attributes:
+        params: what the kernels read.
+        sign, offset: ``(6,)``.
+        a1, a2, f, beside: distances axis 1 to 2, 2 to 3, 3 to W, and of the arm's plane from axis 1.
+        tool_on_axis: whether joint 6 turns the tool about its own z axis.
+    """
+
+    params: Array
+    sign: Array
+    offset: Array
+    a1: float
+    a2: float
+    f: float
+    beside: float
+    tool_on_axis: bool
+
+
+def match(robot: Robot) -> Geometry | None:
+    """The geometry if axes 2 and 3 are parallel, axis 2 square to axis 1, and 4, 5, 6 meet, neighbours square."""
+    if robot.n != 6 or not robot.revolute.all():
+        return None
+    links = links_of(robot, (-1, -1, -1, -1, 1))
+    a, d, alpha = links.a, links.d, links.alpha
+    if not (is_square(alpha[0]) and alpha[1] == 0.0 and is_square(alpha[3]) and is_square(alpha[4])):
+        return None
+    if not is_zero(a[3], a[4], d[4]):
+        return None
+    # W as seen from axis 3, across it and along it.
+    across = complex(a[2], -math.sin(alpha[2]) * d[3])
+    beside = float(d[2] + math.cos(alpha[2]) * d[3])
+    a1, a2, f, phase = float(a[0]), float(a[1]), abs(across), math.atan2(across.imag, across.real)
+    if min(a2, f) < TOLERANCES.geometry:
+        return None
+    beside = 0.0 if is_zero(beside) else beside
+    offset = links.theta.copy()
+    offset[2] += phase
+    return pack(links, offset, (a1, a2, f, beside), phase, float(alpha[2]))
+
+
+def pack(
+    links: Links, offset: Array, lengths: tuple[float, float, float, float], phase: float, twist: float,
+    slides: bool = False,
+) -> Geometry:  # fmt: skip
+    """The geometry of these lengths (a1, a2, f, L) and angle offsets ``(6,)``.
+
+    Axis 4 is turned by −phase and then by the twist against the line from axis 3 to W. With `slides` the third
+    joint is one, as :mod:`kin.solvers.slide6` has it.
+    """
+    shape = [*lengths, math.cos(phase), math.sin(phase), math.cos(twist), math.sin(twist), float(slides)]
+    params = np.array(
+        [*pose_params(links.base, links.tool), *links.sign, *offset, *shape, *[-_FAR] * 6, *[_FAR] * 6]
+    )
+    on_axis = is_zero(links.tool[0, 3], links.tool[1, 3], abs(links.tool[2, 2]) - 1.0)
+    return Geometry(params, links.sign, offset, *lengths, on_axis)
+
+
+def why(geometry: Geometry) -> str:
+    """What about the axes made the match, in one sentence."""
+    return "axes 4, 5 and 6 meet in one point, and axes 2 and 3 are parallel and square to axis 1"
+
+
+def params(geometry: Geometry) -> Array:
+    """The arm as the flat array ``(57,)`` that the kernels read."""
+    return geometry.params
+
+
+@jit
+def _put(
+    params: Array, out: Array, row: int, t1: float, t2: float, t3: float, A: float, B: float, C: float
+) -> None:
+    """out[row] ← joint values of canonical angles."""
+    out[row, 0] = wrap(params[24] * (t1 - params[30]))
+    out[row, 1] = wrap(params[25] * (t2 - params[31]))
+    q3 = params[26] * (t3 - params[32])
+    out[row, 2] = q3 if params[_SHAPE + 8] else wrap(q3)
+    out[row, 3] = wrap(params[27] * (A - params[33]))
+    out[row, 4] = wrap(params[28] * (B - params[34]))
+    out[row, 5] = wrap(params[29] * (C - params[35]))
+
+
+@jit
+def _aligned(
+    params: Array, x: float, y: float, z: float, m00: float, m10: float, m01: float, m11: float,
+    near: Array, lower: Array, upper: Array,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Wrist angles of a rotation whose third column is (x, y, z) with x = y = 0: θ4 and θ6 shared out."""
+    box, low, high, angles = np.empty(6), np.empty(6), np.empty(6), np.empty(6)
+    signed_box(near, lower, upper, params[24:30], params[30:36], box, low, high)
+    M = np.empty((3, 3))
+    M[0, 0], M[1, 0], M[0, 1], M[1, 1], M[0, 2], M[1, 2], M[2, 2] = m00, m10, m01, m11, x, y, z
+    zyz(M, 1.0, box, low, high, 3, angles)
+    return angles[3], angles[4], angles[5]
+
+
+@jit
+def _seen(params: Array, g: float, s: float, X: float, Y: float, Z: float) -> tuple[float, float, float]:
+    """A vector that is (X, Y, Z) in the frame turning with axis 1, seen from the forearm at cos, sin = g, s."""
+    ca, sa = params[_SHAPE + 6], params[_SHAPE + 7]
+    v = -s * X - g * Z
+    return g * X - s * Z, ca * v + sa * Y, ca * Y - sa * v
+
+
+@jit
+def _on_axis(
+    params: Array, T: Array, t2: float, t3: float, sign: float, value: float, branch: int, near: Array,
+    lower: Array, upper: Array, arcs: Array, found: int, out: Array,
+) -> int:  # fmt: skip
+    """out[branch] ← W on axis 1 and θ1 the feasible one nearest to the seed's; returns the number of arcs."""
+    box, low, high, angles = np.empty(6), np.empty(6), np.empty(6), np.empty(6)
+    signed_box(near, lower, upper, params[24:30], params[30:36], box, low, high)
+    M, M0, M1, M2 = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    r00, r01, r02, _, r10, r11, r12, _, r20, r21, r22, _ = canonical(params, T)
+    columns = ((r00, r10, r20), (r01, r11, r21), (r02, r12, r22))
+    breaks, probes = np.empty(32), np.empty(66)
+    phased = t2 - math.atan2(params[_SHAPE + 5], params[_SHAPE + 4]) + (0.0 if params[_SHAPE + 8] else t3)
+    g, s = math.cos(phased), math.sin(phased)
+    for j in range(3):
+        x, y, z = columns[j]
+        M0[0, j], M0[1, j], M0[2, j] = _seen(params, g, s, 0.0, 0.0, z)
+        M1[0, j], M1[1, j], M1[2, j] = _seen(params, g, s, x, y, 0.0)
+        M2[0, j], M2[1, j], M2[2, j] = _seen(params, g, s, y, -x, 0.0)
+    n = 0
+    if arcs.shape[0] > 0:
+        count = zyz_breaks(M0, M1, M2, low, high, 3, breaks, 0)
+        for side in range(2):
+            if high[0] - low[0] < TURN:
+                breaks[count] = wrap(low[0] if side == 0 else high[0])
+                count += 1
+        n = lay_probes(breaks, count, probes)
+    first = found
+    best = math.inf
+    t1 = box[0]
+    for k in range(n + 1):
+        # The last round writes the angle that was chosen.
+        if k == n:
+            if not math.isnan(value):
+                t1 = params[24] * value + params[30]
+            elif found > first:
+                t1 = nearest_in_arcs(arcs, first, found, box[0])
+        angles[0] = probes[k] if k < n else t1
+        c1, s1 = math.cos(angles[0]), math.sin(angles[0])
+        for i in range(3):
+            for j in range(3):
+                M[i, j] = M0[i, j] + c1 * M1[i, j] + s1 * M2[i, j]
+        zyz(M, sign, box, low, high, 3, angles)
+        if k < n:
+            misfit = misfit_of(angles, low, high, 0, 1) + misfit_of(angles, low, high, 3, 6)
+            if misfit == 0.0 and found < arcs.shape[0]:
+                found = extend_arcs(arcs, first, found, branch, probes, k, n)
+            elif misfit < best and found == first:
+                best, t1 = misfit, probes[k]
+    _put(params, out, branch, t1, t2, t3, angles[3], angles[4], angles[5])
+    return found
+
+
+@jit
+def _branches(
+    params: Array, T: Array, value: float, near: Array, lower: Array, upper: Array, arcs: Array, out: Array
+) -> tuple[float, int]:
+    """The branches inside limits ``(6,)``, see `branches_one`. Returns (gap, number of arcs of θ1 or −1)."""
+    clear(out)
+    r00, r01, r02, wx, r10, r11, r12, wy, r20, r21, r22, wz = canonical(params, T)
+    a1, a2, f, beside = params[_SHAPE], params[_SHAPE + 1], params[_SHAPE + 2], params[_SHAPE + 3]
+    slides = params[_SHAPE + 8] != 0.0
+    r = math.sqrt(wx * wx + wy * wy)
+    if r < abs(beside) - _REACH:
+        return abs(beside) - r, -1
+    free = beside == 0.0 and r < _SINGULAR
+    root = math.sqrt(max((r - abs(beside)) * (r + abs(beside)), 0.0))
+    if beside != 0.0 and root < _MERGE * abs(beside):
+        root = 0.0
+    single = free or root == 0.0
+    azimuth = atan2(wy, wx)
+    gap = math.inf
+    found = 0 if free else -1
+    for si in range(1 if single else 2):
+        side = 1.0 if si == 0 else -1.0
+        X = side * root
+        x, h = X - a1, -wz
+        D = math.sqrt(x * x + h * h)
+        if slides:
+            # The slide runs past axis 2 at the distance f, and W is at ±bend on it.
+            miss, c3, k2 = abs(f) - D, 1.0, -f
+            bend = math.sqrt(max((D - f) * (D + f), 0.0))
+            if bend < max(_MERGE * abs(f), _SINGULAR):
+                bend = 0.0
+            k1 = bend
+        else:
+            miss, bend, c3, k1, k2 = two_links(x, h, a2, f)
+        if miss > _REACH and beside != 0.0 and not slides:
+            # Where two shoulders merge X is known but roughly: a hair more or less may be what the elbow needs.
+            edge = a2 + f if x * x + h * h > a2 * a2 + f * f else a2 - f
+            nearest = math.copysign(math.sqrt(max(edge * edge - h * h, 0.0)), x)
+            if abs(nearest - x) < abs(beside) * min(_HAIR, _ROUNDING / max(root, _ROUNDING)):
+                x = nearest
+                X = x + a1
+                miss, bend, c3, k1, k2 = two_links(x, h, a2, f)
+                D = math.sqrt(x * x + h * h)
+        gap = min(gap, miss)
+        if miss > _REACH:
+            continue
+        t1 = azimuth - atan2(beside, X)
+        scale = 1.0 / max(r * math.sqrt(X * X + beside * beside), 1e-300)
+        c1, s1 = (wx * X + wy * beside) * scale, (wy * X - wx * beside) * scale
+        x0, y0 = c1 * r00 + s1 * r10, c1 * r10 - s1 * r00
+        x1, y1 = c1 * r01 + s1 * r11, c1 * r11 - s1 * r01
+        x2, y2 = c1 * r02 + s1 * r12, c1 * r12 - s1 * r02
+        for ei in range(2 if bend > 0.0 else 1):
+            up = (side if ei == 0 else -side) if not slides else (1.0 if ei == 0 else -1.0)
+            e1, e2 = (up * k1, k2) if slides else (k1, up * k2)
+            c2, s2 = x * e1 + h * e2, h * e1 - x * e2
+            if D < _SINGULAR:
+                # W on axis 2, as in a folded arm of equal links: θ2 is free.
+                a, b = params[25] * lower[1] + params[31], params[25] * upper[1] + params[31]
+                t2 = min(max(params[25] * near[1] + params[31], min(a, b)), max(a, b))
+                c2, s2 = math.cos(t2), math.sin(t2)
+            else:
+                t2 = atan2(s2, c2)
+                unit = 1.0 / math.sqrt(c2 * c2 + s2 * s2)
+                c2, s2 = c2 * unit, s2 * unit
+            t3, s3 = up * bend, 0.0 if slides else up * k2 / f
+            branch = 4 * si + 2 * ei
+            if free:
+                for wi in range(2):
+                    sign = 1.0 if wi == 0 else -1.0
+                    found = _on_axis(
+                        params, T, t2, t3, sign, value, branch + wi, near, lower, upper, arcs, found, out
+                    )
+                continue
+            c23, s23 = c2 * c3 - s2 * s3, s2 * c3 + c2 * s3
+            g = c23 * params[_SHAPE + 4] + s23 * params[_SHAPE + 5]
+            s = s23 * params[_SHAPE + 4] - c23 * params[_SHAPE + 5]
+            m00, m10, _ = _seen(params, g, s, x0, y0, r20)
+            m01, m11, _ = _seen(params, g, s, x1, y1, r21)
+            m02, m12, m22 = _seen(params, g, s, x2, y2, r22)
+            sine = math.sqrt(m02 * m02 + m12 * m12)
+            if sine < _SINGULAR:
+                A, B, C = _aligned(params, m02, m12, m22, m00, m10, m01, m11, near, lower, upper)
+                _put(params, out, branch, t1, t2, t3, A, B, C)
+                copy_row(out, branch, branch + 1)
+            else:
+                cA, sA = m02 / sine, m12 / sine
+                A, B = atan2(m12, m02), atan2(sine, m22)
+                C = atan2(cA * m10 - sA * m00, cA * m11 - sA * m01)
+                _put(params, out, branch, t1, t2, t3, A, B, C)
+                # The other wrist, with the same three first joints.
+                out[branch + 1, 0], out[branch + 1, 1], out[branch + 1, 2] = (
+                    out[branch, 0], out[branch, 1], out[branch, 2]
+                )  # fmt: skip
+                out[branch + 1, 3] = wrap(params[27] * (A + math.pi - params[33]))
+                out[branch + 1, 4] = wrap(params[28] * (-B - params[34]))
+                out[branch + 1, 5] = wrap(params[29] * (C + math.pi - params[35]))
+        if bend == 0.0:
+            copy_row(out, 4 * si, 4 * si + 2)
+            copy_row(out, 4 * si + 1, 4 * si + 3)
+    if single:
+        for branch in range(4):
+            copy_row(out, branch, branch + 4)
+    return gap, found
+
+
+@jit
+def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
+    """out ``(8, 6)`` ← all branches of the target T ``(4, 4)``; False if T is not finite."""
+    _branches(params, T, value, near, params[_LOWER:_UPPER], params[_UPPER:_SIZE], out[:0], out)
+    return is_finite(T)
+
+
+@jit
+def branches_many(params: Array, T: Array, value: float, near: Array, out: Array) -> None:
+    """out ``(N, 8, 6)`` ← all branches of each of the targets T ``(N, 4, 4)``."""
+    for i in range(T.shape[0]):
+        branches_one(params, T[i], value, near, out[i])
+
+
+def solve(geometry: Geometry, problem: Problem) -> Candidates:
+    """All branches; with an approach direction only, joint 6 stays or goes where it is asked to be."""
+    g, free_roll = geometry, problem.task == APPROACH
+    out, arcs = np.empty((8, 6)), np.empty((128, 3))
+    T, lower, upper = problem.T, problem.lower, problem.upper
+    if free_roll:
+        T, lower, upper = rolled(T, problem.seed_roll), lower.copy(), upper.copy()
+        lower[5], upper[5] = -_FAR, _FAR
+    value = math.nan if not _has_axis_point(g) else problem.values[0]
+    gap, count = _branches(g.params, T, value, problem.seed, lower, upper, arcs, out)
+    values, ranges = np.full((8, len(freedoms(g, problem.task))), math.nan), []
+    if _has_axis_point(g):
+        rows = arcs[: max(count, 0)]
+        rows[:, 1:] -= g.offset[0]
+        if g.sign[0] < 0.0:
+            rows[:, 1:] = -rows[:, :0:-1]
+        if count >= 0:
+            values[:, 0] = out[:, 0]
+        ranges.append(rows)
+    if free_roll:
+        ranges.append(free_last(problem, out))
+        values[:, -1] = out[:, 5]
+    obstacle = "" if gap <= _REACH else "with this orientation the wrist centre is out of the elbow's reach"
+    return Candidates(out, values, tuple(ranges), max(gap, 0.0), obstacle)
+
+
+def _has_axis_point(geometry: Geometry) -> bool:
+    """Whether W can be on axis 1."""
+    return geometry.beside == 0.0
+
+
+def handles(geometry: Geometry, task: int) -> bool:
+    """Poses, and an approach direction when it is the last joint's own axis (then that joint is free)."""
+    return task == POSE or (task == APPROACH and geometry.tool_on_axis)
+
+
+def freedoms(geometry: Geometry, task: int) -> tuple[Freedom, ...]:
+    """θ1 where the wrist centre can be on axis 1; for an approach direction joint 6 as well."""
+    return (_THETA1,) * _has_axis_point(geometry) + (_THETA6,) * (task == APPROACH)
+
+
+def _reach(geometry: Geometry, t: Array) -> float:
+    """X of the wrist centre: how far it is before axis 1 in the arm's own plane, metres."""
+    return float(geometry.a1 + geometry.a2 * math.cos(t[1]) + geometry.f * math.cos(t[1] + t[2]))
+
+
+def branch_of(geometry: Geometry, q: Array) -> int:
+    """The branch a configuration is on.
+
+    "Front" is the side of axis 1 the arm faces with the wrist centre before it; the elbow is "up" when it is above
+    the line from the shoulder to the wrist centre; the wrist is the sign of θ5.
+    """
+    t = geometry.sign * q + geometry.offset
+    side = -1.0 if _reach(geometry, t) < 0.0 else 1.0
+    return 4 * int(side < 0.0) + 2 * int(side * math.sin(t[2]) < 0.0) + int(math.sin(t[4]) < 0.0)
+
+
+def singularities(geometry: Geometry, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
+    """How far a configuration ``(6,)`` is from each of the arm's singularities.
+
+    The three are the factors of the determinant, −a2 f s3 (a1 + a2 c2 + f c23) s5: there are no others.
+    """
+    g = geometry
+    t = g.sign * q + g.offset
+    elbow, wrist = off_line(t[2]), off_line(t[4])
+    where = "on axis 1" if _has_axis_point(g) else "beside axis 1, as near to it as it can get"
+    return those_within(
+        within,
+        (
+            "elbow",
+            abs(elbow),
+            "rad",
+            lambda: (
+                f"elbow {stretch(t[2])} ({at(3, q[2], g.sign[2] * elbow)}): "
+                "the wrist centre cannot move along the arm"
+            ),
+        ),
+        ("shoulder", abs(_reach(g, t)), "m", lambda: f"wrist centre {where}: it cannot move sideways"),
+        (
+            "wrist",
+            abs(wrist),
+            "rad",
+            lambda: (
+                f"axes 4 and 6 in line ({at(5, q[4], g.sign[4] * wrist)}): "
+                "the tool cannot tilt about the third axis"
+            ),
+        ),
+    )

@@ -1,0 +1,135 @@
+"""How axes lie: known arms, random chains built to order, and the same answer at every configuration and scale."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import kin
+from kin import axes
+from kin.robot import Joint, Robot
+
+
+def arm(*rows, convention="standard", scale=1.0):
+    """A robot of rows (d, a, alpha) or (kind, d, a, alpha), in metres and radians."""
+    joints = []
+    for i, row in enumerate(rows):
+        kind, d, a, alpha = row if isinstance(row[0], str) else ("revolute", *row)
+        joints.append(Joint(f"{i}", 0.3, d * scale, a * scale, alpha, kind, (-2.0, 2.0)))
+    return Robot("any", "any", "made", convention, tuple(joints), (0.0,) * len(joints))
+
+
+def facts(robot, q=None):
+    """What is said of every pair, without figures."""
+    return [(p.parallel, p.perpendicular, p.intersect, p.almost) for p in axes.pairs(robot, q)]
+
+
+SQUARE = math.pi / 2
+
+
+@pytest.mark.parametrize(
+    ("robot_id", "spherical", "parallel"),
+    [
+        ("pioneer5", (), ((1, 2),)),
+        ("redundant7", (2, 4), ((0, 1),)),
+        ("redundant7-craig", (0, 2, 4), ()),
+        ("iiwa14", (0, 2, 4), ()),
+        ("irb120", (3,), ((1, 2),)),
+        ("panda", (0,), ()),
+        ("puma560", (3,), ((1, 2),)),
+        ("scara", (), ((0, 3),)),
+        ("stanford", (3,), ((2, 3),)),
+        ("ur5", (), ((1, 3),)),
+    ],
+)
+def test_the_built_in_arms_are_what_their_books_say(robot_id, spherical, parallel):
+    robot = kin.get_robot(robot_id)
+    assert axes.spherical_groups(robot) == spherical
+    assert axes.parallel_groups(robot) == parallel
+
+
+def test_distances_are_those_of_the_drawing():
+    distances = [p.distance for p in axes.pairs(kin.get_robot("puma560"))]
+    assert distances == pytest.approx([0.0, 0.4318, 0.0203, 0.0, 0.0], abs=1e-12)
+    distances = [p.distance for p in axes.pairs(kin.get_robot("panda"))]
+    assert distances == pytest.approx([0.0, 0.0, 0.0825, 0.0825, 0.0, 0.088], abs=1e-12)
+    assert math.isnan(axes.pairs(kin.get_robot("scara"))[1].distance)  # a slide is nowhere in particular
+
+
+twist = st.one_of(st.sampled_from([0.0, SQUARE, -SQUARE, math.pi]), st.floats(0.1, 1.4))
+length = st.one_of(st.just(0.0), st.floats(0.05, 0.5))
+
+
+@given(
+    rows=st.lists(st.tuples(length, length, twist), min_size=2, max_size=7),
+    convention=st.sampled_from(["standard", "modified"]),
+    scale=st.sampled_from([1e-3, 1.0, 50.0]),
+    data=st.data(),
+)
+def test_pairs_are_what_the_rows_were_built_as(rows, convention, scale, data):
+    """a and α between two joints are the distance and angle of their axes, at any configuration and any scale."""
+    robot = arm(*rows, convention=convention, scale=scale)
+    between = rows[:-1] if convention == "standard" else rows[1:]
+    q = np.array(data.draw(st.lists(st.floats(-3, 3), min_size=robot.n, max_size=robot.n)))
+    for where in (None, q):
+        for (_, a, alpha), pair in zip(between, axes.pairs(robot, where), strict=True):
+            assert pair.distance == pytest.approx(a * scale, abs=1e-9 * scale)
+            assert pair.angle == pytest.approx(math.atan2(abs(math.sin(alpha)), abs(math.cos(alpha))), abs=1e-9)
+            assert pair.parallel == (alpha in (0.0, math.pi))
+            assert pair.perpendicular == (abs(alpha) == SQUARE)
+            assert pair.intersect == (a == 0.0)
+            assert pair.one_line == (a == 0.0 and alpha in (0.0, math.pi))
+            assert pair.almost == ""
+    assert facts(robot) == facts(robot, q)
+    assert axes.spherical_groups(robot) == axes.spherical_groups(robot, q)
+
+
+@given(angles=st.tuples(st.floats(0.3, 2.8), st.floats(0.3, 2.8)), d=st.floats(0.01, 1), data=st.data())
+def test_three_axes_meet_or_do_not(angles, d, data):
+    """a = 0 lets neighbours meet; the offset of the middle joint decides whether all three do."""
+    first, second = angles
+    ends = (0.2, 0.3, 0.7), (0.4, 0.1, 0.2)
+    q = np.array(data.draw(st.lists(st.floats(-3, 3), min_size=5, max_size=5)))
+    wrist = arm(ends[0], (0.1, 0.0, first), (0.0, 0.0, second), (d, 0.2, 1.0), ends[1])
+    assert axes.spherical_groups(wrist, q) == (1,)
+    offset = arm(ends[0], (0.1, 0.0, first), (d, 0.0, second), (0.1, 0.2, 1.0), ends[1])
+    assert axes.spherical_groups(offset, q) == ()
+    sliding = arm(ends[0], (0.1, 0.0, first), ("prismatic", 0.0, 0.0, second), (d, 0.2, 1.0), ends[1])
+    assert axes.spherical_groups(sliding, q) == ()
+
+
+def test_fixed_rows_base_and_tool_change_nothing():
+    plain = kin.get_robot("puma560")
+    turned = ((0.0, -1.0, 0.0, 1.0), (1.0, 0.0, 0.0, 2.0), (0.0, 0.0, 1.0, 3.0), (0.0, 0.0, 0.0, 1.0))
+    moved = replace(plain, base=turned, tool=turned)
+    assert facts(moved) == facts(plain)
+    assert axes.spherical_groups(moved) == axes.spherical_groups(plain) == (3,)
+
+
+@pytest.mark.parametrize(
+    ("row", "almost"),
+    [
+        ((0.1, 0.3, 1.5708), "perpendicular"),  # π/2 typed with five digits
+        ((0.1, 0.3, 1e-4), "parallel"),
+        ((0.1, 0.3, 3.1416), "parallel"),
+        ((0.1, 1e-4, 1.0), "intersecting"),
+        ((0.1, 0.3, 1.5), ""),
+        ((0.1, 0.02, 1.0), ""),
+    ],
+)
+def test_what_was_meant_but_rounded_is_told(row, almost):
+    (pair, _) = axes.pairs(arm(row, (0.2, 0.3, SQUARE), (0.1, 0.2, 0.4)))
+    assert pair.almost == almost
+    assert (pair.parallel, pair.perpendicular, pair.intersect) == (False, False, False)
+
+
+def test_generic_configurations_are_inside_the_limits_and_not_special():
+    for robot in kin.builtin_robots().values():
+        q = axes.generic_q(robot)
+        assert robot.in_limits(q)
+        assert kin.manipulability(robot, q) > 1e-7

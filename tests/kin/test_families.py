@@ -1,0 +1,557 @@
+"""The families of arms that are known by their axes: any member, in either convention, in any spelling.
+
+Members are drawn at random: lengths, offsets and their signs, twists of either sign, axes that point backwards,
+base and tool. What is asked of them are laws: each configuration is among the branches of its own pose, every
+branch closes, no branch is missed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import kin
+from kin import Joint, Robot, Status, solve_ik
+from kin.catalog import parse_robot
+from kin.solvers import parallel6, scara4, slide6, solver_for, wrist6
+from kin.solvers.numeric import spread
+
+PI = math.pi
+FAMILIES = {"wrist6": wrist6, "parallel6": parallel6, "slide6": slide6, "scara4": scara4}
+
+
+def arm(rows, kinds=None, convention="standard", base=None, tool=None, limits=(-PI, PI)):
+    """An arm of standard rows (theta, d, a, alpha), spelt in either convention; kinds are "r" or "p"."""
+    kinds = kinds or "r" * len(rows)
+    joints = []
+    before = (0.0, 0.0)
+    for i, (theta, d, a, alpha) in enumerate(rows):
+        x = (a, alpha) if convention == "standard" else before
+        kind = "revolute" if kinds[i] == "r" else "prismatic"
+        joints.append(Joint(f"joint {i + 1}", theta, d, *x, kind, limits if kinds[i] == "r" else (-4.0, 4.0)))
+        before = (a, alpha)
+    if convention == "modified":
+        joints.append(Joint("end", 0.0, 0.0, *before, "fixed"))
+    extra = {name: T for name, T in (("base", base), ("tool", tool)) if T is not None}
+    return Robot("arm", "arm", "test", convention, tuple(joints), (0.0,) * len(rows), **extra)
+
+
+class Draw:
+    """Random parts of arms."""
+
+    def __init__(self, seed):
+        self.rng = np.random.default_rng(seed)
+
+    def length(self):
+        return float(self.rng.uniform(0.1, 0.6) * self.rng.choice([-1, 1]))
+
+    def offset(self):
+        return self.length() if self.rng.random() < 0.6 else 0.0
+
+    def angle(self):
+        return float(self.rng.choice([0, PI / 2, -PI / 2, PI, *self.rng.uniform(-3, 3, 4)]))
+
+    def square(self):
+        return float(self.rng.choice([-PI / 2, PI / 2]))
+
+    def parallel(self):
+        return float(self.rng.choice([0.0, PI]))
+
+    def oblique(self):
+        return float(self.rng.uniform(0.4, 2.7) * self.rng.choice([-1, 1]))
+
+    def pose(self):
+        if self.rng.random() < 0.4:
+            return None
+        R = np.linalg.qr(self.rng.normal(size=(3, 3)))[0]
+        T = np.eye(4)
+        T[:3, :3], T[:3, 3] = R * np.linalg.det(R), self.rng.uniform(-0.3, 0.3, 3)
+        return tuple(tuple(row) for row in T.tolist())
+
+    def arm(self, rows, kinds=None):
+        return arm(rows, kinds, str(self.rng.choice(["standard", "modified"])), self.pose(), self.pose())
+
+    def last(self):
+        return (self.angle(), self.offset(), self.offset(), self.angle())
+
+    def wrist6(self):
+        return self.arm(
+            [
+                (self.angle(), self.offset(), self.offset(), self.square()),
+                (self.angle(), self.offset(), self.length(), self.parallel()),
+                (
+                    self.angle(),
+                    self.offset(),
+                    self.offset(),
+                    float(self.rng.choice([self.square(), self.oblique()])),
+                ),
+                (self.angle(), self.length(), 0.0, self.square()),
+                (self.angle(), 0.0, 0.0, self.square()),
+                self.last(),
+            ]
+        )
+
+    def parallel6(self):
+        return self.arm(
+            [
+                (
+                    self.angle(),
+                    self.offset(),
+                    self.offset(),
+                    float(self.rng.choice([self.square(), self.oblique()])),
+                ),
+                (self.angle(), self.offset(), self.length(), self.parallel()),
+                (self.angle(), self.offset(), self.length(), self.parallel()),
+                (self.angle(), self.offset(), self.offset(), self.square()),
+                (self.angle(), self.length(), 0.0, self.square()),
+                self.last(),
+            ]
+        )
+
+    def slide6(self):
+        return self.arm(
+            [
+                (self.angle(), self.offset(), self.offset(), self.square()),
+                (self.angle(), self.offset(), self.offset(), self.square()),
+                (
+                    self.angle(),
+                    self.offset(),
+                    self.offset(),
+                    float(self.rng.choice([0.0, self.square(), self.oblique()])),
+                ),
+                (self.angle(), self.offset(), 0.0, self.square()),
+                (self.angle(), 0.0, 0.0, self.square()),
+                self.last(),
+            ],
+            "rrprrr",
+        )
+
+    def scara4(self):
+        kinds = str(self.rng.choice(["rrpr", "rrrp", "prrr", "rprr", "rrr"]))
+        rows = [(self.angle(), self.offset(), self.length(), self.parallel()) for _ in kinds]
+        return self.arm([*rows[:-1], self.last()], kinds)
+
+
+def members(family, count, seed=7):
+    draw = Draw(seed)
+    return [getattr(draw, family)() for _ in range(count)]
+
+
+def branches(robot, T, near, value=math.nan):
+    """All branches ``(b, n)`` by the fast path."""
+    solver, geometry, _ = solver_for(robot)
+    out = np.empty((len(solver.BRANCHES), robot.n))
+    solver.branches_one(solver.params(geometry), np.array(T), value, np.array(near), out)
+    return out
+
+
+def there(rows):
+    return rows[~np.isnan(rows[:, 0])]
+
+
+def apart(a, b):
+    """Largest joint difference, whole turns aside."""
+    return np.abs((a - b + PI) % (2 * PI) - PI).max(axis=-1)
+
+
+def puma560():
+    rows = [(-90, 0, 0), (0, 0, 0.4318), (90, 0.15005, 0.0203), (-90, 0.4318, 0), (90, 0, 0), (0, 0, 0)]
+    return arm([(0.0, d, a, math.radians(alpha)) for alpha, d, a in rows])
+
+
+def ur5():
+    rows = [
+        (90, 0.089159, 0),
+        (0, 0, -0.425),
+        (0, 0, -0.39225),
+        (90, 0.10915, 0),
+        (-90, 0.09465, 0),
+        (0, 0.0823, 0),
+    ]
+    return arm([(0.0, d, a, math.radians(alpha)) for alpha, d, a in rows], limits=(-2 * PI, 2 * PI))
+
+
+def kr6():
+    """KR 6 R900: a base that points down, the elbow's offset, and a modified table."""
+    rows = [(0, 180, 0), (0.025, 90, 0), (0.455, 0, -PI / 2), (0.035, 90, 0), (0, -90, 0), (0, 90, PI)]
+    d = [-0.4, 0, 0, -0.42, 0, -0.08]
+    joints = [
+        Joint(f"A{i + 1}", theta, d[i], a, math.radians(alpha), "revolute", (-3.0, 3.0))
+        for i, (a, alpha, theta) in enumerate(rows)
+    ]
+    return Robot("kr6", "KR 6", "test", "modified", tuple(joints), (0.0,) * 6)
+
+
+def stanford():
+    """Paul 1981: the slide is on axis 4."""
+    rows = [(-90, 0.412, 0), (90, 0.154, 0), (0, 0, 0), (-90, 0, 0), (90, 0, 0), (0, 0.263, 0)]
+    return arm([(0.0, d, a, math.radians(alpha)) for alpha, d, a in rows], "rrprrr")
+
+
+SCARA = """
+id = "scara"
+name = "SCARA"
+source = "test"
+convention = "standard"
+units = { length = "mm", angle = "deg" }
+rows = [
+  { name = "1", d = 387, a = 325, limits = [-132, 132] },
+  { name = "2", a = 275, alpha = 180, limits = [-150, 150] },
+  { name = "3", kind = "prismatic", limits = [0, 200] },
+  { name = "4", d = 50, limits = [-360, 360] },
+]
+"""
+
+
+def scara():
+    return parse_robot(SCARA)
+
+
+NAMED = [
+    (puma560(), "wrist6"),
+    (kr6(), "wrist6"),
+    (ur5(), "parallel6"),
+    (stanford(), "slide6"),
+    (scara(), "scara4"),
+]
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_every_configuration_is_among_the_branches_of_its_pose_and_all_of_them_close(family):
+    rng = np.random.default_rng(1)
+    for robot in members(family, 60):
+        match = solver_for(robot)
+        assert match is not None, robot
+        if family != match.solver.NAME:
+            continue  # a member of both
+        for q in rng.uniform(-3, 3, (6, robot.n)):
+            T = kin.fk(robot, q)
+            rows = branches(robot, T, q)
+            assert apart(rows[match.solver.branch_of(match.geometry, q)], q) < 1e-6
+            assert np.abs(kin.fk(robot, there(rows)) - T).max() < 1e-9
+            for i in np.flatnonzero(~np.isnan(rows[:, 0])):
+                assert match.solver.branch_of(match.geometry, rows[i]) == i
+
+
+@pytest.mark.parametrize(("robot", "family"), NAMED, ids=[family + "-" + robot.id for robot, family in NAMED])
+def test_named_arms_are_recognised_and_have_all_their_branches(robot, family):
+    match = solver_for(robot)
+    assert family == match.solver.NAME
+    assert match.solver.why(match.geometry)
+    rng = np.random.default_rng(2)
+    counts = []
+    for q in robot.random_q(rng, 20):
+        result = solve_ik(robot, kin.fk(robot, q), q_seed=q)
+        assert result.status == Status.SOLVED
+        assert result.solver == family
+        assert apart(result.solutions[0].q, q) < 1e-6
+        counts.append(len(there(branches(robot, kin.fk(robot, q), q))))
+    assert max(counts) == len(match.solver.BRANCHES)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_many_targets_at_once_give_what_one_gives(family):
+    robot = members(family, 1, seed=3)[0]
+    solver, geometry, _ = solver_for(robot)
+    q = np.random.default_rng(3).uniform(-3, 3, (5, robot.n))
+    T = kin.fk(robot, q)
+    out = np.empty((5, len(solver.BRANCHES), robot.n))
+    solver.branches_many(solver.params(geometry), T, math.nan, q[0], out)
+    for i in range(5):
+        np.testing.assert_array_equal(out[i], branches(robot, T[i], q[0]))
+    T[0, 1, 3] = math.nan
+    assert not solver.branches_one(solver.params(geometry), T[0], math.nan, q[0], out[0])
+    assert np.isnan(out[0]).any(axis=1).all()
+
+
+def newton(robot, target, q):
+    """Damped Gauss–Newton on the pose error, written apart from the code under test: ``(n,)`` or None."""
+    for _ in range(60):
+        T = kin.fk(robot, q)
+        e = np.zeros(6)
+        e[:3] = target[:3, 3] - T[:3, 3]
+        for i in range(3):
+            e[3:] += 0.5 * np.cross(T[:3, i], target[:3, i])
+        J = kin.jacobian(robot, q)
+        step = J.T @ np.linalg.solve(J @ J.T + 1e-7 * np.eye(6), e)
+        q = q + step / max(1.0, np.abs(step).max())
+        if not np.abs(q).max() < 50:
+            return None
+        if np.linalg.norm(e) < 1e-12:
+            return q if np.trace(T[:3, :3].T @ target[:3, :3]) > 2.7 else None
+    return None
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_numeric_search_from_many_starts_finds_no_branch_we_miss(family):
+    rng = np.random.default_rng(4)
+    found = 0
+    for robot in members(family, 6, seed=4):
+        target = kin.fk(robot, rng.uniform(-3, 3, robot.n))
+        for start in spread(np.full(robot.n, -PI), np.full(robot.n, PI), 25):
+            q = newton(robot, target, start)
+            if q is None or kin.singularities(robot, q)[0].distance < 0.02:
+                continue
+            found += 1
+            assert np.nanmin(apart(branches(robot, target, q), q)) < 1e-6
+    assert found >= 40
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_an_axis_a_little_off_is_another_arm(family):
+    """Twists that the family asks for, one after the other, a milliradian off."""
+    asked = {"wrist6": (0, 1, 3, 4), "parallel6": (1, 2, 3, 4), "slide6": (0, 1, 3, 4), "scara4": (0, 1)}[family]
+    checked = 0
+    for robot in members(family, 12, seed=5):
+        if robot.convention != "standard" or family != solver_for(robot).solver.NAME:
+            continue
+        for row in asked:
+            rows = list(robot.rows)
+            rows[row] = replace(rows[row], alpha=rows[row].alpha + 1e-3)
+            assert FAMILIES[family].match(replace(robot, rows=tuple(rows))) is None
+            checked += 1
+    assert checked >= 8
+
+
+def test_axes_that_pass_each_other_by_are_another_arm():
+    for make, row in ((puma560, 4), (ur5, 4)):
+        rows = list(make().rows)
+        rows[row] = replace(rows[row], a=1e-4)
+        robot = replace(make(), rows=tuple(rows))
+        assert wrist6.match(robot) is None
+        assert parallel6.match(robot) is None
+
+
+def canonical(robot):
+    """(solver, geometry, q of canonical angles)."""
+    solver, g, _ = solver_for(robot)
+
+    def q_of(t):
+        q = g.sign * (np.asarray(t) - g.offset)
+        return np.where(robot.revolute, (q + PI) % (2 * PI) - PI, q)
+
+    return solver, g, q_of
+
+
+def reach_zero(g, t):
+    """θ2 for which the wrist centre is over axis 1, or None."""
+    if g.a2 == 0.0:
+        arm_vector = t[2] - 1j * g.f
+    elif hasattr(g, "f"):
+        arm_vector = g.a2 + g.f * np.exp(1j * t[2])
+    else:
+        arm_vector = g.a2 + g.a3 * np.exp(1j * t[2]) + (g.a4 + 1j * g.d5) * np.exp(1j * (t[2] + t[3]))
+    if abs(arm_vector) <= abs(g.a1):
+        return None
+    cosine = -g.a1 / abs(arm_vector)
+    return math.acos(cosine) - np.angle(arm_vector)
+
+
+@pytest.mark.parametrize("family", ["wrist6", "parallel6", "slide6"])
+def test_singular_targets_have_answers_that_close(family):
+    """Elbow, shoulder and wrist singular, one by one and together, exactly and nearly; inside the limits."""
+    rng = np.random.default_rng(6)
+    seen = set()
+    for robot in members(family, 40, seed=6):
+        if family != solver_for(robot).solver.NAME:
+            continue
+        _, g, q_of = canonical(robot)
+        for mode in range(1, 8):
+            t = rng.uniform(-3, 3, 6)
+            eps = float(rng.choice([0.0, 1e-12, 1e-9, 1e-7]))
+            if mode & 2:
+                t[4] = PI * rng.integers(0, 2) + eps
+            if mode & 4:
+                t[2] = (0.0 if family == "slide6" else PI * rng.integers(0, 2)) + eps
+            if mode & 1:
+                t2 = reach_zero(g, t)
+                if t2 is None:
+                    continue
+                t[1] = t2 + eps
+            q = q_of(t)
+            T = kin.fk(robot, q)
+            result = solve_ik(robot, T, q_seed=rng.uniform(-3, 3, 6))
+            assert result.status == Status.SOLVED, (robot, q.tolist(), mode, eps)
+            for s in result.solutions:
+                assert np.abs(kin.fk(robot, s.q) - T).max() < 1e-8
+            if mode in (1, 2, 4):
+                rows = branches(robot, T, rng.uniform(-3, 3, 6))
+                assert len(there(rows))
+                assert np.abs(kin.fk(robot, there(rows)) - T).max() < 1e-9
+                seen.add(mode)
+    assert seen == {1, 2, 4}
+
+
+def narrow(robot, widths):
+    """The arm with limits of these half widths about 0, None for a joint that keeps its own."""
+    spans = iter(widths)
+    rows = [
+        row if row.kind == "fixed" or (w := next(spans)) is None else replace(row, limits=(-w, w))
+        for row in robot.rows
+    ]
+    return replace(robot, rows=tuple(rows))
+
+
+def check_arcs(robot, q, joint, task="pose"):
+    """Inside the ranges told for the free joint the limits can be kept, and nowhere else."""
+    T = kin.fk(robot, q)
+    result = solve_ik(robot, T, q_seed=q)
+    (free,) = result.redundancy
+    assert abs(free.value - result.solutions[0].q[joint]) < 1e-12
+    inside = 0
+    values = np.linspace(-PI + 0.01, PI - 0.01, 61)
+    for value in values:
+        rows = there(branches(robot, T, q, value))
+        assert np.abs(kin.fk(robot, rows) - T).max() < 1e-9 if len(rows) else True
+        possible = bool(len(rows)) and bool(robot.in_limits(rows, 1e-9).any())
+        told = any(low - 1e-6 <= value <= high + 1e-6 for low, high in free.intervals)
+        near_end = any(min(abs(value - low), abs(value - high)) < 1e-5 for low, high in free.intervals)
+        assert possible == told or near_end, (value, free.intervals)
+        inside += told
+    return inside, len(values)
+
+
+def test_with_the_wrist_centre_on_axis_1_the_ranges_of_theta_1_are_exact():
+    rows = tuple(replace(row, d=0.4318 * (i == 3)) for i, row in enumerate(puma560().rows))
+    robot = narrow(replace(puma560(), rows=rows), (2.5, 3.1, 3.1, 1.5, 1.4, 2.0))
+    _, g, q_of = canonical(robot)
+    assert g.beside == 0.0
+    rng = np.random.default_rng(8)
+    some = 0
+    for _ in range(6):
+        t = g.sign * rng.uniform(-1.2, 1.2, 6) + g.offset
+        t[1] = reach_zero(g, t)
+        q = q_of(t)
+        if robot.in_limits(q):
+            inside, total = check_arcs(robot, q, 0)
+            some += 0 < inside < total
+    assert some >= 1
+
+
+def test_with_axis_6_parallel_to_the_three_the_ranges_of_theta_6_are_exact():
+    robot = narrow(ur5(), (3.1, 2.8, 2.5, 2.0, 2.0, 2.6))
+    rng = np.random.default_rng(9)
+    some = 0
+    for _ in range(6):
+        q = rng.uniform(-1.9, 1.9, 6)
+        q[4] = 0.0
+        inside, total = check_arcs(robot, q, 5)
+        some += 0 < inside < total
+    assert some >= 1
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_the_distances_told_are_the_factors_of_the_determinant(family):
+    rng = np.random.default_rng(10)
+    for robot in members(family, 15, seed=10):
+        if family != solver_for(robot).solver.NAME:
+            continue
+        solver, g, _ = solver_for(robot)
+        ratios = []
+        for q in rng.uniform(-3, 3, (5, robot.n)):
+            J = kin.jacobian(robot, q)
+            volume = math.sqrt(np.linalg.det(J.T @ J)) if family == "scara4" else abs(np.linalg.det(J))
+            told = solver.singularities(g, q)
+            factors = math.prod(math.sin(s.distance) if s.unit == "rad" else s.distance for s in told)
+            ratios.append(volume / factors)
+        if family == "scara4":
+            # The tool's lever makes no factor of the reduced Jacobian; only the zeros agree.
+            q[g.order[1]] = -g.sign[1] * g.offset[1]
+            J = kin.jacobian(robot, q)
+            assert np.linalg.svd(J, compute_uv=False)[robot.n - 1] < 1e-12
+            assert solver.singularities(g, q)[0].distance < 1e-12
+        else:
+            np.testing.assert_allclose(ratios, ratios[0], rtol=1e-6)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("task", ["pose", "approach"])
+def test_answers_inside_random_limits(family, task):
+    """Each joint between random stops: what is in them is found again, from another seed too."""
+    rng = np.random.default_rng(11)
+    for robot in members(family, 15, seed=11):
+        rows = tuple(
+            row
+            if row.kind == "fixed"
+            else replace(row, limits=(low := float(rng.uniform(-3, 0)), low + float(rng.uniform(0.5, 5))))
+            for row in robot.rows
+        )
+        robot = replace(robot, rows=rows, home=tuple(0.5 * sum(r.limits) for r in rows if r.kind != "fixed"))
+        q = robot.random_q(rng)
+        result = solve_ik(robot, kin.fk(robot, q), task=task)
+        assert result.status == Status.SOLVED
+        assert robot.in_limits(result.solutions[0].q, 1e-9)
+
+
+def test_a_scara_takes_upright_poses_and_tells_of_others_what_is_kept():
+    robot = scara()
+    q = np.array([0.4, -0.9, 0.11, 0.7])
+    T = kin.fk(robot, q)
+    tilted = T.copy()
+    c, s = math.cos(0.3), math.sin(0.3)
+    tilted[:3, :3] = T[:3, :3] @ np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    result = solve_ik(robot, tilted, q_seed=q)
+    assert result.status == Status.APPROXIMATE
+    assert result.solutions[0].position_error < 1e-9
+    assert result.solutions[0].rotation_error == pytest.approx(0.3)
+    too_high = T.copy()
+    too_high[2, 3] += 1.0
+    assert solve_ik(robot, too_high).status != Status.SOLVED
+
+
+@pytest.mark.parametrize("task", ["approach", "position"])
+def test_the_free_angle_of_a_scara_has_exact_ranges(task):
+    """A tool off the last axis, so that reach and all three limits bind."""
+    lever = ((1.0, 0.0, 0.0, 0.15), (0.0, 1.0, 0.0, 0.05), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+    robot = replace(scara(), tool=lever)
+    robot = replace(robot, rows=tuple(replace(r, limits=(-1.0, 1.4)) if r.name == "4" else r for r in robot.rows))
+    rng = np.random.default_rng(12)
+    some = 0
+    for q in robot.random_q(rng, 6):
+        T = kin.fk(robot, q)
+        result = solve_ik(robot, T, task=task, q_seed=q)
+        assert result.status == Status.SOLVED
+        assert result.solver == "scara4"
+        assert apart(result.solutions[0].q, q) < 1e-6
+        (free,) = result.redundancy
+        for value in np.linspace(-3, 3, 25):
+            told = any(low - 1e-6 <= value <= high + 1e-6 for low, high in free.intervals)
+            asked = solve_ik(robot, T, task=task, redundancy=float(value))
+            assert (asked.status == Status.SOLVED) == told
+            some += told
+    assert 10 < some < 140
+
+
+def test_a_planar_arm_takes_poses_in_its_plane_only():
+    robot = arm([(0.0, 0.0, 0.3, 0.0), (0.0, 0.0, 0.25, 0.0), (0.0, 0.0, 0.1, 0.0)])
+    q = np.array([0.3, 0.8, -0.4])
+    T = kin.fk(robot, q)
+    result = solve_ik(robot, T, q_seed=q)
+    assert result.status == Status.SOLVED
+    assert len(result.solutions) == 2
+    T[2, 3] = 0.05
+    assert solve_ik(robot, T).status == Status.UNREACHABLE
+
+
+def test_a_roll_that_is_free_stays_with_the_seed():
+    """The approach direction of a tool on axis 6: joint 6 keeps its value, beside the wrist singularity too."""
+    for robot in (puma560(), ur5()):
+        for flat in (False, True):
+            q = np.array([0.3, -0.7, 0.9, 0.4, 0.0 if flat else 0.6, 0.2])
+            seed = q + np.array([0.05, 0.1, -0.1, 0.1, 0.02, 0.3])
+            result = solve_ik(robot, kin.fk(robot, q), task="approach", q_seed=seed)
+            assert result.status == Status.SOLVED
+            assert result.solver in FAMILIES
+            assert result.solutions[0].q[5] == pytest.approx(seed[5])
+            asked = solve_ik(robot, kin.fk(robot, q), task="approach", redundancy={"theta6": -1.0})
+            assert asked.solutions[0].q[5] == pytest.approx(-1.0)
+
+
+def test_only_arms_that_can_be_on_axis_1_have_a_free_theta_1():
+    beside, over = puma560(), kr6()
+    for robot, names in ((beside, []), (over, ["theta1"])):
+        solver, g, _ = solver_for(robot)
+        assert [f.name for f in solver.freedoms(g, 0)] == names
