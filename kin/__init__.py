@@ -17,9 +17,24 @@ from kin.robot import Joint, Robot
 from kin.singularity import Singularity, singularities
 from kin.thin import ik_branches
 from kin.warmup import warm_up
+from kin.workspace import (
+    Estimate,
+    Extreme,
+    Section,
+    SectionArc,
+    WorkspaceChunk,
+    WorkspaceFacts,
+    configuration_at,
+    sample_workspace,
+    section,
+    workspace_facts,
+    workspace_slice,
+)
 
 __all__ = [
     "BlockedBranch",
+    "Estimate",
+    "Extreme",
     "IKResult",
     "IKSolution",
     "InputError",
@@ -32,14 +47,19 @@ __all__ = [
     "Redundancy",
     "Robot",
     "RobotFileError",
+    "Section",
+    "SectionArc",
     "Singularity",
     "Status",
     "Task",
     "UnknownRobotError",
+    "WorkspaceChunk",
+    "WorkspaceFacts",
     "__version__",
     "branch_names",
     "branch_of",
     "builtin_robots",
+    "configuration_at",
     "fk",
     "fk_positions",
     "get_robot",
@@ -50,8 +70,12 @@ __all__ = [
     "load_robot",
     "manipulability",
     "parse_robot",
+    "sample_workspace",
+    "section",
     "singularities",
     "solve_ik",
     "solve_path",
     "warm_up",
+    "workspace_facts",
+    "workspace_slice",
 ]

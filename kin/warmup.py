@@ -17,6 +17,7 @@ from kin.ik import solve_ik
 from kin.path import solve_path
 from kin.robot import Robot
 from kin.solvers import solver_for
+from kin.workspace import sample_workspace, section, workspace_facts
 
 
 def warm_up() -> None:
@@ -41,6 +42,12 @@ def warm_up() -> None:
         branch = "seed" if solver_for(robot) is not None else None
         solve_ik(robot, T, task="approach", branch=branch, prefer="manipulability")
         solve_path(robot, fk(robot, np.stack([q, q])))
+    # The kernels of the workspace are the same for every arm; with all joints locked it is one point, soon done.
+    robot = next(iter(builtin_robots().values()))
+    next(sample_workspace(robot, 1, locked=robot.home, with_q=True))
+    next(sample_workspace(robot, 1, strategy="volume", locked=robot.home))
+    workspace_facts(robot, locked=robot.home)
+    section(robot, locked=robot.home, resolution=8)
 
 
 def one_of_each_family() -> tuple[Robot, ...]:

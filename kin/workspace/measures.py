@@ -1,0 +1,35 @@
+"""What can be told of each configuration of a cloud, to colour its points by."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kin.errors import InputError
+from kin.fk import manipulability
+from kin.transforms import Array
+from kin.workspace.region import Region
+
+Measure = Literal["manipulability", "limits"]
+MEASURES: tuple[Measure, ...] = get_args(Measure)
+
+
+def measure_names(measure: Measure | Sequence[Measure] | None) -> tuple[Measure, ...]:
+    """The measures asked for; raises `InputError` naming a wrong one."""
+    names = (measure,) if isinstance(measure, str) else () if measure is None else measure
+    if not isinstance(names, Sequence) or any(name not in MEASURES for name in names):
+        raise InputError("measure", measure, "any of " + ", ".join(f'"{name}"' for name in MEASURES))
+    return tuple(dict.fromkeys(names))
+
+
+def measured(region: Region, name: Measure, q: Array) -> NDArray[np.float32]:
+    """A measure ``(k,)`` of configurations ``(k, n)``."""
+    if name == "manipulability":
+        return manipulability(region.robot, q).astype(np.float32)
+    free = region.free
+    half = 0.5 * (region.upper - region.lower)[free]
+    room = np.minimum(q - region.lower, region.upper - q)[:, free] / half
+    return np.asarray(room.min(axis=1, initial=1.0), dtype=np.float32)

@@ -1,0 +1,65 @@
+"""What a cloud is drawn from: the box of joint values that limits and locks leave."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kin.errors import InputError
+from kin.question import Limits, Locks, ask
+from kin.robot import Robot
+from kin.transforms import Array
+
+
+@dataclass(frozen=True)
+class Region:
+    """An arm and the box its joints may move in; hashable, so that what is learnt about it can be kept.
+
+    Attributes:
+        robot: the arm.
+        bounds: (lower, upper) of each joint, equal for a locked one; ±π for a joint without limits.
+    """
+
+    robot: Robot
+    bounds: tuple[tuple[float, float], ...]
+
+    @classmethod
+    def of(cls, robot: Robot, limits: Limits | None, locked: Locks | None) -> Region:
+        """The region of a request; raises `InputError` naming the wrong limit or lock."""
+        question = ask(robot, np.zeros(3), task="position", limits=limits, locked=locked)
+        lower = np.where(np.isfinite(question.lower), question.lower, -math.pi)
+        upper = np.where(np.isfinite(question.upper), question.upper, math.pi)
+        return cls(robot, tuple(zip(lower.tolist(), upper.tolist(), strict=True)))
+
+    @cached_property
+    def lower(self) -> Array:
+        """Lower ends ``(n,)``."""
+        return np.array([low for low, _ in self.bounds])
+
+    @cached_property
+    def upper(self) -> Array:
+        """Upper ends ``(n,)``."""
+        return np.array([high for _, high in self.bounds])
+
+    @cached_property
+    def free(self) -> NDArray[np.bool_]:
+        """Which joints can move ``(n,)``."""
+        return self.upper > self.lower
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash((self.robot, self.bounds))
+
+
+def whole(field: str, value: object, low: int, high: int, expected: str) -> int:
+    """A whole number in [low, high]; raises `InputError` naming `field`."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not low <= value <= high:
+        raise InputError(field, value, expected)
+    return int(value)
