@@ -39,9 +39,11 @@ def warm_up() -> None:
         solve_ik(robot, far, task="pose")
         solve_ik(robot, T, mask=(True, True, False, False, False, False))
         solve_ik(robot, T, task="pose", prefer="manipulability")
-        branch = "seed" if solver_for(robot) is not None else None
-        solve_ik(robot, T, task="approach", branch=branch, prefer="manipulability")
         solve_path(robot, fk(robot, np.stack([q, q])))
+
+
+def warm_up_workspace() -> None:
+    """The same for clouds, sizes and sections, which are asked for later than an arm is moved."""
     # The kernels of the workspace are the same for every arm; with all joints locked it is one point, soon done.
     robot = next(iter(builtin_robots().values()))
     next(sample_workspace(robot, 1, locked=robot.home, with_q=True))
