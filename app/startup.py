@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 from app.bridge import ViewerBridge
 from app.settings import Settings
 from app.store import Store
-from kin import warm_up, warm_up_workspace
+from kin import warm_up
 
 if TYPE_CHECKING:
     from app.viewer.server import ViewerServer
@@ -55,7 +55,6 @@ class Startup:
             if not self._stopping.is_set():
                 warm_up()
                 self.status = "ready"
-                warm_up_workspace()
         except Exception:
             # REST goes on; /readyz tells whoever watches the service.
             logger.exception("the viewer could not be started, or a kernel could not be compiled")
