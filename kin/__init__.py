@@ -16,7 +16,7 @@ from kin.results import BlockedBranch, IKResult, IKSolution, LimitViolation, Red
 from kin.robot import Joint, Robot
 from kin.singularity import Singularity, singularities
 from kin.thin import ik_branches
-from kin.warmup import warm_up, warm_up_workspace
+from kin.warmup import warm_up
 from kin.workspace import (
     Estimate,
     Extreme,
@@ -76,7 +76,6 @@ __all__ = [
     "solve_ik",
     "solve_path",
     "warm_up",
-    "warm_up_workspace",
     "workspace_facts",
     "workspace_slice",
 ]

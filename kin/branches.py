@@ -7,13 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kin.finish import POSITION_ERROR, ROTATION_ERROR, finish, ranges
 from kin.finish import Flags as Flags
+from kin.finish import finish, judge, ranges
 from kin.fk import fk
 from kin.question import Question
 from kin.results import IKSolution, LimitViolation, Redundancy
 from kin.solvers.common import APPROACH, Freedom, Problem
-from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 _NO_LIMIT = 1e6
@@ -42,10 +41,9 @@ class Branches:
 
 def is_closed(stats: Array) -> Flags:
     """Which rows of statistics ``(k, 5)`` meet the task, whatever the limits say ``(k,)``."""
-    return np.asarray(
-        (stats[:, POSITION_ERROR] <= TOLERANCES.closure_position)
-        & (stats[:, ROTATION_ERROR] <= TOLERANCES.closure_rotation)
-    )
+    closed, good = np.empty((2, len(stats)), dtype=bool)
+    judge(stats, False, closed, good)
+    return closed
 
 
 def solve_branches(

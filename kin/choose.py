@@ -68,7 +68,7 @@ def improve(question: Question, branches: Branches, good: Flags) -> None:
     """Bring every good row of `branches`, in place, to its best free values."""
     branches.q, branches.stats = centred(question, branches.q)
     score = scores(question, branches.q)
-    rows = np.flatnonzero(good & np.array([question.allows(i) for i in range(len(good))]))
+    rows = np.flatnonzero(good)
     for k in range(len(branches.freedoms)):
         if not math.isnan(question.values[k]):
             continue

@@ -3,7 +3,7 @@
 Each function takes one configuration ``(n,)`` or any batch ``(..., n)`` and returns the same leading axes.
 
 One configuration costs less than looking at it does. So the array is looked at once, and a compiled function is
-entered directly (:func:`kin.kernels.direct`); whatever is not a plain float64 array takes the careful way.
+entered directly (:func:`kin.compiled.direct`); whatever is not a plain float64 array takes the careful way.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 :func:`kin.solve_ik` answers a question: limits, ranges, a seed, an order, a sentence. Who wants joint values at
 the rate of a control loop, or for a million targets, asks here: no limits, no order, no verification. A solver
-offers it with ``params(geometry)``, a flat array, and kernels: ``branches_one``, ``branches_many`` and, where a
-value may differ from target to target, ``branches_each``.
+offers it with ``params(geometry)``, a flat array, and two kernels: ``branches_one``, and ``branches_many`` or,
+where a value may differ from target to target, ``branches_each``.
 """
 
 from __future__ import annotations

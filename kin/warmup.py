@@ -17,7 +17,6 @@ from kin.ik import solve_ik
 from kin.path import solve_path
 from kin.robot import Robot
 from kin.solvers import solver_for
-from kin.workspace import sample_workspace, section, workspace_facts
 
 
 def warm_up() -> None:
@@ -40,16 +39,6 @@ def warm_up() -> None:
         solve_ik(robot, T, mask=(True, True, False, False, False, False))
         solve_ik(robot, T, task="pose", prefer="manipulability")
         solve_path(robot, fk(robot, np.stack([q, q])))
-
-
-def warm_up_workspace() -> None:
-    """The same for clouds, sizes and sections, which are asked for later than an arm is moved."""
-    # The kernels of the workspace are the same for every arm; with all joints locked it is one point, soon done.
-    robot = next(iter(builtin_robots().values()))
-    next(sample_workspace(robot, 1, locked=robot.home, with_q=True))
-    next(sample_workspace(robot, 1, strategy="volume", locked=robot.home))
-    workspace_facts(robot, locked=robot.home)
-    section(robot, locked=robot.home, resolution=8)
 
 
 def one_of_each_family() -> tuple[Robot, ...]:

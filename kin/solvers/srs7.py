@@ -580,14 +580,6 @@ def branches_each(params: Array, T: Array, values: Array, near: Array, out: Arra
 
 
 @jit
-def branches_many(params: Array, T: Array, value: float, near: Array, out: Array) -> None:
-    """`branches_each` with one value for all targets."""
-    values = np.empty(1)
-    values[0] = value
-    branches_each(params, T, values, near, out)
-
-
-@jit
 def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
     """out ``(8, 7)`` ← all branches of the target T ``(4, 4)``, NaN if there is none; False if T is not finite.
 
