@@ -23,6 +23,7 @@ from starlette.concurrency import run_in_threadpool
 
 from app.api import build_router, install_problem_handlers
 from app.bridge import MAX_MESSAGE, ViewerBridge
+from app.clouds import Clouds
 from app.pages import page_routes
 from app.prefix import PathPrefix, clean_prefix
 from app.security import SecurityHeaders
@@ -53,13 +54,15 @@ def create_app(settings: Settings, store: Store | None = None) -> FastAPI:
     """
     store = store or Store(settings.robots)
     bridge = ViewerBridge(settings.allowed_origins)
-    startup = Startup(settings, store, bridge)
+    clouds = Clouds(settings.cloud_memory)
+    startup = Startup(settings, store, clouds, bridge)
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         startup.start()
         yield
         await run_in_threadpool(startup.stop)
+        clouds.close()
 
     app = FastAPI(
         title="Kinboard",
@@ -74,6 +77,7 @@ def create_app(settings: Settings, store: Store | None = None) -> FastAPI:
         lifespan=lifespan,
     )
     app.state.store, app.state.settings, app.state.startup = store, settings, startup
+    app.state.clouds = clouds
     install_problem_handlers(app)
     app.include_router(build_router())
     app.router.routes.extend([*page_routes(), *bridge.routes()])

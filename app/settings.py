@@ -20,6 +20,9 @@ class Settings(BaseSettings):
     max_batch: int = Field(10_000, ge=1, description="Most configurations or targets one request may hold.")
     max_path: int = Field(1000, ge=1, description="Most waypoints one path may have.")
     max_body: int = Field(8 * 1024 * 1024, ge=1024, description="Largest request body in bytes.")
+    cloud_memory: int = Field(
+        512 * 1024 * 1024, ge=0, description="Bytes of workspace clouds kept for all visitors together."
+    )
     allowed_origins: tuple[str, ...] = Field(
         (), description="Origins, besides our own, whose pages may open the viewer's websocket."
     )

@@ -11,6 +11,7 @@ import threading
 from typing import TYPE_CHECKING, Literal
 
 from app.bridge import ViewerBridge
+from app.clouds import Clouds
 from app.settings import Settings
 from app.store import Store
 from kin import warm_up
@@ -26,10 +27,11 @@ Status = Literal["warming", "ready", "failed"]
 class Startup:
     """Starts the viewer and warms the kernels in a thread of its own; `status` is what ``/readyz`` reports."""
 
-    def __init__(self, settings: Settings, store: Store, bridge: ViewerBridge) -> None:
+    def __init__(self, settings: Settings, store: Store, clouds: Clouds, bridge: ViewerBridge) -> None:
         self.status: Status = "warming"
         self._settings = settings
         self._store = store
+        self._clouds = clouds
         self._bridge = bridge
         self._viewer: ViewerServer | None = None
         self._stopping = threading.Event()
@@ -65,7 +67,7 @@ class Startup:
             # viser takes half a second to import: the landing page and REST need not wait for it.
             from app.viewer.server import ViewerServer
 
-            viewer = ViewerServer(self._store, self._settings)
+            viewer = ViewerServer(self._store, self._settings, self._clouds)
             self._bridge.port = viewer.start()
             self._viewer = viewer
         finally:

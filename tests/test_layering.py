@@ -17,7 +17,8 @@ RULES: dict[str, set[str]] = {
     "kin/compiled.py": {"numba"},
     "kin/simd.py": {"numba", "kin.compiled"},
     "kin/kernels.py": {"numpy", "kin.compiled", "kin.simd", "kin.transforms"},
-    "app": {"kin", "app.answers", "app.settings", "app.store"},
+    "app": {"kin", "app.answers", "app.clouds", "app.settings", "app.store"},
+    "app/clouds.py": {"kin"},
     "app/bench": {"kin", "numpy", "numba", "app.bench"},
     "app/bench/contestants.py": {
         *(
@@ -44,16 +45,19 @@ RULES: dict[str, set[str]] = {
     "app/security.py": {"starlette"},
     "app/pages.py": {"starlette", "kin"},
     "app/bridge.py": {"starlette", "websockets", "msgspec", "app.security"},
-    "app/startup.py": {"kin", "app.bridge", "app.settings", "app.store", "app.viewer"},
+    "app/startup.py": {"kin", "app.bridge", "app.clouds", "app.settings", "app.store", "app.viewer"},
     "app/main.py": {
-        *("kin", "fastapi", "starlette", "pydantic", "uvicorn", "app.api"),
+        *("kin", "fastapi", "starlette", "pydantic", "uvicorn", "app.api", "app.clouds"),
         *("app.bridge", "app.pages", "app.prefix", "app.security", "app.settings", "app.startup", "app.store"),
     },
     "app/api": {
         *("fastapi", "starlette", "pydantic", "pydantic_core", "typing_extensions", "numpy", "kin"),
-        *("app.api", "app.answers", "app.settings", "app.store"),
+        *("app.api", "app.answers", "app.clouds", "app.settings", "app.store"),
     },
-    "app/viewer": {"viser", "trimesh", "numpy", "kin", "app.viewer", "app.settings", "app.store"},
+    "app/viewer": {
+        *("viser", "trimesh", "numpy", "kin"),
+        *("app.viewer", "app.clouds", "app.settings", "app.store"),
+    },
 }
 
 MODULES = sorted(

@@ -9,6 +9,7 @@ import threading
 
 import viser
 
+from app.clouds import Clouds
 from app.settings import Settings
 from app.store import Store
 from app.viewer.motion import Pace
@@ -23,8 +24,9 @@ PATIENCE = 5.0
 class ViewerServer:
     """Serves the 3-D page. Bound to 127.0.0.1: the public port bridges to it and decides who may come in."""
 
-    def __init__(self, store: Store, settings: Settings) -> None:
+    def __init__(self, store: Store, settings: Settings, clouds: Clouds) -> None:
         self._store = store
+        self._clouds = clouds
         self._settings = settings
         self._server: viser.ViserServer | None = None
         self._sessions: dict[int, Session] = {}

@@ -11,6 +11,7 @@ import pytest
 from fake_browser import FakeBrowser
 
 import kin
+from app.clouds import Clouds
 from app.settings import Settings
 from app.store import Store
 from app.viewer.panel.joints import label
@@ -28,7 +29,7 @@ PRINTED = STORE.get("redundant7")
 @pytest.fixture(scope="module")
 def port() -> Iterator[int]:
     kin.warm_up()
-    server = ViewerServer(STORE, Settings())
+    server = ViewerServer(STORE, Settings(), Clouds())
     yield server.start()
     server.stop()
 

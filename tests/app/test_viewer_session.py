@@ -13,6 +13,7 @@ import pytest
 from fake_browser import FakeBrowser
 
 import kin
+from app.clouds import Clouds
 from app.settings import Settings
 from app.store import Store
 from app.viewer.panel.joints import label
@@ -29,7 +30,7 @@ SRS = STORE.get("redundant7-craig")
 @pytest.fixture(scope="module")
 def viewer() -> Iterator[tuple[ViewerServer, int]]:
     kin.warm_up()
-    server = ViewerServer(STORE, Settings())
+    server = ViewerServer(STORE, Settings(), Clouds())
     port = server.start()
     yield server, port
     server.stop()
@@ -302,7 +303,7 @@ def test_fifty_visits_leave_no_thread(viewer: tuple[ViewerServer, int]) -> None:
 
 def test_stopping_ends_sessions_and_the_port() -> None:
     before = set(threading.enumerate())
-    server = ViewerServer(STORE, Settings())
+    server = ViewerServer(STORE, Settings(), Clouds())
     tabs = [FakeBrowser(server.start())]
     tabs[0].wait(lambda: bool(tabs[0].sliders))
     server.stop()
