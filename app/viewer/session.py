@@ -17,18 +17,23 @@ import numpy as np
 import viser
 
 import kin
+from app.clouds import Clouds
 from app.store import Store
 from app.viewer import camera
+from app.viewer.feature import Feature
 from app.viewer.inbox import Inbox
+from app.viewer.lessons import LESSONS
 from app.viewer.motion import Motion, Pace
 from app.viewer.panel import assign, listen, listen_click
 from app.viewer.panel.joints import JointSliders
+from app.viewer.panel.lessons import LessonChoice
 from app.viewer.panel.posture import BranchChoice, FreeSliders
 from app.viewer.panel.readout import PoseReadout
 from app.viewer.panel.status import Notice, StatusLine, notice
 from app.viewer.panel.target import TASKS, TargetChoice, default_task
 from app.viewer.panel.view import ViewOptions, ViewState, configure_theme
 from app.viewer.scene import ArmScene
+from app.viewer.tabs import TABS
 from kin import Robot, Task
 from kin.transforms import Array, from_position_wxyz
 
@@ -46,12 +51,14 @@ BY_HAND = Notice("hand", "Moved by joints", "The target follows the tool.")
 class Session:
     """The state of one visitor.
 
-    `start`, `post`, `end` and `join` may be called by any thread; everything else belongs to the worker.
+    `start`, `post`, `end` and `join` may be called by any thread; everything else belongs to the worker. For its
+    features it is the :class:`~app.viewer.feature.Stage`.
     """
 
-    def __init__(self, client: viser.ClientHandle, store: Store, pace: Pace) -> None:
+    def __init__(self, client: viser.ClientHandle, store: Store, clouds: Clouds, pace: Pace) -> None:
+        self.store = store
+        self.clouds = clouds
         self._client = client
-        self._store = store
         self._pace = pace
         self._inbox = Inbox()
         self._thread = threading.Thread(target=self._run, name=f"visitor-{client.client_id}", daemon=True)
@@ -69,10 +76,13 @@ class Session:
         self._held_free: str | None = None
         self._arms = 0
         self._sheet = False
+        self._tabs: list[Feature] = []
+        self._lessons: LessonChoice | None = None
         # Made by the worker when it builds the page.
         self._robot: Robot
         self._task: Task
         self._motion: Motion
+        self._q: Array  # in the picture
         self._scene: ArmScene
         self._status: StatusLine
         self._readout: PoseReadout
@@ -101,12 +111,67 @@ class Session:
         self._thread.join(timeout)
         return not self._thread.is_alive()
 
+    # The stage of the features
+
+    @property
+    def client(self) -> viser.ClientHandle:
+        return self._client
+
+    @property
+    def robot(self) -> Robot:
+        return self._robot
+
+    @property
+    def task(self) -> Task:
+        return self._task
+
+    @property
+    def goal(self) -> Array:
+        return self._motion.goal
+
+    @property
+    def q(self) -> Array:
+        return self._q
+
+    @property
+    def target(self) -> Array | None:
+        return self._target
+
+    @property
+    def degrees(self) -> bool:
+        return self._degrees
+
+    @property
+    def dark(self) -> bool:
+        return self._view.dark
+
+    def go(self, q: Array, why: Notice | None = None) -> None:
+        """Head for a configuration, the gizmo following the tool."""
+        self._target = None
+        self._aim(q)
+        self._let_go_of_branch()
+        self._status.show(why or BY_HAND)
+
+    def ask(self, T_base_tool: Array) -> None:
+        """Answer a target as if the gizmo had been put there."""
+        self._scene.place_gizmo(T_base_tool)
+        self._solve(T_base_tool)
+
+    def tell(self, notice: Notice) -> None:
+        """Show a notice in the status line."""
+        self._status.show(notice)
+
+    @property
+    def _features(self) -> list[Feature]:
+        lesson = self._lessons.shown if self._lessons is not None else None
+        return [*self._tabs, lesson] if lesson is not None else self._tabs
+
     # The worker
 
     def _run(self) -> None:
         try:
             self._guard(self._build)
-            while (batch := self._inbox.take(self._pace.interval if self._moving else None)) is not None:
+            while (batch := self._inbox.take(self._rest)) is not None:
                 self._guard(lambda batch=batch: self._step(batch))  # type: ignore[misc]
         finally:
             self._pace.moving(self._client.client_id, False)
@@ -114,6 +179,14 @@ class Session:
     @property
     def _moving(self) -> bool:
         return hasattr(self, "_motion") and self._motion.moving
+
+    @property
+    def _rest(self) -> float | None:
+        """Seconds the worker may sleep if nothing happens."""
+        wishes = [feature.due for feature in self._features if feature.due is not None]
+        if self._moving:
+            wishes.append(self._pace.interval)
+        return min(wishes, default=None)
 
     def _guard(self, act: Callable[[], None]) -> None:
         """Run one step; an error is logged and shown, and the session lives on."""
@@ -141,6 +214,10 @@ class Session:
                 # Each on its own, so that one bad value does not take the others with it.
                 self._guard(lambda key=key, value=value: self._handle(key, value))  # type: ignore[misc]
             self._draw(fresh=bool(batch))
+            now = time.perf_counter()
+            for feature in self._features:
+                if feature.due is not None:
+                    self._guard(lambda feature=feature: feature.tick(now))  # type: ignore[misc]
         self._client.flush()
         if self._sliders_due:
             # After the picture: telling seven sliders takes longer than posing seven joints.
@@ -163,6 +240,13 @@ class Session:
             case ("branch", str(robot_id)):
                 if robot_id == self._robot.id:
                     self._on_branch(value)
+            case ("feature", str(name), wish):
+                for feature in self._features:
+                    if feature.key == name:
+                        feature.handle(wish, value)
+            case "lesson":
+                assert self._lessons is not None
+                self._lessons.choose(value)
             case "robot":
                 self._on_robot(str(value))
             case "task":
@@ -170,11 +254,11 @@ class Session:
             case "units":
                 self._on_units(bool(value))
             case "home":
-                self._go(self._robot.q_home)
+                self.go(self._robot.q_home)
             case "random":
-                self._go(self._robot.random_q(self._rng))
+                self.go(self._robot.random_q(self._rng))
             case "recall":
-                self._go(self._motion.goal)
+                self.go(self._motion.goal)
             case ("view", str(name)):
                 self._on_view(name, bool(value))
             case "camera":
@@ -246,10 +330,10 @@ class Session:
         )
 
     def _on_robot(self, name: str) -> None:
-        robot = next((r for r in self._store.robots if r.name == name), None)
+        robot = next((r for r in self.store.robots if r.name == name), None)
         if robot is None:
             assign(self._robot_choice, self._robot.name)
-            robot = self._store.get(name)  # raises with the list of valid ones
+            robot = self.store.get(name)  # raises with the list of valid ones
         if robot == self._robot:
             return
         self._sliders.remove()
@@ -258,6 +342,7 @@ class Session:
         self._scene.remove()
         self._use(robot)
         self._status.show(Notice("hand", robot.name, robot.description))
+        self._for_features(lambda feature: feature.on_robot())
 
     def _on_task(self, name: str) -> None:
         if name not in TASKS:
@@ -274,11 +359,18 @@ class Session:
         self._sliders.remove()
         self._sliders = self._make_sliders()
         self._show_posture()
+        self._for_features(lambda feature: feature.on_style())
+
+    def _for_features(self, act: Callable[[Feature], None]) -> None:
+        """Let every feature act; the error of one does not keep the others from it."""
+        for feature in self._features:
+            self._guard(lambda feature=feature: act(feature))  # type: ignore[misc]
 
     def _on_view(self, name: str, value: bool) -> None:
         setattr(self._view, name, value)
         if name == "dark":
             configure_theme(self._client.gui, value)
+            self._for_features(lambda feature: feature.on_style())
         self._apply_view()
 
     def _solve(self, T: Array) -> None:
@@ -290,13 +382,7 @@ class Session:
             self._aim(result.best.q)
         self._reached = result.status == "solved"
         self._status.show(notice(result))
-
-    def _go(self, q: Array) -> None:
-        """Head for a configuration, the gizmo following the tool."""
-        self._target = None
-        self._aim(q)
-        self._let_go_of_branch()
-        self._status.show(BY_HAND)
+        self._for_features(lambda feature: feature.on_answer(result))
 
     def _let_go_of_branch(self) -> None:
         """A joint moved by hand may leave the branch that was chosen: from then on none is."""
@@ -318,10 +404,10 @@ class Session:
             self._sheet = self._client.camera.image_width < NARROW
             if not self._sheet:
                 gui.main_panel.dock_right()
-            robot = self._store.robots[0]
+            robot = self.store.robots[0]
             self._task = default_task(robot)
             self._status = StatusLine(gui, WELCOME)
-            names = tuple(r.name for r in self._store.robots)
+            names = tuple(r.name for r in self.store.robots)
             self._robot_choice = gui.add_dropdown("Robot", names, initial_value=robot.name)
             listen(self._robot_choice, self.post, "robot")
             self._readout = PoseReadout(gui, kin.fk(robot, robot.q_home), self._degrees)
@@ -333,11 +419,18 @@ class Session:
                 self._target_choice = TargetChoice(gui, self._task, self.post)
                 self._posture_folder = gui.add_folder("Posture")
                 self._free = FreeSliders(gui, self._posture_folder, self.post)
+            learn = tabs.add_tab("Learn") if LESSONS else None
+            places = [(tab, tabs.add_tab(tab.title)) for tab in TABS]
             with tabs.add_tab("View"):
                 units = gui.add_checkbox("Radians", False, hint="Angles in radians instead of degrees")
                 listen(units, self.post, "units")
                 ViewOptions(gui, self._view, self.post)
             self._use(robot)
+            if learn is not None:
+                self._lessons = LessonChoice(gui, learn, self, self.post)
+            for tab, place in places:
+                with place:
+                    self._tabs.append(tab(self))
         self._client.flush()
 
     def _use(self, robot: Robot) -> None:
@@ -347,6 +440,7 @@ class Session:
         self._dragging = False
         weights = np.where(robot.revolute, 1.0, 4.0)
         self._motion = Motion(robot.q_home, weights)
+        self._q = robot.q_home
         self._arms += 1
         self._scene = ArmScene(self._client.scene, robot, self._view.dark, f"/arm-{self._arms}")
         self._task = default_task(robot)
@@ -395,6 +489,9 @@ class Session:
         self._pace.moving(self._client.client_id, not arrived)
         T = kin.fk(self._robot, q)
         self._scene.show(q)
+        if not np.array_equal(q, self._q):
+            self._q = q
+            self._for_features(lambda feature: feature.on_picture(T))
         if self._target is None:
             if not self._dragging:
                 self._scene.place_gizmo(T)

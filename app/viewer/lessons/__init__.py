@@ -1,0 +1,11 @@
+"""Lessons: one idea each, one on show at a time.
+
+Adding a lesson is one module with a :class:`~app.viewer.feature.Feature` and one row here.
+"""
+
+from __future__ import annotations
+
+from app.viewer.feature import Feature
+
+# In the order of a course.
+LESSONS: tuple[type[Feature], ...] = ()

@@ -1,0 +1,10 @@
+"""Tabs of the panel that are features of their own, between the arm's controls and the view's.
+
+Adding one is one module with a :class:`~app.viewer.feature.Feature` and one row here.
+"""
+
+from __future__ import annotations
+
+from app.viewer.feature import Feature
+
+TABS: tuple[type[Feature], ...] = ()
