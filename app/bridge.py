@@ -28,6 +28,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.typing import Subprotocol
 
+from app.access import LOOK_ONLY
 from app.security import VIEWER_POLICY, origin_allowed
 
 logger = logging.getLogger("kinboard.bridge")
@@ -37,6 +38,9 @@ MAX_MESSAGE = 50 * 1024 * 1024
 
 # Any visitor could have viser open a tunnel to the public internet, or close one; hiding its button is not enough.
 REFUSED_TYPES = frozenset({"ShareUrlRequest", "ShareUrlDisconnect"})
+
+# All that a visitor who may look, not touch, may send: where the camera is.
+LOOKING_TYPE = "ViewerCameraMessage"
 
 _WARMING_PAGE = (
     '<!doctype html><html lang="en"><meta charset="utf-8"><meta http-equiv="refresh" content="1">'
@@ -134,7 +138,7 @@ async def _to_viser(visitor: WebSocket, upstream: ClientConnection) -> _Ending:
             data = event.get("bytes")
             if data is None:
                 return 1003, "binary messages only"
-            if not _is_refused(data):
+            if not _is_refused(data, visitor.scope.get(LOOK_ONLY, False)):
                 await upstream.send(data)
     except ConnectionClosed:
         return _ending_of(upstream)
@@ -164,15 +168,16 @@ def _sendable(code: int) -> int:
     return _UNSENDABLE.get(code, code)
 
 
-def _is_refused(message: bytes) -> bool:
-    """Whether this is a message no visitor may send; decodes only what holds one of the names at all."""
-    if b"ShareUrl" not in message:
+def _is_refused(message: bytes, look_only: bool) -> bool:
+    """Whether this visitor may not send this message; of the others' only what holds a name at all is decoded."""
+    if not look_only and b"ShareUrl" not in message:
         return False
     try:
         decoded = msgspec.msgpack.decode(message)
     except msgspec.DecodeError:
         return True
-    return isinstance(decoded, dict) and decoded.get("type") in REFUSED_TYPES
+    kind = decoded.get("type") if isinstance(decoded, dict) else None
+    return kind != LOOKING_TYPE if look_only else kind in REFUSED_TYPES
 
 
 async def _add_slash(request: Request) -> Response:

@@ -51,7 +51,7 @@ def _serve(arguments: argparse.Namespace) -> int:
 
     from app.settings import Settings
 
-    given = {name: getattr(arguments, name) for name in ("host", "port", "root_path", "robots")}
+    given = {name: getattr(arguments, name) for name in ("host", "port", "root_path", "robots", "read_only")}
     try:
         settings = Settings(**{name: value for name, value in given.items() if value is not None})
     except ValidationError as error:
@@ -192,6 +192,10 @@ def _parser() -> argparse.ArgumentParser:
     serve.add_argument("--host", help="address to listen on (default 127.0.0.1)")
     serve.add_argument("--port", type=int, help="port to listen on (default 8000; 0 takes any free one)")
     serve.add_argument("--root-path", metavar="PREFIX", help="path prefix a reverse proxy serves us under")
+    serve.add_argument(
+        "--read-only", action="store_true", default=None,
+        help="whoever has no token (KINBOARD_TOKEN) may look, not touch",
+    )  # fmt: skip
     serve.add_argument("--open", action="store_true", help="open the dashboard in the browser")
     serve.set_defaults(command=_serve)
 

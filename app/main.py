@@ -7,6 +7,7 @@ people. Here they get their addresses: ``/`` the landing page, ``/viewer/`` the 
 
 from __future__ import annotations
 
+import ipaddress
 import signal
 import socket
 import sys
@@ -20,11 +21,13 @@ import uvicorn
 from fastapi import FastAPI, Response
 from pydantic import BaseModel
 from starlette.concurrency import run_in_threadpool
+from starlette.middleware.cors import CORSMiddleware
 
+from app.access import Access
 from app.api import build_router, install_problem_handlers
 from app.bridge import MAX_MESSAGE, ViewerBridge
 from app.clouds import Clouds
-from app.pages import page_routes
+from app.pages import page_routes, static_folder
 from app.prefix import PathPrefix, clean_prefix
 from app.security import SecurityHeaders
 from app.settings import Settings
@@ -32,6 +35,12 @@ from app.startup import Startup
 from app.startup import Status as StartupStatus
 from app.store import Store
 from kin import RobotFileError, __version__
+
+OPEN_TO_ALL = """\
+**************************************************************************
+  Kinboard is open to everybody who can reach this machine, without a token.
+  Set KINBOARD_TOKEN to ask for one, or KINBOARD_READ_ONLY=1.
+**************************************************************************"""
 
 
 class Alive(BaseModel):
@@ -97,6 +106,19 @@ def create_app(settings: Settings, store: Store | None = None) -> FastAPI:
         response.status_code = 200 if startup.status == "ready" else 503
         return Readiness(status=startup.status)
 
+    token = None if settings.token is None else settings.token.get_secret_value()
+    login_page = static_folder() / "login.html"
+    app.add_middleware(
+        Access, token=token, read_only=settings.read_only, rate=settings.rate_limit, login_page=login_page
+    )
+    if settings.cors_origins:
+        app.add_middleware(
+            CORSMiddleware,
+            allow_origins=settings.cors_origins,
+            allow_methods=["*"],
+            allow_headers=["*"],
+            expose_headers=["*"],
+        )
     app.add_middleware(SecurityHeaders)
     app.add_middleware(PathPrefix, prefix=settings.root_path)
     return app
@@ -121,6 +143,8 @@ def run(settings: Settings, open_browser: bool = False) -> int:
             print(f"kinboard: {error}", file=sys.stderr)
             return 1
         url = _url(settings, listener.getsockname()[1])
+        if settings.token is None and not settings.read_only and not _is_loopback(listener):
+            print(OPEN_TO_ALL, file=sys.stderr, flush=True)
         server = _Server(server_config(app), url, open_browser)
         # uvicorn ends in good order and then raises the signal again: for us it is the expected end.
         before = signal.signal(signal.SIGTERM, lambda *_: None)
@@ -180,6 +204,10 @@ def _listen(host: str, port: int) -> socket.socket:
     ]
     dual = family == socket.AF_INET6 and address[0] == "::" and socket.has_dualstack_ipv6()
     return socket.create_server(address[:2], family=family, backlog=2048, dualstack_ipv6=dual)
+
+
+def _is_loopback(listener: socket.socket) -> bool:
+    return ipaddress.ip_address(listener.getsockname()[0].partition("%")[0]).is_loopback
 
 
 def _url(settings: Settings, port: int) -> str:

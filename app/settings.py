@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pydantic import Field
+from pydantic import Field, SecretStr
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 
@@ -20,6 +20,14 @@ class Settings(BaseSettings):
     max_batch: int = Field(10_000, ge=1, description="Most configurations or targets one request may hold.")
     max_path: int = Field(1000, ge=1, description="Most waypoints one path may have.")
     max_body: int = Field(8 * 1024 * 1024, ge=1024, description="Largest request body in bytes.")
+    token: SecretStr | None = Field(
+        None, min_length=8, description="Whoever wants in must know it; none: everybody may."
+    )
+    read_only: bool = Field(False, description="Whoever has no token may look, not touch.")
+    rate_limit: float = Field(
+        0.0, ge=0, allow_inf_nan=False, description="Requests per second of one client; 0: no limit."
+    )
+    cors_origins: tuple[str, ...] = Field((), description="Origins whose pages may read REST's answers.")
     cloud_memory: int = Field(
         512 * 1024 * 1024, ge=0, description="Bytes of workspace clouds kept for all visitors together."
     )

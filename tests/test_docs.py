@@ -95,6 +95,7 @@ def test_the_settings_table_is_the_settings():
     expected = []
     for name, field in Settings.model_fields.items():
         default = list(field.default) if isinstance(field.default, tuple) else field.default
+        default = str(default).lower() if isinstance(default, bool) else default
         shown = "" if default in (None, "") else f"`{default}`"
         expected.append([f"`KINBOARD_{name.upper()}`", shown, field.description])
     assert rows == expected

@@ -44,10 +44,11 @@ RULES: dict[str, set[str]] = {
     "app/prefix.py": {"starlette"},
     "app/security.py": {"starlette"},
     "app/pages.py": {"starlette", "kin"},
-    "app/bridge.py": {"starlette", "websockets", "msgspec", "app.security"},
+    "app/access.py": {"starlette", "app.api.problems"},
+    "app/bridge.py": {"starlette", "websockets", "msgspec", "app.access", "app.security"},
     "app/startup.py": {"kin", "app.bridge", "app.clouds", "app.settings", "app.store", "app.viewer"},
     "app/main.py": {
-        *("kin", "fastapi", "starlette", "pydantic", "uvicorn", "app.api", "app.clouds"),
+        *("kin", "fastapi", "starlette", "pydantic", "uvicorn", "app.access", "app.api", "app.clouds"),
         *("app.bridge", "app.pages", "app.prefix", "app.security", "app.settings", "app.startup", "app.store"),
     },
     "app/api": {

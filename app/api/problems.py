@@ -36,6 +36,9 @@ KINDS = {
     "unknown-robot": "There is no such robot",
     "not-found": "There is nothing at this address",
     "method-not-allowed": "This address does not take this method",
+    "unauthorized": "A token is needed",
+    "read-only": "Nothing may be asked of this service",
+    "too-many-requests": "Too much is asked for",
     "body-too-large": "The request body is too large",
     "batch-too-large": "The request holds too many items",
     "unsupported-media-type": "The body must be JSON",
@@ -141,33 +144,34 @@ def shorten_text(text: str, length: int = 80) -> str:
     return text if len(text) <= length else text[: length - 1] + "…"
 
 
-def _respond(error: ProblemError) -> Response:
+def respond(error: ProblemError) -> Response:
+    """The document as a response."""
     content = to_json(error.problem)
     return Response(content, error.status_code, dict(error.headers or {}), MEDIA_TYPE)
 
 
 async def _http_error(request: Request, error: Exception) -> Response:
     if isinstance(error, ProblemError):
-        return _respond(error)
+        return respond(error)
     assert isinstance(error, StarletteHTTPException)
     path = shorten_text(request.url.path)
     headers = dict(error.headers or {})
     if error.status_code == 404:
-        return _respond(
+        return respond(
             ProblemError(404, "not-found", f"Nothing answers at {path}.", "See /docs for what there is.")
         )
     if error.status_code == 405:
         hint = f"It takes {headers['Allow']}." if "Allow" in headers else DOCS_HINT
         detail = f"{path} does not take {request.method}."
-        return _respond(ProblemError(405, "method-not-allowed", detail, hint, headers=headers))
+        return respond(ProblemError(405, "method-not-allowed", detail, hint, headers=headers))
     kind = "bad-request" if error.status_code == 400 else "http-error"
     detail = str(error.detail) or HTTPStatus(error.status_code).phrase
-    return _respond(ProblemError(error.status_code, kind, detail, headers=headers))
+    return respond(ProblemError(error.status_code, kind, detail, headers=headers))
 
 
 async def _validation_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
-    return _respond(invalid(*(field_error(item) for item in error.errors())))
+    return respond(invalid(*(field_error(item) for item in error.errors())))
 
 
 async def _unknown_robot(request: Request, error: Exception) -> Response:
@@ -176,19 +180,19 @@ async def _unknown_robot(request: Request, error: Exception) -> Response:
     field = FieldError(field="robot_id", value=show(error.robot_id), expected=f"one of {known}")
     detail = f"There is no robot {field.value}."
     hint = f"Known robots: {known}. GET /api/v1/robots describes them."
-    return _respond(ProblemError(404, "unknown-robot", detail, hint, [field]))
+    return respond(ProblemError(404, "unknown-robot", detail, hint, [field]))
 
 
 async def _input_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, InputError)
-    return _respond(invalid(from_input_error(error)))
+    return respond(invalid(from_input_error(error)))
 
 
 async def _internal_error(request: Request, error: Exception) -> Response:
     # What happened belongs into the log (the server re-raises after this answer), not to the client.
     detail = "The request was understood, but answering it failed."
     hint = "Please report it with the request you sent; the server's log has the cause."
-    return _respond(ProblemError(500, "internal-error", detail, hint))
+    return respond(ProblemError(500, "internal-error", detail, hint))
 
 
 def from_input_error(error: InputError, prefix: str = "") -> FieldError:

@@ -18,9 +18,9 @@ from kin.transforms import from_position_wxyz, wxyz_from_rotation
 class FakeBrowser:
     """One visitor. `pump` reads messages; everything shown is in `gui`, `values`, `poses` and `visible`."""
 
-    def __init__(self, port: int, width: int = 1280, height: int = 720) -> None:
+    def __init__(self, port: int, width: int = 1280, height: int = 720, path: str = "") -> None:
         self._socket = connect(
-            f"ws://127.0.0.1:{port}",
+            f"ws://127.0.0.1:{port}{path}",
             subprotocols=[f"viser-v{viser.__version__}"],  # type: ignore[list-item]
             max_size=None,
             compression=None,

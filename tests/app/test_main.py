@@ -212,3 +212,20 @@ def test_the_process_starts_and_a_signal_ends_it_quickly_and_quietly(stop, ready
     finally:
         process.kill()
         process.wait()
+
+
+@pytest.mark.parametrize(
+    ("settings", "warned"),
+    [
+        ({"host": "0.0.0.0"}, True),
+        ({"host": "::"}, True),
+        ({"host": "127.0.0.1"}, False),
+        ({"host": "::1"}, False),
+        ({"host": "0.0.0.0", "token": "long enough"}, False),
+        ({"host": "0.0.0.0", "read_only": True}, False),
+    ],
+)
+def test_a_service_that_is_open_to_all_says_so_loudly(capfd, monkeypatch, settings, warned):
+    monkeypatch.setattr("app.main._Server.run", lambda self, sockets: setattr(self, "started", True))
+    assert run(Settings(port=0, **settings)) == 0
+    assert ("open to everybody" in capfd.readouterr().err) is warned
