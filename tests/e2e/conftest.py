@@ -1,0 +1,80 @@
+"""The real service, Chromium, and a visitor's page, for all browser tests."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from page import Tab
+from playwright.sync_api import Browser, sync_playwright
+
+import kin
+
+CHROMIUM = Path(os.environ.get("KINBOARD_TEST_CHROMIUM", "/usr/bin/chromium"))
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="session")
+def address() -> Iterator[str]:
+    """The service as a user starts it, on a free port."""
+    env = {**os.environ, "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-m", "app.cli", "serve", "--port", "0"]
+    with subprocess.Popen(
+        command, cwd=ROOT, env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    ) as process:
+        try:
+            assert process.stdout is not None
+            line = process.stdout.readline()
+            assert "http://" in line, f"the service did not start: {line}{process.stdout.read()}"
+            url = "http://" + line.split("http://")[1].split()[0]
+            wait_until_ready(url)
+            yield url
+        finally:
+            process.terminate()
+            process.wait(20)
+
+
+def wait_until_ready(url: str, seconds: float = 180.0) -> None:
+    end = time.monotonic() + seconds
+    reason = ""
+    while time.monotonic() < end:
+        try:
+            with urllib.request.urlopen(url + "readyz", timeout=5):
+                return
+        except OSError as error:  # 503 until everything is warm
+            reason = str(error)
+        time.sleep(0.2)
+    pytest.fail(f"not ready after {seconds} s: {reason}")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    if not CHROMIUM.exists():
+        pytest.fail(
+            f"no Chromium at {CHROMIUM}: install it (apt-get install chromium) or set KINBOARD_TEST_CHROMIUM"
+        )
+    with sync_playwright() as playwright:
+        started = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
+        yield started
+        started.close()
+
+
+@pytest.fixture(scope="module")
+def desktop(browser: Browser, address: str) -> Iterator[Tab]:
+    """One tab for all tests: software rendering compiles its shaders for seconds whenever a page opens."""
+    opened = Tab(browser, address, 1280, 720)
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def tab(desktop: Tab) -> Tab:
+    """The tab with the Pioneer arm at home."""
+    desktop.show(kin.get_robot("pioneer5"))
+    return desktop

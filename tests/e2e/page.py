@@ -1,0 +1,116 @@
+"""One visitor's page in a browser, with the hands and eyes the tests need."""
+
+from __future__ import annotations
+
+import math
+import time
+from pathlib import Path
+
+import numpy as np
+from playwright.sync_api import Browser, Locator, Page, expect
+
+import kin
+from app.viewer import camera
+from app.viewer.meshes import body
+
+ARTIFACTS = Path(__file__).parents[1] / "artifacts"
+WAIT = 20_000  # ms; software rendering on a busy machine is slow
+
+
+class Tab:
+    """One visitor's page, with the hands and eyes the tests need."""
+
+    def __init__(self, browser: Browser, address: str, width: int, height: int) -> None:
+        self.page: Page = browser.new_page(viewport={"width": width, "height": height})
+        self.page.set_default_timeout(WAIT)
+        expect.set_options(timeout=WAIT)
+        self.errors: list[str] = []
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.goto(address + "viewer/")
+        expect(self.status).to_have_attribute("data-status", "hand")
+        self.page.locator("#webgl-software-rendering button").click()
+
+    def close(self) -> None:
+        self.page.close()
+        assert self.errors == []
+
+    @property
+    def status(self) -> Locator:
+        return self.page.locator("[data-status]")
+
+    def row(self, label: str) -> Locator:
+        """The line of the panel with this label."""
+        return self.page.get_by_text(label, exact=True).locator("xpath=ancestor::div[.//input or .//button][1]")
+
+    def number(self, label: str) -> float:
+        return float(self.row(label).locator("input:visible").last.input_value())
+
+    def type_number(self, label: str, text: str) -> None:
+        entry = self.row(label).locator("input:visible").last
+        entry.fill(text)
+        entry.press("Enter")
+
+    def choose(self, label: str, option: str) -> None:
+        self.row(label).locator("input:visible").first.click()
+        self.page.get_by_role("option", name=option, exact=True).click()
+
+    def check(self, label: str) -> None:
+        self.row(label).locator("input:visible").first.click()
+
+    def tool(self) -> list[float]:
+        """x, y, z in mm as the panel shows them."""
+        cells = self.page.locator('table[aria-label="tool pose"] tr').first.locator("td span")
+        return [float(text.replace("−", "-")) for text in cells.all_inner_texts()]
+
+    def wait_for_tool(self, xyz: np.ndarray, within: float) -> None:
+        end = time.monotonic() + WAIT / 1000
+        while np.abs(np.array(self.tool()) - 1000 * xyz).max() > within:
+            assert time.monotonic() < end, f"the tool is at {self.tool()}, expected {1000 * xyz}"
+            self.page.wait_for_timeout(50)
+
+    def pixel(self, robot: kin.Robot, point: np.ndarray) -> np.ndarray:
+        """Where a point of the scene is on the page, in the default view."""
+        area = self.page.locator("canvas").first.bounding_box()
+        assert area is not None
+        position, look_at = camera.view(body(robot), area["width"] / area["height"])
+        forward = (look_at - position) / np.linalg.norm(look_at - position)
+        right = np.cross(forward, [0.0, 0.0, 1.0])
+        right /= np.linalg.norm(right)
+        seen = np.array([right, np.cross(right, forward), forward]) @ (point - position)
+        half = math.tan(camera.FOV / 2) * seen[2] * 2
+        return np.array(
+            [
+                area["x"] + area["width"] / 2 + seen[0] / half * area["height"],
+                area["y"] + area["height"] / 2 - seen[1] / half * area["height"],
+            ]
+        )
+
+    def drag_arrow(self, robot: kin.Robot, T: np.ndarray, axis: int, lengths: float, steps: int = 6) -> None:
+        """Drag an arrow of the gizmo at pose T along its own direction, by a multiple of its length."""
+        arrow = 0.26 * body(robot).radius * T[:3, axis]
+        at = self.pixel(robot, T[:3, 3] + 0.8 * arrow)
+        to = self.pixel(robot, T[:3, 3] + (0.8 + lengths) * arrow)
+        self.page.mouse.move(*at.tolist())
+        self.page.wait_for_timeout(300)  # the arrow lights up under the pointer
+        self.page.mouse.down()
+        for k in range(1, steps + 1):
+            self.page.mouse.move(*(at + (to - at) * k / steps).tolist())
+            self.page.wait_for_timeout(60)
+        self.page.mouse.up()
+
+    def show(self, robot: kin.Robot) -> None:
+        """The robot at home."""
+        self.page.get_by_role("tab", name="Move").click()
+        if self.row("Robot").locator("input:visible").first.input_value() != robot.name:
+            self.choose("Robot", robot.name)
+            free = 1 if robot.n > 5 else 0  # the arm angle, or θ1
+            expect(self.page.get_by_role("slider")).to_have_count(robot.n + free)
+        self.page.get_by_role("button", name="Home").click()
+        self.wait_for_tool(kin.fk(robot, robot.q_home)[:3, 3], within=0.06)
+        self.page.wait_for_timeout(500)
+
+    def screenshot(self, name: str) -> None:
+        ARTIFACTS.mkdir(exist_ok=True)
+        self.page.mouse.move(5, 5)
+        self.page.wait_for_timeout(700)
+        self.page.screenshot(path=ARTIFACTS / f"{name}.png")
