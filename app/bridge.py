@@ -4,8 +4,10 @@ viser listens on a port of its own, reachable from this machine only. Visitors s
 out viser's page under ``/viewer/`` and carries each websocket's messages both ways, unchanged. The page dials
 its own address without the trailing slash, so both spellings are routes.
 
-A slow visitor must not make us hoard: with ``max_queue=1`` and both pumps waiting for the other side to take a
-message, what waits is left in viser's own windowed buffer, and TCP pushes back from there.
+What visitors send is looked at first (:mod:`app.inspection`); who sends nonsense is disconnected, and nobody else
+notices. A slow visitor must not make us hoard: with ``max_queue=1`` and both pumps waiting for the other side to
+take a message, what waits is left in viser's own windowed buffer, and TCP pushes back from there. Whoever takes
+nothing for a minute is let go.
 """
 
 from __future__ import annotations
@@ -16,9 +18,9 @@ import gzip
 import hashlib
 import http.client
 import logging
+import time
 from collections.abc import Iterable
 
-import msgspec
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, RedirectResponse, Response
@@ -29,22 +31,30 @@ from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.typing import Subprotocol
 
 from app.access import LOOK_ONLY
+from app.inspection import BURST, RATE, Budget, MalformedMessageError, admitted
+from app.metrics import DROPPED, STREAMED, VISITORS
 from app.security import VIEWER_POLICY, origin_allowed
 
 logger = logging.getLogger("kinboard.bridge")
 
-# What viser's own server accepts from a visitor: a screenshot asked for by the server comes back as one message.
-MAX_MESSAGE = 50 * 1024 * 1024
+# Seconds that one message may take to leave: what a visitor does not read waits in our memory.
+PATIENCE = 60.0
 
-# Any visitor could have viser open a tunnel to the public internet, or close one; hiding its button is not enough.
-REFUSED_TYPES = frozenset({"ShareUrlRequest", "ShareUrlDisconnect"})
-
-# All that a visitor who may look, not touch, may send: where the camera is.
-LOOKING_TYPE = "ViewerCameraMessage"
-
-_WARMING_PAGE = (
-    '<!doctype html><html lang="en"><meta charset="utf-8"><meta http-equiv="refresh" content="1">'
-    "<title>Kinboard is warming up</title><p>The viewer is warming up and will appear here in a moment.</p></html>"
+_PAGE = (
+    '<!doctype html><html lang="en"><meta charset="utf-8"><meta http-equiv="refresh" content="{again}">'
+    '<meta name="viewport" content="width=device-width"><meta name="color-scheme" content="light dark">'
+    "<title>{title}</title><style>body{{display:grid;place-items:center;min-height:90vh;margin:1rem;"
+    "font:1.05rem/1.6 system-ui,sans-serif;text-align:center}}</style><p>{words}</p></html>"
+)
+_WARMING_PAGE = _PAGE.format(
+    again=1,
+    title="Kinboard is warming up",
+    words="The viewer is warming up and will appear here in a moment.",
+)
+_FULL_PAGE = _PAGE.format(
+    again=10,
+    title="Kinboard is full",
+    words="All places in the viewer are taken. This page looks again every ten seconds.",
 )
 
 # Codes that describe a lost connection and may not travel in a close frame (RFC 6455, 7.4.1).
@@ -57,8 +67,10 @@ _Ending = tuple[int, str]
 class ViewerBridge:
     """Routes for ``/viewer``. `port` is that of the internal viser server, None until it listens."""
 
-    def __init__(self, allowed_origins: Iterable[str] = ()) -> None:
+    def __init__(self, allowed_origins: Iterable[str] = (), max_visitors: int = 200) -> None:
         self.port: int | None = None
+        self.visitors = 0
+        self._max_visitors = max_visitors
         self._allowed_origins = tuple(allowed_origins)
         self._page: _Page | None = None
 
@@ -75,6 +87,8 @@ class ViewerBridge:
         """viser's page under our content policy; 503 and a page that tries again until viser listens."""
         if self.port is None:
             return HTMLResponse(_WARMING_PAGE, status_code=503, headers={"retry-after": "1"})
+        if self.visitors >= self._max_visitors:
+            return HTMLResponse(_FULL_PAGE, status_code=503, headers={"retry-after": "10"})
         if self._page is None:
             self._page = await run_in_threadpool(_fetch_page, self.port)
         return self._page.response(request)
@@ -88,9 +102,21 @@ class ViewerBridge:
         if self.port is None:
             await _turn_away(visitor, "The viewer is warming up.")
             return
+        if self.visitors >= self._max_visitors:
+            DROPPED.labels("full").inc()
+            await _turn_away(visitor, "All places are taken.")
+            return
+        self.visitors += 1
+        try:
+            with VISITORS.track_inprogress():
+                await self._serve(visitor, self.port)
+        finally:
+            self.visitors -= 1
+
+    async def _serve(self, visitor: WebSocket, port: int) -> None:
         try:
             upstream = await connect(
-                f"ws://127.0.0.1:{self.port}/",
+                f"ws://127.0.0.1:{port}/",
                 subprotocols=[Subprotocol(name) for name in visitor.scope.get("subprotocols", ())] or None,
                 compression=None,
                 max_size=None,
@@ -130,6 +156,8 @@ async def _carry(visitor: WebSocket, upstream: ClientConnection) -> None:
 
 
 async def _to_viser(visitor: WebSocket, upstream: ClientConnection) -> _Ending:
+    look_only = bool(visitor.scope.get(LOOK_ONLY, False))
+    budget = Budget(RATE, BURST)
     try:
         while True:
             event = await visitor.receive()
@@ -138,8 +166,17 @@ async def _to_viser(visitor: WebSocket, upstream: ClientConnection) -> _Ending:
             data = event.get("bytes")
             if data is None:
                 return 1003, "binary messages only"
-            if not _is_refused(data, visitor.scope.get(LOOK_ONLY, False)):
+            try:
+                passes = admitted(data, look_only)
+            except MalformedMessageError as error:
+                DROPPED.labels("malformed").inc()
+                return 1007, str(error)
+            if passes:
                 await upstream.send(data)
+            else:
+                DROPPED.labels("refused").inc()
+            # A flood is not read faster than it may go on: it waits in the sender's own buffers.
+            await asyncio.sleep(budget.spend(time.monotonic()))
     except ConnectionClosed:
         return _ending_of(upstream)
 
@@ -147,9 +184,15 @@ async def _to_viser(visitor: WebSocket, upstream: ClientConnection) -> _Ending:
 async def _to_visitor(upstream: ClientConnection, visitor: WebSocket) -> _Ending:
     try:
         while True:
-            await visitor.send({"type": "websocket.send", "bytes": await upstream.recv(decode=False)})
+            message = await upstream.recv(decode=False)
+            async with asyncio.timeout(PATIENCE):
+                await visitor.send({"type": "websocket.send", "bytes": message})
+            STREAMED.labels("viewer").inc(len(message))
     except ConnectionClosed:
         return _ending_of(upstream)
+    except TimeoutError:
+        DROPPED.labels("slow").inc()
+        return 1008, "the connection is too slow"
     except WebSocketDisconnect:
         return 1001, ""
 
@@ -166,18 +209,6 @@ async def _turn_away(visitor: WebSocket, why: str) -> None:
 
 def _sendable(code: int) -> int:
     return _UNSENDABLE.get(code, code)
-
-
-def _is_refused(message: bytes, look_only: bool) -> bool:
-    """Whether this visitor may not send this message; of the others' only what holds a name at all is decoded."""
-    if not look_only and b"ShareUrl" not in message:
-        return False
-    try:
-        decoded = msgspec.msgpack.decode(message)
-    except msgspec.DecodeError:
-        return True
-    kind = decoded.get("type") if isinstance(decoded, dict) else None
-    return kind != LOOKING_TYPE if look_only else kind in REFUSED_TYPES
 
 
 async def _add_slash(request: Request) -> Response:

@@ -22,11 +22,15 @@ from fastapi import FastAPI, Response
 from pydantic import BaseModel
 from starlette.concurrency import run_in_threadpool
 from starlette.middleware.cors import CORSMiddleware
+from starlette.responses import PlainTextResponse
 
 from app.access import Access
 from app.api import build_router, install_problem_handlers
-from app.bridge import MAX_MESSAGE, ViewerBridge
+from app.bridge import ViewerBridge
 from app.clouds import Clouds
+from app.inspection import MAX_MESSAGE
+from app.metrics import CONTENT_TYPE, exposition
+from app.observe import Observe, write_to_stderr
 from app.pages import page_routes, static_folder
 from app.prefix import PathPrefix, clean_prefix
 from app.security import SecurityHeaders
@@ -62,7 +66,7 @@ def create_app(settings: Settings, store: Store | None = None) -> FastAPI:
         RobotFileError: a file in the operator's folder of robots is wrong.
     """
     store = store or Store(settings.robots)
-    bridge = ViewerBridge(settings.allowed_origins)
+    bridge = ViewerBridge(settings.allowed_origins, settings.max_visitors)
     clouds = Clouds(settings.cloud_memory)
     startup = Startup(settings, store, clouds, bridge)
 
@@ -90,6 +94,10 @@ def create_app(settings: Settings, store: Store | None = None) -> FastAPI:
     install_problem_handlers(app)
     app.include_router(build_router())
     app.router.routes.extend([*page_routes(), *bridge.routes()])
+
+    @app.get("/metrics", tags=["service"], summary="Counters, for Prometheus", response_class=PlainTextResponse)
+    async def metrics() -> Response:
+        return Response(exposition(), media_type=CONTENT_TYPE)
 
     @app.get("/livez", tags=["service"], summary="Is the process alive?")
     async def livez() -> Alive:
@@ -120,6 +128,7 @@ def create_app(settings: Settings, store: Store | None = None) -> FastAPI:
             expose_headers=["*"],
         )
     app.add_middleware(SecurityHeaders)
+    app.add_middleware(Observe, log=settings.access_log)
     app.add_middleware(PathPrefix, prefix=settings.root_path)
     return app
 
@@ -145,6 +154,8 @@ def run(settings: Settings, open_browser: bool = False) -> int:
         url = _url(settings, listener.getsockname()[1])
         if settings.token is None and not settings.read_only and not _is_loopback(listener):
             print(OPEN_TO_ALL, file=sys.stderr, flush=True)
+        if settings.access_log:
+            write_to_stderr()
         server = _Server(server_config(app), url, open_browser)
         # uvicorn ends in good order and then raises the signal again: for us it is the expected end.
         before = signal.signal(signal.SIGTERM, lambda *_: None)
@@ -168,7 +179,7 @@ def server_config(app: FastAPI) -> uvicorn.Config:
         ws="websockets-sansio",
         # Compressing a 12 MB point cloud would take half a second; what is worth it, viser compressed already.
         ws_per_message_deflate=False,
-        ws_max_size=MAX_MESSAGE,
+        ws_max_size=MAX_MESSAGE + 1024,
         ws_ping_interval=20.0,
         # A slow line may need this long to take a large scene before it gets to answer a ping.
         ws_ping_timeout=120.0,

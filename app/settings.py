@@ -28,6 +28,8 @@ class Settings(BaseSettings):
         0.0, ge=0, allow_inf_nan=False, description="Requests per second of one client; 0: no limit."
     )
     cors_origins: tuple[str, ...] = Field((), description="Origins whose pages may read REST's answers.")
+    max_visitors: int = Field(200, ge=1, description="Most tabs of the viewer at a time.")
+    access_log: bool = Field(False, description="Write each request to stderr, one JSON object a line.")
     cloud_memory: int = Field(
         512 * 1024 * 1024, ge=0, description="Bytes of workspace clouds kept for all visitors together."
     )

@@ -45,19 +45,23 @@ RULES: dict[str, set[str]] = {
     "app/security.py": {"starlette"},
     "app/pages.py": {"starlette", "kin"},
     "app/access.py": {"starlette", "app.api.problems"},
-    "app/bridge.py": {"starlette", "websockets", "msgspec", "app.access", "app.security"},
+    "app/metrics.py": {"prometheus_client"},
+    "app/inspection.py": {"msgspec"},
+    "app/observe.py": {"starlette", "app.access", "app.metrics"},
+    "app/bridge.py": {"starlette", "websockets", "app.access", "app.inspection", "app.metrics", "app.security"},
     "app/startup.py": {"kin", "app.bridge", "app.clouds", "app.settings", "app.store", "app.viewer"},
     "app/main.py": {
         *("kin", "fastapi", "starlette", "pydantic", "uvicorn", "app.access", "app.api", "app.clouds"),
+        *("app.inspection", "app.metrics", "app.observe"),
         *("app.bridge", "app.pages", "app.prefix", "app.security", "app.settings", "app.startup", "app.store"),
     },
     "app/api": {
         *("fastapi", "starlette", "pydantic", "pydantic_core", "typing_extensions", "numpy", "kin"),
-        *("app.api", "app.answers", "app.clouds", "app.settings", "app.store"),
+        *("app.api", "app.answers", "app.clouds", "app.metrics", "app.settings", "app.store"),
     },
     "app/viewer": {
         *("viser", "trimesh", "numpy", "kin"),
-        *("app.viewer", "app.clouds", "app.settings", "app.store"),
+        *("app.viewer", "app.clouds", "app.metrics", "app.settings", "app.store"),
     },
 }
 

@@ -23,6 +23,7 @@ from app.api.schemas import (
     one_or_all,
 )
 from app.api.targets import Target
+from app.metrics import SOLVE_SECONDS
 from app.settings import Settings
 from kin import Robot, solve_ik
 from kin.transforms import Array
@@ -161,7 +162,8 @@ def inverse_kinematics(
             for (task, T), seed in zip(questions[some], seeds[some], strict=True)
         ]
 
-    return one_or_all(answers, len(targets), single)
+    with SOLVE_SECONDS.labels("rest").time():
+        return one_or_all(answers, len(targets), single)
 
 
 def _seeds(robot: Robot, body: IkRequest, count: int, settings: Settings) -> list[Array | None]:

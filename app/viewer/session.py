@@ -18,6 +18,7 @@ import viser
 
 import kin
 from app.clouds import Clouds
+from app.metrics import SOLVE_SECONDS
 from app.store import Store
 from app.viewer import camera
 from app.viewer.feature import Feature
@@ -376,7 +377,10 @@ class Session:
     def _solve(self, T: Array) -> None:
         """Answer the gizmo's target: seed with where the arm is heading, so that it stays on its branch."""
         target = T[:3, 3] if self._task == "position" else T
-        result = kin.solve_ik(self._robot, target, task=self._task, q_seed=self._motion.goal, branch=self._branch)
+        with SOLVE_SECONDS.labels("viewer").time():
+            result = kin.solve_ik(
+                self._robot, target, task=self._task, q_seed=self._motion.goal, branch=self._branch
+            )
         self._target = T
         if result.best is not None:
             self._aim(result.best.q)

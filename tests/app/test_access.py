@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 
-import msgspec
 import pytest
 import viser
 from fake_browser import FakeBrowser
@@ -279,8 +278,7 @@ def test_whoever_may_only_look_sees_the_arm_and_cannot_move_it():
             before = tab.tool_pose()
             tab.set("1 rotating base", 10.0)
             tab.drag(position=(0.1, 0.1, 0.1))
-            tab.send_raw(msgspec.msgpack.encode(["no", "message"]))
-            tab.send_raw(b"\xc1 not msgpack")
+            tab.send("GuiUpdateMessage", uuid=tab.element("Radians"), updates={"value": True})
             tab.settle()
             assert (tab.tool_pose() == before).all()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import socket
 import threading
 import time
@@ -19,8 +20,17 @@ from websockets.sync.server import ServerConnection
 from websockets.sync.server import serve as serve_websocket
 
 from app.bridge import ViewerBridge
+from app.inspection import BURST, RATE, Budget
 
 PROTOCOL = "viser-v9.9.9"
+
+
+def said(word: str, **fields: object) -> bytes:
+    """A message as our page sends them."""
+    return msgspec.msgpack.encode({"type": "GuiUpdateMessage", "uuid": word, "updates": {"value": 1}} | fields)
+
+
+HELLO = said("hello")
 
 
 class StandIn:
@@ -55,15 +65,17 @@ class StandIn:
             while True:
                 message = connection.recv()
                 self.received.append(message)
-                match message:
-                    case b"close":
+                match msgspec.msgpack.decode(message).get("uuid"):
+                    case "close":
                         connection.close(4001, "bye")
-                    case b"drop":
+                    case "drop":
                         connection.socket.shutdown(socket.SHUT_RDWR)
-                    case b"flood":
+                    case "flood":
                         for k in range(200):
                             connection.send(k.to_bytes(4, "little") + bytes(1_000_000))
                             self.sent += 1
+                    case "bytes":
+                        connection.send(bytes(range(256)) * 20_000)
                     case _:
                         connection.send(message)
         except ConnectionClosed:
@@ -105,16 +117,18 @@ def visit(port: int, path: str = "/viewer", **options):
 def test_bytes_travel_both_ways_unchanged_with_the_subprotocol(port, viser, path):
     with visit(port, path) as visitor:
         assert visitor.subprotocol == PROTOCOL
-        for message in (b"", b"\x00\xff", bytes(range(256)) * 20_000):
+        for message in (HELLO, said("é", updates={"value": [1.5, None, b"\x00\xff"]})):
             visitor.send(message)
             assert visitor.recv(timeout=10) == message
+        visitor.send(said("bytes"))
+        assert visitor.recv(timeout=10) == bytes(range(256)) * 20_000
     assert viser.subprotocols == [PROTOCOL]
 
 
 def test_a_visitor_without_a_subprotocol_gets_none(port, viser):
     with visit(port, subprotocols=None) as visitor:
-        visitor.send(b"hello")
-        assert visitor.recv(timeout=10) == b"hello"
+        visitor.send(HELLO)
+        assert visitor.recv(timeout=10) == HELLO
         assert visitor.subprotocol is None
 
 
@@ -137,8 +151,8 @@ def test_nothing_is_compressed(port):
 def test_our_own_pages_may_connect(port, origin, headers):
     origin = origin and origin.format(port=port)
     with visit(port, origin=origin, additional_headers=headers) as visitor:
-        visitor.send(b"hello")
-        assert visitor.recv(timeout=10) == b"hello"
+        visitor.send(HELLO)
+        assert visitor.recv(timeout=10) == HELLO
 
 
 @pytest.mark.parametrize(
@@ -163,24 +177,144 @@ def test_pages_of_other_sites_are_refused(port, viser, origin, headers, caplog):
     assert [record.levelname for record in caplog.records if record.name != "websockets.server"] == ["WARNING"]
 
 
-@pytest.mark.parametrize("kind", ["ShareUrlRequest", "ShareUrlDisconnect"])
-def test_a_visitor_cannot_open_or_close_a_public_tunnel(port, viser, kind):
-    harmless = msgspec.msgpack.encode({"type": "GuiUpdateMessage", "uuid": "a", "updates": {"value": kind}})
-    hidden = msgspec.msgpack.encode({"type": "GuiUpdateMessage", "x": 1})[:-1] + b"\x01"
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"type": "ShareUrlRequest"},
+        {"type": "ShareUrlDisconnect"},
+        {"type": "FileTransferStartUpload", "size_bytes": 1 << 40},
+        {"type": "GetRenderResponseMessage", "payload": b"x"},
+        {"type": "GuiUpdateMessage", "uuid": "a", "updates": {"update_cb": []}},
+        {"type": "GuiUpdateMessage", "uuid": "a", "updates": {"value": 1, "gui_api": None}},
+        {"type": "GuiUpdateMessage", "uuid": "a", "updates": "value"},
+        {"type": "RunJavascriptMessage", "source": "alert(1)"},
+        {"type": "RemoveSceneNodeMessage", "name": "/arm"},
+        {"type": None},
+        {"type": ["GuiUpdateMessage"]},
+        {"kind": "GuiUpdateMessage"},
+    ],
+)
+def test_what_a_visitor_has_no_business_sending_is_dropped(port, viser, fields):
     with visit(port) as visitor:
-        visitor.send(msgspec.msgpack.encode({"type": kind}))
-        visitor.send(msgspec.msgpack.encode({"padding": "x" * 100_000, "type": kind}))
-        visitor.send(b"ShareUrl is not msgpack")
-        visitor.send(harmless)
-        visitor.send(hidden)
-        assert visitor.recv(timeout=10) == harmless
-        assert visitor.recv(timeout=10) == hidden
-    assert viser.received == [harmless, hidden]
+        visitor.send(msgspec.msgpack.encode(fields))
+        visitor.send(HELLO)
+        assert visitor.recv(timeout=10) == HELLO
+    assert viser.received == [HELLO]
+
+
+def nested(depth: int) -> bytes:
+    return HELLO[:-1] + b"\x91" * depth + b"\x00"
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        b"",
+        b"\xc1",
+        b"ShareUrl is not msgpack",
+        msgspec.msgpack.encode(["type", "GuiUpdateMessage"]),
+        HELLO[:-1],
+        HELLO + b"\x00",
+        said("a", padding="x" * 65_536),
+        nested(20),
+        nested(60_000),
+        b"\x81\xa4type\xdd\xff\xff\xff\xff",
+        b"\x81\xa4\xff\xff\xff\xff\x00",
+    ],
+    ids=lambda message: f"{len(message)} bytes",
+)
+def test_nonsense_ends_the_connection_it_came_on_and_no_other(port, viser, message):
+    with visit(port) as honest, visit(port) as visitor:
+        visitor.send(message)
+        with pytest.raises(ConnectionClosed) as end:
+            visitor.recv(timeout=10)
+        assert end.value.rcvd is not None
+        assert end.value.rcvd.code == 1007
+        honest.send(HELLO)
+        assert honest.recv(timeout=10) == HELLO
+    assert viser.received == [HELLO]
+
+
+def test_a_huge_message_is_not_even_read(viser, bridge):
+    app = FastAPI()
+    app.router.routes.extend(bridge.routes())
+    with serve(app) as port, visit(port) as visitor:
+        with contextlib.suppress(ConnectionClosed):  # we may be told in the middle of it
+            visitor.send(bytes(10_000_000))
+        with pytest.raises(ConnectionClosed) as end:
+            visitor.recv(timeout=10)
+        assert end.value.rcvd is None or end.value.rcvd.code == 1009
+    assert viser.received == []
+
+
+def test_a_flood_is_slowed_down_and_the_others_do_not_wait(port, viser):
+    stop = threading.Event()
+
+    def pour() -> None:
+        with visit(port, close_timeout=0.1) as visitor:
+            while not stop.is_set():
+                visitor.send(said("pour"))
+
+    flooding = threading.Thread(target=pour)
+    flooding.start()
+    try:
+        with visit(port) as honest:
+            began = time.monotonic()
+            waits = []
+            while time.monotonic() < began + 2.0:
+                sent = time.monotonic()
+                honest.send(HELLO)
+                assert honest.recv(timeout=10) == HELLO
+                waits.append(time.monotonic() - sent)
+                time.sleep(0.02)
+            came = sum(1 for message in viser.received if message != HELLO)
+            assert BURST <= came < BURST + 4 * RATE
+            assert sorted(waits)[len(waits) // 2] < 0.1
+    finally:
+        stop.set()
+        flooding.join(10)
+
+
+def test_a_budget_lets_a_hand_move_freely_and_fills_up_again():
+    budget = Budget(10.0, 5.0)
+    assert [budget.spend(0.0) for _ in range(5)] == [0.0] * 5
+    assert budget.spend(0.0) == pytest.approx(0.1)
+    assert budget.spend(1000.0) == 0.0
+    assert [budget.spend(1000.0) for _ in range(5)][-1] == pytest.approx(0.1)
+
+
+def test_a_reader_who_takes_nothing_is_let_go(port, viser, monkeypatch):
+    monkeypatch.setattr("app.bridge.PATIENCE", 0.3)
+    with visit(port, max_queue=1, close_timeout=0.1) as visitor:
+        visitor.send(said("flood"))
+        wait_for(lambda: len(viser.endings) == 1, 10)
+        assert viser.sent < 40
+
+
+def test_when_all_places_are_taken_a_page_says_so(viser):
+    bridge = ViewerBridge(max_visitors=2)
+    bridge.port = viser.port
+    app = FastAPI()
+    app.router.routes.extend(bridge.routes())
+    with serve(app) as port:
+        with visit(port) as one, visit(port) as two:
+            for visitor in (one, two):
+                visitor.send(HELLO)
+                assert visitor.recv(timeout=10) == HELLO
+            assert turned_away(port) == (1013, "All places are taken.")
+            page = httpx2.get(f"http://127.0.0.1:{port}/viewer/", trust_env=False)
+            assert page.status_code == 503
+            assert "All places in the viewer are taken" in page.text
+            assert page.headers["retry-after"] == "10"
+        wait_for(lambda: bridge.visitors == 0)
+        with visit(port) as three:
+            three.send(HELLO)
+            assert three.recv(timeout=10) == HELLO
 
 
 def test_viser_ends_the_connection_and_the_visitor_learns_why(port):
     with visit(port) as visitor:
-        visitor.send(b"close")
+        visitor.send(said("close"))
         with pytest.raises(ConnectionClosed) as end:
             visitor.recv(timeout=10)
     assert end.value.rcvd is not None
@@ -189,7 +323,7 @@ def test_viser_ends_the_connection_and_the_visitor_learns_why(port):
 
 def test_viser_lost_closes_the_visitor(port):
     with visit(port) as visitor:
-        visitor.send(b"drop")
+        visitor.send(said("drop"))
         with pytest.raises(ConnectionClosed) as end:
             visitor.recv(timeout=10)
     assert end.value.rcvd is not None
@@ -199,7 +333,7 @@ def test_viser_lost_closes_the_visitor(port):
 @pytest.mark.parametrize(("code", "seen"), [(1000, 1000), (1001, 1001), (4242, 4242)])
 def test_the_visitor_leaves_and_viser_learns_it(port, viser, code, seen):
     with visit(port) as visitor:
-        visitor.send(b"hello")
+        visitor.send(HELLO)
         visitor.recv(timeout=10)
         visitor.close(code)
     wait_for(lambda: viser.endings == [seen])
@@ -208,7 +342,7 @@ def test_the_visitor_leaves_and_viser_learns_it(port, viser, code, seen):
 def test_the_visitor_vanishes_and_nothing_is_left(port, viser):
     for _ in range(10):
         visitor = visit(port)
-        visitor.send(b"hello")
+        visitor.send(HELLO)
         visitor.recv(timeout=10)
         visitor.socket.shutdown(socket.SHUT_RDWR)
         visitor.close()
@@ -228,7 +362,7 @@ def test_text_is_not_of_this_protocol(port, viser):
 
 def test_a_slow_reader_holds_viser_back_instead_of_filling_our_memory(port, viser):
     with visit(port, max_queue=1) as visitor:
-        visitor.send(b"flood")
+        visitor.send(said("flood"))
         wait_for(lambda: viser.sent > 0)
         time.sleep(1.0)  # plenty for 200 MB over loopback, were nothing holding it back
         assert viser.sent < 40
