@@ -7,19 +7,23 @@ people. Here they get their addresses: ``/`` the landing page, ``/viewer/`` the 
 
 from __future__ import annotations
 
+import contextlib
 import ipaddress
+import os
 import signal
 import socket
 import sys
+import tempfile
 import threading
 import webbrowser
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from functools import partial
 from typing import Literal
 
 import uvicorn
 from fastapi import FastAPI, Response
-from pydantic import BaseModel
+from pydantic import BaseModel, Field
 from starlette.concurrency import run_in_threadpool
 from starlette.middleware.cors import CORSMiddleware
 from starlette.responses import PlainTextResponse
@@ -38,6 +42,7 @@ from app.settings import Settings
 from app.startup import Startup
 from app.startup import Status as StartupStatus
 from app.store import Store
+from app.workers import supervise
 from kin import RobotFileError, __version__
 
 OPEN_TO_ALL = """\
@@ -51,6 +56,7 @@ class Alive(BaseModel):
     """The process answers."""
 
     status: Literal["alive"] = "alive"
+    pid: int = Field(description="Which process: with several workers each answers for itself.")
 
 
 class Readiness(BaseModel):
@@ -101,7 +107,7 @@ def create_app(settings: Settings, store: Store | None = None) -> FastAPI:
 
     @app.get("/livez", tags=["service"], summary="Is the process alive?")
     async def livez() -> Alive:
-        return Alive()
+        return Alive(pid=os.getpid())
 
     @app.get(
         "/readyz",
@@ -136,7 +142,7 @@ def create_app(settings: Settings, store: Store | None = None) -> FastAPI:
 def run(settings: Settings, open_browser: bool = False) -> int:
     """Serve until Ctrl-C or SIGTERM; returns the exit code: 0, or 1 with a message if it could not start."""
     try:
-        listener = _listen(settings.host, settings.port)
+        listeners = _listen(settings)
     except OSError as error:
         reason = error.strerror or str(error)
         print(
@@ -145,31 +151,50 @@ def run(settings: Settings, open_browser: bool = False) -> int:
             file=sys.stderr,
         )
         return 1
-    with listener:
+    with contextlib.ExitStack() as stack:
+        for listener in listeners:
+            stack.enter_context(listener)
         try:
-            app = create_app(settings)
+            store = Store(settings.robots)
         except RobotFileError as error:
             print(f"kinboard: {error}", file=sys.stderr)
             return 1
-        url = _url(settings, listener.getsockname()[1])
-        if settings.token is None and not settings.read_only and not _is_loopback(listener):
+        if settings.token is None and not settings.read_only and not _is_loopback(listeners[0]):
             print(OPEN_TO_ALL, file=sys.stderr, flush=True)
-        if settings.access_log:
-            write_to_stderr()
-        server = _Server(server_config(app), url, open_browser)
-        # uvicorn ends in good order and then raises the signal again: for us it is the expected end.
-        before = signal.signal(signal.SIGTERM, lambda *_: None)
-        try:
-            server.run(sockets=[listener])
-        except KeyboardInterrupt:
-            pass
-        finally:
-            signal.signal(signal.SIGTERM, before)
+        greeting = _Greeting(_url(settings, listeners[0].getsockname()[1]), open_browser)
+        if len(listeners) == 1:
+            return _serve(settings, listeners[0], store, greeting)
+        os.environ["PROMETHEUS_MULTIPROC_DIR"] = stack.enter_context(
+            tempfile.TemporaryDirectory(prefix="kinboard-")
+        )
+        greeting.say()
+        return supervise(partial(_serve, settings), listeners, settings.drain + 5.0)
+
+
+def _serve(
+    settings: Settings, listener: socket.socket, store: Store | None = None, greeting: _Greeting | None = None
+) -> int:
+    """Serve on one socket, in this process."""
+    if settings.access_log:
+        write_to_stderr()
+    server = _Server(server_config(create_app(settings, store), settings.drain), greeting)
+    # uvicorn ends in good order and then raises the signal again: for us it is the expected end.
+    before = signal.signal(signal.SIGTERM, lambda *_: None)
+    try:
+        server.run(sockets=[listener])
+    except KeyboardInterrupt:
+        pass
+    finally:
+        signal.signal(signal.SIGTERM, before)
     return 0 if server.started else 1
 
 
-def server_config(app: FastAPI) -> uvicorn.Config:
-    """How uvicorn must serve `app` for the viewer's websockets to be quick and robust."""
+def server_config(app: FastAPI, drain: float = 5.0) -> uvicorn.Config:
+    """How uvicorn must serve `app` for the viewer's websockets to be quick and robust.
+
+    Args:
+        drain: seconds that answers under way may take after SIGTERM.
+    """
     return uvicorn.Config(
         app,
         lifespan="on",
@@ -183,22 +208,19 @@ def server_config(app: FastAPI) -> uvicorn.Config:
         ws_ping_interval=20.0,
         # A slow line may need this long to take a large scene before it gets to answer a ping.
         ws_ping_timeout=120.0,
-        timeout_graceful_shutdown=2,
+        timeout_graceful_shutdown=max(1, round(drain)),
     )
 
 
-class _Server(uvicorn.Server):
-    """Says where we are once connections are really accepted."""
+class _Greeting:
+    """Says where we are, once, and opens it."""
 
-    def __init__(self, config: uvicorn.Config, url: str, open_browser: bool) -> None:
-        super().__init__(config)
+    def __init__(self, url: str, open_browser: bool) -> None:
         self._url = url
         self._open_browser = open_browser
-
         self._out = sys.stdout  # now: starting viser borrows sys.stdout for a moment, in another thread
 
-    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        await super().startup(sockets=sockets)
+    def say(self) -> None:
         print(f"Kinboard {__version__} is at {self._url}  (Ctrl-C to stop)", file=self._out, flush=True)
         if self._open_browser:
             # A terminal browser would not return before it is closed.
@@ -209,12 +231,38 @@ class _Server(uvicorn.Server):
             print("No browser could be opened here: visit the address yourself.", file=self._out, flush=True)
 
 
-def _listen(host: str, port: int) -> socket.socket:
-    family, *_, address = socket.getaddrinfo(host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[
-        0
-    ]
+class _Server(uvicorn.Server):
+    """Greets once connections are really accepted."""
+
+    def __init__(self, config: uvicorn.Config, greeting: _Greeting | None) -> None:
+        super().__init__(config)
+        self._greeting = greeting
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets=sockets)
+        if self._greeting is not None:
+            self._greeting.say()
+
+
+def _listen(settings: Settings) -> list[socket.socket]:
+    """A socket for each worker, all on one address; raises `OSError` if somebody else has it."""
+    family, *_, address = socket.getaddrinfo(
+        settings.host or None, settings.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+    )[0]
     dual = family == socket.AF_INET6 and address[0] == "::" and socket.has_dualstack_ipv6()
-    return socket.create_server(address[:2], family=family, backlog=2048, dualstack_ipv6=dual)
+
+    def listen(port: object, shared: bool) -> socket.socket:
+        return socket.create_server(
+            (address[0], port), family=family, backlog=2048, dualstack_ipv6=dual, reuse_port=shared
+        )
+
+    alone = listen(address[1], False)
+    if settings.workers == 1:
+        return [alone]
+    # Sockets that share a port share it with any other service of the same user: only now is it known to be free.
+    port = alone.getsockname()[1]
+    alone.close()
+    return [listen(port, True) for _ in range(settings.workers)]
 
 
 def _is_loopback(listener: socket.socket) -> bool:

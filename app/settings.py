@@ -28,7 +28,11 @@ class Settings(BaseSettings):
         0.0, ge=0, allow_inf_nan=False, description="Requests per second of one client; 0: no limit."
     )
     cors_origins: tuple[str, ...] = Field((), description="Origins whose pages may read REST's answers.")
-    max_visitors: int = Field(200, ge=1, description="Most tabs of the viewer at a time.")
+    workers: int = Field(1, ge=1, le=64, description="Processes that serve side by side; REST and viewers alike.")
+    drain: float = Field(
+        5.0, ge=1, le=300, description="Seconds that answers under way may take when the service is told to stop."
+    )
+    max_visitors: int = Field(200, ge=1, description="Most tabs of the viewer at a time, for each worker.")
     access_log: bool = Field(False, description="Write each request to stderr, one JSON object a line.")
     cloud_memory: int = Field(
         512 * 1024 * 1024, ge=0, description="Bytes of workspace clouds kept for all visitors together."

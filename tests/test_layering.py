@@ -47,12 +47,13 @@ RULES: dict[str, set[str]] = {
     "app/access.py": {"starlette", "app.api.problems"},
     "app/metrics.py": {"prometheus_client"},
     "app/inspection.py": {"msgspec"},
+    "app/workers.py": set(),
     "app/observe.py": {"starlette", "app.access", "app.metrics"},
     "app/bridge.py": {"starlette", "websockets", "app.access", "app.inspection", "app.metrics", "app.security"},
     "app/startup.py": {"kin", "app.bridge", "app.clouds", "app.settings", "app.store", "app.viewer"},
     "app/main.py": {
         *("kin", "fastapi", "starlette", "pydantic", "uvicorn", "app.access", "app.api", "app.clouds"),
-        *("app.inspection", "app.metrics", "app.observe"),
+        *("app.inspection", "app.metrics", "app.observe", "app.workers"),
         *("app.bridge", "app.pages", "app.prefix", "app.security", "app.settings", "app.startup", "app.store"),
     },
     "app/api": {
