@@ -47,6 +47,7 @@ RULES: dict[str, set[str]] = {
     "app/access.py": {"starlette", "app.api.problems"},
     "app/metrics.py": {"prometheus_client"},
     "app/inspection.py": {"msgspec"},
+    "app/picture.py": {"kin", "numpy"},
     "app/workers.py": set(),
     "app/observe.py": {"starlette", "app.access", "app.metrics"},
     "app/bridge.py": {"starlette", "websockets", "app.access", "app.inspection", "app.metrics", "app.security"},
