@@ -14,6 +14,7 @@ import io
 import os
 import sys
 from collections.abc import Callable, Sequence
+from typing import Any
 
 UNITS_NOTE = "degrees and millimetres, or radians and metres with --rad"
 DESCRIPTION = "Kinematics of robot arms: a dashboard in the browser, a REST interface, this command line."
@@ -104,6 +105,12 @@ def _check(arguments: argparse.Namespace) -> int:
     from app import commands
 
     return _refusing_misuse(commands.check, arguments)
+
+
+def _capability(arguments: argparse.Namespace) -> int:
+    from app import mapping
+
+    return _refusing_misuse(mapping.capability, arguments)
 
 
 def _refusing_misuse(command: Callable[[argparse.Namespace], int], arguments: argparse.Namespace) -> int:
@@ -287,7 +294,38 @@ def _parser() -> argparse.ArgumentParser:
     check = commands.add_parser("check", parents=[answers], help="validate a robot file and tell what the arm is")
     check.add_argument("file", metavar="FILE", help="robot file (*.toml)")
     check.set_defaults(command=_check)
+    _add_capability(commands, [common, answers])
     return parser
+
+
+def _add_capability(commands: Any, parents: list[argparse.ArgumentParser]) -> None:
+    capability = commands.add_parser(
+        "capability", parents=parents, help="map of the directions from which each place can be approached"
+    )
+    capability.add_argument("robot", metavar="ROBOT", help="id of the robot; `kinboard robots` lists them")
+    size = capability.add_mutually_exclusive_group()
+    size.add_argument("--voxel", type=_number, metavar="SIDE", help="side of a voxel, millimetres (--rad: metres)")
+    size.add_argument(
+        "--resolution", type=int, default=25, metavar="N", help="voxels along the longest side (default 25)"
+    )
+    capability.add_argument(
+        "--directions", type=int, default=48, metavar="N", help="directions per voxel: 12, 24, 48 (default) or 96"
+    )
+    capability.add_argument(
+        "--lock", type=_named_numbers, action="append", metavar="JOINT=VALUE",
+        help=f"keep a joint (counted from 1) at a value; {UNITS_NOTE}",
+    )  # fmt: skip
+    capability.add_argument(
+        "--limit", type=_named_numbers, action="append", metavar="JOINT=LOWER:UPPER",
+        help=f"narrow the limits of a joint (counted from 1); {UNITS_NOTE}",
+    )  # fmt: skip
+    capability.add_argument(
+        "--dask", metavar="ADDRESS",
+        help="let the workers of this Dask scheduler compute, such as tcp://host:8786; "
+        "`pip install 'kinboard[cluster]'` brings what that needs",
+    )  # fmt: skip
+    capability.add_argument("-o", "--output", metavar="FILE", help="write the map to a file: .npz, .ply or .csv")
+    capability.set_defaults(command=_capability)
 
 
 if __name__ == "__main__":

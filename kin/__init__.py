@@ -18,12 +18,19 @@ from kin.singularity import Singularity, singularities
 from kin.thin import ik_branches
 from kin.warmup import warm_up
 from kin.workspace import (
+    CapabilityBlock,
+    CapabilityGrid,
+    CapabilityMap,
     Estimate,
     Extreme,
     Section,
     SectionArc,
     WorkspaceChunk,
     WorkspaceFacts,
+    capability_block,
+    capability_grid,
+    capability_join,
+    capability_map,
     configuration_at,
     sample_workspace,
     section,
@@ -33,6 +40,9 @@ from kin.workspace import (
 
 __all__ = [
     "BlockedBranch",
+    "CapabilityBlock",
+    "CapabilityGrid",
+    "CapabilityMap",
     "Estimate",
     "Extreme",
     "IKResult",
@@ -59,6 +69,10 @@ __all__ = [
     "branch_names",
     "branch_of",
     "builtin_robots",
+    "capability_block",
+    "capability_grid",
+    "capability_join",
+    "capability_map",
     "configuration_at",
     "fk",
     "fk_positions",

@@ -5,6 +5,15 @@ descent (:mod:`kin.workspace.settle`), and everything that asks whether a point 
 descents may begin (:mod:`kin.workspace.atlas`).
 """
 
+from kin.workspace.capability import (
+    CapabilityBlock,
+    CapabilityGrid,
+    CapabilityMap,
+    capability_block,
+    capability_grid,
+    capability_join,
+    capability_map,
+)
 from kin.workspace.cloud import STRATEGIES, Strategy, configuration_at, sample_workspace, workspace_slice
 from kin.workspace.cut import section
 from kin.workspace.facts import workspace_facts
@@ -14,6 +23,9 @@ from kin.workspace.results import Estimate, Extreme, Section, SectionArc, Span, 
 __all__ = [
     "MEASURES",
     "STRATEGIES",
+    "CapabilityBlock",
+    "CapabilityGrid",
+    "CapabilityMap",
     "Estimate",
     "Extreme",
     "Measure",
@@ -23,6 +35,10 @@ __all__ = [
     "Strategy",
     "WorkspaceChunk",
     "WorkspaceFacts",
+    "capability_block",
+    "capability_grid",
+    "capability_join",
+    "capability_map",
     "configuration_at",
     "sample_workspace",
     "section",
