@@ -23,6 +23,7 @@ EPILOG = """examples:
   kinboard fk pioneer5 90 30 60 30 30
   kinboard ik pioneer5 --position 45 191 -211 --approach -0.31 -0.164 -0.936
   kinboard robots pioneer5 --json
+  kinboard workspace pioneer5 -n 1e6 -o cloud.ply
   kinboard check my-arm.toml"""
 
 
@@ -100,6 +101,12 @@ def _bench(arguments: argparse.Namespace) -> int:
     return _refusing_misuse(command.bench, arguments)
 
 
+def _workspace(arguments: argparse.Namespace) -> int:
+    from app import commands
+
+    return _refusing_misuse(commands.workspace, arguments)
+
+
 def _check(arguments: argparse.Namespace) -> int:
     _do_without_compiler()
     from app import commands
@@ -153,6 +160,18 @@ def _number(text: str) -> float:
 _number.__name__ = "number"  # argparse says "invalid number value"
 
 
+def _whole(text: str) -> int:
+    return int(text.replace("−", "-"))
+
+
+def _count(text: str) -> int:
+    """A whole number, also written as 1e6."""
+    value = float(text)
+    if not value.is_integer():
+        raise ValueError
+    return int(value)
+
+
 def _named_number(text: str) -> tuple[str, float]:
     name, _, value = text.rpartition("=")
     return name.strip(), _number(value)
@@ -163,6 +182,7 @@ def _named_numbers(text: str) -> tuple[str, list[float]]:
     return name.strip(), [_number(value) for value in values.split(":")]
 
 
+_whole.__name__ = _count.__name__ = "whole number"
 _named_number.__name__ = "value"
 _named_numbers.__name__ = "value"
 
@@ -195,6 +215,15 @@ def _parser() -> argparse.ArgumentParser:
     unit.add_argument(
         "--rad", dest="rad", action="store_true", default=False, help="radians and metres, typed and printed"
     )
+    region = argparse.ArgumentParser(add_help=False)
+    region.add_argument(
+        "--lock", type=_named_numbers, action="append", metavar="JOINT=VALUE",
+        help=f"keep a joint (counted from 1) at a value; {UNITS_NOTE}",
+    )  # fmt: skip
+    region.add_argument(
+        "--limit", type=_named_numbers, action="append", metavar="JOINT=LOWER:UPPER",
+        help=f"narrow the limits of a joint (counted from 1); {UNITS_NOTE}",
+    )  # fmt: skip
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
 
     serve = commands.add_parser("serve", parents=[common], help="serve the dashboard and REST (default)")
@@ -217,7 +246,7 @@ def _parser() -> argparse.ArgumentParser:
 
     ik = commands.add_parser(
         "ik",
-        parents=[common, answers],
+        parents=[common, answers, region],
         help="joint values for a pose of the tool",
         usage="kinboard ik ROBOT --position X Y Z [--wxyz W X Y Z | --approach X Y Z] [options]",
     )
@@ -241,14 +270,6 @@ def _parser() -> argparse.ArgumentParser:
     ik.add_argument(
         "--branch", action="append", metavar="NAME",
         help="only this branch: 'elbow up', 'shoulder front · wrist flip', 'seed'; may be repeated",
-    )  # fmt: skip
-    ik.add_argument(
-        "--lock", type=_named_numbers, action="append", metavar="JOINT=VALUE",
-        help=f"keep a joint (counted from 1) at a value; {UNITS_NOTE}",
-    )  # fmt: skip
-    ik.add_argument(
-        "--limit", type=_named_numbers, action="append", metavar="JOINT=LOWER:UPPER",
-        help=f"narrow the limits of a joint (counted from 1); {UNITS_NOTE}",
     )  # fmt: skip
     ik.add_argument(
         "--prefer", choices=("nearest", "limits", "manipulability"), default="nearest",
@@ -277,6 +298,43 @@ def _parser() -> argparse.ArgumentParser:
     robots = commands.add_parser("robots", parents=[common, answers], help="list the robots, or describe one")
     robots.add_argument("robot", nargs="?", metavar="ROBOT", help="describe this one")
     robots.set_defaults(command=_robots)
+
+    workspace = commands.add_parser(
+        "workspace",
+        parents=[common, answers, region],
+        help="sizes of the set of points the tool reaches; with -o a cloud of them as a file",
+    )
+    workspace.add_argument("robot", metavar="ROBOT", help="id of the robot; `kinboard robots` lists them")
+    workspace.add_argument(
+        "-o",
+        "--output",
+        metavar="FILE",
+        help="write a cloud of points in metres to this file; - is standard output",
+    )
+    workspace.add_argument(
+        "--format", choices=("csv", "npz", "ply", "ndjson", "bin"), help="of that file (default: by its name)"
+    )
+    workspace.add_argument(
+        "-n", type=_count, default=100_000, help="how many points, such as 1e6 (default 100000)"
+    )
+    workspace.add_argument("--seed", type=_whole, default=0, help="another seed is another cloud (default 0)")
+    workspace.add_argument(
+        "--strategy", choices=("uniform", "quasi", "volume", "boundary"), default="uniform",
+        help="joints drawn evenly (default), more evenly, points even in space, points on the envelope",
+    )  # fmt: skip
+    workspace.add_argument(
+        "--measure", choices=("manipulability", "limits"), action="append", default=[],
+        help="a further column: manipulability, or how far the nearest stop is (0 to 1); may be repeated",
+    )  # fmt: skip
+    workspace.add_argument("--q", action="store_true", help="also the joint values, in radians (metres)")
+    workspace.add_argument(
+        "--progress", action=argparse.BooleanOptionalAction,
+        help="tell on standard error how far it is (default: if that is a terminal)",
+    )  # fmt: skip
+    workspace.add_argument(
+        "--effort", type=_whole, default=4, help="2 to 64: work put into volume and surface (default 4)"
+    )
+    workspace.set_defaults(command=_workspace)
 
     bench = commands.add_parser(
         "bench", help="measure against other libraries; `pip install 'kinboard[bench]'` brings them"

@@ -1,4 +1,4 @@
-"""What ``kinboard fk``, ``ik``, ``robots`` and ``check`` do: ask the core, print for people or as JSON.
+"""What ``kinboard fk``, ``ik``, ``workspace`` and so on do: ask the core, print for people or as JSON.
 
 Each command takes the parsed arguments of :mod:`app.cli`, prints its answer and returns the exit code: 0, or 1
 when ``ik`` has no exact answer. Misuse raises `kin.KinematicsError`.
@@ -16,14 +16,27 @@ from typing import Any
 
 import numpy as np
 
-from app.answers import Blocked, RobotAnswer, Solution, fk_answers, ik_answer, robot_answer
+from app.answers import (
+    Blocked,
+    RobotAnswer,
+    Solution,
+    fk_answers,
+    ik_answer,
+    robot_answer,
+    workspace_answer,
+)
 from app.check import CheckAnswer
 from app.check import check as check_robot
+from app.clouds import Cloud
+from app.formats import FORMATS
+from app.save import save
 from app.store import Store
-from kin import InputError, Robot, Task, builtin_robots, load_robot, solve_ik
+from kin import InputError, Robot, Task, builtin_robots, load_robot, sample_workspace, solve_ik, workspace_facts
 from kin.catalog import BUILTIN
 from kin.question import MASK_NAMES
 from kin.transforms import Array, frame_from_approach, from_position_wxyz
+
+_INTERRUPTED = 130  # what shells expect after Ctrl-C
 
 
 def fk(arguments: Namespace) -> int:
@@ -139,6 +152,79 @@ def check(arguments: Namespace) -> int:
     print(_table(["", "joint", "kind", "lower", "upper", "home"], rows) + "\n")
     for line in _about(answer, units):
         print(line)
+    return 0
+
+
+def workspace(arguments: Namespace) -> int:
+    robot = _store(arguments).get(arguments.robot)
+    limits = _per_joint(robot, arguments.limit, "--limit", 2, arguments.rad)
+    locked = _per_joint(robot, arguments.lock, "--lock", 1, arguments.rad)
+    if arguments.output is not None:
+        return _save(_cloud(robot, arguments, limits, locked), arguments)
+    answer = workspace_answer(workspace_facts(robot, limits=limits, locked=locked, effort=arguments.effort))
+    if arguments.json:
+        return _print_json(answer)
+    units = Units(robot, arguments.rad)
+    spans = [
+        *(("x", answer["x"]), ("y", answer["y"]), ("z", answer["z"])),
+        *(("from the axis of joint 1", answer["radius"]), ("from the shoulder", answer["reach"])),
+    ]
+    rows = [
+        [name, units.length(span["least"]["value"]), units.length(span["largest"]["value"])]
+        for name, span in spans
+    ]
+    print(f"{robot.name} ({robot.id})\n")
+    print(_table([f"tool point, {units.of_length}", "least", "largest"], rows) + "\n")
+    for name, unit, estimate in (("volume", "m³", answer["volume"]), ("surface", "m²", answer["surface"])):
+        if estimate is not None:
+            print(f"{name:<8} {estimate['value']:.4g} ± {estimate['error']:.1g} {unit}: {estimate['method']}")
+    return 0
+
+
+def _cloud(robot: Robot, arguments: Namespace, limits: Any, locked: Any) -> Cloud:
+    """The cloud asked for; raises `InputError` for what is wrong with it, before anything is begun."""
+    cloud = Cloud(
+        robot,
+        arguments.n,
+        arguments.seed,
+        arguments.strategy,
+        tuple(dict.fromkeys(arguments.measure)),
+        None if limits is None else tuple(pair and tuple(pair) for pair in limits),
+        None if locked is None else tuple(locked),
+    )
+    # Checks its arguments when it is called, and draws nothing until it is read.
+    sample_workspace(
+        robot,
+        cloud.n,
+        seed=cloud.seed,
+        strategy=cloud.strategy,
+        limits=cloud.limits,
+        locked=cloud.locked,
+        measure=cloud.measures,
+    )
+    return cloud
+
+
+def _save(cloud: Cloud, arguments: Namespace) -> int:
+    """Write a cloud: 0, 2 if it cannot be written, 130 after Ctrl-C."""
+    target: str = arguments.output
+    kind = arguments.format or Path(target).suffix.removeprefix(".").lower()
+    if kind not in FORMATS:
+        expected = "a name that ends in " + ", ".join(f".{name}" for name in FORMATS) + ", or --format"
+        raise InputError("--output", target, expected)
+    progress = sys.stderr.isatty() if arguments.progress is None else arguments.progress
+    try:
+        size = save(cloud, target, kind, arguments.q, progress)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        print(f"kinboard: cannot write {target}: {error.strerror or error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("kinboard: interrupted" + ("; nothing was written" if target != "-" else ""), file=sys.stderr)
+        return _INTERRUPTED
+    if target != "-":
+        print(f"{target}: {cloud.n} points, {size / 1e6:.1f} MB")
     return 0
 
 

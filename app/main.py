@@ -29,7 +29,7 @@ from starlette.middleware.cors import CORSMiddleware
 from starlette.responses import PlainTextResponse
 
 from app.access import Access
-from app.api import build_router, install_problem_handlers
+from app.api import Gate, build_router, install_problem_handlers, memory
 from app.bridge import ViewerBridge
 from app.clouds import Clouds
 from app.inspection import MAX_MESSAGE
@@ -73,7 +73,7 @@ def create_app(settings: Settings, store: Store | None = None) -> FastAPI:
     """
     store = store or Store(settings.robots)
     bridge = ViewerBridge(settings.allowed_origins, settings.max_visitors)
-    clouds = Clouds(settings.cloud_memory)
+    clouds, sizes = Clouds(settings.cloud_memory), memory()
     startup = Startup(settings, store, clouds, bridge)
 
     @asynccontextmanager
@@ -82,6 +82,7 @@ def create_app(settings: Settings, store: Store | None = None) -> FastAPI:
         yield
         await run_in_threadpool(startup.stop)
         clouds.close()
+        sizes.close()
 
     app = FastAPI(
         title="Kinboard",
@@ -96,7 +97,7 @@ def create_app(settings: Settings, store: Store | None = None) -> FastAPI:
         lifespan=lifespan,
     )
     app.state.store, app.state.settings, app.state.startup = store, settings, startup
-    app.state.clouds = clouds
+    app.state.clouds, app.state.gate, app.state.sizes = clouds, Gate(settings.max_streams), sizes
     install_problem_handlers(app)
     app.include_router(build_router())
     app.router.routes.extend([*page_routes(), *bridge.routes()])

@@ -19,6 +19,8 @@ class Settings(BaseSettings):
     robots: Path | None = Field(None, description="Folder with further robot files (*.toml).")
     max_batch: int = Field(10_000, ge=1, description="Most configurations or targets one request may hold.")
     max_path: int = Field(1000, ge=1, description="Most waypoints one path may have.")
+    max_points: int = Field(100_000_000, ge=1, description="Most points one cloud of the workspace may have.")
+    max_streams: int = Field(8, ge=1, description="Most clouds one process sends at a time.")
     max_body: int = Field(8 * 1024 * 1024, ge=1024, description="Largest request body in bytes.")
     token: SecretStr | None = Field(
         None, min_length=8, description="Whoever wants in must know it; none: everybody may."

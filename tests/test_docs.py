@@ -78,12 +78,17 @@ def test_rest_examples_are_answered():
         words = shlex.split(line)
         url = urlsplit(next(word for word in words if word.startswith("http://")))
         assert url.netloc == f"127.0.0.1:{Settings.model_fields['port'].default}"
-        headers = dict([words[words.index("-H") + 1].split(": ", 1)])
-        answer = client.post(url.path, content=words[words.index("-d") + 1], headers=headers)
+        if "-d" in words:
+            headers = dict([words[words.index("-H") + 1].split(": ", 1)])
+            answer = client.post(url.path, content=words[words.index("-d") + 1], headers=headers)
+        else:
+            answer = client.get(f"{url.path}?{url.query}")
         assert answer.status_code == 200, answer.text
-        answers[url.path.rsplit("/", 1)[1]] = answer.json()
-    assert set(answers) == {"fk", "ik"}
-    assert answers["ik"]["status"] == "solved"
+        answers[url.path.rsplit("/", 1)[1]] = answer
+    assert set(answers) == {"fk", "ik", "workspace", "summary", "reachable"}
+    assert answers["ik"].json()["status"] == "solved"
+    assert [one["reachable"] for one in answers["reachable"].json()["results"]] == [True, False]
+    assert answers["workspace"].text.startswith("x,y,z,manipulability,q1,")
 
 
 def test_the_status_table_lists_every_status():

@@ -19,6 +19,8 @@ RULES: dict[str, set[str]] = {
     "kin/kernels.py": {"numpy", "kin.compiled", "kin.simd", "kin.transforms"},
     "app": {"kin", "app.answers", "app.clouds", "app.settings", "app.store"},
     "app/clouds.py": {"kin"},
+    "app/formats.py": {"kin", "numpy", "app.clouds"},
+    "app/save.py": {"kin", "app.clouds", "app.formats"},
     "app/bench": {"kin", "numpy", "numba", "app.bench"},
     "app/bench/contestants.py": {
         *(
@@ -48,9 +50,11 @@ RULES: dict[str, set[str]] = {
         "pydantic",
     },
     "app/check.py": {"kin", "numpy", "typing_extensions", "app.answers"},
-    "app/commands.py": {"kin", "numpy", "app.answers", "app.check", "app.store"},
     "app/mapreduce.py": {"kin", "distributed"},
     "app/mapping.py": {"kin", "numpy", "app.commands", "app.mapreduce"},
+    "app/commands.py": {
+        *("kin", "numpy", "app.answers", "app.check", "app.clouds", "app.formats", "app.save", "app.store"),
+    },
     "app/prefix.py": {"starlette"},
     "app/security.py": {"starlette"},
     "app/pages.py": {"starlette", "kin"},
@@ -69,7 +73,8 @@ RULES: dict[str, set[str]] = {
     },
     "app/api": {
         *("fastapi", "starlette", "pydantic", "pydantic_core", "typing_extensions", "numpy", "kin"),
-        *("app.api", "app.answers", "app.clouds", "app.metrics", "app.settings", "app.store"),
+        *("app.api", "app.answers", "app.clouds", "app.formats", "app.metrics", "app.security", "app.settings"),
+        "app.store",
     },
     "app/viewer": {
         *("viser", "trimesh", "numpy", "kin"),

@@ -43,6 +43,7 @@ KINDS = {
     "batch-too-large": "The request holds too many items",
     "unsupported-media-type": "The body must be JSON",
     "invalid-input": "The request holds a value that is not usable",
+    "busy": "The service has its hands full",
     "internal-error": "Something went wrong on our side",
     "http-error": "The request was refused",
 }
@@ -111,6 +112,15 @@ def invalid(*errors: FieldError, hint: str = DOCS_HINT) -> ProblemError:
     return ProblemError(422, "invalid-input", detail, hint, errors[:SHOWN])
 
 
+def unknown_robot(error: UnknownRobotError) -> ProblemError:
+    """404 with the robots there are."""
+    known = ", ".join(error.known)
+    field = FieldError(field="robot_id", value=show(error.robot_id), expected=f"one of {known}")
+    detail = f"There is no robot {field.value}."
+    hint = f"Known robots: {known}. GET /api/v1/robots describes them."
+    return ProblemError(404, "unknown-robot", detail, hint, [field])
+
+
 def install_problem_handlers(app: FastAPI) -> None:
     """Makes every refusal of `app`, unhandled errors included, a problem document, and says so in its OpenAPI."""
     app.add_exception_handler(StarletteHTTPException, _http_error)
@@ -176,11 +186,7 @@ async def _validation_error(request: Request, error: Exception) -> Response:
 
 async def _unknown_robot(request: Request, error: Exception) -> Response:
     assert isinstance(error, UnknownRobotError)
-    known = ", ".join(error.known)
-    field = FieldError(field="robot_id", value=show(error.robot_id), expected=f"one of {known}")
-    detail = f"There is no robot {field.value}."
-    hint = f"Known robots: {known}. GET /api/v1/robots describes them."
-    return respond(ProblemError(404, "unknown-robot", detail, hint, [field]))
+    return respond(unknown_robot(error))
 
 
 async def _input_error(request: Request, error: Exception) -> Response:

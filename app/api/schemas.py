@@ -95,6 +95,7 @@ _REFUSALS: dict[int, str] = {
     415: "The body does not say it is JSON.",
     422: "A value is not usable; the document names the field, the value and what is valid.",
     500: "Answering failed.",
+    503: "Busy; the header Retry-After tells after how many seconds it is worth another try.",
 }
 
 
@@ -103,7 +104,7 @@ def refusals(*statuses: int) -> dict[int | str, dict[str, Any]]:
     return {status: {"model": Problem, "description": _REFUSALS[status]} for status in statuses}
 
 
-POST_REFUSALS = refusals(*_REFUSALS)
+POST_REFUSALS = refusals(400, 404, 413, 415, 422, 500)
 
 
 def example(summary: str, value: dict[str, Any]) -> dict[str, Any]:

@@ -4,7 +4,8 @@ import json
 
 import pytest
 
-from app.answers import FkAnswer, IkAnswer, JacobianAnswer
+from app.answers import FkAnswer, IkAnswer, JacobianAnswer, ReachableAnswer
+from app.formats import FORMATS
 
 
 @pytest.fixture(scope="session")
@@ -34,7 +35,21 @@ def test_every_operation_has_summary_description_and_documented_refusals(documen
                 assert list(response["content"]) == ["application/problem+json"]
                 schema = response["content"]["application/problem+json"]["schema"]
                 assert schema == {"$ref": "#/components/schemas/Problem"}
-    assert seen == 6
+    assert seen == 9
+
+
+def test_every_parameter_is_described_and_a_cloud_has_all_its_formats(document):
+    described = 0
+    for path, _, operation in operations(document):
+        for parameter in operation.get("parameters", []):
+            assert parameter["description"], f"{path} {parameter['name']}"
+            described += 1
+    assert described > 15
+    cloud = document["paths"]["/api/v1/robots/{robot_id}/workspace"]["get"]
+    assert set(cloud["responses"]["200"]["content"]) == {kind.media_type for kind in FORMATS.values()}
+    (asked,) = [p["schema"]["enum"] for p in cloud["parameters"] if p["name"] == "format"]
+    assert asked == list(FORMATS)
+    assert "503" in cloud["responses"]
 
 
 def test_every_field_is_described(document):
@@ -55,13 +70,15 @@ def test_a_quantity_says_its_unit(document):
         *(("Pose", "position"), ("Pose", "matrix"), ("Solution", "q"), ("Solution", "position_error")),
         *(("Solution", "rotation_error"), ("IkAnswer", "distance"), ("FkRequest", "q"), ("IkRequest", "q_seed")),
         *(("Target", "position"), ("RowAnswer", "d"), ("RowAnswer", "alpha"), ("RobotAnswer", "reach")),
+        *(("ExtremeAnswer", "value"), ("ArcAnswer", "start"), ("ReachableAnswer", "distance")),
     ]:
         text = schemas[name]["properties"][field]["description"]
         assert "metres" in text or "radians" in text, f"{name}.{field}"
 
 
 def test_a_single_answer_and_a_list_are_both_in_the_schema(document):
-    for what, kind in {"fk": FkAnswer, "ik": IkAnswer, "jacobian": JacobianAnswer}.items():
+    kinds = {"fk": FkAnswer, "ik": IkAnswer, "jacobian": JacobianAnswer, "reachable": ReachableAnswer}
+    for what, kind in kinds.items():
         responses = document["paths"][f"/api/v1/robots/{{robot_id}}/{what}"]["post"]["responses"]
         options = responses["200"]["content"]["application/json"]["schema"]["anyOf"]
         one, many = (document["components"]["schemas"][option["$ref"].rsplit("/", 1)[1]] for option in options)

@@ -3,15 +3,19 @@
 import json
 import math
 import re
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import kin
-from app import cli
+from app import cli, save
+from app.clouds import Cloud, Clouds
+from app.formats import FORMATS, encode
 from app.settings import Settings
 from kin.solvers import solver_for
 
@@ -402,3 +406,144 @@ def test_check_refuses_a_bad_file_as_everywhere(capsys, tmp_path):
     assert (code, out) == (2, "")
     assert err.startswith(f"kinboard: {file}: rows[3].a: got 'long', expected a finite number")
     assert run(capsys, "check", tmp_path / "none.toml")[0] == 2
+
+
+# -- workspace -------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def clouds():
+    made = Clouds(max_bytes=0, threads=1)
+    yield made
+    made.close()
+
+
+def test_workspace_tells_sizes(capsys):
+    facts = kin.workspace_facts(PIONEER, effort=2)
+    code, out, err = run(capsys, "workspace", "pioneer5", "--effort", 2)
+    assert (code, err) == (0, "")
+    for name, span in (
+        ("x", facts.x),
+        ("from the axis of joint 1", facts.radius),
+        ("from the shoulder", facts.reach),
+    ):
+        line = next(line for line in out.splitlines() if re.match(rf"{name}  +", line))
+        assert [float(word) for word in line.split()[-2:]] == pytest.approx(
+            [1e3 * e.value for e in span], abs=6e-4
+        )
+    assert f"{facts.volume.value:.4g} ± {facts.volume.error:.1g} m³: {facts.volume.method}" in out
+    assert f"{facts.surface.value:.4g} ±" in out
+    metres = run(capsys, "workspace", "pioneer5", "--effort", 2, "--rad")[1]
+    assert f"{facts.x.largest.value:.6f}" in metres
+
+
+def test_workspace_json_is_what_rest_says(capsys, client):
+    got = answer(capsys, "workspace", "scara", "--lock", "1=45", "--limit", "3=0:100", "--effort", 2)
+    address = f"/api/v1/robots/scara/workspace/summary?lock=1:{math.pi / 4}&limit=3:0:0.1&effort=2"
+    assert got == client.get(address).json()
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_cloud_is_written_by_the_name_of_its_file(capsys, tmp_path, clouds, name):
+    file = tmp_path / f"cloud.{name}"
+    words = ("-n", "3e3", "--seed", 5, "--strategy", "quasi", "--measure", "limits", "--q")
+    code, out, err = run(
+        capsys, "workspace", "pioneer5", *words, "--limit", "1=0:90", "--lock", "3=20", "-o", file
+    )
+    assert (code, err) == (0, "")
+    assert out.startswith(f"{file}: 3000 points, ")
+    limits, locked = ((0.0, math.radians(90)), *[None] * 4), (None, None, math.radians(20), None, None)
+    cloud = Cloud(PIONEER, 3000, 5, "quasi", ("limits",), limits, locked)
+    assert file.read_bytes() == b"".join(encode(name, clouds, cloud, True))
+    assert list(tmp_path.iterdir()) == [file]
+    bare = tmp_path / "cloud"
+    assert run(capsys, "workspace", "pioneer5", "-n", 5, "-o", bare, "--format", name)[0] == 0
+    assert bare.read_bytes() == b"".join(encode(name, clouds, Cloud(PIONEER, 5)))
+
+
+def test_a_cloud_to_standard_output_and_the_format_by_option(capsys, tmp_path, clouds):
+    expected = b"".join(encode("csv", clouds, Cloud(PIONEER, 100)))
+    assert run(capsys, "workspace", "pioneer5", "-n", 100, "-o", "-", "--format", "csv") == (
+        0,
+        expected.decode(),
+        "",
+    )
+    file = tmp_path / "cloud.txt"
+    assert run(capsys, "workspace", "pioneer5", "-n", 100, "-o", file, "--format", "csv")[0] == 0
+    assert file.read_bytes() == expected
+
+
+def test_a_link_stays_a_link_and_a_device_a_device(capsys, tmp_path):
+    real, link = tmp_path / "real.bin", tmp_path / "link.bin"
+    real.write_bytes(b"old")
+    link.symlink_to(real)
+    assert run(capsys, "workspace", "pioneer5", "-n", 10, "-o", link)[0] == 0
+    assert link.is_symlink()
+    assert real.read_bytes().startswith(b"KINCLOUD")
+    assert run(capsys, "workspace", "pioneer5", "-n", 10, "-o", "/dev/null", "--format", "bin")[0] == 0
+    assert Path("/dev/null").is_char_device()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("-o", "cloud.xyz"), "--output: got 'cloud.xyz', expected a name that ends in .ndjson"),
+        (("-o", "-"), "--output: got '-'"),
+        (("-o", "/no/such/folder/cloud.ply"), "cannot write /no/such/folder/cloud.ply: No such file"),
+        (("-n", "1e20", "-o", "cloud.ply"), "n: got 100000000000000000000"),
+        (("-n", "0", "-o", "cloud.ply"), "n: got 0"),
+        (("-n", "1.5"), "argument -n: invalid whole number value: '1.5'"),
+        (("-n", "inf"), "argument -n: invalid whole number value: 'inf'"),
+        (("--seed", "-1", "-o", "cloud.ply"), "seed: got -1"),
+        (("--seed", "x"), "argument --seed: invalid whole number value: 'x'"),
+        (("--strategy", "even"), "argument --strategy: invalid choice"),
+        (("--effort", "1"), "effort: got 1"),
+        (("--limit", "9=0:1"), "--limit: got '9', expected a joint from 1 to 5"),
+        (("--lock", "2=999", "-o", "cloud.ply"), "locked[1]: got"),
+    ],
+)
+def test_workspace_refuses_what_it_cannot_do(capsys, tmp_path, monkeypatch, words, said):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run(capsys, "workspace", "pioneer5", *words)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interrupted_cloud_leaves_nothing_behind(tmp_path):
+    old = tmp_path / "cloud.bin"
+    old.write_bytes(b"old")
+    words = ["workspace", "pioneer5", "-n", "1e10", "-o", str(old), "--progress"]
+    command = [sys.executable, "-c", "import sys; from app import cli; sys.exit(cli.main())", *words]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        deadline = time.monotonic() + 60
+        while not any(file.stat().st_size > 1e6 for file in tmp_path.iterdir()):
+            assert time.monotonic() < deadline
+            assert process.poll() is None
+            time.sleep(0.02)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=30)
+    assert (process.returncode, out) == (130, b"")
+    assert err.decode().splitlines()[-1] == "kinboard: interrupted; nothing was written"
+    assert b"M points/s" in err
+    assert [(file.name, file.read_bytes()) for file in tmp_path.iterdir()] == [("cloud.bin", b"old")]
+
+
+def test_progress_counts_every_pass(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr("app.formats.KEPT", 0)
+    monkeypatch.setattr(save, "_TOLD_EVERY", 0.0)
+    file = tmp_path / "cloud.npz"
+    code, _, err = run(capsys, "workspace", "pioneer5", "-n", 2e5, "--measure", "limits", "-o", file, "--progress")
+    assert code == 0
+    parts = [int(part) for part in re.findall(r"(\d+)%", err)]
+    assert parts == sorted(parts)
+    assert parts[-1] == 100
+    assert len(parts) == 8  # four slices, twice
+    assert "0 s left" in err
+    assert run(capsys, "workspace", "pioneer5", "-n", 100, "-o", file)[2] == ""  # no terminal, no progress
+
+
+def test_what_progress_says():
+    progress = save.Progress(4_000_000, sys.stderr)
+    progress._done = 1_000_000
+    assert progress.line(0.5) == "[######                  ]  25%     2.000 M points/s       2 s left"

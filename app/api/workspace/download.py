@@ -1,0 +1,67 @@
+"""A cloud of tool points as a file, sent while it is computed."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Query, Request, Response
+from pydantic import Field
+
+from app.api.body import JsonRoute
+from app.api.schemas import RobotDep, SettingsDep, refusals
+from app.api.workspace.flow import Flow
+from app.api.workspace.query import CloudQuery
+from app.formats import FORMATS, encode, table_of
+
+router = APIRouter(tags=["workspace"], route_class=JsonRoute)
+
+_BINARY: dict[str, Any] = {"schema": {"type": "string", "format": "binary"}}
+_CONTENT: dict[str, Any] = {
+    each.media_type: {"schema": {"type": "string"}} if each.name in ("csv", "ndjson") else _BINARY
+    for each in FORMATS.values()
+}
+_HEADERS: dict[str, Any] = {
+    "x-cloud-count": {"description": "How many points.", "schema": {"type": "integer"}},
+    "x-cloud-columns": {"description": "Names of the columns, separated by commas.", "schema": {"type": "string"}},
+}
+
+
+class DownloadQuery(CloudQuery):
+    """Which cloud, and in which format."""
+
+    format: Literal["ndjson", "csv", "bin", "ply", "npz"] = Field(
+        "ndjson", description="; ".join(f"{each.name}: {each.meaning}" for each in FORMATS.values()) + "."
+    )
+
+
+@router.get(
+    "/robots/{robot_id}/workspace",
+    summary="Points the tool reaches",
+    response_class=Response,
+    responses={
+        200: {"description": "The cloud, a point after the other.", "content": _CONTENT, "headers": _HEADERS},
+        **refusals(404, 422, 500, 503),
+    },
+)
+async def workspace(
+    request: Request, robot: RobotDep, settings: SettingsDep, query: Annotated[DownloadQuery, Query()]
+) -> Response:
+    """A cloud of tool points in the base frame, metres, sent while it is computed, of any size in little memory.
+
+    The same question always gets the same bytes, and a larger cloud begins with the points of a smaller one.
+    Columns are x, y, z, then the measures asked for, then the joint values q1, q2, … where `q` is asked for. `bin`
+    begins with: `KINCLOUD`, version (uint16), columns (uint16), where rows begin (uint32), count (uint64), all
+    little-endian, and the names of the columns, separated by commas and filled up with spaces.
+    """
+    cloud = query.cloud(robot, settings)
+    kind, table = FORMATS[query.format], table_of(cloud, query.q)
+    headers = {
+        "content-disposition": f'attachment; filename="{robot.id}-{query.strategy}-{query.n}.{kind.name}"',
+        "x-cloud-count": str(table.n),
+        "x-cloud-columns": ",".join(table.columns),
+    }
+    if kind.size is not None:
+        headers["content-length"] = str(kind.size(table))
+    state = request.app.state
+    pieces = encode(query.format, state.clouds, cloud, query.q)
+    return Flow(pieces, "workspace", kind.media_type, headers, state.gate)

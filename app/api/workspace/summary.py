@@ -1,0 +1,122 @@
+"""How large the workspace is: bounding box, reach, holes, volume, surface, and its section."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request, Response
+from pydantic import Field
+
+from app.answers import WorkspaceAnswer, workspace_answer
+from app.api.body import JsonRoute
+from app.api.problems import FieldError, invalid
+from app.api.schemas import RobotDep, refusals, reply
+from app.api.workspace.flow import busy
+from app.api.workspace.query import RegionQuery
+from kin import section, workspace_facts
+
+router = APIRouter(tags=["workspace"], route_class=JsonRoute)
+
+
+class SummaryQuery(RegionQuery):
+    """What is wanted."""
+
+    volume: bool = Field(
+        True, description="Whether volume and surface are wanted: seconds the first time, the rest a tenth of one."
+    )
+    effort: int = Field(
+        4, ge=2, le=16, description="How much work goes into volume and surface; errors shrink with it."
+    )
+    section: bool = Field(
+        False, description="Whether the section in r and z is wanted, with the arcs of its boundary."
+    )
+    resolution: int = Field(96, ge=8, le=400, description="Squares along the longer side of the section.")
+
+
+class Memory:
+    """Answers that are dear, kept and shared: who asks for one that is being computed waits for it.
+
+    They have threads of their own: whoever waits takes none from the rest of the service.
+
+    Args:
+        most: how many answers are kept, the one asked for longest ago goes first.
+        threads: how many are computed at a time.
+        waiting: how many may be under way.
+    """
+
+    def __init__(self, most: int, threads: int, waiting: int) -> None:
+        self._most = most
+        self._waiting = waiting
+        self._lock = threading.Lock()
+        self._pool = ThreadPoolExecutor(threads, thread_name_prefix="summary")
+        self._answers: OrderedDict[Hashable, Future[WorkspaceAnswer]] = OrderedDict()
+
+    def get(self, key: Hashable, compute: Callable[[], WorkspaceAnswer]) -> Future[WorkspaceAnswer]:
+        """The answer to `key`, there already or under way; raises 503 where too many are.
+
+        What fails is not kept. Do not cancel it: others may wait for it.
+        """
+        with self._lock:
+            known = self._answers.get(key)
+            if known is not None:
+                self._answers.move_to_end(key)
+                return known
+            if sum(not answer.done() for answer in self._answers.values()) >= self._waiting:
+                raise busy(f"{self._waiting} summaries are being computed already.")
+            answer = self._answers[key] = self._pool.submit(compute)
+            while len(self._answers) > self._most:
+                self._answers.popitem(last=False)
+        answer.add_done_callback(lambda done: self._forget(key, done))
+        return answer
+
+    def close(self) -> None:
+        """Begin nothing more; returns at once."""
+        self._pool.shutdown(wait=False, cancel_futures=True)
+
+    def _forget(self, key: Hashable, done: Future[WorkspaceAnswer]) -> None:
+        if done.cancelled() or done.exception() is not None:
+            with self._lock:
+                self._answers.pop(key, None)
+
+
+def memory() -> Memory:
+    """As the service needs it: some 100 kB for an answer with a section, a core left for everybody else."""
+    return Memory(most=64, threads=max(1, (os.cpu_count() or 2) - 1), waiting=32)
+
+
+@router.get(
+    "/robots/{robot_id}/workspace/summary",
+    summary="Sizes of the workspace",
+    response_model=WorkspaceAnswer,
+    responses=refusals(404, 422, 500, 503),
+)
+async def summary(request: Request, robot: RobotDep, query: Annotated[SummaryQuery, Query()]) -> Response:
+    """Bounding box, reach and holes, exact and with configurations; volume and surface with their errors.
+
+    `section` adds the cut with a half-plane through the line of joint 1: closed curves and the arcs they are made
+    of. Answers are kept for a while, so only the first visitor waits for the seconds they take.
+    """
+    limits, locked = query.bounds(robot)
+    if query.section and robot.joints[0].kind != "revolute":
+        expected = f"false: joint 1 of {robot.id} slides, so there is no section in r and z"
+        raise invalid(FieldError(field="section", value="true", expected=expected))
+
+    def compute() -> WorkspaceAnswer:
+        facts = workspace_facts(robot, limits=limits, locked=locked, effort=query.effort, volume=query.volume)
+        cut = None
+        if query.section:
+            cut = section(robot, limits=limits, locked=locked, resolution=query.resolution)
+        return workspace_answer(facts, cut)
+
+    # What was not asked for makes no other answer.
+    effort = query.effort if query.volume else None
+    resolution = query.resolution if query.section else None
+    answer = request.app.state.sizes.get((robot, limits, locked, effort, resolution), compute)
+    # Shielded: a visitor who leaves must not cancel it for the others.
+    return reply(await asyncio.shield(asyncio.wrap_future(answer)))
