@@ -312,6 +312,12 @@ def _parser() -> argparse.ArgumentParser:
         help="write a cloud of points in metres to this file; - is standard output",
     )
     workspace.add_argument(
+        "--picture", metavar="FILE", help="draw the cloud along the three axes, and the section (SVG)"
+    )
+    workspace.add_argument(
+        "--hull", metavar="FILE", help="write the convex hull of the cloud as a body: stl, ply, obj, off, glb"
+    )
+    workspace.add_argument(
         "--format", choices=("csv", "npz", "ply", "ndjson", "bin"), help="of that file (default: by its name)"
     )
     workspace.add_argument(

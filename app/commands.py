@@ -11,6 +11,8 @@ import math
 import os
 import sys
 from argparse import Namespace
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,9 +31,20 @@ from app.check import CheckAnswer
 from app.check import check as check_robot
 from app.clouds import Cloud
 from app.formats import FORMATS
-from app.save import save
+from app.picture import draw
+from app.save import opened, reading, save
 from app.store import Store
-from kin import InputError, Robot, Task, builtin_robots, load_robot, sample_workspace, solve_ik, workspace_facts
+from kin import (
+    InputError,
+    Robot,
+    Task,
+    builtin_robots,
+    load_robot,
+    sample_workspace,
+    section,
+    solve_ik,
+    workspace_facts,
+)
 from kin.catalog import BUILTIN
 from kin.question import MASK_NAMES
 from kin.transforms import Array, frame_from_approach, from_position_wxyz
@@ -159,8 +172,12 @@ def workspace(arguments: Namespace) -> int:
     robot = _store(arguments).get(arguments.robot)
     limits = _per_joint(robot, arguments.limit, "--limit", 2, arguments.rad)
     locked = _per_joint(robot, arguments.lock, "--lock", 1, arguments.rad)
-    if arguments.output is not None:
-        return _save(_cloud(robot, arguments, limits, locked), arguments)
+    files = ((arguments.output, _saved), (arguments.picture, _drawn), (arguments.hull, _enclosed))
+    if any(target is not None for target, _ in files):
+        cloud = _cloud(robot, arguments, limits, locked)
+        # All names are read before the first file is begun.
+        ready = [write(cloud, target, arguments) for target, write in files if target is not None]
+        return max(write() for write in ready)
     answer = workspace_answer(workspace_facts(robot, limits=limits, locked=locked, effort=arguments.effort))
     if arguments.json:
         return _print_json(answer)
@@ -205,26 +222,71 @@ def _cloud(robot: Robot, arguments: Namespace, limits: Any, locked: Any) -> Clou
     return cloud
 
 
-def _save(cloud: Cloud, arguments: Namespace) -> int:
-    """Write a cloud: 0, 2 if it cannot be written, 130 after Ctrl-C."""
-    target: str = arguments.output
+def _saved(cloud: Cloud, target: str, arguments: Namespace) -> Callable[[], int]:
     kind = arguments.format or Path(target).suffix.removeprefix(".").lower()
     if kind not in FORMATS:
         expected = "a name that ends in " + ", ".join(f".{name}" for name in FORMATS) + ", or --format"
         raise InputError("--output", target, expected)
-    progress = sys.stderr.isatty() if arguments.progress is None else arguments.progress
+
+    def act() -> str:
+        size = save(cloud, target, kind, arguments.q, _told(arguments))
+        return f"{cloud.n} points, {size / 1e6:.1f} MB"
+
+    return partial(_writing, target, act)
+
+
+def _drawn(cloud: Cloud, target: str, arguments: Namespace) -> Callable[[], int]:
+    if Path(target).suffix.lower() != ".svg":
+        raise InputError("--picture", target, "a name that ends in .svg")
+
+    def act() -> str:
+        robot, limits, locked = cloud.robot, cloud.limits, cloud.locked
+        facts = workspace_facts(robot, limits=limits, locked=locked, effort=arguments.effort)
+        turns = robot.joints[0].kind == "revolute"
+        cut = section(robot, limits=limits, locked=locked) if turns else None
+        with reading(cloud, _told(arguments)) as chunks, opened(target) as file:
+            file.write(draw(robot, chunks, facts, cut).encode())
+        return f"{cloud.n} points"
+
+    return partial(_writing, target, act)
+
+
+def _enclosed(cloud: Cloud, target: str, arguments: Namespace) -> Callable[[], int]:
+    from app.hull import hull, kind_of  # trimesh takes a quarter of a second
+
+    kind = kind_of(target)
+
+    def act() -> str:
+        with reading(cloud, _told(arguments)) as chunks:
+            body = hull(chunks)
+        with opened(target) as file:
+            body.export(file, file_type=kind)
+        return f"{len(body.vertices)} corners, {body.volume:.4g} m³, {body.area:.4g} m²"
+
+    return partial(_writing, target, act)
+
+
+def _told(arguments: Namespace) -> bool:
+    return sys.stderr.isatty() if arguments.progress is None else bool(arguments.progress)
+
+
+def _writing(target: str, act: Callable[[], str]) -> int:
+    """Write a file and tell what is in it: 0, 2 if it cannot be written, 130 after Ctrl-C."""
     try:
-        size = save(cloud, target, kind, arguments.q, progress)
+        told = act()
     except BrokenPipeError:
         raise
     except OSError as error:
         print(f"kinboard: cannot write {target}: {error.strerror or error}", file=sys.stderr)
         return 2
+    except ImportError as error:
+        print(f"kinboard: this needs {error.name}: pip install 'kinboard[hull]'", file=sys.stderr)
+        return 2
     except KeyboardInterrupt:
         print("kinboard: interrupted" + ("; nothing was written" if target != "-" else ""), file=sys.stderr)
         return _INTERRUPTED
     if target != "-":
-        print(f"{target}: {cloud.n} points, {size / 1e6:.1f} MB")
+        print(f"{target}: {told}")
     return 0
 
 

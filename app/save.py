@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import BinaryIO, TextIO
 
 from app.clouds import Cloud, Clouds
-from app.formats import FORMATS, encode, table_of
+from app.formats import FORMATS, encode, slices, table_of
 from kin import WorkspaceChunk
 
 _TOLD_EVERY = 0.1  # seconds
@@ -40,7 +40,7 @@ def save(cloud: Cloud, target: str, kind: str, with_q: bool, progress: bool) -> 
     told = Progress(total, sys.stderr) if progress else None
     size = 0
     try:
-        with _opened(target) as file, closing(encode(kind, clouds, cloud, with_q, told)) as pieces:
+        with opened(target) as file, closing(encode(kind, clouds, cloud, with_q, told)) as pieces:
             for piece in pieces:
                 file.write(piece)
                 size += len(piece)
@@ -53,7 +53,27 @@ def save(cloud: Cloud, target: str, kind: str, with_q: bool, progress: bool) -> 
 
 
 @contextmanager
-def _opened(target: str) -> Iterator[BinaryIO]:
+def reading(cloud: Cloud, progress: bool) -> Iterator[Iterator[WorkspaceChunk]]:
+    """The slices of a cloud, told on standard error as they are taken."""
+    clouds = Clouds(max_bytes=0, threads=os.cpu_count())
+    told = Progress(cloud.n, sys.stderr) if progress else None
+
+    def watched() -> Iterator[WorkspaceChunk]:
+        for chunk in slices(clouds, cloud, False):
+            if told is not None:
+                told(chunk)
+            yield chunk
+
+    try:
+        yield watched()
+    finally:
+        clouds.close()
+        if told is not None:
+            told.end()
+
+
+@contextmanager
+def opened(target: str) -> Iterator[BinaryIO]:
     """A file that gets its name when all went well; standard output and devices are written to as they are."""
     if target == "-":
         yield sys.stdout.buffer

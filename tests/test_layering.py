@@ -61,6 +61,7 @@ RULES: dict[str, set[str]] = {
     "app/access.py": {"starlette", "app.api.problems"},
     "app/metrics.py": {"prometheus_client"},
     "app/inspection.py": {"msgspec"},
+    "app/hull.py": {"kin", "numpy", "scipy", "trimesh"},
     "app/picture.py": {"kin", "numpy"},
     "app/workers.py": set(),
     "app/observe.py": {"starlette", "app.access", "app.metrics"},

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 import kin
 from app import cli, save
@@ -498,6 +499,10 @@ def test_a_link_stays_a_link_and_a_device_a_device(capsys, tmp_path):
         (("--seed", "x"), "argument --seed: invalid whole number value: 'x'"),
         (("--strategy", "even"), "argument --strategy: invalid choice"),
         (("--effort", "1"), "effort: got 1"),
+        (("-o", "a.csv", "--picture", "a.png"), "--picture: got 'a.png', expected a name that ends in .svg"),
+        (("--hull", "hull.doc"), "--hull: got 'hull.doc', expected a name that ends in .stl"),
+        (("--picture", "/no/such/folder/a.svg", "-n", "10"), "cannot write /no/such/folder/a.svg: No such file"),
+        (("--hull", "a.stl", "-n", "3"), "hull: got '3 points', expected at least four"),
         (("--limit", "9=0:1"), "--limit: got '9', expected a joint from 1 to 5"),
         (("--lock", "2=999", "-o", "cloud.ply"), "locked[1]: got"),
     ],
@@ -507,6 +512,43 @@ def test_workspace_refuses_what_it_cannot_do(capsys, tmp_path, monkeypatch, word
     code, out, err = run(capsys, "workspace", "pioneer5", *words)
     assert (code, out) == (2, "")
     assert said in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_workspace_draws_and_encloses(capsys, tmp_path):
+    picture, body, cloud = tmp_path / "a.svg", tmp_path / "a.stl", tmp_path / "a.csv"
+    words = ["workspace", "pioneer5", "-n", 20_000, "--effort", 2, "--limit", "1=0:90"]
+    code, out, err = run(capsys, *words, "--picture", picture, "--hull", body, "-o", cloud)
+    assert (code, err) == (0, "")
+    assert [line.split(":")[0] for line in out.splitlines()] == [str(cloud), str(picture), str(body)]
+    assert picture.read_text().startswith("<svg")
+    hull = trimesh.load(body)
+    points = np.loadtxt(cloud, delimiter=",", skiprows=1)
+    assert hull.is_watertight
+    assert np.allclose(hull.bounds, [points.min(axis=0), points.max(axis=0)], atol=1e-6)
+    whole = trimesh.convex.convex_hull(points)
+    assert hull.volume == pytest.approx(whole.volume, rel=1e-5)
+
+
+def test_an_arm_whose_first_joint_slides_is_drawn_without_a_section(capsys, tmp_path):
+    file = tmp_path / "rail.toml"
+    file.write_text(
+        'id = "rail"\nname = "Rail"\ndescription = ""\nsource = "test"\nconvention = "standard"\n'
+        'units = { length = "m", angle = "rad" }\n'
+        '[[rows]]\nname = "rail"\nkind = "prismatic"\nalpha = 1.5707963267948966\nlimits = [0, 1]\n'
+        '[[rows]]\nname = "arm"\na = 0.3\nlimits = [-1, 1]\n'
+    )
+    picture = tmp_path / "b.svg"
+    words = ["workspace", "rail", "--robots", tmp_path, "-n", 1000, "--picture", picture]
+    assert run(capsys, *words) == (0, f"{picture}: 1000 points\n", "")
+    assert "section" not in picture.read_text()
+
+
+def test_a_hull_without_scipy_says_what_to_install(capsys, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "scipy.spatial", None)
+    code, out, err = run(capsys, "workspace", "pioneer5", "-n", 100, "--hull", tmp_path / "a.stl")
+    assert (code, out) == (2, "")
+    assert "pip install 'kinboard[hull]'" in err
     assert list(tmp_path.iterdir()) == []
 
 
