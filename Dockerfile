@@ -42,7 +42,7 @@ RUN useradd --system --uid 10001 --no-create-home --shell /usr/sbin/nologin kinb
     && install -d -o kinboard -g kinboard /var/cache/kinboard
 USER kinboard
 WORKDIR /tmp
-RUN python -c "import kin; kin.warm_up()"
+RUN python -c "import kin; kin.warm_up(); kin.warm_up_rest()"
 # numba insists on a cache it can write to: a volume stays writable under `docker run --read-only`, and starts as a
 # copy of what was compiled above.
 VOLUME /var/cache/kinboard

@@ -10,10 +10,12 @@ Nothing heavy is imported before the arguments are known, and each command impor
 from __future__ import annotations
 
 import argparse
+import gc
 import io
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 UNITS_NOTE = "degrees and millimetres, or radians and metres with --rad"
@@ -68,27 +70,32 @@ def _serve(arguments: argparse.Namespace) -> int:
             )
             print(f"kinboard: {where}: got {item['input']!r}: {item['msg']}", file=sys.stderr)
         return 2
-    from app.main import run
+    with _loading():
+        from app.main import run
 
+        gc.freeze()  # the collections to come pass over what has been imported, too
     return run(settings, open_browser=arguments.open)
 
 
 def _fk(arguments: argparse.Namespace) -> int:
     _do_without_compiler()
-    from app import commands
+    with _loading():
+        from app import commands
 
     return _refusing_misuse(commands.fk, arguments)
 
 
 def _ik(arguments: argparse.Namespace) -> int:
-    from app import commands
+    with _loading():
+        from app import commands
 
     return _refusing_misuse(commands.ik, arguments)
 
 
 def _robots(arguments: argparse.Namespace) -> int:
     _do_without_compiler()
-    from app import commands
+    with _loading():
+        from app import commands
 
     return _refusing_misuse(commands.robots, arguments)
 
@@ -109,7 +116,8 @@ def _workspace(arguments: argparse.Namespace) -> int:
 
 def _check(arguments: argparse.Namespace) -> int:
     _do_without_compiler()
-    from app import commands
+    with _loading():
+        from app import commands
 
     return _refusing_misuse(commands.check, arguments)
 
@@ -128,6 +136,18 @@ def _refusing_misuse(command: Callable[[argparse.Namespace], int], arguments: ar
     except KinematicsError as error:
         print(f"kinboard: {error}", file=sys.stderr)
         return 2
+
+
+@contextmanager
+def _loading() -> Iterator[None]:
+    """For imports: what they make stays, and looking for garbage in it again and again is a tenth of the start."""
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collecting:
+            gc.enable()
 
 
 def _do_without_compiler() -> None:

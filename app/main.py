@@ -60,7 +60,7 @@ class Alive(BaseModel):
 
 
 class Readiness(BaseModel):
-    """Whether kernels are compiled and the viewer listens."""
+    """Whether the kernels that move an arm are compiled and the viewer listens."""
 
     status: StartupStatus
 

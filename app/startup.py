@@ -1,7 +1,8 @@
 """Everything slow about starting, done beside the running server: the viewer, and the compiled kernels.
 
 The page answers at once and says "warming up" until ``/readyz`` does not. Kernels come from numba's cache in
-milliseconds, or are compiled on first use, which takes seconds; no visitor should be the one who waits.
+milliseconds, or are compiled on first use, which takes seconds; no visitor should be the one who waits. What few
+ask for in the first minute, such as a cloud of the workspace, is compiled when the service is ready already.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from app.bridge import ViewerBridge
 from app.clouds import Clouds
 from app.settings import Settings
 from app.store import Store
-from kin import warm_up
+from kin import warm_up, warm_up_rest
 
 if TYPE_CHECKING:
     from app.viewer.server import ViewerServer
@@ -38,18 +39,21 @@ class Startup:
         self._viewer_settled = threading.Event()
         # A daemon: Ctrl-C in the middle of a long compilation must not wait for its end.
         self._thread = threading.Thread(target=self._run, name="kinboard-startup", daemon=True)
+        self._rest = threading.Thread(target=self._warm_up_rest, name="kinboard-warm-up", daemon=True)
 
     def start(self) -> None:
         """Begin; returns at once."""
         self._thread.start()
 
     def stop(self) -> None:
-        """End the viewer. A compilation under way is left to end with the process."""
+        """End the viewer and what warms up. A compilation under way is left to end with the process."""
         self._stopping.set()
         self._viewer_settled.wait(timeout=5.0)
         self._bridge.port = None
         if self._viewer is not None:
             self._viewer.stop()
+        if self._rest.ident is not None:
+            self._rest.join(timeout=1.0)
 
     def _run(self) -> None:
         try:
@@ -57,10 +61,18 @@ class Startup:
             if not self._stopping.is_set():
                 warm_up()
                 self.status = "ready"
+                self._rest.start()
         except Exception:
             # REST goes on; /readyz tells whoever watches the service.
             logger.exception("the viewer could not be started, or a kernel could not be compiled")
             self.status = "failed"
+
+    def _warm_up_rest(self) -> None:
+        try:
+            warm_up_rest(self._stopping.is_set)
+        except Exception:
+            # What this kernel is for fails when it is asked for; everything else works.
+            logger.exception("a kernel could not be compiled ahead of its use")
 
     def _start_viewer(self) -> None:
         try:

@@ -16,7 +16,7 @@ from kin.results import BlockedBranch, IKResult, IKSolution, LimitViolation, Red
 from kin.robot import Joint, Robot
 from kin.singularity import Singularity, singularities
 from kin.thin import ik_branches
-from kin.warmup import warm_up
+from kin.warmup import warm_up, warm_up_rest
 from kin.workspace import (
     CapabilityBlock,
     CapabilityGrid,
@@ -90,6 +90,7 @@ __all__ = [
     "solve_ik",
     "solve_path",
     "warm_up",
+    "warm_up_rest",
     "workspace_facts",
     "workspace_slice",
 ]

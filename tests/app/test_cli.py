@@ -1,5 +1,6 @@
 """The command line: what it prints, and with which exit code it ends."""
 
+import gc
 import json
 import math
 import re
@@ -589,3 +590,9 @@ def test_what_progress_says():
     progress = save.Progress(4_000_000, sys.stderr)
     progress._done = 1_000_000
     assert progress.line(0.5) == "[######                  ]  25%     2.000 M points/s       2 s left"
+
+
+def test_the_search_for_garbage_goes_on_after_a_command(capsys):
+    assert gc.isenabled()
+    assert cli.main(["fk", "pioneer5", "90", "30", "60", "30", "30"]) == 0
+    assert gc.isenabled()

@@ -92,6 +92,34 @@ def test_stopping_ends_the_viewer_and_the_thread_that_started_it(monkeypatch):
     wait_for(lambda: not [thread for thread in threading.enumerate() if thread.name == "kinboard-startup"])
 
 
+def test_what_few_ask_for_is_warmed_when_ready_and_stopping_ends_that(monkeypatch):
+    begun, ended = threading.Event(), threading.Event()
+
+    def rest(stop):
+        begun.set()
+        wait_for(stop, 60)
+        ended.set()
+
+    monkeypatch.setattr(app.startup, "warm_up", lambda: None)
+    monkeypatch.setattr(app.startup, "warm_up_rest", rest)
+    with TestClient(create_app(Settings())) as client:
+        assert begun.wait(30)
+        assert client.get("/readyz").json() == {"status": "ready"}
+        assert not ended.is_set()
+    assert ended.wait(10)
+
+
+def test_a_kernel_that_cannot_be_compiled_ahead_is_told_and_the_service_stays_ready(monkeypatch, caplog):
+    def rest(stop):
+        raise RuntimeError("disk full")
+
+    monkeypatch.setattr(app.startup, "warm_up", lambda: None)
+    monkeypatch.setattr(app.startup, "warm_up_rest", rest)
+    with TestClient(create_app(Settings())) as client:
+        wait_for(lambda: "disk full" in caplog.text)
+        assert client.get("/readyz").status_code == 200
+
+
 @pytest.mark.parametrize("page", ["/", "/docs"])
 def test_pages_refer_to_our_own_files_only_and_each_is_there(client, page):
     html = client.get(page).text

@@ -1,0 +1,77 @@
+"""What is loaded or compiled before anybody asks."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+from numba.core.event import trigger_event
+
+import kin
+from kin import warmup
+
+
+def test_after_the_rest_no_question_needs_another_kernel():
+    """Counted in a process of its own, in which nothing else has asked for kernels."""
+    program = """
+import sys
+import kin
+from numba.core.dispatcher import Dispatcher
+
+def compilations():
+    modules = [m for name, m in sys.modules.items() if name.startswith("kin.")]
+    kernels = {id(k): k for m in modules for k in vars(m).values() if isinstance(k, Dispatcher)}
+    return {f"{k.__module__}.{k.__name__}": len(k.overloads) for k in kernels.values() if k.overloads}
+
+kin.warm_up()
+kin.warm_up_rest()
+before = compilations()
+assert len(before) > 40, before
+for robot in kin.builtin_robots().values():
+    T = kin.fk(robot, robot.home)
+    kin.jacobian(robot, robot.home)
+    for task in ("pose", "approach", "position"):
+        kin.solve_ik(robot, T, task=task)
+arm = kin.get_robot("pioneer5")
+locked = [None, None, None, 0.3, 0.3]
+for strategy in ("uniform", "quasi", "boundary", "volume"):
+    kin.workspace_slice(arm, 9, 2, 7, strategy=strategy, measure="limits", with_q=True, locked=locked)
+kin.section(arm, ((0.0, 0.0, 0.1), (0.0, 1.0, 1.0)), resolution=8, locked=locked)
+kin.section(arm, resolution=8, locked=locked)
+kin.workspace_facts(arm, effort=2, locked=locked)
+after = compilations()
+assert after == before, {k: n for k, n in after.items() if before.get(k) != n}
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_rest_asks_between_kernels_whether_to_stop(monkeypatch):
+    steps: list[int] = []
+    monkeypatch.setattr(warmup, "_rest", lambda: (lambda i=i: steps.append(i) for i in range(9)))
+    kin.warm_up_rest(lambda: len(steps) == 3)
+    assert steps == [0, 1, 2]
+    kin.warm_up_rest()
+    assert steps[3:] == list(range(9))
+
+
+def test_what_has_to_be_compiled_is_compiled_for_all_arms_before_ready(monkeypatch):
+    asked: list[tuple[str, str]] = []
+    arms = [robot.id for robot in warmup.one_of_each_family()]
+    assert len(arms) >= 6
+
+    def move(robot):
+        asked.append(("move", robot.id))
+        if cold:
+            with trigger_event("numba:compile"):
+                pass
+
+    monkeypatch.setattr(warmup, "_move", move)
+    monkeypatch.setattr(warmup, "_ask_all", lambda robot: asked.append(("all", robot.id)))
+    cold = False
+    kin.warm_up()
+    assert asked == [("move", arms[0])], "a warm cache: what is left loads in milliseconds"
+    asked.clear()
+    cold = True
+    kin.warm_up()
+    assert asked == [("move", arm) for arm in arms] + [("all", arm) for arm in arms]
