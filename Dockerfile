@@ -1,29 +1,39 @@
-# Kinboard: one port, no root, nothing fetched at run time.
+# Kinboard: one port, no root, nothing written, nothing fetched at run time.
 #   docker build -t kinboard .
-#   docker run --rm -p 8000:8000 kinboard
+#   docker run --rm -p 127.0.0.1:8000:8000 kinboard
+# scripts/image.sh builds it without Docker and proves what README.md says of it.
 
-FROM python:3.12-slim AS build
-ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1
+FROM python:3.13-slim-trixie AS build
+ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1 PIP_ROOT_USER_ACTION=ignore
+# An index of your own: --build-arg PIP_INDEX_URL=…, or a mounted file and its place. Neither gets into the image.
+ARG PIP_INDEX_URL
+ARG PIP_CONFIG_FILE
+RUN apt-get update -qq && apt-get install -y -qq --no-install-recommends binutils
 WORKDIR /src
 # The environment has no pip of its own: the image never installs anything later.
-RUN python -m venv --without-pip /opt/kinboard
-# Dependencies first: they change seldom, so a change of code rebuilds in seconds.
-COPY pyproject.toml ./
-RUN python -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['project']['dependencies'], sep='\n')" \
-      > requirements.txt \
-    && pip --python /opt/kinboard/bin/python install -r requirements.txt
-COPY README.md LICENSE ./
+RUN python -m venv --without-pip /opt/kinboard && python -m venv --system-site-packages /opt/tools
+# Dependencies first: they change seldom, so a change of code rebuilds quickly. Both lists are exact, with hashes.
+COPY requirements.lock requirements-build.lock ./
+RUN install="install --no-compile --require-hashes --only-binary :all:" \
+    && pip --python /opt/kinboard/bin/python $install -r requirements.lock \
+    && pip --python /opt/tools/bin/python $install -r requirements-build.lock
+# What only developers of these packages need: their tests, headers, debugging symbols, and the viewer's sources (its
+# built page stays). Libraries in *.libs are left alone: they were patched in a way that strip may break.
+RUN cd /opt/kinboard/lib/python*/site-packages \
+    && find . -type d -name tests -prune -exec rm -r {} + \
+    && find . -type f \( -name '*.pyi' -o -name '*.h' -o -name '*.pxd' -o -name '*.lib' -o -name '*.a' \) -delete \
+    && find viser/client -mindepth 1 -maxdepth 1 ! -name build ! -name '*.py' -exec rm -r {} + \
+    && find . -name '*.so' ! -path '*.libs/*' -exec strip --strip-unneeded {} +
+COPY pyproject.toml README.md LICENSE ./
 COPY static static
 COPY kin kin
 COPY app app
-RUN pip --python /opt/kinboard/bin/python install --no-deps .
+RUN /opt/tools/bin/python -m hatchling build -t wheel \
+    && pip --python /opt/kinboard/bin/python install --no-compile --no-deps --no-index dist/*.whl
+COPY deploy/image /opt/kinboard/image
 
 
-FROM python:3.12-slim
-LABEL org.opencontainers.image.title="Kinboard" \
-      org.opencontainers.image.description="An interactive robot-arm kinematics dashboard for the browser." \
-      org.opencontainers.image.version="0.1.0" \
-      org.opencontainers.image.licenses="MIT"
+FROM python:3.13-slim-trixie
 COPY --from=build /opt/kinboard /opt/kinboard
 # Machine code cached on one CPU model is ignored on any other, and compiling takes about a minute. So kernels are
 # compiled here for a fixed level that every 64-bit x86 machine of the last decade has, emulators included; the
@@ -31,22 +41,31 @@ COPY --from=build /opt/kinboard /opt/kinboard
 # the level and falls back to its generic one.
 ARG CPU_LEVEL=x86-64-v2
 ENV PATH=/opt/kinboard/bin:$PATH \
+    PYTHONPATH=/opt/kinboard/image \
     PYTHONUNBUFFERED=1 \
-    PYTHONDONTWRITEBYTECODE=1 \
     NUMBA_CPU_NAME=$CPU_LEVEL \
     NUMBA_CPU_FEATURES="" \
-    NUMBA_CACHE_DIR=/var/cache/kinboard \
+    NUMBA_CACHE_DIR=/opt/kinboard/kernels \
     KINBOARD_HOST=0.0.0.0 \
     KINBOARD_PORT=8000
-RUN useradd --system --uid 10001 --no-create-home --shell /usr/sbin/nologin kinboard \
-    && install -d -o kinboard -g kinboard /var/cache/kinboard
-USER kinboard
-WORKDIR /tmp
-RUN python -c "import kin; kin.warm_up(); kin.warm_up_rest()"
-# numba insists on a cache it can write to: a volume stays writable under `docker run --read-only`, and starts as a
-# copy of what was compiled above.
-VOLUME /var/cache/kinboard
+RUN groupadd --gid 10001 kinboard \
+    && useradd --uid 10001 --gid 10001 --no-create-home --home-dir /nonexistent --shell /usr/sbin/nologin kinboard \
+    && python /opt/kinboard/image/prepare.py
+# From here on all of this is only read; deploy/image/kernel_store.py tells how numba is content with that.
+ENV PYTHONDONTWRITEBYTECODE=1 \
+    NUMBA_CACHE_LOCATOR_CLASSES=kernel_store.LinkedCacheLocator
+# The user kinboard, as a number: Kubernetes' runAsNonRoot does not look names up.
+USER 10001:10001
+WORKDIR /
 EXPOSE 8000
-HEALTHCHECK --interval=15s --timeout=5s --start-period=60s --retries=3 \
-    CMD ["python", "-c", "import os, urllib.request as r; r.build_opener(r.ProxyHandler({})).open('http://127.0.0.1:' + os.environ['KINBOARD_PORT'] + '/readyz', timeout=4)"]
+HEALTHCHECK --interval=15s --timeout=5s --start-period=30s --retries=3 \
+    CMD ["python", "-ISc", "import http.client as h, os, sys; c = h.HTTPConnection('127.0.0.1', int(os.environ['KINBOARD_PORT']), timeout=4); c.request('GET', '/readyz'); sys.exit(c.getresponse().status != 200)"]
 CMD ["kinboard", "serve"]
+ARG REVISION=unknown
+LABEL org.opencontainers.image.title="Kinboard" \
+      org.opencontainers.image.description="An interactive robot-arm kinematics dashboard for the browser." \
+      org.opencontainers.image.version="0.1.0" \
+      org.opencontainers.image.revision=$REVISION \
+      org.opencontainers.image.licenses="MIT" \
+      org.opencontainers.image.vendor="The Kinboard authors" \
+      org.opencontainers.image.base.name="docker.io/library/python:3.13-slim-trixie"

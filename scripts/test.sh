@@ -7,8 +7,11 @@ install_kinboard "[test]"
 if [ ! -x "${KINBOARD_TEST_CHROMIUM:-/usr/bin/chromium}" ]; then
   apt_install chromium || fail "the browser tests need Chromium. On Debian: sudo apt-get install chromium"
 fi
+PATH="$root/.venv/bin:$root/.venv/debian/usr/sbin:$root/.venv/debian/usr/bin:$PATH:/usr/sbin"
+for proxy in nginx caddy; do
+  command -v $proxy >/dev/null || apt_unpack $proxy || fail "the tests of deploy/ need $proxy in the PATH"
+done
 cd "$root"
-PATH="$root/.venv/bin:$PATH"
 ruff check .
 ruff format --check .
 mypy

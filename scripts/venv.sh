@@ -12,6 +12,18 @@ apt_install() {
   fi
 }
 
+# A Debian package's files in .venv/debian: no root needed, and no service is started on its usual port.
+apt_unpack() {
+  command -v apt-get >/dev/null || return 1
+  echo "Unpacking $1 from Debian into .venv…"
+  mkdir -p "$root/.venv/debian" && (
+    cd "$root/.venv/debian" &&
+      { [ "$(id -u)" != 0 ] || apt-get update -qq; } &&
+      apt-get download -qq -o APT::Sandbox::User=root "$1" &&
+      dpkg -x "$1"_*.deb . && rm "$1"_*.deb
+  )
+}
+
 find_python() {
   for candidate in ${PYTHON:-} python3 python3.13 python3.12 python3.11 python; do
     if command -v "$candidate" >/dev/null && "$candidate" -c \

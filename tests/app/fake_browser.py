@@ -16,14 +16,20 @@ from kin.transforms import from_position_wxyz, wxyz_from_rotation
 
 
 class FakeBrowser:
-    """One visitor. `pump` reads messages; everything shown is in `gui`, `values`, `poses` and `visible`."""
+    """One visitor, of viser's own port or of any address, which may need more `options` to connect.
 
-    def __init__(self, port: int, width: int = 1280, height: int = 720, path: str = "") -> None:
+    `pump` reads messages; everything shown is in `gui`, `values`, `poses` and `visible`.
+    """
+
+    def __init__(
+        self, where: int | str, width: int = 1280, height: int = 720, path: str = "", **options: Any
+    ) -> None:
         self._socket = connect(
-            f"ws://127.0.0.1:{port}{path}",
+            where if isinstance(where, str) else f"ws://127.0.0.1:{where}{path}",
             subprotocols=[f"viser-v{viser.__version__}"],  # type: ignore[list-item]
             max_size=None,
             compression=None,
+            **options,
         )
         self.gui: dict[str, dict[str, Any]] = {}
         self.values: dict[str, Any] = {}

@@ -1,0 +1,119 @@
+"""What can be said of the image without building it; `sh scripts/image.sh` builds and visits it."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+DOCKERFILE = (ROOT / "Dockerfile").read_text(encoding="utf-8")
+COMPOSE = (ROOT / "compose.yaml").read_text(encoding="utf-8")
+MODULE = """
+from numba import njit
+
+@njit(cache=True)
+def double(x):
+    return 2 * x
+"""
+
+
+@pytest.fixture
+def brought(tmp_path: Path) -> Path:
+    """A cache with one compiled kernel, as the image brings it."""
+    (tmp_path / "arithmetic.py").write_text(MODULE)
+    run(tmp_path, "from arithmetic import double; double(1)")
+    assert list(tmp_path.glob("brought/*/*.nbc"))
+    return tmp_path / "brought"
+
+
+def run(folder: Path, program: str, **environment: str) -> str:
+    """What a program prints whose compiled kernels come from `folder`/brought."""
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env={
+            **os.environ,
+            "PYTHONPATH": f"{folder}{os.pathsep}{ROOT / 'deploy' / 'image'}",
+            "NUMBA_CACHE_DIR": str(folder / "brought"),
+            "TMPDIR": str(folder),
+            **environment,
+        },
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+def in_the_image(folder: Path, program: str) -> str:
+    locator = re.search(r"NUMBA_CACHE_LOCATOR_CLASSES=(\S+)", DOCKERFILE).group(1)
+    return run(folder, program, NUMBA_CACHE_LOCATOR_CLASSES=locator)
+
+
+def state(folder: Path) -> dict[Path, bytes]:
+    return {file: file.read_bytes() for file in folder.rglob("*") if file.is_file()}
+
+
+def test_a_container_uses_the_kernels_that_the_image_brought(brought: Path, tmp_path: Path) -> None:
+    before = state(brought)
+    program = "from arithmetic import double; double(1); print(*double.stats.cache_hits.values())"
+    assert in_the_image(tmp_path, program) == "1"
+    assert state(brought) == before
+    assert not list(tmp_path.glob("kernels-*")), "the folder of links is gone with the process"
+
+
+def test_a_container_keeps_further_kernels_to_itself(brought: Path, tmp_path: Path) -> None:
+    before = state(brought)
+    program = (
+        "from arithmetic import double; from pathlib import Path; "
+        "print(double(1.5), *double.stats.cache_misses.values()); "
+        "print(len([f for f in Path(double._cache.cache_path).glob('*.nbc') if not f.is_symlink()]))"
+    )
+    assert in_the_image(tmp_path, program).split() == ["3.0", "1", "1"]
+    assert state(brought) == before
+
+
+def test_python_finds_the_locator_where_the_image_puts_it() -> None:
+    folder = re.search(r"^COPY deploy/image (\S+)$", DOCKERFILE, re.MULTILINE).group(1)
+    assert f"PYTHONPATH={folder}" in DOCKERFILE
+    assert f"python {folder}/prepare.py" in DOCKERFILE
+
+
+def test_both_stages_have_the_same_base() -> None:
+    (base,) = set(re.findall(r"^FROM (\S+)", DOCKERFILE, re.MULTILINE))
+    assert f'image.base.name="docker.io/library/{base}"' in DOCKERFILE
+
+
+def test_the_health_check_asks_the_port_and_tells_by_its_exit_code() -> None:
+    """Nobody listens: it must fail, and because of that."""
+    program = re.search(r'CMD \["python", "-ISc", "(.+)"\]', DOCKERFILE).group(1)
+    done = subprocess.run(
+        [sys.executable, "-ISc", program],
+        env={**os.environ, "KINBOARD_PORT": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert "ConnectionRefusedError" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "read_only: true",
+        "cap_drop:\n      - ALL",
+        "no-new-privileges:true",
+        'cpus: "2"',
+        "memory: 2g",
+        "pids: 256",
+        '"127.0.0.1:8000:8000"',
+    ],
+)
+def test_compose_keeps_the_container_small_and_to_itself(line: str) -> None:
+    assert line in COMPOSE
