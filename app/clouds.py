@@ -82,7 +82,7 @@ class Clouds:
     def __init__(self, max_bytes: int = 512 << 20, threads: int | None = None) -> None:
         self._max_bytes = max_bytes
         self._threads = threads or max(1, (os.cpu_count() or 2) - 1)
-        self._pool = ThreadPoolExecutor(self._threads, thread_name_prefix="cloud", initializer=_step_back)
+        self._pool = ThreadPoolExecutor(self._threads, thread_name_prefix="cloud", initializer=step_back)
         self._lock = threading.Lock()
         self._parts: OrderedDict[tuple[Cloud, int], Future[WorkspaceChunk]] = OrderedDict()
         self._sizes: dict[tuple[Cloud, int], int] = {}  # of the parts that are ready
@@ -146,7 +146,7 @@ def _size(chunk: WorkspaceChunk) -> int:
     return chunk.points.nbytes + sum(values.nbytes for values in chunk.measures.values())
 
 
-def _step_back() -> None:
+def step_back() -> None:
     """Lets everybody else's work go first. Linux schedules threads by niceness; elsewhere it is the process's."""
     if sys.platform == "linux":
         os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), BEHIND)

@@ -12,7 +12,7 @@ import threading
 from typing import TYPE_CHECKING, Literal
 
 from app.bridge import ViewerBridge
-from app.clouds import Clouds
+from app.clouds import Clouds, step_back
 from app.settings import Settings
 from app.store import Store
 from kin import warm_up, warm_up_rest
@@ -68,6 +68,7 @@ class Startup:
             self.status = "failed"
 
     def _warm_up_rest(self) -> None:
+        step_back()
         try:
             warm_up_rest(self._stopping.is_set)
         except Exception:

@@ -22,7 +22,15 @@ from kin.ik import solve_ik
 from kin.path import solve_path
 from kin.robot import Robot
 from kin.solvers import solver_for
-from kin.workspace import MEASURES, STRATEGIES, configuration_at, section, workspace_facts, workspace_slice
+from kin.workspace import (
+    MEASURES,
+    STRATEGIES,
+    capability_map,
+    configuration_at,
+    section,
+    workspace_facts,
+    workspace_slice,
+)
 
 
 def warm_up() -> None:
@@ -97,3 +105,6 @@ def _rest() -> Iterator[Callable[[], object]]:
     yield partial(configuration_at, robot, 0, locked=locked)
     yield partial(section, robot, resolution=8, locked=locked)
     yield partial(workspace_facts, robot, effort=2, locked=locked)
+    for robot in robots:
+        still = [None, None, *robot.q_home[2:].tolist()]
+        yield partial(capability_map, robot, resolution=2, directions=12, locked=still)
