@@ -53,7 +53,8 @@ RULES: dict[str, set[str]] = {
     "app/mapreduce.py": {"kin", "distributed"},
     "app/mapping.py": {"kin", "numpy", "app.commands", "app.mapreduce"},
     "app/commands.py": {
-        *("kin", "numpy", "app.answers", "app.check", "app.clouds", "app.formats", "app.save", "app.store"),
+        *("kin", "numpy", "app.answers", "app.check", "app.clouds", "app.formats", "app.hull", "app.picture"),
+        *("app.save", "app.store"),
     },
     "app/prefix.py": {"starlette"},
     "app/security.py": {"starlette"},

@@ -46,7 +46,8 @@ def client() -> Iterator[TestClient]:
 
 
 def test_alive_and_ready(client):
-    assert (client.get("/livez").status_code, client.get("/livez").json()) == (200, {"status": "alive"})
+    alive = client.get("/livez")
+    assert (alive.status_code, alive.json()) == (200, {"status": "alive", "pid": os.getpid()})
     ready = client.get("/readyz")
     assert (ready.status_code, ready.json()) == (200, {"status": "ready"})
     assert ready.headers["cache-control"] == "no-store"
