@@ -28,6 +28,7 @@ joints 1 and 2 about one line, hence they are the cosine and sine of θ1 + θ2.
 from __future__ import annotations
 
 import ast
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -67,6 +68,9 @@ class Equation:
         largest: largest difference from the DH product inside the joint limits, in metres for ``p``, else a pure
             number; 0 for a right equation.
         largest_at: a configuration inside the limits where it is reached, in degrees; empty for a right equation.
+        turn: for a wrong equation of an axis (``n``, ``o``, ``a``), the largest angle in radians between that axis
+            and what it becomes with this one entry as printed, see `turned`; else 0.
+        turn_at: a configuration inside the limits where it is reached, in degrees; empty where `turn` is 0.
     """
 
     number: int
@@ -78,6 +82,13 @@ class Equation:
     note: str = ""
     largest: float = 0.0
     largest_at: tuple[float, ...] = ()
+    turn: float = 0.0
+    turn_at: tuple[float, ...] = ()
+
+    @property
+    def worst_at(self) -> tuple[float, ...]:
+        """Where the misprint shows most: farthest from the tool for ``p``, turned most for an axis; degrees."""
+        return self.turn_at or self.largest_at
 
     @property
     def index(self) -> tuple[int, int]:
@@ -90,7 +101,8 @@ class Equation:
 class Comparison:
     """One equation at given configurations: each array is ``(...)``; `difference` is printed − dh.
 
-    Metres for ``p``, pure numbers for ``n``, ``o``, ``a``. `dh` comes from the product of the table's rows.
+    Metres for ``p``, pure numbers for ``n``, ``o``, ``a``. `dh` comes from the product of the table's rows. `turn`
+    is the same difference as an angle in radians, see `turned`; 0 for ``p``.
     """
 
     number: int
@@ -99,6 +111,7 @@ class Comparison:
     corrected: Array
     dh: Array
     difference: Array
+    turn: Array
 
 
 def equations(robot_id: str) -> tuple[Equation, ...]:
@@ -132,8 +145,25 @@ def compare(robot_id: str, q: ArrayLike) -> list[Comparison]:
         printed = evaluate(equation.printed, values)
         corrected = evaluate(equation.corrected, values)
         dh = T[(..., *equation.index)]
-        out.append(Comparison(equation.number, equation.entry, printed, corrected, dh, printed - dh))
+        turn = turned(T, equation.index, printed)
+        out.append(Comparison(equation.number, equation.entry, printed, corrected, dh, printed - dh, turn))
     return out
+
+
+def turned(T_base_tool: Array, index: tuple[int, int], entry: Array) -> Array:
+    """Angle in radians ``(...)`` between an axis of poses ``(..., 4, 4)`` and the same with one entry replaced.
+
+    An entry of n, o, a is a pure number; this tells what it means for the tool: by so much the axis points
+    elsewhere. 0 for an entry of p.
+    """
+    row, column = index
+    if column == 3:
+        return np.zeros(T_base_tool.shape[:-2])
+    axis = T_base_tool[..., :3, column]
+    other = axis.copy()
+    other[..., row] = entry
+    # An arc cosine would lose half the digits of a small angle.
+    return np.asarray(np.arctan2(np.linalg.norm(np.cross(axis, other), axis=-1), (axis * other).sum(axis=-1)))
 
 
 def matrix(robot_id: str, q: ArrayLike, form: Form = "printed") -> Array:
@@ -272,6 +302,8 @@ EQUATIONS: tuple[Equation, ...] = (
         "In the second term c5 must be s5.",
         largest=0.7044160264027588,
         largest_at=(90.0, 0.0, 0.0, 85.0, 15.0),
+        turn=0.6157384581117262,
+        turn_at=(115.1104, 61.7465, 116.9157, 85.0, 15.0),
     ),
     _right(14, _PIONEER, "a_y", "-s1*s23*c4*s5 + c1*s4*s5 + s1*c23*c5"),
     _right(15, _PIONEER, "a_z", "-c23*c4*s5 - s23*c5"),
@@ -298,6 +330,8 @@ EQUATIONS: tuple[Equation, ...] = (
         "the signs of the last two.",
         largest=2.377382821692843,
         largest_at=(0.0, 0.0, -66.55, 0.0, 60.35, 16.2679, -236.7554),
+        turn=math.pi,
+        turn_at=(0.0, 0.0, 0.0, -45.0, 0.0, 0.0, 90.0),
     ),
     _right(
         20,
@@ -321,6 +355,8 @@ EQUATIONS: tuple[Equation, ...] = (
         "In the last term c4 must be s4.",
         largest=1.4142135623730951,
         largest_at=(0.0, 0.0, 90.0, -45.0, 0.0, 0.0, 0.0),
+        turn=math.pi,
+        turn_at=(0.0, 0.0, -90.0, -67.5, 0.0, -22.5, 0.0),
     ),
     _right(
         23,
@@ -344,6 +380,8 @@ EQUATIONS: tuple[Equation, ...] = (
         "Three signs: the first and the last two terms.",
         largest=2.3094010767585034,
         largest_at=(0.0, 0.0, 54.7356, 0.0, -35.2644, 0.0, -215.2644),
+        turn=math.pi,
+        turn_at=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     ),
     _right(
         26,

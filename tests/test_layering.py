@@ -49,6 +49,7 @@ RULES: dict[str, set[str]] = {
         "app.settings",
         "pydantic",
     },
+    "app/equations": {"kin", "numpy", "sympy", "app.equations"},
     "app/check.py": {"kin", "numpy", "typing_extensions", "app.answers"},
     "app/mapreduce.py": {"kin", "distributed"},
     "app/mapping.py": {"kin", "numpy", "app.commands", "app.mapreduce"},
@@ -75,12 +76,12 @@ RULES: dict[str, set[str]] = {
     },
     "app/api": {
         *("fastapi", "starlette", "pydantic", "pydantic_core", "typing_extensions", "numpy", "kin"),
-        *("app.api", "app.answers", "app.clouds", "app.formats", "app.metrics", "app.security", "app.settings"),
-        "app.store",
+        *("app.api", "app.answers", "app.clouds", "app.equations", "app.formats", "app.metrics", "app.security"),
+        *("app.settings", "app.store"),
     },
     "app/viewer": {
         *("viser", "trimesh", "numpy", "kin"),
-        *("app.viewer", "app.clouds", "app.metrics", "app.settings", "app.store"),
+        *("app.viewer", "app.clouds", "app.equations", "app.metrics", "app.settings", "app.store"),
     },
 }
 

@@ -6,7 +6,7 @@ counts the clouds being sent, and in ``sizes`` those that were computed.
 
 from fastapi import APIRouter
 
-from app.api import fk, ik, jacobian, path, robots, workspace
+from app.api import equations, fk, ik, jacobian, path, robots, workspace
 from app.api.body import JsonRoute
 from app.api.problems import install_problem_handlers
 from app.api.workspace.flow import Gate
@@ -18,6 +18,6 @@ __all__ = ["Gate", "build_router", "install_problem_handlers", "memory"]
 def build_router() -> APIRouter:
     """Every route of the first version of the interface, under /api/v1."""
     router = APIRouter(prefix="/api/v1", route_class=JsonRoute)
-    for module in (robots, fk, ik, path, jacobian, workspace):
+    for module in (robots, fk, ik, path, jacobian, equations, workspace):
         router.include_router(module.router)
     return router

@@ -109,6 +109,32 @@ def test_a_search_inside_the_limits_finds_that_difference_and_no_larger_one(equa
     assert maximum(robot, size) == pytest.approx(equation.largest, abs=1e-7)
 
 
+AXES = [e for e in EVALUABLE if e.verdict == "wrong" and e.entry[0] != "p"]
+
+
+@pytest.mark.parametrize("equation", AXES, ids=label)
+def test_the_largest_turn_is_where_and_what_is_said_and_no_search_finds_a_larger_one(equation):
+    robot = kin.get_robot(equation.robot_id)
+    q = np.radians(equation.worst_at)
+    assert robot.in_limits(q, 1e-9)
+    assert difference(equation, q).turn == pytest.approx(equation.turn, rel=1e-9)
+
+    def turn(q):
+        printed = chapter.evaluate(equation.printed, chapter.symbols(robot, q))
+        return chapter.turned(kin.fk(robot, q), equation.index, printed)
+
+    assert turn(robot.random_q(np.random.default_rng(1), 100_000)).max() <= equation.turn + 1e-9
+    assert maximum(robot, turn) == pytest.approx(equation.turn, abs=1e-4)  # the peak at 180° is a sharp one
+
+
+def test_a_turn_is_the_angle_between_the_axis_and_what_is_printed():
+    T = np.eye(4)
+    assert chapter.turned(T, (0, 2), np.float64(1.0)) == pytest.approx(math.pi / 4)
+    assert chapter.turned(T, (2, 2), np.float64(-0.1)) == pytest.approx(math.pi)
+    assert chapter.turned(T, (2, 2), np.float64(0.3)) == 0.0
+    assert chapter.turned(T, (0, 3), np.float64(0.3)) == 0.0
+
+
 @pytest.mark.parametrize(("robot_id", "largest"), [("pioneer5", 1.2346318), ("redundant7", 3.0562825)])
 def test_printed_matrix_is_no_rotation(robot_id, largest):
     """The misprints show without any reference: RᵀR is not I, by as much as this inside the limits."""

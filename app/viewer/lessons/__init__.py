@@ -6,6 +6,7 @@ Adding a lesson is one module with a :class:`~app.viewer.feature.Feature` and on
 from __future__ import annotations
 
 from app.viewer.feature import Feature
+from app.viewer.lessons.equations import EquationsLesson
 
 # In the order of a course.
-LESSONS: tuple[type[Feature], ...] = ()
+LESSONS: tuple[type[Feature], ...] = (EquationsLesson,)

@@ -1,0 +1,259 @@
+"""The equations of an arm: the chapter's as printed and corrected, or a closed form derived from the DH table."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Body, Response
+from pydantic import Field
+from typing_extensions import TypedDict
+
+from app.answers import documented
+from app.api import schemas
+from app.api.body import JsonRoute
+from app.api.schemas import (
+    POST_REFUSALS,
+    Configurations,
+    RobotDep,
+    SettingsDep,
+    example,
+    one_or_all,
+    refusals,
+    reply,
+)
+from app.equations import Book, Equation, Symbol, book, typeset
+from app.equations.expression import Expression
+from kin import Robot
+from kin.transforms import Array
+
+router = APIRouter(tags=["robots"], route_class=JsonRoute)
+
+EXAMPLES = {
+    "one": example("One configuration", {"q": [1.5708, 0.5236, 1.0472, 0.5236, 0.5236]}),
+    "worst": example("Where equation (6) is worst", {"q": [0.0, 1.2741, 0.2967, 0.0, 0.2618]}),
+    "many": example("Several configurations", {"q": [[0.0, 0.0, 0.0, 0.0, 0.5], [1.2, 0.4, 0.9, 0.3, 0.6]]}),
+}
+
+
+@documented
+class Formula(TypedDict):
+    """An equation, typeset twice from one source."""
+
+    mathml: str
+    """A whole `<math>` element."""
+    latex: str
+    """The same for math mode."""
+
+
+@documented
+class SymbolAnswer(TypedDict):
+    """A name in the equations."""
+
+    id: str
+    """The name in plain letters, such as `c23` or `d6`."""
+    mathml: str
+    """The name as a whole `<math>` element."""
+    latex: str
+    """The same for math mode."""
+    meaning: str
+    """What it stands for, such as `cos(θ2 + θ3)`."""
+    value: float | None
+    """Its value if that is the same in every configuration, in `unit`; else null."""
+    unit: Literal["m", ""]
+    """metres for lengths and the travel of sliding joints; empty for pure numbers."""
+
+
+@documented
+class LineAnswer(TypedDict):
+    """An intermediate result with a name of its own."""
+
+    id: str
+    """The name in plain letters."""
+    formula: Formula
+    """What it is."""
+
+
+@documented
+class EquationAnswer(TypedDict):
+    """One equation of an arm: an entry of the tool's pose [n o a p]."""
+
+    id: str
+    """Its key: the chapter's number, or the entry for a derived one."""
+    name: str
+    """Which entry of [n o a p], such as `p_x`; `T` for the whole matrix."""
+    reference: int | None
+    """Number in the source chapter; null for a derived equation."""
+    verdict: Literal["right", "misprinted", "unreadable", "derived"]
+    """What is to be thought of it. "derived": not from the chapter, checked against forward kinematics."""
+    as_printed: Formula | None
+    """As the chapter prints it; null for a derived equation and for one that cannot be read."""
+    corrected: Formula | None
+    """The right form of a misprinted equation; else null."""
+    derived: Formula | None
+    """The closed form derived from the DH table; null for an equation of the chapter."""
+    note: str
+    """What is wrong with the printed form; empty if nothing is."""
+    worst_q: list[float] | None
+    """Of a misprinted equation, a configuration inside the limits, in radians, in which the tool is farthest from
+    where this entry puts it, or its axis turned farthest; else null."""
+    uses: list[str]
+    """Names in it, and in what it needs: ids of `symbols` and of `lines`; other equations are not listed."""
+
+
+@documented
+class EquationsAnswer(TypedDict):
+    """The equations of one arm."""
+
+    source: Literal["chapter", "derived"]
+    """Whether they are the source chapter's, or were derived from the DH table."""
+    equations: list[EquationAnswer]
+    """In the chapter's order; derived ones position first."""
+    symbols: list[SymbolAnswer]
+    """What the names stand for."""
+    lines: list[LineAnswer]
+    """Intermediate results, each using only those before it."""
+
+
+@documented
+class EquationValue(TypedDict):
+    """What one equation gives in one configuration."""
+
+    id: str
+    """Which equation."""
+    name: str
+    """Which entry of [n o a p]."""
+    printed: float | None
+    """By the equation as printed, in `unit`; null for a derived one."""
+    corrected: float
+    """By the corrected or the derived equation, in `unit`."""
+    dh: float
+    """By the product of the DH matrices, in `unit`."""
+    difference: float
+    """Of what is printed, or else derived, from the DH product, in `unit`."""
+    turn: float
+    """For an axis (n, o, a) the same as an angle in radians: between the axis and what it becomes with this one
+    entry replaced. 0 for p."""
+    unit: Literal["m", ""]
+    """metres for p; empty for n, o, a, which are pure numbers."""
+
+
+@documented
+class EquationValues(TypedDict):
+    """Every equation in one configuration."""
+
+    values: list[EquationValue]
+    """Of every equation that can be read, in order."""
+
+
+@documented
+class EquationValuesList(TypedDict):
+    """Answers to a list of configurations."""
+
+    results: list[EquationValues]
+    """One per configuration, in the same order."""
+
+
+@router.get(
+    "/robots/{robot_id}/equations",
+    summary="Equations of a robot",
+    response_model=EquationsAnswer,
+    responses=refusals(404, 422, 500),
+)
+def equations(robot: RobotDep) -> Response:
+    """The tool's pose [n o a p] entry by entry, as MathML and LaTeX.
+
+    For the arms of the source chapter: each of its equations as printed, and corrected where it is misprinted. For
+    any other arm: a closed form derived from its DH table, checked against forward kinematics before it is shown.
+    The first request for such an arm may take a second.
+    """
+    found = book(robot)
+    return reply(
+        EquationsAnswer(
+            source=found.source,
+            equations=[_equation(found, equation) for equation in found.equations],
+            symbols=[_symbol(symbol) for symbol in found.symbols.values()],
+            lines=[{"id": line.name, "formula": _formula(line.name, line.expression)} for line in found.lines],
+        )
+    )
+
+
+class EquationsRequest(schemas.Body):
+    """Where to evaluate the equations."""
+
+    q: Configurations = Field(
+        description="Joint values from base to tool, in radians (metres for sliding joints): "
+        "one configuration of n numbers, or a list of configurations."
+    )
+
+
+@router.post(
+    "/robots/{robot_id}/equations",
+    summary="Values of a robot's equations",
+    response_model=EquationValues | EquationValuesList,
+    responses=POST_REFUSALS,
+)
+def equation_values(
+    robot: RobotDep, settings: SettingsDep, body: Annotated[EquationsRequest, Body(openapi_examples=EXAMPLES)]
+) -> Response:
+    """Every equation as printed and corrected (or derived), beside the product of the DH matrices.
+
+    One configuration gets one answer; a list gets `{"results": [...]}` in the same order.
+    """
+    q, single = schemas.as_configurations(robot, body.q, settings)
+    return one_or_all(lambda some: _values(robot, q[some]), len(q), single)
+
+
+def _equation(found: Book, equation: Equation) -> EquationAnswer:
+    correct = None if equation.correct is None else _formula(equation.entry, equation.correct)
+    return {
+        "id": equation.id,
+        "name": equation.entry,
+        "reference": equation.number,
+        "verdict": equation.verdict,
+        "as_printed": None if equation.printed is None else _formula(equation.entry, equation.printed),
+        "corrected": correct if equation.verdict == "misprinted" else None,
+        "derived": correct if equation.verdict == "derived" else None,
+        "note": equation.note,
+        "worst_q": list(equation.worst) or None,
+        "uses": [
+            *(symbol.name for symbol in found.symbols_of(equation)),
+            *(line.name for line in found.lines_of(equation)),
+        ],
+    }
+
+
+def _formula(name: str, expression: Expression) -> Formula:
+    return {"mathml": typeset.mathml(expression, name), "latex": typeset.latex(expression, name)}
+
+
+def _symbol(symbol: Symbol) -> SymbolAnswer:
+    return {
+        "id": symbol.name,
+        "mathml": typeset.mathml_name(symbol.name),
+        "latex": typeset.latex_name(symbol.name),
+        "meaning": symbol.meaning,
+        "value": symbol.constant if symbol.fixed and symbol.kind in ("length", "number") else None,
+        "unit": "m" if symbol.kind in ("length", "slide") else "",
+    }
+
+
+def _values(robot: Robot, q: Array) -> list[EquationValues]:
+    out: list[EquationValues] = [{"values": []} for _ in q]
+    for equation, values in book(robot).compare(q):
+        printed = [None] * len(q) if values.printed is None else values.printed.tolist()
+        numbers = (values.correct, values.dh, values.difference, values.turn)
+        rows = zip(printed, *(column.tolist() for column in numbers), strict=True)
+        for answer, (as_printed, correct, dh, difference, turn) in zip(out, rows, strict=True):
+            answer["values"].append(
+                {
+                    "id": equation.id,
+                    "name": equation.entry,
+                    "printed": as_printed,
+                    "corrected": correct,
+                    "dh": dh,
+                    "difference": difference,
+                    "turn": turn,
+                    "unit": "m" if equation.is_length else "",
+                }
+            )
+    return out

@@ -1,0 +1,242 @@
+"""The equations of one arm, ready to be shown: the chapter's own, or derived ones that have passed their check.
+
+`book` makes them in the calling thread, for REST and scripts. A visitor's worker must not wait for sympy, so it
+asks `book_later` and goes on drawing. Both share one cache.
+"""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Literal
+
+import numpy as np
+
+from app.equations.derive import AXES, COLUMNS, Line, derive
+from app.equations.expression import Expression, astray, from_text, names, value
+from app.equations.symbols import Symbol, chapter_symbols
+from kin import Robot, chapter, fk, get_robot
+from kin.transforms import Array
+
+Verdict = Literal["right", "misprinted", "unreadable", "derived"]
+
+CHECKED = 1000  # random configurations a derived form must agree in
+AGREES = 1e-12  # of the arm's size, and of 1 for directions
+KEPT = 64  # books
+
+
+class DerivationError(RuntimeError):
+    """A derived closed form disagrees with forward kinematics, so it is not shown."""
+
+
+@dataclass(frozen=True)
+class Equation:
+    """One equation: an entry of ``T_base_tool = [n o a p]``.
+
+    Attributes:
+        id: its key within the book: the chapter's number, or the entry for a derived one.
+        number: the chapter's number; None for a derived one.
+        entry: which entry, e.g. ``"p_x"``; ``"T"`` for the whole matrix.
+        verdict: what is to be thought of it.
+        printed: as the chapter prints it; None for derived and unreadable ones.
+        correct: what equals the DH product; None for the unreadable one.
+        note: what is wrong with the printed form.
+        worst: for a misprinted one, the configuration inside the limits, in radians, where that shows most.
+    """
+
+    id: str
+    number: int | None
+    entry: str
+    verdict: Verdict
+    printed: Expression | None
+    correct: Expression | None
+    note: str = ""
+    worst: tuple[float, ...] = ()
+
+    @property
+    def index(self) -> tuple[int, int]:
+        """Row and column in T_base_tool; raises ValueError for the whole matrix."""
+        column, row = self.entry.split("_")
+        return AXES.index(row), COLUMNS.index(column)
+
+    @property
+    def is_length(self) -> bool:
+        """Whether it is in metres: an entry of p. Else a pure number."""
+        return self.entry[0] == "p"
+
+    @cached_property
+    def wrong_terms(self) -> tuple[bool, ...]:
+        """For each outer term of `printed`, whether it is a misprint."""
+        assert self.printed is not None
+        assert self.correct is not None
+        return astray(self.printed, self.correct)
+
+    @cached_property
+    def mended_terms(self) -> tuple[bool, ...]:
+        """For each outer term of `correct`, whether the print has it wrong or lacks it."""
+        assert self.printed is not None
+        assert self.correct is not None
+        return astray(self.correct, self.printed)
+
+
+@dataclass(frozen=True)
+class Values:
+    """One equation at configurations: arrays ``(...)``, in metres for p, else pure numbers.
+
+    `printed` is None where nothing is printed. `difference` and `turn` are those of what is on show, the printed
+    form if there is one, from the DH product: the latter as an angle, see `kin.chapter.turned`.
+    """
+
+    printed: Array | None
+    correct: Array
+    dh: Array
+    difference: Array
+    turn: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Book:
+    """All equations of one arm.
+
+    Attributes:
+        source: whether they are the chapter's or derived here.
+        symbols: what the names stand for, by name.
+        lines: intermediate results, each using only those before it.
+        equations: position first for derived ones, in the order of the print for the chapter's.
+    """
+
+    robot: Robot
+    source: Literal["chapter", "derived"]
+    symbols: dict[str, Symbol]
+    lines: tuple[Line, ...]
+    equations: tuple[Equation, ...]
+
+    def equation(self, key: str) -> Equation:
+        """The one with this id; raises KeyError."""
+        return self._by_id[key]
+
+    def values(self, equation: Equation, q: Array, T_base_tool: Array | None = None) -> Values:
+        """An equation that can be read, at configurations ``(..., n)``; their poses may be given if known."""
+        return self._values(equation, q, fk(self.robot, q) if T_base_tool is None else T_base_tool, {})
+
+    def compare(self, q: Array) -> list[tuple[Equation, Values]]:
+        """Every equation that can be read, at configurations ``(..., n)``."""
+        T = fk(self.robot, q)
+        known: dict[str, Array] = {}
+        return [(e, self._values(e, q, T, known)) for e in self.equations if e.correct is not None]
+
+    def _values(self, equation: Equation, q: Array, T: Array, known: dict[str, Array]) -> Values:
+        forms = [form for form in (equation.printed, equation.correct) if form is not None]
+        for form in forms:
+            for name in names(form):
+                self._value(name, q, known)
+        *printed, correct = (np.broadcast_to(value(form, known), q.shape[:-1]) for form in forms)
+        dh = T[(..., *equation.index)]
+        shown = printed[0] if printed else correct
+        turn = chapter.turned(T, equation.index, shown)
+        return Values(printed[0] if printed else None, correct, dh, shown - dh, turn)
+
+    def lines_of(self, equation: Equation) -> list[Line]:
+        """The intermediate results it needs, in order; not among them: entries with an equation of their own."""
+        wanted: set[str] = set()
+        fresh = [name for form in (equation.printed, equation.correct) if form for name in names(form)]
+        while fresh:
+            line = self._lines.get(fresh.pop())
+            if line is not None and line.name not in wanted:
+                wanted.add(line.name)
+                fresh += names(line.expression)
+        return [line for line in self.lines if line.name in wanted]
+
+    def symbols_of(self, equation: Equation) -> list[Symbol]:
+        """What its names stand for, those of its intermediate results included."""
+        forms = [equation.printed, equation.correct, *(line.expression for line in self.lines_of(equation))]
+        found = {name for form in forms if form is not None for name in names(form)}
+        return [symbol for name, symbol in self.symbols.items() if name in found]
+
+    @cached_property
+    def _by_id(self) -> dict[str, Equation]:
+        return {equation.id: equation for equation in self.equations}
+
+    @cached_property
+    def _lines(self) -> dict[str, Line]:
+        return {line.name: line for line in self.lines}
+
+    @cached_property
+    def _entries(self) -> dict[str, Expression]:
+        return {e.entry: e.correct for e in self.equations if e.correct is not None}
+
+    def _value(self, name: str, q: Array, known: dict[str, Array]) -> None:
+        """Add what a name is worth to `known`, and before it whatever that takes."""
+        if name in known:
+            return
+        if name in self.symbols:
+            known[name] = self.symbols[name].value(q)
+            return
+        form = self._lines[name].expression if name in self._lines else self._entries[name]
+        for inner in names(form):
+            self._value(inner, q, known)
+        known[name] = value(form, known)
+
+
+@lru_cache(maxsize=KEPT)
+def book(robot: Robot) -> Book:
+    """The equations of an arm: the chapter's if it prints any, else derived and checked, which may take a second.
+
+    Raises:
+        DerivationError: the check failed, by how much the message says.
+    """
+    if robot.id in chapter.LENGTHS and robot == get_robot(robot.id):
+        return _chapter_book(robot)
+    derived = derive(robot)
+    order = [f"{column}_{row}" for column in "pnoa" for row in AXES]
+    equations = tuple(Equation(key, None, key, "derived", None, derived.entries[key]) for key in order)
+    out = Book(robot, "derived", derived.symbols, derived.lines, equations)
+    check(out)
+    return out
+
+
+@lru_cache(maxsize=KEPT)
+def book_later(robot: Robot) -> Future[Book]:
+    """The same in a thread of its own, one arm after the other. Its error, if any, is the future's."""
+    return _POOL.submit(book, robot)
+
+
+_POOL = ThreadPoolExecutor(1, thread_name_prefix="equations")
+
+
+def check(found: Book) -> None:
+    """Compare a book with forward kinematics; raises `DerivationError` where they disagree."""
+    robot = found.robot
+    q = robot.random_q(np.random.default_rng(0), CHECKED)
+    size = robot.reach + float(np.linalg.norm(robot.T_world_base[:3, 3]))
+    if not math.isfinite(size):  # a slide without stops
+        size = 1.0 + float(np.abs(q).max())
+    for equation, values in found.compare(q):
+        error = float(np.abs(values.correct - values.dh).max())
+        # Written so that a NaN fails too.
+        if not error <= AGREES * (size if equation.is_length else 1.0):
+            raise DerivationError(
+                f"the closed form derived for {equation.entry} of {robot.id} is off by {error:.2g} and not shown"
+            )
+
+
+def _chapter_book(robot: Robot) -> Book:
+    verdicts: dict[str, Verdict] = {"right": "right", "wrong": "misprinted", "garbled": "unreadable"}
+    equations = tuple(
+        Equation(
+            str(e.number),
+            e.number,
+            e.entry,
+            verdicts[e.verdict],
+            from_text(e.printed) if e.printed else None,
+            from_text(e.corrected) if e.corrected else None,
+            e.note,
+            tuple(math.radians(angle) for angle in e.worst_at),
+        )
+        for e in chapter.equations(robot.id)
+    )
+    used = {name for e in equations for form in (e.printed, e.correct) if form is not None for name in names(form)}
+    lines = tuple(Line(name, from_text(text)) for name, text in chapter.ABBREVIATIONS.items() if name in used)
+    return Book(robot, "chapter", chapter_symbols(robot), lines, equations)

@@ -1,0 +1,179 @@
+"""An equation's right-hand side as one tree, from which its value and every way of showing it come.
+
+What is shown and what is computed cannot drift apart: `value`, `latex` and `mathml` (:mod:`app.equations.typeset`)
+walk the same tree. The chapter's equations get theirs from the text of :mod:`kin.chapter`, in the order of the
+print; derived ones get theirs from sympy, in an order that people would write.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from kin import chapter
+from kin.transforms import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Name:
+    """A symbol: c1, s23, d6, n_x. What it stands for is told by a `Symbol` or a `Line` of the same name."""
+
+    id: str
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A whole number, 0 or larger."""
+
+    value: int
+
+
+@dataclass(frozen=True, slots=True)
+class Negative:
+    """−of."""
+
+    of: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Product:
+    """Two or more factors, none of them a product; the first is not negative, its sign is the product's."""
+
+    factors: tuple[Expression, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Sum:
+    """Two or more terms, none of them a sum."""
+
+    terms: tuple[Expression, ...]
+
+
+Expression = Name | Number | Negative | Product | Sum
+
+
+def value(expression: Expression, values: Mapping[str, Array]) -> Array:
+    """The value for given values of the names, broadcast together."""
+    match expression:
+        case Name(id=name):
+            return values[name]
+        case Number(value=number):
+            return np.asarray(float(number))
+        case Negative(of=inner):
+            return -value(inner, values)
+        case Product(factors=factors):
+            out = value(factors[0], values)
+            for factor in factors[1:]:
+                out = out * value(factor, values)
+            return out
+        case Sum(terms=terms):
+            out = value(terms[0], values)
+            for term in terms[1:]:
+                out = out + value(term, values)
+            return out
+
+
+def names(expression: Expression) -> list[str]:
+    """Every name in it, in order of appearance, each once."""
+    match expression:
+        case Name(id=name):
+            return [name]
+        case Negative(of=inner):
+            return names(inner)
+        case Product(factors=parts) | Sum(terms=parts):
+            return list(dict.fromkeys(name for part in parts for name in names(part)))
+    return []
+
+
+def size(expression: Expression) -> int:
+    """How many names and numbers are written down: how long it is to read."""
+    match expression:
+        case Negative(of=inner):
+            return size(inner)
+        case Product(factors=parts) | Sum(terms=parts):
+            return sum(size(part) for part in parts)
+    return 1
+
+
+def terms(expression: Expression) -> tuple[Expression, ...]:
+    """What is added up on the outside; the expression alone if nothing is."""
+    return expression.terms if isinstance(expression, Sum) else (expression,)
+
+
+def negative(expression: Expression) -> Expression:
+    """−expression, without two minus signs in a row."""
+    return expression.of if isinstance(expression, Negative) else Negative(expression)
+
+
+def multiply(factors: list[Expression]) -> Expression:
+    """Their product, nested products written as one, the sign of the first in front of all."""
+    minus = isinstance(factors[0], Negative)
+    flat: list[Expression] = []
+    for i, factor in enumerate(factors):
+        if i == 0 and isinstance(factor, Negative):
+            factor = factor.of
+        flat += factor.factors if isinstance(factor, Product) else [factor]
+    out = flat[0] if len(flat) == 1 else Product(tuple(flat))
+    return Negative(out) if minus else out
+
+
+def add(parts: list[Expression]) -> Expression:
+    """Their sum, nested sums written as one."""
+    flat = [term for part in parts for term in terms(part)]
+    return flat[0] if len(flat) == 1 else Sum(tuple(flat))
+
+
+def from_text(text: str) -> Expression:
+    """An expression of the chapter's notation, in the order of the text; raises ValueError as `chapter.parse`."""
+    return _from_ast(chapter.parse(text))
+
+
+def _from_ast(node: ast.expr) -> Expression:
+    match node:
+        case ast.Name(id=name):
+            return Name(name)
+        case ast.UnaryOp(operand=inner):
+            return negative(_from_ast(inner))
+        case ast.BinOp(left=left, op=ast.Mult(), right=right):
+            return multiply([_from_ast(left), _from_ast(right)])
+        case ast.BinOp(left=left, op=ast.Add(), right=right):
+            return add([_from_ast(left), _from_ast(right)])
+        case ast.BinOp(left=left, op=ast.Sub(), right=right):
+            return add([_from_ast(left), *map(negative, terms(_from_ast(right)))])
+    raise ValueError(f"not in the chapter's notation: {ast.dump(node)}")
+
+
+def astray(expression: Expression, other: Expression) -> tuple[bool, ...]:
+    """For each of the `terms`, whether it does not belong to `other`, both multiplied out.
+
+    Of a misprinted equation and the right one these are the misprints, however differently the two are bracketed;
+    the other way round, what is missing.
+    """
+    known = expanded(other)
+    return tuple(bool(expanded(term) - known) for term in terms(expression))
+
+
+def expanded(expression: Expression) -> Counter[tuple[bool, tuple[str, ...]]]:
+    """Multiplied out: its terms, each a sign (True for minus) with sorted names, and how often it occurs."""
+    match expression:
+        case Name(id=name):
+            return Counter([(False, (name,))])
+        case Number(value=number):
+            return Counter([(False, (str(number),))])
+        case Negative(of=inner):
+            return Counter({(not minus, found): k for (minus, found), k in expanded(inner).items()})
+        case Sum(terms=parts):
+            return sum((expanded(part) for part in parts), Counter())
+        case Product(factors=parts):
+            return Counter(
+                (
+                    sum(minus for minus, _ in choice) % 2 == 1,
+                    tuple(sorted(n for _, found in choice for n in found)),
+                )
+                for choice in product(*(expanded(part).elements() for part in parts))
+            )

@@ -1,0 +1,117 @@
+"""REST: the equations of every arm, typeset, and their values."""
+
+import json
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+from pydantic import TypeAdapter
+
+import kin
+from app.api.equations import EquationsAnswer, EquationValues
+from app.equations import book
+from kin import chapter
+
+ROBOTS = tuple(kin.builtin_robots().values())
+each_robot = pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.id)
+
+
+def get(client, robot):
+    response = client.get(f"/api/v1/robots/{robot.id}/equations")
+    assert response.status_code == 200, response.text
+    return json.loads(response.text)
+
+
+def post(client, robot, q):
+    response = client.post(f"/api/v1/robots/{robot.id}/equations", json={"q": q})
+    assert response.status_code == 200, response.text
+    return json.loads(response.text, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
+
+
+@each_robot
+def test_every_arm_has_its_equations(client, robot):
+    answer = get(client, robot)
+    assert TypeAdapter(EquationsAnswer).validate_python(answer, strict=True) == answer
+    printed = robot.id in chapter.LENGTHS
+    assert answer["source"] == ("chapter" if printed else "derived")
+    entries = [equation["name"] for equation in answer["equations"] if equation["name"] != "T"]
+    assert sorted(entries) == sorted(f"{column}_{row}" for column in "noap" for row in "xyz")
+    if not printed:
+        assert entries[:3] == ["p_x", "p_y", "p_z"]
+    known = {item["id"] for item in (*answer["symbols"], *answer["lines"])}
+    for equation in answer["equations"]:
+        assert set(equation["uses"]) <= known
+        assert (equation["derived"] is not None) == (not printed)
+        assert (equation["reference"] is None) == (not printed)
+    formulas = [
+        equation[form] for equation in answer["equations"] for form in ("as_printed", "corrected", "derived")
+    ]
+    formulas += [line["formula"] for line in answer["lines"]]
+    for formula in filter(None, (*formulas, *answer["symbols"])):
+        assert ET.fromstring(formula["mathml"]).tag.endswith("}math")
+        assert formula["latex"].count("{") == formula["latex"].count("}")
+
+
+@pytest.mark.parametrize("robot_id", list(chapter.LENGTHS))
+def test_the_chapters_equations_are_told_with_their_verdicts(client, robot_id):
+    answer = get(client, kin.get_robot(robot_id))
+    verdicts = {"right": "right", "wrong": "misprinted", "garbled": "unreadable"}
+    for told, equation in zip(answer["equations"], chapter.equations(robot_id), strict=True):
+        assert (told["reference"], told["name"], told["note"]) == (equation.number, equation.entry, equation.note)
+        assert told["verdict"] == verdicts[equation.verdict]
+        assert (told["as_printed"] is None) == (equation.verdict == "garbled")
+        wrong = equation.verdict == "wrong"
+        assert (told["corrected"] is not None) == wrong
+        assert told["worst_q"] == (np.radians(equation.worst_at).tolist() if wrong else None)
+
+
+def test_lengths_are_in_metres_and_angles_have_no_value(client):
+    symbols = {symbol["id"]: symbol for symbol in get(client, kin.get_robot("pioneer5"))["symbols"]}
+    assert (symbols["d6"]["value"], symbols["d6"]["unit"]) == (0.12, "m")
+    assert symbols["c23"]["value"] is None
+    assert symbols["c23"]["meaning"] == "cos(θ2 + θ3)"
+    slide = {symbol["id"]: symbol for symbol in get(client, kin.get_robot("stanford"))["symbols"]}["d3"]
+    assert (slide["value"], slide["unit"]) == (None, "m")
+
+
+@each_robot
+def test_values_of_one_and_of_a_list(client, robot):
+    q = robot.random_q(np.random.default_rng(0), 300)
+    answers = post(client, robot, q.tolist())["results"]
+    assert len(answers) == 300
+    one = post(client, robot, q[7].tolist())
+    assert TypeAdapter(EquationValues).validate_python(one, strict=True) == one
+    T = kin.fk(robot, q)
+    for k, answer in enumerate(answers):
+        for told in answer["values"]:
+            equation = book(robot).equation(told["id"])
+            assert told["dh"] == T[(k, *equation.index)]
+            assert told["corrected"] == pytest.approx(told["dh"], abs=1e-12)
+            shown = told["corrected"] if told["printed"] is None else told["printed"]
+            assert told["difference"] == pytest.approx(shown - told["dh"], abs=1e-15)
+            if equation.verdict != "misprinted":
+                assert abs(told["difference"]) < 1e-12
+                assert told["turn"] < 1e-12
+    for told, again in zip(answers[7]["values"], one["values"], strict=True):
+        assert told["dh"] == again["dh"]
+
+
+def test_a_misprint_shows_in_the_values(client):
+    robot = kin.get_robot("pioneer5")
+    worst = next(e for e in get(client, robot)["equations"] if e["reference"] == 6)["worst_q"]
+    (six,) = [v for v in post(client, robot, worst)["values"] if v["id"] == "6"]
+    assert six["difference"] == pytest.approx(-0.13522961568046956)
+    assert (six["unit"], six["turn"]) == ("m", 0.0)
+
+
+@pytest.mark.parametrize(
+    ("q", "field"), [([1.0], "q"), ([[0, 0, 0, 0, 0], [1]], "q[1]"), (["a", 0, 0, 0, 0], "q[0]"), (None, "q")]
+)
+def test_misuse_is_refused_by_name(client, q, field):
+    response = client.post("/api/v1/robots/pioneer5/equations", json={"q": q})
+    assert response.status_code == 422
+    assert response.json()["errors"][0]["field"] == field
+
+
+def test_an_unknown_robot_is_refused(client):
+    assert client.get("/api/v1/robots/nobody/equations").status_code == 404

@@ -1,0 +1,92 @@
+"""The lesson on equations in a real browser: typeset, live, and inside its panel on every screen."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from page import Tab
+from playwright.sync_api import Browser, Locator, expect
+
+import kin
+from kin import chapter
+
+pytestmark = pytest.mark.browser
+
+PIONEER = kin.get_robot("pioneer5")
+
+
+def open_lesson(tab: Tab) -> None:
+    tab.page.get_by_role("tab", name="Learn").click()
+    tab.choose("Lesson", "Equations")
+    expect(shown(tab)).to_be_visible()
+
+
+def shown(tab: Tab) -> Locator:
+    return tab.page.locator("[data-equation]")
+
+
+def off(tab: Tab) -> Locator:
+    return tab.page.locator("[data-off]")
+
+
+def stays_inside(tab: Tab) -> None:
+    """What the lesson shows is no wider than its panel, and nothing is squeezed to nothing."""
+    width = tab.page.viewport_size["width"]
+    for part in (shown(tab), off(tab)):
+        box = part.bounding_box()
+        assert box is not None
+        assert box["width"] > 150
+        assert box["x"] + box["width"] <= width
+    for formula in tab.page.locator("[data-equation] math").all():
+        box = formula.bounding_box()
+        assert box is not None
+        assert box["height"] > 8, "MathML is laid out"
+
+
+def test_equations_are_typeset_marked_and_shown_where_they_are_worst(tab: Tab) -> None:
+    open_lesson(tab)
+    expect(shown(tab)).to_have_attribute("data-verdict", "misprinted")
+    expect(tab.page.get_by_text("Equation (6):")).to_be_visible()
+    stays_inside(tab)
+    tab.screenshot("equations-light")
+    tab.page.get_by_role("button", name="Show where it is worst").click()
+    worst = next(e for e in chapter.EQUATIONS if e.number == 6)
+    expect(off(tab)).to_contain_text("135 mm here")
+    tab.wait_for_tool(kin.fk(PIONEER, np.radians(worst.worst_at))[:3, 3], within=0.06)
+    tab.screenshot("equations-worst")
+    tab.choose("Equation", "(13) a_x ✕ misprinted")
+    expect(off(tab)).to_contain_text("no difference at this pose")  # θ4 is 0 here
+    tab.page.get_by_role("button", name="Show where it is worst").click()
+    expect(off(tab)).to_contain_text("by 35.3° here, by 35.3° at worst")
+    stays_inside(tab)
+    tab.choose("Equation", "(4) p_x ✓")
+    expect(off(tab)).to_contain_text("equal to the DH product")
+    tab.screenshot("equations-right")
+
+
+def test_the_other_arms(tab: Tab) -> None:
+    open_lesson(tab)
+    for robot_id in ("redundant7", "redundant7-craig", "puma560"):
+        tab.choose("Robot", kin.get_robot(robot_id).name)
+        first = "19" if robot_id == "redundant7" else "p_x"
+        expect(tab.page.locator(f"[data-robot={robot_id}][data-equation='{first}']")).to_be_visible()
+        stays_inside(tab)
+        tab.screenshot(f"equations-{robot_id}")
+    tab.choose("Equation", "n_x")
+    tab.page.get_by_text("Symbols", exact=True).click()
+    expect(tab.page.locator("table[aria-label=symbols]")).to_be_visible()
+    tab.screenshot("equations-derived-symbols")
+
+
+def test_dark_and_phone(browser: Browser, address: str, tab: Tab) -> None:
+    tab.page.get_by_role("tab", name="View").click()
+    tab.check("Dark page")
+    open_lesson(tab)
+    tab.screenshot("equations-dark")
+    tab.page.get_by_role("tab", name="View").click()
+    tab.check("Dark page")
+    phone = Tab(browser, address, 390, 844)
+    open_lesson(phone)
+    stays_inside(phone)
+    phone.screenshot("equations-phone")
+    phone.close()
