@@ -51,6 +51,14 @@ class Stage(Protocol):
         """The pose ``(4, 4)`` asked for with the gizmo while it is the arm's task, else None."""
 
     @property
+    def locked(self) -> tuple[float | None, ...] | None:
+        """The value each joint is locked at, None for a joint that may move; None if none is locked."""
+
+    @property
+    def branch(self) -> str | None:
+        """The branch asked for, as `kin.solve_ik` takes it."""
+
+    @property
     def degrees(self) -> bool:
         """Whether angles are shown in degrees; else radians."""
 
@@ -61,11 +69,23 @@ class Stage(Protocol):
     def post(self, key: Hashable, value: object = None) -> None:
         """Have `Feature.handle` called by the worker; any thread may. The newest value of a key wins."""
 
-    def go(self, q: Array, why: Notice | None = None) -> None:
-        """Send the arm to a configuration ``(n,)``, eased, the target following; the status says `why`."""
+    def go(self, q: Array, why: Notice | None = None, at_once: bool = False) -> None:
+        """Send the arm to a configuration ``(n,)``, the target following; the status says `why`.
+
+        Eased, unless it is to be there `at_once`: between two configurations easing takes the tool off its target.
+        """
 
     def ask(self, T_base_tool: Array) -> None:
         """Make this pose ``(4, 4)`` the target, as if the gizmo had been put there."""
+
+    def require(self, task: Task) -> None:
+        """Ask for this much of the target from now on."""
+
+    def unlock(self, joint: int | None = None) -> None:
+        """Unlock a joint; None: all of them."""
+
+    def any_branch(self) -> None:
+        """Let any branch take the target."""
 
     def tell(self, notice: Notice) -> None:
         """Show a notice in the status line."""
@@ -106,6 +126,9 @@ class Feature:
 
     def on_answer(self, result: IKResult) -> None:
         """A target was answered."""
+
+    def on_question(self) -> None:
+        """The task, the branch asked for, or what is locked was changed."""
 
     def on_style(self) -> None:
         """Degrees or radians, dark or light, were changed."""

@@ -12,14 +12,16 @@ import numpy as np
 import viser
 
 from app.viewer.meshes import Part, body
+from app.viewer.offer import Offer
 from kin import Robot, fk, link_frames
-from kin.transforms import Array, wxyz_from_rotation
+from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
 
 SMALL = (
     "trim",
     "axis",
     "approach",
 )  # their shadows would cost as much as those of the bodies, and nobody sees them
+NO_TURN = np.array([1.0, 0.0, 0.0, 0.0])
 GAP_COLOR = (213, 94, 0)
 GRID_LIGHT = {"cell_color": (214, 219, 226), "section_color": (176, 184, 196)}
 GRID_DARK = {"cell_color": (58, 64, 74), "section_color": (88, 96, 110)}
@@ -35,7 +37,8 @@ class ArmScene:
             removed node and gives it to the next node of that name, whose own pose is not sent when it is zero.
 
     Attributes:
-        gizmo: the transform controls; the visitor drags them, `place_gizmo` moves them.
+        gizmo: the transform controls; the visitor drags them, `place_gizmo` moves them. Where not every turn is
+            offered, it has arrows only, and a ring for each turn hangs on it (`offer`).
     """
 
     def __init__(self, scene: viser.SceneApi, robot: Robot, dark: bool = False, root: str = "/arm") -> None:
@@ -65,6 +68,8 @@ class ArmScene:
             visible=False,
         )
         self._top += [self.gizmo, self._gap]
+        self._rings: list[viser.TransformControlsHandle] = []
+        self._offers = 0
         self.show(robot.q_home)
         self.place_gizmo(fk(robot, robot.q_home))
 
@@ -83,6 +88,41 @@ class ArmScene:
     def place_gizmo(self, T_base_tool: Array) -> None:
         """Move the gizmo. Never call it while the visitor holds it."""
         _assign(self.gizmo, T_base_tool[:3, 3], wxyz_from_rotation(T_base_tool[:3, :3]))
+        for ring in self._rings:
+            _assign(ring, np.zeros(3), NO_TURN)
+
+    @property
+    def gizmo_pose(self) -> Array:
+        """Where the gizmo is ``(4, 4)``, its rings aside."""
+        return from_position_wxyz(self.gizmo.position, self.gizmo.wxyz)
+
+    def offer(self, offer: Offer) -> list[viser.TransformControlsHandle]:
+        """Give the gizmo these arrows and rings; returns the rings that are nodes of their own.
+
+        Those hang on the gizmo: their pose is told in its frame. One set of controls cannot leave out a single
+        ring, as a ring is drawn wherever both axes of its plane are active.
+        """
+        for ring in self._rings:
+            ring.remove()
+        self._offers += 1
+        some = any(offer.rings) and not (all(offer.rings) and all(offer.arrows))
+        self.gizmo.active_axes = offer.arrows
+        self.gizmo.disable_rotations = some or not any(offer.rings)
+        self._rings = [
+            self._scene.add_transform_controls(
+                f"{self.gizmo.name}/ring-{'xyz'[axis]}-{self._offers}",
+                scale=0.26 * self.body.radius,
+                line_width=4.0,
+                active_axes=(axis != 0, axis != 1, axis != 2),
+                disable_axes=True,
+                disable_sliders=True,
+                depth_test=False,
+                opacity=0.95,
+            )
+            for axis in range(3)
+            if some and offer.rings[axis]
+        ]
+        return self._rings
 
     def show_gap(self, tool: Array, target: Array | None) -> None:
         """Draw a line and a ghost gripper from the tool point to an unreached target ``(3,)``; None hides them."""

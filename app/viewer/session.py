@@ -25,6 +25,7 @@ from app.viewer.feature import Feature
 from app.viewer.inbox import Inbox
 from app.viewer.lessons import LESSONS
 from app.viewer.motion import Motion, Pace
+from app.viewer.offer import offered
 from app.viewer.panel import assign, listen, listen_click
 from app.viewer.panel.joints import JointSliders
 from app.viewer.panel.lessons import LessonChoice
@@ -34,6 +35,7 @@ from app.viewer.panel.status import Notice, StatusLine, notice
 from app.viewer.panel.target import TASKS, TargetChoice, default_task
 from app.viewer.panel.view import ViewOptions, ViewState, configure_theme
 from app.viewer.scene import ArmScene
+from app.viewer.selfmotion import self_motion
 from app.viewer.tabs import TABS
 from kin import Robot, Task
 from kin.transforms import Array, from_position_wxyz
@@ -41,10 +43,9 @@ from kin.transforms import Array, from_position_wxyz
 log = logging.getLogger(__name__)
 
 READOUT_INTERVAL = 0.05
-SMOOTH = 0.6  # rad of one joint in one event: more than that is no motion but another posture
 NARROW = 700  # pixels
-# Phase (start, update, end), position (m) and wxyz of the gizmo.
-GizmoEvent = tuple[str, list[float], list[float]]
+# Phase (start, update, end), position (m) and wxyz of the gizmo, and whether it is one of its rings.
+GizmoEvent = tuple[str, list[float], list[float], bool]
 WELCOME = Notice("hand", "Ready", "Drag the gizmo at the tool, or move a joint.")
 BY_HAND = Notice("hand", "Moved by joints", "The target follows the tool.")
 
@@ -75,6 +76,7 @@ class Session:
         self._read_at = 0.0
         self._branch: str | None = None  # as solve_ik takes it
         self._held_free: str | None = None
+        self._locks: list[bool] = []
         self._arms = 0
         self._sheet = False
         self._tabs: list[Feature] = []
@@ -139,6 +141,16 @@ class Session:
         return self._target
 
     @property
+    def locked(self) -> tuple[float | None, ...] | None:
+        if not any(self._locks):
+            return None
+        return tuple(x if shut else None for x, shut in zip(self.goal.tolist(), self._locks, strict=True))
+
+    @property
+    def branch(self) -> str | None:
+        return self._branch
+
+    @property
     def degrees(self) -> bool:
         return self._degrees
 
@@ -146,10 +158,10 @@ class Session:
     def dark(self) -> bool:
         return self._view.dark
 
-    def go(self, q: Array, why: Notice | None = None) -> None:
-        """Head for a configuration, the gizmo following the tool."""
+    def go(self, q: Array, why: Notice | None = None, at_once: bool = False) -> None:
+        """Head for a configuration, or be there at once, the gizmo following the tool."""
         self._target = None
-        self._aim(q)
+        self._aim(q, ease=not at_once)
         self._let_go_of_branch()
         self._status.show(why or BY_HAND)
 
@@ -157,6 +169,21 @@ class Session:
         """Answer a target as if the gizmo had been put there."""
         self._scene.place_gizmo(T_base_tool)
         self._solve(T_base_tool)
+
+    def require(self, task: Task) -> None:
+        """Ask for this much of the target from now on."""
+        self._target_choice.show(task)
+        self._require(task)
+
+    def unlock(self, joint: int | None = None) -> None:
+        """Unlock a joint; None: all of them."""
+        self._on_lock(joint, False)
+
+    def any_branch(self) -> None:
+        """Let any branch take the target."""
+        self._branch_choice.reset()
+        self._branch = None
+        self._ask_anew()
 
     def tell(self, notice: Notice) -> None:
         """Show a notice in the status line."""
@@ -238,6 +265,9 @@ class Session:
             case ("free", str(robot_id), str(name), bool(degrees)):
                 if (robot_id, degrees) == (self._robot.id, self._degrees):
                     self._on_free(name, value)
+            case ("lock", str(robot_id), index):
+                if robot_id == self._robot.id:
+                    self._on_lock(cast("int | None", index), bool(value))
             case ("branch", str(robot_id)):
                 if robot_id == self._robot.id:
                     self._on_branch(value)
@@ -270,13 +300,17 @@ class Session:
     # What the visitor can do
 
     def _on_gizmo(self, value: object) -> None:
-        phase, position, wxyz = cast(GizmoEvent, value)
+        phase, position, wxyz, ring = cast(GizmoEvent, value)
         self._dragging = phase != "end"
         if phase == "start":
             return
         target = from_position_wxyz(position, wxyz)
+        if ring:  # the rings hang on the gizmo, which stays as it is until the ring is let go
+            target = self._scene.gizmo_pose @ target
         if self._target is None or not np.array_equal(target, self._target):
             self._solve(target)
+        if ring and not self._dragging:
+            self._scene.place_gizmo(target)
 
     def _on_slider(self, index: int, value: object) -> None:
         q = self._motion.goal.copy()
@@ -290,6 +324,29 @@ class Session:
         """Take the same pose on another branch, and stay there."""
         self._branch = self._branch_choice.read(value)
         self._solve(kin.fk(self._robot, self._motion.goal) if self._target is None else self._target)
+        self._for_features(lambda feature: feature.on_question())
+
+    def _on_lock(self, joint: int | None, shut: bool) -> None:
+        """Lock or unlock a joint, or all of them, where the arm is heading."""
+        which = range(self._robot.n) if joint is None else (joint,)
+        for i in which:
+            self._locks[i] = shut
+        self._sliders.show_locks(self._locks)
+        numbers = [str(i + 1) for i, kept in enumerate(self._locks) if kept]
+        if numbers:
+            joints = "Joint " + numbers[0] if len(numbers) == 1 else "Joints " + ", ".join(numbers)
+            detail = "A target leaves what is locked where it is; its slider still moves it."
+            self._status.show(Notice("hand", f"{joints} locked", detail))
+        else:
+            self._status.show(Notice("hand", "No joint is locked", "Every joint may move to follow a target."))
+        self._ask_anew()
+
+    def _ask_anew(self) -> None:
+        """What is asked for was changed, not the target: answer it again."""
+        if self._target is not None:
+            self._solve(self._target)
+        self._show_posture()
+        self._for_features(lambda feature: feature.on_question())
 
     def _on_free(self, name: str, value: object) -> None:
         """Move what is free while the tool stays; where the limits end, the arm stops and the status says why."""
@@ -311,24 +368,18 @@ class Session:
             self._aim(best.q)
 
     def _self_motion(self, name: str, value: float) -> kin.IKResult:
-        """The tool where it is with a free value set: a smooth motion if there is one, else the same branch."""
+        """The tool where it is with a free value set."""
         q = self._motion.goal
-        T = kin.fk(self._robot, q)
-        for branch in (None, "seed"):
-            result = kin.solve_ik(
-                self._robot, T, task=self._task, q_seed=q, branch=branch, redundancy={name: value}, max_solutions=1
-            )
-            if result.solutions and float(np.abs(result.solutions[0].q - q).max()) < SMOOTH:
-                break
-        return result
+        return self_motion(self._robot, kin.fk(self._robot, q), self._task, q, self.locked, name, value)
 
     def _posture(self) -> kin.IKResult:
         """What is free where the arm is heading, on the branch it is on."""
         q = self._motion.goal
         seed = "seed" if kin.branch_names(self._robot) else None
         return kin.solve_ik(
-            self._robot, kin.fk(self._robot, q), task=self._task, q_seed=q, branch=seed, max_solutions=1
-        )
+            self._robot, kin.fk(self._robot, q), task=self._task, q_seed=q, locked=self.locked, branch=seed,
+            max_solutions=1,
+        )  # fmt: skip
 
     def _on_robot(self, name: str) -> None:
         robot = next((r for r in self.store.robots if r.name == name), None)
@@ -349,11 +400,12 @@ class Session:
         if name not in TASKS:
             self._target_choice.show(self._task)
             raise kin.InputError("task", name, "one of " + ", ".join(TASKS))
-        self._task = TASKS[name]
-        self._scene.gizmo.disable_rotations = self._task == "position"
-        if self._target is not None:
-            self._solve(self._target)
-        self._show_posture()
+        self._require(TASKS[name])
+
+    def _require(self, task: Task) -> None:
+        self._task = task
+        self._offer_gizmo()
+        self._ask_anew()
 
     def _on_units(self, radians: bool) -> None:
         self._degrees = not radians
@@ -379,8 +431,9 @@ class Session:
         target = T[:3, 3] if self._task == "position" else T
         with SOLVE_SECONDS.labels("viewer").time():
             result = kin.solve_ik(
-                self._robot, target, task=self._task, q_seed=self._motion.goal, branch=self._branch
-            )
+                self._robot, target, task=self._task, q_seed=self._motion.goal, locked=self.locked,
+                branch=self._branch,
+            )  # fmt: skip
         self._target = T
         if result.best is not None:
             self._aim(result.best.q)
@@ -394,9 +447,9 @@ class Session:
             self._branch = None
             self._branch_choice.reset()
 
-    def _aim(self, q: Array, held: int | None = None) -> None:
+    def _aim(self, q: Array, held: int | None = None, ease: bool = True) -> None:
         """Head for a configuration; the sliders follow, but for the one in the visitor's hand."""
-        self._motion.aim(q, time.perf_counter(), self._pace.eases)
+        self._motion.aim(q, time.perf_counter(), ease and self._pace.eases)
         self._sliders_due, self._held = True, held
 
     # What the visitor sees
@@ -445,11 +498,13 @@ class Session:
         weights = np.where(robot.revolute, 1.0, 4.0)
         self._motion = Motion(robot.q_home, weights)
         self._q = robot.q_home
+        self._locks = [False] * robot.n
         self._arms += 1
         self._scene = ArmScene(self._client.scene, robot, self._view.dark, f"/arm-{self._arms}")
         self._task = default_task(robot)
         self._target_choice.show(self._task)
-        self._listen_gizmo()
+        self._listen_gizmo(self._scene.gizmo, ring=False)
+        self._offer_gizmo()
         self._sliders = self._make_sliders()
         self._branch = None
         with self._posture_folder:
@@ -468,15 +523,21 @@ class Session:
 
     def _make_sliders(self) -> JointSliders:
         return JointSliders(
-            self._client.gui, self._joint_folder, self._robot, self._motion.goal, self._degrees, self.post
-        )
+            self._client.gui, self._joint_folder, self._robot, self._motion.goal, self._locks, self._degrees,
+            self.post,
+        )  # fmt: skip
 
-    def _listen_gizmo(self) -> None:
-        @self._scene.gizmo.on_update
+    def _offer_gizmo(self) -> None:
+        """A gizmo with what the arm can follow in this task."""
+        for ring in self._scene.offer(offered(self._robot, self._task)):
+            self._listen_gizmo(ring, ring=True)
+
+    def _listen_gizmo(self, handle: viser.TransformControlsHandle, ring: bool) -> None:
+        @handle.on_update
         async def _(event: viser.TransformControlsEvent) -> None:
             if event.client is not None:
                 gizmo = event.target
-                self.post("gizmo", (event.phase, gizmo.position.tolist(), gizmo.wxyz.tolist()))
+                self.post("gizmo", (event.phase, gizmo.position.tolist(), gizmo.wxyz.tolist(), ring))
 
     def _apply_view(self) -> None:
         self._scene.show_frames(self._view.frames)

@@ -130,6 +130,19 @@ class FakeBrowser:
     def release(self) -> None:
         self.send("TransformControlsDragEndMessage", name=self.gizmo, owner=self.nodes[self.gizmo]["owner"])
 
+    def click(self, name: str) -> None:
+        """Click a node of the scene."""
+        self.send(
+            "SceneNodeClickMessage",
+            name=name,
+            instance_index=0,
+            ray_origin=(0, 0, 0),
+            ray_direction=(0, 0, 1),
+            screen_pos=(0.5, 0.5),
+            modifier=None,
+            owner=self.nodes[name]["owner"],
+        )
+
     # Time
 
     def wait(self, until: Callable[[], bool], timeout: float = 10.0) -> None:
@@ -172,6 +185,9 @@ class FakeBrowser:
                 self.nodes = {
                     n: v for n, v in self.nodes.items() if n != m["name"] and not n.startswith(m["name"] + "/")
                 }
+            case "SceneNodeUpdateMessage":
+                if m["name"] in self.nodes:
+                    self.nodes[m["name"]]["props"].update(m["updates"])
             case "GuiUpdateMessage":
                 if m["uuid"] in self.gui:
                     for key, value in m["updates"].items():

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from app.viewer.feature import Feature
 from app.viewer.lessons.equations import EquationsLesson
+from app.viewer.lessons.postures import Postures
+from app.viewer.lessons.redundancy import RedundancyLesson
 
 # In the order of a course.
-LESSONS: tuple[type[Feature], ...] = (EquationsLesson,)
+LESSONS: tuple[type[Feature], ...] = (EquationsLesson, Postures, RedundancyLesson)

@@ -1,8 +1,13 @@
-"""One slider per joint, with exact entry, limits, and the unit of the visitor's choice."""
+"""One slider per joint, with exact entry, limits, and the unit of the visitor's choice; a padlock for each.
+
+A padlock keeps a joint where it is whenever inverse kinematics moves the arm; by hand it still moves.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import viser
@@ -11,6 +16,13 @@ from app.viewer.panel import Post, assign, listen
 from kin import InputError, Robot
 from kin.robot import Joint
 from kin.transforms import Array
+
+CLOSED = "\N{BLACK SQUARE}"  # a padlock is missing from many fonts
+UNLOCK_ALL = "Unlock all"
+LOCK_HINT = (
+    "A locked joint stays at its value while the arm follows a target; its slider still moves it. "
+    f"Click a number to lock that joint, or to unlock it: {CLOSED} marks what is locked."
+)
 
 
 def label(robot: Robot, index: int) -> str:
@@ -27,14 +39,28 @@ def scale(joint: Joint, degrees: bool) -> tuple[float, int, str]:
     return (180 / math.pi, 2, "°") if degrees else (1.0, 4, "rad")
 
 
+def padlocks(locked: Sequence[bool]) -> tuple[str, ...]:
+    """The buttons of the padlocks: one number per joint, with a symbol if it is locked."""
+    buttons = tuple(f"{CLOSED}{i + 1}" if shut else str(i + 1) for i, shut in enumerate(locked))
+    return (*buttons, UNLOCK_ALL) if any(locked) else buttons
+
+
 class JointSliders:
     """The sliders of one robot in one unit; rebuilt when either changes.
 
-    Posts ``("joint", i, degrees)`` with the slider's value in screen units.
+    Posts ``("joint", robot id, i, degrees)`` with the slider's value in screen units, and
+    ``("lock", robot id, i)`` with whether the joint is to be locked (i is None for all joints).
     """
 
     def __init__(
-        self, gui: viser.GuiApi, folder: viser.GuiFolderHandle, robot: Robot, q: Array, degrees: bool, post: Post
+        self,
+        gui: viser.GuiApi,
+        folder: viser.GuiFolderHandle,
+        robot: Robot,
+        q: Array,
+        locked: Sequence[bool],
+        degrees: bool,
+        post: Post,
     ) -> None:
         self.robot = robot
         self._degrees = degrees
@@ -54,6 +80,8 @@ class JointSliders:
                 )
                 listen(slider, post, ("joint", robot.id, i, degrees))
                 self._sliders.append(slider)
+            self._locks = gui.add_button_group("Locked", padlocks(locked), hint=LOCK_HINT)
+        self._listen_locks(post)
 
     def read(self, index: int, value: object) -> float:
         """A slider's value as radians or metres, inside the limits; raises `InputError` for anything else."""
@@ -74,7 +102,26 @@ class JointSliders:
                 value = round(float(q[i]) * factor, decimals)
                 assign(slider, min(max(value, slider.min), slider.max))
 
+    def show_locks(self, locked: Sequence[bool]) -> None:
+        """Show which joints are locked ``(n,)``."""
+        if self._locks.options != padlocks(locked):
+            self._locks.options = padlocks(locked)
+
+    def _listen_locks(self, post: Post) -> None:
+        @self._locks.on_click
+        async def _(event: Any) -> None:
+            if event.client is None:
+                return
+            shown = str(event.target.value)
+            number = shown.removeprefix(CLOSED)
+            if shown == UNLOCK_ALL:
+                post(("lock", self.robot.id, None), False)
+            elif number.isdecimal() and 1 <= int(number) <= self.robot.n:
+                # What the click asks for, not "the other state": two quick clicks arrive as one.
+                post(("lock", self.robot.id, int(number) - 1), shown == number)
+
     def remove(self) -> None:
         """Take the sliders out of the panel."""
+        self._locks.remove()
         for slider in self._sliders:
             slider.remove()

@@ -158,8 +158,13 @@ class FreeSliders:
                 self._strips[item.name] = self._gui.add_html("")
 
 
-def strip_html(item: Redundancy, low: float, high: float, scale: float, unit: str) -> str:
-    """The feasible ranges as bars on a line from `low` to `high` (screen units), and in words."""
+def strip_html(
+    item: Redundancy, low: float, high: float, scale: float, unit: str, under: str = UNDER_TRACK
+) -> str:
+    """The feasible ranges as bars on a line from `low` to `high` (screen units), and in words.
+
+    `under`: margins that put the line under a slider's track.
+    """
     span = high - low
 
     def percent(value: float) -> float:
@@ -181,7 +186,7 @@ def strip_html(item: Redundancy, low: float, high: float, scale: float, unit: st
     words = f"feasible: {ranges}" if ranges else "no value is feasible"
     return (
         f'<div data-free="{escape(item.name)}" style="margin:-.2em 1em .4em">'
-        f'<div style="position:relative;height:6px;{UNDER_TRACK};border-radius:3px;'
+        f'<div style="position:relative;height:6px;{under};border-radius:3px;'
         f'background:rgba(128,128,128,.28)" aria-hidden="true">{bars}{mark}</div>'
         '<div style="font-size:.74em;line-height:1.6;opacity:.8;font-variant-numeric:tabular-nums">'
         f"{escape(words)}</div></div>"

@@ -1,0 +1,128 @@
+"""The ring of arm angles, and the trade of two joints on one line: geometry, without a scene.
+
+In an arm with a spherical shoulder and wrist the elbow turns on a circle about the line from shoulder to wrist.
+The arm angle ψ says where on it: 0 where the elbow is highest (:mod:`kin.solvers.srs7`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kin import Robot, fk, link_frames
+from kin.solvers import solver_for, srs7
+from kin.solvers.common import inverse
+from kin.transforms import Array, frame_from_approach
+
+STEPS = 144
+FLAT = 1e-6  # m; a circle smaller than that is a straight arm
+
+
+@dataclass(frozen=True, eq=False)
+class Circle:
+    """The elbow's circle: shoulder, wrist, centre ``(3,)``, radius, and the directions of ψ = 0 and ψ = 90°."""
+
+    shoulder: Array
+    wrist: Array
+    center: Array
+    radius: float
+    e1: Array
+    e2: Array
+
+    def at(self, psi: float, scale: float = 1.0) -> Array:
+        """The elbow ``(3,)`` at an arm angle; `scale` widens the circle."""
+        return self.center + scale * self.radius * (math.cos(psi) * self.e1 + math.sin(psi) * self.e2)
+
+
+def elbow_circle(robot: Robot, q: Array) -> Circle | None:
+    """The circle at a configuration ``(n,)``; None for an arm of another kind."""
+    match = solver_for(robot)
+    if match is None or match.solver.NAME != srs7.NAME:
+        return None
+    geometry: srs7.Geometry = match.geometry
+    M = geometry.inverse_base @ fk(robot, q) @ geometry.inverse_tool
+    W = M[:3, 3]
+    L = float(np.linalg.norm(W))
+    d3, d5 = geometry.d3, geometry.d5
+    if L < FLAT:
+        return None
+    u = W / L
+    # In the triangle S–E–W: the elbow's distance along the line, and off it.
+    along = (d3 * d3 - d5 * d5 + L * L) / (2.0 * L)
+    off = math.sqrt(max(d3 * d3 - along * along, 0.0))
+    level = math.hypot(u[0], u[1])
+    # W on axis 1 has no highest elbow; the reference is then the base's x axis, as in the solver.
+    e2 = np.array([u[1], -u[0], 0.0]) / level if level > 1e-12 else np.array([0.0, -math.copysign(1.0, u[2]), 0.0])
+    e1 = np.cross(e2, u)
+    base = inverse(geometry.inverse_base)
+    R, p = base[:3, :3], base[:3, 3]
+    return Circle(p, R @ W + p, R @ (along * u) + p, off, R @ e1, R @ e2)
+
+
+def arc_segments(circle: Circle, intervals: Iterable[tuple[float, float]], scale: float) -> tuple[Array, Array]:
+    """The whole circle as short chords ``(k, 2, 3)``, and which of them are feasible ``(k,)``.
+
+    A chord is cut where a range ends, so that the ends are exact.
+    """
+    ranges = list(intervals)
+    marks = {-math.pi + 2.0 * math.pi * i / STEPS for i in range(STEPS + 1)}
+    marks |= {min(max(x, -math.pi), math.pi) for pair in ranges for x in pair}
+    angles = sorted(marks)
+    points = np.array([circle.at(a, scale) for a in angles])
+    middles = [0.5 * (a + b) for a, b in pairwise(angles)]
+    inside = np.array([any(low <= m <= high for low, high in ranges) for m in middles])
+    return np.stack([points[:-1], points[1:]], axis=1), inside
+
+
+def coaxial(robot: Robot) -> bool:
+    """Whether joints 1 and 2 turn about one line, the same way: then one can take back what the other does."""
+    if robot.n < 2 or not robot.revolute[:2].all():
+        return False
+    axes = [joint_axis(robot, robot.q_home, i) for i in (0, 1)]
+    (p, a), (r, b) = axes
+    return bool(np.linalg.norm(a - b) < 1e-9 and np.linalg.norm(np.cross(r - p, a)) < 1e-9)
+
+
+def joint_axis(robot: Robot, q: Array, joint: int) -> tuple[Array, Array]:
+    """A point of a joint's axis and its direction ``(3,)``, in the base frame."""
+    row = robot.joint_rows[joint]
+    frames = link_frames(robot, q)
+    # In the standard convention joint i turns about z of the frame before it, in the modified one about its own.
+    row -= robot.convention == "standard"
+    frame = frames[row] if row >= 0 else robot.T_world_base
+    return frame[:3, 3], frame[:3, 2]
+
+
+def trade_segments(robot: Robot, q: Array, radius: float) -> tuple[Array, NDArray[np.int64]]:
+    """Arcs of θ1 and, going on from its end, of θ2 about their common line, as chords ``(k, 2, 3)``; and
+    whose each is ``(k,)``: 0 and 1 for the joints, 2 for the ray at θ1 + θ2, which stays where it is in a trade.
+    """
+    p, z = joint_axis(robot, q, 1)
+    x, y, _ = frame_from_approach(z).T  # the same for all configurations: the line does not move
+    chords: list[Array] = []
+    numbers: list[int] = []
+    start = 0.0
+    for joint, width in ((0, radius), (1, 1.25 * radius)):
+        end = start + float(q[joint])
+        points = [
+            p + width * (math.cos(a) * x + math.sin(a) * y)
+            for a in np.linspace(start, end, max(2, math.ceil(abs(end - start) / 0.08) + 1)).tolist()
+        ]
+        chords += [np.array(pair) for pair in pairwise(points)]
+        # An arrow head: two strokes back from the tip.
+        tip, turn = points[-1], math.copysign(1.0, end - start)
+        forward = turn * (-math.sin(end) * x + math.cos(end) * y)
+        out = math.cos(end) * x + math.sin(end) * y
+        for side in (-1.0, 1.0):
+            chords.append(np.array([tip - 0.22 * radius * forward + side * 0.12 * radius * out, tip]))
+        numbers += [joint] * (len(points) + 1)
+        start = end
+    total = float(q[0] + q[1])
+    chords.append(np.array([p, p + 1.4 * radius * (math.cos(total) * x + math.sin(total) * y)]))
+    numbers.append(2)
+    return np.array(chords), np.array(numbers, dtype=np.int64)

@@ -1,0 +1,122 @@
+"""The lessons "Postures" and "Redundancy", and the padlocks, in a real browser."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from page import Tab
+from playwright.sync_api import Browser, expect
+
+import kin
+from app.viewer.lessons.postures.ghosts import places
+from app.viewer.lessons.postures.listing import survey
+
+pytestmark = pytest.mark.browser
+
+PUMA, SRS, PRINTED, PIONEER = (
+    kin.get_robot(name) for name in ("puma560", "redundant7-craig", "redundant7", "pioneer5")
+)
+
+
+def learn(tab: Tab, robot: kin.Robot, lesson: str) -> None:
+    tab.choose("Robot", robot.name)
+    tab.page.get_by_role("tab", name="Learn").click()
+    tab.choose("Lesson", lesson)
+
+
+def press(tab: Tab, at: np.ndarray) -> None:
+    """Click as a hand does: come near, rest, press, let go."""
+    tab.page.mouse.move(*(at - 2).tolist())
+    tab.page.wait_for_timeout(200)
+    tab.page.mouse.move(*at.tolist())
+    tab.page.wait_for_timeout(200)
+    tab.page.mouse.down()
+    tab.page.wait_for_timeout(100)
+    tab.page.mouse.up()
+    tab.page.wait_for_timeout(900)
+
+
+def test_a_click_on_a_ghost_in_the_picture_morphs_the_arm(tab: Tab) -> None:
+    learn(tab, PUMA, "Postures")
+    rows = tab.page.locator("[data-posture]")
+    expect(rows).to_have_count(8)
+    T = kin.fk(PUMA, PUMA.q_home)
+    postures = survey(PUMA, T, "pose", PUMA.q_home)
+    here = kin.branch_of(PUMA, PUMA.q_home)
+    expect(tab.page.locator("[data-here]")).to_have_attribute("data-posture", here)
+    tab.screenshot("postures-light")
+    wanted = next(p for p in postures if p.can_be_had and p.name != here)
+    assert wanted.q is not None
+    for point in places(PUMA, np.array([wanted.q]))[0][0][4:]:
+        press(tab, tab.pixel(PUMA, point))
+        if tab.page.locator("[data-here]").get_attribute("data-posture") != here:
+            break
+    taken = tab.page.locator("[data-here]").get_attribute("data-posture")
+    assert taken in {p.name for p in postures if p.can_be_had and p.name != here}
+    tab.wait_for_tool(T[:3, 3], within=0.06)
+    tab.row("Take").get_by_role("button", name=str(list(kin.branch_names(PUMA)).index(here) + 1)).click()
+    expect(tab.page.locator("[data-here]")).to_have_attribute("data-posture", here)
+
+
+def test_why_not_and_what_helps(tab: Tab) -> None:
+    learn(tab, PUMA, "Postures")
+    tab.drag_arrow(PUMA, kin.fk(PUMA, PUMA.q_home), axis=2, lengths=3.0)
+    expect(tab.page.locator("[data-why=unreachable]")).to_contain_text("Out of reach by")
+    button = tab.page.get_by_role("button", name="Nearest reachable pose")
+    expect(button).to_be_visible()
+    tab.screenshot("why-not")
+    button.click()
+    expect(tab.page.locator("[data-why]")).to_contain_text("Nothing is missed")
+    expect(button).to_have_count(0)
+
+
+def test_the_cone_and_the_rings_of_five_joints(tab: Tab) -> None:
+    learn(tab, PIONEER, "Postures")
+    expect(tab.page.locator("[data-cone]")).to_contain_text("% of all directions")
+    tab.screenshot("approach-cone")
+
+
+def test_the_ring_of_arm_angles(tab: Tab) -> None:
+    learn(tab, SRS, "Redundancy")
+    p = kin.fk(SRS, SRS.q_home)[:3, 3]
+    tab.type_number("Swing ψ to", "70")
+    expect(tab.row("Swing ψ to").locator("input:visible").last).to_have_value("70")
+    tab.page.wait_for_timeout(1500)
+    tab.wait_for_tool(p, within=0.06)
+    expect(tab.page.locator("[data-residual]")).to_contain_text("Tool held to")
+    expect(tab.page.locator("[data-stops]")).to_contain_text("stop of joint 6")
+    strip = tab.page.locator("[data-free=psi] > div").first.bounding_box()
+    track = tab.row("Swing ψ to").get_by_role("slider").first.bounding_box()
+    assert strip is not None
+    assert track is not None
+    middle = strip["x"] + strip["width"] * (70 + 180) / 360
+    assert abs(middle - (track["x"] + track["width"] / 2)) < 8, "the mark is under the slider's thumb"
+    tab.screenshot("redundancy-ring")
+    learn(tab, PRINTED, "Redundancy")
+    expect(tab.page.locator("[data-idea]")).to_contain_text("Axes 1 and 2 are one line")
+    tab.screenshot("redundancy-trade")
+
+
+def test_padlocks(tab: Tab) -> None:
+    tab.show(PUMA)
+    tab.row("Locked").get_by_role("button", name="2", exact=True).click()
+    expect(tab.status).to_contain_text("Joint 2 locked")
+    tab.drag_arrow(PUMA, kin.fk(PUMA, PUMA.q_home), axis=0, lengths=0.4)
+    assert tab.number("2 shoulder") == 45
+    tab.screenshot("padlocks")
+    tab.page.get_by_role("button", name="Unlock all").click()
+    expect(tab.status).to_contain_text("No joint is locked")
+
+
+def test_a_phone_in_the_dark(browser: Browser, address: str) -> None:
+    phone = Tab(browser, address, 390, 844)
+    phone.page.get_by_role("tab", name="View").click()
+    phone.check("Dark page")
+    learn(phone, PUMA, "Postures")
+    expect(phone.page.locator("[data-posture]")).to_have_count(8)
+    phone.screenshot("postures-phone-dark")
+    for row in phone.page.locator("[data-posture]").all():
+        box = row.bounding_box()
+        assert box is not None
+        assert box["x"] + box["width"] <= 390
+    phone.close()
