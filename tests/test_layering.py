@@ -81,7 +81,8 @@ RULES: dict[str, set[str]] = {
     },
     "app/viewer": {
         *("viser", "trimesh", "numpy", "kin"),
-        *("app.viewer", "app.clouds", "app.equations", "app.metrics", "app.settings", "app.store"),
+        *("app.viewer", "app.clouds", "app.equations", "app.metrics", "app.picture", "app.settings"),
+        "app.store",
     },
 }
 

@@ -37,6 +37,7 @@ class FakeBrowser:
         self.visible: dict[str, bool] = {}
         self.nodes: dict[str, dict[str, Any]] = {}
         self.log: list[dict[str, Any]] = []
+        self.answers = True  # whether it tells what its storage holds, as a page in front does
         self.send(
             "ViewerCameraMessage",
             wxyz=(1, 0, 0, 0),
@@ -167,7 +168,13 @@ class FakeBrowser:
         assert isinstance(data, bytes)
         size, packed = (int.from_bytes(data[i : i + 8], "little") for i in (0, 8))
         inner = zstandard.ZstdDecompressor().decompress(data[16 : 16 + packed], max_output_size=size)
-        for message in msgspec.msgpack.decode(inner)["messages"]:
+        decoded = msgspec.msgpack.decode(inner)
+        arrays = _arrays(data, 16 + packed, decoded["binaryBufferLengths"])
+        for message in decoded["messages"]:
+            for values in (message.get("props"), message.get("updates")):
+                for key, value in (values or {}).items():
+                    if isinstance(value, dict) and "__binary_index" in value:
+                        values[key] = np.frombuffer(arrays[value["__binary_index"]], value["dtype"])
             self._apply(message)
         return True
 
@@ -180,6 +187,13 @@ class FakeBrowser:
                 self.poses.setdefault(m["name"], {})["wxyz"] = m["wxyz"]
             case "SetSceneNodeVisibilityMessage":
                 self.visible[m["name"]] = m["visible"]
+            case "SceneNodeUpdateMessage":
+                if m["name"] in self.nodes:
+                    self.nodes[m["name"]]["props"].update(m["updates"])
+            case "LocalStorageGetItemRequestMessage":
+                if self.answers:
+                    uuid = m["request_uuid"]
+                    self.send("LocalStorageGetItemResponseMessage", request_uuid=uuid, value=None, error=None)
             case "RemoveSceneNodeMessage":
                 # Like the real page, poses stay behind.
                 self.nodes = {
@@ -202,3 +216,13 @@ class FakeBrowser:
                 self.values[m["uuid"]] = m.get("value")
             case _ if "props" in m and "name" in m:
                 self.nodes[m["name"]] = m
+
+
+def _arrays(data: bytes, start: int, lengths: list[int]) -> list[memoryview]:
+    """The raw arrays behind the packed messages, each at a multiple of eight bytes."""
+    found = []
+    for length in lengths:
+        start = (start + 7) // 8 * 8
+        found.append(memoryview(data)[start : start + length])
+        start += length
+    return found

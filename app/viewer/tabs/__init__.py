@@ -6,5 +6,6 @@ Adding one is one module with a :class:`~app.viewer.feature.Feature` and one row
 from __future__ import annotations
 
 from app.viewer.feature import Feature
+from app.viewer.tabs.workspace.tab import Workspace
 
-TABS: tuple[type[Feature], ...] = ()
+TABS: tuple[type[Feature], ...] = (Workspace,)

@@ -1,0 +1,153 @@
+"""What points are coloured by, with which colours, and the legend that says so.
+
+A scale must not move while a cloud grows, and two visitors must see the same one: so its ends come from the arm
+alone, from a few thousand evenly spread draws. What lies beyond an end has the colour of that end.
+
+The maps are uniform to the eye and read alike with all common kinds of colour vision: cividis (Nuñez, Anderson and
+Renslow, PLOS ONE 13(7), 2018), viridis and inferno (van der Walt and Smith, 2015, CC0), sixteen samples of each.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from html import escape
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kin import Robot, WorkspaceChunk, workspace_slice
+from kin.transforms import Array
+from kin.workspace import Measure
+from kin.workspace.extremes import base_line
+from kin.workspace.region import Region
+
+By = Literal["radius", "height", "manipulability", "limits", "one"]
+Colour = tuple[int, int, int]
+Bytes = NDArray[np.uint8]
+
+MAPS = {
+    "cividis": "00224e 002e6c 1e3a6f 35456c 47516c 575d6d 666970 757575 "
+    "848279 948e77 a59c74 b7a96e c8b866 dbc75a eed649 fee838",
+    "viridis": "440154 481a6c 472f7d 414487 39568c 31688e 2a788e 23888e "
+    "1f988b 22a884 35b779 54c568 7ad151 a5db36 d2e21b fde725",
+    "inferno": "000004 0c0826 240c4f 420a68 5d126e 781c6d 932667 ae305c "
+    "c73e4c dd513a ed6925 f8850f fca50a fac62d f2e661 fcffa4",
+}
+BY: dict[str, By] = {
+    "Radius": "radius",
+    "Height": "height",
+    "Manipulability": "manipulability",
+    "Limit margin": "limits",
+    "One colour": "one",
+}
+MEANING: dict[By, str] = {
+    "radius": "distance from joint 1's axis",
+    "height": "height above the base",
+    "manipulability": "manipulability (Yoshikawa)",
+    "limits": "room to the nearest joint limit, of half its range",
+}
+# Okabe and Ito's blue and orange: the arm's own cloud in one colour, and that of another arm.
+OWN: Colour = (0, 114, 178)
+OTHER: Colour = (230, 159, 0)
+LOOKED_AT = 4096  # draws that tell the ends of a scale
+
+
+@dataclass(frozen=True)
+class Scale:
+    """From a quantity to a colour: its values from `low` to `high`."""
+
+    by: By
+    low: float
+    high: float
+
+
+def measures(by: By) -> tuple[Measure, ...]:
+    """What a cloud has to measure to be coloured so."""
+    return ("manipulability",) if by == "manipulability" else ("limits",) if by == "limits" else ()
+
+
+@lru_cache(maxsize=256)
+def line(robot: Robot) -> tuple[Array, Array]:
+    """A point of joint 1's line and its unit direction, ``(3,)`` each."""
+    point, axis, _ = base_line(Region.of(robot, None, None))
+    return point, axis
+
+
+def radius_and_height(robot: Robot, points: Array | NDArray[np.float32]) -> tuple[Array, Array]:
+    """Distance from joint 1's line and height along it ``(k,)`` of points ``(k, 3)``, as in an (r, z) section."""
+    point, axis = line(robot)
+    height = points @ axis
+    across = points - point - (height - float(point @ axis))[:, None] * axis
+    return np.sqrt(np.einsum("ki,ki->k", across, across)), height
+
+
+def quantity(robot: Robot, by: By, chunk: WorkspaceChunk) -> Array:
+    """What each point ``(k,)`` of a chunk is coloured by."""
+    if by == "radius":
+        return radius_and_height(robot, chunk.points)[0]
+    if by == "height":
+        return np.asarray(chunk.points[:, 2], dtype=np.float64)
+    return np.asarray(chunk.measures[by], dtype=np.float64)
+
+
+@lru_cache(maxsize=256)
+def scale_of(robot: Robot, by: By) -> Scale:
+    """The scale of an arm: of a margin and of manipulability from 0, all up to the largest value seen."""
+    if by == "one":
+        return Scale(by, 0.0, 1.0)
+    chunk = workspace_slice(robot, LOOKED_AT, 0, LOOKED_AT, strategy="quasi", measure=measures(by) or None)
+    values = quantity(robot, by, chunk)
+    low = float(values.min()) if by in ("radius", "height") else 0.0
+    return Scale(by, low, max(float(values.max()), low + 1e-9))
+
+
+@lru_cache(maxsize=len(MAPS))
+def table(name: str) -> Bytes:
+    """A map in 256 steps ``(256, 3)``."""
+    samples = np.array([list(bytes.fromhex(c)) for c in MAPS[name].split()], dtype=float)
+    at = np.linspace(0.0, len(samples) - 1.0, 256)
+    steps = np.stack([np.interp(at, np.arange(len(samples)), samples[:, k]) for k in range(3)], axis=1)
+    made: Bytes = np.rint(steps).astype(np.uint8)
+    made.flags.writeable = False
+    return made
+
+
+def paint(values: Array, scale: Scale, name: str) -> Bytes:
+    """The colours ``(k, 3)`` of values ``(k,)``."""
+    at = (values - scale.low) * (255.0 / (scale.high - scale.low))
+    colours: Bytes = table(name)[np.clip(at, 0.0, 255.0).astype(np.uint8)]
+    return colours
+
+
+def legend(scale: Scale, name: str) -> str:
+    """The scale as a bar with its end values, and in words."""
+    stops = ", ".join("#" + c for c in MAPS[name].split())
+    low, high = (value_text(scale.by, value) for value in (scale.low, scale.high))
+    return (
+        f'<div data-legend="{scale.by}" style="margin:.2em 1em .5em;font-size:.76em;line-height:1.5">'
+        f'<div role="img" aria-label="colours from {low} to {high}" style="height:.9em;border-radius:3px;'
+        f'border:1px solid rgba(128,128,128,.4);background:linear-gradient(to right, {stops})"></div>'
+        '<div style="display:flex;justify-content:space-between;font-variant-numeric:tabular-nums">'
+        f"<span>{low}</span><span>{high}</span></div>"
+        f'<div style="opacity:.8">{escape(MEANING[scale.by])}</div></div>'
+    )
+
+
+def names_legend(names: list[tuple[Colour, str]]) -> str:
+    """Which colour is whose."""
+    rows = "".join(
+        '<div style="display:flex;gap:.5em;align-items:baseline"><span aria-hidden="true" style="flex:none;'
+        f'width:.9em;height:.9em;border-radius:50%;background:rgb{colour};align-self:center"></span>'
+        f"<span>{word}: {escape(name)}</span></div>"
+        for (colour, name), word in zip(names, ("blue", "orange"), strict=False)
+    )
+    return f'<div data-legend="names" style="margin:.2em 1em .5em;font-size:.8em;line-height:1.6">{rows}</div>'
+
+
+def value_text(by: By, value: float) -> str:
+    """A quantity for people, with its unit."""
+    if by in ("radius", "height"):
+        return f"{1000.0 * value:.0f} mm".replace("-", "−")
+    return f"{100.0 * value:.0f} %" if by == "limits" else f"{value:.3g}"

@@ -1,0 +1,93 @@
+"""The workspace tab in a real browser: a cloud drawn, cut, clicked on and looked at beside its section."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from page import Tab
+from playwright.sync_api import Browser, expect
+
+import kin
+from app.clouds import Cloud
+
+pytestmark = pytest.mark.browser
+
+PIONEER = kin.get_robot("pioneer5")
+FEW = 20_000  # the picture is rendered in software
+
+
+def draw(tab: Tab, points: int) -> None:
+    tab.page.get_by_role("tab", name="Workspace").click()
+    tab.type_number("Points", str(points))
+    tab.page.get_by_role("button", name="Start").click()
+    expect(tab.page.locator("[data-cloud]")).to_have_attribute("data-cloud", "done")
+    tab.page.wait_for_timeout(700)
+
+
+def test_phone(browser: Browser, address: str) -> None:
+    """First, while no other page is drawing: software rendering of two would take both cores."""
+    phone = Tab(browser, address, 390, 844)
+    draw(phone, 10_000)
+    phone.check("Section plot")
+    expect(phone.page.locator("[data-plot=section] image")).to_have_count(1)
+    phone.page.locator("[data-plot=section]").scroll_into_view_if_needed()
+    phone.screenshot("workspace-phone")
+    phone.close()
+
+
+def test_a_cloud_is_drawn_and_a_click_moves_the_arm_to_its_point(tab: Tab) -> None:
+    draw(tab, FEW)
+    tab.screenshot("workspace-light")
+    points = Cloud(PIONEER, FEW).slice(0, FEW).points.astype(float)
+    # One on the outside, towards the eye: nothing is before it.
+    index = int(np.argmax(points @ np.array([0.5, 0.8, 0.0]) - 2.0 * np.abs(points[:, 2] + 0.1)))
+    tab.page.mouse.click(*tab.pixel(PIONEER, points[index]).tolist())
+    expect(tab.status).to_contain_text("Moved to point")
+    found = int(re.sub(r"\D", "", re.search(r"point ([\d\s]+)", tab.status.inner_text())[1]))  # type: ignore[index]
+    assert np.linalg.norm(tab.pixel(PIONEER, points[found]) - tab.pixel(PIONEER, points[index])) < 12
+    q = kin.configuration_at(PIONEER, found)
+    tab.wait_for_tool(kin.fk(PIONEER, q)[:3, 3], within=0.06)
+    expect(tab.page.locator("table[aria-label='picked point']")).to_be_visible()
+    tab.screenshot("workspace-picked")
+
+    before = tab.status.inner_text()
+    tab.page.mouse.move(300, 560)
+    tab.page.mouse.down()
+    tab.page.mouse.move(360, 540, steps=4)
+    tab.page.mouse.up()
+    tab.page.wait_for_timeout(500)
+    assert tab.status.inner_text() == before, "turning the view is no click"
+    tab.page.get_by_role("tab", name="View").click()
+    tab.page.get_by_role("button", name="Reset view").click()
+
+
+def test_a_cut_and_the_section_beside_the_picture(tab: Tab) -> None:
+    draw(tab, FEW)
+    tab.choose("Colour by", "Manipulability")
+    tab.choose("Cut", "along the arm")
+    expect(tab.page.get_by_text("Cut at (mm)")).to_be_visible()
+    tab.check("Section plot")
+    expect(tab.page.locator("[data-plot=section] image")).to_have_count(1)
+    section = tab.page.locator("[data-plot=section] svg").bounding_box()
+    dot = tab.page.locator("[data-plot=tool] svg").bounding_box()
+    assert section is not None
+    assert dot is not None
+    assert abs(section["y"] - dot["y"]) < 1.5, "the tool's drawing lies over the section's"
+    assert abs(section["x"] - dot["x"]) < 1.5
+    assert section["height"] < 700
+    tab.screenshot("workspace-section-light")
+    tab.page.get_by_role("tab", name="View").click()
+    tab.check("Dark page")
+    tab.page.get_by_role("tab", name="Workspace").click()
+    tab.choose("Compare with", kin.get_robot("scara").name)
+    expect(tab.page.locator("[data-legend=names]")).to_contain_text("orange")
+    expect(tab.page.locator("[data-cloud]")).to_have_attribute("data-cloud", "done")
+    tab.screenshot("workspace-section-dark")
+    tab.page.get_by_role("button", name="Cancel").click()
+    expect(tab.page.locator("[data-cloud]")).to_have_attribute("data-cloud", "ready")
+    tab.check("Section plot")
+    expect(tab.page.locator("[data-plot=section]")).to_have_count(0)
+    tab.page.get_by_role("tab", name="View").click()
+    tab.check("Dark page")
