@@ -86,6 +86,14 @@ class FakeBrowser:
     def sliders(self) -> list[str]:
         return [m["props"]["label"] for m in self.gui.values() if m["type"] == "GuiSliderMessage"]
 
+    def sliders_in(self, folder: str) -> list[str]:
+        """The labels of the sliders in the folder with this label."""
+        (box,) = [
+            u for u, m in self.gui.items() if m["type"] == "GuiFolderMessage" and m["props"]["label"] == folder
+        ]
+        sliders = (m for m in self.gui.values() if m["type"] == "GuiSliderMessage")
+        return [m["props"]["label"] for m in sliders if m["container_uuid"] == box]
+
     @property
     def gizmo(self) -> str:
         return next(n for n, m in self.nodes.items() if m["type"] == "TransformControlsMessage")

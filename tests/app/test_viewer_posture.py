@@ -102,7 +102,7 @@ def test_the_free_slider_moves_the_arm_and_not_the_tool(port: int, robot: kin.Ro
     T = kin.fk(robot, robot.q_home)
     with FakeBrowser(port) as tab:
         choose(tab, robot)
-        (name,) = [s for s in tab.sliders if not s.startswith("Joint")]
+        (name,) = tab.sliders_in("Posture")
         (free,) = kin.solve_ik(robot, T, q_seed=robot.q_home, branch="seed").redundancy
         low, high = next((a, b) for a, b in free.intervals if a <= free.value <= b)
         before = q_of(tab, robot)

@@ -473,7 +473,7 @@ def test_a_click_moves_the_arm_to_the_configuration_of_the_point(tab):
     q = kin.configuration_at(PIONEER, index, seed=17)
     tab.wait(lambda: np.allclose(tab.tool_pose(), kin.fk(PIONEER, q), atol=1e-9))
     tab.settle()
-    shown = [tab.value(label) for label in tab.sliders[: PIONEER.n]]
+    shown = [tab.value(label) for label in tab.sliders_in("Joints")]
     assert np.abs(np.array(shown) - np.degrees(q)).max() < 0.006
     assert "picked point" in tab.html
     mark = [m for m in tab.nodes.values() if m["type"] == "IcosphereMessage"]

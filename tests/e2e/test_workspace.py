@@ -16,6 +16,7 @@ pytestmark = pytest.mark.browser
 
 PIONEER = kin.get_robot("pioneer5")
 FEW = 20_000  # the picture is rendered in software
+COLD = 120_000  # ms; a service that is ready may still be compiling what sections need
 
 
 def draw(tab: Tab, points: int) -> None:
@@ -31,7 +32,7 @@ def test_phone(browser: Browser, address: str) -> None:
     phone = Tab(browser, address, 390, 844)
     draw(phone, 10_000)
     phone.check("Section plot")
-    expect(phone.page.locator("[data-plot=section] image")).to_have_count(1)
+    expect(phone.page.locator("[data-plot=section] image")).to_have_count(1, timeout=COLD)
     phone.page.locator("[data-plot=section]").scroll_into_view_if_needed()
     phone.screenshot("workspace-phone")
     phone.close()
@@ -69,7 +70,7 @@ def test_a_cut_and_the_section_beside_the_picture(tab: Tab) -> None:
     tab.choose("Cut", "along the arm")
     expect(tab.page.get_by_text("Cut at (mm)")).to_be_visible()
     tab.check("Section plot")
-    expect(tab.page.locator("[data-plot=section] image")).to_have_count(1)
+    expect(tab.page.locator("[data-plot=section] image")).to_have_count(1, timeout=COLD)
     section = tab.page.locator("[data-plot=section] svg").bounding_box()
     dot = tab.page.locator("[data-plot=tool] svg").bounding_box()
     assert section is not None
