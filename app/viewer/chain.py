@@ -94,14 +94,15 @@ def chain(robot: Robot) -> Chain:
 def _steps(row: Joint, modified: bool) -> list[Array | None]:
     """The row's elementary motions in order; None stands for the joint's own motion."""
     motion: list[Array | None] = [] if row.kind == "fixed" else [None]
-    about_z: list[Array | None] = [_rotation(2, row.theta), _translation(2, row.d)]
-    about_x: list[Array | None] = [_translation(0, row.a), _rotation(0, row.alpha)]
+    about_z: list[Array | None] = [rotation(2, row.theta), translation(2, row.d)]
+    about_x: list[Array | None] = [translation(0, row.a), rotation(0, row.alpha)]
     if modified:
         return [about_x[1], about_x[0], *motion, *about_z]
     return [*motion, *about_z, *about_x]
 
 
-def _rotation(axis: int, angle: float) -> Array:
+def rotation(axis: int, angle: float) -> Array:
+    """A turn ``(4, 4)`` about x, y or z (0, 1, 2), exact at quarter turns."""
     c, s = exact_cos_sin(angle)
     T = np.eye(4)
     i, j = (axis + 1) % 3, (axis + 2) % 3
@@ -110,7 +111,8 @@ def _rotation(axis: int, angle: float) -> Array:
     return T
 
 
-def _translation(axis: int, length: float) -> Array:
+def translation(axis: int, length: float) -> Array:
+    """A slide ``(4, 4)`` along x, y or z (0, 1, 2)."""
     T = np.eye(4)
     T[axis, 3] = length
     return T

@@ -110,6 +110,11 @@ def sqrt(part: MathML) -> MathML:
     return MathML(f"<msqrt>{part}</msqrt>")
 
 
+def gap() -> MathML:
+    """A thin space, as between a factor and a function's name."""
+    return MathML('<mspace width=".17em"/>')
+
+
 def func(name: str, argument: MathML) -> MathML:
     """A function's upright name and its argument, without brackets: cos θ₁."""
     return row(

@@ -1,0 +1,326 @@
+"""Lesson: a DH table step by step.
+
+A large frame walks from the base to the tool, one elementary motion of the table after another, on the arm as
+it stands. `steps` knows the walk, `page` writes what the panel shows of it, `draw` puts it into the scene; here
+is the player that moves it on, and what the visitor can set.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from itertools import count
+
+import numpy as np
+import viser
+
+from app.viewer import camera
+from app.viewer.feature import Feature, Stage
+from app.viewer.lessons.dh import page
+from app.viewer.lessons.dh.draw import OtherDrawing, WalkDrawing, aside
+from app.viewer.lessons.dh.steps import MOTIONS, ORDERS, length, place, value
+from app.viewer.meshes import body
+from app.viewer.panel import assign, listen
+from kin import InputError, link_frames
+from kin.transforms import Array
+
+PICTURE = 1 / 30  # s between pictures while it plays
+READ = 0.1  # s between texts: nobody reads faster
+MOTION_TIME = 1.3  # s for one motion at speed 1
+REST = 0.5  # s of rest after each; for a zero, which has nothing to show, the only time it takes
+SPEEDS = {"Half": 0.5, "Normal": 1.0, "Double": 2.0}
+BUTTONS, WHILE_PLAYING = ("Back", "Play", "Next"), ("Back", "Pause", "Next")
+
+
+_fresh = count(1)  # for node names: the browser gives the pose of a removed node to the next of its name
+
+
+class DHLesson(Feature):
+    """The walk through the table of the arm on show."""
+
+    key = "dh"
+    title = "DH table step by step"
+
+    def __init__(self, stage: Stage) -> None:
+        super().__init__(stage)
+        self._at = 0.0
+        self._playing = False
+        self._last = self._rest_until = self._read_at = 0.0
+        self._stale = False
+        self._symbols = False
+        self._compare = False
+        self._speed = "Normal"
+        self._drawing: WalkDrawing | None = None
+        self._other: OtherDrawing | None = None
+        self._view: tuple[Array, Array, Array] | None = None  # camera before the comparison, and where that put it
+        gui = stage.client.gui
+        self._caption = gui.add_html("")
+        self._slider = gui.add_slider(
+            "Row",
+            0.0,
+            float(len(stage.robot.rows)),
+            0.01,
+            0.0,
+            hint="Frame 0 is the base; at 2 row 2 is done; a quarter is one motion. Arrow keys move it finely.",
+        )
+        listen(self._slider, self.post, "at")
+        self._buttons = gui.add_button_group(
+            "Motion", BUTTONS, hint="Back and Next: to the end of the motion before or after"
+        )
+        self._listen_buttons()
+        self._table = gui.add_html("")
+        self._matrices = gui.add_html("")
+        self._symbols_box = gui.add_checkbox(
+            "Symbols", False, hint="Aᵢ with its joint left open, constants put in"
+        )
+        listen(self._symbols_box, self.post, "symbols")
+        self._compare_box = gui.add_checkbox(
+            "Compare conventions", False, hint="The same numbers read in the other order, beside the arm"
+        )
+        listen(self._compare_box, self.post, "compare")
+        self._comparison = gui.add_html("", visible=False)
+        self._speed_choice = gui.add_dropdown("Speed", tuple(SPEEDS), initial_value=self._speed)
+        listen(self._speed_choice, self.post, "speed")
+        self._nine = gui.add_html("")
+        self._start()
+
+    def handle(self, key: object, value: object) -> None:
+        match key:
+            case "at":
+                self._at = self._motions(value)
+                self._pause()
+                self._draw()
+                self._write()
+            case ("press", int()):
+                self._press(value)
+            case "speed":
+                if value not in SPEEDS:
+                    assign(self._speed_choice, self._speed)
+                    raise InputError("speed", value, "one of " + ", ".join(SPEEDS))
+                self._speed = str(value)
+            case "symbols":
+                self._symbols = bool(value)
+                self._write()
+            case "compare":
+                self._compare = bool(value)
+                self._show_other(aim=True)
+                self._write()
+            case _:
+                raise KeyError(key)
+
+    def on_robot(self) -> None:
+        self._pause()
+        self._at = 0.0
+        self._take_drawings()
+        self._view = None  # the session has aimed the camera anew
+        self._start()
+
+    def on_picture(self, T_base_tool: Array) -> None:
+        read = time.perf_counter() - self._read_at >= READ
+        self._draw(names=read)
+        if read:
+            self._write()
+        else:
+            # The last of a motion's pictures may be one of these: `tick` writes what they left out.
+            self._stale = True
+            self.due = self.due or READ
+
+    def on_style(self) -> None:
+        self._draw()
+        self._write()
+
+    def tick(self, now: float) -> None:
+        read = (self._stale or self._playing) and now - self._read_at >= READ
+        if self._playing:
+            self._advance(now)
+        if self._playing or read:
+            self._draw(names=read)
+        if read:
+            self._write()
+            if self._playing:
+                assign(self._slider, self._at / MOTIONS)
+        if not self._playing and not self._stale:
+            self.due = None
+
+    def state(self) -> dict[str, object]:
+        return {"at": self._at, "symbols": self._symbols, "compare": self._compare, "speed": self._speed}
+
+    def restore(self, state: dict[str, object]) -> None:
+        at, symbols, compare, speed = (state.get(name) for name in ("at", "symbols", "compare", "speed"))
+        if isinstance(symbols, bool):
+            self._symbols = symbols
+            assign(self._symbols_box, symbols)
+        if isinstance(compare, bool):
+            self._compare = compare
+            assign(self._compare_box, compare)
+            self._show_other()
+        if isinstance(speed, str) and speed in SPEEDS:
+            self._speed = speed
+            assign(self._speed_choice, speed)
+        if isinstance(at, int | float) and not isinstance(at, bool) and 0.0 <= at <= length(self.stage.robot):
+            self._at = float(at)
+        self._pause()
+        self._go(self._at)
+
+    def remove(self) -> None:
+        self._take_drawings()
+        self._aim_back()
+
+    # The player
+
+    def _listen_buttons(self) -> None:
+        presses = count()
+
+        @self._buttons.on_click
+        async def _(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
+            if event.client is not None:
+                # Each under a key of its own: of two presses under one, the second would replace the first.
+                self.post(("press", next(presses)), event.target.value)
+
+    def _press(self, button: object) -> None:
+        self._pause()
+        match button:
+            case "Back":
+                self._go(math.ceil(self._at) - 1)
+            case "Next":
+                self._go(math.floor(self._at) + 1)
+            case "Play":
+                self._play()
+
+    def _motions(self, rows: object) -> float:
+        """The slider's rows in motions; raises `kin.InputError` for what is no number."""
+        if not isinstance(rows, int | float) or not math.isfinite(rows):
+            raise InputError("row", rows, "a finite number")
+        # Rounded, lest 1.25 rows become a hair more than five motions.
+        return self._inside(round(float(rows) * MOTIONS, 6))
+
+    def _inside(self, at: float) -> float:
+        return min(max(float(at), 0.0), float(length(self.stage.robot)))
+
+    def _go(self, at: float) -> None:
+        self._at = self._inside(at)
+        assign(self._slider, self._at / MOTIONS)
+        self._draw()
+        self._write()
+
+    def _play(self) -> None:
+        if self._at >= length(self.stage.robot):
+            self._at = 0.0
+        self._playing = True
+        self._last = self._rest_until = time.perf_counter()
+        self.due = PICTURE
+        self._buttons.options = WHILE_PLAYING
+
+    def _pause(self) -> None:
+        if self._playing:
+            self._playing = False
+            self._stale = True
+            self._buttons.options = BUTTONS
+            assign(self._slider, self._at / MOTIONS)
+
+    def _advance(self, now: float) -> None:
+        """Go on by the time since the last picture; rest at the end of each motion, where it can be read."""
+        # After a long silence it goes on where it was, rather than leap.
+        passed = min(now - self._last, 0.1)
+        self._last = now
+        if now < self._rest_until:
+            return
+        robot, speed = self.stage.robot, SPEEDS[self._speed]
+        number = math.floor(self._at)
+        row, motion = divmod(number, MOTIONS)
+        nothing = value(robot, row, ORDERS[robot.convention][motion], self.stage.q) == 0.0
+        self._at = number + 1.0 if nothing else min(self._at + passed * speed / MOTION_TIME, number + 1.0)
+        if self._at == number + 1.0:
+            self._rest_until = now + REST / speed
+        if self._at >= length(robot):
+            self._pause()
+
+    # What the visitor sees
+
+    def _start(self) -> None:
+        """Show the walk on the arm that is there now."""
+        robot = self.stage.robot
+        self._slider.max = float(len(robot.rows))
+        assign(self._slider, self._at / MOTIONS)
+        self._nine.content = page.nine_steps_html(robot.convention)
+        frames = link_frames(robot, robot.q_home)
+        self._drawing = WalkDrawing(self.stage.client.scene, robot, frames, f"/dh-{next(_fresh)}")
+        self._show_other(aim=True)
+        self._draw()
+        self._write()
+
+    def _take_drawings(self) -> None:
+        for drawing in (self._drawing, self._other):
+            if drawing is not None:
+                drawing.remove()
+        self._drawing = self._other = None
+
+    def _show_other(self, aim: bool = False) -> None:
+        """The other reading beside the arm, if it is to be compared; `aim`: and the camera on both."""
+        if self._compare and self._other is None:
+            self._other = OtherDrawing(self.stage.client.scene, self.stage.robot, f"/dh-{next(_fresh)}")
+            if aim:
+                self._aim_at_both()
+            self._draw()
+        elif not self._compare and self._other is not None:
+            self._other.remove()
+            self._other = None
+            self._aim_back()
+        self._comparison.visible = self._compare
+
+    def _draw(self, names: bool = True) -> None:
+        """Bring the scene up to date; without `names` the tags of frames wait: they cost as much as the rest."""
+        robot, q = self.stage.robot, self.stage.q
+        if self._drawing is None:
+            return
+        frames = link_frames(robot, q)
+        self._drawing.show(place(robot, q, self._at, frames), frames, self.stage.degrees, names)
+        if self._other is not None:
+            others = link_frames(self._other.robot, q)
+            self._other.show(place(self._other.robot, q, self._at, others), frames, others, names)
+
+    def _write(self) -> None:
+        """Bring the texts up to date."""
+        self._read_at = time.perf_counter()
+        self._stale = False
+        robot, q, degrees = self.stage.robot, self.stage.q, self.stage.degrees
+        at = place(robot, q, self._at)
+        _put(self._caption, page.caption_html(robot, at, degrees))
+        _put(self._table, page.table_html(robot, q, at, degrees))
+        _put(self._matrices, page.matrices_html(robot, at, self._symbols))
+        if self._other is not None:
+            other = self._other.robot
+            tools = [link_frames(reading, q)[-1, :3, 3] for reading in (robot, other)]
+            apart = float(np.linalg.norm(tools[0] - tools[1]))
+            there = place(other, q, self._at)
+            _put(self._comparison, page.compare_html(robot, other, q, there, apart, degrees))
+
+    def _aim_at_both(self) -> None:
+        """Move the camera until arm and skeleton are in view, in the direction it looks already."""
+        eye = self.stage.client.camera
+        robot = self.stage.robot
+        aspect = eye.image_width / eye.image_height if eye.image_height > 0 else 1.6
+        position, look_at = camera.view(body(robot), aspect, sheet=aspect < 1.0)
+        before = (np.array(eye.position), np.array(eye.look_at))
+        out = before[0] - before[1]
+        far = max(float(np.linalg.norm(out)), 1.5 * float(np.linalg.norm(position - look_at)))
+        look_at = look_at + aside(robot) / 2
+        eye.position = look_at + far * out / np.linalg.norm(out)
+        eye.look_at = look_at
+        self._view = (*before, np.array(eye.position))
+
+    def _aim_back(self) -> None:
+        """Undo `_aim_at_both`, unless the visitor has moved the camera since."""
+        if self._view is None:
+            return
+        position, look_at, left_at = self._view
+        self._view = None
+        eye = self.stage.client.camera
+        if np.allclose(eye.position, left_at, atol=1e-3):
+            eye.position, eye.look_at = position, look_at
+
+
+def _put(element: viser.GuiHtmlHandle, content: str) -> None:
+    """Show a text, and send it only if it is another one."""
+    if element.content != content:
+        element.content = content

@@ -1,0 +1,104 @@
+"""The lesson on DH tables in a real browser: by keyboard and mouse, light and dark, on a phone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from page import Tab
+from playwright.sync_api import Browser, expect
+
+import kin
+
+pytestmark = pytest.mark.browser
+
+TITLE = "DH table step by step"
+
+
+def open_lesson(tab: Tab) -> None:
+    tab.page.get_by_role("tab", name="Learn").click()
+    tab.choose("Lesson", TITLE)
+    expect(caption(tab)).to_contain_text("Frame 0 stands on the base")
+
+
+def caption(tab: Tab):
+    return tab.page.locator('[data-dh="caption"]')
+
+
+@pytest.fixture
+def lesson(tab: Tab) -> Iterator[Tab]:
+    open_lesson(tab)
+    yield tab
+    tab.page.get_by_role("tab", name="Learn").click()
+    tab.choose("Lesson", "None")
+
+
+def test_the_walk_by_keyboard_with_typeset_matrices(lesson: Tab) -> None:
+    page = lesson.page
+    following = page.get_by_role("button", name="Next")
+    following.focus()
+    entry = lesson.row("Row").locator("input:visible").last
+    for step in ("0.25", "0.5", "0.75", "1", "1.25"):
+        page.keyboard.press("Enter")
+        expect(entry).to_have_value(step)
+    expect(caption(lesson)).to_contain_text("Row 2 of 6: turn 30.0° about z₁ (θ₂, joint 2).")
+    matrices = page.locator("math mtable")
+    expect(matrices).to_have_count(2)
+    box = matrices.first.bounding_box()
+    assert box is not None
+    assert box["height"] > 40
+    assert box["width"] > 120, "MathML is laid out, not written in a line"
+    widths = {cell.bounding_box()["width"] for cell in matrices.first.locator("mtd").all()}  # type: ignore[index]
+    assert max(widths) - min(widths) < 0.5
+    lesson.screenshot("dh-light")
+
+    thumb = lesson.row("Row").get_by_role("slider").first
+    thumb.focus()
+    page.keyboard.press("ArrowRight")
+    expect(entry).to_have_value("1.26")
+    expect(caption(lesson)).to_contain_text("d₂ = 0")
+
+    page.get_by_role("button", name="Play").focus()
+    page.keyboard.press("Space")
+    expect(caption(lesson)).to_contain_text("Row 3 of 6")
+    page.get_by_role("button", name="Pause").press("Space")
+    expect(page.get_by_role("button", name="Play")).to_be_visible()
+
+
+def test_both_readings_side_by_side_on_a_dark_page(lesson: Tab) -> None:
+    page = lesson.page
+    lesson.choose("Robot", kin.get_robot("redundant7").name)
+    expect(caption(lesson)).to_contain_text("Frame 0")
+    page.get_by_role("tab", name="View").click()
+    lesson.check("Dark page")
+    page.get_by_role("tab", name="Learn").click()
+    page.wait_for_timeout(500)
+    lesson.type_number("Row", "2")
+    lesson.check("Symbols")
+    lesson.check("Compare conventions")
+    expect(page.locator('[data-dh="verdict"]')).to_contain_text("z₀ and z₁ one line")
+    expect(page.locator('[data-dh="verdict"]')).to_contain_text("7 joints, 6 freedoms")
+    expect(page.locator('[data-dh="table"]')).to_have_count(2)
+    expect(page.locator("math mtable").first).to_contain_text("cos")
+    lesson.screenshot("dh-compare-dark")
+    steps = page.locator('[data-dh="nine"]')
+    steps.locator("summary").press("Enter")
+    expect(steps.locator("li").last).to_be_visible()
+    expect(steps.locator("li")).to_have_count(9)
+    page.get_by_role("tab", name="View").click()
+    lesson.check("Dark page")
+
+
+def test_the_lesson_on_a_phone(browser: Browser, address: str) -> None:
+    phone = Tab(browser, address, 390, 844)
+    try:
+        open_lesson(phone)
+        phone.type_number("Row", "1.25")
+        expect(caption(phone)).to_contain_text("turn 30.0°")
+        for part in ("caption", "table"):
+            box = phone.page.locator(f'[data-dh="{part}"]').bounding_box()
+            assert box is not None
+            assert box["x"] + box["width"] <= 390, f"the {part} is cut off"
+        phone.screenshot("dh-phone")
+    finally:
+        phone.close()
