@@ -15,4 +15,9 @@ cd "$root"
 ruff check .
 ruff format --check .
 mypy
-pytest "$@"
+if [ $# -gt 0 ]; then
+  exec pytest "$@"
+fi
+# Two at a time, but for what draws pictures or measures time: that wants the machine for itself.
+pytest -n 2 --dist loadfile -m "not slow and not browser and not bench"
+pytest -m "not slow and (browser or bench)"

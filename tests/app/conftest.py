@@ -1,10 +1,15 @@
-"""One REST client for the whole of tests/app: the real application, without starting the viewer beside it."""
+"""One REST client for the whole of tests/app, and a viewer for each file: the real ones, beside each other."""
+
+from collections.abc import Iterator
 
 import pytest
 from fastapi.testclient import TestClient
 
+import kin
+from app.clouds import Clouds
 from app.main import create_app
 from app.settings import Settings
+from app.store import Store
 
 
 @pytest.fixture(scope="session")
@@ -16,3 +21,14 @@ def app():
 def client(app):
     # Not as a context manager: that would run the lifespan, which starts viser.
     return TestClient(app, raise_server_exceptions=False)
+
+
+@pytest.fixture(scope="module")
+def port() -> Iterator[int]:
+    """Where a viewer listens."""
+    from app.viewer.server import ViewerServer
+
+    kin.warm_up()
+    server = ViewerServer(Store(), Settings(), Clouds())
+    yield server.start()
+    server.stop()

@@ -121,6 +121,15 @@ class FakeBrowser:
         self.values[uuid] = value
         self.send("GuiUpdateMessage", uuid=uuid, updates={"value": value})
 
+    def choose(self, robot: str) -> None:
+        """Show another robot, by its name, and wait until it stands there."""
+        if self.value("Robot") == robot:
+            return
+        before = self.gizmo
+        self.set("Robot", robot)
+        self.wait(lambda: before not in self.nodes)
+        self.settle()
+
     def grab(self) -> None:
         self.send("TransformControlsDragStartMessage", name=self.gizmo, owner=self.nodes[self.gizmo]["owner"])
 

@@ -3,39 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
 
 import kin
-from app.clouds import Clouds
-from app.settings import Settings
 from app.store import Store
 from app.viewer.offer import offered
 from app.viewer.panel.joints import CLOSED, UNLOCK_ALL, label, padlocks
-from app.viewer.server import ViewerServer
 from kin.transforms import wxyz_from_rotation
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
 STORE = Store()
 PIONEER, SRS, SCARA = (STORE.get(name) for name in ("pioneer5", "redundant7-craig", "scara"))
-
-
-@pytest.fixture(scope="module")
-def port() -> Iterator[int]:
-    kin.warm_up()
-    server = ViewerServer(STORE, Settings(), Clouds())
-    yield server.start()
-    server.stop()
-
-
-def choose(tab: FakeBrowser, robot: kin.Robot) -> None:
-    tab.set("Robot", robot.name)
-    tab.wait(lambda: label(robot, robot.n - 1) in tab.sliders)
-    tab.settle()
 
 
 def options(tab: FakeBrowser) -> tuple[str, ...]:
@@ -53,7 +35,7 @@ def test_the_buttons_tell_what_is_locked() -> None:
 
 def test_a_locked_joint_stays_while_the_target_is_dragged_and_moves_by_hand(port: int) -> None:
     with FakeBrowser(port) as tab:
-        choose(tab, SRS)
+        tab.choose(SRS.name)
         tab.set("Locked", "3")
         tab.wait(lambda: f"{CLOSED}3" in options(tab))
         assert "Joint 3 locked" in tab.html
@@ -86,7 +68,7 @@ def test_unlocking_frees_the_joint_and_another_arm_has_no_locks(port: int) -> No
     T = kin.fk(SRS, SRS.q_home)
     T[:3, 3] += (0.0, 0.15, 0.0)
     with FakeBrowser(port) as tab:
-        choose(tab, SRS)
+        tab.choose(SRS.name)
         for number in "124":
             tab.set("Locked", number)
             tab.settle(0.1)
@@ -103,13 +85,13 @@ def test_unlocking_frees_the_joint_and_another_arm_has_no_locks(port: int) -> No
         assert np.allclose(tab.tool_pose(), T, atol=1e-6)
         tab.set("Locked", "5")
         tab.settle(0.1)
-        choose(tab, PIONEER)
+        tab.choose(PIONEER.name)
         assert options(tab) == tuple("12345")
 
 
 def test_the_self_motion_keeps_a_locked_joint(port: int) -> None:
     with FakeBrowser(port) as tab:
-        choose(tab, SRS)
+        tab.choose(SRS.name)
         tab.set("Locked", "3")
         tab.settle()
         before = [joint(tab, SRS, i) for i in range(7)]
@@ -161,9 +143,9 @@ def test_rings_hang_on_the_gizmo_where_not_every_turn_is_offered(port: int) -> N
         tab.set("Match", "Point only")
         tab.settle()
         assert not rings(tab)
-        choose(tab, SCARA)
+        tab.choose(SCARA.name)
         assert sorted(rings(tab)) == ["z"]
-        choose(tab, SRS)
+        tab.choose(SRS.name)
         assert not rings(tab)
         tab.set("Match", "Point + approach")
         tab.settle()

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
 
 import kin
-from app.clouds import Clouds
-from app.settings import Settings
 from app.store import Store
 from app.viewer.panel.joints import label
 from app.viewer.panel.posture import short, strip_html
-from app.viewer.server import ViewerServer
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -24,20 +20,6 @@ STORE = Store()
 PIONEER = STORE.get("pioneer5")
 SRS = STORE.get("redundant7-craig")
 PRINTED = STORE.get("redundant7")
-
-
-@pytest.fixture(scope="module")
-def port() -> Iterator[int]:
-    kin.warm_up()
-    server = ViewerServer(STORE, Settings(), Clouds())
-    yield server.start()
-    server.stop()
-
-
-def choose(tab: FakeBrowser, robot: kin.Robot) -> None:
-    tab.set("Robot", robot.name)
-    tab.wait(lambda: label(robot, robot.n - 1) in tab.sliders)
-    tab.settle()
 
 
 def q_of(tab: FakeBrowser, robot: kin.Robot) -> np.ndarray:
@@ -51,7 +33,7 @@ def branch_shown(tab: FakeBrowser) -> str:
 def test_every_branch_can_be_chosen_and_the_tool_stays(port: int) -> None:
     T = kin.fk(SRS, SRS.q_home)
     with FakeBrowser(port) as tab:
-        choose(tab, SRS)
+        tab.choose(SRS.name)
         assert branch_shown(tab) == kin.branch_of(SRS, SRS.q_home)
         seen = []
         for name in kin.branch_names(SRS):
@@ -69,7 +51,7 @@ def test_every_branch_can_be_chosen_and_the_tool_stays(port: int) -> None:
 
 def test_a_chosen_branch_is_kept_while_dragging_and_left_by_hand(port: int) -> None:
     with FakeBrowser(port) as tab:
-        choose(tab, SRS)
+        tab.choose(SRS.name)
         name = next(n for n in kin.branch_names(SRS) if "elbow down" in n)
         tab.set("Branch", short(name))
         tab.settle()
@@ -101,7 +83,7 @@ def test_a_branch_that_is_not_there_says_so(port: int) -> None:
 def test_the_free_slider_moves_the_arm_and_not_the_tool(port: int, robot: kin.Robot) -> None:
     T = kin.fk(robot, robot.q_home)
     with FakeBrowser(port) as tab:
-        choose(tab, robot)
+        tab.choose(robot.name)
         (name,) = tab.sliders_in("Posture")
         (free,) = kin.solve_ik(robot, T, q_seed=robot.q_home, branch="seed").redundancy
         low, high = next((a, b) for a, b in free.intervals if a <= free.value <= b)
@@ -118,7 +100,7 @@ def test_the_free_slider_moves_the_arm_and_not_the_tool(port: int, robot: kin.Ro
 def test_beyond_the_feasible_range_the_arm_stops_at_its_end_and_says_which_joint(port: int) -> None:
     T = kin.fk(SRS, SRS.q_home)
     with FakeBrowser(port) as tab:
-        choose(tab, SRS)
+        tab.choose(SRS.name)
         (free,) = kin.solve_ik(SRS, T, q_seed=SRS.q_home, branch="seed").redundancy
         end = free.intervals[0][1]
         assert end < math.radians(150)
@@ -145,7 +127,7 @@ def test_the_strip_draws_and_words_the_ranges() -> None:
 
 def test_hostile_choices_are_refused_and_the_session_lives(port: int) -> None:
     with FakeBrowser(port) as tab:
-        choose(tab, SRS)
+        tab.choose(SRS.name)
         for name, value in (("Branch", "<b>up</b>"), ("Arm angle ψ", math.nan), ("Arm angle ψ", -math.inf)):
             tab.set(name, value)
             tab.wait(lambda: 'data-status="error"' in tab.html)

@@ -11,8 +11,6 @@ import pytest
 from fake_browser import FakeBrowser
 
 import kin
-from app.clouds import Clouds
-from app.settings import Settings
 from app.store import Store
 from app.viewer.chain import chain
 from app.viewer.lessons.postures.directions import has_cone, patch, reachable, share, sphere
@@ -21,7 +19,6 @@ from app.viewer.lessons.postures.ghosts import link_poses, places, skeleton
 from app.viewer.lessons.postures.listing import Posture, html, limit_margin, survey
 from app.viewer.panel.joints import label
 from app.viewer.panel.posture import short
-from app.viewer.server import ViewerServer
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -209,14 +206,6 @@ def test_the_cone_holds_the_directions_that_the_solver_finds() -> None:
 # In the page
 
 
-@pytest.fixture(scope="module")
-def port() -> Iterator[int]:
-    kin.warm_up()
-    server = ViewerServer(STORE, Settings(), Clouds())
-    yield server.start()
-    server.stop()
-
-
 @pytest.fixture
 def tab(port: int) -> Iterator[FakeBrowser]:
     with FakeBrowser(port) as opened:
@@ -224,12 +213,6 @@ def tab(port: int) -> Iterator[FakeBrowser]:
         opened.wait(lambda: "data-posture" in opened.html)
         opened.settle()
         yield opened
-
-
-def choose(tab: FakeBrowser, robot: kin.Robot) -> None:
-    tab.set("Robot", robot.name)
-    tab.wait(lambda: label(robot, robot.n - 1) in tab.sliders)
-    tab.settle()
 
 
 def rows(tab: FakeBrowser) -> dict[str, str]:
@@ -262,7 +245,7 @@ def grab_to(tab: FakeBrowser, T: np.ndarray) -> None:
 
 
 def test_the_list_marks_the_branch_the_arm_is_on(tab: FakeBrowser) -> None:
-    choose(tab, PUMA)
+    tab.choose(PUMA.name)
     assert tuple(rows(tab)) == kin.branch_names(PUMA)
     assert here(tab) == kin.branch_of(PUMA, PUMA.q_home)
     expected = {p.name: p.state for p in survey(PUMA, home(PUMA), "pose", PUMA.q_home)}
@@ -270,7 +253,7 @@ def test_the_list_marks_the_branch_the_arm_is_on(tab: FakeBrowser) -> None:
 
 
 def test_a_click_on_a_ghost_morphs_the_arm_into_it(tab: FakeBrowser) -> None:
-    choose(tab, PUMA)
+    tab.choose(PUMA.name)
     postures = survey(PUMA, home(PUMA), "pose", PUMA.q_home)
     index = next(i for i, p in enumerate(postures) if p.can_be_had and p.name != here(tab))
     wanted = postures[index]
@@ -283,7 +266,7 @@ def test_a_click_on_a_ghost_morphs_the_arm_into_it(tab: FakeBrowser) -> None:
 
 
 def test_a_number_sends_the_arm_and_one_beyond_a_stop_says_why(tab: FakeBrowser) -> None:
-    choose(tab, PUMA)
+    tab.choose(PUMA.name)
     states = list(rows(tab).values())
     names = kin.branch_names(PUMA)
     blocked = states.index("blocked")
@@ -299,7 +282,7 @@ def test_a_number_sends_the_arm_and_one_beyond_a_stop_says_why(tab: FakeBrowser)
 
 
 def test_ghosts_can_be_hidden_one_by_one_and_all_together(tab: FakeBrowser) -> None:
-    choose(tab, PUMA)
+    tab.choose(PUMA.name)
     before = shown(tab)
     assert len(before) == len(rows(tab)) - 1
     one = sorted(before)[0]
@@ -316,7 +299,7 @@ def test_ghosts_can_be_hidden_one_by_one_and_all_together(tab: FakeBrowser) -> N
 
 
 def test_the_list_follows_the_target_and_rests_when_nothing_changes(tab: FakeBrowser) -> None:
-    choose(tab, PUMA)
+    tab.choose(PUMA.name)
     T = home(PUMA)
     tab.grab()
     for _ in range(10):
@@ -333,7 +316,7 @@ def test_the_list_follows_the_target_and_rests_when_nothing_changes(tab: FakeBro
 
 
 def test_why_not_and_one_click_that_moves_the_target(tab: FakeBrowser) -> None:
-    choose(tab, PUMA)
+    tab.choose(PUMA.name)
     T = home(PUMA)
     T[:3, 3] = (3.0, 0.0, 0.5)
     grab_to(tab, T)
@@ -347,7 +330,7 @@ def test_why_not_and_one_click_that_moves_the_target(tab: FakeBrowser) -> None:
 
 
 def test_one_click_asks_for_less_and_one_unlocks(tab: FakeBrowser) -> None:
-    choose(tab, PUMA)
+    tab.choose(PUMA.name)
     tab.set("Locked", "1")
     tab.settle()
     T = home(PUMA)
@@ -356,7 +339,7 @@ def test_one_click_asks_for_less_and_one_unlocks(tab: FakeBrowser) -> None:
     tab.set("Unlock joint 1", True)
     tab.settle(0.6)
     assert np.allclose(tab.tool_pose(), T, atol=1e-6)
-    choose(tab, PIONEER)
+    tab.choose(PIONEER.name)
     T = home(PIONEER)
     T[:3, :3] = T[:3, :3] @ np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
     grab_to(tab, T)
@@ -368,7 +351,7 @@ def test_one_click_asks_for_less_and_one_unlocks(tab: FakeBrowser) -> None:
 
 
 def test_one_click_lets_any_branch_do_it(tab: FakeBrowser) -> None:
-    choose(tab, PUMA)
+    tab.choose(PUMA.name)
     blocked = next(name for name, state in rows(tab).items() if state == "blocked")
     tab.set("Branch", short(blocked))
     tab.settle(0.6)
@@ -386,13 +369,13 @@ def test_the_cone_is_drawn_for_five_joints_and_can_be_hidden(tab: FakeBrowser) -
     assert f'data-cone="{share(reachable(PIONEER, home(PIONEER)[:3, 3])):.3f}"' in tab.html
     tab.set("Approach cone", False)
     tab.wait(lambda: not tab.visible[cone])
-    choose(tab, PUMA)
+    tab.choose(PUMA.name)
     assert not [n for n in tab.nodes if "/cone" in n]
 
 
 def test_leaving_the_lesson_leaves_nothing(tab: FakeBrowser) -> None:
     for robot in (PANDA, SRS):
-        choose(tab, robot)
+        tab.choose(robot.name)
     tab.set("Lesson", "None")
     tab.settle()
     assert not [n for n in tab.nodes if n.startswith("/postures")]

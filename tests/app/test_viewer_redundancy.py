@@ -11,14 +11,11 @@ import pytest
 from fake_browser import FakeBrowser
 
 import kin
-from app.clouds import Clouds
-from app.settings import Settings
 from app.store import Store
 from app.viewer import selfmotion
 from app.viewer.lessons.redundancy import told
 from app.viewer.lessons.redundancy.ring import arc_segments, coaxial, elbow_circle, joint_axis, trade_segments
 from app.viewer.panel.joints import label
-from app.viewer.server import ViewerServer
 from kin import Redundancy
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -164,26 +161,12 @@ def test_what_is_free_is_told_for_every_arm_and_task() -> None:
 # In the page
 
 
-@pytest.fixture(scope="module")
-def port() -> Iterator[int]:
-    kin.warm_up()
-    server = ViewerServer(STORE, Settings(), Clouds())
-    yield server.start()
-    server.stop()
-
-
 @pytest.fixture
 def tab(port: int) -> Iterator[FakeBrowser]:
     with FakeBrowser(port) as opened:
         opened.set("Lesson", "Redundancy")
         opened.wait(lambda: "data-idea" in opened.html)
         yield opened
-
-
-def choose(tab: FakeBrowser, robot: kin.Robot) -> None:
-    tab.set("Robot", robot.name)
-    tab.wait(lambda: label(robot, robot.n - 1) in tab.sliders)
-    tab.settle()
 
 
 def q_of(tab: FakeBrowser, robot: kin.Robot) -> np.ndarray:
@@ -208,7 +191,7 @@ def free_label(tab: FakeBrowser) -> str:
 
 @pytest.mark.parametrize("robot", [SRS, PRINTED], ids=lambda robot: robot.id)
 def test_the_tool_stays_in_every_picture_of_a_swing(tab: FakeBrowser, robot: kin.Robot) -> None:
-    choose(tab, robot)
+    tab.choose(robot.name)
     T, before = home(robot), q_of(tab, robot)
     poses = swing(tab, free_label(tab), 60)
     assert len(poses) > 20, "a swing, not a jump"
@@ -221,7 +204,7 @@ def test_the_tool_stays_in_every_picture_of_a_swing(tab: FakeBrowser, robot: kin
 
 
 def test_the_end_of_the_range_names_the_joint(tab: FakeBrowser) -> None:
-    choose(tab, SRS)
+    tab.choose(SRS.name)
     (free,) = selfmotion.free_values(SRS, home(SRS), "pose", SRS.q_home, None)
     swing(tab, free_label(tab), 170)
     assert tab.value(free_label(tab)) == pytest.approx(math.degrees(free.intervals[0][1]), abs=0.1)
@@ -230,7 +213,7 @@ def test_the_end_of_the_range_names_the_joint(tab: FakeBrowser) -> None:
 
 
 def test_the_ring_is_drawn_with_its_stops_and_goes_with_the_lesson(tab: FakeBrowser) -> None:
-    choose(tab, SRS)
+    tab.choose(SRS.name)
     tab.wait(lambda: any("/feasible-" in n for n in tab.nodes))
     tab.wait(lambda: sum("/stop-name-" in n for n in tab.nodes) == 2)
     circle = elbow_circle(SRS, SRS.q_home)
@@ -247,7 +230,7 @@ def test_the_ring_is_drawn_with_its_stops_and_goes_with_the_lesson(tab: FakeBrow
 
 
 def test_back_and_forth_turns_round_at_the_stops_until_a_target_is_dragged(tab: FakeBrowser) -> None:
-    choose(tab, SRS)
+    tab.choose(SRS.name)
     swing(tab, free_label(tab), 100)
     tab.set("Swing", True)
     values = []
@@ -269,7 +252,7 @@ def test_back_and_forth_turns_round_at_the_stops_until_a_target_is_dragged(tab: 
 
 
 def test_a_trade_is_told_as_one(tab: FakeBrowser) -> None:
-    choose(tab, PRINTED)
+    tab.choose(PRINTED.name)
     assert "Axes 1 and 2 are one line" in tab.html
     swing(tab, free_label(tab), 45)
     assert "Elbow moved" in tab.html
@@ -280,7 +263,7 @@ def test_a_trade_is_told_as_one(tab: FakeBrowser) -> None:
 
 
 def test_the_choice_between_two_free_values(tab: FakeBrowser) -> None:
-    choose(tab, PIONEER)
+    tab.choose(PIONEER.name)
     assert "Nothing is free" in tab.html
     assert not [s for s in tab.sliders if s.startswith("Swing")]
     tab.set("Match", "Point only")
@@ -295,7 +278,7 @@ def test_the_choice_between_two_free_values(tab: FakeBrowser) -> None:
 
 
 def test_hostile_values_are_refused_and_the_lesson_lives(tab: FakeBrowser) -> None:
-    choose(tab, SRS)
+    tab.choose(SRS.name)
     for name, value in ((free_label(tab), math.nan), (free_label(tab), math.inf)):
         tab.set(name, value)
         tab.wait(lambda: 'data-status="error"' in tab.html)

@@ -41,13 +41,6 @@ def port(viewer: tuple[ViewerServer, int]) -> int:
     return viewer[1]
 
 
-def choose(tab: FakeBrowser, robot: kin.Robot) -> None:
-    before = tab.gizmo
-    tab.set("Robot", robot.name)
-    tab.wait(lambda: before not in tab.nodes)
-    tab.settle()
-
-
 def arrives(tab: FakeBrowser, T: np.ndarray, atol: float = 1e-9) -> None:
     """Wait until the arm shows this tool pose, then until nothing moves any more; it must still be there."""
     tab.wait(lambda: np.allclose(tab.tool_pose(), T, atol=atol))
@@ -101,7 +94,7 @@ def test_two_visitors_do_not_disturb_each_other(port: int) -> None:
         one.settle()
         two.settle()
         two.log.clear()
-        choose(one, SRS)
+        one.choose(SRS.name)
         one.set("Joint 2", -40)
         one.settle()
         two.settle()
@@ -115,7 +108,7 @@ def test_two_visitors_do_not_disturb_each_other(port: int) -> None:
 
 def test_sixty_fast_drags_end_at_the_last_target(port: int) -> None:
     with FakeBrowser(port) as tab:
-        choose(tab, SRS)
+        tab.choose(SRS.name)
         home = kin.fk(SRS, SRS.q_home)
         tab.grab()
         for k in range(60):
@@ -132,7 +125,7 @@ def test_sixty_fast_drags_end_at_the_last_target(port: int) -> None:
 
 def test_the_gizmo_is_never_moved_while_held_nor_away_from_an_unreachable_target(port: int) -> None:
     with FakeBrowser(port) as tab:
-        choose(tab, SRS)
+        tab.choose(SRS.name)
         T = kin.fk(SRS, SRS.q_home)
         T[:3, 3] = [1.6, 0.0, 0.3]
         tab.log.clear()
@@ -214,7 +207,7 @@ def test_every_robot_can_be_chosen_and_left_again(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
         for robot in [*STORE.robots[1:], *STORE.robots]:
-            choose(tab, robot)
+            tab.choose(robot.name)
             arrives(tab, kin.fk(robot, robot.q_home), 1e-9)
             assert tab.sliders_in("Joints") == [label(robot, i) for i in range(robot.n)]
             gizmos = [name for name, m in tab.nodes.items() if m["type"] == "TransformControlsMessage"]
