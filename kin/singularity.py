@@ -72,7 +72,7 @@ def task_jacobian(robot: Robot, q: Array) -> Array:
 
 
 @lru_cache(maxsize=256)
-def _usual_rank(robot: Robot) -> int:
+def usual_rank(robot: Robot) -> int:
     """How many directions the arm has almost everywhere: a flat arm, for one, never leaves its plane."""
     J = task_jacobian(robot, spread(robot.lower, robot.upper, 16))
     return int(np.linalg.matrix_rank(J, rtol=1e-9).max())
@@ -81,7 +81,7 @@ def _usual_rank(robot: Robot) -> int:
 def _by_jacobian(robot: Robot, q: Array) -> Singularity:
     """The last singular value that is not zero everywhere."""
     J = task_jacobian(robot, q)
-    rank = _usual_rank(robot)
+    rank = usual_rank(robot)
     least = float(np.linalg.svd(J, compute_uv=False)[rank - 1]) if rank else 0.0
     meaning = f"smallest singular value of the {J.shape[0]} × {J.shape[1]} Jacobian: the tool's slowest direction"
     return Singularity("jacobian", meaning, least, "SI")

@@ -443,7 +443,8 @@ class Session:
 
     def _let_go_of_branch(self) -> None:
         """A joint moved by hand may leave the branch that was chosen: from then on none is."""
-        if self._branch not in (None, "seed", kin.branch_of(self._robot, self._motion.goal)):
+        # Asked only where one was chosen: an arm without a closed form has no branches to name.
+        if self._branch not in (None, "seed") and self._branch != kin.branch_of(self._robot, self._motion.goal):
             self._branch = None
             self._branch_choice.reset()
 

@@ -10,6 +10,7 @@ from app.viewer.lessons.dh import DHLesson
 from app.viewer.lessons.equations import EquationsLesson
 from app.viewer.lessons.postures import Postures
 from app.viewer.lessons.redundancy import RedundancyLesson
+from app.viewer.lessons.velocity import VelocityLesson
 
 # In the order of a course.
-LESSONS: tuple[type[Feature], ...] = (DHLesson, EquationsLesson, Postures, RedundancyLesson)
+LESSONS: tuple[type[Feature], ...] = (DHLesson, EquationsLesson, Postures, RedundancyLesson, VelocityLesson)

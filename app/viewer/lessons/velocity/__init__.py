@@ -1,0 +1,353 @@
+"""The lesson "Velocity": the Jacobian where the arm is, and where it loses a direction.
+
+What belongs to a picture (ellipsoid, arrows) moves with each picture. Numbers, sentences and the search for
+singularities follow at `INTERVAL`: nobody reads faster, and a panel is long.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Hashable
+from itertools import count
+from typing import TypeVar
+
+import numpy as np
+import viser
+
+import kin
+from app.viewer.feature import Feature, Stage
+from app.viewer.lessons.velocity import told
+from app.viewer.lessons.velocity.drawing import Drawing
+from app.viewer.lessons.velocity.jog import BUTTONS, Frame, Press, Step, button, step
+from app.viewer.lessons.velocity.rates import (
+    Axes,
+    Ellipsoid,
+    axes_of,
+    lost,
+    nice,
+    part_of,
+    real,
+    semi_axes,
+    state_of,
+    task_rates,
+)
+from app.viewer.panel import assign, listen, listen_click
+from kin import InputError
+from kin.transforms import Array
+
+INTERVAL = 0.05  # s between two updates of the numbers
+HOLD = 10.0  # steps a second while a button is held
+FRAMES: dict[str, Frame] = {"Base": "base", "Tool": "tool"}
+ELLIPSOIDS: dict[str, Ellipsoid | None] = {
+    "Linear velocity": "velocity",
+    "Angular velocity": "turning",
+    "Force": "force",
+    "Moment": "moment",
+    "None": None,
+}
+STEPS = (0.1, 100.0)  # mm
+TURNS = (0.1, 30.0)  # degrees
+FRAME_HINT = "Whose axes the rows of the Jacobian and the jog buttons mean; the point is the tool's in both"
+COLUMN_HINT = "Draws this joint's column at the tool: straight arrow v, round arrow ω; again: no more"
+ELLIPSOID_HINT = (
+    "Velocities the joints can give the tool, or forces they can hold: each strong where the other is slow"
+)
+STEP_HINT = "Millimetres of one step along an axis"
+TURN_HINT = "Angle of one step about an axis"
+# viser gives each button a line of its own; this puts six side by side.
+_BOX = "div:has(>div>[data-jog])"
+GRID = (
+    f"<style>{_BOX}{{display:grid;grid-template-columns:repeat(6,minmax(0,1fr));column-gap:.25em;padding-inline:.4em}}"
+    f"{_BOX}>div:not(:has(>button)){{grid-column:1/-1}}{_BOX}>div:has(>button){{margin-inline:0!important}}"
+    f"{_BOX}>div>button{{padding:0}}</style>"
+    '<div data-jog style="font-size:.74em;opacity:.75;margin:.1em 1em .4em">Press and hold to repeat.</div>'
+)
+_NUMBERS = count(1)
+V = TypeVar("V")
+
+
+class VelocityLesson(Feature):
+    """See the module."""
+
+    key = "velocity"
+    title = "Velocity"
+
+    def __init__(self, stage: Stage) -> None:
+        super().__init__(stage)
+        self._frame: Frame = "base"
+        self._kind: Ellipsoid | None = "velocity"
+        self._chosen: int | None = None
+        self._step, self._turn = 0.005, math.radians(2.0)
+        self._shown_at = 0.0
+        self._refused: tuple[object, ...] = ()
+        self._cut = False
+        self._J: Array
+        self._axes: Axes | None = None
+        self._drawing: Drawing
+        self._scales: dict[Ellipsoid, float]
+        gui = stage.client.gui
+        self._warning = gui.add_html("")
+        self._frames = gui.add_dropdown("Frame", tuple(FRAMES), initial_value="Base", hint=FRAME_HINT)
+        listen(self._frames, self.post, "frame")
+        with gui.add_folder("Jacobian") as self._column_folder:
+            self._matrix = gui.add_html("")
+            self._units = gui.add_html("")
+            self._columns: viser.GuiButtonGroupHandle | None = None
+            self._column = gui.add_html("", order=1e9)
+        with gui.add_folder("Ellipsoid"):
+            self._kinds = gui.add_dropdown(
+                "Show", tuple(ELLIPSOIDS), initial_value="Linear velocity", hint=ELLIPSOID_HINT
+            )
+            listen(self._kinds, self.post, "ellipsoid")
+            self._ellipsoid = gui.add_html("")
+        self._jog_folder = gui.add_folder("Jog")
+        with self._jog_folder:
+            self._build_jog(gui)
+        with gui.add_folder("Singular values", expand_by_default=False):
+            self._values = gui.add_html("")
+        with gui.add_folder("Singularities", expand_by_default=False):
+            self._others = gui.add_html("")
+        self._use_robot()
+
+    def _build_jog(self, gui: viser.GuiApi) -> None:
+        self._step_field = gui.add_number(
+            "Step, mm", 1e3 * self._step, min=STEPS[0], max=STEPS[1], step=0.1, hint=STEP_HINT, order=1
+        )
+        listen(self._step_field, self.post, "step")
+        self._make_turn_field()
+        gui.add_html(GRID, order=3)
+        for number, (axis, sign) in enumerate(BUTTONS):
+            verb = "Turns the tool about" if axis > 2 else "Moves the tool along"
+            handle = gui.add_button(
+                button(axis, sign),
+                color="gray",
+                hint=f"{verb} {'xyz'[axis % 3]} by one step",
+                order=4 + number,
+            )
+            self._listen_jog(handle, number)
+
+    def _listen_jog(self, handle: viser.GuiButtonHandle, number: int) -> None:
+        press = Press()
+
+        # Each press has a key of its own, so that no tap is lost; within one, a slow worker skips repeats.
+        async def held(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
+            if event.client is not None and press.held(time.monotonic()):
+                self.post(("jog", number, press.number))
+
+        async def clicked(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
+            if event.client is not None and press.clicked(time.monotonic()):
+                self.post(("jog", number, press.number))
+
+        handle.on_hold(held, callback_hz=HOLD)
+        handle.on_click(clicked)
+
+    def _make_turn_field(self) -> None:
+        degrees = self.stage.degrees
+        low, high = (t if degrees else round(math.radians(t), 3) for t in TURNS)
+        self._turn_field = self.stage.client.gui.add_number(
+            "Turn, °" if degrees else "Turn, rad",
+            round(self._turn * self._turn_scale, 1 if degrees else 3),
+            min=low,
+            max=high,
+            step=0.1 if degrees else 0.001,
+            hint=TURN_HINT,
+            order=2,
+        )
+        listen(self._turn_field, self.post, ("turn", degrees))
+
+    @property
+    def _turn_scale(self) -> float:
+        return 180.0 / math.pi if self.stage.degrees else 1.0
+
+    # Events
+
+    def handle(self, key: Hashable, value: object) -> None:
+        match key:
+            case "frame":
+                self._frame = _one_of("frame", value, FRAMES)
+                self._show_numbers()
+            case "ellipsoid":
+                self._kind = _one_of("ellipsoid", value, ELLIPSOIDS)
+                self._show_all()
+            case ("column", str(robot_id), int(index)):
+                if robot_id == self.stage.robot.id:
+                    self._chosen = None if index == self._chosen else index
+                    self._show_all()
+            case "step":
+                self._step = _number("step", value, STEPS) / 1e3
+            case ("turn", bool(degrees)):
+                if degrees == self.stage.degrees:
+                    limits = TURNS if degrees else (math.radians(TURNS[0]), math.radians(TURNS[1]))
+                    self._turn = _number("turn", value, limits) / self._turn_scale
+            case ("jog", int(number), int()):
+                self._jog(*BUTTONS[number])
+            case _:
+                raise InputError("velocity", key, "a control of this lesson")
+
+    def on_robot(self) -> None:
+        self._drawing.remove()
+        if self._columns is not None:
+            self._columns.remove()
+        self._use_robot()
+
+    def on_picture(self, T_base_tool: Array) -> None:
+        self._draw(self.stage.q, T_base_tool)
+        self.due = max(0.0, INTERVAL - (time.perf_counter() - self._shown_at))
+
+    def on_style(self) -> None:
+        self._turn_field.remove()
+        with self._jog_folder:
+            self._make_turn_field()
+        self._show_numbers()
+
+    def tick(self, now: float) -> None:
+        wait = INTERVAL - (now - self._shown_at)
+        if wait > 0.0:
+            self.due = wait
+            return
+        self._show_numbers()
+
+    def state(self) -> dict[str, object]:
+        return {
+            "frame": self._frame,
+            "ellipsoid": self._kind or "none",
+            "joint": 0 if self._chosen is None else self._chosen + 1,
+            "step": self._step,
+            "turn": self._turn,
+        }
+
+    def restore(self, state: dict[str, object]) -> None:
+        for name, frame in FRAMES.items():
+            if state.get("frame") == frame:
+                self._frame = frame
+                assign(self._frames, name)
+        for name, kind in ELLIPSOIDS.items():
+            if state.get("ellipsoid") == (kind or "none"):
+                self._kind = kind
+                assign(self._kinds, name)
+        joint = state.get("joint")
+        if type(joint) is int and 0 <= joint <= self.stage.robot.n:
+            self._chosen = joint - 1 if joint else None
+        size, turn = state.get("step"), state.get("turn")
+        if isinstance(size, float) and STEPS[0] <= 1e3 * size <= STEPS[1]:
+            self._step = size
+        if isinstance(turn, float) and TURNS[0] <= math.degrees(turn) <= TURNS[1]:
+            self._turn = turn
+        assign(self._step_field, round(1e3 * self._step, 1))
+        assign(self._turn_field, round(self._turn * self._turn_scale, 1 if self.stage.degrees else 3))
+        self._show_all()
+
+    def remove(self) -> None:
+        self._drawing.remove()
+
+    # What can be done
+
+    def _jog(self, axis: int, sign: int) -> None:
+        stage = self.stage
+        amount = sign * (self._step if axis < 3 else self._turn)
+        asked = (stage.robot, stage.goal.tobytes(), stage.task, axis, amount, self._frame, stage.locked)
+        if asked == self._refused:
+            return  # a button held at a stop would have the same refusal worked out ten times a second
+        made: Step = step(stage.robot, stage.goal, stage.task, axis, amount, self._frame, stage.locked)
+        if made.q is None:
+            self._refused = asked
+            stage.tell(made.told)
+        else:
+            stage.go(made.q, made.told)
+
+    # What is shown
+
+    def _use_robot(self) -> None:
+        """Drawings, scales and column buttons of the arm on show."""
+        stage, robot = self.stage, self.stage.robot
+        self._chosen, self._refused = None, ()
+        self._drawing = Drawing(stage.client.scene, robot, f"/velocity-{next(_NUMBERS)}")
+        self._scales = {kind: self._scale(kind) for kind in ELLIPSOIDS.values() if kind is not None}
+        options = tuple(str(i + 1) for i in range(robot.n))
+        with self._column_folder:
+            self._columns = stage.client.gui.add_button_group("Column", options, hint=COLUMN_HINT)
+        listen_click(self._columns, self.post, {name: ("column", robot.id, k) for k, name in enumerate(options)})
+        self._show_all()
+
+    def _show_all(self) -> None:
+        self._draw(self.stage.q, kin.fk(self.stage.robot, self.stage.q))
+        self._show_numbers()
+
+    def _scale(self, kind: Ellipsoid) -> float:
+        """What 10 cm of this arm's picture stand for: such that the ellipsoid at home has a fitting size."""
+        robot = self.stage.robot
+        semi = semi_axes(axes_of(part_of(kin.jacobian(robot, robot.q_home), kind)).values, kind)
+        usual = semi[np.isfinite(semi) & (semi > 1e-6) & (semi < 1e6)]
+        longest = float(usual.max()) if len(usual) else 1.0
+        return nice(0.1 * longest / (0.42 * self._drawing.radius))
+
+    def _draw(self, q: Array, T_base_tool: Array) -> None:
+        """What moves with each picture."""
+        self._J = J = kin.jacobian(self.stage.robot, q)
+        self._T = T_base_tool
+        self._drawing.place(T_base_tool[:3, 3])
+        self._axes = None
+        if self._kind is not None:
+            self._axes = axes_of(part_of(J, self._kind))
+            lengths = semi_axes(self._axes.values, self._kind) * (0.1 / self._scales[self._kind])
+            self._cut = self._drawing.show_ellipsoid(self._kind, self._axes.R, lengths)
+        else:
+            self._drawing.hide_ellipsoid()
+        if self._chosen is None:
+            self._drawing.show_column(None, None)
+        else:
+            column = J[:, self._chosen]
+            self._drawing.show_column(column[:3] * (0.1 / self._scales["velocity"]), column[3:])
+
+    def _show_numbers(self) -> None:
+        """What is read, and the singularities."""
+        self._shown_at, self.due = time.perf_counter(), None
+        stage, robot, J, T = self.stage, self.stage.robot, self._J, self._T
+        R = T[:3, :3]
+        rows = J if self._frame == "base" else np.vstack([R.T @ J[:3], R.T @ J[3:]])
+        _tell(self._matrix, told.matrix_html(robot, rows, self._frame, self._chosen))
+        _tell(self._units, told.units_html(robot, self._frame))
+        _tell(self._column, told.column_html(robot, J, self._chosen))
+        self._show_singularities(R)
+        rates = task_rates(robot, stage.q)
+        linear, angular = axes_of(J[:3]).values, axes_of(J[3:]).values
+        _tell(self._values, told.values_html(robot, rates, linear, angular))
+        if self._kind is None or self._axes is None:
+            _tell(self._ellipsoid, "")
+            return
+        semi = semi_axes(self._axes.values, self._kind)
+        _tell(self._ellipsoid, told.ellipsoid_html(robot, self._kind, semi, self._scales[self._kind], self._cut))
+        self._drawing.write_values(told.label_texts(semi))
+
+    def _show_singularities(self, R_base_tool: Array) -> None:
+        stage, robot = self.stage, self.stage.robot
+        found = kin.singularities(robot, stage.q)
+        nearest = real(found)
+        state = state_of(nearest[0], robot.reach) if nearest else "far"
+        twists = np.empty((0, 6))
+        if state != "far":
+            rates = task_rates(robot, stage.q)
+            twists = lost(rates) if state == "at" else rates.twists[-1:]
+        self._drawing.show_lost(twists, state == "at")
+        words = [told.lost_words(twist, R_base_tool, slowest=state == "near") for twist in twists]
+        _tell(self._warning, told.warning_html(robot, found, stage.degrees, words))
+        _tell(self._others, told.others_html(robot, found, stage.degrees))
+
+
+def _tell(element: viser.GuiHtmlHandle, html: str) -> None:
+    if element.content != html:
+        element.content = html
+
+
+def _one_of(field: str, value: object, options: dict[str, V]) -> V:
+    if not isinstance(value, str) or value not in options:
+        raise InputError(field, value, "one of " + ", ".join(options))
+    return options[value]
+
+
+def _number(field: str, value: object, limits: tuple[float, float]) -> float:
+    low, high = limits
+    if isinstance(value, bool) or not isinstance(value, int | float) or not low - 1e-3 <= value <= high + 1e-3:
+        raise InputError(field, value, f"a number from {low:g} to {high:g}")
+    return float(value)

@@ -1,0 +1,192 @@
+"""The lesson's drawings at the tool: ellipsoid, a column's arrows, lost directions.
+
+Nodes are made once for an arm and then placed: the ellipsoid is a unit sphere with a rotation and three scales.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+import trimesh
+import viser
+
+from app.viewer.lessons.velocity.rates import Ellipsoid
+from app.viewer.meshes import body
+from app.viewer.shapes import cone, merged, placed, tube
+from kin import Robot
+from kin.transforms import Array, frame_from_approach, wxyz_from_rotation
+
+COLORS: dict[Ellipsoid, tuple[int, int, int]] = {
+    "velocity": (86, 180, 233),
+    "turning": (204, 121, 167),
+    "force": (230, 159, 0),
+    "moment": (240, 228, 66),
+}
+COLUMN, LOST, SLOW = (0, 114, 178), (213, 40, 0), (184, 122, 0)
+AXIS_LINE = (90, 90, 90)
+# Shares of the radius of the sphere round the arm.
+FLAT, LONGEST = 0.004, 1.1
+RING, LOST_RING, LOST_ARROW = 0.13, 0.2, 0.36
+MOST_LOST = 3
+
+
+class Drawing:
+    """The drawings for one arm, below the node `root`; call it from the visitor's worker."""
+
+    def __init__(self, scene: viser.SceneApi, robot: Robot, root: str) -> None:
+        self.radius = body(robot).radius
+        r = self.radius
+        self._root = scene.add_frame(root, show_axes=False)
+        self._kind: Ellipsoid | None = None
+        self._tips = np.zeros(3)
+        # Everything about the ellipsoid hangs on its principal axes: turning them is one message.
+        self._body = scene.add_frame(f"{root}/body", show_axes=False, visible=False)
+        sphere = trimesh.creation.icosphere(subdivisions=3)
+        self._ellipsoid = scene.add_mesh_simple(
+            f"{root}/body/ellipsoid",
+            np.asarray(sphere.vertices),
+            np.asarray(sphere.faces),
+            opacity=0.32,
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+        ends = np.eye(3, dtype=np.float32)
+        self._axes = scene.add_line_segments(
+            f"{root}/body/axes",
+            np.stack([-ends, ends], axis=1),
+            AXIS_LINE,
+            thickness=2.0,
+            thickness_units="screen",
+        )
+        self._labels = [
+            scene.add_label(f"{root}/body/value-{k + 1}", "", font_screen_scale=0.8, anchor="center-center")
+            for k in range(3)
+        ]
+        self._column, self._lost = (
+            scene.add_arrows(
+                f"{root}/{name}",
+                np.zeros((1, 2, 3), np.float32),
+                color,
+                shaft_radius=0.011 * r,
+                head_radius=0.028 * r,
+                head_length=0.07 * r,
+                visible=False,
+            )
+            for name, color in (("column", COLUMN), ("lost", LOST))
+        )
+        self._turn = self._ring(scene, f"{root}/turn", False, COLUMN, RING)
+        self._lost_turns = [
+            self._ring(scene, f"{root}/lost-turn-{k + 1}", True, LOST, LOST_RING + 0.04 * k)
+            for k in range(MOST_LOST)
+        ]
+
+    def _ring(
+        self, scene: viser.SceneApi, name: str, double: bool, color: tuple[int, int, int], radius: float
+    ) -> viser.MeshHandle:
+        mesh = ring_arrow(double)
+        return scene.add_mesh_simple(
+            name,
+            np.asarray(mesh.vertices),
+            np.asarray(mesh.faces),
+            color=color,
+            scale=radius * self.radius,
+            cast_shadow=False,
+            visible=False,
+        )
+
+    def place(self, tool: Array) -> None:
+        """Bring everything to the tool point ``(3,)``."""
+        self._root.position = tool
+
+    def show_ellipsoid(self, kind: Ellipsoid, R: Array, lengths: Array) -> bool:
+        """Draw an ellipsoid with axes R ``(3, 3)`` and semi-axes `lengths` ``(3,)`` in metres.
+
+        Flat ones are drawn as thin discs, endless ones cut; whether one was cut.
+        """
+        shown = np.clip(lengths, FLAT * self.radius, LONGEST * self.radius)
+        if kind != self._kind:
+            self._kind = kind
+            self._ellipsoid.color = COLORS[kind]
+            self._body.visible = True
+        self._body.wxyz = wxyz_from_rotation(R)
+        self._ellipsoid.scale = self._axes.scale = (float(shown[0]), float(shown[1]), float(shown[2]))
+        self._tips = shown + 0.05 * self.radius
+        return bool((lengths > LONGEST * self.radius).any())
+
+    def write_values(self, texts: tuple[str, str, str]) -> None:
+        """Name the axes of the ellipsoid by their values."""
+        for label, text, end in zip(self._labels, texts, np.diag(self._tips), strict=True):
+            label.text = text
+            label.position = end
+
+    def hide_ellipsoid(self) -> None:
+        """Take the ellipsoid out of the picture."""
+        self._kind = None
+        self._body.visible = False
+
+    def show_column(self, linear: Array | None, angular: Array | None) -> None:
+        """Draw a straight arrow ``(3,)`` in metres and a turning arrow about ``(3,)``; None or zero hides one."""
+        straight = linear is not None and float(np.linalg.norm(linear)) > 0.02 * self.radius
+        _set_visible(self._column, straight)
+        if straight:
+            self._column.points = np.array([[np.zeros(3), linear]], np.float32)
+        turning = angular is not None and float(np.linalg.norm(angular)) > 1e-6
+        _set_visible(self._turn, turning)
+        if angular is not None and turning:
+            self._turn.wxyz = wxyz_along(angular)
+
+    def show_lost(self, twists: Array, certain: bool) -> None:
+        """Draw double arrows along and about twists ``(k, 6)``; red where they are lost, amber where only slow."""
+        color = LOST if certain else SLOW
+        arrows = []
+        for twist in twists[:MOST_LOST]:
+            size = float(np.linalg.norm(twist[:3]))
+            if size > 1e-3:
+                end = twist[:3] / size * LOST_ARROW * self.radius
+                arrows += [[np.zeros(3), end], [np.zeros(3), -end]]
+        _set_visible(self._lost, bool(arrows))
+        if arrows:
+            self._lost.points = np.array(arrows, np.float32)
+            self._lost.colors = np.array(color, np.uint8)
+        for k, node in enumerate(self._lost_turns):
+            shown = k < len(twists) and float(np.linalg.norm(twists[k, 3:])) > 1e-3
+            _set_visible(node, shown)
+            if shown:
+                node.wxyz = wxyz_along(twists[k, 3:])
+                node.color = color
+
+    def remove(self) -> None:
+        """Take everything out of the scene."""
+        self._root.remove()
+
+
+def _set_visible(node: viser.SceneNodeHandle, visible: bool) -> None:
+    if node.visible != visible:
+        node.visible = visible
+
+
+def wxyz_along(direction: Array) -> tuple[float, float, float, float]:
+    """The shortest turn that takes z to a direction ``(3,)`` that is not zero."""
+    x, y, z = (direction / np.linalg.norm(direction)).tolist()
+    if z < -1.0 + 1e-12:
+        return 0.0, 1.0, 0.0, 0.0
+    size = math.sqrt(2.0 * (1.0 + z))
+    return 0.5 * size, -y / size, x / size, 0.0
+
+
+@lru_cache(maxsize=2)
+def ring_arrow(double: bool) -> trimesh.Trimesh:
+    """An arrow bent round z, counter-clockwise, of radius 1; with a head at either end if `double`."""
+    first, last = math.radians(35.0 if double else 0.0), math.radians(290.0)
+    angles = np.linspace(first, last, 40)
+    path = np.column_stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)])
+    heads = [(last, 1.0)] + ([(first, -1.0)] if double else [])
+    parts = [tube(path, 0.05)]
+    for angle, way in heads:
+        T = np.eye(4)
+        T[:3, :3] = frame_from_approach((-way * math.sin(angle), way * math.cos(angle), 0.0))
+        T[:3, 3] = math.cos(angle), math.sin(angle), 0.0
+        parts.append(placed(cone(0.16, 0.0, 0.42), T))
+    return merged(parts)

@@ -1,0 +1,183 @@
+"""Jogging: the tool by one step along or about an axis, the joints following on their branch.
+
+A step is made exactly or not at all. Not at all too if a joint would have to jump, as it does for a short step
+beside a singularity: the motion from one configuration to the other would swing the tool away.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+import kin
+from app.viewer.panel.joints import label
+from app.viewer.panel.status import Notice, angle, millimetres, notice
+from kin import IKResult, IKSolution, Robot, Task
+from kin.transforms import Array, rotation_from_wxyz, vector_angle
+
+Frame = Literal["base", "tool"]
+Locked = tuple[float | None, ...] | None
+NAMES = ("x", "y", "z", "rx", "ry", "rz")
+BUTTONS = tuple((axis, sign) for axis in range(6) for sign in (-1, 1))
+
+# The most that a joint may turn (rad) or slide (m) in one step.
+SMOOTH = 0.6
+_TURNED = 1e-6  # rad
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """Where a step leads, or None if it is not made; and what the visitor is told."""
+
+    q: Array | None
+    told: Notice
+
+
+def button(axis: int, sign: int) -> str:
+    """A button's label: ``"+rx"``."""
+    return ("+" if sign > 0 else "−") + NAMES[axis]
+
+
+def moved(T_base_tool: Array, axis: int, amount: float, frame: Frame) -> Array:
+    """The pose ``(4, 4)`` after a step: axis 0–2 along x, y, z by metres, 3–5 about them at the tool point."""
+    T = T_base_tool.copy()
+    e = np.zeros(3)
+    e[axis % 3] = 1.0
+    if axis < 3:
+        T[:3, 3] += amount * (T[:3, :3] @ e if frame == "tool" else e)
+        return T
+    turn = rotation_from_wxyz(np.array([math.cos(0.5 * amount), *(math.sin(0.5 * amount) * e)]))
+    T[:3, :3] = T[:3, :3] @ turn if frame == "tool" else turn @ T[:3, :3]
+    return T
+
+
+def step(
+    robot: Robot, q: Array, task: Task, axis: int, amount: float, frame: Frame, locked: Locked = None
+) -> Step:
+    """One step of `amount` (m or rad) from q ``(n,)``; `locked` as `kin.solve_ik` takes it.
+
+    An arm with fewer than six joints gives up the roll, one with fewer than five the orientation; a step is then
+    made all the same, and what it gave up is told.
+    """
+    T = kin.fk(robot, q)
+    wanted = moved(T, axis, amount, frame)
+    if axis > 2 and (why := _left_out(task, T, wanted)):
+        return Step(None, Notice("hand", "Not moved", why))
+    target = wanted[:3, 3] if task == "position" else wanted
+    # A singularity may be crossed to another branch, as long as the joints move smoothly.
+    refused: list[Step] = []
+    for branch in ("seed", None) if kin.branch_names(robot) else (None,):
+        result = kin.solve_ik(robot, target, task=task, q_seed=q, branch=branch, locked=locked, max_solutions=1)
+        found = _judged(robot, q, T, axis, amount, frame, result)
+        if found.q is not None:
+            return found
+        if result.cause != "branch":
+            refused.append(found)
+    return refused[0]
+
+
+def _left_out(task: Task, T: Array, wanted: Array) -> str:
+    """Why a turn is not made: the task does not ask for it."""
+    if task == "position":
+        return "“Match: Point only” leaves the orientation free. Ask for the full pose to turn the tool."
+    if task == "approach" and vector_angle(T[:3, 2], wanted[:3, 2]) < _TURNED:
+        return "“Match: Point + approach” leaves the roll free. Ask for the full pose to turn it."
+    return ""
+
+
+def _judged(robot: Robot, q: Array, T: Array, axis: int, amount: float, frame: Frame, result: IKResult) -> Step:
+    """An answer as a step: taken if it is exact in all that this arm can keep, and near."""
+    best = result.solutions[0] if result.solutions else None
+    given = _given_up(robot, T, axis, result)
+    if best is None or given is None:
+        if best is not None:
+            return Step(None, Notice("orientation", "Not moved", _too_few(robot, axis, best)))
+        said = notice(result)
+        return Step(None, Notice(said.kind, f"Not moved: {said.title[:1].lower()}{said.title[1:]}", said.detail))
+    off = np.abs(best.q - q)
+    worst = int(off.argmax())
+    if off[worst] > SMOOTH:
+        turn = angle(off[worst]) if robot.revolute[worst] else millimetres(off[worst])
+        return Step(
+            None,
+            Notice(
+                "limits",
+                "Not moved: a joint would have to jump",
+                f"{label(robot, worst)} by {turn}: a singularity is close, or the step is too long.",
+            ),
+        )
+    size = f"{1e3 * abs(amount):.4g} mm" if axis < 3 else f"{math.degrees(abs(amount)):.4g}°"
+    verb = "along" if axis < 3 else "about"
+    title = f"Jogged {size} {verb} {'+' if amount > 0 else '−'}{NAMES[axis][-1]} of the {frame}"
+    if given:
+        return Step(best.q, Notice("compromise", title, given))
+    return Step(best.q, Notice("reached", title, "Exactly, " + _how(robot, q, best.q)))
+
+
+def _given_up(robot: Robot, T: Array, axis: int, result: IKResult) -> str | None:
+    """What the best answer gives up, in words; None if that is more than such an arm must."""
+    if result.status == "solved":
+        return ""
+    best = result.solutions[0] if result.solutions else None
+    if best is None or result.status != "approximate" or robot.n > 5:
+        return None
+    reached = kin.fk(robot, best.q)
+    kept = best.compromise == "roll" and (axis < 3 or vector_angle(T[:3, 2], reached[:3, 2]) > _TURNED)
+    if kept:
+        off = angle(best.rotation_error)
+        return f"{robot.n} joints keep the point and the approach direction; the roll is off by {off}."
+    if best.compromise == "rotation" and robot.n < 5 and axis < 3:
+        off = angle(best.rotation_error)
+        return f"{robot.n} joints keep the point; the orientation is off by {off}."
+    return None
+
+
+def _too_few(robot: Robot, axis: int, best: IKSolution) -> str:
+    count = "1 joint" if robot.n == 1 else f"{robot.n} joints"
+    if axis > 2:
+        return f"{count} cannot turn the tool this way and keep its point."
+    return f"Here {count} can keep the point alone: the orientation would be off by {angle(best.rotation_error)}."
+
+
+def _how(robot: Robot, before: Array, after: Array) -> str:
+    """What became of the branch."""
+    if not kin.branch_names(robot):
+        return "with the joints moving smoothly."
+    now = kin.branch_of(robot, after)
+    if kin.branch_of(robot, before) != now:
+        return f"through a singularity, to the branch {now}."
+    return "on the same branch."
+
+
+class Press:
+    """Tells the steps of one button from what the browser sends while it is held.
+
+    Held by mouse or finger, a button reports at once and then again and again, and a click when it is let go; by
+    keyboard only the click comes. So that a tap is one step, repeats count only after `DELAY`.
+    """
+
+    DELAY = 0.5  # s
+    GAP = 2.0  # s without a report: the click that ended the press was lost
+
+    def __init__(self) -> None:
+        self._since: float | None = None
+        self._last = -math.inf
+        self.number = 0
+
+    def held(self, now: float) -> bool:
+        """A report that the button is down; whether that is a step."""
+        if self._since is None or now - self._last > self.GAP:
+            self._since = now
+            self.number += 1
+        self._last = now
+        return now == self._since or now - self._since >= self.DELAY
+
+    def clicked(self, now: float) -> bool:
+        """A click; whether that is a step."""
+        alone = self._since is None or now - self._last > self.GAP
+        self._since = None
+        self.number += alone
+        return alone
