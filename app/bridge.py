@@ -60,6 +60,9 @@ _FULL_PAGE = _PAGE.format(
 # Codes that describe a lost connection and may not travel in a close frame (RFC 6455, 7.4.1).
 _UNSENDABLE = {1005: 1000, 1006: 1011, 1015: 1011}
 
+# A tab's memory. Relative, so that it holds behind any path prefix.
+_OURS = b'<script src="../static/viewer.js"></script>'
+
 # Close code and reason.
 _Ending = tuple[int, str]
 
@@ -218,10 +221,12 @@ async def _add_slash(request: Request) -> Response:
 
 
 class _Page:
-    """viser's single-file client, kept as it came, plain and compressed."""
+    """viser's single-file client with a script of ours in front, plain and compressed."""
 
     def __init__(self, html: bytes) -> None:
-        self._html = html.replace(b"<title>Viser</title>", b"<title>Kinboard viewer</title>", 1)
+        html = html.replace(b"<title>Viser</title>", b"<title>Kinboard viewer</title>", 1)
+        # Before viser's own script, which it prepares the page for.
+        self._html = html.replace(b"<head>", b"<head>" + _OURS, 1)
         self._gzipped = gzip.compress(self._html, 6)
         self._headers = {
             "content-security-policy": VIEWER_POLICY,

@@ -18,6 +18,8 @@ MAX_DEPTH = 6
 RATE, BURST = 240.0, 480.0
 
 CAMERA = "ViewerCameraMessage"
+# What the page remembers, when viser asks for it: who may only look can still be sent a link to what to look at.
+MEMORY = "LocalStorageGetItemResponseMessage"
 ALLOWED = frozenset(
     {
         CAMERA,
@@ -32,7 +34,7 @@ ALLOWED = frozenset(
         "TransformControlsUpdateMessage",
         "TransformControlsDragStartMessage",
         "TransformControlsDragEndMessage",
-        "LocalStorageGetItemResponseMessage",
+        MEMORY,
         "FileTransferPartAck",
     }
 )
@@ -65,7 +67,7 @@ def admitted(message: bytes, look_only: bool) -> bool:
     """Whether a message goes on to viser; what does not is dropped.
 
     Args:
-        look_only: whether this visitor may look, not touch: then only the camera goes on.
+        look_only: whether this visitor may look, not touch: then only camera and memory go on.
 
     Raises:
         MalformedMessageError: it cannot be read; the connection is not worth keeping.
@@ -84,7 +86,7 @@ def admitted(message: bytes, look_only: bool) -> bool:
             return False
     if not all(_shallow(value, MAX_DEPTH) for value in fields.values()):
         raise MalformedMessageError("nested too deeply")
-    return kind == CAMERA if look_only else isinstance(kind, str) and kind in ALLOWED
+    return kind in (CAMERA, MEMORY) if look_only else isinstance(kind, str) and kind in ALLOWED
 
 
 def _shallow(value: object, depth: int) -> bool:

@@ -31,6 +31,7 @@ async function openViewerWhenReady() {
   }
   const viewer = document.createElement("iframe");
   viewer.src = "viewer/";
+  viewer.name = "viewer";
   viewer.title = "Interactive 3-D view of the arm, with its controls";
   viewer.allow = "fullscreen; clipboard-write";
   byId("frame").append(viewer);
@@ -45,11 +46,44 @@ function element(tag, text, className) {
   return node;
 }
 
+// What the address of a shared view holds: see app/viewer/state.py.
+function viewerWith(robot) {
+  return "viewer/#s=" + btoa(JSON.stringify({ v: 1, robot: robot.id })).replace(/=+$/, "");
+}
+
+// An arm of the operator's own has no picture: three links stand for it.
+function placeholder() {
+  const drawing = byId("any-arm").content.firstElementChild.cloneNode(true);
+  return document.importNode(drawing, true);
+}
+
+function picture(robot) {
+  const image = document.createElement("img");
+  image.src = `static/robots/${encodeURIComponent(robot.id)}.webp`;
+  image.alt = "";
+  image.width = 320;
+  image.height = 240;
+  image.loading = "lazy";
+  image.addEventListener("error", () => image.replaceWith(placeholder()), { once: true });
+  return image;
+}
+
 function card(robot) {
   const item = element("li", "", "card");
+  const title = element("h3", "");
+  const link = element("a", robot.name);
+  link.href = viewerWith(robot);
+  link.target = "viewer"; // the frame above; a tab of its own before that is there
+  link.addEventListener("click", () => byId("viewer").scrollIntoView());
+  title.append(link);
   const facts = element("ul", "", "facts");
   facts.append(element("li", `${robot.n} joints`), element("li", `${robot.convention} DH`));
-  item.append(element("h3", robot.name), facts, element("p", robot.description), element("code", robot.id, "id"));
+  if (robot.branches.length) facts.append(element("li", `${robot.branches.length} postures`));
+  const text = element("p", robot.description.split(/(?<=\.) /)[0]);
+  text.title = robot.description;
+  const shown = element("div", "", "shown");
+  shown.append(picture(robot));
+  item.append(shown, title, facts, text, element("code", robot.id, "id"));
   return item;
 }
 
@@ -64,29 +98,92 @@ async function fillCards() {
   }
 }
 
-function fillExample(figure) {
-  const code = figure.querySelector("code");
-  const button = figure.querySelector("button");
-  const command = `curl -s ${here}${code.dataset.path} \\\n  -H 'Content-Type: application/json' \\\n  -d '${code.textContent}'`;
-  code.textContent = command;
-  button.addEventListener("click", async () => {
-    const done = await copy(command, code);
-    button.textContent = done ? "Copied" : "Press Ctrl-C";
-    setTimeout(() => { button.textContent = "Copy"; }, 1800);
+// The box in which REST can be tried
+
+const method = () => byId("method").textContent;
+
+function choose(example) {
+  for (const each of document.querySelectorAll(".pick")) each.setAttribute("aria-pressed", String(each === example));
+  byId("method").textContent = example.dataset.method;
+  byId("path").value = example.dataset.path;
+  byId("body").value = example.querySelector("code").textContent;
+  byId("body").disabled = example.dataset.method === "GET";
+  byId("body").placeholder = byId("body").disabled ? "A GET has no body: what is asked is in the address." : "";
+  say("", "");
+  byId("answer").textContent = "Send asks this server.";
+}
+
+function say(kind, text) {
+  byId("outcome").dataset.kind = kind;
+  byId("outcome").textContent = text;
+}
+
+// The address must stay on this server, whatever was typed.
+function address() {
+  return here + byId("path").value.trim().replace(/^\/+/, "");
+}
+
+async function send() {
+  byId("send").disabled = true;
+  say("", "asking…");
+  const began = performance.now();
+  try {
+    const request = { method: method() };
+    if (request.method === "POST") Object.assign(request, { headers: { "Content-Type": "application/json" }, body: byId("body").value });
+    const answer = await fetch(address(), request);
+    const text = await answer.text();
+    const took = performance.now() - began;
+    say(answer.ok ? "good" : "bad", `${answer.status} ${answer.statusText} · ${took.toFixed(0)} ms · ${text.length.toLocaleString("en")} characters`);
+    byId("answer").textContent = pretty(text);
+  } catch (error) {
+    say("bad", "no answer");
+    byId("answer").textContent = error.message;
+  } finally {
+    byId("send").disabled = false;
+    byId("answer").scrollTo(0, 0);
+  }
+}
+
+// JSON with lists of numbers on one line each, as people write vectors and matrices.
+function pretty(text) {
+  const most = 60000;
+  let shown = text;
+  try {
+    shown = JSON.stringify(JSON.parse(text), null, 2).replace(/\[\s*(-?[\d.][^[\]{}"]*?)\s*\]/g, (_, row) => `[${row.replace(/\s+/g, " ")}]`);
+  } catch { /* not JSON: as it is */ }
+  return shown.length > most ? `${shown.slice(0, most)}\n… and more` : shown;
+}
+
+function asCurl() {
+  const quoted = (word) => `'${word.replaceAll("'", "'\\''")}'`;
+  if (method() === "GET") return `curl -s ${quoted(address())}`;
+  return `curl -s ${quoted(address())} \\\n  -H 'Content-Type: application/json' \\\n  -d ${quoted(byId("body").value)}`;
+}
+
+function prepareBox() {
+  const examples = [...document.querySelectorAll(".pick")];
+  for (const example of examples) example.addEventListener("click", () => choose(example));
+  choose(examples[0]);
+  byId("try").addEventListener("submit", (event) => { event.preventDefault(); send(); });
+  byId("copy").addEventListener("click", async () => {
+    const command = asCurl();
+    const done = await copy(command);
+    byId("copy").textContent = done ? "Copied" : "See below";
+    if (!done) { byId("answer").textContent = command; getSelection().selectAllChildren(byId("answer")); }
+    setTimeout(() => { byId("copy").textContent = "Copy as curl"; }, 1800);
   });
 }
 
-async function copy(text, node) {
+// The clipboard is closed to pages served over plain http from another machine.
+async function copy(text) {
   try {
     await navigator.clipboard.writeText(text);
     return true;
   } catch {
-    // The clipboard is closed to pages served over plain http from another machine: select it for the visitor.
-    getSelection().selectAllChildren(node);
     return false;
   }
 }
 
-document.querySelectorAll(".example").forEach(fillExample);
+prepareBox();
 fillCards();
 openViewerWhenReady();

@@ -66,6 +66,7 @@ RULES: dict[str, set[str]] = {
     "app/hull.py": {"kin", "numpy", "scipy", "trimesh"},
     "app/picture.py": {"kin", "numpy"},
     "app/workers.py": set(),
+    "app/snippets.py": {"kin", "numpy"},
     "app/observe.py": {"starlette", "app.access", "app.metrics"},
     "app/bridge.py": {"starlette", "websockets", "app.access", "app.inspection", "app.metrics", "app.security"},
     "app/startup.py": {"kin", "app.bridge", "app.clouds", "app.settings", "app.store", "app.viewer"},
@@ -82,7 +83,7 @@ RULES: dict[str, set[str]] = {
     "app/viewer": {
         *("viser", "trimesh", "numpy", "kin"),
         *("app.viewer", "app.clouds", "app.equations", "app.metrics", "app.picture", "app.settings"),
-        "app.store",
+        *("app.snippets", "app.store"),
     },
 }
 

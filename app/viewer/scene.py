@@ -145,6 +145,10 @@ class ArmScene:
         for node in self._axes:
             node.visible = visible
 
+    def show_floor(self, visible: bool) -> None:
+        """Show or hide the grid."""
+        self._grid.visible = visible
+
     def use_dark(self, dark: bool) -> None:
         """Grid colours for a dark or a light page."""
         colors = GRID_DARK if dark else GRID_LIGHT

@@ -67,7 +67,7 @@ class ViewerServer:
         return len(self._sessions)
 
     async def _welcome(self, client: viser.ClientHandle) -> None:
-        session = Session(client, self._store, self._clouds, self._pace)
+        session = Session(client, self._store, self._clouds, self._pace, self._settings.token is not None)
         with self._lock:
             self._sessions[client.client_id] = session
         session.start()

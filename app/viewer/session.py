@@ -19,6 +19,7 @@ import viser
 import kin
 from app.clouds import Clouds
 from app.metrics import SOLVE_SECONDS
+from app.snippets import LOCAL, Moment
 from app.store import Store
 from app.viewer import camera
 from app.viewer.feature import Feature
@@ -31,11 +32,13 @@ from app.viewer.panel.joints import JointSliders
 from app.viewer.panel.lessons import LessonChoice
 from app.viewer.panel.posture import BranchChoice, FreeSliders
 from app.viewer.panel.readout import PoseReadout
+from app.viewer.panel.share import SharePanel
 from app.viewer.panel.status import Notice, StatusLine, notice
 from app.viewer.panel.target import TASKS, TargetChoice, default_task
 from app.viewer.panel.view import ViewOptions, ViewState, configure_theme
 from app.viewer.scene import ArmScene
 from app.viewer.selfmotion import self_motion
+from app.viewer.state import KEY, PageMemory, PageState, decode, encode, read_memory
 from app.viewer.tabs import TABS
 from kin import Robot, Task
 from kin.transforms import Array, from_position_wxyz
@@ -43,6 +46,8 @@ from kin.transforms import Array, from_position_wxyz
 log = logging.getLogger(__name__)
 
 READOUT_INTERVAL = 0.05
+KEEP_AFTER = 0.5  # seconds of rest before the page is told what to remember
+ANSWER_WITHIN = 10.0  # seconds for the page to tell what it remembers; it may still be busy starting
 NARROW = 700  # pixels
 # Phase (start, update, end), position (m) and wxyz of the gizmo, and whether it is one of its rings.
 GizmoEvent = tuple[str, list[float], list[float], bool]
@@ -57,11 +62,14 @@ class Session:
     features it is the :class:`~app.viewer.feature.Stage`.
     """
 
-    def __init__(self, client: viser.ClientHandle, store: Store, clouds: Clouds, pace: Pace) -> None:
+    def __init__(
+        self, client: viser.ClientHandle, store: Store, clouds: Clouds, pace: Pace, token: bool = False
+    ) -> None:
         self.store = store
         self.clouds = clouds
         self._client = client
         self._pace = pace
+        self._token = token  # whether programs have to send one
         self._inbox = Inbox()
         self._thread = threading.Thread(target=self._run, name=f"visitor-{client.client_id}", daemon=True)
         self._rng = np.random.default_rng()
@@ -79,6 +87,9 @@ class Session:
         self._locks: list[bool] = []
         self._arms = 0
         self._sheet = False
+        self._address = LOCAL
+        self._kept = ""
+        self._keep_at: float | None = None
         self._tabs: list[Feature] = []
         self._lessons: LessonChoice | None = None
         # Made by the worker when it builds the page.
@@ -96,6 +107,7 @@ class Session:
         self._posture_folder: viser.GuiFolderHandle
         self._branch_choice: BranchChoice
         self._free: FreeSliders
+        self._share: SharePanel
 
     def start(self) -> None:
         """Build the visitor's page and begin to answer."""
@@ -181,7 +193,7 @@ class Session:
 
     def any_branch(self) -> None:
         """Let any branch take the target."""
-        self._branch_choice.reset()
+        self._branch_choice.choose(None)
         self._branch = None
         self._ask_anew()
 
@@ -214,6 +226,8 @@ class Session:
         wishes = [feature.due for feature in self._features if feature.due is not None]
         if self._moving:
             wishes.append(self._pace.interval)
+        elif self._keep_at is not None and not self._dragging:
+            wishes.append(max(0.0, self._keep_at - time.perf_counter()))
         return min(wishes, default=None)
 
     def _guard(self, act: Callable[[], None]) -> None:
@@ -253,6 +267,11 @@ class Session:
             with self._client.atomic():
                 self._sliders.show(self._motion.goal, self._held)
                 self._show_posture()
+        if batch:
+            self._keep_at = now + KEEP_AFTER
+        elif self._keep_at is not None and now >= self._keep_at and not (self._moving or self._dragging):
+            self._keep_at = None
+            self._guard(self._keep)
 
     def _handle(self, key: Hashable, value: object) -> None:
         match key:
@@ -290,6 +309,8 @@ class Session:
                 self.go(self._robot.random_q(self._rng))
             case "recall":
                 self.go(self._motion.goal)
+            case "copy-as":
+                self._share.choose(value)
             case ("view", str(name)):
                 self._on_view(name, bool(value))
             case "camera":
@@ -446,7 +467,7 @@ class Session:
         # Asked only where one was chosen: an arm without a closed form has no branches to name.
         if self._branch not in (None, "seed") and self._branch != kin.branch_of(self._robot, self._motion.goal):
             self._branch = None
-            self._branch_choice.reset()
+            self._branch_choice.choose(None)
 
     def _aim(self, q: Array, held: int | None = None, ease: bool = True) -> None:
         """Head for a configuration; the sliders follow, but for the one in the visitor's hand."""
@@ -457,12 +478,18 @@ class Session:
 
     def _build(self) -> None:
         gui = self._client.gui
+        memory = self._remembered()
+        self._address = memory.address or LOCAL
+        saved = decode(memory.state, self.store.robots)
+        self._degrees, self._view = saved.degrees, saved.view
         with self._client.atomic():
+            if self._view.dark:
+                configure_theme(gui, True)
             # A phone shows the panel as a sheet from below. Asked once: a docked panel makes the picture narrower.
             self._sheet = self._client.camera.image_width < NARROW
             if not self._sheet:
                 gui.main_panel.dock_right()
-            robot = self.store.robots[0]
+            robot = self.store.get(saved.robot) if saved.robot is not None else self.store.robots[0]
             self._task = default_task(robot)
             self._status = StatusLine(gui, WELCOME)
             names = tuple(r.name for r in self.store.robots)
@@ -480,25 +507,101 @@ class Session:
             learn = tabs.add_tab("Learn") if LESSONS else None
             places = [(tab, tabs.add_tab(tab.title)) for tab in TABS]
             with tabs.add_tab("View"):
-                units = gui.add_checkbox("Radians", False, hint="Angles in radians instead of degrees")
+                units = gui.add_checkbox("Radians", not self._degrees, hint="Angles in radians instead of degrees")
                 listen(units, self.post, "units")
                 ViewOptions(gui, self._view, self.post)
-            self._use(robot)
+                with gui.add_folder("Share"):
+                    self._share = SharePanel(gui, self.post)
+            self._use(robot, saved.q)
             if learn is not None:
                 self._lessons = LessonChoice(gui, learn, self, self.post)
             for tab, place in places:
                 with place:
                     self._tabs.append(tab(self))
+            self._restore(saved)
+            self._draw(fresh=False)
+            self._kept = encode(self._snapshot())
+            self._offer()
         self._client.flush()
 
-    def _use(self, robot: Robot) -> None:
-        """Show another robot, at home, in a fitting view."""
+    # What the page remembers
+
+    def _remembered(self) -> PageMemory:
+        try:
+            return read_memory(self._client.local_storage.get_item(KEY, timeout=ANSWER_WITHIN))
+        except (RuntimeError, TimeoutError) as error:  # storage forbidden, page gone, no answer
+            log.debug("visitor %s remembers nothing: %s", self._client.client_id, error)
+            return PageMemory()
+
+    def _restore(self, saved: PageState) -> None:
+        """Set what a fresh page lacks; whatever cannot be set is told, and the rest is set all the same."""
+        if saved.task is not None:
+            self._task = saved.task
+            self._target_choice.show(saved.task)
+            self._scene.gizmo.disable_rotations = saved.task == "position"
+        if saved.branch is not None:
+            self._branch = saved.branch
+            self._branch_choice.choose(saved.branch)
+        if saved.target is not None:
+            self._guard(lambda: self._restore_target(cast(Array, saved.target), saved.q))
+        lesson = next((lesson for lesson in LESSONS if lesson.key == saved.lesson), None)
+        if self._lessons is not None and lesson is not None:
+            self._guard(lambda: cast(LessonChoice, self._lessons).choose(lesson.title))
+        for feature in self._features:
+            if feature.key in saved.features:
+                told = saved.features[feature.key]
+                self._guard(lambda feature=feature, told=told: feature.restore(told))  # type: ignore[misc]
+        if saved.missing:
+            detail = f"There is no robot “{saved.missing}” here."
+            self._status.show(Notice("error", "The link asks for another robot", detail))
+
+    def _restore_target(self, T: Array, q: Array | None) -> None:
+        """Ask for the pose again, and answer with the configuration it had, if that is as near to it."""
+        self.ask(T)
+        if q is None or self._reached:
+            return
+        near, now = (np.linalg.norm(kin.fk(self._robot, x)[:3, 3] - T[:3, 3]) for x in (q, self._motion.goal))
+        if near <= now + 1e-6:
+            self._aim(q, ease=False)
+
+    def _snapshot(self) -> PageState:
+        lesson = self._lessons.shown if self._lessons is not None else None
+        told = {feature.key: feature.state() for feature in self._features}
+        return PageState(
+            robot=self._robot.id,
+            q=self._motion.goal,
+            target=self._target,
+            task=self._task,
+            branch=self._branch,
+            lesson=None if lesson is None else lesson.key,
+            degrees=self._degrees,
+            view=self._view,
+            features={key: state for key, state in told.items() if state},
+        )
+
+    def _keep(self) -> None:
+        """Have the page remember how it is now."""
+        text = encode(self._snapshot())
+        if text != self._kept:
+            self._kept = text
+            self._client.local_storage.set_item(KEY, text)
+            self._offer()
+            self._client.flush()
+
+    def _offer(self) -> None:
+        q = self._motion.goal
+        target = kin.fk(self._robot, q) if self._target is None else self._target
+        moment = Moment(self._robot, q, target, self._task, self._address, self._token)
+        self._share.show(f"{self._address}viewer/#s={self._kept}", moment)
+
+    def _use(self, robot: Robot, q: Array | None = None) -> None:
+        """Show another robot, at home or at a configuration ``(n,)``, in a fitting view."""
         self._robot = robot
         self._target = None
         self._dragging = False
         weights = np.where(robot.revolute, 1.0, 4.0)
-        self._motion = Motion(robot.q_home, weights)
-        self._q = robot.q_home
+        self._motion = Motion(robot.q_home if q is None else q, weights)
+        self._q = self._motion.goal
         self._locks = [False] * robot.n
         self._arms += 1
         self._scene = ArmScene(self._client.scene, robot, self._view.dark, f"/arm-{self._arms}")

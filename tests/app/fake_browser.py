@@ -18,12 +18,21 @@ from kin.transforms import from_position_wxyz, wxyz_from_rotation
 class FakeBrowser:
     """One visitor, of viser's own port or of any address, which may need more `options` to connect.
 
-    `pump` reads messages; everything shown is in `gui`, `values`, `poses` and `visible`.
+    `pump` reads messages; everything shown is in `gui`, `values`, `poses` and `visible`. `memory` is what the page
+    answers when asked what it remembers, `kept` what it was told to remember.
     """
 
     def __init__(
-        self, where: int | str, width: int = 1280, height: int = 720, path: str = "", **options: Any
+        self,
+        where: int | str,
+        width: int = 1280,
+        height: int = 720,
+        path: str = "",
+        memory: str | None = None,
+        **options: Any,
     ) -> None:
+        self.memory = memory
+        self.kept: list[str] = []
         self._socket = connect(
             where if isinstance(where, str) else f"ws://127.0.0.1:{where}{path}",
             subprotocols=[f"viser-v{viser.__version__}"],  # type: ignore[list-item]
@@ -198,6 +207,14 @@ class FakeBrowser:
     def _apply(self, m: dict[str, Any]) -> None:
         self.log.append(m)
         match m["type"]:
+            case "LocalStorageGetItemRequestMessage":
+                if self.answers:
+                    uuid = m["request_uuid"]
+                    self.send(
+                        "LocalStorageGetItemResponseMessage", request_uuid=uuid, value=self.memory, error=None
+                    )
+            case "LocalStorageSetItemMessage":
+                self.kept.append(m["value"])
             case "SetPositionMessage":
                 self.poses.setdefault(m["name"], {})["position"] = m["position"]
             case "SetOrientationMessage":
@@ -207,10 +224,6 @@ class FakeBrowser:
             case "SceneNodeUpdateMessage":
                 if m["name"] in self.nodes:
                     self.nodes[m["name"]]["props"].update(m["updates"])
-            case "LocalStorageGetItemRequestMessage":
-                if self.answers:
-                    uuid = m["request_uuid"]
-                    self.send("LocalStorageGetItemResponseMessage", request_uuid=uuid, value=None, error=None)
             case "RemoveSceneNodeMessage":
                 # Like the real page, poses stay behind.
                 self.nodes = {

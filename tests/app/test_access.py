@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 
 import pytest
@@ -18,6 +19,8 @@ import app.access as access
 from app.access import COOKIE, Bucket, client_of
 from app.main import create_app
 from app.settings import Settings
+from app.viewer.panel.view import ViewState
+from app.viewer.state import PageState, encode
 
 TOKEN = "correct horse battery"
 HEADER = {"authorization": f"Bearer {TOKEN}"}
@@ -269,12 +272,14 @@ def test_read_only_is_for_those_without_the_token():
     assert client.get("/api/v1/robots", headers={"authorization": "Bearer wrong"}).status_code == 401
 
 
-def test_whoever_may_only_look_sees_the_arm_and_cannot_move_it():
+def test_whoever_may_only_look_sees_the_arm_a_link_shows_and_cannot_move_it():
     application = create_app(Settings(read_only=True))
+    memory = json.dumps({"state": encode(PageState("pioneer5", view=ViewState(frames=True)))})
     with serve(application) as port:
         wait_for(lambda: application.state.startup.status == "ready", 300)
-        with FakeBrowser(port, path="/viewer") as tab:
+        with FakeBrowser(port, path="/viewer", memory=memory) as tab:
             tab.settle()
+            assert tab.value("Link frames") is True
             before = tab.tool_pose()
             tab.set("1 rotating base", 10.0)
             tab.drag(position=(0.1, 0.1, 0.1))

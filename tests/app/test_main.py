@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import signal
@@ -27,6 +26,7 @@ from app.main import create_app, run
 from app.pages import static_folder
 from app.settings import Settings
 from app.viewer.server import ViewerServer
+from kin import builtin_robots
 
 ROOT = Path(__file__).parents[2]
 PROTOCOL = f"viser-v{viser.__version__}"
@@ -152,14 +152,29 @@ def test_no_file_of_ours_names_another_host():
 
 
 def test_the_landing_pages_examples_are_answered_as_they_stand(client):
-    examples = re.findall(r'<code data-path="([^"]+)">([^<]+)</code>', client.get("/").text)
+    pattern = r'data-method="(\w+)" data-path="([^"]+)">[^<]+<code hidden>([^<]*)</code>'
     answers = {}
-    for path, body in examples:
-        answer = client.post(f"/{path}", json=json.loads(body))
+    for method, path, body in re.findall(pattern, client.get("/").text):
+        headers = {"Content-Type": "application/json"} if body else {}
+        answer = client.request(method, f"/{path}", content=body, headers=headers)
         assert answer.status_code == 200, answer.text
-        answers[path.rsplit("/", 1)[1]] = answer.json()
-    assert set(answers) == {"fk", "ik"}
+        answers[urlsplit(path).path.rsplit("/", 1)[1]] = answer.json()
+    assert set(answers) == {"fk", "ik", "summary"}
     assert answers["ik"]["status"] == "solved"
+
+
+def test_every_built_in_arm_has_a_small_picture():
+    pictures = {file.stem: file for file in (static_folder() / "robots").iterdir()}
+    assert set(pictures) == set(builtin_robots())
+    for file in pictures.values():
+        assert file.read_bytes()[8:12] == b"WEBP"
+        assert file.stat().st_size < 15_000
+
+
+def test_viser_gets_its_memory_before_its_own_script(client):
+    html = client.get("/viewer/").text
+    assert html.index('<script src="../static/viewer.js"></script>') < html.index("<script data-p")
+    assert client.get("/static/viewer.js").status_code == 200
 
 
 def test_the_landing_page_names_the_version(client):

@@ -60,9 +60,9 @@ class BranchChoice:
             raise InputError("branch", value, "one of " + ", ".join((NEAREST, STAY, *self._names)))
         return self._names[str(value)]
 
-    def reset(self) -> None:
-        """Back to the nearest."""
-        assign(self._choice, NEAREST)
+    def choose(self, branch: str | None) -> None:
+        """Select a choice, told as `kin.solve_ik` takes it."""
+        assign(self._choice, NEAREST if branch is None else STAY if branch == "seed" else short(branch))
 
     def show(self, branch: str) -> None:
         """Name the branch the arm is on."""

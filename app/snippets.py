@@ -1,0 +1,269 @@
+"""The arm on show as code: the same questions asked with other tools.
+
+Each snippet asks where the tool is at this configuration and how it gets to this target. The first three ask this
+service or this library and get our answers; the Robotics Toolbox and MATLAB get the arm itself, written out as its
+DH table, so that our numbers can be checked against theirs.
+
+How the two conventions read there: `RevoluteDH` of P. Corke's toolbox and ``'dh'`` of MATLAB's `rigidBodyTree` are
+our "standard", `RevoluteMDH` and ``'mdh'`` our "modified". MATLAB replaces a moving row's theta (d of a slide) by
+the joint's value instead of adding it, so there the constant part is added to the values.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import shlex
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from kin import Joint, Robot, Task, builtin_robots
+from kin.transforms import Array, wxyz_from_rotation
+
+DIGITS = 9
+LOCAL = "http://127.0.0.1:8000/"
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """What a snippet asks about.
+
+    Attributes:
+        robot: the arm.
+        q: configuration ``(n,)``.
+        target: T_base_tool ``(4, 4)``.
+        task: how much of it is to be met.
+        address: where this service is, with a slash at the end; no character that a shell or a string would mind.
+        token: whether the service asks for one.
+    """
+
+    robot: Robot
+    q: Array
+    target: Array
+    task: Task = "pose"
+    address: str = LOCAL
+    token: bool = False
+
+
+def curl(moment: Moment) -> str:
+    """Two commands for a shell: forward, then inverse kinematics."""
+    header = ' -H "Authorization: Bearer $KINBOARD_TOKEN"' if moment.token else ""
+
+    def command(operation: str, body: object) -> str:
+        return (
+            f"curl -s {shlex.quote(_address(moment) + '/' + operation)}{header} \\\n"
+            f"  -H 'Content-Type: application/json' \\\n"
+            f"  -d '{json.dumps(body)}'\n"
+        )
+
+    return command("fk", {"q": _list(moment.q)}) + command("ik", _question(moment))
+
+
+def python_requests(moment: Moment) -> str:
+    """Python, asking this service over REST with the requests library."""
+    top, header = "import requests\n", ""
+    if moment.token:
+        top = f"import os\n\n{top}\n" + 'headers = {"Authorization": "Bearer " + os.environ["KINBOARD_TOKEN"]}\n'
+        header = ", headers=headers"
+    body = ",\n    ".join(f'"{name}": {json.dumps(value)}' for name, value in _question(moment).items())
+    return f"""{top}
+robot = {json.dumps(_address(moment))}
+q = {_list(moment.q)}
+question = {{
+    {body},
+}}
+
+forward = requests.post(robot + "/fk", json={{"q": q}}{header}).json()
+print(forward["pose"]["position"], forward["pose"]["wxyz"])
+
+answer = requests.post(robot + "/ik", json=question{header}).json()
+print(answer["status"], answer["reason"])
+for solution in answer["solutions"]:
+    print(solution["branch"], solution["q"])
+"""
+
+
+def python_kin(moment: Moment) -> str:
+    """Python, with this package and without any service."""
+    robot = moment.robot
+    if robot == builtin_robots().get(robot.id):
+        load = f'robot = kin.get_robot("{robot.id}")'
+    else:
+        load = f"# The arm's file in the service's folder of robots:\nrobot = kin.load_robot(\"{robot.id}.toml\")"
+    return f"""import kin
+
+{load}
+q = {_list(moment.q)}
+print(kin.fk(robot, q))  # T_base_tool
+
+target = [
+{_rows(moment.target)}]
+result = kin.solve_ik(robot, target, task="{moment.task}", q_seed=q)
+print(result.status, result.reason)
+for solution in result.solutions:
+    print(solution.branch, solution.q)
+"""
+
+
+def robotics_toolbox(moment: Moment) -> str:
+    """Python, with Corke's Robotics Toolbox.
+
+    It knows no fixed rows: those before the first joint go into its base, those after the last into its tool.
+    For an arm with one between two joints a comment says so instead.
+    """
+    robot = moment.robot
+    first, last = robot.joint_rows[0], robot.joint_rows[-1]
+    if last - first + 1 != robot.n:
+        return f"# {_comment(robot.name)} has a fixed row between two joints, which DHRobot cannot express.\n"
+    suffix = "MDH" if robot.convention == "modified" else "DH"
+    base = _product(robot.T_world_base, robot.rows[:first], robot.convention)
+    tool = _product(np.eye(4), robot.rows[last + 1 :], robot.convention) @ robot.T_last_tool
+    links = "".join(f"        {_link(row, suffix)},\n" for row in robot.joints)
+    ends = "".join(
+        f"    {name}={_se3(T, 4)},\n"
+        for name, T in (("base", base), ("tool", tool))
+        if not np.array_equal(T, np.eye(4))
+    )
+    return f"""import numpy as np
+from roboticstoolbox import DHRobot, Prismatic{suffix}, Revolute{suffix}
+from spatialmath import SE3
+
+robot = DHRobot(
+    [
+{links}    ],
+    name={json.dumps(robot.name)},
+{ends})
+q = {_list(moment.q)}
+print(robot.fkine(q))  # T_base_tool
+
+target = {_se3(moment.target)}
+print(robot.ikine_LM(target, q0=q))  # numerical, the whole pose, one solution
+"""
+
+
+def matlab(moment: Moment) -> str:
+    """MATLAB, with the Robotics System Toolbox."""
+    robot = moment.robot
+    kind = "mdh" if robot.convention == "modified" else "dh"
+    lines = [f"% {_comment(robot.name)}", "robot = rigidBodyTree('DataFormat', 'row');"]
+    parent = "base"
+
+    def add(name: str, joint: str, *setup: str) -> None:
+        nonlocal parent
+        lines.append(f"body = rigidBody('{name}');")
+        lines.append(f"joint = rigidBodyJoint('{name}_joint', '{joint}');")
+        lines.extend(setup)
+        lines.extend(["body.Joint = joint;", f"addBody(robot, body, '{parent}');"])
+        parent = name
+
+    if not np.array_equal(robot.T_world_base, np.eye(4)):
+        add("mount", "fixed", f"setFixedTransform(joint, {_matlab(robot.T_world_base)});")
+    offsets: list[float] = []
+    for number, row in enumerate(robot.rows, 1):
+        name = f"row{number}"
+        if row.kind == "fixed":
+            T = row_transform(row, 0.0, robot.convention)
+            add(name, "fixed", f"setFixedTransform(joint, {_matlab(T)});")
+            continue
+        offset = row.theta if row.kind == "revolute" else row.d
+        offsets.append(offset)
+        table = " ".join(_text(value) for value in (row.a, row.alpha, row.d, row.theta))
+        lower, upper = row.limits or (-math.inf, math.inf)
+        limits = f"{_text(lower + offset)} {_text(upper + offset)}"
+        setup = [f"setFixedTransform(joint, [{table}], '{kind}');  % a alpha d theta"]
+        setup.append(f"joint.PositionLimits = [{limits}];")
+        add(name, row.kind, *setup)
+    if not np.array_equal(robot.T_last_tool, np.eye(4)):
+        add("tool", "fixed", f"setFixedTransform(joint, {_matlab(robot.T_last_tool)});")
+    weights = "0 0 0 1 1 1" if moment.task == "position" else "1 1 1 1 1 1"
+    lines += [
+        "",
+        f"offset = [{_row(np.array(offsets))}];  % MATLAB's joint values contain the table's constant part",
+        f"q = [{_row(moment.q)}];",
+        f"T = getTransform(robot, q + offset, '{parent}')  % T_base_tool",
+        "",
+        f"target = {_matlab(moment.target)};",
+        "solver = inverseKinematics('RigidBodyTree', robot);",
+        f"[solution, info] = solver('{parent}', target, [{weights}], q + offset);  % orientation, then position",
+        "q_solution = solution - offset",
+        "info.Status",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+SNIPPETS: dict[str, Callable[[Moment], str]] = {
+    "curl": curl,
+    "Python, requests": python_requests,
+    "Python, kin": python_kin,
+    "Robotics Toolbox": robotics_toolbox,
+    "MATLAB": matlab,
+}
+
+
+def row_transform(row: Joint, value: float, convention: str) -> Array:
+    """The transform ``(4, 4)`` of one DH row at a joint value (0 for a fixed row)."""
+    theta = row.theta + (value if row.kind == "revolute" else 0.0)
+    d = row.d + (value if row.kind == "prismatic" else 0.0)
+    c, s, ca, sa = math.cos(theta), math.sin(theta), math.cos(row.alpha), math.sin(row.alpha)
+    turn = np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, d], [0, 0, 0, 1]])
+    twist = np.array([[1, 0, 0, row.a], [0, ca, -sa, 0], [0, sa, ca, 0], [0, 0, 0, 1]])
+    return np.asarray(twist @ turn if convention == "modified" else turn @ twist)
+
+
+def _address(moment: Moment) -> str:
+    return f"{moment.address}api/v1/robots/{moment.robot.id}"
+
+
+def _question(moment: Moment) -> dict[str, object]:
+    target: dict[str, object] = {"position": _list(moment.target[:3, 3])}
+    if moment.task != "position":
+        target["wxyz"] = _list(wxyz_from_rotation(moment.target[:3, :3]))
+    return {"target": target, "task": moment.task, "q_seed": _list(moment.q)}
+
+
+def _product(T: Array, rows: tuple[Joint, ...], convention: str) -> Array:
+    for row in rows:
+        T = T @ row_transform(row, 0.0, convention)
+    return T
+
+
+def _link(row: Joint, suffix: str) -> str:
+    slides = row.kind == "prismatic"
+    own = {"theta": row.theta} if slides else {"d": row.d}
+    values = {**own, "a": row.a, "alpha": row.alpha, "offset": row.d if slides else row.theta}
+    # A slide is drawn from 0 to its end there: without limits the toolbox refuses it.
+    limits = f", qlim={_list(np.array(row.limits))}" if row.limits is not None else ""
+    told = ", ".join(f"{name}={_text(value)}" for name, value in values.items() if value != 0.0)
+    return f"{'Prismatic' if slides else 'Revolute'}{suffix}({(told + limits).removeprefix(', ')})"
+
+
+def _text(value: float) -> str:
+    # Table entries in full: a rounded alpha would make right angles nearly right ones.
+    return repr(value + 0.0)
+
+
+def _list(values: Array) -> list[float]:
+    return [round(value, DIGITS) + 0.0 for value in values.tolist()]
+
+
+def _row(values: Array) -> str:
+    return " ".join(map(repr, _list(values)))
+
+
+def _rows(T: Array, indent: int = 4) -> str:
+    return "".join(f"{' ' * indent}{_list(row)},\n" for row in T)
+
+
+def _se3(T: Array, indent: int = 0) -> str:
+    rows = _rows(T, indent + 4)
+    return f"SE3(np.array([\n{rows}{' ' * indent}]), check=False)"
+
+
+def _matlab(T: Array) -> str:
+    return "[" + "; ".join(_row(row) for row in T) + "]"
+
+
+def _comment(name: str) -> str:
+    return " ".join(name.split())

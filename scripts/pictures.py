@@ -1,0 +1,95 @@
+"""Pictures of the built-in arms for the landing page, ``static/robots/*.webp``: ``python scripts/pictures.py``.
+
+Each arm is drawn by the viewer itself, at home, on nothing: the background is transparent, so one picture serves
+light and dark pages. Needs what the browser tests need: playwright, Chromium (KINBOARD_TEST_CHROMIUM) and pillow.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from pathlib import Path
+
+import numpy as np
+import viser
+from PIL import Image, ImageOps
+from playwright.sync_api import sync_playwright
+
+from app.viewer.camera import FOV, view
+from app.viewer.scene import ArmScene
+from kin import Robot, builtin_robots, link_frames
+
+FOLDER = Path(__file__).parents[1] / "static" / "robots"
+SIZE = (320, 240)
+FINER = 3  # drawn so many times larger: smooth edges
+MARGIN = 10
+TALLEST = 1.05  # height of a picture over its width
+PAD = 0.07  # of the whole, for the hand around its frame
+
+
+def draw(client: viser.ClientHandle, robot: Robot) -> Image.Image:
+    """The arm, cut out and centred."""
+    arm = ArmScene(client.scene, robot, root=f"/{robot.id}")
+    arm.gizmo.visible = False
+    arm.show_floor(False)
+    arm.show_labels(False)
+    width, height = (FINER * side for side in SIZE)
+    position, look_at = view(arm.body, width / height)
+    toward = look_at - position
+    z = toward / np.linalg.norm(toward)
+    x = np.cross(z, (0.0, 0.0, 1.0))
+    x /= np.linalg.norm(x)
+    rotation = viser.transforms.SO3.from_matrix(np.column_stack([x, np.cross(z, x), z]))
+    client.flush()
+    pixels = client.get_render(
+        height, width, wxyz=rotation.wxyz, position=position, fov=FOV, transport_format="png", timeout=60
+    )
+    arm.remove()
+    picture = Image.fromarray(pixels)
+    left, top, right, bottom = picture.getbbox()
+    # A tall pedestal runs out of the picture, or the arm on it would be tiny; no joint and no tool does.
+    seen = (link_frames(robot, robot.q_home)[:, :3, 3] - position) @ np.column_stack([np.cross(x, z), z])
+    lowest = height / 2 * (1.0 - (seen[:, 0] / seen[:, 1] / np.tan(FOV / 2)).min()) + PAD * height
+    end = min(bottom, max(round(top + TALLEST * (right - left)), round(lowest)))
+    cut = end < bottom
+    picture = picture.crop((left, top, right, end))
+    room = (SIZE[0] - 2 * MARGIN, SIZE[1] - (1 if cut else 2) * MARGIN)
+    picture = ImageOps.contain(picture, room, Image.Resampling.LANCZOS)
+    canvas = Image.new("RGBA", SIZE)
+    above = SIZE[1] - picture.height if cut else (SIZE[1] - picture.height) // 2
+    canvas.paste(picture, ((SIZE[0] - picture.width) // 2, above))
+    return canvas
+
+
+def main() -> None:
+    """Draw all arms."""
+    FOLDER.mkdir(exist_ok=True)
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    server.scene.configure_environment_map(None)
+    server.scene.configure_default_lights(enabled=True, cast_shadow=False)
+    server.scene.add_light_hemisphere(
+        "/sky", sky_color=(255, 255, 255), ground_color=(176, 184, 200), intensity=1.6
+    )
+    done = threading.Event()
+
+    @server.on_client_connect
+    def _(client: viser.ClientHandle) -> None:
+        for robot in builtin_robots().values():
+            file = FOLDER / f"{robot.id}.webp"
+            draw(client, robot).save(file, quality=82, method=6)
+            print(f"{file.name}: {file.stat().st_size} bytes", flush=True)
+        done.set()
+
+    chromium = os.environ.get("KINBOARD_TEST_CHROMIUM", "/usr/bin/chromium")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": FINER * SIZE[0], "height": FINER * SIZE[1]})
+        page.goto(f"http://127.0.0.1:{server.get_port()}/")
+        while not done.is_set():
+            page.wait_for_timeout(200)
+        browser.close()
+    server.stop()
+
+
+if __name__ == "__main__":
+    main()

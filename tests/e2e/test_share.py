@@ -1,0 +1,198 @@
+"""A link, a reload and a lost connection give the same view again; the landing page, its cards and its box."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+from page import ARTIFACTS, WAIT, Tab
+from playwright.sync_api import Browser, FrameLocator, Page, expect
+
+import kin
+from app.viewer.state import PageState, decode
+
+pytestmark = pytest.mark.browser
+
+PIONEER, UR5 = kin.get_robot("pioneer5"), kin.get_robot("ur5")
+ROBOTS = tuple(kin.builtin_robots().values())
+
+
+class Line:
+    """A line to the service that can be cut, as when a cable is pulled and put back."""
+
+    def __init__(self, port: int) -> None:
+        self._port = port
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self._ends: list[socket.socket] = []
+        self.address = f"http://127.0.0.1:{self._listener.getsockname()[1]}/"
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def _accept(self) -> None:
+        with contextlib.suppress(OSError):
+            while True:
+                visitor, _ = self._listener.accept()
+                service = socket.create_connection(("127.0.0.1", self._port))
+                self._ends += [visitor, service]
+                for source, sink in ((visitor, service), (service, visitor)):
+                    threading.Thread(target=self._carry, args=(source, sink), daemon=True).start()
+
+    def _carry(self, source: socket.socket, sink: socket.socket) -> None:
+        with contextlib.suppress(OSError):
+            while data := source.recv(65536):
+                sink.sendall(data)
+            sink.shutdown(socket.SHUT_WR)
+
+    def cut(self) -> int:
+        """End every connection; how many there were."""
+        ends, self._ends = self._ends, []
+        for end in ends:
+            with contextlib.suppress(OSError):
+                end.shutdown(socket.SHUT_RDWR)
+            end.close()
+        return len(ends)
+
+    def close(self) -> None:
+        self.cut()
+        self._listener.close()
+
+
+@pytest.fixture(scope="module")
+def line(address: str) -> Iterator[Line]:
+    port = urlsplit(address).port
+    assert port is not None
+    opened = Line(port)
+    yield opened
+    opened.close()
+
+
+@pytest.fixture(scope="module")
+def shared(browser: Browser, line: Line) -> Iterator[Tab]:
+    opened = Tab(browser, line.address, 1280, 720)
+    opened.page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    yield opened
+    opened.close()
+
+
+def state_of(page: Page) -> PageState:
+    """What the address holds."""
+    return decode(page.evaluate("new URLSearchParams(location.hash.slice(1)).get('s') ?? ''"), ROBOTS)
+
+
+def wait_for_address(page: Page, key: str) -> None:
+    page.wait_for_function("key => new URLSearchParams(location.hash.slice(1)).has(key)", arg=key, timeout=WAIT)
+
+
+def turned(degrees: float) -> np.ndarray:
+    q = PIONEER.q_home.copy()
+    q[0] = np.radians(degrees)
+    return q
+
+
+def wait_for_tool(page: Page, shown: Page | FrameLocator, T: np.ndarray) -> None:
+    """Wait until the panel tells this pose's position; while a page comes back, it tells nothing."""
+    wanted = 1000 * T[:3, 3]
+    cells = shown.locator('table[aria-label="tool pose"] tr').first.locator("td span")
+    end = time.monotonic() + WAIT / 1000
+    while True:
+        numbers = [float(text.replace("−", "-")) for text in cells.all_inner_texts()]
+        if len(numbers) == 3 and np.abs(np.array(numbers) - wanted).max() < 0.06:
+            return
+        assert time.monotonic() < end, f"the tool is at {numbers}, expected {wanted}"
+        page.wait_for_timeout(50)
+
+
+def test_link_reload_and_lost_connection(shared: Tab, line: Line, browser: Browser) -> None:
+    page = shared.page
+    assert page.url == line.address + "viewer/", "a fresh page has a short address"
+    shared.type_number("1 rotating base", "37.25")
+    wait_for_address(page, "s")
+    assert np.abs(state_of(page).q - turned(37.25)).max() < 1e-9
+
+    page.get_by_role("tab", name="View").click()
+    wait_for_address(page, "tab")
+    with page.expect_event("framenavigated", timeout=WAIT):
+        shared.check("Dark page")
+    shared.screenshot("share-dark")
+    with page.expect_event("framenavigated", timeout=WAIT):
+        shared.check("Dark page")
+    shared.screenshot("share-light")
+    page.get_by_role("button", name="Copy code").click()
+    page.wait_for_function("navigator.clipboard.readText().then(text => text.startsWith('curl -s http'))")
+    page.get_by_role("button", name="Copy link").click()
+    page.wait_for_function("navigator.clipboard.readText().then(text => text.includes('/viewer/#s='))")
+    link = page.evaluate("navigator.clipboard.readText()")
+
+    page.reload()
+    expect(shared.status).to_have_attribute("data-status", "hand")
+    shared.wait_for_tool(kin.fk(PIONEER, turned(37.25))[:3, 3], within=0.06)
+    expect(page.get_by_role("tab", name="View")).to_have_attribute("aria-selected", "true")
+
+    page.get_by_role("tab", name="Move").click()
+    shared.type_number("1 rotating base", "60")
+    page.wait_for_function("link => !link.includes(location.hash.split('&')[0])", arg=link, timeout=WAIT)
+    page.evaluate("window.sinceLoad = true")
+    with page.expect_websocket(timeout=WAIT):
+        assert line.cut() > 0
+    wait_for_tool(page, page, kin.fk(PIONEER, turned(60)))
+    assert page.evaluate("window.sinceLoad"), "it was no reload"
+
+    other = browser.new_page(viewport={"width": 1280, "height": 720})
+    other.goto(link)
+    expect(other.locator("[data-status]")).to_have_attribute("data-status", "hand", timeout=WAIT)
+    wait_for_tool(other, other, kin.fk(PIONEER, turned(37.25)))
+    other.close()
+    shared.wait_for_tool(kin.fk(PIONEER, turned(60))[:3, 3], within=0.06)
+
+
+@pytest.mark.parametrize(
+    ("name", "width", "height", "scheme"),
+    [("light", 1280, 720, "light"), ("dark", 1280, 720, "dark"), ("phone", 390, 844, "dark")],
+)
+def test_the_landing_page(browser: Browser, address: str, name: str, width: int, height: int, scheme: str) -> None:
+    page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)
+    errors: list[str] = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    # An arm of an operator, of which there is no picture.
+    page.route("**/static/robots/scara.webp", lambda route: route.fulfill(status=404))
+    if name != "light":  # one look at the viewer in place is enough: it is drawn in software
+        page.route("**/readyz", lambda route: route.fulfill(status=503, body='{"status": "warming"}'))
+    page.goto(address)
+    expect(page.locator(".card h3 a")).to_have_count(len(ROBOTS))
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "nothing sticks out"
+    page.locator("#cards").scroll_into_view_if_needed()
+    page.evaluate("document.querySelectorAll('.shown img').forEach(image => { image.loading = 'eager'; })")
+    expect(page.locator(".shown svg")).to_have_count(1)
+    loaded = "[...document.querySelectorAll('.shown img')].filter(image => image.naturalWidth === 320).length"
+    end = time.monotonic() + WAIT / 1000
+    while page.evaluate(loaded) != len(ROBOTS) - 1:
+        assert time.monotonic() < end, page.evaluate(loaded)
+        page.wait_for_timeout(50)
+
+    page.get_by_role("button", name="Inverse").click()
+    page.get_by_role("button", name="Send").click()
+    expect(page.locator("#outcome")).to_contain_text("200")
+    expect(page.locator("#answer")).to_contain_text('"status": "solved"')
+    page.locator("#body").fill('{"target": 5}')
+    page.get_by_role("button", name="Send").click()
+    expect(page.locator("#outcome")).to_contain_text("422")
+    page.get_by_role("button", name="Workspace").click()
+    page.get_by_role("button", name="Send").click()
+    expect(page.locator("#outcome")).to_contain_text("200")
+    ARTIFACTS.mkdir(exist_ok=True)
+    page.screenshot(path=ARTIFACTS / f"landing-{name}.png", full_page=True)
+
+    if name == "light":
+        viewer = page.frame_locator("#frame iframe")
+        expect(viewer.locator("[data-status]")).to_have_attribute("data-status", "hand", timeout=WAIT)
+        page.get_by_role("link", name="UR5").click()
+        expect(viewer.locator("input[value='UR5']").first).to_be_visible(timeout=WAIT)
+        wait_for_tool(page, viewer, kin.fk(UR5, UR5.q_home))
+        page.screenshot(path=ARTIFACTS / "landing-card.png")
+    assert errors == []
+    page.close()
