@@ -7,6 +7,7 @@ people. Here they get their addresses: ``/`` the landing page, ``/viewer/`` the 
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import ipaddress
 import os
@@ -29,7 +30,7 @@ from starlette.middleware.cors import CORSMiddleware
 from starlette.responses import PlainTextResponse
 
 from app.access import Access
-from app.api import Gate, build_router, install_problem_handlers, memory
+from app.api import Gate, Work, build_router, complete_document, install_problem_handlers, memory
 from app.bridge import ViewerBridge
 from app.clouds import Clouds
 from app.inspection import MAX_MESSAGE
@@ -74,12 +75,14 @@ def create_app(settings: Settings, store: Store | None = None) -> FastAPI:
     store = store or Store(settings.robots)
     bridge = ViewerBridge(settings.allowed_origins, settings.max_visitors)
     clouds, sizes = Clouds(settings.cloud_memory), memory()
+    work = Work(settings.max_requests, settings.time_budget)
     startup = Startup(settings, store, clouds, bridge)
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         startup.start()
         yield
+        work.close()  # what is still being computed has had its time to drain
         await run_in_threadpool(startup.stop)
         clouds.close()
         sizes.close()
@@ -98,7 +101,9 @@ def create_app(settings: Settings, store: Store | None = None) -> FastAPI:
     )
     app.state.store, app.state.settings, app.state.startup = store, settings, startup
     app.state.clouds, app.state.gate, app.state.sizes = clouds, Gate(settings.max_streams), sizes
+    app.state.work = work
     install_problem_handlers(app)
+    complete_document(app, store, settings)
     app.include_router(build_router())
     app.router.routes.extend([*page_routes(), *bridge.routes()])
 
@@ -178,7 +183,7 @@ def _serve(
     """Serve on one socket, in this process."""
     if settings.access_log:
         write_to_stderr()
-    server = _Server(server_config(create_app(settings, store), settings.drain), greeting)
+    server = _Server(create_app(settings, store), settings.drain, greeting)
     # uvicorn ends in good order and then raises the signal again: for us it is the expected end.
     before = signal.signal(signal.SIGTERM, lambda *_: None)
     try:
@@ -233,16 +238,22 @@ class _Greeting:
 
 
 class _Server(uvicorn.Server):
-    """Greets once connections are really accepted."""
+    """Greets once connections are really accepted; at its end refuses what would be cut off."""
 
-    def __init__(self, config: uvicorn.Config, greeting: _Greeting | None) -> None:
-        super().__init__(config)
+    def __init__(self, app: FastAPI, drain: float, greeting: _Greeting | None) -> None:
+        super().__init__(server_config(app, drain))
+        self._end_work = app.state.work.close
+        self._drain = drain
         self._greeting = greeting
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets=sockets)
         if self._greeting is not None:
             self._greeting.say()
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        asyncio.get_running_loop().call_later(self._drain - min(1.0, 0.5 * self._drain), self._end_work)
+        await super().shutdown(sockets=sockets)
 
 
 def _listen(settings: Settings) -> list[socket.socket]:

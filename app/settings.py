@@ -22,6 +22,12 @@ class Settings(BaseSettings):
     max_points: int = Field(100_000_000, ge=1, description="Most points one cloud of the workspace may have.")
     max_streams: int = Field(8, ge=1, description="Most clouds one process sends at a time.")
     max_body: int = Field(8 * 1024 * 1024, ge=1024, description="Largest request body in bytes.")
+    max_requests: int = Field(
+        16, ge=1, le=32, description="Most requests one process computes at a time; others wait for their turn."
+    )
+    time_budget: float = Field(
+        30.0, ge=0.1, le=3600, description="Seconds one request may compute, and seconds it may wait for its turn."
+    )
     token: SecretStr | None = Field(
         None, min_length=8, description="Whoever wants in must know it; none: everybody may."
     )

@@ -70,7 +70,11 @@ def get_robot(robot_id: str) -> Robot:
 def load_folder(folder: Path) -> dict[str, Robot]:
     """Every ``*.toml`` of a folder, by id. Two files with one id are refused."""
     robots: dict[str, Robot] = {}
-    for path in sorted(folder.glob("*.toml")):
+    try:
+        paths = sorted(path for path in folder.iterdir() if path.suffix == ".toml")
+    except OSError as error:  # which glob would take for an empty folder
+        raise RobotFileError(str(folder), "folder", str(error), "a folder that can be read") from error
+    for path in paths:
         robot = load_robot(path)
         if robot.id in robots:
             raise RobotFileError(str(path), "id", robot.id, "an id no other file of the folder uses")

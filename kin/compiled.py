@@ -4,17 +4,22 @@ numba turns a kernel into machine code when it is first called and keeps that on
 kernel's own file, although the code holds that of the kernels it calls, too: after an upgrade some of it would be
 that of the version before. Here it goes by the text of all modules with kernels.
 
+Nothing depends on the disk: what cannot be read there is compiled, and what cannot be written is not kept.
+
 With NUMBA_DISABLE_JIT=1 kernels are plain Python: a command that answers one question is sooner done so.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from numba import config, njit, types
+from numba.core.caching import FunctionCache
 
 MODEL = "model"
 PLAIN = bool(vars(config)["DISABLE_JIT"])
@@ -35,12 +40,48 @@ def _fingerprint() -> str:
 _FINGERPRINT = _fingerprint()
 
 
+class _Cache(FunctionCache):
+    """numba's cache of one kernel, by our fingerprint; a disk that fails costs time and no more.
+
+    Most of it is private to numba; tests see to it that it works.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        self._cache_file._source_stamp = _FINGERPRINT
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The machine code, None if it has to be compiled."""
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception as error:  # noqa: BLE001 - what is left of a file may raise anything
+            _warn(f"machine code in {self.cache_path} cannot be read ({error!r}) and is compiled anew")
+            # An index that cannot be read could not be added to either.
+            with contextlib.suppress(OSError):
+                Path(self._cache_file._index_path).unlink()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep machine code."""
+        try:
+            super().save_overload(sig, data)
+        except Exception as error:  # noqa: BLE001 - as above
+            self.disable()
+            _warn(f"machine code cannot be kept in {self.cache_path} ({error!r})")
+
+
+def _warn(what: str) -> None:
+    warnings.warn(f"{what}. Kernels are compiled when they are first used, which takes seconds.", stacklevel=2)
+
+
 def _compiled(function: _Kernel, **options: Any) -> _Kernel:
     if PLAIN:
         return function
-    kernel: Any = njit(cache=True, nogil=True, error_model="numpy", **options)(function)
-    # Private to numba; tests see to it that it works.
-    kernel._cache._cache_file._source_stamp = _FINGERPRINT
+    kernel: Any = njit(nogil=True, error_model="numpy", **options)(function)
+    try:
+        kernel._cache = _Cache(function)
+    except RuntimeError:  # numba found no folder to write to
+        _warn("no folder for machine code can be written to; NUMBA_CACHE_DIR names one")
     template = kernel.get_call_template
 
     def plain(arguments: tuple[types.Type, ...], keywords: dict[str, types.Type]) -> Any:

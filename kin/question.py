@@ -7,7 +7,7 @@ input is sound, and nobody needs to know in which form it came.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal, NamedTuple
@@ -43,6 +43,10 @@ _CANONICAL: dict[tuple[bool, ...], int] = {
 }
 
 
+def go_on() -> None:
+    """The `stop` of who has all the time in the world."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Question:
     """A checked question.
@@ -63,6 +67,7 @@ class Question:
         branches: the rows asked for, None for all.
         all_images, prefer, max_solutions: which answers are wanted.
         wanted: the solver asked for, ``"auto"`` or ``"numeric"`` (then `match` is None).
+        stop: called now and then by what may take long; it raises to end the work.
     """
 
     robot: Robot
@@ -86,6 +91,7 @@ class Question:
     wanted: str
     prefer: str
     max_solutions: int | None
+    stop: Callable[[], None] = go_on
 
     @property
     def given(self) -> tuple[Freedom, ...]:

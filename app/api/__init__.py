@@ -1,18 +1,20 @@
 """The REST door: ``build_router()`` holds the routes of /api/v1, `install_problem_handlers` the one error shape.
 
 Routes find what they share in ``app.state``: robots in ``store``, ``settings``, ``clouds``, the ``gate`` that
-counts the clouds being sent, and in ``sizes`` those that were computed.
+counts the clouds being sent, in ``sizes`` those that were computed, and in ``work`` the places to compute in.
 """
 
 from fastapi import APIRouter
 
 from app.api import equations, fk, ik, jacobian, path, robots, workspace
 from app.api.body import JsonRoute
+from app.api.document import complete_document
 from app.api.problems import install_problem_handlers
+from app.api.work import Work
 from app.api.workspace.flow import Gate
 from app.api.workspace.summary import memory
 
-__all__ = ["Gate", "build_router", "install_problem_handlers", "memory"]
+__all__ = ["Gate", "Work", "build_router", "complete_document", "install_problem_handlers", "memory"]
 
 
 def build_router() -> APIRouter:

@@ -21,6 +21,7 @@ from app.api.schemas import (
     refusals,
     reply,
 )
+from app.api.work import BudgetDep
 from app.equations import Book, Equation, Symbol, book, typeset
 from app.equations.expression import Expression
 from kin import Robot
@@ -193,14 +194,17 @@ class EquationsRequest(schemas.Body):
     responses=POST_REFUSALS,
 )
 def equation_values(
-    robot: RobotDep, settings: SettingsDep, body: Annotated[EquationsRequest, Body(openapi_examples=EXAMPLES)]
+    robot: RobotDep,
+    settings: SettingsDep,
+    budget: BudgetDep,
+    body: Annotated[EquationsRequest, Body(openapi_examples=EXAMPLES)],
 ) -> Response:
     """Every equation as printed and corrected (or derived), beside the product of the DH matrices.
 
     One configuration gets one answer; a list gets `{"results": [...]}` in the same order.
     """
     q, single = schemas.as_configurations(robot, body.q, settings)
-    return one_or_all(lambda some: _values(robot, q[some]), len(q), single)
+    return one_or_all(lambda some: _values(robot, q[some]), len(q), single, budget)
 
 
 def _equation(found: Book, equation: Equation) -> EquationAnswer:

@@ -12,6 +12,7 @@ from app.answers import FkAnswer, documented, fk_answers
 from app.api import schemas
 from app.api.body import JsonRoute
 from app.api.schemas import POST_REFUSALS, Configurations, RobotDep, SettingsDep, example, one_or_all
+from app.api.work import BudgetDep
 
 router = APIRouter(tags=["kinematics"], route_class=JsonRoute)
 
@@ -56,7 +57,10 @@ class FkAnswers(TypedDict):
     responses=POST_REFUSALS,
 )
 def forward_kinematics(
-    robot: RobotDep, settings: SettingsDep, body: Annotated[FkRequest, Body(openapi_examples=EXAMPLES)]
+    robot: RobotDep,
+    settings: SettingsDep,
+    budget: BudgetDep,
+    body: Annotated[FkRequest, Body(openapi_examples=EXAMPLES)],
 ) -> Response:
     """Pose of the tool for joint values, as a 4×4 matrix and as position with quaternion.
 
@@ -64,4 +68,4 @@ def forward_kinematics(
     limits are answered too, with `in_limits` false.
     """
     q, single = schemas.as_configurations(robot, body.q, settings)
-    return one_or_all(lambda some: fk_answers(robot, q[some], body.frames), len(q), single)
+    return one_or_all(lambda some: fk_answers(robot, q[some], body.frames), len(q), single, budget)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Body, Response
-from pydantic import Discriminator, Field, Tag
+from pydantic import BeforeValidator, Discriminator, Field, Tag
 from typing_extensions import TypedDict
 
 from app.answers import IkAnswer, documented, ik_answer
@@ -20,12 +20,14 @@ from app.api.schemas import (
     RobotDep,
     SettingsDep,
     example,
+    integral,
     one_or_all,
 )
 from app.api.targets import Target
+from app.api.work import BudgetDep
 from app.metrics import SOLVE_SECONDS
 from app.settings import Settings
-from kin import Robot, solve_ik
+from kin import Robot, Task, solve_ik
 from kin.transforms import Array
 
 router = APIRouter(tags=["kinematics"], route_class=JsonRoute)
@@ -85,7 +87,7 @@ class IkRequest(Asked):
     respect_limits: bool = Field(
         True, strict=True, description="Whether answers outside the joint limits are left out."
     )
-    max_solutions: Annotated[int, Field(ge=1, le=10_000, strict=True)] | None = Field(
+    max_solutions: Annotated[int, Field(ge=1, le=10_000, strict=True), BeforeValidator(integral)] | None = Field(
         None, description="Most solutions per target, nearest to the seed first. By default all."
     )
     images: Literal["nearest", "all"] = Field(
@@ -123,7 +125,10 @@ class IkAnswers(TypedDict):
     responses=POST_REFUSALS,
 )
 def inverse_kinematics(
-    robot: RobotDep, settings: SettingsDep, body: Annotated[IkRequest, Body(openapi_examples=EXAMPLES)]
+    robot: RobotDep,
+    settings: SettingsDep,
+    budget: BudgetDep,
+    body: Annotated[IkRequest, Body(openapi_examples=EXAMPLES)],
 ) -> Response:
     """Every configuration that brings the tool to a target, nearest to the seed first, or why there is none.
 
@@ -138,32 +143,33 @@ def inverse_kinematics(
     questions = [body.resolve(target, "target" if single else f"target[{i}]") for i, target in enumerate(targets)]
     seeds = _seeds(robot, body, len(targets), settings)
 
-    def answers(some: slice) -> list[IkAnswer]:
-        return [
-            ik_answer(
-                solve_ik(
-                    robot,
-                    T,
-                    task=task,
-                    mask=body.mask,
-                    mask_frame=body.mask_frame,
-                    q_seed=seed,
-                    respect_limits=body.respect_limits,
-                    limits=body.limits,
-                    locked=body.locked,
-                    branch=body.branch,
-                    images=body.images,
-                    prefer=body.prefer,
-                    max_solutions=body.max_solutions,
-                    redundancy=body.redundancy,
-                    solver=body.solver,
-                )
+    def answer(task: Task, T: Array, seed: Array | None) -> IkAnswer:
+        budget.check()
+        return ik_answer(
+            solve_ik(
+                robot,
+                T,
+                task=task,
+                mask=body.mask,
+                mask_frame=body.mask_frame,
+                q_seed=seed,
+                respect_limits=body.respect_limits,
+                limits=body.limits,
+                locked=body.locked,
+                branch=body.branch,
+                images=body.images,
+                prefer=body.prefer,
+                max_solutions=body.max_solutions,
+                redundancy=body.redundancy,
+                solver=body.solver,
             )
-            for (task, T), seed in zip(questions[some], seeds[some], strict=True)
-        ]
+        )
+
+    def answers(some: slice) -> list[IkAnswer]:
+        return [answer(task, T, seed) for (task, T), seed in zip(questions[some], seeds[some], strict=True)]
 
     with SOLVE_SECONDS.labels("rest").time():
-        return one_or_all(answers, len(targets), single)
+        return one_or_all(answers, len(targets), single, budget)
 
 
 def _seeds(robot: Robot, body: IkRequest, count: int, settings: Settings) -> list[Array | None]:

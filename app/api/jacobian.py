@@ -12,6 +12,7 @@ from app.answers import JacobianAnswer, documented, jacobian_answers
 from app.api import schemas
 from app.api.body import JsonRoute
 from app.api.schemas import POST_REFUSALS, Configurations, RobotDep, SettingsDep, example, one_or_all
+from app.api.work import BudgetDep
 
 router = APIRouter(tags=["kinematics"], route_class=JsonRoute)
 
@@ -49,11 +50,14 @@ class JacobianAnswers(TypedDict):
     responses=POST_REFUSALS,
 )
 def geometric_jacobian(
-    robot: RobotDep, settings: SettingsDep, body: Annotated[JacobianRequest, Body(openapi_examples=EXAMPLES)]
+    robot: RobotDep,
+    settings: SettingsDep,
+    budget: BudgetDep,
+    body: Annotated[JacobianRequest, Body(openapi_examples=EXAMPLES)],
 ) -> Response:
     """The geometric 6×n Jacobian (linear rows first), its singular values and Yoshikawa's manipulability.
 
     One configuration gets one answer; a list gets `{"results": [...]}` in the same order.
     """
     q, single = schemas.as_configurations(robot, body.q, settings)
-    return one_or_all(lambda some: jacobian_answers(robot, q[some], body.frame), len(q), single)
+    return one_or_all(lambda some: jacobian_answers(robot, q[some], body.frame), len(q), single, budget)

@@ -14,6 +14,7 @@ from app.api.body import JsonRoute
 from app.api.problems import FieldError, invalid
 from app.api.schemas import POST_REFUSALS, Configuration, RobotDep, SettingsDep, example, reply
 from app.api.targets import Target
+from app.api.work import BudgetDep
 from kin import solve_path
 
 router = APIRouter(tags=["kinematics"], route_class=JsonRoute)
@@ -47,7 +48,9 @@ class PathRequest(Asked):
     """Where the tool should go, one waypoint after the other."""
 
     targets: list[Target] = Field(
-        description="The waypoints in order; all of them in a form that allows the same task.", min_length=1
+        description="The waypoints in order; all of them in a form that allows the same task.",
+        min_length=1,
+        fail_fast=True,
     )
     q_start: Configuration | None = Field(
         None,
@@ -69,7 +72,10 @@ class PathRequest(Asked):
     responses=POST_REFUSALS,
 )
 def path_inverse_kinematics(
-    robot: RobotDep, settings: SettingsDep, body: Annotated[PathRequest, Body(openapi_examples=EXAMPLES)]
+    robot: RobotDep,
+    settings: SettingsDep,
+    budget: BudgetDep,
+    body: Annotated[PathRequest, Body(openapi_examples=EXAMPLES)],
 ) -> Response:
     """One continuous joint path through all targets: as few jumps as possible, then as little motion as possible.
 
@@ -98,5 +104,6 @@ def path_inverse_kinematics(
         locked=body.locked,
         branch=body.branch,
         max_step=body.max_step,
+        stop=budget.check,
     )
     return reply(path_answer(result))

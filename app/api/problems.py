@@ -44,6 +44,7 @@ KINDS = {
     "unsupported-media-type": "The body must be JSON",
     "invalid-input": "The request holds a value that is not usable",
     "busy": "The service has its hands full",
+    "too-slow": "The answer takes too long",
     "internal-error": "Something went wrong on our side",
     "http-error": "The request was refused",
 }
@@ -122,18 +123,12 @@ def unknown_robot(error: UnknownRobotError) -> ProblemError:
 
 
 def install_problem_handlers(app: FastAPI) -> None:
-    """Makes every refusal of `app`, unhandled errors included, a problem document, and says so in its OpenAPI."""
+    """Makes every refusal of `app`, unhandled errors included, a problem document."""
     app.add_exception_handler(StarletteHTTPException, _http_error)
     app.add_exception_handler(RequestValidationError, _validation_error)
     app.add_exception_handler(UnknownRobotError, _unknown_robot)
     app.add_exception_handler(InputError, _input_error)
     app.add_exception_handler(Exception, _internal_error)
-    plain = app.openapi
-
-    def openapi() -> dict[str, Any]:
-        return _with_problem_media_type(plain())
-
-    app.openapi = openapi  # type: ignore[method-assign]  # FastAPI's own way to adjust the document
 
 
 def show(value: object) -> str:
@@ -235,14 +230,3 @@ def field_error(item: dict[str, Any]) -> FieldError:
 
 def _items(how: str, count: int) -> str:
     return f"{how} {count} item" + "s" * (count != 1)
-
-
-def _with_problem_media_type(document: dict[str, Any]) -> dict[str, Any]:
-    """FastAPI files every response model under application/json: move those of refusals to their own type."""
-    for path in document.get("paths", {}).values():
-        for operation in path.values():
-            for status, response in operation.get("responses", {}).items():
-                content = response.get("content", {})
-                if status[0] in "45" and "application/json" in content:
-                    content[MEDIA_TYPE] = content.pop("application/json")
-    return document

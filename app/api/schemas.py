@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_val
 from pydantic_core import to_json
 
 from app.api.problems import FieldError, Problem, ProblemError, invalid, show
+from app.api.work import Budget
 from app.settings import Settings
 from app.store import Store
 from kin import InputError, Robot
@@ -26,6 +27,11 @@ Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False, st
 def numbers(count: int) -> Any:
     """Field constraints of a list of exactly `count` numbers; the first wrong item ends the search."""
     return Field(min_length=count, max_length=count, fail_fast=True)
+
+
+def integral(value: object) -> object:
+    """JSON knows one kind of number: 10.0 is as good as 10."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 Vector3 = Annotated[list[Number], numbers(3)]
@@ -57,7 +63,9 @@ class Body(BaseModel):
         if isinstance(data, dict):
             for name, value in data.items():
                 if name not in cls.model_fields:
-                    raise InputError(str(name)[:80], value, "only the fields " + ", ".join(cls.model_fields))
+                    raise InputError(
+                        str(name)[:80] or '""', value, "only the fields " + ", ".join(cls.model_fields)
+                    )
         return data
 
 
@@ -95,7 +103,7 @@ _REFUSALS: dict[int, str] = {
     415: "The body does not say it is JSON.",
     422: "A value is not usable; the document names the field, the value and what is valid.",
     500: "Answering failed.",
-    503: "Busy; the header Retry-After tells after how many seconds it is worth another try.",
+    503: "Busy, or the answer takes too long; the header Retry-After tells when it is worth another try.",
 }
 
 
@@ -104,7 +112,7 @@ def refusals(*statuses: int) -> dict[int | str, dict[str, Any]]:
     return {status: {"model": Problem, "description": _REFUSALS[status]} for status in statuses}
 
 
-POST_REFUSALS = refusals(400, 404, 413, 415, 422, 500)
+POST_REFUSALS = refusals(400, 404, 413, 415, 422, 500, 503)
 
 
 def example(summary: str, value: dict[str, Any]) -> dict[str, Any]:
@@ -121,16 +129,20 @@ def _json(content: object) -> bytes:
     return to_json(content, inf_nan_mode="null")
 
 
-def one_or_all(answers: Callable[[slice], Sequence[object]], count: int, single: bool) -> Response:
+def one_or_all(answers: Callable[[slice], Sequence[object]], count: int, single: bool, budget: Budget) -> Response:
     """The answer itself when one thing was asked, ``{"results": [...]}`` in the same order when a list was.
 
     `answers` gives those of a range of the questions. A range is written out before the next is answered: a
-    hundred thousand live lists would cost more in garbage collection than in work.
+    hundred thousand live lists would cost more in garbage collection than in work. Raises 503 when the time of
+    the request is over.
     """
     if single:
         return reply(answers(slice(0, 1))[0])
     ranges = (slice(start, start + AT_ONCE) for start in range(0, count, AT_ONCE))
-    parts = [_json(list(answers(each)))[1:-1] for each in ranges]
+    parts = []
+    for each in ranges:
+        budget.check()
+        parts.append(_json(list(answers(each)))[1:-1])
     return Response(b'{"results":[' + b",".join(parts) + b"]}", media_type="application/json")
 
 

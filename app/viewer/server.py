@@ -13,12 +13,19 @@ from app.clouds import Clouds
 from app.settings import Settings
 from app.store import Store
 from app.viewer.motion import Pace
+from app.viewer.panel.status import Notice
 from app.viewer.panel.view import configure_theme
-from app.viewer.session import Session
+from app.viewer.session import WELCOME, Session
 
 log = logging.getLogger(__name__)
 
 PATIENCE = 5.0
+RESTARTS = 3  # of one visitor's worker: what fails that often will go on failing
+RESTARTED = Notice(
+    "error",
+    "Started again",
+    "Something went wrong on our side, so this page begins afresh; the log has the cause.",
+)
 
 
 class ViewerServer:
@@ -67,10 +74,37 @@ class ViewerServer:
         return len(self._sessions)
 
     async def _welcome(self, client: viser.ClientHandle) -> None:
-        session = Session(client, self._store, self._clouds, self._pace, self._settings.token is not None)
+        self._begin(client, WELCOME, RESTARTS)
+
+    def _begin(self, client: viser.ClientHandle, welcome: Notice, restarts: int) -> None:
+        session = Session(
+            client,
+            self._store,
+            self._clouds,
+            self._pace,
+            self._settings.token is not None,
+            welcome,
+            lambda: self._again(client, restarts),
+        )
         with self._lock:
             self._sessions[client.client_id] = session
         session.start()
+
+    def _again(self, client: viser.ClientHandle, restarts: int) -> None:
+        """Begin afresh with a visitor whose worker failed; called by that worker as the last thing it does."""
+        with self._lock:
+            left = self._sessions.pop(client.client_id, None) is None
+        if left:
+            return
+        if restarts == 0:
+            log.error(
+                "visitor %s: the worker failed %s times and is not started again", client.client_id, RESTARTS
+            )
+            return
+        client.gui.reset()
+        client.scene.reset()
+        configure_theme(client.gui, dark=False)
+        self._begin(client, RESTARTED, restarts - 1)
 
     async def _farewell(self, client: viser.ClientHandle) -> None:
         with self._lock:

@@ -7,6 +7,7 @@ sleeps. Nothing here is locked, because nothing here is shared.
 
 from __future__ import annotations
 
+import itertools
 import logging
 import threading
 import time
@@ -52,24 +53,35 @@ NARROW = 700  # pixels
 # Phase (start, update, end), position (m) and wxyz of the gizmo, and whether it is one of its rings.
 GizmoEvent = tuple[str, list[float], list[float], bool]
 WELCOME = Notice("hand", "Ready", "Drag the gizmo at the tool, or move a joint.")
+_ARMS = itertools.count(1)  # a name is never used twice: browsers keep the poses of removed nodes
 BY_HAND = Notice("hand", "Moved by joints", "The target follows the tool.")
 
 
 class Session:
     """The state of one visitor.
 
-    `start`, `post`, `end` and `join` may be called by any thread; everything else belongs to the worker. For its
+    `start`, `post`, `end` and `join` may be called by any thread; everything else belongs to the worker, which
+    says good-bye with `failed` if it cannot go on. For its
     features it is the :class:`~app.viewer.feature.Stage`.
     """
 
     def __init__(
-        self, client: viser.ClientHandle, store: Store, clouds: Clouds, pace: Pace, token: bool = False
+        self,
+        client: viser.ClientHandle,
+        store: Store,
+        clouds: Clouds,
+        pace: Pace,
+        token: bool = False,
+        welcome: Notice = WELCOME,
+        failed: Callable[[], None] | None = None,
     ) -> None:
         self.store = store
         self.clouds = clouds
         self._client = client
         self._pace = pace
         self._token = token  # whether programs have to send one
+        self._welcome = welcome
+        self._failed = failed
         self._inbox = Inbox()
         self._thread = threading.Thread(target=self._run, name=f"visitor-{client.client_id}", daemon=True)
         self._rng = np.random.default_rng()
@@ -85,7 +97,6 @@ class Session:
         self._branch: str | None = None  # as solve_ik takes it
         self._held_free: str | None = None
         self._locks: list[bool] = []
-        self._arms = 0
         self._sheet = False
         self._address = LOCAL
         self._kept = ""
@@ -210,9 +221,15 @@ class Session:
 
     def _run(self) -> None:
         try:
-            self._guard(self._build)
+            self._build()
             while (batch := self._inbox.take(self._rest)) is not None:
                 self._guard(lambda batch=batch: self._step(batch))  # type: ignore[misc]
+        except BaseException:
+            gone = self._inbox.closed
+            self._inbox.close()
+            log.log(logging.DEBUG if gone else logging.ERROR, "a visitor's worker failed", exc_info=True)
+            if self._failed is not None and not gone:
+                self._failed()
         finally:
             self._pace.moving(self._client.client_id, False)
 
@@ -491,7 +508,7 @@ class Session:
                 gui.main_panel.dock_right()
             robot = self.store.get(saved.robot) if saved.robot is not None else self.store.robots[0]
             self._task = default_task(robot)
-            self._status = StatusLine(gui, WELCOME)
+            self._status = StatusLine(gui, self._welcome)
             names = tuple(r.name for r in self.store.robots)
             self._robot_choice = gui.add_dropdown("Robot", names, initial_value=robot.name)
             listen(self._robot_choice, self.post, "robot")
@@ -538,7 +555,6 @@ class Session:
         if saved.task is not None:
             self._task = saved.task
             self._target_choice.show(saved.task)
-            self._scene.gizmo.disable_rotations = saved.task == "position"
         if saved.branch is not None:
             self._branch = saved.branch
             self._branch_choice.choose(saved.branch)
@@ -603,8 +619,7 @@ class Session:
         self._motion = Motion(robot.q_home if q is None else q, weights)
         self._q = self._motion.goal
         self._locks = [False] * robot.n
-        self._arms += 1
-        self._scene = ArmScene(self._client.scene, robot, self._view.dark, f"/arm-{self._arms}")
+        self._scene = ArmScene(self._client.scene, robot, self._view.dark, f"/arm-{next(_ARMS)}")
         self._task = default_task(robot)
         self._target_choice.show(self._task)
         self._listen_gizmo(self._scene.gizmo, ring=False)

@@ -19,7 +19,7 @@ Where layers are numeric continuations instead of samples of a closed form, the 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -32,7 +32,7 @@ from kin.path.layers import stops_at
 from kin.path.report import report
 from kin.path.results import JumpCause, PathGap, PathJump, PathResult
 from kin.path.route import DeadEnd, route
-from kin.question import Frame, Limits, Locks, ask, finite_number, pose_of
+from kin.question import Frame, Limits, Locks, ask, finite_number, go_on, pose_of
 from kin.results import Task
 from kin.robot import Robot
 from kin.transforms import Array
@@ -52,6 +52,7 @@ def solve_path(
     locked: Locks | None = None,
     branch: str | Sequence[str] | None = None,
     max_step: float = 0.5,
+    stop: Callable[[], None] = go_on,
 ) -> PathResult:
     """One joint path through all `targets`: as few jumps as possible, then as little joint motion as possible.
 
@@ -64,6 +65,7 @@ def solve_path(
             a jump: the path begins at its first waypoint. Without it the path may start anywhere, and of equally
             good paths the one that starts nearest to the home pose is taken.
         max_step: the most a joint may move between neighbouring waypoints: radians, or 4 per metre.
+        stop: called now and then; it ends the work by raising what then comes out of here.
 
     Raises:
         InputError: a malformed target (named ``targets[i]``) or option. An unreachable target is not an error.
@@ -81,6 +83,7 @@ def solve_path(
         locked=locked,
         branch=branch,
     )
+    question = replace(question, stop=stop)
     step = _checked_step(max_step)
     poses = _checked_targets(targets, question.code)
     way = Way.of(question, step, q_start is not None, len(poses))

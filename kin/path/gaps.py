@@ -53,6 +53,7 @@ def _closest(stop: Stop, start: Array) -> Array:
     branches asked for, the arm stays.
     """
     question, q = stop.asked, start
+    question.stop()
     if stop.gap is not None and stop.gap.status is Status.APPROXIMATE:
         for weight in (search.ORIENTATION_WEIGHT, 1e-2, 1e-4):
             q, _ = search.descend(question, question.code, q[None], weight)

@@ -73,8 +73,10 @@ def route(course: Course) -> tuple[Array, list[DeadEnd]]:
 def _searched(course: Course, layers: list[Array], allowed: float) -> Trellis:
     """The shortest way; while it jumps, with continuations of the motions on both sides added to the layers."""
     way = course.way
+    way.question.stop()
     trellis = shortest(way, layers, course.spans, way.ring, allowed)
     for _ in range(_REPAIRS):
+        way.question.stop()
         if trellis.jumps == 0:
             break
         starts = [(s, row, 1) for s, row in trellis.dead_ends()]

@@ -24,6 +24,7 @@ _HAIR = 1e-6
 
 def branches_near(question: Question, seed: Array, values: tuple[float, ...] | None = None) -> Branches:
     """The branches nearest to a seed ``(n,)``, of a question that a closed form answers."""
+    question.stop()
     found = solve_branches(question, question.T, question.code, seed, values)
     assert found is not None
     return found
@@ -64,6 +65,7 @@ def alike(miss: Array, least: float) -> Flags:
 
 def descended(question: Question, starts: Array) -> Array:
     """Configurations ``(m, n)`` that meet the question, where descents from the starts end: each once."""
+    question.stop()
     if not len(starts):
         return starts
     q, _ = search.descend_each(question, question.code, starts, 1.0)

@@ -14,7 +14,7 @@ from app.store import Store
 
 @pytest.fixture(scope="session")
 def app():
-    return create_app(Settings(max_batch=2000, max_body=1_000_000))
+    return create_app(Settings(max_batch=2000, max_body=1_000_000, time_budget=300))
 
 
 @pytest.fixture(scope="session")

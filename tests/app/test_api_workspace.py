@@ -18,6 +18,7 @@ import kin
 from app.answers import ReachableAnswer, WorkspaceAnswer
 from app.api import Gate, build_router, install_problem_handlers
 from app.api.problems import ProblemError
+from app.api.work import Work
 from app.api.workspace import reachable, summary
 from app.api.workspace.flow import Pieces
 from app.api.workspace.summary import Memory
@@ -38,6 +39,7 @@ def live():
     """REST alone on a real port, two streams at a time, and a client: leaving and waiting need a connection."""
     app = FastAPI()
     app.state.settings, app.state.store = Settings(), Store()
+    app.state.work = Work(16, 300.0)
     app.state.clouds, app.state.gate, app.state.sizes = Clouds(max_bytes=0, threads=1), Gate(2), Memory(8, 1, 8)
     install_problem_handlers(app)
     app.include_router(build_router())

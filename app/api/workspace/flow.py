@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import AsyncIterator, Generator, Iterator
 from contextlib import contextmanager, nullcontext
@@ -11,17 +12,11 @@ from starlette.concurrency import run_in_threadpool
 from starlette.responses import StreamingResponse
 from starlette.types import Receive, Scope, Send
 
-from app.api.problems import ProblemError
+from app.api.work import busy
 from app.metrics import STREAMED
 
-RETRY_AFTER = 2  # seconds
+logger = logging.getLogger("kinboard.workspace")
 T = TypeVar("T")
-
-
-def busy(detail: str, setting: str = "") -> ProblemError:
-    """503, with when to come again and what the operator could raise."""
-    hint = "Try again in a moment" + (f", or ask the operator to raise {setting}." if setting else ".")
-    return ProblemError(503, "busy", detail, hint, headers={"Retry-After": str(RETRY_AFTER)})
 
 
 class Gate:
@@ -61,6 +56,10 @@ class Pieces(Generic[T]):
             self._pieces.close()
 
 
+class _StoppedError(Exception):
+    """The service ends before the answer does."""
+
+
 class Flow(StreamingResponse):
     """Bytes sent as they are computed, each piece in a thread.
 
@@ -88,9 +87,13 @@ class Flow(StreamingResponse):
         super().__init__(self._in_threads(), headers=headers, media_type=media_type)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        self._work = scope["app"].state.work
         try:
             with self._gate.place() if self._gate else nullcontext():
                 await super().__call__(scope, receive, send)
+        except _StoppedError:
+            # An answer without its end: the server closes the connection, and the reader can tell.
+            logger.warning("an answer under way was cut off, as the service is being stopped")
         finally:
             # At once: a reader who leaves is told of after the piece at hand. Only a server that is being stopped
             # may have to wait here.
@@ -98,6 +101,8 @@ class Flow(StreamingResponse):
 
     async def _in_threads(self) -> AsyncIterator[bytes]:
         while (piece := await run_in_threadpool(self._pieces.take)) is not None:
+            if self._work.closed and self._gate:
+                raise _StoppedError
             if piece:
                 STREAMED.labels(self._name).inc(len(piece))
                 yield piece

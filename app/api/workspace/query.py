@@ -22,19 +22,27 @@ _SEEDS = 1 << 64
 
 Bounds = tuple[tuple[float, float] | None, ...]
 Locks = tuple[float | None, ...]
-PerJoint = Annotated[list[Annotated[str, Field(max_length=100)]], Field(max_length=100)]
+_NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+
+
+def _told(values: int) -> Any:
+    """What the document says of a joint and its values; it is refused in our own words."""
+    return Field(max_length=100, json_schema_extra={"pattern": rf"^[0-9]+(:{_NUMBER}){{{values}}}$"})
+
+
+_MANY = Field(max_length=100)
 
 
 class RegionQuery(Body):
     """How far the joints may move."""
 
-    limit: PerJoint = Field(
+    limit: Annotated[list[Annotated[str, _told(2)]], _MANY] = Field(
         [],
         description="Narrower limits of a joint, `JOINT:LOWER:UPPER`, joints counted from 1, radians (metres); "
         "may be repeated, once per joint.",
         examples=[["1:-0.5:0.5"]],
     )
-    lock: PerJoint = Field(
+    lock: Annotated[list[Annotated[str, _told(1)]], _MANY] = Field(
         [],
         description="A joint kept at a value, `JOINT:VALUE`, joints counted from 1, radians (metres); may be "
         "repeated, once per joint.",
@@ -138,8 +146,5 @@ def _per_joint(
 
 def _number(text: str) -> float:
     """A number, NaN for what is none or too large to be meant."""
-    try:
-        value = float(text)
-    except ValueError:
-        return math.nan
+    value = float(text) if re.fullmatch(_NUMBER, text) else math.nan
     return value if abs(value) <= LARGEST else math.nan

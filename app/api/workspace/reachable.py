@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from itertools import chain
-from typing import Annotated
+from typing import Annotated, NotRequired
 
 from fastapi import APIRouter, Body, Response
 from pydantic import Discriminator, Field, Tag
@@ -15,8 +15,10 @@ from app.answers import ReachableAnswer, documented, reachable_answer
 from app.api import schemas
 from app.api.asked import Asked, one_or_many
 from app.api.body import JsonRoute
+from app.api.problems import Problem, ProblemError
 from app.api.schemas import POST_REFUSALS, RobotDep, SettingsDep, example, reply
 from app.api.targets import Target
+from app.api.work import Budget, BudgetDep
 from app.api.workspace.flow import Flow
 from kin import Robot, Task, solve_ik
 from kin.transforms import Array
@@ -61,6 +63,8 @@ class ReachableAnswers(TypedDict):
 
     results: list[ReachableAnswer]
     """One per target, in the same order."""
+    problem: NotRequired[Problem]
+    """Why there are fewer than were asked for: the time of the request was over. Absent if all are there."""
 
 
 @router.post(
@@ -70,7 +74,10 @@ class ReachableAnswers(TypedDict):
     responses=POST_REFUSALS,
 )
 def reachable(
-    robot: RobotDep, settings: SettingsDep, body: Annotated[ReachableRequest, Body(openapi_examples=EXAMPLES)]
+    robot: RobotDep,
+    settings: SettingsDep,
+    budget: BudgetDep,
+    body: Annotated[ReachableRequest, Body(openapi_examples=EXAMPLES)],
 ) -> Response:
     """Whether each target can be reached inside the limits, and if not, why, by how much, and what comes closest.
 
@@ -86,7 +93,7 @@ def reachable(
     if single:
         return reply(_answers(robot, body, questions)[0])
     # What is wrong with the options shows in the first piece, while it can still be said.
-    pieces = _pieces(robot, body, questions)
+    pieces = _pieces(robot, body, questions, budget)
     return Flow(_resumed(next(pieces), pieces), "reachable", "application/json")
 
 
@@ -109,9 +116,18 @@ def _answers(robot: Robot, body: ReachableRequest, questions: list[tuple[Task, A
     ]
 
 
-def _pieces(robot: Robot, body: ReachableRequest, questions: list[tuple[Task, Array]]) -> Generator[bytes]:
-    """``{"results": [...]}``, some answers at a time."""
+def _pieces(
+    robot: Robot, body: ReachableRequest, questions: list[tuple[Task, Array]], budget: Budget
+) -> Generator[bytes]:
+    """``{"results": [...]}``, some at a time; what was done in time, and the problem, if it was not all."""
     for start in range(0, len(questions), AT_ONCE):
+        try:
+            budget.check()
+        except ProblemError as error:
+            if not start:
+                raise
+            yield b'],"problem":' + to_json(error.problem) + b"}"
+            return
         answers = _answers(robot, body, questions[start : start + AT_ONCE])
         yield (b"," if start else b'{"results":[') + to_json(answers, inf_nan_mode="null")[1:-1]
     yield b"]}"

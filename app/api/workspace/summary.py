@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import asyncio
 import os
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
+from queue import SimpleQueue
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
@@ -17,7 +17,7 @@ from app.answers import WorkspaceAnswer, workspace_answer
 from app.api.body import JsonRoute
 from app.api.problems import FieldError, invalid
 from app.api.schemas import RobotDep, refusals, reply
-from app.api.workspace.flow import busy
+from app.api.work import WorkDep, busy
 from app.api.workspace.query import RegionQuery
 from kin import section, workspace_facts
 
@@ -39,6 +39,45 @@ class SummaryQuery(RegionQuery):
     resolution: int = Field(96, ge=8, le=400, description="Squares along the longer side of the section.")
 
 
+class Threads:
+    """Threads that work futures off, and that nobody waits for when the process ends, as for an executor's."""
+
+    def __init__(self, most: int, name: str) -> None:
+        self._most = most
+        self._name = name
+        self._running = 0
+        self._waiting: SimpleQueue[tuple[Future[WorkspaceAnswer], Callable[[], WorkspaceAnswer]] | None]
+        self._waiting = SimpleQueue()
+
+    def submit(self, compute: Callable[[], WorkspaceAnswer]) -> Future[WorkspaceAnswer]:
+        """What `compute` will return; not to be called by several threads at a time."""
+        future: Future[WorkspaceAnswer] = Future()
+        self._waiting.put((future, compute))
+        if self._running < self._most:
+            self._running += 1
+            threading.Thread(target=self._run, name=f"{self._name}-{self._running}", daemon=True).start()
+        return future
+
+    def close(self) -> None:
+        """Begin nothing more; returns at once."""
+        while not self._waiting.empty():
+            task = self._waiting.get()
+            if task is not None:
+                task[0].cancel()
+        for _ in range(self._running):
+            self._waiting.put(None)
+
+    def _run(self) -> None:
+        while (task := self._waiting.get()) is not None:
+            future, compute = task
+            if not future.set_running_or_notify_cancel():
+                continue
+            try:
+                future.set_result(compute())
+            except BaseException as error:  # noqa: BLE001 - it is for whoever waits for the result
+                future.set_exception(error)
+
+
 class Memory:
     """Answers that are dear, kept and shared: who asks for one that is being computed waits for it.
 
@@ -54,7 +93,7 @@ class Memory:
         self._most = most
         self._waiting = waiting
         self._lock = threading.Lock()
-        self._pool = ThreadPoolExecutor(threads, thread_name_prefix="summary")
+        self._threads = Threads(threads, "summary")
         self._answers: OrderedDict[Hashable, Future[WorkspaceAnswer]] = OrderedDict()
 
     def get(self, key: Hashable, compute: Callable[[], WorkspaceAnswer]) -> Future[WorkspaceAnswer]:
@@ -69,7 +108,7 @@ class Memory:
                 return known
             if sum(not answer.done() for answer in self._answers.values()) >= self._waiting:
                 raise busy(f"{self._waiting} summaries are being computed already.")
-            answer = self._answers[key] = self._pool.submit(compute)
+            answer = self._answers[key] = self._threads.submit(compute)
             while len(self._answers) > self._most:
                 self._answers.popitem(last=False)
         answer.add_done_callback(lambda done: self._forget(key, done))
@@ -77,7 +116,7 @@ class Memory:
 
     def close(self) -> None:
         """Begin nothing more; returns at once."""
-        self._pool.shutdown(wait=False, cancel_futures=True)
+        self._threads.close()
 
     def _forget(self, key: Hashable, done: Future[WorkspaceAnswer]) -> None:
         if done.cancelled() or done.exception() is not None:
@@ -96,11 +135,14 @@ def memory() -> Memory:
     response_model=WorkspaceAnswer,
     responses=refusals(404, 422, 500, 503),
 )
-async def summary(request: Request, robot: RobotDep, query: Annotated[SummaryQuery, Query()]) -> Response:
+async def summary(
+    request: Request, robot: RobotDep, work: WorkDep, query: Annotated[SummaryQuery, Query()]
+) -> Response:
     """Bounding box, reach and holes, exact and with configurations; volume and surface with their errors.
 
     `section` adds the cut with a half-plane through the line of joint 1: closed curves and the arcs they are made
-    of. Answers are kept for a while, so only the first visitor waits for the seconds they take.
+    of. Answers are kept for a while, so only the first visitor waits for the seconds they take; who is told that
+    it takes too long finds it when coming again.
     """
     limits, locked = query.bounds(robot)
     if query.section and robot.joints[0].kind != "revolute":
@@ -118,5 +160,4 @@ async def summary(request: Request, robot: RobotDep, query: Annotated[SummaryQue
     effort = query.effort if query.volume else None
     resolution = query.resolution if query.section else None
     answer = request.app.state.sizes.get((robot, limits, locked, effort, resolution), compute)
-    # Shielded: a visitor who leaves must not cancel it for the others.
-    return reply(await asyncio.shield(asyncio.wrap_future(answer)))
+    return reply(await work.wait(answer))
