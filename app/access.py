@@ -149,7 +149,7 @@ class Access:
         if self._read_only:
             websocket = scope["type"] == "websocket"
             looks = path.startswith("/viewer") if websocket else scope["method"] in READING
-            if looks and not re.search(r"/workspace\b", path):
+            if looks and not re.search(r"/(workspace|capability)\b", path):
                 scope[LOOK_ONLY] = True
                 return
             hint = "Send the operator's token: Authorization: Bearer …" if self._token else "It is for everybody."

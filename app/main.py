@@ -34,6 +34,7 @@ from app.api import Gate, Work, build_router, complete_document, install_problem
 from app.bridge import ViewerBridge
 from app.clouds import Clouds
 from app.inspection import MAX_MESSAGE
+from app.maps import Maps
 from app.metrics import CONTENT_TYPE, exposition
 from app.observe import Observe, write_to_stderr
 from app.pages import page_routes, static_folder
@@ -74,9 +75,9 @@ def create_app(settings: Settings, store: Store | None = None) -> FastAPI:
     """
     store = store or Store(settings.robots)
     bridge = ViewerBridge(settings.allowed_origins, settings.max_visitors)
-    clouds, sizes = Clouds(settings.cloud_memory), memory()
+    clouds, maps, sizes = Clouds(settings.cloud_memory), Maps(), memory()
     work = Work(settings.max_requests, settings.time_budget)
-    startup = Startup(settings, store, clouds, bridge)
+    startup = Startup(settings, store, clouds, maps, bridge)
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
@@ -85,6 +86,7 @@ def create_app(settings: Settings, store: Store | None = None) -> FastAPI:
         work.close()  # what is still being computed has had its time to drain
         await run_in_threadpool(startup.stop)
         clouds.close()
+        maps.close()
         sizes.close()
 
     app = FastAPI(
@@ -102,6 +104,7 @@ def create_app(settings: Settings, store: Store | None = None) -> FastAPI:
     app.state.store, app.state.settings, app.state.startup = store, settings, startup
     app.state.clouds, app.state.gate, app.state.sizes = clouds, Gate(settings.max_streams), sizes
     app.state.work = work
+    app.state.maps = maps
     install_problem_handlers(app)
     complete_document(app, store, settings)
     app.include_router(build_router())

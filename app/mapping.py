@@ -7,31 +7,13 @@ import sys
 from argparse import Namespace
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TypedDict
 
 import numpy as np
 
+from app.answers import CapabilityAnswer, capability_answer
 from app.commands import Units, _clean, _per_joint, _print_json, _store, _table
 from app.mapreduce import run_dask, run_local
 from kin import CapabilityBlock, CapabilityMap, InputError, capability_grid, capability_join
-
-
-class CapabilityAnswer(TypedDict):
-    """A capability map in numbers; metres and radians."""
-
-    robot: str
-    method: str
-    directions: int
-    voxel: float
-    origin: list[float]
-    shape: list[int]
-    reachable: int
-    volume: float
-    mean_share: float
-    best_share: float
-    best_share_at: list[float] | None
-    best_manipulability: float
-    best_manipulability_at: list[float] | None
 
 
 def capability(arguments: Namespace) -> int:
@@ -50,41 +32,13 @@ def capability(arguments: Namespace) -> int:
     found = capability_join(grid, _shown(blocks, len(grid.blocks)))
     if save is not None:
         save(found)
-    answer = answer_of(found)
+    answer = capability_answer(found)
     if arguments.json:
         return _print_json(answer)
     print(f"{robot.name} ({robot.id})\n")
     for line in _summary(answer, found, Units(robot, arguments.rad)):
         print(line)
     return 0
-
-
-def answer_of(found: CapabilityMap) -> CapabilityAnswer:
-    """The numbers that sum a map up."""
-    grid = found.grid
-    return CapabilityAnswer(
-        robot=grid.robot.id,
-        method=grid.method,
-        directions=grid.count,
-        voxel=grid.voxel,
-        origin=list(grid.origin),
-        shape=list(grid.shape),
-        reachable=len(found.index),
-        volume=found.volume,
-        mean_share=float(found.share.mean(dtype=np.float64)) if len(found.share) else 0.0,
-        best_share=float(found.share.max(initial=0.0)),
-        best_share_at=_place(found, found.share),
-        best_manipulability=float(found.manipulability.max(initial=0.0)),
-        best_manipulability_at=_place(found, found.manipulability),
-    )
-
-
-def _place(found: CapabilityMap, values: np.ndarray[tuple[int], np.dtype[np.float32]]) -> list[float] | None:
-    """Centre of the voxel with the largest value, None if that is 0 or there is no voxel."""
-    if not values.max(initial=0.0) > 0.0:
-        return None
-    centre: list[float] = found.centres[int(np.argmax(values))].tolist()
-    return centre
 
 
 def _shown(blocks: Iterator[CapabilityBlock], total: int) -> Iterator[CapabilityBlock]:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from functools import partial
 from typing import Any
@@ -27,7 +27,7 @@ _RETRIES = 3  # of a block that failed; one whose worker died is not counted her
 
 def run_local(
     grid: CapabilityGrid, threads: int | None = None, begin: Callable[[], None] | None = None
-) -> Iterator[CapabilityBlock]:
+) -> Generator[CapabilityBlock]:
     """The blocks of a grid as they are finished, by so many threads, or as many as there are processors.
 
     Each thread calls `begin` first, which may lower its priority.

@@ -20,7 +20,8 @@ class Settings(BaseSettings):
     max_batch: int = Field(10_000, ge=1, description="Most configurations or targets one request may hold.")
     max_path: int = Field(1000, ge=1, description="Most waypoints one path may have.")
     max_points: int = Field(100_000_000, ge=1, description="Most points one cloud of the workspace may have.")
-    max_streams: int = Field(8, ge=1, description="Most clouds one process sends at a time.")
+    max_streams: int = Field(8, ge=1, description="Most clouds and maps one process sends at a time.")
+    max_voxels: int = Field(40, ge=1, le=256, description="Most voxels along one side of a capability map.")
     max_body: int = Field(8 * 1024 * 1024, ge=1024, description="Largest request body in bytes.")
     max_requests: int = Field(
         16, ge=1, le=32, description="Most requests one process computes at a time; others wait for their turn."

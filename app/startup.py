@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Literal
 
 from app.bridge import ViewerBridge
 from app.clouds import Clouds, step_back
+from app.maps import Maps
 from app.settings import Settings
 from app.store import Store
 from kin import warm_up, warm_up_rest
@@ -28,11 +29,12 @@ Status = Literal["warming", "ready", "failed"]
 class Startup:
     """Starts the viewer and warms the kernels in a thread of its own; `status` is what ``/readyz`` reports."""
 
-    def __init__(self, settings: Settings, store: Store, clouds: Clouds, bridge: ViewerBridge) -> None:
+    def __init__(self, settings: Settings, store: Store, clouds: Clouds, maps: Maps, bridge: ViewerBridge) -> None:
         self.status: Status = "warming"
         self._settings = settings
         self._store = store
         self._clouds = clouds
+        self._maps = maps
         self._bridge = bridge
         self._viewer: ViewerServer | None = None
         self._stopping = threading.Event()
@@ -80,7 +82,7 @@ class Startup:
             # viser takes half a second to import: the landing page and REST need not wait for it.
             from app.viewer.server import ViewerServer
 
-            viewer = ViewerServer(self._store, self._settings, self._clouds)
+            viewer = ViewerServer(self._store, self._settings, self._clouds, self._maps)
             self._bridge.port = viewer.start()
             self._viewer = viewer
         finally:

@@ -19,6 +19,7 @@ RULES: dict[str, set[str]] = {
     "kin/kernels.py": {"numpy", "kin.compiled", "kin.simd", "kin.transforms"},
     "app": {"kin", "app.answers", "app.clouds", "app.settings", "app.store"},
     "app/clouds.py": {"kin"},
+    "app/maps.py": {"kin", "app.clouds", "app.mapreduce"},
     "app/formats.py": {"kin", "numpy", "app.clouds"},
     "app/save.py": {"kin", "app.clouds", "app.formats"},
     "app/bench": {"kin", "numpy", "numba", "app.bench"},
@@ -52,7 +53,7 @@ RULES: dict[str, set[str]] = {
     "app/equations": {"kin", "numpy", "sympy", "app.equations"},
     "app/check.py": {"kin", "numpy", "typing_extensions", "app.answers"},
     "app/mapreduce.py": {"kin", "distributed"},
-    "app/mapping.py": {"kin", "numpy", "app.commands", "app.mapreduce"},
+    "app/mapping.py": {"kin", "numpy", "app.answers", "app.commands", "app.mapreduce"},
     "app/commands.py": {
         *("kin", "numpy", "app.answers", "app.check", "app.clouds", "app.formats", "app.hull", "app.picture"),
         *("app.save", "app.store"),
@@ -69,20 +70,20 @@ RULES: dict[str, set[str]] = {
     "app/snippets.py": {"kin", "numpy"},
     "app/observe.py": {"starlette", "app.access", "app.metrics"},
     "app/bridge.py": {"starlette", "websockets", "app.access", "app.inspection", "app.metrics", "app.security"},
-    "app/startup.py": {"kin", "app.bridge", "app.clouds", "app.settings", "app.store", "app.viewer"},
+    "app/startup.py": {"kin", "app.bridge", "app.clouds", "app.maps", "app.settings", "app.store", "app.viewer"},
     "app/main.py": {
         *("kin", "fastapi", "starlette", "pydantic", "uvicorn", "app.access", "app.api", "app.clouds"),
-        *("app.inspection", "app.metrics", "app.observe", "app.workers"),
+        *("app.inspection", "app.maps", "app.metrics", "app.observe", "app.workers"),
         *("app.bridge", "app.pages", "app.prefix", "app.security", "app.settings", "app.startup", "app.store"),
     },
     "app/api": {
         *("fastapi", "starlette", "pydantic", "pydantic_core", "typing_extensions", "numpy", "kin"),
-        *("app.api", "app.answers", "app.clouds", "app.equations", "app.formats", "app.metrics", "app.security"),
-        *("app.settings", "app.store"),
+        *("app.api", "app.answers", "app.clouds", "app.equations", "app.formats", "app.maps"),
+        *("app.metrics", "app.security", "app.settings", "app.store"),
     },
     "app/viewer": {
         *("viser", "trimesh", "numpy", "kin"),
-        *("app.viewer", "app.clouds", "app.equations", "app.metrics", "app.picture", "app.settings"),
+        *("app.viewer", "app.clouds", "app.equations", "app.maps", "app.metrics", "app.picture", "app.settings"),
         *("app.snippets", "app.store"),
     },
 }

@@ -1,7 +1,8 @@
 """The REST door: ``build_router()`` holds the routes of /api/v1, `install_problem_handlers` the one error shape.
 
 Routes find what they share in ``app.state``: robots in ``store``, ``settings``, ``clouds``, the ``gate`` that
-counts the clouds being sent, in ``sizes`` those that were computed, and in ``work`` the places to compute in.
+counts the clouds and maps under way, capability ``maps``, in ``sizes`` those computed, and in ``work`` the
+places to compute in.
 """
 
 from fastapi import APIRouter

@@ -14,6 +14,7 @@ from typing import ClassVar, Protocol
 import viser
 
 from app.clouds import Clouds
+from app.maps import Maps
 from app.store import Store
 from app.viewer.panel.status import Notice
 from kin import IKResult, Robot, Task
@@ -25,6 +26,7 @@ class Stage(Protocol):
 
     store: Store
     clouds: Clouds
+    maps: Maps
 
     @property
     def client(self) -> viser.ClientHandle:
@@ -142,6 +144,9 @@ class Feature:
 
     def restore(self, state: dict[str, object]) -> None:
         """Set what `state` told; what is missing or wrong is left as it is."""
+
+    def on_leave(self) -> None:
+        """The visitor has left: let go of what is shared with others. There is no page any more."""
 
     def remove(self) -> None:
         """Take everything out of scene and panel."""

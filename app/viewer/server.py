@@ -10,6 +10,7 @@ import threading
 import viser
 
 from app.clouds import Clouds
+from app.maps import Maps
 from app.settings import Settings
 from app.store import Store
 from app.viewer.motion import Pace
@@ -29,11 +30,17 @@ RESTARTED = Notice(
 
 
 class ViewerServer:
-    """Serves the 3-D page. Bound to 127.0.0.1: the public port bridges to it and decides who may come in."""
+    """Serves the 3-D page. Bound to 127.0.0.1: the public port bridges to it and decides who may come in.
 
-    def __init__(self, store: Store, settings: Settings, clouds: Clouds) -> None:
+    Args:
+        maps: shared with others; None for some of its own.
+    """
+
+    def __init__(self, store: Store, settings: Settings, clouds: Clouds, maps: Maps | None = None) -> None:
         self._store = store
         self._clouds = clouds
+        self._maps = maps or Maps()
+        self._owns_maps = maps is None
         self._settings = settings
         self._server: viser.ViserServer | None = None
         self._sessions: dict[int, Session] = {}
@@ -67,6 +74,8 @@ class ViewerServer:
         for session in sessions:
             if not session.join(PATIENCE):
                 log.error("a visitor's worker did not end within %s s", PATIENCE)
+        if self._owns_maps:
+            self._maps.close()
 
     @property
     def visitors(self) -> int:
@@ -81,6 +90,7 @@ class ViewerServer:
             client,
             self._store,
             self._clouds,
+            self._maps,
             self._pace,
             self._settings.token is not None,
             welcome,

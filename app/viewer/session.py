@@ -19,6 +19,7 @@ import viser
 
 import kin
 from app.clouds import Clouds
+from app.maps import Maps
 from app.metrics import SOLVE_SECONDS
 from app.snippets import LOCAL, Moment
 from app.store import Store
@@ -70,6 +71,7 @@ class Session:
         client: viser.ClientHandle,
         store: Store,
         clouds: Clouds,
+        maps: Maps,
         pace: Pace,
         token: bool = False,
         welcome: Notice = WELCOME,
@@ -77,6 +79,7 @@ class Session:
     ) -> None:
         self.store = store
         self.clouds = clouds
+        self.maps = maps
         self._client = client
         self._pace = pace
         self._token = token  # whether programs have to send one
@@ -232,6 +235,7 @@ class Session:
                 self._failed()
         finally:
             self._pace.moving(self._client.client_id, False)
+            self._for_features(lambda feature: feature.on_leave())
 
     @property
     def _moving(self) -> bool:

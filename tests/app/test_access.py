@@ -26,7 +26,8 @@ TOKEN = "correct horse battery"
 HEADER = {"authorization": f"Bearer {TOKEN}"}
 PAGE = {"accept": "text/html"}
 VISER = Subprotocol(f"viser-v{viser.__version__}")
-FK = "/api/v1/robots/pioneer5/fk"
+ARM = "/api/v1/robots/pioneer5"
+FK = f"{ARM}/fk"
 Q = {"q": [0, 0, 0, 0, 0]}
 
 
@@ -257,7 +258,7 @@ def test_read_only_answers_questions_of_reading_and_refuses_work():
     client = client_with(read_only=True)
     assert client.get("/", headers=PAGE).status_code == 200
     assert client.get("/api/v1/robots").status_code == 200
-    for answer in (client.post(FK, json=Q), client.get("/api/v1/robots/pioneer5/workspace")):
+    for answer in (client.post(FK, json=Q), client.get(f"{ARM}/workspace"), client.get(f"{ARM}/capability")):
         assert answer.status_code == 403
         assert answer.json()["type"] == "urn:kinboard:problem:read-only"
     with pytest.raises(WebSocketDisconnect), client.websocket_connect("/api/v1/robots/pioneer5/workspace/stream"):

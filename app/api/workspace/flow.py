@@ -30,7 +30,7 @@ class Gate:
     def place(self) -> Iterator[None]:
         """A place as long as the context lasts; raises 503 if there is none."""
         if self.open >= self._most:
-            raise busy(f"{self.open} clouds are being sent, the most at a time.", "KINBOARD_MAX_STREAMS")
+            raise busy(f"{self.open} clouds and maps are under way, the most at a time.", "KINBOARD_MAX_STREAMS")
         self.open += 1
         try:
             yield

@@ -123,15 +123,20 @@ def paint(values: Array, scale: Scale, name: str) -> Bytes:
 
 def legend(scale: Scale, name: str) -> str:
     """The scale as a bar with its end values, and in words."""
-    stops = ", ".join("#" + c for c in MAPS[name].split())
     low, high = (value_text(scale.by, value) for value in (scale.low, scale.high))
+    return bar(scale.by, low, high, MEANING[scale.by], name)
+
+
+def bar(key: str, low: str, high: str, meaning: str, name: str) -> str:
+    """All colours of a map from `low` to `high`, and what they mean; `key` marks the element."""
+    stops = ", ".join("#" + c for c in MAPS[name].split())
     return (
-        f'<div data-legend="{scale.by}" style="margin:.2em 1em .5em;font-size:.76em;line-height:1.5">'
+        f'<div data-legend="{key}" style="margin:.2em 1em .5em;font-size:.76em;line-height:1.5">'
         f'<div role="img" aria-label="colours from {low} to {high}" style="height:.9em;border-radius:3px;'
         f'border:1px solid rgba(128,128,128,.4);background:linear-gradient(to right, {stops})"></div>'
         '<div style="display:flex;justify-content:space-between;font-variant-numeric:tabular-nums">'
         f"<span>{low}</span><span>{high}</span></div>"
-        f'<div style="opacity:.8">{escape(MEANING[scale.by])}</div></div>'
+        f'<div style="opacity:.8">{escape(meaning)}</div></div>'
     )
 
 

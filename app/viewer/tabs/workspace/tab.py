@@ -23,6 +23,7 @@ from app.viewer.panel import assign
 from app.viewer.panel.status import Notice
 from app.viewer.tabs.workspace import colours, known, sizes, words
 from app.viewer.tabs.workspace.beside import Plotted, SectionPanel, beside
+from app.viewer.tabs.workspace.capability.folder import Capability
 from app.viewer.tabs.workspace.controls import Controls
 from app.viewer.tabs.workspace.cut import Cut, cut_of
 from app.viewer.tabs.workspace.drawing import Drawing, Look
@@ -41,7 +42,7 @@ SPARING = 0.12  # s between two parts while it does
 
 
 class Workspace(Feature):
-    """Clouds of tool points, their sizes, their section."""
+    """Clouds of tool points, their sizes, their section, and the capability map."""
 
     key: ClassVar[str] = "workspace"
     title: ClassVar[str] = "Workspace"
@@ -63,6 +64,13 @@ class Workspace(Feature):
         self._panel: SectionPanel | None = None
         self._tool = kin.fk(stage.robot, stage.q)[:3, 3]
         self._dot_due = False
+        self._capability = Capability(
+            stage,
+            self._flow,
+            self._post_capability,
+            self._new_root,
+            self._wishes.map,
+        )
         self._report()
 
     # What is posted
@@ -91,6 +99,8 @@ class Workspace(Feature):
             case "plotted":
                 if self._panel is not None:
                     self._panel.plotted(cast(Plotted, value))
+            case ("capability", wish):
+                self._capability.handle(wish, value)
             case ("preset", int(number)):
                 self._apply("n", number)
                 self._controls.show(self._wishes)
@@ -102,6 +112,7 @@ class Workspace(Feature):
 
     def on_robot(self) -> None:
         self._clear()
+        self._capability.clear()
         robot = self.stage.robot
         self._tool = kin.fk(robot, robot.q_home)[:3, 3]
         self._controls.of_robot(robot)
@@ -135,10 +146,15 @@ class Workspace(Feature):
                 own = self._drawings[0]
                 if self._panel.count(own.cloud, own.parts):
                     self._plotted = now
-        self.due = self._next(now)
+        try:
+            self._capability.tick(now, now - self._moved < MOVED)
+        finally:
+            wishes = (self._next(now), self._capability.due)
+            self.due = min((wish for wish in wishes if wish is not None), default=None)
 
     def state(self) -> dict[str, object]:
-        return {**self._wishes.state(), "drawn": bool(self._drawings)}
+        drawn = bool(self._drawings)
+        return {**self._wishes.state(), "drawn": drawn, "capability": self._capability.state()}
 
     def restore(self, state: dict[str, object]) -> None:
         wishes = self._wishes.restored(state, self._others)
@@ -152,11 +168,19 @@ class Workspace(Feature):
         self._controls.show(self._wishes)
         if state.get("drawn") is True:
             self._start()
+        self._capability.restore(state.get("capability"))
         self.due = 0.0
+
+    def on_leave(self) -> None:
+        self._capability.leave()
 
     def remove(self) -> None:
         self._clear()
+        self._capability.clear()
         self._section(False)
+
+    def _post_capability(self, key: Hashable, value: object = None) -> None:
+        self.post(("capability", key), value)
 
     # The cloud
 
@@ -370,6 +394,7 @@ class Workspace(Feature):
         shown = None if self._cut is None else self._cut.shown(self._wishes.at, self._wishes.keep)
         for drawing in self._drawings:
             drawing.show(shown)
+        self._capability.look(self._wishes.map, self._cut, shown)
 
     # Clicks
 
