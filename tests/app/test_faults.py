@@ -189,7 +189,8 @@ def test_a_worker_that_cannot_even_begin_is_not_replaced_for_ever(port, monkeypa
         monkeypatch.setattr(Session, "_draw", lambda *_, **__: sys.exit())
         monkeypatch.setattr(app.viewer.session, "StatusLine", lambda *_: 1 / 0)
         tab.set("1 rotating base", 10.0)
-        wait_for(lambda: "is not started again" in caplog.text)
+        # Each new worker asks the page what it remembers, so the page has to listen.
+        wait_for(lambda: tab._read(0.01) is None or "is not started again" in caplog.text)
     assert caplog.text.count("ZeroDivisionError: division by zero") == RESTARTS
 
 
