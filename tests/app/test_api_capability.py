@@ -14,7 +14,7 @@ from pydantic import TypeAdapter
 import kin
 from app import mapreduce
 from app.answers import CapabilityMapAnswer, capability_answer
-from app.api import Gate, build_router, install_problem_handlers
+from app.api import Gate, Work, build_router, install_problem_handlers
 from app.maps import Maps
 from app.settings import Settings
 from app.store import Store
@@ -28,7 +28,7 @@ def live():
     """REST alone on a real port, one map at a time, and a client: leaving and waiting need a connection."""
     app = FastAPI()
     app.state.settings, app.state.store = Settings(), Store()
-    app.state.maps, app.state.gate = Maps(threads=1), Gate(1)
+    app.state.maps, app.state.gate, app.state.work = Maps(threads=1), Gate(1), Work(4, 60.0)
     install_problem_handlers(app)
     app.include_router(build_router())
     with serve(app) as port, httpx2.Client(base_url=f"http://127.0.0.1:{port}", trust_env=False, timeout=60) as c:
@@ -124,6 +124,15 @@ def test_too_many_at_a_time_are_told_to_come_again(live, held):
     go.set()
     first.join(60)
     assert answers[0].status_code == 200
+
+
+def test_a_map_that_takes_too_long_is_given_up(live, held):
+    app, client = live
+    app.state.work.seconds = 0.2
+    answer = client.get(f"{ADDRESS}?resolution=5&directions=12")
+    assert answer.status_code == 503
+    assert answer.json()["type"] == "urn:kinboard:problem:too-slow"
+    assert app.state.gate.open == 0
 
 
 def test_a_failure_is_a_500_and_is_not_kept(client, monkeypatch, caplog):

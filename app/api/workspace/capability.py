@@ -13,6 +13,7 @@ from app.answers import CapabilityMapAnswer, capability_map_answer
 from app.api.body import JsonRoute
 from app.api.problems import FieldError, invalid
 from app.api.schemas import RobotDep, SettingsDep, refusals, reply
+from app.api.work import Budget, WorkDep
 from app.api.workspace.query import RegionQuery
 from app.maps import Maps, Wanted
 
@@ -43,7 +44,11 @@ class CapabilityQuery(RegionQuery):
     responses=refusals(404, 422, 500, 503),
 )
 async def capability(
-    request: Request, robot: RobotDep, settings: SettingsDep, query: Annotated[CapabilityQuery, Query()]
+    request: Request,
+    robot: RobotDep,
+    settings: SettingsDep,
+    work: WorkDep,
+    query: Annotated[CapabilityQuery, Query()],
 ) -> Response:
     """The workspace in voxels, and for each that is reachable the share of directions along which the tool can be
     brought to its centre inside the limits, and the best manipulability there.
@@ -60,10 +65,11 @@ async def capability(
     wanted = Wanted(robot, query.resolution, int(query.directions), limits, locked)
     maps: Maps = request.app.state.maps
     with request.app.state.gate.place():
-        reader = maps.read(wanted)
+        budget, reader = Budget(work), maps.read(wanted)
         try:
             answer = asyncio.wrap_future(reader.future)
             while not answer.done():
+                budget.check()
                 await asyncio.wait([answer], timeout=LOOKED)
                 if await request.is_disconnected():
                     return Response(status_code=499)  # nobody reads it
