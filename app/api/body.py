@@ -53,6 +53,8 @@ class JsonRequest(Request):
         if not await self.body():
             return
         given = self.headers.get("content-type", "")
+        if given == "application/json":  # as nearly everybody says it
+            return
         message = Message()
         message["content-type"] = given or "none/none"
         subtype = message.get_content_subtype()

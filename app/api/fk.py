@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Body, Response
 from pydantic import Field
+from starlette.concurrency import run_in_threadpool
 from typing_extensions import TypedDict
 
 from app.answers import FkAnswer, documented, fk_answers
@@ -13,6 +15,8 @@ from app.api import schemas
 from app.api.body import JsonRoute
 from app.api.schemas import POST_REFUSALS, Configurations, RobotDep, SettingsDep, example, one_or_all
 from app.api.work import BudgetDep
+
+FEW = 16  # configurations that are answered sooner than a thread could be asked to
 
 router = APIRouter(tags=["kinematics"], route_class=JsonRoute)
 
@@ -56,7 +60,7 @@ class FkAnswers(TypedDict):
     response_model=FkAnswer | FkAnswers,
     responses=POST_REFUSALS,
 )
-def forward_kinematics(
+async def forward_kinematics(
     robot: RobotDep,
     settings: SettingsDep,
     budget: BudgetDep,
@@ -68,4 +72,5 @@ def forward_kinematics(
     limits are answered too, with `in_limits` false.
     """
     q, single = schemas.as_configurations(robot, body.q, settings)
-    return one_or_all(lambda some: fk_answers(robot, q[some], body.frames), len(q), single, budget)
+    answer = partial(one_or_all, lambda some: fk_answers(robot, q[some], body.frames), len(q), single, budget)
+    return answer() if len(q) <= FEW else await run_in_threadpool(answer)
