@@ -185,12 +185,13 @@ async def _to_viser(visitor: WebSocket, upstream: ClientConnection) -> _Ending:
 
 
 async def _to_visitor(upstream: ClientConnection, visitor: WebSocket) -> _Ending:
+    streamed = STREAMED.labels("viewer")
     try:
         while True:
             message = await upstream.recv(decode=False)
             async with asyncio.timeout(PATIENCE):
                 await visitor.send({"type": "websocket.send", "bytes": message})
-            STREAMED.labels("viewer").inc(len(message))
+            streamed.inc(len(message))
     except ConnectionClosed:
         return _ending_of(upstream)
     except TimeoutError:

@@ -82,7 +82,7 @@ RULES: dict[str, set[str]] = {
         *("app.metrics", "app.security", "app.settings", "app.store"),
     },
     "app/viewer": {
-        *("viser", "trimesh", "numpy", "kin"),
+        *("viser", "trimesh", "numpy", "uvloop", "kin"),
         *("app.viewer", "app.clouds", "app.equations", "app.maps", "app.metrics", "app.picture", "app.settings"),
         *("app.snippets", "app.store"),
     },

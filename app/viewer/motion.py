@@ -60,18 +60,20 @@ class Motion:
 class Pace:
     """How often moving arms may be redrawn, shared by all visitors of a server.
 
-    A picture costs about a third of a millisecond of processor time. Thirty visitors dragging at sixty pictures
-    a second would fill a core and make everybody late, so visitors share a budget: few get smooth easing, many
-    get fewer pictures, and beyond that each solution is shown at once.
+    A picture costs half a millisecond of processor time and more, on its way from the solution to the visitor.
+    Thirty visitors dragging at sixty pictures a second would fill a core and make everybody late, so visitors
+    share a budget: few get smooth easing, many get fewer pictures, and beyond that each solution is shown at once.
+    The numbers beside the picture cost as much again and have a budget of their own.
     """
 
-    def __init__(self, pictures_per_second: float = 900.0) -> None:
+    def __init__(self, pictures_per_second: float = 600.0, readings_per_second: float = 100.0) -> None:
         self._budget = pictures_per_second
+        self._readings = readings_per_second
         self._moving: set[int] = set()
         self._lock = threading.Lock()
 
     def moving(self, visitor: int, is_moving: bool) -> None:
-        """Tell whether this visitor's arm is moving."""
+        """Tell whether this visitor's arm is moving, or about to, as the visitor holds the gizmo."""
         if (visitor in self._moving) == is_moving:
             return
         with self._lock:
@@ -81,6 +83,11 @@ class Pace:
     def interval(self) -> float:
         """Seconds between two pictures of one visitor."""
         return max(FRAME, len(self._moving) / self._budget)
+
+    @property
+    def reading(self) -> float:
+        """Seconds between two updates of one visitor's numbers."""
+        return max(SHORTEST, len(self._moving) / self._readings)
 
     @property
     def eases(self) -> bool:

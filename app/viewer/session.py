@@ -47,7 +47,6 @@ from kin.transforms import Array, from_position_wxyz
 
 log = logging.getLogger(__name__)
 
-READOUT_INTERVAL = 0.05
 KEEP_AFTER = 0.5  # seconds of rest before the page is told what to remember
 ANSWER_WITHIN = 10.0  # seconds for the page to tell what it remembers; it may still be busy starting
 NARROW = 700  # pixels
@@ -94,9 +93,10 @@ class Session:
         # The pose asked for with the gizmo, for as long as it is the arm's task; None: the gizmo follows the tool.
         self._target: Array | None = None
         self._reached = False
-        self._sliders_due = False
+        # What the panel has yet to be told, and when it was told last.
+        self._readout_due = self._sliders_due = False
+        self._told_at = 0.0
         self._held: int | None = None
-        self._read_at = 0.0
         self._branch: str | None = None  # as solve_ik takes it
         self._held_free: str | None = None
         self._locks: list[bool] = []
@@ -249,6 +249,8 @@ class Session:
             wishes.append(self._pace.interval)
         elif self._keep_at is not None and not self._dragging:
             wishes.append(max(0.0, self._keep_at - time.perf_counter()))
+        if self._readout_due or self._sliders_due:
+            wishes.append(max(0.0, self._told_at + self._pace.reading - time.perf_counter()))
         return min(wishes, default=None)
 
     def _guard(self, act: Callable[[], None]) -> None:
@@ -282,17 +284,27 @@ class Session:
                 if feature.due is not None:
                     self._guard(lambda feature=feature: feature.tick(now))  # type: ignore[misc]
         self._client.flush()
-        if self._sliders_due:
-            # After the picture: telling seven sliders takes longer than posing seven joints.
-            self._sliders_due = False
-            with self._client.atomic():
-                self._sliders.show(self._motion.goal, self._held)
-                self._show_posture()
+        if time.perf_counter() - self._told_at >= self._pace.reading:
+            self._tell_panel()
         if batch:
             self._keep_at = now + KEEP_AFTER
         elif self._keep_at is not None and now >= self._keep_at and not (self._moving or self._dragging):
             self._keep_at = None
             self._guard(self._keep)
+
+    def _tell_panel(self) -> None:
+        """Bring the numbers up to date: after the picture, as that takes longer than posing the joints."""
+        if not (self._readout_due or self._sliders_due):
+            return
+        self._told_at = time.perf_counter()
+        with self._client.atomic():
+            if self._readout_due:
+                self._readout_due = False
+                self._readout.show(kin.fk(self._robot, self._q), self._degrees)
+            if self._sliders_due:
+                self._sliders_due = False
+                self._sliders.show(self._motion.goal, self._held)
+                self._show_posture()
 
     def _handle(self, key: Hashable, value: object) -> None:
         match key:
@@ -454,6 +466,7 @@ class Session:
         self._sliders.remove()
         self._sliders = self._make_sliders()
         self._show_posture()
+        self._readout_due = True
         self._for_features(lambda feature: feature.on_style())
 
     def _for_features(self, act: Callable[[Feature], None]) -> None:
@@ -619,6 +632,7 @@ class Session:
         self._robot = robot
         self._target = None
         self._dragging = False
+        self._readout_due = True
         weights = np.where(robot.revolute, 1.0, 4.0)
         self._motion = Motion(robot.q_home if q is None else q, weights)
         self._q = self._motion.goal
@@ -674,11 +688,12 @@ class Session:
         # The first picture after an event already shows motion: half a frame of waiting would be felt as lag.
         q = self._motion.at(now + self._pace.interval if fresh else now)
         arrived = not self._motion.moving
-        self._pace.moving(self._client.client_id, not arrived)
+        self._pace.moving(self._client.client_id, self._dragging or not arrived)
         T = kin.fk(self._robot, q)
         self._scene.show(q)
         if not np.array_equal(q, self._q):
             self._q = q
+            self._readout_due = True
             self._for_features(lambda feature: feature.on_picture(T))
         if self._target is None:
             if not self._dragging:
@@ -693,6 +708,3 @@ class Session:
             target = self._target[:3, 3]
             far = float(np.linalg.norm(T[:3, 3] - target)) > 5e-4 and not self._reached
             self._scene.show_gap(T[:3, 3], target if far else None)
-        if arrived or now - self._read_at > READOUT_INTERVAL:
-            self._read_at = now
-            self._readout.show(T, self._degrees)
