@@ -27,10 +27,13 @@ from app.bench import floors
 from app.bench.arms import Arm, ortho
 from app.bench.rows import Task
 from kin.transforms import Array
+from kin.workspace import draw
+from kin.workspace.draw import Points
+from kin.workspace.numbers import streams
 
 OURS = "kinboard"
 RICH = "kinboard, rich"
-FLOORS = ("floor: empty call", "floor: sine, cosine")
+FLOORS = ("floor: empty call", "floor: sine, cosine", "floor: points written")
 _TIGHT = 1e-13  # of iterative solvers: on half the squared error, so about 1e-7 m or rad
 
 
@@ -82,13 +85,19 @@ class Peer:
 def _floor(task: Task) -> list[Contestant]:
     if task.row.batch:
         q = task.q
-        return [Contestant(FLOORS[1], floors.sines_and_cosines, [(q,)], _nothing, len(q), floor=True)]
+        found = [Contestant(FLOORS[1], floors.sines_and_cosines, [(q,)], _nothing, len(q), floor=True)]
+        if task.row.kind == "cloud":
+            out = np.empty((len(q), 3), dtype=np.float32)
+            found.append(Contestant(FLOORS[2], floors.written, [(out,)], _nothing, len(q), floor=True))
+        return found
     inputs = [(task.robot.model.copy(), q) for q in task.q]
     return [Contestant(FLOORS[0], floors.empty_call, inputs, _nothing, floor=True)]
 
 
 def _ours(task: Task) -> list[Contestant]:
     robot, row = task.robot, task.row
+    if row.kind == "cloud":
+        return _cloud(task)
     if row.kind == "fk" and row.batch:
         return [Contestant(OURS, kin.fk_positions, [(robot, task.q)], list, len(task.q))]
     if row.kind == "fk":
@@ -109,12 +118,54 @@ def _ours(task: Task) -> list[Contestant]:
     return found
 
 
+def _cloud(task: Task) -> list[Contestant]:
+    """The kernel alone, the generator as it is called, and each step of the way as if the others were not there.
+
+    The kernel does the first three steps in one pass; what the pass saves is the difference to their sum.
+    """
+    robot, count = task.robot, len(task.q)
+    free = np.ones(robot.n, dtype=np.bool_)
+    key, step = streams(0, free, False)
+    low, high = robot.lower.copy(), robot.upper.copy()
+    out, q = np.empty((count, 3), dtype=np.float32), np.empty_like(task.q)
+
+    def kernel() -> Points:
+        draw.points(robot.model, key, step, False, low, high, 0, out)
+        return out
+
+    def generator() -> list[kin.WorkspaceChunk]:
+        return list(kin.sample_workspace(robot, count))
+
+    def numbers() -> None:
+        draw.configurations(key, step, False, low, high, 0, q)
+
+    exact = kin.fk_positions(robot, task.q)
+
+    def part(name: str, call: Callable[[], Any]) -> Contestant:
+        return Contestant(f"{OURS}, {name} only", call, [()], _nothing, count, floor=True)
+
+    return [
+        Contestant(OURS, kernel, [()], list, count),
+        Contestant("kinboard, generator", generator, [()], _chunks, count),
+        part("numbers", numbers),
+        part("kinematics", lambda: kin.fk_positions(robot, task.q)),
+        part("conversion", lambda: exact.astype(np.float32)),
+        part("encoding", out.tobytes),
+    ]
+
+
+def _chunks(chunks: list[kin.WorkspaceChunk]) -> list[Array]:
+    return [point for chunk in chunks for point in chunk.points]
+
+
 def _solutions(result: kin.IKResult) -> list[Array]:
     return [np.array([s.q for s in result.solutions])]
 
 
 def _numpy(task: Task) -> list[Contestant]:
-    """Plain matrix products: what anybody writes first."""
+    """Plain matrix products: what anybody writes first. Of a cloud it is spared the drawing of numbers."""
+    if task.row.kind == "cloud":
+        return [Contestant("numpy", lambda q: task.arm.fk(q)[:, :3, 3], [(task.q,)], list, len(task.q))]
     if task.row.kind != "fk":
         return []
     if task.row.batch:
@@ -225,7 +276,7 @@ def _opw(task: Task) -> list[Contestant]:
 
     six = task.arm.with_roll() if task.row.kind == "fk" and task.arm.n == 5 else task.six
     shape = ortho(six) if six is not None else None
-    if shape is None or task.row.kind == "answer":
+    if shape is None or task.row.kind in ("answer", "cloud"):
         return []
     robot = Robot(KinematicModel(**shape.lengths), degrees=False)
     tool = RigidTransform.from_matrix(shape.tool)

@@ -8,8 +8,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from kin.compiled import jit
 from kin.transforms import Array
+from kin.workspace.draw import Points
 
 
 @jit
@@ -26,3 +29,13 @@ def sines_and_cosines(q: Array) -> float:
         for j in range(q.shape[1]):
             total += math.sin(q[i, j]) * math.cos(q[i, j])
     return total
+
+
+@jit
+def written(out: Points) -> None:
+    """Every value of an array ``(k, 3)`` written once."""
+    for i in range(out.shape[0]):
+        x = np.float32(i)
+        out[i, 0] = x
+        out[i, 1] = x
+        out[i, 2] = x

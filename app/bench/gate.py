@@ -48,6 +48,7 @@ class Verdict:
 GATES: tuple[Gate, ...] = (
     Gate("fk", OURS, 10.0),
     Gate("fk-batch", OURS, 1.5),
+    Gate("workspace", OURS, 0.5),
     Gate("ik-pioneer5", OURS, 15.0),
     Gate("ik-pioneer5", RICH, 700.0),
     Gate("ik-pioneer5-batch", OURS, 4.0),

@@ -13,7 +13,7 @@ from app.bench.arms import Arm, arm_of
 from kin.robot import Robot
 from kin.transforms import Array
 
-Kind = Literal["fk", "branches", "answer"]
+Kind = Literal["fk", "branches", "answer", "cloud"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +24,7 @@ class Row:
         id, title: name on the command line, and for people.
         robot: id of the arm.
         kind: ``"fk"``; ``"branches"``, all configurations whatever the limits; ``"answer"``, at least one inside
-            the limits, verified.
+            the limits, verified; ``"cloud"``, tool points of configurations that the contestant draws itself.
         batch: all targets in one call.
         approach: point and approach direction only; the roll about the tool's axis is free.
         lock: of a redundant arm, the joint that solvers for six joints keep at `value`.
@@ -41,9 +41,13 @@ class Row:
     value: float = math.nan
 
 
+CLOUD = 16  # batches in a cloud: the call itself must not count, the caches must hold no more than in real life
+
 ROWS: tuple[Row, ...] = (
     Row("fk", "forward kinematics, one pose", "pioneer5", "fk"),
     Row("fk-batch", "forward kinematics, tool positions of a batch, per pose", "pioneer5", "fk", batch=True),
+    Row("workspace", "a cloud of tool points, per point", "pioneer5", "cloud", batch=True),
+    Row("workspace-redundant7", "a cloud of tool points, per point", "redundant7", "cloud", batch=True),
     Row("ik-pioneer5", "all branches, point and approach direction", "pioneer5", "branches", approach=True),
     Row(
         "ik-pioneer5-batch", "all branches, point and approach direction, batch, per target", "pioneer5",
@@ -93,7 +97,10 @@ def prepare(row: Row, size: int, seed: int) -> Task | None:
     robot = kin.builtin_robots().get(row.robot)
     if robot is None or (row.kind == "branches" and not kin.branch_names(robot)):
         return None
-    q = robot.random_q(np.random.default_rng(seed), size)
+    if row.kind == "cloud":
+        q = kin.configuration_at(robot, np.arange(CLOUD * size))
+    else:
+        q = robot.random_q(np.random.default_rng(seed), size)
     if row.lock is not None:
         q[:, row.lock] = row.value
     arm = arm_of(robot)

@@ -79,7 +79,7 @@ class RowReport:
     @property
     def floor(self) -> Entry:
         """What the row's times are measured against by the gate."""
-        return next(entry for entry in self.entries if entry.contestant.floor)
+        return next(entry for entry in self.entries if entry.contestant.name.startswith("floor"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -181,7 +181,7 @@ def _checked(
                     ]
                     if contestant.floor:
                         found.append((contestant, None))
-                    elif task.row.kind == "fk":
+                    elif task.row.kind in ("fk", "cloud"):
                         found.append((contestant, judge_poses(task, answers)))
                     else:
                         sets, check = right_sets(task, answers)

@@ -1,0 +1,51 @@
+"""``python tests/bench/load MODE``: figures of a service under load."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import sys
+from pathlib import Path
+
+sys.path[:0] = [str(Path(__file__).parents[3]), str(Path(__file__).parents[1])]
+
+from app.bench.run import machine  # noqa: E402
+
+MODES = {
+    "rest": "requests a second beside an empty endpoint",
+    "drag": "until the picture answers a drag, for 1, 10, 30 and 100 visitors",
+    "storm": "200 visitors at once",
+    "cloud": "points a second: kernel, generator, REST, viewer",
+    "soak": "visitors who come, drag, draw and go, over and over",
+}
+
+
+def main() -> int:
+    """0, or 1 if the soak found something left behind."""
+    parser = argparse.ArgumentParser(prog="python tests/bench/load", description=__doc__)
+    parser.add_argument("mode", choices=(*MODES, "all"), help="; ".join(f"{k}: {v}" for k, v in MODES.items()))
+    parser.add_argument("--quick", action="store_true", help="seconds instead of minutes, to try it")
+    parser.add_argument("--workers", type=int, default=1, help="processes of the service")
+    parser.add_argument(
+        "--only", nargs="+", help="numbers of visitors, of points, of rounds; of rest its cases, such as fk"
+    )
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write everything measured to this file")
+    arguments = parser.parse_args()
+    found = {"machine": machine(), "workers": arguments.workers}
+    failed = False
+    if arguments.only and arguments.mode == "all":
+        parser.error("--only goes with one mode")
+    for mode in MODES if arguments.mode == "all" else [arguments.mode]:
+        only = arguments.only
+        if only and mode != "rest":
+            only = [int(value) for value in only]
+        found[mode] = importlib.import_module(f"load.{mode}").run(arguments.quick, arguments.workers, only)
+        failed |= bool(found[mode].get("left behind"))
+        print(flush=True)
+    if arguments.json is not None:
+        arguments.json.write_text(json.dumps(found, indent=1) + "\n", "utf-8")
+    return int(failed)
+
+
+sys.exit(main())

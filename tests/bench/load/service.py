@@ -1,0 +1,137 @@
+"""The service as a user starts it, and what the system says about its processes."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[3]
+_TICK = os.sysconf("SC_CLK_TCK")
+_WARM_UP = 300.0  # seconds; kernels may have to be compiled
+
+
+@dataclass(frozen=True, slots=True)
+class Usage:
+    """What all processes of a service hold, and have spent.
+
+    Attributes:
+        seconds: processor time spent so far.
+        memory: bytes, of what processes share each its share (Pss).
+        threads, files: running threads, open file handles.
+    """
+
+    seconds: float
+    memory: int
+    threads: int
+    files: int
+
+
+@dataclass(frozen=True, slots=True)
+class Service:
+    """A running service."""
+
+    pid: int
+    port: int
+
+    def usage(self) -> Usage:
+        """Everything at this moment."""
+        found = [_usage(pid) for pid in _family(self.pid)]
+        return Usage(
+            sum(u.seconds for u in found),
+            sum(u.memory for u in found),
+            sum(u.threads for u in found),
+            sum(u.files for u in found),
+        )
+
+    def seconds(self) -> float:
+        """Processor time spent so far: cheaper to find out than `usage`."""
+        return sum(_seconds(pid) for pid in _family(self.pid))
+
+
+@contextmanager
+def serve(workers: int = 1, **settings: str) -> Iterator[Service]:
+    """A service that is ready, on a port of its own, with no other settings than these."""
+    command = [sys.executable, "-m", "app.cli", "serve", "--port", "0", "--workers", str(workers)]
+    env = {name: value for name, value in os.environ.items() if not name.startswith("KINBOARD_")}
+    env |= {f"KINBOARD_{name.upper()}": value for name, value in settings.items()}
+    with subprocess.Popen(
+        command, cwd=ROOT, env=env | {"PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE, text=True
+    ) as process:
+        try:
+            assert process.stdout is not None
+            found = re.search(r":(\d+)/", process.stdout.readline())
+            if found is None:
+                raise RuntimeError("the service did not start")
+            service = Service(process.pid, int(found[1]))
+            _wait_until_ready(service.port, workers)
+            _wait_until_idle(service)
+            yield service
+        finally:
+            process.send_signal(signal.SIGTERM)
+            try:
+                process.wait(20)
+            except subprocess.TimeoutExpired:
+                process.kill()
+
+
+def _wait_until_ready(port: int, workers: int) -> None:
+    """Each connection may meet another worker: so many times ready in a row that none can have been missed."""
+    end = time.monotonic() + _WARM_UP
+    in_a_row = 0
+    while in_a_row < (1 if workers == 1 else 12 * workers):
+        if time.monotonic() > end:
+            raise RuntimeError(f"the service was not ready within {_WARM_UP:g} s")
+        try:
+            with _direct.open(f"http://127.0.0.1:{port}/readyz", timeout=20):
+                in_a_row += 1
+        except OSError:  # refused, or 503
+            in_a_row = 0
+            time.sleep(0.05)
+
+
+def _wait_until_idle(service: Service) -> None:
+    """Kernels that nobody needs at first are compiled or loaded behind the visitors: they are not our subject."""
+    end = time.monotonic() + _WARM_UP
+    before = service.seconds()
+    while time.monotonic() < end:
+        time.sleep(1.0)
+        now = service.seconds()
+        if now - before < 0.03:
+            return
+        before = now
+    raise RuntimeError(f"the service was not idle within {_WARM_UP:g} s")
+
+
+_direct = urllib.request.build_opener(urllib.request.ProxyHandler({}))
+
+
+def _family(pid: int) -> list[int]:
+    """A process and all below it."""
+    found = [pid]
+    for task in Path(f"/proc/{pid}/task").iterdir():
+        for child in (task / "children").read_text().split():
+            found += _family(int(child))
+    return found
+
+
+def _seconds(pid: int) -> float:
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / _TICK
+
+
+def _usage(pid: int) -> Usage:
+    folder = Path(f"/proc/{pid}")
+    rollup = (folder / "smaps_rollup").read_text()
+    memory = int(re.search(r"^Pss:\s+(\d+) kB", rollup, re.MULTILINE)[1]) << 10  # type: ignore[index]
+    return Usage(
+        _seconds(pid), memory, len(list((folder / "task").iterdir())), len(list((folder / "fd").iterdir()))
+    )

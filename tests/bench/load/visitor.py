@@ -1,0 +1,185 @@
+"""A visitor of the viewer without a browser: builds no page, remembers what has to be answered or measured."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import re
+import time
+from collections import deque
+from typing import Any
+
+import msgspec
+import numpy as np
+import viser
+import zstandard
+
+from load.raw import Socket
+
+_SUBPROTOCOL = f"viser-v{viser.__version__}"
+_BASE_JOINT = re.compile(r"/arm-\d+/\d+")
+_unpack = zstandard.ZstdDecompressor().decompress
+_decode = msgspec.msgpack.Decoder().decode
+_encode = msgspec.msgpack.Encoder().encode
+_CLOSE = 1e-6  # radians
+SWING = 0.5  # radians to either side
+STEP = 0.02  # radians from one event to the next: 0.4 rad/s
+
+
+class Visitor:
+    """One tab.
+
+    A drag turns the gizmo about the line of joint 1, ever farther in one direction and then back. The angle of
+    joint 1 in the picture then tells which event it answers: one beyond the target before last can only have been
+    drawn for the last one. Pictures of the easing towards an earlier target do not count.
+    """
+
+    def __init__(self) -> None:
+        self._socket: Socket
+        self.began = time.perf_counter()
+        self.complete = self.last = math.nan  # when the gizmo was there, and the last message
+        self.gizmo: dict[str, Any] = {}
+        self.elements: dict[str, str] = {}  # uuid by label
+        self.points = 0
+        self.bytes = 0
+        self.pictures = 0
+        self.latencies: list[float] = []
+        self._poses: dict[str, dict[str, Any]] = {}
+        self._joint = ""
+        self._home: Any = None
+        self._there = asyncio.Event()
+        self._target = 0.0
+        self._sense = 1.0
+        # Sense, angle to be passed, time of sending.
+        self._waiting: deque[tuple[float, float, float]] = deque()
+
+    async def connect(self, port: int, timeout: float = 60.0) -> None:
+        """Connect and wait until the arm is there."""
+        self.began = time.perf_counter()
+        async with asyncio.timeout(timeout):
+            self._socket = await Socket.open(port, "/viewer", _SUBPROTOCOL, self._heard)
+            self.send(
+                "ViewerCameraMessage", wxyz=(1, 0, 0, 0), position=(3, 3, 3), fov=1.3, near=0.01, far=1000,
+                image_height=720, image_width=1280, look_at=(0, 0, 0), up_direction=(0, 0, 1),
+            )  # fmt: skip
+            await self._there.wait()
+
+    async def quiet(self, seconds: float = 0.3, timeout: float = 60.0) -> None:
+        """Wait until nothing has come for a while."""
+        end = time.perf_counter() + timeout
+        while (left := self.last + seconds - time.perf_counter()) > 0.0 and time.perf_counter() < end:
+            await asyncio.sleep(left)
+
+    def close(self) -> None:
+        """Close the tab."""
+        self._socket.close()
+
+    def send(self, kind: str, **fields: Any) -> None:
+        """A message of viser's protocol."""
+        self._socket.send(_encode({"type": kind, **fields}))
+
+    def set(self, label: str, value: object) -> None:
+        """Change the control with this label, or click a button of the group of that name."""
+        self.send("GuiUpdateMessage", uuid=self.elements[label], updates={"value": value})
+
+    # Drags
+
+    def grab(self) -> None:
+        """Take the gizmo, which stands where the page has put it."""
+        pose = self._poses[self.gizmo["name"]]
+        self._position = [float(x) for x in pose["position"]]
+        self._wxyz = [float(x) for x in pose["wxyz"]]
+        self._home = [float(x) for x in self._poses[self._joint]["wxyz"]]
+        self._target, self._sense = 0.0, 1.0
+        self.send("TransformControlsDragStartMessage", name=self.gizmo["name"], owner=self.gizmo["owner"])
+
+    def drag(self) -> bool:
+        """One event farther; False at a turning point, where the hand rests until all is answered."""
+        if self._sense * self._target >= SWING:
+            if self._waiting:
+                return False
+            self._sense = -self._sense
+        before, self._target = self._target, self._target + self._sense * STEP
+        half = 0.5 * self._target
+        c, s = math.cos(2 * half), math.sin(2 * half)
+        x, y, z = self._position
+        turn = (math.cos(half), 0.0, 0.0, math.sin(half))
+        now = time.perf_counter()
+        self._waiting.append((self._sense, before, now))
+        self.send(
+            "TransformControlsUpdateMessage", name=self.gizmo["name"], owner=self.gizmo["owner"],
+            position=(c * x - s * y, s * x + c * y, z), wxyz=_product(turn, self._wxyz),
+        )  # fmt: skip
+        return True
+
+    def release(self) -> None:
+        """Let the gizmo go."""
+        self.send("TransformControlsDragEndMessage", name=self.gizmo["name"], owner=self.gizmo["owner"])
+
+    @property
+    def unanswered(self) -> int:
+        """Events that no picture has answered yet."""
+        return len(self._waiting)
+
+    def _shown(self, wxyz: list[float], now: float) -> None:
+        """The base joint has been posed."""
+        self.pictures += 1
+        if not self._waiting:
+            return
+        w, _, _, z = _product((self._home[0], *(-x for x in self._home[1:])), wxyz)
+        angle = math.remainder(2.0 * math.atan2(z, w), 2.0 * math.pi)
+        while self._waiting:
+            sense, before, sent = self._waiting[0]
+            if sense * (angle - before) < _CLOSE:
+                return
+            self._waiting.popleft()
+            self.latencies.append(now - sent)
+
+    # Messages
+
+    def _heard(self, data: bytes) -> None:
+        now = self.last = time.perf_counter()
+        self.bytes += len(data)
+        size, packed = int.from_bytes(data[:8], "little"), int.from_bytes(data[8:16], "little")
+        said = _decode(_unpack(data[16 : 16 + packed], max_output_size=size))
+        for message in said["messages"]:
+            kind = message["type"]
+            if kind == "SetOrientationMessage":
+                name = message["name"]
+                self._pose(name)["wxyz"] = message["wxyz"]
+                if name == self._joint:
+                    self._shown(message["wxyz"], now)
+            elif kind == "SetPositionMessage":
+                self._pose(message["name"])["position"] = message["position"]
+            elif kind == "PointCloudMessage":
+                points = message["props"]["points"]
+                width = 3 * np.dtype(points["dtype"]).itemsize
+                self.points += said["binaryBufferLengths"][points["__binary_index"]] // width
+            elif kind == "LocalStorageGetItemRequestMessage":
+                self.send(
+                    "LocalStorageGetItemResponseMessage", request_uuid=message["request_uuid"], value=None,
+                    error=None,
+                )  # fmt: skip
+            elif kind == "TransformControlsMessage":
+                self.gizmo = self.gizmo or message
+                self.complete = now
+                self._there.set()
+            elif kind == "FrameMessage" and _BASE_JOINT.fullmatch(message["name"]):
+                self._joint = message["name"]
+            elif "uuid" in message and "props" in message:
+                self.elements[message["props"].get("label", "")] = message["uuid"]
+
+    def _pose(self, name: str) -> dict[str, Any]:
+        return self._poses.setdefault(name, {"position": (0.0, 0.0, 0.0), "wxyz": (1.0, 0.0, 0.0, 0.0)})
+
+
+def _product(a: Any, b: Any) -> tuple[float, float, float, float]:
+    """Of two quaternions."""
+    aw, ax, ay, az = a
+    bw, bx, by, bz = b
+    return (
+        aw * bw - ax * bx - ay * by - az * bz,
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+    )

@@ -1,0 +1,87 @@
+"""The load tools against a real service, in small: what they count, and that visitors leave nothing behind."""
+
+from __future__ import annotations
+
+import asyncio
+from math import cos, sin
+
+import pytest
+from load import cloud, drag, rest, soak, storm
+from load.service import Usage, serve
+from load.visitor import STEP, SWING, Visitor
+
+
+@pytest.fixture(scope="module")
+def service():
+    with serve() as running:
+        yield running
+
+
+def test_each_request_is_answered_and_counted(service):
+    rows = asyncio.run(rest.measure(service, 2, 0.1, 2, ["fk", "ik"]))
+    assert [row["request"] for row in rows] == [rest.EMPTY, "fk", "ik"]
+    assert all(row["per second"] > 0 and 0 < row["p50 ms"] <= row["p99 ms"] for row in rows)
+    assert rows[0]["% of empty"] == 100
+
+
+def test_every_drag_is_answered_by_its_own_picture(service):
+    row = asyncio.run(drag.measure(service, 2, 2.0))
+    assert row["unanswered"] == 0
+    assert row["events"] >= 60
+    assert 0 < row["p50 ms"] <= row["p95 ms"] <= row["p99 ms"]
+
+
+def test_a_picture_on_the_way_to_an_earlier_target_answers_nothing():
+    visitor = Visitor()
+    visitor._home = [1.0, 0.0, 0.0, 0.0]
+    visitor._position, visitor._wxyz = [1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
+    visitor.gizmo = {"name": "/arm-1-target", "owner": ""}
+    visitor.send = lambda *_, **__: None
+
+    def shown(angle):
+        visitor._shown([float(x) for x in (cos(angle / 2), 0, 0, sin(angle / 2))], 1e9)
+
+    for _ in range(2):
+        assert visitor.drag()
+    shown(0.5 * STEP)  # half-way to the first
+    assert (len(visitor.latencies), visitor.unanswered) == (1, 1)
+    shown(STEP)  # at the first, exactly
+    assert visitor.unanswered == 1
+    shown(1.3 * STEP)
+    assert (len(visitor.latencies), visitor.unanswered) == (2, 0)
+    for _ in range(round(SWING / STEP) - 2):
+        assert visitor.drag()
+    assert not visitor.drag(), "the hand waits at the turning point"
+    shown(SWING)
+    assert visitor.unanswered == 0
+    assert visitor.drag()
+    shown(SWING)
+    assert visitor.unanswered == 1
+    shown(SWING - 0.5 * STEP)
+    assert visitor.unanswered == 0
+
+
+def test_all_who_come_at_once_get_their_page(service):
+    row = asyncio.run(storm.measure(service, 6))
+    assert row["failed"] == 0
+    assert 0 < row["arm p50 s"] <= row["all pages s"]
+
+
+def test_every_point_arrives_by_every_way(service):
+    rows = asyncio.run(cloud._of_size(service, 20_000, 1))
+    assert [row["way"] for row in rows][1:] == ["REST, bin", "REST, websocket", "viewer"]
+
+
+def test_visitors_leave_nothing_behind(service):
+    before, after = asyncio.run(soak.soak(service, 3, 2, 0.5))
+    assert soak.left_behind(before, after, 6) == []
+
+
+@pytest.mark.parametrize(
+    ("more", "word"), [((0, 0, 1, 0), "1 threads"), ((0, 0, 0, 2), "2 file handles"), ((0, 1 << 28, 0, 0), "kB")]
+)
+def test_whatever_stays_is_told(more, word):
+    before = Usage(1.0, 1 << 28, 10, 20)
+    after = Usage(*(a + b for a, b in zip((1.0, 1 << 28, 10, 20), more, strict=True)))
+    (told,) = soak.left_behind(before, after, 100)
+    assert word in told
