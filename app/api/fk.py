@@ -13,7 +13,7 @@ from typing_extensions import TypedDict
 from app.answers import FkAnswer, documented, fk_answers
 from app.api import schemas
 from app.api.body import JsonRoute
-from app.api.schemas import POST_REFUSALS, Configurations, RobotDep, SettingsDep, example, one_or_all
+from app.api.schemas import POST_REFUSALS, Configurations, RobotDep, SettingsDep, WarmDep, example, one_or_all
 from app.api.work import BudgetDep
 
 FEW = 16  # configurations that are answered sooner than a thread could be asked to
@@ -64,6 +64,7 @@ async def forward_kinematics(
     robot: RobotDep,
     settings: SettingsDep,
     budget: BudgetDep,
+    warm: WarmDep,
     body: Annotated[FkRequest, Body(openapi_examples=EXAMPLES)],
 ) -> Response:
     """Pose of the tool for joint values, as a 4×4 matrix and as position with quaternion.
@@ -73,4 +74,4 @@ async def forward_kinematics(
     """
     q, single = schemas.as_configurations(robot, body.q, settings)
     answer = partial(one_or_all, lambda some: fk_answers(robot, q[some], body.frames), len(q), single, budget)
-    return answer() if len(q) <= FEW else await run_in_threadpool(answer)
+    return answer() if warm and len(q) <= FEW else await run_in_threadpool(answer)

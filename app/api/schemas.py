@@ -85,6 +85,13 @@ StoreDep = Annotated[Store, Depends(_store)]
 SettingsDep = Annotated[Settings, Depends(_settings)]
 
 
+async def _warm(request: Request) -> bool:
+    return bool(request.app.state.startup.status == "ready")
+
+
+WarmDep = Annotated[bool, Depends(_warm)]  # whether no kernel of forward kinematics can still be compiling
+
+
 async def _robot(
     store: StoreDep,
     robot_id: Annotated[

@@ -1,5 +1,6 @@
 """REST: what comes back for good questions, checked against the core and against forward kinematics."""
 
+import asyncio
 import json
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 from pydantic import TypeAdapter
 
 import kin
-from app.answers import FkAnswer, IkAnswer, JacobianAnswer, RobotAnswer
+from app.answers import FkAnswer, IkAnswer, JacobianAnswer, RobotAnswer, fk_answers
 from kin.transforms import rotation_from_wxyz
 
 ROBOTS = tuple(kin.builtin_robots().values())
@@ -291,3 +292,25 @@ def test_extreme_but_finite_numbers_never_put_nan_into_an_answer(client):
                 target={"position": [value] * 3, "wxyz": [1, 0, 0, 0]},
                 q_seed=[value] * robot.n,
             )
+
+
+@pytest.mark.parametrize(
+    ("status", "count", "inline"), [("ready", 3, True), ("warming", 3, False), ("ready", 40, False)]
+)
+def test_a_few_poses_hold_nobody_up_and_more_get_a_thread(app, client, monkeypatch, status, count, inline):
+    """On the event loop only what is quick for sure: while kernels may be compiling, nothing."""
+    on_the_loop = []
+
+    def watched(robot, q, frames):
+        try:
+            asyncio.get_running_loop()
+            on_the_loop.append(True)
+        except RuntimeError:
+            on_the_loop.append(False)
+        return fk_answers(robot, q, frames)
+
+    monkeypatch.setattr("app.api.fk.fk_answers", watched)
+    monkeypatch.setattr(app.state.startup, "status", status)
+    answer = client.post("/api/v1/robots/pioneer5/fk", json={"q": [[0.0] * 5] * count})
+    assert len(answer.json()["results"]) == count
+    assert set(on_the_loop) == {inline}
