@@ -6,9 +6,7 @@ when ``ik`` has no exact answer. Misuse raises `kin.KinematicsError`.
 
 from __future__ import annotations
 
-import json
 import math
-import os
 import sys
 from argparse import Namespace
 from collections.abc import Callable
@@ -33,7 +31,7 @@ from app.clouds import Cloud
 from app.formats import FORMATS
 from app.picture import draw
 from app.save import opened, reading, save
-from app.store import Store
+from app.terminal import Units, clean, per_joint, print_json, store_of, table
 from kin import (
     InputError,
     Robot,
@@ -53,11 +51,11 @@ _INTERRUPTED = 130  # what shells expect after Ctrl-C
 
 
 def fk(arguments: Namespace) -> int:
-    robot = _store(arguments).get(arguments.robot)
+    robot = store_of(arguments).get(arguments.robot)
     q = _configuration(robot, arguments.q, "q", arguments.rad)
     answer = fk_answers(robot, q[None], arguments.frames)[0]
     if arguments.json:
-        return _print_json(answer)
+        return print_json(answer)
     units = Units(robot, arguments.rad)
     rows = [
         [
@@ -69,18 +67,18 @@ def fk(arguments: Namespace) -> int:
         for i, joint in enumerate(robot.joints)
     ]
     print(f"{robot.name} ({robot.id})\n")
-    print(_table(["joint", "value", "limits", ""], rows))
+    print(table(["joint", "value", "limits", ""], rows))
     frames = [("tool", answer["pose"])] + [(frame["name"], frame["pose"]) for frame in answer["frames"] or ()]
     rows = [
-        [name, *(units.length(x) for x in pose["position"]), *(f"{_clean(w, 5)}" for w in pose["wxyz"])]
+        [name, *(units.length(x) for x in pose["position"]), *(f"{clean(w, 5)}" for w in pose["wxyz"])]
         for name, pose in frames
     ]
-    print("\n" + _table(["frame", *(f"{axis} {units.of_length}" for axis in "xyz"), *"wxyz"], rows))
+    print("\n" + table(["frame", *(f"{axis} {units.of_length}" for axis in "xyz"), *"wxyz"], rows))
     return 0
 
 
 def ik(arguments: Namespace) -> int:
-    robot = _store(arguments).get(arguments.robot)
+    robot = store_of(arguments).get(arguments.robot)
     angle, length = (1.0, 1.0) if arguments.rad else (math.pi / 180, 1e-3)
     T = from_position_wxyz([x * length for x in arguments.position], arguments.wxyz)
     if arguments.approach is not None:
@@ -94,8 +92,8 @@ def ik(arguments: Namespace) -> int:
         respect_limits=not arguments.ignore_limits,
         max_solutions=None if arguments.all else 1,
         redundancy=_redundancy(arguments, angle),
-        limits=_per_joint(robot, arguments.limit, "--limit", 2, arguments.rad),
-        locked=_per_joint(robot, arguments.lock, "--lock", 1, arguments.rad),
+        limits=per_joint(robot, arguments.limit, "--limit", 2, arguments.rad),
+        locked=per_joint(robot, arguments.lock, "--lock", 1, arguments.rad),
         branch=arguments.branch,
         images=arguments.images,
         prefer=arguments.prefer,
@@ -106,7 +104,7 @@ def ik(arguments: Namespace) -> int:
     answer = ik_answer(result)
     code = 0 if answer["status"] == "solved" else 1
     if arguments.json:
-        _print_json(answer)
+        print_json(answer)
         return code
     units = Units(robot, arguments.rad)
     print(answer["reason"] + "\n")
@@ -117,34 +115,34 @@ def ik(arguments: Namespace) -> int:
     if answer["nearest_orientation"]:
         listed.append(("nearest orientation", answer["nearest_orientation"]))
     if listed:
-        print(_table(*_solutions(units, listed)))
+        print(table(*_solutions(units, listed)))
     for free in answer["redundancy"]:
         ranges = ", ".join(" … ".join(units.angle(x) for x in interval) for interval in free["intervals"])
         print(f"\n{free['label']} = {units.angle(free['value'])}, possible: {ranges or 'nothing'}")
     if answer["blocked"]:
-        print("\n" + _table(["branch", "would need"], _needs(units, answer["blocked"])))
+        print("\n" + table(["branch", "would need"], _needs(units, answer["blocked"])))
     if not arguments.rad and np.abs(T[:3, 3]).max() < 5e-3:
         print("note: --position is read in millimetres; --rad makes it metres", file=sys.stderr)
     return code
 
 
 def robots(arguments: Namespace) -> int:
-    store = _store(arguments)
+    store = store_of(arguments)
     if arguments.robot is not None:
         robot = store.get(arguments.robot)
         answer = robot_answer(robot)
         if arguments.json:
-            return _print_json(answer)
+            return print_json(answer)
         print(f"{robot.name} ({robot.id})\n{robot.description}\n{robot.source}\n")
         print(_dh_table(answer, Units(robot, arguments.rad)))
         return 0
     answers = [robot_answer(robot) for robot in store.robots]
     if arguments.json:
-        return _print_json({"robots": answers})
+        return print_json({"robots": answers})
     rows = [
-        [s["id"], str(s["n"]), s["convention"], f"{_clean(s['reach'] * 1e3, 0)} mm", s["name"]] for s in answers
+        [s["id"], str(s["n"]), s["convention"], f"{clean(s['reach'] * 1e3, 0)} mm", s["name"]] for s in answers
     ]
-    print(_table(["robot", "joints", "convention", "reach at most", "name"], rows))
+    print(table(["robot", "joints", "convention", "reach at most", "name"], rows))
     return 0
 
 
@@ -153,7 +151,7 @@ def check(arguments: Namespace) -> int:
     robot = load_robot(path)
     answer = check_robot(robot, robot.id in builtin_robots() and path.resolve().parent != BUILTIN.resolve())
     if arguments.json:
-        return _print_json(answer)
+        return print_json(answer)
     units = Units(robot, arguments.rad)
     print(f"{robot.name} ({robot.id})\n{robot.description or 'No description.'}\nsource: {robot.source}\n")
     rows = [
@@ -162,16 +160,16 @@ def check(arguments: Namespace) -> int:
             zip(robot.joints, robot.lower, robot.upper, robot.home, strict=True)
         )
     ]
-    print(_table(["", "joint", "kind", "lower", "upper", "home"], rows) + "\n")
+    print(table(["", "joint", "kind", "lower", "upper", "home"], rows) + "\n")
     for line in _about(answer, units):
         print(line)
     return 0
 
 
 def workspace(arguments: Namespace) -> int:
-    robot = _store(arguments).get(arguments.robot)
-    limits = _per_joint(robot, arguments.limit, "--limit", 2, arguments.rad)
-    locked = _per_joint(robot, arguments.lock, "--lock", 1, arguments.rad)
+    robot = store_of(arguments).get(arguments.robot)
+    limits = per_joint(robot, arguments.limit, "--limit", 2, arguments.rad)
+    locked = per_joint(robot, arguments.lock, "--lock", 1, arguments.rad)
     files = ((arguments.output, _saved), (arguments.picture, _drawn), (arguments.hull, _enclosed))
     if any(target is not None for target, _ in files):
         cloud = _cloud(robot, arguments, limits, locked)
@@ -180,7 +178,7 @@ def workspace(arguments: Namespace) -> int:
         return max(write() for write in ready)
     answer = workspace_answer(workspace_facts(robot, limits=limits, locked=locked, effort=arguments.effort))
     if arguments.json:
-        return _print_json(answer)
+        return print_json(answer)
     units = Units(robot, arguments.rad)
     spans = [
         *(("x", answer["x"]), ("y", answer["y"]), ("z", answer["z"])),
@@ -191,7 +189,7 @@ def workspace(arguments: Namespace) -> int:
         for name, span in spans
     ]
     print(f"{robot.name} ({robot.id})\n")
-    print(_table([f"tool point, {units.of_length}", "least", "largest"], rows) + "\n")
+    print(table([f"tool point, {units.of_length}", "least", "largest"], rows) + "\n")
     for name, unit, estimate in (("volume", "m³", answer["volume"]), ("surface", "m²", answer["surface"])):
         if estimate is not None:
             print(f"{name:<8} {estimate['value']:.4g} ± {estimate['error']:.1g} {unit}: {estimate['method']}")
@@ -316,27 +314,6 @@ def _about(answer: CheckAnswer, units: Units) -> list[str]:
     return lines if answer["warnings"] else [*lines, "No warnings."]
 
 
-class Units:
-    """How values are shown: degrees and millimetres, or radians and metres."""
-
-    def __init__(self, robot: Robot, rad: bool) -> None:
-        self.rad = rad
-        self.of_length = "m" if rad else "mm"
-        self._revolute: list[bool] = robot.revolute.tolist()
-
-    def angle(self, value: float) -> str:
-        """An angle given in radians."""
-        return f"{_clean(value, 6)} rad" if self.rad else f"{_clean(math.degrees(value), 3)}°"
-
-    def length(self, value: float) -> str:
-        """A length given in metres, without its unit."""
-        return _clean(value, 6) if self.rad else _clean(value * 1e3, 3)
-
-    def joint(self, index: int, value: float) -> str:
-        """The value of a joint."""
-        return self.angle(value) if self._revolute[index] else f"{self.length(value)} {self.of_length}"
-
-
 def _solutions(units: Units, listed: list[tuple[str, Solution]]) -> tuple[list[str], list[list[str]]]:
     """Head and rows of the table of solutions."""
     count = len(listed[0][1]["q"]) if listed else 0
@@ -396,25 +373,6 @@ def _redundancy(arguments: Namespace, angle: float) -> float | dict[str, float] 
     return {name: value * angle for name, value in given} or None
 
 
-def _per_joint(
-    robot: Robot, given: list[tuple[str, list[float]]] | None, field: str, count: int, rad: bool
-) -> Any:
-    """``--lock 2=30`` or ``--limit 2=0:30``, joints from 1, as one entry per joint in radians (metres)."""
-    if given is None:
-        return None
-    entries: list[float | list[float] | None] = [None] * robot.n
-    for joint, values in given:
-        if not joint.isdecimal() or not 1 <= int(joint) <= robot.n:
-            raise InputError(field, joint, f"a joint from 1 to {robot.n} before the =")
-        if len(values) != count:
-            raise InputError(field, values, "JOINT=VALUE" if count == 1 else "JOINT=LOWER:UPPER")
-        i = int(joint) - 1
-        scale = 1.0 if rad else math.pi / 180 if robot.revolute[i] else 1e-3
-        scaled = [value * scale for value in values]
-        entries[i] = scaled[0] if count == 1 else scaled
-    return entries
-
-
 def _dh_table(answer: RobotAnswer, units: Units) -> str:
     limits = {joint["name"]: (joint["index"], joint["limits"]) for joint in answer["joints"]}
     rows = []
@@ -429,36 +387,7 @@ def _dh_table(answer: RobotAnswer, units: Units) -> str:
         rows.append([row["name"], row["kind"], *cells, " … ".join(units.joint(index, x) for x in stops or ())])
     length = units.of_length
     head = ["row", "kind", "theta", f"d {length}", f"a {length}", "alpha", "limits"]
-    return f"DH table, {answer['convention']} convention\n\n" + _table(head, rows)
-
-
-def _table(head: list[str], rows: list[list[str]]) -> str:
-    """Columns under their heads, numbers to the right."""
-    lines = [head, *rows]
-    widths = [max(len(line[k]) for line in lines) for k in range(len(head))]
-    numeric = [all(not row[k] or row[k][:1] in "-0123456789" for row in rows) for k in range(len(head))]
-    return "\n".join(
-        "  ".join(
-            cell.rjust(width) if right else cell.ljust(width)
-            for cell, width, right in zip(line, widths, numeric, strict=True)
-        ).rstrip()
-        for line in lines
-    )
-
-
-def _clean(value: float, digits: int) -> str:
-    """Fixed digits without a minus before zero."""
-    return f"{round(value, digits) + 0.0:.{digits}f}"
-
-
-def _print_json(answer: object) -> int:
-    print(json.dumps(answer, ensure_ascii=False, allow_nan=False))
-    return 0
-
-
-def _store(arguments: Namespace) -> Store:
-    folder = arguments.robots or os.environ.get("KINBOARD_ROBOTS")
-    return Store(Path(folder) if folder else None)
+    return f"DH table, {answer['convention']} convention\n\n" + table(head, rows)
 
 
 def _configuration(robot: Robot, values: list[float], field: str, rad: bool) -> Array:

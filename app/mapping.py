@@ -11,21 +11,21 @@ from pathlib import Path
 import numpy as np
 
 from app.answers import CapabilityAnswer, capability_answer
-from app.commands import Units, _clean, _per_joint, _print_json, _store, _table
 from app.mapreduce import run_dask, run_local
+from app.terminal import Units, clean, per_joint, print_json, store_of, table
 from kin import CapabilityBlock, CapabilityMap, InputError, capability_grid, capability_join
 
 
 def capability(arguments: Namespace) -> int:
-    robot = _store(arguments).get(arguments.robot)
+    robot = store_of(arguments).get(arguments.robot)
     save = None if arguments.output is None else _saver(Path(arguments.output))
     voxel = arguments.voxel
     grid = capability_grid(
         robot,
         voxel=voxel if voxel is None or arguments.rad else voxel * 1e-3,
         resolution=arguments.resolution,
-        limits=_per_joint(robot, arguments.limit, "--limit", 2, arguments.rad),
-        locked=_per_joint(robot, arguments.lock, "--lock", 1, arguments.rad),
+        limits=per_joint(robot, arguments.limit, "--limit", 2, arguments.rad),
+        locked=per_joint(robot, arguments.lock, "--lock", 1, arguments.rad),
         directions=arguments.directions,
     )
     blocks = run_local(grid) if arguments.dask is None else run_dask(grid, arguments.dask)
@@ -34,7 +34,7 @@ def capability(arguments: Namespace) -> int:
         save(found)
     answer = capability_answer(found)
     if arguments.json:
-        return _print_json(answer)
+        return print_json(answer)
     print(f"{robot.name} ({robot.id})\n")
     for line in _summary(answer, found, Units(robot, arguments.rad)):
         print(line)
@@ -62,7 +62,7 @@ def _summary(answer: CapabilityAnswer, found: CapabilityMap, units: Units) -> li
     lines = [
         f"grid            {a} voxels of {units.length(answer['voxel'])} {length}",
         f"directions      {answer['directions']}, {answer['method']}",
-        f"reachable       {answer['reachable']} voxels, {_clean(answer['volume'], 4)} m³",
+        f"reachable       {answer['reachable']} voxels, {clean(answer['volume'], 4)} m³",
         f"mean share      {100.0 * answer['mean_share']:.1f} %",
         f"best share      {100.0 * answer['best_share']:.1f} %{at(answer['best_share_at'])}",
         f"manipulability  {answer['best_manipulability']:.4g} at best{at(answer['best_manipulability_at'])}",
@@ -72,7 +72,7 @@ def _summary(answer: CapabilityAnswer, found: CapabilityMap, units: Units) -> li
     for low, high in itertools.pairwise(steps.tolist()):
         inside = (found.share > low) & (found.share <= high + 1e-6)
         rows.append([f"up to {100.0 * high:.0f} %", str(int(inside.sum()))])
-    return [*lines, "", _table(["share of the directions", "voxels"], rows)]
+    return [*lines, "", table(["share of the directions", "voxels"], rows)]
 
 
 def _saver(path: Path) -> Callable[[CapabilityMap], None]:

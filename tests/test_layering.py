@@ -53,10 +53,11 @@ RULES: dict[str, set[str]] = {
     "app/equations": {"kin", "numpy", "sympy", "app.equations"},
     "app/check.py": {"kin", "numpy", "typing_extensions", "app.answers"},
     "app/mapreduce.py": {"kin", "distributed"},
-    "app/mapping.py": {"kin", "numpy", "app.answers", "app.commands", "app.mapreduce"},
+    "app/terminal.py": {"kin", "app.store"},
+    "app/mapping.py": {"kin", "numpy", "app.answers", "app.mapreduce", "app.terminal"},
     "app/commands.py": {
         *("kin", "numpy", "app.answers", "app.check", "app.clouds", "app.formats", "app.hull", "app.picture"),
-        *("app.save", "app.store"),
+        *("app.save", "app.terminal"),
     },
     "app/prefix.py": {"starlette"},
     "app/security.py": {"starlette"},

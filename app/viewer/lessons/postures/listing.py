@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 
 import kin
+from app.viewer.meshes import JOINT_COLORS, Color
 from app.viewer.panel.posture import parts, short
 from app.viewer.panel.status import angle, millimetres
 from kin import IKSolution, LimitViolation, Robot, Task
@@ -24,19 +25,10 @@ from kin.question import ask
 from kin.transforms import Array
 
 State = Literal["reachable", "compromise", "blocked", "absent", "unknown"]
-Color = tuple[int, int, int]
 
-# Okabe and Ito's colours; two greys for the eighth and for what the stops forbid.
-COLORS: tuple[Color, ...] = (
-    (0, 114, 178),
-    (230, 159, 0),
-    (0, 158, 115),
-    (204, 121, 167),
-    (86, 180, 233),
-    (213, 94, 0),
-    (200, 180, 30),
-    (110, 110, 110),
-)
+# The joints' colours, but a yellow that stands out from the page; two greys for the eighth and for what the stops
+# forbid.
+COLORS: tuple[Color, ...] = (*JOINT_COLORS[:6], (200, 180, 30), (110, 110, 110))
 BLOCKED_COLOR: Color = (150, 150, 150)
 _PROBES = 2000
 _SLIDE = 4.0  # radians that a metre counts as, where stops of both kinds are compared
