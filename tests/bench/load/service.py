@@ -14,8 +14,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+import psutil
+
 ROOT = Path(__file__).parents[3]
-_TICK = os.sysconf("SC_CLK_TCK")
 _WARM_UP = 300.0  # seconds; kernels may have to be compiled
 
 
@@ -44,7 +45,7 @@ class Service:
 
     def usage(self) -> Usage:
         """Everything at this moment."""
-        found = [_usage(pid) for pid in _family(self.pid)]
+        found = [_usage(process) for process in _family(self.pid)]
         return Usage(
             sum(u.seconds for u in found),
             sum(u.memory for u in found),
@@ -54,7 +55,7 @@ class Service:
 
     def seconds(self) -> float:
         """Processor time spent so far: cheaper to find out than `usage`."""
-        return sum(_seconds(pid) for pid in _family(self.pid))
+        return sum(_seconds(process) for process in _family(self.pid))
 
 
 @contextmanager
@@ -114,24 +115,16 @@ def _wait_until_idle(service: Service) -> None:
 _direct = urllib.request.build_opener(urllib.request.ProxyHandler({}))
 
 
-def _family(pid: int) -> list[int]:
+def _family(pid: int) -> list[psutil.Process]:
     """A process and all below it."""
-    found = [pid]
-    for task in Path(f"/proc/{pid}/task").iterdir():
-        for child in (task / "children").read_text().split():
-            found += _family(int(child))
-    return found
+    parent = psutil.Process(pid)
+    return [parent, *parent.children(recursive=True)]
 
 
-def _seconds(pid: int) -> float:
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / _TICK
+def _seconds(process: psutil.Process) -> float:
+    times = process.cpu_times()
+    return float(times.user + times.system)
 
 
-def _usage(pid: int) -> Usage:
-    folder = Path(f"/proc/{pid}")
-    rollup = (folder / "smaps_rollup").read_text()
-    memory = int(re.search(r"^Pss:\s+(\d+) kB", rollup, re.MULTILINE)[1]) << 10  # type: ignore[index]
-    return Usage(
-        _seconds(pid), memory, len(list((folder / "task").iterdir())), len(list((folder / "fd").iterdir()))
-    )
+def _usage(process: psutil.Process) -> Usage:
+    return Usage(_seconds(process), process.memory_full_info().pss, process.num_threads(), process.num_fds())
