@@ -179,7 +179,8 @@ async def _to_viser(visitor: WebSocket, upstream: ClientConnection) -> _Ending:
             else:
                 DROPPED.labels("refused").inc()
             # A flood is not read faster than it may go on: it waits in the sender's own buffers.
-            await asyncio.sleep(budget.spend(time.monotonic()))
+            if (wait := budget.spend(time.monotonic())) > 0.0:
+                await asyncio.sleep(wait)
     except ConnectionClosed:
         return _ending_of(upstream)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import gc
 import ipaddress
 import os
 import signal
@@ -17,7 +18,7 @@ import sys
 import tempfile
 import threading
 import webbrowser
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from functools import partial
 from typing import Literal
@@ -30,7 +31,7 @@ from starlette.middleware.cors import CORSMiddleware
 from starlette.responses import PlainTextResponse
 
 from app.access import Access
-from app.api import Gate, Work, build_router, complete_document, install_problem_handlers, memory
+from app.api import Gate, Work, api_routes, complete_document, install_problem_handlers, memory
 from app.bridge import ViewerBridge
 from app.clouds import Clouds
 from app.inspection import MAX_MESSAGE
@@ -71,8 +72,10 @@ class Readiness(BaseModel):
     status: StartupStatus
 
 
-def create_app(settings: Settings, store: Store | None = None) -> FastAPI:
-    """The whole service as one ASGI application.
+def create_app(
+    settings: Settings, store: Store | None = None, on_ready: Callable[[], None] | None = None
+) -> FastAPI:
+    """The whole service as one ASGI application; `on_ready` is called when everything is warm.
 
     Raises:
         RobotFileError: a file in the operator's folder of robots is wrong.
@@ -81,7 +84,7 @@ def create_app(settings: Settings, store: Store | None = None) -> FastAPI:
     bridge = ViewerBridge(settings.allowed_origins, settings.max_visitors)
     clouds, maps, sizes = Clouds(settings.cloud_memory), Maps(), memory()
     work = Work(settings.max_requests, settings.time_budget)
-    startup = Startup(settings, store, clouds, maps, bridge)
+    startup = Startup(settings, store, clouds, maps, bridge, on_ready)
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
@@ -111,8 +114,7 @@ def create_app(settings: Settings, store: Store | None = None) -> FastAPI:
     app.state.maps = maps
     install_problem_handlers(app)
     complete_document(app, store, settings)
-    app.include_router(build_router())
-    app.router.routes.extend([*page_routes(), *bridge.routes()])
+    app.router.routes.extend([*api_routes(), *page_routes(), *bridge.routes()])
 
     @app.get("/metrics", tags=["service"], summary="Counters, for Prometheus", response_class=PlainTextResponse)
     async def metrics() -> Response:
@@ -191,7 +193,8 @@ def _serve(
     if settings.access_log:
         write_to_stderr()
     sys.setswitchinterval(SWITCH)
-    server = _Server(create_app(settings, store), settings.drain, greeting)
+    # Kernels and routes stay: to look for garbage among them once more stops all visitors for 50 ms.
+    server = _Server(create_app(settings, store, on_ready=gc.freeze), settings.drain, greeting)
     # uvicorn ends in good order and then raises the signal again: for us it is the expected end.
     before = signal.signal(signal.SIGTERM, lambda *_: None)
     try:

@@ -101,7 +101,5 @@ def _route_of(scope: Scope, path: str) -> str:
         return "none"
     if path.startswith("/static/"):
         return "/static"
-    # Routers know their own part of an address only: the rest stands before it.
-    own: str = getattr(scope.get("route"), "path", path)
-    before = path.split("/")[: path.count("/") - own.count("/") + 1]
-    return "/".join(before) + own
+    pattern: str = getattr(scope.get("route"), "path", path)
+    return pattern

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 import threading
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal
 
 from app.bridge import ViewerBridge
@@ -27,15 +28,28 @@ Status = Literal["warming", "ready", "failed"]
 
 
 class Startup:
-    """Starts the viewer and warms the kernels in a thread of its own; `status` is what ``/readyz`` reports."""
+    """Starts the viewer and warms the kernels in a thread of its own; `status` is what ``/readyz`` reports.
 
-    def __init__(self, settings: Settings, store: Store, clouds: Clouds, maps: Maps, bridge: ViewerBridge) -> None:
+    Args:
+        on_ready: called by that thread when all is warm, just before ``/readyz`` says so.
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        store: Store,
+        clouds: Clouds,
+        maps: Maps,
+        bridge: ViewerBridge,
+        on_ready: Callable[[], None] | None = None,
+    ) -> None:
         self.status: Status = "warming"
         self._settings = settings
         self._store = store
         self._clouds = clouds
         self._maps = maps
         self._bridge = bridge
+        self._on_ready = on_ready
         self._viewer: ViewerServer | None = None
         self._stopping = threading.Event()
         self._viewer_settled = threading.Event()
@@ -62,6 +76,8 @@ class Startup:
             self._start_viewer()
             if not self._stopping.is_set():
                 warm_up()
+                if self._on_ready is not None:
+                    self._on_ready()
                 self.status = "ready"
                 self._rest.start()
         except Exception:

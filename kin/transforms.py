@@ -108,10 +108,12 @@ def from_position_wxyz(position: ArrayLike, wxyz: ArrayLike | None = None) -> Ar
 
 def rotation_from_wxyz(wxyz: Array) -> Array:
     """Rotation matrix ``(3, 3)`` of a quaternion ``(4,)``; raises `InputError` when it has no direction."""
-    scale = float(np.abs(wxyz).max())
+    given = wxyz.tolist()
+    scale = max(map(abs, given))
     if not scale > 1e-12:
-        raise InputError("wxyz", wxyz.tolist(), "a quaternion that is not zero")
-    w, x, y, z = (wxyz / scale / np.linalg.norm(wxyz / scale)).tolist()
+        raise InputError("wxyz", given, "a quaternion that is not zero")
+    size = math.hypot(*(v / scale for v in given))
+    w, x, y, z = (v / scale / size for v in given)
     return np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],

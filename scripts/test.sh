@@ -12,12 +12,18 @@ for proxy in nginx caddy; do
   command -v $proxy >/dev/null || apt_unpack $proxy || fail "the tests of deploy/ need $proxy in the PATH"
 done
 cd "$root"
+if [ $# -eq 0 ]; then
+  # Kernels are compiled beside the checks of the code; two rows of tests would both compile the same ones.
+  python -c 'import kin; kin.warm_up(); kin.warm_up_rest()' &
+  compiling=$!
+fi
 ruff check .
 ruff format --check .
 mypy
 if [ $# -gt 0 ]; then
   exec pytest "$@"
 fi
+wait $compiling
 # Two at a time, but for what draws pictures or measures time: that wants the machine for itself.
 pytest -n 2 --dist loadfile -m "not slow and not browser and not bench"
 pytest -m "not slow and (browser or bench)"

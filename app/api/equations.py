@@ -2,32 +2,34 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Body, Response
+from fastapi import Body, Request, Response
 from pydantic import Field
 from typing_extensions import TypedDict
 
 from app.answers import documented
 from app.api import schemas
-from app.api.body import JsonRoute
+from app.api.body import versioned
 from app.api.schemas import (
     POST_REFUSALS,
     Configurations,
-    RobotDep,
-    SettingsDep,
+    RobotId,
     example,
     one_or_all,
     refusals,
     reply,
+    robot_of,
+    settings_of,
 )
-from app.api.work import BudgetDep
+from app.api.work import computed
 from app.equations import Book, Equation, Symbol, book, typeset
 from app.equations.expression import Expression
 from kin import Robot
 from kin.transforms import Array
 
-router = APIRouter(tags=["robots"], route_class=JsonRoute)
+router = versioned("robots")
 
 EXAMPLES = {
     "one": example("One configuration", {"q": [1.5708, 0.5236, 1.0472, 0.5236, 0.5236]}),
@@ -160,14 +162,14 @@ class EquationValuesList(TypedDict):
     response_model=EquationsAnswer,
     responses=refusals(404, 422, 500),
 )
-def equations(robot: RobotDep) -> Response:
+def equations(request: Request, robot_id: RobotId) -> Response:
     """The tool's pose [n o a p] entry by entry, as MathML and LaTeX.
 
     For the arms of the source chapter: each of its equations as printed, and corrected where it is misprinted. For
     any other arm: a closed form derived from its DH table, checked against forward kinematics before it is shown.
     The first request for such an arm may take a second.
     """
-    found = book(robot)
+    found = book(robot_of(request, robot_id))
     return reply(
         EquationsAnswer(
             source=found.source,
@@ -193,18 +195,16 @@ class EquationsRequest(schemas.Body):
     response_model=EquationValues | EquationValuesList,
     responses=POST_REFUSALS,
 )
-def equation_values(
-    robot: RobotDep,
-    settings: SettingsDep,
-    budget: BudgetDep,
-    body: Annotated[EquationsRequest, Body(openapi_examples=EXAMPLES)],
+async def equation_values(
+    request: Request, robot_id: RobotId, body: Annotated[EquationsRequest, Body(openapi_examples=EXAMPLES)]
 ) -> Response:
     """Every equation as printed and corrected (or derived), beside the product of the DH matrices.
 
     One configuration gets one answer; a list gets `{"results": [...]}` in the same order.
     """
-    q, single = schemas.as_configurations(robot, body.q, settings)
-    return one_or_all(lambda some: _values(robot, q[some]), len(q), single, budget)
+    robot = robot_of(request, robot_id)
+    q, single = schemas.as_configurations(robot, body.q, settings_of(request))
+    return await computed(request, partial(one_or_all, lambda some: _values(robot, q[some]), len(q), single))
 
 
 def _equation(found: Book, equation: Equation) -> EquationAnswer:

@@ -5,20 +5,28 @@ from __future__ import annotations
 from functools import partial
 from typing import Annotated
 
-from fastapi import APIRouter, Body, Response
+from fastapi import Body, Request, Response
 from pydantic import Field
-from starlette.concurrency import run_in_threadpool
 from typing_extensions import TypedDict
 
 from app.answers import FkAnswer, documented, fk_answers
 from app.api import schemas
-from app.api.body import JsonRoute
-from app.api.schemas import POST_REFUSALS, Configurations, RobotDep, SettingsDep, WarmDep, example, one_or_all
-from app.api.work import BudgetDep
+from app.api.body import versioned
+from app.api.schemas import (
+    POST_REFUSALS,
+    Configurations,
+    RobotId,
+    example,
+    is_warm,
+    one_or_all,
+    robot_of,
+    settings_of,
+)
+from app.api.work import Budget, computed, work_of
 
 FEW = 16  # configurations that are answered sooner than a thread could be asked to
 
-router = APIRouter(tags=["kinematics"], route_class=JsonRoute)
+router = versioned("kinematics")
 
 EXAMPLES = {
     "one": example("One configuration", {"q": [1.5708, 0.5236, 1.0472, 0.5236, 0.5236]}),
@@ -61,17 +69,16 @@ class FkAnswers(TypedDict):
     responses=POST_REFUSALS,
 )
 async def forward_kinematics(
-    robot: RobotDep,
-    settings: SettingsDep,
-    budget: BudgetDep,
-    warm: WarmDep,
-    body: Annotated[FkRequest, Body(openapi_examples=EXAMPLES)],
+    request: Request, robot_id: RobotId, body: Annotated[FkRequest, Body(openapi_examples=EXAMPLES)]
 ) -> Response:
     """Pose of the tool for joint values, as a 4×4 matrix and as position with quaternion.
 
     One configuration gets one answer; a list gets `{"results": [...]}` in the same order. Joint values outside the
     limits are answered too, with `in_limits` false.
     """
-    q, single = schemas.as_configurations(robot, body.q, settings)
-    answer = partial(one_or_all, lambda some: fk_answers(robot, q[some], body.frames), len(q), single, budget)
-    return answer() if warm and len(q) <= FEW else await run_in_threadpool(answer)
+    robot = robot_of(request, robot_id)
+    q, single = schemas.as_configurations(robot, body.q, settings_of(request))
+    answer = partial(one_or_all, lambda some: fk_answers(robot, q[some], body.frames), len(q), single)
+    if is_warm(request) and len(q) <= FEW:
+        return answer(Budget(work_of(request)))
+    return await computed(request, answer)

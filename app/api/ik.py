@@ -2,35 +2,37 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Body, Response
+from fastapi import Body, Request, Response
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 from typing_extensions import TypedDict
 
 from app.answers import IkAnswer, documented, ik_answer
 from app.api import schemas
 from app.api.asked import Asked, one_or_many
-from app.api.body import JsonRoute
+from app.api.body import versioned
 from app.api.problems import FieldError, invalid
 from app.api.schemas import (
     POST_REFUSALS,
     Configurations,
     Number,
-    RobotDep,
-    SettingsDep,
+    RobotId,
     example,
     integral,
     one_or_all,
+    robot_of,
+    settings_of,
 )
 from app.api.targets import Target
-from app.api.work import BudgetDep
+from app.api.work import Budget, computed
 from app.metrics import SOLVE_SECONDS
 from app.settings import Settings
 from kin import Robot, Task, solve_ik
 from kin.transforms import Array
 
-router = APIRouter(tags=["kinematics"], route_class=JsonRoute)
+router = versioned("kinematics")
 
 
 FreeValues = Annotated[
@@ -124,11 +126,8 @@ class IkAnswers(TypedDict):
     response_model=IkAnswer | IkAnswers,
     responses=POST_REFUSALS,
 )
-def inverse_kinematics(
-    robot: RobotDep,
-    settings: SettingsDep,
-    budget: BudgetDep,
-    body: Annotated[IkRequest, Body(openapi_examples=EXAMPLES)],
+async def inverse_kinematics(
+    request: Request, robot_id: RobotId, body: Annotated[IkRequest, Body(openapi_examples=EXAMPLES)]
 ) -> Response:
     """Every configuration that brings the tool to a target, nearest to the seed first, or why there is none.
 
@@ -136,6 +135,10 @@ def inverse_kinematics(
     sentence, `closest` is the nearest the arm gets. One target gets one answer; a list gets
     `{"results": [...]}` in the same order. Each solution's errors are measured by forward kinematics.
     """
+    return await computed(request, partial(_solve, robot_of(request, robot_id), body, settings_of(request)))
+
+
+def _solve(robot: Robot, body: IkRequest, settings: Settings, budget: Budget) -> Response:
     single = isinstance(body.target, Target)
     targets = [body.target] if isinstance(body.target, Target) else body.target
     schemas.check_batch("target", len(targets), settings)

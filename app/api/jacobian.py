@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Body, Response
+from fastapi import Body, Request, Response
 from pydantic import Field
 from typing_extensions import TypedDict
 
 from app.answers import JacobianAnswer, documented, jacobian_answers
 from app.api import schemas
-from app.api.body import JsonRoute
-from app.api.schemas import POST_REFUSALS, Configurations, RobotDep, SettingsDep, example, one_or_all
-from app.api.work import BudgetDep
+from app.api.body import versioned
+from app.api.schemas import POST_REFUSALS, Configurations, RobotId, example, one_or_all, robot_of, settings_of
+from app.api.work import computed
 
-router = APIRouter(tags=["kinematics"], route_class=JsonRoute)
+router = versioned("kinematics")
 
 EXAMPLES = {
     "one": example("One configuration", {"q": [1.5708, 0.5236, 1.0472, 0.5236, 0.5236]}),
@@ -49,15 +50,14 @@ class JacobianAnswers(TypedDict):
     response_model=JacobianAnswer | JacobianAnswers,
     responses=POST_REFUSALS,
 )
-def geometric_jacobian(
-    robot: RobotDep,
-    settings: SettingsDep,
-    budget: BudgetDep,
-    body: Annotated[JacobianRequest, Body(openapi_examples=EXAMPLES)],
+async def geometric_jacobian(
+    request: Request, robot_id: RobotId, body: Annotated[JacobianRequest, Body(openapi_examples=EXAMPLES)]
 ) -> Response:
     """The geometric 6×n Jacobian (linear rows first), its singular values and Yoshikawa's manipulability.
 
     One configuration gets one answer; a list gets `{"results": [...]}` in the same order.
     """
-    q, single = schemas.as_configurations(robot, body.q, settings)
-    return one_or_all(lambda some: jacobian_answers(robot, q[some], body.frame), len(q), single, budget)
+    robot = robot_of(request, robot_id)
+    q, single = schemas.as_configurations(robot, body.q, settings_of(request))
+    answers = partial(one_or_all, lambda some: jacobian_answers(robot, q[some], body.frame), len(q), single)
+    return await computed(request, answers)

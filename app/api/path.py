@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated
 
-from fastapi import APIRouter, Body, Response
+from fastapi import Body, Request, Response
 from pydantic import Field
 
 from app.answers import PathAnswer, path_answer
 from app.api import schemas
 from app.api.asked import Asked
-from app.api.body import JsonRoute
+from app.api.body import versioned
 from app.api.problems import FieldError, invalid
-from app.api.schemas import POST_REFUSALS, Configuration, RobotDep, SettingsDep, example, reply
+from app.api.schemas import POST_REFUSALS, Configuration, RobotId, example, reply, robot_of, settings_of
 from app.api.targets import Target
-from app.api.work import BudgetDep
-from kin import solve_path
+from app.api.work import Budget, computed
+from app.settings import Settings
+from kin import Robot, solve_path
 
-router = APIRouter(tags=["kinematics"], route_class=JsonRoute)
+router = versioned("kinematics")
 
 EXAMPLES = {
     "line": example(
@@ -71,11 +73,8 @@ class PathRequest(Asked):
     response_model=PathAnswer,
     responses=POST_REFUSALS,
 )
-def path_inverse_kinematics(
-    robot: RobotDep,
-    settings: SettingsDep,
-    budget: BudgetDep,
-    body: Annotated[PathRequest, Body(openapi_examples=EXAMPLES)],
+async def path_inverse_kinematics(
+    request: Request, robot_id: RobotId, body: Annotated[PathRequest, Body(openapi_examples=EXAMPLES)]
 ) -> Response:
     """One continuous joint path through all targets: as few jumps as possible, then as little motion as possible.
 
@@ -83,6 +82,10 @@ def path_inverse_kinematics(
     stop where another start would have avoided it. Each jump that is left is told with its place and reason; a
     waypoint that cannot be reached is a gap, and the path holds the closest configuration there.
     """
+    return await computed(request, partial(_solve, robot_of(request, robot_id), body, settings_of(request)))
+
+
+def _solve(robot: Robot, body: PathRequest, settings: Settings, budget: Budget) -> Response:
     schemas.check_batch("targets", len(body.targets), settings, settings.max_path)
     questions = [body.resolve(target, f"targets[{i}]") for i, target in enumerate(body.targets)]
     task = questions[0][0]

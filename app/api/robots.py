@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Response
+from fastapi import Request, Response
 from typing_extensions import TypedDict
 
 from app.answers import RobotAnswer, documented, robot_answer
-from app.api.body import JsonRoute
-from app.api.schemas import RobotDep, StoreDep, refusals, reply
+from app.api.body import versioned
+from app.api.schemas import RobotId, refusals, reply, robot_of, store_of
 
-router = APIRouter(tags=["robots"], route_class=JsonRoute)
+router = versioned("robots")
 
 
 @documented
@@ -21,14 +21,14 @@ class RobotList(TypedDict):
 
 
 @router.get("/robots", summary="List the robots", response_model=RobotList, responses=refusals(500))
-async def list_robots(store: StoreDep) -> Response:
+async def list_robots(request: Request) -> Response:
     """Every arm with its DH table, joints and limits. Its `id` goes into the other addresses."""
-    return reply({"robots": [robot_answer(robot) for robot in store.robots]})
+    return reply({"robots": [robot_answer(robot) for robot in store_of(request).robots]})
 
 
 @router.get(
     "/robots/{robot_id}", summary="Describe a robot", response_model=RobotAnswer, responses=refusals(404, 422, 500)
 )
-async def describe_robot(robot: RobotDep) -> Response:
+async def describe_robot(request: Request, robot_id: RobotId) -> Response:
     """DH table, joints with their limits, home configuration and source of one arm, in radians and metres."""
-    return reply(robot_answer(robot))
+    return reply(robot_answer(robot_of(request, robot_id)))

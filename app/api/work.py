@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from concurrent.futures import Future
 from contextlib import asynccontextmanager
 from typing import Annotated, TypeVar
 
 from fastapi import Depends, Request
+from starlette.concurrency import run_in_threadpool
 
 from app.api.problems import ProblemError
 
@@ -104,18 +105,23 @@ class Budget:
             raise too_slow(self._work.seconds)
 
 
-async def _work(request: Request) -> Work:
+def work_of(request: Request) -> Work:
+    """The places of this process."""
     work = request.app.state.work
     assert isinstance(work, Work)
     return work
 
 
-WorkDep = Annotated[Work, Depends(_work)]
+async def computed(request: Request, answer: Callable[[Budget], T]) -> T:
+    """What `answer` computes in a thread within its budget; raises 503 without a place, or when time is over."""
+    async with work_of(request).place() as budget:
+        return await run_in_threadpool(answer, budget)
 
 
-async def _budget(work: WorkDep) -> AsyncIterator[Budget]:
-    async with work.place() as budget:
+async def _budget(request: Request) -> AsyncIterator[Budget]:
+    async with work_of(request).place() as budget:
         yield budget
 
 
+# For answers that are sent while they are computed: the place is kept until the last byte has left.
 BudgetDep = Annotated[Budget, Depends(_budget)]

@@ -46,7 +46,7 @@ class Link:
         G = self.T_parent_axis
         if self.joint is not None and self.joint.kind == "prismatic":
             return G[:3, 3] + G[:3, 2] * value, self.wxyz
-        return G[:3, 3], turn(self.wxyz, value)
+        return G[:3, 3], np.array(turn(self.wxyz, value))
 
     @cached_property
     def wxyz(self) -> Array:
@@ -118,8 +118,8 @@ def translation(axis: int, length: float) -> Array:
     return T
 
 
-def turn(wxyz: Array, angle: float) -> Array:
+def turn(wxyz: Array, angle: float) -> tuple[float, float, float, float]:
     """`wxyz` followed by a turn of `angle` about its own z axis."""
     c, s = math.cos(angle / 2), math.sin(angle / 2)
     w, x, y, z = wxyz.tolist()
-    return np.array([w * c - z * s, x * c + y * s, y * c - x * s, z * c + w * s])
+    return w * c - z * s, x * c + y * s, y * c - x * s, z * c + w * s

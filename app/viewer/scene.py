@@ -6,13 +6,16 @@ a server that no browser ever visits.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 import viser
 
+from app.viewer.chain import turn
 from app.viewer.meshes import Part, body
 from app.viewer.offer import Offer
+from app.viewer.poses import assign, keep_private
 from kin import Robot, fk, link_frames
 from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
 
@@ -21,7 +24,8 @@ SMALL = (
     "axis",
     "approach",
 )  # their shadows would cost as much as those of the bodies, and nobody sees them
-NO_TURN = np.array([1.0, 0.0, 0.0, 0.0])
+STILL, NO_TURN = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
+SAME = 1e-9  # rad or m: a hundredth of what a browser's numbers tell apart
 GAP_COLOR = (213, 94, 0)
 GRID_LIGHT = {"cell_color": (214, 219, 226), "section_color": (176, 184, 196)}
 GRID_DARK = {"cell_color": (58, 64, 74), "section_color": (88, 96, 110)}
@@ -51,13 +55,14 @@ class ArmScene:
         self._frames: list[viser.SceneNodeHandle] = []
         self._labels: list[viser.SceneNodeHandle] = []
         self._axes: list[viser.SceneNodeHandle] = []
-        self._shown: Array = np.full(robot.n, np.nan)
+        self._shown = [math.nan] * robot.n
         self._top: list[viser.SceneNodeHandle] = []
         self._build_floor(dark)
         self._build_arm()
         self.gizmo = scene.add_transform_controls(
             f"{root}-target", scale=0.26 * self.body.radius, line_width=4.0, depth_test=False, opacity=0.95
         )
+        keep_private(self.gizmo)
         self._ghost = self._add(f"{root}-target", self.body.gripper[0], opacity=0.35, visible=False)
         self._gap = scene.add_line_segments(
             f"{root}-gap",
@@ -75,21 +80,23 @@ class ArmScene:
 
     def show(self, q: Array) -> None:
         """Pose every joint node for a configuration ``(n,)``; untouched joints cost nothing."""
-        for link, node, value, shown in zip(self.body.chain.links[1:], self._joints, q, self._shown, strict=True):
-            if value == shown:
+        shown = self._shown
+        for i, (link, node, value) in enumerate(
+            zip(self.body.chain.links[1:], self._joints, q.tolist(), strict=True)
+        ):
+            if abs(value - shown[i]) <= SAME:
                 continue
-            position, wxyz = link.pose(float(value))
+            shown[i] = value
             if link.joint is not None and link.joint.kind == "prismatic":
-                _assign(node, position=position)
+                assign(node, position=link.pose(value)[0])
             else:
-                _assign(node, wxyz=wxyz)
-        self._shown = np.array(q)
+                assign(node, wxyz=turn(link.wxyz, value))
 
     def place_gizmo(self, T_base_tool: Array) -> None:
         """Move the gizmo. Never call it while the visitor holds it."""
-        _assign(self.gizmo, T_base_tool[:3, 3], wxyz_from_rotation(T_base_tool[:3, :3]))
+        assign(self.gizmo, T_base_tool[:3, 3], wxyz_from_rotation(T_base_tool[:3, :3]))
         for ring in self._rings:
-            _assign(ring, np.zeros(3), NO_TURN)
+            assign(ring, STILL, NO_TURN)
 
     @property
     def gizmo_pose(self) -> Array:
@@ -122,6 +129,8 @@ class ArmScene:
             for axis in range(3)
             if some and offer.rings[axis]
         ]
+        for ring in self._rings:
+            keep_private(ring)
         return self._rings
 
     def show_gap(self, tool: Array, target: Array | None) -> None:
@@ -252,17 +261,3 @@ class ArmScene:
                 visible=True,
             )
         )
-
-
-def _assign(node: viser.SceneNodeHandle, position: Array | None = None, wxyz: Array | None = None) -> None:
-    """Assign a pose exactly.
-
-    viser drops an assignment that is within 1e-5 of the last one. The last step of an easing motion is such a
-    one, and the arm must end on its solution, not near it; so the old value is made unlike any other first.
-    """
-    if position is not None and not np.array_equal(position, node.position):
-        node.position[:] = np.nan
-        node.position = position
-    if wxyz is not None and not np.array_equal(wxyz, node.wxyz):
-        node.wxyz[:] = np.nan
-        node.wxyz = wxyz

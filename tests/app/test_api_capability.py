@@ -14,7 +14,7 @@ from pydantic import TypeAdapter
 import kin
 from app import mapreduce
 from app.answers import CapabilityMapAnswer, capability_answer
-from app.api import Gate, Work, build_router, install_problem_handlers
+from app.api import Gate, Work, api_routes, install_problem_handlers
 from app.maps import Maps
 from app.settings import Settings
 from app.store import Store
@@ -30,7 +30,7 @@ def live():
     app.state.settings, app.state.store = Settings(), Store()
     app.state.maps, app.state.gate, app.state.work = Maps(threads=1), Gate(1), Work(4, 60.0)
     install_problem_handlers(app)
-    app.include_router(build_router())
+    app.router.routes.extend(api_routes())
     with serve(app) as port, httpx2.Client(base_url=f"http://127.0.0.1:{port}", trust_env=False, timeout=60) as c:
         yield app, c
     app.state.maps.close()

@@ -16,7 +16,7 @@ from pydantic import TypeAdapter
 
 import kin
 from app.answers import ReachableAnswer, WorkspaceAnswer
-from app.api import Gate, build_router, install_problem_handlers
+from app.api import Gate, api_routes, install_problem_handlers
 from app.api.problems import ProblemError
 from app.api.work import Work
 from app.api.workspace import reachable, summary
@@ -42,7 +42,7 @@ def live():
     app.state.work = Work(16, 300.0)
     app.state.clouds, app.state.gate, app.state.sizes = Clouds(max_bytes=0, threads=1), Gate(2), Memory(8, 1, 8)
     install_problem_handlers(app)
-    app.include_router(build_router())
+    app.router.routes.extend(api_routes())
     with serve(app) as port, httpx2.Client(base_url=f"http://127.0.0.1:{port}", trust_env=False, timeout=60) as c:
         yield app, c
     app.state.clouds.close()

@@ -14,7 +14,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 import kin
-from app.api import Gate, build_router
+from app.api import Gate, api_routes
 from app.api.workspace import socket as socket_module
 from app.clouds import Cloud, Clouds
 from app.settings import Settings
@@ -31,7 +31,7 @@ def app() -> Iterator[FastAPI]:
     app.state.settings = Settings(allowed_origins=("https://school.example",))
     app.state.store = Store()
     app.state.clouds, app.state.gate = Clouds(max_bytes=0, threads=1), Gate(2)
-    app.include_router(build_router())
+    app.router.routes.extend(api_routes())
     yield app
     app.state.clouds.close()
 

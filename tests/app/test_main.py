@@ -56,15 +56,18 @@ def test_alive_and_ready(client):
 def test_while_warming_the_page_and_livez_answer_and_readyz_says_so(monkeypatch):
     warm = threading.Event()
     monkeypatch.setattr(app.startup, "warm_up", lambda: warm.wait(30))
-    with TestClient(create_app(Settings())) as client:
+    told = []
+    with TestClient(create_app(Settings(), on_ready=lambda: told.append("ready"))) as client:
         for _ in range(3):
             answer = client.get("/readyz")
             assert (answer.status_code, answer.json()) == (503, {"status": "warming"})
             assert client.get("/livez").status_code == 200
             assert client.get("/").status_code == 200
             assert client.get("/api/v1/robots").status_code == 200
+        assert told == []
         warm.set()
         wait_for(lambda: client.get("/readyz").json() == {"status": "ready"})
+        assert told == ["ready"]
         assert client.get("/readyz").status_code == 200
 
 
@@ -223,6 +226,9 @@ def test_a_wrong_folder_of_robots_is_said_plainly(capfd, tmp_path):
     assert "Traceback" not in captured.err
 
 
+SOON = 30  # s, of which a busy machine may take most
+
+
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("ready", [False, True], ids=["while warming", "when ready"])
 def test_the_process_starts_and_a_signal_ends_it_quickly_and_quietly(stop, ready):
@@ -243,7 +249,7 @@ def test_the_process_starts_and_a_signal_ends_it_quickly_and_quietly(stop, ready
         base = f"127.0.0.1:{found[1]}"
         if not ready:
             process.send_signal(stop)
-            out, err = process.communicate(timeout=10)
+            out, err = process.communicate(timeout=SOON)
         else:
             wait_for(lambda: httpx2.get(f"http://{base}/readyz", trust_env=False).status_code == 200, 120)
             with connect(f"ws://{base}/viewer", subprotocols=[PROTOCOL], proxy=None) as visitor:
@@ -251,7 +257,7 @@ def test_the_process_starts_and_a_signal_ends_it_quickly_and_quietly(stop, ready
                 process.send_signal(stop)
                 with pytest.raises(ConnectionClosed):
                     read_to_the_end(visitor)
-            out, err = process.communicate(timeout=10)
+            out, err = process.communicate(timeout=SOON)
         assert (process.returncode, out, err) == (0, "", "")
     finally:
         process.kill()

@@ -85,7 +85,7 @@ def test_a_slider_is_eased_and_ends_exactly(port: int) -> None:
         q[0] = math.pi
         arrives(tab, kin.fk(PIONEER, q))
         turns = [m["wxyz"] for m in tab.log if m["type"] == "SetOrientationMessage" and m["name"].endswith("/1")]
-        assert len(turns) > 8, "a quarter turn must be shown as a motion"
+        assert len(turns) > 4, "a quarter turn must be shown as a motion"
         assert turns[-1] == pytest.approx([math.cos(math.pi / 2), 0, 0, 1], abs=1e-12)
 
 

@@ -5,19 +5,19 @@ from __future__ import annotations
 import asyncio
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import Query, Request, Response
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
 from app.answers import CapabilityMapAnswer, capability_map_answer
-from app.api.body import JsonRoute
+from app.api.body import versioned
 from app.api.problems import FieldError, invalid
-from app.api.schemas import RobotDep, SettingsDep, refusals, reply
-from app.api.work import Budget, WorkDep
+from app.api.schemas import RobotId, refusals, reply, robot_of, settings_of
+from app.api.work import Budget, work_of
 from app.api.workspace.query import RegionQuery
 from app.maps import Maps, Wanted
 
-router = APIRouter(tags=["workspace"], route_class=JsonRoute)
+router = versioned("workspace")
 
 LOOKED = 0.5  # s between two looks whether anybody still waits
 
@@ -45,9 +45,7 @@ class CapabilityQuery(RegionQuery):
 )
 async def capability(
     request: Request,
-    robot: RobotDep,
-    settings: SettingsDep,
-    work: WorkDep,
+    robot_id: RobotId,
     query: Annotated[CapabilityQuery, Query()],
 ) -> Response:
     """The workspace in voxels, and for each that is reachable the share of directions along which the tool can be
@@ -56,16 +54,17 @@ async def capability(
     It takes seconds, for arms without a closed form minutes; it is computed once for all who ask for the same, and
     ends when nobody waits for it any more. Maps are kept for a while.
     """
-    most = settings.max_voxels
+    most = settings_of(request).max_voxels
     if query.resolution > most:
         expected = f"a whole number from 1 to {most}"
         wrong = FieldError(field="resolution", value=str(query.resolution), expected=expected)
         raise invalid(wrong, hint="`kinboard capability` computes finer maps, or ask the operator for more.")
+    robot = robot_of(request, robot_id)
     limits, locked = query.bounds(robot)
     wanted = Wanted(robot, query.resolution, int(query.directions), limits, locked)
     maps: Maps = request.app.state.maps
     with request.app.state.gate.place():
-        budget, reader = Budget(work), maps.read(wanted)
+        budget, reader = Budget(work_of(request)), maps.read(wanted)
         try:
             answer = asyncio.wrap_future(reader.future)
             while not answer.done():

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import Query, Request, Response
 from pydantic import Field
 
-from app.api.body import JsonRoute
-from app.api.schemas import RobotDep, SettingsDep, refusals
+from app.api.body import versioned
+from app.api.schemas import RobotId, refusals, robot_of, settings_of
 from app.api.workspace.flow import Flow
 from app.api.workspace.query import CloudQuery
 from app.formats import FORMATS, encode, table_of
 
-router = APIRouter(tags=["workspace"], route_class=JsonRoute)
+router = versioned("workspace")
 
 _BINARY: dict[str, Any] = {"schema": {"type": "string", "format": "binary"}}
 _CONTENT: dict[str, Any] = {
@@ -43,9 +43,7 @@ class DownloadQuery(CloudQuery):
         **refusals(404, 422, 500, 503),
     },
 )
-async def workspace(
-    request: Request, robot: RobotDep, settings: SettingsDep, query: Annotated[DownloadQuery, Query()]
-) -> Response:
+async def workspace(request: Request, robot_id: RobotId, query: Annotated[DownloadQuery, Query()]) -> Response:
     """A cloud of tool points in the base frame, metres, sent while it is computed, of any size in little memory.
 
     The same question always gets the same bytes, and a larger cloud begins with the points of a smaller one.
@@ -53,7 +51,8 @@ async def workspace(
     begins with: `KINCLOUD`, version (uint16), columns (uint16), where rows begin (uint32), count (uint64), all
     little-endian, and the names of the columns, separated by commas and filled up with spaces.
     """
-    cloud = query.cloud(robot, settings)
+    robot = robot_of(request, robot_id)
+    cloud = query.cloud(robot, settings_of(request))
     kind, table = FORMATS[query.format], table_of(cloud, query.q)
     headers = {
         "content-disposition": f'attachment; filename="{robot.id}-{query.strategy}-{query.n}.{kind.name}"',

@@ -6,7 +6,7 @@ from collections.abc import Generator
 from itertools import chain
 from typing import Annotated, NotRequired
 
-from fastapi import APIRouter, Body, Response
+from fastapi import Body, Request, Response
 from pydantic import Discriminator, Field, Tag
 from pydantic_core import to_json
 from typing_extensions import TypedDict
@@ -14,16 +14,16 @@ from typing_extensions import TypedDict
 from app.answers import ReachableAnswer, documented, reachable_answer
 from app.api import schemas
 from app.api.asked import Asked, one_or_many
-from app.api.body import JsonRoute
+from app.api.body import versioned
 from app.api.problems import Problem, ProblemError
-from app.api.schemas import POST_REFUSALS, RobotDep, SettingsDep, example, reply
+from app.api.schemas import POST_REFUSALS, RobotId, example, reply, robot_of, settings_of
 from app.api.targets import Target
 from app.api.work import Budget, BudgetDep
 from app.api.workspace.flow import Flow
 from kin import Robot, Task, solve_ik
 from kin.transforms import Array
 
-router = APIRouter(tags=["workspace"], route_class=JsonRoute)
+router = versioned("workspace")
 
 # Targets judged between two looks whether anybody still waits: one out of reach may take some ten milliseconds.
 AT_ONCE = 16
@@ -74,8 +74,8 @@ class ReachableAnswers(TypedDict):
     responses=POST_REFUSALS,
 )
 def reachable(
-    robot: RobotDep,
-    settings: SettingsDep,
+    request: Request,
+    robot_id: RobotId,
     budget: BudgetDep,
     body: Annotated[ReachableRequest, Body(openapi_examples=EXAMPLES)],
 ) -> Response:
@@ -85,9 +85,10 @@ def reachable(
     takes a tenth of a millisecond, one out of reach some milliseconds: a list is answered while it is worked on,
     and work ends when nobody listens any more.
     """
+    robot = robot_of(request, robot_id)
     single = isinstance(body.target, Target)
     targets = [body.target] if isinstance(body.target, Target) else body.target
-    schemas.check_batch("target", len(targets), settings)
+    schemas.check_batch("target", len(targets), settings_of(request))
     # All targets are read before the first is judged: a mistake in the last one costs nothing.
     questions = [body.resolve(target, "target" if single else f"target[{i}]") for i, target in enumerate(targets)]
     if single:

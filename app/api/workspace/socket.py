@@ -9,10 +9,11 @@ import logging
 import time
 from typing import Any
 
-from fastapi import APIRouter, WebSocket
+from fastapi import WebSocket
 from starlette.concurrency import run_in_threadpool
 from starlette.websockets import WebSocketDisconnect, WebSocketState
 
+from app.api.body import versioned
 from app.api.problems import Problem, ProblemError, unknown_robot
 from app.api.workspace.flow import Pieces
 from app.api.workspace.query import read_cloud_query
@@ -23,7 +24,7 @@ from app.security import origin_allowed
 from kin import UnknownRobotError
 
 logger = logging.getLogger("kinboard.workspace")
-router = APIRouter()
+router = versioned("workspace")
 
 TOLD_EVERY = 0.1  # seconds between two messages of progress
 

@@ -10,18 +10,18 @@ from concurrent.futures import Future
 from queue import SimpleQueue
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import Query, Request, Response
 from pydantic import Field
 
 from app.answers import WorkspaceAnswer, workspace_answer
-from app.api.body import JsonRoute
+from app.api.body import versioned
 from app.api.problems import FieldError, invalid
-from app.api.schemas import RobotDep, refusals, reply
-from app.api.work import WorkDep, busy
+from app.api.schemas import RobotId, refusals, reply, robot_of
+from app.api.work import busy, work_of
 from app.api.workspace.query import RegionQuery
 from kin import section, workspace_facts
 
-router = APIRouter(tags=["workspace"], route_class=JsonRoute)
+router = versioned("workspace")
 
 
 class SummaryQuery(RegionQuery):
@@ -135,15 +135,14 @@ def memory() -> Memory:
     response_model=WorkspaceAnswer,
     responses=refusals(404, 422, 500, 503),
 )
-async def summary(
-    request: Request, robot: RobotDep, work: WorkDep, query: Annotated[SummaryQuery, Query()]
-) -> Response:
+async def summary(request: Request, robot_id: RobotId, query: Annotated[SummaryQuery, Query()]) -> Response:
     """Bounding box, reach and holes, exact and with configurations; volume and surface with their errors.
 
     `section` adds the cut with a half-plane through the line of joint 1: closed curves and the arcs they are made
     of. Answers are kept for a while, so only the first visitor waits for the seconds they take; who is told that
     it takes too long finds it when coming again.
     """
+    robot = robot_of(request, robot_id)
     limits, locked = query.bounds(robot)
     if query.section and robot.joints[0].kind != "revolute":
         expected = f"false: joint 1 of {robot.id} slides, so there is no section in r and z"
@@ -160,4 +159,4 @@ async def summary(
     effort = query.effort if query.volume else None
     resolution = query.resolution if query.section else None
     answer = request.app.state.sizes.get((robot, limits, locked, effort, resolution), compute)
-    return reply(await work.wait(answer))
+    return reply(await work_of(request).wait(answer))

@@ -1,0 +1,50 @@
+"""Poses of scene nodes, told exactly and cheaply.
+
+viser's own setters drop whatever is within 1e-5 of the last pose, so an arm would end near its solution and not on
+it. Finding that out takes most of their time (`np.allclose`), and an arm that moves is posed joint by joint for
+each picture of each visitor: with thirty visitors it was a fifth of all the service did. So the message that the
+setter would send is sent from here, through the same queue. The names used are viser's private ones: hence the
+narrow range in ``pyproject.toml``, and a test that holds these messages against the setters' own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import viser
+from viser import _messages as messages
+
+from kin.transforms import Array
+
+
+def assign(
+    node: viser.SceneNodeHandle,
+    position: Array | Sequence[float] | None = None,
+    wxyz: Array | Sequence[float] | None = None,
+) -> None:
+    """Give a node this position ``(3,)`` and turn ``(4,)`` in its parent's frame; what it has already is not sent.
+
+    Raises:
+        RuntimeError: the node was removed.
+    """
+    told = node._impl
+    if told.removed:
+        raise RuntimeError(f"{told.name} was removed and cannot be posed")
+    if position is not None and (place := _floats(position)) != told.position.tolist():
+        told.position[:] = place
+        x, y, z = place
+        told.api._queue_scene_message(messages.SetPositionMessage(told.name, (x, y, z)))
+    if wxyz is not None and (turn := _floats(wxyz)) != told.wxyz.tolist():
+        told.wxyz[:] = turn
+        w, x, y, z = turn
+        told.api._queue_scene_message(messages.SetOrientationMessage(told.name, (w, x, y, z)))
+
+
+def keep_private(gizmo: viser.TransformControlsHandle) -> None:
+    """Have viser not repeat each motion of a gizmo to other visitors: on a visitor's own scene there are none."""
+    gizmo._impl_aux.sync_cb = None
+
+
+def _floats(values: Array | Sequence[float]) -> list[float]:
+    return values.tolist() if isinstance(values, np.ndarray) else list(values)

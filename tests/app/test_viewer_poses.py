@@ -1,0 +1,105 @@
+"""Poses told past viser's setters: the same messages, exact, and none where nothing changed."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import io
+
+import numpy as np
+import pytest
+import viser
+from viser._messages import TransformControlsUpdateMessage
+
+from app.viewer.poses import assign, keep_private
+
+PLACE, TURN = (0.1, -0.2, 0.3), (0.5, -0.5, 0.5, 0.5)
+
+
+@pytest.fixture
+def told(monkeypatch):
+    """A scene's messages as they go on the wire, and the scene."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    messages = []
+    monkeypatch.setattr(server.scene, "_queue_scene_message", queue_into(messages, server.scene))
+    yield messages, server.scene
+    with contextlib.redirect_stdout(io.StringIO()):
+        server.stop()
+
+
+def queue_into(messages, scene):
+    send = scene._queue_scene_message
+
+    def queue(message):
+        send(message)
+        messages.append(message.as_serializable_dict())
+
+    return queue
+
+
+@pytest.mark.parametrize("given", [tuple, list, np.array])
+def test_what_is_sent_is_what_the_setters_send(told, given):
+    messages, scene = told
+    node = scene.add_frame("/a")
+    messages.clear()
+    node.position, node.wxyz = PLACE, TURN
+    expected = list(messages)
+    assert [m["type"] for m in expected] == ["SetPositionMessage", "SetOrientationMessage"]
+    other = scene.add_frame("/a")
+    messages.clear()
+    assign(other, given(PLACE), given(TURN))
+    assert messages == expected
+    assert other.position.tolist() == list(PLACE)
+    assert other.wxyz.tolist() == list(TURN)
+
+
+def test_the_smallest_step_is_told_and_a_repetition_is_not(told):
+    messages, scene = told
+    node = scene.add_frame("/a")
+    assign(node, PLACE, TURN)
+    messages.clear()
+    assign(node, PLACE, TURN)
+    assign(node)
+    assert messages == []
+    near = (np.nextafter(PLACE[0], 1.0), *PLACE[1:])
+    assign(node, near)
+    assert [m["position"] for m in messages] == [near]
+
+
+def test_the_array_given_can_be_used_again(told):
+    _, scene = told
+    node = scene.add_frame("/a")
+    place = np.array(PLACE)
+    assign(node, place)
+    place[:] = 7.0
+    assert node.position.tolist() == list(PLACE)
+
+
+def test_a_removed_node_is_not_brought_back(told):
+    messages, scene = told
+    node = scene.add_frame("/a")
+    node.remove()
+    messages.clear()
+    with pytest.raises(RuntimeError, match="/a was removed"):
+        assign(node, PLACE)
+    assert messages == []
+
+
+def test_a_private_gizmo_repeats_nothing_and_is_heard_all_the_same(told):
+    messages, scene = told
+    heard = []
+    for private, expected in ((False, ["SetOrientationMessage", "SetPositionMessage"]), (True, [])):
+        gizmo = scene.add_transform_controls("/g")
+        if private:
+            keep_private(gizmo)
+
+        @gizmo.on_update
+        async def _(event):
+            heard.append((event.phase, event.target.position.tolist()))
+
+        messages.clear()
+        moved = TransformControlsUpdateMessage("/g", wxyz=TURN, position=PLACE)
+        asyncio.run(scene._handle_transform_controls_updates(7, moved))
+        assert [m["type"] for m in messages] == expected
+    assert heard == 2 * [("update", list(PLACE))]
