@@ -14,6 +14,8 @@ from websockets.sync.client import connect
 
 from kin.transforms import from_position_wxyz, wxyz_from_rotation
 
+ANSWER = 1.5  # s, for what was sent to be answered on a busy machine
+
 
 class FakeBrowser:
     """One visitor, of viser's own port or of any address, which may need more `options` to connect.
@@ -46,6 +48,7 @@ class FakeBrowser:
         self.visible: dict[str, bool] = {}
         self.nodes: dict[str, dict[str, Any]] = {}
         self.log: list[dict[str, Any]] = []
+        self._owed = False  # whether something was sent that may yet be answered
         self.answers = True  # whether it tells what its storage holds, as a page in front does
         self.send(
             "ViewerCameraMessage",
@@ -72,6 +75,7 @@ class FakeBrowser:
 
     def send(self, type_: str, **fields: Any) -> None:
         self._socket.send(msgspec.msgpack.encode({"type": type_, **fields}))
+        self._owed = True
 
     def send_raw(self, data: bytes | str) -> None:
         self._socket.send(data)
@@ -181,9 +185,11 @@ class FakeBrowser:
             self._read(left)
 
     def settle(self, quiet: float = 0.3, timeout: float = 10.0) -> None:
-        """Read messages until none came for `quiet` seconds."""
+        """Read messages until none came for `quiet` seconds; the first answer to what was sent may take longer."""
         end = time.monotonic() + timeout
-        while self._read(quiet):
+        self._owed, patience = False, ANSWER if self._owed else quiet
+        while self._read(patience):
+            patience = quiet
             assert time.monotonic() < end, f"the page did not come to rest within {timeout} s"
 
     def _read(self, timeout: float) -> bool:

@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
-from live_server import wait_for
 
 import kin
 from app.store import Store
@@ -142,7 +141,7 @@ def test_rings_hang_on_the_gizmo_where_not_every_turn_is_offered(port: int) -> N
         assert sorted(rings(tab)) == ["x", "y"]
         assert tab.nodes[tab.gizmo]["props"]["disable_rotations"]
         tab.set("Match", "Point only")
-        wait_for(lambda: not rings(tab))
+        tab.wait(lambda: not rings(tab))
         tab.choose(SCARA.name)
         assert sorted(rings(tab)) == ["z"]
         tab.choose(SRS.name)
