@@ -123,10 +123,11 @@ def test_heavy_requests_leave_threads_to_the_others():
 
 # -- hostile input ---------------------------------------------------------------------------------------------
 
-ROUTES = ("fk", "jacobian", "ik", "ik/path", "reachable")
+ROUTES = ("fk", "jacobian", "ik", "ik/path", "reachable", "equations")
 GOOD = {
     "fk": {"q": [0.1] * 5},
     "jacobian": {"q": [0.1] * 5},
+    "equations": {"q": [0.1] * 5},
     "ik": {"target": {"position": [0.045, 0.191, -0.211]}},
     "ik/path": {"targets": [{"position": [0.045, 0.191, -0.211]}]},
     "reachable": {"target": {"position": [0.045, 0.191, -0.211]}},
@@ -233,7 +234,7 @@ NASTY = (
 
 
 @pytest.mark.parametrize("name", NASTY)
-@pytest.mark.parametrize("what", ["", *ROUTES, "workspace", "workspace/summary"])
+@pytest.mark.parametrize("what", ["", *ROUTES, "workspace", "workspace/summary", "capability"])
 def test_nasty_names_of_robots(client, name, what):
     method = "POST" if what in ROUTES else "GET"
     answer = client.request(method, f"/api/v1/robots/{name}/{what}".rstrip("/"), json=GOOD.get(what))
@@ -278,4 +279,5 @@ SCHEMAS = {
     "ik": "IkRequest",
     "ik/path": "PathRequest",
     "reachable": "ReachableRequest",
+    "equations": "EquationsRequest",
 }
