@@ -15,7 +15,7 @@ import viser
 from app.viewer.chain import turn
 from app.viewer.meshes import Part, body
 from app.viewer.offer import Offer
-from app.viewer.poses import assign, keep_private
+from app.viewer.quick import assign, keep_private
 from kin import Robot, fk, link_frames
 from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
 

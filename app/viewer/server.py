@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import io
 import logging
 import threading
-from collections.abc import Iterator
 
 import viser
 
@@ -18,6 +16,7 @@ from app.store import Store
 from app.viewer.motion import Pace
 from app.viewer.panel.status import Notice
 from app.viewer.panel.view import configure_theme
+from app.viewer.quick import quick_loops, remember_hints
 from app.viewer.session import WELCOME, Session
 
 log = logging.getLogger(__name__)
@@ -53,8 +52,9 @@ class ViewerServer:
         """Start listening on a free port of 127.0.0.1 and return that port."""
         if self._server is not None:
             raise RuntimeError("the viewer is already running")
+        remember_hints()
         # viser prints an address that no visitor should use
-        with contextlib.redirect_stdout(io.StringIO()), _quick_loops():
+        with contextlib.redirect_stdout(io.StringIO()), quick_loops():
             server = viser.ViserServer(host="127.0.0.1", port=0, label="Kinboard", verbose=False)
         self._server = server
         configure_theme(server.gui, dark=False)
@@ -124,22 +124,6 @@ class ViewerServer:
             session = self._sessions.pop(client.client_id, None)
         if session is not None:
             session.end()
-
-
-@contextlib.contextmanager
-def _quick_loops() -> Iterator[None]:
-    """Event loops made meanwhile are uvloop's, where there is one: viser makes its own and asks nobody."""
-    try:
-        import uvloop
-    except ImportError:  # Windows
-        yield
-        return
-    before = asyncio.get_event_loop_policy()
-    asyncio.set_event_loop_policy(uvloop.EventLoopPolicy())
-    try:
-        yield
-    finally:
-        asyncio.set_event_loop_policy(before)
 
 
 def _light(scene: viser.SceneApi) -> None:

@@ -31,6 +31,7 @@ async def measure(service: Service, count: int) -> dict[str, Any]:
     return {
         "visitors": count,
         "failed": count - len(there),
+        "why": "; ".join(sorted({repr(error) for error in came if error is not None})),
         "arm p50 s": percentile(arms, 50),
         "arm p99 s": percentile(arms, 99),
         "all pages s": max((visitor.last for visitor in there), default=began) - began,

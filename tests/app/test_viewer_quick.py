@@ -1,17 +1,19 @@
-"""Poses told past viser's setters: the same messages, exact, and none where nothing changed."""
+"""What is done past viser's own ways: the same messages and pages, exact, and none where nothing changed."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
 import io
+import typing
 
 import numpy as np
 import pytest
 import viser
+from viser import _assignable_props_api as props
 from viser._messages import TransformControlsUpdateMessage
 
-from app.viewer.poses import assign, keep_private
+from app.viewer.quick import assign, keep_private, remember_hints
 
 PLACE, TURN = (0.1, -0.2, 0.3), (0.5, -0.5, 0.5, 0.5)
 
@@ -103,3 +105,17 @@ def test_a_private_gizmo_repeats_nothing_and_is_heard_all_the_same(told):
         asyncio.run(scene._handle_transform_controls_updates(7, moved))
         assert [m["type"] for m in messages] == expected
     assert heard == 2 * [("update", list(PLACE))]
+
+
+def test_hints_are_looked_up_once_and_are_the_same(told, monkeypatch):
+    _, scene = told
+    monkeypatch.setattr(props, "get_type_hints", typing.get_type_hints)
+    theirs = scene.add_frame("/theirs")._prop_hints
+    remember_hints()
+    first, second = scene.add_frame("/first"), scene.add_frame("/second")
+    assert first._prop_hints is second._prop_hints
+    assert first._prop_hints == theirs
+    first.axes_length = 0.25
+    assert first.axes_length == 0.25
+    with pytest.raises(AttributeError):
+        _ = first.no_such_thing
