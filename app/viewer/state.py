@@ -21,6 +21,7 @@ from typing import Any, get_args
 
 import numpy as np
 
+from app.viewer.camera import UP
 from app.viewer.panel.view import ViewState
 from kin import Robot, Task, branch_names
 from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
@@ -28,9 +29,11 @@ from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
 VERSION = 1
 KEY = "kinboard"  # of the item of the page's storage
 MAX_TEXT = 16_000  # characters; the bridge refuses messages of 64 KiB
-FARTHEST = 1000.0  # metres of a target from the base
+FARTHEST = 1000.0  # metres of a target from the base, or of a camera
 # Nine digits are a nanometre: a shared configuration is the same for every purpose, in half the text.
 DIGITS = 9
+CAMERA_DIGITS = 4  # of metres: nobody sees the difference
+CAMERA_ROOM = 100.0  # how much nearer or farther than an arm's reach a camera may be
 
 FRESH = ViewState()
 _ADDRESS = re.compile(r"https?://[A-Za-z0-9._:%\[\]-]+/[A-Za-z0-9._~%/-]*")
@@ -48,6 +51,8 @@ class PageState:
         lesson: key of the lesson on show.
         degrees: whether angles are shown in degrees.
         features: `Feature.state` of each feature by its key, unread.
+        locks: indices of the joints that are locked, each at its value in `q`.
+        camera: viewpoint ``(3, 3)`` as `VisitorCamera.chosen`; None: the default view.
         missing: the arm that was asked for, if there is none of that id here.
     """
 
@@ -60,6 +65,8 @@ class PageState:
     degrees: bool = True
     view: ViewState = field(default_factory=ViewState)
     features: dict[str, dict[str, object]] = field(default_factory=dict)
+    locks: tuple[int, ...] = ()
+    camera: Array | None = None
     missing: str = ""
 
 
@@ -86,6 +93,11 @@ def encode(state: PageState) -> str:
     for name in ("task", "branch", "lesson"):
         if getattr(state, name) is not None:
             said[name] = getattr(state, name)
+    if state.locks:
+        said["locks"] = list(state.locks)
+    if state.camera is not None:
+        position, look_at, up = (_rounded(row, CAMERA_DIGITS) for row in state.camera)
+        said["camera"] = position + look_at + (up if up != UP.tolist() else [])
     if not state.degrees:
         said["units"] = "rad"
     view = {name: value for name, value in vars(state.view).items() if value != getattr(FRESH, name)}
@@ -129,6 +141,8 @@ def decode(text: str, robots: Sequence[Robot]) -> PageState:
         target=_pose(said.get("target")),
         task=task if task in _TASKS else None,
         branch=branch if branch in known else None,
+        locks=_joints(said.get("locks"), robot),
+        camera=_viewpoint(said.get("camera"), robot),
         **common,
     )
 
@@ -167,9 +181,9 @@ def _parse(text: str) -> dict[str, Any]:
     return said if isinstance(said, dict) else {}
 
 
-def _rounded(values: Array) -> list[float]:
+def _rounded(values: Array, digits: int = DIGITS) -> list[float]:
     # Adding zero turns -0.0 into 0.0.
-    return [round(value, DIGITS) + 0.0 for value in values.tolist()]
+    return [round(value, digits) + 0.0 for value in values.tolist()]
 
 
 def _numbers(value: object, count: int) -> Array | None:
@@ -198,6 +212,27 @@ def _pose(value: object) -> Array | None:
     if not math.isclose(math.hypot(*numbers[3:].tolist()), 1.0, abs_tol=1e-3):
         return None
     return from_position_wxyz(numbers[:3], numbers[3:])
+
+
+def _joints(value: object, robot: Robot) -> tuple[int, ...]:
+    told = value if isinstance(value, list) else []
+    known = {item for item in told if type(item) is int and 0 <= item < robot.n}  # True is an int too
+    return tuple(sorted(known))
+
+
+def _viewpoint(value: object, robot: Robot) -> Array | None:
+    numbers = _numbers(value, 6)
+    numbers = _numbers(value, 9) if numbers is None else np.append(numbers, UP)
+    if numbers is None or np.abs(numbers).max() > FARTHEST:
+        return None
+    position, look_at, up = numbers.reshape(3, 3)
+    away = float(np.linalg.norm(position - look_at))
+    aside = float(np.linalg.norm(look_at - robot.T_world_base[:3, 3]))
+    if not robot.reach / CAMERA_ROOM <= away <= robot.reach * CAMERA_ROOM or aside > robot.reach * CAMERA_ROOM:
+        return None
+    if not math.isclose(float(np.linalg.norm(up)), 1.0, abs_tol=1e-3):
+        return None
+    return numbers.reshape(3, 3)
 
 
 def _view(value: object) -> ViewState:

@@ -21,7 +21,8 @@ class FakeBrowser:
     """One visitor, of viser's own port or of any address, which may need more `options` to connect.
 
     `pump` reads messages; everything shown is in `gui`, `values`, `poses` and `visible`. `memory` is what the page
-    answers when asked what it remembers, `kept` what it was told to remember.
+    answers when asked what it remembers, `kept` what it was told to remember. `camera` is where it was sent to;
+    unlike a real page it tells so only when asked to `look`.
     """
 
     def __init__(
@@ -50,18 +51,9 @@ class FakeBrowser:
         self.log: list[dict[str, Any]] = []
         self._owed = False  # whether something was sent that may yet be answered
         self.answers = True  # whether it tells what its storage holds, as a page in front does
-        self.send(
-            "ViewerCameraMessage",
-            wxyz=(1, 0, 0, 0),
-            position=(3, 3, 3),
-            fov=1.3,
-            near=0.01,
-            far=1000,
-            image_height=height,
-            image_width=width,
-            look_at=(0, 0, 0),
-            up_direction=(0, 0, 1),
-        )
+        self.camera: dict[str, Any] = {"position": (3, 3, 3), "look_at": (0, 0, 0), "up_direction": (0, 0, 1)}
+        self._size = {"image_width": width, "image_height": height}
+        self.look()
 
     def __enter__(self) -> FakeBrowser:
         self.wait(lambda: any(m["type"] == "TransformControlsMessage" for m in self.nodes.values()))
@@ -161,6 +153,11 @@ class FakeBrowser:
     def release(self) -> None:
         self.send("TransformControlsDragEndMessage", name=self.gizmo, owner=self.nodes[self.gizmo]["owner"])
 
+    def look(self, **camera: Any) -> None:
+        """Tell where the camera is: where it was sent to, but for what is given."""
+        told = {"wxyz": (1, 0, 0, 0), "fov": 1.3, "near": 0.01, "far": 1000, **self._size, **self.camera, **camera}
+        self.send("ViewerCameraMessage", **told)
+
     def click(self, name: str) -> None:
         """Click a node of the scene."""
         self.send(
@@ -221,6 +218,12 @@ class FakeBrowser:
                     )
             case "LocalStorageSetItemMessage":
                 self.kept.append(m["value"])
+            case "SetCameraPositionMessage":
+                self.camera["position"] = m["position"]
+            case "SetCameraLookAtMessage":
+                self.camera["look_at"] = m["look_at"]
+            case "SetCameraUpDirectionMessage":
+                self.camera["up_direction"] = m["position"]
             case "SetPositionMessage":
                 self.poses.setdefault(m["name"], {})["position"] = m["position"]
             case "SetOrientationMessage":

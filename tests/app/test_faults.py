@@ -24,7 +24,7 @@ from live_server import wait_for
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-import app.viewer.session
+import app.viewer.panel.layout
 import kin
 from app.cli import main
 from app.clouds import Clouds
@@ -187,7 +187,7 @@ def test_a_worker_that_cannot_even_begin_is_not_replaced_for_ever(port, monkeypa
     with FakeBrowser(port) as tab:
         tab.settle()
         monkeypatch.setattr(Session, "_draw", lambda *_, **__: sys.exit())
-        monkeypatch.setattr(app.viewer.session, "StatusLine", lambda *_: 1 / 0)
+        monkeypatch.setattr(app.viewer.panel.layout, "StatusLine", lambda *_: 1 / 0)
         tab.set("1 rotating base", 10.0)
         # Each new worker asks the page what it remembers, so the page has to listen.
         wait_for(lambda: tab._read(0.01) is None or "is not started again" in caplog.text)

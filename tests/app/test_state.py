@@ -18,7 +18,7 @@ from app.store import Store
 from app.viewer import session
 from app.viewer.feature import Feature
 from app.viewer.panel import listen
-from app.viewer.panel.joints import label
+from app.viewer.panel.joints import UNLOCK_ALL, label, padlocks
 from app.viewer.panel.view import ViewState
 from app.viewer.server import ViewerServer
 from app.viewer.state import MAX_TEXT, PageState, decode, encode, read_memory
@@ -47,14 +47,16 @@ def test_a_state_survives_as_text_that_any_address_may_carry():
     branch = kin.branch_names(PUMA)[2]
     view = ViewState(frames=True, labels=False, dark=True)
     told = {"w": {"n": 3, "name": "π & <b>"}}
-    state = PageState("puma560", q, T, "approach", branch, "dh", False, view, told)
+    camera = np.array([[1.5, -2.25, 0.75], [0.1, 0.2, 0.3], [0.0, 0.6, 0.8]])
+    state = PageState("puma560", q, T, "approach", branch, "dh", False, view, told, (1, 4), camera)
     text = encode(state)
     assert set(text) <= set("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_")
     back = decode(text, ROBOTS)
     assert np.abs(back.q - q).max() < 1e-9
     assert np.abs(back.target - T).max() < 1e-8
     assert (back.robot, back.task, back.branch, back.lesson) == ("puma560", "approach", branch, "dh")
-    assert (back.degrees, back.view, back.features) == (False, view, told)
+    assert (back.degrees, back.view, back.features, back.locks) == (False, view, told, (1, 4))
+    assert np.abs(back.camera - camera).max() < 1e-9
     assert encode(back) == text
 
 
@@ -116,6 +118,39 @@ def test_a_configuration_that_is_none_is_left_out_and_the_rest_stays(q):
 )
 def test_a_target_that_is_no_pose_is_left_out(target):
     assert there(target=target).target is None
+
+
+@pytest.mark.parametrize(
+    ("locks", "kept"),
+    [
+        *(([2, 0, 2], (0, 2)), ([5], (5,)), ([], ()), ([6, -1, 3], (3,)), ([10**400], ()), ([1.0, "1", None], ())),
+        *(([True, [1]], ()), ("12", ()), (3, ()), ({"1": 1}, ()), (None, ())),
+    ],
+)
+def test_only_joints_of_the_arm_come_back_locked(locks, kept):
+    assert there(locks=locks).locks == kept
+
+
+@pytest.mark.parametrize(
+    "camera",
+    [
+        *(7, "x", {}, [], [1.0] * 5, [2, 2, 2, 0, 0, 0, 1], [[2, 2, 2], [0, 0, 0]], ["2"] * 6, [None] * 6),
+        *([math.nan, 2, 2, 0, 0, 0], [2, 2, math.inf, 0, 0, 0], [True, 2, 2, 0, 0, 0], [1e308] * 3 + [-1e308] * 3),
+        *([1, 1, 1, 1, 1, 1], [0, 0, 1e-3, 0, 0, 0], [300, 0, 0, 0, 0, 0], [302, 0, 0, 300, 0, 0]),
+        *([2, 2, 2, 0, 0, 0, 0, 0, 0], [2, 2, 2, 0, 0, 0, 0, 0, 1e308], [2, 2, 2, 0, 0, 0, 0, 0, "1"]),
+    ],
+)
+def test_a_camera_that_could_not_see_the_arm_is_left_out_and_the_rest_stays(camera):
+    state = there(camera=camera)
+    assert state.camera is None
+    assert np.array_equal(state.q, PUMA.q_home)
+
+
+def test_a_camera_is_told_in_few_digits_and_its_upright_direction_not_at_all():
+    camera = np.array([[1.23456789, -2.0, 0.5], [0.0, 1e-9, 0.3], [0.0, 0.0, 1.0]])
+    plain, seen = encode(PageState("ur5")), encode(PageState("ur5", camera=camera))
+    assert np.array_equal(decode(seen, ROBOTS).camera, [[1.2346, -2.0, 0.5], [0.0, 0.0, 0.3], [0.0, 0.0, 1.0]])
+    assert len(seen) - len(plain) < 64
 
 
 def test_names_that_nobody_knows_are_left_out():
@@ -311,6 +346,40 @@ def test_a_robot_that_is_not_here_is_named(port):
     with FakeBrowser(port, memory=remembering(packed({"v": 1, "robot": "<b>mine</b>"}))) as tab:
         tab.settle()
         assert "There is no robot “&lt;b&gt;mine&lt;/b&gt;” here." in tab.html
+
+
+def options(tab: FakeBrowser) -> tuple[str, ...]:
+    return tuple(tab.gui[tab.element("Locked")]["props"]["options"])
+
+
+def test_locked_joints_come_back_locked_where_they_were(port):
+    q = PUMA.random_q(np.random.default_rng(4))
+    state = PageState("puma560", q, locks=(1,), features={"counter": {"count": 2}})
+    with FakeBrowser(port, memory=remembering(encode(state))) as tab:
+        tab.settle()
+        assert options(tab) == padlocks([False, True, False, False, False, False])
+        assert "Ready" in tab.html
+        T = kin.fk(PUMA, q)
+        T[:3, 3] *= 0.97
+        tab.grab()
+        tab.drag(T)
+        tab.release()
+        moved = kept(tab)
+        assert moved.locks == (1,)
+        assert moved.q[1] == pytest.approx(q[1], abs=1e-9)
+        assert np.abs(moved.q - q).max() > 1e-3
+        tab.set("Locked", UNLOCK_ALL)
+        tab.wait(lambda: len(tab.kept) > 1)
+        assert decode(tab.kept[-1], ROBOTS).locks == ()
+
+
+def test_a_task_that_comes_back_has_its_rings(port):
+    cobra = STORE.get("scara")
+    with FakeBrowser(port, memory=remembering(encode(PageState("scara", cobra.q_home, task="position")))) as tab:
+        tab.settle()
+        assert tab.value("Match") == "Point only"
+        assert not [n for n in tab.nodes if n.startswith(f"{tab.gizmo}/ring")]
+        assert tab.nodes[tab.gizmo]["props"]["disable_rotations"]
 
 
 def test_another_language(port):

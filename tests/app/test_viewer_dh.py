@@ -258,7 +258,7 @@ def tab(served: tuple[ViewerServer, int]) -> Iterator[FakeBrowser]:
 def lesson_of(server: ViewerServer) -> dh.DHLesson:
     """Of the newest visitor."""
     session = server._sessions[max(server._sessions)]
-    shown = session._lessons.shown
+    shown = session.lessons.shown
     assert isinstance(shown, dh.DHLesson)
     return shown
 

@@ -9,12 +9,16 @@ import time
 from collections.abc import Iterator
 from urllib.parse import urlsplit
 
+import msgspec
 import numpy as np
 import pytest
 from page import ARTIFACTS, WAIT, Tab
 from playwright.sync_api import Browser, FrameLocator, Page, expect
 
 import kin
+from app.viewer import camera
+from app.viewer.meshes import body
+from app.viewer.panel.joints import CLOSED
 from app.viewer.state import PageState, decode
 
 pytestmark = pytest.mark.browser
@@ -107,12 +111,62 @@ def wait_for_tool(page: Page, shown: Page | FrameLocator, T: np.ndarray) -> None
         page.wait_for_timeout(50)
 
 
+def cameras(page: Page) -> list[np.ndarray]:
+    """Grows with each place ``(2, 3)`` that a page which connects anew says its camera is at and looks at."""
+    told: list[np.ndarray] = []
+
+    def note(frame: str | bytes) -> None:
+        said = msgspec.msgpack.decode(frame) if isinstance(frame, bytes) else {}
+        if said.get("type") == "ViewerCameraMessage":
+            told.append(np.array([said["position"], said["look_at"]]))
+
+    page.on("websocket", lambda socket: socket.on("framesent", note))
+    return told
+
+
+def wait_for_camera(page: Page, told: list[np.ndarray], place: np.ndarray) -> None:
+    end = time.monotonic() + WAIT / 1000
+    while not told or np.abs(told[-1] - place).max() > 2e-3:
+        assert time.monotonic() < end, f"the camera is at {told[-1:]}, expected {place}"
+        page.wait_for_timeout(50)
+
+
+def wait_for_viewpoint(page: Page) -> np.ndarray:
+    """The camera in the address, once it stays."""
+    end = time.monotonic() + WAIT / 1000
+    before = None
+    while (kept := state_of(page).camera) is None or before is None or not np.array_equal(kept, before):
+        assert time.monotonic() < end, "the address tells of no camera"
+        before = kept
+        page.wait_for_timeout(1000)
+    return kept
+
+
+def orbit(page: Page, right: int, down: int) -> None:
+    """Drag the floor."""
+    area = page.locator("canvas").first.bounding_box()
+    assert area is not None
+    x, y = area["x"] + 0.12 * area["width"], area["y"] + 0.7 * area["height"]
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + right, y + down, steps=8)
+    page.mouse.up()
+
+
 def test_link_reload_and_lost_connection(shared: Tab, line: Line, browser: Browser) -> None:
     page = shared.page
     assert page.url == line.address + "viewer/", "a fresh page has a short address"
     shared.type_number("1 rotating base", "37.25")
     wait_for_address(page, "s")
     assert np.abs(state_of(page).q - turned(37.25)).max() < 1e-9
+
+    page.get_by_role("button", name="2", exact=True).click()
+    expect(page.get_by_role("button", name=f"{CLOSED}2", exact=True)).to_be_visible()
+    orbit(page, 260, -60)
+    place = wait_for_viewpoint(page)[:2]
+    assert np.abs(place - np.stack(camera.view(body(PIONEER), 1.6))).max() > 0.3
+    shared.screenshot("share-orbited")
+    told = cameras(page)  # of the connections to come
 
     page.get_by_role("tab", name="View").click()
     wait_for_address(page, "tab")
@@ -132,15 +186,20 @@ def test_link_reload_and_lost_connection(shared: Tab, line: Line, browser: Brows
     expect(shared.status).to_have_attribute("data-status", "hand")
     shared.wait_for_tool(kin.fk(PIONEER, turned(37.25))[:3, 3], within=0.06)
     expect(page.get_by_role("tab", name="View")).to_have_attribute("aria-selected", "true")
+    wait_for_camera(page, told, place)
 
     page.get_by_role("tab", name="Move").click()
+    expect(page.get_by_role("button", name=f"{CLOSED}2", exact=True)).to_be_visible()
     shared.type_number("1 rotating base", "60")
     page.wait_for_function("link => !link.includes(location.hash.split('&')[0])", arg=link, timeout=WAIT)
+    shared.screenshot("share-restored")
     page.evaluate("window.sinceLoad = true")
     with page.expect_websocket(timeout=WAIT):
         assert line.cut() > 0
     wait_for_tool(page, page, kin.fk(PIONEER, turned(60)))
     assert page.evaluate("window.sinceLoad"), "it was no reload"
+    wait_for_camera(page, told, place)
+    assert state_of(page).locks == (1,)
 
     other = browser.new_page(viewport={"width": 1280, "height": 720})
     other.goto(link)

@@ -13,6 +13,7 @@ import numpy as np
 import viser
 
 from app.viewer.panel import Post, assign, listen
+from app.viewer.panel.status import Notice
 from kin import InputError, Robot
 from kin.robot import Joint
 from kin.transforms import Array
@@ -43,6 +44,16 @@ def padlocks(locked: Sequence[bool]) -> tuple[str, ...]:
     """The buttons of the padlocks: one number per joint, with a symbol if it is locked."""
     buttons = tuple(f"{CLOSED}{i + 1}" if shut else str(i + 1) for i, shut in enumerate(locked))
     return (*buttons, UNLOCK_ALL) if any(locked) else buttons
+
+
+def lock_notice(locked: Sequence[bool]) -> Notice:
+    """What a visitor is told who has locked or unlocked a joint."""
+    numbers = [str(i + 1) for i, shut in enumerate(locked) if shut]
+    if not numbers:
+        return Notice("hand", "No joint is locked", "Every joint may move to follow a target.")
+    joints = "Joint " + numbers[0] if len(numbers) == 1 else "Joints " + ", ".join(numbers)
+    detail = "A target leaves what is locked where it is; its slider still moves it."
+    return Notice("hand", f"{joints} locked", detail)
 
 
 class JointSliders:

@@ -42,6 +42,12 @@ class LessonChoice:
         with self._box:
             self.shown = wanted(self._stage)
 
+    def open(self, key: str) -> None:
+        """Show the lesson of this key, if there is one."""
+        lesson = next((lesson for lesson in LESSONS if lesson.key == key), None)
+        if lesson is not None:
+            self.choose(lesson.title)
+
     def remove(self) -> None:
         """Take the lesson on show away."""
         if self.shown is not None:

@@ -1,0 +1,61 @@
+"""What stands where in the panel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import viser
+
+from app.viewer.panel import Post, listen, listen_click
+from app.viewer.panel.readout import PoseReadout
+from app.viewer.panel.share import SharePanel
+from app.viewer.panel.status import Notice, StatusLine
+from app.viewer.panel.target import TargetChoice, default_task
+from app.viewer.panel.view import ViewOptions, ViewState
+from kin import Robot, fk
+
+
+class Panel:
+    """One visitor's panel. Posts ``"robot"``, ``"home"``, ``"random"``, ``"units"``, and what its parts post.
+
+    Args:
+        learn: whether there is a tab for lessons.
+        tabs: titles of the features' tabs.
+
+    Attributes:
+        joints, posture: folders to be filled for each arm.
+        learn: the tab for lessons.
+        tabs: the features' tabs.
+    """
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        robots: Sequence[Robot],
+        robot: Robot,
+        degrees: bool,
+        view: ViewState,
+        welcome: Notice,
+        learn: bool,
+        tabs: Sequence[str],
+        post: Post,
+    ) -> None:
+        self.status = StatusLine(gui, welcome)
+        self.robot = gui.add_dropdown("Robot", tuple(r.name for r in robots), initial_value=robot.name)
+        listen(self.robot, post, "robot")
+        self.readout = PoseReadout(gui, fk(robot, robot.q_home), degrees)
+        group = gui.add_tab_group()
+        with group.add_tab("Move"):
+            self.joints = gui.add_folder("Joints")
+            buttons = gui.add_button_group("Go to", ("Home", "Random"))
+            listen_click(buttons, post, {"Home": "home", "Random": "random"})
+            self.target = TargetChoice(gui, default_task(robot), post)
+            self.posture = gui.add_folder("Posture")
+        self.learn = group.add_tab("Learn") if learn else None
+        self.tabs = [group.add_tab(title) for title in tabs]
+        with group.add_tab("View"):
+            units = gui.add_checkbox("Radians", not degrees, hint="Angles in radians instead of degrees")
+            listen(units, post, "units")
+            ViewOptions(gui, view, post)
+            with gui.add_folder("Share"):
+                self.share = SharePanel(gui, post)
