@@ -17,6 +17,7 @@ from app.clouds import Clouds
 from app.maps import Maps
 from app.store import Store
 from app.viewer.panel.status import Notice
+from app.viewer.units import Units
 from kin import IKResult, Robot, Task
 from kin.transforms import Array
 
@@ -61,8 +62,8 @@ class Stage(Protocol):
         """The branch asked for, as `kin.solve_ik` takes it."""
 
     @property
-    def degrees(self) -> bool:
-        """Whether angles are shown in degrees; else radians."""
+    def units(self) -> Units:
+        """The units angles and lengths are shown in."""
 
     @property
     def dark(self) -> bool:
@@ -133,7 +134,7 @@ class Feature:
         """The task, the branch asked for, or what is locked was changed."""
 
     def on_style(self) -> None:
-        """Degrees or radians, dark or light, were changed."""
+        """The units, or dark or light, were changed."""
 
     def tick(self, now: float) -> None:
         """Go on with what takes time, ten milliseconds at most: pictures wait. `now` is `time.perf_counter`'s."""

@@ -143,7 +143,7 @@ class Memory:
             task=page.task,
             branch=page.branch,
             lesson=None if lesson is None else lesson.key,
-            degrees=page.degrees,
+            units=page.units,
             view=page.view,
             features={key: state for key, state in told.items() if state},
             locks=tuple(i for i, shut in enumerate(page.locks) if shut),

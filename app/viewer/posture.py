@@ -8,7 +8,6 @@ import kin
 from app.viewer.feature import Stage
 from app.viewer.panel import Post
 from app.viewer.panel.posture import BranchChoice, FreeSliders
-from app.viewer.panel.status import Notice, notice
 from app.viewer.selfmotion import self_motion
 from kin.transforms import Array
 
@@ -47,7 +46,7 @@ class Posture:
         robot = self._stage.robot
         if kin.branch_names(robot):
             self._choice.show(kin.branch_of(robot, self._stage.goal))
-        self._free.show(found.redundancy, robot, self._stage.degrees, self._held)
+        self._free.show(found.redundancy, robot, self._stage.units, self._held)
         self._held = None
 
     def read(self, value: object) -> None:
@@ -65,14 +64,14 @@ class Posture:
         if self.branch not in (None, "seed") and self.branch != kin.branch_of(self._stage.robot, self._stage.goal):
             self.choose(None)
 
-    def move(self, name: str, value: object) -> tuple[Array | None, Notice]:
-        """Set what is free while the tool stays: where to go ``(n,)``, if anywhere, and what to say.
+    def move(self, name: str, value: object) -> tuple[Array | None, kin.IKResult]:
+        """Set what is free while the tool stays: where to go ``(n,)``, if anywhere, and the answer to tell.
 
-        Where the limits end, the arm stops and the words say why.
+        Where the limits end, the arm stops and the answer says why.
         """
         wanted = self._free.read(name, value)
         result = self._self_motion(name, wanted)
-        told = notice(result)
+        told = result
         if result.status != "solved":
             ranges = [r.intervals for r in self._posture().redundancy if r.name == name]
             inside = [min(max(wanted, low), high) for low, high in (ranges[0] if ranges else ())]

@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Callable, Hashable, Sequence
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
@@ -31,12 +32,13 @@ from app.viewer.panel import assign
 from app.viewer.panel.joints import JointSliders, lock_notice
 from app.viewer.panel.layout import Panel
 from app.viewer.panel.lessons import LessonChoice
-from app.viewer.panel.status import Notice, StatusLine, notice
+from app.viewer.panel.status import Notice, StatusLine
 from app.viewer.panel.target import TASKS, default_task
 from app.viewer.panel.view import ViewState, configure_theme
 from app.viewer.posture import Posture
 from app.viewer.scene import ArmScene
 from app.viewer.tabs import TABS
+from app.viewer.units import USUAL, Units
 from app.viewer.worker import Worker
 from kin import Robot, Task
 from kin.transforms import Array, from_position_wxyz
@@ -73,7 +75,7 @@ class Session(Worker):
         self._welcome = welcome
         self._memory = Memory(self, token, self._guard)
         self._rng = np.random.default_rng()
-        self._degrees = True
+        self._units = USUAL
         self.view = ViewState()
         self._dragging = False
         # The pose asked for with the gizmo, for as long as it is the arm's task; None: the gizmo follows the tool.
@@ -135,8 +137,8 @@ class Session(Worker):
         return self.posture.branch
 
     @property
-    def degrees(self) -> bool:
-        return self._degrees
+    def units(self) -> Units:
+        return self._units
 
     @property
     def dark(self) -> bool:
@@ -244,7 +246,7 @@ class Session(Worker):
         with self._client.atomic():
             if self._readout_due:
                 self._readout_due = False
-                self._panel.readout.show(kin.fk(self._robot, self._q), self._degrees)
+                self._panel.readout.show(kin.fk(self._robot, self._q), self._units)
             if self._sliders_due:
                 self._sliders_due = False
                 self._sliders.show(self._motion.goal, self._held)
@@ -254,12 +256,12 @@ class Session(Worker):
         match key:
             case "gizmo":
                 self._on_gizmo(value)
-            case ("joint", str(robot_id), int(index), bool(degrees)):
+            case ("joint", str(robot_id), int(index), Units() as units):
                 # A late event of sliders that are already replaced says nothing about the present ones.
-                if (robot_id, degrees) == (self._robot.id, self._degrees):
+                if (robot_id, units) == (self._robot.id, self._units):
                     self._on_slider(index, value)
-            case ("free", str(robot_id), str(name), bool(degrees)):
-                if (robot_id, degrees) == (self._robot.id, self._degrees):
+            case ("free", str(robot_id), str(name), Units() as units):
+                if (robot_id, units) == (self._robot.id, self._units):
                     self._on_free(name, value)
             case ("lock", str(robot_id), index):
                 if robot_id == self._robot.id:
@@ -278,8 +280,10 @@ class Session(Worker):
                 self._on_robot(str(value))
             case "task":
                 self._on_task(str(value))
-            case "units":
-                self._on_units(bool(value))
+            case "radians":
+                self._on_units(replace(self._units, degrees=not value))
+            case "lengths":
+                self._on_units(replace(self._units, length=self._panel.units.read_length(value)))
             case "home":
                 self.go(self._robot.q_home)
             case "random":
@@ -342,8 +346,8 @@ class Session(Worker):
 
     def _on_free(self, name: str, value: object) -> None:
         """Move what is free while the tool stays."""
-        q, why = self.posture.move(name, value)
-        self._status.show(why)
+        q, result = self.posture.move(name, value)
+        self._status.answer(result, self._units)
         if q is not None:
             self._target = None
             self._aim(q)
@@ -373,8 +377,9 @@ class Session(Worker):
         self._offer_gizmo()
         self._ask_anew()
 
-    def _on_units(self, radians: bool) -> None:
-        self._degrees = not radians
+    def _on_units(self, units: Units) -> None:
+        self._units = units
+        self._status.use(units)
         self._sliders.remove()
         self._sliders = self._make_sliders()
         self.posture.show()
@@ -405,7 +410,7 @@ class Session(Worker):
         if result.best is not None:
             self._aim(result.best.q)
         self._reached = result.status == "solved"
-        self._status.show(notice(result))
+        self._status.answer(result, self._units)
         self._for_features(lambda feature: feature.on_answer(result))
 
     def _aim(self, q: Array, held: int | None = None, ease: bool = True) -> None:
@@ -418,7 +423,7 @@ class Session(Worker):
     def _build(self) -> None:
         gui = self._client.gui
         saved = self._memory.recall()
-        self._degrees, self.view = saved.degrees, saved.view
+        self._units, self.view = saved.units, saved.view
         robot = self.store.get(saved.robot) if saved.robot is not None else self.store.robots[0]
         with self._client.atomic():
             if self.view.dark:
@@ -428,7 +433,7 @@ class Session(Worker):
                 gui.main_panel.dock_right()
             titles = [tab.title for tab in TABS]
             self._panel = Panel(
-                gui, self.store.robots, robot, self._degrees, self.view, self._welcome, bool(LESSONS), titles,
+                gui, self.store.robots, robot, self._units, self.view, self._welcome, bool(LESSONS), titles,
                 self.post,
             )  # fmt: skip
             self._status = self._panel.status
@@ -466,7 +471,7 @@ class Session(Worker):
 
     def _make_sliders(self) -> JointSliders:
         return JointSliders(
-            self._client.gui, self._panel.joints, self._robot, self._motion.goal, self.locks, self._degrees,
+            self._client.gui, self._panel.joints, self._robot, self._motion.goal, self.locks, self._units,
             self.post,
         )  # fmt: skip
 

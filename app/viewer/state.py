@@ -23,6 +23,7 @@ import numpy as np
 
 from app.viewer.camera import UP
 from app.viewer.panel.view import ViewState
+from app.viewer.units import LENGTHS, USUAL, Units
 from kin import Robot, Task, branch_names
 from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
 
@@ -49,7 +50,7 @@ class PageState:
         target: pose ``(4, 4)`` that was asked for and is not reached, else None.
         branch: as `kin.solve_ik` takes it.
         lesson: key of the lesson on show.
-        degrees: whether angles are shown in degrees.
+        units: of angles and lengths.
         features: `Feature.state` of each feature by its key, unread.
         locks: indices of the joints that are locked, each at its value in `q`.
         camera: viewpoint ``(3, 3)`` as `VisitorCamera.chosen`; None: the default view.
@@ -62,7 +63,7 @@ class PageState:
     task: Task | None = None
     branch: str | None = None
     lesson: str | None = None
-    degrees: bool = True
+    units: Units = USUAL
     view: ViewState = field(default_factory=ViewState)
     features: dict[str, dict[str, object]] = field(default_factory=dict)
     locks: tuple[int, ...] = ()
@@ -98,8 +99,10 @@ def encode(state: PageState) -> str:
     if state.camera is not None:
         position, look_at, up = (_rounded(row, CAMERA_DIGITS) for row in state.camera)
         said["camera"] = position + look_at + (up if up != UP.tolist() else [])
-    if not state.degrees:
+    if not state.units.degrees:
         said["units"] = "rad"
+    if state.units.length != USUAL.length:
+        said["length"] = state.units.length
     view = {name: value for name, value in vars(state.view).items() if value != getattr(FRESH, name)}
     if view:
         said["view"] = view
@@ -127,7 +130,7 @@ def decode(text: str, robots: Sequence[Robot]) -> PageState:
     features = said.get("features")
     common: dict[str, Any] = {
         "lesson": lesson if isinstance(lesson, str) else None,
-        "degrees": said.get("units") != "rad",
+        "units": _units(said),
         "view": _view(said.get("view")),
         "features": _features(features),
     }
@@ -233,6 +236,11 @@ def _viewpoint(value: object, robot: Robot) -> Array | None:
     if not math.isclose(float(np.linalg.norm(up)), 1.0, abs_tol=1e-3):
         return None
     return numbers.reshape(3, 3)
+
+
+def _units(said: dict[str, Any]) -> Units:
+    length = next((unit for unit in LENGTHS if unit == said.get("length")), USUAL.length)
+    return Units(said.get("units") != "rad", length)
 
 
 def _view(value: object) -> ViewState:

@@ -22,12 +22,14 @@ from app.viewer.panel.joints import UNLOCK_ALL, label, padlocks
 from app.viewer.panel.view import ViewState
 from app.viewer.server import ViewerServer
 from app.viewer.state import MAX_TEXT, PageState, decode, encode, read_memory
+from app.viewer.units import USUAL, Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
 STORE = Store()
 ROBOTS = STORE.robots
 PUMA, PIONEER = STORE.get("puma560"), STORE.get("pioneer5")
+RADIANS_CM = Units(degrees=False, length="cm")
 
 
 def packed(said: object) -> str:
@@ -48,16 +50,27 @@ def test_a_state_survives_as_text_that_any_address_may_carry():
     view = ViewState(frames=True, labels=False, dark=True)
     told = {"w": {"n": 3, "name": "π & <b>"}}
     camera = np.array([[1.5, -2.25, 0.75], [0.1, 0.2, 0.3], [0.0, 0.6, 0.8]])
-    state = PageState("puma560", q, T, "approach", branch, "dh", False, view, told, (1, 4), camera)
+    state = PageState("puma560", q, T, "approach", branch, "dh", RADIANS_CM, view, told, (1, 4), camera)
     text = encode(state)
     assert set(text) <= set("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_")
     back = decode(text, ROBOTS)
     assert np.abs(back.q - q).max() < 1e-9
     assert np.abs(back.target - T).max() < 1e-8
     assert (back.robot, back.task, back.branch, back.lesson) == ("puma560", "approach", branch, "dh")
-    assert (back.degrees, back.view, back.features, back.locks) == (False, view, told, (1, 4))
+    assert (back.units, back.view, back.features, back.locks) == (RADIANS_CM, view, told, (1, 4))
     assert np.abs(back.camera - camera).max() < 1e-9
     assert encode(back) == text
+
+
+def test_an_address_from_before_lengths_had_a_unit_is_in_millimetres():
+    assert there().units == USUAL
+    assert there(units="rad").units == Units(degrees=False)
+    assert there(length="m").units == Units(length="m")
+
+
+@pytest.mark.parametrize("length", ["inch", "MM", "", 3, None, True, ["cm"], {"cm": 1}, "cm" * 5000])
+def test_a_unit_that_there_is_not_is_left_out(length):
+    assert there(length=length, units="rad").units == Units(degrees=False)
 
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda r: r.id)
@@ -101,7 +114,7 @@ def test_what_is_no_state_is_a_fresh_page(text):
 def test_a_configuration_that_is_none_is_left_out_and_the_rest_stays(q):
     state = there(q=q, units="rad")
     assert state.q is None
-    assert (state.robot, state.degrees) == ("puma560", False)
+    assert (state.robot, state.units) == ("puma560", Units(degrees=False))
 
 
 @pytest.mark.parametrize(
@@ -167,7 +180,7 @@ def test_another_services_robot_is_told_and_nothing_of_it_is_used():
         packed({"v": 1, "robot": "somebodys", "q": [0.0] * 5, "task": "approach", "units": "rad"}), ROBOTS
     )
     assert (state.robot, state.missing, state.q, state.task) == (None, "somebodys", None, None)
-    assert state.degrees is False
+    assert state.units == Units(degrees=False)
     assert decode(packed({"v": 1, "robot": {"a": [1]}}), ROBOTS).robot is None
 
 
@@ -252,7 +265,7 @@ def test_a_link_shows_the_same_view_and_a_lost_connection_brings_it_back(port):
     far = kin.fk(PUMA, q)
     far[:3, 3] *= 3.0
     view = ViewState(frames=True, dark=True)
-    state = PageState("puma560", q, far, "position", "seed", None, False, view, {"counter": {"count": 4}})
+    state = PageState("puma560", q, far, "position", "seed", None, RADIANS_CM, view, {"counter": {"count": 4}})
     with FakeBrowser(port, memory=remembering(encode(state))) as tab:
         tab.settle()
         assert (tab.value("Robot"), tab.value("Match"), tab.value("Branch")) == (
@@ -273,7 +286,7 @@ def test_a_link_shows_the_same_view_and_a_lost_connection_brings_it_back(port):
         again = kept(tab)
         assert again.features == {"counter": {"count": 5}}
         assert np.abs(again.target - far).max() < 1e-8
-        assert (again.view, again.branch, again.degrees) == (view, "seed", False)
+        assert (again.view, again.branch, again.units) == (view, "seed", RADIANS_CM)
         q_end, text = again.q, tab.kept[-1]
     with FakeBrowser(port, memory=remembering(text)) as tab:
         tab.settle()

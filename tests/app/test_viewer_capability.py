@@ -23,6 +23,7 @@ from app.viewer.server import ViewerServer
 from app.viewer.tabs.workspace import colours, cut
 from app.viewer.tabs.workspace.capability import told, voxels
 from app.viewer.tabs.workspace.capability.wishes import MapWishes
+from app.viewer.units import USUAL, Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -74,17 +75,28 @@ def test_what_is_no_state_restores_nothing(state):
 def test_words_tell_what_the_map_holds():
     found = the_map()
     row = int(found.share.argmax())
-    text = html.unescape(told.picked(found, row))
+    text = html.unescape(told.picked(found, row, USUAL))
     assert f"{found.approachable[row].sum()} of 12 directions" in text
     none = int(np.flatnonzero(found.share == 0.0)[0])
-    assert "none of the set" in told.picked(found, none)
-    assert told.WORTH["closed form"] in told.facts(found, whole=True)
-    assert f"{found.volume:.4g}" in told.facts(found, whole=True)
-    assert "so far" in told.facts(found, whole=False)
+    assert "none of the set" in told.picked(found, none, USUAL)
+    assert told.WORTH["closed form"] in told.facts(found, whole=True, units=USUAL)
+    assert f"{found.volume:.4g}" in told.facts(found, whole=True, units=USUAL)
+    assert "so far" in told.facts(found, whole=False, units=USUAL)
     empty = kin.capability_join(found.grid, [])
-    assert "0" in told.facts(empty, whole=False)
+    assert "0" in told.facts(empty, whole=False, units=USUAL)
     assert 'data-shown="0"' in told.legend(empty, "share", "viridis", 0.0)
     assert all(set(told.WORTH) >= {kin.capability_grid(r, resolution=2).method} for r in (PIONEER, PUMA))
+
+
+@pytest.mark.parametrize(("length", "scale", "decimals"), [("mm", 1000, 0), ("cm", 100, 1), ("m", 1, 3)])
+def test_lengths_follow_the_units(length, scale, decimals):
+    found, units = the_map(), Units(length=length)
+    row = int(found.share.argmax())
+    assert f">{scale * found.grid.voxel:.{decimals + 1}f}<" in told.facts(found, True, units)
+    x = f"{scale * found.centres[row, 0]:.{decimals}f}".replace("-", "−")
+    assert f">{x} " in told.picked(found, row, units)
+    for text in (told.facts(found, True, units), told.picked(found, row, units)):
+        assert f">{length}<" in text
 
 
 def test_a_cage_has_twelve_edges():

@@ -18,6 +18,7 @@ from app.settings import Settings
 from app.store import Store
 from app.viewer.lessons.equations import EquationsLesson, page
 from app.viewer.server import ViewerServer
+from app.viewer.units import USUAL, Units
 from kin import chapter
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -130,7 +131,7 @@ def test_a_failed_check_is_said_instead_of_shown(tab: FakeBrowser, monkeypatch: 
 
 
 def test_what_was_chosen_can_be_restored() -> None:
-    stage = MagicMock(robot=PIONEER, q=PIONEER.q_home, degrees=True)
+    stage = MagicMock(robot=PIONEER, q=PIONEER.q_home, units=USUAL)
     book_later(PIONEER).result(30)
     chosen = EquationsLesson(stage)
     chosen.handle("equation", "(13) a_x ✕ misprinted")
@@ -157,11 +158,11 @@ def test_every_equation_of_every_arm_can_be_shown(robot) -> None:
         text = page.equation_html(found, equation)
         assert text.count("<div") == text.count("</div>")
         assert text.count("<math") == text.count("</math>") > (0 if equation.correct else -1)
-        assert page.symbols_html(robot, found.symbols_of(equation))
+        assert page.symbols_html(found.symbols_of(equation), USUAL)
         if equation.correct is None:
             continue
         values = found.values(equation, robot.q_home, T)
-        assert page.values_html(equation, values, True, 1.0).count("<td") == (
+        assert page.values_html(equation, values, USUAL, 1.0).count("<td") == (
             2 if equation.verdict == "derived" else 3
         )
         if equation.verdict == "misprinted":
@@ -177,9 +178,25 @@ def test_every_equation_of_every_arm_can_be_shown(robot) -> None:
 def test_names_that_people_typed_are_escaped() -> None:
     rows = (replace(PUMA.rows[0], name="<script>"), *PUMA.rows[1:])
     robot = replace(PUMA, rows=rows)
-    text = page.symbols_html(robot, book(robot).symbols.values())
+    text = page.symbols_html(book(robot).symbols.values(), USUAL)
     assert "<script>" not in text
     assert "&lt;script&gt;" in text
+
+
+@pytest.mark.parametrize("length", ["cm", "m"])
+def test_lengths_follow_the_units(length: str) -> None:
+    found, units = book(PIONEER), Units(length=length)
+    equation = next(e for e in found.equations if e.verdict == "misprinted" and e.is_length)
+    values = found.values(equation, np.array(equation.worst), kin.fk(PIONEER, np.array(equation.worst)))
+    off = abs(float(values.difference))
+    text = page.values_html(equation, values, units, off)
+    assert f" in {length}, at this pose" in text
+    assert f">{page.fixed(units.lengths.scale * float(values.dh), units.lengths.decimals(1))}<" in text
+    assert f"off by <b>{units.distance(off)}</b> here" in text
+    assert "mm" not in text
+    symbols = page.symbols_html(found.symbols.values(), units)
+    assert f"{units.lengths.scale * 0.13:.6g} {length}, " in symbols
+    assert " mm" not in symbols
 
 
 def test_notes_are_typeset() -> None:
@@ -190,6 +207,6 @@ def test_small_and_vanishing_differences_are_not_called_zero() -> None:
     equation = book(PIONEER).equation("6")
     values = book(PIONEER).values(equation, PIONEER.q_home)
     tiny = replace(values, difference=np.array(1e-6))
-    assert "<b>&lt; 0.1 mm</b>" in page.told(equation, tiny, True, 0.1)[1]
+    assert "<b>&lt; 0.1 mm</b>" in page.told(equation, tiny, USUAL, 0.1)[1]
     none = replace(values, difference=np.array(0.0))
-    assert page.told(equation, none, True, 0.1)[0] == "✓"
+    assert page.told(equation, none, USUAL, 0.1)[0] == "✓"

@@ -20,6 +20,7 @@ from app.viewer.feature import Feature
 from app.viewer.panel import lessons as choice
 from app.viewer.panel import listen
 from app.viewer.server import ViewerServer
+from app.viewer.units import Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -64,7 +65,7 @@ class Witness(Feature):
         self.note("answer", result.status)
 
     def on_style(self):
-        self.note("style", self.stage.degrees, self.stage.dark)
+        self.note("style", self.stage.units, self.stage.dark)
 
     def tick(self, now):
         self.note("tick")
@@ -110,9 +111,11 @@ def test_a_tab_is_told_what_happens_by_the_visitors_worker_alone(tab: FakeBrowse
     tab.drag(T)
     told(tab, "answer", "solved")
     tab.set("Radians", True)
-    told(tab, "style", False, False)
+    told(tab, "style", Units(degrees=False), False)
+    tab.set("Lengths", "cm")
+    told(tab, "style", Units(False, "cm"), False)
     tab.set("Dark page", True)
-    told(tab, "style", False, True)
+    told(tab, "style", Units(False, "cm"), True)
     tab.set("Robot", OTHER.name)
     told(tab, "robot", "puma560")
     assert len(Witness.threads) == 1

@@ -13,6 +13,7 @@ import kin
 from app.store import Store
 from app.viewer.panel.joints import label
 from app.viewer.panel.posture import short, strip_html
+from app.viewer.units import DEGREES
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -117,11 +118,11 @@ def test_beyond_the_feasible_range_the_arm_stops_at_its_end_and_says_which_joint
 
 def test_the_strip_draws_and_words_the_ranges() -> None:
     free = kin.Redundancy("psi", "arm angle ψ", 0.0, ((-math.pi, -math.pi / 2), (0.0, math.pi / 2)))
-    strip = strip_html(free, -180, 180, 180 / math.pi, "°")
+    strip = strip_html(free, -180, 180, DEGREES)
     assert strip.count("background:#009e73") == 2
     assert "left:50.00%;width:max(2px,25.00%)" in strip
     assert "feasible: −180.0 … −90.0°, 0.0 … 90.0°" in strip
-    nothing = strip_html(kin.Redundancy("psi", "arm angle ψ", 0.0, ()), -180, 180, 180 / math.pi, "°")
+    nothing = strip_html(kin.Redundancy("psi", "arm angle ψ", 0.0, ()), -180, 180, DEGREES)
     assert "no value is feasible" in nothing
 
 

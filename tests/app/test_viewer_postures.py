@@ -13,12 +13,14 @@ from fake_browser import FakeBrowser
 import kin
 from app.store import Store
 from app.viewer.chain import chain
+from app.viewer.lessons.postures import fixes
 from app.viewer.lessons.postures.directions import has_cone, patch, reachable, share, sphere
 from app.viewer.lessons.postures.fixes import Fix, remedies
 from app.viewer.lessons.postures.ghosts import link_poses, places, skeleton
 from app.viewer.lessons.postures.listing import Posture, html, limit_margin, survey
 from app.viewer.panel.joints import label
 from app.viewer.panel.posture import short
+from app.viewer.units import USUAL, Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -72,8 +74,21 @@ def test_how_far_beyond_a_stop_is_told_in_the_unit_of_the_visitor() -> None:
     assert worst.q is not None
     over = np.maximum(worst.q - PIONEER.upper, PIONEER.lower - worst.q).max()
     assert f"by {math.degrees(over):.1f}°" in worst.words
-    radians = survey(PIONEER, home(PIONEER), "approach", PIONEER.q_home, degrees=False)
+    radians = survey(PIONEER, home(PIONEER), "approach", PIONEER.q_home, units=Units(degrees=False))
     assert f"by {over:.3f} rad" in next(p for p in radians if p.name == worst.name).words
+
+
+@pytest.mark.parametrize("length", ["cm", "m"])
+def test_what_is_missed_is_told_in_the_unit_of_the_visitor(length: str) -> None:
+    units, T = Units(length=length), home(PUMA)
+    T[0, 3] += 2.0
+    result = kin.solve_ik(PUMA, T, q_seed=PUMA.q_home)
+    why = fixes.html(result, None, units)
+    assert f"Out of reach by {units.distance(result.distance)}" in why
+    assert "mm" not in why
+    found = remedies(PUMA, T, "position", PUMA.q_home, None, None, result, units)
+    (move,) = [fix for fix in found if fix is not None and fix.kind == "move"]
+    assert re.search(rf" \d+\.\d+ {length} away$", move.hint)
 
 
 def test_a_lock_that_is_in_the_way_is_told_as_one() -> None:
@@ -107,7 +122,7 @@ def test_an_arm_without_named_branches_has_its_nearest_posture() -> None:
 
 def test_the_row_of_the_list_is_escaped_and_marked() -> None:
     hostile = Posture("shoulder <b> · elbow up", "blocked", "beyond <i>")
-    text = html(PIONEER, (hostile,), hostile.name, frozenset(), True)
+    text = html(PIONEER, (hostile,), hostile.name, frozenset(), USUAL)
     assert "<b> ·" not in text
     assert "<i>" not in text
     assert "data-here" in text

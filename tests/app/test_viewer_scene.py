@@ -20,6 +20,7 @@ from app.viewer.meshes import body, joint_color
 from app.viewer.panel import joints, readout, status
 from app.viewer.scene import ArmScene
 from app.viewer.shapes import tube
+from app.viewer.units import USUAL, Units
 from kin.transforms import from_position_wxyz
 
 ROW = '[[rows]]\nname = "{}"\nkind = "{}"\ntheta = {}\nd = {}\na = {}\nalpha = {}\n'
@@ -259,12 +260,12 @@ def rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:
 def test_the_readout_keeps_its_shape_and_shows_no_negative_zero() -> None:
     T = np.eye(4)
     T[:3, 3] = [-1e-9, 0.1234567, -1.5]
-    text = readout.html(T, degrees=True)
+    text = readout.html(T, USUAL)
     assert ">0.0<" in text
     assert "−0.0<" not in text
     assert ">123.5<" in text
     assert ">−1500.0<" in text
-    assert "rad" in readout.html(T, degrees=False)
+    assert "rad" in readout.html(T, Units(degrees=False))
 
 
 def test_status_speaks_words_symbol_and_colour() -> None:
@@ -290,7 +291,7 @@ def test_notices_say_what_happened(robot_id: str, shift: tuple[float, ...], titl
     T = kin.fk(robot, robot.q_home)
     T[:3, 3] += shift
     result = kin.solve_ik(robot, T)
-    shown = status.notice(result)
+    shown = status.notice(result, USUAL)
     assert shown.title.startswith(title)
     assert shown.detail.lower() in result.reason.lower()
     assert len(shown.detail) > 10
@@ -298,9 +299,15 @@ def test_notices_say_what_happened(robot_id: str, shift: tuple[float, ...], titl
         assert f"{result.distance * 1000:.0f} mm" in shown.title
 
 
-def test_small_errors_are_not_rounded_to_nothing() -> None:
-    assert status.angle(math.radians(0.01)) == "< 0.1°"
-    assert status.angle(math.radians(-3.21)) == "3.2°"
-    assert status.millimetres(0.00001) == "< 0.1 mm"
-    assert status.millimetres(0.00456) == "4.6 mm"
-    assert status.millimetres(0.1234) == "123 mm"
+def test_notices_and_readout_follow_the_units() -> None:
+    robot = kin.get_robot("redundant7-craig")
+    T = kin.fk(robot, robot.q_home)
+    T[0, 3] += 2.0
+    result = kin.solve_ik(robot, T)
+    for length, factor, decimals in (("cm", 100, 1), ("m", 1, 3)):
+        units = Units(length=length)
+        far = f"{factor * result.distance:.{decimals}f} {length}"
+        assert status.notice(result, units).title == f"Out of reach by {far}"
+        assert f">{factor * T[0, 3]:.{decimals + 1}f}<" in readout.html(T, units)
+        assert f">{length}<" in readout.html(T, units)
+        assert "mm" not in status.notice(result, units).detail + readout.html(T, units)

@@ -32,6 +32,7 @@ from app.viewer.lessons.velocity.rates import (
     task_rates,
 )
 from app.viewer.server import ViewerServer
+from app.viewer.units import USUAL, Units
 from kin.singularity import task_jacobian
 from kin.transforms import rotation_angle, rotation_from_wxyz, vector_angle
 
@@ -349,6 +350,41 @@ def test_jogging_moves_the_tool_by_the_step(tab: FakeBrowser) -> None:
     tab.wait(lambda: "Not understood" in tab.html)
 
 
+def test_steps_and_sentences_follow_the_unit_of_length(tab: FakeBrowser) -> None:
+    robot = STORE.get("irb120")
+    use(tab, robot)
+    tab.set("Step, mm", 12.5)
+    assert "100 mm in the picture are" in tab.html
+    for length, shown, sample in (("cm", 1.25, "10 cm"), ("m", 0.0125, "0.1 m")):
+        tab.set("Lengths", length)
+        tab.wait(lambda length=length: f"Step, {length}" in labels(tab))  # type: ignore[misc]
+        assert tab.value(f"Step, {length}") == pytest.approx(shown)
+        tab.wait(lambda sample=sample: f"{sample} in the picture are" in tab.html)  # type: ignore[misc]
+        T = tab.tool_pose()
+        press(tab, "+z")
+        tab.wait(lambda T=T: np.allclose(tab.tool_pose()[2, 3], T[2, 3] + 0.0125, atol=1e-9))  # type: ignore[misc]
+        tab.wait(lambda shown=shown, length=length: f"Jogged {shown} {length} along +z" in tab.html)  # type: ignore[misc]
+    tab.set("Step, m", 0.002)
+    T = tab.tool_pose()
+    press(tab, "−z")
+    tab.wait(lambda: np.allclose(tab.tool_pose()[2, 3], T[2, 3] - 0.002, atol=1e-9))
+    tab.set("Step, m", 2.0)
+    tab.wait(lambda: "a number from 0.0001 to 0.1" in tab.html)
+
+
+def labels(tab: FakeBrowser) -> list[object]:
+    return [m["props"].get("label") for m in tab.gui.values()]
+
+
+def test_distances_to_a_singularity_follow_the_units() -> None:
+    robot = STORE.get("ur5")
+    found = next(s for s in kin.singularities(robot, robot.q_home) if s.unit == "m")
+    for length in ("mm", "cm", "m"):
+        units = Units(length=length)
+        assert told.distance(found, units) == units.distance(found.distance)
+        assert f">{units.distance(found.distance)}<" in told.others_html(robot, (found,), units)
+
+
 def test_a_singular_pose_is_told_with_its_kind_and_what_is_lost(tab: FakeBrowser) -> None:
     use(tab, STORE.get("irb120"))
     assert 'data-singular="far"' in tab.html
@@ -395,7 +431,7 @@ def test_a_shared_state_is_restored_and_a_hostile_one_is_ignored() -> None:
     try:
         robot = STORE.get("ur5")
         stage = SimpleNamespace(
-            client=server, robot=robot, q=robot.q_home, goal=robot.q_home, task="pose", degrees=True, dark=False
+            client=server, robot=robot, q=robot.q_home, goal=robot.q_home, task="pose", units=USUAL, dark=False
         )
         lesson = VelocityLesson(stage)  # type: ignore[arg-type]
         first = lesson.state()
@@ -408,6 +444,16 @@ def test_a_shared_state_is_restored_and_a_hostile_one_is_ignored() -> None:
         assert lesson.state() == other
         lesson.restore(first)
         assert lesson.state() == first
+        # What was on its way from fields that are gone is not read in the new units.
+        stage.units = Units(False, "cm")
+        lesson.on_style()
+        lesson.handle(("step", USUAL), 5.0)
+        lesson.handle(("turn", USUAL), 0.2)
+        assert lesson.state() == first
+        lesson.handle(("step", stage.units), 5.0)
+        lesson.handle(("turn", stage.units), 0.2)
+        assert lesson.state() == {**first, "step": 0.05, "turn": 0.2}
+        lesson.restore(first)
         lesson.restore({"ellipsoid": "none"})
         assert lesson.state()["ellipsoid"] == "none"
         lesson.remove()

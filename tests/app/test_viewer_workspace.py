@@ -24,6 +24,7 @@ from app.store import Store
 from app.viewer.server import ViewerServer
 from app.viewer.tabs.workspace import colours, cut, flow, known, pick, plot, sizes, words
 from app.viewer.tabs.workspace.wishes import MOST, Wishes, default_size
+from app.viewer.units import USUAL, Units
 from kin.robot import Joint
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -61,8 +62,8 @@ def test_a_scale_holds_nearly_all_points(robot, by):
     scale = colours.scale_of(robot, by)
     assert scale.low < scale.high
     assert ((values >= scale.low) & (values <= scale.high)).mean() > 0.98
-    legend = colours.legend(scale, "viridis")
-    assert colours.value_text(by, scale.high) in legend
+    legend = colours.legend(scale, "viridis", USUAL)
+    assert colours.value_text(by, scale.high, USUAL) in legend
     assert colours.MEANING[by].replace("'", "&#x27;") in legend
 
 
@@ -189,11 +190,11 @@ def test_the_cloud_in_the_drawing_is_inside_the_boundary_in_the_drawing():
     assert density.parts == 1
     alpha = np.asarray(Image.open(io.BytesIO(density.picture())))[..., 3]
     assert np.array_equal(alpha > 0, density.counts > 0)
-    drawn = plot.drawing(section, frame, density)
+    drawn = plot.drawing(section, frame, plot.image(density), USUAL)
     assert "data:image/png;base64," in drawn
     assert {int(j) for j in re.findall(r'data-arc="(\d)"', drawn)} == {a.joint + 1 for a in section.arcs}
     assert drawn.count("data-arc") == len(section.arcs)
-    assert "data:image" not in plot.drawing(section, frame, None)
+    assert "data:image" not in plot.drawing(section, frame, "", USUAL)
     # Equal scales, z upwards.
     a, b, c = frame.at(np.array([[0.0, 0.0], [0.1, 0.0], [0.0, 0.1]]))
     assert b[0] - a[0] == pytest.approx(a[1] - c[1])
@@ -211,11 +212,44 @@ def test_an_arm_whose_first_joint_slides_has_no_section():
 
 def test_sizes_say_what_is_unknown_yet():
     facts = known.facts(PIONEER, False)
-    table = sizes.html(facts, waiting=True)
+    table = sizes.html(facts, waiting=True, units=USUAL)
     assert table.count("computing…") == 2
     assert f"{1000 * facts.reach.largest.value:.1f}" in table
     assert "none" in table
-    assert "unknown" in sizes.html(facts, waiting=False)
+    assert "unknown" in sizes.html(facts, waiting=False, units=USUAL)
+
+
+@pytest.mark.parametrize(("length", "scale", "decimals"), [("mm", 1000, 0), ("cm", 100, 1), ("m", 1, 3)])
+def test_sizes_legend_and_picked_point_follow_the_units(length, scale, decimals):
+    units, facts = Units(length=length), known.facts(PIONEER, False)
+    table = sizes.html(facts, True, units)
+    assert f">{scale * facts.reach.largest.value:.{decimals + 1}f}<" in table
+    assert table.count(f">{length}<") == 7 - table.count(">none<")
+    scales = colours.scale_of(PIONEER, "radius")
+    assert f"{scale * scales.high:.{decimals}f} {length}" in colours.legend(scales, "viridis", units)
+    point = np.array([0.1234, -0.2, 0.0])
+    text = words.picked(PIONEER, 7, PIONEER.q_home, point, units)
+    assert f">{scale * 0.1234:.{decimals + 1}f} &nbsp; −{scale * 0.2:.{decimals + 1}f} " in text
+    assert f">{length}<" in text
+
+
+@pytest.mark.parametrize(
+    ("length", "ticks"), [("mm", ["0", "100", "200"]), ("cm", ["0", "10", "20"]), ("m", ["0.0", "0.1", "0.2"])]
+)
+def test_the_drawing_of_the_section_follows_the_units(length, ticks):
+    section = kin.section(PIONEER, resolution=32)
+    drawn = plot.drawing(section, plot.Frame.of(section), "", Units(length=length))
+    shown = re.findall(r'text-anchor="middle" style="[^"]*">([−\d.]+)</text>', drawn)
+    assert [text for text in ticks if text in shown] == ticks
+    assert len({len(text.partition(".")[2]) for text in shown if "." in text or length != "m"}) == 1
+    assert f"axis, {length}</text>" in drawn
+    assert f"z: height, {length}</text>" in drawn
+    assert re.search(rf"alone, radius [\d.]+ {length}</title>", drawn)
+
+
+def test_marks_closer_than_a_millimetre_are_told_apart():
+    texts = [text for _, text in plot._labels((0.0, 0.003), USUAL.lengths)]
+    assert texts == ["0.0", "0.5", "1.0", "1.5", "2.0", "2.5", "3.0"]
 
 
 def test_progress_in_words():
@@ -435,6 +469,48 @@ def test_a_cut_hides_points_without_sending_any(tab):
     tab.set("Cut", "none")
     tab.wait(lambda: len(tab.clouds) == 3 and tab.count == N and "Cut at (mm)" not in tab.sliders)
     assert np.array_equal(tab.points(only_visible=True), points)
+
+
+def test_the_tab_follows_the_unit_of_length_and_keeps_what_it_shows():
+    server = ViewerServer(STORE, Settings(), Clouds())
+    with Visitor(server.start()) as tab:
+        tab.settle(0.2)
+        (session,) = server._sessions.values()
+        post = session._tabs[0].post
+        tab.draw(2000, seed=17)
+        tab.set("Cut", "across z (level)")
+        tab.set("Sizes", True)
+        tab.set("Section plot", True)
+        tab.wait(lambda: "z: height, mm" in tab.html and tab.html.count(" ± ") == 2, 60.0)
+        tab.wait(lambda: "Cut at (mm)" in tab.sliders)
+        tab.set("Cut at (mm)", 200.0)
+        tab.settle()
+        size, sent, seen = (
+            tab.value("Point size (mm)"),
+            tab.sent("PointCloudMessage"),
+            tab.points(only_visible=True),
+        )
+        table = tab.html.count(">mm</td>")
+        tab.set("Lengths", "cm")
+        tab.wait(lambda: "Cut at (cm)" in tab.sliders)
+        # What was on its way from sliders that are gone.
+        post(("at", USUAL), 0.0)
+        post(("size", USUAL), 20.0)
+        tab.settle()
+        assert tab.value("Cut at (cm)") == pytest.approx(20.0)
+        assert tab.value("Point size (cm)") == pytest.approx(size / 10)
+        assert tab.html.count(">cm</td>") == table
+        assert "z: height, cm" in tab.html
+        assert re.search(r"<span>[−\d.]+ cm</span>", tab.html), "the legend"
+        assert not re.search(r"[> ]mm\b", tab.html)
+        assert tab.sent("PointCloudMessage") == sent
+        assert np.array_equal(tab.points(only_visible=True), seen)
+        tab.set("Point size (cm)", 0.8)
+        tab.wait(lambda: all(m["props"]["point_size"] == pytest.approx(0.004) for m in tab.clouds))
+        tab.set("Cut at (cm)", 10.0)
+        tab.settle()
+        assert tab.points(only_visible=True)[:, 2].max() < 0.1 + HALF
+    server.stop()
 
 
 def test_a_cut_while_it_streams_loses_nothing(tab):

@@ -4,6 +4,9 @@ Every piece is built from a visitor's own `viser.GuiApi` and a `post` function. 
 into the visitor's inbox; its `show…` methods are called by the visitor's worker. Assigning a value here makes
 viser call the callbacks too, with ``event.client is None``: those calls are ignored, or moving the gizmo would
 move the sliders would move the gizmo.
+
+A control that shows a value in a unit is made anew when the unit changes, and posts under a key that holds the
+`Units` it was made in: an event that was on its way meanwhile is told apart from those of its successor.
 """
 
 from __future__ import annotations

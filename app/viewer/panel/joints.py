@@ -14,10 +14,11 @@ import viser
 
 from app.viewer.panel import Post, assign, listen
 from app.viewer.panel.status import Notice
+from app.viewer.units import Unit, Units
 from kin import InputError, Robot
-from kin.robot import Joint
 from kin.transforms import Array
 
+DIGITS = 2
 CLOSED = "\N{BLACK SQUARE}"  # a padlock is missing from many fonts
 UNLOCK_ALL = "Unlock all"
 LOCK_HINT = (
@@ -31,13 +32,6 @@ def label(robot: Robot, index: int) -> str:
     name = robot.joints[index].name
     number = str(index + 1)
     return f"Joint {number}" if name.lower() == f"joint {number}" else f"{number} {name}"
-
-
-def scale(joint: Joint, degrees: bool) -> tuple[float, int, str]:
-    """Screen units per internal unit, decimals shown, and the unit's name."""
-    if joint.kind == "prismatic":
-        return 1000.0, 2, "mm"
-    return (180 / math.pi, 2, "°") if degrees else (1.0, 4, "rad")
 
 
 def padlocks(locked: Sequence[bool]) -> tuple[str, ...]:
@@ -57,9 +51,9 @@ def lock_notice(locked: Sequence[bool]) -> Notice:
 
 
 class JointSliders:
-    """The sliders of one robot in one unit; rebuilt when either changes.
+    """The sliders of one robot in the visitor's units; rebuilt when either changes.
 
-    Posts ``("joint", robot id, i, degrees)`` with the slider's value in screen units, and
+    Posts ``("joint", robot id, i, units)`` with the slider's value in screen units, and
     ``("lock", robot id, i)`` with whether the joint is to be locked (i is None for all joints).
     """
 
@@ -70,26 +64,26 @@ class JointSliders:
         robot: Robot,
         q: Array,
         locked: Sequence[bool],
-        degrees: bool,
+        units: Units,
         post: Post,
     ) -> None:
         self.robot = robot
-        self._degrees = degrees
+        self._units = units
         self._sliders: list[viser.GuiSliderHandle[float]] = []
         with folder:
             for i, joint in enumerate(robot.joints):
-                factor, decimals, unit = scale(joint, degrees)
+                unit = self._unit(i)
                 low, high = joint.limits or (-math.pi, math.pi)
-                bounds = (round(low * factor, decimals), round(high * factor, decimals))
+                bounds = (unit.shown(low, DIGITS), unit.shown(high, DIGITS))
                 slider = gui.add_slider(
                     label(robot, i),
                     min=bounds[0],
                     max=bounds[1],
-                    step=10.0**-decimals,
-                    initial_value=min(max(round(float(q[i]) * factor, decimals), bounds[0]), bounds[1]),
-                    hint=f"{joint.name}: {bounds[0]:g} … {bounds[1]:g} {unit}",
+                    step=unit.step(DIGITS),
+                    initial_value=min(max(unit.shown(float(q[i]), DIGITS), bounds[0]), bounds[1]),
+                    hint=f"{joint.name}: {bounds[0]:g} … {bounds[1]:g}{unit.suffix}",
                 )
-                listen(slider, post, ("joint", robot.id, i, degrees))
+                listen(slider, post, ("joint", robot.id, i, units))
                 self._sliders.append(slider)
             self._locks = gui.add_button_group("Locked", padlocks(locked), hint=LOCK_HINT)
         self._listen_locks(post)
@@ -98,8 +92,7 @@ class JointSliders:
         """A slider's value as radians or metres, inside the limits; raises `InputError` for anything else."""
         if not isinstance(value, int | float) or not math.isfinite(value):
             raise InputError(f"joint {index + 1}", value, "a finite number")
-        joint = self.robot.joints[index]
-        raw = float(value) / scale(joint, self._degrees)[0]
+        raw = self._unit(index).read(float(value))
         return float(np.clip(raw, self.robot.lower[index], self.robot.upper[index]))
 
     def show(self, q: Array, held: int | None = None) -> None:
@@ -109,14 +102,16 @@ class JointSliders:
         """
         for i, slider in enumerate(self._sliders):
             if i != held or not slider.min <= slider.value <= slider.max:
-                factor, decimals, _ = scale(self.robot.joints[i], self._degrees)
-                value = round(float(q[i]) * factor, decimals)
+                value = self._unit(i).shown(float(q[i]), DIGITS)
                 assign(slider, min(max(value, slider.min), slider.max))
 
     def show_locks(self, locked: Sequence[bool]) -> None:
         """Show which joints are locked ``(n,)``."""
         if self._locks.options != padlocks(locked):
             self._locks.options = padlocks(locked)
+
+    def _unit(self, index: int) -> Unit:
+        return self._units.of(self.robot.joints[index].kind == "revolute")
 
     def _listen_locks(self, post: Post) -> None:
         @self._locks.on_click

@@ -11,12 +11,13 @@ from app.viewer.panel.readout import PoseReadout
 from app.viewer.panel.share import SharePanel
 from app.viewer.panel.status import Notice, StatusLine
 from app.viewer.panel.target import TargetChoice, default_task
-from app.viewer.panel.view import ViewOptions, ViewState
+from app.viewer.panel.view import UnitChoice, ViewOptions, ViewState
+from app.viewer.units import Units
 from kin import Robot, fk
 
 
 class Panel:
-    """One visitor's panel. Posts ``"robot"``, ``"home"``, ``"random"``, ``"units"``, and what its parts post.
+    """One visitor's panel. Posts ``"robot"``, ``"home"``, ``"random"``, and what its parts post.
 
     Args:
         learn: whether there is a tab for lessons.
@@ -33,7 +34,7 @@ class Panel:
         gui: viser.GuiApi,
         robots: Sequence[Robot],
         robot: Robot,
-        degrees: bool,
+        units: Units,
         view: ViewState,
         welcome: Notice,
         learn: bool,
@@ -43,7 +44,7 @@ class Panel:
         self.status = StatusLine(gui, welcome)
         self.robot = gui.add_dropdown("Robot", tuple(r.name for r in robots), initial_value=robot.name)
         listen(self.robot, post, "robot")
-        self.readout = PoseReadout(gui, fk(robot, robot.q_home), degrees)
+        self.readout = PoseReadout(gui, fk(robot, robot.q_home), units)
         group = gui.add_tab_group()
         with group.add_tab("Move"):
             self.joints = gui.add_folder("Joints")
@@ -54,8 +55,7 @@ class Panel:
         self.learn = group.add_tab("Learn") if learn else None
         self.tabs = [group.add_tab(title) for title in tabs]
         with group.add_tab("View"):
-            units = gui.add_checkbox("Radians", not degrees, hint="Angles in radians instead of degrees")
-            listen(units, post, "units")
+            self.units = UnitChoice(gui, units, post)
             ViewOptions(gui, view, post)
             with gui.add_folder("Share"):
                 self.share = SharePanel(gui, post)

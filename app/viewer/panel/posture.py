@@ -13,6 +13,7 @@ from html import escape
 import viser
 
 from app.viewer.panel import Post, assign, listen
+from app.viewer.units import USUAL, Unit, Units
 from kin import InputError, Redundancy, Robot, branch_names
 
 NEAREST = "Nearest"
@@ -82,7 +83,7 @@ class BranchChoice:
 class FreeSliders:
     """A slider with its feasible strip for each free value; made anew when other values are free.
 
-    Posts ``("free", name)`` with the slider's value in screen units.
+    Posts ``("free", robot id, name, units)`` with the slider's value in screen units.
     """
 
     def __init__(self, gui: viser.GuiApi, folder: viser.GuiFolderHandle, post: Post) -> None:
@@ -92,21 +93,21 @@ class FreeSliders:
         self._key: tuple[object, ...] = ()
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
         self._strips: dict[str, viser.GuiHtmlHandle] = {}
-        self._degrees = True
+        self._unit = USUAL.angles
 
-    def show(self, free: Sequence[Redundancy], robot: Robot, degrees: bool, held: str | None = None) -> None:
+    def show(self, free: Sequence[Redundancy], robot: Robot, units: Units, held: str | None = None) -> None:
         """Show these values and ranges; the slider in the visitor's hand (`held`) keeps its value."""
-        key = (robot.id, degrees, *(item.name for item in free))
+        key = (robot.id, units, *(item.name for item in free))
         if key != self._key:
             self.remove()
             self._key = key
-            self._make(free, robot, degrees)
+            self._make(free, robot, units)
         for item in free:
             slider = self._sliders[item.name]
-            value = self._shown(item.value)
+            value = self._unit.shown(item.value)
             if item.name != held:
                 assign(slider, min(max(value, slider.min), slider.max))
-            strip = strip_html(item, float(slider.min), float(slider.max), self._scale, self._unit)
+            strip = strip_html(item, float(slider.min), float(slider.max), self._unit)
             if self._strips[item.name].content != strip:
                 self._strips[item.name].content = strip
 
@@ -116,7 +117,7 @@ class FreeSliders:
             raise InputError("free parameter", name, "one of " + ", ".join(self._sliders))
         if not isinstance(value, int | float) or not math.isfinite(value):
             raise InputError(name, value, "a finite number")
-        return float(value) / self._scale
+        return self._unit.read(float(value))
 
     def remove(self) -> None:
         """Take the sliders out of the panel."""
@@ -126,41 +127,29 @@ class FreeSliders:
             strip.remove()
         self._sliders, self._strips, self._key = {}, {}, ()
 
-    @property
-    def _scale(self) -> float:
-        return 180 / math.pi if self._degrees else 1.0
-
-    @property
-    def _unit(self) -> str:
-        return "°" if self._degrees else " rad"
-
-    def _shown(self, value: float) -> float:
-        return round(value * self._scale, 1 if self._degrees else 3)
-
-    def _make(self, free: Sequence[Redundancy], robot: Robot, degrees: bool) -> None:
-        self._degrees = degrees
+    def _make(self, free: Sequence[Redundancy], robot: Robot, units: Units) -> None:
+        self._unit = unit = units.angles
         with self._folder:
             for item in free:
                 low, high = -math.pi, math.pi
                 if item.name.startswith("theta"):
                     joint = robot.joints[int(item.name.removeprefix("theta")) - 1]
                     low, high = joint.limits or (low, high)
+                least, most = unit.shown(low), unit.shown(high)
                 slider = self._gui.add_slider(
                     item.label[0].upper() + item.label[1:] if item.label[0].isascii() else item.label,
-                    min=self._shown(low),
-                    max=self._shown(high),
-                    step=0.1 if degrees else 0.001,
-                    initial_value=min(max(self._shown(item.value), self._shown(low)), self._shown(high)),
+                    min=least,
+                    max=most,
+                    step=unit.step(1),
+                    initial_value=min(max(unit.shown(item.value), least), most),
                     hint="Moves the arm while the target stays met. The strip shows the values the limits allow.",
                 )
-                listen(slider, self._post, ("free", robot.id, item.name, degrees))
+                listen(slider, self._post, ("free", robot.id, item.name, units))
                 self._sliders[item.name] = slider
                 self._strips[item.name] = self._gui.add_html("")
 
 
-def strip_html(
-    item: Redundancy, low: float, high: float, scale: float, unit: str, under: str = UNDER_TRACK
-) -> str:
+def strip_html(item: Redundancy, low: float, high: float, unit: Unit, under: str = UNDER_TRACK) -> str:
     """The feasible ranges as bars on a line from `low` to `high` (screen units), and in words.
 
     `under`: margins that put the line under a slider's track.
@@ -168,7 +157,7 @@ def strip_html(
     span = high - low
 
     def percent(value: float) -> float:
-        return 100.0 * min(max((value * scale - low) / span, 0.0), 1.0)
+        return 100.0 * min(max((value * unit.scale - low) / span, 0.0), 1.0)
 
     bars = "".join(
         f'<span style="position:absolute;top:0;bottom:0;left:{percent(a):.2f}%;'
@@ -179,10 +168,7 @@ def strip_html(
         f'<span style="position:absolute;top:-3px;bottom:-3px;left:calc({percent(item.value):.2f}% - 1px);'
         'width:2px;background:currentColor"></span>'
     )
-    digits = 1 if unit == "°" else 3
-    ranges = ", ".join(
-        f"{a * scale:.{digits}f} … {b * scale:.{digits}f}{unit}".replace("-", "−") for a, b in item.intervals[:4]
-    )
+    ranges = ", ".join(f"{unit.number(a)} … {unit.text(b)}" for a, b in item.intervals[:4])
     words = f"feasible: {ranges}" if ranges else "no value is feasible"
     return (
         f'<div data-free="{escape(item.name)}" style="margin:-.2em 1em .4em">'

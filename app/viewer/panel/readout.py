@@ -6,6 +6,7 @@ import math
 
 import viser
 
+from app.viewer.units import Units
 from kin.transforms import Array, wxyz_from_rotation
 
 
@@ -18,15 +19,15 @@ def roll_pitch_yaw(R: Array) -> tuple[float, float, float]:
     return math.atan2(R[2, 1], R[2, 2]), pitch, math.atan2(R[1, 0], R[0, 0])
 
 
-def html(T_base_tool: Array, degrees: bool) -> str:
-    """Position in mm, roll/pitch/yaw and quaternion of a pose ``(4, 4)`` as a small table."""
-    angles = roll_pitch_yaw(T_base_tool[:3, :3])
-    shown = [math.degrees(a) for a in angles] if degrees else list(angles)
+def html(T_base_tool: Array, units: Units) -> str:
+    """Position, roll/pitch/yaw and quaternion of a pose ``(4, 4)`` as a small table."""
+    lengths, angles = units.lengths, units.angles
+    position = (lengths.scale * T_base_tool[:3, 3]).tolist()
+    turned = [angles.scale * a for a in roll_pitch_yaw(T_base_tool[:3, :3])]
     quaternion = wxyz_from_rotation(T_base_tool[:3, :3]).tolist()
-    position = (1000.0 * T_base_tool[:3, 3]).tolist()
     rows = (
-        ("x y z", position, 1, "mm"),
-        ("roll pitch yaw", shown, 1 if degrees else 3, "°" if degrees else "rad"),
+        ("x y z", position, lengths.decimals(1), lengths.name),
+        ("roll pitch yaw", turned, angles.decimals(1), angles.name),
         ("wxyz", quaternion, 3, ""),
     )
     body = "".join(
@@ -56,9 +57,9 @@ def _cell(value: float, decimals: int, width: float) -> str:
 class PoseReadout:
     """Shows the tool's pose."""
 
-    def __init__(self, gui: viser.GuiApi, T_base_tool: Array, degrees: bool) -> None:
-        self._html = gui.add_html(html(T_base_tool, degrees))
+    def __init__(self, gui: viser.GuiApi, T_base_tool: Array, units: Units) -> None:
+        self._html = gui.add_html(html(T_base_tool, units))
 
-    def show(self, T_base_tool: Array, degrees: bool) -> None:
+    def show(self, T_base_tool: Array, units: Units) -> None:
         """Replace the numbers."""
-        self._html.content = html(T_base_tool, degrees)
+        self._html.content = html(T_base_tool, units)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from html import escape
 from typing import Literal
 
 import viser
 
+from app.viewer.units import Units
 from kin import IKResult
 
 Kind = Literal["reached", "compromise", "limits", "orientation", "unreachable", "hand", "error"]
@@ -34,20 +34,20 @@ class Notice:
     detail: str = ""
 
 
-def notice(result: IKResult) -> Notice:
-    """The answer to a target, in words for people (degrees and millimetres)."""
-    kind, title = _headline(result)
-    return Notice(kind, title, _without_repeating(title, result.reason))
+def notice(result: IKResult, units: Units) -> Notice:
+    """The answer to a target, in words for people."""
+    kind, title = _headline(result, units)
+    return Notice(kind, title, _without_repeating(title, units.retold(result.reason)))
 
 
-def _headline(result: IKResult) -> tuple[Kind, str]:
+def _headline(result: IKResult, units: Units) -> tuple[Kind, str]:
     if result.status == "solved":
         return "reached", "Reached"
     if result.status == "approximate":
         best = result.best
         error = best.rotation_error if best is not None else 0.0
         name = "roll" if best is not None and best.compromise == "roll" else "rotation"
-        return "compromise", f"Reached with {name} error {angle(error)}"
+        return "compromise", f"Reached with {name} error {units.angle(error)}"
     if result.status == "limits":
         numbers = [str(v.joint + 1) for v in result.violations]
         which = "joint " + numbers[0] if len(numbers) == 1 else "joints " + ", ".join(numbers)
@@ -56,7 +56,7 @@ def _headline(result: IKResult) -> tuple[Kind, str]:
         return "orientation", "Orientation not attainable here"
     if result.cause == "branch":
         return "unreachable", "No solution on the chosen branch"
-    return "unreachable", f"Out of reach by {millimetres(result.distance)}"
+    return "unreachable", f"Out of reach by {units.distance(result.distance)}"
 
 
 def _without_repeating(title: str, reason: str) -> str:
@@ -65,20 +65,6 @@ def _without_repeating(title: str, reason: str) -> str:
     if colon and opening.split()[0] == title.split()[0]:
         return rest[:1].upper() + rest[1:]
     return reason
-
-
-def angle(radians: float) -> str:
-    """An error angle for people: never rounded down to a zero that it is not."""
-    degrees = math.degrees(abs(radians))
-    return "< 0.1°" if 0.0 < degrees < 0.1 else f"{degrees:.1f}°"
-
-
-def millimetres(metres: float) -> str:
-    """A distance for people, in millimetres."""
-    mm = 1000.0 * metres
-    if mm < 0.1:
-        return "< 0.1 mm"
-    return f"{mm:.1f} mm" if mm < 10.0 else f"{mm:.0f} mm"
 
 
 def html(shown: Notice) -> str:
@@ -102,11 +88,23 @@ class StatusLine:
     """Shows one notice at a time."""
 
     def __init__(self, gui: viser.GuiApi, first: Notice) -> None:
+        self._answer: IKResult | None = None
         self._shown = first
         self._html = gui.add_html(html(first))
 
     def show(self, shown: Notice) -> None:
         """Replace the notice."""
+        self._answer = None
         if shown != self._shown:
             self._shown = shown
             self._html.content = html(shown)
+
+    def answer(self, result: IKResult, units: Units) -> None:
+        """Tell the answer to a target."""
+        self.show(notice(result, units))
+        self._answer = result
+
+    def use(self, units: Units) -> None:
+        """Tell an answer that is still on show in these units. Anything else stays as it was told."""
+        if self._answer is not None:
+            self.answer(self._answer, units)

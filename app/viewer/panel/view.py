@@ -1,4 +1,4 @@
-"""What is drawn and how: frames, labels, axes, page colours, camera."""
+"""What is shown and how: units, frames, labels, axes, page colours, camera."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import viser
 
-from app.viewer.panel import Post, listen, listen_click
+from app.viewer.panel import Post, assign, listen, listen_click
+from app.viewer.units import LENGTHS, Length, Units
+from kin import InputError
 
 BRAND = (0, 114, 178)
 BRAND_ON_DARK = (86, 180, 233)
@@ -20,6 +22,27 @@ class ViewState:
     labels: bool = True
     axes: bool = True
     dark: bool = False
+
+
+class UnitChoice:
+    """Posts ``"radians"`` and ``"lengths"``."""
+
+    def __init__(self, gui: viser.GuiApi, units: Units, post: Post) -> None:
+        radians = gui.add_checkbox("Radians", not units.degrees, hint="Angles in radians instead of degrees")
+        listen(radians, post, "radians")
+        self._length: Length = units.length
+        self._lengths = gui.add_dropdown(
+            "Lengths", LENGTHS, initial_value=units.length, hint="Unit of all lengths, shown and typed"
+        )
+        listen(self._lengths, post, "lengths")
+
+    def read_length(self, value: object) -> Length:
+        """A choice of the dropdown; raises `InputError` for one that is not on its list."""
+        if value not in LENGTHS:
+            assign(self._lengths, self._length)
+            raise InputError("lengths", value, "one of " + ", ".join(LENGTHS))
+        self._length = value
+        return self._length
 
 
 class ViewOptions:

@@ -274,7 +274,7 @@ class DHLesson(Feature):
         if self._drawing is None:
             return
         frames = link_frames(robot, q)
-        self._drawing.show(place(robot, q, self._at, frames), frames, self.stage.degrees, names)
+        self._drawing.show(place(robot, q, self._at, frames), frames, self.stage.units, names)
         if self._other is not None:
             others = link_frames(self._other.robot, q)
             self._other.show(place(self._other.robot, q, self._at, others), frames, others, names)
@@ -283,17 +283,17 @@ class DHLesson(Feature):
         """Bring the texts up to date."""
         self._read_at = time.perf_counter()
         self._stale = False
-        robot, q, degrees = self.stage.robot, self.stage.q, self.stage.degrees
+        robot, q, units = self.stage.robot, self.stage.q, self.stage.units
         at = place(robot, q, self._at)
-        _put(self._caption, page.caption_html(robot, at, degrees))
-        _put(self._table, page.table_html(robot, q, at, degrees))
-        _put(self._matrices, page.matrices_html(robot, at, self._symbols))
+        _put(self._caption, page.caption_html(robot, at, units))
+        _put(self._table, page.table_html(robot, q, at, units))
+        _put(self._matrices, page.matrices_html(robot, at, self._symbols, units))
         if self._other is not None:
             other = self._other.robot
             tools = [link_frames(reading, q)[-1, :3, 3] for reading in (robot, other)]
             apart = float(np.linalg.norm(tools[0] - tools[1]))
             there = place(other, q, self._at)
-            _put(self._comparison, page.compare_html(robot, other, q, there, apart, degrees))
+            _put(self._comparison, page.compare_html(robot, other, q, there, apart, units))
 
     def _aim_at_both(self) -> None:
         """Move the camera until arm and skeleton are in view, in the direction it looks already."""

@@ -16,6 +16,7 @@ from app.viewer.camera import DIRECTION
 from app.viewer.lessons.dh.page import ABOUT_X, ABOUT_Z, TITLES
 from app.viewer.lessons.dh.steps import Factor, Place, amount, axis, reread, shared_lines, symbol, turns
 from app.viewer.meshes import body, joint_color
+from app.viewer.units import Units
 from kin import Robot
 from kin.transforms import Array, wxyz_from_rotation
 
@@ -138,11 +139,11 @@ class WalkDrawing:
         self._applied: tuple[int, int] | None = None
         self._made = 0
 
-    def show(self, at: Place, frames: Array, degrees: bool, names: bool) -> None:
+    def show(self, at: Place, frames: Array, units: Units, names: bool) -> None:
         """Show a place, with the arm's ``link_frames``; `names`: bring the names of frames along as well."""
         pose(self._moving, at.T_0_now)
         self._show_placed(np.concatenate([self._robot.T_world_base[None], frames[: at.placed]]), names)
-        self._show_quantity(at, degrees)
+        self._show_quantity(at, units)
 
     def remove(self) -> None:
         """Take everything out of the scene."""
@@ -166,7 +167,7 @@ class WalkDrawing:
         for label, height, T in zip(self._labels, self._heights, frames, strict=False):
             label.position = T[:3, 3] + height * PLACED * self._size * T[:3, 2]
 
-    def _show_quantity(self, at: Place, degrees: bool) -> None:
+    def _show_quantity(self, at: Place, units: Units) -> None:
         shown = at.value * at.share
         there = at.motion >= 0 and at.value != 0.0
         self._value.visible = there
@@ -186,8 +187,8 @@ class WalkDrawing:
             colors[:2], colors[2:] = linear(GREY), linear(ABOUT_Z if about == 2 else ABOUT_X)
             self._quantity = self._lines("quantity", points, colors, 0.42)
             self._applied = (at.row, at.motion)
-        whole = amount(at.factor, at.value, degrees)
-        so_far = "= " if at.share == 1.0 else f"{amount(at.factor, shown, degrees)} of "
+        whole = amount(at.factor, at.value, units)
+        so_far = "= " if at.share == 1.0 else f"{amount(at.factor, shown, units)} of "
         self._value.text = f"{symbol(self._robot, at.row, at.factor)} {so_far}{whole}"
         self._value.position = R @ middle(at.factor, shown, radius, aside) + p
 

@@ -6,7 +6,6 @@ Colours come with words or weight; the greys are the text's own colour, so that 
 
 from __future__ import annotations
 
-import math
 from html import escape
 
 from app.viewer import mathml as m
@@ -24,6 +23,7 @@ from app.viewer.lessons.dh.steps import (
     value,
     verdict,
 )
+from app.viewer.units import Unit, Units
 from kin import Robot
 from kin.robot import Convention
 from kin.transforms import Array
@@ -32,6 +32,7 @@ from kin.transforms import Array
 ABOUT_Z, ABOUT_X = (0, 114, 178), (213, 94, 0)
 ROW_GROUND = "rgba(128,128,128,.16)"
 TITLES: dict[Convention, str] = {"standard": "Standard order", "modified": "Craig’s order (modified)"}
+WIDTHS = {"mm": 3.3, "cm": 3.3, "m": 3.7}  # em of a column
 MATRIX = 0.74  # em, so that sixteen numbers and a name fit a panel of 300 pixels
 
 NINE_STEPS = (
@@ -59,9 +60,9 @@ def color(factor: Factor, strength: float = 1.0) -> str:
     return f"rgba({r},{g},{b},{strength:g})"
 
 
-def caption_html(robot: Robot, at: Place, degrees: bool) -> str:
+def caption_html(robot: Robot, at: Place, units: Units) -> str:
     """The motion under way: in words, and marked in the row's product of four."""
-    words = caption(robot, at, degrees)
+    words = caption(robot, at, units)
     # Always two lines high: what is below must not jump.
     return (
         '<div data-dh="caption" style="margin:.1em 1em .2em;font-size:.86em;line-height:1.35">'
@@ -86,12 +87,12 @@ def _symbol(robot: Robot, row: int, factor: Factor) -> m.MathML:
     return m.sub(m.ident(LETTERS[factor]), m.short(index(robot, row, factor)))
 
 
-def table_html(robot: Robot, q: Array, at: Place | None, degrees: bool) -> str:
+def table_html(robot: Robot, q: Array, at: Place | None, units: Units) -> str:
     """The table at a configuration ``(n,)``, columns in the order of application, the place marked."""
     order = ORDERS[robot.convention]
     line = '<tr style="{}">{}</tr>'
     heads = [("", "row")] + [
-        (LETTERS[f] + ("ᵢ₋₁" if index(robot, 0, f) == 0 else "ᵢ"), _unit(f, degrees)) for f in order
+        (LETTERS[f] + ("ᵢ₋₁" if index(robot, 0, f) == 0 else "ᵢ"), units.of(turns(f)).name) for f in order
     ]
     head = "".join(
         '<th scope="col" style="padding:0 .35em;font-weight:500;text-align:right">'
@@ -111,7 +112,7 @@ def table_html(robot: Robot, q: Array, at: Place | None, degrees: bool) -> str:
                 style += ";font-weight:700;text-decoration:underline dotted;text-underline-offset:.2em"
             if here and at is not None and k == at.motion:
                 style += f";background:{color(factor, 0.3)};box-shadow:inset 0 0 0 1.5px {color(factor)}"
-            cells.append(f'<td style="{style}">{_shown(factor, value(robot, i, factor, q), degrees)}</td>')
+            cells.append(f'<td style="{style}">{units.of(turns(factor)).number(value(robot, i, factor, q))}</td>')
         body.append(line.format(f"background:{ROW_GROUND}" if here else "", "".join(cells)))
     return (
         f'<table data-dh="table" aria-label="DH table, {TITLES[robot.convention]}" style="width:calc(100% - 2em);'
@@ -121,26 +122,17 @@ def table_html(robot: Robot, q: Array, at: Place | None, degrees: bool) -> str:
     )
 
 
-def _unit(factor: Factor, degrees: bool) -> str:
-    return ("°" if degrees else "rad") if turns(factor) else "mm"
-
-
-def _shown(factor: Factor, number: float, degrees: bool) -> str:
-    if turns(factor):
-        return m.fixed(math.degrees(number) if degrees else number, 1 if degrees else 3)
-    return m.fixed(1000.0 * number, 1)
-
-
-def matrices_html(robot: Robot, at: Place, symbols: bool) -> str:
-    """The row's matrix and the moving frame's, so far; lengths in mm. `symbols`: the row's with its joint open."""
+def matrices_html(robot: Robot, at: Place, symbols: bool, units: Units) -> str:
+    """The row's matrix and the moving frame's, so far. `symbols`: the row's with its joint open."""
+    unit = units.lengths
     whole = at.placed > at.row
     A = m.sub(m.ident("A"), m.short(at.row + 1))
     T = m.subsup(m.ident("T"), m.short(at.row + 1), m.short(0))
     far = "" if whole else " so far"
-    shown = _symbols(robot, at) if symbols else _numbers(at.A)
+    shown = _symbols(robot, at, unit) if symbols else _numbers(at.A, unit)
     blocks = (
-        (f"Row {at.row + 1}{far}, lengths in mm", m.math(A, m.op("="), shown, size=MATRIX)),
-        (f"All rows{far}: the moving frame", m.math(T, m.op("="), _numbers(at.T_0_now), size=MATRIX)),
+        (f"Row {at.row + 1}{far}, lengths in {unit.name}", m.math(A, m.op("="), shown, size=MATRIX)),
+        (f"All rows{far}: the moving frame", m.math(T, m.op("="), _numbers(at.T_0_now, unit), size=MATRIX)),
     )
     return "".join(
         f'<div style="margin:.25em 1em .4em"><div style="font-size:.78em;opacity:.8">{escape(title)}'
@@ -149,13 +141,16 @@ def matrices_html(robot: Robot, at: Place, symbols: bool) -> str:
     )
 
 
-def _numbers(T: Array) -> m.MathML:
-    """A pose ``(4, 4)``: directions with three decimals, the position in millimetres with one."""
-    lines = [[*(m.number(v, 3) for v in line[:3]), m.number(1000.0 * line[3], 1)] for line in T[:3].tolist()]
-    return m.matrix([*lines, [m.short(v) for v in T[3].tolist()]], width=3.3)
+def _numbers(T: Array, unit: Unit) -> m.MathML:
+    """A pose ``(4, 4)``: directions with three decimals, the position with one of a millimetre."""
+    lines = [
+        [*(m.number(v, 3) for v in line[:3]), m.number(unit.scale * line[3], unit.decimals(1))]
+        for line in T[:3].tolist()
+    ]
+    return m.matrix([*lines, [m.short(v) for v in T[3].tolist()]], width=WIDTHS[unit.name])
 
 
-def _symbols(robot: Robot, at: Place) -> m.MathML:
+def _symbols(robot: Robot, at: Place, unit: Unit) -> m.MathML:
     """The row's matrix, up to the motion under way, as sums of what its joint leaves open."""
     found = symbolic(robot, at.row, at.motion + 1)
     q = _symbol(robot, at.row, MOVED.get(robot.rows[at.row].kind, "theta"))
@@ -164,13 +159,13 @@ def _symbols(robot: Robot, at: Place) -> m.MathML:
     def entry(r: int, c: int) -> m.MathML:
         terms: list[m.MathML] = []
         for name, constants in zip(found.names, found.constants, strict=True):
-            # Lengths in mm; a sliding joint's own d is one already.
-            scale = 1000.0 if c == 3 and r < 3 and name != "q" else 1.0
-            k = float(constants[r, c]) * scale
+            # A sliding joint's own d is a length already.
+            length = c == 3 and r < 3 and name != "q"
+            k = float(constants[r, c]) * (unit.scale if length else 1.0)
             if abs(k) < 1e-9:
                 continue
             piece = names[name]
-            size = m.short(abs(k), 1 if scale > 1.0 else 3)
+            size = m.short(abs(k), unit.decimals(1) if length else 3)
             shown = size if piece is None else piece if abs(abs(k) - 1.0) < 1e-9 else m.row(size, m.gap(), piece)
             if terms:
                 terms += [m.op("-" if k < 0.0 else "+"), shown]
@@ -192,13 +187,13 @@ def nine_steps_html(convention: Convention) -> str:
     )
 
 
-def compare_html(robot: Robot, other: Robot, q: Array, place_other: Place, apart: float, degrees: bool) -> str:
+def compare_html(robot: Robot, other: Robot, q: Array, place_other: Place, apart: float, units: Units) -> str:
     """The same numbers read in the other order: its table, what differs and why; `apart`: between the tools, m."""
-    paragraphs = "".join(f'<p style="margin:0 0 .4em">{escape(words)}</p>' for words in verdict(robot, degrees))
+    paragraphs = "".join(f'<p style="margin:0 0 .4em">{escape(words)}</p>' for words in verdict(robot, units))
     return (
-        f"{table_html(other, q, place_other, degrees)}"
+        f"{table_html(other, q, place_other, units)}"
         '<div data-dh="verdict" style="margin:.2em 1em .5em;font-size:.84em;line-height:1.4">'
         f"{paragraphs}"
         '<div style="opacity:.85;font-variant-numeric:tabular-nums">At these joint values the two tool points are '
-        f"{m.fixed(1000.0 * apart, 1)} mm apart.</div></div>"
+        f"{units.lengths.text(apart)} apart.</div></div>"
     )

@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 
 from app.viewer.chain import rotation, translation
+from app.viewer.units import Units
 from kin import Robot, link_frames
 from kin.axes import joint_axes, pairs
 from kin.robot import Convention
@@ -179,17 +180,12 @@ def axis_name(robot: Robot, row: int, factor: Factor) -> str:
     return "xyz"[axis(factor)] + low(number)
 
 
-def amount(factor: Factor, shown: float, degrees: bool) -> str:
-    """A value with its unit, as the panel shows it: degrees or radians, millimetres."""
-    if turns(factor):
-        text = f"{math.degrees(shown):.1f}°" if degrees else f"{shown:.3f} rad"
-    else:
-        text = f"{1000.0 * shown:.1f} mm"
-    bare = text.lstrip("-").rstrip("° radm")
-    return (text.lstrip("-") if float(bare) == 0.0 else text).replace("-", "−")
+def amount(factor: Factor, shown: float, units: Units) -> str:
+    """A value with its unit, as the panel shows it."""
+    return units.of(turns(factor)).text(shown)
 
 
-def caption(robot: Robot, at: Place, degrees: bool) -> str:
+def caption(robot: Robot, at: Place, units: Units) -> str:
     """The motion under way in words."""
     if at.motion < 0:
         return "Frame 0 stands on the base. Each row of the table now carries a copy of it to the next frame."
@@ -205,7 +201,7 @@ def caption(robot: Robot, at: Place, degrees: bool) -> str:
         words = f"{name} = 0, {nothing} {line}"
     else:
         verb = "turn {} about {}" if turns(at.factor) else "slide {} along {}"
-        words = verb.format(amount(at.factor, at.value, degrees), line) + f" ({name}{mover})"
+        words = verb.format(amount(at.factor, at.value, units), line) + f" ({name}{mover})"
     end = f". Frame {at.row + 1} is placed." if at.placed > at.row else "."
     return opening + words + end
 
@@ -221,36 +217,36 @@ def freedoms(robot: Robot) -> int:
 
 
 @lru_cache(maxsize=64)
-def verdict(robot: Robot, degrees: bool) -> tuple[str, ...]:
+def verdict(robot: Robot, units: Units) -> tuple[str, ...]:
     """What each reading makes of the table, and which of its numbers decides it, in words."""
     readings = sorted((robot, reread(robot)), key=lambda r: r.convention, reverse=True)
     if any(shared_lines(reading) for reading in readings):
-        return tuple(_lines(reading, degrees) for reading in readings)
+        return tuple(_lines(reading, units) for reading in readings)
     return (
         "In neither order do two neighbouring joints share a line. The arms differ all the same: "
         "a row’s a and α come after its joint in the standard order, and before it in Craig’s.",
     )
 
 
-def _lines(robot: Robot, degrees: bool) -> str:
+def _lines(robot: Robot, units: Units) -> str:
     """Which neighbouring joints share a line when the table is read so, and why."""
     opening = "Standard order: " if robot.convention == "standard" else "Craig’s order: "
     shared = shared_lines(robot)
     if not shared:
         first = shared_lines(reread(robot))[0]
-        link = _link(robot, first, degrees)
+        link = _link(robot, first, units)
         return (
             f"{opening}{link} stands between joints {first + 1} and {first + 2}, and all {robot.n} joints count."
         )
     told = "; ".join(
-        f"{_link(robot, k, degrees)} leaves {_axes(robot, k)} one line, so joints {k + 1} and {k + 2} turn "
+        f"{_link(robot, k, units)} leaves {_axes(robot, k)} one line, so joints {k + 1} and {k + 2} turn "
         f"about it together and only {_sum(robot, k)} counts"
         for k in shared
     )
     return f"{opening}{told}: {robot.n} joints, {freedoms(robot)} freedoms."
 
 
-def _link(robot: Robot, k: int, degrees: bool) -> str:
+def _link(robot: Robot, k: int, units: Units) -> str:
     """The numbers between joints k and k + 1."""
     before, after = robot.joint_rows[k], robot.joint_rows[k + 1]
     if after - before > 1:
@@ -258,7 +254,7 @@ def _link(robot: Robot, k: int, degrees: bool) -> str:
     row = before if robot.convention == "standard" else after
     factors: tuple[Factor, ...] = ("a", "alpha")
     numbers = (
-        f"{symbol(robot, row, factor)} = {amount(factor, number, degrees) if number else '0'}"
+        f"{symbol(robot, row, factor)} = {amount(factor, number, units) if number else '0'}"
         for factor in factors
         for number in [getattr(robot.rows[row], factor)]
     )

@@ -19,7 +19,7 @@ from app.equations import Book, DerivationError, Equation, book_later
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons.equations import page
 from app.viewer.panel import assign, listen
-from app.viewer.panel.status import Notice, millimetres
+from app.viewer.panel.status import Notice
 from kin import InputError, fk
 from kin.transforms import Array
 
@@ -104,6 +104,7 @@ class EquationsLesson(Feature):
             self._show_values()
 
     def on_style(self) -> None:
+        self._show_symbols()
         self._show_values()
 
     def state(self) -> dict[str, object]:
@@ -165,7 +166,7 @@ class EquationsLesson(Feature):
         self._text.content = page.equation_html(self._book, equation)
         self._button.visible = equation.verdict == "misprinted"
         self._folder.visible = equation.correct is not None
-        self._symbols.content = page.symbols_html(self.stage.robot, self._book.symbols_of(equation))
+        self._show_symbols()
         self._largest = self._most(equation)
         self._clear_picture()
         self._show_values()
@@ -182,10 +183,18 @@ class EquationsLesson(Feature):
         if self._equation is None or not self._equation.worst:
             return
         equation = self._equation
-        off = millimetres(self._largest) if equation.is_length else page.turn(self._largest, self.stage.degrees)
+        units = self.stage.units
+        off = units.distance(self._largest) if equation.is_length else units.angle(self._largest)
         detail = f"As printed, {equation.entry} is off by {off} here."
         why = Notice("hand", f"Equation ({equation.number}) at its worst", detail)
         self.stage.go(np.array(equation.worst), why)
+
+    def _show_symbols(self) -> None:
+        if self._book is None or self._equation is None:
+            return
+        content = page.symbols_html(self._book.symbols_of(self._equation), self.stage.units)
+        if self._symbols.content != content:
+            self._symbols.content = content
 
     def _show_values(self) -> None:
         self.due = None
@@ -199,7 +208,7 @@ class EquationsLesson(Feature):
             )
             return
         values = self._book.values(equation, self.stage.q, self._T)
-        content = page.values_html(equation, values, self.stage.degrees, self._largest)
+        content = page.values_html(equation, values, self.stage.units, self._largest)
         if self._values.content != content:
             self._values.content = content
         if equation.verdict == "misprinted":

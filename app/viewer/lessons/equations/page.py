@@ -10,8 +10,8 @@ import numpy as np
 
 from app.equations import Book, Equation, Line, Symbol, Values, typeset
 from app.equations.expression import Expression, names
-from app.viewer.panel.status import angle, millimetres
-from kin import Robot
+from app.viewer.mathml import fixed
+from app.viewer.units import Units
 from kin.transforms import Array
 
 # Mark, words and colour of each verdict; the colours are Okabe and Ito's.
@@ -21,7 +21,6 @@ LOOKS = {
     "unreadable": ("?", "unreadable", "#6b4c9a"),
     "derived": ("✓", "derived and checked", "#0072b2"),
 }
-UNITS = {"mm": 1e3, "cm": 1e2, "m": 1.0}
 SAME = 1e-9  # rounding, in metres or pure numbers
 AXES = {"n": "x", "o": "y", "a": "z"}
 
@@ -89,11 +88,11 @@ def note_html(note: str) -> str:
     return re.sub(r"\b([acds])(\d+)", r"<i>\1</i><sub>\2</sub>", text)
 
 
-def symbols_html(robot: Robot, symbols: Iterable[Symbol]) -> str:
+def symbols_html(symbols: Iterable[Symbol], units: Units) -> str:
     """What the names of an equation stand for, one a line."""
     rows = "".join(
         f'<tr><td style="padding:0 .6em 0 0;white-space:nowrap">{typeset.mathml_name(symbol.name)}</td>'
-        f'<td style="padding:0">{escape(meaning(robot, symbol))}</td></tr>'
+        f'<td style="padding:0">{escape(meaning(symbol, units))}</td></tr>'
         for symbol in symbols
     )
     return (
@@ -102,28 +101,28 @@ def symbols_html(robot: Robot, symbols: Iterable[Symbol]) -> str:
     )
 
 
-def meaning(robot: Robot, symbol: Symbol) -> str:
-    """A symbol in words, a constant with its value in the unit of the arm's own table."""
+def meaning(symbol: Symbol, units: Units) -> str:
+    """A symbol in words, a constant with its value."""
     if not symbol.fixed or symbol.kind in ("cos", "sin"):
         return symbol.meaning
     if symbol.kind == "number":
         return f"{symbol.constant:.6g}, {symbol.meaning}".replace("-", "−")
-    return f"{symbol.constant * UNITS[robot.units]:.6g} {robot.units}, {symbol.meaning}".replace("-", "−")
+    return f"{symbol.constant * units.lengths.scale:.6g}{units.lengths.suffix}, {symbol.meaning}".replace("-", "−")
 
 
-def values_html(equation: Equation, values: Values, degrees: bool, largest: float) -> str:
+def values_html(equation: Equation, values: Values, units: Units, largest: float) -> str:
     """The values side by side, and by how much the first one is off; `largest` is the most it can be."""
     columns = {"printed": values.printed, "corrected": values.correct, "DH product": values.dh}
     if equation.verdict == "derived":
         columns = {"closed form": values.correct, "DH product": values.dh}
     head = "".join(f'<th style="{CELL};font-weight:500;opacity:.75">{name}</th>' for name in columns)
     cells = "".join(
-        f'<td style="{CELL}">{number(float(v), equation.is_length)}</td>'
+        f'<td style="{CELL}">{number(float(v), equation.is_length, units)}</td>'
         for v in columns.values()
         if v is not None
     )
-    unit = f"{typeset.mathml_name(equation.entry)}{' in mm' if equation.is_length else ''}"
-    mark, words, color = told(equation, values, degrees, largest)
+    unit = f"{typeset.mathml_name(equation.entry)}{f' in {units.lengths.name}' if equation.is_length else ''}"
+    mark, words, color = told(equation, values, units, largest)
     return (
         f'<div style="margin:.1em 1em .4em;font-size:.8em;line-height:1.6">{verdict_html(equation)}'
         '<table aria-label="values here" style="width:100%;table-layout:fixed;border-collapse:collapse;'
@@ -137,7 +136,7 @@ def values_html(equation: Equation, values: Values, degrees: bool, largest: floa
 CELL = "padding:0 0 0 .4em;text-align:right"
 
 
-def told(equation: Equation, values: Values, degrees: bool, largest: float) -> tuple[str, str, str]:
+def told(equation: Equation, values: Values, units: Units, largest: float) -> tuple[str, str, str]:
     """Mark, words and colour: what the difference at this pose means for the tool."""
     right, wrong = LOOKS["right"], LOOKS["misprinted"]
     off = abs(float(values.difference))
@@ -146,24 +145,16 @@ def told(equation: Equation, values: Values, degrees: bool, largest: float) -> t
     if off < SAME:
         return right[0], "equal to the DH product", right[2]
     if equation.is_length:
-        size, most = escape(millimetres(off)), escape(millimetres(largest))
+        size, most = escape(units.distance(off)), escape(units.distance(largest))
         return wrong[0], f"puts the tool off by <b>{size}</b> here, by {most} at worst", wrong[2]
-    size, most = escape(turn(float(values.turn), degrees)), escape(turn(largest, degrees))
+    size, most = escape(units.angle(float(values.turn))), escape(units.angle(largest))
     axis = f"the tool’s {AXES[equation.entry[0]]} axis ({equation.entry[0]})"
     return wrong[0], f"turns {axis} by <b>{size}</b> here, by {most} at worst", wrong[2]
 
 
-def number(value: float, is_length: bool) -> str:
-    """A value for people: millimetres, or a pure number."""
-    text = f"{1000 * value:.1f}" if is_length else f"{value:.4f}"
-    if float(text) == 0.0:
-        text = text.lstrip("-")
-    return text.replace("-", "−")
-
-
-def turn(radians: float, degrees: bool) -> str:
-    """An angle in the visitor's unit."""
-    return angle(radians) if degrees else f"{radians:.3f} rad"
+def number(value: float, is_length: bool, units: Units) -> str:
+    """A value for people: a length, or a pure number."""
+    return units.lengths.number(value) if is_length else fixed(value, 4)
 
 
 def _formula(

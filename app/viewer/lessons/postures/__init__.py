@@ -57,6 +57,7 @@ class Postures(Feature):
         self._ghosts_on = True
         self._cone_on = True
         self._hidden: set[str] = set()
+        self._units = stage.units
         self._names: tuple[str, ...]
         self._postures: tuple[Posture, ...]
         self._key: tuple[object, ...]  # what was surveyed
@@ -113,6 +114,12 @@ class Postures(Feature):
 
     def on_style(self) -> None:
         self._key = ()
+        if self.stage.units != self._units:
+            self._units = self.stage.units
+            self._say()
+            # What the remedies say is in the old units: they are looked for anew.
+            self._drop_fixes()
+            self._search = None
         self._wake()
 
     def tick(self, now: float) -> None:
@@ -170,7 +177,7 @@ class Postures(Feature):
         self._result, self._search, self._searched, self._fixes = None, None, False, {}
         numbers = tuple(str(i + 1) for i in range(len(self._names)))
         with self._place:
-            self._why = gui.add_html(fixes.html(None, None))
+            self._why = gui.add_html(fixes.html(None, None, self.stage.units))
             with gui.add_folder(None) as self._fix_place:
                 pass
             self._to = gui.add_button_group("Take", numbers, hint=GO_HINT)
@@ -246,17 +253,17 @@ class Postures(Feature):
 
     def _survey(self, now: float) -> None:
         stage, T = self.stage, self._target
-        key: tuple[object, ...] = (T.tobytes(), stage.goal.tobytes(), stage.task, stage.locked, stage.degrees)
+        key: tuple[object, ...] = (T.tobytes(), stage.goal.tobytes(), stage.task, stage.locked, stage.units)
         if key == self._key:
             return
         self._key, self._surveyed = key, now
-        self._postures = survey(stage.robot, T, stage.task, stage.goal, stage.locked, stage.degrees)
+        self._postures = survey(stage.robot, T, stage.task, stage.goal, stage.locked, stage.units)
         self._show()
 
     def _show(self) -> None:
         here = self._here
         seen = frozenset(set(self._names) - self._hidden) if self._ghosts_on else frozenset()
-        content = html(self.stage.robot, self._postures, here, seen, self.stage.degrees)
+        content = html(self.stage.robot, self._postures, here, seen, self.stage.units)
         if content != self._list.content:
             self._list.content = content
         if self._eyes.options != self._eye_labels():
@@ -279,7 +286,7 @@ class Postures(Feature):
     # Why not
 
     def _say(self) -> None:
-        content = fixes.html(self._result, self.stage.branch)
+        content = fixes.html(self._result, self.stage.branch, self.stage.units)
         if content != self._why.content:
             self._why.content = content
 
@@ -289,8 +296,9 @@ class Postures(Feature):
         if self._search is None:
             assert self._result is not None
             self._search = remedies(
-                stage.robot, self._target, stage.task, stage.goal, stage.locked, stage.branch, self._result
-            )
+                stage.robot, self._target, stage.task, stage.goal, stage.locked, stage.branch, self._result,
+                stage.units,
+            )  # fmt: skip
         try:
             fix = next(self._search)
         except StopIteration:

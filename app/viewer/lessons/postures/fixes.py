@@ -14,7 +14,8 @@ from typing import Literal
 import numpy as np
 
 import kin
-from app.viewer.panel.status import LOOKS, angle, millimetres, notice
+from app.viewer.panel.status import LOOKS, notice
+from app.viewer.units import USUAL, Units
 from kin import IKResult, Robot, Task
 from kin.transforms import Array, rotation_angle
 
@@ -54,6 +55,7 @@ def remedies(
     locked: tuple[float | None, ...] | None,
     branch: str | None,
     result: IKResult,
+    units: Units = USUAL,
 ) -> Iterator[Fix | None]:
     """What would let the arm reach the target `T` ``(4, 4)``, from the least change to the greatest.
 
@@ -62,6 +64,7 @@ def remedies(
         task, locked, branch: what was asked for.
         q: the configuration ``(n,)`` it was asked from.
         result: the answer; there is nothing to offer if it is solved.
+        units: of what is told.
 
     Yields:
         A remedy that works, or None for one that was tried in vain.
@@ -95,34 +98,34 @@ def remedies(
     turned = result.nearest_orientation or next((s for s in result.solutions if s.compromise), None)
     if turned is not None:
         what = "roll" if turned.compromise == "roll" else "orientation"
-        label = f"Nearest {what}, {angle(turned.rotation_error)} away"
+        label = f"Nearest {what}, {units.angle(turned.rotation_error)} away"
         yield Fix(
             "turn", label, f"Turn the target to the nearest {what} that the arm can have", np.array(turned.q)
         )
     best = result.closest
     if best is not None and (turned is None or not np.allclose(best.q, turned.q, atol=1e-6)):
-        hint = f"Move the target to where the tool can be: {_off(robot, T, task, best.q)} away"
+        hint = f"Move the target to where the tool can be: {_off(robot, T, task, best.q, units)} away"
         yield Fix(
             "move", "Nearest reachable " + ("point" if task == "position" else "pose"), hint, np.array(best.q)
         )
 
 
-def _off(robot: Robot, T: Array, task: Task, q: Array) -> str:
+def _off(robot: Robot, T: Array, task: Task, q: Array, units: Units) -> str:
     there = kin.fk(robot, q)
-    far = millimetres(float(np.linalg.norm(there[:3, 3] - T[:3, 3])))
+    far = units.distance(float(np.linalg.norm(there[:3, 3] - T[:3, 3])))
     if task == "position":
         return far
-    return f"{far}, {angle(rotation_angle(there[:3, :3], T[:3, :3]))}"
+    return f"{far}, {units.angle(rotation_angle(there[:3, :3], T[:3, :3]))}"
 
 
-def html(result: IKResult | None, branch: str | None) -> str:
+def html(result: IKResult | None, branch: str | None, units: Units) -> str:
     """The answer in words; None: there is no target, the tool is where it is."""
     if result is None:
         title, detail, color, symbol = "Nothing is missed", "The target is where the tool is.", "#0072b2", "✓"
     elif result.status == "solved":
-        title, detail, color, symbol = "Reached", result.reason, LOOKS["reached"][1], "✓"
+        title, detail, color, symbol = "Reached", units.retold(result.reason), LOOKS["reached"][1], "✓"
     else:
-        said = notice(result)
+        said = notice(result, units)
         symbol, color = LOOKS[said.kind]
         title, detail = f"Why not? {said.title}", said.detail
     kept = f"Asked for: branch {branch}." if branch not in (None, "seed") and result is not None else ""

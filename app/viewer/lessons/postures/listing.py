@@ -17,7 +17,7 @@ import numpy as np
 import kin
 from app.viewer.meshes import JOINT_COLORS, Color
 from app.viewer.panel.posture import parts, short
-from app.viewer.panel.status import angle, millimetres
+from app.viewer.units import USUAL, Units
 from kin import IKSolution, LimitViolation, Robot, Task
 from kin.branches import is_closed, solve_branches, violations_of
 from kin.finish import OVERRUN
@@ -69,7 +69,7 @@ def survey(
     task: Task,
     q: Array,
     locked: tuple[float | None, ...] | None = None,
-    degrees: bool = True,
+    units: Units = USUAL,
 ) -> tuple[Posture, ...]:
     """All branches for the target `T` ``(4, 4)``, seen from `q` ``(n,)``, in the order of `kin.branch_names`.
 
@@ -83,30 +83,30 @@ def survey(
     names = kin.branch_names(robot)
     if not names:
         one = next(iter(solutions.values()), None)
-        return (Posture("nearest", "absent", "not here"),) if one is None else (_had(robot, "nearest", one),)
-    rest = {} if len(solutions) == len(names) else _left_out(robot, T, task, q, locked, degrees)
+        return (Posture("nearest", "absent", "not here") if one is None else _had(robot, "nearest", one, units),)
+    rest = {} if len(solutions) == len(names) else _left_out(robot, T, task, q, locked, units)
     return tuple(
-        _had(robot, name, solutions[name])
+        _had(robot, name, solutions[name], units)
         if name in solutions
         else rest.get(name, Posture(name, "unknown", "not looked for"))
         for name in names
     )
 
 
-def _had(robot: Robot, name: str, solution: IKSolution) -> Posture:
+def _had(robot: Robot, name: str, solution: IKSolution, units: Units) -> Posture:
     q = solution.q
     margin, joint = limit_margin(robot, q)
     value = float(kin.manipulability(robot, q))
     state: State = "compromise" if solution.compromise else "reachable"
     words = "reachable"
     if solution.compromise:
-        words = f"{solution.compromise} off by {angle(solution.rotation_error)}"
+        words = f"{solution.compromise} off by {units.angle(solution.rotation_error)}"
     share = min(1.0, value / best_manipulability(robot))
     return Posture(name, state, words, q, margin, joint, value, share)
 
 
 def _left_out(
-    robot: Robot, T: Array, task: Task, q: Array, locked: tuple[float | None, ...] | None, degrees: bool
+    robot: Robot, T: Array, task: Task, q: Array, locked: tuple[float | None, ...] | None, units: Units
 ) -> dict[str, Posture]:
     """What the closed form knows of each branch; nothing if it does not cover the task."""
     # Of a pose, an arm of five joints keeps point and approach: that is where its branches are.
@@ -120,7 +120,7 @@ def _left_out(
         if not closed[i]:
             found[name] = Posture(name, "absent", "not here")
         elif branches.stats[i, OVERRUN] > 0.0:
-            words = beyond(robot, violations_of(question, branches.q[i]), question.locked, degrees)
+            words = beyond(robot, violations_of(question, branches.q[i]), question.locked, units)
             found[name] = Posture(name, "blocked", words, branches.q[i].copy())
         else:
             found[name] = Posture(name, "absent", "the same as another")  # two branches have merged
@@ -142,19 +142,12 @@ def best_manipulability(robot: Robot) -> float:
     return float(kin.manipulability(robot, q).max()) or 1.0
 
 
-def amount(robot: Robot, joint: int, value: float, degrees: bool) -> str:
-    """A joint's motion for people."""
-    if not robot.revolute[joint]:
-        return millimetres(value)
-    return angle(value) if degrees else f"{value:.3f} rad"
-
-
-def beyond(robot: Robot, violations: tuple[LimitViolation, ...], locked: tuple[bool, ...], degrees: bool) -> str:
+def beyond(robot: Robot, violations: tuple[LimitViolation, ...], locked: tuple[bool, ...], units: Units) -> str:
     """``beyond stop of joint 3 by 12.0°``, the widest first, and how many more."""
     if not violations:
         return "beyond a stop"
     worst = max(violations, key=lambda v: abs(v.value - v.limit))
-    by = amount(robot, worst.joint, abs(worst.value - worst.limit), degrees)
+    by = units.motion(robot.revolute[worst.joint], worst.value - worst.limit)
     more = f", and {len(violations) - 1} more" if len(violations) > 1 else ""
     number = worst.joint + 1
     if locked[worst.joint]:
@@ -162,9 +155,9 @@ def beyond(robot: Robot, violations: tuple[LimitViolation, ...], locked: tuple[b
     return f"beyond stop of joint {number} by {by}{more}"
 
 
-def html(robot: Robot, postures: tuple[Posture, ...], here: str, shown: frozenset[str], degrees: bool) -> str:
+def html(robot: Robot, postures: tuple[Posture, ...], here: str, shown: frozenset[str], units: Units) -> str:
     """The list: a numbered row for each branch, the one the arm is on marked; `shown`: those with a ghost."""
-    rows = "".join(_row(robot, i, p, p.name == here, p.name in shown, degrees) for i, p in enumerate(postures))
+    rows = "".join(_row(robot, i, p, p.name == here, p.name in shown, units) for i, p in enumerate(postures))
     what = parts(robot)
     head = f'<div style="opacity:.75;margin-bottom:.2em">{escape(what)}</div>' if what else ""
     return (
@@ -173,7 +166,7 @@ def html(robot: Robot, postures: tuple[Posture, ...], here: str, shown: frozense
     )
 
 
-def _row(robot: Robot, index: int, posture: Posture, here: bool, shown: bool, degrees: bool) -> str:
+def _row(robot: Robot, index: int, posture: Posture, here: bool, shown: bool, units: Units) -> str:
     r, g, b = COLORS[index % len(COLORS)] if posture.can_be_had else BLOCKED_COLOR
     fill = f"background:rgb({r},{g},{b});color:#fff" if shown or here else "background:none"
     badge = (
@@ -185,7 +178,8 @@ def _row(robot: Robot, index: int, posture: Posture, here: bool, shown: bool, de
     if posture.can_be_had:
         room = "no stops"
         if posture.joint >= 0:
-            room = f"{amount(robot, posture.joint, posture.margin, degrees)} to stop of joint {posture.joint + 1}"
+            left = units.motion(robot.revolute[posture.joint], posture.margin)
+            room = f"{left} to stop of joint {posture.joint + 1}"
         detail = (
             f'<span style="flex:1">{room}</span>'
             f'<span title="manipulability" style="flex:none">{posture.manipulability:.4f}</span>'

@@ -25,6 +25,7 @@ from app.viewer.meshes import JOINT_COLORS, body
 from app.viewer.panel import assign, listen
 from app.viewer.panel.status import Notice
 from app.viewer.selfmotion import INSET, SMOOTH, End, ends, free_values, reach_of, self_motion
+from app.viewer.units import Units
 from kin import IKResult, InputError, Redundancy
 from kin.transforms import Array
 
@@ -86,13 +87,13 @@ class RedundancyLesson(Feature):
 
     def handle(self, key: Hashable, value: object) -> None:
         match key:
-            case ("value", str(name), bool(degrees)):
-                if name == self._name and degrees == self.stage.degrees:
+            case ("value", str(name), Units() as units):
+                if name == self._name and units == self.stage.units:
                     if not isinstance(value, int | float) or not math.isfinite(value):
                         raise InputError(name, value, "a finite number")
                     self._swings = False
                     self._show_swing()
-                    self._wish = self._bounded(float(value) / self._scale)
+                    self._wish = self._bounded(units.angles.read(float(value)))
                     self._wake()
             case "swing":
                 self._swings, self._wish = bool(value), None
@@ -174,10 +175,6 @@ class RedundancyLesson(Feature):
     # The motion
 
     @property
-    def _scale(self) -> float:
-        return 180.0 / math.pi if self.stage.degrees else 1.0
-
-    @property
     def _item(self) -> Redundancy | None:
         return next((item for item in self._free if item.name == self._name), None)
 
@@ -257,7 +254,7 @@ class RedundancyLesson(Feature):
         stage, robot = self.stage, self.stage.robot
         self._read_at = now
         goal = stage.goal
-        key: tuple[object, ...] = (goal.tobytes(), stage.q.tobytes(), stage.task, stage.locked, stage.degrees)
+        key: tuple[object, ...] = (goal.tobytes(), stage.q.tobytes(), stage.task, stage.locked, stage.units)
         if key != self._read_key:
             self._read_key, self._changed = key, now
             self._free = free_values(robot, self._held, stage.task, goal, stage.locked)
@@ -268,7 +265,7 @@ class RedundancyLesson(Feature):
         item = self._item
         # The ranges of an arm angle belong to the target and the branch; swinging through them changes nothing.
         ends_key: tuple[object, ...] = (
-            self._held.tobytes(), stage.task, stage.locked, stage.degrees,
+            self._held.tobytes(), stage.task, stage.locked, stage.units,
             None if item is None else (item.name, np.round(item.intervals, 6).tobytes()),
         )  # fmt: skip
         if ends_key == self._ends_key:
@@ -278,7 +275,7 @@ class RedundancyLesson(Feature):
             return
         self._ends_key = ends_key
         self._ends = () if item is None else ends(robot, self._held, stage.task, goal, stage.locked, item)
-        _tell(self._stops, told.stops_html(robot, self._ends, stage.degrees) if item is not None else "")
+        _tell(self._stops, told.stops_html(robot, self._ends, stage.units) if item is not None else "")
         self._draw_ring()
 
     def _show_numbers(self) -> None:
@@ -289,23 +286,20 @@ class RedundancyLesson(Feature):
             self._draw_now()
             return
         low, high = told.bounds(robot, item)
-        _tell(self._bar, told.range_html(item, low, high, stage.degrees))
+        _tell(self._bar, told.range_html(item, low, high, stage.units))
         if self._slider is not None and self._wish is None:
-            value = self._rounded(item.value)
+            value = stage.units.angles.shown(item.value)
             assign(self._slider, min(max(value, self._slider.min), self._slider.max))
         off, turned = told.residual(kin.fk(robot, stage.q), self._held, stage.task)
         elbow = None
         if self._trades:
             elbow = float(np.linalg.norm(told.elbow_of(robot, stage.q) - self._shape, axis=1).max())
-        _tell(self._residual, told.residual_html(off, turned, elbow))
+        _tell(self._residual, told.residual_html(off, turned, elbow, stage.units))
         self._draw_now()
 
     @property
     def _trades(self) -> bool:
         return self._name == "theta1" and coaxial(self.stage.robot)
-
-    def _rounded(self, value: float) -> float:
-        return round(value * self._scale, 1 if self.stage.degrees else 3)
 
     def _show_controls(self) -> None:
         """Slider, swing and choice, made anew when other values are free."""
@@ -313,7 +307,7 @@ class RedundancyLesson(Feature):
         circle = elbow_circle(stage.robot, stage.goal)
         text = told.idea(stage.robot, stage.task, self._free, coaxial(stage.robot), circle is not None)
         _tell(self._idea, _paragraph(text))
-        key = (stage.robot.id, stage.degrees, self._name, *(item.name for item in self._free))
+        key = (stage.robot.id, stage.units, self._name, *(item.name for item in self._free))
         if key == self._control_key:
             return
         self._control_key = key
@@ -323,8 +317,8 @@ class RedundancyLesson(Feature):
         item = self._item
         if item is None:
             return
-        gui = stage.client.gui
-        low, high = (self._rounded(x) for x in told.bounds(stage.robot, item))
+        gui, unit = stage.client.gui, stage.units.angles
+        low, high = (unit.shown(x) for x in told.bounds(stage.robot, item))
         with self._controls_place:
             if len(self._free) > 1:
                 labels = tuple(i.label for i in self._free)
@@ -335,10 +329,10 @@ class RedundancyLesson(Feature):
             listen(self._swing, self.post, "swing")
             self._slider = gui.add_slider(
 f"Swing {item.label.split()[-1]} to",
-                min=low, max=high, step=0.1 if stage.degrees else 0.001,
-                initial_value=min(max(self._rounded(item.value), low), high), hint=SLIDER_HINT,
+                min=low, max=high, step=unit.step(1),
+                initial_value=min(max(unit.shown(item.value), low), high), hint=SLIDER_HINT,
             )  # fmt: skip
-            listen(self._slider, self.post, ("value", item.name, stage.degrees))
+            listen(self._slider, self.post, ("value", item.name, stage.units))
         self._controls += [self._swing, self._slider]
 
     def _show_swing(self) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import kin
 from app.viewer.panel.posture import strip_html
 from app.viewer.selfmotion import End
+from app.viewer.units import Unit, Units
 from kin import Redundancy, Robot, Task
 from kin.transforms import Array, rotation_angle, vector_angle
 
@@ -62,40 +63,40 @@ def residual(T: Array, held: Array, task: Task) -> tuple[float, float | None]:
     return off, rotation_angle(T[:3, :3], held[:3, :3])
 
 
-def small(value: float) -> str:
+def small(value: float, unit: Unit) -> str:
     """A residual for people: plain where that says something, else with its power of ten."""
-    if value == 0.0:
-        return "0"
-    if value >= 0.01:
-        return f"{value:.2f}"
-    mantissa, exponent = f"{value:.0e}".split("e")
-    return f"{mantissa}·10<sup>{int(exponent)}</sup>".replace("-", "−")
+    shown = value * unit.scale
+    if shown == 0.0:
+        return f"0{unit.suffix}"
+    if shown >= unit.step(2):
+        return unit.text(value, 2)
+    mantissa, exponent = f"{shown:.0e}".split("e")
+    return f"{mantissa}·10<sup>{int(exponent)}</sup>{unit.suffix}".replace("-", "−")
 
 
-def residual_html(off: float, turned: float | None, elbow: float | None) -> str:
+def residual_html(off: float, turned: float | None, elbow: float | None, units: Units) -> str:
     """The residual, measured by forward kinematics; `elbow`: metres it has moved, for an arm whose does not."""
-    parts = [f"{small(1000.0 * off)} mm"]
+    parts = [small(off, units.lengths)]
     if turned is not None:
-        parts.append(f"{small(math.degrees(turned))}°")
-    still = f"<br>Elbow moved {small(1000.0 * elbow)} mm." if elbow is not None else ""
+        parts.append(small(turned, units.angles))
+    still = f"<br>Elbow moved {small(elbow, units.lengths)}." if elbow is not None else ""
     return (
         '<div data-residual style="margin:0 1em .4em;font-size:.8em;min-height:1.6em;font-variant-numeric:'
         f'tabular-nums">Tool held to {", ".join(parts)}.{still}</div>'
     )
 
 
-def stops_html(robot: Robot, found: tuple[End, ...], degrees: bool) -> str:
+def stops_html(robot: Robot, found: tuple[End, ...], units: Units) -> str:
     """Each end of a range, and whose stop it is."""
     rows = []
     for end in found:
-        value = f"{math.degrees(end.value):.1f}°" if degrees else f"{end.value:.3f} rad"
+        value = units.angles.text(end.value)
         if end.joint < 0:
             why = "the branch ends"
         else:
             name = robot.joints[end.joint].name
             same = name.lower() in (f"joint {end.joint + 1}", str(end.joint + 1))
             why = f"stop of joint {end.joint + 1}" + ("" if same else f", {name}")
-        value = value.replace("-", "−")
         rows.append(f'<tr><td style="text-align:right;width:5em">{value}</td><td>{escape(why)}</td></tr>')
     if not rows:
         return _small("No stop is in the way: the whole turn is free.")
@@ -105,10 +106,10 @@ def stops_html(robot: Robot, found: tuple[End, ...], degrees: bool) -> str:
     )
 
 
-def range_html(item: Redundancy, low: float, high: float, degrees: bool) -> str:
+def range_html(item: Redundancy, low: float, high: float, units: Units) -> str:
     """The ranges as a bar from `low` to `high` (radians)."""
-    scale = 180.0 / math.pi if degrees else 1.0
-    return strip_html(item, low * scale, high * scale, scale, "°" if degrees else " rad", UNDER_TRACK)
+    unit = units.angles
+    return strip_html(item, low * unit.scale, high * unit.scale, unit, UNDER_TRACK)
 
 
 def bounds(robot: Robot, item: Redundancy) -> tuple[float, float]:

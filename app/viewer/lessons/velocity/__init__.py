@@ -33,6 +33,7 @@ from app.viewer.lessons.velocity.rates import (
     task_rates,
 )
 from app.viewer.panel import assign, listen, listen_click
+from app.viewer.units import Unit, Units
 from kin import InputError
 from kin.transforms import Array
 
@@ -46,14 +47,14 @@ ELLIPSOIDS: dict[str, Ellipsoid | None] = {
     "Moment": "moment",
     "None": None,
 }
-STEPS = (0.1, 100.0)  # mm
-TURNS = (0.1, 30.0)  # degrees
+STEPS = (1e-4, 0.1)  # m
+TURNS = (math.radians(0.1), math.radians(30.0))  # rad
 FRAME_HINT = "Whose axes the rows of the Jacobian and the jog buttons mean; the point is the tool's in both"
 COLUMN_HINT = "Draws this joint's column at the tool: straight arrow v, round arrow ω; again: no more"
 ELLIPSOID_HINT = (
     "Velocities the joints can give the tool, or forces they can hold: each strong where the other is slow"
 )
-STEP_HINT = "Millimetres of one step along an axis"
+STEP_HINT = "Length of one step along an axis"
 TURN_HINT = "Angle of one step about an axis"
 # viser gives each button a line of its own; this puts six side by side.
 _BOX = "div:has(>div>[data-jog])"
@@ -65,6 +66,7 @@ GRID = (
 )
 _NUMBERS = count(1)
 V = TypeVar("V")
+Field = viser.GuiNumberHandle[float]
 
 
 class VelocityLesson(Feature):
@@ -111,11 +113,7 @@ class VelocityLesson(Feature):
         self._use_robot()
 
     def _build_jog(self, gui: viser.GuiApi) -> None:
-        self._step_field = gui.add_number(
-            "Step, mm", 1e3 * self._step, min=STEPS[0], max=STEPS[1], step=0.1, hint=STEP_HINT, order=1
-        )
-        listen(self._step_field, self.post, "step")
-        self._make_turn_field()
+        self._make_fields()
         gui.add_html(GRID, order=3)
         for number, (axis, sign) in enumerate(BUTTONS):
             verb = "Turns the tool about" if axis > 2 else "Moves the tool along"
@@ -142,23 +140,22 @@ class VelocityLesson(Feature):
         handle.on_hold(held, callback_hz=HOLD)
         handle.on_click(clicked)
 
-    def _make_turn_field(self) -> None:
-        degrees = self.stage.degrees
-        low, high = (t if degrees else round(math.radians(t), 3) for t in TURNS)
-        self._turn_field = self.stage.client.gui.add_number(
-            "Turn, °" if degrees else "Turn, rad",
-            round(self._turn * self._turn_scale, 1 if degrees else 3),
-            min=low,
-            max=high,
-            step=0.1 if degrees else 0.001,
-            hint=TURN_HINT,
-            order=2,
-        )
-        listen(self._turn_field, self.post, ("turn", degrees))
+    def _make_fields(self) -> None:
+        """How far one step is, in the units of now."""
+        gui, units = self.stage.client.gui, self.stage.units
+        self._units_made = units
 
-    @property
-    def _turn_scale(self) -> float:
-        return 180.0 / math.pi if self.stage.degrees else 1.0
+        def field(name: str, unit: Unit, value: float, ends: tuple[float, float], hint: str, order: int) -> Field:
+            low, high = (unit.shown(end) for end in ends)
+            made = gui.add_number(
+                f"{name}, {unit.name}", unit.shown(value), min=low, max=high, step=unit.step(1), hint=hint,
+                order=order,
+            )  # fmt: skip
+            listen(made, self.post, (name.lower(), units))
+            return made
+
+        self._step_field = field("Step", units.lengths, self._step, STEPS, STEP_HINT, 1)
+        self._turn_field = field("Turn", units.angles, self._turn, TURNS, TURN_HINT, 2)
 
     # Events
 
@@ -174,12 +171,12 @@ class VelocityLesson(Feature):
                 if robot_id == self.stage.robot.id:
                     self._chosen = None if index == self._chosen else index
                     self._show_all()
-            case "step":
-                self._step = _number("step", value, STEPS) / 1e3
-            case ("turn", bool(degrees)):
-                if degrees == self.stage.degrees:
-                    limits = TURNS if degrees else (math.radians(TURNS[0]), math.radians(TURNS[1]))
-                    self._turn = _number("turn", value, limits) / self._turn_scale
+            case ("step", Units() as units):
+                if units == self.stage.units:
+                    self._step = _number("step", value, STEPS, units.lengths)
+            case ("turn", Units() as units):
+                if units == self.stage.units:
+                    self._turn = _number("turn", value, TURNS, units.angles)
             case ("jog", int(number), int()):
                 self._jog(*BUTTONS[number])
             case _:
@@ -196,9 +193,12 @@ class VelocityLesson(Feature):
         self.due = max(0.0, INTERVAL - (time.perf_counter() - self._shown_at))
 
     def on_style(self) -> None:
-        self._turn_field.remove()
-        with self._jog_folder:
-            self._make_turn_field()
+        if self.stage.units != self._units_made:
+            self._step_field.remove()
+            self._turn_field.remove()
+            with self._jog_folder:
+                self._make_fields()
+        self._refused = ()
         self._show_numbers()
 
     def tick(self, now: float) -> None:
@@ -230,12 +230,13 @@ class VelocityLesson(Feature):
         if type(joint) is int and 0 <= joint <= self.stage.robot.n:
             self._chosen = joint - 1 if joint else None
         size, turn = state.get("step"), state.get("turn")
-        if isinstance(size, float) and STEPS[0] <= 1e3 * size <= STEPS[1]:
+        if isinstance(size, float) and STEPS[0] <= size <= STEPS[1]:
             self._step = size
-        if isinstance(turn, float) and TURNS[0] <= math.degrees(turn) <= TURNS[1]:
+        if isinstance(turn, float) and TURNS[0] <= turn <= TURNS[1]:
             self._turn = turn
-        assign(self._step_field, round(1e3 * self._step, 1))
-        assign(self._turn_field, round(self._turn * self._turn_scale, 1 if self.stage.degrees else 3))
+        units = self.stage.units
+        assign(self._step_field, units.lengths.shown(self._step))
+        assign(self._turn_field, units.angles.shown(self._turn))
         self._show_all()
 
     def remove(self) -> None:
@@ -249,7 +250,9 @@ class VelocityLesson(Feature):
         asked = (stage.robot, stage.goal.tobytes(), stage.task, axis, amount, self._frame, stage.locked)
         if asked == self._refused:
             return  # a button held at a stop would have the same refusal worked out ten times a second
-        made: Step = step(stage.robot, stage.goal, stage.task, axis, amount, self._frame, stage.locked)
+        made: Step = step(
+            stage.robot, stage.goal, stage.task, axis, amount, self._frame, stage.locked, stage.units
+        )
         if made.q is None:
             self._refused = asked
             stage.tell(made.told)
@@ -275,12 +278,12 @@ class VelocityLesson(Feature):
         self._show_numbers()
 
     def _scale(self, kind: Ellipsoid) -> float:
-        """What 10 cm of this arm's picture stand for: such that the ellipsoid at home has a fitting size."""
+        """What `told.SAMPLE` of the picture stands for: such that the ellipsoid at home has a fitting size."""
         robot = self.stage.robot
         semi = semi_axes(axes_of(part_of(kin.jacobian(robot, robot.q_home), kind)).values, kind)
         usual = semi[np.isfinite(semi) & (semi > 1e-6) & (semi < 1e6)]
         longest = float(usual.max()) if len(usual) else 1.0
-        return nice(0.1 * longest / (0.42 * self._drawing.radius))
+        return nice(told.SAMPLE * longest / (0.42 * self._drawing.radius))
 
     def _draw(self, q: Array, T_base_tool: Array) -> None:
         """What moves with each picture."""
@@ -290,7 +293,7 @@ class VelocityLesson(Feature):
         self._axes = None
         if self._kind is not None:
             self._axes = axes_of(part_of(J, self._kind))
-            lengths = semi_axes(self._axes.values, self._kind) * (0.1 / self._scales[self._kind])
+            lengths = semi_axes(self._axes.values, self._kind) * (told.SAMPLE / self._scales[self._kind])
             self._cut = self._drawing.show_ellipsoid(self._kind, self._axes.R, lengths)
         else:
             self._drawing.hide_ellipsoid()
@@ -298,7 +301,7 @@ class VelocityLesson(Feature):
             self._drawing.show_column(None, None)
         else:
             column = J[:, self._chosen]
-            self._drawing.show_column(column[:3] * (0.1 / self._scales["velocity"]), column[3:])
+            self._drawing.show_column(column[:3] * (told.SAMPLE / self._scales["velocity"]), column[3:])
 
     def _show_numbers(self) -> None:
         """What is read, and the singularities."""
@@ -317,7 +320,8 @@ class VelocityLesson(Feature):
             _tell(self._ellipsoid, "")
             return
         semi = semi_axes(self._axes.values, self._kind)
-        _tell(self._ellipsoid, told.ellipsoid_html(robot, self._kind, semi, self._scales[self._kind], self._cut))
+        scale = self._scales[self._kind]
+        _tell(self._ellipsoid, told.ellipsoid_html(robot, self._kind, semi, scale, self._cut, stage.units))
         self._drawing.write_values(told.label_texts(semi))
 
     def _show_singularities(self, R_base_tool: Array) -> None:
@@ -331,8 +335,8 @@ class VelocityLesson(Feature):
             twists = lost(rates) if state == "at" else rates.twists[-1:]
         self._drawing.show_lost(twists, state == "at")
         words = [told.lost_words(twist, R_base_tool, slowest=state == "near") for twist in twists]
-        _tell(self._warning, told.warning_html(robot, found, stage.degrees, words))
-        _tell(self._others, told.others_html(robot, found, stage.degrees))
+        _tell(self._warning, told.warning_html(robot, found, stage.units, words))
+        _tell(self._others, told.others_html(robot, found, stage.units))
 
 
 def _tell(element: viser.GuiHtmlHandle, html: str) -> None:
@@ -346,8 +350,9 @@ def _one_of(field: str, value: object, options: dict[str, V]) -> V:
     return options[value]
 
 
-def _number(field: str, value: object, limits: tuple[float, float]) -> float:
-    low, high = limits
-    if isinstance(value, bool) or not isinstance(value, int | float) or not low - 1e-3 <= value <= high + 1e-3:
+def _number(field: str, value: object, limits: tuple[float, float], unit: Unit) -> float:
+    """What was typed in this unit, in radians or metres."""
+    low, high = (unit.shown(limit) for limit in limits)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
         raise InputError(field, value, f"a number from {low:g} to {high:g}")
-    return float(value)
+    return min(max(unit.read(float(value)), limits[0]), limits[1])

@@ -14,7 +14,8 @@ import numpy as np
 
 import kin
 from app.viewer.panel.joints import label
-from app.viewer.panel.status import Notice, angle, millimetres, notice
+from app.viewer.panel.status import Notice, notice
+from app.viewer.units import USUAL, Units
 from kin import IKResult, IKSolution, Robot, Task
 from kin.transforms import Array, rotation_from_wxyz, vector_angle
 
@@ -55,9 +56,16 @@ def moved(T_base_tool: Array, axis: int, amount: float, frame: Frame) -> Array:
 
 
 def step(
-    robot: Robot, q: Array, task: Task, axis: int, amount: float, frame: Frame, locked: Locked = None
+    robot: Robot,
+    q: Array,
+    task: Task,
+    axis: int,
+    amount: float,
+    frame: Frame,
+    locked: Locked = None,
+    units: Units = USUAL,
 ) -> Step:
-    """One step of `amount` (m or rad) from q ``(n,)``; `locked` as `kin.solve_ik` takes it.
+    """One step of `amount` (m or rad) from q ``(n,)``; `locked` as `kin.solve_ik` takes it; told in `units`.
 
     An arm with fewer than six joints gives up the roll, one with fewer than five the orientation; a step is then
     made all the same, and what it gave up is told.
@@ -71,7 +79,7 @@ def step(
     refused: list[Step] = []
     for branch in ("seed", None) if kin.branch_names(robot) else (None,):
         result = kin.solve_ik(robot, target, task=task, q_seed=q, branch=branch, locked=locked, max_solutions=1)
-        found = _judged(robot, q, T, axis, amount, frame, result)
+        found = _judged(robot, q, T, axis, amount, frame, result, units)
         if found.q is not None:
             return found
         if result.cause != "branch":
@@ -88,19 +96,21 @@ def _left_out(task: Task, T: Array, wanted: Array) -> str:
     return ""
 
 
-def _judged(robot: Robot, q: Array, T: Array, axis: int, amount: float, frame: Frame, result: IKResult) -> Step:
+def _judged(
+    robot: Robot, q: Array, T: Array, axis: int, amount: float, frame: Frame, result: IKResult, units: Units
+) -> Step:
     """An answer as a step: taken if it is exact in all that this arm can keep, and near."""
     best = result.solutions[0] if result.solutions else None
-    given = _given_up(robot, T, axis, result)
+    given = _given_up(robot, T, axis, result, units)
     if best is None or given is None:
         if best is not None:
-            return Step(None, Notice("orientation", "Not moved", _too_few(robot, axis, best)))
-        said = notice(result)
+            return Step(None, Notice("orientation", "Not moved", _too_few(robot, axis, best, units)))
+        said = notice(result, units)
         return Step(None, Notice(said.kind, f"Not moved: {said.title[:1].lower()}{said.title[1:]}", said.detail))
     off = np.abs(best.q - q)
     worst = int(off.argmax())
     if off[worst] > SMOOTH:
-        turn = angle(off[worst]) if robot.revolute[worst] else millimetres(off[worst])
+        turn = units.motion(robot.revolute[worst], off[worst])
         return Step(
             None,
             Notice(
@@ -109,7 +119,7 @@ def _judged(robot: Robot, q: Array, T: Array, axis: int, amount: float, frame: F
                 f"{label(robot, worst)} by {turn}: a singularity is close, or the step is too long.",
             ),
         )
-    size = f"{1e3 * abs(amount):.4g} mm" if axis < 3 else f"{math.degrees(abs(amount)):.4g}°"
+    size = units.of(axis > 2).brief(abs(amount))
     verb = "along" if axis < 3 else "about"
     title = f"Jogged {size} {verb} {'+' if amount > 0 else '−'}{NAMES[axis][-1]} of the {frame}"
     if given:
@@ -117,7 +127,7 @@ def _judged(robot: Robot, q: Array, T: Array, axis: int, amount: float, frame: F
     return Step(best.q, Notice("reached", title, "Exactly, " + _how(robot, q, best.q)))
 
 
-def _given_up(robot: Robot, T: Array, axis: int, result: IKResult) -> str | None:
+def _given_up(robot: Robot, T: Array, axis: int, result: IKResult, units: Units) -> str | None:
     """What the best answer gives up, in words; None if that is more than such an arm must."""
     if result.status == "solved":
         return ""
@@ -127,19 +137,20 @@ def _given_up(robot: Robot, T: Array, axis: int, result: IKResult) -> str | None
     reached = kin.fk(robot, best.q)
     kept = best.compromise == "roll" and (axis < 3 or vector_angle(T[:3, 2], reached[:3, 2]) > _TURNED)
     if kept:
-        off = angle(best.rotation_error)
+        off = units.angle(best.rotation_error)
         return f"{robot.n} joints keep the point and the approach direction; the roll is off by {off}."
     if best.compromise == "rotation" and robot.n < 5 and axis < 3:
-        off = angle(best.rotation_error)
+        off = units.angle(best.rotation_error)
         return f"{robot.n} joints keep the point; the orientation is off by {off}."
     return None
 
 
-def _too_few(robot: Robot, axis: int, best: IKSolution) -> str:
+def _too_few(robot: Robot, axis: int, best: IKSolution, units: Units) -> str:
     count = "1 joint" if robot.n == 1 else f"{robot.n} joints"
     if axis > 2:
         return f"{count} cannot turn the tool this way and keep its point."
-    return f"Here {count} can keep the point alone: the orientation would be off by {angle(best.rotation_error)}."
+    off = units.angle(best.rotation_error)
+    return f"Here {count} can keep the point alone: the orientation would be off by {off}."
 
 
 def _how(robot: Robot, before: Array, after: Array) -> str:

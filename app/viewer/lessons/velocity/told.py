@@ -11,7 +11,7 @@ import numpy as np
 from app.viewer.lessons.velocity.rates import Ellipsoid, State, TaskRates, condition, real, state_of
 from app.viewer.mathml import fixed, ident, sub, text
 from app.viewer.mathml import math as formula
-from app.viewer.panel.status import millimetres
+from app.viewer.units import Units
 from kin import Robot, Singularity
 from kin.transforms import Array
 
@@ -22,6 +22,7 @@ LOOKS: dict[State, tuple[str, str, str]] = {
     "at": ("✕", "singular", "#d55e00"),
 }
 CHOSEN = "rgba(0,114,178,.28)"
+SAMPLE = 0.1  # m of the picture that an ellipsoid's scale is told for
 DECADES = (-3, 1)  # of the singular values' bars
 _ALIGNED = math.cos(math.radians(0.5))
 _BLOCK = "margin:.1em 1em .45em;font-size:.8em;line-height:1.45;font-variant-numeric:tabular-nums"
@@ -109,17 +110,17 @@ def headline(first: Singularity | None, state: State) -> str:
     return f"{state[:1].upper()}{state[1:]} {article} {name}"
 
 
-def distance(singularity: Singularity, degrees: bool) -> str:
+def distance(singularity: Singularity, units: Units) -> str:
     """A distance with its unit."""
     d = singularity.distance
     if singularity.unit == "m":
-        return millimetres(d) if d > 0.0 else "0 mm"
+        return units.distance(d)
     if singularity.unit == "SI":
         return fixed(d, 4)
-    return f"{math.degrees(d):.1f}°" if degrees else f"{d:.3f} rad"
+    return units.angles.text(d)
 
 
-def warning_html(robot: Robot, found: tuple[Singularity, ...], degrees: bool, directions: Sequence[str]) -> str:
+def warning_html(robot: Robot, found: tuple[Singularity, ...], units: Units, directions: Sequence[str]) -> str:
     """How near the arm is to a singularity, of which kind, and what is lost there."""
     ours = real(found)
     first = ours[0] if ours else None
@@ -127,11 +128,11 @@ def warning_html(robot: Robot, found: tuple[Singularity, ...], degrees: bool, di
     mark, _, color = LOOKS[state]
     sentences = []
     if first is not None and state == "at":
-        sentences = [first.meaning.partition(": ")[0], *directions]
+        sentences = [units.retold(first.meaning).partition(": ")[0], *directions]
     elif first is not None:
         name = "Smallest σ" if first.kind == "jacobian" else first.kind
         away = "" if first.kind == "jacobian" else " away"
-        sentences = [f"{name}, {distance(first, degrees)}{away}", first.meaning, *directions[:1]]
+        sentences = [f"{name}, {distance(first, units)}{away}", units.retold(first.meaning), *directions[:1]]
     detail = " ".join(f"{s[:1].upper()}{s[1:].rstrip('.')}." for s in sentences)
     return (
         f'<div role="status" data-singular="{state}" style="display:flex;gap:.6em;margin:.15em 1em .35em;'
@@ -145,7 +146,7 @@ def warning_html(robot: Robot, found: tuple[Singularity, ...], degrees: bool, di
     )
 
 
-def others_html(robot: Robot, found: tuple[Singularity, ...], degrees: bool) -> str:
+def others_html(robot: Robot, found: tuple[Singularity, ...], units: Units) -> str:
     """Every singularity with its distance, the nearest first."""
     rows = ""
     for s in found:
@@ -153,12 +154,13 @@ def others_html(robot: Robot, found: tuple[Singularity, ...], degrees: bool) -> 
         name = {"algorithmic": "formula only", "jacobian": "smallest σ"}.get(s.kind, s.kind)
         if s.kind == "algorithmic":
             mark, word, color = "·", "–", "inherit"
+        meaning = escape(units.retold(s.meaning), quote=True)
         rows += (
-            f'<tr title="{escape(s.meaning, quote=True)}"><td style="padding:0 .5em 0 0;font-weight:700;'
+            f'<tr title="{meaning}"><td style="padding:0 .5em 0 0;font-weight:700;'
             f'color:{color};white-space:nowrap">{mark} {word}</td><td style="padding:0">{escape(name)}</td>'
-            f'<td style="padding:0;text-align:right;white-space:nowrap">{distance(s, degrees)}</td></tr>'
+            f'<td style="padding:0;text-align:right;white-space:nowrap">{distance(s, units)}</td></tr>'
             f'<tr><td></td><td colspan="2" style="padding:0 0 .3em;font-size:.92em;line-height:1.3;{_QUIET}">'
-            f"{escape(s.meaning)}</td></tr>"
+            f"{meaning}</td></tr>"
         )
     return (
         f'<table aria-label="singularities" style="{_BLOCK};width:calc(100% - 2em);border-collapse:collapse">'
@@ -202,11 +204,11 @@ WORDS: dict[Ellipsoid, tuple[str, str]] = {
 }
 
 
-def ellipsoid_html(robot: Robot, kind: Ellipsoid, semi: Array, scale: float, cut: bool) -> str:
-    """What the ellipsoid means, its semi-axes ``(3,)`` and its scale: so much of its unit is 10 cm long."""
+def ellipsoid_html(robot: Robot, kind: Ellipsoid, semi: Array, scale: float, cut: bool, units: Units) -> str:
+    """What the ellipsoid means, its semi-axes ``(3,)`` and its scale: so much of its unit is `SAMPLE` long."""
     unit, meaning = WORDS[kind]
     axes = "".join(f'<span style="display:inline-block;min-width:4.6em">{_size(float(v))}</span>' for v in semi)
-    notes = [f"10 cm in the picture are {scale:g} {unit}."]
+    notes = [f"{units.lengths.brief(SAMPLE)} in the picture are {scale:g} {unit}."]
     if not robot.revolute.all():
         notes.append("A sliding joint counts 1 m/s like 1 rad/s (1 N like 1 N·m).")
     if cut:

@@ -17,6 +17,7 @@ from app.clouds import Cloud, Clouds, step_back
 from app.viewer.panel import Post
 from app.viewer.tabs.workspace import known, plot
 from app.viewer.tabs.workspace.colours import radius_and_height
+from app.viewer.units import Units
 from kin import Robot, Section
 from kin.transforms import Array
 
@@ -39,10 +40,10 @@ def beside(work: Callable[[], None], name: str, post: Post) -> None:
 
 @dataclass(frozen=True)
 class Plotted:
-    """A drawing of the section with the points that were counted for it."""
+    """Points that were counted, and their image."""
 
     density: plot.Density
-    html: str
+    image: str
 
 
 class SectionPanel:
@@ -52,7 +53,9 @@ class SectionPanel:
         root: prefix of node names, never used before in this scene.
     """
 
-    def __init__(self, client: viser.ClientHandle, robot: Robot, clouds: Clouds, root: str, post: Post) -> None:
+    def __init__(
+        self, client: viser.ClientHandle, robot: Robot, clouds: Clouds, root: str, units: Units, post: Post
+    ) -> None:
         self.robot = robot
         self._scene = client.scene
         self._clouds = clouds
@@ -63,6 +66,8 @@ class SectionPanel:
         # The cloud's counts; while a thread adds to them, nobody else touches them. Another cloud gets new ones.
         self._density: plot.Density | None = None
         self._plotting = False
+        self._image = ""
+        self._units = units
         self._outline: viser.FrameHandle | None = None
         self._angle = math.nan
         self._aside = np.zeros(3)
@@ -88,7 +93,7 @@ class SectionPanel:
             return
         self._section, self._frame = found.section, plot.Frame.of(found.section)
         self._aside = np.cross(found.section.v, found.section.u)
-        self._html.content = plot.drawing(self._section, self._frame, None)
+        self._draw()
         self._draw_outline(found.section)
         self.tool_at(tool)
 
@@ -123,30 +128,36 @@ class SectionPanel:
             return False
         density = self._density = self._density or plot.Density(self._frame)
         self._plotting = True
-        section, frame = self._section, self._frame
 
         def work() -> None:
             for i in range(density.parts, parts):
                 if self._density is not density:
                     return  # another cloud, or none
                 density.add(cloud.robot, self._clouds.part(cloud, i).result().points)
-            self._post("plotted", Plotted(density, plot.drawing(section, frame, density)))
+            self._post("plotted", Plotted(density, plot.image(density)))
 
         beside(work, "plot", self._post)
         return True
 
     def plotted(self, made: Plotted) -> None:
-        """A drawing is there."""
+        """An image of the points is there."""
         if made.density is self._density:
             self._plotting = False
-            self._html.content = made.html
+            self._image = made.image
+            self._draw()
+
+    def use(self, units: Units) -> None:
+        """Draw in these units."""
+        if units != self._units:
+            self._units = units
+            self._draw()
 
     def forget(self) -> None:
         """The cloud is gone; the section stays."""
         self._density = None
         self._plotting = False
-        if self._section is not None and self._frame is not None:
-            self._html.content = plot.drawing(self._section, self._frame, None)
+        self._image = ""
+        self._draw()
 
     def remove(self) -> None:
         """Close the panel and take the outline away."""
@@ -155,6 +166,10 @@ class SectionPanel:
             self._outline.remove()
             self._outline = None
         self._section = self._frame = self._density = None
+
+    def _draw(self) -> None:
+        if self._section is not None and self._frame is not None:
+            self._html.content = plot.drawing(self._section, self._frame, self._image, self._units)
 
     def _draw_outline(self, section: Section) -> None:
         """The boundary and its arcs as lines in the plane of joint 1's line and the tool."""

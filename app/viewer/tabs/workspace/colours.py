@@ -17,6 +17,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from app.viewer.units import Units
 from kin import Robot, WorkspaceChunk, workspace_slice
 from kin.transforms import Array
 from kin.workspace import Measure
@@ -121,9 +122,9 @@ def paint(values: Array, scale: Scale, name: str) -> Bytes:
     return colours
 
 
-def legend(scale: Scale, name: str) -> str:
+def legend(scale: Scale, name: str, units: Units) -> str:
     """The scale as a bar with its end values, and in words."""
-    low, high = (value_text(scale.by, value) for value in (scale.low, scale.high))
+    low, high = (value_text(scale.by, value, units) for value in (scale.low, scale.high))
     return bar(scale.by, low, high, MEANING[scale.by], name)
 
 
@@ -151,8 +152,8 @@ def names_legend(names: list[tuple[Colour, str]]) -> str:
     return f'<div data-legend="names" style="margin:.2em 1em .5em;font-size:.8em;line-height:1.6">{rows}</div>'
 
 
-def value_text(by: By, value: float) -> str:
+def value_text(by: By, value: float, units: Units) -> str:
     """A quantity for people, with its unit."""
     if by in ("radius", "height"):
-        return f"{1000.0 * value:.0f} mm".replace("-", "−")
+        return units.lengths.text(value, 0)
     return f"{100.0 * value:.0f} %" if by == "limits" else f"{value:.3g}"

@@ -11,6 +11,7 @@ from app.viewer.panel import Post, assign, listen, listen_click
 from app.viewer.tabs.workspace.colours import BY, MAPS
 from app.viewer.tabs.workspace.cut import AXES, KEEP, Cut
 from app.viewer.tabs.workspace.wishes import LARGEST, MOST, SMALLEST, Wishes
+from app.viewer.units import Units
 from kin import InputError, Robot
 from kin.workspace import Strategy
 
@@ -22,16 +23,23 @@ STRATEGIES: dict[str, Strategy] = {
 }
 PRESETS = {"10 k": 10_000, "100 k": 100_000, "1 M": 1_000_000, "4 M": MOST}
 NONE = "none"
-MM = 1000.0
+FINE = 3  # decimals of a millimetre
 
 
 class Controls:
     """Everything that can be set. `read` turns what a control has posted into a wish's value."""
 
     def __init__(
-        self, gui: viser.GuiApi, wishes: Wishes, robot: Robot, robots: tuple[Robot, ...], post: Post
+        self,
+        gui: viser.GuiApi,
+        wishes: Wishes,
+        robot: Robot,
+        robots: tuple[Robot, ...],
+        units: Units,
+        post: Post,
     ) -> None:
         self._gui = gui
+        self._units = units
         self._post = post
         self._robots = robots
         self._choices: dict[str, Mapping[str, object]] = {
@@ -52,9 +60,22 @@ class Controls:
             if value not in self._choices[name]:
                 raise InputError(name, value, "one of " + ", ".join(self._choices[name]))
             return self._choices[name][str(value)]
-        if name in ("size", "at") and isinstance(value, int | float):
-            return value / MM
         return value
+
+    def read_length(self, value: object, units: Units) -> object:
+        """The same for the sliders that are lengths; None for what comes from one that is gone."""
+        if units != self._units:
+            return None
+        return units.lengths.read(value) if isinstance(value, int | float) else value
+
+    def use(self, units: Units, wishes: Wishes, cut: Cut | None) -> None:
+        """Offer lengths in these units."""
+        if units == self._units:
+            return
+        self._units = units
+        self._handles["size"].remove()
+        self._add_size(wishes.size)
+        self.show_cut(cut, wishes.at)
 
     def show(self, wishes: Wishes) -> None:
         """Set every control."""
@@ -74,16 +95,17 @@ class Controls:
         self._handles["keep"].visible = cut is not None
         if cut is None:
             return
+        unit = self._units.lengths
         with self._folder:
             self._at = self._gui.add_slider(
-                "Cut at (mm)",
-                min=round(MM * cut.low, 6),
-                max=round(MM * cut.high, 6),
-                step=round(MM * cut.step, 6),
-                initial_value=round(MM * at, 6),
-                hint="Where the cut is, in millimetres from the base along the cut's direction",
+                f"Cut at ({unit.name})",
+                min=unit.shown(cut.low, FINE),
+                max=unit.shown(cut.high, FINE),
+                step=unit.shown(cut.step, FINE),
+                initial_value=unit.shown(at, FINE),
+                hint="Where the cut is: how far from the base along the cut's direction",
             )
-        listen(self._at, self._post, "at")
+        listen(self._at, self._post, ("at", self._units))
 
     def _build(self, wishes: Wishes) -> None:
         gui = self._gui
@@ -127,17 +149,9 @@ class Controls:
             ),
         )
         self.legend = gui.add_html("")
-        self._add(
-            "size",
-            gui.add_slider(
-                "Point size (mm)",
-                min=MM * SMALLEST,
-                max=MM * LARGEST,
-                step=0.5,
-                initial_value=MM * wishes.size,
-                hint="Diameter of a point",
-            ),
-        )
+        with gui.add_folder(None) as self._size_place:
+            pass
+        self._add_size(wishes.size)
         self._folder = gui.add_folder("Cut open")
         with self._folder:
             self._add(
@@ -181,6 +195,19 @@ class Controls:
             )
             self.sizes = gui.add_html("")
 
+    def _add_size(self, size: float) -> None:
+        unit = self._units.lengths
+        with self._size_place:
+            self._handles["size"] = self._gui.add_slider(
+                f"Point size ({unit.name})",
+                min=unit.shown(SMALLEST, FINE),
+                max=unit.shown(LARGEST, FINE),
+                step=unit.shown(SMALLEST, FINE),
+                initial_value=unit.shown(size, FINE),
+                hint="Diameter of a point",
+            )
+        listen(self._handles["size"], self._post, ("size", self._units))
+
     def _add(self, name: str, handle: Any) -> None:
         self._handles[name] = handle
         listen(handle, self._post, name)
@@ -188,7 +215,7 @@ class Controls:
     def _written(self, name: str, value: object) -> Any:
         if name in self._choices:
             return next(label for label, v in self._choices[name].items() if v == value)
-        return round(MM * value, 6) if name == "size" and isinstance(value, float) else value
+        return self._units.lengths.shown(value, FINE) if name == "size" and isinstance(value, float) else value
 
     def _others(self, robot: Robot) -> dict[str, str | None]:
         return {NONE: None, **{other.name: other.id for other in self._robots if other != robot}}

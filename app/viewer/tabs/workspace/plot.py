@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.picture import JOINT_COLOURS, png, ticks
+from app.viewer.mathml import fixed
 from app.viewer.tabs.workspace.colours import radius_and_height
+from app.viewer.units import Unit, Units
 from kin import Robot, Section
 from kin.transforms import Array
 from kin.workspace import SectionArc
@@ -87,13 +89,13 @@ class Density:
         return png(pixels)
 
 
-def drawing(section: Section, frame: Frame, density: Density | None) -> str:
-    """The section with its axes, as HTML; above it, which colour is which joint's."""
+def drawing(section: Section, frame: Frame, image: str, units: Units) -> str:
+    """The section with its axes over an `image` of points, as HTML; above it, which colour is which joint's."""
     joints = sorted({arc.joint for arc in section.arcs})
     return (
         f'{_legend(joints)}<div data-plot="section">{_svg_open(frame)}'
-        f"{_image(density)}{_axes(frame)}{_curves(section, frame)}"
-        f"{''.join(_arc(arc, frame) for arc in section.arcs)}</svg></div>"
+        f"{image}{_axes(frame, units.lengths)}{_curves(section, frame)}"
+        f"{''.join(_arc(arc, frame, units.lengths) for arc in section.arcs)}</svg></div>"
     )
 
 
@@ -120,9 +122,8 @@ def _svg_open(frame: Frame) -> str:
     )
 
 
-def _image(density: Density | None) -> str:
-    if density is None or not density.parts:
-        return ""
+def image(density: Density) -> str:
+    """The counts as a part of a `drawing`."""
     frame = density.frame
     rows, columns = density.counts.shape
     size = density.cell * frame.scale
@@ -133,28 +134,28 @@ def _image(density: Density | None) -> str:
     )
 
 
-def _axes(frame: Frame) -> str:
+def _axes(frame: Frame, unit: Unit) -> str:
     parts = []
     bottom = TOP + frame.scale * (frame.z[1] - frame.z[0])
     right = LEFT + frame.scale * frame.r[1]
-    for value in ticks(*frame.r):
+    for value, text in _labels(frame.r, unit):
         x = LEFT + frame.scale * value
         parts.append(
             f'<path d="M{x:.1f} {TOP}V{bottom + 4:.1f}" stroke="currentColor" stroke-opacity=".18"/>'
-            f'<text x="{x:.1f}" y="{bottom + 15:.1f}" text-anchor="middle" style="{FONT}">{_number(value)}</text>'
+            f'<text x="{x:.1f}" y="{bottom + 15:.1f}" text-anchor="middle" style="{FONT}">{text}</text>'
         )
-    for value in ticks(*frame.z):
+    for value, text in _labels(frame.z, unit):
         y = TOP + frame.scale * (frame.z[1] - value)
         parts.append(
             f'<path d="M{LEFT - 4} {y:.1f}H{right:.1f}" stroke="currentColor" stroke-opacity=".18"/>'
-            f'<text x="{LEFT - 7}" y="{y + 3.5:.1f}" text-anchor="end" style="{FONT}">{_number(value)}</text>'
+            f'<text x="{LEFT - 7}" y="{y + 3.5:.1f}" text-anchor="end" style="{FONT}">{text}</text>'
         )
     parts.append(
         f'<path d="M{LEFT} {TOP}V{bottom:.1f}H{right:.1f}" fill="none" stroke="currentColor" stroke-opacity=".6"/>'
         f'<text x="{(LEFT + right) / 2:.1f}" y="{bottom + 30:.1f}" text-anchor="middle" style="{FONT}">'
-        "r: distance from joint 1's axis, mm</text>"
+        f"r: distance from joint 1's axis, {unit.name}</text>"
         f'<text transform="translate(9 {(TOP + bottom) / 2:.1f}) rotate(-90)" text-anchor="middle" style="{FONT}">'
-        "z: height, mm</text>"
+        f"z: height, {unit.name}</text>"
     )
     return "".join(parts)
 
@@ -167,10 +168,10 @@ def _curves(section: Section, frame: Frame) -> str:
     )
 
 
-def _arc(arc: SectionArc, frame: Frame) -> str:
+def _arc(arc: SectionArc, frame: Frame, unit: Unit) -> str:
     colour = colour_of(arc.joint)
     x, y = frame.at(arc.points[len(arc.points) // 2]).tolist()
-    way = "" if arc.radius is None else f", radius {1000.0 * arc.radius:.1f} mm"
+    way = "" if arc.radius is None else f", radius {unit.text(arc.radius)}"
     return (
         f'<g data-arc="{arc.joint + 1}"><title>drawn by joint {arc.joint + 1} alone{way}</title>'
         f'<path d="{_path(arc.points, frame)}" fill="none" stroke="{colour}" stroke-width="3" '
@@ -200,5 +201,9 @@ def _path(points: Array, frame: Frame) -> str:
     return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in frame.at(points).tolist())
 
 
-def _number(metres: float) -> str:
-    return f"{1000.0 * metres:.0f}".replace("-", "−")
+def _labels(ends: tuple[float, float], unit: Unit) -> list[tuple[float, str]]:
+    """Round values and their texts, with as many decimals as tell them apart."""
+    values = ticks(*ends)
+    step = unit.scale * (values[1] - values[0])
+    decimals = max(0, math.ceil(-math.log10(step) - 1e-9))
+    return [(value, fixed(unit.scale * value, decimals)) for value in values]

@@ -30,6 +30,7 @@ from app.viewer.tabs.workspace.drawing import Drawing, Look
 from app.viewer.tabs.workspace.flow import Flow
 from app.viewer.tabs.workspace.pick import Candidate, nearest
 from app.viewer.tabs.workspace.wishes import Wishes, default_size
+from app.viewer.units import Units
 from kin import InputError, Robot, WorkspaceFacts
 from kin.transforms import Array, finite_array
 
@@ -50,7 +51,9 @@ class Workspace(Feature):
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
         self._wishes = Wishes(size=default_size(stage.robot))
-        self._controls = Controls(stage.client.gui, self._wishes, stage.robot, stage.store.robots, self.post)
+        self._controls = Controls(
+            stage.client.gui, self._wishes, stage.robot, stage.store.robots, stage.units, self.post
+        )
         self._flow = Flow(stage.client, lambda: self.post("more"))
         self._drawings: list[Drawing] = []
         self._running = False
@@ -62,6 +65,8 @@ class Workspace(Feature):
         self._mark: viser.IcosphereHandle | None = None
         self._clicks: Callable[[viser.SceneClickEvent], None] | None = None
         self._panel: SectionPanel | None = None
+        self._found: tuple[WorkspaceFacts, bool] | None = None  # sizes, and whether that is all of them
+        self._pick: tuple[int, Array, Array] | None = None  # the point clicked on: index, configuration, place
         self._tool = kin.fk(stage.robot, stage.q)[:3, 3]
         self._dot_due = False
         self._capability = Capability(
@@ -104,6 +109,10 @@ class Workspace(Feature):
             case ("preset", int(number)):
                 self._apply("n", number)
                 self._controls.show(self._wishes)
+            case (("size" | "at") as name, Units() as units):
+                length = self._controls.read_length(value, units)
+                if length is not None:
+                    self._apply(name, length)
             case str(name):
                 self._apply(name, self._controls.read(name, value))
             case _:
@@ -124,6 +133,16 @@ class Workspace(Feature):
             self._section(True)
         self._sizes(self._wishes.sizes)
         self.due = 0.0
+
+    def on_style(self) -> None:
+        units = self.stage.units
+        self._controls.use(units, self._wishes, self._cut)
+        self._show_legend()
+        self._tell_pick()
+        self._tell_sizes()
+        if self._panel is not None:
+            self._panel.use(units)
+        self._capability.restyle()
 
     def on_picture(self, T_base_tool: Array) -> None:
         self._moved = time.perf_counter()
@@ -349,7 +368,7 @@ class Workspace(Feature):
     def _show_legend(self) -> None:
         """What the colours tell, once there are any: before, nothing has to be known of the arm."""
         if not any(drawing.parts for drawing in self._drawings):
-            self._controls.legend.content = ""
+            _put(self._controls.legend, "")
             return
         robot, other = self.stage.robot, self._other
         if other is not None:
@@ -357,8 +376,8 @@ class Workspace(Feature):
         elif self._wishes.by == "one":
             content = colours.names_legend([(colours.OWN, robot.name)])
         else:
-            content = colours.legend(colours.scale_of(robot, self._wishes.by), self._wishes.map)
-        self._controls.legend.content = content
+            content = colours.legend(colours.scale_of(robot, self._wishes.by), self._wishes.map, self.stage.units)
+        _put(self._controls.legend, content)
 
     def _compare(self) -> None:
         for drawing in self._drawings[1:]:
@@ -444,6 +463,7 @@ class Workspace(Feature):
         if number != self._picks or not self._drawings:
             return
         if found is None or q is None:
+            self._pick = None
             self._controls.picked.content = words.nothing_picked()
             return
         robot = self.stage.robot
@@ -454,7 +474,8 @@ class Workspace(Feature):
             self._new_root(), radius=max(1.2 * self._wishes.size, 0.008 * robot.reach), color=(213, 94, 0),
             position=point,
         )  # fmt: skip
-        self._controls.picked.content = words.picked(robot, found.index, q, point)
+        self._pick = (found.index, q, point)
+        self._tell_pick()
         self.stage.go(
             q, Notice("hand", f"Moved to point {words.grouped(found.index)}", "The configuration that drew it.")
         )
@@ -464,9 +485,19 @@ class Workspace(Feature):
         if self._mark is not None:
             self._mark.remove()
             self._mark = None
+        self._pick = None
         self._controls.picked.content = ""
 
     # What is told
+
+    def _tell_pick(self) -> None:
+        if self._pick is not None:
+            _put(self._controls.picked, words.picked(self.stage.robot, *self._pick, self.stage.units))
+
+    def _tell_sizes(self) -> None:
+        if self._found is not None:
+            found, whole = self._found
+            _put(self._controls.sizes, sizes.html(found, not whole, self.stage.units))
 
     def _report(self) -> None:
         now = time.perf_counter()
@@ -496,9 +527,12 @@ class Workspace(Feature):
         if wanted:
             stage = self.stage
             self._tool = kin.fk(stage.robot, stage.q)[:3, 3]
-            self._panel = SectionPanel(stage.client, stage.robot, stage.clouds, self._new_root(), self.post)
+            self._panel = SectionPanel(
+                stage.client, stage.robot, stage.clouds, self._new_root(), stage.units, self.post
+            )
 
     def _sizes(self, wanted: bool) -> None:
+        self._found = None
         self._controls.sizes.content = sizes.WAIT if wanted else ""
         if not wanted:
             return
@@ -512,4 +546,10 @@ class Workspace(Feature):
 
     def _facts(self, robot: Robot, found: WorkspaceFacts, whole: bool) -> None:
         if self._wishes.sizes and robot == self.stage.robot:
-            self._controls.sizes.content = sizes.html(found, waiting=not whole)
+            self._found = (found, whole)
+            self._tell_sizes()
+
+
+def _put(element: viser.GuiHtmlHandle, content: str) -> None:
+    if element.content != content:
+        element.content = content

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 import kin
+from app.viewer.units import Units
 from kin import Robot
 from kin.transforms import Array
 from kin.workspace.measures import measured
@@ -48,14 +49,14 @@ def progress(state: State, drawn: int, total: int, speed: float) -> str:
     )
 
 
-def picked(robot: Robot, index: int, q: Array, point: Array) -> str:
+def picked(robot: Robot, index: int, q: Array, point: Array, units: Units) -> str:
     """The numbers of a point that was clicked on."""
-    x, y, z = (f"{1000.0 * v:.1f}".replace("-", "−") for v in point.tolist())
+    x, y, z = (units.lengths.number(v) for v in point.tolist())
     w = float(kin.manipulability(robot, q))
     margin = float(measured(Region.of(robot, None, None), "limits", np.asarray(q)[None])[0])
     rows = (
         ("point", grouped(index), ""),
-        ("x y z", f"{x} &nbsp; {y} &nbsp; {z}", "mm"),
+        ("x y z", f"{x} &nbsp; {y} &nbsp; {z}", units.lengths.name),
         ("manipulability", f"{w:.3g}", ""),
         ("limit margin", f"{100.0 * margin:.0f}", "%"),
     )

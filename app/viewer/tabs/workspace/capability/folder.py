@@ -56,6 +56,7 @@ class Capability:
         self._drawn_root = ""
         self._stale = False  # what is drawn is no longer what is meant
         self._mark: viser.FrameHandle | None = None
+        self._marked: tuple[CapabilityMap, int] | None = None  # the map and its row that were clicked on
         self._handles: dict[str, Any] = {}
         self._build()
         self._report()
@@ -126,6 +127,10 @@ class Capability:
         """Draw in these colours, and these slabs of this cut only."""
         self._relook(replace(self._look, map=colours, cut=cut, shown=shown))
 
+    def restyle(self) -> None:
+        """Tell everything in the units of now."""
+        self._tell()
+
     def state(self) -> dict[str, object]:
         """What a shared address restores."""
         return {**self._wishes.state(), "drawn": self._state in ("waiting", "computing", "done")}
@@ -190,14 +195,14 @@ class Capability:
         self._forget_pick()
         found = self._voxels.found
         self._mark = mark(self._stage.client.scene, self._root(), found, row)
-        self._pick.content = told.picked(found, row)
+        self._marked = (found, row)
+        self._tell()
 
     def _forget_pick(self) -> None:
         if self._mark is not None:
             self._mark.remove()
             self._mark = None
-        if self._pick.content:
-            self._pick.content = ""
+        self._marked = None
 
     def _apply(self, name: str, value: object) -> None:
         """Take a setting, and let the picture follow."""
@@ -213,13 +218,14 @@ class Capability:
             self._tell()
 
     def _tell(self) -> None:
-        """Legend and numbers of what there is."""
-        found = self._found
+        """Legend and numbers of what there is, and of what was clicked on."""
+        found, units = self._found, self._stage.units
         legend = facts = ""
+        pick = "" if self._marked is None else told.picked(*self._marked, units)
         if found is not None:
             legend = told.legend(found, self._wishes.by, self._look.map, self._wishes.least)
-            facts = told.facts(found, self._state == "done")
-        for element, content in ((self._legend, legend), (self._facts, facts)):
+            facts = told.facts(found, self._state == "done", units)
+        for element, content in ((self._legend, legend), (self._facts, facts), (self._pick, pick)):
             if element.content != content:
                 element.content = content
 

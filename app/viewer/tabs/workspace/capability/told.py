@@ -10,6 +10,7 @@ from app.viewer.tabs.workspace import colours
 from app.viewer.tabs.workspace.capability.voxels import LEVELS, first_level, largest, levels, values_of
 from app.viewer.tabs.workspace.capability.wishes import By
 from app.viewer.tabs.workspace.words import grouped
+from app.viewer.units import Units
 from kin import CapabilityMap
 from kin.workspace.capability import ROLLS, STARTS, Method
 
@@ -62,13 +63,13 @@ def legend(found: CapabilityMap, by: By, name: str, least: float) -> str:
     )
 
 
-def facts(found: CapabilityMap, whole: bool) -> str:
+def facts(found: CapabilityMap, whole: bool, units: Units) -> str:
     """Size, shares and what a missing direction is worth; of a part that is there so far unless `whole`."""
     count, share = len(found.index), found.share
     w = float(found.manipulability.max(initial=0.0))
     mean = float(share.mean(dtype=np.float64)) if count else 0.0
     rows = (
-        ("voxel", f"{1000.0 * found.grid.voxel:.1f}", "mm"),
+        ("voxel", units.lengths.number(found.grid.voxel), units.lengths.name),
         ("reachable", grouped(count), ""),
         ("their volume", f"{found.volume:.4g}", "m³"),
         ("mean share", f"{100.0 * mean:.3g}", "%"),
@@ -79,12 +80,12 @@ def facts(found: CapabilityMap, whole: bool) -> str:
     return f'{_table("capability in numbers", rows)}<div style="{STYLE};opacity:.8">{note}</div>'
 
 
-def picked(found: CapabilityMap, row: int) -> str:
+def picked(found: CapabilityMap, row: int, units: Units) -> str:
     """What is known of the voxel that was clicked on."""
-    x, y, z = (f"{1000.0 * v:.0f}".replace("-", "−") for v in found.centres[row].tolist())
+    x, y, z = (units.lengths.number(v, 0) for v in found.centres[row].tolist())
     fits, of = int(found.approachable[row].sum()), found.grid.count
     rows = (
-        ("centre x y z", f"{x} &nbsp; {y} &nbsp; {z}", "mm"),
+        ("centre x y z", f"{x} &nbsp; {y} &nbsp; {z}", units.lengths.name),
         ("approached from", f"{fits} of {of} directions", ""),
         ("share", f"{100.0 * fits / of:.3g}", "%"),
         ("best manipulability", f"{float(found.manipulability[row]):.3g}", ""),
