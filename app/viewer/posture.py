@@ -9,6 +9,7 @@ from app.viewer.feature import Stage
 from app.viewer.panel import Post
 from app.viewer.panel.posture import BranchChoice, FreeSliders
 from app.viewer.selfmotion import self_motion
+from kin import Redundancy
 from kin.transforms import Array
 
 
@@ -26,6 +27,7 @@ class Posture:
         self._held: str | None = None
         self._free = FreeSliders(stage.client.gui, folder, post)
         self._choice: BranchChoice
+        self._answered: tuple[tuple[object, ...], tuple[Redundancy, ...]] | None = None
         self.branch: str | None = None
 
     def use(self) -> None:
@@ -42,12 +44,21 @@ class Posture:
 
     def show(self) -> None:
         """The branch the arm is on, and what is free there."""
-        found = self._posture()
+        free = self._free_now()
         robot = self._stage.robot
         if kin.branch_names(robot):
             self._choice.show(kin.branch_of(robot, self._stage.goal))
-        self._free.show(found.redundancy, robot, self._stage.units, self._held)
+        self._free.show(free, robot, self._stage.units, self._held)
         self._held = None
+
+    def answered(self, result: kin.IKResult) -> None:
+        """Learn from the answer the arm is heading for what is free there."""
+        best = result.best
+        # Other tasks leave a turn about the target's own axis free, which is not the tool's until it has arrived.
+        if self._stage.task == "pose" and result.status == "solved" and best is not None:
+            self._answered = self._question(), best.redundancy
+        else:
+            self._answered = None
 
     def read(self, value: object) -> None:
         """Ask for what the visitor chose; raises `kin.InputError` for what is not on the list."""
@@ -73,7 +84,7 @@ class Posture:
         result = self._self_motion(name, wanted)
         told = result
         if result.status != "solved":
-            ranges = [r.intervals for r in self._posture().redundancy if r.name == name]
+            ranges = [r.intervals for r in self._free_now() if r.name == name]
             inside = [min(max(wanted, low), high) for low, high in (ranges[0] if ranges else ())]
             if not inside:
                 return None, told
@@ -88,11 +99,17 @@ class Posture:
         stage, q = self._stage, self._stage.goal
         return self_motion(stage.robot, kin.fk(stage.robot, q), stage.task, q, stage.locked, name, value)
 
-    def _posture(self) -> kin.IKResult:
+    def _free_now(self) -> tuple[Redundancy, ...]:
         """What is free where the arm is heading, on the branch it is on."""
         stage, q = self._stage, self._stage.goal
+        if self._answered is not None and self._answered[0] == self._question():
+            return self._answered[1]
         seed = "seed" if kin.branch_names(stage.robot) else None
         return kin.solve_ik(
             stage.robot, kin.fk(stage.robot, q), task=stage.task, q_seed=q, locked=stage.locked, branch=seed,
             max_solutions=1,
-        )  # fmt: skip
+        ).redundancy  # fmt: skip
+
+    def _question(self) -> tuple[object, ...]:
+        stage = self._stage
+        return stage.robot.id, stage.task, stage.goal.tobytes(), stage.locked

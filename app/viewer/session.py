@@ -409,6 +409,7 @@ class Session(Worker):
         self._target = T
         if result.best is not None:
             self._aim(result.best.q)
+        self.posture.answered(result)
         self._reached = result.status == "solved"
         self._status.answer(result, self._units)
         self._for_features(lambda feature: feature.on_answer(result))

@@ -137,3 +137,36 @@ def test_hostile_choices_are_refused_and_the_session_lives(port: int) -> None:
             tab.wait(lambda: 'data-status="hand"' in tab.html)
         tab.settle()
         assert np.allclose(tab.tool_pose(), kin.fk(SRS, SRS.q_home), atol=1e-9)
+
+
+@pytest.mark.parametrize("robot", kin.builtin_robots().values(), ids=lambda r: r.id)
+def test_the_answer_to_a_pose_tells_what_asking_again_where_it_leads_would_tell(robot: kin.Robot) -> None:
+    """So that a drag need not ask twice."""
+    rng = np.random.default_rng(5)
+    seed = "seed" if kin.branch_names(robot) else None
+    for _ in range(10):
+        q = robot.random_q(rng)
+        T = kin.fk(robot, robot.clip(q + 0.05 * rng.normal(size=robot.n)))
+        best = kin.solve_ik(robot, T, task="pose", q_seed=q).best
+        again = kin.solve_ik(
+            robot, kin.fk(robot, best.q), task="pose", q_seed=best.q, branch=seed, max_solutions=1
+        ).redundancy
+        assert [r.name for r in best.redundancy] == [r.name for r in again]
+        for one, other in zip(best.redundancy, again, strict=True):
+            assert math.remainder(one.value - other.value, math.tau) == pytest.approx(0.0, abs=1e-6)
+            assert np.array(one.intervals) == pytest.approx(np.array(other.intervals), abs=1e-5)
+
+
+def test_another_task_after_a_drag_leaves_free_what_it_leaves_free(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.choose(SRS.name)
+        T = kin.fk(SRS, SRS.q_home)
+        T[0, 3] += 0.02
+        tab.grab()
+        tab.drag(T)
+        tab.release()
+        tab.wait(lambda: "Reached" in tab.html)
+        tab.settle()
+        assert 'data-free="theta7"' not in tab.html
+        tab.set("Match", "Point + approach")
+        tab.wait(lambda: 'data-free="theta7"' in tab.html)
