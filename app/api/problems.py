@@ -20,6 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from pydantic_core import to_json
 from starlette.exceptions import HTTPException as StarletteHTTPException
 from starlette.responses import Response
+from starlette.routing import Match, Route
 
 from kin import InputError, UnknownRobotError
 from kin.errors import shorten
@@ -166,12 +167,22 @@ async def _http_error(request: Request, error: Exception) -> Response:
             ProblemError(404, "not-found", f"Nothing answers at {path}.", "See /docs for what there is.")
         )
     if error.status_code == 405:
-        hint = f"It takes {headers['Allow']}." if "Allow" in headers else DOCS_HINT
+        headers["Allow"] = ", ".join(_methods_at(request))
+        hint = f"It takes {headers['Allow']}." if headers["Allow"] else DOCS_HINT
         detail = f"{path} does not take {request.method}."
         return respond(ProblemError(405, "method-not-allowed", detail, hint, headers=headers))
     kind = "bad-request" if error.status_code == 400 else "http-error"
     detail = str(error.detail) or HTTPStatus(error.status_code).phrase
     return respond(ProblemError(error.status_code, kind, detail, headers=headers))
+
+
+def _methods_at(request: Request) -> list[str]:
+    """What an address takes: each method may be a route of its own, and the one that refuses knows only that."""
+    taken: set[str] = set()
+    for route in request.app.routes:
+        if isinstance(route, Route) and route.matches(request.scope)[0] is not Match.NONE:
+            taken |= route.methods or set()
+    return sorted(taken)
 
 
 async def _validation_error(request: Request, error: Exception) -> Response:

@@ -58,6 +58,8 @@ def test_a_wrong_method_says_which_is_right(client):
     document = problem(response, 405, "method-not-allowed")
     assert response.headers["allow"] == "POST"
     assert "POST" in document["hint"]
+    both = client.request("DELETE", f"{ARM}/equations")  # two routes of one address
+    assert both.headers["allow"] == "GET, POST"
 
 
 def test_a_huge_robot_id_is_shortened(client):
