@@ -193,11 +193,16 @@ def frame_from_approach(approach: ArrayLike) -> Array:
     z = finite_array("approach", approach, (3,))
     if z.ndim != 1:
         raise InputError("approach", f"shape {z.shape}", "three numbers: the direction of the tool's z axis")
-    scale = float(np.abs(z).max())
+    given = z.tolist()
+    scale = max(map(abs, given))
     if not scale > 1e-12:
-        raise InputError("approach", z.tolist(), "a direction that is not zero")
-    z = z / scale
-    z /= np.linalg.norm(z)
-    x = np.cross((0.0, 0.0, 1.0) if abs(z[2]) < 0.9 else (0.0, 1.0, 0.0), z)
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(z, x), z])
+        raise InputError("approach", given, "a direction that is not zero")
+    # In plain numbers: arrays of three cost ten times as much, and a batch of targets is made of these.
+    zx, zy, zz = (v / scale for v in given)
+    size = math.hypot(zx, zy, zz)
+    zx, zy, zz = zx / size, zy / size, zz / size
+    # The product of (0, 0, 1) and z, or of (0, 1, 0) and z.
+    xx, xy, xz = (-zy, zx, 0.0) if abs(zz) < 0.9 else (zz, 0.0, -zx)
+    size = math.hypot(xx, xy, xz)
+    xx, xy, xz = xx / size, xy / size, xz / size
+    return np.array([[xx, zy * xz - zz * xy, zx], [xy, zz * xx - zx * xz, zy], [xz, zx * xy - zy * xx, zz]])
