@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 
 import numpy as np
 import viser
+from numpy.typing import NDArray
 
 from app.viewer.meshes import Body
 from app.viewer.panel import Post
@@ -27,18 +29,39 @@ FARTHEST = 1e6  # metres; viser's own limit of zooming out is 1e4
 SAME = 1e-3  # of the distance to what is looked at
 _MARGIN = 1.06  # of the sphere around the arm
 _LIFT = 0.57  # of its radius, for the arm to stand above a sheet
+Sphere = tuple[Array, float]  # centre ``(3,)`` and radius, m
 
 
-def view(body: Body, aspect: float, sheet: bool = False) -> tuple[Array, Array]:
+def round_points(points: NDArray[np.floating]) -> Sphere:
+    """A sphere that holds points ``(n, 3)``, n > 0: round the middle of their box."""
+    center = (points.min(axis=0) + points.max(axis=0)).astype(float) / 2.0
+    return center, float(np.linalg.norm(points - center, axis=1).max())
+
+
+def round_both(one: Sphere, other: Sphere) -> Sphere:
+    """The smallest sphere that holds two."""
+    out = other[0] - one[0]
+    apart = float(np.linalg.norm(out))
+    if apart + other[1] <= one[1]:
+        return one
+    if apart + one[1] <= other[1]:
+        return other
+    radius = (apart + one[1] + other[1]) / 2.0
+    return one[0] + out / apart * (radius - one[1]), radius
+
+
+def view(body: Body, aspect: float, sheet: bool = False, room: Sequence[Sphere] = ()) -> tuple[Array, Array]:
     """Camera position and look-at point ``(3,)`` that show the whole of the arm in a window of this aspect.
 
     In a portrait window the width is what limits. On a phone the panel is a `sheet` that covers the lower part:
-    there the arm goes above it.
+    there the arm goes above it. `room`: what else is to be seen.
     """
-    center = body.center
+    center, radius = body.center, body.radius
+    for sphere in room:
+        center, radius = round_both((center, radius), sphere)
     if sheet and aspect < 1.0:
-        center = center - UP * _LIFT * body.radius / aspect
-    distance = _MARGIN * body.radius / math.sin(_half_angle(aspect))
+        center = center - UP * _LIFT * radius / aspect
+    distance = _MARGIN * radius / math.sin(_half_angle(aspect))
     return center + DIRECTION / np.linalg.norm(DIRECTION) * distance, center
 
 
@@ -75,14 +98,25 @@ class VisitorCamera:
         self._aimed, self._aimed_at, self._arrived = np.zeros((3, 3)), 0.0, False
         self.sheet = self._camera.image_width < NARROW
         self.chosen: Array | None = None
+        self._body: Body | None = None
+        self._room: tuple[Sphere, ...] = ()
         self._camera.on_update(self._on_update)
 
     def aim(self, body: Body) -> None:
-        """Move to the default view."""
+        """Move to the default view; that of another arm has room for nothing else."""
+        if body is not self._body:
+            self._body, self._room = body, ()
         self._camera.fov = FOV
         self._camera.near, self._camera.far = body.radius / 50, body.radius * 200
         self.chosen = None
-        self._go(np.stack([*view(body, self._aspect, self.sheet), UP]))
+        self._go(np.stack([*view(body, self._aspect, self.sheet, self._room), UP]))
+
+    def make_room(self, room: Sequence[Sphere]) -> None:
+        """Have the default view show these spheres too, from now on; a view that is `chosen` stays as it is."""
+        before, self._room = self._room, tuple(room)
+        self.look()
+        if self._body is not None and self.chosen is None and (before or room):
+            self.aim(self._body)
 
     def restore(self, viewpoint: Array) -> None:
         """Move to a viewpoint that was `chosen` in this window or in another."""

@@ -8,7 +8,7 @@ post, as every control does; its methods are called by the visitor's worker, one
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from typing import ClassVar, Protocol
 
 import viser
@@ -16,6 +16,7 @@ import viser
 from app.clouds import Clouds
 from app.maps import Maps
 from app.store import Store
+from app.viewer.camera import Sphere
 from app.viewer.panel.status import Notice
 from app.viewer.units import Units
 from kin import IKResult, Robot, Task
@@ -92,6 +93,9 @@ class Stage(Protocol):
 
     def tell(self, notice: Notice) -> None:
         """Show a notice in the status line."""
+
+    def make_room(self, room: Sequence[Sphere]) -> None:
+        """Have the default view show these spheres too, and only these; a view the visitor has chosen stays."""
 
 
 class Feature:

@@ -22,7 +22,7 @@ from app.maps import Maps
 from app.metrics import SOLVE_SECONDS
 from app.store import Store
 from app.viewer import gizmo
-from app.viewer.camera import VisitorCamera
+from app.viewer.camera import Sphere, VisitorCamera
 from app.viewer.feature import Feature
 from app.viewer.lessons import LESSONS
 from app.viewer.memory import Memory
@@ -189,6 +189,10 @@ class Session(Worker):
     def tell(self, notice: Notice) -> None:
         """Show a notice in the status line."""
         self._status.show(notice)
+
+    def make_room(self, room: Sequence[Sphere]) -> None:
+        """Have the default view show these spheres too."""
+        self.camera.make_room(room)
 
     @property
     def features(self) -> list[Feature]:

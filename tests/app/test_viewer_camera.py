@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -197,3 +198,42 @@ def test_an_address_without_a_camera_has_the_default_view(port: int) -> None:
     with FakeBrowser(port, 390, 844, memory=memory(PageState("ur5", UR5.q_home))) as tab:
         tab.settle()
         assert np.allclose(shown(tab), default(UR5, PHONE, sheet=True))
+
+
+def test_the_camera_steps_back_for_what_is_drawn_and_leaves_a_chosen_view_alone() -> None:
+    lens = SimpleNamespace(
+        image_width=956, image_height=720, position=np.ones(3), look_at=np.zeros(3), up_direction=camera.UP,
+        on_update=lambda act: act,
+    )  # fmt: skip
+    of_visitor = camera.VisitorCamera(SimpleNamespace(camera=lens), lambda key, value: None)  # type: ignore[arg-type]
+    arm = body(PIONEER)
+    of_visitor.aim(arm)
+    near = lens.position
+    points = np.random.default_rng(1).normal(size=(500, 3))
+    room = [camera.round_points(points)]
+    assert np.linalg.norm(points - room[0][0], axis=1).max() <= room[0][1]
+
+    def distance() -> float:
+        return float(np.linalg.norm(lens.position - lens.look_at) / np.linalg.norm(near - arm.center))
+
+    of_visitor.make_room(room)
+    assert distance() > 1.5
+    of_visitor.make_room([])
+    assert np.array_equal(lens.position, near), "and comes near again"
+    of_visitor.restore(ASIDE)
+    of_visitor.make_room(room)
+    assert np.array_equal(lens.position, ASIDE[0]), "it is the visitor's now"
+    of_visitor.aim(arm)
+    assert distance() > 1.5, "until asked to"
+    of_visitor.aim(body(UR5))
+    of_visitor.aim(arm)
+    assert np.array_equal(lens.position, near), "another arm, another cloud"
+
+
+def test_a_sphere_round_two() -> None:
+    small, large = (np.array([1.0, 0.0, 0.0]), 0.5), (np.array([0.0, 0.0, 0.0]), 2.0)
+    assert camera.round_both(small, large) is large
+    assert camera.round_both(large, small) is large
+    center, radius = camera.round_both(small, (np.array([-2.0, 0.0, 0.0]), 1.0))
+    assert radius == pytest.approx(2.25)
+    assert center == pytest.approx([-0.75, 0.0, 0.0])

@@ -22,6 +22,7 @@ import viser
 from numpy.typing import NDArray
 
 from app.clouds import Cloud, Clouds
+from app.viewer.camera import Sphere, round_points
 from app.viewer.tabs.workspace.colours import By, Bytes, Colour, measures, paint, quantity, scale_of
 from app.viewer.tabs.workspace.cut import Cut
 from kin import WorkspaceChunk
@@ -85,6 +86,7 @@ class Drawing:
         self.look = look
         self.running = True
         self.parts = 0  # in the picture, some perhaps in their old look
+        self.extent: Sphere | None = None  # of the first part
         self._scene = scene
         self._clouds = clouds
         self._size = size
@@ -225,6 +227,8 @@ class Drawing:
     def _take(self, chunk: WorkspaceChunk) -> None:
         """Paint the next part; with the last one of a block, the block is ready to be sent."""
         look, robot = self.look, self.cloud.robot
+        if self.extent is None:
+            self.extent = round_points(chunk.points)
         colours: Bytes | Colour = look.colour
         if look.by != "one":
             colours = paint(quantity(robot, look.by, chunk), scale_of(robot, look.by), look.map)

@@ -69,6 +69,7 @@ class Workspace(Feature):
         self._pick: tuple[int, Array, Array] | None = None  # the point clicked on: index, configuration, place
         self._tool = kin.fk(stage.robot, stage.q)[:3, 3]
         self._dot_due = False
+        self._seen: tuple[int, bool] = (0, False)  # clouds and a map the view has room for
         self._capability = Capability(
             stage,
             self._flow,
@@ -167,6 +168,7 @@ class Workspace(Feature):
                     self._plotted = now
         try:
             self._capability.tick(now, now - self._moved < MOVED)
+            self._make_room()
         finally:
             wishes = (self._next(now), self._capability.due)
             self.due = min((wish for wish in wishes if wish is not None), default=None)
@@ -321,6 +323,15 @@ class Workspace(Feature):
     def _new_root(self) -> str:
         self._roots += 1
         return f"/workspace-{self._roots}"
+
+    def _make_room(self) -> None:
+        """Have what is drawn in view as soon as there is something of it, and the arm alone when all is gone."""
+        clouds = [drawing.extent for drawing in self._drawings if drawing.extent is not None]
+        mapped = self._capability.extent
+        seen = (len(clouds), mapped is not None)
+        if seen != self._seen:
+            self._seen = seen
+            self.stage.make_room(clouds if mapped is None else [*clouds, mapped])
 
     # What it looks like
 

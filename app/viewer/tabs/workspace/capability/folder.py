@@ -15,6 +15,7 @@ import viser
 from numpy.typing import NDArray
 
 from app.maps import Reader, Wanted
+from app.viewer.camera import Sphere
 from app.viewer.feature import Stage
 from app.viewer.panel import Post, assign, listen, listen_click
 from app.viewer.tabs.workspace.capability import told
@@ -76,6 +77,15 @@ class Capability:
                 self._apply(name, self._read(name, value))
             case _:
                 raise KeyError(key)
+
+    @property
+    def extent(self) -> Sphere | None:
+        """A sphere round the map, whole or not, that leaves out the corners of its grid: there is nothing."""
+        if self._found is None or not len(self._found.index):
+            return None
+        grid = self._found.grid
+        sides = np.array(grid.shape) * grid.voxel
+        return np.array(grid.origin) + sides / 2.0, float(sides.max()) / 2.0
 
     @property
     def due(self) -> float | None:
