@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Iterator
@@ -17,7 +18,7 @@ from app.clouds import Clouds
 from app.settings import Settings
 from app.store import Store
 from app.viewer.lessons.velocity import VelocityLesson, told
-from app.viewer.lessons.velocity.drawing import ring_arrow, wxyz_along
+from app.viewer.lessons.velocity.drawing import ring_arrow, sides, wxyz_along
 from app.viewer.lessons.velocity.jog import BUTTONS, Press, button, moved, step
 from app.viewer.lessons.velocity.rates import (
     NEAR,
@@ -430,8 +431,9 @@ def test_a_shared_state_is_restored_and_a_hostile_one_is_ignored() -> None:
     server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     try:
         robot = STORE.get("ur5")
+        client = SimpleNamespace(gui=server.gui, scene=server.scene, camera=SimpleNamespace(position=np.ones(3)))
         stage = SimpleNamespace(
-            client=server, robot=robot, q=robot.q_home, goal=robot.q_home, task="pose", units=USUAL, dark=False
+            client=client, robot=robot, q=robot.q_home, goal=robot.q_home, task="pose", units=USUAL, dark=False
         )
         lesson = VelocityLesson(stage)  # type: ignore[arg-type]
         first = lesson.state()
@@ -459,3 +461,21 @@ def test_a_shared_state_is_restored_and_a_hostile_one_is_ignored() -> None:
         lesson.remove()
     finally:
         server.stop()
+
+
+def test_values_are_written_at_ends_that_lie_apart_on_screen() -> None:
+    towards = np.array([1.0, 1.0, 0.5])
+    rng = np.random.default_rng(5)
+    for _ in range(50):
+        R = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        tips = R * rng.uniform(0.1, 1.0, 3)
+        signs = sides(tips, towards)
+        assert set(np.abs(signs)) == {1.0}
+
+        def apart(signs: np.ndarray, tips: np.ndarray = tips) -> float:
+            ahead = towards / np.linalg.norm(towards)
+            ends = [s * (t - ahead * (ahead @ t)) for s, t in zip(signs, tips.T, strict=True)]
+            return min(float(np.linalg.norm(ends[i] - ends[k])) for i, k in ((0, 1), (0, 2), (1, 2)))
+
+        every = [apart(np.array(choice)) for choice in itertools.product((1, -1), repeat=3)]
+        assert apart(signs) == pytest.approx(max(every), abs=2e-3)

@@ -322,7 +322,7 @@ class VelocityLesson(Feature):
         semi = semi_axes(self._axes.values, self._kind)
         scale = self._scales[self._kind]
         _tell(self._ellipsoid, told.ellipsoid_html(robot, self._kind, semi, scale, self._cut, stage.units))
-        self._drawing.write_values(told.label_texts(semi))
+        self._drawing.write_values(told.label_texts(semi), np.asarray(stage.client.camera.position))
 
     def _show_singularities(self, R_base_tool: Array) -> None:
         stage, robot = self.stage, self.stage.robot

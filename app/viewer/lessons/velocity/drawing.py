@@ -30,6 +30,7 @@ AXIS_LINE = (90, 90, 90)
 FLAT, LONGEST = 0.004, 1.1
 RING, LOST_RING, LOST_ARROW = 0.13, 0.2, 0.36
 MOST_LOST = 3
+CHOICES = np.array([(1.0, b, c) for b in (1.0, -1.0) for c in (1.0, -1.0)])
 
 
 class Drawing:
@@ -41,6 +42,7 @@ class Drawing:
         self._root = scene.add_frame(root, show_axes=False)
         self._kind: Ellipsoid | None = None
         self._tips = np.zeros(3)
+        self._R = np.eye(3)
         # Everything about the ellipsoid hangs on its principal axes: turning them is one message.
         self._body = scene.add_frame(f"{root}/body", show_axes=False, visible=False)
         sphere = trimesh.creation.icosphere(subdivisions=3)
@@ -110,14 +112,16 @@ class Drawing:
             self._kind = kind
             self._ellipsoid.color = COLORS[kind]
             self._body.visible = True
+        self._R = R
         self._body.wxyz = wxyz_from_rotation(R)
         self._ellipsoid.scale = self._axes.scale = (float(shown[0]), float(shown[1]), float(shown[2]))
         self._tips = shown + 0.05 * self.radius
         return bool((lengths > LONGEST * self.radius).any())
 
-    def write_values(self, texts: tuple[str, str, str]) -> None:
-        """Name the axes of the ellipsoid by their values."""
-        for label, text, end in zip(self._labels, texts, np.diag(self._tips), strict=True):
+    def write_values(self, texts: tuple[str, str, str], eye: Array) -> None:
+        """Name the axes of the ellipsoid by their values, as seen from a point ``(3,)``."""
+        ends = np.diag(self._tips * sides(self._R * self._tips, eye - self._root.position))
+        for label, text, end in zip(self._labels, texts, ends, strict=True):
             label.text = text
             label.position = end
 
@@ -160,6 +164,22 @@ class Drawing:
     def remove(self) -> None:
         """Take everything out of the scene."""
         self._root.remove()
+
+
+def sides(tips: Array, towards: Array) -> Array:
+    """Which end of each axis to write at, ±1 ``(3,)``: the choice that keeps the texts farthest apart on screen.
+
+    Args:
+        tips: the axes' ends as columns ``(3, 3)``, from their common middle.
+        towards: from there to the eye ``(3,)``.
+    """
+    ahead = towards / max(float(np.linalg.norm(towards)), 1e-9)
+    flat = (tips - np.outer(ahead, ahead @ tips)).T
+    ends = CHOICES[:, :, None] * flat
+    apart = np.linalg.norm(ends - np.roll(ends, 1, axis=1), axis=2).min(axis=1)
+    # The first of equals: an arm that moves does not make the texts jump without need.
+    best: Array = CHOICES[int(np.argmax(apart > apart.max() - 1e-3 * np.abs(tips).max()))]
+    return best
 
 
 def _set_visible(node: viser.SceneNodeHandle, visible: bool) -> None:
