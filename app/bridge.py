@@ -60,8 +60,8 @@ _FULL_PAGE = _PAGE.format(
 # Codes that describe a lost connection and may not travel in a close frame (RFC 6455, 7.4.1).
 _UNSENDABLE = {1005: 1000, 1006: 1011, 1015: 1011}
 
-# A tab's memory. Relative, so that it holds behind any path prefix.
-_OURS = b'<script src="../static/viewer.js"></script>'
+# A tab's memory, and what viser's controls lack. Relative, so that it holds behind any path prefix.
+_OURS = b'<link rel="stylesheet" href="../static/viewer.css"><script src="../static/viewer.js"></script>'
 
 # Close code and reason.
 _Ending = tuple[int, str]
@@ -223,7 +223,7 @@ async def _add_slash(request: Request) -> Response:
 
 
 class _Page:
-    """viser's single-file client with a script of ours in front, plain and compressed."""
+    """viser's single-file client with a script and a style sheet of ours in front, plain and compressed."""
 
     def __init__(self, html: bytes) -> None:
         html = html.replace(b"<title>Viser</title>", b"<title>Kinboard viewer</title>", 1)

@@ -80,6 +80,61 @@
   addEventListener("click", noteTab);
   addEventListener("keyup", noteTab);
 
+  // What viser leaves without a name or out of the keyboard's reach.
+
+  const NAMELESS = '[role="slider"][aria-label=""], [role="progressbar"]:not([aria-label]), input:not([type="hidden"]):not([aria-label])';
+  const FOLDER = ".mantine-Paper-root > .mantine-Paper-root:has(> .tabler-icon-chevron-up, > .tabler-icon-chevron-down)";
+  const name = (node, text) => { if (node && text) node.setAttribute("aria-label", text); };
+
+  /** The label of the line of the panel that a control is in: the nearest box around both has only that one. */
+  function lineLabel(node) {
+    for (let box = node.parentElement; box; box = box.parentElement) {
+      const labels = box.querySelectorAll("label");
+      if (labels.length) return labels.length === 1 ? labels[0] : null;
+    }
+    return null;
+  }
+
+  function complete() {
+    for (const node of document.querySelectorAll(NAMELESS)) {
+      if (node.labels?.length) continue;
+      const found = lineLabel(node);
+      name(node, found ? label(found) : node.role === "progressbar" ? "Progress" : "");
+    }
+    for (const found of document.querySelectorAll("label[for]")) {
+      const line = found.closest(".mantine-Flex-root");
+      const buttons = line?.querySelector("button:not([role])")?.parentElement;
+      if (!buttons || buttons.role === "group" || document.getElementById(found.htmlFor)) continue;
+      buttons.role = "group";
+      name(buttons, label(found) || "Choices");
+    }
+    for (const icon of document.querySelectorAll("button:not([aria-label]) .tabler-icon-adjustments")) {
+      name(icon.closest("button"), "Settings of the page");
+    }
+    for (const head of document.querySelectorAll(FOLDER)) {
+      head.role = "button";
+      head.tabIndex = 0;
+      head.ariaExpanded = String(head.nextElementSibling?.getAttribute("aria-hidden") !== "true");
+    }
+  }
+
+  let waiting = 0;
+  addEventListener("DOMContentLoaded", () => {
+    const changes = new MutationObserver(() => { waiting ||= setTimeout(() => { waiting = 0; complete(); }, 150); });
+    changes.observe(document.body, { subtree: true, childList: true, attributes: true, attributeFilter: ["aria-hidden"] });
+    // A control's arrow keys are its own: viser would also turn the view by them.
+    for (const kind of ["keydown", "keyup"]) {
+      document.body.addEventListener(kind, (event) => {
+        if (event.key.startsWith("Arrow") && event.target.matches("input, textarea, [role]")) event.stopPropagation();
+      });
+    }
+  });
+  addEventListener("keydown", (event) => {
+    if (!["Enter", " "].includes(event.key) || !(event.target instanceof Element) || !event.target.matches(FOLDER)) return;
+    event.preventDefault();
+    event.target.click();
+  });
+
   async function copy(code) {
     try {
       await navigator.clipboard.writeText(code.textContent);

@@ -177,7 +177,8 @@ def test_every_built_in_arm_has_a_small_picture():
 def test_viser_gets_its_memory_before_its_own_script(client):
     html = client.get("/viewer/").text
     assert html.index('<script src="../static/viewer.js"></script>') < html.index("<script data-p")
-    assert client.get("/static/viewer.js").status_code == 200
+    assert html.index('<link rel="stylesheet" href="../static/viewer.css">') < html.index("<script data-p")
+    assert all(client.get(f"/static/viewer.{kind}").status_code == 200 for kind in ("js", "css"))
 
 
 def test_the_landing_page_names_the_version(client):

@@ -42,7 +42,7 @@ def html(T_base_tool: Array, units: Units) -> str:
         for name, values, decimals, unit in rows
     )
     return (
-        '<table aria-label="tool pose" style="width:calc(100% - 2em);margin:.1em 1em .3em;'
+        '<table aria-label="tool pose" style="width:calc(100% - 2em);margin:.1em 1em .8em;'
         f'border-collapse:collapse;font-size:.78em;line-height:1.55;font-variant-numeric:tabular-nums">{body}</table>'
     )
 

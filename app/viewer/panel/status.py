@@ -25,6 +25,11 @@ LOOKS: dict[Kind, tuple[str, str]] = {
 }
 
 
+def ink(color: str) -> str:
+    """A colour for text: nearer to the page's own, so that it can be read on a light page and on a dark one."""
+    return f"color-mix(in srgb, {color} 60%, currentColor)"
+
+
 @dataclass(frozen=True)
 class Notice:
     """What the visitor is told: a headline and a sentence."""

@@ -11,6 +11,7 @@ import numpy as np
 from app.equations import Book, Equation, Line, Symbol, Values, typeset
 from app.equations.expression import Expression, names
 from app.viewer.mathml import fixed
+from app.viewer.panel.status import ink
 from app.viewer.units import Units
 from kin.transforms import Array
 
@@ -79,7 +80,7 @@ def verdict_html(equation: Equation) -> str:
     """What is to be thought of the equation, by a mark, words and a colour."""
     mark, words, color = LOOKS[equation.verdict]
     number = "" if equation.number is None else f"Equation ({equation.number}): "
-    return f'<b style="font-size:1.08em">{number}<span style="color:{color}">{mark} {words}</span></b>'
+    return f'<b style="font-size:1.08em">{number}<span style="color:{ink(color)}">{mark} {words}</span></b>'
 
 
 def note_html(note: str) -> str:
@@ -129,7 +130,7 @@ def values_html(equation: Equation, values: Values, units: Units, largest: float
         f'font-variant-numeric:tabular-nums"><caption style="text-align:left;opacity:.75">{unit}, at this pose'
         f"</caption><tr>{head}</tr><tr>{cells}</tr></table>"
         '<div data-off="" style="min-height:2.6em;line-height:1.3;padding-top:.2em">'
-        f'<b style="color:{color}">{mark}</b> {words}</div></div>'
+        f'<b style="color:{ink(color)}">{mark}</b> {words}</div></div>'
     )
 
 
@@ -171,7 +172,7 @@ def _formula(
     for part, mark in zip(parts, marked or (False,) * len(parts), strict=True):
         style = "display:inline-block;margin-right:.25em"
         if mark:
-            style += f";color:{color};border-bottom:2px solid {color}"
+            style += f";color:{ink(color)};border-bottom:2px solid {color}"
         spans.append(f'<span style="{style}"' + (f' title="{word}"' if mark else "") + f">{part}</span>")
     return f'<div style="margin-top:.35em;opacity:.75">{title}</div><div style="{BOX}">{" ".join(spans)}</div>'
 

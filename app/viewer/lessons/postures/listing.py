@@ -168,7 +168,8 @@ def html(robot: Robot, postures: tuple[Posture, ...], here: str, shown: frozense
 
 def _row(robot: Robot, index: int, posture: Posture, here: bool, shown: bool, units: Units) -> str:
     r, g, b = COLORS[index % len(COLORS)] if posture.can_be_had else BLOCKED_COLOR
-    fill = f"background:rgb({r},{g},{b});color:#fff" if shown or here else "background:none"
+    ink = "#000" if 0.3 * r + 0.59 * g + 0.11 * b > 105.0 else "#fff"
+    fill = f"background:rgb({r},{g},{b});color:{ink}" if shown or here else "background:none"
     badge = (
         f'<span style="flex:none;width:1.7em;height:1.7em;line-height:1.5em;box-sizing:border-box;'
         f'border:.12em solid rgb({r},{g},{b});border-radius:50%;text-align:center;font-weight:700;{fill}">'
@@ -193,12 +194,12 @@ def _row(robot: Robot, index: int, posture: Posture, here: bool, shown: bool, un
     return (
         f'<div role="listitem" data-posture="{escape(posture.name, quote=True)}" data-state="{posture.state}"'
         f'{" data-here" if here else ""} style="display:flex;gap:.6em;align-items:center;padding:.2em .3em;'
-        f"border-radius:.4em;min-height:2em;opacity:{1 if posture.can_be_had else 0.62};"
+        f"border-radius:.4em;min-height:2em;opacity:{1 if posture.can_be_had else 0.78};"
         f'background:{"rgba(128,128,128,.16)" if here else "none"}">{badge}'
         '<span style="flex:1;min-width:0"><span style="display:flex;gap:.5em">'
         f'<span style="flex:1"><b style="font-weight:600">{escape(short(posture.name))}</b>{mark}</span>'
         f'<span style="flex:none">{escape(state) if not words else ""}</span></span>'
-        f'<span style="display:flex;gap:.5em;align-items:center;font-size:.93em;opacity:.85">'
+        f'<span style="display:flex;gap:.5em;align-items:center;font-size:.93em;opacity:.9">'
         f"{escape(words)}{detail}</span></span></div>"
     )
 

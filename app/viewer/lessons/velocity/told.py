@@ -11,6 +11,7 @@ import numpy as np
 from app.viewer.lessons.velocity.rates import Ellipsoid, State, TaskRates, condition, real, state_of
 from app.viewer.mathml import fixed, ident, sub, text
 from app.viewer.mathml import math as formula
+from app.viewer.panel.status import ink
 from app.viewer.units import Units
 from kin import Robot, Singularity
 from kin.transforms import Array
@@ -157,7 +158,7 @@ def others_html(robot: Robot, found: tuple[Singularity, ...], units: Units) -> s
         meaning = escape(units.retold(s.meaning), quote=True)
         rows += (
             f'<tr title="{meaning}"><td style="padding:0 .5em 0 0;font-weight:700;'
-            f'color:{color};white-space:nowrap">{mark} {word}</td><td style="padding:0">{escape(name)}</td>'
+            f'color:{ink(color)};white-space:nowrap">{mark} {word}</td><td style="padding:0">{escape(name)}</td>'
             f'<td style="padding:0;text-align:right;white-space:nowrap">{distance(s, units)}</td></tr>'
             f'<tr><td></td><td colspan="2" style="padding:0 0 .3em;font-size:.92em;line-height:1.3;{_QUIET}">'
             f"{meaning}</td></tr>"
