@@ -53,7 +53,7 @@ def wait_until_ready(url: str, seconds: float = 180.0) -> None:
     pytest.fail(f"not ready after {seconds} s: {reason}")
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
     if not CHROMIUM.exists():
         pytest.fail(
@@ -65,10 +65,18 @@ def browser() -> Iterator[Browser]:
         started.close()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def desktop(browser: Browser, address: str) -> Iterator[Tab]:
     """One tab for all tests: software rendering compiles its shaders for seconds whenever a page opens."""
     opened = Tab(browser, address, 1280, 720)
+    yield opened
+    opened.close()
+
+
+@pytest.fixture(scope="session")
+def phone(browser: Browser, address: str) -> Iterator[Tab]:
+    """One for all that is looked at on a phone."""
+    opened = Tab(browser, address, 390, 844)
     yield opened
     opened.close()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,13 @@ from app.viewer.panel.joints import label
 
 ARTIFACTS = Path(__file__).parents[1] / "artifacts"
 WAIT = 20_000  # ms; software rendering on a busy machine is slow
+# A third of the work of software rendering is smoothing edges.
+PLAIN = """
+const { getContext } = HTMLCanvasElement.prototype;
+HTMLCanvasElement.prototype.getContext = function (kind, options) {
+  return getContext.call(this, kind, kind.startsWith("webgl") ? { ...options, antialias: false } : options);
+};
+"""
 
 
 class Tab:
@@ -23,6 +31,7 @@ class Tab:
 
     def __init__(self, browser: Browser, address: str, width: int, height: int) -> None:
         self.page: Page = browser.new_page(viewport={"width": width, "height": height})
+        self.page.add_init_script(PLAIN)
         self.page.set_default_timeout(WAIT)
         expect.set_options(timeout=WAIT)
         self.errors: list[str] = []
@@ -51,6 +60,28 @@ class Tab:
         entry.fill(text)
         entry.press("Enter")
 
+    def open(self, title: str) -> None:
+        """A tab of the panel."""
+        self.page.get_by_role("tab", name=title).click()
+
+    def take(self, robot: kin.Robot) -> None:
+        """Have this robot on show."""
+        if self.row("Robot").locator("input:visible").first.input_value() != robot.name:
+            self.choose("Robot", robot.name)
+            expect(self.status.first).to_contain_text(robot.name)
+
+    def choose_lesson(self, title: str) -> None:
+        self.open("Learn")
+        self.choose("Lesson", title)
+
+    def dark(self, wanted: bool) -> None:
+        """A dark page, or a light one."""
+        self.open("View")
+        scheme = "dark" if wanted else "light"
+        if self.page.locator("html").get_attribute("data-mantine-color-scheme") != scheme:
+            self.check("Dark page")
+        expect(self.page.locator("html")).to_have_attribute("data-mantine-color-scheme", scheme)
+
     def choose(self, label: str, option: str) -> None:
         self.row(label).locator("input:visible").first.click()
         self.page.get_by_role("option", name=option, exact=True).click()
@@ -69,11 +100,11 @@ class Tab:
             assert time.monotonic() < end, f"the tool is at {self.tool()}, expected {1000 * xyz}"
             self.page.wait_for_timeout(50)
 
-    def pixel(self, robot: kin.Robot, point: np.ndarray) -> np.ndarray:
-        """Where a point of the scene is on the page, in the default view."""
+    def pixel(self, robot: kin.Robot, point: np.ndarray, room: Sequence[camera.Sphere] = ()) -> np.ndarray:
+        """Where a point of the scene is on the page, in the default view with room for these spheres."""
         area = self.page.locator("canvas").first.bounding_box()
         assert area is not None
-        position, look_at = camera.view(body(robot), area["width"] / area["height"])
+        position, look_at = camera.view(body(robot), area["width"] / area["height"], room=room)
         forward = (look_at - position) / np.linalg.norm(look_at - position)
         right = np.cross(forward, [0.0, 0.0, 1.0])
         right /= np.linalg.norm(right)
@@ -100,17 +131,40 @@ class Tab:
         self.page.mouse.up()
 
     def show(self, robot: kin.Robot) -> None:
-        """The robot at home."""
+        """The robot at home, without a lesson."""
+        self.open("Learn")
+        if self.row("Lesson").locator("input:visible").first.input_value() != "None":
+            self.choose("Lesson", "None")
         self.page.get_by_role("tab", name="Move").click()
         if self.row("Robot").locator("input:visible").first.input_value() != robot.name:
             self.choose("Robot", robot.name)
             expect(self.page.get_by_text(label(robot, robot.n - 1), exact=True)).to_be_visible()
         self.page.get_by_role("button", name="Home").click()
         self.wait_for_tool(kin.fk(robot, robot.q_home)[:3, 3], within=0.06)
-        self.page.wait_for_timeout(500)
+        self.page.wait_for_timeout(300)
+
+    def _area(self) -> Locator:
+        """What of the panel scrolls."""
+        return self.page.locator(".mantine-ScrollArea-viewport:has([data-status])").first
+
+    def hidden(self) -> int:
+        """Pixels of the panel that have to be scrolled to."""
+        hidden: int = self._area().evaluate("area => area.scrollHeight - area.clientHeight")
+        return hidden
+
+    def top(self) -> None:
+        """Scroll the panel to its beginning."""
+        self._area().evaluate("area => area.scrollTo(0, 0)")
+
+    def picture_of_the_rest(self, name: str) -> None:
+        """A picture of the panel's end, if it does not fit the window."""
+        area = self._area()
+        if self.hidden() > 2:
+            area.evaluate("area => area.scrollTo(0, area.scrollHeight)")
+            area.screenshot(path=ARTIFACTS / f"{name}.png", animations="disabled")
 
     def screenshot(self, name: str) -> None:
         ARTIFACTS.mkdir(exist_ok=True)
         self.page.mouse.move(5, 5)
-        self.page.wait_for_timeout(700)
+        self.page.wait_for_timeout(400)
         self.page.screenshot(path=ARTIFACTS / f"{name}.png")

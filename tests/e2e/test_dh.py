@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 from page import Tab
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
 import kin
 
@@ -50,7 +50,6 @@ def test_the_walk_by_keyboard_with_typeset_matrices(lesson: Tab) -> None:
     assert box["width"] > 120, "MathML is laid out, not written in a line"
     widths = {cell.bounding_box()["width"] for cell in matrices.first.locator("mtd").all()}  # type: ignore[index]
     assert max(widths) - min(widths) < 0.5
-    lesson.screenshot("dh-light")
 
     thumb = lesson.row("Row").get_by_role("slider").first
     thumb.focus()
@@ -65,14 +64,10 @@ def test_the_walk_by_keyboard_with_typeset_matrices(lesson: Tab) -> None:
     expect(page.get_by_role("button", name="Play")).to_be_visible()
 
 
-def test_both_readings_side_by_side_on_a_dark_page(lesson: Tab) -> None:
+def test_both_readings_side_by_side(lesson: Tab) -> None:
     page = lesson.page
     lesson.choose("Robot", kin.get_robot("redundant7").name)
     expect(caption(lesson)).to_contain_text("Frame 0")
-    page.get_by_role("tab", name="View").click()
-    lesson.check("Dark page")
-    page.get_by_role("tab", name="Learn").click()
-    page.wait_for_timeout(500)
     lesson.type_number("Row", "2")
     lesson.check("Symbols")
     lesson.check("Compare conventions")
@@ -80,25 +75,8 @@ def test_both_readings_side_by_side_on_a_dark_page(lesson: Tab) -> None:
     expect(page.locator('[data-dh="verdict"]')).to_contain_text("7 joints, 6 freedoms")
     expect(page.locator('[data-dh="table"]')).to_have_count(2)
     expect(page.locator("math mtable").first).to_contain_text("cos")
-    lesson.screenshot("dh-compare-dark")
+    lesson.screenshot("dh-compare")
     steps = page.locator('[data-dh="nine"]')
     steps.locator("summary").press("Enter")
     expect(steps.locator("li").last).to_be_visible()
     expect(steps.locator("li")).to_have_count(9)
-    page.get_by_role("tab", name="View").click()
-    lesson.check("Dark page")
-
-
-def test_the_lesson_on_a_phone(browser: Browser, address: str) -> None:
-    phone = Tab(browser, address, 390, 844)
-    try:
-        open_lesson(phone)
-        phone.type_number("Row", "1.25")
-        expect(caption(phone)).to_contain_text("turn 30.0°")
-        for part in ("caption", "table"):
-            box = phone.page.locator(f'[data-dh="{part}"]').bounding_box()
-            assert box is not None
-            assert box["x"] + box["width"] <= 390, f"the {part} is cut off"
-        phone.screenshot("dh-phone")
-    finally:
-        phone.close()

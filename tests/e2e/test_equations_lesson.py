@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from page import Tab
-from playwright.sync_api import Browser, Locator, expect
+from playwright.sync_api import Locator, expect
 
 import kin
 from kin import chapter
@@ -48,7 +48,6 @@ def test_equations_are_typeset_marked_and_shown_where_they_are_worst(tab: Tab) -
     expect(shown(tab)).to_have_attribute("data-verdict", "misprinted")
     expect(tab.page.get_by_text("Equation (6):")).to_be_visible()
     stays_inside(tab)
-    tab.screenshot("equations-light")
     tab.page.get_by_role("button", name="Show where it is worst").click()
     worst = next(e for e in chapter.EQUATIONS if e.number == 6)
     expect(off(tab)).to_contain_text("135 mm here")
@@ -61,7 +60,6 @@ def test_equations_are_typeset_marked_and_shown_where_they_are_worst(tab: Tab) -
     stays_inside(tab)
     tab.choose("Equation", "(4) p_x ✓")
     expect(off(tab)).to_contain_text("equal to the DH product")
-    tab.screenshot("equations-right")
 
 
 def test_the_other_arms(tab: Tab) -> None:
@@ -76,17 +74,3 @@ def test_the_other_arms(tab: Tab) -> None:
     tab.page.get_by_text("Symbols", exact=True).click()
     expect(tab.page.locator("table[aria-label=symbols]")).to_be_visible()
     tab.screenshot("equations-derived-symbols")
-
-
-def test_dark_and_phone(browser: Browser, address: str, tab: Tab) -> None:
-    tab.page.get_by_role("tab", name="View").click()
-    tab.check("Dark page")
-    open_lesson(tab)
-    tab.screenshot("equations-dark")
-    tab.page.get_by_role("tab", name="View").click()
-    tab.check("Dark page")
-    phone = Tab(browser, address, 390, 844)
-    open_lesson(phone)
-    stays_inside(phone)
-    phone.screenshot("equations-phone")
-    phone.close()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from page import Tab
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
 import kin
 from app.viewer.lessons.postures.ghosts import places
@@ -44,7 +44,6 @@ def test_a_click_on_a_ghost_in_the_picture_morphs_the_arm(tab: Tab) -> None:
     postures = survey(PUMA, T, "pose", PUMA.q_home)
     here = kin.branch_of(PUMA, PUMA.q_home)
     expect(tab.page.locator("[data-here]")).to_have_attribute("data-posture", here)
-    tab.screenshot("postures-light")
     wanted = next(p for p in postures if p.can_be_had and p.name != here)
     assert wanted.q is not None
     for point in places(PUMA, np.array([wanted.q]))[0][0][4:]:
@@ -103,20 +102,5 @@ def test_padlocks(tab: Tab) -> None:
     expect(tab.status).to_contain_text("Joint 2 locked")
     tab.drag_arrow(PUMA, kin.fk(PUMA, PUMA.q_home), axis=0, lengths=0.4)
     assert tab.number("2 shoulder") == 45
-    tab.screenshot("padlocks")
     tab.page.get_by_role("button", name="Unlock all").click()
     expect(tab.status).to_have_attribute("data-status", "reached")
-
-
-def test_a_phone_in_the_dark(browser: Browser, address: str) -> None:
-    phone = Tab(browser, address, 390, 844)
-    phone.page.get_by_role("tab", name="View").click()
-    phone.check("Dark page")
-    learn(phone, PUMA, "Postures")
-    expect(phone.page.locator("[data-posture]")).to_have_count(8)
-    phone.screenshot("postures-phone-dark")
-    for row in phone.page.locator("[data-posture]").all():
-        box = row.bounding_box()
-        assert box is not None
-        assert box["x"] + box["width"] <= 390
-    phone.close()

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from page import Tab
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
 import kin
 
@@ -46,7 +46,6 @@ def test_jogging_by_click_by_keyboard_and_by_holding(lesson: Tab) -> None:
     expect(lesson.status.first).to_contain_text("Jogged 5 mm along −z of the base")
     down.press("Enter")
     lesson.wait_for_tool(at - [0, 0, 0.010], within=0.06)
-    lesson.screenshot("velocity-jog")
 
     sideways = page.get_by_role("button", name="+y", exact=True)
     box = sideways.bounding_box()
@@ -79,20 +78,10 @@ def test_a_singular_pose_with_what_is_lost(lesson: Tab) -> None:
     lesson.screenshot("velocity-singular")
 
 
-def test_seven_columns_fit_a_phone_and_a_dark_page(browser: Browser, address: str) -> None:
-    phone = Tab(browser, address, 390, 844)
-    phone.choose("Robot", IIWA.name)
+def test_seven_columns_fit_a_phone(phone: Tab) -> None:
+    phone.take(IIWA)
     open_lesson(phone)
     matrix = phone.page.locator('table[aria-label="Jacobian"]')
     expect(matrix.locator("[data-j]")).to_have_count(42)
     within = matrix.evaluate("e => e.scrollWidth <= e.parentElement.clientWidth + 1")
     assert within, "the matrix needs no scrolling"
-    matrix.scroll_into_view_if_needed()
-    phone.screenshot("velocity-phone")
-    phone.page.get_by_role("tab", name="View").click()
-    phone.check("Dark page")
-    phone.page.get_by_role("tab", name="Learn").click()
-    phone.page.get_by_text("Singular values", exact=True).click()
-    phone.page.get_by_text("Logarithmic bars").scroll_into_view_if_needed()
-    phone.screenshot("velocity-phone-dark")
-    phone.close()

@@ -1,0 +1,85 @@
+// What a machine can see of a screen: called by test_screens.py with axe loaded; gives a list of sentences.
+async () => {
+  const problems = [];
+  const shown = (node) => node.checkVisibility() && node.getClientRects().length > 0;
+  const told = (node) => node.outerHTML.replace(/ (style|class)="[^"]*"/g, "").slice(0, 170);
+  await Promise.all(document.getAnimations().filter((a) => a.effect.getComputedTiming().endTime < 5000).map((a) => a.finished.catch(() => {})));
+  const area = document.querySelector("[data-status]")?.closest(".mantine-ScrollArea-viewport");
+
+  const failed = document.querySelector("[data-status=error]");
+  if (failed) problems.push(`the page tells of an error: ${failed.textContent}`);
+
+  // Nothing sticks out.
+  const page = document.documentElement;
+  if (page.scrollWidth > innerWidth) problems.push(`the page is ${page.scrollWidth} px wide`);
+  if (area) {
+    const box = area.getBoundingClientRect();
+    const scrolls = (node) => {
+      for (let e = node.parentElement; e !== area; e = e.parentElement) {
+        if (getComputedStyle(e).overflowX !== "visible") return true;
+      }
+      return false;
+    };
+    if (area.scrollWidth > area.clientWidth) problems.push(`the panel is ${area.scrollWidth} px wide`);
+    for (const node of area.querySelectorAll("*")) {
+      const { left, right, width } = node.getBoundingClientRect();
+      if (width && shown(node) && (right > box.right + 1 || left < box.left - 1) && !scrolls(node)) {
+        problems.push(`cut off, ${Math.round(left)} to ${Math.round(right)} px: ${told(node)}`);
+      }
+    }
+  }
+
+  // Controls and their labels do not overlap.
+  const controls = [...(area ?? document).querySelectorAll(
+    'input:not([type="hidden"]), textarea, button, a, summary, label, table, math, [role="slider"], [role="tab"], [role="button"]',
+  )].filter(shown);
+  const boxes = controls.map((node) => node.getBoundingClientRect());
+  const wrapper = (node) => node.closest(".mantine-Input-wrapper") ?? node;
+  controls.forEach((a, i) => controls.slice(0, i).forEach((b, k) => {
+    const across = Math.min(boxes[i].right, boxes[k].right) - Math.max(boxes[i].left, boxes[k].left);
+    const down = Math.min(boxes[i].bottom, boxes[k].bottom) - Math.max(boxes[i].top, boxes[k].top);
+    if (across <= 1 || down <= 1 || a.contains(b) || b.contains(a) || wrapper(a) === wrapper(b)) return;
+    problems.push(`overlap by ${Math.round(across)} × ${Math.round(down)} px: ${told(a)} and ${told(b)}`);
+  }));
+
+  // What axe says.
+  const tags = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa"];
+  const found = await axe.run(
+    { exclude: [["canvas"], ["iframe"]] },
+    { resultTypes: ["violations", "incomplete"], runOnly: { type: "tag", values: tags }, iframes: false },
+  );
+  const nodes = (rules) => rules.flatMap(({ id, nodes }) => nodes.map((node) => ({ id, ...node })));
+  for (const { id, element, target, any, all, none } of nodes(found.violations)) {
+    const node = element ?? document.querySelector(target[0]);
+    problems.push(`${id}: ${[...any, ...all, ...none][0]?.message}: ${node ? told(node) : target}`);
+  }
+
+  // Where axe cannot tell the contrast (see-through text, single letters): colours laid over each other.
+  const rgba = (text) => {
+    const [r, g, b, a = 1] = text.match(/[\d.]+/g).map(Number);
+    const full = text.startsWith("color(") ? 255 * a : a;
+    return [r * full, g * full, b * full, a];
+  };
+  const over = (top, below) => top.map((v, i) => v + below[i] * (1 - top[3]));
+  const luminance = (colour) => colour.slice(0, 3).reduce((sum, v, i) => {
+    const s = v / 255;
+    return sum + [0.2126, 0.7152, 0.0722][i] * (s <= 0.04045 ? s / 12.92 : ((s + 0.055) / 1.055) ** 2.4);
+  }, 0);
+  for (const { id, target, any } of nodes(found.incomplete)) {
+    const node = document.querySelector(target[0]);
+    // In a drawing, what is behind a text is beside it in the document.
+    if (id !== "color-contrast" || !node || node.closest("svg")) continue;
+    let ink = rgba(getComputedStyle(node).color), ground = [0, 0, 0, 0];
+    for (let e = node; e; e = e.parentElement) {
+      const style = getComputedStyle(e);
+      const behind = rgba(style.backgroundColor);
+      [ink, ground] = [ink, ground].map((colour) => over(colour, behind).map((v) => v * style.opacity));
+    }
+    const white = [255, 255, 255, 1];
+    const [a, b] = [ink, ground].map((colour) => luminance(over(colour, white)) + 0.05);
+    const ratio = Math.max(a, b) / Math.min(a, b);
+    const symbol = any.some((check) => check.data?.messageKey === "nonBmp");
+    if (ratio < (symbol ? 3 : 4.5)) problems.push(`contrast ${ratio.toFixed(2)}: ${told(node)}`);
+  }
+  return problems;
+}
