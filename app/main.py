@@ -48,8 +48,8 @@ from app.store import Store
 from app.workers import supervise
 from kin import RobotFileError, __version__
 
-# Seconds that a thread may keep the interpreter while others wait. A drag goes through three threads: beside a batch
-# of REST, Python's own 5 ms make one in twenty wait for 36 ms instead of 13.
+# Seconds that a thread may keep the interpreter while others wait. A drag goes through three threads: beside a
+# batch of REST, Python's own 5 ms make one in twenty wait for 36 ms instead of 13.
 SWITCH = 5e-4
 
 OPEN_TO_ALL = """\
