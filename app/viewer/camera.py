@@ -28,7 +28,7 @@ PATIENCE = 10.0  # seconds for a page to draw where it was sent; a lesson may ha
 FARTHEST = 1e6  # metres; viser's own limit of zooming out is 1e4
 SAME = 1e-3  # of the distance to what is looked at
 _MARGIN = 1.06  # of the sphere around the arm
-_LIFT = 0.57  # of its radius, for the arm to stand above a sheet
+_SEEN = 0.4  # of the window's height, above a sheet
 Sphere = tuple[Array, float]  # centre ``(3,)`` and radius, m
 
 
@@ -59,9 +59,11 @@ def view(body: Body, aspect: float, sheet: bool = False, room: Sequence[Sphere] 
     center, radius = body.center, body.radius
     for sphere in room:
         center, radius = round_both((center, radius), sphere)
-    if sheet and aspect < 1.0:
-        center = center - UP * _LIFT * radius / aspect
-    distance = _MARGIN * radius / math.sin(_half_angle(aspect))
+    margin, lift = _framed(aspect, sheet)
+    # The way up is seen aslant.
+    upright = math.hypot(*DIRECTION[:2]) / float(np.linalg.norm(DIRECTION))
+    center = center - UP * lift * radius / upright
+    distance = margin * radius / math.sin(_half_angle(aspect))
     return center + DIRECTION / np.linalg.norm(DIRECTION) * distance, center
 
 
@@ -167,12 +169,21 @@ def _half_angle(aspect: float) -> float:
     return math.atan(math.tan(FOV / 2) * min(aspect, 1.0))
 
 
+def _framed(aspect: float, sheet: bool) -> tuple[float, float]:
+    """What the sphere around the arm needs, in its radii: half the picture's narrow side, and how far to go up."""
+    if not sheet or aspect >= 1.0:
+        return _MARGIN, 0.0
+    margin = max(_MARGIN, aspect * _MARGIN / _SEEN)
+    return margin, (1.0 - _SEEN) * margin / aspect
+
+
 def _sheet(aspect: float) -> tuple[float, float]:
     """How many times farther a camera is on a phone, and how much lower it looks, in distances of the other."""
     if aspect >= 1.0:
         return 1.0, 0.0
-    narrower = math.sin(FOV / 2) / math.sin(_half_angle(aspect))
-    return narrower, _LIFT / _MARGIN * math.sin(FOV / 2) / aspect
+    margin, lift = _framed(aspect, True)
+    farther = margin / _MARGIN * math.sin(FOV / 2) / math.sin(_half_angle(aspect))
+    return farther, lift / _MARGIN * math.sin(FOV / 2)
 
 
 def _moved(viewpoint: Array, farther: float, lift: float) -> Array:

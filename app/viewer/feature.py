@@ -106,12 +106,14 @@ class Feature:
     Attributes:
         key: its short name, in messages and in the shared address.
         title: what the visitor reads.
+        about: a lesson in a sentence, for who has to choose one.
         due: the worker sleeps at most so many seconds and then calls `tick`; it does so after every other event
             too. None: no ticks.
     """
 
     key: ClassVar[str]
     title: ClassVar[str]
+    about: ClassVar[str] = ""
 
     def __init__(self, stage: Stage) -> None:
         self.stage = stage

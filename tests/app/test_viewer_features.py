@@ -78,6 +78,7 @@ class Witness(Feature):
 class Pupil(Witness):
     key = "pupil"
     title = "Pupil"
+    about = "Learns & reports."
 
 
 @pytest.fixture
@@ -145,14 +146,17 @@ def test_a_feature_that_breaks_says_so_and_the_page_lives_on(
 
 def test_one_lesson_at_a_time(tab: FakeBrowser) -> None:
     assert len([c for c in Witness.calls if c[0] == "made"]) == 1
+    assert "Learns &amp; reports." in tab.html, "what there is to choose from"
     tab.set("Lesson", "Pupil")
     told(tab, "made", "pioneer5")
+    tab.wait(lambda: "Learns" not in tab.html)
     tab.wait(lambda: "Pupil" in tab.sliders)
     tab.set("Pupil", 4)
     told(tab, "handle", "slider", 4)
     tab.set("Lesson", "None")
     told(tab, "remove")
     tab.wait(lambda: "Pupil" not in tab.sliders)
+    tab.wait(lambda: "Learns &amp; reports." in tab.html)
 
 
 def test_a_lesson_that_there_is_not_is_refused_by_name(tab: FakeBrowser) -> None:
@@ -160,6 +164,10 @@ def test_a_lesson_that_there_is_not_is_refused_by_name(tab: FakeBrowser) -> None
     tab.wait(lambda: "Astrology" in tab.html)
     assert "Not understood" in tab.html
     tab.wait(lambda: tab.value("Lesson") == "None")
+
+
+def test_every_lesson_says_what_it_is_about() -> None:
+    assert all(lesson.about.endswith(".") and len(lesson.about) < 100 for lesson in lessons.LESSONS)
 
 
 def test_keys_and_titles_are_unique() -> None:

@@ -228,7 +228,7 @@ def test_the_default_view_holds_the_arm(robot: kin.Robot, aspect: float) -> None
     assert np.abs(upward).max() < 1.0
     assert max(across.max(), np.abs(upward).max()) > 0.25, "the arm should not be a speck"
     if sheet:
-        assert upward.min() > 0.0, "on a phone the panel covers the lower part"
+        assert upward.min() > 0.2, "on a phone the panel covers the lower three fifths"
     else:
         assert np.array_equal(look_at, body(robot).center)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from html import escape
+
 import viser
 
 from app.viewer.feature import Feature, Stage
@@ -23,6 +25,7 @@ class LessonChoice:
         self._titles = (NONE, *(lesson.title for lesson in LESSONS))
         with parent:
             self._choice = gui.add_dropdown("Lesson", self._titles, initial_value=NONE, hint=HINT)
+            self._overview: viser.GuiHtmlHandle | None = gui.add_html(_overview())
         listen(self._choice, post, "lesson")
         self._box: viser.GuiFolderHandle | None = None
         self.shown: Feature | None = None
@@ -36,6 +39,8 @@ class LessonChoice:
         self.remove()
         wanted = next((lesson for lesson in LESSONS if lesson.title == title), None)
         if wanted is None:
+            with self._parent:
+                self._overview = self._gui.add_html(_overview())
             return
         with self._parent:
             self._box = self._gui.add_folder(None)
@@ -49,10 +54,22 @@ class LessonChoice:
             self.choose(lesson.title)
 
     def remove(self) -> None:
-        """Take the lesson on show away."""
+        """Take the lesson on show away, or the list of all if there is none."""
         if self.shown is not None:
             self.shown.remove()
             self.shown = None
         if self._box is not None:
             self._box.remove()
             self._box = None
+        if self._overview is not None:
+            self._overview.remove()
+            self._overview = None
+
+
+def _overview() -> str:
+    """All lessons with a sentence each."""
+    rows = "".join(
+        f'<dt><b>{escape(lesson.title)}</b></dt><dd style="margin:0 0 .7em">{escape(lesson.about)}</dd>'
+        for lesson in LESSONS
+    )
+    return f'<dl data-lessons style="margin:.2em 1em .4em;font-size:.85em;line-height:1.4">{rows}</dl>'

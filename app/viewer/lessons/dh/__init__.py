@@ -40,6 +40,7 @@ class DHLesson(Feature):
 
     key = "dh"
     title = "DH table step by step"
+    about = "How four motions a row lead from the base to the tool, one after another."
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)

@@ -34,6 +34,7 @@ class EquationsLesson(Feature):
 
     key = "equations"
     title = "Equations"
+    about = "What the chapter prints, what is right, and by how much the tool is off otherwise."
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)

@@ -51,6 +51,7 @@ class Postures(Feature):
 
     key = "postures"
     title = "Postures"
+    about = "All the ways to reach one target, and why there is none."
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)

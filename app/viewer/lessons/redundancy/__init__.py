@@ -52,6 +52,7 @@ class RedundancyLesson(Feature):
 
     key = "redundancy"
     title = "Redundancy"
+    about = "How seven joints move while the tool stays where it is."
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)

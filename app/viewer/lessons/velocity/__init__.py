@@ -74,6 +74,7 @@ class VelocityLesson(Feature):
 
     key = "velocity"
     title = "Velocity"
+    about = "What the tool can do from here: Jacobian, ellipsoids, singularities."
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
