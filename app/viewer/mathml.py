@@ -4,7 +4,7 @@ Small functions that put one piece of markup round others. A leaf (`ident`, `tex
 text and escapes it; everything else takes and gives :data:`MathML`, so that a type checker keeps the two apart.
 `math` closes a formula: it goes into an HTML or Markdown element of viser.
 
->>> math(sub(ident("T"), text("02")), op("="), frac(number(-1, 0), number(2, 0)))[:26]
+>>> math(sub(ident("T"), text("02")), op("="), number(-1, 0))[:26]
 '<math style="font-size:1em'
 
 Brackets do not stretch with the fonts most machines have: `matrix` draws its own, as borders.
@@ -90,24 +90,9 @@ def sub(base: MathML, index: MathML) -> MathML:
     return MathML(f"<msub>{base}{index}</msub>")
 
 
-def sup(base: MathML, exponent: MathML) -> MathML:
-    """A piece with an exponent."""
-    return MathML(f"<msup>{base}{exponent}</msup>")
-
-
 def subsup(base: MathML, index: MathML, exponent: MathML) -> MathML:
     """A piece with an index below and an exponent."""
     return MathML(f"<msubsup>{base}{index}{exponent}</msubsup>")
-
-
-def frac(over: MathML, under: MathML) -> MathML:
-    """A fraction."""
-    return MathML(f"<mfrac>{over}{under}</mfrac>")
-
-
-def sqrt(part: MathML) -> MathML:
-    """A square root."""
-    return MathML(f"<msqrt>{part}</msqrt>")
 
 
 def gap() -> MathML:
@@ -156,17 +141,3 @@ def matrix(
         f"<mtr>{''.join(cell(r, c, entry) for c, entry in enumerate(line))}</mtr>" for r, line in enumerate(rows)
     )
     return MathML(f'<mtable style="{_BRACKETS}">{body}</mtable>')
-
-
-def numbers(
-    rows: Sequence[Sequence[float]],
-    decimals: int = 3,
-    width: float | None = None,
-    marks: Mapping[tuple[int, int], str] | None = None,
-) -> MathML:
-    """`matrix` of numbers of fixed width."""
-    if width is None:
-        # A digit is about half an em; a sign, three digits before the point in the worst case of what we show.
-        largest = max((abs(v) for line in rows for v in line), default=0.0)
-        width = 0.52 * (decimals + 2 + len(f"{largest:.0f}"))
-    return matrix([[number(v, decimals) for v in line] for line in rows], width, marks)
