@@ -56,7 +56,8 @@ def _serve(arguments: argparse.Namespace) -> int:
     from app.settings import Settings
 
     given = {
-        name: getattr(arguments, name) for name in ("host", "port", "root_path", "robots", "read_only", "workers")
+        name: getattr(arguments, name)
+        for name in ("host", "port", "root_path", "robots", "read_only", "workers", "pin")
     }
     try:
         settings = Settings(**{name: value for name, value in given.items() if value is not None})
@@ -250,6 +251,9 @@ def _parser() -> argparse.ArgumentParser:
     serve.add_argument("--host", help="address to listen on (default 127.0.0.1)")
     serve.add_argument("--port", type=int, help="port to listen on (default 8000; 0 takes any free one)")
     serve.add_argument("--workers", type=int, metavar="N", help="processes that serve side by side (default 1)")
+    serve.add_argument(
+        "--pin", action="store_true", default=None, help="keep each process's interpreter on one processor"
+    )
     serve.add_argument("--root-path", metavar="PREFIX", help="path prefix a reverse proxy serves us under")
     serve.add_argument(
         "--read-only", action="store_true", default=None,

@@ -19,6 +19,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 
+from app.processor import spread
 from kin import Robot, WorkspaceChunk, workspace_slice
 from kin.workspace import Measure, Strategy
 
@@ -147,6 +148,10 @@ def _size(chunk: WorkspaceChunk) -> int:
 
 
 def step_back() -> None:
-    """Lets everybody else's work go first. Linux schedules threads by niceness; elsewhere it is the process's."""
+    """Lets everybody else's work go first, on any processor.
+
+    Linux schedules threads by niceness; elsewhere it is the process's.
+    """
+    spread()
     if sys.platform == "linux":
         os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), BEHIND)

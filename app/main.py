@@ -40,6 +40,7 @@ from app.metrics import CONTENT_TYPE, exposition
 from app.observe import Observe, write_to_stderr
 from app.pages import page_routes, static_folder
 from app.prefix import PathPrefix, clean_prefix
+from app.processor import keep_to_one
 from app.security import SecurityHeaders
 from app.settings import Settings
 from app.startup import Startup
@@ -178,7 +179,7 @@ def run(settings: Settings, open_browser: bool = False) -> int:
             print(OPEN_TO_ALL, file=sys.stderr, flush=True)
         greeting = _Greeting(_url(settings, listeners[0].getsockname()[1]), open_browser)
         if len(listeners) == 1:
-            return _serve(settings, listeners[0], store, greeting)
+            return _serve(settings, listeners[0], None, store, greeting)
         os.environ["PROMETHEUS_MULTIPROC_DIR"] = stack.enter_context(
             tempfile.TemporaryDirectory(prefix="kinboard-")
         )
@@ -187,9 +188,15 @@ def run(settings: Settings, open_browser: bool = False) -> int:
 
 
 def _serve(
-    settings: Settings, listener: socket.socket, store: Store | None = None, greeting: _Greeting | None = None
+    settings: Settings,
+    listener: socket.socket,
+    number: int | None = None,
+    store: Store | None = None,
+    greeting: _Greeting | None = None,
 ) -> int:
-    """Serve on one socket, in this process."""
+    """Serve on one socket, in this process: of several the one of this number."""
+    if settings.pin:
+        keep_to_one(number)
     if settings.access_log:
         write_to_stderr()
     sys.setswitchinterval(SWITCH)

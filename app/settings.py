@@ -38,6 +38,7 @@ class Settings(BaseSettings):
     )
     cors_origins: tuple[str, ...] = Field((), description="Origins whose pages may read REST's answers.")
     workers: int = Field(1, ge=1, le=64, description="Processes that serve side by side; REST and viewers alike.")
+    pin: bool = Field(False, description="Keep the interpreter of each process on one processor: quicker drags.")
     drain: float = Field(
         5.0, ge=1, le=300, description="Seconds that answers under way may take when the service is told to stop."
     )

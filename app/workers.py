@@ -23,21 +23,22 @@ from multiprocessing.context import SpawnProcess
 
 logger = logging.getLogger("kinboard.workers")
 
-Work = Callable[[socket.socket], int]
+Work = Callable[[socket.socket, int], int]
 
 
 def supervise(work: Work, sockets: list[socket.socket], grace: float) -> int:
     """Run `work` in one process per socket until SIGTERM or Ctrl-C; the exit code.
 
     Args:
-        work: serves on its socket until SIGTERM and returns 0, or another code if it cannot; picklable.
+        work: serves on its socket, as number so many, until SIGTERM and returns 0, or another code if it cannot;
+            picklable.
         grace: seconds from SIGTERM until a process that has not ended is killed.
     """
     stopping = threading.Event()
     before = {
         number: signal.signal(number, lambda *_: stopping.set()) for number in (signal.SIGTERM, signal.SIGINT)
     }
-    running = [_start(work, each) for each in sockets]
+    running = [_start(work, each, k) for k, each in enumerate(sockets)]
     try:
         code = _watch(work, sockets, running, stopping)
     finally:
@@ -47,16 +48,16 @@ def supervise(work: Work, sockets: list[socket.socket], grace: float) -> int:
     return code
 
 
-def _start(work: Work, listener: socket.socket) -> SpawnProcess:
+def _start(work: Work, listener: socket.socket, number: int) -> SpawnProcess:
     process = multiprocessing.get_context("spawn").Process(
-        target=_run, args=(work, listener), name="kinboard-worker"
+        target=_run, args=(work, listener, number), name="kinboard-worker"
     )
     process.start()
     return process
 
 
-def _run(work: Work, listener: socket.socket) -> None:
-    raise SystemExit(work(listener))
+def _run(work: Work, listener: socket.socket, number: int) -> None:
+    raise SystemExit(work(listener, number))
 
 
 def _watch(
@@ -70,7 +71,7 @@ def _watch(
             if (process.exitcode or 0) > 0:
                 return 1
             logger.error("worker %s ended with code %s and is started again", process.pid, process.exitcode)
-            running[k] = _start(work, sockets[k])
+            running[k] = _start(work, sockets[k], k)
     return 0
 
 

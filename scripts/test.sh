@@ -24,6 +24,6 @@ if [ $# -gt 0 ]; then
   exec pytest "$@"
 fi
 wait $compiling
-# Two at a time, but for what draws pictures or measures time: that wants the machine for itself.
-pytest -n 2 --dist loadfile -m "not slow and not browser and not bench"
+# Four at a time, as they often wait; but what draws pictures or measures time wants the machine for itself.
+pytest -n 4 --dist loadfile -m "not slow and not browser and not bench"
 pytest -m "not slow and (browser or bench)"

@@ -18,7 +18,8 @@ RULES: dict[str, set[str]] = {
     "kin/simd.py": {"numba", "kin.compiled"},
     "kin/kernels.py": {"numpy", "kin.compiled", "kin.simd", "kin.transforms"},
     "app": {"kin", "app.answers", "app.clouds", "app.settings", "app.store"},
-    "app/clouds.py": {"kin"},
+    "app/processor.py": set(),
+    "app/clouds.py": {"kin", "app.processor"},
     "app/maps.py": {"kin", "app.clouds", "app.mapreduce"},
     "app/formats.py": {"kin", "numpy", "app.clouds"},
     "app/save.py": {"kin", "app.clouds", "app.formats"},
@@ -74,12 +75,13 @@ RULES: dict[str, set[str]] = {
     "app/startup.py": {"kin", "app.bridge", "app.clouds", "app.maps", "app.settings", "app.store", "app.viewer"},
     "app/main.py": {
         *("kin", "fastapi", "starlette", "pydantic", "uvicorn", "app.access", "app.api", "app.clouds"),
+        "app.processor",
         *("app.inspection", "app.maps", "app.metrics", "app.observe", "app.workers"),
         *("app.bridge", "app.pages", "app.prefix", "app.security", "app.settings", "app.startup", "app.store"),
     },
     "app/api": {
         *("fastapi", "starlette", "pydantic", "pydantic_core", "typing_extensions", "numpy", "kin"),
-        *("app.api", "app.answers", "app.clouds", "app.equations", "app.formats", "app.maps"),
+        *("app.api", "app.answers", "app.clouds", "app.equations", "app.formats", "app.maps", "app.processor"),
         *("app.metrics", "app.security", "app.settings", "app.store"),
     },
     "app/viewer": {

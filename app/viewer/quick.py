@@ -7,6 +7,8 @@ the setter would send is sent from here, through the same queue.
 
 Pages: viser looks up the type hints of a class anew for each object of it, a quarter of what a page costs.
 
+Wake-ups: messages of other threads than the loop's wake their reader unsafely; a visitor was lost now and then.
+
 Hence viser's narrow range in ``pyproject.toml``, and tests that hold all this against viser's own ways.
 """
 
@@ -15,13 +17,16 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import functools
+import threading
 import typing
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import viser
 from viser import _assignable_props_api as props
 from viser import _messages as messages
+from viser.infra import _async_message_buffer as buffers
 
 from kin.transforms import Array
 
@@ -72,6 +77,39 @@ def quick_loops() -> Iterator[None]:
         yield
     finally:
         asyncio.set_event_loop_policy(before)
+
+
+class _LoopEvent(asyncio.Event):
+    """An event that only its loop's thread sets; it belongs to the thread that makes it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._thread = threading.get_ident()
+
+    def set(self) -> None:
+        """Wake who waits; in another thread nothing at all."""
+        if threading.get_ident() == self._thread:
+            super().set()
+
+
+def wake_in_the_loop() -> None:
+    """Have viser's buffers wake their readers in their own thread only.
+
+    A message pushed by another thread sets an `asyncio.Event` there, which is not safe: of two hundred visitors
+    who came at once some were lost ("deque mutated during iteration"), or waited for ever. viser asks the loop to
+    set it as well, at once or at the end of an atomic block, so that nothing is missing here.
+    """
+    made = buffers.AsyncMessageBuffer.__init__
+    if getattr(made, "wakes_in_the_loop", False):
+        return
+
+    @functools.wraps(made)
+    def make(self: buffers.AsyncMessageBuffer, *given: Any, **named: Any) -> None:
+        made(self, *given, **named)
+        self.message_event = _LoopEvent()
+
+    make.wakes_in_the_loop = True  # type: ignore[attr-defined]
+    buffers.AsyncMessageBuffer.__init__ = make  # type: ignore[method-assign]
 
 
 def remember_hints() -> None:

@@ -16,7 +16,7 @@ from app.store import Store
 from app.viewer.motion import Pace
 from app.viewer.panel.status import Notice
 from app.viewer.panel.view import configure_theme
-from app.viewer.quick import quick_loops, remember_hints
+from app.viewer.quick import quick_loops, remember_hints, wake_in_the_loop
 from app.viewer.session import WELCOME, Session
 
 log = logging.getLogger(__name__)
@@ -53,6 +53,7 @@ class ViewerServer:
         if self._server is not None:
             raise RuntimeError("the viewer is already running")
         remember_hints()
+        wake_in_the_loop()
         # viser prints an address that no visitor should use
         with contextlib.redirect_stdout(io.StringIO()), quick_loops():
             server = viser.ViserServer(host="127.0.0.1", port=0, label="Kinboard", verbose=False)

@@ -120,11 +120,11 @@ def test_one_signal_ends_them_all(service):
         assert not Path(f"/proc/{pid}").exists()
 
 
-def _fails(listener: socket.socket) -> int:
+def _fails(listener: socket.socket, number: int) -> int:
     return 3
 
 
-def _ignores(code: int, listener: socket.socket) -> int:
+def _ignores(code: int, listener: socket.socket, number: int) -> int:
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     os.kill(os.getppid(), signal.SIGTERM)
     time.sleep(60)

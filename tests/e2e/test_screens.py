@@ -21,7 +21,7 @@ pytestmark = pytest.mark.browser
 
 LOOK = (Path(__file__).parent / "screens.js").read_text(encoding="utf-8")
 COLD = 120_000  # ms; a service that is ready may still be compiling what sections and maps need
-PATIENCE = 6  # looks
+PATIENCE = 12  # looks
 FEW = 4000  # points; the picture is rendered in software
 
 # What is found of viser's own and cannot be mended by static/viewer.css and .js: a part of the finding, and why.

@@ -19,6 +19,7 @@ from app.api.problems import FieldError, invalid
 from app.api.schemas import RobotId, refusals, reply, robot_of
 from app.api.work import busy, work_of
 from app.api.workspace.query import RegionQuery
+from app.processor import spread
 from kin import section, workspace_facts
 
 router = versioned("workspace")
@@ -68,6 +69,7 @@ class Threads:
             self._waiting.put(None)
 
     def _run(self) -> None:
+        spread()
         while (task := self._waiting.get()) is not None:
             future, compute = task
             if not future.set_running_or_notify_cancel():
