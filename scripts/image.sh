@@ -102,7 +102,10 @@ run() {
     --health-interval disable "$@"
 }
 
-stop_container() { podman rm --force --ignore --time 1 "$container" >/dev/null; }
+# Once more if it ended by itself between being told to and being killed.
+stop_container() {
+  podman rm --force --ignore --time 10 "$container" >/dev/null || podman rm --force --ignore "$container" >/dev/null
+}
 
 wait_until_ready() { # $1: seconds at most
   end=$(($(date +%s) + $1))
