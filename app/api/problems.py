@@ -167,8 +167,9 @@ async def _http_error(request: Request, error: Exception) -> Response:
             ProblemError(404, "not-found", f"Nothing answers at {path}.", "See /docs for what there is.")
         )
     if error.status_code == 405:
-        headers["Allow"] = ", ".join(_methods_at(request))
-        hint = f"It takes {headers['Allow']}." if headers["Allow"] else DOCS_HINT
+        if methods := _methods_at(request):  # a mounted folder tells its own
+            headers["Allow"] = ", ".join(methods)
+        hint = f"It takes {headers['Allow']}." if "Allow" in headers else DOCS_HINT
         detail = f"{path} does not take {request.method}."
         return respond(ProblemError(405, "method-not-allowed", detail, hint, headers=headers))
     kind = "bad-request" if error.status_code == 400 else "http-error"

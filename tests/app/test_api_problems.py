@@ -60,6 +60,9 @@ def test_a_wrong_method_says_which_is_right(client):
     assert "POST" in document["hint"]
     both = client.request("DELETE", f"{ARM}/equations")  # two routes of one address
     assert both.headers["allow"] == "GET, POST"
+    folder = client.request("DELETE", "/static/landing.js")
+    problem(folder, 405, "method-not-allowed")
+    assert folder.headers["allow"] == "GET, HEAD"
 
 
 def test_a_huge_robot_id_is_shortened(client):
