@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
 from app.api import schemas
 from app.api.schemas import Number, numbers
 from app.api.targets import Target
+from app.settings import Settings
 from kin import Task
 from kin.transforms import Array
 
@@ -59,6 +60,23 @@ class Asked(schemas.Body):
         description="Only these branches: a name as in `branches` of the robot, parts of one such as `elbow up`, "
         "`seed` for the branch the seed is on, or a list of these.",
     )
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """These fields but for the task, as `kin.solve_ik` and `kin.solve_path` take them by name."""
+        return {name: getattr(self, name) for name in ("mask", "mask_frame", "limits", "locked", "branch")}
+
+    def resolve_all(
+        self, target: Target | list[Target], settings: Settings
+    ) -> tuple[list[tuple[Task, Array]], bool]:
+        """What `resolve` gives for one target or for a list, and whether it was one.
+
+        All are read before anything is answered: a mistake in the last one costs nothing. Raises 413 for too many.
+        """
+        if isinstance(target, Target):
+            return [self.resolve(target, "target")], True
+        schemas.check_batch("target", len(target), settings)
+        return [self.resolve(each, f"target[{i}]") for i, each in enumerate(target)], False
 
     def resolve(self, target: Target, field: str) -> tuple[Task, Array]:
         """The task as the core takes it, and the target's pose ``(4, 4)``; raises `ProblemError` naming `field`.

@@ -139,12 +139,8 @@ async def inverse_kinematics(
 
 
 def _solve(robot: Robot, body: IkRequest, settings: Settings, budget: Budget) -> Response:
-    single = isinstance(body.target, Target)
-    targets = [body.target] if isinstance(body.target, Target) else body.target
-    schemas.check_batch("target", len(targets), settings)
-    # All targets are read before the first is solved: a mistake in the last one costs nothing.
-    questions = [body.resolve(target, "target" if single else f"target[{i}]") for i, target in enumerate(targets)]
-    seeds = _seeds(robot, body, len(targets), settings)
+    questions, single = body.resolve_all(body.target, settings)
+    seeds = _seeds(robot, body, len(questions), settings)
 
     def answer(task: Task, T: Array, seed: Array | None) -> IkAnswer:
         budget.check()
@@ -153,18 +149,14 @@ def _solve(robot: Robot, body: IkRequest, settings: Settings, budget: Budget) ->
                 robot,
                 T,
                 task=task,
-                mask=body.mask,
-                mask_frame=body.mask_frame,
                 q_seed=seed,
                 respect_limits=body.respect_limits,
-                limits=body.limits,
-                locked=body.locked,
-                branch=body.branch,
                 images=body.images,
                 prefer=body.prefer,
                 max_solutions=body.max_solutions,
                 redundancy=body.redundancy,
                 solver=body.solver,
+                **body.options,
             )
         )
 
@@ -172,7 +164,7 @@ def _solve(robot: Robot, body: IkRequest, settings: Settings, budget: Budget) ->
         return [answer(task, T, seed) for (task, T), seed in zip(questions[some], seeds[some], strict=True)]
 
     with SOLVE_SECONDS.labels("rest").time():
-        return one_or_all(answers, len(targets), single, budget)
+        return one_or_all(answers, len(questions), single, budget)
 
 
 def _seeds(robot: Robot, body: IkRequest, count: int, settings: Settings) -> list[Array | None]:

@@ -100,13 +100,9 @@ def _solve(robot: Robot, body: PathRequest, settings: Settings, budget: Budget) 
         robot,
         [T for _, T in questions],
         task=task,
-        mask=body.mask,
-        mask_frame=body.mask_frame,
         q_start=q_start,
-        limits=body.limits,
-        locked=body.locked,
-        branch=body.branch,
         max_step=body.max_step,
         stop=budget.check,
+        **body.options,
     )
     return reply(path_answer(result))

@@ -12,7 +12,6 @@ from pydantic_core import to_json
 from typing_extensions import TypedDict
 
 from app.answers import ReachableAnswer, documented, reachable_answer
-from app.api import schemas
 from app.api.asked import Asked, one_or_many
 from app.api.body import versioned
 from app.api.problems import Problem, ProblemError
@@ -86,11 +85,7 @@ def reachable(
     and work ends when nobody listens any more.
     """
     robot = robot_of(request, robot_id)
-    single = isinstance(body.target, Target)
-    targets = [body.target] if isinstance(body.target, Target) else body.target
-    schemas.check_batch("target", len(targets), settings_of(request))
-    # All targets are read before the first is judged: a mistake in the last one costs nothing.
-    questions = [body.resolve(target, "target" if single else f"target[{i}]") for i, target in enumerate(targets)]
+    questions, single = body.resolve_all(body.target, settings_of(request))
     if single:
         return reply(_answers(robot, body, questions)[0])
     # What is wrong with the options shows in the first piece, while it can still be said.
@@ -100,20 +95,7 @@ def reachable(
 
 def _answers(robot: Robot, body: ReachableRequest, questions: list[tuple[Task, Array]]) -> list[ReachableAnswer]:
     return [
-        reachable_answer(
-            solve_ik(
-                robot,
-                T,
-                task=task,
-                mask=body.mask,
-                mask_frame=body.mask_frame,
-                limits=body.limits,
-                locked=body.locked,
-                branch=body.branch,
-                max_solutions=1,
-            )
-        )
-        for task, T in questions
+        reachable_answer(solve_ik(robot, T, task=task, max_solutions=1, **body.options)) for task, T in questions
     ]
 
 
