@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kin.finish import Flags as Flags
-from kin.finish import finish, judge, ranges
+from kin.finish import finish, judge, ranges, settle
 from kin.fk import fk
 from kin.question import Question
 from kin.results import IKSolution, LimitViolation, Redundancy
@@ -26,12 +26,17 @@ class Branches:
     Attributes:
         q: ``(k, n)``, NaN where the branch does not exist.
         stats: ``(k, 5)``, columns as in :mod:`kin.finish`.
+        closed, good: ``(k,)``, which rows meet the task, and which are inside the limits too if those count.
+        order: the good rows, nearest to the seed first, each posture once.
         freedoms: what `values` and `arcs` are about.
         values, arcs, gap, obstacle: as in `kin.solvers.common.Candidates`.
     """
 
     q: Array
     stats: Array
+    closed: Flags
+    good: Flags
+    order: list[int]
     freedoms: tuple[Freedom, ...]
     values: Array
     arcs: list[Array]
@@ -66,18 +71,32 @@ def solve_branches(
         values = question.values if code == question.code else (math.nan,) * len(freedoms)
     seed = question.seed if seed is None else seed
     roll = 0.0
-    if code == APPROACH and any(freedom.name == "roll" for freedom in freedoms):
+    if code == APPROACH and "roll" in [freedom.name for freedom in freedoms]:
         x = fk(question.robot, seed)[:3, 0]
         roll = math.atan2(float(T[:3, 1] @ x), float(T[:3, 0] @ x))
     lower, upper = question.lower, question.upper
     if not question.respect:
         # Limits to be ignored must not even pull what is free away from the seed.
         lower, upper = np.full_like(lower, -_NO_LIMIT), np.full_like(upper, _NO_LIMIT)
-    problem = Problem(T, code, values, question.respect, seed, lower, upper, roll)
-    candidates = match.solver.solve(match.geometry, problem)
-    q, stats = measure(question, candidates.q, seed)
-    found = candidates
-    return Branches(q, stats, freedoms, found.values, list(found.arcs), found.gap, found.obstacle)
+    found = match.solver.solve(
+        match.geometry, Problem(T, code, values, question.respect, seed, lower, upper, roll)
+    )
+    q = np.array(found.q, order="C")
+    count = len(q)
+    stats, closed, good, order = (
+        np.empty((count, 5)),
+        np.empty(count, bool),
+        np.empty(count, bool),
+        np.empty(count, int),
+    )
+    count = settle(
+        question.robot.model, question.T, question.code, question.mask, seed, question.seed, question.lower,
+        question.upper, question.turns, question.respect, q, stats, closed, good, order,
+    )  # fmt: skip
+    return Branches(
+        q, stats, closed, good, order[:count].tolist(), freedoms, found.values, list(found.arcs), found.gap,
+        found.obstacle,
+    )  # fmt: skip
 
 
 def measure(
@@ -122,11 +141,12 @@ def redundancy_of(
         rows_here = [i for i, row in enumerate(rows) if there[row] == there[row]]
         if not rows_here:
             continue
+        name, label = freedom.name, freedom.label
         intervals = _intervals(question, branches.arcs[k], rows, every, freedom.circular)
         for i in rows_here:
-            found[i] += (Redundancy(freedom.name, freedom.label, values[rows[i]], intervals[i]),)
+            found[i] += (Redundancy(name, label, values[rows[i]], intervals[i]),)
         if rows_here[0] == 0:
-            together += (Redundancy(freedom.name, freedom.label, values[rows[0]], intervals[-1]),)
+            together += (Redundancy(name, label, values[rows[0]], intervals[-1]),)
     return found, together
 
 

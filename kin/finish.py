@@ -191,15 +191,21 @@ def select(q: Array, key: Array) -> tuple[Whole, int]:
 
 
 @jit
-def take(q: Array, stats: Array, rows: Flags, key: Array, q_out: Array, stats_out: Array) -> tuple[Whole, int]:
-    """q_out, stats_out ← the flagged rows by rising key, equal ones once: (their indices, count)."""
-    left = np.empty(q.shape[0])
+def settle(
+    model: Array, target: Array, task: int, mask: Array, near: Array, seed: Array, lower: Array, upper: Array,
+    turns: Array, respect: bool, q: Array, stats: Array, closed: Flags, good: Flags, order: Whole,
+) -> int:  # fmt: skip
+    """`finish`, `judge`, and order ← the good rows as `select` takes them, nearest to the seed first: how many.
+
+    Every target goes through this, and a call from Python costs as much as a row does.
+    """
+    finish(model, target, task, mask, near, seed, lower, upper, turns, respect, q, stats)
+    if judge(stats, respect, closed, good) == 0:
+        return 0
+    key = np.empty(q.shape[0])
     for k in range(q.shape[0]):
-        left[k] = key[k] if rows[k] else math.inf
-    kept, count = select(q, left)
+        key[k] = stats[k, DISTANCE] if good[k] else math.inf
+    kept, count = select(q, key)
     for k in range(count):
-        for j in range(q.shape[1]):
-            q_out[k, j] = q[kept[k], j]
-        for j in range(stats.shape[1]):
-            stats_out[k, j] = stats[kept[k], j]
-    return kept, count
+        order[k] = kept[k]
+    return count

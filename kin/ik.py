@@ -31,7 +31,7 @@ from kin.branches import (
     violations_of,
 )
 from kin.errors import InputError
-from kin.finish import DISTANCE, OVERRUN, ROLL, judge, select, take
+from kin.finish import DISTANCE, OVERRUN, ROLL, select
 from kin.fk import fk
 from kin.question import Frame, Images, Limits, Locks, Preference, Question, Solver, ask
 from kin.results import BlockedBranch, Cause, IKResult, IKSolution, Redundancy, Status, Task
@@ -135,12 +135,11 @@ def answer(question: Question) -> IKResult:
     branches = solve_branches(question, question.T, question.code)
     if branches is None:
         return _numeric(question)
-    closed, good = np.empty((2, len(branches.q)), dtype=bool)
-    count = judge(branches.stats, question.respect, closed, good)
-    if count > 0 and question.branches is None:
-        return _solved(question, branches, good)
-    if count == 0 and not question.given:  # a value that was asked for is not for a descent to change
-        good = search.polish(question, branches)
+    if branches.order and question.branches is None:
+        return _solved(question, branches, branches.good)
+    closed, good = branches.closed, branches.good
+    if not branches.order and not question.given:  # a value that was asked for is not for a descent to change
+        good = search.polish(question, branches.q, branches.stats)
         closed |= good
     asked = _asked(question, len(closed))
     if (good & asked).any():
@@ -152,6 +151,13 @@ def answer(question: Question) -> IKResult:
     if question.robot.n < 6 and question.code == POSE:
         return _compromise(question, branches, asked)
     return _out_of_reach(question, branches)
+
+
+def _by(q: Array, rows: Flags, key: Array) -> list[int]:
+    """The flagged rows of q ``(k, n)`` by rising key, each posture once."""
+    kept, count = select(q, np.where(rows, key, math.inf))
+    order: list[int] = kept[:count].tolist()
+    return order
 
 
 def _asked(question: Question, count: int) -> Flags:
@@ -202,12 +208,14 @@ def _result(
 
 
 def _solved(question: Question, branches: Branches, good: Flags) -> IKResult:
-    if question.prefer == "nearest":
-        key = branches.stats[:, DISTANCE]
-    else:
+    if question.prefer != "nearest":
         choose.improve(question, branches, good)
-        key = choose.ranks(question, branches.q, branches.stats[:, DISTANCE])
-    solutions, redundancy = _wrap_up(question, branches, good, key)
+        order = _by(branches.q, good, choose.ranks(question, branches.q, branches.stats[:, DISTANCE]))
+    elif good is branches.good:
+        order = branches.order
+    else:
+        order = _by(branches.q, good, branches.stats[:, DISTANCE])
+    solutions, redundancy = _wrap_up(question, branches, order, good)
     if question.all_images:
         solutions = _with_images(question, solutions)
         if redundancy and solutions[0].redundancy:
@@ -225,24 +233,19 @@ def _solved(question: Question, branches: Branches, good: Flags) -> IKResult:
 
 
 def _wrap_up(
-    question: Question, branches: Branches, rows: Flags, key: Array, compromise: str | None = None
+    question: Question, branches: Branches, order: list[int], every: Flags, compromise: str | None = None
 ) -> tuple[tuple[IKSolution, ...], tuple[Redundancy, ...]]:
-    """The chosen rows as named solutions, by rising key, each posture once; and what is free for all together."""
-    q, stats = np.empty_like(branches.q), np.empty_like(branches.stats)
-    kept, count = take(branches.q, branches.stats, rows, key, q, stats)
-    order: list[int] = kept[:count].tolist()
-    free, together = redundancy_of(question, branches, order, rows)
+    """Rows as named solutions in this order, and what is free for all together on the rows in `every`."""
+    q, stats = branches.q.copy(), branches.stats.tolist()
     q.flags.writeable = False
+    free, together = redundancy_of(question, branches, order, every)
     assert question.match is not None  # whose branches these are
     names = question.match.solver.BRANCHES
-    return tuple(
-        [
-            IKSolution(row, names[i], position, rotation, overrun == 0.0, distance, own, compromise)
-            for row, (position, rotation, distance, overrun, _), i, own in zip(
-                q, stats[:count].tolist(), order, free, strict=False
-            )
-        ]
-    ), together
+    solutions = []
+    for i, own in zip(order, free, strict=True):
+        position, rotation, distance, overrun, _ = stats[i]
+        solutions.append(IKSolution(q[i], names[i], position, rotation, overrun == 0.0, distance, own, compromise))
+    return tuple(solutions), together
 
 
 def _with_images(question: Question, solutions: tuple[IKSolution, ...]) -> tuple[IKSolution, ...]:
@@ -289,14 +292,13 @@ def _blocked(question: Question, branches: Branches, rows: Flags, good: Flags) -
     closest = search.closest(question, branches.q)
     if closest is not None and not question.given and search.is_exact(question, closest):
         return _found_by_descent(question, closest)
-    kept, count = select(branches.q, np.where(rows, branches.stats[:, OVERRUN], math.inf))
-    order = kept[:count].tolist()
+    order = _by(branches.q, rows, branches.stats[:, OVERRUN])
     blocked = tuple(
         BlockedBranch(question.branch_name(i), branches.q[i].copy(), violations_of(question, branches.q[i]))
         for i in order
     )
     redundancy = redundancy_of(question, branches, order[:1], rows)[1]
-    others = int(select(branches.q, np.where(good, 0.0, math.inf))[1])
+    others = len(_by(branches.q, good, branches.stats[:, DISTANCE]))
     return _result(
         question,
         Status.LIMITS,
@@ -314,7 +316,7 @@ def _other_branch(question: Question, branches: Branches, closed: Flags, good: F
     closest = search.closest(question, branches.q)
     if closest is not None and not question.given and search.is_exact(question, closest):
         return _found_by_descent(question, closest)
-    fits, exist = (int(select(branches.q, np.where(rows, 0.0, math.inf))[1]) for rows in (good, closed))
+    fits, exist = (len(_by(branches.q, rows, branches.stats[:, DISTANCE])) for rows in (good, closed))
     reason = explain.other_branch(fits, exist)
     return _result(question, Status.UNREACHABLE, "branch", reason, closest=closest)
 
@@ -329,7 +331,7 @@ def _compromise(question: Question, branches: Branches, asked: Flags) -> IKResul
     approach_q, approach_stats = measure(question, branches.q, code=APPROACH)
     possible = asked & is_closed(approach_stats)
     rows = possible & (stats[:, OVERRUN] == 0.0) if question.respect else possible
-    solutions, _ = _wrap_up(question, branches, rows, np.abs(stats[:, ROLL]), "roll")
+    solutions, _ = _wrap_up(question, branches, _by(branches.q, rows, np.abs(stats[:, ROLL])), rows, "roll")
     nearest = search.nearest_orientation(question, branches.q if rows.any() else None)
     if nearest is not None and (question.branches is None or question.allows(question.branch_of(nearest.q))):
         solutions += (nearest,)
@@ -337,10 +339,9 @@ def _compromise(question: Question, branches: Branches, asked: Flags) -> IKResul
         return _out_of_reach(question, branches)
     blocked: tuple[BlockedBranch, ...] = ()
     if not rows.any() and possible.any():
-        kept, count = select(approach_q, np.where(possible, approach_stats[:, OVERRUN], math.inf))
         blocked = tuple(
             BlockedBranch(question.branch_name(i), approach_q[i].copy(), violations_of(question, approach_q[i]))
-            for i in kept[:count].tolist()
+            for i in _by(approach_q, possible, approach_stats[:, OVERRUN])
         )
     closest = search.closest(question, branches.q)
     return _result(

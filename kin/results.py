@@ -100,7 +100,7 @@ class BlockedBranch:
     violations: tuple[LimitViolation, ...]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class IKResult:
     """The answer to one target.
 

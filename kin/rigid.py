@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from kin.compiled import jit
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -12,15 +10,15 @@ _SLACK = TOLERANCES.rotation_matrix
 
 
 @jit
-def straighten(T: Array, out: Array) -> bool:
-    """out ← the rigid transform T ``(4, 4)``, its rotation re-orthonormalised; False if T is none.
+def straighten(T: Array, far: float, out: Array) -> bool:
+    """out ← the rigid transform T ``(4, 4)``, its rotation re-orthonormalised; False if T is none, or `far` away.
 
     What `kin.transforms.as_transform` does, without telling what is wrong.
     """
     for r in range(4):
         for c in range(4):
             out[r, c] = T[r, c]
-            if not math.isfinite(T[r, c]) or (r < 3 and c < 3 and abs(T[r, c]) > 2.0):
+            if not abs(T[r, c]) <= far or (r < 3 and c < 3 and abs(T[r, c]) > 2.0):
                 return False
             if r == 3 and abs(T[r, c] - (1.0 if c == 3 else 0.0)) > _SLACK:
                 return False

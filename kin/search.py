@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.branches import Branches, Flags, measure, solution, solve_branches
+from kin.branches import Flags, measure, solution, solve_branches
 from kin.finish import OVERRUN, POSITION_ERROR, ROTATION_ERROR
 from kin.fk import fk
 from kin.question import Question
@@ -114,13 +114,12 @@ def starting_points(question: Question, candidates: Array | None = None, count: 
     return np.concatenate(rows)
 
 
-def polish(question: Question, branches: Branches) -> Flags:
-    """Descend from the rows that miss by a hair, in place; which of them then are good ``(k,)``.
+def polish(question: Question, q: Array, stats: Array) -> Flags:
+    """Descend from the rows ``(k, n)`` that miss by a hair, in place; which of them then are good ``(k,)``.
 
     Where two branches merge, a rounding error of 1e-16 in the target is 1e-8 in an angle: enough to push another
     joint past its stop or the roll past the closure tolerance.
     """
-    q, stats = branches.q, branches.stats
     good = np.zeros(len(q), dtype=bool)
     miss = stats[:, POSITION_ERROR] + stats[:, ROTATION_ERROR]
     if question.respect:

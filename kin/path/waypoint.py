@@ -45,9 +45,9 @@ def meeting(question: Question, relaxed: bool, q: Array, near: Array) -> Array:
     miss = stats[:, POSITION_ERROR] + stats[:, ROTATION_ERROR] + stats[:, OVERRUN]
     hair = np.flatnonzero(~good & (miss < _HAIR))[:8]
     if len(hair):
-        missed = Branches(q[hair], stats[hair], (), np.empty((len(hair), 0)), [], 0.0, "")
-        good[hair] = search.polish(question.near(near), missed)
-        q[hair], stats[hair] = missed.q, missed.stats
+        missed, figures = q[hair], stats[hair]
+        good[hair] = search.polish(question.near(near), missed, figures)
+        q[hair], stats[hair] = missed, figures
     if relaxed and good.any():
         roll = np.abs(stats[:, ROLL])
         good &= alike(roll, float(roll[good].min()))

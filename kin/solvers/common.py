@@ -363,7 +363,7 @@ class Freedom(NamedTuple):
     rare: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True, eq=False)
 class Problem:
     """What a solver is asked: a target, and how to choose what it leaves free.
 
@@ -386,7 +386,7 @@ class Problem:
     seed_roll: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True, eq=False)
 class Candidates:
     """What a solver answers: one configuration per branch, not verified, not filtered, not sorted.
 

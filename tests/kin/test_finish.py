@@ -10,9 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kin import InputError
-from kin.finish import judge, ranges, select, take
+from kin import InputError, fk, get_robot, ik_branches
+from kin.finish import DISTANCE, finish, judge, ranges, select, settle
 from kin.rigid import straighten
+from kin.solvers.common import POSE
 from kin.transforms import as_transform, rotation_from_wxyz
 
 angle = st.floats(-10, 10)
@@ -53,17 +54,37 @@ def test_a_range_without_a_stop_is_told_as_such():
 
 def test_rows_are_taken_by_rising_key_and_once():
     q = np.array([[3.0, 0.0], [1.0, 0.0], [1.0, 1e-9], [2.0, 0.0], [0.0, 0.0]])
-    stats = np.arange(25.0).reshape(5, 5)
-    flags = np.array([True, True, True, True, False])
-    key = np.array([3.0, 1.5, 1.0, 2.0, 0.0])
-    q_out, stats_out = np.empty_like(q), np.empty_like(stats)
-    kept, count = take(q, stats, flags, key, q_out, stats_out)
+    kept, count = select(q, np.array([3.0, 1.5, 1.0, 2.0, math.inf]))
     assert kept[:count].tolist() == [2, 3, 0]
-    assert q_out[:count].tolist() == q[[2, 3, 0]].tolist()
-    assert stats_out[:count].tolist() == stats[[2, 3, 0]].tolist()
-    assert key.tolist() == [3.0, 1.5, 1.0, 2.0, 0.0], "the key is left as it was"
     kept, count = select(q, np.array([math.nan, 1.0, math.inf, 0.5, math.nan]))
     assert kept[:count].tolist() == [3, 1]
+
+
+@pytest.mark.parametrize("respect", [True, False])
+def test_rows_are_settled_in_one_call_as_step_by_step(respect):
+    arm = get_robot("puma560")
+    rng = np.random.default_rng(3)
+    q = rng.uniform(1.4 * arm.lower, 1.4 * arm.upper, (8, arm.n))
+    q[3], q[5] = math.nan, q[2] + 2.0 * math.pi
+    T, turns = fk(arm, q[2]), np.full(arm.n, 2.0 * math.pi)
+    q[0] = ik_branches(arm, T)[4]
+    seed, whole = rng.uniform(arm.lower, arm.upper), np.array([1.0] * 6 + [0.0])
+    given = (arm.model, T, POSE, whole, seed, seed, arm.lower.copy(), arm.upper.copy(), turns, respect)
+    rows, stats = q.copy(), np.empty((8, 5))
+    closed, good, order = np.empty(8, bool), np.empty(8, bool), np.empty(8, np.int64)
+    count = settle(*given, rows, stats, closed, good, order)
+    rows_twin, stats_twin = q.copy(), np.empty((8, 5))
+    finish(*given, rows_twin, stats_twin)
+    closed_twin, good_twin = np.empty((2, 8), bool)
+    judge(stats_twin, respect, closed_twin, good_twin)
+    kept, expected = select(rows_twin, np.where(good_twin, stats_twin[:, DISTANCE], math.inf))
+    assert np.array_equal(rows, rows_twin, equal_nan=True)
+    assert np.array_equal(stats, stats_twin, equal_nan=True)
+    assert (closed.tolist(), good.tolist()) == (closed_twin.tolist(), good_twin.tolist())
+    assert order[:count].tolist() == kept[:expected].tolist()
+    assert closed[[0, 2, 5]].all()
+    assert closed.sum() == 3
+    assert count == len({0, 2} & set(np.flatnonzero(good).tolist()))
 
 
 def test_what_meets_the_task_and_the_limits():
@@ -94,7 +115,7 @@ def test_the_compiled_check_of_a_target_agrees_with_the_one_that_explains(wxyz, 
     T[:3, 3] = (0.1, -5.0, 2e7)
     T.flat[entry] = factor if not math.isfinite(factor) else T.flat[entry] * factor + noise
     out = np.empty((4, 4))
-    sound = straighten(T, out)
+    sound = straighten(T, 1e8, out)
     try:
         expected = as_transform(T)
     except InputError:
