@@ -144,6 +144,12 @@ def atan2(y: float, x: float) -> float:
 
 
 @inlined
+def rounded(x: float) -> float:
+    """The whole number nearest to x, for |x| < 2⁵¹; of two the even one."""
+    return (x + _ROUND) - _ROUND
+
+
+@inlined
 def wrapped(angle: float) -> float:
     """The same angle in (−π, π], for one that is at most a turn away from it."""
     down = angle - TURN

@@ -22,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kin.compiled import jit
+from kin.kernels import sine_cosine
 from kin.robot import Robot, exact_cos_sin
 from kin.simd import atan2
 from kin.tolerances import TOLERANCES
@@ -143,11 +144,11 @@ def add_roots(a: float, b: float, c: float, breaks: Array, count: int) -> int:
 
     A root that is missed by rounding error only (|c| a hair above the amplitude) is kept as the touching point.
     """
-    amplitude = math.hypot(a, b)
+    amplitude = math.sqrt(a * a + b * b)
     if amplitude < 1e-15 or abs(c) > amplitude * (1.0 + 1e-9):
         return count
-    centre = math.atan2(b, a)
-    offset = math.acos(min(1.0, max(-1.0, -c / amplitude)))
+    centre = atan2(b, a)
+    offset = atan2(math.sqrt(max((amplitude - c) * (amplitude + c), 0.0)), -c)
     breaks[count] = wrap(centre + offset)
     breaks[count + 1] = wrap(centre - offset)
     return count + 2
@@ -167,7 +168,7 @@ def zyz_breaks(
         # A joint held still has one stop, not two.
         if high[first] - low[first] < TURN and (side == 0 or high[first] > low[first]):
             t = low[first] if side == 0 else high[first]
-            c, s = math.cos(t), math.sin(t)
+            s, c = sine_cosine(t)
             count = add_roots(
                 M1[1, 2] * c - M1[0, 2] * s,
                 M2[1, 2] * c - M2[0, 2] * s,
@@ -177,10 +178,10 @@ def zyz_breaks(
             )
         if high[first + 1] - low[first + 1] < TURN and (side == 0 or high[first + 1] > low[first + 1]):
             t = low[first + 1] if side == 0 else high[first + 1]
-            count = add_roots(M1[2, 2], M2[2, 2], M0[2, 2] - math.cos(t), breaks, count)
+            count = add_roots(M1[2, 2], M2[2, 2], M0[2, 2] - sine_cosine(t)[1], breaks, count)
         if high[first + 2] - low[first + 2] < TURN and (side == 0 or high[first + 2] > low[first + 2]):
             t = low[first + 2] if side == 0 else high[first + 2]
-            c, s = math.cos(t), math.sin(t)
+            s, c = sine_cosine(t)
             count = add_roots(
                 M1[2, 1] * c + M1[2, 0] * s,
                 M2[2, 1] * c + M2[2, 0] * s,
@@ -188,8 +189,8 @@ def zyz_breaks(
                 breaks,
                 count,
             )
-    if math.hypot(M1[2, 2], M2[2, 2]) > 1e-15:
-        extreme = math.atan2(M2[2, 2], M1[2, 2])
+    if M1[2, 2] * M1[2, 2] + M2[2, 2] * M2[2, 2] > 1e-30:
+        extreme = atan2(M2[2, 2], M1[2, 2])
         breaks[count] = extreme
         breaks[count + 1] = wrap(extreme + math.pi)
         count += 2

@@ -24,7 +24,7 @@ import numpy as np
 from kin.compiled import inlined, jit
 from kin.kernels import BLOCK, all_finite_pose
 from kin.robot import Robot
-from kin.simd import WIDE, atan2, sin_cos, widest, wrapped
+from kin.simd import TURN, WIDE, atan2, rounded, sin_cos, widest, wrapped
 from kin.solvers.common import (
     APPROACH,
     POSE,
@@ -40,12 +40,10 @@ from kin.solvers.common import (
     is_zero,
     lay_probes,
     merged,
-    misfit_of,
     nearest_image,
     nearest_in_arcs,
     screw_z,
     shifted,
-    split_sum,
     to_canonical,
     wrap,
     zyz,
@@ -67,6 +65,8 @@ BRANCHES = tuple(
 )
 _REACH = TOLERANCES.closure_position * 0.1
 _SINGULAR = TOLERANCES.singular
+_LIMIT = TOLERANCES.limit
+_PER_TURN = 1.0 / TURN
 _CALM = 0.05  # rad; a way shorter than this is calm
 
 
@@ -187,48 +187,93 @@ def _travel(angles: Array, near: Array, low: Array, high: Array, first: int, las
     return total
 
 
+@inlined
+def _image(x: float, near: float, low: float, high: float) -> tuple[float, float]:
+    """How far the angle x is outside [low, high] at its best whole turn, and that turn's step from `near` where
+    there is one inside: `excess` and `nearest_image`, without a branch.
+    """
+    least, most = low - _LIMIT, high + _LIMIT
+    y = x + TURN * rounded((near - x) * _PER_TURN)
+    turns = (least - x) * _PER_TURN
+    up = rounded(turns)
+    above = x + TURN * (up + 1.0 if up < turns else up)
+    turns = (most - x) * _PER_TURN
+    down = rounded(turns)
+    below = x + TURN * (down - 1.0 if down > turns else down)
+    y = below if y > most else y
+    y = above if y < least else y
+    under, over = low - (above - TURN), above - high
+    outside = under if under < over else over
+    return outside if above > most else 0.0, y - near
+
+
 @jit
 def _weigh(
-    M0: Array, M1: Array, M2: Array, psi: float, near: Array, low: Array, high: Array, first: int, last: int,
-    column: int, angles: Array, misfits: Array, ways: Array, j: int,
+    M0: Array, M1: Array, M2: Array, looks: Array, count: int, near: Array, low: Array, high: Array, first: int,
+    last: int, row: int, angles: Array, S: Array, misfits: Array, ways: Array,
 ) -> None:  # fmt: skip
-    """misfits, ways [j, column + side] ← how far a spherical joint's angles at ψ are outside the limits, and their
-    squared steps from `near`, for either sign of sin B.
+    """misfits, ways [row + side, j] ← how far a spherical joint's angles at ψ = looks[j], j < count, are outside
+    the limits, and their squared steps from `near`, for either sign of sin B.
 
     ``Rz(A) Ry(B) Rz(C) = M0 + M1 cos ψ + M2 sin ψ``; the other sign is A + π, −B, C + π. The steps of the joints
-    first…last−1 count.
+    first…last−1 count. S ``(3, k)`` and `angles` are scratch. All ψ go through each step together, as vectors.
     """
-    s, c = sin_cos(psi)
-    x = M0[0, 2] + c * M1[0, 2] + s * M2[0, 2]
-    y = M0[1, 2] + c * M1[1, 2] + s * M2[1, 2]
-    z = M0[2, 2] + c * M1[2, 2] + s * M2[2, 2]
-    xx = M0[0, 0] + c * M1[0, 0] + s * M2[0, 0]
-    yx = M0[1, 0] + c * M1[1, 0] + s * M2[1, 0]
-    xy = M0[0, 1] + c * M1[0, 1] + s * M2[0, 1]
-    yy = M0[1, 1] + c * M1[1, 1] + s * M2[1, 1]
-    h = math.sqrt(x * x + y * y)
-    k = first + 2
-    if h < _SINGULAR:
-        sign = 1.0 if z > 0.0 else -1.0
-        total = math.atan2(sign * yx, sign * xx)
-        if z > 0.0:
-            A = split_sum(total, near[first], low[first], high[first], near[k], low[k], high[k])
-        else:
-            A = split_sum(total, near[first], low[first], high[first], -near[k], -high[k], -low[k])
-        ca, sa = math.cos(A), math.sin(A)
-    else:
-        A = atan2(y, x)
+    widest()
+    lost = 0
+    for j in range(count):
+        s, c = sin_cos(looks[j])
+        x = M0[0, 2] + c * M1[0, 2] + s * M2[0, 2]
+        y = M0[1, 2] + c * M1[1, 2] + s * M2[1, 2]
+        z = M0[2, 2] + c * M1[2, 2] + s * M2[2, 2]
+        xx = M0[0, 0] + c * M1[0, 0] + s * M2[0, 0]
+        yx = M0[1, 0] + c * M1[1, 0] + s * M2[1, 0]
+        xy = M0[0, 1] + c * M1[0, 1] + s * M2[0, 1]
+        yy = M0[1, 1] + c * M1[1, 1] + s * M2[1, 1]
+        h = math.sqrt(x * x + y * y)
+        lost += 1 if h < _SINGULAR else 0
         ca, sa = x / h, y / h
-    angles[first] = A
-    angles[first + 1] = atan2(h, z)
-    angles[k] = atan2(ca * yx - sa * xx, ca * yy - sa * xy)
+        S[0, j] = atan2(y, x)
+        S[1, j] = atan2(h, z)
+        S[2, j] = atan2(ca * yx - sa * xx, ca * yy - sa * xy)
+    if lost > 0:
+        _split_lost(M0, M1, M2, looks, count, near, low, high, first, angles, S)
     for side in range(2):
-        misfits[j, column + side] = misfit_of(angles, low, high, first, first + 3)
-        ways[j, column + side] = _travel(angles, near, low, high, first, last)
-        if h >= _SINGULAR:
-            angles[first] += math.pi
-            angles[first + 1] = -angles[first + 1]
-            angles[k] += math.pi
+        k = row + side
+        for j in range(count):
+            misfits[k, j] = 0.0
+            ways[k, j] = 0.0
+        for i in range(3):
+            here, least, most = near[first + i], low[first + i], high[first + i]
+            counts = 1.0 if first + i < last else 0.0
+            sign = -1.0 if i == 1 and side == 1 else 1.0
+            turn = math.pi if i != 1 and side == 1 else 0.0
+            for j in range(count):
+                outside, step = _image(sign * S[i, j] + turn, here, least, most)
+                misfits[k, j] += outside
+                ways[k, j] += counts * (step * step)
+    if lost > 0:
+        for j in range(count):
+            if abs(math.sin(S[1, j])) < _SINGULAR:  # no sign to choose
+                misfits[row + 1, j] = misfits[row, j]
+                ways[row + 1, j] = ways[row, j]
+
+
+@jit
+def _split_lost(
+    M0: Array, M1: Array, M2: Array, looks: Array, count: int, near: Array, low: Array, high: Array, first: int,
+    angles: Array, S: Array,
+) -> None:  # fmt: skip
+    """S ← A, B, C of `_weigh` where sin B vanishes and only A ± C matters."""
+    R = np.empty((3, 3))
+    for j in range(count):
+        s, c = sin_cos(looks[j])
+        for r in range(3):
+            for q in range(3):
+                R[r, q] = M0[r, q] + c * M1[r, q] + s * M2[r, q]
+        if math.sqrt(R[0, 2] * R[0, 2] + R[1, 2] * R[1, 2]) < _SINGULAR:
+            zyz(R, 1.0, near, low, high, first, angles)
+            for i in range(3):
+                S[i, j] = angles[first + i]
 
 
 @jit
@@ -246,7 +291,7 @@ def _solve(
     breaks = np.empty(64)
     # Arm angles to look at: stops and the middles between them, then those at which some joint stays where it is.
     looks = np.empty(160)
-    misfits, ways = np.empty((160, 4)), np.empty((160, 4))
+    S, misfits, ways = np.empty((3, 160)), np.empty((4, 160)), np.empty((4, 160))
     near, low, high = shifted(seed, offset), shifted(lower, offset), shifted(upper, offset)
     clear(out)
     to_canonical(T, inverse_base, inverse_tool, M)
@@ -283,9 +328,8 @@ def _solve(
             n_looks = zyz_breaks(A0, A1, A2, near, still, 0, looks, n_looks)
             n_looks = zyz_breaks(B0, B1, B2, near, still, 4, looks, n_looks)
         # Shoulder and wrist do not see each other: each is judged once per arm angle and sign.
-        for j in range(n_looks):
-            _weigh(A0, A1, A2, looks[j], near, low, high, 0, 3, 0, angles, misfits, ways, j)
-            _weigh(B0, B1, B2, looks[j], near, low, high, 4, joints, 2, angles, misfits, ways, j)
+        _weigh(A0, A1, A2, looks, n_looks, near, low, high, 0, 3, 0, angles, S, misfits, ways)
+        _weigh(B0, B1, B2, looks, n_looks, near, low, high, 4, joints, 2, angles, S, misfits, ways)
         for si in range(2):
             for wi in range(2):
                 branch = 4 * si + 2 * e + wi
@@ -293,7 +337,7 @@ def _solve(
                 first = found
                 best = math.inf
                 for j in range(n_probes):
-                    misfit = elbow_misfit + misfits[j, si] + misfits[j, 2 + wi]
+                    misfit = elbow_misfit + misfits[si, j] + misfits[2 + wi, j]
                     if misfit == 0.0 and found < arcs.shape[0]:
                         found = extend_arcs(arcs, first, found, branch, looks, j, n_probes)
                     elif misfit < best and found == first:
@@ -315,8 +359,8 @@ def _solve(
                     calm = -1
                     for j in range(n_looks):
                         between = n_probes > 0 and j % 2 == 1 and j < n_probes
-                        outside = respect and elbow_misfit + misfits[j, si] + misfits[j, 2 + wi] > 0.0
-                        way = elbow_way + ways[j, si] + ways[j, 2 + wi]
+                        outside = respect and elbow_misfit + misfits[si, j] + misfits[2 + wi, j] > 0.0
+                        way = elbow_way + ways[si, j] + ways[2 + wi, j]
                         if way < least and not between and not outside:
                             least, calm = way, j
                     if calm >= 0:
