@@ -16,7 +16,7 @@ from app.viewer.meshes import body
 from app.viewer.panel.joints import label
 
 ARTIFACTS = Path(__file__).parents[1] / "artifacts"
-WAIT = 20_000  # ms; software rendering on a busy machine is slow
+WAIT = 45_000  # ms; software rendering on a busy machine is slow
 # A third of the work of software rendering is smoothing edges.
 PLAIN = """
 const { getContext } = HTMLCanvasElement.prototype;

@@ -103,7 +103,9 @@ SCREENS: dict[str, Callable[[Tab], None]] = {
     "workspace-capability": capability,
     "view": view,
 }
-DARK_ON_A_PHONE = ("move", "learn-postures", "learn-velocity")
+# Every screen is looked at dark on a desk and light on a phone; these the other way round as well.
+ON_A_DESK = ("move", "learn-equations", "learn-postures", "learn-velocity", "workspace-cloud")
+DARK_ON_A_PHONE = ("learn-velocity",)
 
 
 def walk(tab: Tab, names: tuple[str, ...], suffix: str) -> None:
@@ -118,7 +120,7 @@ def walk(tab: Tab, names: tuple[str, ...], suffix: str) -> None:
 
 
 def test_on_a_desk(tab: Tab) -> None:
-    walk(tab, tuple(SCREENS), "light")
+    walk(tab, ON_A_DESK, "light")
 
 
 def test_on_a_desk_in_the_dark(tab: Tab) -> None:
