@@ -8,12 +8,15 @@ that a person can picture, which a singular value or a determinant is not.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Literal
 
 Kind = Literal["elbow", "shoulder", "wrist", "algorithmic", "jacobian"]
 Entry = tuple[Kind, float, str, Callable[[], str]]
+_OTHERWISE: ContextVar[tuple[int, ...]] = ContextVar("joints told with the other sign", default=())
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +55,18 @@ def off_square(t: float) -> float:
 
 def at(joint: int, q: float, off: float) -> str:
     """``"θ4 = 0°"``: where joint number `joint`, now at q, would meet a condition it misses by `off` (radians)."""
-    return f"θ{joint} = {round(math.degrees(q - off), 3) + 0.0:g}°"
+    there = off - q if joint - 1 in _OTHERWISE.get() else q - off
+    return f"θ{joint} = {round(math.degrees(there), 3) + 0.0:g}°"
+
+
+@contextmanager
+def counting_otherwise(joints: tuple[int, ...]) -> Iterator[None]:
+    """Inside, `at` tells these joints (indices) with the other sign: see :mod:`kin.solvers.mirrored`."""
+    token = _OTHERWISE.set(joints)
+    try:
+        yield
+    finally:
+        _OTHERWISE.reset(token)
 
 
 def stretch(t: float) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -87,6 +88,41 @@ def test_the_elbow_is_on_its_circle_at_the_arm_angle(robot: kin.Robot) -> None:
         assert np.linalg.norm(points - circle.at(free.value), axis=1).min() < 1e-9
         for point in (circle.shoulder, circle.wrist):
             assert np.linalg.norm(points - point, axis=1).min() < 1e-9
+
+
+def with_joint_turned_round(robot: kin.Robot, joint: int) -> kin.Robot:
+    """The same arm in space, by a standard table in which a joint counts the other way round."""
+    rows, home, base = list(robot.rows), list(robot.home), np.array(robot.base)
+    row, home[joint] = rows[joint], -home[joint]
+    assert row.limits is not None
+    low, high = row.limits
+    rows[joint] = replace(row, theta=-row.theta, d=-row.d, alpha=row.alpha + math.pi, limits=(-high, -low))
+    if joint:
+        rows[joint - 1] = replace(rows[joint - 1], alpha=rows[joint - 1].alpha + math.pi)
+    else:
+        base = base @ np.diag([1.0, -1.0, -1.0, 1.0])
+    return replace(robot, id="turned", rows=tuple(rows), home=tuple(home), base=tuple(map(tuple, base.tolist())))
+
+
+@pytest.mark.parametrize("joint", [0, 2, 4, 6])
+def test_the_elbow_is_on_its_circle_whichever_way_a_joint_counts(joint: int) -> None:
+    test_the_elbow_is_on_its_circle_at_the_arm_angle(with_joint_turned_round(IIWA, joint))
+
+
+@pytest.mark.parametrize("joint", [0, 1])
+def test_joints_on_one_line_may_count_against_each_other(joint: int) -> None:
+    robot = with_joint_turned_round(PRINTED, joint)
+    assert coaxial(robot)
+    q = robot.q_home + 0.3
+    (free,) = selfmotion.free_values(robot, kin.fk(robot, q), "pose", q, None)
+    (low, high) = free.intervals[0]
+    rays = []
+    for value in (low + 1e-3, 0.5 * (low + high), high - 1e-3):
+        there = kin.solve_ik(robot, kin.fk(robot, q), q_seed=q, branch="seed", redundancy=value).solutions[0].q
+        assert there[0] == value
+        chords, whose = trade_segments(robot, there, 0.1)
+        rays.append(chords[whose == 2])
+    assert np.allclose(rays, rays[0])
 
 
 def test_no_circle_for_other_arms() -> None:

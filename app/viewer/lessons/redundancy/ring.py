@@ -80,12 +80,12 @@ def arc_segments(circle: Circle, intervals: Iterable[tuple[float, float]], scale
 
 
 def coaxial(robot: Robot) -> bool:
-    """Whether joints 1 and 2 turn about one line, the same way: then one can take back what the other does."""
+    """Whether joints 1 and 2 turn about one line: then one can take back what the other does."""
     if robot.n < 2 or not robot.revolute[:2].all():
         return False
     axes = [joint_axis(robot, robot.q_home, i) for i in (0, 1)]
     (p, a), (r, b) = axes
-    return bool(np.linalg.norm(a - b) < 1e-9 and np.linalg.norm(np.cross(r - p, a)) < 1e-9)
+    return bool(np.linalg.norm(np.cross(a, b)) < 1e-9 and np.linalg.norm(np.cross(r - p, a)) < 1e-9)
 
 
 def joint_axis(robot: Robot, q: Array, joint: int) -> tuple[Array, Array]:
@@ -100,15 +100,17 @@ def joint_axis(robot: Robot, q: Array, joint: int) -> tuple[Array, Array]:
 
 def trade_segments(robot: Robot, q: Array, radius: float) -> tuple[Array, NDArray[np.int64]]:
     """Arcs of θ1 and, going on from its end, of θ2 about their common line, as chords ``(k, 2, 3)``; and
-    whose each is ``(k,)``: 0 and 1 for the joints, 2 for the ray at θ1 + θ2, which stays where it is in a trade.
+    whose each is ``(k,)``: 0 and 1 for the joints, 2 for the ray at the end of both, which stays where it is in a
+    trade.
     """
-    p, z = joint_axis(robot, q, 1)
+    (_, z), (p, other) = (joint_axis(robot, q, joint) for joint in (0, 1))
+    turns = float(q[0]), float(q[1] * np.sign(z @ other))  # both as joint 1 counts
     x, y, _ = frame_from_approach(z).T  # the same for all configurations: the line does not move
     chords: list[Array] = []
     numbers: list[int] = []
     start = 0.0
     for joint, width in ((0, radius), (1, 1.25 * radius)):
-        end = start + float(q[joint])
+        end = start + turns[joint]
         points = [
             p + width * (math.cos(a) * x + math.sin(a) * y)
             for a in np.linspace(start, end, max(2, math.ceil(abs(end - start) / 0.08) + 1)).tolist()
@@ -122,7 +124,7 @@ def trade_segments(robot: Robot, q: Array, radius: float) -> tuple[Array, NDArra
             chords.append(np.array([tip - 0.22 * radius * forward + side * 0.12 * radius * out, tip]))
         numbers += [joint] * (len(points) + 1)
         start = end
-    total = float(q[0] + q[1])
+    total = sum(turns)
     chords.append(np.array([p, p + 1.4 * radius * (math.cos(total) * x + math.sin(total) * y)]))
     numbers.append(2)
     return np.array(chords), np.array(numbers, dtype=np.int64)

@@ -1,0 +1,547 @@
+"""Arms with joints that count the other way round: the closed form, and every answer, of the arm as it was.
+
+Two laws carry the tests. An arm read with some joints turned round answers as the arm whose table has them so, but
+for signs and rounding. And whichever joints of a built-in arm are turned round, it keeps its
+closed form, its postures and its workspace; the branches may only change their names.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import kin
+from kin import Joint, Robot, Status, solve_ik
+from kin.solvers import solver_for
+from kin.solvers.common import screw_x, screw_z
+from kin.solvers.mirrored import Mirrored, readings
+
+PI = math.pi
+ARMS = {name: kin.get_robot(name) for name in ("pioneer5", "redundant7", "redundant7-craig", "iiwa14")}
+HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])
+# Which single joints no closed form is used to, by arm: 7 only in order to have approach directions.
+STRANGE = {"pioneer5": (1, 2, 3), "redundant7": (0, 1, 2, 4), "redundant7-craig": (2, 4, 6), "iiwa14": (2, 4, 6)}
+
+
+def nested(T):
+    return tuple(tuple(row) for row in np.asarray(T).tolist())
+
+
+def turned(robot, joints):
+    """The same arm in space by a table in which `joints` count the other way round."""
+    rows, base, tool, home = list(robot.rows), np.array(robot.base), np.array(robot.tool), list(robot.home)
+    for i in joints:
+        k, home[i] = robot.joint_rows[i], -home[i]
+        row = rows[k]
+        limits = None if row.limits is None else (-row.limits[1], -row.limits[0])
+        rows[k] = replace(row, theta=-row.theta, d=-row.d, alpha=row.alpha + PI, limits=limits)
+        neighbour = k - 1 if robot.convention == "standard" else k + 1
+        if neighbour < 0:
+            base = base @ HALF_TURN
+        elif neighbour == len(rows):
+            tool = HALF_TURN @ tool
+        else:
+            rows[neighbour] = replace(rows[neighbour], alpha=rows[neighbour].alpha + PI)
+    rows = [replace(row, alpha=math.remainder(row.alpha, 2 * PI)) for row in rows]
+    name = f"{robot.id}-{''.join(str(i + 1) for i in joints)}"
+    return replace(robot, id=name, rows=tuple(rows), home=tuple(home), base=nested(base), tool=nested(tool))
+
+
+def signs_of(robot, joints):
+    signs = np.ones(robot.n)
+    signs[list(joints)] = -1.0
+    return signs
+
+
+CASES = [
+    (name, joints)
+    for name, more in (
+        ("pioneer5", [(0, 1, 3), (2, 3), (0, 1, 2, 3, 4)]),
+        ("redundant7", [(0, 2, 5), (1, 2, 4, 6), (0, 1, 2, 3, 4, 5, 6)]),
+        ("redundant7-craig", [(0, 2, 3), (1, 2, 4, 5, 6)]),
+        ("iiwa14", [(0, 2, 4, 5), (0, 1, 2, 3, 4, 5, 6)]),
+    )
+    for joints in [*((i,) for i in STRANGE[name]), *more]
+]
+IDS = [f"{name}-{''.join(str(i + 1) for i in joints)}" for name, joints in CASES]
+cases = pytest.mark.parametrize(("name", "joints"), CASES, ids=IDS)
+
+
+class Pair:
+    """An arm that is read with joints turned round, and the one a closed form fits as it is."""
+
+    def __init__(self, robot):
+        self.robot = robot
+        self.match = solver_for(robot)
+        self.joints = getattr(self.match.solver, "joints", ())
+        self.plain = turned(robot, self.joints)
+        self.signs = signs_of(robot, self.joints)
+        assert not isinstance(solver_for(self.plain).solver, Mirrored)
+
+    def value(self, name, x):
+        """A free value of the plain arm as the other one has it."""
+        match = re.fullmatch(r"theta(\d)", name)
+        return -x if match and int(match[1]) - 1 in self.joints else x
+
+    def both(self, target, **options):
+        """Answers of the plain arm and of the other one."""
+        there = dict(options)
+        if "q_seed" in options:
+            there["q_seed"] = options["q_seed"] * self.signs
+        if "limits" in options:
+            there["limits"] = [
+                pair if sign > 0 else (-pair[1], -pair[0])
+                for pair, sign in zip(options["limits"], self.signs, strict=True)
+            ]
+        if "locked" in options:
+            there["locked"] = [
+                None if x is None else x * s for x, s in zip(options["locked"], self.signs, strict=True)
+            ]
+        if "redundancy" in options:
+            there["redundancy"] = {k: self.value(k, x) for k, x in options["redundancy"].items()}
+        return solve_ik(self.plain, target, **options), solve_ik(self.robot, target, **there)
+
+    def agree(self, a, b, tolerance=1e-7):
+        """Whether an answer of the other arm is that of the plain one."""
+        assert (a.status, a.cause, a.solver, len(a.solutions)) == (b.status, b.cause, b.solver, len(b.solutions))
+        for x, y in zip(a.solutions, b.solutions, strict=True):
+            assert (x.branch, x.compromise) == (y.branch, y.compromise)
+            if x.compromise == "rotation":  # by descents, which may end a whole turn away
+                assert abs(x.rotation_error - y.rotation_error) < 1e-6
+                continue
+            assert np.abs(x.q - y.q * self.signs).max() < tolerance
+            assert max(y.position_error, y.rotation_error) <= 1e-9 or y.compromise
+            self._free(x.redundancy, y.redundancy, tolerance)
+        if a.solutions:
+            self._free(a.redundancy, b.redundancy, tolerance)
+        here, there = (sorted(r.blocked, key=lambda x: x.branch) for r in (a, b))  # often some break as little
+        for x, y in zip(here, there, strict=True):
+            assert x.branch == y.branch
+            assert [v.joint for v in x.violations] == [v.joint for v in y.violations]
+            for v, w in zip(x.violations, y.violations, strict=True):
+                sign = self.signs[v.joint]
+                assert abs((v.value - v.limit) - (w.value - w.limit) * sign) < 1e-6
+
+    def _free(self, a, b, tolerance):
+        assert [r.name for r in a] == [r.name for r in b]
+        for x, y in zip(a, b, strict=True):
+            assert abs(self.value(x.name, y.value) - x.value) < tolerance
+            ranges = [tuple(sorted(self.value(x.name, end) for end in pair)) for pair in y.intervals]
+            assert np.allclose(wide(ranges), wide(x.intervals), rtol=0.0, atol=max(tolerance, 1e-7))
+
+
+def wide(intervals):
+    """The intervals that are more than a point: whether a point is one, rounding decides."""
+    return np.array(sorted(pair for pair in intervals if pair[1] - pair[0] > 1e-6)).reshape(-1, 2)
+
+
+def poses(robot, count, seed=0, inside=True):
+    """Configurations and their poses; and poses that limits or reach forbid."""
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        q = robot.random_q(rng)
+        yield q, kin.fk(robot, q)
+        if not inside:
+            q = rng.uniform(-PI, PI, robot.n)
+            T = kin.fk(robot, q)
+            yield q, T
+            T = T.copy()
+            T[:3, 3] *= rng.uniform(0.9, 1.6)
+            yield q, T
+
+
+# -- found --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_whatever_counts_otherwise_the_arm_keeps_its_family_and_tasks(name):
+    base, n = solver_for(ARMS[name]), ARMS[name].n
+    for count in (0, 1, 2, n - 1, n):
+        for joints in itertools.combinations(range(n), count):
+            match = solver_for(turned(ARMS[name], joints))
+            assert match is not None, joints
+            assert match.solver.NAME == base.solver.NAME
+            assert match.solver.BRANCHES == base.solver.BRANCHES
+            for task in range(4):
+                assert match.solver.handles(match.geometry, task) == base.solver.handles(base.geometry, task)
+            assert len(getattr(match.solver, "joints", ())) <= count
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_a_single_joint_that_a_closed_form_is_not_used_to_is_the_one_turned_round(name):
+    for joint in range(ARMS[name].n):
+        match = solver_for(turned(ARMS[name], (joint,)))
+        strange = joint in STRANGE[name]
+        assert isinstance(match.solver, Mirrored) == strange
+        assert match.reason.endswith(f"; joint {joint + 1} counts the other way round") == strange
+    assert solver_for(turned(ARMS["iiwa14"], (2, 4))).reason.endswith("; joints 3 and 5 count the other way round")
+    assert solver_for(turned(ARMS["iiwa14"], (2, 4, 6))).reason.endswith(
+        "joints 3, 5 and 7 count the other way round"
+    )
+
+
+def test_arms_of_no_family_are_left_alone():
+    for name in ("panda", "ur5", "puma560", "irb120", "stanford", "scara", *ARMS):
+        match = solver_for(kin.get_robot(name))
+        assert (match is None) == (name == "panda")
+        assert match is None or not isinstance(match.solver, Mirrored)
+    one = Robot(
+        "one", "one", "test", "standard", (Joint("j", 0.0, 0.1, 0.2, 0.3, "revolute", (-1.0, 1.0)),), (0.0,)
+    )
+    assert solver_for(one) is None
+    snake = [Joint(f"j{i}", 0.0, 0.0, 0.1, PI * (i % 2) if i % 4 < 3 else 1.0, limits=(-1, 1)) for i in range(40)]
+    assert solver_for(Robot("snake", "snake", "test", "standard", tuple(snake), (0.0,) * 40)) is None
+
+
+@cases
+def test_a_reading_is_the_same_arm_in_space(name, joints):
+    robot = turned(ARMS[name], joints)
+    q = robot.random_q(np.random.default_rng(1), 5)
+    assert np.allclose(kin.fk(robot, q), kin.fk(ARMS[name], q * signs_of(robot, joints)), atol=1e-12)
+    for reversed_, read in readings(robot):
+        assert np.allclose(kin.fk(read, q * signs_of(robot, reversed_)), kin.fk(robot, q), atol=1e-12)
+
+
+# -- answers ------------------------------------------------------------------------------------------------------
+
+
+@cases
+def test_answers_are_those_of_the_plain_arm(name, joints):
+    pair = Pair(turned(ARMS[name], joints))
+    rng = np.random.default_rng(2)
+    found = set()
+    for q, T in poses(pair.plain, 2, inside=False):
+        seed = q + rng.uniform(-0.4, 0.4, len(q))
+        for options in (
+            {"q_seed": seed},
+            {"task": "approach"},
+            {"task": "approach", "q_seed": seed, "branch": "seed"},
+            {"q_seed": seed, "images": "all", "respect_limits": True},
+            {"respect_limits": False, "q_seed": seed},
+        ):
+            a, b = pair.both(T, **options)
+            found.add(a.status)
+            pair.agree(a, b)
+    assert {Status.SOLVED, Status.LIMITS} <= found
+
+
+@pytest.mark.parametrize("joints", [joints for name, joints in CASES if name == "pioneer5"], ids=str)
+def test_a_point_alone(joints):
+    """Of other branches a stop may leave a single configuration, which rounding decides about."""
+    pair = Pair(turned(ARMS["pioneer5"], joints))
+    for q, T in poses(pair.plain, 3, seed=4):
+        for options in (
+            {},
+            {"redundancy": {"theta4": float(q[3])}},
+            {"redundancy": {"theta4": float(q[3]), "theta5": float(q[4])}},
+            {"redundancy": {"theta5": float(q[4])}, "locked": [None, None, None, float(q[3]), None]},
+        ):
+            a, b = pair.both(T[:3, 3], task="position", q_seed=q + 1e-3, **options)
+            assert a.status is b.status is Status.SOLVED
+            pair.agree(replace(a, solutions=a.solutions[:1]), replace(b, solutions=b.solutions[:1]), 1e-6)
+
+
+@cases
+def test_narrowed_limits_and_locked_joints(name, joints):
+    pair = Pair(turned(ARMS[name], joints))
+    plain = pair.plain
+    rng = np.random.default_rng(5)
+    for q, T in poses(plain, 2, seed=5):
+        seed = q + rng.uniform(-0.2, 0.2, plain.n)
+        near = [
+            (max(low, x - 0.9), min(high, x + 0.7))
+            for x, low, high in zip(q, plain.lower, plain.upper, strict=True)
+        ]
+        a, b = pair.both(T, limits=near, q_seed=seed)
+        assert a.status is Status.SOLVED
+        pair.agree(a, b)
+        elsewhere = [(low, low + 0.4 * (high - low)) for low, high in zip(plain.lower, plain.upper, strict=True)]
+        pair.agree(*pair.both(T, limits=elsewhere, q_seed=seed))
+        locked = [None] * plain.n
+        locked[joints[0]] = float(q[joints[0]])
+        a, b = pair.both(T, locked=locked, q_seed=seed)
+        assert a.status is Status.SOLVED
+        pair.agree(a, b)
+
+
+SEVEN = [(name, joints) for name, joints in CASES if name != "pioneer5"]
+
+
+@pytest.mark.parametrize(("name", "joints"), SEVEN, ids=IDS[-len(SEVEN) :])
+def test_free_values_asked_for_and_preferred(name, joints):
+    pair = Pair(turned(ARMS[name], joints))
+    free = "theta1" if name == "redundant7" else "psi"
+    for q, T in poses(pair.plain, 1, seed=6):
+        seed = q + 0.1
+        for value in (-1.9, 0.3, 2.0):
+            pair.agree(*pair.both(T, redundancy={free: value}, q_seed=seed))
+        other = {"redundant7": ("roll", 0.4)}.get(name, ("theta7", float(q[6])))
+        pair.agree(*pair.both(T, task="approach", redundancy={free: 0.3, other[0]: other[1]}, q_seed=seed))
+        for prefer, worth in (("limits", margin), ("manipulability", kin.manipulability)):
+            a, b = pair.both(T, prefer=prefer, q_seed=seed)
+            assert a.status is b.status is Status.SOLVED
+            # Many values may be as good as each other.
+            here, there = (
+                {s.branch: worth(r, s.q) for s in x.solutions} for r, x in ((pair.plain, a), (pair.robot, b))
+            )
+            assert here.keys() == there.keys()
+            assert all(abs(here[key] - there[key]) < 1e-3 * max(1.0, abs(here[key])) for key in here)
+            assert all(
+                there[x.branch] >= worth(pair.robot, x.q) - 1e-3 for x in pair.both(T, q_seed=seed)[1].solutions
+            )
+
+
+def margin(robot, q):
+    """Distance to the nearest stop, as a share of half the joint's range."""
+    return float((np.minimum(q - robot.lower, robot.upper - q) / (0.5 * (robot.upper - robot.lower))).min())
+
+
+@cases
+def test_thin_branches(name, joints):
+    robot = turned(ARMS[name], joints)
+    pair = Pair(robot)
+    five = robot.n == 5
+    q = pair.plain.random_q(np.random.default_rng(7), 40)
+    T = kin.fk(pair.plain, q)
+    values = np.linspace(-2.5, 2.5, len(q))
+    values[::5] = math.nan
+    there = -values if name == "redundant7" and 0 in pair.joints else values
+    for a, b in ((math.nan, math.nan), (0.7, -0.7 if there is not values else 0.7), (values, there)):
+        x, y = kin.ik_branches(pair.plain, T, a), kin.ik_branches(robot, T, b)
+        assert np.array_equal(np.isnan(x), np.isnan(y))
+        assert apart(x, y * pair.signs).max() < 1e-7
+        assert five or not np.isnan(y).all()
+        here = ~np.isnan(y)
+        assert name == "redundant7" or ((np.abs(y[here]) <= PI).all() and (y[here] > -PI).all())
+        for i in range(4):
+            one = kin.ik_branches(robot, T[i], b if np.ndim(b) == 0 else float(b[i]))
+            assert np.allclose(one, y[i], rtol=0.0, atol=1e-12, equal_nan=True)
+
+
+def apart(a, b):
+    """Joint differences, whole turns aside; 0 where there is nothing."""
+    return np.nan_to_num(np.abs((a - b + PI) % (2 * PI) - PI))
+
+
+def test_thin_angles_are_told_in_the_half_open_turn():
+    robot = turned(ARMS["iiwa14"], (2,))
+    q = np.array([0.0, 0.5, PI, -0.7, 0.2, 0.4, 0.1])
+    rows = kin.ik_branches(robot, kin.fk(robot, q), 0.0)
+    rows = rows[~np.isnan(rows[:, 0])]
+    assert (rows > -PI).all()
+    assert (np.abs(rows) <= PI).all()
+    printed = turned(ARMS["redundant7"], (0,))
+    q = np.array([-PI, 0.5, 0.4, 0.7, 0.2, 0.4, 0.1])
+    rows = kin.ik_branches(printed, kin.fk(printed, q), -PI)
+    assert (rows[~np.isnan(rows[:, 0]), 0] == -PI).all()  # as it was asked for
+
+
+@pytest.mark.parametrize("joint", STRANGE["iiwa14"])
+def test_the_arm_angle_is_counted_from_the_same_plane_over_the_base(joint):
+    base, robot = ARMS["iiwa14"], turned(ARMS["iiwa14"], (joint,))
+    q = np.array([0.5, 0.4, 0.0, 0.4 + math.asin(0.42 / 0.4 * math.sin(0.4)), 0.3, 0.7, 0.2])
+    T = kin.fk(base, q)
+    assert np.abs(T[:2, 3] - 0.126 * T[:2, 2]).max() < 1e-12  # the wrist centre is on axis 1
+    expected, found = (kin.ik_branches(arm, T, 0.3) for arm in (base, robot))
+    assert apart(expected, found * signs_of(base, (joint,))).max() < 1e-7
+    assert not np.isnan(found).any()
+
+
+@cases
+def test_the_branches_of_the_arm_itself_are_there_and_named_alike(name, joints):
+    base, robot = ARMS[name], turned(ARMS[name], joints)
+    signs = signs_of(base, joints)
+    names = {}
+    for q, _ in poses(base, 60, seed=8):
+        here, there = kin.branch_of(base, q), kin.branch_of(robot, q * signs)
+        assert names.setdefault(here, there) == there
+    assert len(set(names.values())) == len(names)
+    exact = getattr(solver_for(robot).solver, "joints", ()) == joints
+    if exact:
+        assert all(here == there for here, there in names.items())
+    for q, T in poses(base, 3, seed=9):
+        a, b = solve_ik(base, T, q_seed=q + 0.1), solve_ik(robot, T, q_seed=(q + 0.1) * signs)
+        assert a.status is b.status is Status.SOLVED
+        assert min(np.abs(s.q - q * signs).max() for s in solve_ik(robot, T, q_seed=q * signs).solutions) < 1e-6
+        assert {names.get(s.branch, s.branch) for s in a.solutions} == {s.branch for s in b.solutions}
+        for s in b.solutions:
+            assert s.branch == kin.branch_of(robot, s.q)
+        if exact:
+            assert [s.branch for s in a.solutions] == [s.branch for s in b.solutions]
+            assert all(
+                np.abs(x.q - y.q * signs).max() < 1e-6 for x, y in zip(a.solutions, b.solutions, strict=True)
+            )
+
+
+NUMBER = re.compile(r"θ(\d) = (-?[\d.]+)°")
+
+
+@cases
+def test_singularities_tell_the_real_joints_value(name, joints):
+    pair = Pair(turned(ARMS[name], joints))
+    told = 0
+    for q, _ in poses(pair.plain, 20, seed=10):
+        expected = kin.singularities(pair.plain, q)
+        found = kin.singularities(pair.robot, q * pair.signs)
+        assert len(expected) == len(found)
+        for a, b in zip(expected, found, strict=True):
+            assert (a.kind, a.unit) == (b.kind, b.unit)
+            assert abs(a.distance - b.distance) < 1e-9
+            assert NUMBER.sub("", a.meaning) == NUMBER.sub("", b.meaning)
+            for (i, x), (k, y) in zip(NUMBER.findall(a.meaning), NUMBER.findall(b.meaning), strict=True):
+                assert i == k
+                assert abs(float(x) * pair.signs[int(i) - 1] - float(y)) < 2e-3
+                told += int(i) - 1 in pair.joints
+    alone = {"pioneer5": {2, 4}, "redundant7": {2, 3, 5}}.get(name, {1, 2, 3, 4, 5})
+    assert told > 0 or not alone & set(pair.joints)
+
+
+@cases
+def test_the_values_told_are_singular(name, joints):
+    robot = turned(ARMS[name], joints)
+    for s in kin.singularities(robot, robot.q_home):
+        q = robot.q_home.copy()
+        for i, value in NUMBER.findall(s.meaning):
+            q[int(i) - 1] = math.radians(float(value))
+        there = next(x for x in kin.singularities(robot, q) if x.meaning == s.meaning)
+        assert there.distance < 1e-4 or not NUMBER.search(s.meaning)
+
+
+# -- paths and maps -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("name", "joints"), [("pioneer5", (2,)), ("redundant7", (0, 2)), ("iiwa14", (2, 4, 6))])
+def test_a_path(name, joints):
+    pair = Pair(turned(ARMS[name], joints))
+    start, end = (q for q, _ in poses(pair.plain, 2, seed=11))
+    way = [kin.fk(pair.plain, start + s * 0.3 * (end - start)) for s in np.linspace(0.0, 1.0, 8)]
+    a, b = kin.solve_path(pair.plain, way), kin.solve_path(pair.robot, way)
+    assert a.solver == b.solver == solver_for(pair.plain).solver.NAME
+    assert len(a.jumps) == len(b.jumps)
+    assert np.allclose(a.q, b.q * pair.signs, atol=1e-5, equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    ("name", "joints"), [("pioneer5", (1,)), ("pioneer5", (2, 3)), ("redundant7", (0, 4)), ("iiwa14", (2, 6))]
+)
+def test_capability_maps_are_the_arms_own(name, joints):
+    base = ARMS[name]
+    a, b = (kin.capability_map(r, resolution=5, directions=12) for r in (base, turned(base, joints)))
+    assert a.grid.method == b.grid.method == "closed form"
+    assert np.array_equal(a.index, b.index)
+    assert np.array_equal(a.approachable, b.approachable)
+    seen = a.approachable.any(axis=1)  # others are reached by a configuration that descents from home come to
+    assert seen.any()
+    assert np.allclose(a.manipulability[seen], b.manipulability[seen], rtol=1e-5, atol=1e-9)
+
+
+# -- tables from elsewhere ----------------------------------------------------------------------------------------
+
+
+class Draw:
+    """Random arms of a family: lengths of either sign, twists of either sign, any base, either convention."""
+
+    def __init__(self, seed):
+        self.rng = np.random.default_rng(seed)
+
+    def length(self):
+        return float(self.rng.uniform(0.1, 0.6) * self.rng.choice([-1, 1]))
+
+    def angle(self):
+        return float(self.rng.choice([0, PI / 2, -PI / 2, PI, *self.rng.uniform(-3, 3, 4)]))
+
+    def square(self):
+        return float(self.rng.choice([-PI / 2, PI / 2]))
+
+    def parallel(self):
+        return float(self.rng.choice([0.0, PI]))
+
+    def pose(self):
+        R = np.linalg.qr(self.rng.normal(size=(3, 3)))[0]
+        T = np.eye(4)
+        T[:3, :3], T[:3, 3] = R * np.linalg.det(R), self.rng.uniform(-0.3, 0.3, 3)
+        return nested(T)
+
+    def rows(self, lengths, twists):
+        return [(self.angle(), d, a, alpha) for (d, a), alpha in zip(lengths, twists, strict=True)]
+
+    def srs7(self):
+        d = [self.length(), 0.0, self.length(), 0.0, self.length(), 0.0, self.length()]
+        twists = [self.square() for _ in range(6)] + [self.parallel()]
+        return self.rows([(x, 0.0) for x in d], twists), None if self.rng.random() < 0.5 else self.pose()
+
+    def collinear7(self):
+        d = [self.length(), self.length(), self.length(), 0.0, self.length(), 0.0, self.length()]
+        twists = [self.parallel(), *(self.square() for _ in range(5)), self.parallel()]
+        return self.rows([(x, 0.0) for x in d], twists), None if self.rng.random() < 0.5 else self.pose()
+
+    def wrist5(self):
+        middle, beside = self.parallel(), self.length()
+        back = -beside if middle == 0.0 else beside
+        lengths = [
+            (self.length(), self.length()),
+            (beside, self.length()),
+            (back, 0.0),
+            (self.length(), 0.0),
+            (0, 0),
+        ]
+        # The tool looks across the last axis, whichever way the zero of the last joint lies.
+        tool = screw_z(self.angle(), 0.0) @ screw_x(0.0, self.square()) @ screw_z(0.0, self.length())
+        return self.rows(lengths, [self.square(), middle, self.square(), self.square(), 0.0]), nested(tool)
+
+    def arm(self, family):
+        rows, tool = getattr(self, family)()
+        table, before, modified = [], (0.0, 0.0), self.rng.random() < 0.5
+        pieces = self.rng.random() < 0.4
+        turn, shift = 0.0, 0.0  # done already by a row that does not move
+        for i, (theta, d, a, alpha) in enumerate(rows):
+            if modified:
+                table.append(Joint(f"j{i}", theta, d, *before, limits=(-PI, PI)))
+            elif pieces:
+                table.append(Joint(f"j{i}", theta - turn, d - shift - 0.1, limits=(-PI, PI)))
+                turn, shift = (0.4, 0.2) if i + 1 < len(rows) else (0.0, 0.0)
+                table.append(Joint(f"fixed {i}", 0.0, 0.1, a, alpha, "fixed"))
+                table.append(Joint(f"and {i}", turn, shift, 0.0, 0.0, "fixed"))
+            else:
+                table.append(Joint(f"j{i}", theta, d, a, alpha, limits=(-PI, PI)))
+            before = (a, alpha)
+        if modified:
+            table.append(Joint("end", 0.0, 0.0, *before, "fixed"))
+        extra = {} if tool is None else {"tool": tool}
+        convention = "modified" if modified else "standard"
+        return Robot(
+            "drawn", "drawn", "test", convention, tuple(table), (0.1,) * len(rows), base=self.pose(), **extra
+        )
+
+
+@pytest.mark.parametrize("family", ["srs7", "collinear7", "wrist5"])
+def test_tables_from_elsewhere(family):
+    draw = Draw(12)
+    as_it_is = 0
+    for _ in range(25):
+        robot = draw.arm(family)
+        match = solver_for(robot)
+        assert match is not None
+        assert family == match.solver.NAME
+        as_it_is += not isinstance(match.solver, Mirrored)
+        q = robot.random_q(draw.rng, 3)
+        T = kin.fk(robot, q)
+        for row in kin.ik_branches(robot, T).swapaxes(0, 1):
+            there = ~np.isnan(row[:, 0])
+            off = kin.fk(robot, row[there]) - T[there]
+            assert np.abs(off[:, :3, 2:] if robot.n == 5 else off).max(initial=0.0) < 1e-9
+        for seed, pose in zip(q, T, strict=True):
+            result = solve_ik(robot, pose, q_seed=seed)
+            assert result.solver == family
+            assert np.abs(result.solutions[0].q - seed).max() < 1e-6
+            assert result.solutions[0].branch == kin.branch_of(robot, seed)
+            assert all(s.branch == kin.branch_of(robot, s.q) for s in result.solutions)
+            assert match.solver.handles(match.geometry, 1) == (
+                family == "wrist5" or robot.T_last_tool[0, 3] == 0.0
+            )
+    assert 0 < as_it_is < 20
