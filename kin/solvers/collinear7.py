@@ -572,6 +572,10 @@ def singularities(geometry: Geometry, q: Array, within: float = math.inf) -> tup
     g = geometry
     t = (q + g.offset).tolist()
     shoulder, elbow, wrist = off_square(t[2]), off_line(t[3]), off_line(t[5])
+    across, along = g.d5 * math.sin(t[3]) * math.cos(t[2]), g.d3 + g.d5 * math.cos(t[3])
+    off_axis = math.hypot(across, along)
+    if min(abs(shoulder), abs(elbow), abs(wrist), off_axis) > within:
+        return ()  # as almost everywhere
     entries: list[Entry] = [
         (
             "elbow",
@@ -597,7 +601,6 @@ def singularities(geometry: Geometry, q: Array, within: float = math.inf) -> tup
     ]
     if g.d5 >= g.d3 - TOLERANCES.geometry:
         # Only a forearm at least as long as the upper arm gets back to axis 1; then θ3 is square, too.
-        across, along = g.d5 * math.sin(t[3]) * math.cos(t[2]), g.d3 + g.d5 * math.cos(t[3])
         meaning = "wrist centre on axis 1: the closed form takes θ1 + θ2 from the seed"
-        entries.append(("algorithmic", math.hypot(across, along), "m", lambda: meaning))
+        entries.append(("algorithmic", off_axis, "m", lambda: meaning))
     return those_within(within, *entries)

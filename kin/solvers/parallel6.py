@@ -25,6 +25,7 @@ same for T ``(N, 4, 4)`` and out ``(N, 8, 6)`` is `branches_many`.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -363,7 +364,7 @@ def freedoms(geometry: Geometry, task: int) -> tuple[Freedom, ...]:
     return (_THETA6,) if task == APPROACH else (_SPIN6,)
 
 
-def _reach(geometry: Geometry, t: Array) -> float:
+def _reach(geometry: Geometry, t: Sequence[float] | Array) -> float:
     """x of W in the frame that turns with axis 1, metres."""
     g = geometry
     A = t[1] + t[2] + t[3]
@@ -390,8 +391,10 @@ def singularities(geometry: Geometry, q: Array, within: float = math.inf) -> tup
     With x that of W in the frame turning with axis 1, the determinant is ±a2 a3 s3 · x sin α1 · s5.
     """
     g = geometry
-    t = g.sign * q + g.offset
-    elbow, wrist = off_line(t[2]), off_line(t[4])
+    t = (g.sign * q + g.offset).tolist()
+    elbow, reach, wrist = off_line(t[2]), _reach(g, t), off_line(t[4])
+    if min(abs(elbow), abs(reach), abs(wrist)) > within:
+        return ()  # as almost everywhere
     return those_within(
         within,
         (
@@ -402,7 +405,7 @@ def singularities(geometry: Geometry, q: Array, within: float = math.inf) -> tup
         ),
         (
             "shoulder",
-            abs(_reach(g, t)),
+            abs(reach),
             "m",
             lambda: "wrist centre beside axis 1, as near to it as it can get: it cannot move along axis 2",
         ),

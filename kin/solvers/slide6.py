@@ -14,6 +14,7 @@ s5 = 0. The fast path is that of :mod:`kin.solvers.wrist6`: the same kernels, on
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from kin.robot import Robot
 from kin.solvers import wrist6
@@ -83,7 +84,7 @@ def freedoms(geometry: Geometry, task: int) -> tuple[Freedom, ...]:
     return wrist6.freedoms(geometry, task)
 
 
-def _reach(geometry: Geometry, t: Array) -> float:
+def _reach(geometry: Geometry, t: Sequence[float] | Array) -> float:
     """X of the wrist centre: how far it is before axis 1 in the arm's own plane, metres."""
     return float(geometry.a1 + t[2] * math.cos(t[1]) + geometry.f * math.sin(t[1]))
 
@@ -97,8 +98,10 @@ def branch_of(geometry: Geometry, q: Array) -> int:
 def singularities(geometry: Geometry, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
     """How far a configuration ``(6,)`` is from each of the arm's singularities: the determinant is ±S X s5."""
     g = geometry
-    t = g.sign * q + g.offset
-    wrist = off_line(t[4])
+    t = (g.sign * q + g.offset).tolist()
+    reach, wrist = _reach(g, t), off_line(t[4])
+    if min(abs(t[2]), abs(reach), abs(wrist)) > within:
+        return ()  # as almost everywhere
     return those_within(
         within,
         (
@@ -109,7 +112,7 @@ def singularities(geometry: Geometry, q: Array, within: float = math.inf) -> tup
         ),
         (
             "shoulder",
-            abs(_reach(g, t)),
+            abs(reach),
             "m",
             lambda: "wrist centre as near to axis 1 as it can get: it cannot move sideways",
         ),

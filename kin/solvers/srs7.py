@@ -675,6 +675,10 @@ def singularities(geometry: Geometry, q: Array, within: float = math.inf) -> tup
     across5, wrist = off_square(t[4]), off_line(t[5])
     side, along = g.d5 * math.sin(t[3]), g.d3 + g.d5 * math.cos(t[3])
     x = math.cos(t[1]) * math.cos(t[2]) * side + math.sin(t[1]) * along
+    above, before, between = math.hypot(shoulder, across3), math.hypot(wrist, across5), math.hypot(shoulder, wrist)
+    off_axis = math.hypot(x, math.sin(t[2]) * side)
+    if min(abs(elbow), above, before, between, off_axis) > within:
+        return ()  # as almost everywhere
     return those_within(
         within,
         (
@@ -685,7 +689,7 @@ def singularities(geometry: Geometry, q: Array, within: float = math.inf) -> tup
         ),
         (
             "shoulder",
-            math.hypot(shoulder, across3),
+            above,
             "rad",
             lambda: (
                 f"upper arm on axis 1, axes 2 and 4 square ({at(2, q[1], shoulder)}, {at(3, q[2], across3)}): "
@@ -694,7 +698,7 @@ def singularities(geometry: Geometry, q: Array, within: float = math.inf) -> tup
         ),
         (
             "wrist",
-            math.hypot(wrist, across5),
+            before,
             "rad",
             lambda: (
                 f"hand in line with the forearm, axes 4 and 6 square ({at(6, q[5], wrist)}, "
@@ -703,7 +707,7 @@ def singularities(geometry: Geometry, q: Array, within: float = math.inf) -> tup
         ),
         (
             "wrist",
-            math.hypot(shoulder, wrist),
+            between,
             "rad",
             lambda: (
                 f"upper arm on axis 1 and hand in line with the forearm "
@@ -713,7 +717,7 @@ def singularities(geometry: Geometry, q: Array, within: float = math.inf) -> tup
         ),
         (
             "algorithmic",
-            math.hypot(x, math.sin(t[2]) * side),
+            off_axis,
             "m",
             lambda: "wrist centre on axis 1: the arm angle ψ loses its reference, the arm no motion",
         ),

@@ -484,6 +484,8 @@ def singularities(geometry: Geometry, q: Array, within: float = math.inf) -> tup
     t = (q + g.offset).tolist()
     elbow, wrist = off_line(t[2]), off_line(t[4])
     reach = g.a1 + g.a2 * math.cos(t[1]) + g.d4 * math.cos(t[1] + t[2])
+    if min(abs(elbow), abs(reach), abs(wrist)) > within:
+        return ()  # as almost everywhere
     return those_within(
         within,
         (

@@ -24,6 +24,7 @@ same for T ``(N, 4, 4)`` and out ``(N, 8, 6)`` is `branches_many`.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -403,7 +404,7 @@ def freedoms(geometry: Geometry, task: int) -> tuple[Freedom, ...]:
     return (_THETA1,) * _has_axis_point(geometry) + (_THETA6,) * (task == APPROACH)
 
 
-def _reach(geometry: Geometry, t: Array) -> float:
+def _reach(geometry: Geometry, t: Sequence[float] | Array) -> float:
     """X of the wrist centre: how far it is before axis 1 in the arm's own plane, metres."""
     return float(geometry.a1 + geometry.a2 * math.cos(t[1]) + geometry.f * math.cos(t[1] + t[2]))
 
@@ -425,8 +426,10 @@ def singularities(geometry: Geometry, q: Array, within: float = math.inf) -> tup
     The three are the factors of the determinant, −a2 f s3 (a1 + a2 c2 + f c23) s5: there are no others.
     """
     g = geometry
-    t = g.sign * q + g.offset
-    elbow, wrist = off_line(t[2]), off_line(t[4])
+    t = (g.sign * q + g.offset).tolist()
+    elbow, reach, wrist = off_line(t[2]), _reach(g, t), off_line(t[4])
+    if min(abs(elbow), abs(reach), abs(wrist)) > within:
+        return ()  # as almost everywhere
     where = "on axis 1" if _has_axis_point(g) else "beside axis 1, as near to it as it can get"
     return those_within(
         within,
@@ -439,7 +442,7 @@ def singularities(geometry: Geometry, q: Array, within: float = math.inf) -> tup
                 "the wrist centre cannot move along the arm"
             ),
         ),
-        ("shoulder", abs(_reach(g, t)), "m", lambda: f"wrist centre {where}: it cannot move sideways"),
+        ("shoulder", abs(reach), "m", lambda: f"wrist centre {where}: it cannot move sideways"),
         (
             "wrist",
             abs(wrist),
