@@ -3,6 +3,7 @@
 set -eu
 root=$(cd "$(dirname "$0")/.." && pwd)
 . "$root/scripts/venv.sh"
+unset PYTHONDONTWRITEBYTECODE # hundreds of processes are started, each of which would compile all it imports
 install_kinboard "[test]"
 if [ ! -x "${KINBOARD_TEST_CHROMIUM:-/usr/bin/chromium}" ]; then
   apt_install chromium || fail "the browser tests need Chromium. On Debian: sudo apt-get install chromium"

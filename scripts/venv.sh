@@ -51,7 +51,10 @@ install_kinboard() {
   [ -x "$root/.venv/bin/python" ] || make_venv
   if [ ! -e "$stamp" ] || [ "$root/pyproject.toml" -nt "$stamp" ]; then
     echo "Installing Kinboard$1 into .venv (a minute or two, once)…"
-    "$root/.venv/bin/python" -m pip install -q --disable-pip-version-check -e "$root$1" ||
+    # Few of the modules that are installed are ever imported: each is compiled then, if that may be kept.
+    compile=--no-compile
+    [ -z "${PYTHONDONTWRITEBYTECODE:-}" ] || compile=--compile
+    "$root/.venv/bin/python" -m pip install -q $compile --disable-pip-version-check -e "$root$1" ||
       fail "the installation failed; its message is above. Remove .venv to begin afresh."
     touch "$stamp"
   fi
