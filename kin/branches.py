@@ -137,15 +137,15 @@ def redundancy_of(
     together: tuple[Redundancy, ...] = ()
     for k, freedom in enumerate(branches.freedoms):
         there = branches.values[:, k].tolist()
-        values = there if freedom.joint < 0 else branches.q[:, freedom.joint].tolist()
-        rows_here = [i for i, row in enumerate(rows) if there[row] == there[row]]
-        if not rows_here:
+        if not rows or all(map(math.isnan, there)):
             continue
-        name, label = freedom.name, freedom.label
+        values = there if freedom.joint < 0 else branches.q[:, freedom.joint].tolist()
         intervals = _intervals(question, branches.arcs[k], rows, every, freedom.circular)
-        for i in rows_here:
-            found[i] += (Redundancy(name, label, values[rows[i]], intervals[i]),)
-        if rows_here[0] == 0:
+        name, label = freedom.name, freedom.label
+        for i, row in enumerate(rows):
+            if not math.isnan(there[row]):
+                found[i] += (Redundancy(name, label, values[row], intervals[i]),)
+        if not math.isnan(there[rows[0]]):
             together += (Redundancy(name, label, values[rows[0]], intervals[-1]),)
     return found, together
 

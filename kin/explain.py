@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -21,6 +22,7 @@ _WHAT = {
 }
 
 
+@lru_cache(maxsize=256)
 def solved(count: int, task: str, redundant: bool) -> str:
     """Reached, with how many branches."""
     ways = "one configuration" if count == 1 else f"{count} configurations"
@@ -42,7 +44,7 @@ def solver(question: Question, used: str) -> str:
 
 def singular(found: tuple[Singularity, ...], shown: bool) -> str:
     """A further sentence if the configuration is singular; `shown`: it is the answer, not the closest one."""
-    real = [s for s in found if s.kind != "algorithmic"]
+    real = [s for s in found if s.kind != "algorithmic"] if found else found
     if not real:
         return ""
     where = "there" if shown else "at the closest pose"
