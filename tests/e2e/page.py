@@ -61,8 +61,8 @@ class Tab:
         entry.press("Enter")
 
     def open(self, title: str) -> None:
-        """A tab of the panel."""
-        self.page.get_by_role("tab", name=title).click()
+        """A tab of the panel. They stand still: no need to wait for two frames of the picture to see that."""
+        self.page.get_by_role("tab", name=title).click(force=True)
 
     def take(self, robot: kin.Robot) -> None:
         """Have this robot on show."""
@@ -135,7 +135,7 @@ class Tab:
         self.open("Learn")
         if self.row("Lesson").locator("input:visible").first.input_value() != "None":
             self.choose("Lesson", "None")
-        self.page.get_by_role("tab", name="Move").click()
+        self.open("Move")
         if self.row("Robot").locator("input:visible").first.input_value() != robot.name:
             self.choose("Robot", robot.name)
             expect(self.page.get_by_text(label(robot, robot.n - 1), exact=True)).to_be_visible()
