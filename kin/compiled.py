@@ -32,7 +32,7 @@ def _fingerprint() -> str:
     digest = hashlib.blake2b(digest_size=16)
     for file in sorted(Path(__file__).parent.rglob("*.py")):
         text = file.read_bytes()
-        if b"@jit" in text or b"@inlined" in text:
+        if any(mark in text for mark in (b"@jit", b"@inlined", b"@joined")):
             digest.update(text)
     return digest.hexdigest()
 
@@ -74,12 +74,12 @@ def _warn(what: str) -> None:
     warnings.warn(f"{what}. Kernels are compiled when they are first used, which takes seconds.", stacklevel=2)
 
 
-def _compiled(function: _Kernel, **options: Any) -> _Kernel:
+def _compiled(function: _Kernel, kept: bool = True, **options: Any) -> _Kernel:
     if PLAIN:
         return function
     kernel: Any = njit(nogil=True, error_model="numpy", **options)(function)
     try:
-        kernel._cache = _Cache(function)
+        kernel._cache = _Cache(function) if kept else kernel._cache
     except RuntimeError:  # numba found no folder to write to
         _warn("no folder for machine code can be written to; NUMBA_CACHE_DIR names one")
     template = kernel.get_call_template
@@ -100,6 +100,11 @@ def jit(function: _Kernel) -> _Kernel:
 def inlined(function: _Kernel) -> _Kernel:
     """A kernel that becomes a part of whatever calls it, so that loops over it turn into vector instructions."""
     return _compiled(function, forceinline=True)
+
+
+def joined(function: _Kernel) -> _Kernel:
+    """As `inlined`, for a kernel that takes kernels: on disk it is a part of what calls it, and only so."""
+    return _compiled(function, kept=False, forceinline=True)
 
 
 def direct(kernel: Any, *arguments: Any) -> Callable[..., Any]:

@@ -8,7 +8,7 @@ axis 2 at the distance E, so
 - θ2 = atan2(h, X − a1) + atan2(E, S); the wrist is the same.
 
 Eight branches, of which S < 0 is seldom inside the limits. Singular: S = 0; X = 0, where θ1 is free if L = 0;
-s5 = 0. The fast path is that of :mod:`kin.solvers.wrist6`: the same kernels, on this arm's `params`.
+s5 = 0. The fast path is that of :mod:`kin.solvers.wrist6`, on this arm's `params`.
 """
 
 from __future__ import annotations
@@ -16,15 +16,36 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
+from kin.compiled import inlined, jit, joined
+from kin.kernels import BLOCK
 from kin.robot import Robot
+from kin.simd import widest
 from kin.solvers import wrist6
+from kin.solvers.blocks import Arc, Entries, canonical_of, each, one, rows_of
 from kin.solvers.common import Candidates, Freedom, Problem, is_zero, screw_x, screw_z
 from kin.solvers.links import is_square, links_of
 from kin.solvers.singular import Singularity, at, off_line, those_within
-from kin.solvers.wrist6 import Geometry, branches_many, branches_one, params
+from kin.solvers.wrist6 import (
+    BEND,
+    FRONT,
+    PAIRS,
+    ROWS,
+    Geometry,
+    all_but_third,
+    arm_pairs,
+    closely,
+    params,
+    shape_of,
+    shoulder,
+    store,
+    turned,
+)
+from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
-__all__ = ["branches_many", "branches_one", "params"]
+__all__ = ["params"]
 
 NAME = "slide6"
 TITLE = "closed form, sliding arm with a spherical wrist"
@@ -34,6 +55,9 @@ BRANCHES = tuple(
     for e in ("out", "through")
     for w in ("no-flip", "flip")
 )
+_REACH = TOLERANCES.closure_position * 0.1
+_SINGULAR = TOLERANCES.singular
+_MERGE = TOLERANCES.merge
 
 
 def match(robot: Robot) -> Geometry | None:
@@ -65,6 +89,79 @@ def match(robot: Robot) -> Geometry | None:
 def why(geometry: Geometry) -> str:
     """What about the axes made the match, in one sentence."""
     return "axes 4, 5 and 6 meet in one point, and joint 3 slides square to axis 2, which is square to axis 1"
+
+
+# Thin, as in :mod:`kin.solvers.wrist6`. How far W is along the slide (front, back) has rows of its own; those of
+# θ3 have no pairs, and what is found there is written over.
+_ALONG, _ROWS = ROWS - 1, ROWS + 2
+
+
+@inlined
+def _side(
+    M: Entries, X: float, scale: float, lengths: tuple[float, float, float],
+    stands: tuple[float, float, float, float], S: Array, back: int, b: int,
+) -> bool:  # fmt: skip
+    """All pairs of the shoulder with W at X, scale = 1/r²; whether one is to be looked at closely."""
+    a1, f, beside = lengths
+    s1, c1, R = turned(M, X, beside, scale)
+    x, h, apart = X - a1, -M[11], abs(f)
+    square = x * x + h * h
+    inverse, distance = 1.0 / square, math.sqrt(square)
+    square = (distance - apart) * (distance + apart)
+    along = math.sqrt(square if square > 0.0 else 0.0)
+    along = math.nan if distance + _REACH < apart else along
+    S[FRONT + back, b], S[PAIRS + FRONT + back, b] = s1, c1 + 0.0 * along
+    S[_ALONG + back, b] = along
+    close0 = arm_pairs(x, h, along, -f, 1.0, 0.0, inverse, R, stands, S, 2 * back, b)
+    close1 = arm_pairs(x, h, -along, -f, 1.0, 0.0, inverse, R, stands, S, 2 * back + 1, b)
+    return close0 | close1 | (along < _MERGE * apart + _SINGULAR)
+
+
+@inlined
+def _pairs(params: Array, near: Array, count: int, S: Array) -> int:
+    """The pairs of `count` targets; S[-1] ← 1.0 for those to be looked at closely, and how many these are."""
+    base, tool = rows_of(params, 0), rows_of(params, 12)
+    a1, _, f, beside, stands = shape_of(params)
+    lengths = (a1, f, beside)
+    found = 0
+    for b in range(count):
+        M = canonical_of(base, tool, S, b)
+        X, scale, close = shoulder(M[3], M[7], beside)
+        close0 = _side(M, X, scale, lengths, stands, S, 0, b)
+        close1 = _side(M, -X, scale, lengths, stands, S, 1, b)
+        marked = close | close0 | close1
+        S[-1, b] = 1.0 if marked else 0.0
+        found += 1 if marked else 0
+    return found
+
+
+@joined
+def _angles(arc: Arc, params: Array, near: Array, count: int, S: Array) -> None:
+    """S ← the joint values of `count` targets, from the pairs."""
+    widest()
+    all_but_third(arc, params, count, S)
+    sign, offset = params[26], params[32]
+    for k in range(2):
+        for b in range(count):
+            along = S[_ALONG + k, b]
+            S[BEND + k, b] = sign * (along - offset)
+            S[PAIRS + BEND + k, b] = sign * (-along - offset)
+
+
+@jit
+def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
+    """out ``(8, 6)`` ← all branches of the target T ``(4, 4)``; False if T is not finite."""
+    S = np.empty((_ROWS, 1))
+    return one(_pairs, _angles, store, closely, PAIRS, params, T, value, near, out, S)
+
+
+@jit
+def branches_many(params: Array, T: Array, value: float, near: Array, out: Array) -> None:
+    """out ``(N, 8, 6)`` ← all branches of each of the targets T ``(N, 4, 4)``."""
+    widest()
+    S, values = np.empty((_ROWS, BLOCK)), np.empty(1)
+    values[0] = value
+    each(_pairs, _angles, store, closely, params, T, values, near, out, S)
 
 
 def solve(geometry: Geometry, problem: Problem) -> Candidates:

@@ -29,9 +29,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.compiled import jit
+from kin.compiled import inlined, jit, joined
+from kin.kernels import BLOCK
 from kin.robot import Robot
-from kin.simd import atan2
+from kin.simd import atan2, widest
+from kin.solvers.blocks import OWN, Arc, Entries, canonical_of, double, each, elbow_of, one, rows_of, single
 from kin.solvers.common import (
     APPROACH,
     POSE,
@@ -54,7 +56,6 @@ from kin.solvers.links import (
     Links,
     canonical,
     free_last,
-    is_finite,
     is_square,
     links_of,
     pose_params,
@@ -82,7 +83,7 @@ _MERGE = TOLERANCES.merge
 _ROUNDING, _HAIR = 1e-14, 3e-7  # metres in a target's coordinates; the root of that
 _FAR = 1e6
 # Layout of params: base⁻¹ and tool⁻¹ (24), signs, offsets, shape (see `pack`), then limits that never bind.
-_SHAPE, _LOWER, _UPPER, _SIZE = 36, 45, 51, 57
+_SHAPE, _LOW, _HIGH, _SIZE = 36, 45, 51, 57
 
 
 class Geometry(NamedTuple):
@@ -349,18 +350,160 @@ def _branches(
     return gap, found
 
 
+# Thin: all branches, without limits, ranges and a choice, as :mod:`kin.solvers.blocks` has it. Rows of S are θ1
+# (front, back), θ3 (front, back), and of the four arms (front up, front down, back up, back down) θ2, θ4, θ5, θ6.
+# The other elbow is −θ3, the other wrist −θ5 and half a turn on in θ4 and θ6.
+FRONT, BEND, _UPPER, _ROLL, _TILT, _SPIN, _END = (OWN + i for i in (0, 2, 4, 8, 12, 16, 20))
+PAIRS, ROWS = _END - OWN, _END + _END - OWN + 1
+_BESIDE = 1e-4  # of the distance L: how far apart two shoulders are that the careful kernel looks at
+Rotation = tuple[float, float, float, float, float, float, float, float, float]
+
+
+@inlined
+def shape_of(params: Array) -> tuple[float, float, float, float, tuple[float, float, float, float]]:
+    """a1, a2, f, L, and how axis 4 stands against the line from axis 3 to W; see `pack`."""
+    p, k = params, _SHAPE
+    return p[k], p[k + 1], p[k + 2], p[k + 3], (p[k + 4], p[k + 5], p[k + 6], p[k + 7])
+
+
+@inlined
+def shoulder(wx: float, wy: float, beside: float) -> tuple[float, float, bool]:
+    """X of the shoulder in front, NaN if W is too near to axis 1; 1/r²; whether it is to be looked at closely."""
+    r2 = wx * wx + wy * wy
+    r, apart = math.sqrt(r2), abs(beside)
+    square = (r - apart) * (r + apart)
+    x = math.sqrt(square if square > 0.0 else 0.0)
+    x = math.nan if r + _REACH < apart else x
+    return x, 1.0 / r2, x < _BESIDE * apart + _SINGULAR
+
+
+@inlined
+def turned(M: Entries, X: float, beside: float, scale: float) -> tuple[float, float, Rotation]:
+    """sin and cos of θ1 with W at (X, L), scale = 1/r²; the rotation's columns as seen once axis 1 has turned."""
+    r00, r01, r02, wx, r10, r11, r12, wy, r20, r21, r22, _ = M
+    c, s = (wx * X + wy * beside) * scale, (wy * X - wx * beside) * scale
+    R = (
+        c * r00 + s * r10, c * r10 - s * r00, r20,
+        c * r01 + s * r11, c * r11 - s * r01, r21,
+        c * r02 + s * r12, c * r12 - s * r02, r22,
+    )  # fmt: skip
+    return s, c, R
+
+
+@inlined
+def arm_pairs(
+    x: float, h: float, A: float, B: float, c3: float, s3: float, scale: float, R: Rotation,
+    stands: tuple[float, float, float, float], S: Array, arm: int, b: int,
+) -> bool:  # fmt: skip
+    """The pairs of θ2, θ4, θ5, θ6, given θ3 and scale = 1/D²; whether axes 4 and 6 are in line.
+
+    W is at (x, h) in the arm's plane, and seen from axis 2 at (A, B) with θ2 = 0.
+    """
+    c2, s2 = (x * A + h * B) * scale, (h * A - x * B) * scale
+    S[_UPPER + arm, b], S[PAIRS + _UPPER + arm, b] = s2, c2
+    cp, sp, ca, sa = stands
+    c23, s23 = c2 * c3 - s2 * s3, s2 * c3 + c2 * s3
+    g, s = c23 * cp + s23 * sp, s23 * cp - c23 * sp
+    x0, y0, z0, x1, y1, z1, x2, y2, z2 = R
+    # As `_seen`.
+    v0, v1, v2 = -s * x0 - g * z0, -s * x1 - g * z1, -s * x2 - g * z2
+    m00, m01, m02 = g * x0 - s * z0, g * x1 - s * z1, g * x2 - s * z2
+    m10, m11, m12, m22 = ca * v0 + sa * y0, ca * v1 + sa * y1, ca * v2 + sa * y2, ca * y2 - sa * v2
+    sine = math.sqrt(m02 * m02 + m12 * m12)
+    S[_ROLL + arm, b], S[PAIRS + _ROLL + arm, b] = m12, m02
+    S[_TILT + arm, b], S[PAIRS + _TILT + arm, b] = sine, m22
+    S[_SPIN + arm, b], S[PAIRS + _SPIN + arm, b] = m02 * m10 - m12 * m00, m02 * m11 - m12 * m01
+    return sine < _SINGULAR
+
+
+@inlined
+def _side(
+    M: Entries, X: float, scale: float, side: float, lengths: tuple[float, float, float, float],
+    stands: tuple[float, float, float, float], S: Array, back: int, b: int,
+) -> bool:  # fmt: skip
+    """All pairs of the shoulder with W at X, scale = 1/r²; whether one is to be looked at closely."""
+    a1, a2, f, beside = lengths
+    s1, c1, R = turned(M, X, beside, scale)
+    x, h = X - a1, -M[11]
+    c3, s3, inverse_D2, close0 = elbow_of(x, h, a2, f)
+    s3 = side * s3
+    S[FRONT + back, b], S[PAIRS + FRONT + back, b] = s1, c1 + 0.0 * c3
+    S[BEND + back, b], S[PAIRS + BEND + back, b] = s3, c3
+    A, B = a2 + f * c3, f * s3
+    close1 = arm_pairs(x, h, A, B, c3, s3, inverse_D2, R, stands, S, 2 * back, b)
+    close2 = arm_pairs(x, h, A, -B, c3, -s3, inverse_D2, R, stands, S, 2 * back + 1, b)
+    return close0 | close1 | close2
+
+
+@inlined
+def _pairs(params: Array, near: Array, count: int, S: Array) -> int:
+    """The pairs of `count` targets; S[-1] ← 1.0 for those to be looked at closely, and how many these are."""
+    base, tool = rows_of(params, 0), rows_of(params, 12)
+    a1, a2, f, beside, stands = shape_of(params)
+    lengths = (a1, a2, f, beside)
+    found = 0
+    for b in range(count):
+        M = canonical_of(base, tool, S, b)
+        X, scale, close = shoulder(M[3], M[7], beside)
+        close0 = _side(M, X, scale, 1.0, lengths, stands, S, 0, b)
+        close1 = _side(M, -X, scale, -1.0, lengths, stands, S, 1, b)
+        marked = close | close0 | close1
+        S[-1, b] = 1.0 if marked else 0.0
+        found += 1 if marked else 0
+    return found
+
+
+@joined
+def all_but_third(arc: Arc, params: Array, count: int, S: Array) -> None:
+    """S ← the values of joints 1, 2, 4, 5, 6 for `count` targets, from the pairs."""
+    single(arc, S, FRONT, BEND, PAIRS, count, params[24], params[30])
+    single(arc, S, _UPPER, _ROLL, PAIRS, count, params[25], params[31])
+    double(arc, S, _ROLL, _TILT, PAIRS, count, params[27], params[33], True)
+    double(arc, S, _TILT, _SPIN, PAIRS, count, params[28], params[34], False)
+    double(arc, S, _SPIN, _END, PAIRS, count, params[29], params[35], True)
+
+
+@joined
+def _angles(arc: Arc, params: Array, near: Array, count: int, S: Array) -> None:
+    """S ← the joint values of `count` targets, from the pairs."""
+    widest()
+    all_but_third(arc, params, count, S)
+    double(arc, S, BEND, _UPPER, PAIRS, count, params[26], params[32], False)
+
+
+@inlined
+def store(params: Array, S: Array, b: int, out: Array) -> None:
+    """out ``(8, 6)`` ← the branches of target b."""
+    for row in range(8):
+        back, down, flip, arm = row >> 2, (row >> 1) & 1, row & 1, row >> 1
+        out[row, 0] = S[FRONT + back, b]
+        out[row, 1] = S[_UPPER + arm, b]
+        out[row, 2] = S[PAIRS * down + BEND + back, b]
+        out[row, 3] = S[PAIRS * flip + _ROLL + arm, b]
+        out[row, 4] = S[PAIRS * flip + _TILT + arm, b]
+        out[row, 5] = S[PAIRS * flip + _SPIN + arm, b]
+
+
+@jit
+def closely(params: Array, T: Array, value: float, near: Array, out: Array) -> None:
+    """out ``(8, 6)`` ← the branches by `_branches`, which is at home in singularities."""
+    _branches(params, T, value, near, params[_LOW:_HIGH], params[_HIGH:_SIZE], out[:0], out)
+
+
 @jit
 def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
     """out ``(8, 6)`` ← all branches of the target T ``(4, 4)``; False if T is not finite."""
-    _branches(params, T, value, near, params[_LOWER:_UPPER], params[_UPPER:_SIZE], out[:0], out)
-    return is_finite(T)
+    S = np.empty((ROWS, 1))
+    return one(_pairs, _angles, store, closely, PAIRS, params, T, value, near, out, S)
 
 
 @jit
 def branches_many(params: Array, T: Array, value: float, near: Array, out: Array) -> None:
     """out ``(N, 8, 6)`` ← all branches of each of the targets T ``(N, 4, 4)``."""
-    for i in range(T.shape[0]):
-        branches_one(params, T[i], value, near, out[i])
+    widest()
+    S, values = np.empty((ROWS, BLOCK)), np.empty(1)
+    values[0] = value
+    each(_pairs, _angles, store, closely, params, T, values, near, out, S)
 
 
 def solve(geometry: Geometry, problem: Problem) -> Candidates:

@@ -17,6 +17,7 @@ import kin
 from kin import Joint, Robot, Status, solve_ik
 from kin.catalog import parse_robot
 from kin.solvers import parallel6, scara4, slide6, solver_for, wrist6
+from kin.solvers.common import POSE, Problem
 from kin.solvers.numeric import spread
 
 PI = math.pi
@@ -157,6 +158,11 @@ def apart(a, b):
     return np.abs((a - b + PI) % (2 * PI) - PI).max(axis=-1)
 
 
+def merged(rows, within=0.0):
+    """Pairs of rows that hold the same joints."""
+    return {(i, j) for j in range(len(rows)) for i in range(j) if apart(rows[i], rows[j]) <= within}
+
+
 def puma560():
     rows = [(-90, 0, 0), (0, 0, 0.4318), (90, 0.15005, 0.0203), (-90, 0.4318, 0), (90, 0, 0), (0, 0, 0)]
     return arm([(0.0, d, a, math.radians(alpha)) for alpha, d, a in rows])
@@ -252,19 +258,70 @@ def test_named_arms_are_recognised_and_have_all_their_branches(robot, family):
     assert max(counts) == len(match.solver.BRANCHES)
 
 
+def mixture(robot, rng):
+    """Targets ``(150, 4, 4)`` in no order: met at random, singular or nearly, moved and maybe out of reach."""
+    solver, g, q_of = canonical(robot)
+    q = rng.uniform(-3, 3, (150, robot.n))
+    eps = rng.choice([0.0, 1e-12, 1e-9, 1e-7], 60)
+    for i in range(60):
+        if solver.NAME == "scara4":
+            q[i, g.order[1]] = g.sign[1] * (PI * rng.integers(0, 2) + eps[i] - g.offset[1])
+            continue
+        t = g.sign * q[i] + g.offset
+        kind = rng.integers(0, 3)
+        if kind == 0:
+            t2 = reach_zero(g, t)
+            t[1] = t[1] if t2 is None else t2 + eps[i]
+        elif kind == 1:
+            t[4] = PI * rng.integers(0, 2) + eps[i]
+        else:
+            t[2] = (0.0 if solver.NAME == "slide6" else PI * rng.integers(0, 2)) + eps[i]
+        q[i] = q_of(t)
+    T = kin.fk(robot, q)
+    if robot.n > 3:  # a planar arm would leave its plane
+        T[60:100, :3, 3] *= rng.uniform(0.5, 2.0, (40, 1))
+    return T[rng.permutation(150)]
+
+
+def careful(robot, T):
+    """The branches of one target by the kernel that limits and ranges are computed with, without limits."""
+    solver, geometry, _ = solver_for(robot)
+    far = np.full(robot.n, 1e6)
+    return solver.solve(geometry, Problem(T, POSE, (math.nan,), False, robot.q_home.copy(), -far, far)).q
+
+
 @pytest.mark.parametrize("family", FAMILIES)
-def test_many_targets_at_once_give_what_one_gives(family):
+def test_a_batch_has_the_bits_of_its_targets_one_by_one_and_all_their_branches(family):
+    rng = np.random.default_rng(3)
+    counts = set()
+    for robot in members(family, 20, seed=3):
+        T = mixture(robot, rng)
+        rows = kin.ik_branches(robot, T)
+        for pose, alone in zip(T, rows, strict=True):
+            np.testing.assert_array_equal(kin.ik_branches(robot, pose), alone)
+            wanted = careful(robot, pose)
+            np.testing.assert_array_equal(np.isnan(alone), np.isnan(wanted))
+            assert apart(there(alone), there(wanted)).max(initial=0.0) < 1e-6
+            assert merged(alone, 1e-12) >= merged(wanted)
+        exists = ~np.isnan(rows[..., 0])
+        assert np.array_equal(np.isnan(rows).any(axis=2), ~exists)
+        assert np.array_equal(np.isnan(rows).all(axis=2), ~exists)
+        targets = np.broadcast_to(T[:, None], (*exists.shape, 4, 4))
+        assert np.abs(kin.fk(robot, rows[exists]) - targets[exists]).max() < 1e-9
+        counts |= set(exists.sum(axis=1).tolist())
+    assert counts >= ({0, 2} if family == "scara4" else {0, 4, 8})
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_the_kernels_tell_of_a_target_that_is_no_numbers(family):
     robot = members(family, 1, seed=3)[0]
     solver, geometry, _ = solver_for(robot)
-    q = np.random.default_rng(3).uniform(-3, 3, (5, robot.n))
-    T = kin.fk(robot, q)
-    out = np.empty((5, len(solver.BRANCHES), robot.n))
-    solver.branches_many(solver.params(geometry), T, math.nan, q[0], out)
-    for i in range(5):
-        np.testing.assert_array_equal(out[i], branches(robot, T[i], q[0]))
-    T[0, 1, 3] = math.nan
-    assert not solver.branches_one(solver.params(geometry), T[0], math.nan, q[0], out[0])
-    assert np.isnan(out[0]).any(axis=1).all()
+    T = kin.fk(robot, robot.q_home)
+    out = np.empty((len(solver.BRANCHES), robot.n))
+    assert solver.branches_one(solver.params(geometry), T, math.nan, robot.q_home.copy(), out)
+    T[1, 3] = math.nan
+    assert not solver.branches_one(solver.params(geometry), T, math.nan, robot.q_home.copy(), out)
+    assert np.isnan(out).any(axis=1).all()
 
 
 def newton(robot, target, q):

@@ -172,8 +172,8 @@ def test_every_family_answers_one_and_many_alike(robot_id):
     assert many.shape == (100, len(kin.branch_names(robot)), robot.n)
     assert closure(robot, T, many) <= 1e-12
     assert not np.isnan(many).all(axis=(1, 2)).any()
-    for pose, branches in zip(T[:20], many, strict=False):
-        assert np.allclose(kin.ik_branches(robot, pose), branches, rtol=0, atol=1e-12, equal_nan=True)
+    for pose, branches in zip(T, many, strict=True):
+        assert np.array_equal(kin.ik_branches(robot, pose), branches, equal_nan=True)
 
 
 # Shapes, kinds of arrays, misuse
@@ -265,7 +265,7 @@ def test_an_arm_without_closed_form_is_refused():
         kin.ik_branches(slide, np.eye(4))
 
 
-@pytest.mark.parametrize("robot_id", ROBOTS)
+@pytest.mark.parametrize("robot_id", CLOSED)
 def test_many_threads_get_the_serial_answers(robot_id):
     robot = kin.get_robot(robot_id)
     batches = [targets(robot, 300, seed) for seed in range(24)]

@@ -1,0 +1,189 @@
+"""The thin kernels' way through many targets: in blocks, by loops that turn into vector instructions.
+
+A block of `BLOCK` targets is laid out entry by entry in one array S ``(rows, BLOCK)``. What a family computes of a
+target is then a loop along the rows of S, without jumps and calls, several targets to an instruction:
+
+1. *pairs*: every angle of every branch as (y, x), from the poses and values in the first rows of S. Where there is
+   no branch, one of the two is NaN; a target beside a singularity is marked by 1.0 in the last row.
+2. *angles*: the arc tangents of all pairs, which are most of the work, and joint values of them.
+3. *store*: the rows of the answer, gathered from S.
+4. *closely*: a marked target once more, by the careful kernel that limits and ranges are computed with, too.
+
+One target is a block of one, the same operations in the same order: so a batch gives the bits of one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from kin.compiled import inlined, joined
+from kin.kernels import BLOCK, all_finite_pose
+from kin.simd import TURN, atan2, rounded, widest, wrapped
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+_REACH = TOLERANCES.closure_position * 0.1
+# Rows of S: the first three rows of the pose, the value asked for, a family's own from OWN on, and last the mark.
+VALUE, OWN, _MARK = 12, 13, -1
+
+Pairs = Callable[[Array, Array, int, Array], int]
+Arc = Callable[[Array, int, int, int], float]
+Angles = Callable[[Arc, Array, Array, int, Array], None]
+Store = Callable[[Array, Array, int, Array], None]
+Closely = Callable[[Array, Array, float, Array, Array], None]
+Entries = tuple[float, float, float, float, float, float, float, float, float, float, float, float]
+
+
+@joined
+def each(
+    pairs: Pairs, angles: Angles, store: Store, closely: Closely, params: Array, T: Array, values: Array,
+    near: Array, out: Array, S: Array,
+) -> None:  # fmt: skip
+    """out ``(N, branches, n)`` ← all branches of each of the targets T ``(N, 4, 4)``; S is ``(rows, BLOCK)``.
+
+    values: what is asked for of each target ``(N,)``, or of all ``(1,)``.
+    """
+    last = values.shape[0] - 1
+    for first in range(0, T.shape[0], BLOCK):
+        count = min(BLOCK, T.shape[0] - first)
+        for b in range(count):
+            for r in range(3):
+                for c in range(4):
+                    S[4 * r + c, b] = T[first + b, r, c]
+            S[VALUE, b] = values[min(first + b, last)]
+        marked = pairs(params, near, count, S)
+        angles(arc, params, near, count, S)
+        for b in range(count):
+            store(params, S, b, out[first + b])
+        if marked > 0:
+            for b in range(count):
+                if S[_MARK, b] > 0.0:
+                    i = first + b
+                    closely(params, T[i], values[min(i, last)], near, out[i])
+
+
+@joined
+def one(
+    pairs: Pairs, angles: Angles, store: Store, closely: Closely, size: int, params: Array, T: Array, value: float,
+    near: Array, out: Array, S: Array,
+) -> bool:  # fmt: skip
+    """out ``(branches, n)`` ← all branches of T ``(4, 4)``; S is ``(rows, 1)``. False if T is not finite.
+
+    size: how many pairs there are: S[OWN + k], S[OWN + size + k].
+    """
+    for r in range(3):
+        for c in range(4):
+            S[4 * r + c, 0] = T[r, c]
+    S[VALUE, 0] = value
+    if pairs(params, near, S.shape[1], S) > 0:
+        closely(params, T, value, near, out)
+    else:
+        # Vectors go down the one column: all arc tangents in one loop.
+        for k in range(OWN, OWN + size):
+            S[k, 0] = atan2(S[k, 0], S[size + k, 0])
+        angles(taken, params, near, S.shape[1], S)
+        store(params, S, 0, out)
+    return all_finite_pose(T)
+
+
+@inlined
+def rows_of(params: Array, first: int) -> Entries:
+    """Twelve numbers of params: read before a loop, as it might write there for all LLVM knows."""
+    p, i = params, first
+    return (
+        p[i], p[i + 1], p[i + 2], p[i + 3], p[i + 4], p[i + 5], p[i + 6], p[i + 7], p[i + 8], p[i + 9], p[i + 10],
+        p[i + 11],
+    )  # fmt: skip
+
+
+@inlined
+def in_base(k: Entries, S: Array, column: int, b: int) -> tuple[float, float, float]:
+    """A column of the pose of target b, turned by base⁻¹, whose first three rows are k."""
+    x, y, z = S[column, b], S[column + 4, b], S[column + 8, b]
+    return k[0] * x + k[1] * y + k[2] * z, k[4] * x + k[5] * y + k[6] * z, k[8] * x + k[9] * y + k[10] * z
+
+
+@inlined
+def canonical_of(k: Entries, t: Entries, S: Array, b: int) -> Entries:
+    """base⁻¹ · T · tool⁻¹ of target b, row after row; k and t are the first three rows of base⁻¹ and tool⁻¹."""
+    u0, u1, u2 = in_base(k, S, 0, b)
+    v0, v1, v2 = in_base(k, S, 1, b)
+    w0, w1, w2 = in_base(k, S, 2, b)
+    p0, p1, p2 = in_base(k, S, 3, b)
+    return (
+        u0 * t[0] + v0 * t[4] + w0 * t[8], u0 * t[1] + v0 * t[5] + w0 * t[9], u0 * t[2] + v0 * t[6] + w0 * t[10],
+        u0 * t[3] + v0 * t[7] + w0 * t[11] + (p0 + k[3]),
+        u1 * t[0] + v1 * t[4] + w1 * t[8], u1 * t[1] + v1 * t[5] + w1 * t[9], u1 * t[2] + v1 * t[6] + w1 * t[10],
+        u1 * t[3] + v1 * t[7] + w1 * t[11] + (p1 + k[7]),
+        u2 * t[0] + v2 * t[4] + w2 * t[8], u2 * t[1] + v2 * t[5] + w2 * t[9], u2 * t[2] + v2 * t[6] + w2 * t[10],
+        u2 * t[3] + v2 * t[7] + w2 * t[11] + (p2 + k[11]),
+    )  # fmt: skip
+
+
+@inlined
+def elbow_of(x: float, y: float, a: float, b: float) -> tuple[float, float, float, bool]:
+    """The elbow of a planar arm of links a, b that ends in (x, y): c, s ≥ 0, 1/D²; c is NaN if it does not close.
+
+    The last is whether it is straight or folded, or ends so near to the first axis, that it is to be looked at
+    closely. See :func:`kin.solvers.links.two_links`.
+    """
+    D2 = x * x + y * y
+    most, least = a + b, abs(a - b)
+    far, near_by = most * most - D2, D2 - least * least
+    far = far if far > 0.0 else 0.0
+    near_by = near_by if near_by > 0.0 else 0.0
+    nearest = least - _REACH if least > _REACH else 0.0
+    reached = ((most + _REACH) ** 2 >= D2) & (nearest * nearest <= D2)  # not if it is NaN
+    half = 0.5 / (a * b)
+    s = half * math.sqrt(far * near_by)
+    c = 0.5 * half * (near_by - far)
+    close = (far < 1e-14 * near_by) | (near_by < 1e-14 * far) | (1e-8 * most * most > D2)
+    return c if reached else math.nan, s, 1.0 / D2, close & reached
+
+
+@inlined
+def arc(S: Array, k: int, pairs: int, b: int) -> float:
+    """The angle whose pair (y, x) is S[k, b], S[pairs + k, b]."""
+    return atan2(S[k, b], S[pairs + k, b])
+
+
+@inlined
+def taken(S: Array, k: int, pairs: int, b: int) -> float:
+    """The angle that `arc` gave, left in S[k, b]."""
+    return float(S[k, b])
+
+
+@inlined
+def _shift(sign: float, offset: float) -> float:
+    """What `sign` times an angle lacks to its joint value, in [−π, π]; θ = sign q + offset."""
+    angle = -sign * offset
+    return angle - TURN * rounded(angle / TURN)
+
+
+@joined
+def single(
+    angle_of: Arc, S: Array, first: int, last: int, pairs: int, count: int, sign: float, offset: float
+) -> None:
+    """S[first:last] ← joint values of the angles whose pairs (y, x) are S[k], S[pairs + k]."""
+    widest()
+    shift = _shift(sign, offset)
+    for k in range(first, last):
+        for b in range(count):
+            S[k, b] = wrapped(sign * angle_of(S, k, pairs, b) + shift)
+
+
+@joined
+def double(
+    angle_of: Arc, S: Array, first: int, last: int, pairs: int, count: int, sign: float, offset: float,
+    turned: bool,
+) -> None:  # fmt: skip
+    """As `single`, and S[pairs + k] ← those of the same angles half a turn on, or of the opposite sign."""
+    widest()
+    shift = _shift(sign, offset)
+    second, other = (sign, wrapped(shift + math.pi)) if turned else (-sign, shift)
+    for k in range(first, last):
+        for b in range(count):
+            angle = angle_of(S, k, pairs, b)
+            S[k, b] = wrapped(sign * angle + shift)
+            S[pairs + k, b] = wrapped(second * angle + other)
