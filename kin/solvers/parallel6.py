@@ -30,14 +30,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.compiled import jit
+from kin.compiled import inlined, jit, joined
+from kin.kernels import BLOCK
 from kin.robot import Robot
-from kin.simd import atan2
+from kin.simd import atan2, widest, wrapped
+from kin.solvers.blocks import OWN, Arc, Entries, canonical_of, double, each, elbow_of, one, rows_of, single
 from kin.solvers.common import APPROACH, POSE, Candidates, Freedom, Problem, clear, copy_row, is_zero, wrap
 from kin.solvers.links import (
     canonical,
     free_last,
-    is_finite,
     is_square,
     links_of,
     planar_angles,
@@ -68,7 +69,7 @@ _STEPS = 180  # that half a turn of θ1 is tried in, where it is free
 _FAR = 1e6
 _ROUNDING, _HAIR = 1e-14, 3e-7  # metres in a target's coordinates; the root of that
 # Layout of params: base⁻¹ and tool⁻¹ (24), signs, offsets, lengths and the first twist, limits that never bind.
-_SHAPE, _LOWER, _UPPER, _SIZE = 36, 44, 50, 56
+_SHAPE, _LOW, _HIGH, _SIZE = 36, 44, 50, 56
 
 
 class Geometry(NamedTuple):
@@ -320,18 +321,155 @@ def _folded(params: Array, total: float, near: Array, lower: Array, upper: Array
     return float(angles[0])
 
 
+# Thin: all branches, without limits, ranges and a choice, as :mod:`kin.solvers.blocks` has it. Rows of S are of
+# the shoulders (left, right) θ1, θ5, θ6 and A, of the four pairs of shoulder and wrist θ3, of the eight branches
+# θ2. The other elbow is −θ3, the other wrist −θ5 and half a turn on in θ6 and A; θ4 is what A leaves.
+_FRONT, _TILT, _SPIN, _SUM, _BEND, _UPPER, _END = (OWN + i for i in (0, 2, 4, 6, 8, 12, 20))
+_PAIRS, _ROWS = _END - OWN, _END + _END - OWN + 1
+_REST = _PAIRS + _UPPER  # θ4
+_BESIDE = 1e-3  # of the lengths: what two shoulders are apart that the careful kernel looks at
+_ALONG = 1e-4  # the sine of θ5 at which it looks
+
+
+@inlined
+def _arm(
+    u: float, v: float, p: float, q: float, a2: float, a3: float, side: float, S: Array, pair: int, branch: int,
+    b: int,
+) -> bool:  # fmt: skip
+    """The pairs of θ2 and θ3 with axis 4 at (u − p, v − q), on the shoulder `side`; whether to look closely."""
+    px, py = u - p, v - q
+    c3, s3, scale, close = elbow_of(px, py, a2, a3)
+    s3 = side * s3
+    S[_BEND + pair, b], S[_PAIRS + _BEND + pair, b] = s3, c3
+    A, B = a2 + a3 * c3, a3 * s3
+    S[_UPPER + branch, b], S[_PAIRS + _UPPER + branch, b] = (py * A - px * B) * scale, (px * A + py * B) * scale
+    branch += 2
+    S[_UPPER + branch, b], S[_PAIRS + _UPPER + branch, b] = (py * A + px * B) * scale, (px * A - py * B) * scale
+    return close
+
+
+@inlined
+def _shoulder(
+    M: Entries, x: float, y: float, scale: float, side: float,
+    lengths: tuple[float, float, float, float, float, float, float], S: Array, si: int, b: int,
+) -> bool:  # fmt: skip
+    """All pairs of the shoulder with W at (x, y) in the frame that turns with axis 1, scale = 1/r²."""
+    r00, r01, r02, wx, r10, r11, r12, wy, r20, r21, r22, wz = M
+    a1, a2, a3, a4, d5, ca, sa = lengths
+    c1, s1 = (wx * x + wy * y) * scale, (wy * x - wx * y) * scale
+    v0, v1, v2 = c1 * r10 - s1 * r00, c1 * r11 - s1 * r01, c1 * r12 - s1 * r02
+    m00, m01, m02 = c1 * r00 + s1 * r10, c1 * r01 + s1 * r11, c1 * r02 + s1 * r12
+    m10, m11, m12, m22 = ca * v0 + sa * r20, ca * v1 + sa * r21, ca * v2 + sa * r22, ca * r22 - sa * v2
+    square = m02 * m02 + m12 * m12
+    sine = math.sqrt(square)
+    inverse = sine / square
+    cA, sA = m02 * inverse, m12 * inverse
+    S[_FRONT + si, b], S[_PAIRS + _FRONT + si, b] = s1, c1
+    S[_TILT + si, b], S[_PAIRS + _TILT + si, b] = sine, m22
+    S[_SPIN + si, b], S[_PAIRS + _SPIN + si, b] = cA * m10 - sA * m00, cA * m11 - sA * m01
+    S[_SUM + si, b], S[_PAIRS + _SUM + si, b] = m12, m02
+    u, v, p, q = x - a1, ca * y + sa * wz, a4 * cA - d5 * sA, a4 * sA + d5 * cA
+    close0 = _arm(u, v, p, q, a2, a3, side, S, 2 * si, 4 * si, b)
+    close1 = _arm(u, v, -p, -q, a2, a3, side, S, 2 * si + 1, 4 * si + 1, b)
+    return close0 | close1 | (sine < _ALONG)
+
+
+@inlined
+def _pairs(params: Array, near: Array, count: int, S: Array) -> int:
+    """The pairs of `count` targets; S[-1] ← 1.0 for those to be looked at closely, and how many these are."""
+    base, tool = rows_of(params, 0), rows_of(params, 12)
+    a4, d5, beside, ca, sa = (
+        params[_SHAPE + 3], params[_SHAPE + 4], params[_SHAPE + 5], params[_SHAPE + 6], params[_SHAPE + 7]
+    )  # fmt: skip
+    lengths = (params[_SHAPE], params[_SHAPE + 1], params[_SHAPE + 2], a4, d5, ca, sa)
+    left = 1.0 if beside >= 0.0 else -1.0
+    inverse_sa = 1.0 / sa
+    found = 0
+    for b in range(count):
+        M = canonical_of(base, tool, S, b)
+        wx, wy, wz = M[3], M[7], M[11]
+        y = (ca * wz - beside) * inverse_sa
+        r2 = wx * wx + wy * wy
+        r, apart = math.sqrt(r2), abs(y)
+        square = (r - apart) * (r + apart)
+        root = math.sqrt(square if square > 0.0 else 0.0)
+        root = math.nan if r + _REACH < apart else root
+        scale = 1.0 / r2
+        x = left * root
+        close0 = _shoulder(M, x, y, scale, left, lengths, S, 0, b)
+        close1 = _shoulder(M, -x, y, scale, -left, lengths, S, 1, b)
+        marked = close0 | close1 | (root < _BESIDE * (apart + abs(a4) + abs(d5)) + _SINGULAR)
+        S[-1, b] = 1.0 if marked else 0.0
+        found += 1 if marked else 0
+    return found
+
+
+@joined
+def _angles(arc: Arc, params: Array, near: Array, count: int, S: Array) -> None:
+    """S ← the joint values of `count` targets, from the pairs."""
+    widest()
+    single(arc, S, _FRONT, _TILT, _PAIRS, count, params[24], params[30])
+    double(arc, S, _TILT, _SPIN, _PAIRS, count, params[28], params[34], False)
+    double(arc, S, _SPIN, _SUM, _PAIRS, count, params[29], params[35], True)
+    # A as joint 4 would have it with joints 2 and 3 at 0.
+    double(arc, S, _SUM, _BEND, _PAIRS, count, params[27], params[31] + params[32] + params[33], True)
+    double(arc, S, _BEND, _UPPER, _PAIRS, count, params[26], params[32], False)
+    single(arc, S, _UPPER, _END, _PAIRS, count, params[25], params[31])
+    sense2, sense3 = params[27] * params[25], params[27] * params[26]
+    for si in range(2):
+        for wi in range(2):
+            pair = _BEND + 2 * si + wi
+            wrist = _PAIRS * wi
+            for b in range(count):
+                bend, other, upper, lower = (
+                    S[pair, b], S[_PAIRS + pair, b], S[_UPPER + 4 * si + wi, b], S[_UPPER + 4 * si + 2 + wi, b]
+                )  # fmt: skip
+                total = S[_SUM + wrist + si, b]
+                S[_REST + 4 * si + wi, b] = wrapped(wrapped(total - sense2 * upper) - sense3 * bend)
+                S[_REST + 4 * si + 2 + wi, b] = wrapped(wrapped(total - sense2 * lower) - sense3 * other)
+                # Where the elbow does not close nothing is left of the branch.
+                nothing = 0.0 * bend
+                S[_TILT + wrist + si, b] += nothing
+                S[_SPIN + wrist + si, b] += nothing
+        for b in range(count):
+            front = S[_FRONT + si, b]
+            S[_FRONT + si, b] = front + 0.0 * S[_BEND + 2 * si, b]
+            S[_PAIRS + _FRONT + si, b] = front + 0.0 * S[_BEND + 2 * si + 1, b]
+
+
+@inlined
+def _store(params: Array, S: Array, b: int, out: Array) -> None:
+    """out ``(8, 6)`` ← the branches of target b."""
+    for row in range(8):
+        right, down, flip = row >> 2, (row >> 1) & 1, row & 1
+        out[row, 0] = S[_PAIRS * flip + _FRONT + right, b]
+        out[row, 1] = S[_UPPER + row, b]
+        out[row, 2] = S[_PAIRS * down + _BEND + 2 * right + flip, b]
+        out[row, 3] = S[_REST + row, b]
+        out[row, 4] = S[_PAIRS * flip + _TILT + right, b]
+        out[row, 5] = S[_PAIRS * flip + _SPIN + right, b]
+
+
+@jit
+def _closely(params: Array, T: Array, value: float, near: Array, out: Array) -> None:
+    """out ``(8, 6)`` ← the branches by `_branches`, which is at home in singularities."""
+    _branches(params, T, value, near, params[_LOW:_HIGH], params[_HIGH:_SIZE], out[:0], params[:0], out)
+
+
 @jit
 def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
     """out ``(8, 6)`` ← all branches of the target T ``(4, 4)``; False if T is not finite."""
-    _branches(params, T, value, near, params[_LOWER:_UPPER], params[_UPPER:_SIZE], out[:0], params[:0], out)
-    return is_finite(T)
+    S = np.empty((_ROWS, 1))
+    return one(_pairs, _angles, _store, _closely, _PAIRS, params, T, value, near, out, S)
 
 
 @jit
 def branches_many(params: Array, T: Array, value: float, near: Array, out: Array) -> None:
     """out ``(N, 8, 6)`` ← all branches of each of the targets T ``(N, 4, 4)``."""
-    for i in range(T.shape[0]):
-        branches_one(params, T[i], value, near, out[i])
+    widest()
+    S, values = np.empty((_ROWS, BLOCK)), np.empty(1)
+    values[0] = value
+    each(_pairs, _angles, _store, _closely, params, T, values, near, out, S)
 
 
 def solve(geometry: Geometry, problem: Problem) -> Candidates:
