@@ -190,16 +190,6 @@ def canonical(
 
 
 @jit
-def is_finite(T: Array) -> bool:
-    """Whether the first three rows of T ``(4, 4)`` are numbers."""
-    total = 0.0
-    for r in range(3):
-        for c in range(4):
-            total += 0.0 * T[r, c]
-    return total == 0.0
-
-
-@jit
 def signed_box(
     near: Array, lower: Array, upper: Array, sign: Array, offset: Array, out_near: Array, low: Array, high: Array
 ) -> None:

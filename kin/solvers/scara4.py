@@ -26,8 +26,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.compiled import jit
+from kin.compiled import inlined, jit, joined
+from kin.kernels import BLOCK
 from kin.robot import Robot
+from kin.simd import widest, wrapped
+from kin.solvers.blocks import OWN, Arc, double, each, elbow_of, in_base, one, rows_of, single
 from kin.solvers.common import (
     APPROACH,
     POSE,
@@ -44,7 +47,6 @@ from kin.solvers.common import (
 from kin.solvers.links import (
     axes_of,
     frame_of,
-    is_finite,
     planar_free,
     pose_params,
     signed_box,
@@ -64,7 +66,7 @@ _SINGULAR = TOLERANCES.singular
 _FAR = 1e6
 # Layout of params: base⁻¹ (12), tool (12), a, b, then of the joints θ1, θ2, θ3, slide their index in q (−1: none),
 # sign and offset, and the limits that never bind.
-_A, _B, _JOINT, _SIGN, _OFFSET, _LOWER, _UPPER, _SIZE = 24, 25, 26, 30, 34, 38, 42, 46
+_A, _B, _JOINT, _SIGN, _OFFSET, _LOW, _HIGH, _SIZE = 24, 25, 26, 30, 34, 38, 42, 46
 
 
 class Geometry(NamedTuple):
@@ -217,19 +219,93 @@ def _branches(
     return miss, 0
 
 
+# Thin: both branches of a pose, without limits, ranges and a choice, as :mod:`kin.solvers.blocks` has it. Rows
+# of S are θ2, of which the other is −θ2, ψ, and θ1 of both branches; θ3 is what ψ leaves.
+_BEND, _SUM, _UPPER, _END = OWN, OWN + 1, OWN + 2, OWN + 4
+_PAIRS, _HEIGHT, _ROWS = _END - OWN, _END + _END - OWN, _END + _END - OWN + 2
+_REST = _PAIRS + _UPPER  # θ3
+_TINY = 1e-20  # where ψ is anything
+
+
+@inlined
+def _pairs(params: Array, near: Array, count: int, S: Array) -> int:
+    """The pairs of `count` targets; S[-1] ← 1.0 for those to be looked at closely, and how many these are."""
+    k, t = rows_of(params, 0), rows_of(params, 12)
+    a, b = params[_A], params[_B]
+    sign, height = params[_SIGN + 3], params[_OFFSET + 3]
+    found = 0
+    for i in range(count):
+        cosine = sine = 0.0
+        for j in range(3):
+            x, y, _ = in_base(k, S, j, i)
+            cosine += x * t[j] + y * t[4 + j]
+            sine += y * t[j] - x * t[4 + j]
+        norm2 = cosine * cosine + sine * sine
+        inverse = math.sqrt(norm2) / norm2
+        c, s = cosine * inverse, sine * inverse
+        x, y, z = in_base(k, S, 3, i)
+        cx, cy = x + k[3] - t[3] * c + t[7] * s, y + k[7] - t[3] * s - t[7] * c
+        c2, s2, scale, close = elbow_of(cx, cy, a, b)
+        S[_BEND, i], S[_PAIRS + _BEND, i] = s2, c2
+        S[_SUM, i], S[_PAIRS + _SUM, i] = sine, cosine
+        A, B = a + b * c2, b * s2
+        S[_UPPER, i], S[_PAIRS + _UPPER, i] = (cy * A - cx * B) * scale, (cx * A + cy * B) * scale
+        S[_UPPER + 1, i], S[_PAIRS + _UPPER + 1, i] = (cy * A + cx * B) * scale, (cx * A - cy * B) * scale
+        S[_HEIGHT, i] = sign * (z + k[11] - t[11] - height) + 0.0 * c2
+        marked = close | (norm2 < _TINY)
+        S[-1, i] = 1.0 if marked else 0.0
+        found += 1 if marked else 0
+    return found
+
+
+@joined
+def _angles(arc: Arc, params: Array, near: Array, count: int, S: Array) -> None:
+    """S ← the joint values of `count` targets, from the pairs."""
+    widest()
+    s1, s2, s3 = params[_SIGN], params[_SIGN + 1], params[_SIGN + 2]
+    o1, o2, o3 = params[_OFFSET], params[_OFFSET + 1], params[_OFFSET + 2]
+    double(arc, S, _BEND, _SUM, _PAIRS, count, s2, o2, False)
+    # ψ as the third joint would have it with the first two at 0.
+    single(arc, S, _SUM, _UPPER, _PAIRS, count, s3, o1 + o2 + o3)
+    single(arc, S, _UPPER, _END, _PAIRS, count, s1, o1)
+    for b in range(count):
+        psi = S[_SUM, b]
+        S[_REST, b] = wrapped(wrapped(psi - s3 * s1 * S[_UPPER, b]) - s3 * s2 * S[_BEND, b])
+        S[_REST + 1, b] = wrapped(wrapped(psi - s3 * s1 * S[_UPPER + 1, b]) - s3 * s2 * S[_PAIRS + _BEND, b])
+
+
+@inlined
+def _store(params: Array, S: Array, b: int, out: Array) -> None:
+    """out ``(2, n)`` ← the branches of target b."""
+    for row in range(2):
+        out[row, int(params[_JOINT])] = S[_UPPER + row, b]
+        out[row, int(params[_JOINT + 1])] = S[_PAIRS * row + _BEND, b]
+        out[row, int(params[_JOINT + 2])] = S[_REST + row, b]
+        if params[_JOINT + 3] >= 0.0:
+            out[row, int(params[_JOINT + 3])] = S[_HEIGHT, b]
+
+
+@jit
+def _closely(params: Array, T: Array, value: float, near: Array, out: Array) -> None:
+    """out ``(2, n)`` ← the branches by `_branches`, which is at home in singularities."""
+    lower, upper, free = params[_LOW:_HIGH], params[_HIGH:_SIZE], params.shape[0] == 0
+    _branches(params, T, POSE, free, value, near, lower, upper, out[:0], params[:0], out)
+
+
 @jit
 def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
     """out ``(2, n)`` ← both branches of the target T ``(4, 4)``; False if T is not finite."""
-    lower, upper = params[_LOWER:_UPPER], params[_UPPER:_SIZE]
-    _branches(params, T, POSE, False, value, near, lower, upper, out[:0], params[:0], out)
-    return is_finite(T)
+    S = np.empty((_ROWS, 1))
+    return one(_pairs, _angles, _store, _closely, _PAIRS, params, T, value, near, out, S)
 
 
 @jit
 def branches_many(params: Array, T: Array, value: float, near: Array, out: Array) -> None:
     """out ``(N, 2, n)`` ← both branches of each of the targets T ``(N, 4, 4)``."""
-    for i in range(T.shape[0]):
-        branches_one(params, T[i], value, near, out[i])
+    widest()
+    S, values = np.empty((_ROWS, BLOCK)), np.empty(1)
+    values[0] = value
+    each(_pairs, _angles, _store, _closely, params, T, values, near, out, S)
 
 
 def solve(geometry: Geometry, problem: Problem) -> Candidates:
