@@ -19,10 +19,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.compiled import inlined, jit
-from kin.kernels import BLOCK, all_finite_pose
+from kin.compiled import inlined, jit, joined
+from kin.kernels import BLOCK
 from kin.robot import Robot
-from kin.simd import atan2, widest, wrapped
+from kin.simd import widest, wrapped
+from kin.solvers.blocks import OWN, VALUE, Arc, canonical_of, double, each, one, rows_of
 from kin.solvers.common import (
     APPROACH,
     POSE,
@@ -293,11 +294,12 @@ def why(geometry: Geometry) -> str:
     return "axes 1 and 2 are one line, axis 3 leaves it squarely, and axes 5, 6, 7 meet in one point"
 
 
-# Thin: all branches of one target or of many at one θ1, without limits, ranges and a choice. The angles are taken
-# at the end and all together, from pairs (y, x), two of each: one per shoulder. The other six branches are half
-# turns: a sign of θ4 turns θ3 and θ5, one of θ6 turns θ5 and θ7.
+# Thin: all branches at one θ1, without limits, ranges and a choice, as :mod:`kin.solvers.blocks` has it. There are
+# two pairs of each angle, one per shoulder. The other six branches are half turns: a sign of θ4 turns θ3 and θ5,
+# one of θ6 turns θ5 and θ7.
 
-_PAIRS, _INPUT, _VALUE, _THETA2, _SPECIAL, _SLOTS = 12, 24, 36, 38, 40, 41
+_PAIRS, _END = 12, OWN + 12
+_FIRST, _SECOND, _ROWS = _END + _PAIRS, _END + _PAIRS + 2, _END + _PAIRS + 5  # rows of θ1, θ2, and of all
 _TOOL, _OFFSET, _LENGTHS = 12, 24, 31
 _UNBOUND = 1e6
 
@@ -331,45 +333,13 @@ def _column(
 
 
 @inlined
-def _pairs(params: Array, count: int, S: Array) -> int:
-    """S[0:24] ← the pairs of `count` targets, from their first three rows in S[24:36].
-
-    S[40] ← 1.0 for the targets beside a singularity, which `_closely` looks at; returns how many these are.
-    """
+def _pairs(params: Array, near: Array, count: int, S: Array) -> int:
+    """The pairs of `count` targets; S[-1] ← 1.0 for those to be looked at closely, and how many these are."""
     d3, d5 = params[_LENGTHS], params[_LENGTHS + 1]
-    b00, b01, b02, b03 = params[0], params[1], params[2], params[3]
-    b10, b11, b12, b13 = params[4], params[5], params[6], params[7]
-    b20, b21, b22, b23 = params[8], params[9], params[10], params[11]
-    t00, t01, t02, t03 = params[12], params[13], params[14], params[15]
-    t10, t11, t12, t13 = params[16], params[17], params[18], params[19]
-    t20, t21, t22, t23 = params[20], params[21], params[22], params[23]
+    base, tool = rows_of(params, 0), rows_of(params, _TOOL)
     found = 0
     for b in range(count):
-        x, y, z = S[_INPUT, b], S[_INPUT + 4, b], S[_INPUT + 8, b]
-        u0, u1, u2 = b00 * x + b01 * y + b02 * z, b10 * x + b11 * y + b12 * z, b20 * x + b21 * y + b22 * z
-        x, y, z = S[_INPUT + 1, b], S[_INPUT + 5, b], S[_INPUT + 9, b]
-        v0, v1, v2 = b00 * x + b01 * y + b02 * z, b10 * x + b11 * y + b12 * z, b20 * x + b21 * y + b22 * z
-        x, y, z = S[_INPUT + 2, b], S[_INPUT + 6, b], S[_INPUT + 10, b]
-        w0, w1, w2 = b00 * x + b01 * y + b02 * z, b10 * x + b11 * y + b12 * z, b20 * x + b21 * y + b22 * z
-        x, y, z = S[_INPUT + 3, b], S[_INPUT + 7, b], S[_INPUT + 11, b]
-        px = u0 * t03 + v0 * t13 + w0 * t23 + (b00 * x + b01 * y + b02 * z + b03)
-        py = u1 * t03 + v1 * t13 + w1 * t23 + (b10 * x + b11 * y + b12 * z + b13)
-        pz = u2 * t03 + v2 * t13 + w2 * t23 + (b20 * x + b21 * y + b22 * z + b23)
-        m00, m01, m02 = (
-            u0 * t00 + v0 * t10 + w0 * t20,
-            u0 * t01 + v0 * t11 + w0 * t21,
-            u0 * t02 + v0 * t12 + w0 * t22,
-        )
-        m10, m11, m12 = (
-            u1 * t00 + v1 * t10 + w1 * t20,
-            u1 * t01 + v1 * t11 + w1 * t21,
-            u1 * t02 + v1 * t12 + w1 * t22,
-        )
-        m20, m21, m22 = (
-            u2 * t00 + v2 * t10 + w2 * t20,
-            u2 * t01 + v2 * t11 + w2 * t21,
-            u2 * t02 + v2 * t12 + w2 * t22,
-        )
+        m00, m01, m02, px, m10, m11, m12, py, m20, m21, m22, pz = canonical_of(base, tool, S, b)
         h2 = px * px + py * py
         h = math.sqrt(h2)
         k = (h2 + pz * pz + d3 * d3 - d5 * d5) / (2.0 * d3)
@@ -381,85 +351,80 @@ def _pairs(params: Array, count: int, S: Array) -> int:
         # cos θ12 = sin of the azimuth ± its spread, sin θ12 = −cos of it.
         c = (py * k + px * across) * inverse_h2
         s = (py * across - px * k) * inverse_h2
-        S[0, b], S[_PAIRS, b] = s, c
+        S[OWN, b], S[_END, b] = s, c
         e1, e2, e3, side, c3, s3, inverse_v = _side(c, s, px, py, pz, d3)
-        S[2, b], S[_PAIRS + 2, b] = e2, e1
-        S[4, b], S[_PAIRS + 4, b] = side, e3
+        S[OWN + 2, b], S[_END + 2, b] = e2, e1
+        S[OWN + 4, b], S[_END + 4, b] = side, e3
         c4, s4 = e3 * inverse_v, side * inverse_v
         f0, g0, _ = _column(c, s, c3, s3, c4, s4, m00, m10, m20)
         f1, g1, _ = _column(c, s, c3, s3, c4, s4, m01, m11, m21)
         f2, g2, q2 = _column(c, s, c3, s3, c4, s4, m02, m12, m22)
         tilt = math.sqrt(f2 * f2 + g2 * g2)
-        S[6, b], S[_PAIRS + 6, b] = g2, f2
-        S[8, b], S[_PAIRS + 8, b] = tilt, q2
-        S[10, b], S[_PAIRS + 10, b] = (f2 * g0 - g2 * f0) / tilt, (f2 * g1 - g2 * f1) / tilt
+        S[OWN + 6, b], S[_END + 6, b] = g2, f2
+        S[OWN + 8, b], S[_END + 8, b] = tilt, q2
+        S[OWN + 10, b], S[_END + 10, b] = (f2 * g0 - g2 * f0) / tilt, (f2 * g1 - g2 * f1) / tilt
         close0 = (side < 1e-11 * d5) | (tilt < _SINGULAR)
         c = (py * k - px * across) * inverse_h2
         s = (-py * across - px * k) * inverse_h2
-        S[1, b], S[_PAIRS + 1, b] = s, c
+        S[OWN + 1, b], S[_END + 1, b] = s, c
         e1, e2, e3, side, c3, s3, inverse_v = _side(c, s, px, py, pz, d3)
-        S[3, b], S[_PAIRS + 3, b] = e2, e1
-        S[5, b], S[_PAIRS + 5, b] = side, e3
+        S[OWN + 3, b], S[_END + 3, b] = e2, e1
+        S[OWN + 5, b], S[_END + 5, b] = side, e3
         c4, s4 = e3 * inverse_v, side * inverse_v
         f0, g0, _ = _column(c, s, c3, s3, c4, s4, m00, m10, m20)
         f1, g1, _ = _column(c, s, c3, s3, c4, s4, m01, m11, m21)
         f2, g2, q2 = _column(c, s, c3, s3, c4, s4, m02, m12, m22)
         tilt = math.sqrt(f2 * f2 + g2 * g2)
-        S[7, b], S[_PAIRS + 7, b] = g2, f2
-        S[9, b], S[_PAIRS + 9, b] = tilt, q2
-        S[11, b], S[_PAIRS + 11, b] = (f2 * g0 - g2 * f0) / tilt, (f2 * g1 - g2 * f1) / tilt
+        S[OWN + 7, b], S[_END + 7, b] = g2, f2
+        S[OWN + 9, b], S[_END + 9, b] = tilt, q2
+        S[OWN + 11, b], S[_END + 11, b] = (f2 * g0 - g2 * f0) / tilt, (f2 * g1 - g2 * f1) / tilt
         close1 = (side < 1e-11 * d5) | (tilt < _SINGULAR)
         special = (close0 | close1 | (h - k < 1e-13 * h) | (h < 1e-12)) & ((not lost) | (h < 1e-12))
-        S[_SPECIAL, b] = 1.0 if special else 0.0
+        S[-1, b] = 1.0 if special else 0.0
         found += 1 if special else 0
     return found
 
 
-@inlined
-def _angles(params: Array, near: Array, count: int, S: Array) -> None:
-    """S[0:12], S[12:24] ← both values of each angle for `count` targets, from the pairs; θ1, θ2 go to S[36:40].
+@joined
+def _angles(arc: Arc, params: Array, near: Array, count: int, S: Array) -> None:
+    """S ← the joint values of `count` targets, from the pairs.
 
-    θ1 and θ2 go equal parts of the way from near ``(7,)``, unless θ1 is asked for in S[36].
+    θ1 and θ2 go equal parts of the way from near ``(7,)``, unless θ1 is asked for.
     """
     widest()
-    for k in range(_PAIRS):
-        # The joint is k/2 + 1. Half a turn apart for θ3, θ5, θ7, of either sign for θ4, θ6; θ12 has one value.
-        joint = k // 2 + 1
-        sign, half_turn = (1.0, math.pi) if joint % 2 == 0 else (-1.0, 0.0)
+    for joint in range(1, 7):
+        # Half a turn apart for θ3, θ5, θ7, of either sign for θ4, θ6; θ12 has one value.
         offset = params[_OFFSET + joint] if joint > 1 else 0.0
-        shift, other = -offset, wrap(half_turn - offset)
-        for b in range(count):
-            angle = atan2(S[k, b], S[_PAIRS + k, b])
-            S[k, b] = wrapped(angle + shift)
-            S[_PAIRS + k, b] = wrapped(sign * angle + other)
+        first = OWN + 2 * joint - 2
+        double(arc, S, first, first + 2, _PAIRS, count, 1.0, offset, joint % 2 == 0)
     near1 = near[0] + params[_OFFSET]
     near2 = near[1] + params[_OFFSET + 1]
     both = wrap(near1 + near2)
     middle = wrap(near2 - params[_OFFSET + 1])
     for b in range(count):
-        value = S[_VALUE, b]
+        value = S[VALUE, b]
         asked = wrap(value + params[_OFFSET])
         for shoulder in range(2):
-            t12 = S[shoulder, b]
+            t12 = S[OWN + shoulder, b]
             half = 0.5 * wrapped(t12 - both)
             t1 = value if value == value else near[0] + half
             t2 = wrapped(wrapped(t12 - asked) - params[_OFFSET + 1]) if value == value else wrapped(middle + half)
-            S[_VALUE + shoulder, b] = t1 + 0.0 * t12
-            S[_THETA2 + shoulder, b] = t2
+            S[_FIRST + shoulder, b] = t1 + 0.0 * t12
+            S[_SECOND + shoulder, b] = t2
 
 
 @inlined
-def _store(S: Array, b: int, out: Array) -> None:
+def _store(params: Array, S: Array, b: int, out: Array) -> None:
     """out ``(8, 7)`` ← the branches of target b."""
     for row in range(8):
         shoulder, elbow, wrist = row >> 2, (row >> 1) & 1, row & 1
-        out[row, 0] = S[_VALUE + shoulder, b]
-        out[row, 1] = S[_THETA2 + shoulder, b]
-        out[row, 2] = S[_PAIRS * elbow + 2 + shoulder, b]
-        out[row, 3] = S[_PAIRS * elbow + 4 + shoulder, b]
-        out[row, 4] = S[_PAIRS * (elbow ^ wrist) + 6 + shoulder, b]
-        out[row, 5] = S[_PAIRS * wrist + 8 + shoulder, b]
-        out[row, 6] = S[_PAIRS * wrist + 10 + shoulder, b]
+        out[row, 0] = S[_FIRST + shoulder, b]
+        out[row, 1] = S[_SECOND + shoulder, b]
+        out[row, 2] = S[_PAIRS * elbow + OWN + 2 + shoulder, b]
+        out[row, 3] = S[_PAIRS * elbow + OWN + 4 + shoulder, b]
+        out[row, 4] = S[_PAIRS * (elbow ^ wrist) + OWN + 6 + shoulder, b]
+        out[row, 5] = S[_PAIRS * wrist + OWN + 8 + shoulder, b]
+        out[row, 6] = S[_PAIRS * wrist + OWN + 10 + shoulder, b]
 
 
 @jit
@@ -506,23 +471,8 @@ def branches_each(params: Array, T: Array, values: Array, near: Array, out: Arra
     values: θ1 for each target ``(N,)``, or one for all ``(1,)``.
     """
     widest()
-    S = np.empty((_SLOTS, BLOCK))
-    for first in range(0, T.shape[0], BLOCK):
-        count = min(BLOCK, T.shape[0] - first)
-        for b in range(count):
-            for r in range(3):
-                for c in range(4):
-                    S[_INPUT + 4 * r + c, b] = T[first + b, r, c]
-            S[_VALUE, b] = values[min(first + b, values.shape[0] - 1)]
-        special = _pairs(params, count, S)
-        _angles(params, near, count, S)
-        for b in range(count):
-            _store(S, b, out[first + b])
-        if special > 0:
-            for b in range(count):
-                if S[_SPECIAL, b] > 0.0:
-                    i = first + b
-                    _closely(params, T[i], values[min(i, values.shape[0] - 1)], near, out[i])
+    S = np.empty((_ROWS, BLOCK))
+    each(_pairs, _angles, _store, _closely, params, T, values, near, out, S)
 
 
 @jit
@@ -532,18 +482,8 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
     value: θ1, which is returned as it is, NaN to part the way from near ``(7,)`` between joints 1 and 2; near also
     has the angles that are free at a singularity.
     """
-    S = np.empty((_SLOTS, 1))
-    for r in range(3):
-        for c in range(4):
-            S[_INPUT + 4 * r + c, 0] = T[r, c]
-    S[_VALUE, 0] = value
-    if _pairs(params, S.shape[1], S) > 0:
-        _closely(params, T, value, near, out)
-    else:
-        _angles(params, near, S.shape[1], S)
-        for b in range(S.shape[1]):
-            _store(S, b, out)
-    return all_finite_pose(T)
+    S = np.empty((_ROWS, 1))
+    return one(_pairs, _angles, _store, _closely, _PAIRS, params, T, value, near, out, S)
 
 
 def handles(geometry: Geometry, task: int) -> bool:

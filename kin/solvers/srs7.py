@@ -21,10 +21,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.compiled import inlined, jit
-from kin.kernels import BLOCK, all_finite_pose
+from kin.compiled import inlined, jit, joined
+from kin.kernels import BLOCK, sine_cosine
 from kin.robot import Robot
-from kin.simd import TURN, WIDE, atan2, rounded, sin_cos, widest, wrapped
+from kin.simd import TURN, WIDE, atan2, rounded, sin_cos, widest
+from kin.solvers.blocks import OWN, VALUE, Arc, double, each, in_base, one, rows_of
 from kin.solvers.common import (
     APPROACH,
     POSE,
@@ -415,11 +416,11 @@ def why(geometry: Geometry) -> str:
     return "axes 1, 2, 3 meet in one point and axes 5, 6, 7 in another, with the elbow's axis square to both links"
 
 
-# Thin: all branches of one target or of many at one arm angle, without limits, ranges and a choice. The angles are
-# taken at the end and all together, from pairs (y, x). One branch is enough: the others are its half turns, a sign
-# of θ2 turns θ1 and θ3, one of θ4 turns θ3 and θ5, one of θ6 turns θ5 and θ7.
+# Thin: all branches at one arm angle, without limits, ranges and a choice, as :mod:`kin.solvers.blocks` has it.
+# One branch is enough: the others are its half turns, a sign of θ2 turns θ1 and θ3, one of θ4 turns θ3 and θ5, one
+# of θ6 turns θ5 and θ7.
 
-_PAIRS, _INPUT, _VALUE, _SPECIAL, _SLOTS = 7, 14, 26, 27, 28
+_PAIRS, _END, _ROWS = 7, OWN + 7, OWN + 15
 _TOOL, _OFFSET, _LENGTHS = 12, 24, 31
 _UNBOUND = 1e6
 
@@ -434,11 +435,14 @@ def params(geometry: Geometry) -> Array:
 @jit
 def _radial(near: Array, d3: float, d5: float) -> tuple[float, float, float]:
     """The elbow's direction off the line SW at canonical angles, see `_arm_angle`."""
-    c1, s1, c2, s2 = math.cos(near[0]), math.sin(near[0]), math.cos(near[1]), math.sin(near[1])
-    c3, s3, s4 = math.cos(near[2]), math.sin(near[2]), math.sin(near[3])
-    beta = math.atan2(d5 * abs(s4), d3 + d5 * math.cos(near[3]))
-    k = -math.cos(beta) if s4 >= 0.0 else math.cos(beta)
-    m = math.sin(beta)
+    s1, c1 = sine_cosine(near[0])
+    s2, c2 = sine_cosine(near[1])
+    s3, c3 = sine_cosine(near[2])
+    s4, c4 = sine_cosine(near[3])
+    along, m = d3 + d5 * c4, d5 * abs(s4)
+    length = math.sqrt(along * along + m * m)
+    along, m = (along / length, m / length) if length > 0.0 else (1.0, 0.0)
+    k = -along if s4 >= 0.0 else along
     return (
         k * (c1 * c2 * c3 - s1 * s3) + m * c1 * s2,
         k * (s1 * c2 * c3 + c1 * s3) + m * s1 * s2,
@@ -457,34 +461,37 @@ def _zyz_pairs(
 
 
 @inlined
-def _pairs(params: Array, rx: float, ry: float, rz: float, count: int, S: Array) -> int:
-    """S[0:14] ← the pairs of `count` targets, from their first three rows in S[14:26] and arm angles in S[26].
+def _pairs(params: Array, near: Array, count: int, S: Array) -> int:
+    """The pairs of `count` targets; S[-1] ← 1.0 for those to be looked at closely, and how many these are.
 
-    An arm angle of NaN stands for the elbow's direction (rx, ry, rz). S[27] ← 1.0 for the targets beside a
-    singularity, which `_closely` looks at; returns how many these are.
+    An arm angle of NaN stands for the elbow's direction of near ``(7,)``.
     """
     d3, d5 = params[_LENGTHS], params[_LENGTHS + 1]
     most, least = d3 + d5, abs(d3 - d5)
     nearest = max(least - _REACH, 1e-12)
     half = 0.5 / (d3 * d5)
-    b00, b01, b02, b03 = params[0], params[1], params[2], params[3]
-    b10, b11, b12, b13 = params[4], params[5], params[6], params[7]
-    b20, b21, b22, b23 = params[8], params[9], params[10], params[11]
-    t00, t01, t02, t03 = params[12], params[13], params[14], params[15]
-    t10, t11, t12, t13 = params[16], params[17], params[18], params[19]
-    t20, t21, t22, t23 = params[20], params[21], params[22], params[23]
+    base, tool = rows_of(params, 0), rows_of(params, _TOOL)
+    t00, t01, t02, t03, t10, t11, t12, t13, t20, t21, t22, t23 = tool
+    free, wide = 0, 0
+    for b in range(count):
+        value = S[VALUE, b]
+        free += 0 if value == value else 1
+        wide += 1 if abs(value) > WIDE else 0
+    if wide > 0:
+        for b in range(count):
+            S[VALUE, b] = wrap(S[VALUE, b]) if abs(S[VALUE, b]) > WIDE else S[VALUE, b]
+    rx, ry, rz = 0.0, 0.0, 0.0
+    if free > 0:
+        rx, ry, rz = _radial(shifted(near, params[_OFFSET:_LENGTHS]), d3, d5)
     found = 0
     for b in range(count):
-        x, y, z = S[_INPUT, b], S[_INPUT + 4, b], S[_INPUT + 8, b]
-        u0, u1, u2 = b00 * x + b01 * y + b02 * z, b10 * x + b11 * y + b12 * z, b20 * x + b21 * y + b22 * z
-        x, y, z = S[_INPUT + 1, b], S[_INPUT + 5, b], S[_INPUT + 9, b]
-        v0, v1, v2 = b00 * x + b01 * y + b02 * z, b10 * x + b11 * y + b12 * z, b20 * x + b21 * y + b22 * z
-        x, y, z = S[_INPUT + 2, b], S[_INPUT + 6, b], S[_INPUT + 10, b]
-        w0, w1, w2 = b00 * x + b01 * y + b02 * z, b10 * x + b11 * y + b12 * z, b20 * x + b21 * y + b22 * z
-        x, y, z = S[_INPUT + 3, b], S[_INPUT + 7, b], S[_INPUT + 11, b]
-        px = u0 * t03 + v0 * t13 + w0 * t23 + (b00 * x + b01 * y + b02 * z + b03)
-        py = u1 * t03 + v1 * t13 + w1 * t23 + (b10 * x + b11 * y + b12 * z + b13)
-        pz = u2 * t03 + v2 * t13 + w2 * t23 + (b20 * x + b21 * y + b22 * z + b23)
+        u0, u1, u2 = in_base(base, S, 0, b)
+        v0, v1, v2 = in_base(base, S, 1, b)
+        w0, w1, w2 = in_base(base, S, 2, b)
+        x, y, z = in_base(base, S, 3, b)
+        px = u0 * t03 + v0 * t13 + w0 * t23 + (x + base[3])
+        py = u1 * t03 + v1 * t13 + w1 * t23 + (y + base[7])
+        pz = u2 * t03 + v2 * t13 + w2 * t23 + (z + base[11])
         # The triangle S–E–W: u = (ux, uy, uz) towards W, e1 and e2 across it.
         L2 = px * px + py * py + pz * pz
         far, near_by = most * most - L2, L2 - least * least
@@ -502,7 +509,7 @@ def _pairs(params: Array, rx: float, ry: float, rz: float, count: int, S: Array)
         e1x, e1y = e2y * uz, -e2x * uz
         along1, along2 = rx * e1x + ry * e1y + rz * h, rx * e2x + ry * e2y
         amplitude = math.sqrt(along1 * along1 + along2 * along2)
-        s, c = sin_cos(S[_VALUE, b])
+        s, c = sin_cos(S[VALUE, b])
         asked = c == c
         c = c if asked else along1 / amplitude
         s = s if asked else along2 / amplitude
@@ -510,10 +517,10 @@ def _pairs(params: Array, rx: float, ry: float, rz: float, count: int, S: Array)
         x0, x1, x2 = rho * ux - along * qx, rho * uy - along * qy, rho * uz - along * qz
         y0, y1, y2 = s * e1x - c * e2x, s * e1y - c * e2y, s * h
         z0, z1, z2 = along * ux + rho * qx, along * uy + rho * qy, along * uz + rho * qz
-        S[0, b], S[_PAIRS, b] = z1, z0
-        S[2, b], S[_PAIRS + 2, b], S[1, b], close0 = _zyz_pairs(x0, y0, z0, x1, y1, z1)
-        S[_PAIRS + 1, b] = z2
-        S[3, b], S[_PAIRS + 3, b] = s4, c4
+        S[OWN, b], S[_END, b] = z1, z0
+        S[OWN + 2, b], S[_END + 2, b], S[OWN + 1, b], close0 = _zyz_pairs(x0, y0, z0, x1, y1, z1)
+        S[_END + 1, b] = z2
+        S[OWN + 3, b], S[_END + 3, b] = s4, c4
         # R47 = R04ᵀ R, and R = (u v w)·tool⁻¹ is applied last.
         f0, f1, f2 = c4 * x0 - s4 * z0, c4 * x1 - s4 * z1, c4 * x2 - s4 * z2
         g0, g1, g2 = s4 * x0 + c4 * z0, s4 * x1 + c4 * z1, s4 * x2 + c4 * z2
@@ -530,12 +537,12 @@ def _pairs(params: Array, rx: float, ry: float, rz: float, count: int, S: Array)
             yu * t01 + yv * t11 + yw * t21,
             yu * t02 + yv * t12 + yw * t22,
         )
-        S[4, b], S[_PAIRS + 4, b] = m12, m02
-        S[6, b], S[_PAIRS + 6, b], S[5, b], close1 = _zyz_pairs(m00, m01, m02, m10, m11, m12)
-        S[_PAIRS + 5, b] = gu * t02 + gv * t12 + gw * t22
+        S[OWN + 4, b], S[_END + 4, b] = m12, m02
+        S[OWN + 6, b], S[_END + 6, b], S[OWN + 5, b], close1 = _zyz_pairs(m00, m01, m02, m10, m11, m12)
+        S[_END + 5, b] = gu * t02 + gv * t12 + gw * t22
         close = close0 | close1 | (far < 1e-14 * near_by) | (h < 1e-12) | ((not asked) & (amplitude < 1e-12))
         special = close & (not lost)
-        S[_SPECIAL, b] = 1.0 if special else 0.0
+        S[-1, b] = 1.0 if special else 0.0
         found += 1 if special else 0
     return found
 
@@ -567,32 +574,27 @@ def _closely(params: Array, T: Array, value: float, near: Array, out: Array) -> 
             out[i, j] = rows[i, j]
 
 
-@inlined
-def _angles(params: Array, count: int, S: Array) -> None:
-    """S[0:7], S[7:14] ← the two values of each joint for `count` targets, from the pairs."""
+@joined
+def _angles(arc: Arc, params: Array, near: Array, count: int, S: Array) -> None:
+    """S ← the joint values of `count` targets, from the pairs."""
     widest()
     for k in range(_PAIRS):
         # Half a turn apart for an even k (θ1, θ3, θ5, θ7), of either sign for an odd one.
-        sign, half_turn = (1.0, math.pi) if k % 2 == 0 else (-1.0, 0.0)
-        shift, other = -params[_OFFSET + k], wrap(half_turn - params[_OFFSET + k])
-        for b in range(count):
-            angle = atan2(S[k, b], S[_PAIRS + k, b])
-            S[k, b] = wrapped(angle + shift)
-            S[_PAIRS + k, b] = wrapped(sign * angle + other)
+        double(arc, S, OWN + k, OWN + k + 1, _PAIRS, count, 1.0, params[_OFFSET + k], k % 2 == 0)
 
 
 @inlined
-def _store(S: Array, b: int, out: Array) -> None:
+def _store(params: Array, S: Array, b: int, out: Array) -> None:
     """out ``(8, 7)`` ← the branches of target b."""
     for row in range(8):
         shoulder, elbow, wrist = row >> 2, (row >> 1) & 1, row & 1
-        out[row, 0] = S[_PAIRS * shoulder, b]
-        out[row, 1] = S[_PAIRS * shoulder + 1, b]
-        out[row, 2] = S[_PAIRS * (shoulder ^ elbow) + 2, b]
-        out[row, 3] = S[_PAIRS * elbow + 3, b]
-        out[row, 4] = S[_PAIRS * (elbow ^ wrist) + 4, b]
-        out[row, 5] = S[_PAIRS * wrist + 5, b]
-        out[row, 6] = S[_PAIRS * wrist + 6, b]
+        out[row, 0] = S[_PAIRS * shoulder + OWN, b]
+        out[row, 1] = S[_PAIRS * shoulder + OWN + 1, b]
+        out[row, 2] = S[_PAIRS * (shoulder ^ elbow) + OWN + 2, b]
+        out[row, 3] = S[_PAIRS * elbow + OWN + 3, b]
+        out[row, 4] = S[_PAIRS * (elbow ^ wrist) + OWN + 4, b]
+        out[row, 5] = S[_PAIRS * wrist + OWN + 5, b]
+        out[row, 6] = S[_PAIRS * wrist + OWN + 6, b]
 
 
 @jit
@@ -602,25 +604,8 @@ def branches_each(params: Array, T: Array, values: Array, near: Array, out: Arra
     values: the arm angle for each target ``(N,)``, or one for all ``(1,)``.
     """
     widest()
-    S = np.empty((_SLOTS, BLOCK))
-    rx, ry, rz = _radial(shifted(near, params[_OFFSET:_LENGTHS]), params[_LENGTHS], params[_LENGTHS + 1])
-    for first in range(0, T.shape[0], BLOCK):
-        count = min(BLOCK, T.shape[0] - first)
-        for b in range(count):
-            for r in range(3):
-                for c in range(4):
-                    S[_INPUT + 4 * r + c, b] = T[first + b, r, c]
-            value = values[min(first + b, values.shape[0] - 1)]
-            S[_VALUE, b] = value if abs(value) <= WIDE else wrap(value)
-        special = _pairs(params, rx, ry, rz, count, S)
-        _angles(params, count, S)
-        for b in range(count):
-            _store(S, b, out[first + b])
-        if special > 0:
-            for b in range(count):
-                if S[_SPECIAL, b] > 0.0:
-                    i = first + b
-                    _closely(params, T[i], values[min(i, values.shape[0] - 1)], near, out[i])
+    S = np.empty((_ROWS, BLOCK))
+    each(_pairs, _angles, _store, _closely, params, T, values, near, out, S)
 
 
 @jit
@@ -630,21 +615,8 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
     value: the arm angle, NaN for the elbow direction of near ``(7,)``; near also has the angles that are free at a
     singularity.
     """
-    S = np.empty((_SLOTS, 1))
-    rx, ry, rz = 0.0, 0.0, 0.0
-    if math.isnan(value):
-        rx, ry, rz = _radial(shifted(near, params[_OFFSET:_LENGTHS]), params[_LENGTHS], params[_LENGTHS + 1])
-    for r in range(3):
-        for c in range(4):
-            S[_INPUT + 4 * r + c, 0] = T[r, c]
-    S[_VALUE, 0] = value if abs(value) <= WIDE else wrap(value)
-    if _pairs(params, rx, ry, rz, S.shape[1], S) > 0:
-        _closely(params, T, value, near, out)
-    else:
-        _angles(params, S.shape[1], S)
-        for b in range(S.shape[1]):
-            _store(S, b, out)
-    return all_finite_pose(T)
+    S = np.empty((_ROWS, 1))
+    return one(_pairs, _angles, _store, _closely, _PAIRS, params, T, value, near, out, S)
 
 
 def handles(geometry: Geometry, task: int) -> bool:

@@ -19,11 +19,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.compiled import inlined, jit
-from kin.kernels import BLOCK, all_finite_pose
+from kin.compiled import inlined, jit, joined
+from kin.kernels import BLOCK
 from kin.robot import Robot
-from kin.simd import atan2, widest, wrapped
+from kin.simd import widest
 from kin.solvers import point5
+from kin.solvers.blocks import OWN, Arc, double, each, elbow_of, in_base, one, rows_of, single
 from kin.solvers.common import (
     APPROACH,
     POSE,
@@ -253,12 +254,13 @@ def why(geometry: Geometry) -> str:
     return "axes 2 and 3 are parallel and square to axis 1, axes 3 and 4 meet squarely, and so do 4 and 5"
 
 
-# Thin: all branches of one target or of many, without limits, ranges and a choice. The angles are taken at the end
-# and all together, from pairs (y, x) that come out of the geometry without any sine or cosine of an angle.
+# Thin: all branches, without limits, ranges and a choice, as :mod:`kin.solvers.blocks` has it; the pairs come out
+# of the geometry without any sine or cosine of an angle. Rows of S are θ1, θ3 of each shoulder, then θ2, θ4, θ5 of
+# each shoulder and elbow. The other shoulder is half a turn on in θ1, the other elbow −θ3, the other wrist −θ5 and
+# half a turn on in θ4.
 
-_PAIRS = 15
-_FRONT, _BEND, _UPPER, _ROLL, _TILT = 0, 1, 3, 7, 11  # θ1, θ3 per shoulder, then θ2, θ4, θ5 per shoulder and elbow
-_INPUT, _SPECIAL, _SLOTS = 30, 36, 37
+_FRONT, _BEND, _UPPER, _ROLL, _TILT, _END = (OWN + i for i in (0, 1, 3, 7, 11, 15))
+_PAIRS, _ROWS = _END - OWN, _END + _END - OWN + 1
 _OFFSET, _LENGTHS = 12, 17
 _UNBOUND = 1e6
 
@@ -268,26 +270,6 @@ def params(geometry: Geometry) -> Array:
     g = geometry
     offset = [wrap(t) for t in g.offset.tolist()]
     return np.array([*g.inverse_base[:3].ravel(), *offset, g.a1, g.a2, g.d4, g.d6])
-
-
-@inlined
-def _reach(rho: float, h: float, a2: float, d4: float) -> tuple[float, float, float, bool]:
-    """The elbow triangle: c3, s3 ≥ 0, 1/D²; NaN where it does not close.
-
-    The last is whether it is near enough to a merged root, or to the shoulder, to be looked at closely.
-    """
-    D2 = rho * rho + h * h
-    most, least = a2 + d4, abs(a2 - d4)
-    far, near_by = most * most - D2, D2 - least * least
-    far = far if far > 0.0 else 0.0
-    near_by = near_by if near_by > 0.0 else 0.0
-    nearest = least - _REACH if least > _REACH else 0.0
-    out_of_reach = ((most + _REACH) ** 2 < D2) | (nearest * nearest > D2)
-    half = 0.5 / (a2 * d4)
-    s3 = half * math.sqrt(far * near_by)
-    c3 = 0.5 * half * (near_by - far)
-    close = (far < 1e-14 * near_by) | (1e-8 * most * most > D2)
-    return math.nan if out_of_reach else c3, s3, 1.0 / D2, close & (not out_of_reach)
 
 
 @inlined
@@ -313,29 +295,21 @@ def _hand(
 
 
 @inlined
-def _pairs(params: Array, count: int, S: Array) -> int:
-    """S[0:30] ← the pairs of `count` targets, from their approach directions and points in S[30:36].
-
-    S[36] ← 1.0 for the targets beside a singularity, which `_closely` looks at; returns how many these are.
-    """
+def _pairs(params: Array, near: Array, count: int, S: Array) -> int:
+    """The pairs of `count` targets; S[-1] ← 1.0 for those to be looked at closely, and how many these are."""
     a1, a2, d4, d6 = params[_LENGTHS], params[_LENGTHS + 1], params[_LENGTHS + 2], params[_LENGTHS + 3]
-    b00, b01, b02, b03 = params[0], params[1], params[2], params[3]
-    b10, b11, b12, b13 = params[4], params[5], params[6], params[7]
-    b20, b21, b22, b23 = params[8], params[9], params[10], params[11]
+    base = rows_of(params, 0)
     found = 0
     for b in range(count):
-        x, y, z = S[_INPUT, b], S[_INPUT + 1, b], S[_INPUT + 2, b]
-        ax, ay, az = b00 * x + b01 * y + b02 * z, b10 * x + b11 * y + b12 * z, b20 * x + b21 * y + b22 * z
-        x, y, z = S[_INPUT + 3, b], S[_INPUT + 4, b], S[_INPUT + 5, b]
-        wx = b00 * x + b01 * y + b02 * z + b03 - d6 * ax
-        wy = b10 * x + b11 * y + b12 * z + b13 - d6 * ay
-        h = d6 * az - (b20 * x + b21 * y + b22 * z + b23)
+        ax, ay, az = in_base(base, S, 2, b)
+        x, y, z = in_base(base, S, 3, b)
+        wx, wy, h = x + base[3] - d6 * ax, y + base[7] - d6 * ay, d6 * az - (z + base[11])
         r = math.sqrt(wx * wx + wy * wy)
         inverse_r = 1.0 / r
         level, u2 = (wx * ax + wy * ay) * inverse_r, (wy * ax - wx * ay) * inverse_r
-        S[_FRONT, b], S[_PAIRS, b] = wy, wx
+        S[_FRONT, b], S[_PAIRS + _FRONT, b] = wy, wx
         rho = r - a1
-        c3, s3, scale, close0 = _reach(rho, h, a2, d4)
+        c3, s3, scale, close0 = elbow_of(rho, h, a2, d4)
         S[_BEND, b], S[_PAIRS + _BEND, b] = s3, c3
         s2, c2, u1, w, u3, close1 = _hand(rho, h, a2, d4, c3, s3, scale, level, u2, az)
         S[_UPPER, b], S[_PAIRS + _UPPER, b] = s2, c2
@@ -346,7 +320,7 @@ def _pairs(params: Array, count: int, S: Array) -> int:
         S[_ROLL + 1, b], S[_PAIRS + _ROLL + 1, b] = -u2, -u1
         S[_TILT + 1, b], S[_PAIRS + _TILT + 1, b] = w, u3
         rho = -r - a1
-        c3, s3, scale, close3 = _reach(rho, h, a2, d4)
+        c3, s3, scale, close3 = elbow_of(rho, h, a2, d4)
         S[_BEND + 1, b], S[_PAIRS + _BEND + 1, b] = s3, c3
         s2, c2, u1, w, u3, close4 = _hand(rho, h, a2, d4, c3, s3, scale, -level, -u2, az)
         S[_UPPER + 2, b], S[_PAIRS + _UPPER + 2, b] = s2, c2
@@ -357,24 +331,20 @@ def _pairs(params: Array, count: int, S: Array) -> int:
         S[_ROLL + 3, b], S[_PAIRS + _ROLL + 3, b] = u2, -u1
         S[_TILT + 3, b], S[_PAIRS + _TILT + 3, b] = w, u3
         special = close0 | close1 | close2 | close3 | close4 | close5 | (r < _SINGULAR)
-        S[_SPECIAL, b] = 1.0 if special else 0.0
+        S[-1, b] = 1.0 if special else 0.0
         found += 1 if special else 0
     return found
 
 
-@inlined
-def _angles(params: Array, count: int, S: Array) -> None:
-    """S[0:15], S[15:30] ← the two values of each angle for `count` targets, from the pairs."""
+@joined
+def _angles(arc: Arc, params: Array, near: Array, count: int, S: Array) -> None:
+    """S ← the joint values of `count` targets, from the pairs."""
     widest()
-    for k in range(_PAIRS):
-        # Half a turn apart for θ1 and θ4, of either sign for θ3 and θ5.
-        joint = 0 if k < _BEND else (2 if k < _UPPER else (1 if k < _ROLL else (3 if k < _TILT else 4)))
-        sign, half_turn = (1.0, math.pi) if joint == 0 or joint == 3 else (-1.0, 0.0)
-        shift, other = -params[_OFFSET + joint], wrap(half_turn - params[_OFFSET + joint])
-        for b in range(count):
-            angle = atan2(S[k, b], S[_PAIRS + k, b])
-            S[k, b] = wrapped(angle + shift)
-            S[_PAIRS + k, b] = wrapped(sign * angle + other)
+    double(arc, S, _FRONT, _BEND, _PAIRS, count, 1.0, params[_OFFSET], True)
+    double(arc, S, _BEND, _UPPER, _PAIRS, count, 1.0, params[_OFFSET + 2], False)
+    single(arc, S, _UPPER, _ROLL, _PAIRS, count, 1.0, params[_OFFSET + 1])
+    double(arc, S, _ROLL, _TILT, _PAIRS, count, 1.0, params[_OFFSET + 3], True)
+    double(arc, S, _TILT, _END, _PAIRS, count, 1.0, params[_OFFSET + 4], False)
     for b in range(count):
         # θ1 is NaN, too, on the side where the arm does not reach.
         S[_FRONT, b] += 0.0 * S[_BEND, b]
@@ -382,7 +352,7 @@ def _angles(params: Array, count: int, S: Array) -> None:
 
 
 @inlined
-def _store(S: Array, b: int, out: Array) -> None:
+def _store(params: Array, S: Array, b: int, out: Array) -> None:
     """out ``(8, 5)`` ← the branches of target b."""
     for row in range(8):
         back, down, flip = row >> 2, (row >> 1) & 1, row & 1
@@ -417,22 +387,8 @@ def branches_each(params: Array, T: Array, values: Array, near: Array, out: Arra
     values: θ1 for each target ``(N,)``, or one for all ``(1,)``.
     """
     widest()
-    S = np.empty((_SLOTS, BLOCK))
-    for first in range(0, T.shape[0], BLOCK):
-        count = min(BLOCK, T.shape[0] - first)
-        for b in range(count):
-            for r in range(3):
-                S[_INPUT + r, b] = T[first + b, r, 2]
-                S[_INPUT + 3 + r, b] = T[first + b, r, 3]
-        special = _pairs(params, count, S)
-        _angles(params, count, S)
-        for b in range(count):
-            _store(S, b, out[first + b])
-        if special > 0:
-            for b in range(count):
-                if S[_SPECIAL, b] > 0.0:
-                    i = first + b
-                    _closely(params, T[i], values[min(i, values.shape[0] - 1)], near, out[i])
+    S = np.empty((_ROWS, BLOCK))
+    each(_pairs, _angles, _store, _closely, params, T, values, near, out, S)
 
 
 @jit
@@ -441,17 +397,8 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
 
     value: θ1 where the wrist centre is on axis 1, NaN for that of near ``(5,)``; near also has a free θ4.
     """
-    S = np.empty((_SLOTS, 1))
-    for r in range(3):
-        S[_INPUT + r, 0] = T[r, 2]
-        S[_INPUT + 3 + r, 0] = T[r, 3]
-    if _pairs(params, S.shape[1], S) > 0:
-        _closely(params, T, value, near, out)
-    else:
-        _angles(params, S.shape[1], S)
-        for b in range(S.shape[1]):
-            _store(S, b, out)
-    return all_finite_pose(T)
+    S = np.empty((_ROWS, 1))
+    return one(_pairs, _angles, _store, _closely, _PAIRS, params, T, value, near, out, S)
 
 
 def handles(geometry: Geometry, task: int) -> bool:
