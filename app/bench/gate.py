@@ -54,6 +54,8 @@ GATES: tuple[Gate, ...] = (
     Gate("ik-pioneer5-batch", OURS, 4.0),
     Gate("ik-srs", OURS, 15.0),
     Gate("ik-srs-batch", OURS, 2.5),
+    Gate("ik-puma560-batch", OURS, 3.0),
+    Gate("ik-ur5-batch", OURS, 3.0),
     Gate("solve-redundant7-craig", RICH, 1200.0),
 )
 
