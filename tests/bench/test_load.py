@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-from math import cos, sin
+from math import cos, isnan, sin
 
 import pytest
 from load import cloud, drag, rest, soak, storm
+from load.raw import Socket
 from load.service import Usage, serve
 from load.visitor import STEP, SWING, Visitor
 
@@ -70,6 +71,27 @@ def test_all_who_come_at_once_get_their_page(service):
 def test_every_point_arrives_by_every_way(service):
     rows = asyncio.run(cloud._of_size(service, 20_000, 1))
     assert [row["way"] for row in rows][1:] == ["REST, bin", "REST, websocket", "viewer"]
+
+
+def test_the_steps_of_a_point_are_told_beside_numpy_and_the_floors():
+    rows = {row["alone"]: row for row in cloud.alone(quick=True)}
+    shares = [row["% of the steps"] for row in rows.values() if not isnan(row["% of the steps"])]
+    assert len(shares) == 4
+    assert sum(shares) == pytest.approx(100.0)
+    assert rows["kinboard, kernel"]["× kernel"] == 1.0
+    assert {"kinboard, generator", "numpy", "floor: sine, cosine", "floor: points written"} <= set(rows)
+
+
+def test_a_message_of_numbers_that_looks_like_text_is_heard_too():
+    async def heard():
+        found = []
+        socket = Socket("/", "", found.append)
+        socket._upgraded = True
+        for opcode, data in ((2, b"{\x01\x02\x03"), (1, b'{"type": "progress"}'), (2, b"plain")):
+            socket.data_received(bytes([0x80 | opcode, len(data)]) + data)
+        return found
+
+    assert asyncio.run(heard()) == [b"{\x01\x02\x03", b"plain"]
 
 
 def test_visitors_leave_nothing_behind(service):

@@ -16,7 +16,7 @@ MODES = {
     "rest": "requests a second beside an empty endpoint",
     "drag": "until the picture answers a drag, for 1, 10, 30 and 100 visitors",
     "storm": "200 visitors at once",
-    "cloud": "points a second: kernel, generator, REST, viewer",
+    "cloud": "points a second: kernel and its steps, generator, REST, viewer",
     "soak": "visitors who come, drag, draw and go, over and over",
 }
 

@@ -1,8 +1,9 @@
-"""Points a second on their way: through the generator, over REST, into a visitor's page."""
+"""Points a second: in the kernel and its steps, through the generator, over REST, into a visitor's page."""
 
 from __future__ import annotations
 
 import asyncio
+import math
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -10,6 +11,9 @@ from contextlib import contextmanager
 from typing import Any
 
 import kin
+from app.bench import run as bench
+from app.bench.contestants import OURS, PEERS
+from app.bench.rows import ROWS
 from load.figures import table
 from load.raw import Http, Socket, request
 from load.service import Service, serve
@@ -58,8 +62,7 @@ async def stream(service: Service, n: int) -> None:
 
     def heard(data: bytes) -> None:
         nonlocal received
-        if not data.startswith(b"{"):
-            received += len(data)
+        received += len(data)
         if received >= 12 * n:
             done.set()
 
@@ -84,14 +87,39 @@ def _generator(n: int) -> None:
         pass
 
 
+def alone(quick: bool) -> list[dict[str, Any]]:
+    """What a point costs one thread here: the kernel, its steps one by one, numpy, and what nobody can beat."""
+    settings = bench.Settings(
+        rows=tuple(row for row in ROWS if row.id == "workspace"),
+        peers=tuple(peer for peer in PEERS if peer.name == "numpy"),
+    )
+    (row,) = bench.run(settings.quick() if quick else settings).rows
+    steps = {f"{OURS}, {step} only" for step in ("numbers", "kinematics", "conversion", "encoding")}
+    whole = sum(entry.turns.median for entry in row.entries if entry.contestant.name in steps)
+    kernel = row.named(OURS)
+    assert kernel is not None
+    return [
+        {
+            "alone": f"{OURS}, kernel" if entry is kernel else entry.contestant.name,
+            "ns a point": 1e9 * entry.turns.median,
+            "M/s": 1e-6 / entry.turns.median,
+            "× kernel": entry.to_thin,
+            "% of the steps": 100.0 * entry.turns.median / whole if entry.contestant.name in steps else math.nan,
+        }
+        for entry in row.entries
+    ]
+
+
 def run(quick: bool, workers: int, sizes: list[int] | None = None) -> dict[str, Any]:
-    """The table on stdout, and what is in it."""
+    """The tables on stdout, and what is in them."""
+    steps = alone(quick)
+    print(table(f"cloud: {ROBOT}, a thread of this process", steps) + "\n", flush=True)
     rows: list[dict[str, Any]] = []
     with serve(workers) as service:
         for n in sizes or ([100_000] if quick else [1_000_000, 10_000_000]):
             rows += asyncio.run(_of_size(service, n, 2 if quick else 5))
     print(table(f"cloud: {ROBOT}, {workers} worker(s), the fastest run of each", rows))
-    return {"rows": rows, "robot": ROBOT}
+    return {"alone": steps, "rows": rows, "robot": ROBOT}
 
 
 async def _of_size(service: Service, n: int, runs: int) -> list[dict[str, Any]]:

@@ -92,7 +92,7 @@ def request(method: str, path: str, body: bytes | None = None) -> bytes:
 
 
 class Socket(asyncio.Protocol):
-    """A websocket; `heard` is called with each binary or text message.
+    """A websocket; `heard` is called with each binary message, texts are passed over.
 
     Frames are masked with zeros, which costs nothing and is as good as any mask where nobody stands between.
     """
@@ -183,7 +183,7 @@ class Socket(asyncio.Protocol):
             at = begin + length
             if not whole or opcode == 0:
                 raise RuntimeError("a message in several frames: this client does not put them together")
-            if opcode in (1, 2):
+            if opcode == 2:
                 self._heard(data)
             elif opcode == 9:
                 self._frame(10, data)
