@@ -79,11 +79,12 @@ def test_words_tell_what_the_map_holds():
     assert f"{found.approachable[row].sum()} of 12 directions" in text
     none = int(np.flatnonzero(found.share == 0.0)[0])
     assert "none of the set" in told.picked(found, none, USUAL)
-    assert told.WORTH["closed form"] in told.facts(found, whole=True, units=USUAL)
-    assert f"{found.volume:.4g}" in told.facts(found, whole=True, units=USUAL)
-    assert "so far" in told.facts(found, whole=False, units=USUAL)
+    assert told.WORTH["closed form"] in told.facts(found, None, whole=True, units=USUAL)
+    assert f"{found.volume:.4g}" in told.facts(found, None, whole=True, units=USUAL)
+    assert "so far" in told.facts(found, None, whole=False, units=USUAL)
+    assert "With joints 1, 3 locked. " in told.facts(found, (0.0, None, 0.5), whole=True, units=USUAL)
     empty = kin.capability_join(found.grid, [])
-    assert "0" in told.facts(empty, whole=False, units=USUAL)
+    assert "0" in told.facts(empty, None, whole=False, units=USUAL)
     assert 'data-shown="0"' in told.legend(empty, "share", "viridis", 0.0)
     assert all(set(told.WORTH) >= {kin.capability_grid(r, resolution=2).method} for r in (PIONEER, PUMA))
 
@@ -92,10 +93,10 @@ def test_words_tell_what_the_map_holds():
 def test_lengths_follow_the_units(length, scale, decimals):
     found, units = the_map(), Units(length=length)
     row = int(found.share.argmax())
-    assert f">{scale * found.grid.voxel:.{decimals + 1}f}<" in told.facts(found, True, units)
+    assert f">{scale * found.grid.voxel:.{decimals + 1}f}<" in told.facts(found, None, True, units)
     x = f"{scale * found.centres[row, 0]:.{decimals}f}".replace("-", "−")
     assert f">{x} " in told.picked(found, row, units)
-    for text in (told.facts(found, True, units), told.picked(found, row, units)):
+    for text in (told.facts(found, None, True, units), told.picked(found, row, units)):
         assert f">{length}<" in text
 
 
@@ -232,6 +233,17 @@ def test_a_map_is_drawn_whole_in_its_colours_and_then_rests(tab):
     sent = tab.sent("BatchedMeshesMessage")
     tab.settle()
     assert tab.sent("BatchedMeshesMessage") == sent
+
+
+def test_locked_joints_are_locked_in_the_map_too(tab):
+    tab.set("Locked", "1")
+    tab.wait(lambda: "Joint 1 locked" in tab.html)
+    tab.compute()
+    locked = (float(PIONEER.q_home[0]), None, None, None, None)
+    found = kin.capability_map(PIONEER, resolution=15, directions=12, locked=locked)
+    tab.done(len(found.index))
+    assert same_places(tab.centres(), found.centres)
+    assert "With joint 1 locked." in tab.html
 
 
 def test_voxels_are_seen_while_the_map_grows_and_stop_keeps_them(tab, held, monkeypatch):

@@ -21,6 +21,7 @@ import kin
 from app.clouds import DRAWN, Cloud, Clouds
 from app.settings import Settings
 from app.store import Store
+from app.viewer.panel.joints import UNLOCK_ALL
 from app.viewer.server import ViewerServer
 from app.viewer.tabs.workspace import colours, cut, flow, known, pick, plot, sizes, words
 from app.viewer.tabs.workspace.wishes import MOST, Wishes, default_size
@@ -228,7 +229,7 @@ def test_sizes_legend_and_picked_point_follow_the_units(length, scale, decimals)
     scales = colours.scale_of(PIONEER, "radius")
     assert f"{scale * scales.high:.{decimals}f} {length}" in colours.legend(scales, "viridis", units)
     point = np.array([0.1234, -0.2, 0.0])
-    text = words.picked(PIONEER, 7, PIONEER.q_home, point, units)
+    text = words.picked(PIONEER, None, 7, PIONEER.q_home, point, units)
     assert f">{scale * 0.1234:.{decimals + 1}f} &nbsp; −{scale * 0.2:.{decimals + 1}f} " in text
     assert f">{length}<" in text
 
@@ -259,6 +260,8 @@ def test_progress_in_words():
     assert 'data-cloud="paused"' in line
     assert "12.3 k points/s" in line
     assert "points/s" not in words.progress("ready", 0, 10, 0.0)
+    assert ">joint 2 locked<" in words.progress("ready", 0, 10, 0.0, (None, 0.0, None))
+    assert "locked" not in line
 
 
 def test_points_are_about_two_pixels():
@@ -586,6 +589,31 @@ def test_a_click_respects_the_cut(tab):
     tab.wait(lambda: "Moved to point" in tab.html)
     index = int(re.search(r"Moved to point ([\d\u202f]+)", tab.html)[1].replace("\u202f", ""))
     assert whole(PIONEER, N, 18).points[index, 0] < made.middle
+
+
+def test_locked_joints_are_locked_in_the_cloud_too(tab):
+    locked = (None, None, float(PIONEER.q_home[2]), None, float(PIONEER.q_home[4]))
+    for joint in ("3", "5"):
+        tab.set("Locked", joint)
+    tab.wait(lambda: ">joints 3, 5 locked<" in tab.html)
+    tab.draw(N, seed=30)
+    (chunk,) = kin.sample_workspace(PIONEER, N, seed=30, locked=locked, chunk=N)
+    assert np.abs(tab.points() - chunk.points).max() < HALF
+    index = int(np.argmax(chunk.points @ np.array([1.0, 1.0, 0.3])))
+    tab.send("ScenePointerMessage", **ray_to(chunk.points[index].astype(float), np.array([2.0, 2.0, 0.6])))
+    tab.wait(lambda: f"Moved to point {words.grouped(index)}" in tab.html)
+    q = kin.configuration_at(PIONEER, index, seed=30, locked=locked)
+    tab.wait(lambda: np.allclose(tab.tool_pose(), kin.fk(PIONEER, q), atol=1e-9))
+    tab.set("Compare with", PUMA.name)
+    tab.done(2 * N)
+    tab.set("Compare with", "none")
+    tab.set("Locked", UNLOCK_ALL)
+    tab.wait(lambda: "No joint is locked" in tab.html)
+    assert ">joints 3, 5 locked<" in tab.html, "the cloud is the same"
+    tab.click("Start")
+    tab.wait(lambda: ">joints 3, 5 locked<" not in tab.html)
+    tab.done(N)
+    assert np.abs(tab.points() - whole(PIONEER, N, 30).points).max() < HALF
 
 
 def test_two_arms_in_one_picture_each_in_its_colour(tab):

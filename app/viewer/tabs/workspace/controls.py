@@ -128,7 +128,8 @@ class Controls:
         group = gui.add_button_group(
             "Cloud",
             ("Start", "Pause", "Cancel"),
-            hint="Start: draw, or go on after a pause. Pause: hold. Cancel: stop and take the points away.",
+            hint="Start: draw, or go on after a pause; joints that are locked stay where they are. Pause: hold. "
+            "Cancel: stop and take the points away.",
         )
         listen_click(group, self._post, {"Start": "start", "Pause": "pause", "Cancel": "cancel"})
         self.bar = gui.add_progress_bar(0.0)
@@ -186,12 +187,16 @@ class Controls:
             self._add(
                 "section",
                 gui.add_checkbox(
-                    "Section plot", wishes.section, hint="The section in (r, z), its boundary, and the tool in it"
+                    "Section plot",
+                    wishes.section,
+                    hint="The section in (r, z), its boundary, and the tool in it; no joint locked",
                 ),
             )
             self._add(
                 "sizes",
-                gui.add_checkbox("Sizes", wishes.sizes, hint="Bounding box, reach, holes, volume and surface"),
+                gui.add_checkbox(
+                    "Sizes", wishes.sizes, hint="Bounding box, reach, holes, volume and surface; no joint locked"
+                ),
             )
             self.sizes = gui.add_html("")
 

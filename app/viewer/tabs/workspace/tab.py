@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Hashable
+from dataclasses import replace
 from typing import ClassVar, cast
 
 import numpy as np
@@ -135,6 +136,9 @@ class Workspace(Feature):
         self._sizes(self._wishes.sizes)
         self.due = 0.0
 
+    def on_question(self) -> None:
+        self._report()  # what is locked shows there
+
     def on_style(self) -> None:
         units = self.stage.units
         self._controls.use(units, self._wishes, self._cut)
@@ -206,7 +210,7 @@ class Workspace(Feature):
     # The cloud
 
     def _start(self) -> None:
-        cloud = self._cloud(self.stage.robot)
+        cloud = self._cloud()
         if self._drawings and not self._running and self._busy_or_more and self._same(cloud):
             self._go_on(True)
             return
@@ -214,7 +218,7 @@ class Workspace(Feature):
         self._time(True)
         self._drawings = [self._drawing(cloud, 0)]
         if self._other is not None:
-            self._drawings.append(self._drawing(self._cloud(self._other), 1))
+            self._drawings.append(self._drawing(replace(cloud, robot=self._other, locked=None), 1))
         self._show_cut()
         self._listen_clicks()
         self._report()
@@ -295,17 +299,14 @@ class Workspace(Feature):
     def _busy_or_more(self) -> bool:
         return self._busy or any(drawing.parts < drawing.cloud.parts for drawing in self._drawings)
 
-    def _cloud(self, robot: Robot) -> Cloud:
-        return Cloud(robot, self._wishes.n, self._wishes.seed, self._wishes.strategy)
+    def _cloud(self) -> Cloud:
+        """The cloud of the arm on show that is wished for, with the joints locked that are now."""
+        wishes = self._wishes
+        return Cloud(self.stage.robot, wishes.n, wishes.seed, wishes.strategy, locked=self.stage.locked)
 
     def _same(self, cloud: Cloud) -> bool:
-        drawn = self._drawings[0].cloud
-        return (drawn.robot, drawn.n, drawn.seed, drawn.strategy) == (
-            cloud.robot,
-            cloud.n,
-            cloud.seed,
-            cloud.strategy,
-        )
+        """Whether it is the one in the picture, whatever that measures."""
+        return replace(self._drawings[0].cloud, measures=cloud.measures) == cloud
 
     def _drawing(self, cloud: Cloud, which: int) -> Drawing:
         drawing = Drawing(
@@ -398,7 +399,7 @@ class Workspace(Feature):
         if self._drawings and other is not None:
             own = self._drawings[0].cloud
             own_done = self._drawings[0].parts == own.parts
-            cloud = Cloud(other, own.n, own.seed, own.strategy)
+            cloud = replace(own, robot=other, measures=(), locked=None)
             if own_done and not self._running:
                 self._time(True)
             self._drawings.append(self._drawing(cloud, 1))
@@ -465,7 +466,9 @@ class Workspace(Feature):
                     best = found
             q = None
             if best is not None:
-                q = kin.configuration_at(cloud.robot, best.index, seed=cloud.seed, strategy=cloud.strategy)
+                q = kin.configuration_at(
+                    cloud.robot, best.index, seed=cloud.seed, strategy=cloud.strategy, locked=cloud.locked
+                )
             self.post("picked", (number, best, q))
 
         beside(search, "pick", self.post)
@@ -503,7 +506,8 @@ class Workspace(Feature):
 
     def _tell_pick(self) -> None:
         if self._pick is not None:
-            _put(self._controls.picked, words.picked(self.stage.robot, *self._pick, self.stage.units))
+            cloud = self._drawings[0].cloud
+            _put(self._controls.picked, words.picked(cloud.robot, cloud.locked, *self._pick, self.stage.units))
 
     def _tell_sizes(self) -> None:
         if self._found is not None:
@@ -524,7 +528,9 @@ class Workspace(Feature):
                 state = "preparing"
             if self._busy and not self._running:
                 state = "recolouring"
-        line = words.progress(state, drawn, total or self._wishes.n, drawn / spent if spent > 0.0 else 0.0)
+        speed = drawn / spent if spent > 0.0 else 0.0
+        locked = self._drawings[0].cloud.locked if self._drawings else self.stage.locked
+        line = words.progress(state, drawn, total or self._wishes.n, speed, locked)
         percent = round(100.0 * drawn / total, 1) if total else 0.0
         if self._controls.line.content != line:
             self._controls.line.content = line

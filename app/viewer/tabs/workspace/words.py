@@ -13,6 +13,7 @@ from kin.transforms import Array
 from kin.workspace.measures import measured
 from kin.workspace.region import Region
 
+Locks = tuple[float | None, ...] | None
 State = Literal["ready", "preparing", "running", "paused", "recolouring", "done"]
 SYMBOLS: dict[State, str] = {
     "ready": "○",
@@ -37,23 +38,31 @@ def rate(points_per_second: float) -> str:
     return f"{points_per_second:.3g} "
 
 
-def progress(state: State, drawn: int, total: int, speed: float) -> str:
-    """The line below the bar."""
+def locks(locked: Locks) -> str:
+    """Which joints a cloud or a map was made without; nothing if all moved."""
+    joints = [str(i + 1) for i, value in enumerate(locked or ()) if value is not None]
+    return f"joint{'s' if len(joints) > 1 else ''} {', '.join(joints)} locked" if joints else ""
+
+
+def progress(state: State, drawn: int, total: int, speed: float, locked: Locks = None) -> str:
+    """The line below the bar, and one more if joints are locked."""
     right = f"{rate(speed)} points/s" if drawn and speed > 0.0 else ""
+    said = locks(locked)
     return (
         f'<div data-cloud="{state}" role="status" style="display:flex;justify-content:space-between;gap:.6em;'
         'margin:-.2em 1em .5em;font-size:.78em;line-height:1.5;font-variant-numeric:tabular-nums">'
         f'<span style="white-space:nowrap"><span aria-hidden="true">{SYMBOLS[state]}</span> {state}</span>'
         f'<span style="white-space:nowrap">{grouped(drawn)} / {grouped(total)}</span>'
         f'<span style="white-space:nowrap;min-width:7.5em;text-align:right">{right}</span></div>'
+        + (f'<div style="margin:-.4em 1em .5em;font-size:.78em;opacity:.8">{said}</div>' if said else "")
     )
 
 
-def picked(robot: Robot, index: int, q: Array, point: Array, units: Units) -> str:
-    """The numbers of a point that was clicked on."""
+def picked(robot: Robot, locked: Locks, index: int, q: Array, point: Array, units: Units) -> str:
+    """The numbers of a point that was clicked on, of a cloud with these joints locked."""
     x, y, z = (units.lengths.number(v) for v in point.tolist())
     w = float(kin.manipulability(robot, q))
-    margin = float(measured(Region.of(robot, None, None), "limits", np.asarray(q)[None])[0])
+    margin = float(measured(Region.of(robot, None, locked), "limits", np.asarray(q)[None])[0])
     rows = (
         ("point", grouped(index), ""),
         ("x y z", f"{x} &nbsp; {y} &nbsp; {z}", units.lengths.name),

@@ -51,6 +51,7 @@ class Capability:
         self._reader: Reader | None = None
         self._state: told.State = "ready"
         self._blocks = (0, 0)
+        self._locked = stage.locked  # in the map
         self._found: CapabilityMap | None = None
         self._voxels: Voxels | None = None
         self._drawn = 0.0
@@ -110,8 +111,11 @@ class Capability:
     def compute(self) -> None:
         """Have the map of the arm on show that is wished for, and draw it while it grows."""
         self.clear()
-        wishes = self._wishes
-        self._reader = self._stage.maps.read(Wanted(self._stage.robot, wishes.resolution, wishes.directions))
+        wishes, stage = self._wishes, self._stage
+        self._reader = stage.maps.read(
+            Wanted(stage.robot, wishes.resolution, wishes.directions, locked=stage.locked)
+        )
+        self._locked = stage.locked
         self._state = "waiting"
         self._report()
 
@@ -234,7 +238,7 @@ class Capability:
         pick = "" if self._marked is None else told.picked(*self._marked, units)
         if found is not None:
             legend = told.legend(found, self._wishes.by, self._look.map, self._wishes.least)
-            facts = told.facts(found, self._state == "done", units)
+            facts = told.facts(found, self._locked, self._state == "done", units)
         for element, content in ((self._legend, legend), (self._facts, facts), (self._pick, pick)):
             if element.content != content:
                 element.content = content

@@ -9,7 +9,7 @@ import numpy as np
 from app.viewer.tabs.workspace import colours
 from app.viewer.tabs.workspace.capability.voxels import LEVELS, first_level, largest, levels, values_of
 from app.viewer.tabs.workspace.capability.wishes import By
-from app.viewer.tabs.workspace.words import grouped
+from app.viewer.tabs.workspace.words import Locks, grouped, locks
 from app.viewer.units import Units
 from kin import CapabilityMap
 from kin.workspace.capability import ROLLS, STARTS, Method
@@ -63,8 +63,8 @@ def legend(found: CapabilityMap, by: By, name: str, least: float) -> str:
     )
 
 
-def facts(found: CapabilityMap, whole: bool, units: Units) -> str:
-    """Size, shares and what a missing direction is worth; of a part that is there so far unless `whole`."""
+def facts(found: CapabilityMap, locked: Locks, whole: bool, units: Units) -> str:
+    """Size, shares, which joints were locked, and what a missing direction is worth; unless `whole`, of a part."""
     count, share = len(found.index), found.share
     w = float(found.manipulability.max(initial=0.0))
     mean = float(share.mean(dtype=np.float64)) if count else 0.0
@@ -77,6 +77,8 @@ def facts(found: CapabilityMap, whole: bool, units: Units) -> str:
         ("best manipulability", f"{w:.3g}", ""),
     )
     note = WORTH[found.grid.method] if whole else "Of the part that is there so far."
+    if locked is not None:
+        note = f"With {locks(locked)}. {note}"
     return f'{_table("capability in numbers", rows)}<div style="{STYLE};opacity:.8">{note}</div>'
 
 
