@@ -611,7 +611,8 @@ class ArcAnswer(TypedDict):
 class SectionAnswer(TypedDict):
     """The cut of the workspace with a half-plane through the line of joint 1, whatever joint 1 does.
 
-    The point [r, z] of the section is origin + r·u + z·v."""
+    The point [r, z] of the section is origin + r·u + z·v. Or the cut with the plane that was asked for: then u and
+    v are any two axes of it, v upright if the plane is, and there are no arcs."""
 
     origin: list[float]
     """Where r and z are 0: x, y, z in metres."""
@@ -654,7 +655,7 @@ class WorkspaceAnswer(TypedDict):
     surface: EstimateAnswer | None
     """Area of the whole boundary in m², holes included; null where volume was not asked for."""
     section: SectionAnswer | None
-    """The section in r and z; null unless asked for."""
+    """The section in r and z, or in a plane; null unless asked for."""
 
 
 def workspace_answer(facts: WorkspaceFacts, cut: Section | None = None) -> WorkspaceAnswer:

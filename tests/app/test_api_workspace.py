@@ -268,6 +268,29 @@ def test_the_summary_is_what_the_core_says(client):
         assert arc["radius"] == expected.radius
 
 
+def test_any_plane_can_be_cut(client):
+    answer = client.get(f"{WORKSPACE}/summary?volume=false&resolution=16&plane=0:0:0.1:0:0:2&lock=5:0.5").json()
+    TypeAdapter(WorkspaceAnswer).validate_python(answer, strict=True)
+    locked = [None, None, None, None, 0.5]
+    cut = kin.section(PIONEER, ([0.0, 0.0, 0.1], [0.0, 0.0, 1.0]), locked=locked, resolution=16)
+    assert answer["section"]["area"] == cut.area > 0.1
+    assert answer["section"]["curves"] == [curve.tolist() for curve in cut.curves]
+    assert (answer["section"]["u"], answer["section"]["v"]) == (cut.u.tolist(), cut.v.tolist())
+    assert answer["section"]["arcs"] == []
+    other = client.get(f"{WORKSPACE}/summary?volume=false&resolution=16&plane=0:0:9:0:0:1&lock=5:0.5").json()
+    assert other["section"]["area"] == 0.0
+    assert other["section"]["curves"] == []
+
+
+@pytest.mark.parametrize(
+    "plane", ["", "0:0:0.1", "0:0:0.1:0:0:0", "0:0:0:0:0:nan", "0:0:0:1e-300:0:0", "a:0:0:0:0:1", "0:0:1e99:0:0:1"]
+)
+def test_what_is_no_plane_is_refused(client, plane):
+    answer = client.get(f"{WORKSPACE}/summary?volume=false&plane={plane}")
+    assert answer.status_code == 422
+    assert answer.json()["errors"][0]["field"] == "plane"
+
+
 def test_limits_and_locks_count(client):
     limits, locked = [None, (0.5, 1.0), None, None, None], [0.25, None, None, None, None]
     answer = client.get(f"{WORKSPACE}/summary?volume=false&limit=2:0.5:1&lock=1:0.25").json()
@@ -301,6 +324,9 @@ def test_a_sliding_first_joint_has_no_section(client, tmp_path):
     assert answer.status_code == 422
     assert answer.json()["errors"][0]["field"] == "section"
     assert "slides" in answer.json()["errors"][0]["expected"]
+    address = f"{API}/rail/workspace/summary?volume=false&plane=0:0:0.5:1:0:0"
+    level = TestClient(create_app(Settings(robots=tmp_path))).get(address)
+    assert level.status_code == 200
 
 
 @pytest.fixture

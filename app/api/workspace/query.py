@@ -22,12 +22,12 @@ _SEEDS = 1 << 64
 
 Bounds = tuple[tuple[float, float] | None, ...]
 Locks = tuple[float | None, ...]
-_NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 
 
 def _told(values: int) -> Any:
     """What the document says of a joint and its values; it is refused in our own words."""
-    return Field(max_length=100, json_schema_extra={"pattern": rf"^[0-9]+(:{_NUMBER}){{{values}}}$"})
+    return Field(max_length=100, json_schema_extra={"pattern": rf"^[0-9]+(:{NUMBER}){{{values}}}$"})
 
 
 _MANY = Field(max_length=100)
@@ -131,7 +131,7 @@ def _per_joint(
     form = "JOINT:VALUE" if count == 1 else "JOINT:LOWER:UPPER"
     for k, text in enumerate(given):
         joint, *parts = text.split(":")
-        values = [_number(part) for part in parts]
+        values = [number(part) for part in parts]
         known = joint.isdecimal() and joint.isascii() and 1 <= int(joint) <= robot.n
         if not known or len(values) != count or not all(map(math.isfinite, values)):
             expected = f"{form}, a joint from 1 to {robot.n} and values in radians (metres)"
@@ -144,7 +144,7 @@ def _per_joint(
     return entries, places
 
 
-def _number(text: str) -> float:
+def number(text: str) -> float:
     """A number, NaN for what is none or too large to be meant."""
-    value = float(text) if re.fullmatch(_NUMBER, text) else math.nan
+    value = float(text) if re.fullmatch(NUMBER, text) else math.nan
     return value if abs(value) <= LARGEST else math.nan

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import threading
 from collections import OrderedDict
@@ -15,10 +16,10 @@ from pydantic import Field
 
 from app.answers import WorkspaceAnswer, workspace_answer
 from app.api.body import versioned
-from app.api.problems import FieldError, invalid
+from app.api.problems import FieldError, invalid, show
 from app.api.schemas import RobotId, refusals, reply, robot_of
 from app.api.work import busy, work_of
-from app.api.workspace.query import RegionQuery
+from app.api.workspace.query import NUMBER, RegionQuery, number
 from app.processor import spread
 from kin import section, workspace_facts
 
@@ -37,7 +38,24 @@ class SummaryQuery(RegionQuery):
     section: bool = Field(
         False, description="Whether the section in r and z is wanted, with the arcs of its boundary."
     )
+    plane: str | None = Field(
+        None,
+        max_length=200,
+        description="The section in this plane instead, `X:Y:Z:NX:NY:NZ`: a point of it in metres, and a normal.",
+        examples=["0:0:0.1:0:0:1"],
+        json_schema_extra={"pattern": rf"^{NUMBER}(:{NUMBER}){{5}}$"},
+    )
     resolution: int = Field(96, ge=8, le=400, description="Squares along the longer side of the section.")
+
+    def cut(self) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
+        """Point and normal of the plane; raises 422."""
+        if self.plane is None:
+            return None
+        values = tuple(map(number, self.plane.split(":")))
+        if len(values) != 6 or not all(map(math.isfinite, values)) or not any(values[3:]):
+            expected = "X:Y:Z:NX:NY:NZ, a point in metres and a normal that is not zero"
+            raise invalid(FieldError(field="plane", value=show(self.plane), expected=expected))
+        return values[:3], values[3:]
 
 
 class Threads:
@@ -141,24 +159,26 @@ async def summary(request: Request, robot_id: RobotId, query: Annotated[SummaryQ
     """Bounding box, reach and holes, exact and with configurations; volume and surface with their errors.
 
     `section` adds the cut with a half-plane through the line of joint 1: closed curves and the arcs they are made
-    of. Answers are kept for a while, so only the first visitor waits for the seconds they take; who is told that
-    it takes too long finds it when coming again.
+    of; `plane` the cut with any plane instead. Answers are kept for a while, so only the first visitor waits for
+    the seconds they take; who is told that it takes too long finds it when coming again.
     """
     robot = robot_of(request, robot_id)
     limits, locked = query.bounds(robot)
-    if query.section and robot.joints[0].kind != "revolute":
+    plane = query.cut()
+    wanted = query.section or plane is not None
+    if query.section and plane is None and robot.joints[0].kind != "revolute":
         expected = f"false: joint 1 of {robot.id} slides, so there is no section in r and z"
         raise invalid(FieldError(field="section", value="true", expected=expected))
 
     def compute() -> WorkspaceAnswer:
         facts = workspace_facts(robot, limits=limits, locked=locked, effort=query.effort, volume=query.volume)
         cut = None
-        if query.section:
-            cut = section(robot, limits=limits, locked=locked, resolution=query.resolution)
+        if wanted:
+            cut = section(robot, plane, limits=limits, locked=locked, resolution=query.resolution)
         return workspace_answer(facts, cut)
 
     # What was not asked for makes no other answer.
     effort = query.effort if query.volume else None
-    resolution = query.resolution if query.section else None
-    answer = request.app.state.sizes.get((robot, limits, locked, effort, resolution), compute)
+    resolution = query.resolution if wanted else None
+    answer = request.app.state.sizes.get((robot, limits, locked, effort, plane, resolution), compute)
     return reply(await work_of(request).wait(answer))
