@@ -26,7 +26,7 @@ Points = NDArray[np.float32]
 _QUARTERS = 2.0 / math.pi  # per radian
 _HEADER, _WIDTH = 27, 8  # of `Robot.model`, see kin.kernels
 # Where a block keeps what: BLOCK values each.
-_X, _Y, _Z, _SPACE = range(0, 4 * BLOCK, BLOCK)
+_X, _Y, _Z, _ANGLE, _SPACE = range(0, 5 * BLOCK, BLOCK)
 
 
 @inlined
@@ -109,14 +109,16 @@ def points(
                 continue
             least = (theta + low[j]) * _QUARTERS
             span *= _QUARTERS
+            # Two loops: one value's way through both is longer than a processor looks ahead, and it would wait.
             if quasi:
                 for b in range(BLOCK):
-                    s, c = _sin_cos_quarters(fma(fraction(x + ahead_by[j, b]), span, least))
-                    _move(S, b, s, c, d, a, ca, sa)
+                    S[_ANGLE + b] = fma(fraction(x + ahead_by[j, b]), span, least)
             else:
                 for b in range(BLOCK):
-                    s, c = _sin_cos_quarters(fma(fraction(scrambled(x + ahead_by[j, b])), span, least))
-                    _move(S, b, s, c, d, a, ca, sa)
+                    S[_ANGLE + b] = fma(fraction(scrambled(x + ahead_by[j, b])), span, least)
+            for b in range(BLOCK):
+                s, c = _sin_cos_quarters(S[_ANGLE + b])
+                _move(S, b, s, c, d, a, ca, sa)
         # Converted with vector instructions first: storing three by three is scalar work.
         for b in range(BLOCK):
             x, y, z = S[_X + b], S[_Y + b], S[_Z + b]
