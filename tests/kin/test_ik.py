@@ -16,7 +16,7 @@ from kin import InputError, Status, solve_ik
 from kin.transforms import rotation_angle, vector_angle
 
 SEVEN = ("redundant7", "redundant7-craig")
-ROUND_TRIPS = 20_000
+ROUND_TRIPS = 5_000
 
 
 def turned(T, degrees, axis="z"):
