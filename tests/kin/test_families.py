@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from arms import Draw
 
 import kin
 from kin import Joint, Robot, Status, solve_ik
@@ -40,37 +41,17 @@ def arm(rows, kinds=None, convention="standard", base=None, tool=None, limits=(-
     return Robot("arm", "arm", "test", convention, tuple(joints), (0.0,) * len(rows), **extra)
 
 
-class Draw:
-    """Random parts of arms."""
-
-    def __init__(self, seed):
-        self.rng = np.random.default_rng(seed)
-
-    def length(self):
-        return float(self.rng.uniform(0.1, 0.6) * self.rng.choice([-1, 1]))
+class Member(Draw):
+    """Random members of the families."""
 
     def offset(self):
         return self.length() if self.rng.random() < 0.6 else 0.0
-
-    def angle(self):
-        return float(self.rng.choice([0, PI / 2, -PI / 2, PI, *self.rng.uniform(-3, 3, 4)]))
-
-    def square(self):
-        return float(self.rng.choice([-PI / 2, PI / 2]))
-
-    def parallel(self):
-        return float(self.rng.choice([0.0, PI]))
 
     def oblique(self):
         return float(self.rng.uniform(0.4, 2.7) * self.rng.choice([-1, 1]))
 
     def pose(self):
-        if self.rng.random() < 0.4:
-            return None
-        R = np.linalg.qr(self.rng.normal(size=(3, 3)))[0]
-        T = np.eye(4)
-        T[:3, :3], T[:3, 3] = R * np.linalg.det(R), self.rng.uniform(-0.3, 0.3, 3)
-        return tuple(tuple(row) for row in T.tolist())
+        return None if self.rng.random() < 0.4 else super().pose()
 
     def arm(self, rows, kinds=None):
         return arm(rows, kinds, str(self.rng.choice(["standard", "modified"])), self.pose(), self.pose())
@@ -137,7 +118,7 @@ class Draw:
 
 
 def members(family, count, seed=7):
-    draw = Draw(seed)
+    draw = Member(seed)
     return [getattr(draw, family)() for _ in range(count)]
 
 

@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from arms import Draw, nested
 
 import kin
 from kin import Joint, Robot, Status, solve_ik
@@ -26,10 +27,6 @@ ARMS = {name: kin.get_robot(name) for name in ("pioneer5", "redundant7", "redund
 HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])
 # Which single joints no closed form is used to, by arm: 7 only in order to have approach directions.
 STRANGE = {"pioneer5": (1, 2, 3), "redundant7": (0, 1, 2, 4), "redundant7-craig": (2, 4, 6), "iiwa14": (2, 4, 6)}
-
-
-def nested(T):
-    return tuple(tuple(row) for row in np.asarray(T).tolist())
 
 
 def turned(robot, joints):
@@ -443,29 +440,8 @@ def test_capability_maps_are_the_arms_own(name, joints):
 # -- tables from elsewhere ----------------------------------------------------------------------------------------
 
 
-class Draw:
+class Table(Draw):
     """Random arms of a family: lengths of either sign, twists of either sign, any base, either convention."""
-
-    def __init__(self, seed):
-        self.rng = np.random.default_rng(seed)
-
-    def length(self):
-        return float(self.rng.uniform(0.1, 0.6) * self.rng.choice([-1, 1]))
-
-    def angle(self):
-        return float(self.rng.choice([0, PI / 2, -PI / 2, PI, *self.rng.uniform(-3, 3, 4)]))
-
-    def square(self):
-        return float(self.rng.choice([-PI / 2, PI / 2]))
-
-    def parallel(self):
-        return float(self.rng.choice([0.0, PI]))
-
-    def pose(self):
-        R = np.linalg.qr(self.rng.normal(size=(3, 3)))[0]
-        T = np.eye(4)
-        T[:3, :3], T[:3, 3] = R * np.linalg.det(R), self.rng.uniform(-0.3, 0.3, 3)
-        return nested(T)
 
     def rows(self, lengths, twists):
         return [(self.angle(), d, a, alpha) for (d, a), alpha in zip(lengths, twists, strict=True)]
@@ -521,7 +497,7 @@ class Draw:
 
 @pytest.mark.parametrize("family", ["srs7", "collinear7", "wrist5"])
 def test_tables_from_elsewhere(family):
-    draw = Draw(12)
+    draw = Table(12)
     as_it_is = 0
     for _ in range(25):
         robot = draw.arm(family)
