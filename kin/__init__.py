@@ -11,11 +11,11 @@ from kin.catalog import builtin_robots, get_robot, load_folder, load_robot, pars
 from kin.errors import InputError, KinematicsError, RobotFileError, UnknownRobotError
 from kin.fk import fk, fk_positions, jacobian, link_frames, manipulability
 from kin.ik import branch_names, branch_of, solve_ik
+from kin.ik.batch import ik_branches
+from kin.ik.results import BlockedBranch, IKResult, IKSolution, LimitViolation, Redundancy, Status, Task
 from kin.path import PathGap, PathJump, PathResult, solve_path
-from kin.results import BlockedBranch, IKResult, IKSolution, LimitViolation, Redundancy, Status, Task
 from kin.robot import Joint, Robot
 from kin.singularity import Singularity, singularities
-from kin.thin import ik_branches
 from kin.warmup import warm_up, warm_up_rest
 from kin.workspace import (
     CapabilityBlock,

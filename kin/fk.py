@@ -3,7 +3,7 @@
 Each function takes one configuration ``(n,)`` or any batch ``(..., n)`` and returns the same leading axes.
 
 One configuration costs less than looking at it does. So the array is looked at once, and a compiled function is
-entered directly (:func:`kin.compiled.direct`); whatever is not a plain float64 array takes the careful way.
+entered directly (:func:`kin.kernels.compile.direct`); whatever is not a plain float64 array takes the careful way.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kin import kernels
-from kin.compiled import MODEL, direct
 from kin.errors import InputError
+from kin.kernels import fk as fk_kernels
+from kin.kernels.compile import MODEL, direct
 from kin.robot import Robot
 from kin.transforms import Array
 
@@ -34,19 +34,19 @@ class _Compiled:
 
     @cached_property
     def fk_one(self) -> Callable[[Array, Array, Array], bool]:
-        return direct(kernels.fk_one, MODEL, 1, 2)
+        return direct(fk_kernels.fk_one, MODEL, 1, 2)
 
     @cached_property
     def fk_many(self) -> Callable[[Array, Array, Array], bool]:
-        return direct(kernels.fk_many, MODEL, 2, 3)
+        return direct(fk_kernels.fk_many, MODEL, 2, 3)
 
     @cached_property
     def positions_many(self) -> Callable[[Array, Array, Array], bool]:
-        return direct(kernels.positions_many, MODEL, 2, 2)
+        return direct(fk_kernels.positions_many, MODEL, 2, 2)
 
     @cached_property
     def jacobian_one(self) -> Callable[[Array, Array, Array], bool]:
-        return direct(kernels.jacobian_one, MODEL, 1, 2)
+        return direct(fk_kernels.jacobian_one, MODEL, 1, 2)
 
 
 _compiled = _Compiled()
@@ -84,7 +84,7 @@ def fk_positions(robot: Robot, q: ArrayLike) -> Array:
 def link_frames(robot: Robot, q: ArrayLike) -> Array:
     """Frame after every DH row, ``(..., rows, 4, 4)``: ``A_1``, ``A_1 A_2``, … in the base frame."""
     q = _writable(robot.check_q(q))
-    frames = kernels.frames_many(robot.model, q.reshape(-1, robot.n))
+    frames = fk_kernels.frames_many(robot.model, q.reshape(-1, robot.n))
     return frames.reshape(*q.shape[:-1], len(robot.rows), 4, 4)
 
 
@@ -102,7 +102,7 @@ def jacobian(robot: Robot, q: ArrayLike, frame: Literal["base", "tool"] = "base"
     elif frame != "tool":
         raise InputError("frame", frame, 'one of "base", "tool"')
     q = _writable(robot.check_q(q))
-    J = kernels.jacobian_many(robot.model, q.reshape(-1, robot.n)).reshape(*q.shape[:-1], 6, robot.n)
+    J = fk_kernels.jacobian_many(robot.model, q.reshape(-1, robot.n)).reshape(*q.shape[:-1], 6, robot.n)
     if frame == "tool":
         R_T = np.swapaxes(fk(robot, q)[..., :3, :3], -1, -2)
         J = np.concatenate([R_T @ J[..., :3, :], R_T @ J[..., 3:, :]], axis=-2)
@@ -119,7 +119,7 @@ def manipulability(robot: Robot, q: ArrayLike, part: Part = "all") -> Array:
         raise InputError("part", part, "one of " + ", ".join(f'"{name}"' for name in _PARTS))
     first, last = _PARTS[part]
     J = jacobian(robot, q)
-    values = kernels.manipulability_many(J.reshape(-1, 6, robot.n), first, last)
+    values = fk_kernels.manipulability_many(J.reshape(-1, 6, robot.n), first, last)
     return values.reshape(J.shape[:-2])
 
 

@@ -134,7 +134,7 @@ class Robot:
 
     @cached_property
     def model(self) -> Array:
-        """The whole arm as one flat array for the compiled kernels; layout in :mod:`kin.kernels`."""
+        """The whole arm as one flat array for the compiled kernels; layout in :mod:`kin.kernels.fk`."""
         header = [float(len(self.rows)), float(self.n), float(self.convention == "modified")]
         header += self.T_world_base[:3].ravel().tolist() + self.T_last_tool[:3].ravel().tolist()
         q_index = 0

@@ -4,8 +4,8 @@ Loading a kernel takes some hundredths of a second, compiling one takes seconds.
 needs compiling that forward and inverse kinematics call: with a warm cache as soon as the first arm answers, on a
 machine that never ran these kernels after some tens of seconds. What is left is done beside the first visitors.
 
-The thin call (:mod:`kin.thin`) is for who computes, not for who serves: its kernels are compiled when first used.
-Kernels belong to families of arms, not to arms: one arm of each family is asked, however many there are.
+The thin call (:mod:`kin.ik.batch`) is for who computes, not for who serves: its kernels are compiled when first
+used. Kernels belong to families of arms, not to arms: one arm of each family is asked, however many there are.
 """
 
 from __future__ import annotations

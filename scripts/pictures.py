@@ -15,8 +15,8 @@ import viser
 from PIL import Image, ImageOps
 from playwright.sync_api import sync_playwright
 
-from app.viewer.camera import FOV, view
-from app.viewer.scene import ArmScene
+from app.viewer.scene.arm import ArmScene
+from app.viewer.scene.camera import FOV, view
 from kin import Robot, builtin_robots, link_frames
 
 FOLDER = Path(__file__).parents[1] / "static" / "robots"

@@ -46,7 +46,7 @@ function element(tag, text, className) {
   return node;
 }
 
-// What the address of a shared view holds: see app/viewer/state.py.
+// What the address of a shared view holds: see app/viewer/session/state.py.
 function viewerWith(robot) {
   return "viewer/#s=" + btoa(JSON.stringify({ v: 1, robot: robot.id })).replace(/=+$/, "");
 }

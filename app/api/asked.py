@@ -9,7 +9,7 @@ from pydantic import Discriminator, Field, Tag
 from app.api import schemas
 from app.api.schemas import Number, numbers
 from app.api.targets import Target
-from app.settings import Settings
+from app.shared.settings import Settings
 from kin import Task
 from kin.transforms import Array
 

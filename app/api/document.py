@@ -8,8 +8,8 @@ from typing import Any
 from fastapi import FastAPI
 
 from app.api.problems import MEDIA_TYPE
-from app.settings import Settings
-from app.store import Store
+from app.shared.settings import Settings
+from app.shared.store import Store
 
 _PROBLEM = {"$ref": "#/components/schemas/Problem"}
 

@@ -9,7 +9,6 @@ from fastapi import Body, Request, Response
 from pydantic import Field
 from typing_extensions import TypedDict
 
-from app.answers import documented
 from app.api import schemas
 from app.api.body import versioned
 from app.api.schemas import (
@@ -26,6 +25,7 @@ from app.api.schemas import (
 from app.api.work import computed
 from app.equations import Book, Equation, Symbol, book, typeset
 from app.equations.expression import Expression
+from app.shared.answers import documented
 from kin import Robot
 from kin.transforms import Array
 

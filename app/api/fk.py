@@ -9,7 +9,6 @@ from fastapi import Body, Request, Response
 from pydantic import Field
 from typing_extensions import TypedDict
 
-from app.answers import FkAnswer, documented, fk_answers
 from app.api import schemas
 from app.api.body import versioned
 from app.api.schemas import (
@@ -23,6 +22,7 @@ from app.api.schemas import (
     settings_of,
 )
 from app.api.work import Budget, computed, work_of
+from app.shared.answers import FkAnswer, documented, fk_answers
 
 FEW = 16  # configurations that are answered sooner than a thread could be asked to
 

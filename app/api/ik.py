@@ -9,7 +9,6 @@ from fastapi import Body, Request, Response
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 from typing_extensions import TypedDict
 
-from app.answers import IkAnswer, documented, ik_answer
 from app.api import schemas
 from app.api.asked import Asked, one_or_many
 from app.api.body import versioned
@@ -27,8 +26,9 @@ from app.api.schemas import (
 )
 from app.api.targets import Target
 from app.api.work import Budget, computed
-from app.metrics import SOLVE_SECONDS
-from app.settings import Settings
+from app.shared.answers import IkAnswer, documented, ik_answer
+from app.shared.metrics import SOLVE_SECONDS
+from app.shared.settings import Settings
 from kin import Robot, Task, solve_ik
 from kin.transforms import Array
 

@@ -9,11 +9,11 @@ from fastapi import Body, Request, Response
 from pydantic import Field
 from typing_extensions import TypedDict
 
-from app.answers import JacobianAnswer, documented, jacobian_answers
 from app.api import schemas
 from app.api.body import versioned
 from app.api.schemas import POST_REFUSALS, Configurations, RobotId, example, one_or_all, robot_of, settings_of
 from app.api.work import computed
+from app.shared.answers import JacobianAnswer, documented, jacobian_answers
 
 router = versioned("kinematics")
 

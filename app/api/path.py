@@ -8,7 +8,6 @@ from typing import Annotated
 from fastapi import Body, Request, Response
 from pydantic import Field
 
-from app.answers import PathAnswer, path_answer
 from app.api import schemas
 from app.api.asked import Asked
 from app.api.body import versioned
@@ -16,7 +15,8 @@ from app.api.problems import FieldError, invalid
 from app.api.schemas import POST_REFUSALS, Configuration, RobotId, example, reply, robot_of, settings_of
 from app.api.targets import Target
 from app.api.work import Budget, computed
-from app.settings import Settings
+from app.shared.answers import PathAnswer, path_answer
+from app.shared.settings import Settings
 from kin import Robot, solve_path
 
 router = versioned("kinematics")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from fastapi import Request, Response
 from typing_extensions import TypedDict
 
-from app.answers import RobotAnswer, documented, robot_answer
 from app.api.body import versioned
 from app.api.schemas import RobotId, refusals, reply, robot_of, store_of
+from app.shared.answers import RobotAnswer, documented, robot_answer
 
 router = versioned("robots")
 

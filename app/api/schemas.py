@@ -12,8 +12,8 @@ from pydantic_core import to_json
 
 from app.api.problems import FieldError, Problem, ProblemError, invalid, show
 from app.api.work import Budget
-from app.settings import Settings
-from app.store import Store
+from app.shared.settings import Settings
+from app.shared.store import Store
 from kin import InputError, Robot
 from kin.transforms import Array
 

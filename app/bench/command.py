@@ -15,7 +15,7 @@ from app.bench.contestants import PEERS, Peer
 from app.bench.rows import ROWS, Row
 from app.bench.run import Settings, run
 from kin import InputError
-from kin.kernels import fk_one
+from kin.kernels.fk import fk_one
 
 INSTALL = "pip install 'kinboard[bench]'"
 _INTERRUPTED = 130  # what shells expect after Ctrl-C

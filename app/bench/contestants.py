@@ -27,9 +27,9 @@ from app.bench import floors
 from app.bench.arms import Arm, ortho
 from app.bench.rows import Task
 from kin.transforms import Array
-from kin.workspace import draw
-from kin.workspace.draw import Points
-from kin.workspace.numbers import streams
+from kin.workspace.clouds import draw
+from kin.workspace.clouds.draw import Points
+from kin.workspace.clouds.numbers import streams
 
 OURS = "kinboard"
 RICH = "kinboard, rich"

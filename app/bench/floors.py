@@ -10,9 +10,9 @@ import math
 
 import numpy as np
 
-from kin.compiled import jit
+from kin.kernels.compile import jit
 from kin.transforms import Array
-from kin.workspace.draw import Points
+from kin.workspace.clouds.draw import Points
 
 
 @jit

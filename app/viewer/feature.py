@@ -13,11 +13,11 @@ from typing import ClassVar, Protocol
 
 import viser
 
-from app.clouds import Clouds
-from app.maps import Maps
-from app.store import Store
-from app.viewer.camera import Sphere
+from app.shared.clouds import Clouds
+from app.shared.maps import Maps
+from app.shared.store import Store
 from app.viewer.panel.status import Notice
+from app.viewer.scene.camera import Sphere
 from app.viewer.units import Units
 from kin import IKResult, Robot, Task
 from kin.transforms import Array

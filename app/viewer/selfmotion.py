@@ -14,7 +14,7 @@ import numpy as np
 import kin
 from kin import IKResult, Redundancy, Robot, Task
 from kin.ik import answer
-from kin.question import ask
+from kin.ik.problem import ask
 from kin.transforms import Array
 
 SMOOTH = 0.6  # rad of one joint in one event: more than that is no motion but another posture

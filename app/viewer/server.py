@@ -9,15 +9,15 @@ import threading
 
 import viser
 
-from app.clouds import Clouds
-from app.maps import Maps
-from app.settings import Settings
-from app.store import Store
-from app.viewer.motion import Pace
+from app.shared.clouds import Clouds
+from app.shared.maps import Maps
+from app.shared.settings import Settings
+from app.shared.store import Store
 from app.viewer.panel.status import Notice
 from app.viewer.panel.view import configure_theme
 from app.viewer.quick import quick_loops, remember_hints, wake_in_the_loop
-from app.viewer.session import WELCOME, Session
+from app.viewer.scene.motion import Pace
+from app.viewer.session.controller import WELCOME, Session
 
 log = logging.getLogger(__name__)
 

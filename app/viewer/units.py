@@ -13,7 +13,7 @@ import re
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from app.viewer.mathml import fixed
+from app.viewer.views.mathml import fixed
 
 Length = Literal["mm", "cm", "m"]
 LENGTHS: tuple[Length, ...] = get_args(Length)

@@ -26,14 +26,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kin.errors import InputError
+from kin.ik.problem import Frame, Limits, Locks, ask, finite_number, go_on, pose_of
+from kin.ik.results import Task
 from kin.path.course import Course, Way
 from kin.path.gaps import fill_gaps
 from kin.path.layers import stops_at
 from kin.path.report import report
 from kin.path.results import JumpCause, PathGap, PathJump, PathResult
 from kin.path.route import DeadEnd, route
-from kin.question import Frame, Limits, Locks, ask, finite_number, go_on, pose_of
-from kin.results import Task
 from kin.robot import Robot
 from kin.transforms import Array
 

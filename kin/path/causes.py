@@ -19,16 +19,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kin import explain
-from kin.branches import Flags, is_closed, measure, violations_of
-from kin.finish import POSITION_ERROR, ROTATION_ERROR
 from kin.fk import fk
+from kin.ik import messages
+from kin.ik.branches import Flags, is_closed, measure, violations_of
+from kin.ik.candidates import POSITION_ERROR, ROTATION_ERROR
+from kin.ik.problem import Question
+from kin.ik.results import LimitViolation
 from kin.path.course import Course, Way, has_closed_form
 from kin.path.results import JumpCause, PathJump
 from kin.path.route import DeadEnd
 from kin.path.waypoint import LEAP, branches_near, continued, descended, nearest
-from kin.question import Question
-from kin.results import LimitViolation
 from kin.robot import Robot
 from kin.singularity import singularities
 from kin.solvers.common import APPROACH, POSE, POSITION, TURN
@@ -90,7 +90,7 @@ def jump_at(course: Course, q: Array, index: int, end: DeadEnd | None) -> PathJu
     cause, why = _judged(_halt(course, q, index, end))
     widest = int(np.argmax(moves))
     others = f" (and {len(joints) - 1} more)" if len(joints) > 1 else ""
-    name, size = explain.joint(way.question.robot, widest), way.told(widest, float(moves[widest]))
+    name, size = messages.joint(way.question.robot, widest), way.told(widest, float(moves[widest]))
     reason = f"Between waypoints {index - 1} and {index} {name}{others} leaps by {size}: {why}."
     return PathJump(index, joints, float(moves.max()), cause, reason)
 
@@ -137,10 +137,10 @@ def _judged(halt: _Halt) -> tuple[JumpCause, str]:
             return broken
     who = "the waypoints" if not halt.is_here else "they"
     joint = 0 if there is None else int(np.argmax(way.moves(halt.q, there)))
-    turns = f" and turns by {explain.degrees(turn)}" if turn > TOLERANCES.closure_rotation else ""
+    turns = f" and turns by {messages.degrees(turn)}" if turn > TOLERANCES.closure_rotation else ""
     return "spacing", (
         f"{halt.place} {who} are too far apart for steps of {way.told(joint, way.max_step)}: "
-        f"the tool moves by {explain.millimetres(shift)}{turns}"
+        f"the tool moves by {messages.millimetres(shift)}{turns}"
     )
 
 
@@ -149,8 +149,8 @@ def _stopped(halt: _Halt, violations: Sequence[LimitViolation]) -> str:
     first = max(violations, key=lambda v: abs(v.value - v.limit))
     robot = halt.question.robot
     does = "is locked at" if halt.question.locked[first.joint] else "reaches its stop at"
-    stop = explain.joint_value(robot, first.joint, first.limit)
-    return f"{halt.place} {explain.joint(robot, first.joint)} {does} {stop}"
+    stop = messages.joint_value(robot, first.joint, first.limit)
+    return f"{halt.place} {messages.joint(robot, first.joint)} {does} {stop}"
 
 
 def _broken(halt: _Halt, question: Question) -> tuple[JumpCause, str] | None:

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kin import explain
-from kin.question import Question
-from kin.results import IKResult
+from kin.ik import messages
+from kin.ik.problem import Question
+from kin.ik.results import IKResult
 from kin.solvers.common import POSITION, TURN
 from kin.transforms import Array
 
@@ -78,7 +78,7 @@ class Way:
 
     def told(self, joint: int, move: float) -> str:
         """A weighted motion of a joint as its own, for a sentence."""
-        return explain.joint_value(self.question.robot, joint, move / float(self.weight[joint]))
+        return messages.joint_value(self.question.robot, joint, move / float(self.weight[joint]))
 
     def leaps(self, q: Array, spans: Sequence[int]) -> list[int]:
         """The steps of a path ``(s, n)`` that are jumps, by the index of their end."""

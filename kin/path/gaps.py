@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from kin import search
-from kin.branches import measure
-from kin.finish import POSITION_ERROR, ROTATION_ERROR
+from kin.ik import nearest
+from kin.ik.branches import measure
+from kin.ik.candidates import POSITION_ERROR, ROTATION_ERROR
+from kin.ik.results import Status
 from kin.path.course import Stop, Way
 from kin.path.trellis import shortest
 from kin.path.waypoint import alike
-from kin.results import Status
 from kin.solvers.common import POSITION
 from kin.transforms import Array
 
@@ -55,11 +55,11 @@ def _closest(stop: Stop, start: Array) -> Array:
     question, q = stop.asked, start
     question.stop()
     if stop.gap is not None and stop.gap.status is Status.APPROXIMATE:
-        for weight in (search.ORIENTATION_WEIGHT, 1e-2, 1e-4):
-            q, _ = search.descend(question, question.code, q[None], weight)
-        q, _ = search.descend(question, POSITION, q[None], 1.0)
+        for weight in (nearest.ORIENTATION_WEIGHT, 1e-2, 1e-4):
+            q, _ = nearest.descend(question, question.code, q[None], weight)
+        q, _ = nearest.descend(question, POSITION, q[None], 1.0)
     else:
-        q, _ = search.descend(question, question.code, q[None], search.ORIENTATION_WEIGHT)
+        q, _ = nearest.descend(question, question.code, q[None], nearest.ORIENTATION_WEIGHT)
     if question.branches is not None and not question.allows(question.branch_of(q)):
         return np.clip(start, question.lower, question.upper)
     return q
@@ -72,5 +72,5 @@ def _as_close(stop: Stop, q: Array) -> Array:
     if best is not None:
         q = np.concatenate([q, measure(question, best.q[None], q[0])[0]])
     q, stats = measure(question.without_turns(), q)
-    miss = np.hypot(stats[:, POSITION_ERROR], search.ORIENTATION_WEIGHT * stats[:, ROTATION_ERROR])
+    miss = np.hypot(stats[:, POSITION_ERROR], nearest.ORIENTATION_WEIGHT * stats[:, ROTATION_ERROR])
     return np.ascontiguousarray(q[alike(miss, float(miss.min()))])

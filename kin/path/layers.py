@@ -15,12 +15,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from kin.branches import Branches
 from kin.ik import answer
+from kin.ik.branches import Branches
+from kin.ik.problem import Question
+from kin.ik.results import Status
 from kin.path.course import Stop, is_sampled
 from kin.path.waypoint import branches_near, descended, distinct, meeting, pool, with_images
-from kin.question import Question
-from kin.results import Status
 from kin.solvers.common import APPROACH, POSE, Problem, wrap
 from kin.transforms import Array
 

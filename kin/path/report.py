@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from kin import explain
-from kin.branches import measure, solution
-from kin.finish import POSITION_ERROR, ROTATION_ERROR
+from kin.ik import messages
+from kin.ik.branches import measure, solution
+from kin.ik.candidates import POSITION_ERROR, ROTATION_ERROR
+from kin.ik.results import Status
 from kin.path.causes import jump_at
 from kin.path.course import Course, Stop, Way, has_closed_form
 from kin.path.results import PathGap, PathJump, PathResult
 from kin.path.route import DeadEnd
-from kin.results import Status
 from kin.transforms import Array
 
 
@@ -46,7 +46,7 @@ def report(course: Course, stops: list[Stop], q: Array, ends: list[DeadEnd]) -> 
 def _gap(stop: Stop, index: int, q: Array, stats: Array) -> PathGap:
     if stop.gap is not None:
         return PathGap(index, stop.gap.status, stop.gap.reason, stop.gap.distance)
-    reason = explain.approximate(stop.asked, solution(stop.asked, q, stats, compromise="roll"), ())
+    reason = messages.approximate(stop.asked, solution(stop.asked, q, stats, compromise="roll"), ())
     return PathGap(index, Status.APPROXIMATE, reason, 0.0)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from kin.results import Status
+from kin.ik.results import Status
 from kin.transforms import Array
 
 JumpCause = Literal["limits", "singularity", "branch", "spacing"]

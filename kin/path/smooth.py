@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from kin.compiled import jit
 from kin.fk import fk
-from kin.kernels import fk_into
+from kin.kernels.compile import jit
+from kin.kernels.fk import fk_into
 from kin.path.course import Course, Stop, has_closed_form
 from kin.path.trellis import shortest
 from kin.path.waypoint import branches_near, descended, meeting

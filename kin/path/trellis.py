@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.compiled import jit
+from kin.kernels.compile import jit
 from kin.path.course import Way
 from kin.solvers.common import TURN
 from kin.transforms import Array

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from kin import search
-from kin.branches import Branches, Flags, is_closed, measure, solve_branches
-from kin.finish import OVERRUN, POSITION_ERROR, ROLL, ROTATION_ERROR, select
+from kin.ik import nearest as search
+from kin.ik.branches import Branches, Flags, is_closed, measure, solve_branches
+from kin.ik.candidates import OVERRUN, POSITION_ERROR, ROLL, ROTATION_ERROR, select
+from kin.ik.problem import Question
 from kin.path.course import WIDE, Course, Way, has_closed_form
-from kin.question import Question
 from kin.solvers.common import TURN
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array

@@ -17,9 +17,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from kin.compiled import inlined, joined
-from kin.kernels import BLOCK, all_finite_pose
-from kin.simd import TURN, atan2, rounded, widest, wrapped
+from kin.kernels.compile import inlined, joined
+from kin.kernels.fk import BLOCK, all_finite_pose
+from kin.kernels.simd import TURN, atan2, rounded, widest, wrapped
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 

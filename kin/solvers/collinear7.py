@@ -19,10 +19,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.compiled import inlined, jit, joined
-from kin.kernels import BLOCK
+from kin.kernels.compile import inlined, jit, joined
+from kin.kernels.fk import BLOCK
+from kin.kernels.simd import widest, wrapped
 from kin.robot import Robot
-from kin.simd import widest, wrapped
 from kin.solvers.blocks import OWN, VALUE, Arc, canonical_of, double, each, one, rows_of
 from kin.solvers.common import (
     APPROACH,

@@ -21,10 +21,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.compiled import jit
-from kin.kernels import sine_cosine
+from kin.kernels.compile import jit
+from kin.kernels.fk import sine_cosine
+from kin.kernels.simd import atan2
 from kin.robot import Robot, exact_cos_sin
-from kin.simd import atan2
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 

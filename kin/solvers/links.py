@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.compiled import jit
+from kin.kernels.compile import jit
+from kin.kernels.simd import atan2
 from kin.robot import Robot
-from kin.simd import atan2
 from kin.solvers.common import (
     Problem,
     add_roots,

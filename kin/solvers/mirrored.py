@@ -181,9 +181,9 @@ class Mirrored:
 
 
 class _Around:
-    """A thin kernel of the arm turned round, called like that of the arm as it is; see :mod:`kin.thin`.
+    """A thin kernel of the arm turned round, called like that of the arm as it is; see :mod:`kin.ik.batch`.
 
-    Like a kernel it can be compiled ahead (`kin.compiled.direct`).
+    Like a kernel it can be compiled ahead (`kin.kernels.compile.direct`).
     """
 
     def __init__(self, kernel: Any, signs: Array, joints: Joints, free: list[int]) -> None:

@@ -34,8 +34,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from kin.compiled import jit
-from kin.kernels import jacobian_into
+from kin.kernels.compile import jit
+from kin.kernels.fk import jacobian_into
 from kin.solvers.common import APPROACH, MASK, POSE, POSITION, relative_pose
 from kin.transforms import Array
 

@@ -30,10 +30,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.compiled import inlined, jit, joined
-from kin.kernels import BLOCK
+from kin.kernels.compile import inlined, jit, joined
+from kin.kernels.fk import BLOCK
+from kin.kernels.simd import atan2, widest, wrapped
 from kin.robot import Robot
-from kin.simd import atan2, widest, wrapped
 from kin.solvers.blocks import OWN, Arc, Entries, canonical_of, double, each, elbow_of, one, rows_of, single
 from kin.solvers.common import APPROACH, POSE, Candidates, Freedom, Problem, clear, copy_row, is_zero, wrap
 from kin.solvers.links import (

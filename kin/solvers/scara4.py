@@ -26,10 +26,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.compiled import inlined, jit, joined
-from kin.kernels import BLOCK
+from kin.kernels.compile import inlined, jit, joined
+from kin.kernels.fk import BLOCK
+from kin.kernels.simd import widest, wrapped
 from kin.robot import Robot
-from kin.simd import widest, wrapped
 from kin.solvers.blocks import OWN, Arc, double, each, elbow_of, in_base, one, rows_of, single
 from kin.solvers.common import (
     APPROACH,

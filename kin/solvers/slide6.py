@@ -18,10 +18,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kin.compiled import inlined, jit, joined
-from kin.kernels import BLOCK
+from kin.kernels.compile import inlined, jit, joined
+from kin.kernels.fk import BLOCK
+from kin.kernels.simd import widest
 from kin.robot import Robot
-from kin.simd import widest
 from kin.solvers import wrist6
 from kin.solvers.blocks import Arc, Entries, canonical_of, each, one, rows_of
 from kin.solvers.common import Candidates, Freedom, Problem, is_zero, screw_x, screw_z

@@ -21,10 +21,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.compiled import inlined, jit, joined
-from kin.kernels import BLOCK, sine_cosine
+from kin.kernels.compile import inlined, jit, joined
+from kin.kernels.fk import BLOCK, sine_cosine
+from kin.kernels.simd import TURN, WIDE, atan2, rounded, sin_cos, widest
 from kin.robot import Robot
-from kin.simd import TURN, WIDE, atan2, rounded, sin_cos, widest
 from kin.solvers.blocks import OWN, VALUE, Arc, double, each, in_base, one, rows_of
 from kin.solvers.common import (
     APPROACH,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kin.errors import InputError
-from kin.question import Limits, Locks, ask
+from kin.ik.problem import Limits, Locks, ask
 from kin.robot import Robot
 from kin.transforms import Array
 

@@ -6,10 +6,10 @@ import pytest
 from fastapi.testclient import TestClient
 
 import kin
-from app.clouds import Clouds
-from app.main import create_app
-from app.settings import Settings
-from app.store import Store
+from app.service.main import create_app
+from app.shared.clouds import Clouds
+from app.shared.settings import Settings
+from app.shared.store import Store
 
 
 @pytest.fixture(scope="session")

@@ -7,6 +7,6 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from app.cli import main
+from app.cli.parser import main
 
 sys.exit(main(["bench", *sys.argv[1:]]))

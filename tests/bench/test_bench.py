@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 
 import kin
-from app import cli
 from app.bench import command, judge, report
 from app.bench.arms import arm_of, ortho
 from app.bench.contestants import FLOOR, KINBOARD, OURS, PEERS, RICH, Contestant, Peer
 from app.bench.measure import Turns, measure, ratio
 from app.bench.rows import ROWS, prepare
 from app.bench.run import Settings, run
+from app.cli import parser
 
 ROOT = Path(__file__).parents[2]
 ROWS_BY_ID = {row.id: row for row in ROWS}
@@ -269,7 +269,7 @@ def quick(monkeypatch):
 
 
 def bench(capsys, *words):
-    code = cli.main(["bench", *map(str, words)])
+    code = parser.main(["bench", *map(str, words)])
     out, err = capsys.readouterr()
     return code, out, err
 

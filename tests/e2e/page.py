@@ -11,9 +11,9 @@ import numpy as np
 from playwright.sync_api import Browser, Locator, Page, expect
 
 import kin
-from app.viewer import camera
-from app.viewer.meshes import body
 from app.viewer.panel.joints import label
+from app.viewer.scene import camera
+from app.viewer.scene.meshes import body
 
 ARTIFACTS = Path(__file__).parents[1] / "artifacts"
 WAIT = 45_000  # ms; software rendering on a busy machine is slow

@@ -15,7 +15,7 @@ from page import ARTIFACTS, Tab
 from playwright.sync_api import Browser, Page, expect
 
 import kin
-from app.pages import static_folder
+from app.service.web.pages import static_folder
 
 pytestmark = pytest.mark.browser
 

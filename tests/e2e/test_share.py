@@ -16,10 +16,10 @@ from page import ARTIFACTS, WAIT, Tab
 from playwright.sync_api import Browser, FrameLocator, Page, expect
 
 import kin
-from app.viewer import camera
-from app.viewer.meshes import body
 from app.viewer.panel.joints import CLOSED
-from app.viewer.state import PageState, decode
+from app.viewer.scene import camera
+from app.viewer.scene.meshes import body
+from app.viewer.session.state import PageState, decode
 
 pytestmark = pytest.mark.browser
 

@@ -10,8 +10,8 @@ from page import Tab
 from playwright.sync_api import expect
 
 import kin
-from app.clouds import Cloud
-from app.viewer.camera import round_points
+from app.shared.clouds import Cloud
+from app.viewer.scene.camera import round_points
 
 pytestmark = pytest.mark.browser
 

@@ -9,13 +9,13 @@ from fastapi import Query, Request, Response
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
-from app.answers import CapabilityMapAnswer, capability_map_answer
 from app.api.body import versioned
 from app.api.problems import FieldError, invalid
 from app.api.schemas import RobotId, refusals, reply, robot_of, settings_of
 from app.api.work import Budget, work_of
 from app.api.workspace.query import RegionQuery
-from app.maps import Maps, Wanted
+from app.shared.answers import CapabilityMapAnswer, capability_map_answer
+from app.shared.maps import Maps, Wanted
 
 router = versioned("workspace")
 

@@ -11,7 +11,7 @@ from app.api.body import versioned
 from app.api.schemas import RobotId, refusals, robot_of, settings_of
 from app.api.workspace.flow import Flow
 from app.api.workspace.query import CloudQuery
-from app.formats import FORMATS, encode, table_of
+from app.exports.formats import FORMATS, encode, table_of
 
 router = versioned("workspace")
 

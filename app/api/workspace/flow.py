@@ -13,7 +13,7 @@ from starlette.responses import StreamingResponse
 from starlette.types import Receive, Scope, Send
 
 from app.api.work import busy
-from app.metrics import STREAMED
+from app.shared.metrics import STREAMED
 
 logger = logging.getLogger("kinboard.workspace")
 T = TypeVar("T")

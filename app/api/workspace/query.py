@@ -11,8 +11,8 @@ from starlette.datastructures import QueryParams
 
 from app.api.problems import FieldError, field_error, from_input_error, invalid, show
 from app.api.schemas import LARGEST, Body
-from app.clouds import Cloud
-from app.settings import Settings
+from app.shared.clouds import Cloud
+from app.shared.settings import Settings
 from kin import InputError, Robot
 from kin.workspace import Measure, Strategy
 from kin.workspace.region import Region

@@ -11,7 +11,6 @@ from pydantic import Discriminator, Field, Tag
 from pydantic_core import to_json
 from typing_extensions import TypedDict
 
-from app.answers import ReachableAnswer, documented, reachable_answer
 from app.api.asked import Asked, one_or_many
 from app.api.body import versioned
 from app.api.problems import Problem, ProblemError
@@ -19,6 +18,7 @@ from app.api.schemas import POST_REFUSALS, RobotId, example, reply, robot_of, se
 from app.api.targets import Target
 from app.api.work import Budget, BudgetDep
 from app.api.workspace.flow import Flow
+from app.shared.answers import ReachableAnswer, documented, reachable_answer
 from kin import Robot, Task, solve_ik
 from kin.transforms import Array
 

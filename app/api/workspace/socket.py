@@ -17,10 +17,10 @@ from app.api.body import versioned
 from app.api.problems import Problem, ProblemError, unknown_robot
 from app.api.workspace.flow import Pieces
 from app.api.workspace.query import read_cloud_query
-from app.clouds import Cloud
-from app.formats import slices, table_of
-from app.metrics import STREAMED
-from app.security import origin_allowed
+from app.exports.formats import slices, table_of
+from app.shared.clouds import Cloud
+from app.shared.metrics import STREAMED
+from app.shared.security import origin_allowed
 from kin import UnknownRobotError
 
 logger = logging.getLogger("kinboard.workspace")

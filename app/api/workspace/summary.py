@@ -14,13 +14,13 @@ from typing import Annotated
 from fastapi import Query, Request, Response
 from pydantic import Field
 
-from app.answers import WorkspaceAnswer, workspace_answer
 from app.api.body import versioned
 from app.api.problems import FieldError, invalid, show
 from app.api.schemas import RobotId, refusals, reply, robot_of
 from app.api.work import busy, work_of
 from app.api.workspace.query import NUMBER, RegionQuery, number
-from app.processor import spread
+from app.shared.answers import WorkspaceAnswer, workspace_answer
+from app.shared.processor import spread
 from kin import section, workspace_facts
 
 router = versioned("workspace")

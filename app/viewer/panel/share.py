@@ -10,7 +10,7 @@ from html import escape
 
 import viser
 
-from app.snippets import SNIPPETS, Moment
+from app.exports.snippets import SNIPPETS, Moment
 from app.viewer.panel import Post, assign, listen
 from kin import InputError
 

@@ -14,13 +14,13 @@ from itertools import count
 import numpy as np
 import viser
 
-from app.viewer import camera
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons.dh import page
 from app.viewer.lessons.dh.draw import OtherDrawing, WalkDrawing, aside
 from app.viewer.lessons.dh.steps import MOTIONS, ORDERS, length, place, value
-from app.viewer.meshes import body
 from app.viewer.panel import assign, listen
+from app.viewer.scene import camera
+from app.viewer.scene.meshes import body
 from kin import InputError, link_frames
 from kin.transforms import Array
 

@@ -12,10 +12,10 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from app.viewer.camera import DIRECTION
 from app.viewer.lessons.dh.page import ABOUT_X, ABOUT_Z, TITLES
 from app.viewer.lessons.dh.steps import Factor, Place, amount, axis, reread, shared_lines, symbol, turns
-from app.viewer.meshes import body, joint_color
+from app.viewer.scene.camera import DIRECTION
+from app.viewer.scene.meshes import body, joint_color
 from app.viewer.units import Units
 from kin import Robot
 from kin.transforms import Array, wxyz_from_rotation

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from html import escape
 
-from app.viewer import mathml as m
 from app.viewer.lessons.dh.steps import (
     LETTERS,
     MOVED,
@@ -24,6 +23,7 @@ from app.viewer.lessons.dh.steps import (
     verdict,
 )
 from app.viewer.units import Unit, Units
+from app.viewer.views import mathml as m
 from kin import Robot
 from kin.robot import Convention
 from kin.transforms import Array

@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from app.viewer.chain import rotation, translation
+from app.viewer.scene.chain import rotation, translation
 from app.viewer.units import Units
 from kin import Robot, link_frames
 from kin.axes import joint_axes, pairs

@@ -10,9 +10,9 @@ import numpy as np
 
 from app.equations import Book, Equation, Line, Symbol, Values, typeset
 from app.equations.expression import Expression, names
-from app.viewer.mathml import fixed
 from app.viewer.panel.status import ink
 from app.viewer.units import Units
+from app.viewer.views.mathml import fixed
 from kin.transforms import Array
 
 # Mark, words and colour of each verdict; the colours are Okabe and Ito's.

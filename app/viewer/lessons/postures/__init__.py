@@ -24,10 +24,10 @@ from app.viewer.lessons.postures.directions import has_cone, patch, reachable, s
 from app.viewer.lessons.postures.fixes import Fix, remedies
 from app.viewer.lessons.postures.ghosts import Ghosts
 from app.viewer.lessons.postures.listing import Posture, html, survey
-from app.viewer.meshes import body
 from app.viewer.panel import assign, listen, listen_click
 from app.viewer.panel.posture import short
 from app.viewer.panel.status import Notice
+from app.viewer.scene.meshes import body
 from kin import IKResult, InputError
 from kin.transforms import Array
 

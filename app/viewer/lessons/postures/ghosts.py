@@ -14,9 +14,9 @@ from functools import lru_cache
 import numpy as np
 import viser
 
-from app.viewer.chain import chain
 from app.viewer.lessons.postures.listing import BLOCKED_COLOR, COLORS, Posture
-from app.viewer.meshes import body
+from app.viewer.scene.chain import chain
+from app.viewer.scene.meshes import body
 from kin import Robot
 from kin.transforms import Array, frame_from_approach, wxyz_from_rotation
 

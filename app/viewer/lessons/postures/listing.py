@@ -15,13 +15,13 @@ from typing import Literal
 import numpy as np
 
 import kin
-from app.viewer.meshes import JOINT_COLORS, Color
 from app.viewer.panel.posture import parts, short
+from app.viewer.scene.meshes import JOINT_COLORS, Color
 from app.viewer.units import USUAL, Units
 from kin import IKSolution, LimitViolation, Robot, Task
-from kin.branches import is_closed, solve_branches, violations_of
-from kin.finish import OVERRUN
-from kin.question import ask
+from kin.ik.branches import is_closed, solve_branches, violations_of
+from kin.ik.candidates import OVERRUN
+from kin.ik.problem import ask
 from kin.transforms import Array
 
 State = Literal["reachable", "compromise", "blocked", "absent", "unknown"]

@@ -21,9 +21,9 @@ import kin
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons.redundancy import told
 from app.viewer.lessons.redundancy.ring import FLAT, arc_segments, coaxial, elbow_circle, trade_segments
-from app.viewer.meshes import JOINT_COLORS, body
 from app.viewer.panel import assign, listen
 from app.viewer.panel.status import Notice
+from app.viewer.scene.meshes import JOINT_COLORS, body
 from app.viewer.selfmotion import INSET, SMOOTH, End, ends, free_values, reach_of, self_motion
 from app.viewer.units import Units
 from kin import IKResult, InputError, Redundancy

@@ -13,8 +13,8 @@ import trimesh
 import viser
 
 from app.viewer.lessons.velocity.rates import Ellipsoid
-from app.viewer.meshes import body
-from app.viewer.shapes import cone, merged, placed, tube
+from app.viewer.scene.meshes import body
+from app.viewer.scene.shapes import cone, merged, placed, tube
 from kin import Robot
 from kin.transforms import Array, frame_from_approach, wxyz_from_rotation
 

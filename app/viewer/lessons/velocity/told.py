@@ -9,10 +9,10 @@ from html import escape
 import numpy as np
 
 from app.viewer.lessons.velocity.rates import Ellipsoid, State, TaskRates, condition, real, state_of
-from app.viewer.mathml import fixed, ident, sub, text
-from app.viewer.mathml import math as formula
 from app.viewer.panel.status import ink
 from app.viewer.units import Units
+from app.viewer.views.mathml import fixed, ident, sub, text
+from app.viewer.views.mathml import math as formula
 from kin import Robot, Singularity
 from kin.transforms import Array
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import viser
 
-from app.clouds import Cloud, Clouds, step_back
+from app.shared.clouds import Cloud, Clouds, step_back
 from app.viewer.panel import Post
 from app.viewer.tabs.workspace import known, plot
 from app.viewer.tabs.workspace.colours import radius_and_height

@@ -21,7 +21,7 @@ from app.viewer.units import Units
 from kin import Robot, WorkspaceChunk, workspace_slice
 from kin.transforms import Array
 from kin.workspace import Measure
-from kin.workspace.extremes import base_line
+from kin.workspace.facts.extremes import base_line
 from kin.workspace.region import Region
 
 By = Literal["radius", "height", "manipulability", "limits", "one"]

@@ -21,8 +21,8 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from app.clouds import Cloud, Clouds
-from app.viewer.camera import Sphere, round_points
+from app.shared.clouds import Cloud, Clouds
+from app.viewer.scene.camera import Sphere, round_points
 from app.viewer.tabs.workspace.colours import By, Bytes, Colour, measures, paint, quantity, scale_of
 from app.viewer.tabs.workspace.cut import Cut
 from kin import WorkspaceChunk

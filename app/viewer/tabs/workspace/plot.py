@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.picture import JOINT_COLOURS, png, ticks
-from app.viewer.mathml import fixed
+from app.exports.picture import JOINT_COLOURS, png, ticks
 from app.viewer.tabs.workspace.colours import radius_and_height
 from app.viewer.units import Unit, Units
+from app.viewer.views.mathml import fixed
 from kin import Robot, Section
 from kin.transforms import Array
 from kin.workspace import SectionArc

@@ -1,8 +1,9 @@
 """The workspace tab: what happens between its controls, the clouds in the picture, and what is told of them.
 
 The worker paints and sends one part of a cloud at a time, so a dragged arm never waits for more than one. All that
-takes longer happens in threads that post: parts are computed by :mod:`app.clouds`, sizes and sections once per
-arm, a clicked point is looked for in all parts again. A cloud has no configurations: its description and a point's
+takes longer happens in threads that post: parts are computed by :mod:`app.shared.clouds`, sizes and sections once
+per arm, a clicked point is looked for in all parts again. A cloud has no configurations: its description and a
+point's
 index give them exactly, whenever they are wanted.
 """
 
@@ -17,11 +18,11 @@ import numpy as np
 import viser
 
 import kin
-from app.clouds import Cloud
+from app.shared.clouds import Cloud
 from app.viewer.feature import Feature, Stage
-from app.viewer.motion import FRAME
 from app.viewer.panel import assign
 from app.viewer.panel.status import Notice
+from app.viewer.scene.motion import FRAME
 from app.viewer.tabs.workspace import colours, known, sizes, words
 from app.viewer.tabs.workspace.beside import Plotted, SectionPanel, beside
 from app.viewer.tabs.workspace.capability.folder import Capability

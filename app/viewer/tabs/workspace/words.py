@@ -10,7 +10,7 @@ import kin
 from app.viewer.units import Units
 from kin import Robot
 from kin.transforms import Array
-from kin.workspace.measures import measured
+from kin.workspace.clouds.measures import measured
 from kin.workspace.region import Region
 
 Locks = tuple[float | None, ...] | None

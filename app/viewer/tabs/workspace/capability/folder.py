@@ -1,7 +1,8 @@
 """The folder "Capability": what happens between its controls, the shared computation and the voxels.
 
-The map is computed by :mod:`app.maps`, once for all visitors who want the same. Here it is looked at a few times a
-second while it grows, and drawn anew when there is more of it. Everything is called by the visitor's worker.
+The map is computed by :mod:`app.shared.maps`, once for all visitors who want the same. Here it is looked at a few
+times a second while it grows, and drawn anew when there is more of it. Everything is called by the visitor's
+worker.
 """
 
 from __future__ import annotations
@@ -14,10 +15,10 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from app.maps import Reader, Wanted
-from app.viewer.camera import Sphere
+from app.shared.maps import Reader, Wanted
 from app.viewer.feature import Stage
 from app.viewer.panel import Post, assign, listen, listen_click
+from app.viewer.scene.camera import Sphere
 from app.viewer.tabs.workspace.capability import told
 from app.viewer.tabs.workspace.capability.voxels import LEVELS, Look, Voxels, mark
 from app.viewer.tabs.workspace.capability.wishes import BY, CHOICES, DIRECTIONS, SIZES, MapWishes

@@ -14,7 +14,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from app.viewer.shapes import box
+from app.viewer.scene.shapes import box
 from app.viewer.tabs.workspace.capability.wishes import By
 from app.viewer.tabs.workspace.colours import Scale, paint
 from app.viewer.tabs.workspace.cut import Cut

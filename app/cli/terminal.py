@@ -1,0 +1,86 @@
+"""What commands share: reading arguments as people type them, writing answers as people read them.
+
+People type and read degrees and millimetres, or radians and metres with ``--rad``; ``--json`` is always in the
+latter.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from argparse import Namespace
+from pathlib import Path
+from typing import Any
+
+from app.shared.store import Store
+from kin import InputError, Robot
+
+
+def store_of(arguments: Namespace) -> Store:
+    """The robots that ``--robots`` or the environment adds to the built-in ones, and those."""
+    folder = arguments.robots or os.environ.get("KINBOARD_ROBOTS")
+    return Store(Path(folder) if folder else None)
+
+
+def per_joint(robot: Robot, given: list[tuple[str, list[float]]] | None, field: str, count: int, rad: bool) -> Any:
+    """``--lock 2=30`` or ``--limit 2=0:30``, joints from 1, as one entry per joint in radians (metres)."""
+    if given is None:
+        return None
+    entries: list[float | list[float] | None] = [None] * robot.n
+    for joint, values in given:
+        if not joint.isdecimal() or not 1 <= int(joint) <= robot.n:
+            raise InputError(field, joint, f"a joint from 1 to {robot.n} before the =")
+        if len(values) != count:
+            raise InputError(field, values, "JOINT=VALUE" if count == 1 else "JOINT=LOWER:UPPER")
+        i = int(joint) - 1
+        scale = 1.0 if rad else math.pi / 180 if robot.revolute[i] else 1e-3
+        scaled = [value * scale for value in values]
+        entries[i] = scaled[0] if count == 1 else scaled
+    return entries
+
+
+class Units:
+    """How values are shown: degrees and millimetres, or radians and metres."""
+
+    def __init__(self, robot: Robot, rad: bool) -> None:
+        self.rad = rad
+        self.of_length = "m" if rad else "mm"
+        self._revolute: list[bool] = robot.revolute.tolist()
+
+    def angle(self, value: float) -> str:
+        """An angle given in radians."""
+        return f"{clean(value, 6)} rad" if self.rad else f"{clean(math.degrees(value), 3)}°"
+
+    def length(self, value: float) -> str:
+        """A length given in metres, without its unit."""
+        return clean(value, 6) if self.rad else clean(value * 1e3, 3)
+
+    def joint(self, index: int, value: float) -> str:
+        """The value of a joint."""
+        return self.angle(value) if self._revolute[index] else f"{self.length(value)} {self.of_length}"
+
+
+def table(head: list[str], rows: list[list[str]]) -> str:
+    """Columns under their heads, numbers to the right."""
+    lines = [head, *rows]
+    widths = [max(len(line[k]) for line in lines) for k in range(len(head))]
+    numeric = [all(not row[k] or row[k][:1] in "-0123456789" for row in rows) for k in range(len(head))]
+    return "\n".join(
+        "  ".join(
+            cell.rjust(width) if right else cell.ljust(width)
+            for cell, width, right in zip(line, widths, numeric, strict=True)
+        ).rstrip()
+        for line in lines
+    )
+
+
+def clean(value: float, digits: int) -> str:
+    """Fixed digits without a minus before zero."""
+    return f"{round(value, digits) + 0.0:.{digits}f}"
+
+
+def print_json(answer: object) -> int:
+    """Print an answer on one line; 0, the exit code."""
+    print(json.dumps(answer, ensure_ascii=False, allow_nan=False))
+    return 0

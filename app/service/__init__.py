@@ -1,0 +1,1 @@
+"""The running service: application, start-up and worker processes."""

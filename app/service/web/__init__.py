@@ -1,0 +1,1 @@
+"""The HTTP edge: static pages, access control, observation, path prefix and viewer proxy."""

@@ -1,0 +1,62 @@
+"""Our own pages and their files: the landing page, the API's documentation, everything in ``static/``.
+
+Every link in them is relative, so they work below any path prefix, and nothing comes from another host.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, RedirectResponse, Response
+from starlette.routing import BaseRoute, Mount, Route
+from starlette.staticfiles import StaticFiles
+from starlette.types import Scope
+
+from kin import __version__
+
+
+def static_folder() -> Path:
+    """Beside the package in a checkout, inside it once installed."""
+    package = Path(__file__).parents[2]
+    installed = package / "_static"
+    return installed if installed.is_dir() else package.parent / "static"
+
+
+def page_routes() -> list[BaseRoute]:
+    """``/``, ``/docs`` and ``/static``."""
+    folder = static_folder()
+    return [
+        Route("/", _html_page(folder / "index.html"), name="landing"),
+        Route("/docs", _html_page(folder / "docs.html"), name="docs"),
+        Route("/docs/", _without_slash),
+        Route("/favicon.ico", _favicon),
+        Mount("/static", _FreshStaticFiles(directory=folder), name="static"),
+    ]
+
+
+def _html_page(file: Path) -> Callable[[Request], Awaitable[Response]]:
+    body = file.read_text(encoding="utf-8").replace("{{version}}", __version__)
+
+    async def page(_: Request) -> Response:
+        return HTMLResponse(body, headers={"cache-control": "no-cache"})
+
+    return page
+
+
+async def _without_slash(_: Request) -> Response:
+    return RedirectResponse("../docs")
+
+
+async def _favicon(_: Request) -> Response:
+    return RedirectResponse("static/favicon.svg")
+
+
+class _FreshStaticFiles(StaticFiles):
+    """Browsers ask again each time (and get a 304), so that an upgrade shows at once."""
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        response = await super().get_response(path, scope)
+        response.headers.setdefault("cache-control", "no-cache")
+        return response

@@ -1,0 +1,263 @@
+"""One arm in a viser scene: nodes are made once, afterwards only poses are assigned.
+
+`ArmScene` needs a `viser.SceneApi` and nothing else, so it works on a visitor's private scene and, in tests, on
+a server that no browser ever visits.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import viser
+
+from app.viewer.quick import assign, keep_private
+from app.viewer.scene.chain import turn
+from app.viewer.scene.meshes import Part, body
+from app.viewer.scene.offer import Offer
+from kin import Robot, fk, link_frames
+from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
+
+SMALL = (
+    "trim",
+    "axis",
+    "approach",
+)  # their shadows would cost as much as those of the bodies, and nobody sees them
+STILL, NO_TURN = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
+SAME = 1e-9  # rad or m: a hundredth of what a browser's numbers tell apart
+GAP_COLOR = (213, 94, 0)
+GRID_LIGHT = {"cell_color": (214, 219, 226), "section_color": (176, 184, 196)}
+GRID_DARK = {"cell_color": (58, 64, 74), "section_color": (88, 96, 110)}
+
+
+class ArmScene:
+    """The nodes of one robot: arm, pedestal, floor, frames, target gizmo.
+
+    Not thread-safe: call it from the visitor's worker, inside ``client.atomic()``.
+
+    Args:
+        root: prefix of all node names. Use a new one for each arm of a scene: the browser keeps the pose of a
+            removed node and gives it to the next node of that name, whose own pose is not sent when it is zero.
+
+    Attributes:
+        gizmo: the transform controls; the visitor drags them, `place_gizmo` moves them. Where not every turn is
+            offered, it has arrows only, and a ring for each turn hangs on it (`offer`).
+    """
+
+    def __init__(self, scene: viser.SceneApi, robot: Robot, dark: bool = False, root: str = "/arm") -> None:
+        self.robot = robot
+        self._root = root
+        self.body = body(robot)
+        self._scene = scene
+        self._home_frames = link_frames(robot, robot.q_home)
+        self._joints: list[viser.SceneNodeHandle] = []
+        self._frames: list[viser.SceneNodeHandle] = []
+        self._labels: list[viser.SceneNodeHandle] = []
+        self._axes: list[viser.SceneNodeHandle] = []
+        self._shown = [math.nan] * robot.n
+        self._top: list[viser.SceneNodeHandle] = []
+        self._build_floor(dark)
+        self._build_arm()
+        self.gizmo = scene.add_transform_controls(
+            f"{root}-target", scale=0.26 * self.body.radius, line_width=4.0, depth_test=False, opacity=0.95
+        )
+        keep_private(self.gizmo)
+        self._ghost = self._add(f"{root}-target", self.body.gripper[0], opacity=0.35, visible=False)
+        self._gap = scene.add_line_segments(
+            f"{root}-gap",
+            np.zeros((1, 2, 3), np.float32),
+            GAP_COLOR,
+            thickness=3.0,
+            thickness_units="screen",
+            visible=False,
+        )
+        self._top += [self.gizmo, self._gap]
+        self._rings: list[viser.TransformControlsHandle] = []
+        self._offers = 0
+        self.show(robot.q_home)
+        self.place_gizmo(fk(robot, robot.q_home))
+
+    def show(self, q: Array) -> None:
+        """Pose every joint node for a configuration ``(n,)``; untouched joints cost nothing."""
+        shown = self._shown
+        for i, (link, node, value) in enumerate(
+            zip(self.body.chain.links[1:], self._joints, q.tolist(), strict=True)
+        ):
+            if abs(value - shown[i]) <= SAME:
+                continue
+            shown[i] = value
+            if link.joint is not None and link.joint.kind == "prismatic":
+                assign(node, position=link.pose(value)[0])
+            else:
+                assign(node, wxyz=turn(link.wxyz, value))
+
+    def place_gizmo(self, T_base_tool: Array) -> None:
+        """Move the gizmo. Never call it while the visitor holds it."""
+        assign(self.gizmo, T_base_tool[:3, 3], wxyz_from_rotation(T_base_tool[:3, :3]))
+        for ring in self._rings:
+            assign(ring, STILL, NO_TURN)
+
+    @property
+    def gizmo_pose(self) -> Array:
+        """Where the gizmo is ``(4, 4)``, its rings aside."""
+        return from_position_wxyz(self.gizmo.position, self.gizmo.wxyz)
+
+    def offer(self, offer: Offer) -> list[viser.TransformControlsHandle]:
+        """Give the gizmo these arrows and rings; returns the rings that are nodes of their own.
+
+        Those hang on the gizmo: their pose is told in its frame. One set of controls cannot leave out a single
+        ring, as a ring is drawn wherever both axes of its plane are active.
+        """
+        for ring in self._rings:
+            ring.remove()
+        self._offers += 1
+        some = any(offer.rings) and not (all(offer.rings) and all(offer.arrows))
+        self.gizmo.active_axes = offer.arrows
+        self.gizmo.disable_rotations = some or not any(offer.rings)
+        self._rings = [
+            self._scene.add_transform_controls(
+                f"{self.gizmo.name}/ring-{'xyz'[axis]}-{self._offers}",
+                scale=0.26 * self.body.radius,
+                line_width=4.0,
+                active_axes=(axis != 0, axis != 1, axis != 2),
+                disable_axes=True,
+                disable_sliders=True,
+                depth_test=False,
+                opacity=0.95,
+            )
+            for axis in range(3)
+            if some and offer.rings[axis]
+        ]
+        for ring in self._rings:
+            keep_private(ring)
+        return self._rings
+
+    def show_gap(self, tool: Array, target: Array | None) -> None:
+        """Draw a line and a ghost gripper from the tool point to an unreached target ``(3,)``; None hides them."""
+        self._gap.visible = self._ghost.visible = target is not None
+        if target is not None:
+            self._gap.points = np.array([[tool, target]], dtype=np.float32)
+
+    def show_frames(self, visible: bool) -> None:
+        """Show or hide the frame of every DH row."""
+        for node in self._frames:
+            node.visible = visible
+
+    def show_labels(self, visible: bool) -> None:
+        """Show or hide the names of the frames."""
+        for node in self._labels:
+            node.visible = visible
+
+    def show_axes(self, visible: bool) -> None:
+        """Show or hide the joint axes."""
+        for node in self._axes:
+            node.visible = visible
+
+    def show_floor(self, visible: bool) -> None:
+        """Show or hide the grid."""
+        self._grid.visible = visible
+
+    def use_dark(self, dark: bool) -> None:
+        """Grid colours for a dark or a light page."""
+        colors = GRID_DARK if dark else GRID_LIGHT
+        self._grid.cell_color, self._grid.section_color = colors["cell_color"], colors["section_color"]
+
+    def remove(self) -> None:
+        """Take everything out of the scene."""
+        for node in self._top:
+            node.remove()
+
+    def _build_floor(self, dark: bool) -> None:
+        unit = 0.1 if self.body.radius < 0.6 else 0.25
+        width = max(2, round(7 * self.body.radius / unit / 4)) * 4 * unit
+        colors: dict[str, Any] = GRID_DARK if dark else GRID_LIGHT
+        self._grid = self._scene.add_grid(
+            f"{self._root}-floor",
+            width=width,
+            height=width,
+            cell_size=unit,
+            section_size=4 * unit,
+            position=(0.0, 0.0, self.body.floor),
+            fade_distance=9 * self.body.radius,
+            fade_strength=1.5,
+            fade_from="origin",
+            shadow_opacity=0.2,
+            **colors,
+        )
+        self._top.append(self._grid)
+
+    def _build_arm(self) -> None:
+        root = self._scene.add_frame(self._root, show_axes=False)
+        self._top.append(root)
+        self._add(self._root, self.body.pedestal)
+        name = self._root
+        for link, parts, q in zip(self.body.chain.links, self.body.parts, (0.0, *self.robot.home), strict=True):
+            parent = name
+            if link.joint is not None:
+                name = f"{parent}/{link.index + 1}"
+                position, wxyz = link.pose(q)
+                self._joints.append(self._scene.add_frame(name, show_axes=False, position=position, wxyz=wxyz))
+            for part in parts:
+                # On the parent's node there may be a part of the same name already.
+                node = (
+                    self._add(parent, part, link.T_parent_axis, name=f"{part.name}-{link.index + 1}")
+                    if part.fixed_to_parent
+                    else self._add(name, part)
+                )
+                if part.name == "axis":
+                    self._axes.append(node)
+            for row, T in link.frames:
+                self._add_frame(name, row, T)
+        tool = self.body.chain.T_last_tool
+        for part in self.body.gripper:
+            self._add(name, part, tool)
+
+    def _add(
+        self,
+        parent: str,
+        part: Part,
+        T: Array | None = None,
+        opacity: float | None = None,
+        visible: bool = True,
+        name: str = "",
+    ) -> viser.SceneNodeHandle:
+        T = np.eye(4) if T is None else T
+        return self._scene.add_mesh_simple(
+            f"{parent}/{name or part.name}",
+            part.mesh.vertices,
+            part.mesh.faces,
+            color=part.color,
+            opacity=opacity,
+            position=T[:3, 3],
+            wxyz=wxyz_from_rotation(T[:3, :3]),
+            visible=visible,
+            cast_shadow=opacity is None and part.name not in SMALL,
+        )
+
+    def _add_frame(self, parent: str, row: int, T: Array) -> None:
+        length = 4.0 * self.body.size
+        name = f"{parent}/frame-{row + 1}"
+        self._frames.append(
+            self._scene.add_frame(
+                name,
+                axes_length=length,
+                axes_radius=0.09 * self.body.size,
+                position=T[:3, 3],
+                wxyz=wxyz_from_rotation(T[:3, :3]),
+                visible=False,
+            )
+        )
+        text = f"frame {row + 1}" if row + 1 < len(self.robot.rows) else "tool"
+        # At the tip of z, not at the origin, and each further out: the frames of one wrist share their origin.
+        origins = self._home_frames[:, :3, 3]
+        crowd = int((np.linalg.norm(origins[:row] - origins[row], axis=1) < 1e-6).sum())
+        self._labels.append(
+            self._scene.add_label(
+                f"{name}/label",
+                text,
+                position=(0.0, 0.0, (1.15 + 0.6 * crowd) * length),
+                anchor="center-center",
+                visible=True,
+            )
+        )

@@ -1,0 +1,267 @@
+"""Bodies for any arm, made from its DH geometry alone.
+
+Each link is a smooth tube along its DH centre line. Each joint is a coloured housing around its axis, and how it
+sits tells how it moves:
+
+- a **hinge** (the link leaves at right angles to the axis) is a drum across the arm;
+- a **roll** joint (the link leaves along the axis) is a collar round the tube;
+- a **slide** (prismatic) is a square sleeve with a square bar through it.
+
+Wrists and shoulders put several joints on one point. There a collar moves outward along its own axis until it
+clears its neighbour, and each further drum is slimmer and longer than the one before, like nested gimbals.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import trimesh
+
+from app.viewer.scene.chain import Chain, Link, chain
+from app.viewer.scene.shapes import ball, box, cone, cylinder, merged, placed, tube
+from kin import Robot, link_frames
+from kin.transforms import Array
+
+Color = tuple[int, int, int]
+
+# Okabe and Ito's palette, which stays distinguishable with any colour vision; ordered for contrast between
+# neighbours along the arm.
+JOINT_COLORS: tuple[Color, ...] = (
+    (0, 114, 178),
+    (230, 159, 0),
+    (0, 158, 115),
+    (204, 121, 167),
+    (86, 180, 233),
+    (213, 94, 0),
+    (240, 228, 66),
+)
+LINK_COLOR: Color = (214, 218, 224)
+TRIM_COLOR: Color = (58, 64, 74)
+TOOL_COLOR: Color = (92, 99, 112)
+APPROACH_COLOR: Color = (214, 39, 120)
+PEDESTAL_COLOR: Color = (126, 134, 147)
+PROBES = 8000
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One mesh of one colour, in the coordinates of the node it hangs on.
+
+    `fixed_to_parent` puts it on the previous link, in this joint's axis frame: a sleeve that a bar slides through.
+    """
+
+    name: str
+    mesh: trimesh.Trimesh
+    color: Color
+    fixed_to_parent: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """Everything drawn of a robot.
+
+    Attributes:
+        chain: the nodes.
+        parts: per link (base first), its meshes.
+        gripper: the tool's meshes in the tool frame, z being the approach direction.
+        pedestal: what carries the base, in world coordinates.
+        floor: height of the floor (m), below everything the arm can reach.
+        center, radius: a sphere ``(3,)``, m that the camera should show.
+        size: radius of the thickest link (m), the unit of all decoration.
+    """
+
+    chain: Chain
+    parts: tuple[tuple[Part, ...], ...]
+    gripper: tuple[Part, ...]
+    pedestal: Part
+    floor: float
+    center: Array
+    radius: float
+    size: float
+
+
+@lru_cache(maxsize=32)
+def body(robot: Robot) -> Body:
+    """The robot's body; the same object for every visitor."""
+    links = chain(robot)
+    size = _thickness(robot, links)
+    grip = _grip_length(links, size, robot)
+    tip = _tip(links, size)
+    parts = []
+    crowd = 0
+    for link in links.links:
+        crowd = crowd + 1 if link.index > 0 and np.linalg.norm(link.T_parent_axis[:3, 3]) < 1e-6 else 0
+        held = grip if all(len(after.path) < 2 for after in links.links[link.index + 2 :]) else 0.0
+        parts.append(_link_parts(link, size * _taper(link.index, robot.n, tip), crowd, held, links))
+    reach = _extent(robot)
+    floor = min(reach[0][2] - 2.5 * size, robot.T_world_base[2, 3] - 3 * size)
+    floor = math.floor(floor / 0.05) * 0.05
+    center, radius = _view_sphere(robot, floor, size)
+    hand = _gripper(min(size, grip / 2), grip)
+    pedestal = _pedestal(robot, size, floor)
+    return Body(links, tuple(parts), hand, pedestal, floor, center, radius, size)
+
+
+def joint_color(index: int) -> Color:
+    """The colour of a moving joint, by its number."""
+    return JOINT_COLORS[index % len(JOINT_COLORS)]
+
+
+def _thickness(robot: Robot, links: Chain) -> float:
+    """Tube radius: a fixed share of the reach, but no thicker than short links allow."""
+    steps = [np.linalg.norm(np.diff(link.path, axis=0), axis=1) for link in links.links]
+    lengths = np.concatenate([*steps, [robot.reach]])
+    size = max(robot.reach, 0.05)
+    shortest = float(lengths[lengths > 0.04 * size].min(initial=robot.reach))  # a shorter step is only a jog
+    return max(min(0.032 * size, 0.3 * shortest), 0.014 * size)
+
+
+def _tip(links: Chain, size: float) -> float:
+    """Thickness of the last link as a share of the first: slim enough for a flange close to the wrist."""
+    path = links.links[-1].path
+    if len(path) < 2:
+        return 0.62
+    return min(0.62, 0.27 * float(np.linalg.norm(path[1] - path[0])) / size)
+
+
+def _taper(index: int, n: int, tip: float) -> float:
+    return 1.0 - (1.0 - tip) * max(index, 0) / max(n - 1, 1)
+
+
+def _grip_length(links: Chain, size: float, robot: Robot) -> float:
+    path = links.links[-1].path
+    wanted = min(3.2 * size, 0.11 * max(robot.reach, 0.05))
+    if len(path) < 2:
+        strokes = [j.limits[1] - j.limits[0] for j in robot.joints if j.kind == "prismatic" and j.limits]
+        return min(wanted, 0.4 * min(strokes, default=math.inf))  # room to leave the sleeve it hangs from
+    return min(wanted, 0.62 * float(np.linalg.norm(path[-1] - path[-2])))
+
+
+def _link_parts(link: Link, r: float, crowd: int, grip: float, links: Chain) -> tuple[Part, ...]:
+    """A link's meshes. `grip` is the gripper's length if nothing but the gripper follows, 0 otherwise."""
+    path = link.path
+    if grip > 0.0 and len(path) > 1 and link is links.links[-1]:
+        step = path[-1] - path[-2]
+        length = float(np.linalg.norm(step))
+        if step @ links.T_last_tool[:3, 2] > 0.9 * length:  # the gripper takes the place of the tube's end
+            path = np.vstack([path[:-1], path[-1] - step / length * min(grip, 0.95 * length)])
+    parts = [Part("link", tube(path, r), LINK_COLOR)] if len(path) > 1 else []
+    if link.joint is None:
+        return tuple(parts)
+    color = joint_color(link.index)
+    if link.joint.kind == "prismatic":
+        return (*parts, *_slide(link, r, color, grip))
+    along = _leaves_along(link)
+    if along:
+        middle = 0.85 * r + (1.75 * r if crowd else 0.15 * r)
+        if link is links.links[-1]:  # the fingers stay free
+            middle = max(min(middle, float(np.linalg.norm(link.path[1])) - 0.45 * grip - 0.85 * r), 0.85 * r)
+        return (*parts, *_collar(r, along, along * middle, color))
+    ahead = float(links.T_last_tool[2, 2])
+    if grip > 0.0 and len(path) < 2 and link is links.links[-1] and abs(ahead) > 0.9:
+        # The joint turns the gripper about the gripper's own axis: its collar sits behind the gripper.
+        return (*parts, *_collar(r, 1, -math.copysign(grip + 0.7 * r, ahead), color))
+    return (*parts, *_drum(r, crowd, color))
+
+
+def _leaves_along(link: Link) -> int:
+    """+1 or −1 when the link leaves its joint along the axis, 0 for a hinge."""
+    if len(link.path) < 2:
+        return 0
+    step = link.path[1] - link.path[0]
+    share = float(step[2] / np.linalg.norm(step))
+    return int(math.copysign(1, share)) if abs(share) > 0.9 else 0
+
+
+def _drum(r: float, crowd: int, color: Color) -> list[Part]:
+    radius, half = r * 1.62 * 0.8**crowd, r * 1.6 * 1.32**crowd
+    caps = merged([cylinder(0.72 * radius, s * half - 0.1 * r, s * half + 0.1 * r) for s in (-1.0, 1.0)])
+    mark = box((radius * 0.6, -0.16 * r, -0.82 * half), (radius * 1.06, 0.16 * r, 0.82 * half))
+    return [
+        Part("housing", cylinder(radius, -half, half), color),
+        Part("trim", merged([caps, mark]), TRIM_COLOR),
+        Part("axis", _axis(r, -half - 1.5 * r, half + 2.1 * r), color),
+    ]
+
+
+def _collar(r: float, along: int, middle: float, color: Color) -> list[Part]:
+    """A collar around a height of the axis; the link leaves upward or downward."""
+    radius, half = r * 1.42, r * 0.85
+    rims = [cylinder(radius * 1.06, middle + s * half - 0.13 * r, middle + s * half + 0.13 * r) for s in (-1, 1)]
+    mark = box((radius * 0.8, -0.16 * r, middle - 0.8 * half), (radius * 1.07, 0.16 * r, middle + 0.8 * half))
+    # The tube hides the axis on one side; it shows behind the joint, and through the collar as its rims.
+    behind = -along * 3.4 * r
+    return [
+        Part("housing", cylinder(radius, middle - half, middle + half), color),
+        Part("trim", merged([*rims, mark]), TRIM_COLOR),
+        Part("axis", _axis(r, min(behind, 0.0), max(behind, 0.0), arrow=along < 0), color),
+    ]
+
+
+def _slide(link: Link, r: float, color: Color, grip: float) -> list[Part]:
+    """A sleeve, and a bar so long that it is in the sleeve at both ends of the stroke."""
+    assert link.joint is not None
+    low, high = link.joint.limits or (0.0, 8 * r)
+    bar = 0.75 * r
+    back, front = -max(high, 0.0) - 1.2 * r, -min(low, 0.0) + (1.2 * r if grip == 0.0 else -0.9 * grip)
+    return [
+        Part("link-bar", box((-bar, -bar, back), (bar, bar, front)), LINK_COLOR),
+        Part("housing", box((-1.3 * r, -1.3 * r, -r), (1.3 * r, 1.3 * r, r)), color, fixed_to_parent=True),
+        Part("axis", _axis(r, front, front + 2.4 * r), color),
+    ]
+
+
+def _axis(r: float, low: float, high: float, arrow: bool = True) -> trimesh.Trimesh:
+    """A thin rod along z whose arrow head tells which way is positive."""
+    rod = cylinder(0.13 * r, low, high)
+    return merged([rod, cone(0.38 * r, high - 0.2 * r, high + 0.8 * r)]) if arrow else rod
+
+
+def _gripper(size: float, grip: float) -> tuple[Part, ...]:
+    w = 0.62 * size  # half the opening
+    t = 0.2 * size
+    palm = box((-w - 2 * t, -0.5 * size, -0.78 * grip), (w + 2 * t, 0.5 * size, -0.5 * grip))
+    flange = cylinder(0.8 * size, -grip, -0.78 * grip)
+    fingers = [
+        box((min(a, b), -0.34 * size, -0.5 * grip), (max(a, b), 0.34 * size, 0.0))
+        for a, b in ((w, w + 1.4 * t), (-w, -w - 1.4 * t))
+    ]
+    arrow = merged([cylinder(0.11 * size, 0.0, 2.2 * size), cone(0.34 * size, 2.1 * size, 3.1 * size)])
+    return (
+        Part("gripper", merged([flange, palm, *fingers]), TOOL_COLOR),
+        Part("approach", merged([ball(0.2 * size), arrow]), APPROACH_COLOR),
+    )
+
+
+def _pedestal(robot: Robot, size: float, floor: float) -> Part:
+    base = robot.T_world_base
+    top = float(base[2, 3])
+    plate = placed(cylinder(2.3 * size, -0.9 * size, 0.0), base)
+    x, y = base[:2, 3]
+    foot = np.eye(4)
+    foot[:3, 3] = x, y, 0.0
+    column = [
+        cylinder(1.45 * size, floor, top - 0.4 * size, bevel=0.02),
+        cylinder(3.6 * size, floor, floor + 0.5 * size),
+    ]
+    return Part("pedestal", merged([plate, *(placed(part, foot) for part in column)]), PEDESTAL_COLOR)
+
+
+def _extent(robot: Robot) -> Array:
+    """Lowest and highest coordinates ``(2, 3)`` that any frame of the arm reaches, by a fixed sample."""
+    q = robot.random_q(np.random.default_rng(7), PROBES)
+    points = link_frames(robot, q)[..., :3, 3].reshape(-1, 3)
+    return np.array([points.min(axis=0), points.max(axis=0)])
+
+
+def _view_sphere(robot: Robot, floor: float, size: float) -> tuple[Array, float]:
+    """A sphere round the arm at home and most of its pedestal."""
+    points = [robot.T_world_base[:3, 3], *link_frames(robot, robot.q_home)[:, :3, 3]]
+    points.append(np.array([*robot.T_world_base[:2, 3], 0.55 * floor]))
+    corners = np.array([np.min(points, axis=0), np.max(points, axis=0)])
+    center = corners.mean(axis=0)
+    radius = max(float(np.linalg.norm(np.array(points) - center, axis=1).max()) + 3 * size, 0.5 * robot.reach)
+    return center, radius

@@ -1,0 +1,1 @@
+"""One visitor: the controller, its worker thread and inbox, and what a link restores."""

@@ -1,0 +1,122 @@
+"""The thin call: all branches of a closed form as a plain array, and nothing else.
+
+:func:`kin.solve_ik` answers a question: limits, ranges, a seed, an order, a sentence. Who wants joint values at
+the rate of a control loop, or for a million targets, asks here: no limits, no order, no verification. A solver
+offers it with ``params(geometry)``, a flat array, and two kernels: ``branches_one``, and ``branches_many`` or,
+where a value may differ from target to target, ``branches_each``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kin.errors import InputError
+from kin.kernels import fk as fk_kernels
+from kin.kernels.compile import direct
+from kin.robot import Robot
+from kin.solvers import solver_for
+from kin.transforms import Array, finite_array
+
+_FLOAT = np.dtype(np.float64)
+_POSE = (4, 4)
+_CACHE = "_thin"
+_empty, _isinf, _ndarray = np.empty, math.isinf, np.ndarray
+
+
+class _Thin(NamedTuple):
+    """What a call needs of an arm: compiled functions without guard, and their constant arguments."""
+
+    one: Callable[[Array, Array, float, Array, Array], bool | None]
+    many: Callable[[Array, Array, Any, Array, Array], None]
+    each: bool
+    params: Array
+    near: Array
+    shape: tuple[int, int]
+
+    def __reduce__(self) -> tuple[type[None], tuple[()]]:
+        """Machine code cannot be pickled: the copy of an arm prepares itself anew."""
+        return type(None), ()
+
+
+def ik_branches(robot: Robot, target: ArrayLike, redundancy: ArrayLike = math.nan) -> Array:
+    """All closed-form branches ``(..., branches, n)`` for poses T_base_tool ``(..., 4, 4)``, radians (metres).
+
+    Row i is branch i of :func:`kin.branch_names`, NaN where it does not exist; where two have merged, both rows
+    hold the same joints. Angles are in (−π, π], but for a joint whose value is asked for. Limits are not asked for
+    and nothing is verified; a rotation is taken to be one. Of an arm with five joints the roll about the tool's z
+    axis is whatever it is.
+
+    Args:
+        robot: an arm with a closed form.
+        target: one pose, or any batch of them.
+        redundancy: value of the arm's first free parameter (θ1 or the arm angle ψ, radians), one for all targets
+            or one for each; NaN leaves it near the home configuration. So is what a singularity leaves free.
+
+    Raises:
+        InputError: an arm without closed form, a target or a redundancy that is no array of finite numbers of that
+            shape (a redundancy may be NaN).
+    """
+    thin = robot.__dict__.get(_CACHE) or _prepare(robot)
+    if type(target) is _ndarray and target.dtype is _FLOAT and target.flags.c_contiguous:
+        T = target
+        if T.shape == _POSE and type(redundancy) is float and not _isinf(redundancy):
+            out = _empty(thin.shape)
+            finite = thin.one(thin.params, T, redundancy, thin.near, out)
+            if finite or (finite is None and _finite(T.reshape(-1))):  # some kernels do not say
+                return out
+    else:
+        T = finite_array("target", target, _POSE)
+    if T.shape[-2:] != _POSE or not _finite(T.reshape(-1)):
+        finite_array("target", target, _POSE)
+    value = _redundancy(redundancy, T.shape[:-2])
+    out = np.empty((*T.shape[:-2], *thin.shape))
+    targets, rows = T.reshape(-1, 4, 4), out.reshape(-1, *thin.shape)
+    if thin.each or len(value) == 1:
+        thin.many(thin.params, targets, value if thin.each else value.item(), thin.near, rows)
+    else:
+        for one, own, row in zip(targets, value.tolist(), rows, strict=True):
+            thin.one(thin.params, one, own, thin.near, row)
+    return out
+
+
+def _prepare(robot: Robot) -> _Thin:
+    match = solver_for(robot)
+    if match is None:
+        raise InputError("robot", robot.id, "an arm with a closed form")
+    solver: Any = match.solver
+    each = getattr(solver, "branches_each", None)
+    # A family whose value may differ from target to target needs no second kernel for one that does not.
+    many = (solver.branches_many, 1, 3, float, 1, 3) if each is None else (each, 1, 3, 1, 1, 3)
+    thin = _Thin(
+        direct(solver.branches_one, 1, 2, float, 1, 2),
+        direct(*many),
+        each is not None,
+        solver.params(match.geometry),
+        robot.q_home.copy(),
+        (len(solver.BRANCHES), robot.n),
+    )
+    robot.__dict__[_CACHE] = thin
+    return thin
+
+
+def _redundancy(value: ArrayLike, shape: tuple[int, ...]) -> Array:
+    """One value ``(1,)``, or one for each target, flat; NaN is allowed."""
+    try:
+        values = np.asarray(value)
+        if values.dtype.kind not in "biuf":
+            raise TypeError
+        values = (values if values.ndim == 0 else np.broadcast_to(values, shape)).astype(np.float64).reshape(-1)
+    except (TypeError, ValueError):
+        raise InputError("redundancy", value, f"one number, or numbers of shape {shape}") from None
+    if np.isinf(values).any():
+        raise InputError("redundancy", value, "finite numbers, or NaN")
+    return values
+
+
+def _finite(values: Array) -> bool:
+    return bool(fk_kernels.all_finite(values))

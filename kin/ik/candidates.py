@@ -1,0 +1,211 @@
+"""One compiled pass over raw candidates: images inside the limits, residuals by FK, distances to the seed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kin.kernels.compile import jit
+from kin.kernels.fk import fk_into
+from kin.solvers.common import APPROACH, MASK, POSE, TURN, nearest_image, relative_pose, wrap
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+Flags = NDArray[np.bool_]
+Whole = NDArray[np.int64]
+_POSITION = TOLERANCES.closure_position
+_ROTATION = TOLERANCES.closure_rotation
+_LIMIT = TOLERANCES.limit
+_MERGE = TOLERANCES.merge
+POSITION_ERROR, ROTATION_ERROR, DISTANCE, OVERRUN, ROLL = range(5)
+
+
+@jit
+def residuals(T: Array, target: Array, task: int, mask: Array, e: Array) -> tuple[float, float, float]:
+    """(position error, rotation error of the task, roll about the target's approach axis), m and rad.
+
+    Of a mask only its coordinates count; e ``(6,)`` is scratch.
+    """
+    if task == MASK:
+        relative_pose(T, target, mask[6] == 0.0, e)
+        for i in range(6):
+            e[i] *= mask[i]
+        position = math.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
+        return position, math.sqrt(e[3] * e[3] + e[4] * e[4] + e[5] * e[5]), 0.0
+    p = 0.0
+    chord = 0.0
+    trace = 0.0
+    for r in range(3):
+        p += (T[r, 3] - target[r, 3]) ** 2
+        for c in range(3):
+            chord += (T[r, c] - target[r, c]) ** 2
+            trace += T[r, c] * target[r, c]
+    # |R − S|_F = 2√2 sin(θ/2) and 1 + tr = 4 cos²(θ/2): exact from 0 to π.
+    angle = 2.0 * math.atan2(math.sqrt(chord / 8.0), 0.5 * math.sqrt(max(0.0, 1.0 + trace)))
+    ax, ay, az = T[0, 2], T[1, 2], T[2, 2]
+    bx, by, bz = target[0, 2], target[1, 2], target[2, 2]
+    x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    tilt = math.atan2(math.sqrt(x * x + y * y + z * z), ax * bx + ay * by + az * bz)
+    nx, ny, nz = target[0, 0], target[1, 0], target[2, 0]
+    across = T[0, 0] * (by * nz - bz * ny) + T[1, 0] * (bz * nx - bx * nz) + T[2, 0] * (bx * ny - by * nx)
+    roll = math.atan2(across, T[0, 0] * nx + T[1, 0] * ny + T[2, 0] * nz)
+    rotation = angle if task == POSE else (tilt if task == APPROACH else 0.0)
+    return math.sqrt(p), rotation, roll
+
+
+@jit
+def finish(
+    model: Array, target: Array, task: int, mask: Array, near: Array, seed: Array, lower: Array, upper: Array,
+    turns: Array, respect: bool, q: Array, stats: Array,
+) -> None:  # fmt: skip
+    """Bring each row of q ``(k, n)`` to its best image, in place, and fill stats ``(k, 5)``; NaN rows stay NaN.
+
+    The best image is inside the limits and nearest to `near`; the distance is told from `seed`. `turns` is 2π for
+    a joint that has images and 0 for one that has none.
+    """
+    T = np.empty((4, 4))
+    e = np.empty(6)
+    for k in range(q.shape[0]):
+        if math.isnan(q[k, 0]):
+            for i in range(stats.shape[1]):
+                stats[k, i] = math.nan
+            continue
+        distance = 0.0
+        overrun = 0.0
+        for i in range(q.shape[1]):
+            x = q[k, i]
+            low, high = (lower[i], upper[i]) if respect else (-math.inf, math.inf)
+            if turns[i] > 0.0:
+                x = nearest_image(x, near[i], low, high)
+            if x < lower[i]:
+                if lower[i] - x <= _LIMIT:
+                    x = lower[i]
+                else:
+                    overrun += lower[i] - x
+            elif x > upper[i]:
+                if x - upper[i] <= _LIMIT:
+                    x = upper[i]
+                else:
+                    overrun += x - upper[i]
+            q[k, i] = x
+            distance += (x - seed[i]) ** 2
+        fk_into(model, q[k], T)
+        stats[k, 0], stats[k, 1], stats[k, 4] = residuals(T, target, task, mask, e)
+        stats[k, 2] = math.sqrt(distance)
+        stats[k, 3] = overrun
+
+
+@jit
+def judge(stats: Array, respect: bool, closed: Flags, good: Flags) -> int:
+    """closed, good ``(k,)`` ← which rows meet the task, and which are inside the limits too; returns how many."""
+    count = 0
+    for k in range(stats.shape[0]):
+        closed[k] = stats[k, POSITION_ERROR] <= _POSITION and stats[k, ROTATION_ERROR] <= _ROTATION
+        good[k] = closed[k] and (stats[k, OVERRUN] == 0.0 or not respect)
+        if good[k]:
+            count += 1
+    return count
+
+
+@jit
+def ranges(arcs: Array, rows: Whole, together: Flags, circular: bool, out: Array) -> int:
+    """out ``(m, 3)`` ← rows (k, low, high): the intervals of branch rows[k], sorted and joined, then those of all
+    branches in `together` (k = len(rows)); returns their number, or −1 if an end is not finite.
+
+    On a circle they are told in (−π, π], one across the seam as two, the whole of it as one.
+    """
+    n = rows.shape[0]
+    total = 0
+    for k in range(n + 1):
+        first = total
+        for i in range(arcs.shape[0]):
+            branch = int(arcs[i, 0])
+            if (k < n and branch != rows[k]) or (k == n and not together[branch]):
+                continue
+            low, high = arcs[i, 1], arcs[i, 2]
+            if not (math.isfinite(low) and math.isfinite(high)):
+                return -1
+            if not circular:
+                total = _put(out, k, first, total, low, high)
+            elif high - low >= TURN - 1e-12:
+                total = _put(out, k, first, total, -math.pi, math.pi)
+            else:
+                start = wrap(low)
+                end = start + (high - low)
+                total = _put(out, k, first, total, start, min(end, math.pi))
+                if end > math.pi:
+                    total = _put(out, k, first, total, -math.pi, end - TURN)
+    return total
+
+
+@jit
+def _put(out: Array, k: int, first: int, total: int, low: float, high: float) -> int:
+    """Insert an interval into the sorted, disjoint ones out[first:total], joining what it touches."""
+    i = first
+    while i < total and out[i, 2] < low - 1e-12:
+        i += 1
+    j = i
+    while j < total and out[j, 1] <= high + 1e-12:
+        low, high = min(low, out[j, 1]), max(high, out[j, 2])
+        j += 1
+    if j == i:
+        for r in range(total, i, -1):
+            out[r, 1], out[r, 2] = out[r - 1, 1], out[r - 1, 2]
+        out[total, 0] = k
+        total += 1
+    else:
+        for r in range(j, total):
+            out[r - (j - i - 1), 1], out[r - (j - i - 1), 2] = out[r, 1], out[r, 2]
+        total -= j - i - 1
+    out[i, 0], out[i, 1], out[i, 2] = k, low, high
+    return total
+
+
+@jit
+def select(q: Array, key: Array) -> tuple[Whole, int]:
+    """Rows of q ``(k, n)`` with a finite key, by rising key, equal ones once: (rows, count); uses up `key`."""
+    kept = np.empty(q.shape[0], dtype=np.int64)
+    count = 0
+    for _ in range(q.shape[0]):
+        i = -1
+        for k in range(q.shape[0]):
+            if math.isfinite(key[k]) and (i < 0 or key[k] < key[i]):
+                i = k
+        if i < 0:
+            break
+        key[i] = math.inf
+        new = True
+        for k in range(count):
+            gap = 0.0
+            for j in range(q.shape[1]):
+                gap = max(gap, abs(q[i, j] - q[kept[k], j]))
+            if gap <= _MERGE:
+                new = False
+                break
+        if new:
+            kept[count] = i
+            count += 1
+    return kept, count
+
+
+@jit
+def settle(
+    model: Array, target: Array, task: int, mask: Array, near: Array, seed: Array, lower: Array, upper: Array,
+    turns: Array, respect: bool, q: Array, stats: Array, closed: Flags, good: Flags, order: Whole,
+) -> int:  # fmt: skip
+    """`finish`, `judge`, and order ← the good rows as `select` takes them, nearest to the seed first: how many.
+
+    Every target goes through this, and a call from Python costs as much as a row does.
+    """
+    finish(model, target, task, mask, near, seed, lower, upper, turns, respect, q, stats)
+    if judge(stats, respect, closed, good) == 0:
+        return 0
+    key = np.empty(q.shape[0])
+    for k in range(q.shape[0]):
+        key[k] = stats[k, DISTANCE] if good[k] else math.inf
+    kept, count = select(q, key)
+    for k in range(count):
+        order[k] = kept[k]
+    return count

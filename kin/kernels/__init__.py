@@ -1,0 +1,1 @@
+"""Compiled loops: compilation and caching, vectorised trigonometry, forward kinematics, input checks."""

@@ -1,0 +1,45 @@
+"""The check every target goes through, compiled: it costs less than one call of numpy."""
+
+from __future__ import annotations
+
+from kin.kernels.compile import jit
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+_SLACK = TOLERANCES.rotation_matrix
+
+
+@jit
+def straighten(T: Array, far: float, out: Array) -> bool:
+    """out ← the rigid transform T ``(4, 4)``, its rotation re-orthonormalised; False if T is none, or `far` away.
+
+    What `kin.transforms.as_transform` does, without telling what is wrong.
+    """
+    for r in range(4):
+        for c in range(4):
+            out[r, c] = T[r, c]
+            if not abs(T[r, c]) <= far or (r < 3 and c < 3 and abs(T[r, c]) > 2.0):
+                return False
+            if r == 3 and abs(T[r, c] - (1.0 if c == 3 else 0.0)) > _SLACK:
+                return False
+    if out[3, 3] != 1.0 or out[3, 0] != 0.0 or out[3, 1] != 0.0 or out[3, 2] != 0.0:
+        out[3, 0], out[3, 1], out[3, 2], out[3, 3] = 0.0, 0.0, 0.0, 1.0
+    for step in range(2):
+        # The Gram matrix RᵀR of the columns, then one Newton step of the polar decomposition: R (3 − RᵀR)/2.
+        xx = out[0, 0] * out[0, 0] + out[1, 0] * out[1, 0] + out[2, 0] * out[2, 0]
+        yy = out[0, 1] * out[0, 1] + out[1, 1] * out[1, 1] + out[2, 1] * out[2, 1]
+        zz = out[0, 2] * out[0, 2] + out[1, 2] * out[1, 2] + out[2, 2] * out[2, 2]
+        xy = out[0, 0] * out[0, 1] + out[1, 0] * out[1, 1] + out[2, 0] * out[2, 1]
+        xz = out[0, 0] * out[0, 2] + out[1, 0] * out[1, 2] + out[2, 0] * out[2, 2]
+        yz = out[0, 1] * out[0, 2] + out[1, 1] * out[1, 2] + out[2, 1] * out[2, 2]
+        if step == 0 and max(abs(xx - 1.0), abs(yy - 1.0), abs(zz - 1.0), abs(xy), abs(xz), abs(yz)) > _SLACK:
+            return False
+        for r in range(3):
+            x, y, z = out[r, 0], out[r, 1], out[r, 2]
+            out[r, 0] = 1.5 * x - 0.5 * (x * xx + y * xy + z * xz)
+            out[r, 1] = 1.5 * y - 0.5 * (x * xy + y * yy + z * yz)
+            out[r, 2] = 1.5 * z - 0.5 * (x * xz + y * yz + z * zz)
+    x = out[1, 1] * out[2, 2] - out[2, 1] * out[1, 2]
+    y = out[1, 0] * out[2, 2] - out[2, 0] * out[1, 2]
+    z = out[1, 0] * out[2, 1] - out[2, 0] * out[1, 1]
+    return bool(out[0, 0] * x - out[0, 1] * y + out[0, 2] * z > 0.0)

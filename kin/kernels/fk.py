@@ -1,0 +1,471 @@
+"""Compiled loops on plain arrays: forward kinematics, link frames, Jacobian, manipulability.
+
+Every kernel is serial, releases the GIL, keeps no state and caches its machine code on disk, so any number of
+threads may call at once. The arm comes as one flat float64 array (`Robot.model`):
+
+====================  =======================================================================
+``model[0:3]``        number of rows, number of joints, 1.0 if the convention is modified
+``model[3:15]``       base transform, three rows of four
+``model[15:27]``      tool transform, three rows of four
+``model[27+8i: …]``   row i: θ, d, a, cos α, sin α, kind (0 fixed, 1 revolute, 2 prismatic), index into q, 0
+====================  =======================================================================
+
+One row costs two plane rotations of the running rotation matrix's columns instead of a 4×4 product: rotating
+about z mixes the x and y columns, rotating about x mixes y and z, translations add a multiple of a column.
+
+Batches go through in blocks of `BLOCK` configurations, laid out entry by entry (all x's, then all y's, …), so that
+one vector instruction serves several configurations. The operations and their order are those of one configuration
+alone: a batch gives the same bits.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kin.kernels.compile import inlined, jit
+from kin.kernels.simd import WIDE, sin_cos, widest
+from kin.transforms import Array
+
+BLOCK = 64
+# Where a block keeps what: BLOCK values each.
+_SIN, _COS, _D, _ANGLE, _T0, _T1, _T2, _T3, _T4, _T5, _T6, _T7, _T8, _T9, _T10, _T11, _SPACE = range(
+    0, 17 * BLOCK, BLOCK
+)
+_HEADER = 27
+_WIDTH = 8
+
+
+@inlined
+def sine_cosine(angle: float) -> tuple[float, float]:
+    """(sin, cos) of any angle; the library's where the polynomials would lose digits."""
+    if abs(angle) <= WIDE:
+        return sin_cos(angle)
+    return math.sin(angle), math.cos(angle)
+
+
+@jit
+def all_finite(values: Array) -> bool:
+    """Whether an array ``(k,)`` holds neither NaN nor infinities."""
+    bad = 0
+    for i in range(values.shape[0]):
+        bad += 0 if abs(values[i]) < math.inf else 1
+    return bad == 0
+
+
+@jit
+def all_finite_pose(T: Array) -> bool:
+    """Whether the entries of a 4×4 array are neither NaN nor infinite."""
+    bad = 0
+    for r in range(4):
+        for c in range(4):
+            bad += 0 if abs(T[r, c]) < math.inf else 1
+    return bad == 0
+
+
+@jit
+def _turn_z(T: Array, s: float, c: float, d: float) -> None:
+    """T ← T · Rz(θ) Tz(d), on the three rows that move."""
+    for r in range(3):
+        x = T[r, 0]
+        y = T[r, 1]
+        T[r, 0] = c * x + s * y
+        T[r, 1] = c * y - s * x
+        T[r, 3] += d * T[r, 2]
+
+
+@jit
+def _turn_x(T: Array, a: float, ca: float, sa: float) -> None:
+    """T ← T · Tx(a) Rx(α), on the three rows that move."""
+    for r in range(3):
+        y = T[r, 1]
+        z = T[r, 2]
+        T[r, 1] = ca * y + sa * z
+        T[r, 2] = ca * z - sa * y
+        T[r, 3] += a * T[r, 0]
+
+
+@jit
+def _load(T: Array, model: Array, start: int) -> None:
+    for r in range(3):
+        for c in range(4):
+            T[r, c] = model[start + 4 * r + c]
+    T[3, 0] = 0.0
+    T[3, 1] = 0.0
+    T[3, 2] = 0.0
+    T[3, 3] = 1.0
+
+
+@jit
+def copy_pose(T: Array, out: Array) -> None:
+    """out ← T for 4×4 arrays; written out, as numba takes seconds to compile an array assignment."""
+    for r in range(4):
+        for c in range(4):
+            out[r, c] = T[r, c]
+
+
+@inlined
+def _x_part(model: Array, i: int) -> tuple[float, float, float]:
+    """(a, cos α, sin α) of row i; of the row after the last, nothing."""
+    if i >= int(model[0]):
+        return 0.0, 1.0, 0.0
+    k = _HEADER + _WIDTH * i
+    return model[k + 2], model[k + 3], model[k + 4]
+
+
+@inlined
+def _turn(
+    x: float, y: float, z: float, p: float, s: float, c: float, d: float, a: float, ca: float, sa: float
+) -> tuple[float, float, float, float]:
+    """One row of T · Rz(θ) Tz(d) Tx(a) Rx(α)."""
+    p += d * z
+    u = c * x + s * y
+    y = c * y - s * x
+    return u, ca * y + sa * z, ca * z - sa * y, p + a * u
+
+
+@inlined
+def _z_part(model: Array, i: int, q: Array) -> tuple[float, float, float]:
+    """(sin θ, cos θ, d) of row i."""
+    k = _HEADER + _WIDTH * i
+    theta = model[k]
+    d = model[k + 1]
+    kind = model[k + 5]
+    if kind == 1.0:
+        theta += q[int(model[k + 6])]
+    elif kind == 2.0:
+        d += q[int(model[k + 6])]
+    s, c = sine_cosine(theta)
+    return s, c, d
+
+
+@jit
+def _start(model: Array, T: Array) -> int:
+    """T ← what is before the first z part; returns by how many rows the x part is ahead of the z part it joins.
+
+    A modified row is x before z. Taking the z part of each row together with the x part of the next, both
+    conventions are one loop.
+    """
+    _load(T, model, 3)
+    if model[2] == 0.0:
+        return 0
+    _turn_x(T, model[_HEADER + 2], model[_HEADER + 3], model[_HEADER + 4])
+    return 1
+
+
+Rows = tuple[float, float, float, float, float, float, float, float, float, float, float, float]
+
+
+@inlined
+def _before(model: Array, ahead: int) -> Rows:
+    """The three rows of what is before the first z part, as `_start`, but held in registers.
+
+    Reading back from memory what has just been written there costs as much as the rest of the arm.
+    """
+    x0, y0, z0, p0 = model[3], model[4], model[5], model[6]
+    x1, y1, z1, p1 = model[7], model[8], model[9], model[10]
+    x2, y2, z2, p2 = model[11], model[12], model[13], model[14]
+    if ahead == 1:
+        a, ca, sa = _x_part(model, 0)
+        x0, y0, z0, p0 = _turn(x0, y0, z0, p0, 0.0, 1.0, 0.0, a, ca, sa)
+        x1, y1, z1, p1 = _turn(x1, y1, z1, p1, 0.0, 1.0, 0.0, a, ca, sa)
+        x2, y2, z2, p2 = _turn(x2, y2, z2, p2, 0.0, 1.0, 0.0, a, ca, sa)
+    return x0, y0, z0, p0, x1, y1, z1, p1, x2, y2, z2, p2
+
+
+@inlined
+def _with_tool(model: Array, rows: Rows, T: Array) -> None:
+    """T ← the three rows · tool."""
+    x0, y0, z0, p0, x1, y1, z1, p1, x2, y2, z2, p2 = rows
+    for k in range(3):
+        u, v, w = model[15 + k], model[19 + k], model[23 + k]
+        T[0, k] = x0 * u + y0 * v + z0 * w
+        T[1, k] = x1 * u + y1 * v + z1 * w
+        T[2, k] = x2 * u + y2 * v + z2 * w
+        T[3, k] = 0.0
+    u, v, w = model[18], model[22], model[26]
+    T[0, 3] = p0 + (x0 * u + y0 * v + z0 * w)
+    T[1, 3] = p1 + (x1 * u + y1 * v + z1 * w)
+    T[2, 3] = p2 + (x2 * u + y2 * v + z2 * w)
+    T[3, 3] = 1.0
+
+
+@jit
+def fk_into(model: Array, q: Array, T: Array) -> None:
+    """T ← T_base_tool(q) for one configuration ``(n,)``; T is ``(4, 4)``."""
+    ahead = 0 if model[2] == 0.0 else 1
+    x0, y0, z0, p0, x1, y1, z1, p1, x2, y2, z2, p2 = _before(model, ahead)
+    for i in range(int(model[0])):
+        k = _HEADER + _WIDTH * i
+        theta, d = model[k], model[k + 1]
+        if model[k + 5] == 1.0:
+            theta += q[int(model[k + 6])]
+        elif model[k + 5] == 2.0:
+            d += q[int(model[k + 6])]
+        # `_z_part` written out: called, it doubles the time of the loop.
+        if abs(theta) <= WIDE:
+            s, c = sin_cos(theta)
+        else:
+            s, c = math.sin(theta), math.cos(theta)
+        a, ca, sa = _x_part(model, i + ahead)
+        x0, y0, z0, p0 = _turn(x0, y0, z0, p0, s, c, d, a, ca, sa)
+        x1, y1, z1, p1 = _turn(x1, y1, z1, p1, s, c, d, a, ca, sa)
+        x2, y2, z2, p2 = _turn(x2, y2, z2, p2, s, c, d, a, ca, sa)
+    _with_tool(model, (x0, y0, z0, p0, x1, y1, z1, p1, x2, y2, z2, p2), T)
+
+
+@jit
+def fk_one(model: Array, q: Array, T: Array) -> bool:
+    """T ← T_base_tool ``(4, 4)`` of one configuration; False if q is not n finite numbers."""
+    if q.shape[0] != int(model[1]):
+        return False
+    fk_into(model, q, T)
+    return math.isfinite(T[0, 3])  # a NaN or an infinity anywhere in q reaches every entry of the position
+
+
+@inlined
+def _joint_block(model: Array, i: int, q: Array, first: int, count: int, S: Array) -> int:
+    """S ← sin θ, cos θ, d of row i for a block of configurations; returns how many are not finite."""
+    k = _HEADER + _WIDTH * i
+    theta, d, kind, j = model[k], model[k + 1], model[k + 5], int(model[k + 6])
+    widest()
+    wide = 0
+    bad = 0
+    if kind == 1.0:
+        for b in range(count):
+            S[_ANGLE + b] = theta + q[first + b, j]
+        for b in range(count):
+            angle = S[_ANGLE + b]
+            wide += 0 if abs(angle) <= WIDE else 1
+            s, c = sin_cos(angle)
+            S[_SIN + b] = s
+            S[_COS + b] = c
+            S[_D + b] = d
+        if wide > 0:
+            for b in range(count):
+                angle = S[_ANGLE + b]
+                S[_SIN + b], S[_COS + b] = sine_cosine(angle)
+                bad += 0 if abs(angle) < math.inf else 1
+    else:
+        s, c = sine_cosine(theta)
+        for b in range(count):
+            S[_SIN + b] = s
+            S[_COS + b] = c
+            S[_D + b] = d + (q[first + b, j] if kind == 2.0 else 0.0)
+            bad += 0 if abs(S[_D + b]) < math.inf else 1
+    return bad
+
+
+@jit
+def fk_many(model: Array, q: Array, out: Array) -> bool:
+    """out ← T_base_tool ``(k, 4, 4)`` of configurations ``(k, n)``; False if any of them is not finite."""
+    widest()
+    S = np.empty(_SPACE)
+    T = np.empty((4, 4))
+    ahead = _start(model, T)
+    bad = 0
+    for first in range(0, q.shape[0], BLOCK):
+        count = min(BLOCK, q.shape[0] - first)
+        for r in range(3):
+            for c in range(4):
+                for b in range(count):
+                    S[_T0 + (4 * r + c) * BLOCK + b] = T[r, c]
+        for i in range(int(model[0])):
+            bad += _joint_block(model, i, q, first, count, S)
+            a, ca, sa = _x_part(model, i + ahead)
+            for b in range(count):
+                s, c, d = S[_SIN + b], S[_COS + b], S[_D + b]
+                x, y, z, p = _turn(S[_T0 + b], S[_T1 + b], S[_T2 + b], S[_T3 + b], s, c, d, a, ca, sa)
+                S[_T0 + b], S[_T1 + b], S[_T2 + b], S[_T3 + b] = x, y, z, p
+                x, y, z, p = _turn(S[_T4 + b], S[_T5 + b], S[_T6 + b], S[_T7 + b], s, c, d, a, ca, sa)
+                S[_T4 + b], S[_T5 + b], S[_T6 + b], S[_T7 + b] = x, y, z, p
+                x, y, z, p = _turn(S[_T8 + b], S[_T9 + b], S[_T10 + b], S[_T11 + b], s, c, d, a, ca, sa)
+                S[_T8 + b], S[_T9 + b], S[_T10 + b], S[_T11 + b] = x, y, z, p
+        for b in range(count):
+            for r in range(3):
+                x = S[_T0 + 4 * r * BLOCK + b]
+                y = S[_T1 + 4 * r * BLOCK + b]
+                z = S[_T2 + 4 * r * BLOCK + b]
+                for c in range(3):
+                    out[first + b, r, c] = x * model[15 + c] + y * model[19 + c] + z * model[23 + c]
+                out[first + b, r, 3] = S[_T3 + 4 * r * BLOCK + b] + (x * model[18] + y * model[22] + z * model[26])
+            out[first + b, 3, 0] = 0.0
+            out[first + b, 3, 1] = 0.0
+            out[first + b, 3, 2] = 0.0
+            out[first + b, 3, 3] = 1.0
+    return bad == 0
+
+
+@jit
+def positions_many(model: Array, q: Array, out: Array) -> bool:
+    """out ← tool points ``(k, 3)`` of configurations ``(k, n)``; False if any of them is not finite.
+
+    From the tool backwards: a row then moves one point instead of a frame.
+    """
+    widest()
+    X, Y, Z = _T0, _T1, _T2
+    S = np.empty(_SPACE)
+    T = np.empty((4, 4))
+    ahead = _start(model, T)
+    bad = 0
+    for first in range(0, q.shape[0], BLOCK):
+        count = min(BLOCK, q.shape[0] - first)
+        for b in range(count):
+            S[X + b] = model[18]
+            S[Y + b] = model[22]
+            S[Z + b] = model[26]
+        for i in range(int(model[0]) - 1, -1, -1):
+            bad += _joint_block(model, i, q, first, count, S)
+            a, ca, sa = _x_part(model, i + ahead)
+            for b in range(count):
+                s = S[_SIN + b]
+                c = S[_COS + b]
+                x = S[X + b] + a
+                y = ca * S[Y + b] - sa * S[Z + b]
+                z = sa * S[Y + b] + ca * S[Z + b]
+                S[X + b] = c * x - s * y
+                S[Y + b] = s * x + c * y
+                S[Z + b] = z + S[_D + b]
+        for b in range(count):
+            for r in range(3):
+                out[first + b, r] = T[r, 0] * S[X + b] + T[r, 1] * S[Y + b] + T[r, 2] * S[Z + b] + T[r, 3]
+    return bad == 0
+
+
+@jit
+def _apply_row(T: Array, model: Array, i: int, q: Array) -> None:
+    """T ← T · A_i, as its convention has it."""
+    s, c, d = _z_part(model, i, q)
+    a, ca, sa = _x_part(model, i)
+    if model[2] == 0.0:
+        _turn_z(T, s, c, d)
+        _turn_x(T, a, ca, sa)
+    else:
+        _turn_x(T, a, ca, sa)
+        _turn_z(T, s, c, d)
+
+
+@jit
+def frames_many(model: Array, q: Array) -> Array:
+    """Frames after each row ``(k, rows, 4, 4)`` of configurations ``(k, n)``; the tool is not applied."""
+    rows = int(model[0])
+    out = np.empty((q.shape[0], rows, 4, 4))
+    T = np.empty((4, 4))
+    for j in range(q.shape[0]):
+        _load(T, model, 3)
+        for i in range(rows):
+            _apply_row(T, model, i, q[j])
+            copy_pose(T, out[j, i])
+    return out
+
+
+@jit
+def jacobian_into(model: Array, q: Array, J: Array, T: Array, axes: Array) -> None:
+    """J ← geometric Jacobian ``(6, n)`` in the base frame, T ← T_base_tool; `axes` ``(n, 7)`` is scratch.
+
+    A joint's axis is the z axis its own Rz/Tz acts along, the same line before and after.
+    """
+    ahead = 0 if model[2] == 0.0 else 1
+    x0, y0, z0, p0, x1, y1, z1, p1, x2, y2, z2, p2 = _before(model, ahead)
+    for i in range(int(model[0])):
+        k = _HEADER + _WIDTH * i
+        j = int(model[k + 6])
+        if j >= 0:
+            axes[j, 0], axes[j, 1], axes[j, 2] = z0, z1, z2
+            axes[j, 3], axes[j, 4], axes[j, 5] = p0, p1, p2
+            axes[j, 6] = model[k + 5]
+        s, c, d = _z_part(model, i, q)
+        a, ca, sa = _x_part(model, i + ahead)
+        x0, y0, z0, p0 = _turn(x0, y0, z0, p0, s, c, d, a, ca, sa)
+        x1, y1, z1, p1 = _turn(x1, y1, z1, p1, s, c, d, a, ca, sa)
+        x2, y2, z2, p2 = _turn(x2, y2, z2, p2, s, c, d, a, ca, sa)
+    _with_tool(model, (x0, y0, z0, p0, x1, y1, z1, p1, x2, y2, z2, p2), T)
+    for j in range(int(model[1])):
+        zx, zy, zz = axes[j, 0], axes[j, 1], axes[j, 2]
+        if axes[j, 6] == 1.0:
+            rx, ry, rz = T[0, 3] - axes[j, 3], T[1, 3] - axes[j, 4], T[2, 3] - axes[j, 5]
+            J[0, j] = zy * rz - zz * ry
+            J[1, j] = zz * rx - zx * rz
+            J[2, j] = zx * ry - zy * rx
+            J[3, j] = zx
+            J[4, j] = zy
+            J[5, j] = zz
+        else:
+            J[0, j] = zx
+            J[1, j] = zy
+            J[2, j] = zz
+            J[3, j] = 0.0
+            J[4, j] = 0.0
+            J[5, j] = 0.0
+
+
+@jit
+def jacobian_one(model: Array, q: Array, J: Array) -> bool:
+    """J ← geometric Jacobian ``(6, n)`` in the base frame; False if q is not n finite numbers."""
+    if q.shape[0] != int(model[1]):
+        return False
+    T = np.empty((4, 4))
+    jacobian_into(model, q, J, T, np.empty((q.shape[0], 7)))
+    return math.isfinite(T[0, 3])  # as in `fk_one`
+
+
+@jit
+def jacobian_many(model: Array, q: Array) -> Array:
+    """Geometric Jacobians ``(k, 6, n)`` in the base frame of configurations ``(k, n)``."""
+    n = int(model[1])
+    out = np.empty((q.shape[0], 6, n))
+    T = np.empty((4, 4))
+    axes = np.empty((n, 7))
+    for i in range(q.shape[0]):
+        jacobian_into(model, q[i], out[i], T, axes)
+    return out
+
+
+@jit
+def volume_of(A: Array) -> float:
+    """Product of the singular values of A ``(m, k)``, m ≥ k, by Householder QR; A is overwritten."""
+    m, k = A.shape
+    product = 1.0
+    for j in range(k):
+        scale = 0.0
+        for i in range(j, m):
+            scale = max(scale, abs(A[i, j]))
+        if scale == 0.0:
+            return 0.0
+        norm2 = 0.0
+        for i in range(j, m):
+            A[i, j] /= scale
+            norm2 += A[i, j] * A[i, j]
+        norm = math.sqrt(norm2)
+        product *= norm * scale
+        head = A[j, j]
+        pivot = head + math.copysign(norm, head)
+        A[j, j] = pivot
+        half = norm2 + abs(head) * norm
+        for c in range(j + 1, k):
+            dot = 0.0
+            for i in range(j, m):
+                dot += A[i, j] * A[i, c]
+            dot /= half
+            for i in range(j, m):
+                A[i, c] -= dot * A[i, j]
+    return product
+
+
+@jit
+def manipulability_many(J: Array, first: int, last: int) -> Array:
+    """Product of the singular values of rows first…last−1 of Jacobians ``(k, 6, n)``: ``(k,)``."""
+    rows = last - first
+    n = J.shape[2]
+    out = np.empty(J.shape[0])
+    tall = np.empty((max(rows, n), min(rows, n)))
+    for i in range(J.shape[0]):
+        for r in range(rows):
+            for c in range(n):
+                if rows > n:
+                    tall[r, c] = J[i, first + r, c]
+                else:
+                    tall[c, r] = J[i, first + r, c]
+        out[i] = volume_of(tall)
+    return out

@@ -1,0 +1,1 @@
+"""Capability maps: from which directions each voxel can be approached."""

@@ -1,0 +1,1 @@
+"""Point clouds of tool positions, drawn reproducibly slice by slice."""

@@ -1,0 +1,1 @@
+"""Sizes of a workspace: bounding box, reach, holes, volume and surface."""

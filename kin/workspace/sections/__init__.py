@@ -1,0 +1,1 @@
+"""Planar sections through a workspace and their boundary curves."""

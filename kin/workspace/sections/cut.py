@@ -1,0 +1,215 @@
+"""A cut through the workspace, with the curves that bound it.
+
+The nodes of a grid in the plane are asked whether the tool reaches them (:mod:`kin.workspace.facts.atlas`), and
+on each edge with one end inside the boundary is closed in on. From outside, the nearest reachable point and the
+direction
+to it give the tangent of the boundary: where it meets the edge, a little outside, is the next place to look,
+halfway where that leads nowhere. Seen from near by, the tangent is the boundary. It is never looked at from nearer
+than needed: descents are slow where the tool just does not reach its target.
+
+Without a plane the section is that in (r, z), distance from joint 1's line and height along it, whatever joint 1
+does: the cut of a half-plane through the line with the body that a joint 1 without stops would sweep.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kin.errors import InputError
+from kin.fk import fk_positions
+from kin.ik.problem import Limits, Locks
+from kin.robot import Robot
+from kin.transforms import Array, finite_array
+from kin.workspace.facts.atlas import Atlas, atlas
+from kin.workspace.facts.extremes import base_line
+from kin.workspace.region import Region, whole
+from kin.workspace.results import Section
+from kin.workspace.sections.arcs import arcs_of
+from kin.workspace.sections.contour import Edge, Flags, enclosed, ends, loops
+
+_EXACT = 1e-6  # of a cube's side
+# Parts of a square's side. From this near, the tangent tells the boundary this far aside: to a part of some 1e-5.
+_NEAR, _ASIDE = 0.04, 0.1
+_NARROW = 1e-4  # of a square's side
+_ROUNDS = 16
+_DOUBTS = 64  # descents from all over for a node in a hole
+ALIKE = 3
+
+
+def section(
+    robot: Robot,
+    plane: tuple[ArrayLike, ArrayLike] | None = None,
+    *,
+    limits: Limits | None = None,
+    locked: Locks | None = None,
+    resolution: int = 96,
+) -> Section:
+    """The cut of the workspace with a plane, and its boundary.
+
+    Args:
+        robot: the arm.
+        plane: a point (m) and a normal of it; None for the section in (r, z) of an arm whose joint 1 turns.
+        limits, locked: as in `kin.solve_ik`. Of an (r, z) section those of joint 1 do not matter.
+        resolution: squares along the longer side of the plane's window, 8 to 1000.
+
+    Raises:
+        InputError: naming the wrong argument.
+    """
+    region = Region.of(robot, limits, locked)
+    count = whole("resolution", resolution, 8, 1000, "a whole number from 8 to 1000")
+    if plane is None:
+        if robot.joints[0].kind != "revolute":
+            raise InputError("plane", None, f"a point and a normal: joint 1 of {robot.id} slides")
+        return profile(region, count)
+    if not isinstance(plane, Sequence) or len(plane) != 2:
+        raise InputError("plane", plane, "a point and a normal, three numbers each")
+    origin, normal = finite_array("plane[0]", plane[0], (3,)), finite_array("plane[1]", plane[1], (3,))
+    length = float(np.linalg.norm(normal))
+    if origin.ndim != 1 or normal.ndim != 1 or not length > 0.0:
+        raise InputError("plane", plane, "a point and a normal, three numbers each, the normal not zero")
+    u, v = _axes(normal / length)
+    return _cut(atlas(region), origin, u, v, -math.inf, count)
+
+
+def opened(region: Region) -> Region:
+    """The same region with joint 1 free to turn all the way."""
+    return replace(region, bounds=((-math.pi, math.pi), *region.bounds[1:]))
+
+
+def profile(region: Region, resolution: int) -> Section:
+    """The section in (r, z)."""
+    point, axis, _ = base_line(region)
+    u, _ = _axes(axis)
+    turning = opened(region)
+    found = _cut(atlas(turning), point - axis * (point @ axis), u, axis, 0.0, resolution)
+    return replace(found, arcs=arcs_of(turning, found))
+
+
+def _axes(normal: Array) -> tuple[Array, Array]:
+    """Two unit vectors of the plane; upright planes have v upwards, level ones u along x."""
+    if abs(normal[2]) < 0.9:
+        v = np.array([0.0, 0.0, 1.0]) - normal[2] * normal
+        v /= np.linalg.norm(v)
+        u = np.cross(v, normal)
+    else:
+        u = np.array([1.0, 0.0, 0.0]) - normal[0] * normal
+        u /= np.linalg.norm(u)
+        v = np.cross(normal, u)
+    return u, v
+
+
+def _cut(found: Atlas, origin: Array, u: Array, v: Array, least: float, resolution: int) -> Section:
+    """The section in the plane through `origin`, where s is not below `least`."""
+    corners = np.concatenate([found.corners[found.occupied], found.corners[found.occupied] + found.edge]) - origin
+    s, t = corners @ u, corners @ v
+    low, high = np.array([max(s.min(), least), t.min()]), np.array([s.max(), t.max()])
+    step = float((high - low).max()) / resolution
+    if not step > 0.0:
+        return Section(origin, u, v, (), (), 0.0, 0.0)
+    # The first column of nodes of an (r, z) section stands on the line itself, so that r is not cut off at a
+    # square.
+    first = low - step
+    shape = np.ceil((high - low) / step).astype(int) + 3
+    s, t = first[0] + step * np.arange(shape[0]), first[1] + step * np.arange(shape[1])
+    places = np.stack(np.meshgrid(s, t, indexing="ij"), axis=-1)
+    q, distance = _ask_nodes(found, origin, u, v, places, least)
+    inside = distance <= _EXACT * found.size
+    curves = tuple(_on_boundary(found, origin, u, v, places, inside, q, loop, least) for loop in loops(inside))
+    area = sum(_area(curve) for curve in curves)
+    for curve in curves:
+        curve.flags.writeable = False
+    return Section(origin, u, v, curves, (), area, step)
+
+
+def _ask_nodes(
+    found: Atlas, origin: Array, u: Array, v: Array, places: Array, least: float
+) -> tuple[Array, Array]:
+    """The nearest configuration ``(a, b, n)`` of every node ``(a, b, 2)`` and its distance ``(a, b)``."""
+    a, b, _ = places.shape
+    p = origin + places[..., :1] * u + places[..., 1:] * v
+    q, distance = found.nearest(p.reshape(-1, 3), _EXACT * found.size, ALIKE)
+    q, distance = q.reshape(a, b, -1), distance.reshape(a, b)
+    out = places[..., 0] < least
+    exact = _EXACT * found.size
+
+    def again(where: Flags, guess: Array, alike: int = 1) -> None:
+        i, j = np.nonzero(where)
+        near, d = found.nearest(p[i, j], exact, alike, guess[i, j])
+        better = d < distance[i, j]
+        q[i[better], j[better]], distance[i[better], j[better]] = near[better], d[better]
+
+    def ask_neighbours() -> None:
+        for axis, by in ((0, 1), (0, -1), (1, 1), (1, -1)):
+            again((distance > exact) & (np.roll(distance, by, axis) <= exact) & ~out, np.roll(q, by, axis))
+
+    # A node said to be missed is tried again from the neighbours that are reached, one in a hole from all over.
+    ask_neighbours()
+    ask_neighbours()
+    distance[out] = math.inf
+    holes = enclosed(distance <= exact)
+    if holes.any():
+        starts = found.seeds[found.occupied].reshape(-1, q.shape[-1])
+        for k in range(_DOUBTS):
+            doubtful = holes & (distance > exact)
+            start = starts[k * len(starts) // _DOUBTS]
+            again(doubtful, np.broadcast_to(start, q.shape))
+        ask_neighbours()
+        distance[out] = math.inf
+    return q, distance
+
+
+def _on_boundary(
+    found: Atlas, origin: Array, u: Array, v: Array, places: Array, inside: Flags, q: Array, loop: list[Edge],
+    least: float,
+) -> Array:  # fmt: skip
+    """The boundary's points ``(k, 2)`` on the edges that a loop crosses."""
+    pairs = [ends(edge, inside) for edge in loop]
+    a = np.array([places[i] for i, _ in pairs])
+    way = np.array([places[o] for _, o in pairs]) - a
+    from_inside = np.array([q[i] for i, _ in pairs])
+    step = float(np.abs(way[0]).max())
+    # Parts of the way from a: reached, missed, where to look next, and what the tangent says.
+    reached, missed, ahead = np.zeros(len(a)), np.ones(len(a)), np.ones(len(a))
+    answer = np.full(len(a), 0.5)
+    # The line itself bounds an (r, z) section: there is nothing beyond it to be missed.
+    beyond = a[:, 0] + way[:, 0] < least
+    answer[beyond] = ((least - a[:, 0]) / np.where(beyond, way[:, 0], 1.0))[beyond]
+    open_ = np.flatnonzero(~beyond)
+    for _ in range(_ROUNDS):
+        if not len(open_):
+            break
+        at = a[open_] + ahead[open_, None] * way[open_]
+        p = origin + at[:, :1] * u + at[:, 1:] * v
+        near, distance = found.nearest(p, _EXACT * found.size, 2, from_inside[open_])
+        hit = distance <= _EXACT * found.size
+        seen = np.isfinite(distance) & ~hit
+        reached[open_[hit]], missed[open_[~hit]] = ahead[open_[hit]], ahead[open_[~hit]]
+        from_inside[open_[hit]] = near[hit]
+        answer[open_] = ahead[open_] = 0.5 * (reached + missed)[open_]
+        out = np.where(
+            seen[:, None], p - fk_positions(found.region.robot, np.where(seen[:, None], near, 0.0)), 0.0
+        )
+        fall = np.einsum("kr,kr->k", out, way[open_, :1] * u + way[open_, 1:] * v)
+        meets = missed[open_] - distance**2 / np.where(fall > 0.0, fall, math.nan)
+        good = seen & (meets >= reached[open_])
+        answer[open_[good]] = meets[good]
+        aside = np.linalg.norm((at - out @ np.stack([u, v], axis=1)) - (a + answer[:, None] * way)[open_], axis=1)
+        ahead[open_[good]] = np.minimum(meets[good] + 0.5 * _NEAR, ahead[open_[good]])
+        near_by = good & (distance <= _NEAR * step) & (aside <= _ASIDE * step)
+        done = near_by | ((missed - reached)[open_] < _NARROW)
+        open_ = open_[~done]
+    curve = a + answer[:, None] * way
+    # Of a stretch of the line itself only the ends are told.
+    on_line = beyond & np.roll(beyond, 1) & np.roll(beyond, -1)
+    return np.ascontiguousarray(curve[~on_line])
+
+
+def _area(curve: Array) -> float:
+    """Area that a closed polyline ``(k, 2)`` goes round counterclockwise."""
+    s, t = curve.T
+    return 0.5 * float((s * np.roll(t, -1) - t * np.roll(s, -1)).sum())

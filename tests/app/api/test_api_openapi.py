@@ -1,0 +1,104 @@
+"""REST: what /openapi.json promises is what the service does."""
+
+import json
+
+import pytest
+
+from app.exports.formats import FORMATS
+from app.shared.answers import FkAnswer, IkAnswer, JacobianAnswer, ReachableAnswer
+
+
+@pytest.fixture(scope="session")
+def document(app):
+    return json.loads(json.dumps(app.openapi(), allow_nan=False))
+
+
+def operations(document):
+    for path, item in document["paths"].items():
+        if path.startswith("/api/"):
+            for method, operation in item.items():
+                yield path, method, operation
+
+
+def test_every_operation_has_summary_description_and_documented_refusals(document):
+    seen = 0
+    for path, method, operation in operations(document):
+        seen += 1
+        assert operation["summary"]
+        assert operation["description"]
+        assert "200" in operation["responses"]
+        expected = {"500"} | ({"404", "422"} if "{robot_id}" in path else set())
+        expected |= {"400", "413", "415"} if method == "post" else set()
+        assert expected <= set(operation["responses"])
+        for status, response in operation["responses"].items():
+            if status[0] in "45":
+                assert list(response["content"]) == ["application/problem+json"]
+                schema = response["content"]["application/problem+json"]["schema"]
+                assert schema == {"$ref": "#/components/schemas/Problem"}
+    assert seen == 12
+
+
+def test_every_parameter_is_described_and_a_cloud_has_all_its_formats(document):
+    described = 0
+    for path, _, operation in operations(document):
+        for parameter in operation.get("parameters", []):
+            assert parameter["description"], f"{path} {parameter['name']}"
+            described += 1
+    assert described > 15
+    cloud = document["paths"]["/api/v1/robots/{robot_id}/workspace"]["get"]
+    assert set(cloud["responses"]["200"]["content"]) == {kind.media_type for kind in FORMATS.values()}
+    (asked,) = [p["schema"]["enum"] for p in cloud["parameters"] if p["name"] == "format"]
+    assert asked == list(FORMATS)
+    assert "503" in cloud["responses"]
+
+
+def test_every_field_is_described(document):
+    described = 0
+    for name, schema in document["components"]["schemas"].items():
+        if name in ("Alive", "Readiness"):  # the service's own state, not ours
+            continue
+        assert schema["description"], name
+        for field, details in schema["properties"].items():
+            assert details.get("description"), f"{name}.{field}"
+            described += 1
+    assert described > 60
+
+
+def test_a_quantity_says_its_unit(document):
+    schemas = document["components"]["schemas"]
+    for name, field in [
+        *(("Pose", "position"), ("Pose", "matrix"), ("Solution", "q"), ("Solution", "position_error")),
+        *(("Solution", "rotation_error"), ("IkAnswer", "distance"), ("FkRequest", "q"), ("IkRequest", "q_seed")),
+        *(("Target", "position"), ("RowAnswer", "d"), ("RowAnswer", "alpha"), ("RobotAnswer", "reach")),
+        *(("ExtremeAnswer", "value"), ("ArcAnswer", "start"), ("ReachableAnswer", "distance")),
+    ]:
+        text = schemas[name]["properties"][field]["description"]
+        assert "metres" in text or "radians" in text, f"{name}.{field}"
+
+
+def test_a_single_answer_and_a_list_are_both_in_the_schema(document):
+    kinds = {"fk": FkAnswer, "ik": IkAnswer, "jacobian": JacobianAnswer, "reachable": ReachableAnswer}
+    for what, kind in kinds.items():
+        responses = document["paths"][f"/api/v1/robots/{{robot_id}}/{what}"]["post"]["responses"]
+        options = responses["200"]["content"]["application/json"]["schema"]["anyOf"]
+        one, many = (document["components"]["schemas"][option["$ref"].rsplit("/", 1)[1]] for option in options)
+        assert set(one["properties"]) == set(kind.__annotations__)
+        assert many["properties"]["results"]["items"] == options[0]
+
+
+def test_every_example_request_works(client, document):
+    tried = 0
+    for path, _, operation in operations(document):
+        examples = (
+            operation.get("requestBody", {}).get("content", {}).get("application/json", {}).get("examples", {})
+        )
+        for name, example in examples.items():
+            response = client.post(path.replace("{robot_id}", "pioneer5"), json=example["value"])
+            assert response.status_code == 200, f"{path} {name}: {response.text}"
+            answer = response.json()
+            for one in answer.get("results", [answer]):
+                if "status" in one:
+                    expected = {"unreachable": "unreachable", "pose": "approximate"}.get(name, "solved")
+                    assert one["status"] == expected, one["reason"]
+            tried += 1
+    assert tried >= 10

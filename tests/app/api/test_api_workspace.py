@@ -1,0 +1,487 @@
+"""REST: clouds of the workspace as files, its sizes, and whether targets are in it."""
+
+from __future__ import annotations
+
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import httpx2
+import numpy as np
+import pytest
+from fastapi import FastAPI
+from fastapi.testclient import TestClient
+from live_server import serve, wait_for
+from pydantic import TypeAdapter
+
+import kin
+from app.api import Gate, api_routes, install_problem_handlers
+from app.api.problems import ProblemError
+from app.api.work import Work
+from app.api.workspace import reachable, summary
+from app.api.workspace.flow import Pieces
+from app.api.workspace.summary import Memory
+from app.exports.formats import FORMATS, encode
+from app.service.main import create_app
+from app.shared.answers import ReachableAnswer, WorkspaceAnswer
+from app.shared.clouds import Cloud, Clouds
+from app.shared.settings import Settings
+from app.shared.store import Store
+
+PIONEER = kin.get_robot("pioneer5")
+SRS = kin.get_robot("redundant7-craig")
+API = "/api/v1/robots"
+WORKSPACE = f"{API}/pioneer5/workspace"
+
+
+@pytest.fixture
+def live():
+    """REST alone on a real port, two streams at a time, and a client: leaving and waiting need a connection."""
+    app = FastAPI()
+    app.state.settings, app.state.store = Settings(), Store()
+    app.state.work = Work(16, 300.0)
+    app.state.clouds, app.state.gate, app.state.sizes = Clouds(max_bytes=0, threads=1), Gate(2), Memory(8, 1, 8)
+    install_problem_handlers(app)
+    app.router.routes.extend(api_routes())
+    with serve(app) as port, httpx2.Client(base_url=f"http://127.0.0.1:{port}", trust_env=False, timeout=60) as c:
+        yield app, c
+    app.state.clouds.close()
+    app.state.sizes.close()
+
+
+@pytest.fixture
+def slices(monkeypatch):
+    """Where the slices that were computed begin, as they are begun."""
+    begun = []
+    slice_of = Cloud.slice
+
+    def counting(self, start, *rest):
+        begun.append(start)
+        return slice_of(self, start, *rest)
+
+    monkeypatch.setattr(Cloud, "slice", counting)
+    return begun
+
+
+# -- clouds ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_cloud_is_the_file_of_its_format(client, app, name):
+    parameters = {
+        "n": 5000,
+        "seed": 3,
+        "strategy": "quasi",
+        "measure": ["limits", "manipulability", "limits"],
+        "limit": ["1:-0:0.5", "2:0.1:1"],
+        "lock": "3:0.2",
+        "q": "true",
+        "format": name,
+    }
+    answer = client.get(WORKSPACE, params=parameters)
+    assert answer.status_code == 200, answer.text
+    cloud = Cloud(
+        PIONEER,
+        5000,
+        3,
+        "quasi",
+        ("limits", "manipulability"),
+        ((0.0, 0.5), (0.1, 1.0), None, None, None),
+        (None, None, 0.2, None, None),
+    )
+    assert answer.content == b"".join(encode(name, app.state.clouds, cloud, True))
+    kind = FORMATS[name]
+    assert answer.headers["content-type"].partition(";")[0] == kind.media_type
+    assert answer.headers["content-disposition"] == f'attachment; filename="pioneer5-quasi-5000.{name}"'
+    assert answer.headers["x-cloud-count"] == "5000"
+    assert answer.headers["x-cloud-columns"] == "x,y,z,limits,manipulability,q1,q2,q3,q4,q5"
+    told = answer.headers.get("content-length")
+    assert told == (None if kind.size is None else str(len(answer.content)))
+
+
+def test_what_is_not_asked_for_is_the_plain_cloud(client, app):
+    answer = client.get(WORKSPACE)
+    assert answer.content == b"".join(encode("ndjson", app.state.clouds, Cloud(PIONEER, 10_000)))
+    assert answer.headers["x-cloud-columns"] == "x,y,z"
+
+
+def test_all_strategies_and_all_arms(client):
+    for robot in kin.builtin_robots().values():
+        answer = client.get(f"{API}/{robot.id}/workspace?n=100&format=csv&q=true")
+        assert answer.text.count("\n") == 101
+    answers = {s: client.get(WORKSPACE, params={"n": 50, "strategy": s}).content for s in kin.workspace.STRATEGIES}
+    assert len(set(answers.values())) == 4
+
+
+@pytest.mark.parametrize(
+    ("query", "field", "value", "said"),
+    [
+        ("n=0", "n", '"0"', "greater than or equal to 1"),
+        ("n=many", "n", '"many"', "integer"),
+        ("n=1000000001", "n", "1000000001", "from 1 to 100000000"),
+        ("seed=-1", "seed", '"-1"', "greater than or equal to 0"),
+        (f"seed={2**64}", "seed", f'"{2**64}"', "less than"),
+        ("strategy=even", "strategy", '"even"', "'boundary'"),
+        ("measure=limits&measure=beauty", "measure[1]", '"beauty"', "'manipulability' or 'limits'"),
+        ("format=xls", "format", '"xls"', "'ply'"),
+        ("q=perhaps", "q", '"perhaps"', "boolean"),
+        ("sed=1", "sed", '"1"', "seed"),
+        ("limit=1:0", "limit[0]", '"1:0"', "JOINT:LOWER:UPPER"),
+        ("limit=6:0:1", "limit[0]", '"6:0:1"', "joint from 1 to 5"),
+        ("limit=0:0:1", "limit[0]", '"0:0:1"', "joint from 1 to 5"),
+        ("limit=1:nan:1", "limit[0]", '"1:nan:1"', "JOINT:LOWER:UPPER"),
+        ("limit=2:0:1&limit=1:-9:9", "limit[1]", '"1:-9:9"', "inside the joint's own"),
+        ("limit=2:1:0.5", "limit[0]", '"2:1:0.5"', "not below"),
+        ("limit=2:0:1&limit=2:0:1", "limit[1]", '"2:0:1"', "limit[0] has this one"),
+        ("lock=3:a", "lock[0]", '"3:a"', "JOINT:VALUE"),
+        ("lock=5:0.1&lock=2:9", "lock[1]", '"2:9"', "inside the limits"),
+        ("lock=²:1", "lock[0]", '"²:1"', "joint from 1 to 5"),
+    ],
+)
+@pytest.mark.parametrize("where", ["", "/summary"])
+def test_a_wrong_value_is_named(client, query, field, value, said, where):
+    if where and query.partition("=")[0] not in ("limit", "lock"):
+        query, field, value, said = "limt=1:0:1", "limt", '"1:0:1"', "limit"
+    answer = client.get(f"{WORKSPACE}{where}?{query}")
+    assert answer.status_code == 422
+    assert answer.headers["content-type"] == "application/problem+json"
+    error = answer.json()["errors"][0]
+    assert (error["field"], error["value"]) == (field, value)
+    assert said in error["expected"]
+
+
+def test_an_unknown_robot_is_a_404(client):
+    for what in ("workspace", "workspace/summary"):
+        assert client.get(f"{API}/nobody/{what}").json()["type"].endswith("unknown-robot")
+    assert client.post(f"{API}/nobody/reachable", json={"target": {"position": [0, 0, 0]}}).status_code == 404
+
+
+def test_a_reader_who_leaves_ends_the_work(live, slices):
+    app, client = live
+    with client.stream("GET", f"{WORKSPACE}?n=100000000&format=bin") as answer:
+        assert next(answer.iter_bytes()).startswith(b"KINCLOUD")
+        assert app.state.gate.open == 1
+    wait_for(lambda: app.state.gate.open == 0)
+    wait_for(lambda: app.state.clouds._pool._work_queue.empty())
+    begun = len(slices)
+    time.sleep(0.2)
+    assert len(slices) == begun
+    assert begun < 1000  # of 1526
+
+
+def test_a_slow_reader_holds_the_work_back(live, slices):
+    _, client = live
+    with client.stream("GET", f"{WORKSPACE}?n=100000000&format=bin") as answer:
+        next(answer.iter_bytes())
+        time.sleep(1.0)  # plenty for a gigabyte, were nothing holding it back
+        assert len(slices) < 100
+
+
+def test_streams_are_counted_and_the_rest_goes_on(live):
+    app, client = live
+    endless = f"{WORKSPACE}?n=100000000&format=bin"
+    with client.stream("GET", endless) as first, client.stream("GET", endless) as second:
+        parts = [stream.iter_bytes() for stream in (first, second)]  # kept: one that is dropped may hang up
+        assert all(next(part) for part in parts)
+        refused = client.get(f"{WORKSPACE}?n=10")
+        assert refused.status_code == 503
+        assert refused.headers["retry-after"] == "2"
+        assert refused.json()["type"] == "urn:kinboard:problem:busy"
+        assert "KINBOARD_MAX_STREAMS" in refused.json()["hint"]
+        assert client.get(f"{API}/pioneer5").status_code == 200
+        assert (
+            client.post(f"{API}/pioneer5/reachable", json={"target": [{"position": [0, 0, 9]}]}).status_code == 200
+        )
+    wait_for(lambda: app.state.gate.open == 0)
+    assert client.get(f"{WORKSPACE}?n=10").status_code == 200
+
+
+def test_refused_and_finished_streams_give_their_place_back(client, app):
+    for query in ("n=10", "n=0", "n=1000000001", "limit=9:0:1", "n=100000&format=npz"):
+        client.get(f"{WORKSPACE}?{query}")
+        assert app.state.gate.open == 0
+
+
+def test_the_gate_frees_a_place_whatever_happens():
+    gate = Gate(1)
+    with pytest.raises(ZeroDivisionError), gate.place():
+        raise ZeroDivisionError
+    with gate.place(), pytest.raises(Exception, match="1 clouds"), gate.place():
+        pass
+    assert gate.open == 0
+
+
+def test_pieces_are_closed_by_any_thread_after_the_piece_at_hand():
+    working, go, closed = threading.Event(), threading.Event(), []
+
+    def work():
+        try:
+            while True:
+                working.set()
+                go.wait(10)
+                yield b"x"
+        finally:
+            closed.append(threading.get_ident())
+
+    pieces = Pieces(work())
+    with ThreadPoolExecutor(2) as threads:
+        taken = threads.submit(pieces.take)
+        working.wait(10)
+        closing = threads.submit(pieces.close)
+        assert not closed
+        go.set()
+        assert taken.result(10) == b"x"
+        closing.result(10)
+    assert len(closed) == 1
+    assert pieces.take() is None
+
+
+# -- sizes -------------------------------------------------------------------------------------------------------
+
+
+def span(found):
+    return [(end.value, end.q.tolist(), end.point.tolist()) for end in found]
+
+
+def told(answer):
+    return [(answer[end]["value"], answer[end]["q"], answer[end]["point"]) for end in ("least", "largest")]
+
+
+def test_the_summary_is_what_the_core_says(client):
+    answer = client.get(f"{WORKSPACE}/summary?section=true&resolution=24&effort=2").json()
+    TypeAdapter(WorkspaceAnswer).validate_python(answer, strict=True)
+    facts = kin.workspace_facts(PIONEER, effort=2)
+    for name in ("x", "y", "z", "radius", "reach"):
+        assert told(answer[name]) == span(getattr(facts, name))
+    for name in ("axis_point", "axis", "shoulder"):
+        assert answer[name] == getattr(facts, name).tolist()
+    for name in ("volume", "surface"):
+        estimate = getattr(facts, name)
+        assert answer[name] == {"value": estimate.value, "error": estimate.error, "method": estimate.method}
+    cut = kin.section(PIONEER, resolution=24)
+    assert answer["section"]["curves"] == [curve.tolist() for curve in cut.curves]
+    assert answer["section"]["area"] == cut.area
+    assert len(answer["section"]["arcs"]) == len(cut.arcs) > 0
+    for arc, expected in zip(answer["section"]["arcs"], cut.arcs, strict=True):
+        assert (arc["joint"], arc["start"], arc["stop"]) == (expected.joint, expected.start, expected.stop)
+        assert arc["points"] == expected.points.tolist()
+        assert arc["radius"] == expected.radius
+
+
+def test_any_plane_can_be_cut(client):
+    answer = client.get(f"{WORKSPACE}/summary?volume=false&resolution=16&plane=0:0:0.1:0:0:2&lock=5:0.5").json()
+    TypeAdapter(WorkspaceAnswer).validate_python(answer, strict=True)
+    locked = [None, None, None, None, 0.5]
+    cut = kin.section(PIONEER, ([0.0, 0.0, 0.1], [0.0, 0.0, 1.0]), locked=locked, resolution=16)
+    assert answer["section"]["area"] == cut.area > 0.1
+    assert answer["section"]["curves"] == [curve.tolist() for curve in cut.curves]
+    assert (answer["section"]["u"], answer["section"]["v"]) == (cut.u.tolist(), cut.v.tolist())
+    assert answer["section"]["arcs"] == []
+    other = client.get(f"{WORKSPACE}/summary?volume=false&resolution=16&plane=0:0:9:0:0:1&lock=5:0.5").json()
+    assert other["section"]["area"] == 0.0
+    assert other["section"]["curves"] == []
+
+
+@pytest.mark.parametrize(
+    "plane", ["", "0:0:0.1", "0:0:0.1:0:0:0", "0:0:0:0:0:nan", "0:0:0:1e-300:0:0", "a:0:0:0:0:1", "0:0:1e99:0:0:1"]
+)
+def test_what_is_no_plane_is_refused(client, plane):
+    answer = client.get(f"{WORKSPACE}/summary?volume=false&plane={plane}")
+    assert answer.status_code == 422
+    assert answer.json()["errors"][0]["field"] == "plane"
+
+
+def test_limits_and_locks_count(client):
+    limits, locked = [None, (0.5, 1.0), None, None, None], [0.25, None, None, None, None]
+    answer = client.get(f"{WORKSPACE}/summary?volume=false&limit=2:0.5:1&lock=1:0.25").json()
+    facts = kin.workspace_facts(PIONEER, limits=limits, locked=locked, volume=False)
+    assert told(answer["x"]) == span(facts.x)
+    assert told(answer["x"]) != span(kin.workspace_facts(PIONEER, volume=False).x)
+
+
+def test_what_is_not_wanted_is_null(client):
+    answer = client.get(f"{WORKSPACE}/summary?volume=false").json()
+    assert answer["volume"] is answer["surface"] is answer["section"] is None
+    assert answer["x"]["largest"]["value"] > 0.4
+
+
+def test_the_second_visitor_does_not_wait(client, monkeypatch):
+    address = f"{WORKSPACE}/summary?volume=false&lock=5:0.25"
+    first = client.get(address)
+    monkeypatch.setattr(summary, "workspace_facts", lambda *args, **options: pytest.fail("computed again"))
+    assert client.get(address).content == first.content
+    assert client.get(f"{address}&effort=9&resolution=50").content == first.content  # which have no say here
+
+
+def test_a_sliding_first_joint_has_no_section(client, tmp_path):
+    (tmp_path / "rail.toml").write_text(
+        'id = "rail"\nname = "Rail"\nsource = "this test"\nconvention = "standard"\n'
+        'units = { length = "m", angle = "deg" }\n'
+        '[[rows]]\nname = "slide"\nkind = "prismatic"\nlimits = [0, 1]\n[[rows]]\nname = "turn"\na = 0.1\n',
+        encoding="utf-8",
+    )
+    answer = TestClient(create_app(Settings(robots=tmp_path))).get(f"{API}/rail/workspace/summary?section=true")
+    assert answer.status_code == 422
+    assert answer.json()["errors"][0]["field"] == "section"
+    assert "slides" in answer.json()["errors"][0]["expected"]
+    address = f"{API}/rail/workspace/summary?volume=false&plane=0:0:0.5:1:0:0"
+    level = TestClient(create_app(Settings(robots=tmp_path))).get(address)
+    assert level.status_code == 200
+
+
+@pytest.fixture
+def memory():
+    made = Memory(most=2, threads=1, waiting=2)
+    yield made
+    made.close()
+
+
+def test_those_who_ask_for_the_same_share_one_computation(memory):
+    computed, go = [], threading.Event()
+
+    def compute():
+        computed.append(1)
+        go.wait(10)
+        return {"x": 1}
+
+    answers = [memory.get("key", compute) for _ in range(8)]
+    go.set()
+    assert all(answer.result(10) is answers[0].result() for answer in answers)
+    assert computed == [1]
+
+
+def test_too_many_under_way_are_refused_those_that_are_there_are_not(memory):
+    go = threading.Event()
+    memory.get("there", lambda: "there").result(10)
+    slow = [memory.get(key, lambda: go.wait(10)) for key in ("a", "b")]
+    with pytest.raises(ProblemError, match="2 summaries") as refused:
+        memory.get("c", lambda: "c")
+    assert refused.value.status_code == 503
+    assert memory.get("b", lambda: "not asked") is slow[1]
+    go.set()
+    assert [answer.result(10) for answer in slow] == [True, True]
+    assert memory.get("c", lambda: "c").result(10) == "c"
+
+
+def test_failures_are_told_and_forgotten_and_memory_is_bounded(memory):
+    def now(key, value):
+        return memory.get(key, value).result(10)
+
+    with pytest.raises(ZeroDivisionError):
+        now("a", lambda: 1 / 0)
+    wait_for(lambda: now("a", lambda: "good") == "good")
+    assert now("b", lambda: "b") == "b"
+    assert now("a", lambda: "not asked") == "good"
+    now("c", lambda: "c")  # drops b, asked for longest ago
+    assert now("a", lambda: "not asked") == "good"
+    assert now("b", lambda: "anew") == "anew"
+
+
+def test_visitors_who_leave_do_not_cancel_it_for_others(live, monkeypatch):
+    _, client = live
+    go = threading.Event()
+    facts = kin.workspace_facts
+
+    def slow(*args, **options):
+        go.wait(10)
+        return facts(*args, **options)
+
+    monkeypatch.setattr(summary, "workspace_facts", slow)
+    address = f"{WORKSPACE}/summary?volume=false"
+    with pytest.raises(httpx2.TimeoutException):
+        client.get(address, timeout=0.3)
+    with ThreadPoolExecutor(1) as other:
+        answer = other.submit(client.get, address)
+        time.sleep(0.1)
+        go.set()
+        assert answer.result(10).status_code == 200
+
+
+# -- reachable ---------------------------------------------------------------------------------------------------
+
+
+def ask(client, robot, status=200, **body):
+    answer = client.post(f"{API}/{robot.id}/reachable", json=body)
+    assert answer.status_code == status, answer.text
+    return answer.json()
+
+
+@pytest.mark.parametrize("robot", [PIONEER, SRS, kin.get_robot("scara")], ids=lambda robot: robot.id)
+def test_every_point_of_a_cloud_can_be_reached_and_others_are_told_apart(client, robot):
+    cloud = Cloud(robot, reachable.AT_ONCE + 5, strategy="quasi")
+    inside = cloud.slice(0, cloud.n).points.astype(float)
+    outside = inside + np.array([0.0, 0.0, 3.0 * robot.reach])
+    points = np.concatenate([inside, outside])
+    # A point in single precision may be a hair outside of an arm that reaches no volume.
+    results = ask(client, robot, target=[{"position": p.tolist()} for p in points])["results"]
+    for p, answer in zip(points, results, strict=True):
+        TypeAdapter(ReachableAnswer).validate_python(answer, strict=True)
+        expected = kin.solve_ik(robot, p, task="position", max_solutions=1)
+        assert answer["reachable"] == (answer["status"] == "solved") == (expected.status == "solved")
+        assert (answer["reason"], answer["distance"]) == (expected.reason, expected.distance)
+        at = kin.fk_positions(robot, answer["q"])
+        assert np.linalg.norm(at - p) == pytest.approx(answer["position_error"], abs=1e-9)
+    assert all(answer["reachable"] for answer in results[: len(inside)])
+    assert not any(answer["reachable"] for answer in results[len(inside) :])
+    assert all(answer["distance"] > 0.9 * robot.reach for answer in results[len(inside) :])
+
+
+def test_one_target_of_each_form_and_limits_count(client):
+    q = np.array(SRS.home)
+    pose = {"matrix": kin.fk(SRS, q).tolist()}
+    answer = ask(client, SRS, target=pose)
+    assert answer["reachable"] is True
+    assert np.allclose(kin.fk(SRS, answer["q"]), kin.fk(SRS, q), atol=1e-9)
+    far = ask(client, SRS, target=pose, locked=[None, None, None, 0.0, None, None, None])
+    assert far["reachable"] is False
+    assert (
+        far["status"] == kin.solve_ik(SRS, kin.fk(SRS, q), locked=[None, None, None, 0.0, None, None, None]).status
+    )
+    p, z = kin.fk(PIONEER, PIONEER.home)[:3, 3].tolist(), kin.fk(PIONEER, PIONEER.home)[:3, 2].tolist()
+    assert ask(client, PIONEER, target={"position": p, "approach": z})["reachable"]
+    # Five joints get to a whole pose up to its roll: that is not reaching it.
+    turned = ask(client, PIONEER, target={"position": p, "wxyz": [0.3, 0.5, -0.2, 0.7]})
+    assert (turned["reachable"], turned["status"]) == (False, "approximate")
+    assert turned["reason"]
+    none = ask(client, SRS, target={"position": [0.4, 0.1, 0.3]}, branch="elbow up")
+    assert none["reachable"]
+
+
+@pytest.mark.parametrize(
+    ("body", "field"),
+    [
+        ({"target": []}, "target"),
+        ({"target": [{"position": [0, 0, 0]}, {"position": [0, 0]}]}, "target[1].position"),
+        ({"target": {"position": [0, 0, 0]}, "task": "pose"}, "target"),
+        ({"target": [{"position": [0, 0, 0]}] * 3, "branch": "sideways"}, "branch"),
+        ({"target": [{"position": [0, 0, 0]}] * 3, "limits": [[0, 1]]}, "limits"),
+        ({"target": {"position": [0, 0, 0]}, "q_seed": [0] * 7}, "q_seed"),
+    ],
+)
+def test_a_wrong_question_is_refused_by_name(client, body, field):
+    assert ask(client, SRS, 422, **body)["errors"][0]["field"] == field
+
+
+def test_too_many_targets_are_refused(client, app):
+    most = app.state.settings.max_batch
+    assert str(most) in ask(client, SRS, 413, target=[{"position": [0, 0, 0]}] * (most + 1))["detail"]
+
+
+def test_judging_ends_when_nobody_listens(live, monkeypatch):
+    _, client = live
+    judged = []
+    solve = kin.solve_ik
+
+    def slow(*args, **options):
+        judged.append(1)
+        time.sleep(0.005)
+        return solve(*args, **options)
+
+    monkeypatch.setattr(reachable, "solve_ik", slow)
+    body = {"target": [{"position": [0.0, 0.2, -0.2]}] * 5000}
+    with client.stream("POST", f"{API}/pioneer5/reachable", json=body) as answer:
+        assert next(answer.iter_bytes()).startswith(b'{"results":[{"reachable":true')
+    time.sleep(0.5)
+    done = len(judged)
+    time.sleep(0.3)
+    assert len(judged) == done < 5000

@@ -1,0 +1,82 @@
+"""REST against its own OpenAPI document: schemathesis makes requests up from it and judges every answer.
+
+A few cases of each operation, and sequences of requests with ``-m slow``; KINBOARD_TEST_CASES=300 for thousands.
+"""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+import schemathesis
+from hypothesis import HealthCheck, settings
+from schemathesis.config import SchemathesisConfig
+
+import app.api.workspace.summary
+from app.service.main import create_app
+from app.shared.settings import Settings
+
+CASES = int(os.environ.get("KINBOARD_TEST_CASES", "12"))
+FEW = settings(
+    max_examples=CASES, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck)
+)
+REFUSED = ["400", "404", "405", "413", "415", "422"]
+CHECKS = {
+    # Busy and too slow are documented answers.
+    "not_a_server_error": {"expected-statuses": ["2xx", "3xx", "4xx", "503"]},
+    # No schema can tell how many joints this robot has, or that a target needs one of its forms.
+    "positive_data_acceptance": {"expected-statuses": ["2xx", "404", "413", "422", "503"]},
+    "negative_data_rejection": {"expected-statuses": REFUSED},
+}
+
+
+def contract():
+    """The document of an application with small limits, which is asked in this process."""
+    service = create_app(Settings(max_batch=20, max_body=100_000, max_points=500, max_path=10, time_budget=5.0))
+    service.state.startup.status = "ready"
+
+    async def without_viewer(scope, receive, send):
+        """The lifespan would start viser, anew for each operation."""
+        if scope["type"] != "lifespan":
+            await service(scope, receive, send)
+            return
+        for done in ("startup", "shutdown"):
+            await receive()
+            await send({"type": f"lifespan.{done}.complete"})
+
+    return schemathesis.openapi.from_asgi(
+        "/openapi.json", without_viewer, config=SchemathesisConfig.from_dict({"checks": CHECKS})
+    )
+
+
+schema = contract()
+
+
+@pytest.fixture(autouse=True)
+def quick_sizes(monkeypatch):
+    """Volumes take seconds and are looked at elsewhere."""
+    facts = app.api.workspace.summary.workspace_facts
+    monkeypatch.setattr(
+        app.api.workspace.summary,
+        "workspace_facts",
+        lambda robot, **asked: facts(robot, **asked | {"effort": 2, "volume": False}),
+    )
+
+
+@pytest.mark.slow
+def test_so_is_every_answer_in_a_sequence_of_requests():
+    """Robots that one answer names are asked about in the next."""
+    few = settings(FEW, max_examples=max(CASES, 200), stateful_step_count=6)
+    schema.as_state_machine().run(settings=few)
+
+
+@schema.parametrize()
+@FEW
+def test_every_answer_is_one_the_document_tells_of(case):
+    answer = case.call_and_validate()
+    if answer.status_code >= 400:
+        problem = answer.json()
+        assert answer.status_code == problem["status"]
+        assert problem["detail"]
+        if answer.status_code == 422:  # of all kinds the one in which something in particular is wrong
+            assert problem["errors"][0]["field"]

@@ -1,0 +1,601 @@
+"""The command line: what it prints, and with which exit code it ends."""
+
+import gc
+import json
+import math
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+import kin
+from app.cli import parser
+from app.exports import save
+from app.exports.formats import FORMATS, encode
+from app.shared.clouds import Cloud, Clouds
+from app.shared.settings import Settings
+from kin.solvers import solver_for
+
+ROOT = Path(__file__).parents[3]
+PIONEER = kin.get_robot("pioneer5")
+
+
+def run(capsys, *words):
+    """Exit code, standard output and standard error of one command."""
+    code = parser.main([str(word) for word in words])
+    out, err = capsys.readouterr()
+    assert "Traceback" not in err
+    return code, out, err
+
+
+def answer(capsys, *words, code=0):
+    got, out, err = run(capsys, *words, "--json")
+    assert (got, err) == (code, "")
+    return json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
+
+
+# -- fk --------------------------------------------------------------------------------------------------------
+
+
+def test_fk_reads_degrees_and_answers_as_rest_does(capsys, client):
+    q = [math.radians(x) for x in (90, 30, 60, 30, 30)]
+    got = answer(capsys, "fk", "pioneer5", 90, 30, 60, 30, 30, "--frames")
+    assert got == client.post("/api/v1/robots/pioneer5/fk", json={"q": q, "frames": True}).json()
+    assert got["pose"]["matrix"] == kin.fk(PIONEER, q).tolist()
+
+
+def test_fk_in_radians(capsys):
+    got = answer(capsys, "fk", "pioneer5", 1.5, 0.5, 1, 0.5, 0.5, "--rad")
+    assert got["pose"]["matrix"] == kin.fk(PIONEER, [1.5, 0.5, 1, 0.5, 0.5]).tolist()
+
+
+@pytest.mark.parametrize("words", [("-90", "-.5", "-1e-3", "−10", "+5"), ("-90.", "-0.5", "-1E-3", "-1e1", "5")])
+def test_negative_numbers_are_numbers(capsys, words):
+    q = np.radians([-90, -0.5, -0.001, -10, 5])
+    assert np.allclose(answer(capsys, "fk", "pioneer5", *words)["pose"]["matrix"], kin.fk(PIONEER, q), atol=1e-15)
+
+
+def test_fk_for_people_is_in_degrees_and_millimetres(capsys):
+    code, out, err = run(capsys, "fk", "pioneer5", 90, 30, 160, 30, 30, "--frames")
+    assert (code, err) == (0, "")
+    x, y, z = kin.fk(PIONEER, np.radians([90, 30, 160, 30, 30]))[:3, 3] * 1e3
+    tool = next(line for line in out.splitlines() if line.startswith("tool"))
+    assert [float(word) for word in tool.split()[1:4]] == pytest.approx([x, y, z], abs=5e-4)
+    assert re.search(r"^pivoting elbow +160\.000° +0\.000° … 150\.000° +beyond its stop$", out, re.MULTILINE)
+    assert re.search(r"^rotating elbow +30\.000° +0\.000° … 150\.000°$", out, re.MULTILINE)
+    assert all(f"\n{row.name} " in out for row in PIONEER.rows)
+
+
+def test_a_sliding_joint_is_typed_in_millimetres(capsys, tmp_path):
+    (tmp_path / "slider.toml").write_text(
+        'id = "slider"\nname = "Slider"\nsource = "this test"\nconvention = "standard"\n'
+        'units = { length = "mm", angle = "deg" }\n'
+        '[[rows]]\nname = "turn"\na = 100\n[[rows]]\nname = "slide"\nkind = "prismatic"\nlimits = [0, 250]\n',
+        encoding="utf-8",
+    )
+    got = answer(capsys, "fk", "slider", 90, 120, "--robots", tmp_path)
+    assert got["pose"]["position"] == pytest.approx([0, 0.1, 0.12], abs=1e-15)
+    code, out, _ = run(capsys, "fk", "slider", 90, 120, "--robots", tmp_path)
+    assert code == 0
+    assert re.search(r"^slide +120\.000 mm +0\.000 mm … 250\.000 mm$", out, re.MULTILINE)
+    assert "slider" in run(capsys, "robots", "--robots", tmp_path)[1]
+
+
+# -- ik --------------------------------------------------------------------------------------------------------
+
+
+def test_ik_leads_back_to_the_pose_fk_printed(capsys):
+    T = kin.fk(PIONEER, np.radians([80, 30, 50, 30, 25]))
+    where = [f"{x * 1e3:.9f}" for x in T[:3, 3]]
+    got = answer(capsys, "ik", "pioneer5", "--position", *where, "--approach", *T[:3, 2])
+    assert got["task"] == "approach"
+    assert got["status"] == "solved"
+    assert np.allclose(np.degrees(got["solutions"][0]["q"]), [80, 30, 50, 30, 25], atol=1e-6)
+
+
+def test_ik_prints_degrees_and_says_reached(capsys):
+    words = ("--position", 45, 191, -211, "--approach", -0.31, -0.164, -0.936)
+    code, out, err = run(capsys, "ik", "pioneer5", *words)
+    assert (code, err) == (0, "")
+    assert out.startswith("Reached")
+    typed = re.findall(r"(-?\d+\.\d+)°", out.splitlines()[-1])[:5]
+    T = kin.fk(PIONEER, np.radians([float(x) for x in typed]))
+    assert T[:3, 3] * 1e3 == pytest.approx([45, 191, -211], abs=0.02)
+    assert "shoulder front" in out
+
+
+def test_ik_with_options_asks_the_core_the_same(capsys):
+    robot = kin.get_robot("redundant7-craig")
+    T = kin.fk(robot, robot.q_home)
+    wxyz = kin.transforms.wxyz_from_rotation(T[:3, :3])
+    seed = (10, 20, 0, 60, 0, 40, -90)
+    options = ("--wxyz", *wxyz, "--seed", *seed, "--redundancy", -20, "--all", "--ignore-limits")
+    got = answer(capsys, "ik", robot.id, "--position", *(T[:3, 3] * 1e3), *options)
+    result = kin.solve_ik(robot, T, q_seed=np.radians(seed), redundancy=math.radians(-20), respect_limits=False)
+    assert len(got["solutions"]) == len(result.solutions) > 1
+    assert np.allclose([s["q"] for s in got["solutions"]], [s.q for s in result.solutions], atol=1e-9)
+    code, out, _ = run(capsys, "ik", robot.id, "--position", *(T[:3, 3] * 1e3), *options)
+    assert code == 0
+    assert f"{result.redundancy[0].label} = -20.000°" in out
+    one = answer(capsys, "ik", robot.id, "--position", *(T[:3, 3] * 1e3), *options[:-2])
+    assert len(one["solutions"]) == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "options"),
+    [
+        (("--branch", "elbow up", "--branch", "seed"), {"branch": ["elbow up", "seed"]}),
+        (("--lock", "7=-30"), {"locked": [None] * 6 + [math.radians(-30)]}),
+        (("--limit", "2=0:60", "--limit", "4=-100:100"), {"limits": {1: (0, 60), 3: (-100, 100)}}),
+        (("--images", "all"), {"images": "all"}),
+        (("--prefer", "limits"), {"prefer": "limits"}),
+        (("--redundancy", "psi=20"), {"redundancy": {"psi": math.radians(20)}}),
+        (("--mask", "x", "y", "z", "rz", "--mask-frame", "base"), {"mask": [True] * 3 + [False] * 2 + [True]}),
+    ],
+    ids=lambda words: words[0] if isinstance(words, tuple) else "",
+)
+def test_every_option_of_ik_reaches_the_core(capsys, words, options):
+    robot = kin.get_robot("redundant7-craig")
+    T = kin.fk(robot, robot.q_home)
+    wxyz = kin.transforms.wxyz_from_rotation(T[:3, :3])
+    if "limits" in options:
+        options = {"limits": [np.radians(options["limits"][i]) if i in (1, 3) else None for i in range(7)]}
+    if "mask" in options:
+        options["mask_frame"] = "base"
+    got = answer(capsys, "ik", robot.id, "--position", *(T[:3, 3] * 1e3), "--wxyz", *wxyz, "--all", *words)
+    result = kin.solve_ik(robot, T, **options)
+    assert len(got["solutions"]) == len(result.solutions) > 0
+    assert np.allclose([s["q"] for s in got["solutions"]], [s.q for s in result.solutions], atol=1e-6)
+
+
+def test_blocked_branches_are_printed_with_what_they_need(capsys):
+    words = ("ik", "pioneer5", "--position", 45, 191, 100, "--approach", 0, 0, 1)
+    code, out, _ = run(capsys, *words)
+    assert code == 1
+    result = answer(capsys, *words, code=1)
+    assert len(result["blocked"]) > 1
+    for branch in result["blocked"]:
+        (line,) = [x for x in out.splitlines() if x.startswith(branch["branch"])]
+        for v in branch["violations"]:
+            value, limit = math.degrees(v["value"]), math.degrees(v["limit"])
+            assert f"q{v['joint'] + 1} = {value:.3f}° (limit {limit:.3f}°)" in line
+
+
+@pytest.mark.parametrize(
+    ("position", "extra", "status", "said"),
+    [
+        ((2000, 0, 0), (), "unreachable", "Out of reach"),
+        ((45, 191, 100), ("--approach", 0, 0, 1), "limits", "pivoting wrist"),
+        ((45, 191, -211), ("--wxyz", 0, 0.9, 0.4, -0.2), "approximate", "5 joints"),
+    ],
+)
+def test_no_exact_answer_is_exit_code_1_and_a_reason(capsys, position, extra, status, said):
+    words = ("ik", "pioneer5", "--position", *position, *extra)
+    assert answer(capsys, *words, code=1)["status"] == status
+    code, out, err = run(capsys, *words)
+    assert (code, err) == (1, "")
+    assert said in out
+
+
+def test_a_target_typed_in_metres_is_pointed_out(capsys):
+    _, _, err = run(capsys, "ik", "pioneer5", "--position", 0.045, 0.191, -0.211)
+    assert "millimetres" in err
+    assert run(capsys, "ik", "pioneer5", "--position", 0.045, 0.191, -0.211, "--rad")[::2] == (0, "")
+
+
+# -- robots and the rest ---------------------------------------------------------------------------------------
+
+
+def test_robots_lists_all_and_describes_one(capsys, client):
+    code, out, _ = run(capsys, "robots")
+    assert code == 0
+    assert [line.split()[0] for line in out.splitlines()[1:]] == list(kin.builtin_robots())
+    assert answer(capsys, "robots") == client.get("/api/v1/robots").json()
+    assert answer(capsys, "robots", "redundant7") == client.get("/api/v1/robots/redundant7").json()
+    code, out, _ = run(capsys, "robots", "pioneer5")
+    assert re.search(
+        r"^rotating base +revolute +0\.000° +130\.000 +70\.000 +-90\.000° +0\.000° … 180\.000°$", out, re.M
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("fk", "puma", 1), "expected one of pioneer5"),
+        (("fk", "pioneer5", 1, 2), "one for each of: rotating base"),
+        (("fk", "pioneer5", 1, 2, 3, 4, "x"), "invalid number value: 'x'"),
+        (("fk", "pioneer5", 1, 2, 3, 4, "nan"), "'nan' is not a number"),
+        (("fk", "pioneer5", 1, 2, 3, 4, "-inf"), "'-inf' is not a number"),
+        (("fk", "pioneer5", 1, 2, 3, 4, "1e308"), "between -1e6 and 1e6"),
+        (("fk", "pioneer5"), "required"),
+        (("ik", "pioneer5"), "--position"),
+        (("ik", "pioneer5", "--position", 1, 2), "expected 3 arguments"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--wxyz", 0, 0, 0, 0), "not zero"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--approach", 0, 0, 0), "not zero"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--task", "pose"), "--wxyz"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--task", "approach"), "--approach"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--seed", 1), "--seed"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--lock", "9=1"), "a joint from 1 to 5"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--lock", "1=1:2"), "JOINT=VALUE"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--limit", "1=5"), "JOINT=LOWER:UPPER"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--limit", "1=5:x"), "invalid value"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--branch", "sideways"), "elbow up"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--mask", "rx"), "--wxyz"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--mask", "x", "--task", "pose"), "no task besides"),
+        (("robots", "puma"), "expected one of pioneer5"),
+        (("robots", "--robots", "/no/such/folder"), "existing folder"),
+        (("dance",), "invalid choice: 'dance'"),
+        (("serve", "--port", "http"), "invalid int value"),
+        (("serve", "--port", "99999"), "--port or KINBOARD_PORT: got 99999"),
+    ],
+)
+def test_bad_input_is_exit_code_2_and_one_clear_message(capsys, words, said):
+    code, out, err = run(capsys, *words)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert len(err.splitlines()) <= 6
+
+
+def test_a_bad_environment_variable_is_named(capsys, monkeypatch):
+    monkeypatch.setenv("KINBOARD_MAX_BATCH", "-1")
+    code, _, err = run(capsys, "serve")
+    assert code == 2
+    assert "KINBOARD_MAX_BATCH: got '-1'" in err
+
+
+@pytest.fixture
+def served(monkeypatch):
+    """What the command line would have served, instead of serving it."""
+    import app.service.main
+
+    calls = []
+    monkeypatch.setattr(
+        app.service.main, "run", lambda settings, open_browser: calls.append((settings, open_browser)) or 0
+    )
+    return calls
+
+
+@pytest.mark.parametrize("words", [(), ("serve",)])
+def test_serving_is_the_default(served, words):
+    assert parser.main(words) == 0
+    assert served == [(Settings(), False)]
+
+
+@pytest.mark.parametrize("first", [(), ("serve",)])
+def test_flags_reach_the_settings_and_win_over_the_environment(served, monkeypatch, first, tmp_path):
+    monkeypatch.setenv("KINBOARD_PORT", "1234")
+    monkeypatch.setenv("KINBOARD_HOST", "0.0.0.0")
+    words = (*first, "--port", "0", "--open", "--root-path", "/arms", "--robots", str(tmp_path))
+    assert parser.main(words) == 0
+    settings, opened = served[0]
+    assert (settings.port, settings.host, settings.root_path, settings.robots) == (0, "0.0.0.0", "/arms", tmp_path)
+    assert opened is True
+
+
+def test_version_and_help(capsys):
+    assert run(capsys, "--version") == (0, f"kinboard {kin.__version__}\n", "")
+    code, out, _ = run(capsys, "--help")
+    assert code == 0
+    assert "kinboard fk pioneer5 90 30 60 30 30" in out
+
+
+def test_the_program_itself():
+    """A process of its own, without the compiler: the same digits, and a start that does not load the server."""
+    words = [
+        sys.executable,
+        "-X",
+        "importtime",
+        "-m",
+        "app.cli",
+        "fk",
+        "pioneer5",
+        "90",
+        "-30",
+        "60",
+        "30",
+        "30",
+        "--json",
+    ]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, timeout=60, check=True)
+    T = kin.fk(PIONEER, np.radians([90, -30, 60, 30, 30]))
+    assert np.allclose(json.loads(done.stdout)["pose"]["matrix"], T, rtol=0, atol=1e-15)
+    imported = {line.rsplit("|", 1)[1].strip() for line in done.stderr.splitlines() if "|" in line}
+    assert "kin.fk" in imported
+    assert not imported & {"fastapi", "pydantic", "viser", "uvicorn"}
+
+
+def test_a_reader_that_leaves_early_is_no_error():
+    words = f"{sys.executable} -m app.cli.parser robots --json | true"
+    done = subprocess.run(words, cwd=ROOT, shell=True, capture_output=True, text=True, timeout=60, check=True)
+    assert done.stderr == ""
+
+
+# -- check -----------------------------------------------------------------------------------------------------
+
+
+def test_check_tells_what_an_arm_is(capsys):
+    file = ROOT / "kin" / "robots" / "puma560.toml"
+    code, out, err = run(capsys, "check", file)
+    assert (code, err) == (0, "")
+    assert "PUMA 560 (puma560)" in out
+    assert re.search(r"^3 +elbow +revolute +-225\.000° +45\.000° +-180\.000°$", out, re.M)
+    for line in (
+        "axes 1 and 2: perpendicular, intersecting",
+        "axes 2 and 3: parallel, 431.800 mm apart",
+        "axes 3 and 4: perpendicular, 20.300 mm apart",
+        "joints 2 to 3: parallel axes",
+        "joints 4 to 6: axes through one point",
+        "convention  standard",
+        "No warnings.",
+    ):
+        assert line in out.splitlines()
+    _, out, _ = run(capsys, "check", file, "--rad")
+    assert "axes 2 and 3: parallel, 0.431800 m apart" in out
+    _, out, _ = run(capsys, "check", ROOT / "kin" / "robots" / "scara.toml")
+    assert re.search(r"^3 +quill +prismatic +0\.000 mm +210\.000 mm +150\.000 mm$", out, re.M)
+    assert "joints      4, giving the tool 4 independent motions" in out
+
+
+def test_check_names_the_solver_and_why(capsys):
+    for robot in kin.builtin_robots().values():
+        got = answer(capsys, "check", ROOT / "kin" / "robots" / f"{robot.id}.toml")
+        match = solver_for(robot)
+        assert got["solver"] == ("numeric" if match is None else match.solver.NAME)
+        assert got["reason"]
+        assert got["robot"]["branches"] == list(kin.branch_names(robot))
+        assert got["motions"] == min(robot.n, 6)
+        assert len(got["axes"]) == robot.n - 1
+        assert not any("built-in" in text for text in got["warnings"])
+
+
+ODD = """
+id = "ur5"
+name = "Odd"
+source = "this test"
+convention = "standard"
+units = { length = "m", angle = "rad" }
+[[rows]]
+name = "around"
+alpha = 1.5708
+limits = [-7, 7]
+[[rows]]
+name = "up"
+d = 300
+[[rows]]
+name = "nothing"
+kind = "fixed"
+[[rows]]
+name = "again"
+a = 200
+[[rows]]
+name = "last"
+a = 200
+[home]
+q = [0, 0, 0, 0]
+"""
+
+
+def test_check_tells_what_looks_odd(capsys, tmp_path):
+    file = tmp_path / "odd.toml"
+    file.write_text(ODD, encoding="utf-8")
+    code, out, _ = run(capsys, "check", file)
+    assert code == 0
+    said = [line for line in out.splitlines() if line.startswith("warning: ")]
+    for number, words in enumerate(
+        (
+            '"ur5" is that of a built-in robot',
+            "reaches 700 m",
+            "Joint 1 (around) turns through 802°",
+            "joints 1 and 2 are almost perpendicular",
+            "Joints 2 and 3 turn about the same line",
+            'row "nothing" changes nothing',
+            "near a singularity",
+        )
+    ):
+        assert words in said[number]
+    assert len(said) == 7
+
+
+def test_check_refuses_a_bad_file_as_everywhere(capsys, tmp_path):
+    file = tmp_path / "bad.toml"
+    file.write_text(ODD.replace("a = 200", 'a = "long"', 1), encoding="utf-8")
+    code, out, err = run(capsys, "check", file)
+    assert (code, out) == (2, "")
+    assert err.startswith(f"kinboard: {file}: rows[3].a: got 'long', expected a finite number")
+    assert run(capsys, "check", tmp_path / "none.toml")[0] == 2
+
+
+# -- workspace -------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def clouds():
+    made = Clouds(max_bytes=0, threads=1)
+    yield made
+    made.close()
+
+
+def test_workspace_tells_sizes(capsys):
+    facts = kin.workspace_facts(PIONEER, effort=2)
+    code, out, err = run(capsys, "workspace", "pioneer5", "--effort", 2)
+    assert (code, err) == (0, "")
+    for name, span in (
+        ("x", facts.x),
+        ("from the axis of joint 1", facts.radius),
+        ("from the shoulder", facts.reach),
+    ):
+        line = next(line for line in out.splitlines() if re.match(rf"{name}  +", line))
+        assert [float(word) for word in line.split()[-2:]] == pytest.approx(
+            [1e3 * e.value for e in span], abs=6e-4
+        )
+    assert f"{facts.volume.value:.4g} ± {facts.volume.error:.1g} m³: {facts.volume.method}" in out
+    assert f"{facts.surface.value:.4g} ±" in out
+    metres = run(capsys, "workspace", "pioneer5", "--effort", 2, "--rad")[1]
+    assert f"{facts.x.largest.value:.6f}" in metres
+
+
+def test_workspace_json_is_what_rest_says(capsys, client):
+    got = answer(capsys, "workspace", "scara", "--lock", "1=45", "--limit", "3=0:100", "--effort", 2)
+    address = f"/api/v1/robots/scara/workspace/summary?lock=1:{math.pi / 4}&limit=3:0:0.1&effort=2"
+    assert got == client.get(address).json()
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_cloud_is_written_by_the_name_of_its_file(capsys, tmp_path, clouds, name):
+    file = tmp_path / f"cloud.{name}"
+    words = ("-n", "3e3", "--seed", 5, "--strategy", "quasi", "--measure", "limits", "--q")
+    code, out, err = run(
+        capsys, "workspace", "pioneer5", *words, "--limit", "1=0:90", "--lock", "3=20", "-o", file
+    )
+    assert (code, err) == (0, "")
+    assert out.startswith(f"{file}: 3000 points, ")
+    limits, locked = ((0.0, math.radians(90)), *[None] * 4), (None, None, math.radians(20), None, None)
+    cloud = Cloud(PIONEER, 3000, 5, "quasi", ("limits",), limits, locked)
+    assert file.read_bytes() == b"".join(encode(name, clouds, cloud, True))
+    assert list(tmp_path.iterdir()) == [file]
+    bare = tmp_path / "cloud"
+    assert run(capsys, "workspace", "pioneer5", "-n", 5, "-o", bare, "--format", name)[0] == 0
+    assert bare.read_bytes() == b"".join(encode(name, clouds, Cloud(PIONEER, 5)))
+
+
+def test_a_cloud_to_standard_output_and_the_format_by_option(capsys, tmp_path, clouds):
+    expected = b"".join(encode("csv", clouds, Cloud(PIONEER, 100)))
+    assert run(capsys, "workspace", "pioneer5", "-n", 100, "-o", "-", "--format", "csv") == (
+        0,
+        expected.decode(),
+        "",
+    )
+    file = tmp_path / "cloud.txt"
+    assert run(capsys, "workspace", "pioneer5", "-n", 100, "-o", file, "--format", "csv")[0] == 0
+    assert file.read_bytes() == expected
+
+
+def test_a_link_stays_a_link_and_a_device_a_device(capsys, tmp_path):
+    real, link = tmp_path / "real.bin", tmp_path / "link.bin"
+    real.write_bytes(b"old")
+    link.symlink_to(real)
+    assert run(capsys, "workspace", "pioneer5", "-n", 10, "-o", link)[0] == 0
+    assert link.is_symlink()
+    assert real.read_bytes().startswith(b"KINCLOUD")
+    assert run(capsys, "workspace", "pioneer5", "-n", 10, "-o", "/dev/null", "--format", "bin")[0] == 0
+    assert Path("/dev/null").is_char_device()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("-o", "cloud.xyz"), "--output: got 'cloud.xyz', expected a name that ends in .ndjson"),
+        (("-o", "-"), "--output: got '-'"),
+        (("-o", "/no/such/folder/cloud.ply"), "cannot write /no/such/folder/cloud.ply: No such file"),
+        (("-n", "1e20", "-o", "cloud.ply"), "n: got 100000000000000000000"),
+        (("-n", "0", "-o", "cloud.ply"), "n: got 0"),
+        (("-n", "1.5"), "argument -n: invalid whole number value: '1.5'"),
+        (("-n", "inf"), "argument -n: invalid whole number value: 'inf'"),
+        (("--seed", "-1", "-o", "cloud.ply"), "seed: got -1"),
+        (("--seed", "x"), "argument --seed: invalid whole number value: 'x'"),
+        (("--strategy", "even"), "argument --strategy: invalid choice"),
+        (("--effort", "1"), "effort: got 1"),
+        (("-o", "a.csv", "--picture", "a.png"), "--picture: got 'a.png', expected a name that ends in .svg"),
+        (("--hull", "hull.doc"), "--hull: got 'hull.doc', expected a name that ends in .stl"),
+        (("--picture", "/no/such/folder/a.svg", "-n", "10"), "cannot write /no/such/folder/a.svg: No such file"),
+        (("--hull", "a.stl", "-n", "3"), "hull: got '3 points', expected at least four"),
+        (("--limit", "9=0:1"), "--limit: got '9', expected a joint from 1 to 5"),
+        (("--lock", "2=999", "-o", "cloud.ply"), "locked[1]: got"),
+    ],
+)
+def test_workspace_refuses_what_it_cannot_do(capsys, tmp_path, monkeypatch, words, said):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run(capsys, "workspace", "pioneer5", *words)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_workspace_draws_and_encloses(capsys, tmp_path):
+    picture, body, cloud = tmp_path / "a.svg", tmp_path / "a.stl", tmp_path / "a.csv"
+    words = ["workspace", "pioneer5", "-n", 20_000, "--effort", 2, "--limit", "1=0:90"]
+    code, out, err = run(capsys, *words, "--picture", picture, "--hull", body, "-o", cloud)
+    assert (code, err) == (0, "")
+    assert [line.split(":")[0] for line in out.splitlines()] == [str(cloud), str(picture), str(body)]
+    assert picture.read_text().startswith("<svg")
+    hull = trimesh.load(body)
+    points = np.loadtxt(cloud, delimiter=",", skiprows=1)
+    assert hull.is_watertight
+    assert np.allclose(hull.bounds, [points.min(axis=0), points.max(axis=0)], atol=1e-6)
+    whole = trimesh.convex.convex_hull(points)
+    assert hull.volume == pytest.approx(whole.volume, rel=1e-5)
+
+
+def test_an_arm_whose_first_joint_slides_is_drawn_without_a_section(capsys, tmp_path):
+    file = tmp_path / "rail.toml"
+    file.write_text(
+        'id = "rail"\nname = "Rail"\ndescription = ""\nsource = "test"\nconvention = "standard"\n'
+        'units = { length = "m", angle = "rad" }\n'
+        '[[rows]]\nname = "rail"\nkind = "prismatic"\nalpha = 1.5707963267948966\nlimits = [0, 1]\n'
+        '[[rows]]\nname = "arm"\na = 0.3\nlimits = [-1, 1]\n'
+    )
+    picture = tmp_path / "b.svg"
+    words = ["workspace", "rail", "--robots", tmp_path, "-n", 1000, "--picture", picture]
+    assert run(capsys, *words) == (0, f"{picture}: 1000 points\n", "")
+    assert "section" not in picture.read_text()
+
+
+def test_a_hull_without_scipy_says_what_to_install(capsys, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "scipy.spatial", None)
+    code, out, err = run(capsys, "workspace", "pioneer5", "-n", 100, "--hull", tmp_path / "a.stl")
+    assert (code, out) == (2, "")
+    assert "pip install 'kinboard[hull]'" in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interrupted_cloud_leaves_nothing_behind(tmp_path):
+    old = tmp_path / "cloud.bin"
+    old.write_bytes(b"old")
+    words = ["workspace", "pioneer5", "-n", "1e10", "-o", str(old), "--progress"]
+    # As at a terminal: what a shell starts in the background ignores Ctrl-C, and so do its children.
+    listening = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+    command = [sys.executable, "-c", f"{listening}; import sys; from app import cli; sys.exit(cli.main())", *words]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        deadline = time.monotonic() + 60
+        while not any(file.stat().st_size > 1e6 for file in tmp_path.iterdir()):
+            assert time.monotonic() < deadline
+            assert process.poll() is None
+            time.sleep(0.02)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=120)
+    assert (process.returncode, out) == (130, b"")
+    assert err.decode().splitlines()[-1] == "kinboard: interrupted; nothing was written"
+    assert b"M points/s" in err
+    assert [(file.name, file.read_bytes()) for file in tmp_path.iterdir()] == [("cloud.bin", b"old")]
+
+
+def test_progress_counts_every_pass(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr("app.exports.formats.KEPT", 0)
+    monkeypatch.setattr(save, "_TOLD_EVERY", 0.0)
+    file = tmp_path / "cloud.npz"
+    code, _, err = run(capsys, "workspace", "pioneer5", "-n", 2e5, "--measure", "limits", "-o", file, "--progress")
+    assert code == 0
+    parts = [int(part) for part in re.findall(r"(\d+)%", err)]
+    assert parts == sorted(parts)
+    assert parts[-1] == 100
+    assert len(parts) == 8  # four slices, twice
+    assert "0 s left" in err
+    assert run(capsys, "workspace", "pioneer5", "-n", 100, "-o", file)[2] == ""  # no terminal, no progress
+
+
+def test_what_progress_says():
+    progress = save.Progress(4_000_000, sys.stderr)
+    progress._done = 1_000_000
+    assert progress.line(0.5) == "[######                  ]  25%     2.000 M points/s       2 s left"
+
+
+def test_the_search_for_garbage_goes_on_after_a_command(capsys):
+    assert gc.isenabled()
+    assert parser.main(["fk", "pioneer5", "90", "30", "60", "30", "30"]) == 0
+    assert gc.isenabled()

@@ -1,0 +1,355 @@
+"""Who gets in, who may only look, and who is asked to slow down. Half of these tests try to get in."""
+
+from __future__ import annotations
+
+import json
+import time
+
+import pytest
+import viser
+from fake_browser import FakeBrowser
+from fastapi.testclient import TestClient
+from live_server import serve, wait_for
+from starlette.websockets import WebSocketDisconnect
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+from websockets.typing import Subprotocol
+
+import app.service.web.access as access
+from app.service.main import create_app
+from app.service.web.access import COOKIE, Bucket, client_of
+from app.shared.settings import Settings
+from app.viewer.panel.view import ViewState
+from app.viewer.session.state import PageState, encode
+
+TOKEN = "correct horse battery"
+HEADER = {"authorization": f"Bearer {TOKEN}"}
+PAGE = {"accept": "text/html"}
+VISER = Subprotocol(f"viser-v{viser.__version__}")
+ARM = "/api/v1/robots/pioneer5"
+FK = f"{ARM}/fk"
+Q = {"q": [0, 0, 0, 0, 0]}
+
+
+def client_with(**settings: object) -> TestClient:
+    return TestClient(
+        create_app(Settings(**settings)),  # type: ignore[arg-type]
+        raise_server_exceptions=False,
+        follow_redirects=False,
+    )
+
+
+@pytest.fixture(scope="module")
+def application():
+    return create_app(Settings(token=TOKEN))  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def guarded(application):
+    # Everybody is a new client: tokens guessed in one test do not count in the next.
+    global _next
+    _next += 1
+    return TestClient(
+        application, raise_server_exceptions=False, follow_redirects=False, client=(f"10.1.0.{_next}", 5000)
+    )
+
+
+_next = 0
+
+
+def test_without_a_token_everybody_may_do_everything():
+    client = client_with()
+    assert client.post(FK, json=Q).status_code == 200
+    assert client.get("/", headers=PAGE).status_code == 200
+    assert client.get("/login?next=docs").headers["location"] == "./docs"
+
+
+@pytest.mark.parametrize(
+    "path", ["/api/v1/robots", FK, "/docs", "/openapi.json", "/viewer/", "/", "/no-such-thing"]
+)
+def test_with_a_token_nothing_answers_without_it(guarded, path):
+    answer = guarded.get(path)
+    assert answer.status_code == 401
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert answer.headers["www-authenticate"].startswith("Bearer")
+    assert answer.headers["cache-control"] == "no-store"
+    assert answer.json()["type"] == "urn:kinboard:problem:unauthorized"
+
+
+@pytest.mark.parametrize("path", ["/livez", "/static/landing.css", "/login", "/favicon.ico"])
+def test_health_and_the_login_page_stay_open(guarded, path):
+    assert guarded.get(path).status_code in (200, 307)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/static/../api/v1/robots",
+        "/static/%2e%2e/api/v1/robots",
+        "/static/..%2fapi/v1/robots",
+        "/login/../api/v1/robots",
+        "//api/v1/robots",
+        "/livez/../api/v1/robots",
+        "/API/v1/robots",
+        "/login;/api/v1/robots",
+        "/livez%00/../../api/v1/robots",
+    ],
+)
+def test_no_spelling_of_an_address_leads_around(guarded, path):
+    assert "pioneer5" not in guarded.get(path).text
+
+
+def test_a_program_with_the_token_gets_in(guarded):
+    assert guarded.post(FK, json=Q, headers=HEADER).status_code == 200
+    assert guarded.post(FK, json=Q, headers={"authorization": f"bearer  {TOKEN} "}).status_code == 200
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        "Bearer",
+        "Bearer ",
+        f"Basic {TOKEN}",
+        TOKEN,
+        "Bearer correct horse",
+        f"Bearer {TOKEN}x",
+        "Bearer \xe9",
+        "Bearer null",
+    ],
+)
+def test_anything_else_in_the_header_does_not(guarded, value):
+    answer = guarded.post(FK, json=Q, headers={"authorization": value.encode("latin-1")})
+    assert answer.status_code == 401
+
+
+def test_guessing_is_slowed_down_and_does_not_lock_others_out(guarded, application):
+    wrong = {"authorization": "Bearer guess"}
+    codes = [guarded.get("/api/v1/robots", headers=wrong).status_code for _ in range(8)]
+    assert codes == [401] * access.TRIES + [429] * 3
+    late = guarded.get("/api/v1/robots", headers=HEADER)
+    assert late.status_code == 429
+    assert 1 <= int(late.headers["retry-after"]) <= access.TRY_EVERY
+    other = TestClient(application, client=("10.9.9.9", 1))
+    assert other.get("/api/v1/robots", headers=HEADER).status_code == 200
+
+
+def test_a_browser_is_asked_once_and_then_brought_to_where_it_wanted(guarded):
+    sent = guarded.get("/docs", headers=PAGE)
+    assert (sent.status_code, sent.headers["location"]) == (303, "login?next=docs")
+    page = guarded.get("/login?next=docs")
+    assert 'action="login?next=docs"' in page.text
+    assert "content-security-policy" in page.headers
+    answer = guarded.post("/login?next=docs", data={"token": TOKEN})
+    assert (answer.status_code, answer.headers["location"]) == (303, "./docs")
+    cookie = answer.headers["set-cookie"].lower()
+    assert "httponly" in cookie
+    assert "samesite=lax" in cookie
+    assert TOKEN not in cookie
+    assert guarded.get("/docs", headers=PAGE).status_code == 200
+    assert guarded.post(FK, json=Q).status_code == 200
+
+
+def test_the_way_to_the_login_page_is_relative_to_where_one_is(guarded):
+    assert guarded.get("/viewer/", headers=PAGE).headers["location"] == "../login?next=viewer/"
+
+
+def test_a_wrong_token_is_told_on_the_page(guarded):
+    answer = guarded.post("/login", data={"token": "<script>"})
+    assert answer.status_code == 401
+    assert "That is not the token." in answer.text
+    assert "set-cookie" not in answer.headers
+    assert [guarded.post("/login", data={"token": "no"}).status_code for _ in range(6)][-1] == 429
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        "//evil.example",
+        "https://evil.example",
+        "/\\evil.example",
+        "\\\\evil",
+        "javascript:alert(1)",
+        "a//b",
+        "x\nSet-Cookie: a=b",
+        "/etc",
+    ],
+)
+def test_the_login_page_sends_nobody_elsewhere(guarded, place):
+    answer = guarded.post("/login", params={"next": place}, data={"token": TOKEN})
+    assert answer.headers["location"] == "./"
+
+
+def test_a_form_that_is_too_large_is_not_read(guarded):
+    assert guarded.post("/login", data={"token": "x" * 10_000}).status_code == 413
+
+
+@pytest.mark.parametrize("forge", ["later", "unsigned", "empty", "dots", "huge", "nonsense"])
+def test_a_cookie_that_we_did_not_sign_opens_nothing(guarded, forge):
+    guarded.post("/login", data={"token": TOKEN})
+    ends, _, signature = guarded.cookies[COOKIE].strip('"').partition(".")
+    guarded.cookies.clear()
+    value = {
+        "later": f"{int(ends) + 1}.{signature}",
+        "unsigned": f"{ends}.",
+        "empty": "",
+        "dots": "." * 50,
+        "huge": "9" * 400 + "." + signature,
+        "nonsense": "\x7f[]",
+    }[forge]
+    answer = guarded.get("/api/v1/robots", headers={"cookie": f"{COOKIE}={value}"})
+    assert answer.status_code == 401
+
+
+def test_a_cookie_ends(guarded, monkeypatch):
+    guarded.post("/login", data={"token": TOKEN})
+    assert guarded.get("/api/v1/robots").status_code == 200
+    after = time.time() + access.LASTS + 10
+    monkeypatch.setattr(access.time, "time", lambda: after)
+    cookie = {"cookie": f"{COOKIE}={guarded.cookies[COOKIE]}"}
+    assert guarded.get("/api/v1/robots", headers=cookie).status_code == 401
+
+
+def test_a_cookie_of_another_token_opens_nothing(guarded):
+    other = client_with(token="another token")
+    other.post("/login", data={"token": "another token"})
+    cookie = {"cookie": f"{COOKIE}={other.cookies[COOKIE]}"}
+    assert other.get("/api/v1/robots", headers=cookie).status_code == 200
+    assert guarded.get("/api/v1/robots", headers=cookie).status_code == 401
+
+
+def test_over_https_the_cookie_never_travels_in_clear(application):
+    client = TestClient(
+        application, base_url="https://kin.example", client=("10.8.8.8", 1), follow_redirects=False
+    )
+    assert "secure" in client.post("/login", data={"token": TOKEN}).headers["set-cookie"].lower()
+
+
+def test_below_a_prefix(application):
+    client = client_with(token=TOKEN, root_path="/arm")
+    sent = client.get("/arm/viewer/", headers=PAGE)
+    assert sent.headers["location"] == "../login?next=viewer/"
+    answer = client.post("/arm/login", data={"token": TOKEN})
+    assert "path=/arm/" in answer.headers["set-cookie"].lower()
+    assert client.get("/arm/api/v1/robots", headers=HEADER).status_code == 200
+
+
+@pytest.mark.parametrize("path", ["/viewer", "/viewer/"])
+def test_a_websocket_needs_the_token_too(guarded, path):
+    with pytest.raises(WebSocketDisconnect) as refused, guarded.websocket_connect(path):
+        pass
+    assert refused.value.code == 1008
+
+
+def test_who_is_logged_in_gets_a_viewer():
+    application = create_app(Settings(token=TOKEN))  # type: ignore[arg-type]
+    with serve(application) as port:
+        address = f"ws://127.0.0.1:{port}/viewer"
+        with pytest.raises(InvalidStatus, match="403"):
+            connect(address)
+        wait_for(lambda: application.state.startup.status == "ready", 300)
+        with connect(address, additional_headers=HEADER, subprotocols=[VISER]) as socket:
+            assert socket.subprotocol == VISER
+
+
+# Read-only
+
+
+def test_read_only_answers_questions_of_reading_and_refuses_work():
+    client = client_with(read_only=True)
+    assert client.get("/", headers=PAGE).status_code == 200
+    assert client.get("/api/v1/robots").status_code == 200
+    for answer in (client.post(FK, json=Q), client.get(f"{ARM}/workspace"), client.get(f"{ARM}/capability")):
+        assert answer.status_code == 403
+        assert answer.json()["type"] == "urn:kinboard:problem:read-only"
+    with pytest.raises(WebSocketDisconnect), client.websocket_connect("/api/v1/robots/pioneer5/workspace/stream"):
+        pass
+
+
+def test_read_only_is_for_those_without_the_token():
+    client = client_with(read_only=True, token=TOKEN)
+    assert client.get("/api/v1/robots").status_code == 200
+    assert client.post(FK, json=Q).status_code == 403
+    assert client.post(FK, json=Q, headers=HEADER).status_code == 200
+    assert client.get("/api/v1/robots", headers={"authorization": "Bearer wrong"}).status_code == 401
+
+
+def test_whoever_may_only_look_sees_the_arm_a_link_shows_and_cannot_move_it():
+    application = create_app(Settings(read_only=True))
+    memory = json.dumps({"state": encode(PageState("pioneer5", view=ViewState(frames=True)))})
+    with serve(application) as port:
+        wait_for(lambda: application.state.startup.status == "ready", 300)
+        with FakeBrowser(port, path="/viewer", memory=memory) as tab:
+            tab.settle()
+            assert tab.value("Link frames") is True
+            before = tab.tool_pose()
+            tab.set("1 rotating base", 10.0)
+            tab.drag(position=(0.1, 0.1, 0.1))
+            tab.send("GuiUpdateMessage", uuid=tab.element("Radians"), updates={"value": True})
+            tab.settle()
+            assert (tab.tool_pose() == before).all()
+
+
+# How much
+
+
+def test_a_client_that_asks_for_too_much_is_told_when_to_come_again():
+    client = client_with(rate_limit=1.0)
+    codes = [client.get("/api/v1/robots").status_code for _ in range(12)]
+    assert codes[:10] == [200] * 10
+    assert codes[-1] == 429
+    answer = client.get("/api/v1/robots")
+    assert answer.headers["retry-after"] == "1"
+    assert answer.json()["type"] == "urn:kinboard:problem:too-many-requests"
+    assert client.get("/livez").status_code == 200
+
+
+def test_a_bucket_fills_up_again_and_forgets_the_oldest(monkeypatch):
+    now = [0.0]
+    bucket = Bucket(2.0, 3.0, lambda: now[0])
+    for _ in range(3):
+        assert bucket.wait("a") == 0.0
+        bucket.take("a")
+    assert bucket.wait("a") == pytest.approx(0.5)
+    assert bucket.wait("b") == 0.0
+    now[0] = 0.5
+    assert bucket.wait("a") == 0.0
+    now[0] = 100.0
+    bucket.take("a")
+    assert bucket.wait("a") == 0.0  # two of three are left, however long it rested
+    monkeypatch.setattr(Bucket, "MOST", 5)
+    for name in "bcdefgh":
+        bucket.take(name)
+    assert len(bucket._left) == 5
+
+
+@pytest.mark.parametrize(
+    ("host", "client"),
+    [
+        ("192.0.2.7", "192.0.2.7"),
+        ("2001:db8:1:2:3:4:5:6", "2001:db8:1:2::/64"),
+        ("::ffff:192.0.2.7", "192.0.2.7"),
+        ("testclient", "testclient"),
+    ],
+)
+def test_a_budget_belongs_to_an_address_or_network(host, client):
+    assert client_of({"client": (host, 1)}) == client
+
+
+def test_pages_of_other_origins_read_answers_only_if_the_operator_says_so():
+    asking = {"origin": "https://school.example"}
+    assert "access-control-allow-origin" not in client_with().get("/api/v1/robots", headers=asking).headers
+    client = client_with(cors_origins=("https://school.example",), token=TOKEN)
+    preflight = client.options(FK, headers=asking | {"access-control-request-method": "POST"})
+    assert preflight.status_code == 200
+    assert preflight.headers["access-control-allow-origin"] == "https://school.example"
+    refused = client.options(
+        FK, headers={"origin": "https://evil.example", "access-control-request-method": "POST"}
+    )
+    assert "access-control-allow-origin" not in refused.headers
+    answer = client.post(FK, json=Q, headers=asking | HEADER)
+    assert answer.headers["access-control-allow-origin"] == "https://school.example"
+
+
+def test_a_short_token_is_refused_at_start():
+    with pytest.raises(ValueError, match="8"):
+        Settings(token="short")  # type: ignore[arg-type]

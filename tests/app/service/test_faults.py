@@ -1,0 +1,314 @@
+"""What goes wrong around the service: a stop in mid-answer, workers that fail, broken files, full disks."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx2
+import numpy as np
+import pytest
+import viser
+from fake_browser import FakeBrowser
+from live_server import wait_for
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection, connect
+
+import app.viewer.panel.layout
+import kin
+from app.cli.parser import main
+from app.service.main import run
+from app.shared.clouds import Clouds
+from app.shared.settings import Settings
+from app.shared.store import Store
+from app.viewer.server import RESTARTS, ViewerServer
+from app.viewer.session.controller import Session
+
+ROOT = Path(__file__).parents[3]
+ARM = kin.get_robot("pioneer5")
+FAR = {"position": [5.0, 0.0, 0.0], "wxyz": [1.0, 0.0, 0.0, 0.0]}  # for the Panda some tenths of a second each
+
+
+# -- SIGTERM ---------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def service(**environment: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    env = os.environ | {"PYTHONPATH": str(ROOT), "KINBOARD_PORT": "0"} | environment
+    with subprocess.Popen(
+        [sys.executable, "-m", "app.cli", "serve"],
+        cwd=ROOT, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        try:
+            assert process.stdout is not None
+            found = re.search(r":(\d+)/", process.stdout.readline())
+            assert found
+            base = f"127.0.0.1:{found[1]}"
+            wait_for(lambda: httpx2.get(f"http://{base}/readyz", trust_env=False).status_code == 200, 120)
+            yield process, base
+        finally:
+            process.kill()
+
+
+class Asking(threading.Thread):
+    """A request under way."""
+
+    def __init__(self, base: str, robot: str, what: str, body: object) -> None:
+        super().__init__()
+        self.url = f"http://{base}/api/v1/robots/{robot}/{what}"
+        self.body = body
+        self.answer: httpx2.Response | None = None
+        self.error: Exception | None = None
+        self.start()
+
+    def run(self) -> None:
+        try:
+            method = "GET" if self.body is None else "POST"
+            self.answer = httpx2.request(method, self.url, json=self.body, timeout=60, trust_env=False)
+        except httpx2.HTTPError as error:
+            self.error = error
+
+
+def stopped(process: subprocess.Popen[str], within: float) -> str:
+    """What it had to say at its end, which has to come in time."""
+    began = time.monotonic()
+    process.send_signal(signal.SIGTERM)
+    _, errors = process.communicate(timeout=60)
+    assert time.monotonic() - began < within
+    assert process.returncode == 0, errors
+    assert "Traceback" not in errors
+    return errors
+
+
+def test_an_answer_under_way_arrives_whole_and_visitors_are_told():
+    with service(KINBOARD_DRAIN="30") as (process, base):
+        asking = Asking(base, "panda", "ik", {"target": [FAR] * 12, "max_solutions": 1})
+        with connect(f"ws://{base}/viewer", subprotocols=[f"viser-v{viser.__version__}"], proxy=None) as visitor:
+            assert visitor.recv(timeout=20)
+            time.sleep(0.3)
+            assert asking.is_alive()
+            stopped(process, 33.0)
+            with pytest.raises(ConnectionClosed) as closed:
+                read_to_the_end(visitor)
+        asking.join(5)
+    assert asking.answer is not None, asking.error
+    assert len(asking.answer.json()["results"]) == 12
+    assert closed.value.rcvd is not None
+    assert closed.value.rcvd.code in (1001, 1012)
+
+
+def test_what_takes_too_long_is_given_up_in_time():
+    """A batch of minutes, a cloud of minutes as a file and over a websocket, sizes of minutes."""
+    with service(KINBOARD_DRAIN="4") as (process, base):
+        asking = Asking(base, "panda", "ik", {"target": [FAR] * 5000})
+        waiting = Asking(base, "panda", "workspace/summary?effort=16", None)
+        where = f"{base}/api/v1/robots/panda/workspace"
+        with (
+            httpx2.stream("GET", f"http://{where}?n=50000000", timeout=60, trust_env=False) as cloud,
+            connect(f"ws://{where}/stream?n=50000000", proxy=None) as visitor,
+        ):
+            taken = cloud.iter_raw()
+            assert next(taken)
+            assert visitor.recv(timeout=20)
+            reading = threading.Thread(target=lambda: drained(taken))
+            reading.start()
+            stopped(process, 20.0)  # all of it would take minutes
+            reading.join(10)
+            assert not reading.is_alive()
+            with pytest.raises(ConnectionClosed):
+                read_to_the_end(visitor)
+        asking.join(10)
+        waiting.join(10)
+    for each in (asking, waiting):
+        assert each.answer is not None, each.error
+        assert each.answer.status_code == 503
+        assert each.answer.json()["type"] == "urn:kinboard:problem:busy"
+        assert int(each.answer.headers["retry-after"]) > 0
+
+
+def read_to_the_end(visitor: ClientConnection) -> None:
+    while True:
+        visitor.recv(timeout=5)
+
+
+def drained(pieces: Iterator[bytes]) -> None:
+    with pytest.raises(httpx2.HTTPError):  # cut off, and seen to be
+        for _ in pieces:
+            pass
+
+
+# -- a visitor's worker ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def port() -> Iterator[int]:
+    server = ViewerServer(Store(), Settings(), Clouds())
+    yield server.start()
+    server.stop()
+
+
+def test_a_worker_that_dies_is_replaced_and_the_visitor_told(port, monkeypatch, caplog):
+    draw = Session._draw
+    deaths: list[str] = []
+
+    def dies(self: Session, fresh: bool) -> None:
+        if fresh and not deaths:
+            deaths.append(threading.current_thread().name)
+            raise SystemExit  # which no guard takes for an error
+        draw(self, fresh)
+
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        arm = tab.gizmo
+        monkeypatch.setattr(Session, "_draw", dies)
+        tab.set("1 rotating base", 10.0)
+        tab.wait(lambda: "Started again" in tab.html)
+        tab.settle()
+        assert tab.gizmo != arm
+        assert np.allclose(tab.tool_pose(), kin.fk(ARM, ARM.q_home), atol=1e-6)
+        tab.set("1 rotating base", 20.0)
+        tab.wait(lambda: 'data-status="hand"' in tab.html)
+        assert tab.value("1 rotating base") == 20.0
+    assert len(deaths) == 1
+    assert "a visitor's worker failed" in caplog.text
+
+
+def test_a_worker_that_cannot_even_begin_is_not_replaced_for_ever(port, monkeypatch, caplog):
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        monkeypatch.setattr(Session, "_draw", lambda *_, **__: sys.exit())
+        monkeypatch.setattr(app.viewer.panel.layout, "StatusLine", lambda *_: 1 / 0)
+        tab.set("1 rotating base", 10.0)
+        # Each new worker asks the page what it remembers, so the page has to listen.
+        wait_for(lambda: tab._read(0.01) is None or "is not started again" in caplog.text)
+    assert caplog.text.count("ZeroDivisionError: division by zero") == RESTARTS
+
+
+# -- files -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        (b"\x00\xff\xfe", "UTF-8"),
+        (b"id = ", "valid TOML"),
+        (b"[" * 100_000, "valid TOML"),
+        (b'id = "x"', "odd.toml"),
+        (b"", "odd.toml"),
+    ],
+)
+def test_a_corrupt_robot_file_ends_the_start_with_a_message(content, told, tmp_path, capfd):
+    (tmp_path / "odd.toml").write_bytes(content)
+    assert run(Settings(port=0, robots=tmp_path)) == 1
+    error = capfd.readouterr().err
+    assert told in error
+    assert "odd.toml" in error
+    assert "Traceback" not in error
+
+
+def test_a_folder_of_robots_that_cannot_be_read_ends_the_start_with_a_message(tmp_path, capfd, monkeypatch):
+    def refuses(self: Path) -> None:
+        raise PermissionError(13, "Permission denied", str(self))
+
+    monkeypatch.setattr(Path, "iterdir", refuses)  # root may read everything
+    assert run(Settings(port=0, robots=tmp_path)) == 1
+    assert "Permission denied" in capfd.readouterr().err
+
+
+def test_a_full_disk_is_said_plainly(capsys):
+    assert main(["workspace", "pioneer5", "-n", "100000", "-o", "/dev/full", "--format", "csv"]) == 2
+    assert "No space left on device" in capsys.readouterr().err
+
+
+def test_of_a_file_that_does_not_fit_nothing_is_left(tmp_path, capsys):
+    resource = pytest.importorskip("resource")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, before[1]))
+    try:
+        assert main(["workspace", "pioneer5", "-n", "100000", "-o", str(tmp_path / "cloud.csv")]) == 2
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, ignored)
+    assert "File too large" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+# -- the cache of machine code ---------------------------------------------------------------------------------
+
+KERNEL = """
+from kin.compiled import jit
+
+@jit
+def twice(x):
+    return 2.0 * x
+"""
+
+
+def twice(folder: Path, before: str = "") -> dict[str, object]:
+    """What a new process makes of a kernel in this folder: result, hits of the cache, warnings."""
+    code = f"""
+        import json, sys, warnings
+        {before}
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            import kernel
+            result = kernel.twice(1.5)
+        hits = sum(kernel.twice.stats.cache_hits.values())
+        print(json.dumps({{"result": result, "hits": hits, "told": [str(w.message) for w in told]}}))
+    """
+    (folder / "kernel.py").write_text(KERNEL)
+    env = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, check=True, timeout=120,
+        env=env | {"PYTHONPATH": f"{ROOT}{os.pathsep}{folder}"},
+    )  # fmt: skip
+    answer: dict[str, object] = json.loads(done.stdout)
+    return answer
+
+
+@pytest.mark.parametrize(("ending", "left"), [("nbi", 7), ("nbc", 0), ("nbc", 200)])
+def test_what_is_left_of_machine_code_is_thrown_away(tmp_path, ending, left):
+    assert twice(tmp_path) == {"result": 3.0, "hits": 0, "told": []}
+    (file,) = (tmp_path / "__pycache__").glob(f"*.{ending}")
+    file.write_bytes(file.read_bytes()[:left])
+    found = twice(tmp_path)
+    assert (found["result"], found["hits"]) == (3.0, 0)
+    (told,) = found["told"]
+    assert "cannot be read" in told
+    assert twice(tmp_path) == {"result": 3.0, "hits": 1, "told": []}
+
+
+def test_without_a_folder_to_write_to_kernels_work_and_one_warning_says_so(tmp_path):
+    refused = """
+        import numba.core.caching as caching
+        def refuse(self): raise OSError(30, "Read-only file system")
+        import kin.compiled
+        caching._CacheLocator.ensure_cache_path = refuse
+    """
+    found = twice(tmp_path, textwrap.dedent(refused).replace("\n", "\n        "))
+    assert found["result"] == 3.0
+    (told,) = found["told"]
+    assert "NUMBA_CACHE_DIR" in told
+
+
+def test_a_full_disk_keeps_no_machine_code_and_one_warning_says_so(tmp_path):
+    refused = """
+        import numba.core.caching as caching
+        def refuse(self, key, data): raise OSError(28, "No space left on device")
+        caching.IndexDataCacheFile.save = refuse
+    """
+    found = twice(tmp_path, textwrap.dedent(refused).replace("\n", "\n        "))
+    assert found["result"] == 3.0
+    (told,) = found["told"]
+    assert "No space left on device" in told

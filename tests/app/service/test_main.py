@@ -1,0 +1,285 @@
+"""The whole service: health, pages without internet, path prefix, start and stop of the real process."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from urllib.parse import urljoin, urlsplit
+
+import httpx2
+import pytest
+import viser
+from fastapi.testclient import TestClient
+from live_server import serve, wait_for
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection, connect
+
+import app.service.startup
+from app.service.main import create_app, run
+from app.service.web.pages import static_folder
+from app.shared.settings import Settings
+from app.viewer.server import ViewerServer
+from kin import builtin_robots
+
+ROOT = Path(__file__).parents[3]
+PROTOCOL = f"viser-v{viser.__version__}"
+LINK = re.compile(r"""\b(?:href|src)="([^"]*)\"""")
+
+
+def read_to_the_end(visitor: ClientConnection) -> None:
+    while True:
+        visitor.recv(timeout=5)
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[TestClient]:
+    with TestClient(create_app(Settings())) as client:
+        wait_for(lambda: client.get("/readyz").status_code == 200, 120)
+        yield client
+
+
+def test_alive_and_ready(client):
+    alive = client.get("/livez")
+    assert (alive.status_code, alive.json()) == (200, {"status": "alive", "pid": os.getpid()})
+    ready = client.get("/readyz")
+    assert (ready.status_code, ready.json()) == (200, {"status": "ready"})
+    assert ready.headers["cache-control"] == "no-store"
+
+
+def test_while_warming_the_page_and_livez_answer_and_readyz_says_so(monkeypatch):
+    warm = threading.Event()
+    monkeypatch.setattr(app.service.startup, "warm_up", lambda: warm.wait(30))
+    told = []
+    with TestClient(create_app(Settings(), on_ready=lambda: told.append("ready"))) as client:
+        for _ in range(3):
+            answer = client.get("/readyz")
+            assert (answer.status_code, answer.json()) == (503, {"status": "warming"})
+            assert client.get("/livez").status_code == 200
+            assert client.get("/").status_code == 200
+            assert client.get("/api/v1/robots").status_code == 200
+        assert told == []
+        warm.set()
+        wait_for(lambda: client.get("/readyz").json() == {"status": "ready"})
+        assert told == ["ready"]
+        assert client.get("/readyz").status_code == 200
+
+
+def test_a_viewer_that_fails_is_never_ready_but_rest_goes_on(monkeypatch, caplog):
+    def fail(self):
+        raise OSError("no port left")
+
+    monkeypatch.setattr(ViewerServer, "start", fail)
+    with TestClient(create_app(Settings())) as client:
+        wait_for(lambda: client.get("/readyz").json() == {"status": "failed"})
+        assert client.get("/readyz").status_code == 503
+        assert client.get("/viewer/").status_code == 503
+        assert client.get("/api/v1/robots").status_code == 200
+    assert "no port left" in caplog.text
+
+
+def test_stopping_ends_the_viewer_and_the_thread_that_started_it(monkeypatch):
+    start = ViewerServer.start
+    ports: list[int] = []
+    monkeypatch.setattr(ViewerServer, "start", lambda self: ports.append(start(self)) or ports[-1])
+    with TestClient(create_app(Settings())) as client:
+        wait_for(lambda: client.get("/readyz").status_code == 200, 120)
+        socket.create_connection(("127.0.0.1", ports[0])).close()
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection(("127.0.0.1", ports[0]))
+    wait_for(lambda: not [thread for thread in threading.enumerate() if thread.name == "kinboard-startup"])
+
+
+def test_what_few_ask_for_is_warmed_when_ready_and_stopping_ends_that(monkeypatch):
+    begun, ended = threading.Event(), threading.Event()
+
+    def rest(stop):
+        begun.set()
+        wait_for(stop, 60)
+        ended.set()
+
+    monkeypatch.setattr(app.service.startup, "warm_up", lambda: None)
+    monkeypatch.setattr(app.service.startup, "warm_up_rest", rest)
+    with TestClient(create_app(Settings())) as client:
+        assert begun.wait(30)
+        assert client.get("/readyz").json() == {"status": "ready"}
+        assert not ended.is_set()
+    assert ended.wait(10)
+
+
+def test_a_kernel_that_cannot_be_compiled_ahead_is_told_and_the_service_stays_ready(monkeypatch, caplog):
+    def rest(stop):
+        raise RuntimeError("disk full")
+
+    monkeypatch.setattr(app.service.startup, "warm_up", lambda: None)
+    monkeypatch.setattr(app.service.startup, "warm_up_rest", rest)
+    with TestClient(create_app(Settings())) as client:
+        wait_for(lambda: "disk full" in caplog.text)
+        assert client.get("/readyz").status_code == 200
+
+
+@pytest.mark.parametrize("page", ["/", "/docs"])
+def test_pages_refer_to_our_own_files_only_and_each_is_there(client, page):
+    html = client.get(page).text
+    links = [link for link in LINK.findall(html) if not link.startswith("#")]
+    assert len(links) >= 4
+    for link in links:
+        assert not urlsplit(link).netloc, f"{page} refers to another host: {link}"
+        assert not link.startswith("/"), f"{page} would break behind a path prefix: {link}"
+        assert client.get(urljoin(page, link)).status_code == 200, link
+
+
+@pytest.mark.parametrize("page", ["/", "/docs"])
+def test_pages_have_no_inline_script_or_style_and_a_policy_that_forbids_them(client, page):
+    answer = client.get(page)
+    assert not re.search(r"<script(?![^>]*\bsrc=)|\bon\w+=|<style|\bstyle=", answer.text)
+    policy = answer.headers["content-security-policy"]
+    assert "script-src 'self';" in policy
+    assert "default-src 'self';" in policy
+    assert answer.headers["x-content-type-options"] == "nosniff"
+
+
+def test_no_file_of_ours_names_another_host():
+    files = [f for f in static_folder().glob("*") if f.suffix in (".html", ".css", ".js", ".svg")]
+    assert len(files) >= 6
+    for file in files:
+        hosts = set(re.findall(r"https?://[\w.-]+", file.read_text())) - {"http://www.w3.org"}
+        assert not hosts, f"{file.name} names {hosts}"
+    assert "validatorUrl: null" in (static_folder() / "docs.js").read_text()
+
+
+def test_the_landing_pages_examples_are_answered_as_they_stand(client):
+    pattern = r'data-method="(\w+)" data-path="([^"]+)">[^<]+<code hidden>([^<]*)</code>'
+    answers = {}
+    for method, path, body in re.findall(pattern, client.get("/").text):
+        headers = {"Content-Type": "application/json"} if body else {}
+        answer = client.request(method, f"/{path}", content=body, headers=headers)
+        assert answer.status_code == 200, answer.text
+        answers[urlsplit(path).path.rsplit("/", 1)[1]] = answer.json()
+    assert set(answers) == {"fk", "ik", "summary"}
+    assert answers["ik"]["status"] == "solved"
+
+
+def test_every_built_in_arm_has_a_small_picture():
+    pictures = {file.stem: file for file in (static_folder() / "robots").iterdir()}
+    assert set(pictures) == set(builtin_robots())
+    for file in pictures.values():
+        assert file.read_bytes()[8:12] == b"WEBP"
+        assert file.stat().st_size < 15_000
+
+
+def test_viser_gets_its_memory_before_its_own_script(client):
+    html = client.get("/viewer/").text
+    assert html.index('<script src="../static/viewer.js"></script>') < html.index("<script data-p")
+    assert html.index('<link rel="stylesheet" href="../static/viewer.css">') < html.index("<script data-p")
+    assert all(client.get(f"/static/viewer.{kind}").status_code == 200 for kind in ("js", "css"))
+
+
+def test_the_landing_page_names_the_version(client):
+    assert f"Kinboard {client.get('/openapi.json').json()['info']['version']} " in client.get("/").text
+
+
+def test_the_old_addresses_of_the_documentation_do_not_exist(client):
+    assert client.get("/redoc").status_code == 404
+    assert client.get("/docs/", follow_redirects=False).headers["location"] == "../docs"
+
+
+@pytest.mark.parametrize("sent", ["", "/kinboard"], ids=["proxy strips the prefix", "proxy passes it on"])
+@pytest.mark.parametrize("setting", ["/kinboard", "kinboard/"])
+def test_behind_a_path_prefix(sent, setting):
+    with (
+        serve(create_app(Settings(root_path=setting))) as port,
+        httpx2.Client(base_url=f"http://127.0.0.1:{port}{sent}", trust_env=False, timeout=30) as browser,
+    ):
+        wait_for(lambda: browser.get("/readyz").status_code == 200, 120)
+        for path in ("/", "/docs", "/static/landing.css", "/static/vendor/swagger-ui/swagger-ui.css", "/viewer/"):
+            assert browser.get(path).status_code == 200, path
+        assert browser.get("/api/v1/robots").status_code == 200
+        assert browser.get("/openapi.json").json()["servers"] == [{"url": "/kinboard"}]
+        assert browser.get("/static/nothing-here").status_code == 404
+        root = httpx2.get(f"http://127.0.0.1:{port}/kinboard", trust_env=False)
+        assert (root.status_code, root.headers["location"]) == (307, "/kinboard/")
+        with connect(f"ws://127.0.0.1:{port}{sent}/viewer", subprotocols=[PROTOCOL], proxy=None) as visitor:
+            assert len(visitor.recv(timeout=20)) > 16
+
+
+def test_a_port_in_use_is_said_plainly(capfd):
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        assert run(Settings(port=port)) == 1
+    captured = capfd.readouterr()
+    assert f"cannot listen on 127.0.0.1:{port}" in captured.err
+    assert "--port" in captured.err
+    assert "Traceback" not in captured.err
+    assert captured.out == ""
+
+
+def test_a_wrong_folder_of_robots_is_said_plainly(capfd, tmp_path):
+    assert run(Settings(port=0, robots=tmp_path / "nowhere")) == 1
+    captured = capfd.readouterr()
+    assert "nowhere" in captured.err
+    assert "Traceback" not in captured.err
+
+
+SOON = 30  # s, of which a busy machine may take most
+
+
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("ready", [False, True], ids=["while warming", "when ready"])
+def test_the_process_starts_and_a_signal_ends_it_quickly_and_quietly(stop, ready):
+    code = (
+        "import sys; from app.service.main import run; from app.shared.settings import Settings; "
+        "sys.exit(run(Settings()))"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-W", "error", "-c", code],
+        cwd=ROOT,
+        env=os.environ | {"KINBOARD_PORT": "0", "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        found = re.fullmatch(r"Kinboard \S+ is at http://127\.0\.0\.1:(\d+)/  \(Ctrl-C to stop\)\n", line)
+        assert found, line + process.communicate(timeout=10)[1]
+        base = f"127.0.0.1:{found[1]}"
+        if not ready:
+            process.send_signal(stop)
+            out, err = process.communicate(timeout=SOON)
+        else:
+            wait_for(lambda: httpx2.get(f"http://{base}/readyz", trust_env=False).status_code == 200, 120)
+            with connect(f"ws://{base}/viewer", subprotocols=[PROTOCOL], proxy=None) as visitor:
+                assert visitor.recv(timeout=20)
+                process.send_signal(stop)
+                with pytest.raises(ConnectionClosed):
+                    read_to_the_end(visitor)
+            out, err = process.communicate(timeout=SOON)
+        assert (process.returncode, out, err) == (0, "", "")
+    finally:
+        process.kill()
+        process.wait()
+
+
+@pytest.mark.parametrize(
+    ("settings", "warned"),
+    [
+        ({"host": "0.0.0.0"}, True),
+        ({"host": "::"}, True),
+        ({"host": "127.0.0.1"}, False),
+        ({"host": "::1"}, False),
+        ({"host": "0.0.0.0", "token": "long enough"}, False),
+        ({"host": "0.0.0.0", "read_only": True}, False),
+    ],
+)
+def test_a_service_that_is_open_to_all_says_so_loudly(capfd, monkeypatch, settings, warned):
+    monkeypatch.setattr("app.service.main._Server.run", lambda self, sockets: setattr(self, "started", True))
+    assert run(Settings(port=0, **settings)) == 0
+    assert ("open to everybody" in capfd.readouterr().err) is warned

@@ -1,0 +1,265 @@
+"""The snippets of deploy/ in the real nginx and Caddy: TLS and a path prefix in front of the real service."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import socket
+import ssl
+import subprocess
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx2
+import numpy as np
+import pytest
+from fake_browser import FakeBrowser
+from live_server import serve, wait_for
+from playwright.sync_api import expect, sync_playwright
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+from websockets.sync.server import serve as serve_websocket
+
+import kin
+from app.service.main import create_app
+from app.shared.settings import Settings
+
+DEPLOY = Path(__file__).parents[3] / "deploy"
+CHROMIUM = os.environ.get("KINBOARD_TEST_CHROMIUM", "/usr/bin/chromium")
+PIONEER = kin.get_robot("pioneer5")
+LARGE = 12 * 1024 * 1024
+TOKEN = "a token for proxies"
+BEARER = {"Authorization": f"Bearer {TOKEN}"}
+
+Start = Callable[[Path, int, int], list[str | Path]]
+
+
+def program(name: str) -> str:
+    found = shutil.which(name)
+    if found is None:
+        pytest.fail(f"no {name}: scripts/test.sh unpacks it on Debian; elsewhere install it")
+    return found
+
+
+def replaced(text: str, changes: dict[str, str]) -> str:
+    """Each placeholder must be there: a test of a changed snippet shall not pass by accident."""
+    for old, new in changes.items():
+        assert old in text
+        text = text.replace(old, new)
+    return text
+
+
+def nginx(folder: Path, port: int, upstream: int) -> list[str | Path]:
+    changes = {
+        "listen 443 ssl": f"listen 127.0.0.1:{port} ssl",
+        "/etc/ssl/certs/robots.example.pem": str(folder / "certificate.pem"),
+        "/etc/ssl/private/robots.example.key": str(folder / "key.pem"),
+        "http://127.0.0.1:8000": f"http://127.0.0.1:{upstream}",
+    }
+    (folder / "kinboard.conf").write_text(replaced((DEPLOY / "nginx.conf").read_text(), changes))
+    user = "user root;" if os.geteuid() == 0 else ""  # or its workers could not enter pytest's folder
+    places = "".join(
+        f"{name}_temp_path {folder}/{name};" for name in ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
+    )
+    (folder / "nginx.conf").write_text(
+        f"{user} daemon off; pid {folder}/pid; error_log stderr warn; events {{}} "
+        f"http {{ access_log off; {places} include {folder}/kinboard.conf; }}"
+    )
+    return [program("nginx"), "-e", "stderr", "-p", folder, "-c", folder / "nginx.conf"]
+
+
+def caddy(folder: Path, port: int, upstream: int) -> list[str | Path]:
+    changes = {
+        "robots.example {": f"localhost:{port} {{\n    tls {folder}/certificate.pem {folder}/key.pem",
+        "127.0.0.1:8000": f"127.0.0.1:{upstream}",
+    }
+    snippet = replaced((DEPLOY / "Caddyfile").read_text(), changes)
+    options = (
+        "admin off",
+        "auto_https disable_redirects",
+        "default_bind 127.0.0.1",
+        f"storage file_system {folder}",
+    )
+    (folder / "Caddyfile").write_text("\n".join(["{", *options, "}", snippet]))
+    return [program("caddy"), "run", "--adapter", "caddyfile", "--config", folder / "Caddyfile"]
+
+
+PROXIES = {"nginx": nginx, "caddy": caddy}
+
+
+@contextmanager
+def running(start: Start, folder: Path, certificate: Path, upstream: int) -> Iterator[str]:
+    """The address of a proxy in front of a port of this machine."""
+    folder.mkdir()
+    for file in certificate.iterdir():
+        shutil.copy(file, folder)
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    messages = folder / "messages"
+    environment = {**os.environ, "XDG_DATA_HOME": str(folder), "XDG_CONFIG_HOME": str(folder)}
+    with (
+        messages.open("wb") as output,
+        subprocess.Popen(start(folder, port, upstream), env=environment, stdout=output, stderr=output) as process,
+    ):
+
+        def listens() -> bool:
+            assert process.poll() is None, messages.read_text()
+            with socket.socket() as probe:
+                return probe.connect_ex(("127.0.0.1", port)) == 0
+
+        try:
+            wait_for(listens)
+            yield f"localhost:{port}"
+        finally:
+            process.terminate()
+            process.wait(10)
+
+
+@pytest.fixture(scope="module")
+def certificate(tmp_path_factory) -> Path:
+    """A folder with a self-signed certificate for localhost and its key."""
+    folder = tmp_path_factory.mktemp("certificate")
+    command = (
+        "openssl req -x509 -nodes -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -days 2 -subj /CN=localhost"
+    )
+    names = ["-addext", "subjectAltName=DNS:localhost,IP:127.0.0.1"]
+    files = ["-keyout", folder / "key.pem", "-out", folder / "certificate.pem"]
+    subprocess.run([*command.split(), *names, *files], check=True, capture_output=True)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def tls(certificate: Path) -> ssl.SSLContext:
+    return ssl.create_default_context(cafile=certificate / "certificate.pem")
+
+
+@pytest.fixture(scope="module")
+def service() -> Iterator[int]:
+    app = create_app(Settings(root_path="/kinboard", token=TOKEN))
+    with serve(app) as port:
+        wait_for(lambda: app.state.startup.status != "warming", seconds=600)
+        assert app.state.startup.status == "ready"
+        yield port
+
+
+@pytest.fixture(scope="module", params=PROXIES)
+def address(request, service: int, certificate: Path, tmp_path_factory) -> Iterator[str]:
+    """Host and port of the service's proxy."""
+    folder = tmp_path_factory.mktemp("proxy") / request.param
+    with running(PROXIES[request.param], folder, certificate, service) as host:
+        yield host
+
+
+@pytest.fixture
+def visitor(address: str, tls: ssl.SSLContext) -> Iterator[httpx2.Client]:
+    with httpx2.Client(base_url=f"https://{address}", verify=tls, headers=BEARER, trust_env=False) as client:
+        yield client
+
+
+def test_pages_and_whatever_they_load_stay_under_the_prefix(visitor: httpx2.Client) -> None:
+    moved = visitor.get("/kinboard")
+    assert moved.status_code == 308
+    landing = visitor.get(str(moved.url.join(moved.headers["location"])))
+    assert landing.status_code == 200
+    docs = visitor.get("/kinboard/docs")
+    for page in (landing, docs):
+        loaded = re.findall(r'(?:src|href)="([^"#:]+)"', page.text)
+        assert len(loaded) > 2
+        for link in loaded:
+            answer = visitor.get(str(page.url.join(link)), follow_redirects=True)
+            assert answer.status_code == 200, link
+            assert answer.url.path.startswith("/kinboard/")
+    assert visitor.get("/kinboard/openapi.json").json()["servers"] == [{"url": "/kinboard"}]
+    assert "Kinboard viewer" in visitor.get("/kinboard/viewer", follow_redirects=True).text
+    assert visitor.get("/").status_code != 308, "the rest of the site is not ours"
+
+
+def test_rest(visitor: httpx2.Client) -> None:
+    q = [0.1, 0.2, 0.3, 0.4, 0.5]
+    answer = visitor.post("/kinboard/api/v1/robots/pioneer5/fk", json={"q": q})
+    assert np.allclose(answer.json()["pose"]["matrix"], kin.fk(PIONEER, q))
+
+
+def test_the_largest_body_we_take_passes(visitor: httpx2.Client) -> None:
+    body = b'{"q": [0, 0, 0, 0, 0]}'.rjust(Settings().max_body)
+    answer = visitor.post(
+        "/kinboard/api/v1/robots/pioneer5/fk", content=body, headers={"content-type": "application/json"}
+    )
+    assert answer.status_code == 200
+
+
+def test_a_slider_moves_the_arm_through_the_websocket(address: str, tls: ssl.SSLContext) -> None:
+    """The whole scene arrives, a control's message goes back, and the arm moves."""
+    with FakeBrowser(
+        f"wss://{address}/kinboard/viewer",
+        ssl=tls,
+        origin=f"https://{address}",
+        additional_headers=BEARER,
+        proxy=None,
+    ) as tab:
+        q = PIONEER.q_home.copy()
+        q[0] = 0.6
+        tab.set("1 rotating base", float(np.degrees(q[0])))
+        target = kin.fk(PIONEER, q)
+        tab.wait(lambda: np.allclose(tab.tool_pose(), target, atol=1e-4))
+
+
+def test_pages_of_other_origins_are_refused(address: str, tls: ssl.SSLContext) -> None:
+    with pytest.raises(InvalidStatus) as refused:
+        connect(
+            f"wss://{address}/kinboard/viewer",
+            ssl=tls,
+            origin="https://elsewhere.example",
+            additional_headers=BEARER,
+            proxy=None,
+        )
+    assert refused.value.response.status_code == 403
+
+
+@pytest.mark.parametrize("name", PROXIES)
+def test_large_messages_pass_both_ways(name: str, certificate: Path, tls: ssl.SSLContext, tmp_path: Path) -> None:
+    """As large as a cloud of points; through the proxy alone, to a server that sends back what it gets."""
+
+    def echo(connection) -> None:
+        for message in connection:
+            connection.send(message)
+
+    with serve_websocket(echo, "127.0.0.1", 0, max_size=None, compression=None) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        try:
+            with (
+                running(PROXIES[name], tmp_path / name, certificate, server.socket.getsockname()[1]) as address,
+                connect(
+                    f"wss://{address}/kinboard/viewer", ssl=tls, max_size=None, compression=None, proxy=None
+                ) as tab,
+            ):
+                message = os.urandom(LARGE)
+                tab.send(message)
+                assert tab.recv(timeout=30) == message
+        finally:
+            server.shutdown()
+            thread.join(10)
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("address", ["nginx"], indirect=True)
+def test_a_real_browser_is_asked_for_the_token_and_shown_the_viewer(address: str) -> None:
+    """The pages find their way back: wss, the prefix, and a cookie for them alone."""
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        page = browser.new_page(ignore_https_errors=True)
+        dialled: list[str] = []
+        page.on("websocket", lambda opened: dialled.append(opened.url))
+        page.goto(f"https://{address}/kinboard/viewer/")
+        page.locator("#token").fill(TOKEN)
+        page.locator("#token").press("Enter")
+        expect(page.locator("[data-status]")).to_have_attribute("data-status", "hand", timeout=30_000)
+        assert page.url.partition("?")[0] == f"https://{address}/kinboard/viewer/"
+        assert f"wss://{address}/kinboard/viewer" in [url.rstrip("/") for url in dialled]
+        (cookie,) = page.context.cookies()
+        assert (cookie["path"], cookie["secure"]) == ("/kinboard/", True)
+        browser.close()

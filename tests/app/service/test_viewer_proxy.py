@@ -1,0 +1,415 @@
+"""The bridge between a visitor's websocket and viser's, with a small stand-in for viser's server."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from http import HTTPStatus
+
+import httpx2
+import msgspec
+import pytest
+from fastapi import FastAPI
+from live_server import serve, wait_for
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+from websockets.sync.server import ServerConnection
+from websockets.sync.server import serve as serve_websocket
+
+from app.service.web.inspection import BURST, RATE, Budget
+from app.service.web.viewer_proxy import ViewerBridge
+
+PROTOCOL = "viser-v9.9.9"
+
+
+def said(word: str, **fields: object) -> bytes:
+    """A message as our page sends them."""
+    return msgspec.msgpack.encode({"type": "GuiUpdateMessage", "uuid": word, "updates": {"value": 1}} | fields)
+
+
+HELLO = said("hello")
+
+
+class StandIn:
+    """Echoes what it gets; a few messages make it misbehave."""
+
+    def __init__(self) -> None:
+        self.received: list[bytes | str] = []
+        self.endings: list[int | None] = []
+        self.subprotocols: list[str | None] = []
+        self.sent = 0
+        self.server = serve_websocket(
+            self.handle,
+            "127.0.0.1",
+            0,
+            compression=None,
+            max_size=None,
+            process_request=self.http,
+            select_subprotocol=lambda connection, offered: offered[0] if offered else None,
+        )
+        self.port: int = self.server.socket.getsockname()[1]
+        self.thread = threading.Thread(target=self.server.serve_forever)
+        self.thread.start()
+
+    def http(self, connection: ServerConnection, request):
+        if "Upgrade" in request.headers:
+            return None
+        return connection.respond(HTTPStatus.OK, "<html><title>Viser</title>page</html>")
+
+    def handle(self, connection: ServerConnection) -> None:
+        self.subprotocols.append(connection.subprotocol)
+        try:
+            while True:
+                message = connection.recv()
+                self.received.append(message)
+                match msgspec.msgpack.decode(message).get("uuid"):
+                    case "close":
+                        connection.close(4001, "bye")
+                    case "drop":
+                        connection.socket.shutdown(socket.SHUT_RDWR)
+                    case "flood":
+                        for k in range(200):
+                            connection.send(k.to_bytes(4, "little") + bytes(1_000_000))
+                            self.sent += 1
+                    case "bytes":
+                        connection.send(bytes(range(256)) * 20_000)
+                    case _:
+                        connection.send(message)
+        except ConnectionClosed:
+            self.endings.append(connection.close_code)
+
+    def stop(self) -> None:
+        self.server.shutdown()
+        self.thread.join(10)
+
+
+@pytest.fixture
+def viser() -> Iterator[StandIn]:
+    stand_in = StandIn()
+    yield stand_in
+    stand_in.stop()
+
+
+@pytest.fixture
+def bridge(viser: StandIn) -> ViewerBridge:
+    bridge = ViewerBridge(allowed_origins=("https://school.example",))
+    bridge.port = viser.port
+    return bridge
+
+
+@pytest.fixture
+def port(bridge: ViewerBridge) -> Iterator[int]:
+    app = FastAPI()
+    app.router.routes.extend(bridge.routes())
+    with serve(app) as port:
+        yield port
+
+
+def visit(port: int, path: str = "/viewer", **options):
+    options = {"subprotocols": [PROTOCOL], "max_size": None, "proxy": None} | options
+    return connect(f"ws://127.0.0.1:{port}{path}", **options)
+
+
+@pytest.mark.parametrize("path", ["/viewer", "/viewer/"])
+def test_bytes_travel_both_ways_unchanged_with_the_subprotocol(port, viser, path):
+    with visit(port, path) as visitor:
+        assert visitor.subprotocol == PROTOCOL
+        for message in (HELLO, said("é", updates={"value": [1.5, None, b"\x00\xff"]})):
+            visitor.send(message)
+            assert visitor.recv(timeout=10) == message
+        visitor.send(said("bytes"))
+        assert visitor.recv(timeout=10) == bytes(range(256)) * 20_000
+    assert viser.subprotocols == [PROTOCOL]
+
+
+def test_a_visitor_without_a_subprotocol_gets_none(port, viser):
+    with visit(port, subprotocols=None) as visitor:
+        visitor.send(HELLO)
+        assert visitor.recv(timeout=10) == HELLO
+        assert visitor.subprotocol is None
+
+
+def test_nothing_is_compressed(port):
+    with visit(port) as visitor:
+        assert visitor.protocol.extensions == []
+
+
+@pytest.mark.parametrize(
+    ("origin", "headers"),
+    [
+        (None, {}),
+        ("http://127.0.0.1:{port}", {}),
+        ("https://arm.example", {"X-Forwarded-Host": "arm.example"}),
+        ("https://arm.example", {"X-Forwarded-Host": "arm.example:443, inner.example"}),
+        ("https://school.example", {}),
+        ("https://SCHOOL.example", {}),
+    ],
+)
+def test_our_own_pages_may_connect(port, origin, headers):
+    origin = origin and origin.format(port=port)
+    with visit(port, origin=origin, additional_headers=headers) as visitor:
+        visitor.send(HELLO)
+        assert visitor.recv(timeout=10) == HELLO
+
+
+@pytest.mark.parametrize(
+    ("origin", "headers"),
+    [
+        ("https://evil.example", {}),
+        ("http://127.0.0.1:{port}.evil.example", {}),
+        ("http://127.0.0.1:1", {}),
+        ("http://127.0.0.1", {}),
+        ("null", {}),
+        ("", {}),
+        ("https://evil.example", {"X-Forwarded-Host": "arm.example"}),
+        ("http://school.example.evil", {}),
+    ],
+)
+def test_pages_of_other_sites_are_refused(port, viser, origin, headers, caplog):
+    headers = {"Origin": origin.format(port=port)} | headers
+    with pytest.raises(InvalidStatus) as refusal:
+        visit(port, additional_headers=headers)
+    assert refusal.value.response.status_code == 403
+    assert viser.subprotocols == [], "viser must not even see the connection"
+    assert [record.levelname for record in caplog.records if record.name != "websockets.server"] == ["WARNING"]
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"type": "ShareUrlRequest"},
+        {"type": "ShareUrlDisconnect"},
+        {"type": "FileTransferStartUpload", "size_bytes": 1 << 40},
+        {"type": "GetRenderResponseMessage", "payload": b"x"},
+        {"type": "GuiUpdateMessage", "uuid": "a", "updates": {"update_cb": []}},
+        {"type": "GuiUpdateMessage", "uuid": "a", "updates": {"value": 1, "gui_api": None}},
+        {"type": "GuiUpdateMessage", "uuid": "a", "updates": "value"},
+        {"type": "RunJavascriptMessage", "source": "alert(1)"},
+        {"type": "RemoveSceneNodeMessage", "name": "/arm"},
+        {"type": None},
+        {"type": ["GuiUpdateMessage"]},
+        {"kind": "GuiUpdateMessage"},
+    ],
+)
+def test_what_a_visitor_has_no_business_sending_is_dropped(port, viser, fields):
+    with visit(port) as visitor:
+        visitor.send(msgspec.msgpack.encode(fields))
+        visitor.send(HELLO)
+        assert visitor.recv(timeout=10) == HELLO
+    assert viser.received == [HELLO]
+
+
+def nested(depth: int) -> bytes:
+    return HELLO[:-1] + b"\x91" * depth + b"\x00"
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        b"",
+        b"\xc1",
+        b"ShareUrl is not msgpack",
+        msgspec.msgpack.encode(["type", "GuiUpdateMessage"]),
+        HELLO[:-1],
+        HELLO + b"\x00",
+        said("a", padding="x" * 65_536),
+        nested(20),
+        nested(60_000),
+        b"\x81\xa4type\xdd\xff\xff\xff\xff",
+        b"\x81\xa4\xff\xff\xff\xff\x00",
+    ],
+    ids=lambda message: f"{len(message)} bytes",
+)
+def test_nonsense_ends_the_connection_it_came_on_and_no_other(port, viser, message):
+    with visit(port) as honest, visit(port) as visitor:
+        visitor.send(message)
+        with pytest.raises(ConnectionClosed) as end:
+            visitor.recv(timeout=10)
+        assert end.value.rcvd is not None
+        assert end.value.rcvd.code == 1007
+        honest.send(HELLO)
+        assert honest.recv(timeout=10) == HELLO
+    assert viser.received == [HELLO]
+
+
+def test_a_huge_message_is_not_even_read(viser, bridge):
+    app = FastAPI()
+    app.router.routes.extend(bridge.routes())
+    with serve(app) as port, visit(port) as visitor:
+        with contextlib.suppress(ConnectionClosed):  # we may be told in the middle of it
+            visitor.send(bytes(10_000_000))
+        with pytest.raises(ConnectionClosed) as end:
+            visitor.recv(timeout=10)
+        assert end.value.rcvd is None or end.value.rcvd.code == 1009
+    assert viser.received == []
+
+
+def test_a_flood_is_slowed_down_and_the_others_do_not_wait(port, viser):
+    stop = threading.Event()
+
+    def pour() -> None:
+        with visit(port, close_timeout=0.1) as visitor:
+            while not stop.is_set():
+                visitor.send(said("pour"))
+
+    flooding = threading.Thread(target=pour)
+    flooding.start()
+    try:
+        with visit(port) as honest:
+            began = time.monotonic()
+            waits = []
+            while time.monotonic() < began + 2.0:
+                sent = time.monotonic()
+                honest.send(HELLO)
+                assert honest.recv(timeout=10) == HELLO
+                waits.append(time.monotonic() - sent)
+                time.sleep(0.02)
+            came = sum(1 for message in viser.received if message != HELLO)
+            assert BURST <= came < BURST + 4 * RATE
+            assert sorted(waits)[len(waits) // 2] < 0.1
+    finally:
+        stop.set()
+        flooding.join(10)
+
+
+def test_a_budget_lets_a_hand_move_freely_and_fills_up_again():
+    budget = Budget(10.0, 5.0)
+    assert [budget.spend(0.0) for _ in range(5)] == [0.0] * 5
+    assert budget.spend(0.0) == pytest.approx(0.1)
+    assert budget.spend(1000.0) == 0.0
+    assert [budget.spend(1000.0) for _ in range(5)][-1] == pytest.approx(0.1)
+
+
+def test_a_reader_who_takes_nothing_is_let_go(port, viser, monkeypatch):
+    monkeypatch.setattr("app.service.web.viewer_proxy.PATIENCE", 0.3)
+    with visit(port, max_queue=1, close_timeout=0.1) as visitor:
+        visitor.send(said("flood"))
+        wait_for(lambda: len(viser.endings) == 1, 10)
+        assert viser.sent < 100, "how much the sockets on the way hold differs by tens of megabytes"
+
+
+def test_when_all_places_are_taken_a_page_says_so(viser):
+    bridge = ViewerBridge(max_visitors=2)
+    bridge.port = viser.port
+    app = FastAPI()
+    app.router.routes.extend(bridge.routes())
+    with serve(app) as port:
+        with visit(port) as one, visit(port) as two:
+            for visitor in (one, two):
+                visitor.send(HELLO)
+                assert visitor.recv(timeout=10) == HELLO
+            assert turned_away(port) == (1013, "All places are taken.")
+            page = httpx2.get(f"http://127.0.0.1:{port}/viewer/", trust_env=False)
+            assert page.status_code == 503
+            assert "All places in the viewer are taken" in page.text
+            assert page.headers["retry-after"] == "10"
+        wait_for(lambda: bridge.visitors == 0)
+        with visit(port) as three:
+            three.send(HELLO)
+            assert three.recv(timeout=10) == HELLO
+
+
+def test_viser_ends_the_connection_and_the_visitor_learns_why(port):
+    with visit(port) as visitor:
+        visitor.send(said("close"))
+        with pytest.raises(ConnectionClosed) as end:
+            visitor.recv(timeout=10)
+    assert end.value.rcvd is not None
+    assert (end.value.rcvd.code, end.value.rcvd.reason) == (4001, "bye")
+
+
+def test_viser_lost_closes_the_visitor(port):
+    with visit(port) as visitor:
+        visitor.send(said("drop"))
+        with pytest.raises(ConnectionClosed) as end:
+            visitor.recv(timeout=10)
+    assert end.value.rcvd is not None
+    assert end.value.rcvd.code == 1011
+
+
+@pytest.mark.parametrize(("code", "seen"), [(1000, 1000), (1001, 1001), (4242, 4242)])
+def test_the_visitor_leaves_and_viser_learns_it(port, viser, code, seen):
+    with visit(port) as visitor:
+        visitor.send(HELLO)
+        visitor.recv(timeout=10)
+        visitor.close(code)
+    wait_for(lambda: viser.endings == [seen])
+
+
+def test_the_visitor_vanishes_and_nothing_is_left(port, viser):
+    for _ in range(10):
+        visitor = visit(port)
+        visitor.send(HELLO)
+        visitor.recv(timeout=10)
+        visitor.socket.shutdown(socket.SHUT_RDWR)
+        visitor.close()
+    wait_for(lambda: len(viser.endings) == 10)
+
+
+def test_text_is_not_of_this_protocol(port, viser):
+    with visit(port) as visitor:
+        visitor.send("text")
+        with pytest.raises(ConnectionClosed) as end:
+            visitor.recv(timeout=10)
+    assert end.value.rcvd is not None
+    assert end.value.rcvd.code == 1003
+    assert viser.received == []
+    wait_for(lambda: len(viser.endings) == 1)
+
+
+def test_a_slow_reader_holds_viser_back_instead_of_filling_our_memory(port, viser):
+    with visit(port, max_queue=1) as visitor:
+        visitor.send(said("flood"))
+        wait_for(lambda: viser.sent > 0)
+        time.sleep(1.0)  # plenty for 200 MB over loopback, were nothing holding it back
+        assert viser.sent < 100, "how much the sockets on the way hold differs by tens of megabytes"
+        for k in range(200):
+            message = visitor.recv(timeout=10)
+            assert int.from_bytes(message[:4], "little") == k
+
+
+def test_before_the_viewer_listens(port, bridge):
+    bridge.port = None
+    page = httpx2.get(f"http://127.0.0.1:{port}/viewer/", trust_env=False)
+    assert page.status_code == 503
+    assert "warming up" in page.text
+    assert page.headers["retry-after"] == "1"
+    assert turned_away(port) == (1013, "The viewer is warming up.")
+
+
+def test_a_viewer_that_went_away_is_worth_another_try(port, viser, caplog):
+    viser.stop()
+    assert turned_away(port) == (1013, "The viewer does not answer.")
+    assert "does not answer" in caplog.text
+
+
+def turned_away(port: int) -> tuple[int, str]:
+    with visit(port) as visitor, pytest.raises(ConnectionClosed) as end:
+        visitor.recv(timeout=10)
+    assert end.value.rcvd is not None
+    return end.value.rcvd.code, end.value.rcvd.reason
+
+
+def test_the_page_is_visers_under_our_policy(port):
+    with httpx2.Client(base_url=f"http://127.0.0.1:{port}", trust_env=False) as browser:
+        page = browser.get("/viewer/")
+        assert page.text == "<html><title>Kinboard viewer</title>page</html>"
+        assert page.headers["content-encoding"] == "gzip"
+        plain = browser.get("/viewer/", headers={"Accept-Encoding": "identity"})
+        assert plain.text == page.text
+        assert "content-encoding" not in plain.headers
+        again = browser.get("/viewer/", headers={"If-None-Match": page.headers["etag"]})
+        assert (again.status_code, again.content) == (304, b"")
+        policy = dict(part.split(" ", 1) for part in page.headers["content-security-policy"].split("; "))
+        assert policy["connect-src"].split() == ["'self'", "data:", "blob:"]
+        assert policy["frame-ancestors"] == "'self'"
+        assert "http" not in page.headers["content-security-policy"]
+
+
+def test_the_address_without_slash_leads_to_the_page(port):
+    answer = httpx2.get(f"http://127.0.0.1:{port}/viewer?a=b", trust_env=False)
+    assert answer.status_code == 307
+    assert answer.headers["location"] == "viewer/?a=b"

@@ -1,0 +1,148 @@
+"""Several processes on one port, started as a user starts them."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import httpx2
+import pytest
+from fake_browser import FakeBrowser
+from live_server import wait_for
+
+from app.service.main import run
+from app.service.workers import supervise
+from app.shared.settings import Settings
+
+ROOT = Path(__file__).parents[3]
+
+
+@pytest.fixture(scope="module")
+def service() -> Iterator[tuple[subprocess.Popen[str], int]]:
+    command = [sys.executable, "-m", "app.cli", "serve", "--workers", "2", "--port", "0"]
+    env = os.environ | {"PYTHONPATH": str(ROOT)}
+    with subprocess.Popen(
+        command, cwd=ROOT, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        try:
+            assert process.stdout is not None
+            found = re.search(r":(\d+)/", process.stdout.readline())
+            assert found
+            port = int(found[1])
+            wait_for(lambda: len(ready(port)) == 2, 120)
+            yield process, port
+        finally:
+            process.kill()
+
+
+def ask(port: int, path: str) -> httpx2.Response:
+    """Each time over a new connection, so that either process may answer."""
+    return httpx2.get(f"http://127.0.0.1:{port}{path}", trust_env=False, timeout=20)
+
+
+def pids(port: int) -> list[int]:
+    return [ask(port, "/livez").json()["pid"] for _ in range(40)]
+
+
+def ready(port: int) -> set[int]:
+    """The processes that say they are ready, each asked over one connection that is kept."""
+    found = set()
+    for _ in range(16):
+        with httpx2.Client(base_url=f"http://127.0.0.1:{port}", trust_env=False, timeout=20) as kept:
+            if kept.get("/readyz").status_code == 200:
+                found.add(kept.get("/livez").json()["pid"])
+    return found
+
+
+def test_both_processes_answer_and_share_the_work(service):
+    answers = pids(service[1])
+    assert len(set(answers)) == 2
+    assert min(answers.count(pid) for pid in set(answers)) >= 5
+
+
+def test_a_visitor_stays_with_the_process_that_took_the_connection(service):
+    port = service[1]
+    tabs = [FakeBrowser(port, path="/viewer") for _ in range(8)]
+    try:
+        for k, tab in enumerate(tabs):
+            with tab:
+                tab.settle()
+                tab.set("1 rotating base", 10.0 + k)
+                tab.settle()
+                assert tab.value("1 rotating base") == 10.0 + k
+                assert 'data-status="hand"' in tab.html
+    finally:
+        for tab in tabs:
+            tab.close()
+
+
+def test_counters_of_all_processes_are_told_together(service):
+    port = service[1]
+
+    def counted() -> float:
+        found = re.search(
+            r'requests_total\{method="GET",route="/livez",status="200"\} (\S+)', ask(port, "/metrics").text
+        )
+        return float(found[1]) if found else 0.0
+
+    before = counted()
+    assert len(set(pids(port))) == 2
+    assert counted() == before + 40
+
+
+def test_a_process_that_dies_is_started_again_and_the_other_goes_on(service):
+    port = service[1]
+    victim, other = sorted(set(pids(port)))
+    os.kill(victim, signal.SIGKILL)
+    wait_for(lambda: len(now := ready(port)) == 2 and victim not in now, 60)
+    assert other in pids(port)
+
+
+def test_one_signal_ends_them_all(service):
+    process, port = service
+    children = set(pids(port))
+    with FakeBrowser(port, path="/viewer"):
+        began = time.monotonic()
+        process.send_signal(signal.SIGTERM)
+        _, errors = process.communicate(timeout=30)
+    assert process.returncode == 0
+    assert time.monotonic() - began < 15.0
+    assert "Traceback" not in errors
+    for pid in children:
+        assert not Path(f"/proc/{pid}").exists()
+
+
+def _fails(listener: socket.socket, number: int) -> int:
+    return 3
+
+
+def _ignores(code: int, listener: socket.socket, number: int) -> int:
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    os.kill(os.getppid(), signal.SIGTERM)
+    time.sleep(60)
+    return code
+
+
+def test_what_fails_at_once_is_not_started_over_and_over():
+    with socket.create_server(("127.0.0.1", 0)) as one, socket.create_server(("127.0.0.1", 0)) as two:
+        assert supervise(_fails, [one, two], 1.0) == 1
+
+
+def test_who_does_not_end_is_killed(caplog):
+    with socket.create_server(("127.0.0.1", 0)) as one:
+        assert supervise(partial(_ignores, 0), [one], 0.5) == 0
+    assert "is killed" in caplog.text
+
+
+def test_a_port_in_use_is_found_although_sockets_are_shared(capfd):
+    with socket.create_server(("127.0.0.1", 0), reuse_port=True) as taken:
+        assert run(Settings(port=taken.getsockname()[1], workers=2)) == 1
+    assert "cannot listen on" in capfd.readouterr().err

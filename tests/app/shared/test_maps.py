@@ -1,0 +1,170 @@
+"""Capability maps shared by many readers: computed once, seen while they grow, stopped by the last who leaves."""
+
+from __future__ import annotations
+
+import threading
+from concurrent.futures import CancelledError
+
+import numpy as np
+import pytest
+from live_server import wait_for
+
+import kin
+from app.shared import mapreduce
+from app.shared.maps import Maps, Wanted
+from kin import InputError
+
+ARM = kin.get_robot("pioneer5")
+SMALL = Wanted(ARM, 8, 12)
+SEVERAL = Wanted(ARM, 30, 12)  # blocks
+
+
+@pytest.fixture
+def maps():
+    made = Maps(threads=2)
+    yield made
+    made.close()
+
+
+class Slowly:
+    """Blocks that wait to be let through, and how many were begun."""
+
+    def __init__(self, monkeypatch):
+        self.begun = 0
+        self.free = 0
+        self.change = threading.Condition()
+        self.compute = mapreduce.capability_block
+        monkeypatch.setattr(mapreduce, "capability_block", self)
+
+    def __call__(self, grid, block):
+        with self.change:
+            self.begun += 1
+            self.change.wait_for(lambda: self.free > 0, 20.0)
+            self.free -= 1
+        return self.compute(grid, block)
+
+    def let(self, count):
+        with self.change:
+            self.free += count
+            self.change.notify_all()
+
+
+@pytest.fixture
+def slowly(monkeypatch):
+    made = Slowly(monkeypatch)
+    yield made
+    made.let(10**6)
+
+
+def same(found, robot, **wanted):
+    expected = kin.capability_map(robot, **wanted)
+    for name in ("index", "centres", "approachable", "share", "manipulability"):
+        assert np.array_equal(getattr(found, name), getattr(expected, name)), name
+
+
+def test_a_map_is_that_of_the_core_with_limits_and_locks(maps):
+    limits = (None, (0.0, 1.0), None, None, None)
+    locked = (0.3, None, None, None, None)
+    reader = maps.read(Wanted(ARM, 8, 12, limits, locked))
+    same(reader.future.result(60), ARM, resolution=8, directions=12, limits=limits, locked=locked)
+    assert reader.finished
+    assert reader.done == reader.total > 0
+    assert reader.latest is reader.future.result()
+
+
+def test_thirty_readers_share_one_computation_and_one_map(maps, slowly):
+    readers = [maps.read(SMALL) for _ in range(30)]
+    slowly.let(10**6)
+    found = readers[0].future.result(60)
+    assert all(reader.future.result(60) is found for reader in readers)
+    assert slowly.begun == readers[0].total
+    for reader in readers:
+        reader.leave()
+    assert maps.read(SMALL).future.result(0) is found, "kept for those who come later"
+
+
+def test_a_map_can_be_seen_while_it_grows(maps, slowly, monkeypatch):
+    monkeypatch.setattr("app.shared.maps.PUBLISHED", 0.0)
+    reader = maps.read(SEVERAL)
+    slowly.let(2)
+    wait_for(lambda: reader.done == 2)
+    wait_for(lambda: reader.latest is not None)
+    part = reader.latest
+    assert not reader.finished
+    slowly.let(10**6)
+    whole = reader.future.result(60)
+    assert len(part.index) < len(whole.index)
+    assert {tuple(i) for i in part.index.tolist()} <= {tuple(i) for i in whole.index.tolist()}
+
+
+def test_one_who_leaves_stops_nothing_the_last_one_does(maps, slowly):
+    first, second = maps.read(SEVERAL), maps.read(SEVERAL)
+    slowly.let(1)
+    wait_for(lambda: first.done == 1)
+    first.leave()
+    first.leave()  # which counts once
+    slowly.let(1)
+    wait_for(lambda: second.done == 2)
+    second.leave()
+    again = maps.read(SEVERAL)
+    assert not again.finished
+    again.leave()
+
+    def over():
+        slowly.let(1)  # one by one: a thread is through several before the one that collects them has its turn
+        return second.future.done()
+
+    wait_for(over)
+    with pytest.raises(CancelledError):
+        second.future.result(0)
+    assert second.done < second.total
+    assert slowly.begun < 2 * second.total, "of both"
+    assert maps.bytes == 0
+
+
+def test_one_that_waits_for_its_turn_can_be_left(slowly):
+    maps = Maps(threads=1, at_once=1)
+    busy = maps.read(SEVERAL)
+    waiting = maps.read(SMALL)
+    wait_for(lambda: slowly.begun == 1)
+    assert waiting.total == 0
+    waiting.leave()
+    assert waiting.future.cancelled()
+    slowly.let(10**6)
+    busy.future.result(60)
+    maps.close()
+
+
+def test_memory_is_bounded_and_what_was_asked_for_longest_ago_goes_first():
+    first, second, third = (Wanted(ARM, n, 12) for n in (6, 7, 8))
+    roomy = Maps(threads=1)
+    for wanted in (first, second, third):
+        roomy.read(wanted).future.result(60)
+    room = roomy.bytes - 1
+    roomy.close()
+    maps = Maps(max_bytes=room, threads=1)
+    maps.read(second).future.result(60)
+    kept = maps.read(first).future.result(60)
+    maps.read(third).future.result(60)
+    wait_for(lambda: 0 < maps.bytes <= room)
+    assert maps.read(first).latest is kept
+    assert second not in maps._works
+    maps.close()
+
+
+def test_a_wrong_description_is_told_to_each_who_asks_and_not_kept(maps):
+    for _ in range(2):
+        with pytest.raises(InputError, match="directions"):
+            maps.read(Wanted(ARM, 8, 13)).future.result(20)
+        wait_for(lambda: not maps._works)
+
+
+def test_closing_ends_the_work(maps, slowly):
+    reader = maps.read(SEVERAL)
+    slowly.let(1)
+    wait_for(lambda: reader.done == 1)
+    maps.close()
+    slowly.let(10**6)
+    with pytest.raises(CancelledError):
+        reader.future.result(20)
+    wait_for(lambda: not any(thread.is_alive() for thread in maps._pool._threads))

@@ -1,0 +1,53 @@
+"""Which processors threads run on: read back from the system."""
+
+from __future__ import annotations
+
+import os
+import threading
+
+import pytest
+
+from app.shared import processor
+from app.shared.clouds import step_back
+
+pytestmark = pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="Linux only")
+
+
+@pytest.fixture(autouse=True)
+def as_before(monkeypatch):
+    monkeypatch.setattr(processor, "_pinned_from", set())
+    before = os.sched_getaffinity(0)
+    yield before
+    os.sched_setaffinity(0, before)
+
+
+def in_thread(act):
+    found = []
+    thread = threading.Thread(target=lambda: (act(), found.append(os.sched_getaffinity(0))))
+    thread.start()
+    thread.join()
+    return found[0]
+
+
+def test_a_process_keeps_to_one_and_what_computes_may_use_all(as_before):
+    processor.keep_to_one()
+    (chosen,) = os.sched_getaffinity(0)
+    assert chosen in as_before
+    assert in_thread(lambda: None) == {chosen}
+    assert in_thread(step_back) == as_before
+    assert os.sched_getaffinity(0) == {chosen}, "others stay where they are"
+
+
+def test_workers_keep_to_one_each_in_turn(as_before):
+    chosen = []
+    for number in range(len(as_before) + 1):
+        os.sched_setaffinity(0, as_before)
+        processor.keep_to_one(number)
+        chosen += os.sched_getaffinity(0)
+    assert set(chosen) == as_before
+    assert chosen[0] == chosen[-1]
+
+
+def test_without_it_nothing_changes(as_before):
+    processor.spread()
+    assert os.sched_getaffinity(0) == as_before

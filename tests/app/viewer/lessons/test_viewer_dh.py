@@ -1,0 +1,421 @@
+"""The lesson on DH tables: the walk is forward kinematics; page and scene show the same place of it."""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from fake_browser import FakeBrowser
+
+import kin
+from app.shared.clouds import Clouds
+from app.shared.settings import Settings
+from app.shared.store import Store
+from app.viewer.lessons import dh
+from app.viewer.lessons.dh import draw, page, steps
+from app.viewer.server import ViewerServer
+from app.viewer.units import USUAL, Units
+
+ROBOTS = [*kin.builtin_robots().values()]
+READINGS = [reading for robot in ROBOTS for reading in (robot, steps.reread(robot))]
+PIONEER, PRINTED, CRAIG = (kin.get_robot(name) for name in ("pioneer5", "redundant7", "redundant7-craig"))
+SCARA = kin.get_robot("scara")
+RADIANS = Units(degrees=False)
+
+
+def some_q(robot: kin.Robot) -> np.ndarray:
+    return robot.random_q(np.random.default_rng(7))
+
+
+def words(html: str) -> str:
+    return re.sub(r"\s+", " ", "".join(ET.fromstring(f"<div>{html}</div>").itertext()))
+
+
+# The walk
+
+
+@pytest.mark.parametrize("robot", READINGS, ids=lambda r: f"{r.id}-{r.convention}")
+def test_at_the_end_of_each_row_stands_its_frame(robot: kin.Robot) -> None:
+    q = some_q(robot)
+    frames = kin.link_frames(robot, q)
+    for row, T in enumerate(frames):
+        at = steps.place(robot, q, 4 * (row + 1))
+        assert np.allclose(at.T_0_now, T, atol=1e-12)
+        assert (at.row, at.motion, at.share, at.placed) == (row, 3, 1.0, row + 1)
+    assert np.array_equal(steps.place(robot, q, 0.0).T_0_now, robot.T_world_base)
+
+
+@pytest.mark.parametrize("robot", [PIONEER, CRAIG, SCARA], ids=lambda r: r.id)
+def test_between_motions_the_frame_goes_on_without_a_leap(robot: kin.Robot) -> None:
+    q = some_q(robot)
+    walk = [steps.place(robot, q, at).T_0_now for at in np.arange(0.0, steps.length(robot), 0.01)]
+    largest = np.abs(np.diff(walk, axis=0)).max()
+    assert largest < 0.02 * max(1.0, np.abs(q).max())
+
+
+def test_a_share_of_a_motion_is_that_share_of_its_value() -> None:
+    at = steps.place(PIONEER, PIONEER.q_home, 4.5)
+    assert (at.row, at.motion, at.share, at.factor, at.placed) == (1, 0, 0.5, "theta", 1)
+    assert np.allclose(at.A, steps.elementary("theta", np.radians(15)))
+    assert np.allclose(at.T_0_before @ at.A, at.T_0_now)
+
+
+@pytest.mark.parametrize("robot", READINGS, ids=lambda r: f"{r.id}-{r.convention}")
+def test_symbols_with_numbers_put_in_are_the_matrix(robot: kin.Robot) -> None:
+    q = some_q(robot)
+    for row in range(len(robot.rows)):
+        free = q[robot.joint_rows.index(row)] if row in robot.joint_rows else 0.0
+        numbers = {"1": 1.0, "cos": np.cos(free), "sin": np.sin(free), "q": free}
+        for motions in range(1, 5):
+            found = steps.symbolic(robot, row, motions)
+            A = sum(numbers[name] * part for name, part in zip(found.names, found.constants, strict=True))
+            assert np.allclose(A, steps.place(robot, q, 4 * row + motions).A, atol=1e-12)
+
+
+def test_captions_follow_the_order_of_the_convention() -> None:
+    def told(robot: kin.Robot, row: int) -> list[str]:
+        return [steps.caption(robot, steps.place(robot, robot.q_home, 4 * row + k), USUAL) for k in range(1, 5)]
+
+    assert told(PIONEER, 0) == [
+        "Row 1 of 6: turn 90.0° about z₀ (θ₁, joint 1).",
+        "Row 1 of 6: slide 130.0 mm along z₀ (d₁).",
+        "Row 1 of 6: slide 70.0 mm along x₁ (a₁).",
+        "Row 1 of 6: turn −90.0° about x₁ (α₁). Frame 1 is placed.",
+    ]
+    assert told(CRAIG, 1) == [
+        "Row 2 of 8: turn −90.0° about x₁ (α₁).",
+        "Row 2 of 8: a₁ = 0, nothing to slide along x₁.",
+        "Row 2 of 8: turn 30.0° about z₂ (θ₂, joint 2).",
+        "Row 2 of 8: d₂ = 0, nothing to slide along z₂. Frame 2 is placed.",
+    ]
+    assert told(SCARA, 2)[1] == "Row 3 of 4: slide 150.0 mm along z₂ (d₃, joint 3)."
+
+
+# The comparison
+
+
+def test_the_two_built_in_readings_are_each_others() -> None:
+    q = some_q(PRINTED)
+    assert np.allclose(kin.fk(steps.reread(PRINTED), q), kin.fk(CRAIG, q))
+    assert np.allclose(kin.fk(steps.reread(CRAIG), q), kin.fk(PRINTED, q))
+
+
+def test_why_two_joints_of_the_printed_table_are_one() -> None:
+    assert steps.shared_lines(PRINTED) == [0]
+    assert steps.shared_lines(CRAIG) == []
+    for robot in (PRINTED, CRAIG):
+        standard, craig = steps.verdict(robot, USUAL)
+        assert standard == (
+            "Standard order: row 1 (a₁ = 0, α₁ = 0) leaves z₀ and z₁ one line, so joints 1 and 2 turn about it "
+            "together and only θ₁ + θ₂ counts: 7 joints, 6 freedoms."
+        )
+        assert craig == (
+            "Craig’s order: row 2 (a₁ = 0, α₁ = −90.0°) stands between joints 1 and 2, and all 7 joints count."
+        )
+
+
+@pytest.mark.parametrize("robot", READINGS, ids=lambda r: f"{r.id}-{r.convention}")
+def test_freedoms_told_are_the_rank_of_the_jacobian_where_lines_coincide(robot: kin.Robot) -> None:
+    rank = np.linalg.matrix_rank(kin.jacobian(robot, some_q(robot)), tol=1e-9)
+    assert rank <= steps.freedoms(robot)
+    if steps.shared_lines(robot):
+        assert rank == min(steps.freedoms(robot), 6)
+    assert steps.verdict(robot, USUAL)
+
+
+def test_opposite_turns_about_one_line_count_by_their_difference() -> None:
+    text = """
+id = "folded"
+name = "folded"
+source = "made up"
+convention = "standard"
+units = { length = "m", angle = "deg" }
+rows = [
+  { name = "a", d = 1, alpha = 180, limits = [-90, 90] }, { name = "b", a = 1, limits = [-90, 90] },
+  { name = "c", a = 1, limits = [-90, 90] },
+]
+"""
+    assert "θ₁ − θ₂ counts" in steps.verdict(kin.parse_robot(text), USUAL)[0]
+
+
+# The page
+
+
+@pytest.mark.parametrize("robot", READINGS, ids=lambda r: f"{r.id}-{r.convention}")
+@pytest.mark.parametrize("symbols", [False, True])
+def test_every_page_is_well_formed(robot: kin.Robot, symbols: bool) -> None:
+    q = some_q(robot)
+    for at in (0.0, 1.0, 2.5, 4.0, float(steps.length(robot))):
+        here = steps.place(robot, q, at)
+        told = words(
+            page.caption_html(robot, here, USUAL)
+            + page.table_html(robot, q, here, RADIANS)
+            + page.matrices_html(robot, here, symbols, USUAL)
+            + page.compare_html(robot, steps.reread(robot), q, here, 0.1, USUAL)
+            + page.nine_steps_html(robot.convention)
+        )
+        assert "-" not in re.sub(r"[a-z]-[a-z]", "", told), "every minus is a true one"
+        assert "nan" not in told
+
+
+def test_the_table_marks_where_the_walk_is_and_what_joints_move() -> None:
+    at = steps.place(CRAIG, CRAIG.q_home, 6.5)
+    html = page.table_html(CRAIG, CRAIG.q_home, at, USUAL)
+    rows = [*ET.fromstring(html).iter("tr")]
+    assert [words(ET.tostring(th, encoding="unicode")) for th in rows[0]] == [
+        *(" row", "αᵢ₋₁ °", "aᵢ₋₁ mm", "θᵢ °", "dᵢ mm"),
+    ]
+    assert ["background" in row.attrib["style"] for row in rows[1:]] == [i == 1 for i in range(8)]
+    assert [cell.text for cell in rows[2]] == ["2", "−90.0", "0.0", "30.0", "0.0"]
+    assert ["box-shadow" in cell.attrib["style"] for cell in rows[2]] == [False, False, False, True, False]
+    bold = [[c for c, cell in enumerate(row) if "underline" in cell.attrib["style"]] for row in rows[1:]]
+    assert bold == [[3]] * 7 + [[]]
+
+
+def test_symbols_put_constants_in_and_leave_the_joint_open() -> None:
+    def entries(robot: kin.Robot, row: int) -> list[str]:
+        html = page.matrices_html(robot, steps.place(robot, robot.q_home, 4 * row + 4), True, USUAL)
+        cells = [words(ET.tostring(c, encoding="unicode")) for c in ET.fromstring(f"<d>{html}</d>").iter("mtd")]
+        return cells[:16]
+
+    assert entries(PIONEER, 0) == [
+        *("cosθ1", "0", "−sinθ1", "70cosθ1"),
+        *("sinθ1", "0", "cosθ1", "70sinθ1"),
+        *("0", "−1", "0", "130"),
+        *("0", "0", "0", "1"),
+    ]
+    # θ3 − 90°: its cosine is a sine.
+    assert entries(PIONEER, 2)[:4] == ["sinθ3", "0", "cosθ3", "0"]
+    assert entries(SCARA, 2)[8:12] == ["0", "0", "1", "d3"]
+
+
+def test_numbers_follow_the_units() -> None:
+    at = steps.place(PIONEER, PIONEER.q_home, 4.5)
+    assert "30.0" in page.table_html(PIONEER, PIONEER.q_home, at, USUAL)
+    radians = words(page.table_html(PIONEER, PIONEER.q_home, at, RADIANS))
+    assert "0.524" in radians
+    assert "rad" in radians
+    assert "turn 0.524 rad about z₁" in steps.caption(PIONEER, at, RADIANS)
+
+
+@pytest.mark.parametrize(
+    ("length", "d", "d_short"), [("mm", "130.0", "130"), ("cm", "13.00", "13"), ("m", "0.1300", "0.13")]
+)
+def test_lengths_follow_the_units(length: str, d: str, d_short: str) -> None:
+    units, q = Units(length=length), PIONEER.q_home
+    at = steps.place(PIONEER, q, 2.0)
+    assert f"slide {d} {length} along z₀ (d₁)" in steps.caption(PIONEER, at, units)
+    table = words(page.table_html(PIONEER, q, at, units))
+    assert f"dᵢ {length}" in table
+    assert d in table
+    assert f"lengths in {length}" in page.matrices_html(PIONEER, at, False, units)
+    assert f">{d}<" in page.matrices_html(PIONEER, at, False, units)
+    assert f">{d_short}<" in page.matrices_html(PIONEER, at, True, units)
+    apart = page.compare_html(PIONEER, steps.reread(PIONEER), q, at, 0.13, units)
+    assert f"{d} {length} apart" in apart
+
+
+# The drawing
+
+
+@pytest.mark.parametrize("factor", ["theta", "alpha"])
+@pytest.mark.parametrize("angle", [0.7, -2.9, 6.0])
+def test_an_arc_ends_where_the_turn_ends(factor: steps.Factor, angle: float) -> None:
+    lines = draw.arc(steps.axis(factor), 2.0, angle)
+    start = np.eye(3)[0 if factor == "theta" else 2]
+    turned = steps.elementary(factor, angle)[:3, :3] @ start
+    assert np.allclose(lines[2, 0], 2.0 * start, atol=1e-6)
+    assert np.allclose(lines[-3, 1], 2.0 * turned, atol=1e-6)
+    assert np.allclose(np.linalg.norm(lines[2:-2], axis=-1), 2.0, atol=1e-6)
+    assert np.allclose(np.cross(lines[1, 1], turned), 0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("distance", [0.3, -0.3])
+def test_a_ruler_is_as_long_as_the_slide(distance: float) -> None:
+    for factor in ("d", "a"):
+        line = draw.ruler(steps.axis(factor), 0.1, distance)[2]
+        assert np.allclose(line[1] - line[0], steps.elementary(factor, distance)[:3, 3], atol=1e-7)
+
+
+@pytest.mark.parametrize("robot", READINGS, ids=lambda r: f"{r.id}-{r.convention}")
+def test_a_skeleton_hangs_together_and_bends_at_right_angles(robot: kin.Robot) -> None:
+    frames = kin.link_frames(robot, some_q(robot))
+    bones = draw.skeleton(robot, frames)
+    assert np.allclose(bones[1:, 0], bones[:-1, 1], atol=1e-6)
+    assert np.allclose(bones[1::2, 1], frames[:, :3, 3], atol=1e-6)
+    lengths = np.linalg.norm(bones[:, 1] - bones[:, 0], axis=1)
+    q = some_q(robot)
+    first, second = ("d", "a") if robot.convention == "standard" else ("a", "d")
+    for i in range(len(robot.rows)):
+        assert lengths[2 * i] == pytest.approx(abs(steps.value(robot, i, first, q)), abs=1e-6)
+        assert lengths[2 * i + 1] == pytest.approx(abs(steps.value(robot, i, second, q)), abs=1e-6)
+
+
+# The lesson in a visitor's page
+
+
+@pytest.fixture(scope="module")
+def served() -> Iterator[tuple[ViewerServer, int]]:
+    server = ViewerServer(Store(), Settings(), Clouds())
+    yield server, server.start()
+    server.stop()
+
+
+@pytest.fixture
+def tab(served: tuple[ViewerServer, int]) -> Iterator[FakeBrowser]:
+    with FakeBrowser(served[1]) as opened:
+        opened.settle()
+        opened.set("Lesson", dh.DHLesson.title)
+        opened.wait(lambda: "Row" in opened.sliders)
+        opened.settle()
+        yield opened
+
+
+def lesson_of(server: ViewerServer) -> dh.DHLesson:
+    """Of the newest visitor."""
+    session = server._sessions[max(server._sessions)]
+    shown = session.lessons.shown
+    assert isinstance(shown, dh.DHLesson)
+    return shown
+
+
+def moving(tab: FakeBrowser) -> np.ndarray:
+    """The moving frame on the arm."""
+    name = next(n for n in tab.nodes if re.fullmatch(r"/dh-\d+/moving", n))
+    return tab.local(name)
+
+
+def shows(tab: FakeBrowser, T: np.ndarray) -> bool:
+    return np.allclose(moving(tab), T, atol=5e-5)
+
+
+def at(robot: kin.Robot, q: np.ndarray, motions: float) -> np.ndarray:
+    return steps.place(robot, q, motions).T_0_now
+
+
+def test_scrubbing_moves_the_frame_and_says_where_it_is(tab: FakeBrowser) -> None:
+    tab.set("Row", 1.9)
+    tab.wait(lambda: shows(tab, at(PIONEER, PIONEER.q_home, 7.6)))
+    tab.wait(lambda: "Row 2 of 6: α₂ = 0" in tab.html)
+    tab.set("Row", 1.125)
+    tab.wait(lambda: "Row 2 of 6: turn 30.0° about z₁ (θ₂, joint 2)." in tab.html)
+    tab.wait(lambda: shows(tab, at(PIONEER, PIONEER.q_home, 4.5)))
+    labels = [m["props"]["text"] for m in tab.nodes.values() if "text" in m["props"]]
+    assert "frame 1" in labels
+
+
+def test_a_row_that_is_no_number_is_refused(tab: FakeBrowser) -> None:
+    tab.set("Row", float("nan"))
+    tab.wait(lambda: "a finite number" in tab.html)
+
+
+def test_next_and_back_go_to_the_ends_of_motions(tab: FakeBrowser) -> None:
+    # Pressed quickly, each counts.
+    for _ in range(5):
+        tab.set("Motion", "Next")
+    tab.wait(lambda: tab.value("Row") == 1.25)
+    tab.set("Row", 0.6)
+    tab.settle()
+    tab.set("Motion", "Back")
+    tab.wait(lambda: tab.value("Row") == 0.5)
+    tab.set("Motion", "Back")
+    tab.wait(lambda: tab.value("Row") == 0.25)
+    tab.wait(lambda: shows(tab, at(PIONEER, PIONEER.q_home, 1)))
+
+
+def test_playing_walks_to_the_end_and_rests(tab: FakeBrowser, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(dh, "MOTION_TIME", 0.05)
+    monkeypatch.setattr(dh, "REST", 0.01)
+    tab.set("Motion", "Play")
+    tab.wait(lambda: "Pause" in tab.gui[tab.element("Motion")]["props"]["options"])
+    tab.wait(lambda: tab.value("Row") == 6.0)
+    tab.wait(lambda: shows(tab, kin.link_frames(PIONEER, PIONEER.q_home)[-1]))
+    tab.wait(lambda: "Frame 6 is placed" in tab.html)
+    tab.settle()
+    assert "Play" in tab.gui[tab.element("Motion")]["props"]["options"]
+    monkeypatch.setattr(dh, "MOTION_TIME", 5.0)
+    tab.set("Motion", "Play")
+    tab.wait(lambda: 0.0 < tab.value("Row") < 1.0)
+    tab.set("Motion", "Pause")
+    tab.settle()
+    assert tab.value("Row") < 1.0
+
+
+def test_the_arm_moves_everything(tab: FakeBrowser) -> None:
+    tab.set("Row", 3)
+    tab.settle()
+    tab.set("1 rotating base", 20.0)
+    q = PIONEER.q_home
+    q = np.array([np.radians(20.0), *q[1:]])
+    tab.wait(lambda: shows(tab, at(PIONEER, q, 12)))
+    tab.settle()
+    assert ">20.0<" in tab.html
+    tab.set("Radians", True)
+    tab.wait(lambda: ">0.349<" in tab.html)
+
+
+def test_another_arm_starts_anew_in_its_own_order(tab: FakeBrowser) -> None:
+    tab.set("Row", 3)
+    tab.settle()
+    tab.set("Robot", CRAIG.name)
+    tab.wait(lambda: "Craig’s order" in tab.html)
+    tab.settle()
+    assert tab.value("Row") == 0.0
+    assert tab.gui[tab.element("Row")]["props"]["max"] == 8
+    tab.set("Row", 8)
+    tab.wait(lambda: shows(tab, kin.link_frames(CRAIG, CRAIG.q_home)[-1]))
+
+
+def test_symbols_and_comparison_on_request_and_gone_with_the_lesson(tab: FakeBrowser) -> None:
+    tab.set("Robot", PRINTED.name)
+    tab.wait(lambda: "Standard order" in tab.html)
+    tab.settle()
+    assert "cos" not in tab.html
+    tab.set("Symbols", True)
+    tab.set("Row", 2)
+    tab.wait(lambda: "cos" in tab.html)
+    tab.set("Compare conventions", True)
+    tab.wait(lambda: "7 joints, 6 freedoms" in tab.html)
+    beside = next(n for n in tab.nodes if n.endswith("/beside/moving"))
+    tab.wait(lambda: np.allclose(tab.local(beside), at(CRAIG, PRINTED.q_home, 8), atol=5e-5))
+    texts = [m["props"]["text"] for n, m in tab.nodes.items() if n.startswith("/dh-") and "text" in m["props"]]
+    assert "joints 1 and 2: one line" in texts
+    tab.set("Lesson", "None")
+    tab.wait(lambda: "Row" not in tab.sliders)
+    tab.settle()
+    assert not [n for n in tab.nodes if n.startswith("/dh-")]
+
+
+def test_the_lesson_opened_again_begins_at_the_base(tab: FakeBrowser) -> None:
+    tab.set("Row", 3)
+    tab.wait(lambda: shows(tab, at(PIONEER, PIONEER.q_home, 12)))
+    tab.set("Lesson", "None")
+    tab.wait(lambda: "Row" not in tab.sliders)
+    tab.set("Lesson", dh.DHLesson.title)
+    tab.wait(lambda: "Row" in tab.sliders)
+    tab.settle()
+    assert shows(tab, np.eye(4)), "and does not take over the pose of a node of the same name"
+
+
+def test_a_shared_address_restores_what_was_set_and_ignores_nonsense(
+    served: tuple[ViewerServer, int], tab: FakeBrowser
+) -> None:
+    lesson = lesson_of(served[0])
+    lesson.restore({"at": 6.5, "symbols": True, "compare": True, "speed": "Double"})
+    kept = lesson.state()
+    assert kept == {"at": 6.5, "symbols": True, "compare": True, "speed": "Double"}
+    for hostile in (
+        {"at": float("nan")},
+        {"at": 1e9},
+        {"at": True},
+        {"at": [1]},
+        {"speed": ["x"]},
+        {"symbols": 1},
+    ):
+        lesson.restore(hostile)
+        assert lesson.state() == kept
+    tab.wait(lambda: tab.value("Row") == 6.5 / 4)
+    assert tab.value("Compare conventions") is True

@@ -1,0 +1,212 @@
+"""The lesson on equations: what it shows, when it moves the arm, and what it costs."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from unittest.mock import MagicMock
+
+import numpy as np
+import pytest
+from fake_browser import FakeBrowser
+
+import kin
+from app.equations import book, book_later, books
+from app.shared.clouds import Clouds
+from app.shared.settings import Settings
+from app.shared.store import Store
+from app.viewer.lessons.equations import EquationsLesson, page
+from app.viewer.server import ViewerServer
+from app.viewer.units import USUAL, Units
+from kin import chapter
+
+pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
+
+PIONEER = kin.get_robot("pioneer5")
+PUMA = kin.get_robot("puma560")
+
+
+@pytest.fixture
+def tab() -> Iterator[FakeBrowser]:
+    server = ViewerServer(Store(), Settings(), Clouds())
+    with FakeBrowser(server.start()) as opened:
+        opened.settle()
+        opened.set("Lesson", "Equations")
+        opened.wait(lambda: "data-equation" in opened.html)
+        yield opened
+    server.stop()
+
+
+def press(tab: FakeBrowser, label: str) -> None:
+    tab.send("GuiUpdateMessage", uuid=tab.element(label), updates={"value": True})
+
+
+def values_shown(tab: FakeBrowser) -> list[float]:
+    table = re.search(r'aria-label="values here".*?</table>', tab.html).group()
+    return [float(text.replace("−", "-")) for text in re.findall(r"<td[^>]*>([^<]+)</td>", table)]
+
+
+def drawn(tab: FakeBrowser) -> list[str]:
+    return [name for name in tab.nodes if name.startswith("/equations-")]
+
+
+# -- in the page --------------------------------------------------------------------------------------------
+
+
+def test_it_begins_with_a_misprint_and_its_values_follow_the_arm(tab: FakeBrowser) -> None:
+    assert tab.value("Equation") == "(6) p_z ✕ misprinted"
+    assert "Equation (6):" in tab.html
+    q = np.radians([20.0, 30.0, 60.0, 30.0, 30.0])
+    tab.set("1 rotating base", 20)
+    tab.set("2 rotating elbow", 41)
+    q[1] = np.radians(41.0)
+    (row,) = (c for c in chapter.compare("pioneer5", q) if c.number == 6)
+    expected = [round(1000 * float(x), 1) for x in (row.printed, row.corrected, row.dh)]
+    tab.wait(lambda: values_shown(tab) == expected)
+    assert f"<b>{1000 * abs(row.difference):.0f} mm</b> here, by 135 mm at worst" in tab.html
+
+
+def test_show_where_it_is_worst(tab: FakeBrowser) -> None:
+    press(tab, "Show where it is worst")
+    worst = np.radians(next(e for e in chapter.EQUATIONS if e.number == 6).worst_at)
+    tab.wait(lambda: np.allclose(tab.tool_pose(), kin.fk(PIONEER, worst), atol=1e-6))
+    tab.wait(lambda: "<b>135 mm</b> here" in tab.html)
+    assert "Equation (6) at its worst" in tab.html
+
+
+def test_another_equation_and_its_picture(tab: FakeBrowser) -> None:
+    assert len(drawn(tab)) == 2
+    tab.set("Equation", "(4) p_x ✓")
+    tab.wait(lambda: "equal to the DH product" in tab.html)
+    tab.wait(lambda: not drawn(tab))
+    tab.set("Equation", "(3) the whole matrix ? unreadable")
+    tab.wait(lambda: "unreadable</span>" in tab.html)
+    assert 'aria-label="values here"' not in tab.html
+    tab.set("Equation", "(13) a_x ✕ misprinted")
+    tab.wait(lambda: "tool’s z axis (a)" in tab.html)
+    tab.wait(lambda: len(drawn(tab)) == 2)
+    tab.set("Radians", True)
+    tab.wait(lambda: "by 0.616 rad at worst" in tab.html)
+    tab.set("Lesson", "None")
+    tab.wait(lambda: not drawn(tab) and "data-equation" not in tab.html)
+
+
+def test_another_arm_has_its_own_equations(tab: FakeBrowser) -> None:
+    tab.set("Robot", PUMA.name)
+    tab.wait(lambda: "derived and checked" in tab.html)
+    assert tab.value("Equation") == "p_x"
+    assert not drawn(tab)
+    T = kin.fk(PUMA, PUMA.q_home)
+    tab.wait(lambda: values_shown(tab) == [round(1000 * T[0, 3], 1)] * 2)
+    tab.set("Robot", PIONEER.name)
+    tab.wait(lambda: "Equation (6):" in tab.html)
+    assert len(drawn(tab)) == 2
+
+
+def test_an_equation_that_there_is_not_is_refused_by_name(tab: FakeBrowser) -> None:
+    tab.set("Equation", "E = m c²")
+    tab.wait(lambda: "Not understood" in tab.html)
+    tab.wait(lambda: tab.value("Equation") == "(6) p_z ✕ misprinted")
+
+
+def test_a_failed_check_is_said_instead_of_shown(tab: FakeBrowser, monkeypatch: pytest.MonkeyPatch) -> None:
+    true = books.derive
+
+    def wrong(robot):
+        derived = true(robot)
+        return replace(derived, entries={**derived.entries, "o_z": derived.entries["o_y"]})
+
+    monkeypatch.setattr(books, "derive", wrong)
+    books.book.cache_clear()
+    books.book_later.cache_clear()
+    try:
+        tab.set("Robot", PUMA.name)
+        tab.wait(lambda: "o_z of puma560 is off by" in tab.html)
+        assert 'data-status="error"' in tab.html
+        assert "data-equation" not in tab.html
+    finally:
+        books.book.cache_clear()
+        books.book_later.cache_clear()
+
+
+def test_what_was_chosen_can_be_restored() -> None:
+    stage = MagicMock(robot=PIONEER, q=PIONEER.q_home, units=USUAL)
+    book_later(PIONEER).result(30)
+    chosen = EquationsLesson(stage)
+    chosen.handle("equation", "(13) a_x ✕ misprinted")
+    assert chosen.state() == {"equation": "13"}
+    other = EquationsLesson(stage)
+    for hostile in ({"equation": "nonsense"}, {"equation": ["13"]}, {"equation": None}, {}):
+        other.restore(hostile)
+        assert other.state() == {"equation": "6"}
+    other.restore(chosen.state())
+    assert other.state() == {"equation": "13"}
+
+
+# -- as HTML ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("robot", kin.builtin_robots().values(), ids=lambda robot: robot.id)
+def test_every_equation_of_every_arm_can_be_shown(robot) -> None:
+    found = book(robot)
+    assert page.summary(found)
+    labels = [page.label(e) for e in found.equations]
+    assert len(set(labels)) == len(labels)
+    T = kin.fk(robot, robot.q_home)
+    for equation in found.equations:
+        text = page.equation_html(found, equation)
+        assert text.count("<div") == text.count("</div>")
+        assert text.count("<math") == text.count("</math>") > (0 if equation.correct else -1)
+        assert page.symbols_html(found.symbols_of(equation), USUAL)
+        if equation.correct is None:
+            continue
+        values = found.values(equation, robot.q_home, T)
+        assert page.values_html(equation, values, USUAL, 1.0).count("<td") == (
+            2 if equation.verdict == "derived" else 3
+        )
+        if equation.verdict == "misprinted":
+            lines = page.segments(equation, values, T, 0.3)
+            assert np.array_equal(lines[0, 0], T[:3, 3])
+            if equation.is_length:
+                assert np.linalg.norm(lines[0, 1] - lines[0, 0]) == pytest.approx(abs(values.difference))
+            else:
+                a, b = lines[:, 1] - lines[:, 0]
+                assert np.arccos(a @ b / 0.09) == pytest.approx(float(values.turn), abs=1e-6)
+
+
+def test_names_that_people_typed_are_escaped() -> None:
+    rows = (replace(PUMA.rows[0], name="<script>"), *PUMA.rows[1:])
+    robot = replace(PUMA, rows=rows)
+    text = page.symbols_html(book(robot).symbols.values(), USUAL)
+    assert "<script>" not in text
+    assert "&lt;script&gt;" in text
+
+
+@pytest.mark.parametrize("length", ["cm", "m"])
+def test_lengths_follow_the_units(length: str) -> None:
+    found, units = book(PIONEER), Units(length=length)
+    equation = next(e for e in found.equations if e.verdict == "misprinted" and e.is_length)
+    values = found.values(equation, np.array(equation.worst), kin.fk(PIONEER, np.array(equation.worst)))
+    off = abs(float(values.difference))
+    text = page.values_html(equation, values, units, off)
+    assert f" in {length}, at this pose" in text
+    assert f">{page.fixed(units.lengths.scale * float(values.dh), units.lengths.decimals(1))}<" in text
+    assert f"off by <b>{units.distance(off)}</b> here" in text
+    assert "mm" not in text
+    symbols = page.symbols_html(found.symbols.values(), units)
+    assert f"{units.lengths.scale * 0.13:.6g} {length}, " in symbols
+    assert " mm" not in symbols
+
+
+def test_notes_are_typeset() -> None:
+    assert page.note_html("-d4*s23 & 5") == "−<i>d</i><sub>4</sub>\u2009<i>s</i><sub>23</sub> &amp; 5"
+
+
+def test_small_and_vanishing_differences_are_not_called_zero() -> None:
+    equation = book(PIONEER).equation("6")
+    values = book(PIONEER).values(equation, PIONEER.q_home)
+    tiny = replace(values, difference=np.array(1e-6))
+    assert "<b>&lt; 0.1 mm</b>" in page.told(equation, tiny, USUAL, 0.1)[1]
+    none = replace(values, difference=np.array(0.0))
+    assert page.told(equation, none, USUAL, 0.1)[0] == "✓"

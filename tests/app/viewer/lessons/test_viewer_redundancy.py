@@ -1,0 +1,331 @@
+"""The lesson "Redundancy": the tool is held, the ring is exact, a trade of two joints is told as one."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fake_browser import FakeBrowser
+
+import kin
+from app.shared.store import Store
+from app.viewer import selfmotion
+from app.viewer.lessons.redundancy import told
+from app.viewer.lessons.redundancy.ring import arc_segments, coaxial, elbow_circle, joint_axis, trade_segments
+from app.viewer.panel.joints import label
+from app.viewer.units import RADIANS, USUAL, Units
+from kin import Redundancy
+
+pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
+
+STORE = Store()
+PIONEER, SRS, IIWA, PRINTED, PUMA, PANDA, UR5 = (
+    STORE.get(name) for name in ("pioneer5", "redundant7-craig", "iiwa14", "redundant7", "puma560", "panda", "ur5")
+)
+
+
+def home(robot: kin.Robot) -> np.ndarray:
+    return kin.fk(robot, robot.q_home)
+
+
+# Self-motion
+
+
+def test_only_what_may_be_asked_for_is_free() -> None:
+    straight = np.array([0.3, -0.9, 1.1, 0.4, 0.0, 0.2])
+    T = kin.fk(UR5, straight)
+    assert kin.solve_ik(UR5, T, q_seed=straight, branch="seed").redundancy, "free at the singularity only"
+    assert selfmotion.free_values(UR5, T, "pose", straight, None) == ()
+    free = selfmotion.free_values(PIONEER, home(PIONEER), "position", PIONEER.q_home, None)
+    assert [item.name for item in free] == ["theta4", "theta5"]
+
+
+@pytest.mark.parametrize("robot", [SRS, IIWA, PRINTED], ids=lambda robot: robot.id)
+def test_each_end_is_a_stop_of_the_joint_that_is_named(robot: kin.Robot) -> None:
+    T, q = home(robot), robot.q_home
+    (item,) = selfmotion.free_values(robot, T, "pose", q, None)
+    found = selfmotion.ends(robot, T, "pose", q, None, item)
+    assert len(found) == 2 * len(item.intervals)
+    for end in found:
+        inside = math.copysign(1e-6, item.value - end.value)
+        if not any(low <= end.value + inside <= high for low, high in item.intervals):
+            inside = -inside
+        result = selfmotion.self_motion(robot, T, "pose", q, None, item.name, end.value + inside)
+        there = result.solutions[0].q
+        room = min(there[end.joint] - robot.lower[end.joint], robot.upper[end.joint] - there[end.joint])
+        assert abs(room) < 1e-4
+        beyond = kin.solve_ik(robot, T, q_seed=q, branch="seed", redundancy={item.name: end.value - inside})
+        assert beyond.status == "limits"
+        assert end.joint in {v.joint for v in beyond.violations}
+
+
+def test_a_range_across_the_seam_is_one_range() -> None:
+    pi = math.pi
+    split = Redundancy("psi", "arm angle ψ", 3.0, ((-pi, -2.0), (-1.0, 1.0), (2.5, pi)))
+    assert selfmotion.reach_of(split) == (2.5, pytest.approx(2 * pi - 2.0))
+    assert selfmotion.reach_of(split._replace(value=-2.5)) == (pytest.approx(2.5 - 2 * pi), -2.0)
+    assert selfmotion.reach_of(split._replace(value=0.0)) == (-1.0, 1.0)
+    assert selfmotion.reach_of(split._replace(value=1.5)) is None
+    assert selfmotion.reach_of(Redundancy("psi", "", 1.0, ((-pi, pi),))) == (-pi, pi)
+    assert selfmotion.reach_of(Redundancy("theta1", "", 3.0, ((-pi, -2.0), (2.5, pi)))) == (2.5, pi)
+
+
+# Geometry
+
+
+@pytest.mark.parametrize("robot", [SRS, IIWA], ids=lambda robot: robot.id)
+def test_the_elbow_is_on_its_circle_at_the_arm_angle(robot: kin.Robot) -> None:
+    rng = np.random.default_rng(4)
+    for q in robot.random_q(rng, 10):
+        circle = elbow_circle(robot, q)
+        assert circle is not None
+        (free,) = selfmotion.free_values(robot, kin.fk(robot, q), "pose", q, None)
+        points = kin.link_frames(robot, q)[:, :3, 3]
+        assert np.linalg.norm(points - circle.at(free.value), axis=1).min() < 1e-9
+        for point in (circle.shoulder, circle.wrist):
+            assert np.linalg.norm(points - point, axis=1).min() < 1e-9
+
+
+def with_joint_turned_round(robot: kin.Robot, joint: int) -> kin.Robot:
+    """The same arm in space, by a standard table in which a joint counts the other way round."""
+    rows, home, base = list(robot.rows), list(robot.home), np.array(robot.base)
+    row, home[joint] = rows[joint], -home[joint]
+    assert row.limits is not None
+    low, high = row.limits
+    rows[joint] = replace(row, theta=-row.theta, d=-row.d, alpha=row.alpha + math.pi, limits=(-high, -low))
+    if joint:
+        rows[joint - 1] = replace(rows[joint - 1], alpha=rows[joint - 1].alpha + math.pi)
+    else:
+        base = base @ np.diag([1.0, -1.0, -1.0, 1.0])
+    return replace(robot, id="turned", rows=tuple(rows), home=tuple(home), base=tuple(map(tuple, base.tolist())))
+
+
+@pytest.mark.parametrize("joint", [0, 2, 4, 6])
+def test_the_elbow_is_on_its_circle_whichever_way_a_joint_counts(joint: int) -> None:
+    test_the_elbow_is_on_its_circle_at_the_arm_angle(with_joint_turned_round(IIWA, joint))
+
+
+@pytest.mark.parametrize("joint", [0, 1])
+def test_joints_on_one_line_may_count_against_each_other(joint: int) -> None:
+    robot = with_joint_turned_round(PRINTED, joint)
+    assert coaxial(robot)
+    q = robot.q_home + 0.3
+    (free,) = selfmotion.free_values(robot, kin.fk(robot, q), "pose", q, None)
+    (low, high) = free.intervals[0]
+    rays = []
+    for value in (low + 1e-3, 0.5 * (low + high), high - 1e-3):
+        there = kin.solve_ik(robot, kin.fk(robot, q), q_seed=q, branch="seed", redundancy=value).solutions[0].q
+        assert there[0] == value
+        chords, whose = trade_segments(robot, there, 0.1)
+        rays.append(chords[whose == 2])
+    assert np.allclose(rays, rays[0])
+
+
+def test_no_circle_for_other_arms() -> None:
+    assert all(elbow_circle(robot, robot.q_home) is None for robot in (PIONEER, PRINTED, PUMA, PANDA))
+
+
+def test_the_arcs_of_the_ring_end_where_the_ranges_end() -> None:
+    circle = elbow_circle(SRS, SRS.q_home)
+    assert circle is not None
+    chords, inside = arc_segments(circle, [(-1.949, 1.2345)], 1.3)
+    assert np.allclose(chords[0, 0], chords[-1, 1]), "the circle closes"
+    feasible = chords[inside]
+    assert np.allclose(feasible[0, 0], circle.at(-1.949, 1.3))
+    assert np.allclose(feasible[-1, 1], circle.at(1.2345, 1.3))
+    assert not arc_segments(circle, (), 1.0)[1].any()
+
+
+def test_two_joints_on_one_line_are_found_and_their_sum_does_not_move_in_a_trade() -> None:
+    assert [robot.id for robot in STORE.robots if coaxial(robot)] == ["redundant7"]
+    q = PRINTED.q_home.copy()
+    traded = q.copy()
+    traded[0] += 0.7
+    traded[1] -= 0.7
+    assert np.allclose(kin.fk(PRINTED, traded), kin.fk(PRINTED, q), atol=1e-12)
+    (a, i), (b, k) = (trade_segments(PRINTED, x, 0.1) for x in (q, traded))
+    assert np.allclose(a[i == 2], b[k == 2])
+    tips = [chords[numbers == 0][-1, 1] for chords, numbers in ((a, i), (b, k))]
+    assert np.linalg.norm(tips[1] - tips[0]) > 0.05
+    assert np.allclose(told.elbow_of(PRINTED, q), told.elbow_of(PRINTED, traded), atol=1e-12)
+
+
+@pytest.mark.parametrize("robot", STORE.robots, ids=lambda robot: robot.id)
+def test_a_joint_turns_the_tool_about_the_axis_told(robot: kin.Robot) -> None:
+    q = robot.random_q(np.random.default_rng(6))
+    J = kin.jacobian(robot, q)
+    for i in range(robot.n):
+        point, axis = joint_axis(robot, q, i)
+        assert np.allclose(J[3:, i] if robot.revolute[i] else J[:3, i], axis, atol=1e-9)
+        if robot.revolute[i]:
+            assert np.allclose(J[:3, i], np.cross(axis, kin.fk(robot, q)[:3, 3] - point), atol=1e-9)
+
+
+# Words
+
+
+def test_residuals_are_measured_by_the_task_and_never_rounded_to_nothing() -> None:
+    held = np.eye(4)
+    T = np.eye(4)
+    T[:3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+    T[0, 3] = 2e-13
+    assert told.residual(T, held, "pose") == (2e-13, pytest.approx(math.pi / 2))
+    assert told.residual(T, held, "approach") == (2e-13, 0.0)
+    assert told.residual(T, held, "position") == (2e-13, None)
+    assert told.small(2e-13, USUAL.lengths) == "2·10<sup>−10</sup> mm"
+    assert told.small(0.0, USUAL.lengths) == "0 mm"
+    assert told.small(0.00125, USUAL.lengths) == "1.25 mm"
+    assert told.small(0.00125, Units(length="cm").lengths) == "0.125 cm"
+    assert told.small(2e-13, Units(length="m").lengths) == "2·10<sup>−13</sup> m"
+    assert told.small(0.5, RADIANS) == "0.5000 rad"
+    assert "1·10<sup>−4</sup> cm, 0.5000 rad.<br>Elbow moved 0 cm." in told.residual_html(
+        1e-6, 0.5, 0.0, Units(False, "cm")
+    )
+
+
+def test_what_is_free_is_told_for_every_arm_and_task() -> None:
+    def said(robot: kin.Robot, task: kin.Task) -> str:
+        free = selfmotion.free_values(robot, home(robot), task, robot.q_home, None)
+        swings = elbow_circle(robot, robot.q_home) is not None
+        return told.idea(robot, task, free, coaxial(robot), swings)
+
+    assert said(PUMA, "pose").startswith("Nothing is free: 6 joints for the 6 demands")
+    assert said(PRINTED, "pose") == told.TRADE
+    assert said(SRS, "pose") == told.SWING
+    assert "θ4 and θ5 may be anything" in said(PIONEER, "position")
+    assert said(PANDA, "pose").startswith("One of 7 joints is free")
+    assert said(PANDA, "position").startswith("Four motions are free")
+
+
+# In the page
+
+
+@pytest.fixture
+def tab(port: int) -> Iterator[FakeBrowser]:
+    with FakeBrowser(port) as opened:
+        opened.set("Lesson", "Redundancy")
+        opened.wait(lambda: "data-idea" in opened.html)
+        yield opened
+
+
+def q_of(tab: FakeBrowser, robot: kin.Robot) -> np.ndarray:
+    return np.radians([tab.value(label(robot, i)) for i in range(robot.n)])
+
+
+def swing(tab: FakeBrowser, name: str, degrees: float) -> list[np.ndarray]:
+    """Set the slider and wait; the tool's pose in every picture on the way."""
+    poses: list[np.ndarray] = []
+    tab.set(name, degrees)
+    for _ in range(400):
+        if not tab._read(0.35):
+            break
+        poses.append(tab.tool_pose())
+    return poses
+
+
+def free_label(tab: FakeBrowser) -> str:
+    (name,) = [s for s in tab.sliders if s.startswith("Swing ")]
+    return name
+
+
+@pytest.mark.parametrize("robot", [SRS, PRINTED], ids=lambda robot: robot.id)
+def test_the_tool_stays_in_every_picture_of_a_swing(tab: FakeBrowser, robot: kin.Robot) -> None:
+    tab.choose(robot.name)
+    T, before = home(robot), q_of(tab, robot)
+    poses = swing(tab, free_label(tab), 60)
+    assert len(poses) > 20, "a swing, not a jump"
+    assert max(np.abs(pose - T).max() for pose in poses) < 1e-6
+    assert tab.value(free_label(tab)) == 60
+    assert np.abs(q_of(tab, robot) - before).max() > 0.5
+    exponents = [int(x.replace("−", "-")) for x in re.findall(r"<sup>([−\d]+)</sup>", tab.html)]
+    assert exponents
+    assert max(exponents) < -9
+
+
+def test_the_end_of_the_range_names_the_joint(tab: FakeBrowser) -> None:
+    tab.choose(SRS.name)
+    (free,) = selfmotion.free_values(SRS, home(SRS), "pose", SRS.q_home, None)
+    swing(tab, free_label(tab), 170)
+    assert tab.value(free_label(tab)) == pytest.approx(math.degrees(free.intervals[0][1]), abs=0.1)
+    assert "Joint 6 meets its stop" in tab.html
+    assert "stop of joint 6" in re.findall(r"data-stops.*?</table>", tab.html)[-1]
+
+
+def test_the_ring_is_drawn_with_its_stops_and_goes_with_the_lesson(tab: FakeBrowser) -> None:
+    tab.choose(SRS.name)
+    tab.wait(lambda: any("/feasible-" in n for n in tab.nodes))
+    tab.wait(lambda: sum("/stop-name-" in n for n in tab.nodes) == 2)
+    circle = elbow_circle(SRS, SRS.q_home)
+    (free,) = selfmotion.free_values(SRS, home(SRS), "pose", SRS.q_home, None)
+    assert circle is not None
+    label_at = [tab.local(n)[:3, 3] for n in tab.nodes if "/stop-name-" in n]
+    expected = [circle.at(value) - circle.center for value in free.intervals[0]]
+    for point, direction in zip(label_at, expected, strict=True):
+        out = point - circle.center
+        assert np.allclose(out / np.linalg.norm(out), direction / np.linalg.norm(direction), atol=1e-5)
+    tab.set("Lesson", "None")
+    tab.settle()
+    assert not [n for n in tab.nodes if n.startswith("/redundancy")]
+
+
+def test_back_and_forth_turns_round_at_the_stops_until_a_target_is_dragged(tab: FakeBrowser) -> None:
+    tab.choose(SRS.name)
+    swing(tab, free_label(tab), 100)
+    tab.set("Swing", True)
+    values = []
+
+    def seen() -> bool:
+        values.append(tab.value(free_label(tab)))
+        return max(values) > 111 and values[-1] < 100
+
+    tab.wait(seen)
+    assert max(values) <= 111.8
+    T = home(SRS)
+    T[:3, 3] += (-0.02, 0.0, 0.0)
+    tab.grab()
+    tab.drag(T)
+    tab.release()
+    tab.wait(lambda: tab.value("Swing") is False)
+    tab.settle()
+    assert np.allclose(tab.tool_pose(), T, atol=1e-6)
+
+
+def test_a_trade_is_told_as_one(tab: FakeBrowser) -> None:
+    tab.choose(PRINTED.name)
+    assert "Axes 1 and 2 are one line" in tab.html
+    swing(tab, free_label(tab), 45)
+    assert "Elbow moved" in tab.html
+    trade = [n for n in tab.nodes if "/trade-" in n]
+    assert len(trade) == 3
+    assert all(tab.visible.get(n, True) for n in trade)
+    assert not [n for n in tab.nodes if "/feasible-" in n]
+
+
+def test_the_choice_between_two_free_values(tab: FakeBrowser) -> None:
+    tab.choose(PIONEER.name)
+    assert "Nothing is free" in tab.html
+    assert not [s for s in tab.sliders if s.startswith("Swing")]
+    tab.set("Match", "Point only")
+    tab.wait(lambda: "Swing θ4 to" in tab.sliders)
+    tab.settle()
+    tab.set("Free value", "θ5")
+    tab.wait(lambda: "Swing θ5 to" in tab.sliders)
+    p = home(PIONEER)[:3, 3]
+    poses = swing(tab, "Swing θ5 to", 40)
+    assert max(np.abs(pose[:3, 3] - p).max() for pose in poses) < 1e-6
+    assert tab.value("5 pivoting wrist") == pytest.approx(40, abs=0.01)
+
+
+def test_hostile_values_are_refused_and_the_lesson_lives(tab: FakeBrowser) -> None:
+    tab.choose(SRS.name)
+    for name, value in ((free_label(tab), math.nan), (free_label(tab), math.inf)):
+        tab.set(name, value)
+        tab.wait(lambda: 'data-status="error"' in tab.html)
+        tab.set("Go to", "Home")
+        tab.wait(lambda: 'data-status="hand"' in tab.html)
+    swing(tab, free_label(tab), 20)
+    assert tab.value(free_label(tab)) == 20

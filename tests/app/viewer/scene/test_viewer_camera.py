@@ -1,0 +1,239 @@
+"""The visitor's camera: aimed, orbited, kept where it rests, restored on the same screen and on another."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from fake_browser import FakeBrowser
+
+from app.shared.store import Store
+from app.viewer.scene import camera
+from app.viewer.scene.meshes import body
+from app.viewer.session.state import PageState, decode, encode
+
+pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
+
+STORE = Store()
+PIONEER, UR5 = STORE.get("pioneer5"), STORE.get("ur5")
+DESKTOP, PHONE = 1280 / 720, 390 / 844
+ASIDE = np.array([[2.5, -1.5, 1.0], [0.1, 0.0, 0.4], [0.0, 0.0, 1.0]])
+
+
+def memory(state: PageState | str) -> str:
+    return json.dumps({"address": "", "state": state if isinstance(state, str) else encode(state)})
+
+
+def shown(tab: FakeBrowser) -> np.ndarray:
+    """The viewpoint the page was sent to."""
+    return np.array([tab.camera[name] for name in ("position", "look_at", "up_direction")], float)
+
+
+def default(robot: object, aspect: float, sheet: bool = False) -> np.ndarray:
+    return np.stack([*camera.view(body(robot), aspect, sheet), camera.UP])
+
+
+def orbit(tab: FakeBrowser, viewpoint: np.ndarray) -> None:
+    position, look_at, up = viewpoint.tolist()
+    tab.look(position=position, look_at=look_at, up_direction=up)
+
+
+def rest(tab: FakeBrowser, count: int = 1) -> PageState:
+    """What the page is told to remember, the so manieth time."""
+    tab.wait(lambda: len(tab.kept) >= count)
+    tab.settle(quiet=0.8)
+    assert len(tab.kept) == count
+    return decode(tab.kept[-1], STORE.robots)
+
+
+@pytest.mark.parametrize("aspect", [0.3, PHONE, 0.99, 1.0, 1.6])
+def test_what_a_sheet_changes_is_undone_without_it(aspect: float) -> None:
+    rng = np.random.default_rng(2)
+    for _ in range(20):
+        viewpoint = np.stack([rng.normal(size=3) * 3, rng.normal(size=3), camera.UP])
+        there = camera.on_sheet(viewpoint, aspect)
+        assert np.abs(camera.off_sheet(there, aspect) - viewpoint).max() < 1e-12
+        ways = [v[0] - v[1] for v in (there, viewpoint)]
+        assert np.allclose(np.cross(*ways), 0.0, atol=1e-9), "the direction stays"
+        assert np.array_equal(there[2], viewpoint[2])
+        if aspect >= 1.0:
+            assert np.allclose(there, viewpoint)
+
+
+def test_a_phone_shows_what_a_desktop_shows_above_its_sheet() -> None:
+    wide = default(PIONEER, DESKTOP)
+    there, own = camera.on_sheet(wide, PHONE), default(PIONEER, PHONE, sheet=True)
+    assert np.abs(there - own).max() < 0.1 * np.linalg.norm(own[0] - own[1])
+    radius = body(PIONEER).radius
+    forward = (there[1] - there[0]) / np.linalg.norm(there[1] - there[0])
+    right = np.cross(forward, camera.UP) / np.linalg.norm(np.cross(forward, camera.UP))
+    above = np.cross(right, forward)
+    for point in (wide[1] + sign * radius * side for sign in (-1, 1) for side in (right, above)):
+        x, y, depth = np.array([right, above, forward]) @ (point - there[0])
+        assert abs(x) / depth < math.tan(camera.FOV / 2) * PHONE, "beside the picture"
+        assert 0.15 < y / depth / math.tan(camera.FOV / 2) < 1.0, "under the sheet, or above the picture"
+    straight_down = np.array([[0.0, 0.0, 3.0], [0.0, 0.0, 0.0], camera.UP])
+    assert np.isfinite(camera.on_sheet(straight_down, PHONE)).all()
+
+
+def test_where_the_camera_rests_is_kept_and_restored(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        assert np.allclose(shown(tab), default(PIONEER, DESKTOP))
+        tab.look()
+        tab.settle(quiet=0.8)
+        assert tab.kept == [], "the view it was sent to is nobody's choice"
+        sent = len(tab.log)
+        for k in range(30):
+            orbit(tab, np.array([ASIDE[0] * (1.0 + 0.02 * k), ASIDE[1], ASIDE[2]]))
+            time.sleep(0.03)
+        assert tab.kept == []
+        orbit(tab, ASIDE)
+        assert np.abs(rest(tab).camera - ASIDE).max() < 1e-9
+        assert {m["type"] for m in tab.log[sent:]} == {"LocalStorageSetItemMessage", "GuiUpdateMessage"}
+        text = tab.kept[-1]
+    with FakeBrowser(port, memory=memory(text)) as tab:
+        tab.settle()
+        assert np.abs(shown(tab) - ASIDE).max() < 1e-9
+        tab.look()
+        tab.set("1 rotating base", 20.0)
+        assert np.abs(rest(tab).camera - ASIDE).max() < 1e-9
+        tab.set("Camera", "Reset view")
+        assert rest(tab, 2).camera is None
+        assert np.allclose(shown(tab), default(PIONEER, DESKTOP))
+        tab.look()
+        orbit(tab, ASIDE)
+        assert rest(tab, 3).camera is not None
+        tab.choose(UR5.name)
+        assert rest(tab, 4).camera is None
+        assert np.allclose(shown(tab), default(UR5, DESKTOP))
+
+
+def test_a_roll_of_the_camera_is_kept_and_reset(port: int) -> None:
+    rolled = np.array([*ASIDE[:2], [0.0, 0.6, 0.8]])
+    with FakeBrowser(port, memory=memory(PageState("pioneer5", PIONEER.q_home, camera=rolled))) as tab:
+        tab.settle()
+        assert np.abs(shown(tab) - rolled).max() < 1e-9
+        tab.set("Camera", "Reset view")
+        tab.settle()
+        assert np.allclose(shown(tab), default(PIONEER, DESKTOP))
+
+
+def test_a_view_from_before_the_camera_was_aimed_is_nobodys_choice(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.look(position=(3, 3, 3), look_at=(0, 0, 0))  # as a page does that has yet to draw where it was sent
+        tab.set("1 rotating base", 20.0)
+        assert rest(tab).camera is None
+        tab.look()
+        orbit(tab, ASIDE)
+        assert rest(tab, 2).camera is not None
+
+
+def test_a_page_that_is_there_already_is_believed_at_once(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.look()
+        tab.set("Camera", "Reset view")
+        tab.settle()
+        orbit(tab, ASIDE)
+        assert rest(tab).camera is not None
+
+
+def test_a_page_that_never_tells_it_was_there_is_believed_in_the_end(port: int, monkeypatch) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        orbit(tab, ASIDE)
+        tab.settle(quiet=0.8)
+        assert tab.kept == []
+        monkeypatch.setattr(camera, "PATIENCE", 0.0)
+        orbit(tab, ASIDE)
+        assert rest(tab).camera is not None
+
+
+@pytest.mark.filterwarnings("ignore:.*does not match annotation")
+@pytest.mark.parametrize(
+    "nonsense",
+    [
+        *({"position": (math.nan, 0, 1)}, {"look_at": (0, 0, math.inf)}, {"position": (1e300, 0, 0)}),
+        *({"up_direction": (0, 0)}, {"position": ()}),
+    ],
+)
+def test_a_camera_that_tells_nonsense_spoils_nothing(port: int, nonsense: dict[str, object]) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.look()
+        tab.look(**nonsense)
+        tab.set("1 rotating base", 20.0)
+        state = rest(tab)
+        assert state.camera is None
+        assert state.q[0] == pytest.approx(math.radians(20.0))
+        assert "Something went wrong" not in tab.html
+
+
+def test_a_link_from_a_desktop_shows_the_arm_on_a_phone_and_comes_back(port: int) -> None:
+    link = memory(PageState("pioneer5", PIONEER.q_home, camera=ASIDE))
+    with FakeBrowser(port, 390, 844, memory=link) as tab:
+        tab.settle()
+        assert np.abs(shown(tab) - camera.on_sheet(ASIDE, PHONE)).max() < 1e-9
+        tab.look()
+        tab.set("1 rotating base", 20.0)
+        assert np.abs(rest(tab).camera - ASIDE).max() < 1e-9, "not touched on the phone"
+        nearer = shown(tab)
+        nearer[0] += 0.2 * (nearer[1] - nearer[0])
+        orbit(tab, nearer)
+        again = rest(tab, 2)
+        assert np.abs(camera.on_sheet(again.camera, PHONE) - nearer).max() < 1e-3
+        text = tab.kept[-1]
+    with FakeBrowser(port, 390, 844, memory=memory(text)) as tab:
+        tab.settle()
+        assert np.abs(shown(tab) - nearer).max() < 1e-3
+
+
+def test_an_address_without_a_camera_has_the_default_view(port: int) -> None:
+    with FakeBrowser(port, 390, 844, memory=memory(PageState("ur5", UR5.q_home))) as tab:
+        tab.settle()
+        assert np.allclose(shown(tab), default(UR5, PHONE, sheet=True))
+
+
+def test_the_camera_steps_back_for_what_is_drawn_and_leaves_a_chosen_view_alone() -> None:
+    lens = SimpleNamespace(
+        image_width=956, image_height=720, position=np.ones(3), look_at=np.zeros(3), up_direction=camera.UP,
+        on_update=lambda act: act,
+    )  # fmt: skip
+    of_visitor = camera.VisitorCamera(SimpleNamespace(camera=lens), lambda key, value: None)  # type: ignore[arg-type]
+    arm = body(PIONEER)
+    of_visitor.aim(arm)
+    near = lens.position
+    points = np.random.default_rng(1).normal(size=(500, 3))
+    room = [camera.round_points(points)]
+    assert np.linalg.norm(points - room[0][0], axis=1).max() <= room[0][1]
+
+    def distance() -> float:
+        return float(np.linalg.norm(lens.position - lens.look_at) / np.linalg.norm(near - arm.center))
+
+    of_visitor.make_room(room)
+    assert distance() > 1.5
+    of_visitor.make_room([])
+    assert np.array_equal(lens.position, near), "and comes near again"
+    of_visitor.restore(ASIDE)
+    of_visitor.make_room(room)
+    assert np.array_equal(lens.position, ASIDE[0]), "it is the visitor's now"
+    of_visitor.aim(arm)
+    assert distance() > 1.5, "until asked to"
+    of_visitor.aim(body(UR5))
+    of_visitor.aim(arm)
+    assert np.array_equal(lens.position, near), "another arm, another cloud"
+
+
+def test_a_sphere_round_two() -> None:
+    small, large = (np.array([1.0, 0.0, 0.0]), 0.5), (np.array([0.0, 0.0, 0.0]), 2.0)
+    assert camera.round_both(small, large) is large
+    assert camera.round_both(large, small) is large
+    center, radius = camera.round_both(small, (np.array([-2.0, 0.0, 0.0]), 1.0))
+    assert radius == pytest.approx(2.25)
+    assert center == pytest.approx([-0.75, 0.0, 0.0])

@@ -1,0 +1,313 @@
+"""Chain, bodies and scene of every robot, and of awkward ones, without any browser."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import math
+import re
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+import viser
+
+import kin
+from app.shared.store import Store
+from app.viewer.panel import joints, readout, status
+from app.viewer.scene import camera
+from app.viewer.scene.arm import ArmScene
+from app.viewer.scene.chain import chain
+from app.viewer.scene.meshes import body, joint_color
+from app.viewer.scene.shapes import tube
+from app.viewer.units import USUAL, Units
+from kin.transforms import from_position_wxyz
+
+ROW = '[[rows]]\nname = "{}"\nkind = "{}"\ntheta = {}\nd = {}\na = {}\nalpha = {}\n'
+
+
+def robot_of(convention: str, *rows: tuple[object, ...], extra: str = "") -> kin.Robot:
+    """A robot from rows of (name, kind, theta, d, a, alpha), in metres and degrees."""
+    head = f'id = "test"\nname = "Test"\nsource = "made up"\nconvention = "{convention}"\n'
+    units = 'units = { length = "m", angle = "deg" }\n'
+    return kin.parse_robot(head + units + extra + "".join(ROW.format(*row) for row in rows))
+
+
+BASE = "[base]\nxyz = [0.3, -0.2, 0.5]\nrpy = [90, 0, 30]\n"
+TOOL = "[tool]\nxyz = [0.01, 0.02, 0.1]\nrpy = [0, 45, 10]\n"
+AWKWARD = {
+    "stanford-like": robot_of(
+        "standard",
+        ("1", "revolute", 0, 0.4, 0, -90),
+        ("2", "revolute", 0, 0.15, 0, 90),
+        ("slide", "prismatic", -90, 0.1, 0, 0),
+        ("4", "revolute", 0, 0, 0, -90),
+        ("5", "revolute", 0, 0, 0, 90),
+        ("6", "revolute", 0, 0.2, 0, 0),
+    ),
+    "scara-modified": robot_of(
+        "modified",
+        ("plate", "fixed", 15, 0.05, 0.1, 20),
+        ("1", "revolute", 0, 0.3, 0, 0),
+        ("2", "revolute", 30, 0, 0.3, 0),
+        ("adapter", "fixed", 10, 0.02, 0.05, 0),
+        ("3", "prismatic", 45, -0.1, 0.25, 180),
+        ("4", "revolute", 0, 0, 0, 0),
+        extra=BASE.replace("[base]", "[base]"),
+    ),
+    "one-joint-no-length": robot_of("standard", ("only", "revolute", 0, 0, 0, 0)),
+    "offset-base-and-tool": robot_of(
+        "modified", ("1", "revolute", 10, 0.2, 0, 0), ("2", "revolute", 0, 0, 0.3, -90), extra=BASE + TOOL
+    ),
+    "doubling-back": robot_of(
+        "standard", ("1", "revolute", 0, 0.3, 0, 0), ("x", "fixed", 0, -0.2, 0, 0), ("2", "revolute", 0, 0, 0.2, 0)
+    ),
+}
+ROBOTS = [*Store().robots, *AWKWARD.values()]
+IDS = [*(r.id for r in Store().robots), *AWKWARD]
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[viser.ViserServer]:
+    with contextlib.redirect_stdout(io.StringIO()):
+        made = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        yield made
+        made.stop()
+
+
+def world(scene: viser.SceneApi, name: str) -> np.ndarray:
+    """Pose of a node in the world, by composing its ancestors."""
+    T = np.eye(4)
+    parts = name.strip("/").split("/")
+    for k in range(len(parts)):
+        node = scene.get_handle_by_name("/" + "/".join(parts[: k + 1]))
+        assert node is not None
+        T = T @ from_position_wxyz(node.position, node.wxyz)
+    return T
+
+
+def node_names(scene: viser.SceneApi, end: str) -> list[str]:
+    return [n for n in scene._handle_from_node_name if n.split("/")[-1] == end]
+
+
+@pytest.mark.parametrize("robot", ROBOTS, ids=IDS)
+def test_chain_composes_to_the_forward_kinematics(robot: kin.Robot) -> None:
+    links = chain(robot)
+    for q in robot.random_q(np.random.default_rng(1), 20):
+        T, frames = np.eye(4), {}
+        for link, value in zip(links.links, [0.0, *q], strict=True):
+            T = T @ from_position_wxyz(*link.pose(float(value)))
+            frames |= {row: T @ F for row, F in link.frames}
+        assert np.allclose(T @ links.T_last_tool, kin.fk(robot, q), atol=1e-12)
+        expected = kin.link_frames(robot, q)
+        assert sorted(frames) == list(range(len(robot.rows)))
+        for row, frame in frames.items():
+            assert np.allclose(frame, expected[row], atol=1e-12)
+
+
+@pytest.mark.parametrize("robot", ROBOTS, ids=IDS)
+def test_posed_nodes_are_where_the_kinematics_says(server: viser.ViserServer, robot: kin.Robot) -> None:
+    arm = ArmScene(server.scene, robot)
+    try:
+        for q in (robot.q_home, *robot.random_q(np.random.default_rng(2), 3), robot.lower, robot.upper):
+            arm.show(q)
+            arm.place_gizmo(kin.fk(robot, q))
+            frames = kin.link_frames(robot, q)
+            for row in range(len(robot.rows)):
+                (name,) = node_names(server.scene, f"frame-{row + 1}")
+                assert np.allclose(world(server.scene, name), frames[row], atol=1e-12)
+            grip = next(n for n in node_names(server.scene, "gripper") if "target" not in n)
+            assert np.allclose(world(server.scene, grip), kin.fk(robot, q), atol=1e-12)
+            assert np.allclose(world(server.scene, arm.gizmo.name), kin.fk(robot, q), atol=1e-12)
+    finally:
+        arm.remove()
+    assert not [n for n in server.scene._handle_from_node_name if n.startswith("/arm")]
+
+
+def test_the_last_tiny_step_is_not_dropped(server: viser.ViserServer) -> None:
+    robot = Store().get("redundant7-craig")
+    arm = ArmScene(server.scene, robot)
+    q = robot.q_home + 1e-7
+    arm.show(q)
+    (name,) = node_names(server.scene, "frame-8")
+    assert np.abs(world(server.scene, name) - kin.link_frames(robot, q)[-1]).max() < 1e-12
+    arm.remove()
+
+
+@pytest.mark.parametrize("robot", ROBOTS, ids=IDS)
+def test_bodies_are_sound_and_stay_above_the_floor(robot: kin.Robot) -> None:
+    made = body(robot)
+    for part in [made.pedestal, *made.gripper, *(p for parts in made.parts for p in parts)]:
+        assert np.isfinite(part.mesh.vertices).all(), part.name
+        assert part.mesh.faces.max() < len(part.mesh.vertices)
+        assert part.mesh.area > 0
+    frames = kin.link_frames(robot, robot.random_q(np.random.default_rng(3), 4000))
+    assert frames[..., 2, 3].min() - made.size > made.floor
+    assert made.pedestal.mesh.bounds[0, 2] == pytest.approx(made.floor)
+    assert len(made.parts) == robot.n + 1
+    for link in made.parts[1:]:
+        assert {"housing", "axis"} <= {part.name for part in link}, "each joint shows itself and its axis"
+
+
+@pytest.mark.parametrize("robot", ROBOTS, ids=IDS)
+def test_every_part_has_a_node_of_its_own(server: viser.ViserServer, robot: kin.Robot) -> None:
+    """A second node of one name would take the place of the first: a sleeve that of the housing it is fixed to."""
+    made = body(robot)
+    arm = ArmScene(server.scene, robot)
+    for name in ("housing", "axis", "link", "link-bar"):
+        wanted = sum(part.name == name for parts in made.parts for part in parts)
+        shown = [
+            n for n in server.scene._handle_from_node_name if re.fullmatch(rf"{name}(-\d+)?", n.split("/")[-1])
+        ]
+        assert len(shown) == wanted
+    arm.remove()
+
+
+@pytest.mark.parametrize("robot_id", ["scara", "stanford"])
+def test_a_bar_is_in_its_sleeve_all_along_the_stroke(robot_id: str) -> None:
+    """The sleeve stands at the origin of the joint's axis; the bar reaches from there to the next joint."""
+    robot = Store().get(robot_id)
+    made = body(robot)
+    for link, parts in zip(made.chain.links[1:], made.parts[1:], strict=True):
+        bar = next((part for part in parts if part.name == "link-bar"), None)
+        if bar is None or link.joint is None or link.joint.limits is None:
+            continue
+        low, high = bar.mesh.bounds[:, 2]
+        for q in link.joint.limits:
+            assert low + q < 0.0, "the bar comes out at the back"
+        assert low + link.joint.limits[1] > -0.1 * robot.reach, "and no further than it must"
+        assert high + link.joint.limits[1] > 0.9 * link.joint.limits[1] - 0.1 * robot.reach
+        return
+    pytest.fail("no slide")
+
+
+def test_a_body_is_made_once_for_all_visitors() -> None:
+    robot = Store().get("pioneer5")
+    assert body(robot) is body(kin.get_robot("pioneer5"))
+
+
+@pytest.mark.parametrize("robot", Store().robots, ids=[r.id for r in Store().robots])
+def test_joints_on_one_point_are_told_apart(robot: kin.Robot) -> None:
+    """Housings of joints that share an origin differ in size or place, and neighbours differ in colour."""
+    made = body(robot)
+    boxes = []
+    for link, parts in zip(made.chain.links[1:], made.parts[1:], strict=True):
+        housing = next(p for p in parts if p.name == "housing")
+        assert housing.color == joint_color(link.index)
+        boxes.append(housing.mesh.bounds)
+        if np.linalg.norm(link.T_parent_axis[:3, 3]) < 1e-9 and len(boxes) > 1:
+            assert np.abs(boxes[-1] - boxes[-2]).max() > 0.2 * made.size
+    colors = [joint_color(k) for k in range(robot.n)]
+    assert len(set(colors)) == robot.n
+
+
+def test_surfaces_of_tubes_face_outward() -> None:
+    mesh = tube(np.array([[0, 0, 0], [0, 0, 0.3], [0.2, 0, 0.3]], dtype=float), 0.02)
+    assert mesh.is_winding_consistent
+    assert mesh.volume == pytest.approx(math.pi * 0.02**2 * 0.47, rel=0.12)
+    turning_back = tube(np.array([[0, 0, 0], [0, 0, 0.3], [0, 0, 0.1]], dtype=float), 0.02)
+    assert np.isfinite(turning_back.vertices).all()
+
+
+@pytest.mark.parametrize("aspect", [0.46, 0.9, 1.0, 956 / 720, 2.2])
+@pytest.mark.parametrize("robot", Store().robots, ids=[r.id for r in Store().robots])
+def test_the_default_view_holds_the_arm(robot: kin.Robot, aspect: float) -> None:
+    sheet = aspect < 0.6
+    position, look_at = camera.view(body(robot), aspect, sheet)
+    forward = (look_at - position) / np.linalg.norm(look_at - position)
+    right = np.cross(forward, [0, 0, 1.0])
+    right /= np.linalg.norm(right)
+    up = np.cross(right, forward)
+    points = kin.link_frames(robot, robot.q_home)[:, :3, 3] - position
+    depth = points @ forward
+    half = math.tan(camera.FOV / 2)
+    assert (depth > 0).all()
+    across = np.abs(points @ right) / depth / half / aspect
+    upward = points @ up / depth / half
+    assert across.max() < 1.0
+    assert np.abs(upward).max() < 1.0
+    assert max(across.max(), np.abs(upward).max()) > 0.25, "the arm should not be a speck"
+    if sheet:
+        assert upward.min() > 0.2, "on a phone the panel covers the lower three fifths"
+    else:
+        assert np.array_equal(look_at, body(robot).center)
+
+
+def test_joint_labels_do_not_repeat_their_number() -> None:
+    assert joints.label(Store().get("pioneer5"), 0) == "1 rotating base"
+    assert joints.label(Store().get("redundant7"), 2) == "Joint 3"
+
+
+def test_roll_pitch_yaw_round_trip_and_stay_finite_at_the_pole() -> None:
+    for q in Store().get("redundant7").random_q(np.random.default_rng(5), 50):
+        R = kin.fk(Store().get("redundant7"), q)[:3, :3]
+        assert np.allclose(rotation(*readout.roll_pitch_yaw(R)), R, atol=1e-9)
+    pole = rotation(0.3, math.pi / 2, 1.1)
+    assert np.allclose(rotation(*readout.roll_pitch_yaw(pole)), pole, atol=1e-9)
+
+
+def rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:
+    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a), math.sin(a)) for a in (roll, pitch, yaw))
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def test_the_readout_keeps_its_shape_and_shows_no_negative_zero() -> None:
+    T = np.eye(4)
+    T[:3, 3] = [-1e-9, 0.1234567, -1.5]
+    text = readout.html(T, USUAL)
+    assert ">0.0<" in text
+    assert "−0.0<" not in text
+    assert ">123.5<" in text
+    assert ">−1500.0<" in text
+    assert "rad" in readout.html(T, Units(degrees=False))
+
+
+def test_status_speaks_words_symbol_and_colour() -> None:
+    for kind, (symbol, color) in status.LOOKS.items():
+        text = status.html(status.Notice(kind, "Headline", "a <b>sentence</b>"))
+        assert symbol in text
+        assert color in text
+        assert "Headline" in text
+        assert "<b>sentence" not in text
+    assert len({look[0] for look in status.LOOKS.values()}) == len(status.LOOKS)
+
+
+@pytest.mark.parametrize(
+    ("robot_id", "shift", "title"),
+    [
+        ("pioneer5", (0.0, 0.02, 0.0), "Reached with roll error"),
+        ("redundant7-craig", (0.0, 0.05, 0.0), "Reached"),
+        ("redundant7-craig", (2.0, 0.0, 0.0), "Out of reach by"),
+    ],
+)
+def test_notices_say_what_happened(robot_id: str, shift: tuple[float, ...], title: str) -> None:
+    robot = kin.get_robot(robot_id)
+    T = kin.fk(robot, robot.q_home)
+    T[:3, 3] += shift
+    result = kin.solve_ik(robot, T)
+    shown = status.notice(result, USUAL)
+    assert shown.title.startswith(title)
+    assert shown.detail.lower() in result.reason.lower()
+    assert len(shown.detail) > 10
+    if result.distance:
+        assert f"{result.distance * 1000:.0f} mm" in shown.title
+
+
+def test_notices_and_readout_follow_the_units() -> None:
+    robot = kin.get_robot("redundant7-craig")
+    T = kin.fk(robot, robot.q_home)
+    T[0, 3] += 2.0
+    result = kin.solve_ik(robot, T)
+    for length, factor, decimals in (("cm", 100, 1), ("m", 1, 3)):
+        units = Units(length=length)
+        far = f"{factor * result.distance:.{decimals}f} {length}"
+        assert status.notice(result, units).title == f"Out of reach by {far}"
+        assert f">{factor * T[0, 3]:.{decimals + 1}f}<" in readout.html(T, units)
+        assert f">{length}<" in readout.html(T, units)
+        assert "mm" not in status.notice(result, units).detail + readout.html(T, units)

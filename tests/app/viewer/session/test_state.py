@@ -1,0 +1,405 @@
+"""The state of a page as text: there and back, and whatever else an address may hold."""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from fake_browser import FakeBrowser
+
+import kin
+from app.shared.clouds import Clouds
+from app.shared.settings import Settings
+from app.shared.store import Store
+from app.viewer.feature import Feature
+from app.viewer.panel import listen
+from app.viewer.panel.joints import UNLOCK_ALL, label, padlocks
+from app.viewer.panel.view import ViewState
+from app.viewer.server import ViewerServer
+from app.viewer.session import controller
+from app.viewer.session.state import MAX_TEXT, PageState, decode, encode, read_memory
+from app.viewer.units import USUAL, Units
+
+pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
+
+STORE = Store()
+ROBOTS = STORE.robots
+PUMA, PIONEER = STORE.get("puma560"), STORE.get("pioneer5")
+RADIANS_CM = Units(degrees=False, length="cm")
+
+
+def packed(said: object) -> str:
+    return base64.urlsafe_b64encode(json.dumps(said).encode()).rstrip(b"=").decode()
+
+
+def there(**changes: object) -> PageState:
+    """What is left of a page of the PUMA with these entries changed."""
+    said = {"v": 1, "robot": "puma560", "q": PUMA.q_home.tolist(), "task": "pose", **changes}
+    return decode(packed(said), ROBOTS)
+
+
+def test_a_state_survives_as_text_that_any_address_may_carry():
+    rng = np.random.default_rng(5)
+    q = PUMA.random_q(rng)
+    T = kin.fk(PUMA, PUMA.random_q(rng))
+    branch = kin.branch_names(PUMA)[2]
+    view = ViewState(frames=True, labels=False, dark=True)
+    told = {"w": {"n": 3, "name": "π & <b>"}}
+    camera = np.array([[1.5, -2.25, 0.75], [0.1, 0.2, 0.3], [0.0, 0.6, 0.8]])
+    state = PageState("puma560", q, T, "approach", branch, "dh", RADIANS_CM, view, told, (1, 4), camera)
+    text = encode(state)
+    assert set(text) <= set("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_")
+    back = decode(text, ROBOTS)
+    assert np.abs(back.q - q).max() < 1e-9
+    assert np.abs(back.target - T).max() < 1e-8
+    assert (back.robot, back.task, back.branch, back.lesson) == ("puma560", "approach", branch, "dh")
+    assert (back.units, back.view, back.features, back.locks) == (RADIANS_CM, view, told, (1, 4))
+    assert np.abs(back.camera - camera).max() < 1e-9
+    assert encode(back) == text
+
+
+def test_an_address_from_before_lengths_had_a_unit_is_in_millimetres():
+    assert there().units == USUAL
+    assert there(units="rad").units == Units(degrees=False)
+    assert there(length="m").units == Units(length="m")
+
+
+@pytest.mark.parametrize("length", ["inch", "MM", "", 3, None, True, ["cm"], {"cm": 1}, "cm" * 5000])
+def test_a_unit_that_there_is_not_is_left_out(length):
+    assert there(length=length, units="rad").units == Units(degrees=False)
+
+
+@pytest.mark.parametrize("robot", ROBOTS, ids=lambda r: r.id)
+def test_a_configuration_at_its_limits_comes_back_inside_them(robot):
+    for q in (robot.lower, robot.upper):
+        q = np.where(np.isfinite(q), q, 0.0)
+        back = decode(encode(PageState(robot.id, q)), ROBOTS)
+        assert np.abs(back.q - q).max() < 1e-9
+        assert robot.in_limits(back.q)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *(
+            "",
+            "%%%",
+            "é",
+            "A" * (MAX_TEXT + 4),
+            packed([1, 2]),
+            packed("x"),
+            packed({"v": 2, "robot": "ur5"}),
+            packed({}),
+        ),
+        base64.urlsafe_b64encode(b'{"v":1,"q":' + b"[" * 5000).decode(),
+        base64.urlsafe_b64encode(b"\xff\xfe\x00").decode(),
+        base64.urlsafe_b64encode(b'{"v":1,"robot":"ur5"').decode(),
+    ],
+)
+def test_what_is_no_state_is_a_fresh_page(text):
+    assert encode(decode(text, ROBOTS)) == encode(PageState())
+
+
+@pytest.mark.parametrize(
+    "q",
+    [
+        *(None, 3, "1,2,3", {}, [], [0.0] * 5, [0.0] * 7, [[0.0] * 6], ["0"] * 6, [True] * 6, [None] * 6),
+        *([math.nan] * 6, [math.inf] * 6, [1e308] * 6, [10**400] * 6, [4.0] * 6),
+    ],
+)
+def test_a_configuration_that_is_none_is_left_out_and_the_rest_stays(q):
+    state = there(q=q, units="rad")
+    assert state.q is None
+    assert (state.robot, state.units) == ("puma560", Units(degrees=False))
+
+
+@pytest.mark.parametrize(
+    "target",
+    [
+        *(7, "x", [0.0] * 6, [0.0] * 7, [0, 0, 0, 1e-200, 0, 0, 0], [0, 0, 0, 1e308, 1e308, 0, 0]),
+        *(
+            [math.nan, 0, 0, 1, 0, 0, 0],
+            [1e9, 0, 0, 1, 0, 0, 0],
+            [0, 0, 0, math.inf, 0, 0, 0],
+            [0, 0, 0, 1, 0, 0, "0"],
+        ),
+    ],
+)
+def test_a_target_that_is_no_pose_is_left_out(target):
+    assert there(target=target).target is None
+
+
+@pytest.mark.parametrize(
+    ("locks", "kept"),
+    [
+        *(([2, 0, 2], (0, 2)), ([5], (5,)), ([], ()), ([6, -1, 3], (3,)), ([10**400], ()), ([1.0, "1", None], ())),
+        *(([True, [1]], ()), ("12", ()), (3, ()), ({"1": 1}, ()), (None, ())),
+    ],
+)
+def test_only_joints_of_the_arm_come_back_locked(locks, kept):
+    assert there(locks=locks).locks == kept
+
+
+@pytest.mark.parametrize(
+    "camera",
+    [
+        *(7, "x", {}, [], [1.0] * 5, [2, 2, 2, 0, 0, 0, 1], [[2, 2, 2], [0, 0, 0]], ["2"] * 6, [None] * 6),
+        *([math.nan, 2, 2, 0, 0, 0], [2, 2, math.inf, 0, 0, 0], [True, 2, 2, 0, 0, 0], [1e308] * 3 + [-1e308] * 3),
+        *([1, 1, 1, 1, 1, 1], [0, 0, 1e-3, 0, 0, 0], [300, 0, 0, 0, 0, 0], [302, 0, 0, 300, 0, 0]),
+        *([2, 2, 2, 0, 0, 0, 0, 0, 0], [2, 2, 2, 0, 0, 0, 0, 0, 1e308], [2, 2, 2, 0, 0, 0, 0, 0, "1"]),
+    ],
+)
+def test_a_camera_that_could_not_see_the_arm_is_left_out_and_the_rest_stays(camera):
+    state = there(camera=camera)
+    assert state.camera is None
+    assert np.array_equal(state.q, PUMA.q_home)
+
+
+def test_a_camera_is_told_in_few_digits_and_its_upright_direction_not_at_all():
+    camera = np.array([[1.23456789, -2.0, 0.5], [0.0, 1e-9, 0.3], [0.0, 0.0, 1.0]])
+    plain, seen = encode(PageState("ur5")), encode(PageState("ur5", camera=camera))
+    assert np.array_equal(decode(seen, ROBOTS).camera, [[1.2346, -2.0, 0.5], [0.0, 0.0, 0.3], [0.0, 0.0, 1.0]])
+    assert len(seen) - len(plain) < 64
+
+
+def test_names_that_nobody_knows_are_left_out():
+    state = there(task="dance", branch="elbow sideways", lesson=7, view={"dark": "yes", "axes": False, "x": True})
+    assert (state.task, state.branch, state.lesson) == (None, None, None)
+    assert state.view == ViewState(axes=False)
+    assert there(task=["pose"], branch={"a": 1}, view=[1], features=[1]).features == {}
+    assert there(features={"a": {"n": 1}, "b": 3}).features == {"a": {"n": 1}}
+    assert there(branch="seed").branch == "seed"
+
+
+def test_another_services_robot_is_told_and_nothing_of_it_is_used():
+    state = decode(
+        packed({"v": 1, "robot": "somebodys", "q": [0.0] * 5, "task": "approach", "units": "rad"}), ROBOTS
+    )
+    assert (state.robot, state.missing, state.q, state.task) == (None, "somebodys", None, None)
+    assert state.units == Units(degrees=False)
+    assert decode(packed({"v": 1, "robot": {"a": [1]}}), ROBOTS).robot is None
+
+
+def test_features_that_say_too_much_are_left_out_of_the_text():
+    text = encode(PageState("ur5", features={"talker": {"words": "x" * MAX_TEXT}}))
+    assert decode(text, ROBOTS).robot == "ur5"
+    assert decode(text, ROBOTS).features == {}
+
+
+@pytest.mark.parametrize(
+    ("address", "usable"),
+    [
+        ("http://127.0.0.1:8000/", True),
+        ("https://robots.example.org/kin/board/", True),
+        ("http://[::1]:8000/", True),
+        ("javascript:alert(1)//", False),
+        ("http://x/'; rm -rf /; '", False),
+        ('http://x/"', False),
+        ("http://x/$(id)/", False),
+        ("http://" + "x" * 600 + "/", False),
+        (5, False),
+    ],
+)
+def test_a_page_may_call_its_service_by_an_address_and_by_nothing_else(address, usable):
+    memory = read_memory(json.dumps({"address": address, "state": "abc"}))
+    assert memory.address == (address if usable else "")
+    assert memory.state == "abc"
+
+
+@pytest.mark.parametrize("text", [None, "", "[]", "{", '{"state": 7}'])
+def test_a_page_that_answers_nonsense_remembers_nothing(text):
+    assert read_memory(text).state == ""
+
+
+# In a session
+
+
+class Counter(Feature):
+    key = "counter"
+    title = "Counter"
+
+    def __init__(self, stage):
+        super().__init__(stage)
+        self._slider = stage.client.gui.add_slider("Count", 0, 10, 1, 0)
+        listen(self._slider, self.post, "count")
+
+    def handle(self, key, value):
+        self._slider.value = value
+
+    def state(self):
+        return {"count": self._slider.value} if self._slider.value else {}
+
+    def restore(self, state):
+        if state["count"] == 13:
+            raise RuntimeError("unlucky")
+        self._slider.value = state["count"]
+
+
+@pytest.fixture(scope="module")
+def port() -> Iterator[int]:
+    kin.warm_up()
+    before, controller.TABS = controller.TABS, (Counter,)
+    server = ViewerServer(STORE, Settings(token="very secret"), Clouds())
+    yield server.start()
+    server.stop()
+    controller.TABS = before
+
+
+def remembering(state: str, address: str = "https://arms.example/kin/") -> str:
+    return json.dumps({"address": address, "state": state})
+
+
+def kept(tab: FakeBrowser) -> PageState:
+    """What the page is told to remember once it has come to rest."""
+    tab.wait(lambda: bool(tab.kept))
+    tab.settle(quiet=0.8)
+    return decode(tab.kept[-1], ROBOTS)
+
+
+def test_a_link_shows_the_same_view_and_a_lost_connection_brings_it_back(port):
+    q = PUMA.random_q(np.random.default_rng(8))
+    far = kin.fk(PUMA, q)
+    far[:3, 3] *= 3.0
+    view = ViewState(frames=True, dark=True)
+    state = PageState("puma560", q, far, "position", "seed", None, RADIANS_CM, view, {"counter": {"count": 4}})
+    with FakeBrowser(port, memory=remembering(encode(state))) as tab:
+        tab.settle()
+        assert (tab.value("Robot"), tab.value("Match"), tab.value("Branch")) == (
+            PUMA.name,
+            "Point only",
+            "Stay on this one",
+        )
+        assert (tab.value("Radians"), tab.value("Link frames"), tab.value("Dark page"), tab.value("Count")) == (
+            True,
+            True,
+            True,
+            4,
+        )
+        assert np.abs(tab.gizmo_pose() - far).max() < 1e-8
+        assert 'data-status="unreachable"' in tab.html
+        assert tab.kept == [], "nothing has changed yet"
+        tab.set("Count", 5)
+        again = kept(tab)
+        assert again.features == {"counter": {"count": 5}}
+        assert np.abs(again.target - far).max() < 1e-8
+        assert (again.view, again.branch, again.units) == (view, "seed", RADIANS_CM)
+        q_end, text = again.q, tab.kept[-1]
+    with FakeBrowser(port, memory=remembering(text)) as tab:
+        tab.settle()
+        assert tab.value("Count") == 5
+        assert np.abs(np.array([tab.value(label(PUMA, i)) for i in range(PUMA.n)]) - q_end).max() < 6e-4
+        assert f"https://arms.example/kin/viewer/#s={text}" in tab.html
+        assert "curl -s https://arms.example/kin/api/v1/robots/puma560/fk" in tab.html
+        assert "Bearer $KINBOARD_TOKEN" in tab.html
+        assert "very secret" not in tab.html
+
+
+def test_the_arm_is_where_the_link_says_from_its_first_picture_on(port):
+    q = PIONEER.random_q(np.random.default_rng(3))
+    with FakeBrowser(port, memory=remembering(encode(PageState("pioneer5", q)))) as tab:
+        tab.settle()
+        assert np.abs(tab.tool_pose() - kin.fk(PIONEER, q)).max() < 1e-8
+        assert np.abs(tab.gizmo_pose() - kin.fk(PIONEER, q)).max() < 1e-8
+        assert not [m for m in tab.log if m["type"] == "SetOrientationMessage" and "ease" in m]
+
+
+def test_nothing_is_kept_while_the_hand_moves_and_the_last_is_kept_after(port):
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        T = kin.fk(PIONEER, PIONEER.q_home)
+        tab.grab()
+        for _ in range(30):
+            T[2, 3] += 0.0005
+            tab.drag(T)
+            tab.settle(quiet=0.05)
+        tab.settle(quiet=0.8)
+        assert tab.kept == []
+        tab.release()
+        state = kept(tab)
+        assert len(tab.kept) == 1
+        assert np.abs(kin.fk(PIONEER, state.q)[:3, 3] - T[:3, 3]).max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    "memory",
+    [
+        *(
+            "",
+            "null",
+            "{}",
+            '{"state": "AAAA"}',
+            remembering("x" * 20000),
+            remembering(packed({"v": 1, "q": [1e308] * 5})),
+        ),
+        remembering(packed({"v": 1, "lesson": "none such", "features": {"nobody": {"a": 1}}})),
+    ],
+)
+def test_a_hostile_memory_gives_a_fresh_page(port, memory):
+    with FakeBrowser(port, memory=memory) as tab:
+        tab.settle()
+        assert tab.value("Robot") == PIONEER.name
+        assert np.abs(tab.tool_pose() - kin.fk(PIONEER, PIONEER.q_home)).max() < 1e-9
+        assert "Ready" in tab.html
+
+
+def test_a_feature_that_cannot_restore_takes_nothing_else_along(port, caplog):
+    text = encode(PageState("ur5", features={"counter": {"count": 13}}))
+    with FakeBrowser(port, memory=remembering(text)) as tab:
+        tab.wait(lambda: "Something went wrong" in tab.html)
+        tab.settle()
+        assert tab.value("Robot") == "UR5"
+    assert "unlucky" in caplog.text
+
+
+def test_a_robot_that_is_not_here_is_named(port):
+    with FakeBrowser(port, memory=remembering(packed({"v": 1, "robot": "<b>mine</b>"}))) as tab:
+        tab.settle()
+        assert "There is no robot “&lt;b&gt;mine&lt;/b&gt;” here." in tab.html
+
+
+def options(tab: FakeBrowser) -> tuple[str, ...]:
+    return tuple(tab.gui[tab.element("Locked")]["props"]["options"])
+
+
+def test_locked_joints_come_back_locked_where_they_were(port):
+    q = PUMA.random_q(np.random.default_rng(4))
+    state = PageState("puma560", q, locks=(1,), features={"counter": {"count": 2}})
+    with FakeBrowser(port, memory=remembering(encode(state))) as tab:
+        tab.settle()
+        assert options(tab) == padlocks([False, True, False, False, False, False])
+        assert "Ready" in tab.html
+        T = kin.fk(PUMA, q)
+        T[:3, 3] *= 0.97
+        tab.grab()
+        tab.drag(T)
+        tab.release()
+        moved = kept(tab)
+        assert moved.locks == (1,)
+        assert moved.q[1] == pytest.approx(q[1], abs=1e-9)
+        assert np.abs(moved.q - q).max() > 1e-3
+        tab.set("Locked", UNLOCK_ALL)
+        tab.wait(lambda: len(tab.kept) > 1)
+        assert decode(tab.kept[-1], ROBOTS).locks == ()
+
+
+def test_a_task_that_comes_back_has_its_rings(port):
+    cobra = STORE.get("scara")
+    with FakeBrowser(port, memory=remembering(encode(PageState("scara", cobra.q_home, task="position")))) as tab:
+        tab.settle()
+        assert tab.value("Match") == "Point only"
+        assert not [n for n in tab.nodes if n.startswith(f"{tab.gizmo}/ring")]
+        assert tab.nodes[tab.gizmo]["props"]["disable_rotations"]
+
+
+def test_another_language(port):
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.set("Copy as", "MATLAB")
+        tab.wait(lambda: "rigidBodyTree" in tab.html)
+        tab.set("Copy as", "COBOL")
+        tab.wait(lambda: "Not understood" in tab.html)
+        assert tab.value("Copy as") == "MATLAB"

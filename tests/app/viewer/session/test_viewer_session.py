@@ -1,0 +1,318 @@
+"""Visitors of the viewer, each played by a fake browser that speaks viser's protocol."""
+
+from __future__ import annotations
+
+import logging
+import math
+import threading
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from fake_browser import FakeBrowser
+
+import kin
+from app.shared.clouds import Clouds
+from app.shared.settings import Settings
+from app.shared.store import Store
+from app.viewer.panel.joints import label
+from app.viewer.server import ViewerServer
+
+# A visitor may leave between two pictures of a motion; viser then warns about the picture nobody will see.
+pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
+
+STORE = Store()
+PIONEER = STORE.get("pioneer5")
+SRS = STORE.get("redundant7-craig")
+
+
+@pytest.fixture(scope="module")
+def viewer() -> Iterator[tuple[ViewerServer, int]]:
+    kin.warm_up()
+    server = ViewerServer(STORE, Settings(), Clouds())
+    port = server.start()
+    yield server, port
+    server.stop()
+
+
+@pytest.fixture
+def port(viewer: tuple[ViewerServer, int]) -> int:
+    return viewer[1]
+
+
+def arrives(tab: FakeBrowser, T: np.ndarray, atol: float = 1e-9) -> None:
+    """Wait until the arm shows this tool pose, then until nothing moves any more; it must still be there."""
+    tab.wait(lambda: np.allclose(tab.tool_pose(), T, atol=atol))
+    tab.settle()
+    assert np.allclose(tab.tool_pose(), T, atol=atol)
+
+
+def q_of(tab: FakeBrowser, robot: kin.Robot) -> np.ndarray:
+    return np.radians([tab.value(label(robot, i)) for i in range(robot.n)])
+
+
+def test_a_visitor_sees_the_first_robot_at_home(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        assert tab.value("Robot") == PIONEER.name
+        arrives(tab, kin.fk(PIONEER, PIONEER.q_home), 1e-9)
+        assert np.allclose(tab.gizmo_pose(), kin.fk(PIONEER, PIONEER.q_home), atol=1e-9)
+        assert tab.sliders_in("Joints") == [f"{i + 1} {j.name}" for i, j in enumerate(PIONEER.joints)]
+
+
+def test_a_slider_moves_arm_and_gizmo_and_nothing_echoes(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.log.clear()
+        tab.set("1 rotating base", 37.25)
+        tab.settle()
+        q = PIONEER.q_home.copy()
+        q[0] = math.radians(37.25)
+        arrives(tab, kin.fk(PIONEER, q), 1e-9)
+        assert np.allclose(tab.gizmo_pose(), kin.fk(PIONEER, q), atol=1e-9)
+        held = tab.element("1 rotating base")
+        assert not [m for m in tab.log if m["type"] == "GuiUpdateMessage" and m["uuid"] == held]
+        assert 'data-status="hand"' in tab.html
+
+
+def test_a_slider_is_eased_and_ends_exactly(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.log.clear()
+        tab.set("1 rotating base", 180)
+        q = PIONEER.q_home.copy()
+        q[0] = math.pi
+        arrives(tab, kin.fk(PIONEER, q))
+        turns = [m["wxyz"] for m in tab.log if m["type"] == "SetOrientationMessage" and m["name"].endswith("/1")]
+        assert len(turns) > 4, "a quarter turn must be shown as a motion"
+        assert turns[-1] == pytest.approx([math.cos(math.pi / 2), 0, 0, 1], abs=1e-12)
+
+
+def test_two_visitors_do_not_disturb_each_other(port: int) -> None:
+    with FakeBrowser(port) as one, FakeBrowser(port) as two:
+        one.settle()
+        two.settle()
+        two.log.clear()
+        one.choose(SRS.name)
+        one.set("Joint 2", -40)
+        one.settle()
+        two.settle()
+        assert two.log == []
+        assert two.value("Robot") == PIONEER.name
+        arrives(two, kin.fk(PIONEER, PIONEER.q_home), 1e-9)
+        q = SRS.q_home.copy()
+        q[1] = math.radians(-40)
+        arrives(one, kin.fk(SRS, q), 1e-9)
+
+
+def test_sixty_fast_drags_end_at_the_last_target(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.choose(SRS.name)
+        home = kin.fk(SRS, SRS.q_home)
+        tab.grab()
+        for k in range(60):
+            T = home.copy()
+            T[:3, 3] += [-0.003 * k, 0.15 * math.sin(k / 9), 0.001 * k]
+            tab.drag(T)
+        tab.release()
+        tab.settle()
+        arrives(tab, T, 1e-6)
+        assert np.allclose(tab.gizmo_pose(), T, atol=1e-6)
+        assert np.allclose(kin.fk(SRS, q_of(tab, SRS)), T, atol=5e-4), "the sliders follow the drag"
+        assert 'data-status="reached"' in tab.html
+
+
+def test_the_gizmo_is_never_moved_while_held_nor_away_from_an_unreachable_target(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.choose(SRS.name)
+        T = kin.fk(SRS, SRS.q_home)
+        T[:3, 3] = [1.6, 0.0, 0.3]
+        tab.log.clear()
+        tab.grab()
+        tab.drag(T)
+        tab.wait(lambda: "Out of reach by" in tab.html)
+        tab.settle()
+        tab.release()
+        tab.settle()
+        assert not [m for m in tab.log if m.get("name") == tab.gizmo and m["type"].startswith("Set")]
+        best = kin.solve_ik(SRS, T, q_seed=SRS.q_home).best
+        assert best is not None
+        arrives(tab, kin.fk(SRS, best.q), 1e-6)
+        assert f"{1000 * kin.solve_ik(SRS, T).distance:.0f} mm" in tab.html
+        gap = next(n for n in tab.nodes if n.endswith("-gap"))
+        assert tab.visible[gap] is True
+        tab.set("Joint 1", 10)
+        tab.settle()
+        assert tab.visible[gap] is False
+        assert np.allclose(tab.gizmo_pose(), tab.tool_pose(), atol=1e-9)
+
+
+def test_the_five_joint_arm_names_the_roll_it_gives_up_and_the_task_can_be_relaxed(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        T = kin.fk(PIONEER, PIONEER.q_home)
+        T[1, 3] += 0.02
+        tab.grab()
+        tab.drag(T)
+        tab.release()
+        tab.wait(lambda: "Reached with roll error" in tab.html)
+        assert 'data-status="compromise"' in tab.html
+        tab.set("Match", "Point + approach")
+        tab.wait(lambda: 'data-status="reached"' in tab.html)
+        tab.settle()
+        assert np.allclose(tab.tool_pose()[:3, 2:], T[:3, 2:], atol=1e-6)
+        assert np.allclose(tab.gizmo_pose(), tab.tool_pose(), atol=1e-9), "a reached target is where the tool is"
+
+
+def test_a_limit_is_named_by_joint_number(port: int) -> None:
+    q = PIONEER.q_home.copy()
+    q[3] = math.radians(-20)  # past the stop of joint 4
+    T = kin.fk(PIONEER, q)
+    expected = kin.solve_ik(PIONEER, T, task="approach", q_seed=PIONEER.q_home)
+    assert expected.status == kin.Status.LIMITS
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.set("Match", "Point + approach")
+        tab.grab()
+        tab.drag(T)
+        tab.release()
+        tab.wait(lambda: 'data-status="limits"' in tab.html)
+        assert f"Out of limits: joint {expected.violations[0].joint + 1}" in tab.html
+
+
+def test_home_random_and_units(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        home = q_of(tab, PIONEER)
+        tab.set("Go to", "Random")
+        tab.wait(lambda: 'data-status="hand"' in tab.html and not np.array_equal(q_of(tab, PIONEER), home))
+        q = q_of(tab, PIONEER)
+        arrives(tab, kin.fk(PIONEER, q), 1e-3)
+        tab.set("Radians", True)
+        tab.wait(lambda: "rad<" in tab.html)
+        tab.settle()
+        shown = [tab.value(name) for name in tab.sliders_in("Joints")]
+        assert np.allclose(shown, q, atol=2e-4)
+        tab.set("1 rotating base", 1.0)
+        tab.settle()
+        q[0] = 1.0
+        arrives(tab, kin.fk(PIONEER, q), 1e-3)
+        tab.set("Go to", "Home")
+        tab.settle()
+        arrives(tab, kin.fk(PIONEER, PIONEER.q_home), 1e-9)
+
+
+def test_every_robot_can_be_chosen_and_left_again(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        for robot in [*STORE.robots[1:], *STORE.robots]:
+            tab.choose(robot.name)
+            arrives(tab, kin.fk(robot, robot.q_home), 1e-9)
+            assert tab.sliders_in("Joints") == [label(robot, i) for i in range(robot.n)]
+            gizmos = [name for name, m in tab.nodes.items() if m["type"] == "TransformControlsMessage"]
+            assert sum("/ring-" not in name for name in gizmos) == 1
+
+
+def test_frames_and_labels_can_be_shown(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        frames = [n for n in tab.nodes if "/frame-" in n and not n.endswith("label")]
+        assert len(frames) == len(PIONEER.rows)
+        assert not any(tab.visible[n] for n in frames)
+        tab.set("Link frames", True)
+        tab.wait(lambda: all(tab.visible[n] for n in frames))
+        tab.set("Frame labels", False)
+        tab.wait(lambda: not any(v for n, v in tab.visible.items() if n.endswith("/label")))
+
+
+HOSTILE = [
+    ("slider NaN", lambda t: t.set("1 rotating base", math.nan)),
+    ("slider infinity", lambda t: t.set("1 rotating base", math.inf)),
+    ("unknown robot", lambda t: t.set("Robot", "<script>alert(1)</script>")),
+    ("unknown task", lambda t: t.set("Match", "everything")),
+    ("gizmo NaN", lambda t: t.drag(position=(math.nan, 0, 0), wxyz=(1, 0, 0, 0))),
+    ("gizmo without direction", lambda t: t.drag(position=(0.1, 0, 0), wxyz=(0, 0, 0, 0))),
+]
+
+
+@pytest.mark.parametrize(("name", "act"), HOSTILE, ids=[name for name, _ in HOSTILE])
+def test_hostile_values_are_shown_as_errors_and_the_session_lives(
+    port: int, name: str, act: object, caplog: pytest.LogCaptureFixture
+) -> None:
+    with FakeBrowser(port) as tab, caplog.at_level(logging.ERROR, "app.viewer"):
+        tab.settle()
+        act(tab)  # type: ignore[operator]
+        tab.wait(lambda: 'data-status="error"' in tab.html)
+        assert "<script>" not in tab.html
+        assert caplog.records, "an error is logged too"
+        tab.set("1 rotating base", 45)
+        tab.settle()
+        q = PIONEER.q_home.copy()
+        q[0] = math.pi / 4
+        arrives(tab, kin.fk(PIONEER, q), 1e-9)
+        assert tab.value("Robot") == PIONEER.name
+
+
+def test_values_beyond_a_stop_end_at_the_stop(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.set("2 rotating elbow", 1e300)
+        tab.settle()
+        q = PIONEER.q_home.copy()
+        q[1] = PIONEER.upper[1]
+        arrives(tab, kin.fk(PIONEER, q), 1e-9)
+        assert tab.value("2 rotating elbow") == 150
+
+
+def test_a_target_at_the_end_of_the_world_is_only_out_of_reach(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.drag(position=(1e5, -1e5, 1e5), wxyz=(1, 0, 0, 0))
+        tab.wait(lambda: "Out of reach by" in tab.html)
+
+
+def test_an_idle_visitor_costs_no_processor_time(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        before = time.process_time()
+        time.sleep(1.0)
+        assert time.process_time() - before < 0.1
+
+
+def test_fifty_visits_leave_no_thread(viewer: tuple[ViewerServer, int]) -> None:
+    server, port = viewer
+    with FakeBrowser(port) as tab:  # whatever starts with the first visit has started
+        tab.settle(0.1)
+    wait_for(lambda: server.visitors == 0)
+    before = threading.active_count()
+    for k in range(50):
+        tab = FakeBrowser(port)
+        if k % 2:
+            tab.wait(lambda tab=tab: bool(tab.sliders))  # type: ignore[misc]
+            tab.set("Go to", "Random")  # some leave in mid-motion, some before the page is built
+        tab.close()
+    wait_for(lambda: server.visitors == 0 and threading.active_count() <= before and not workers())
+
+
+def test_stopping_ends_sessions_and_the_port() -> None:
+    before = set(threading.enumerate())
+    server = ViewerServer(STORE, Settings(), Clouds())
+    tabs = [FakeBrowser(server.start())]
+    tabs[0].wait(lambda: bool(tabs[0].sliders))
+    server.stop()
+    wait_for(lambda: not [t for t in set(threading.enumerate()) - before if not t.name.startswith("Thread-")])
+    assert server.visitors == 0
+    server.stop()  # a second time is harmless
+    tabs[0].close()
+
+
+def workers() -> list[str]:
+    return [t.name for t in threading.enumerate() if t.name.startswith("visitor-")]
+
+
+def wait_for(condition: object, timeout: float = 10.0) -> None:
+    end = time.monotonic() + timeout
+    while not condition():  # type: ignore[operator]
+        assert time.monotonic() < end, [t.name for t in threading.enumerate()]
+        time.sleep(0.02)

@@ -1,0 +1,402 @@
+"""The capability folder: voxels seen while they are computed, thresholds, cuts and clicks."""
+
+from __future__ import annotations
+
+import html
+import re
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fake_browser import FakeBrowser
+
+import kin
+from app.shared import mapreduce
+from app.shared.clouds import Clouds
+from app.shared.maps import Maps
+from app.shared.settings import Settings
+from app.shared.store import Store
+from app.viewer.server import ViewerServer
+from app.viewer.tabs.workspace import colours, cut
+from app.viewer.tabs.workspace.capability import told, voxels
+from app.viewer.tabs.workspace.capability.wishes import MapWishes
+from app.viewer.units import USUAL, Units
+
+pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
+
+STORE = Store()
+PIONEER, PUMA = STORE.get("pioneer5"), STORE.get("puma560")
+LENGTH = 15
+
+
+def the_map(robot: kin.Robot = PIONEER, directions: int = 12) -> kin.CapabilityMap:
+    return kin.capability_map(robot, resolution=LENGTH, directions=directions)
+
+
+# Levels, wishes, words
+
+
+def test_levels_are_equal_steps_and_hold_what_is_on_their_edge():
+    values = np.array([0.0, 1.0, 2.0, 3.0, 5.0], dtype=np.float32) / np.float32(48.0)
+    assert voxels.levels(values).tolist() == [0, 5, 10, 15, voxels.LEVELS - 1]
+    assert voxels.levels(np.zeros(3, np.float32)).tolist() == [0, 0, 0]
+    assert voxels.levels(np.zeros(0, np.float32)).tolist() == []
+    for k in range(voxels.LEVELS):
+        assert voxels.first_level(k / voxels.LEVELS) == k
+    assert voxels.first_level(1.0) == voxels.LEVELS - 1, "the best are always seen"
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        *(("resolution", v) for v in (14, "15", None, True, [15], 25.5)),
+        *(("directions", v) for v in (13, "12", {})),
+        *(("by", v) for v in ("taste", None, 1)),
+        *(("least", v) for v in ("x", None, float("nan"), True)),
+    ],
+)
+def test_a_wrong_wish_is_named_and_in_an_address_ignored(name, value):
+    with pytest.raises(kin.InputError, match=name):
+        MapWishes().having(name, value)
+    other = "least" if name != "least" else "directions"
+    assert MapWishes().restored({name: value, other: 0.5 if other == "least" else 96}) == replace(
+        MapWishes(), **{other: 0.5 if other == "least" else 96}
+    )
+
+
+@pytest.mark.parametrize("state", [None, 3, "x", [1]])
+def test_what_is_no_state_restores_nothing(state):
+    assert MapWishes().restored(state) == MapWishes()
+
+
+def test_words_tell_what_the_map_holds():
+    found = the_map()
+    row = int(found.share.argmax())
+    text = html.unescape(told.picked(found, row, USUAL))
+    assert f"{found.approachable[row].sum()} of 12 directions" in text
+    none = int(np.flatnonzero(found.share == 0.0)[0])
+    assert "none of the set" in told.picked(found, none, USUAL)
+    assert told.WORTH["closed form"] in told.facts(found, None, whole=True, units=USUAL)
+    assert f"{found.volume:.4g}" in told.facts(found, None, whole=True, units=USUAL)
+    assert "so far" in told.facts(found, None, whole=False, units=USUAL)
+    assert "With joints 1, 3 locked. " in told.facts(found, (0.0, None, 0.5), whole=True, units=USUAL)
+    empty = kin.capability_join(found.grid, [])
+    assert "0" in told.facts(empty, None, whole=False, units=USUAL)
+    assert 'data-shown="0"' in told.legend(empty, "share", "viridis", 0.0)
+    assert all(set(told.WORTH) >= {kin.capability_grid(r, resolution=2).method} for r in (PIONEER, PUMA))
+
+
+@pytest.mark.parametrize(("length", "scale", "decimals"), [("mm", 1000, 0), ("cm", 100, 1), ("m", 1, 3)])
+def test_lengths_follow_the_units(length, scale, decimals):
+    found, units = the_map(), Units(length=length)
+    row = int(found.share.argmax())
+    assert f">{scale * found.grid.voxel:.{decimals + 1}f}<" in told.facts(found, None, True, units)
+    x = f"{scale * found.centres[row, 0]:.{decimals}f}".replace("-", "−")
+    assert f">{x} " in told.picked(found, row, units)
+    for text in (told.facts(found, None, True, units), told.picked(found, row, units)):
+        assert f">{length}<" in text
+
+
+def test_a_cage_has_twelve_edges():
+    edges = voxels.edges(2.0)
+    assert edges.shape == (12, 2, 3)
+    assert np.allclose(np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1), 2.0)
+    assert len({tuple(sorted(map(tuple, e.tolist()))) for e in edges}) == 12
+
+
+# In the viewer
+
+
+class Visitor(FakeBrowser):
+    """A visitor of the capability folder."""
+
+    def push(self, button: str) -> None:
+        self.send("GuiUpdateMessage", uuid=self.element("Map"), updates={"value": button})
+
+    @property
+    def state(self) -> str:
+        return re.search(r'data-map="(\w+)"', self.html)[1]
+
+    @property
+    def boxes(self) -> dict[str, dict]:
+        return {n: m for n, m in self.nodes.items() if m["type"] == "BatchedMeshesMessage"}
+
+    def count(self, only_visible: bool = False) -> int:
+        return len(self.centres(only_visible))
+
+    def is_visible(self, name: str) -> bool:
+        # Those made hidden say so by a message of their own.
+        return self.visible.get(name, True)
+
+    def centres(self, only_visible: bool = False) -> np.ndarray:
+        found = [
+            m["props"]["batched_positions"].reshape(-1, 3)
+            for name, m in self.boxes.items()
+            if not only_visible or self.is_visible(name)
+        ]
+        return np.concatenate([np.empty((0, 3)), *found])
+
+    def compute(self) -> None:
+        self.set("Grid", f"{LENGTH} voxels long")
+        self.set("Directions", "12")
+        self.push("Compute")
+
+    def done(self, count: int) -> None:
+        self.wait(lambda: self.state == "done" and self.count() == count, 60.0)
+        self.settle()
+
+    def sent(self, kind: str) -> int:
+        return len([m for m in self.log if m["type"] == kind])
+
+    def hit(self, name: str, instance: int) -> None:
+        self.send(
+            "SceneNodeClickMessage",
+            name=name,
+            instance_index=instance,
+            ray_origin=(0, 0, 0),
+            ray_direction=(0, 0, 1),
+            screen_pos=(0.5, 0.5),
+            modifier=None,
+            owner=self.nodes[name]["owner"],
+        )
+
+
+@pytest.fixture(scope="module")
+def service() -> Iterator[tuple[int, Maps, ViewerServer]]:
+    kin.warm_up()
+    clouds, maps = Clouds(), Maps(threads=2)
+    server = ViewerServer(STORE, Settings(), clouds, maps)
+    yield server.start(), maps, server
+    server.stop()
+    clouds.close()
+    maps.close()
+
+
+@pytest.fixture
+def tab(service) -> Iterator[Visitor]:
+    with Visitor(service[0]) as opened:
+        opened.settle(0.2)
+        yield opened
+
+
+@pytest.fixture
+def held(service, monkeypatch):
+    """A cold cache, and blocks that are computed only as far as they are let: `held.free += 1`."""
+    service[1]._works.clear()
+
+    class Held:
+        free = 0
+        begun = 0
+
+    compute = mapreduce.capability_block
+
+    def block(grid, number):
+        Held.begun += 1
+        end = time.monotonic() + 20.0
+        while Held.free <= 0 and time.monotonic() < end:
+            time.sleep(0.005)
+        Held.free -= 1
+        return compute(grid, number)
+
+    monkeypatch.setattr(mapreduce, "capability_block", block)
+    yield Held
+    Held.free = 10**6
+
+
+def same_places(a: np.ndarray, b: np.ndarray) -> bool:
+    key = [np.sort(np.round(1e4 * x).astype(int).view([("", int)] * 3).ravel()) for x in (a, b)]
+    return bool(np.array_equal(*key))
+
+
+def test_a_map_is_drawn_whole_in_its_colours_and_then_rests(tab):
+    assert tab.state == "ready"
+    tab.compute()
+    found = the_map()
+    tab.done(len(found.index))
+    assert same_places(tab.centres(), found.centres)
+    expected = colours.paint(
+        found.share.astype(float), colours.Scale("one", 0.0, float(found.share.max())), "cividis"
+    )
+    expected = np.rint(voxels.LIT * expected).astype(np.uint8)
+    at = {tuple(np.round(1e4 * c).astype(int)): tuple(rgb) for c, rgb in zip(found.centres, expected, strict=True)}
+    for m in tab.boxes.values():
+        places = m["props"]["batched_positions"].reshape(-1, 3)
+        painted = m["props"]["batched_colors"].reshape(-1, 3)
+        for place, rgb in zip(places, painted, strict=True):
+            assert at[tuple(np.round(1e4 * place.astype(float)).astype(int))] == tuple(rgb)
+        corners = m["props"]["vertices"].reshape(-1, 3)
+        assert np.ptp(corners, axis=0) == pytest.approx(voxels.FILL * found.grid.voxel)
+    assert told.WORTH["closed form"] in html.unescape(tab.html)
+    sent = tab.sent("BatchedMeshesMessage")
+    tab.settle()
+    assert tab.sent("BatchedMeshesMessage") == sent
+
+
+def test_locked_joints_are_locked_in_the_map_too(tab):
+    tab.set("Locked", "1")
+    tab.wait(lambda: "Joint 1 locked" in tab.html)
+    tab.compute()
+    locked = (float(PIONEER.q_home[0]), None, None, None, None)
+    found = kin.capability_map(PIONEER, resolution=15, directions=12, locked=locked)
+    tab.done(len(found.index))
+    assert same_places(tab.centres(), found.centres)
+    assert "With joint 1 locked." in tab.html
+
+
+def test_voxels_are_seen_while_the_map_grows_and_stop_keeps_them(tab, held, monkeypatch):
+    monkeypatch.setattr("app.shared.maps.PUBLISHED", 0.0)
+    tab.compute()
+    held.free = 1
+    tab.wait(lambda: tab.state == "computing" and tab.count() > 0)
+    part = tab.count()
+    assert part < len(the_map().index)
+    assert "so far" in tab.html
+    tab.push("Stop")
+    tab.wait(lambda: tab.state == "stopped")
+    held.free = 10**6
+    tab.settle()
+    assert tab.count() == part
+    tab.push("Clear")
+    tab.wait(lambda: tab.count() == 0 and tab.state == "ready")
+    assert "so far" not in tab.html
+    assert "data-shown" not in tab.html
+
+
+def test_the_threshold_hides_levels_and_sends_no_voxel(tab):
+    found = the_map()
+    tab.compute()
+    tab.done(len(found.index))
+    sent = tab.sent("BatchedMeshesMessage")
+    for percent in (4, 48, 96, 0):
+        tab.set("Least (% best)", percent)
+        first = percent / 100 * voxels.LEVELS
+        expected = int((voxels.levels(found.share) >= round(first)).sum())
+        tab.wait(lambda expected=expected: f'data-shown="{expected}"' in tab.html)
+        tab.settle(0.2)
+        assert tab.count(only_visible=True) == expected
+    assert tab.sent("BatchedMeshesMessage") == sent
+    tab.set("Least (% best)", 48)
+    tab.set("Voxels show", "Manipulability")
+    low = voxels.levels(found.manipulability) >= 12
+    tab.wait(lambda: f'data-shown="{low.sum()}"' in tab.html and tab.count() == len(found.index))
+    tab.wait(lambda: tab.count(only_visible=True) == low.sum())
+    assert same_places(tab.centres(only_visible=True), found.centres[low])
+    assert 'data-legend="map-manipulability"' in tab.html
+
+
+def test_the_cut_of_the_tab_cuts_the_voxels_too(tab):
+    found = the_map()
+    tab.compute()
+    tab.done(len(found.index))
+    tab.set("Cut", "across z (level)")
+    made = cut.cut_of([PIONEER], "z", PIONEER.q_home)
+    below = found.centres[:, 2] < made.middle
+    tab.wait(lambda: tab.count() == below.sum())
+    assert same_places(tab.centres(), found.centres[below])
+    tab.set("Keep", "other side")
+    tab.wait(lambda: tab.count() == (~below).sum())
+    tab.set("Cut", "none")
+    tab.wait(lambda: tab.count() == len(found.index))
+
+
+def test_a_click_tells_of_the_voxel_and_draws_its_directions(tab):
+    found = the_map()
+    tab.compute()
+    tab.done(len(found.index))
+    row = int(found.share.argmax())
+    name, instance = next(
+        (name, int(hits[0]))
+        for name, m in tab.boxes.items()
+        if len(
+            hits := np.flatnonzero(
+                np.abs(m["props"]["batched_positions"].reshape(-1, 3) - found.centres[row]).max(axis=1) < 1e-5
+            )
+        )
+    )
+    tab.hit(name, instance)
+    tab.wait(lambda: "picked voxel" in tab.html)
+    fits = found.approachable[row]
+    assert f"{fits.sum()} of 12 directions" in tab.html
+    (arrows,) = [m for m in tab.nodes.values() if m["type"] == "ArrowMessage"]
+    ends = arrows["props"]["points"].reshape(-1, 2, 3).astype(float)
+    along = ends[:, 1] - ends[:, 0]
+    assert np.allclose(along / np.linalg.norm(along, axis=1)[:, None], found.grid.directions[fits], atol=1e-5)
+    top = arrows["name"].rsplit("/", 1)[0]
+    assert np.allclose(tab.poses[top]["position"], found.centres[row])
+    tab.hit(name, 10**6)  # no such instance
+    tab.settle()
+    assert "picked voxel" in tab.html
+    tab.push("Clear")
+    tab.wait(lambda: "picked voxel" not in tab.html and top not in tab.nodes)
+
+
+def test_another_robot_clears_the_map(tab):
+    tab.compute()
+    tab.wait(lambda: tab.state == "done" and tab.count() > 0, 60.0)
+    tab.set("Robot", PUMA.name)
+    tab.wait(lambda: tab.state == "ready" and tab.count() == 0, 60.0)
+    tab.settle()
+    tab.compute()
+    tab.done(len(the_map(PUMA).index))
+
+
+def test_two_visitors_share_one_map_and_the_last_who_leaves_stops_it(service, held):
+    port, maps, _ = service
+    with Visitor(port) as one, Visitor(port) as two:
+        for visitor in (one, two):
+            visitor.settle(0.2)
+            visitor.compute()
+            visitor.wait(lambda visitor=visitor: visitor.state == "computing")
+        (work,) = maps._works.values()
+        assert work.readers == 2
+        one.push("Clear")
+        one.wait(lambda: one.state == "ready")
+        assert work.readers == 1
+        assert not work.stopped
+    end = time.monotonic() + 10.0
+    while not work.stopped:
+        assert time.monotonic() < end, "a visitor who closes the page wants nothing any more"
+        time.sleep(0.02)
+    held.free = 10**6
+    while any(t.name.startswith("capability") for t in threading.enumerate()):
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def test_a_failure_is_told_and_the_next_try_succeeds(tab, service, monkeypatch, caplog):
+    service[1]._works.clear()
+    with monkeypatch.context() as broken:
+        broken.setattr(mapreduce, "capability_block", lambda grid, block: 1 / 0)
+        tab.compute()
+        tab.wait(lambda: tab.state == "failed" and "Something went wrong" in tab.html)
+    assert "ZeroDivisionError" in caplog.text
+    tab.push("Compute")
+    tab.done(len(the_map().index))
+
+
+def test_wrong_values_are_told_and_leave_the_page_alive(tab):
+    for label, value in (("Grid", "huge"), ("Directions", 12), ("Voxels show", None)):
+        tab.set(label, value)
+        tab.wait(lambda: "Not understood" in tab.html)
+    tab.compute()
+    tab.done(len(the_map().index))
+
+
+def test_an_address_restores_the_map(service):
+    port, _, server = service
+    with Visitor(port) as tab:
+        tab.settle(0.2)
+        feature = server._sessions[max(server._sessions)]._tabs[0]
+        state = {"resolution": LENGTH, "directions": 12, "by": "manipulability", "least": 0.4, "drawn": True}
+        with feature.stage.client.atomic():
+            feature.restore({"capability": state, "map": "viridis"})
+        feature.post("more")
+        found = the_map()
+        tab.done(len(found.index))
+        assert tab.value("Voxels show") == "Manipulability"
+        assert tab.value("Least (% best)") == 40
+        assert tab.count(only_visible=True) == (voxels.levels(found.manipulability) >= 10).sum()
+        assert feature.state()["capability"] == state

@@ -1,0 +1,176 @@
+"""Lessons and tabs in a visitor's page: when they are called, and that none can hurt the page."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from fake_browser import FakeBrowser
+
+import kin
+from app.shared.clouds import Clouds
+from app.shared.settings import Settings
+from app.shared.store import Store
+from app.viewer import lessons
+from app.viewer.feature import Feature
+from app.viewer.panel import lessons as choice
+from app.viewer.panel import listen
+from app.viewer.server import ViewerServer
+from app.viewer.session import controller as session
+from app.viewer.units import Units
+
+pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
+
+STORE = Store()
+PIONEER, OTHER = STORE.get("pioneer5"), STORE.get("puma560")
+
+
+class Witness(Feature):
+    """Writes down what it is told."""
+
+    key = "witness"
+    title = "Witness"
+    calls: ClassVar[list[tuple[object, ...]]] = []
+    threads: ClassVar[set[str]] = set()
+
+    def __init__(self, stage):
+        super().__init__(stage)
+        self.note("made", stage.robot.id)
+        listen(stage.client.gui.add_slider(self.title, 0, 10, 1, 0), self.post, "slider")
+
+    def note(self, *call):
+        self.calls.append(call)
+        self.threads.add(threading.current_thread().name)
+
+    def handle(self, key, value):
+        self.note("handle", key, value)
+        if value == 9:
+            raise RuntimeError("broken on purpose")
+        if value == 8:
+            self.due = 0.01
+        if value == 7:
+            self.stage.go(self.stage.robot.lower)
+
+    def on_robot(self):
+        self.note("robot", self.stage.robot.id)
+
+    def on_picture(self, T_base_tool):
+        assert np.allclose(T_base_tool, kin.fk(self.stage.robot, self.stage.q))
+        self.note("picture")
+
+    def on_answer(self, result):
+        self.note("answer", result.status)
+
+    def on_style(self):
+        self.note("style", self.stage.units, self.stage.dark)
+
+    def tick(self, now):
+        self.note("tick")
+        self.due = None if len([c for c in self.calls if c == ("tick",)]) > 4 else 0.01
+
+    def remove(self):
+        self.note("remove")
+
+
+class Pupil(Witness):
+    key = "pupil"
+    title = "Pupil"
+    about = "Learns & reports."
+
+
+@pytest.fixture
+def tab(monkeypatch: pytest.MonkeyPatch) -> Iterator[FakeBrowser]:
+    monkeypatch.setattr(session, "TABS", (Witness,))
+    monkeypatch.setattr(session, "LESSONS", (Pupil,))
+    monkeypatch.setattr(choice, "LESSONS", (Pupil,))
+    Witness.calls.clear()
+    Witness.threads.clear()
+    server = ViewerServer(STORE, Settings(), Clouds())
+    with FakeBrowser(server.start()) as opened:
+        opened.settle()
+        yield opened
+    server.stop()
+
+
+def told(tab: FakeBrowser, *call: object, times: int = 1) -> None:
+    end = time.monotonic() + 10.0
+    while Witness.calls.count(call) < times:
+        tab._read(0.05)
+        assert time.monotonic() < end, Witness.calls
+
+
+def test_a_tab_is_told_what_happens_by_the_visitors_worker_alone(tab: FakeBrowser) -> None:
+    assert Witness.calls[0] == ("made", "pioneer5")
+    tab.set("Witness", 3)
+    told(tab, "handle", "slider", 3)
+    tab.set("1 rotating base", 50)
+    told(tab, "picture")
+    T = kin.fk(PIONEER, PIONEER.q_home)
+    tab.drag(T)
+    told(tab, "answer", "solved")
+    tab.set("Radians", True)
+    told(tab, "style", Units(degrees=False), False)
+    tab.set("Lengths", "cm")
+    told(tab, "style", Units(False, "cm"), False)
+    tab.set("Dark page", True)
+    told(tab, "style", Units(False, "cm"), True)
+    tab.set("Robot", OTHER.name)
+    told(tab, "robot", "puma560")
+    assert len(Witness.threads) == 1
+
+
+def test_a_feature_gets_its_ticks_and_then_rests(tab: FakeBrowser) -> None:
+    tab.set("Witness", 8)
+    told(tab, "tick", times=5)
+    tab.settle()
+    assert Witness.calls.count(("tick",)) == 5
+
+
+def test_a_feature_moves_the_arm(tab: FakeBrowser) -> None:
+    tab.set("Witness", 7)
+    tab.wait(lambda: np.allclose(tab.tool_pose(), kin.fk(PIONEER, PIONEER.lower), atol=1e-9))
+
+
+def test_a_feature_that_breaks_says_so_and_the_page_lives_on(
+    tab: FakeBrowser, caplog: pytest.LogCaptureFixture
+) -> None:
+    tab.set("Witness", 9)
+    tab.wait(lambda: "Something went wrong" in tab.html)
+    assert "broken on purpose" in caplog.text
+    tab.set("1 rotating base", 50)
+    tab.wait(lambda: 'data-status="hand"' in tab.html)
+
+
+def test_one_lesson_at_a_time(tab: FakeBrowser) -> None:
+    assert len([c for c in Witness.calls if c[0] == "made"]) == 1
+    assert "Learns &amp; reports." in tab.html, "what there is to choose from"
+    tab.set("Lesson", "Pupil")
+    told(tab, "made", "pioneer5")
+    tab.wait(lambda: "Learns" not in tab.html)
+    tab.wait(lambda: "Pupil" in tab.sliders)
+    tab.set("Pupil", 4)
+    told(tab, "handle", "slider", 4)
+    tab.set("Lesson", "None")
+    told(tab, "remove")
+    tab.wait(lambda: "Pupil" not in tab.sliders)
+    tab.wait(lambda: "Learns &amp; reports." in tab.html)
+
+
+def test_a_lesson_that_there_is_not_is_refused_by_name(tab: FakeBrowser) -> None:
+    tab.set("Lesson", "Astrology")
+    tab.wait(lambda: "Astrology" in tab.html)
+    assert "Not understood" in tab.html
+    tab.wait(lambda: tab.value("Lesson") == "None")
+
+
+def test_every_lesson_says_what_it_is_about() -> None:
+    assert all(lesson.about.endswith(".") and len(lesson.about) < 100 for lesson in lessons.LESSONS)
+
+
+def test_keys_and_titles_are_unique() -> None:
+    features = [*lessons.LESSONS, *session.TABS]
+    assert len({f.key for f in features}) == len({f.title for f in features}) == len(features)

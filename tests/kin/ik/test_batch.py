@@ -1,0 +1,346 @@
+"""The thin call and the arithmetic under it: one against many, against the rich kernels, against the library."""
+
+from __future__ import annotations
+
+import math
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+from copy import deepcopy
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from arms import CHAPTER_ARMS
+from numba import njit
+
+import kin
+from kin import InputError
+from kin.kernels import simd
+from kin.robot import Joint, Robot
+from kin.solvers import solver_for
+from kin.solvers.common import POSE, Problem
+
+ROBOTS = CHAPTER_ARMS
+CLOSED = tuple(robot.id for robot in kin.builtin_robots().values() if solver_for(robot) is not None)
+
+
+def moved(robot):
+    """The same arm on a base of its own: no entry of it is zero."""
+    c, s = math.cos(0.7), math.sin(0.7)
+    tilt = np.array([[1, 0, 0, 0.1], [0, c, -s, -0.2], [0, s, c, 0.3], [0, 0, 0, 1]])
+    turn = np.array([[c, -s, 0, 0.4], [s, c, 0, 0.5], [0, 0, 1, 0.6], [0, 0, 0, 1]])
+    return replace(robot, id=robot.id + "-moved", base=tuple(map(tuple, (tilt @ turn).tolist())))
+
+
+ARMS = [robot for known in map(kin.get_robot, CHAPTER_ARMS) for robot in (known, moved(known))]
+arms = pytest.mark.parametrize("robot", ARMS, ids=lambda robot: robot.id)
+
+
+def targets(robot, count, seed=1):
+    return kin.fk(robot, robot.random_q(np.random.default_rng(seed), count))
+
+
+def singular_targets(robot, count=64):
+    """Poses at which joints other than the first are at zero of their closed form, or at a right angle."""
+    rng = np.random.default_rng(2)
+    q = robot.random_q(rng, count)
+    offset = solver_for(robot).geometry.offset
+    special = rng.random(q.shape) < 0.4
+    special[:, 0] = False
+    return kin.fk(robot, np.where(special, rng.integers(-1, 2, q.shape) * (math.pi / 2) - offset, q))
+
+
+def rich(robot, T, value):
+    """The branches of the rich kernels, without limits."""
+    solver, geometry, _ = solver_for(robot)
+    far = np.full(robot.n, 1e6)
+    return solver.solve(geometry, Problem(T, POSE, (value,), False, robot.q_home.copy(), -far, far)).q
+
+
+def turned(a, b):
+    """Differences of angles ``(...)``, NaN where both are NaN."""
+    assert np.array_equal(np.isnan(a), np.isnan(b))
+    return np.abs(np.mod(a - b + math.pi, 2 * math.pi) - math.pi)
+
+
+def closure(robot, T, q):
+    """Largest difference of point and approach direction (and of the rest, with six joints or more)."""
+    there = ~np.isnan(q[..., 0])
+    wanted = np.broadcast_to(T[..., None, :, :], (*q.shape[:-1], 4, 4))[there]
+    return np.abs(kin.fk(robot, q[there]) - wanted)[..., 2 if robot.n == 5 else 0 :].max()
+
+
+# Against each other
+
+
+@arms
+@pytest.mark.parametrize("value", [math.nan, 0.3, -4.0])
+def test_a_batch_gives_the_bits_of_one(robot, value):
+    T = np.concatenate([targets(robot, 130), singular_targets(robot, 20)])
+    many = kin.ik_branches(robot, T, value)
+    assert many.shape == (150, 8, robot.n)
+    for pose, branches in zip(T, many, strict=True):
+        assert np.array_equal(kin.ik_branches(robot, pose, value), branches, equal_nan=True)
+
+
+@arms
+def test_every_target_may_have_its_own_value(robot):
+    T = targets(robot, 70)
+    values = np.linspace(-3, 3, 70)
+    values[::7] = math.nan
+    each = kin.ik_branches(robot, T, values)
+    for pose, value, branches in zip(T, values, each, strict=True):
+        assert np.array_equal(kin.ik_branches(robot, pose, value), branches, equal_nan=True)
+    assert np.array_equal(
+        kin.ik_branches(robot, T.reshape(7, 10, 4, 4), values.reshape(7, 10)).reshape(each.shape),
+        each,
+        equal_nan=True,
+    )
+
+
+@arms
+def test_the_rich_kernels_give_the_same_branches(robot):
+    T = targets(robot, 300)
+    thin = kin.ik_branches(robot, T, 0.3)
+    difference = turned(thin, np.array([rich(robot, pose, 0.3) for pose in T]))
+    assert np.nanmedian(difference) <= 1e-15
+    assert np.nanquantile(difference, 0.99) <= 1e-12
+    assert np.nanmax(difference) <= 1e-9  # a rounding error, seen beside a singularity
+    assert closure(robot, T, thin) <= 5e-15
+
+
+@arms
+@pytest.mark.parametrize("value", [math.nan, 0.3])
+def test_singular_targets_are_met(robot, value):
+    T = singular_targets(robot)
+    thin = kin.ik_branches(robot, T, value)
+    assert not np.isnan(thin).all(axis=(1, 2)).any()
+    assert closure(robot, T, thin) <= 1e-9
+    if not math.isnan(value):
+        for pose, branches in zip(T, thin, strict=True):
+            for one, other in zip(branches, rich(robot, pose, value), strict=True):
+                # Where an angle is free, or all but free, the poses must agree, not the joints.
+                assert np.isnan(one).any() == np.isnan(other).any()
+
+
+@arms
+def test_the_home_configuration_is_among_its_own_branches(robot):
+    branches = kin.ik_branches(robot, kin.fk(robot, robot.home))
+    assert np.nanmin(turned(branches, np.where(np.isnan(branches), math.nan, robot.q_home)).max(axis=1)) <= 1e-7
+
+
+@arms
+def test_every_configuration_is_among_the_branches_at_its_own_value(robot):
+    q = robot.random_q(np.random.default_rng(3), 300)
+    if solver_for(robot).solver.NAME == "srs7":
+        values = [
+            kin.solve_ik(robot, kin.fk(robot, row), q_seed=row, respect_limits=False).solutions[0]
+            for row in q[:20]
+        ]
+        q, values = q[:20], np.array([s.redundancy[0].value for s in values])
+    else:
+        values = q[:, 0]
+    branches = kin.ik_branches(robot, kin.fk(robot, q), values)
+    difference = np.abs(np.mod(branches - q[:, None] + math.pi, 2 * math.pi) - math.pi).max(axis=2)
+    assert np.nanmin(difference, axis=1).max() <= 1e-6
+
+
+@arms
+def test_out_of_reach_there_is_no_branch(robot):
+    T = targets(robot, 70)
+    T[::2, :3, 3] += 10.0
+    branches = kin.ik_branches(robot, T)
+    assert np.isnan(branches[::2]).all()
+    assert not np.isnan(branches[1::2]).all(axis=(1, 2)).any()
+    assert np.isnan(kin.ik_branches(robot, T[0])).all()
+
+
+def test_one_side_alone_may_be_out_of_reach():
+    robot = kin.get_robot("pioneer5")
+    branches = kin.ik_branches(robot, targets(robot, 200))
+    missing = np.isnan(branches)
+    assert np.array_equal(missing.any(axis=2), missing.all(axis=2))
+    sides = missing[:, ::4, 0]
+    assert sides.any(axis=1).any()
+    assert not sides.all(axis=1).any()
+
+
+@pytest.mark.parametrize("robot_id", CLOSED)
+def test_every_family_answers_one_and_many_alike(robot_id):
+    robot = kin.get_robot(robot_id)
+    T = targets(robot, 100)
+    many = kin.ik_branches(robot, T)
+    assert many.shape == (100, len(kin.branch_names(robot)), robot.n)
+    assert closure(robot, T, many) <= 1e-12
+    assert not np.isnan(many).all(axis=(1, 2)).any()
+    for pose, branches in zip(T, many, strict=True):
+        assert np.array_equal(kin.ik_branches(robot, pose), branches, equal_nan=True)
+
+
+# Shapes, kinds of arrays, misuse
+
+
+@pytest.mark.parametrize("robot_id", ROBOTS)
+@pytest.mark.parametrize("shape", [(), (1,), (3,), (2, 3), (0,), (2, 0)])
+def test_batch_axes_come_first(robot_id, shape):
+    robot = kin.get_robot(robot_id)
+    T = kin.fk(robot, robot.random_q(np.random.default_rng(4), shape))
+    assert kin.ik_branches(robot, T).shape == (*shape, 8, robot.n)
+    assert kin.ik_branches(robot, T, np.zeros(shape)).shape == (*shape, 8, robot.n)
+
+
+def test_all_kinds_of_arrays_are_taken():
+    robot = kin.get_robot("redundant7-craig")
+    T = np.eye(4)
+    T[:3, 3] = 0.25, 0.125, 0.5
+    wanted = kin.ik_branches(robot, T, 0.5)
+    assert not np.isnan(wanted).any()
+    read_only = T.copy()
+    read_only.flags.writeable = False
+    every_second = np.repeat(T, 2, axis=1)[:, ::2]
+    for form in (T.tolist(), T.astype(np.float32), read_only, every_second, np.asfortranarray(T)):
+        assert np.array_equal(kin.ik_branches(robot, form, 0.5), wanted)
+    for form in (np.float32(0.5), np.array(0.5), np.float64(0.5)):
+        assert np.array_equal(kin.ik_branches(robot, T, form), wanted)
+    batch = np.stack([T] * 6)
+    frozen = batch.copy()
+    frozen.flags.writeable = False
+    for form in (batch[::2], frozen[:3], np.asfortranarray(batch[:3]), batch[:3].astype(np.float32)):
+        assert np.array_equal(kin.ik_branches(robot, form, 0.5), np.stack([wanted] * 3))
+
+
+def spoilt(value, *index):
+    T = np.stack([np.eye(4)] * 3)
+    T[index] = value
+    return T
+
+
+@pytest.mark.parametrize("robot_id", ROBOTS)
+@pytest.mark.parametrize(
+    ("target", "field"),
+    [
+        (np.eye(3), "target"),
+        (np.zeros((4, 4, 3)), "target"),
+        (np.zeros(16), "target"),
+        ("home", "target"),
+        (None, "target"),
+        (spoilt(math.nan, 0, 0, 0)[0], "target[0][0]"),
+        (spoilt(math.inf, 0, 1, 3)[0], "target[1][3]"),
+        (spoilt(math.nan, 0, 3, 1)[0], "target[3][1]"),
+        (spoilt(math.nan, 2, 0, 1), "target[2][0][1]"),
+        (spoilt(-math.inf, 1, 3, 3), "target[1][3][3]"),
+        (spoilt(math.nan, 2, 0, 1).tolist(), "target[2][0][1]"),
+    ],
+)
+def test_misuse_of_a_target_names_the_field(robot_id, target, field):
+    with pytest.raises(InputError) as caught:
+        kin.ik_branches(kin.get_robot(robot_id), target)
+    assert caught.value.field == field
+
+
+@pytest.mark.parametrize("value", ["psi", None, 1j, [0.0, 1.0], np.zeros((3, 1)), math.inf, [0.0, -math.inf, 0.0]])
+def test_misuse_of_a_redundancy_names_the_field(value):
+    robot = kin.get_robot("redundant7-craig")
+    with pytest.raises(InputError, match="redundancy"):
+        kin.ik_branches(robot, targets(robot, 3), value)
+
+
+@pytest.mark.parametrize("value", ["psi", None, 1j, [0.0], np.zeros((1, 1)), math.inf, -math.inf])
+def test_misuse_of_one_redundancy_names_the_field(value):
+    robot = kin.get_robot("redundant7-craig")
+    with pytest.raises(InputError, match="redundancy"):
+        kin.ik_branches(robot, kin.fk(robot, robot.home), value)
+
+
+@pytest.mark.parametrize("copy", [deepcopy, lambda robot: pickle.loads(pickle.dumps(robot))])
+def test_an_arm_in_use_can_be_copied(copy):
+    robot = replace(kin.get_robot("pioneer5"))
+    T = kin.fk(robot, robot.home)
+    wanted = kin.ik_branches(robot, T)
+    assert np.array_equal(kin.ik_branches(copy(robot), T), wanted, equal_nan=True)
+
+
+def test_an_arm_without_closed_form_is_refused():
+    slide = Robot("slide", "slide", "", "standard", (Joint("1", kind="prismatic", limits=(0.0, 1.0)),), (0.5,))
+    with pytest.raises(InputError, match="robot"):
+        kin.ik_branches(slide, np.eye(4))
+
+
+@pytest.mark.parametrize("robot_id", CLOSED)
+def test_many_threads_get_the_serial_answers(robot_id):
+    robot = kin.get_robot(robot_id)
+    batches = [targets(robot, 300, seed) for seed in range(24)]
+
+    def work(T):
+        return kin.ik_branches(robot, T), kin.ik_branches(robot, T[0]), kin.ik_branches(robot, T, np.zeros(300))
+
+    serial = [work(T) for T in batches]
+    with ThreadPoolExecutor(8) as pool:
+        for one, other in zip(serial, pool.map(work, batches), strict=True):
+            assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(one, other, strict=True))
+
+
+# The arithmetic
+
+
+@njit(error_model="numpy")
+def many_sin_cos(x, s, c):
+    for i in range(x.shape[0]):
+        s[i], c[i] = simd.sin_cos(x[i])
+
+
+@njit(error_model="numpy")
+def many_atan2(y, x, out):
+    for i in range(x.shape[0]):
+        out[i] = simd.atan2(y[i], x[i])
+
+
+def ulps(found, wanted):
+    """Largest error in units of the last place of the library's value."""
+    return (np.abs(found - wanted) / np.spacing(np.abs(wanted))).max()
+
+
+@pytest.mark.parametrize("scale", [1e-300, 1e-8, 1.0, 10.0, 1e3, simd.WIDE])
+def test_sine_and_cosine_are_the_librarys_to_the_last_places(scale):
+    x = np.random.default_rng(6).uniform(-scale, scale, 400_000)
+    s, c = np.empty_like(x), np.empty_like(x)
+    many_sin_cos(x, s, c)
+    assert ulps(s, np.sin(x)) <= 3.0
+    assert ulps(c, np.cos(x)) <= 3.0
+
+
+def test_sine_and_cosine_beside_multiples_of_a_right_angle():
+    k = np.arange(-60_000.0, 60_000.0)
+    for step in (0.0, 1e-12, -1e-7, 1e-3):
+        x = k * (math.pi / 2) + step
+        s, c = np.empty_like(x), np.empty_like(x)
+        many_sin_cos(x, s, c)
+        assert ulps(s, np.sin(x)) <= 3.0
+        assert ulps(c, np.cos(x)) <= 3.0
+
+
+def test_arc_tangent_is_the_librarys_to_the_last_places():
+    rng = np.random.default_rng(7)
+    for spread in (0.0, 0.1, 3.0, 30.0):
+        x, y = rng.normal(size=(2, 400_000)) * 10 ** rng.uniform(-spread, spread, (2, 400_000))
+        out = np.empty_like(x)
+        many_atan2(y, x, out)
+        assert ulps(out, np.arctan2(y, x)) <= 3.0
+
+
+def test_arc_tangent_on_the_axes_and_of_nothing():
+    y = np.array([0.0, 0.0, 0.0, -0.0, 1.0, -1.0, 1.0, -1.0, math.nan, 1.0])
+    x = np.array([0.0, 1.0, -1.0, -1.0, 0.0, 0.0, 1.0, -1.0, 1.0, math.nan])
+    wanted = np.array([0, 0, math.pi, math.pi, math.pi / 2, -math.pi / 2, math.pi / 4, -3 * math.pi / 4])
+    out = np.empty_like(x)
+    many_atan2(y, x, out)
+    assert out[:8] == pytest.approx(wanted, abs=1e-15)
+    assert np.isnan(out[8:]).all()
+
+
+def test_sine_and_cosine_of_no_number_are_no_number():
+    x = np.array([math.nan, math.inf, -math.inf] * 5)
+    s, c = np.empty_like(x), np.empty_like(x)
+    many_sin_cos(x, s, c)
+    assert np.isnan(s).all()
+    assert np.isnan(c).all()

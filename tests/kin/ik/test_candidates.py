@@ -1,0 +1,125 @@
+"""The compiled passes between a solver's raw rows and an answer, each against a plain-Python twin."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from kin import InputError, fk, get_robot, ik_branches
+from kin.ik.candidates import DISTANCE, finish, judge, ranges, select, settle
+from kin.kernels.checks import straighten
+from kin.solvers.common import POSE
+from kin.transforms import as_transform, rotation_from_wxyz
+
+angle = st.floats(-10, 10)
+
+
+def told(arcs, rows, together, circular):
+    out = np.full((4 * len(arcs) + 2, 3), math.nan)
+    count = ranges(np.array(arcs, dtype=float).reshape(-1, 3), np.array(rows), together, circular, out)
+    return count, [[(a, b) for k, a, b in out[: max(count, 0)].tolist() if k == i] for i in range(len(rows) + 1)]
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.lists(st.tuples(st.integers(0, 2), angle, st.floats(0, 7)), max_size=8), st.booleans())
+def test_ranges_hold_exactly_what_their_arcs_hold(arcs, circular):
+    arcs = [(b, low, low + width) for b, low, width in arcs]
+    together = np.array([True, False, True])
+    _, found = told(arcs, [2, 0], together, circular)
+    wanted = [[a for a in arcs if a[0] == 2], [a for a in arcs if a[0] == 0], [a for a in arcs if a[0] != 1]]
+    for intervals, mine in zip(found, wanted, strict=True):
+        assert intervals == sorted(intervals)
+        assert all(b[0] > a[1] for a, b in itertools.pairwise(intervals)), "joined where they touch"
+        for x in np.linspace(-math.pi, math.pi, 101) if circular else np.linspace(-12, 18, 101):
+            images = [x + 2 * math.pi * k for k in range(-3, 5)] if circular else [x]
+            depth = max((min(y - low, high - y) for _, low, high in mine for y in images), default=-1.0)
+            if abs(depth) > 1e-9:
+                assert any(low <= x <= high for low, high in intervals) == (depth > 0)
+
+
+def test_a_range_without_a_stop_is_told_as_such():
+    assert told([(0, -math.inf, 1.0)], [0], np.array([True]), False)[0] == -1
+    assert told([], [0], np.array([True]), False) == (0, [[], []])
+    assert told([(0, 3.0, 3.5)], [0], np.array([False]), True)[1][0] == [
+        pytest.approx((-math.pi, 3.5 - 2 * math.pi)),
+        pytest.approx((3.0, math.pi)),
+    ]
+    assert told([(0, 1.0, 9.0)], [0], np.array([True]), True)[1] == [[(-math.pi, math.pi)]] * 2
+
+
+def test_rows_are_taken_by_rising_key_and_once():
+    q = np.array([[3.0, 0.0], [1.0, 0.0], [1.0, 1e-9], [2.0, 0.0], [0.0, 0.0]])
+    kept, count = select(q, np.array([3.0, 1.5, 1.0, 2.0, math.inf]))
+    assert kept[:count].tolist() == [2, 3, 0]
+    kept, count = select(q, np.array([math.nan, 1.0, math.inf, 0.5, math.nan]))
+    assert kept[:count].tolist() == [3, 1]
+
+
+@pytest.mark.parametrize("respect", [True, False])
+def test_rows_are_settled_in_one_call_as_step_by_step(respect):
+    arm = get_robot("puma560")
+    rng = np.random.default_rng(3)
+    q = rng.uniform(1.4 * arm.lower, 1.4 * arm.upper, (8, arm.n))
+    q[3], q[5] = math.nan, q[2] + 2.0 * math.pi
+    T, turns = fk(arm, q[2]), np.full(arm.n, 2.0 * math.pi)
+    q[0] = ik_branches(arm, T)[4]
+    seed, whole = rng.uniform(arm.lower, arm.upper), np.array([1.0] * 6 + [0.0])
+    given = (arm.model, T, POSE, whole, seed, seed, arm.lower.copy(), arm.upper.copy(), turns, respect)
+    rows, stats = q.copy(), np.empty((8, 5))
+    closed, good, order = np.empty(8, bool), np.empty(8, bool), np.empty(8, np.int64)
+    count = settle(*given, rows, stats, closed, good, order)
+    rows_twin, stats_twin = q.copy(), np.empty((8, 5))
+    finish(*given, rows_twin, stats_twin)
+    closed_twin, good_twin = np.empty((2, 8), bool)
+    judge(stats_twin, respect, closed_twin, good_twin)
+    kept, expected = select(rows_twin, np.where(good_twin, stats_twin[:, DISTANCE], math.inf))
+    assert np.array_equal(rows, rows_twin, equal_nan=True)
+    assert np.array_equal(stats, stats_twin, equal_nan=True)
+    assert (closed.tolist(), good.tolist()) == (closed_twin.tolist(), good_twin.tolist())
+    assert order[:count].tolist() == kept[:expected].tolist()
+    assert closed[[0, 2, 5]].all()
+    assert closed.sum() == 3
+    assert count == len({0, 2} & set(np.flatnonzero(good).tolist()))
+
+
+def test_what_meets_the_task_and_the_limits():
+    nan = math.nan
+    stats = np.array(
+        [[0, 0, 1, 0, 0], [0, 0, 1, 0.1, 0], [1e-8, 0, 1, 0, 0], [0, 1e-8, 1, 0, 0], [nan, nan, nan, nan, nan]],
+        dtype=float,
+    )
+    closed, good = np.empty((2, 5), dtype=bool)
+    assert judge(stats, True, closed, good) == 1
+    assert (closed.tolist(), good.tolist()) == ([True, True, False, False, False], [True] + [False] * 4)
+    assert judge(stats, False, closed, good) == 2
+    assert good.tolist() == closed.tolist()
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    st.lists(st.floats(-1, 1), min_size=4, max_size=4),
+    st.sampled_from([0.0, 1e-12, 1e-7, 4e-7, 3e-6, 1e-2, 1.0]),
+    st.integers(0, 15),
+    st.sampled_from([1.0, -1.0, math.nan, math.inf, 3.0]),
+)
+def test_the_compiled_check_of_a_target_agrees_with_the_one_that_explains(wxyz, noise, entry, factor):
+    if np.linalg.norm(wxyz) < 1e-3:
+        wxyz = [1, 0, 0, 0]
+    T = np.eye(4)
+    T[:3, :3] = rotation_from_wxyz(np.array(wxyz))
+    T[:3, 3] = (0.1, -5.0, 2e7)
+    T.flat[entry] = factor if not math.isfinite(factor) else T.flat[entry] * factor + noise
+    out = np.empty((4, 4))
+    sound = straighten(T, 1e8, out)
+    try:
+        expected = as_transform(T)
+    except InputError:
+        assert not sound
+    else:
+        assert sound
+        assert np.abs(out - expected).max() <= 1e-14 * max(1.0, np.abs(expected).max())

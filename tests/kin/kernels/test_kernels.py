@@ -1,0 +1,38 @@
+"""What is kept of compiled code, and when it is thrown away."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import kin
+
+
+def test_kernels_are_compiled_anew_when_a_kernel_they_call_has_changed(tmp_path):
+    """numba itself looks at the file of the kernel alone."""
+    package = tmp_path / "kin"
+    shutil.copytree(Path(kin.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
+    program = (
+        "import numpy as np; from kin.ik.candidates import select; "
+        "rows, count = select(np.array([[0.0], [1e-3]]), np.array([1.0, 2.0])); "
+        "print(count, sum(select.stats.cache_hits.values()))"
+    )
+
+    def run() -> str:
+        return subprocess.run(
+            [sys.executable, "-c", program],
+            env={**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout.strip()
+
+    assert run() == "2 0"
+    assert run() == "2 1", "kept"
+    common = package / "solvers" / "common.py"
+    common.write_text(common.read_text(encoding="utf-8") + "\n# changed\n", encoding="utf-8")
+    assert run() == "2 0", "compiled anew"
