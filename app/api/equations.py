@@ -25,7 +25,7 @@ from app.api.schemas import (
 from app.api.work import computed
 from app.equations import Book, Equation, Symbol, book, typeset
 from app.equations.expression import Expression
-from app.shared.answers import documented
+from app.shared.answers.document import documented
 from kin import Robot
 from kin.transforms import Array
 

@@ -22,7 +22,8 @@ from app.api.schemas import (
     settings_of,
 )
 from app.api.work import Budget, computed, work_of
-from app.shared.answers import FkAnswer, documented, fk_answers
+from app.shared.answers.document import documented
+from app.shared.answers.fk import FkAnswer, fk_answers
 
 FEW = 16  # configurations that are answered sooner than a thread could be asked to
 

@@ -26,7 +26,8 @@ from app.api.schemas import (
 )
 from app.api.targets import Target
 from app.api.work import Budget, computed
-from app.shared.answers import IkAnswer, documented, ik_answer
+from app.shared.answers.document import documented
+from app.shared.answers.ik import IkAnswer, ik_answer
 from app.shared.metrics import SOLVE_SECONDS
 from app.shared.settings import Settings
 from kin import Robot, Task, solve_ik

@@ -13,7 +13,8 @@ from app.api import schemas
 from app.api.body import versioned
 from app.api.schemas import POST_REFUSALS, Configurations, RobotId, example, one_or_all, robot_of, settings_of
 from app.api.work import computed
-from app.shared.answers import JacobianAnswer, documented, jacobian_answers
+from app.shared.answers.document import documented
+from app.shared.answers.jacobian import JacobianAnswer, jacobian_answers
 
 router = versioned("kinematics")
 

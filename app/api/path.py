@@ -15,7 +15,7 @@ from app.api.problems import FieldError, invalid
 from app.api.schemas import POST_REFUSALS, Configuration, RobotId, example, reply, robot_of, settings_of
 from app.api.targets import Target
 from app.api.work import Budget, computed
-from app.shared.answers import PathAnswer, path_answer
+from app.shared.answers.path import PathAnswer, path_answer
 from app.shared.settings import Settings
 from kin import Robot, solve_path
 

@@ -7,7 +7,8 @@ from typing_extensions import TypedDict
 
 from app.api.body import versioned
 from app.api.schemas import RobotId, refusals, reply, robot_of, store_of
-from app.shared.answers import RobotAnswer, documented, robot_answer
+from app.shared.answers.document import documented
+from app.shared.answers.robots import RobotAnswer, robot_answer
 
 router = versioned("robots")
 

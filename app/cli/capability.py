@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from app.cli.terminal import Units, clean, per_joint, print_json, store_of, table
-from app.shared.answers import CapabilityAnswer, capability_answer
+from app.shared.answers.capability import CapabilityAnswer, capability_answer
 from app.shared.mapreduce import run_dask, run_local
 from kin import CapabilityBlock, CapabilityMap, InputError, capability_grid, capability_join
 

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from typing_extensions import TypedDict
 
-from app.shared.answers import RobotAnswer, robot_answer
+from app.shared.answers.robots import RobotAnswer, robot_answer
 from kin import Robot, jacobian
 from kin.axes import Pair, generic_q, pairs, parallel_groups, size, spherical_groups
 from kin.home import candidates, margins

@@ -22,15 +22,10 @@ from app.cli.terminal import Units, clean, per_joint, print_json, store_of, tabl
 from app.exports.formats import FORMATS
 from app.exports.picture import draw
 from app.exports.save import opened, reading, save
-from app.shared.answers import (
-    Blocked,
-    RobotAnswer,
-    Solution,
-    fk_answers,
-    ik_answer,
-    robot_answer,
-    workspace_answer,
-)
+from app.shared.answers.fk import fk_answers
+from app.shared.answers.ik import Blocked, Solution, ik_answer
+from app.shared.answers.robots import RobotAnswer, robot_answer
+from app.shared.answers.workspace import workspace_answer
 from app.shared.clouds import Cloud
 from kin import (
     InputError,

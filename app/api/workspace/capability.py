@@ -14,7 +14,7 @@ from app.api.problems import FieldError, invalid
 from app.api.schemas import RobotId, refusals, reply, robot_of, settings_of
 from app.api.work import Budget, work_of
 from app.api.workspace.query import RegionQuery
-from app.shared.answers import CapabilityMapAnswer, capability_map_answer
+from app.shared.answers.capability import CapabilityMapAnswer, capability_map_answer
 from app.shared.maps import Maps, Wanted
 
 router = versioned("workspace")

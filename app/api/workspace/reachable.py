@@ -18,7 +18,8 @@ from app.api.schemas import POST_REFUSALS, RobotId, example, reply, robot_of, se
 from app.api.targets import Target
 from app.api.work import Budget, BudgetDep
 from app.api.workspace.flow import Flow
-from app.shared.answers import ReachableAnswer, documented, reachable_answer
+from app.shared.answers.document import documented
+from app.shared.answers.ik import ReachableAnswer, reachable_answer
 from kin import Robot, Task, solve_ik
 from kin.transforms import Array
 

@@ -19,7 +19,7 @@ from app.api.problems import FieldError, invalid, show
 from app.api.schemas import RobotId, refusals, reply, robot_of
 from app.api.work import busy, work_of
 from app.api.workspace.query import NUMBER, RegionQuery, number
-from app.shared.answers import WorkspaceAnswer, workspace_answer
+from app.shared.answers.workspace import WorkspaceAnswer, workspace_answer
 from app.shared.processor import spread
 from kin import section, workspace_facts
 

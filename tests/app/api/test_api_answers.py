@@ -8,7 +8,10 @@ import pytest
 from pydantic import TypeAdapter
 
 import kin
-from app.shared.answers import FkAnswer, IkAnswer, JacobianAnswer, RobotAnswer, fk_answers
+from app.shared.answers.fk import FkAnswer, fk_answers
+from app.shared.answers.ik import IkAnswer
+from app.shared.answers.jacobian import JacobianAnswer
+from app.shared.answers.robots import RobotAnswer
 from kin.transforms import rotation_from_wxyz
 
 ROBOTS = tuple(kin.builtin_robots().values())

@@ -14,7 +14,7 @@ from pydantic import TypeAdapter
 import kin
 from app.api import Gate, Work, api_routes, install_problem_handlers
 from app.shared import mapreduce
-from app.shared.answers import CapabilityMapAnswer, capability_answer
+from app.shared.answers.capability import CapabilityMapAnswer, capability_answer
 from app.shared.maps import Maps
 from app.shared.settings import Settings
 from app.shared.store import Store

@@ -5,7 +5,9 @@ import json
 import pytest
 
 from app.exports.formats import FORMATS
-from app.shared.answers import FkAnswer, IkAnswer, JacobianAnswer, ReachableAnswer
+from app.shared.answers.fk import FkAnswer
+from app.shared.answers.ik import IkAnswer, ReachableAnswer
+from app.shared.answers.jacobian import JacobianAnswer
 
 
 @pytest.fixture(scope="session")

@@ -23,7 +23,8 @@ from app.api.workspace.flow import Pieces
 from app.api.workspace.summary import Memory
 from app.exports.formats import FORMATS, encode
 from app.service.main import create_app
-from app.shared.answers import ReachableAnswer, WorkspaceAnswer
+from app.shared.answers.ik import ReachableAnswer
+from app.shared.answers.workspace import WorkspaceAnswer
 from app.shared.clouds import Cloud, Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store

@@ -1,0 +1,116 @@
+"""Answers about capability maps: their numbers, and their voxels one by one."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from typing_extensions import TypedDict
+
+from app.shared.answers.document import documented
+from app.shared.answers.fk import Matrix
+from kin import CapabilityMap
+
+
+@documented
+class CapabilityAnswer(TypedDict):
+    """A capability map in numbers: from which directions the voxels of the workspace can be approached."""
+
+    robot: str
+    """Id of the arm."""
+    method: Literal["closed form", "sweep", "search"]
+    """How directions were decided. "closed form": exactly; "sweep": with some rolls about each, so that one that
+    few rolls fit may be missing; "search": by descents, which miss a few."""
+    directions: int
+    """How many directions were asked for, spread evenly over the sphere."""
+    voxel: float
+    """Side of a voxel in metres."""
+    origin: list[float]
+    """The least corner of the grid: x, y, z in metres."""
+    shape: list[int]
+    """Voxels along x, y, z."""
+    reachable: int
+    """Voxels whose centre the tool point reaches, with any orientation."""
+    volume: float
+    """Their volume in m³."""
+    mean_share: float
+    """Mean of their shares: which part of the directions the tool can be brought to a centre along, 0 to 1."""
+    best_share: float
+    """The largest share."""
+    best_share_at: list[float] | None
+    """Centre of the voxel that has it, in metres; null if no direction fits anywhere."""
+    best_manipulability: float
+    """The largest manipulability found at any centre, as `all` of the Jacobian's answer."""
+    best_manipulability_at: list[float] | None
+    """Centre of the voxel that has it, in metres; null if it is 0 everywhere."""
+
+
+@documented
+class VoxelAnswer(TypedDict):
+    """The reachable voxels of a capability map, one entry each, in one order."""
+
+    centres: Matrix
+    """Their centres: x, y, z in metres."""
+    share: list[float]
+    """Share of the directions along which the tool can be brought there, 0 to 1; 0 where it gets there with others
+    only."""
+    manipulability: list[float]
+    """The best manipulability found there."""
+    approachable: list[str] | None
+    """Which directions fit, "1" or "0" for each; null unless asked for."""
+
+
+@documented
+class CapabilityMapAnswer(TypedDict):
+    """A capability map: its numbers, its directions, its voxels."""
+
+    summary: CapabilityAnswer
+    """The map in numbers."""
+    directions: Matrix
+    """The directions of the tool's z axis that were asked for, unit vectors in the base frame."""
+    voxels: VoxelAnswer
+    """The voxels that are reachable; all others of the grid are not."""
+
+
+def capability_answer(found: CapabilityMap) -> CapabilityAnswer:
+    """The numbers that sum up a map by `kin.capability_map`."""
+    grid = found.grid
+    return {
+        "robot": grid.robot.id,
+        "method": grid.method,
+        "directions": grid.count,
+        "voxel": grid.voxel,
+        "origin": list(grid.origin),
+        "shape": list(grid.shape),
+        "reachable": len(found.index),
+        "volume": found.volume,
+        "mean_share": float(found.share.mean(dtype=np.float64)) if len(found.share) else 0.0,
+        "best_share": float(found.share.max(initial=0.0)),
+        "best_share_at": _centre_of_best(found, found.share),
+        "best_manipulability": float(found.manipulability.max(initial=0.0)),
+        "best_manipulability_at": _centre_of_best(found, found.manipulability),
+    }
+
+
+def capability_map_answer(found: CapabilityMap, approachable: bool = False) -> CapabilityMapAnswer:
+    """A whole map by `kin.capability_map`; `approachable`: with the directions of each voxel."""
+    fits = ["".join("01"[fit] for fit in row) for row in found.approachable.tolist()] if approachable else None
+    return {
+        "summary": capability_answer(found),
+        "directions": found.grid.directions.tolist(),
+        "voxels": {
+            "centres": found.centres.tolist(),
+            "share": found.share.tolist(),
+            "manipulability": found.manipulability.tolist(),
+            "approachable": fits,
+        },
+    }
+
+
+def _centre_of_best(found: CapabilityMap, values: NDArray[np.float32]) -> list[float] | None:
+    """Centre of the voxel with the largest value, None if that is 0 or there is no voxel."""
+    if not values.max(initial=0.0) > 0.0:
+        return None
+    centre: list[float] = found.centres[int(np.argmax(values))].tolist()
+    return centre

@@ -1,0 +1,59 @@
+"""Answers about the Jacobian of a configuration."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from typing_extensions import TypedDict
+
+from app.shared.answers.document import documented
+from app.shared.answers.fk import Matrix
+from kin import Robot, jacobian, manipulability
+from kin.transforms import Array
+
+
+@documented
+class Manipulability(TypedDict):
+    """Yoshikawa's manipulability: the product of the singular values of the Jacobian; 0 at a singularity."""
+
+    all: float
+    """Of all six rows (metres and radians mixed)."""
+    linear: float
+    """Of the three linear rows (m³ for an arm whose joints all turn)."""
+    angular: float
+    """Of the three angular rows (no unit)."""
+
+
+@documented
+class JacobianAnswer(TypedDict):
+    """The Jacobian of one configuration and what it says about moving from there."""
+
+    jacobian: Matrix
+    """6×n, row by row: rows 0–2 give the tool point's linear velocity (m per rad, or m per m for a sliding
+    joint), rows 3–5 its angular velocity (rad per rad, or 0)."""
+    manipulability: Manipulability
+    """How far from a singularity."""
+    singular_values: list[float]
+    """Of the whole Jacobian, largest first (min(6, n) values; metres and radians mixed)."""
+
+
+def jacobian_answers(robot: Robot, q: Array, frame: Literal["base", "tool"] = "base") -> list[JacobianAnswer]:
+    """Jacobians of configurations ``(k, n)`` in radians (metres), in the base or the tool frame."""
+    J = jacobian(robot, q, frame)
+    columns = zip(
+        J.tolist(),
+        manipulability(robot, q, "all").tolist(),
+        manipulability(robot, q, "linear").tolist(),
+        manipulability(robot, q, "angular").tolist(),
+        np.linalg.svd(J, compute_uv=False).tolist(),
+        strict=True,
+    )
+    return [
+        {
+            "jacobian": rows,
+            "manipulability": {"all": whole, "linear": linear, "angular": angular},
+            "singular_values": values,
+        }
+        for rows, whole, linear, angular, values in columns
+    ]

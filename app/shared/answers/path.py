@@ -1,0 +1,95 @@
+"""Answers about joint paths through a list of targets."""
+
+from __future__ import annotations
+
+from typing import Literal, cast
+
+from typing_extensions import TypedDict
+
+from app.shared.answers.document import documented
+from app.shared.answers.fk import Matrix
+from kin import PathResult
+
+
+@documented
+class JumpAnswer(TypedDict):
+    """A step that cannot be followed without a leap."""
+
+    index: int
+    """The leap is between waypoint index − 1 and waypoint index, counted from 0."""
+    joints: list[int]
+    """The joints that leap, as indices into q."""
+    step: float
+    """The largest of their motions, in radians (4 per metre for a sliding joint)."""
+    cause: Literal["limits", "singularity", "branch", "spacing"]
+    """"limits": the motion goes on, but beyond a stop. "singularity": joints must turn fast beside one. "branch":
+    the branch being followed ends. "spacing": the waypoints are too far apart for `max_step`."""
+    reason: str
+    """The same in a sentence for people."""
+
+
+@documented
+class GapAnswer(TypedDict):
+    """A waypoint without an exact answer."""
+
+    index: int
+    """Which waypoint, counted from 0."""
+    status: Literal["approximate", "limits", "orientation", "unreachable"]
+    """What kind of answer `ik` gives there."""
+    reason: str
+    """Its sentence for people."""
+    distance: float
+    """How far out of reach it is, in metres; 0 within reach."""
+
+
+@documented
+class PathAnswer(TypedDict):
+    """A joint path through a list of targets."""
+
+    q: Matrix
+    """One configuration per waypoint, in radians (metres for sliding joints), inside the limits."""
+    continuous: bool
+    """Whether there is no jump."""
+    jumps: list[JumpAnswer]
+    """Every jump that is left, in order."""
+    gaps: list[GapAnswer]
+    """Every waypoint without an exact answer, in order; q holds the closest configuration there."""
+    position_error: list[float]
+    """Distance of the tool point from each waypoint, in metres, measured by forward kinematics."""
+    rotation_error: list[float]
+    """Rotation left to each waypoint, in radians, as in the solutions of `ik`."""
+    solver: str
+    """Name of the method that answered."""
+    reason: str
+    """The whole in a sentence for people."""
+
+
+def path_answer(result: PathResult) -> PathAnswer:
+    """One result of `kin.solve_path`."""
+    return {
+        "q": result.q.tolist(),
+        "continuous": result.continuous,
+        "jumps": [
+            {
+                "index": jump.index,
+                "joints": list(jump.joints),
+                "step": jump.step,
+                "cause": jump.cause,
+                "reason": jump.reason,
+            }
+            for jump in result.jumps
+        ],
+        "gaps": [
+            {
+                "index": gap.index,
+                "status": cast(Literal["approximate", "limits", "orientation", "unreachable"], gap.status.value),
+                "reason": gap.reason,
+                "distance": gap.distance,
+            }
+            for gap in result.gaps
+        ],
+        "position_error": result.position_error.tolist(),
+        "rotation_error": result.rotation_error.tolist(),
+        "solver": result.solver,
+        "reason": result.reason,
+    }
