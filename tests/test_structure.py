@@ -1,0 +1,565 @@
+"""Size, shape and vocabulary of the code, checked on the syntax tree of every module.
+
+Each rule is a function that yields the places in a source tree that break it; `test_layering.py` holds who may
+import whom. `KNOWN` lists today's exceptions. It has to be exact: an entry without a finding fails as well.
+"""
+
+from __future__ import annotations
+
+import ast
+import io
+import re
+import tokenize
+from collections import Counter
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+MAX_MEMBERS = 14  # modules in a folder
+MAX_MODULE = 400  # lines
+MAX_FUNCTION = 60  # lines, from `def` to the last one
+MAX_PARAMETERS = 9  # of a compiled function
+REASON = "Long because"  # begins the sentence of a docstring that says why a function or module is longer
+COMPILERS = {"jit", "inlined", "joined"}  # decorators of `kin.kernels.compile`
+BANNED = re.compile(
+    r"\b(calm|dear|told|whoever|wish(?:es|ed)?|who (?:asks|wants|waits)|stands guard|the least offending|square to)\b",
+    re.I,
+)
+
+Sources = dict[str, str]  # path relative to the repository → text
+FunctionDef = ast.FunctionDef | ast.AsyncFunctionDef
+
+
+def read_sources(*folders: str) -> Sources:
+    paths = sorted(path for folder in folders for path in (ROOT / folder).rglob("*.py"))
+    return {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in paths}
+
+
+@cache
+def tree(source: str) -> ast.Module:
+    return ast.parse(source)
+
+
+def functions(sources: Sources) -> Iterator[tuple[str, FunctionDef]]:
+    """Every function and method with its place, ``path::name``."""
+    for path, source in sources.items():
+        for node in ast.walk(tree(source)):
+            if isinstance(node, FunctionDef):
+                yield f"{path}::{node.name}", node
+
+
+def crowded_folders(sources: Sources) -> Iterator[str]:
+    """Folders with more than `MAX_MEMBERS` modules."""
+    sizes = Counter(path.rpartition("/")[0] for path in sources)
+    yield from (folder for folder, size in sizes.items() if size > MAX_MEMBERS)
+
+
+def long_modules(sources: Sources) -> Iterator[str]:
+    """Modules of more than `MAX_MODULE` lines whose docstring gives no reason."""
+    for path, source in sources.items():
+        reason = REASON in (ast.get_docstring(tree(source)) or "")
+        if len(source.splitlines()) > MAX_MODULE and not reason:
+            yield path
+
+
+def long_functions(sources: Sources) -> Iterator[str]:
+    """Functions of more than `MAX_FUNCTION` lines whose docstring gives no reason."""
+    for place, node in functions(sources):
+        assert node.end_lineno is not None
+        length = node.end_lineno - node.lineno + 1
+        if length > MAX_FUNCTION and REASON not in (ast.get_docstring(node) or ""):
+            yield place
+
+
+def long_signatures(sources: Sources) -> Iterator[str]:
+    """Compiled functions of more than `MAX_PARAMETERS` parameters: calls mix up their order."""
+    for place, node in functions(sources):
+        decorators = {ast.unparse(d).partition("(")[0].rpartition(".")[2] for d in node.decorator_list}
+        arguments = node.args.posonlyargs + node.args.args + node.args.kwonlyargs
+        if decorators & COMPILERS and len(arguments) > MAX_PARAMETERS:
+            yield place
+
+
+def untyped_solvers(sources: Sources) -> Iterator[str]:
+    """Modules of `kin/solvers` that name `Any` or call `getattr` or `hasattr`: the contract is typed."""
+    for path, source in sources.items():
+        names = {node.id for node in ast.walk(tree(source)) if isinstance(node, ast.Name)}
+        if path.startswith("kin/solvers/") and names & {"Any", "getattr", "hasattr"}:
+            yield path
+
+
+def cut_sentences(sources: Sources) -> Iterator[str]:
+    """Functions that take sentences apart at a colon instead of passing on codes and numbers."""
+    for place, function in functions(sources):
+        for node in ast.walk(function):
+            match node:
+                case ast.Call(
+                    func=ast.Attribute(attr="partition" | "rpartition" | "split" | "rsplit"),
+                    args=[ast.Constant(value=": "), *_],
+                ):
+                    yield place
+
+
+def context_variables(sources: Sources) -> Iterator[str]:
+    """Modules of `kin` that use a `ContextVar`: what a function returns depends on its arguments alone."""
+    yield from (path for path, source in sources.items() if path.startswith("kin/") and "ContextVar" in source)
+
+
+def banned_words(sources: Sources) -> Iterator[str]:
+    """Identifiers, comments and docstrings with a word of `BANNED`, as ``path: word``."""
+    for path, source in sources.items():
+        found = set()
+        for text in prose(source):
+            found |= {match.group(1).lower() for match in BANNED.finditer(text)}
+        yield from (f"{path}: {word}" for word in sorted(found))
+
+
+def prose(source: str) -> Iterator[str]:
+    """The comments, docstrings and identifiers of a source, identifiers as words."""
+    tokens = list(tokenize.generate_tokens(io.StringIO(source).readline))
+    yield "\n".join(token.string for token in tokens if token.type == tokenize.COMMENT)
+    names = sorted({token.string for token in tokens if token.type == tokenize.NAME})
+    yield re.sub(r"(?<=[a-z])(?=[A-Z])", " ", "\n".join(names)).replace("_", " ")
+    for node in ast.walk(tree(source)):
+        if isinstance(node, ast.Module | ast.ClassDef | FunctionDef):
+            yield " ".join((ast.get_docstring(node) or "").split())
+
+
+def import_circles(sources: Sources) -> Iterator[str]:
+    """Imports that are part of a circle among the members of a folder, as ``folder: member → member``.
+
+    A member is a module of the folder or a folder within it with all that it holds; imports inside functions and
+    under TYPE_CHECKING count. Without a circle at any level there is none between modules anywhere.
+    """
+    graphs: dict[str, dict[str, set[str]]] = {}
+    for path, source in sources.items():
+        for imported in imported_paths(source, sources):
+            here, there = path.split("/"), imported.split("/")
+            level = next((i for i, (a, b) in enumerate(zip(here, there, strict=False)) if a != b), None)
+            if level:  # 0: another package; None: itself
+                graph = graphs.setdefault("/".join(here[:level]), {})
+                graph.setdefault(here[level].removesuffix(".py"), set()).add(there[level].removesuffix(".py"))
+    for folder, graph in graphs.items():
+        for member, imported in graph.items():
+            yield from (f"{folder}: {member} → {other}" for other in imported if member in reachable(graph, other))
+
+
+def reachable(graph: dict[str, set[str]], start: str) -> set[str]:
+    found, open_ = {start}, [start]
+    while open_:
+        new = graph.get(open_.pop(), set()) - found
+        found |= new
+        open_ += new
+    return found
+
+
+def imported_paths(source: str, sources: Sources) -> Iterator[str]:
+    """The paths of the modules among `sources` that a source imports."""
+    for node in ast.walk(tree(source)):
+        names = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            # `from app.shared import store` imports the module app.shared.store if there is one.
+            names = [f"{node.module}.{alias.name}" for alias in node.names]
+        for name in names:
+            whole, parent = name.replace(".", "/"), name.rpartition(".")[0].replace(".", "/")
+            candidates = [f"{whole}.py", f"{whole}/__init__.py"]
+            if isinstance(node, ast.ImportFrom):
+                candidates += [f"{parent}.py", f"{parent}/__init__.py"]
+            yield from [path for path in candidates if path in sources][:1]
+
+
+Rule = Callable[[Sources], Iterator[str]]
+CODE = read_sources("kin", "app")
+EVERYTHING = CODE | read_sources("tests")
+RULES: dict[Rule, Sources] = {
+    crowded_folders: EVERYTHING,
+    long_modules: CODE,
+    long_functions: EVERYTHING,
+    long_signatures: CODE,
+    untyped_solvers: CODE,
+    cut_sentences: CODE,
+    context_variables: CODE,
+    banned_words: EVERYTHING,
+    import_circles: CODE,
+}
+
+KNOWN: dict[Rule, set[str]] = {
+    long_modules: {
+        "app/bench/contestants.py",
+        "app/cli/parser.py",
+        "app/shared/answers.py",
+        "app/viewer/lessons/redundancy/__init__.py",
+        "app/viewer/session/controller.py",
+        "app/viewer/tabs/workspace/tab.py",
+        "kin/chapter.py",
+        "kin/ik/__init__.py",
+        "kin/kernels/fk.py",
+        "kin/solvers/collinear7.py",
+        "kin/solvers/common.py",
+        "kin/solvers/numeric.py",
+        "kin/solvers/parallel6.py",
+        "kin/solvers/srs7.py",
+        "kin/solvers/wrist5/__init__.py",
+        "kin/solvers/wrist5/point.py",
+        "kin/solvers/wrist6.py",
+    },
+    long_functions: {
+        "app/cli/parser.py::_parser",
+        "app/service/main.py::create_app",
+        "app/viewer/lessons/postures/fixes.py::remedies",
+        "app/viewer/tabs/workspace/controls.py::_build",
+        "kin/ik/__init__.py::solve_ik",
+        "kin/ik/problem.py::_checked",
+        "kin/solvers/collinear7.py::_solve",
+        "kin/solvers/numeric.py::_descend",
+        "kin/solvers/parallel6.py::_branches",
+        "kin/solvers/srs7.py::_pairs",
+        "kin/solvers/srs7.py::_solve",
+        "kin/solvers/wrist6.py::_branches",
+        "kin/workspace/facts/descent.py::settle",
+    },
+    long_signatures: {
+        "kin/ik/candidates.py::finish",
+        "kin/ik/candidates.py::settle",
+        "kin/kernels/fk.py::_turn",
+        "kin/path/trellis.py::_advance",
+        "kin/solvers/blocks.py::each",
+        "kin/solvers/blocks.py::one",
+        "kin/solvers/collinear7.py::_best_roll",
+        "kin/solvers/collinear7.py::_solve",
+        "kin/solvers/links.py::planar_angles",
+        "kin/solvers/links.py::planar_free",
+        "kin/solvers/numeric.py::_bounded_step",
+        "kin/solvers/numeric.py::_descend",
+        "kin/solvers/numeric.py::_look",
+        "kin/solvers/numeric.py::_model",
+        "kin/solvers/numeric.py::each_of",
+        "kin/solvers/numeric.py::solve",
+        "kin/solvers/parallel6.py::_arm",
+        "kin/solvers/parallel6.py::_spinning",
+        "kin/solvers/scara4.py::_branches",
+        "kin/solvers/srs7.py::_fill",
+        "kin/solvers/srs7.py::_rotations",
+        "kin/solvers/srs7.py::_solve",
+        "kin/solvers/srs7.py::_split_lost",
+        "kin/solvers/srs7.py::_weigh",
+        "kin/solvers/wrist5/__init__.py::_free_base",
+        "kin/solvers/wrist5/__init__.py::_hand",
+        "kin/solvers/wrist5/__init__.py::_solve",
+        "kin/solvers/wrist5/point.py::_add_tool",
+        "kin/solvers/wrist5/point.py::_level_roots",
+        "kin/solvers/wrist5/point.py::_probe",
+        "kin/solvers/wrist5/point.py::_tilt_arcs",
+        "kin/solvers/wrist6.py::_aligned",
+        "kin/solvers/wrist6.py::_on_axis",
+        "kin/solvers/wrist6.py::arm_pairs",
+        "kin/workspace/capability/gauge.py::seek",
+        "kin/workspace/clouds/targets.py::_aim",
+        "kin/workspace/facts/atlas.py::nearest_from",
+        "kin/workspace/facts/atlas.py::probe",
+        "kin/workspace/facts/survey.py::_try",
+    },
+    untyped_solvers: {
+        "kin/solvers/__init__.py",
+        "kin/solvers/mirrored.py",
+    },
+    cut_sentences: {
+        "app/viewer/lessons/velocity/told.py::warning_html",
+        "app/viewer/panel/status.py::_without_repeating",
+        "kin/ik/messages.py::singular",
+        "kin/path/causes.py::_singular",
+    },
+    context_variables: {
+        "kin/solvers/singular.py",
+    },
+    banned_words: {
+        "app/api/asked.py: wish",
+        "app/api/asked.py: wishes",
+        "app/api/path.py: told",
+        "app/api/schemas.py: told",
+        "app/api/workspace/capability.py: whoever",
+        "app/api/workspace/flow.py: told",
+        "app/api/workspace/query.py: told",
+        "app/api/workspace/socket.py: told",
+        "app/api/workspace/summary.py: dear",
+        "app/api/workspace/summary.py: told",
+        "app/api/workspace/summary.py: whoever",
+        "app/bench/arms.py: square to",
+        "app/bench/command.py: told",
+        "app/bench/run.py: told",
+        "app/cli/capability.py: told",
+        "app/cli/commands.py: told",
+        "app/equations/derive.py: told",
+        "app/equations/expression.py: told",
+        "app/exports/formats.py: whoever",
+        "app/exports/save.py: told",
+        "app/exports/snippets.py: told",
+        "app/service/main.py: whoever",
+        "app/service/startup.py: whoever",
+        "app/service/web/access.py: told",
+        "app/service/web/access.py: whoever",
+        "app/service/web/viewer_proxy.py: told",
+        "app/service/web/viewer_proxy.py: whoever",
+        "app/service/workers.py: whoever",
+        "app/shared/clouds.py: whoever",
+        "app/shared/maps.py: whoever",
+        "app/shared/processor.py: told",
+        "app/shared/security.py: told",
+        "app/viewer/feature.py: told",
+        "app/viewer/lessons/dh/draw.py: told",
+        "app/viewer/lessons/dh/steps.py: told",
+        "app/viewer/lessons/equations/page.py: told",
+        "app/viewer/lessons/postures/__init__.py: told",
+        "app/viewer/lessons/postures/fixes.py: told",
+        "app/viewer/lessons/postures/listing.py: told",
+        "app/viewer/lessons/redundancy/__init__.py: told",
+        "app/viewer/lessons/redundancy/__init__.py: wish",
+        "app/viewer/lessons/redundancy/__init__.py: wished",
+        "app/viewer/lessons/velocity/__init__.py: told",
+        "app/viewer/lessons/velocity/jog.py: told",
+        "app/viewer/lessons/velocity/told.py: told",
+        "app/viewer/panel/__init__.py: told",
+        "app/viewer/panel/joints.py: told",
+        "app/viewer/panel/posture.py: told",
+        "app/viewer/panel/status.py: told",
+        "app/viewer/quick.py: told",
+        "app/viewer/scene/arm.py: told",
+        "app/viewer/scene/camera.py: told",
+        "app/viewer/scene/gizmo.py: told",
+        "app/viewer/scene/offer.py: wish",
+        "app/viewer/session/controller.py: told",
+        "app/viewer/session/controller.py: wish",
+        "app/viewer/session/controller.py: wishes",
+        "app/viewer/session/memory.py: told",
+        "app/viewer/session/posture.py: told",
+        "app/viewer/session/state.py: told",
+        "app/viewer/tabs/workspace/beside.py: whoever",
+        "app/viewer/tabs/workspace/capability/folder.py: told",
+        "app/viewer/tabs/workspace/capability/folder.py: wish",
+        "app/viewer/tabs/workspace/capability/folder.py: wished",
+        "app/viewer/tabs/workspace/capability/folder.py: wishes",
+        "app/viewer/tabs/workspace/capability/told.py: wishes",
+        "app/viewer/tabs/workspace/capability/voxels.py: wishes",
+        "app/viewer/tabs/workspace/capability/wishes.py: wished",
+        "app/viewer/tabs/workspace/capability/wishes.py: wishes",
+        "app/viewer/tabs/workspace/controls.py: wish",
+        "app/viewer/tabs/workspace/controls.py: wishes",
+        "app/viewer/tabs/workspace/cut.py: square to",
+        "app/viewer/tabs/workspace/tab.py: told",
+        "app/viewer/tabs/workspace/tab.py: wish",
+        "app/viewer/tabs/workspace/tab.py: wished",
+        "app/viewer/tabs/workspace/tab.py: wishes",
+        "app/viewer/tabs/workspace/wishes.py: wished",
+        "app/viewer/tabs/workspace/wishes.py: wishes",
+        "app/viewer/tabs/workspace/words.py: told",
+        "app/viewer/units.py: told",
+        "kin/chapter.py: whoever",
+        "kin/ik/__init__.py: the least offending",
+        "kin/ik/__init__.py: told",
+        "kin/ik/branches.py: told",
+        "kin/ik/candidates.py: told",
+        "kin/ik/problem.py: told",
+        "kin/ik/problem.py: wish",
+        "kin/ik/problem.py: wishes",
+        "kin/ik/results.py: the least offending",
+        "kin/ik/results.py: told",
+        "kin/kernels/compile.py: stands guard",
+        "kin/path/__init__.py: told",
+        "kin/path/causes.py: told",
+        "kin/path/course.py: told",
+        "kin/path/report.py: told",
+        "kin/path/results.py: told",
+        "kin/path/route.py: dear",
+        "kin/path/smooth.py: wish",
+        "kin/path/smooth.py: wishes",
+        "kin/singularity.py: told",
+        "kin/solvers/collinear7.py: wish",
+        "kin/solvers/common.py: told",
+        "kin/solvers/common.py: wish",
+        "kin/solvers/links.py: square to",
+        "kin/solvers/links.py: wish",
+        "kin/solvers/mirrored.py: told",
+        "kin/solvers/mirrored.py: whoever",
+        "kin/solvers/parallel6.py: square to",
+        "kin/solvers/scara4.py: square to",
+        "kin/solvers/scara4.py: wish",
+        "kin/solvers/singular.py: told",
+        "kin/solvers/slide6.py: square to",
+        "kin/solvers/srs7.py: calm",
+        "kin/solvers/srs7.py: wish",
+        "kin/solvers/wrist5/__init__.py: square to",
+        "kin/solvers/wrist5/point.py: wish",
+        "kin/solvers/wrist6.py: square to",
+        "kin/tolerances.py: told",
+        "kin/workspace/capability/gauge.py: told",
+        "kin/workspace/clouds/draw.py: dear",
+        "kin/workspace/clouds/measures.py: told",
+        "kin/workspace/facts/atlas.py: told",
+        "kin/workspace/facts/extremes.py: told",
+        "kin/workspace/results.py: told",
+        "kin/workspace/sections/arcs.py: square to",
+        "kin/workspace/sections/arcs.py: told",
+        "kin/workspace/sections/cut.py: told",
+        "tests/app/api/test_api_answers.py: told",
+        "tests/app/api/test_api_capability.py: told",
+        "tests/app/api/test_api_equations.py: told",
+        "tests/app/api/test_api_limits.py: told",
+        "tests/app/api/test_api_options.py: told",
+        "tests/app/api/test_api_workspace.py: told",
+        "tests/app/api/test_api_workspace_socket.py: told",
+        "tests/app/equations/test_equations.py: told",
+        "tests/app/exports/test_formats.py: told",
+        "tests/app/fake_browser.py: told",
+        "tests/app/service/test_access.py: told",
+        "tests/app/service/test_access.py: whoever",
+        "tests/app/service/test_faults.py: told",
+        "tests/app/service/test_main.py: told",
+        "tests/app/service/test_viewer_proxy.py: told",
+        "tests/app/service/test_workers.py: told",
+        "tests/app/shared/test_clouds.py: whoever",
+        "tests/app/shared/test_maps.py: told",
+        "tests/app/viewer/lessons/test_viewer_dh.py: told",
+        "tests/app/viewer/lessons/test_viewer_equations.py: told",
+        "tests/app/viewer/lessons/test_viewer_postures.py: told",
+        "tests/app/viewer/lessons/test_viewer_postures.py: wishes",
+        "tests/app/viewer/lessons/test_viewer_redundancy.py: told",
+        "tests/app/viewer/lessons/test_viewer_velocity.py: told",
+        "tests/app/viewer/scene/test_viewer_camera.py: told",
+        "tests/app/viewer/scene/test_viewer_scene.py: told",
+        "tests/app/viewer/session/test_state.py: told",
+        "tests/app/viewer/tabs/test_viewer_capability.py: told",
+        "tests/app/viewer/tabs/test_viewer_capability.py: wish",
+        "tests/app/viewer/tabs/test_viewer_capability.py: wishes",
+        "tests/app/viewer/tabs/test_viewer_workspace.py: told",
+        "tests/app/viewer/tabs/test_viewer_workspace.py: wish",
+        "tests/app/viewer/tabs/test_viewer_workspace.py: wishes",
+        "tests/app/viewer/test_viewer_features.py: told",
+        "tests/app/viewer/test_viewer_quick.py: told",
+        "tests/app/viewer/test_viewer_units.py: told",
+        "tests/arms.py: told",
+        "tests/bench/test_bench.py: calm",
+        "tests/bench/test_bench.py: told",
+        "tests/bench/test_load.py: told",
+        "tests/e2e/test_screens.py: told",
+        "tests/e2e/test_share.py: told",
+        "tests/kin/ik/test_candidates.py: told",
+        "tests/kin/ik/test_ik_options.py: told",
+        "tests/kin/ik/test_ik_options.py: wish",
+        "tests/kin/ik/test_ik_options.py: wishes",
+        "tests/kin/path/test_path.py: told",
+        "tests/kin/solvers/test_families.py: told",
+        "tests/kin/solvers/test_mirrored.py: told",
+        "tests/kin/solvers/test_numeric.py: told",
+        "tests/kin/solvers/test_point5.py: told",
+        "tests/kin/solvers/test_point5.py: wish",
+        "tests/kin/test_axes.py: told",
+        "tests/kin/test_singularity.py: told",
+        "tests/kin/test_singularity.py: wish",
+        "tests/test_docs.py: told",
+    },
+    import_circles: {
+        "app/viewer: feature → panel",
+        "app/viewer: feature → scene",
+        "app/viewer: lessons → feature",
+        "app/viewer: lessons → panel",
+        "app/viewer: lessons → scene",
+        "app/viewer: panel → feature",
+        "app/viewer: panel → lessons",
+        "app/viewer: scene → panel",
+        "kin/solvers/wrist5: __init__ → point",
+        "kin/solvers/wrist5: point → __init__",
+        "kin/solvers: __init__ → mirrored",
+        "kin/solvers: mirrored → __init__",
+        "kin/workspace: clouds → facts",
+        "kin/workspace: facts → clouds",
+        "kin/workspace: facts → sections",
+        "kin/workspace: sections → facts",
+    },
+}
+
+
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.__name__)
+def test_the_code_keeps_the_rules(rule: Rule):
+    found, known = set(rule(RULES[rule])), KNOWN.get(rule, set())
+    assert found - known == set(), rule.__doc__
+    assert known - found == set(), "no longer true: remove these from KNOWN"
+
+
+def lines(count: int, head: str = "def f():", docstring: str = "") -> str:
+    """A function, or whatever else `head` begins, of `count` lines."""
+    body = [f'    """{docstring}"""'] if docstring else []
+    return "\n".join([head, *body, *["    pass"] * (count - 1 - len(body))])
+
+
+TEN = "a, b, c, d, e, f, g, h, i, j"
+BREACHES: list[tuple[Rule, Sources, str]] = [
+    (crowded_folders, {f"kin/new/m{i}.py": "" for i in range(15)}, "kin/new"),
+    (long_modules, {"kin/new.py": "x = 1\n" * 401}, "kin/new.py"),
+    (long_functions, {"app/new.py": lines(61)}, "app/new.py::f"),
+    (long_functions, {"app/new.py": lines(61, "async def f():", "Long as it has to be.")}, "app/new.py::f"),
+    (long_signatures, {"kin/new.py": f"@jit\ndef f({TEN}): ..."}, "kin/new.py::f"),
+    (long_signatures, {"kin/new.py": f"@c.joined(x=1)\ndef f(*, {TEN}): ..."}, "kin/new.py::f"),
+    (untyped_solvers, {"kin/solvers/new.py": "x: Any = 1"}, "kin/solvers/new.py"),
+    (untyped_solvers, {"kin/solvers/new.py": "y = getattr(x, 'solve')"}, "kin/solvers/new.py"),
+    (cut_sentences, {"app/new.py": "def f(text):\n    return text.partition(': ')[0]"}, "app/new.py::f"),
+    (context_variables, {"kin/new.py": "from contextvars import ContextVar"}, "kin/new.py"),
+    (banned_words, {"kin/new.py": "# What is told of it."}, "kin/new.py: told"),
+    (banned_words, {"kin/new.py": "def ik_wishes(): ..."}, "kin/new.py: wishes"),
+    (banned_words, {"kin/new.py": "class DearAnswers: ..."}, "kin/new.py: dear"),
+    (banned_words, {"kin/new.py": '"""Two axes square\nto each other."""'}, "kin/new.py: square to"),
+]
+CIRCLES: list[tuple[Sources, set[str]]] = [
+    ({"kin/a.py": "import kin.b", "kin/b.py": "from kin.a import x"}, {"kin: a → b", "kin: b → a"}),
+    (
+        {"kin/a.py": "from kin import b", "kin/b.py": "def late():\n    import kin.c", "kin/c.py": "import kin.a"},
+        {"kin: a → b", "kin: b → c", "kin: c → a"},
+    ),
+    (
+        {"kin/x/a.py": "from kin.y.b import B", "kin/y/b.py": "", "kin/y/c.py": "if TYPES:\n    import kin.x.a"},
+        {"kin: x → y", "kin: y → x"},
+    ),
+    (
+        {"kin/x/__init__.py": "from kin.x.a import A", "kin/x/a.py": "from kin.x import B"},
+        {"kin/x: __init__ → a", "kin/x: a → __init__"},
+    ),
+]
+
+
+@pytest.mark.parametrize(("rule", "sources", "place"), BREACHES)
+def test_the_rules_have_teeth(rule: Rule, sources: Sources, place: str):
+    assert list(rule(sources)) == [place]
+
+
+@pytest.mark.parametrize(("sources", "imports"), CIRCLES)
+def test_circles_are_found(sources: Sources, imports: set[str]):
+    assert set(import_circles(sources)) == imports
+
+
+def test_every_rule_is_shown_to_have_teeth():
+    assert {rule for rule, *_ in BREACHES} | {import_circles} == set(RULES)
+
+
+@pytest.mark.parametrize(
+    ("rule", "sources"),
+    [
+        (crowded_folders, {f"kin/new/m{i}.py": "" for i in range(14)}),
+        (long_modules, {"kin/new.py": "x = 1\n" * 400}),
+        (long_functions, {"app/new.py": lines(60)}),
+        (long_functions, {"app/new.py": lines(80, docstring="F. Long because one loop has many scalars.")}),
+        (long_signatures, {"kin/new.py": f"def f({TEN}): ..."}),
+        (untyped_solvers, {"app/new.py": "x: Any = getattr(y, 'z')"}),
+        (cut_sentences, {"app/new.py": "def f(text):\n    return text.partition('=')[0]"}),
+        (banned_words, {"app/new.py": "text = 'as I told you'; retold = calmness = 1"}),
+        (
+            import_circles,
+            {"kin/a.py": "from kin.b import x", "kin/b.py": "import kin.c", "kin/c.py": "import numpy"},
+        ),
+    ],
+)
+def test_what_the_rules_allow_passes(rule: Rule, sources: Sources):
+    assert list(rule(sources)) == []
