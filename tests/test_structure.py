@@ -193,7 +193,6 @@ KNOWN: dict[Rule, set[str]] = {
     long_modules: {
         "app/bench/contestants.py",
         "app/cli/parser.py",
-        "app/shared/answers.py",
         "app/viewer/lessons/redundancy/__init__.py",
         "app/viewer/session/controller.py",
         "app/viewer/tabs/workspace/tab.py",
