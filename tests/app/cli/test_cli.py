@@ -560,7 +560,12 @@ def test_an_interrupted_cloud_leaves_nothing_behind(tmp_path):
     words = ["workspace", "pioneer5", "-n", "1e10", "-o", str(old), "--progress"]
     # As at a terminal: what a shell starts in the background ignores Ctrl-C, and so do its children.
     listening = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
-    command = [sys.executable, "-c", f"{listening}; import sys; from app import cli; sys.exit(cli.main())", *words]
+    command = [
+        sys.executable,
+        "-c",
+        f"{listening}; import sys; from app.cli.parser import main; sys.exit(main())",
+        *words,
+    ]
     with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         deadline = time.monotonic() + 60
         while not any(file.stat().st_size > 1e6 for file in tmp_path.iterdir()):

@@ -247,7 +247,7 @@ def test_of_a_file_that_does_not_fit_nothing_is_left(tmp_path, capsys):
 # -- the cache of machine code ---------------------------------------------------------------------------------
 
 KERNEL = """
-from kin.compiled import jit
+from kin.kernels.compile import jit
 
 @jit
 def twice(x):
@@ -293,7 +293,7 @@ def test_without_a_folder_to_write_to_kernels_work_and_one_warning_says_so(tmp_p
     refused = """
         import numba.core.caching as caching
         def refuse(self): raise OSError(30, "Read-only file system")
-        import kin.compiled
+        import kin.kernels.compile
         caching._CacheLocator.ensure_cache_path = refuse
     """
     found = twice(tmp_path, textwrap.dedent(refused).replace("\n", "\n        "))
