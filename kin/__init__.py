@@ -1,4 +1,4 @@
-"""Kinematics of serial arms given by Denavit–Hartenberg tables: pure functions of arrays.
+"""Kinematics of serial arms described by Denavit–Hartenberg tables: pure functions of arrays.
 
 >>> import kin
 >>> robot = kin.get_robot("pioneer5")

@@ -1,6 +1,6 @@
-"""Robot files: TOML ⇄ `Robot`. The only module of the core that touches files.
+"""Robot files: TOML → `Robot`. The only module of the core that reads files.
 
-A file names its own units, so that a table is typed as its source prints it::
+A file states its units, so a table can be copied as its source prints it::
 
     id = "my-arm"
     name = "My arm"
@@ -20,12 +20,12 @@ A file names its own units, so that a table is typed as its source prints it::
     [home]
     q = [90]
 
-Only ``id``, ``name``, ``source``, ``convention``, ``units`` and ``rows`` have to be there; in a row, what is left
-out is zero. Without ``limits`` a revolute joint turns ±180° and a prismatic one slides 0 to 1 m; without ``home``
-the arm starts in the middle of its limits, or bent a little where that would be singular (:mod:`kin.home`).
-``base`` and ``tool`` are tables ``{ xyz = [x, y, z], rpy = [roll, pitch, yaw] }``.
+Only ``id``, ``name``, ``source``, ``convention``, ``units`` and ``rows`` are required; in a row, a missing number
+is zero. Without ``limits`` a revolute joint turns ±180° and a prismatic one slides 0 to 1 m. Without ``home`` the
+arm starts in the middle of its limits, or bent if that configuration is singular (:mod:`kin.home`). ``base`` and
+``tool`` are tables ``{ xyz = [x, y, z], rpy = [roll, pitch, yaw] }``.
 
-A file with an error is refused with the file, the field, the value and what would be valid.
+An error in a file raises `RobotFileError` with the file, the field, the value and what would be valid.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ from kin.home import default_home
 from kin.robot import IDENTITY, Joint, Matrix, Robot, exact_cos_sin
 
 BUILTIN = Path(__file__).parent / "robots"
-FIRST = ("pioneer5", "redundant7", "redundant7-craig")  # the chapter's arms lead every list
+FIRST = ("pioneer5", "redundant7", "redundant7-craig")  # the chapter's arms come first in every list
 LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 ANGLES = {"deg": math.pi / 180, "rad": 1.0}
 KINDS = ("revolute", "prismatic", "fixed")
@@ -54,13 +54,13 @@ _ROW = {"name", "kind", "theta", "d", "a", "alpha", "limits"}
 
 @lru_cache(maxsize=1)
 def builtin_robots() -> dict[str, Robot]:
-    """The robots shipped with the package, by id: the chapter's first, then in the order of their file names."""
+    """The built-in robots by id: the chapter's first, then in alphabetical order."""
     robots = load_folder(BUILTIN)
     return {robot_id: robots[robot_id] for robot_id in dict.fromkeys((*FIRST, *robots))}
 
 
 def get_robot(robot_id: str) -> Robot:
-    """A built-in robot; raises `UnknownRobotError` listing the ids there are."""
+    """A built-in robot; raises `UnknownRobotError` listing the valid ids."""
     robots = builtin_robots()
     if robot_id not in robots:
         raise UnknownRobotError(robot_id, tuple(robots))
@@ -68,24 +68,28 @@ def get_robot(robot_id: str) -> Robot:
 
 
 def load_folder(folder: Path) -> dict[str, Robot]:
-    """Every ``*.toml`` of a folder, by id. Two files with one id are refused."""
+    """The robots of every ``*.toml`` file in a folder, by id.
+
+    Raises:
+        RobotFileError: a file is invalid, two files have the same id, or the folder cannot be read.
+    """
     robots: dict[str, Robot] = {}
     try:
         paths = sorted(path for path in folder.iterdir() if path.suffix == ".toml")
-    except OSError as error:  # which glob would take for an empty folder
+    except OSError as error:  # glob would report an empty folder instead
         raise RobotFileError(str(folder), "folder", str(error), "a folder that can be read") from error
     for path in paths:
         robot = load_robot(path)
         if robot.id in robots:
-            raise RobotFileError(str(path), "id", robot.id, "an id no other file of the folder uses")
+            raise RobotFileError(str(path), "id", robot.id, "an id that no other file of the folder uses")
         robots[robot.id] = robot
     return robots
 
 
 def load_robot(path: Path | str) -> Robot:
-    """The robot described by a TOML file; raises `RobotFileError` for anything wrong with it."""
+    """The robot described by a TOML file; raises `RobotFileError` if the file is invalid."""
     try:
-        text = Path(path).read_text(encoding="utf-8-sig")  # editors on Windows put a mark in front
+        text = Path(path).read_text(encoding="utf-8-sig")  # some editors on Windows write a byte order mark
     except (OSError, UnicodeDecodeError) as error:
         raise RobotFileError(str(path), "file", str(error), "a readable UTF-8 text file") from error
     return parse_robot(text, str(path))
@@ -95,13 +99,13 @@ def parse_robot(text: str, file: str = "robot") -> Robot:
     """The robot described by TOML text; `file` is the name used in messages."""
     try:
         data = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # TOMLDecodeError is a ValueError; so is an endless integer
+    except (ValueError, RecursionError) as error:  # TOMLDecodeError is a ValueError, as is an integer too long
         raise RobotFileError(file, "file", str(error), "valid TOML") from None
     return _Reader(file).robot(data)
 
 
 class _Reader:
-    """Turns parsed TOML into a `Robot`, naming the field whenever it refuses."""
+    """Turns parsed TOML into a `Robot`; every error names the field."""
 
     def __init__(self, file: str) -> None:
         self.file = file
@@ -112,12 +116,12 @@ class _Reader:
         return RobotFileError(self.file, field, value, expected)
 
     def robot(self, data: dict[str, Any]) -> Robot:
-        self.no_strangers("", data, _TOP)
+        self.only_known_fields("", data, _TOP)
         robot_id = self.text(data, "id")
         if not re.fullmatch(r"[a-z0-9][a-z0-9-]{0,39}", robot_id):
             raise self.refuse("id", robot_id, "lower-case letters, digits and hyphens, at most 40")
         units = self.table(data, "units")
-        self.no_strangers("units.", units, {"length", "angle"})
+        self.only_known_fields("units.", units, {"length", "angle"})
         length = self.choice(units, "length", tuple(LENGTHS), "units.")
         self.length = LENGTHS[length]
         self.angle = ANGLES[self.choice(units, "angle", tuple(ANGLES), "units.")]
@@ -151,14 +155,14 @@ class _Reader:
         where = f"rows[{index}]."
         if not isinstance(data, dict):
             raise self.refuse(f"rows[{index}]", data, "a table with theta, d, a, alpha")
-        self.no_strangers(where, data, _ROW)
+        self.only_known_fields(where, data, _ROW)
         kind = self.choice(data, "kind", KINDS, where, default="revolute")
         scale = self.length if kind == "prismatic" else self.angle
         limits: tuple[float, float] | None = None
         if "limits" in data:
             pair = data["limits"]
             if kind == "fixed":
-                raise self.refuse(where + "limits", pair, "no limits, as the row is fixed")
+                raise self.refuse(where + "limits", pair, "no limits, because the row is fixed")
             if not isinstance(pair, list) or len(pair) != 2:
                 raise self.refuse(where + "limits", pair, "two numbers [lower, upper]")
             low, high = (self.number(f"{where}limits[{k}]", v) * scale for k, v in enumerate(pair))
@@ -166,7 +170,7 @@ class _Reader:
                 raise self.refuse(where + "limits", pair, "lower below upper")
             limits = (low, high)
         elif kind != "fixed":
-            # No stated stop: one whole turn about zero, or one metre of stroke, is what fits a slider.
+            # A slider needs limits: one turn about zero, or one metre of stroke.
             limits = (-math.pi, math.pi) if kind == "revolute" else (0.0, 1.0)
         return Joint(
             name=self.text(data, "name", f"joint {index + 1}", where),
@@ -182,7 +186,7 @@ class _Reader:
         if "home" not in data:
             return tuple(0.5 * sum(j.limits) if j.limits else 0.0 for j in joints)
         table = self.table(data, "home")
-        self.no_strangers("home.", table, {"q"})
+        self.only_known_fields("home.", table, {"q"})
         q = table.get("q")
         if not isinstance(q, list) or len(q) != len(joints):
             raise self.refuse("home.q", q, f"{len(joints)} numbers, one per moving joint")
@@ -199,7 +203,7 @@ class _Reader:
         if key not in data:
             return IDENTITY
         table = self.table(data, key)
-        self.no_strangers(key + ".", table, {"xyz", "rpy"})
+        self.only_known_fields(key + ".", table, {"xyz", "rpy"})
         x, y, z = (v * self.length for v in self.triple(table, "xyz", key + "."))
         (cr, sr), (cp, sp), (cy, sy) = (
             exact_cos_sin(v * self.angle) for v in self.triple(table, "rpy", key + ".")
@@ -247,7 +251,7 @@ class _Reader:
             raise self.refuse(where + key, value, "one of " + ", ".join(f'"{v}"' for v in valid))
         return str(value)
 
-    def no_strangers(self, where: str, data: dict[str, Any], known: set[str]) -> None:
+    def only_known_fields(self, where: str, data: dict[str, Any], fields: set[str]) -> None:
         for key in data:
-            if key not in known:
-                raise self.refuse(where + key, data[key], "only the fields " + ", ".join(sorted(known)))
+            if key not in fields:
+                raise self.refuse(where + key, data[key], "only the fields " + ", ".join(sorted(fields)))

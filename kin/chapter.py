@@ -2,24 +2,24 @@
 
 The chapter describes two arms by DH tables, multiplies the row matrices out by hand, and prints the twelve
 entries of the product, ``T_base_tool = [n o a p]``: the tool's x, y and z axes in the columns n, o, a, and its
-position in p. Equations (4)-(15) are the 5-DOF Pioneer arm, (17)-(28) the 7-DOF redundant arm. Whoever types
-them in gets an arm that is sometimes 97 cm away from the real one, for seven of the 24 are misprinted:
+position in p. Equations (4)-(15) describe the 5-DOF Pioneer arm, (17)-(28) the 7-DOF redundant arm. Seven of the
+24 are misprinted, and a program that uses them as printed is wrong by up to 97 cm:
 
-- (6) and (27) carry one term too many, or lack one;
-- (13) and (22) have one cosine where a sine must be;
+- (6) has one term too many, (27) lacks one;
+- (13) and (22) have a cosine in place of a sine;
 - (25), and (28) which is built on it, have three wrong signs;
-- (19) has five slips: three signs, one letter, and a term too many.
+- (19) has five errors: three signs, one letter, and a spurious term.
 
-(3), the matrix as a whole, is garbled in the stored text; its entries are the equations that follow it.
+(3), the whole matrix, is garbled in the stored text; its entries are the equations that follow it.
 
-A misprint betrays itself without any reference: the columns n, o, a of a true rotation are orthonormal, and
-those of the printed ones are not. Here each equation is kept as text in a small notation, and *that text* is
-what gets evaluated, so that what is shown and what is computed cannot drift apart::
+A misprint can be detected without a reference: the columns n, o, a of a rotation are orthonormal, and those of the
+printed equations are not. Each equation is stored as text in a small notation. The same text is displayed and
+evaluated, so the two cannot differ::
 
     -d6*c1*s23*c4*s5 - d6*s1*s4*s5 + …      with c1 = cos θ1, s23 = sin(θ2 + θ3), d6 from the arm's own table
 
-``C`` and ``S`` abbreviate what the chapter writes out each time, see `ABBREVIATIONS`. The arm as printed turns
-joints 1 and 2 about one line, hence they are the cosine and sine of θ1 + θ2.
+``C`` and ``S`` abbreviate sums that the chapter writes out each time, see `ABBREVIATIONS`. In the arm as printed,
+joints 1 and 2 share one axis, so these are the cosine and sine of θ1 + θ2.
 
 >>> [e.number for e in equations("pioneer5") if e.verdict == "wrong"]
 [6, 13]
@@ -47,7 +47,7 @@ Form = Literal["printed", "corrected"]
 
 ABBREVIATIONS = {"C": "c1*c2 - s1*s2", "S": "c1*s2 + s1*c2"}
 
-# What the chapter calls d1, a2 …, as (row, column) of the arm's table. Its d7 is the row "End" after row 7.
+# The chapter's symbols d1, a2 … as (row, column) of the DH table. Its d7 is the row "End" after row 7.
 LENGTHS: dict[str, dict[str, tuple[int, Literal["d", "a"]]]] = {
     "pioneer5": {"d1": (0, "d"), "a1": (0, "a"), "a2": (1, "a"), "d4": (3, "d"), "d6": (5, "d")},
     "redundant7": {"d1": (0, "d"), "d3": (2, "d"), "d5": (4, "d"), "d7": (7, "d")},
@@ -59,18 +59,18 @@ class Equation:
     """One printed equation.
 
     Attributes:
-        number: as in the chapter.
+        number: the chapter's equation number.
         robot_id: the built-in robot it describes.
-        entry: which entry of ``[n o a p]``, e.g. ``"p_x"``; ``"T"`` for the whole matrix.
-        verdict: whether the printed form equals the DH product for every q.
+        entry: the entry of ``[n o a p]`` it gives, e.g. ``"p_x"``; ``"T"`` for the whole matrix.
+        verdict: ``"right"`` if the printed form equals the DH product for every q.
         printed, corrected: right-hand sides in the module's notation; empty where the text is garbled.
-        note: what is wrong with the printed form, empty when nothing is.
+        note: the error in the printed form; empty for a right equation.
         largest: largest difference from the DH product inside the joint limits, in metres for ``p``, else a pure
             number; 0 for a right equation.
-        largest_at: a configuration inside the limits where it is reached, in degrees; empty for a right equation.
+        largest_at: a configuration inside the limits that attains it, in degrees; empty for a right equation.
         turn: for a wrong equation of an axis (``n``, ``o``, ``a``), the largest angle in radians between that axis
-            and what it becomes with this one entry as printed, see `turned`; else 0.
-        turn_at: a configuration inside the limits where it is reached, in degrees; empty where `turn` is 0.
+            and the same axis with this entry as printed, see `turned`; else 0.
+        turn_at: a configuration inside the limits that attains it, in degrees; empty where `turn` is 0.
     """
 
     number: int
@@ -87,22 +87,23 @@ class Equation:
 
     @property
     def worst_at(self) -> tuple[float, ...]:
-        """Where the misprint shows most: farthest from the tool for ``p``, turned most for an axis; degrees."""
+        """The configuration of the largest error: of position for ``p``, of direction for an axis; degrees."""
         return self.turn_at or self.largest_at
 
     @property
     def index(self) -> tuple[int, int]:
-        """Row and column of the entry in T_base_tool; raises ValueError for the garbled whole."""
+        """Row and column of the entry in T_base_tool; raises ValueError for the garbled matrix (3)."""
         column, row = self.entry.split("_")
         return "xyz".index(row), "noap".index(column)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
-    """One equation at given configurations: each array is ``(...)``; `difference` is printed − dh.
+    """Values of one equation at given configurations; every array is ``(...)``.
 
-    Metres for ``p``, pure numbers for ``n``, ``o``, ``a``. `dh` comes from the product of the table's rows. `turn`
-    is the same difference as an angle in radians, see `turned`; 0 for ``p``.
+    `printed` and `corrected` come from the equation, `dh` from the product of the DH matrices, and `difference` is
+    printed − dh: in metres for ``p``, pure numbers for ``n``, ``o``, ``a``. `turn` is the same difference as an
+    angle in radians, see `turned`; 0 for ``p``.
     """
 
     number: int
@@ -115,7 +116,7 @@ class Comparison:
 
 
 def equations(robot_id: str) -> tuple[Equation, ...]:
-    """The chapter's equations about a built-in robot, in order; none for an arm it prints no equations of.
+    """The chapter's equations for a built-in robot, in order; empty for a robot that is not in the chapter.
 
     Raises:
         UnknownRobotError: no built-in robot has this id.
@@ -125,13 +126,13 @@ def equations(robot_id: str) -> tuple[Equation, ...]:
 
 
 def compare(robot_id: str, q: ArrayLike) -> list[Comparison]:
-    """Every equation that can be evaluated, at configurations ``(..., n)``, beside the DH product.
+    """Compare every readable equation with the DH product at configurations ``(..., n)``.
 
     Raises:
         UnknownRobotError: no built-in robot has this id.
         InputError: q is not finite numbers ``(..., n)``.
     """
-    # Late, so that looking at the equations' texts does not wait for compiled kernels.
+    # Imported here, so that reading the equations does not load the compiled kernels.
     from kin.fk import fk
 
     robot = get_robot(robot_id)
@@ -151,10 +152,9 @@ def compare(robot_id: str, q: ArrayLike) -> list[Comparison]:
 
 
 def turned(T_base_tool: Array, index: tuple[int, int], entry: Array) -> Array:
-    """Angle in radians ``(...)`` between an axis of poses ``(..., 4, 4)`` and the same with one entry replaced.
+    """Angle in radians ``(...)`` between an axis of poses ``(..., 4, 4)`` and that axis with one entry replaced.
 
-    An entry of n, o, a is a pure number; this tells what it means for the tool: by so much the axis points
-    elsewhere. 0 for an entry of p.
+    It turns an error in an entry of n, o or a, a pure number, into an error of direction. 0 for an entry of p.
     """
     row, column = index
     if column == 3:
@@ -162,17 +162,17 @@ def turned(T_base_tool: Array, index: tuple[int, int], entry: Array) -> Array:
     axis = T_base_tool[..., :3, column]
     other = axis.copy()
     other[..., row] = entry
-    # An arc cosine would lose half the digits of a small angle.
+    # atan2, because acos loses half the digits of a small angle.
     return np.asarray(np.arctan2(np.linalg.norm(np.cross(axis, other), axis=-1), (axis * other).sum(axis=-1)))
 
 
 def matrix(robot_id: str, q: ArrayLike, form: Form = "printed") -> Array:
-    """``[n o a p]`` put together from the chapter's equations, ``(..., 4, 4)`` for configurations ``(..., n)``.
+    """``[n o a p]`` from the chapter's equations, ``(..., 4, 4)`` for configurations ``(..., n)``.
 
-    With the printed forms this is *not* a rigid transform: that is how the misprints show.
+    With the printed forms the result is *not* a rigid transform, which reveals the misprints.
 
     Raises:
-        InputError: bad q or form, or an arm the chapter prints no equations of.
+        InputError: bad q or form, or a robot that is not in the chapter.
         UnknownRobotError: no built-in robot has this id.
     """
     if form not in ("printed", "corrected"):
@@ -212,10 +212,10 @@ def evaluate(text: str, values: Mapping[str, Array]) -> Array:
 
 @lru_cache(maxsize=256)
 def parse(text: str) -> ast.expr:
-    """The tree of an expression: names, ``+``, ``-``, ``*`` and brackets, as python's own syntax nodes.
+    """Parse an expression of names, ``+``, ``-``, ``*`` and parentheses into Python syntax nodes.
 
     Raises:
-        ValueError: anything else in it. The texts are never run as code, only walked.
+        ValueError: the text contains anything else. It is never executed, only walked.
     """
     try:
         tree = ast.parse(text, mode="eval").body
@@ -261,20 +261,10 @@ EQUATIONS: tuple[Equation, ...] = (
         "garbled",
         "",
         "",
-        "The matrix as a whole cannot be read in the stored text; its entries follow as (4) to (15).",
+        "The matrix cannot be read in the stored text; its entries follow as (4) to (15).",
     ),
-    _right(
-        4,
-        _PIONEER,
-        "p_x",
-        "-d6*c1*s23*c4*s5 - d6*s1*s4*s5 + d6*c1*c23*c5 + d4*c1*c23 + a2*c1*c2 + a1*c1",
-    ),
-    _right(
-        5,
-        _PIONEER,
-        "p_y",
-        "-d6*s1*s23*c4*s5 + d6*c1*s4*s5 + d6*s1*c23*c5 + d4*s1*c23 + a2*s1*c2 + a1*s1",
-    ),
+    _right(4, _PIONEER, "p_x", "-d6*c1*s23*c4*s5 - d6*s1*s4*s5 + d6*c1*c23*c5 + d4*c1*c23 + a2*c1*c2 + a1*c1"),
+    _right(5, _PIONEER, "p_y", "-d6*s1*s23*c4*s5 + d6*c1*s4*s5 + d6*s1*c23*c5 + d4*s1*c23 + a2*s1*c2 + a1*s1"),
     Equation(
         6,
         _PIONEER,
@@ -282,7 +272,7 @@ EQUATIONS: tuple[Equation, ...] = (
         "wrong",
         "-d6*c23*c4*s5 - d6*s23*c5 - d4*s23*c5 - d4*s23 - a2*s2 + d1",
         "-d6*c23*c4*s5 - d6*s23*c5 - d4*s23 - a2*s2 + d1",
-        "The term -d4*s23*c5 does not belong there.",
+        "The term -d4*s23*c5 is spurious.",
         largest=0.13522961568046956,
         largest_at=(0.0, 73.0, 17.0, 0.0, 15.0),
     ),
@@ -299,7 +289,7 @@ EQUATIONS: tuple[Equation, ...] = (
         "wrong",
         "-c1*s23*c4*s5 - s1*s4*c5 + c1*c23*c5",
         "-c1*s23*c4*s5 - s1*s4*s5 + c1*c23*c5",
-        "In the second term c5 must be s5.",
+        "In the second term, c5 should be s5.",
         largest=0.7044160264027588,
         largest_at=(90.0, 0.0, 0.0, 85.0, 15.0),
         turn=0.6157384581117262,
@@ -326,25 +316,15 @@ EQUATIONS: tuple[Equation, ...] = (
         "wrong",
         "c7*c6*s3*c4*s5 - c7*c6*s5*c3 + c7*s6*s3*c3 + c7*s6*s3*s4 + s7*c3*c5 - s7*s3*c4*s5",
         "-c7*c6*(s3*c4*c5 + c3*s5) + c7*s6*s3*s4 - s7*(c3*c5 - s3*c4*s5)",
-        "Five slips: in the first term the sign and s5 for c5, a third term that does not belong there, and "
-        "the signs of the last two.",
+        "Five errors: the sign of the first term, and its s5, which should be c5; a spurious third term; the "
+        "signs of the last two.",
         largest=2.377382821692843,
         largest_at=(0.0, 0.0, -66.55, 0.0, 60.35, 16.2679, -236.7554),
         turn=math.pi,
         turn_at=(0.0, 0.0, 0.0, -45.0, 0.0, 0.0, 90.0),
     ),
-    _right(
-        20,
-        _REDUNDANT,
-        "o_x",
-        "c6*(-c3*s4*C - c4*S) - s6*c5*(c3*c4*C - s4*S) - s6*s5*(-s3*C)",
-    ),
-    _right(
-        21,
-        _REDUNDANT,
-        "o_y",
-        "c6*(-c3*s4*S + c4*C) - s6*c5*(c3*c4*S + s4*C) - s6*s5*(-s3*S)",
-    ),
+    _right(20, _REDUNDANT, "o_x", "c6*(-c3*s4*C - c4*S) - s6*c5*(c3*c4*C - s4*S) - s6*s5*(-s3*C)"),
+    _right(21, _REDUNDANT, "o_y", "c6*(-c3*s4*S + c4*C) - s6*c5*(c3*c4*S + s4*C) - s6*s5*(-s3*S)"),
     Equation(
         22,
         _REDUNDANT,
@@ -352,7 +332,7 @@ EQUATIONS: tuple[Equation, ...] = (
         "wrong",
         "s6*s3*c4*c5 + s5*c3*s6 + s3*c4*c6",
         "s6*(s3*c4*c5 + c3*s5) + c6*s3*s4",
-        "In the last term c4 must be s4.",
+        "In the last term, c4 should be s4.",
         largest=1.4142135623730951,
         largest_at=(0.0, 0.0, 90.0, -45.0, 0.0, 0.0, 0.0),
         turn=math.pi,
@@ -377,7 +357,7 @@ EQUATIONS: tuple[Equation, ...] = (
         "wrong",
         "s7*c6*s3*c4*c5 - s7*c6*s5*c3 + s7*s6*s4*s3 + c7*c4*s3*s5 - c3*c5*c7",
         _AZ_7,
-        "Three signs: the first and the last two terms.",
+        "Three signs are wrong: those of the first term and of the last two.",
         largest=2.3094010767585034,
         largest_at=(0.0, 0.0, 54.7356, 0.0, -35.2644, 0.0, -215.2644),
         turn=math.pi,
@@ -410,7 +390,7 @@ EQUATIONS: tuple[Equation, ...] = (
         "wrong",
         "d7*s7*s3*c6*c5*c4 - d7*s7*s5*c6*c3 + d7*s7*s6*s4*s3 + d7*s5*s3*c7*c4 - d7*c7*c5*c3 + d5*s4*s3 + d1",
         f"d1 + d5*s3*s4 + d7*({_AZ_7})",
-        "The same three signs as in (25), which enters here times d7.",
+        "The same three signs as in (25), which appears here multiplied by d7.",
         largest=0.9699484522385713,
         largest_at=(0.0, 0.0, -54.7356, 0.0, -144.7356, 0.0, 215.2644),
     ),

@@ -1,7 +1,7 @@
-"""What misuse raises.
+"""Exceptions for invalid input.
 
-A question without an answer is a result with a status and a sentence; only misuse raises. Every error says
-which field was wrong, what it was, and what would be valid, so that a message can be shown as it is.
+A problem without a solution is not an error: it gives a result with a status and a reason. Invalid input raises.
+Every message names the field, the value and what would be valid, so it can be shown to people as it is.
 """
 
 from __future__ import annotations
@@ -10,15 +10,15 @@ from reprlib import Repr
 
 
 class KinematicsError(ValueError):
-    """Base of all errors raised by :mod:`kin`."""
+    """Base class of all errors raised by :mod:`kin`."""
 
 
 class InputError(KinematicsError):
-    """A value given to a function is not usable.
+    """An argument is invalid.
 
     Attributes:
-        field: name of the offending argument, e.g. ``"q[2]"``.
-        value: what was given, shortened for display.
+        field: name of the argument, e.g. ``"q[2]"``.
+        value: the given value, shortened for display.
         expected: what would be valid.
     """
 
@@ -30,7 +30,7 @@ class InputError(KinematicsError):
 
 
 class RobotFileError(KinematicsError):
-    """A robot description is refused: it names the file, the field, the value and what is valid."""
+    """A robot file is invalid; the message names the file, the field, the value and what would be valid."""
 
     def __init__(self, file: str, field: str, value: object, expected: str) -> None:
         self.file = file
@@ -41,7 +41,7 @@ class RobotFileError(KinematicsError):
 
 
 class UnknownRobotError(KinematicsError):
-    """No robot has this id; the message lists those that exist."""
+    """No robot has this id; the message lists the valid ids."""
 
     def __init__(self, robot_id: str, known: tuple[str, ...]) -> None:
         self.robot_id = robot_id
@@ -50,13 +50,13 @@ class UnknownRobotError(KinematicsError):
 
 
 def shorten(value: object, length: int = 80) -> str:
-    """`repr` of a value cut to a length that fits a message, whatever the caller sent.
+    """`repr` of any value, cut to a length that fits a message.
 
-    Only the head of a container is looked at, so that refusing a huge or bottomless value costs nothing.
+    Only the first items of a container are read, so huge or deeply nested values cost little.
     """
     try:
         text = _REPR.repr(value)
-    except ValueError:  # an integer of more digits than Python agrees to print
+    except ValueError:  # an integer with more digits than Python converts to text
         text = f"<{type(value).__name__} too long to print>"
     return text if len(text) <= length else text[: length - 1] + "…"
 

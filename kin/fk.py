@@ -2,8 +2,9 @@
 
 Each function takes one configuration ``(n,)`` or any batch ``(..., n)`` and returns the same leading axes.
 
-One configuration costs less than looking at it does. So the array is looked at once, and a compiled function is
-entered directly (:func:`kin.kernels.compile.direct`); whatever is not a plain float64 array takes the careful way.
+For a single configuration, checking the argument takes longer than the kinematics. A contiguous float64 array is
+therefore checked once and passed directly to a compiled function (:func:`kin.kernels.compile.direct`); any other
+argument is validated and converted first.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ _empty, _ndarray = np.empty, np.ndarray
 
 
 class _Compiled:
-    """Kernels without guard, each loaded or compiled when it is first needed."""
+    """Entry points of kernels that do not check their arguments, each loaded or compiled on first use."""
 
     @cached_property
     def fk_one(self) -> Callable[[Array, Array, Array], bool]:
@@ -57,7 +58,7 @@ def fk(robot: Robot, q: ArrayLike) -> Array:
 
     Equation (2) of the chapter, ``T = A_1 … A_n``, for either convention.
     """
-    # Strides of (8,): one axis, and nothing between its numbers.
+    # Strides of (8,): one axis, contiguous.
     if type(q) is _ndarray and q.strides == _DENSE and q.dtype is _FLOAT:
         T = _empty(_POSE)
         if _compiled.fk_one(robot.model, q, T):
@@ -72,7 +73,7 @@ def fk(robot: Robot, q: ArrayLike) -> Array:
 def fk_positions(robot: Robot, q: ArrayLike) -> Array:
     """Tool points ``(..., 3)`` in metres in the base frame, for configurations ``(..., n)``.
 
-    The position column of :func:`fk`, at a fraction of its cost.
+    The position column of :func:`fk`, computed several times faster.
     """
     q = _batch(robot, q)
     out = np.empty((*q.shape[:-1], 3))
@@ -124,12 +125,12 @@ def manipulability(robot: Robot, q: ArrayLike, part: Part = "all") -> Array:
 
 
 def _batch(robot: Robot, q: ArrayLike) -> Array:
-    """`q` as a C-contiguous float64 array ``(..., n)``; a plain one as it is: the kernel looks for NaN itself."""
+    """`q` as a C-contiguous float64 array ``(..., n)``; one that is already is returned as it is."""
     if type(q) is np.ndarray and q.dtype is _FLOAT and q.flags.c_contiguous and q.shape[-1:] == robot.q_shape:
         return q
     return robot.check_q(q)
 
 
 def _writable(q: Array) -> Array:
-    """Kernels are compiled once, for writable arrays: a read-only one would cost a second compilation."""
+    """A writable array equal to q: kernels are compiled for writable arrays only, which halves compile time."""
     return q if q.flags.writeable else q.copy()

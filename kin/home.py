@@ -1,14 +1,13 @@
-"""A home pose for an arm whose file names none.
+"""The home configuration of an arm whose file has none.
 
-The middle of the limits is the natural choice, except that for many arms it is the pose with everything
-stretched: an elbow at 0° is as far from both stops as can be, and the arm cannot draw its tool in from there
-without knowing which way to bend. So a few bent poses are looked at too, each joint a quarter of a half turn
-(or half-way to its stop, if that is nearer) to one side or the other of its middle.
+The middle of the limits is the natural choice, but for many arms it is singular: the arm is fully stretched, and
+the tool cannot be pulled in along it. Therefore bent configurations are considered too, in which up to three
+joints are moved by 45° (or half-way to the limit, if that is less) to one side or the other of their middle.
 
-A pose is judged by its *margin*: the smallest singular value of the Jacobian that is not zero everywhere, lengths
-in units of the reach. Of all candidates with at least half the best margin the one is taken that bends fewest
-joints; then the one that keeps the arm highest; then the one with the greatest margin. Slides stay half-way.
-Nothing is drawn at random: the same file always gives the same home.
+A configuration is judged by its *margin*: the smallest singular value of the Jacobian that is not zero in all of
+them, with lengths in units of the reach. Among the candidates with at least half the largest margin, the one with
+the fewest bent joints is chosen; then the one whose lowest frame is highest; then the one with the largest margin.
+Prismatic joints stay in their middle. The choice is deterministic.
 """
 
 from __future__ import annotations
@@ -26,22 +25,22 @@ from kin.transforms import Array
 _BEND = math.pi / 4
 _ENOUGH = 0.5
 _MOST_BENT = 3
-_MOST_CONSIDERED = 8  # further joints stay in their middle: three of eight already give 576 poses
+_MOST_CONSIDERED = 8  # further joints stay in their middle: eight joints already give 577 configurations
 
 
 def default_home(robot: Robot) -> tuple[float, ...]:
-    """One value per moving joint, inside the limits: the middle of them, or a bent pose that is less singular."""
+    """One value per moving joint: the middle of its limits, or a bent configuration that is less singular."""
     q, bent = candidates(robot)
     margin = margins(robot, q)
     good = margin >= _ENOUGH * margin.max()
     lowest = link_frames(robot, q)[:, :, 2, 3].min(axis=1)
-    step = 1e-6 * (robot.reach if math.isfinite(robot.reach) else 1.0)  # rounding errors must not decide
+    step = 1e-6 * (robot.reach if math.isfinite(robot.reach) else 1.0)  # rounding errors must not decide a tie
     order = np.lexsort((-np.round(margin, 6), -np.round(lowest / (step or 1.0)), bent, ~good))
     return tuple(q[order[0]].tolist())
 
 
 def candidates(robot: Robot) -> tuple[Array, Array]:
-    """The poses looked at ``(k, n)``, and how many joints each bends ``(k,)``; the first is the middle."""
+    """The candidate configurations ``(k, n)`` and how many joints each bends ``(k,)``; the first is the middle."""
     lower = np.where(np.isfinite(robot.lower), robot.lower, -math.pi)
     upper = np.where(np.isfinite(robot.upper), robot.upper, math.pi)
     middle = 0.5 * (lower + upper)
@@ -59,9 +58,10 @@ def candidates(robot: Robot) -> tuple[Array, Array]:
 
 
 def margins(robot: Robot, q: Array) -> Array:
-    """How far each configuration ``(k, n)`` is from losing a motion ``(k,)``, in radians per radian.
+    """Distance of each configuration ``(k, n)`` from losing a direction of motion ``(k,)``, in radians per radian.
 
-    The motions are those that the best of these configurations has: a flat arm, for one, never leaves its plane.
+    Only directions that the best of these configurations has count: a planar arm, for example, never leaves its
+    plane.
     """
     J = task_jacobian(robot, q)
     J[:, :3] /= robot.reach if 0.0 < robot.reach < math.inf else 1.0

@@ -1,14 +1,14 @@
 """A robot arm as a table of Denavit–Hartenberg rows.
 
-Each row carries four numbers and moves one frame to the next. Two orders of the same four elementary motions
-are in use, and they are *not* the same arm when fed the same table:
+Each row holds four numbers and leads from one frame to the next. Two orders of the same four elementary motions
+are in use, and the same table read in both orders gives two *different* arms:
 
 - ``standard`` (distal, Denavit & Hartenberg 1955): ``A = Rz(θ) Tz(d) Tx(a) Rx(α)``; frame i sits at the far
   end of link i and joint i turns about z of frame i−1.
 - ``modified`` (proximal, Craig 1986): ``A = Rx(α) Tx(a) Rz(θ) Tz(d)``; frame i sits on joint i and joint i
-  turns about z of frame i itself.
+  turns about z of frame i.
 
-A revolute joint adds its value to θ, a prismatic one to d; a ``fixed`` row moves nothing (a tool, an adapter).
+A revolute joint adds its value to θ, a prismatic one to d; a ``fixed`` row is constant (a tool, an adapter).
 ``T_base_tool = base · A_1 … A_m · tool``. Lengths are metres and angles radians.
 """
 
@@ -48,14 +48,14 @@ class Joint:
 
 @dataclass(frozen=True)
 class Robot:
-    """A serial arm: frozen, hashable, comparable by value; derived arrays are computed once and read-only.
+    """A serial arm: immutable, hashable, compared by value. Derived arrays are cached and read-only.
 
     Attributes:
-        id: short name used in addresses, e.g. ``"pioneer5"``.
+        id: short name used in URLs, e.g. ``"pioneer5"``.
         rows: all DH rows from base to tool, fixed ones included.
         home: one value per moving joint, inside the limits.
         base, tool: constant transforms before the first and after the last row, as nested tuples.
-        units: the length unit of the robot's own table ("mm", "cm" or "m"), for showing it as its source does.
+        units: the length unit of the robot file ("mm", "cm" or "m"), used when the table is displayed.
     """
 
     id: str
@@ -77,12 +77,12 @@ class Robot:
         return self._hash
 
     def __getstate__(self) -> dict[str, object]:
-        """The table alone: what was derived from it, compiled functions among it, is derived anew elsewhere."""
+        """The fields only: cached values, some of them compiled functions, are computed again after unpickling."""
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
     @cached_property
     def joints(self) -> tuple[Joint, ...]:
-        """The moving rows, in order: q[i] belongs to joints[i]."""
+        """The moving rows in order; q[i] is the value of joints[i]."""
         return tuple(row for row in self.rows if row.kind != "fixed")
 
     @property
@@ -112,7 +112,7 @@ class Robot:
 
     @cached_property
     def revolute(self) -> NDArray[np.bool_]:
-        """Which joints turn ``(n,)``."""
+        """Whether each joint is revolute ``(n,)``."""
         mask = np.array([j.kind == "revolute" for j in self.joints])
         mask.flags.writeable = False
         return mask
@@ -134,7 +134,7 @@ class Robot:
 
     @cached_property
     def model(self) -> Array:
-        """The whole arm as one flat array for the compiled kernels; layout in :mod:`kin.kernels.fk`."""
+        """The arm as one flat array for the compiled kernels; for its layout see :mod:`kin.kernels.fk`."""
         header = [float(len(self.rows)), float(self.n), float(self.convention == "modified")]
         header += self.T_world_base[:3].ravel().tolist() + self.T_last_tool[:3].ravel().tolist()
         q_index = 0
@@ -148,7 +148,7 @@ class Robot:
 
     @cached_property
     def reach(self) -> float:
-        """An upper bound in metres of the tool's distance from the base origin, prismatic strokes included."""
+        """An upper bound in metres on the distance of the tool from the first frame, including strokes."""
         total = float(np.linalg.norm(self.T_last_tool[:3, 3]))
         for row in self.rows:
             stroke = 0.0
@@ -184,7 +184,7 @@ class Robot:
 
 
 def exact_cos_sin(angle: float) -> tuple[float, float]:
-    """Cosine and sine that are exact at multiples of 90°, where DH twists live (cos(π/2) is 6e-17 in floats)."""
+    """Cosine and sine, exact at multiples of 90°, as most DH twists are (in floats cos(π/2) is 6e-17)."""
     quarter = angle / (math.pi / 2)
     if abs(quarter - round(quarter)) < 1e-15 * max(1.0, abs(quarter)):
         return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[round(quarter) % 4]

@@ -1,4 +1,4 @@
-"""Every threshold of the core, named and explained in one place."""
+"""The thresholds of the core, named and explained in one place."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ class Tolerances:
     """Thresholds, in metres and radians.
 
     Attributes:
-        closure_position: a solution's FK position must be this close to the target to count as exact.
-        closure_rotation: the same for the rotation angle.
-        limit: slack on joint limits, so that a target made *at* a stop is not refused for a rounding error.
-        merge: two configurations closer than this in every joint are one (double roots of acos and sqrt
-            split by the square root of the rounding error, hence far above machine epsilon).
-        geometry: lengths and twists closer than this to a family's pattern count as that pattern.
-        rotation_matrix: how far RᵀR may be from I in a target; beyond it the target is refused.
-        singular: below this sine a closed form has lost one angle and takes it from the seed.
-        at_singularity: an answer this near to a singularity (radians, metres) is told to be singular.
+        closure_position: largest position error, measured by FK, of a solution that counts as exact.
+        closure_rotation: the same for the rotation error.
+        limit: slack on joint limits, so that a rounding error does not reject a configuration *at* a limit.
+        merge: configurations closer than this in every joint are duplicates. Double roots of acos and sqrt
+            split by the square root of the rounding error, hence the value far above machine epsilon.
+        geometry: lengths and twists this close to the pattern of a solver family match it.
+        rotation_matrix: largest deviation of RᵀR from I in a target; beyond it the target is rejected.
+        singular: sine below which a closed form cannot determine an angle and takes it from the seed.
+        at_singularity: distance to a singularity (radians, metres) below which a solution is reported as singular.
     """
 
     closure_position: float = 1e-9

@@ -2,7 +2,7 @@
 
 A transform is a float64 array ``(..., 4, 4)``; there is no pose class. ``T_a_b`` maps coordinates in frame b
 to coordinates in frame a, so ``T_a_c = T_a_b @ T_b_c``. Quaternions are ``wxyz`` (scalar first), and they are
-used only at the edges (REST, screen).
+used only in the interfaces (REST, screen).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def finite_array(field: str, value: ArrayLike, shape: tuple[int | None, ...]) ->
     expected = f"finite numbers of shape (…, {', '.join('any' if s is None else str(s) for s in shape)})"
     try:
         raw = np.asarray(value)
-        # Text of digits and complex numbers would convert without a word: look before converting.
+        # numpy silently converts strings of digits and complex numbers: check before converting.
         if raw.dtype.kind not in "biuf":
             raw = _numbers(field, value, expected)
         array = np.ascontiguousarray(raw, dtype=np.float64)
@@ -47,7 +47,7 @@ def finite_array(field: str, value: ArrayLike, shape: tuple[int | None, ...]) ->
 
 
 def _numbers(field: str, value: ArrayLike, expected: str) -> Array:
-    """`value`, not an array of real numbers to numpy, as float64; `InputError` at its first item that is none."""
+    """Convert a value that numpy does not read as real numbers; raises `InputError` naming the first bad item."""
     items = np.asarray(value, dtype=object)
     if items.ndim == 0 or any(isinstance(item, list | tuple | np.ndarray) for item in items.flat):
         raise InputError(field, value, expected)
@@ -107,7 +107,7 @@ def from_position_wxyz(position: ArrayLike, wxyz: ArrayLike | None = None) -> Ar
 
 
 def rotation_from_wxyz(wxyz: Array) -> Array:
-    """Rotation matrix ``(3, 3)`` of a quaternion ``(4,)``; raises `InputError` when it has no direction."""
+    """Rotation matrix ``(3, 3)`` of a quaternion ``(4,)``; raises `InputError` for a zero quaternion."""
     given = wxyz.tolist()
     scale = max(map(abs, given))
     if not scale > 1e-12:
@@ -124,9 +124,9 @@ def rotation_from_wxyz(wxyz: Array) -> Array:
 
 
 def wxyz_from_rotation(R: Array) -> Array:
-    """Unit quaternion ``(..., 4)``, scalar first and never negative, of rotations ``(..., 3, 3)``.
+    """Unit quaternions ``(..., 4)`` of rotations ``(..., 3, 3)``; the scalar comes first and is never negative.
 
-    Shepperd's method: the largest of the four squares is taken first, so no cancellation anywhere.
+    Shepperd's method starts from the largest of the four components, which avoids cancellation.
     """
     R = np.asarray(R, dtype=np.float64)
     if R.size == 9 and R.shape[-2:] == (3, 3):
@@ -156,7 +156,7 @@ def wxyz_from_rotation(R: Array) -> Array:
 def _one_wxyz(
     m00: float, m01: float, m02: float, m10: float, m11: float, m12: float, m20: float, m21: float, m22: float
 ) -> tuple[float, float, float, float]:
-    """The same of one rotation, to the last bit: for a single one, arrays cost ten times the arithmetic."""
+    """The same for one rotation, bit for bit; on plain floats it is ten times faster than on arrays."""
     squares = (1 + m00 + m11 + m22, 1 + m00 - m11 - m22, 1 - m00 + m11 - m22, 1 - m00 - m11 + m22)
     largest = squares.index(max(squares))
     if largest == 0:
@@ -176,8 +176,8 @@ def _one_wxyz(
 def rotation_angle(R_a: Array, R_b: Array) -> float:
     """Angle in radians between two rotations ``(3, 3)``, accurate from 0 to π.
 
-    ``2 atan2(|R_a − R_b|, …)`` through the quaternion of the difference: acos of the trace would lose half
-    of the digits near zero.
+    Computed as ``2 atan2(|xyz|, w)`` from the quaternion of the relative rotation: acos of the trace loses half of
+    the digits near zero.
     """
     q = wxyz_from_rotation(R_a.T @ R_b)
     return 2.0 * math.atan2(float(np.linalg.norm(q[1:])), float(q[0]))
@@ -189,7 +189,7 @@ def vector_angle(a: Array, b: Array) -> float:
 
 
 def frame_from_approach(approach: ArrayLike) -> Array:
-    """Some rotation ``(3, 3)`` whose z axis is the direction `approach` ``(3,)``; x is as level as possible."""
+    """A rotation ``(3, 3)`` with its z axis along `approach` ``(3,)`` and its x axis horizontal if possible."""
     z = finite_array("approach", approach, (3,))
     if z.ndim != 1:
         raise InputError("approach", f"shape {z.shape}", "three numbers: the direction of the tool's z axis")
@@ -197,11 +197,11 @@ def frame_from_approach(approach: ArrayLike) -> Array:
     scale = max(map(abs, given))
     if not scale > 1e-12:
         raise InputError("approach", given, "a direction that is not zero")
-    # In plain numbers: arrays of three cost ten times as much, and a batch of targets is made of these.
+    # Plain floats: ten times faster than arrays of length three, and batches of targets call this per target.
     zx, zy, zz = (v / scale for v in given)
     size = math.hypot(zx, zy, zz)
     zx, zy, zz = zx / size, zy / size, zz / size
-    # The product of (0, 0, 1) and z, or of (0, 1, 0) and z.
+    # The cross product (0, 0, 1) × z, or (0, 1, 0) × z near the vertical.
     xx, xy, xz = (-zy, zx, 0.0) if abs(zz) < 0.9 else (zz, 0.0, -zx)
     size = math.hypot(xx, xy, xz)
     xx, xy, xz = xx / size, xy / size, xz / size

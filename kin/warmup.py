@@ -1,11 +1,11 @@
-"""Load or compile the kernels that a service needs once, so that no user waits for it.
+"""Load or compile the kernels of a service before its first request.
 
-Loading a kernel takes some hundredths of a second, compiling one takes seconds. So a service is ready when nothing
-needs compiling that forward and inverse kinematics call: with a warm cache as soon as the first arm answers, on a
-machine that never ran these kernels after some tens of seconds. What is left is done beside the first visitors.
+Loading a kernel takes hundredths of a second, compiling one takes seconds. A service is ready once every kernel
+of forward and inverse kinematics is compiled: with a warm cache as soon as the first arm has answered, on a new
+machine after some tens of seconds. The remaining kernels are loaded while the first visitors are served.
 
-The thin call (:mod:`kin.ik.batch`) is for who computes, not for who serves: its kernels are compiled when first
-used. Kernels belong to families of arms, not to arms: one arm of each family is asked, however many there are.
+The array-level call (:mod:`kin.ik.batch`) is not part of a service: its kernels are compiled on first use. Kernels
+belong to solver families, not to arms, so one arm of each family is enough.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ from kin.workspace import (
 
 
 def warm_up() -> None:
-    """What readiness means: load what moves the first arm; if that had to be compiled, compile for all arms.
+    """Load what moves the first arm; if that had to be compiled, compile the kernels of all families.
 
-    A cache that has the first arm's kernels is taken to have the others', which then load when first used.
+    A cache that contains the kernels of the first arm is assumed to contain the others; they load on first use.
     """
     first, *others = one_of_each_family()
     with install_recorder("numba:compile") as compiled:
@@ -45,11 +45,11 @@ def warm_up() -> None:
         for robot in others:
             _move(robot)
         for robot in (first, *others):
-            _ask_all(robot)
+            _call_all(robot)
 
 
 def warm_up_rest(stop: Callable[[], bool] = lambda: False) -> None:
-    """Load or compile everything else; `stop` is asked before each step, which may take many seconds."""
+    """Load or compile all remaining kernels; `stop` is checked before each step, which may take many seconds."""
     for step in _rest():
         if stop():
             return
@@ -57,7 +57,7 @@ def warm_up_rest(stop: Callable[[], bool] = lambda: False) -> None:
 
 
 def one_of_each_family() -> tuple[Robot, ...]:
-    """The first built-in arm of each closed form, and the first that has none."""
+    """The first built-in arm of each closed form, and the first without one."""
     families: dict[str, Robot] = {}
     for robot in builtin_robots().values():
         match = solver_for(robot)
@@ -66,7 +66,7 @@ def one_of_each_family() -> tuple[Robot, ...]:
 
 
 def _move(robot: Robot) -> None:
-    """What a drag of a slider or of the target asks for."""
+    """The calls behind dragging a slider or the target."""
     q = robot.q_home.copy()
     T = fk(robot, q)
     link_frames(robot, q)
@@ -76,8 +76,8 @@ def _move(robot: Robot) -> None:
     solve_ik(robot, T, task="approach")
 
 
-def _ask_all(robot: Robot) -> None:
-    """Each public function along each path that has a kernel of its own."""
+def _call_all(robot: Robot) -> None:
+    """The public functions, once along each path that has its own kernel."""
     q = robot.q_home.copy()
     T, pair = fk(robot, q), np.stack([q, q])
     fk(robot, pair)
@@ -94,11 +94,11 @@ def _ask_all(robot: Robot) -> None:
 
 def _rest() -> Iterator[Callable[[], object]]:
     robots = one_of_each_family()
-    for act in (_move, _ask_all):
+    for act in (_move, _call_all):
         for robot in robots:
             yield partial(act, robot)
     robot = robots[0]
-    # Two joints that move suffice: the kernels are the same, what they do takes no time.
+    # Two moving joints call the same kernels and take the least time.
     locked = [None, None, *robot.q_home[2:].tolist()]
     for strategy in STRATEGIES:
         yield partial(workspace_slice, robot, 2, 0, 2, strategy=strategy, measure=MEASURES, locked=locked)
@@ -106,5 +106,5 @@ def _rest() -> Iterator[Callable[[], object]]:
     yield partial(section, robot, resolution=8, locked=locked)
     yield partial(workspace_facts, robot, effort=2, locked=locked)
     for robot in robots:
-        still = [None, None, *robot.q_home[2:].tolist()]
-        yield partial(capability_map, robot, resolution=2, directions=12, locked=still)
+        locked = [None, None, *robot.q_home[2:].tolist()]
+        yield partial(capability_map, robot, resolution=2, directions=12, locked=locked)

@@ -1,12 +1,13 @@
-"""How a kernel is compiled, kept and entered.
+"""Compile kernels, cache their machine code on disk, and call them without dispatch.
 
-numba turns a kernel into machine code when it is first called and keeps that on disk. It goes by the text of the
-kernel's own file, although the code holds that of the kernels it calls, too: after an upgrade some of it would be
-that of the version before. Here it goes by the text of all modules with kernels.
+numba compiles a kernel on first use and caches the machine code on disk. Its cache key is the text of the kernel's
+own file only, although the machine code contains the kernels it calls: after an upgrade a cached kernel could
+contain functions of the previous version. The cache here uses the text of all modules with kernels as its key.
 
-Nothing depends on the disk: what cannot be read there is compiled, and what cannot be written is not kept.
+The cache is optional: if it cannot be read, kernels are compiled again; if it cannot be written, they are compiled
+in every process.
 
-With NUMBA_DISABLE_JIT=1 kernels are plain Python: a command that answers one question is sooner done so.
+With NUMBA_DISABLE_JIT=1 kernels are plain Python functions, which is faster for a command that computes one pose.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
 
 
 def _fingerprint() -> str:
-    """Of the text of every module of the core that has kernels."""
+    """Hash of the text of every module of the core that contains kernels."""
     digest = hashlib.blake2b(digest_size=16)
     for file in sorted(Path(__file__).parents[1].rglob("*.py")):
         text = file.read_bytes()
@@ -41,9 +42,9 @@ _FINGERPRINT = _fingerprint()
 
 
 class _Cache(FunctionCache):
-    """numba's cache of one kernel, by our fingerprint; a disk that fails costs time and no more.
+    """numba's cache of one kernel, keyed by our fingerprint; disk errors become warnings.
 
-    Most of it is private to numba; tests see to it that it works.
+    It uses private attributes of numba; tests check that they still work.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -51,27 +52,27 @@ class _Cache(FunctionCache):
         self._cache_file._source_stamp = _FINGERPRINT
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The machine code, None if it has to be compiled."""
+        """The cached machine code, or None if the kernel has to be compiled."""
         try:
             return super().load_overload(sig, target_context)
-        except Exception as error:  # noqa: BLE001 - what is left of a file may raise anything
-            _warn(f"machine code in {self.cache_path} cannot be read ({error!r}) and is compiled anew")
-            # An index that cannot be read could not be added to either.
+        except Exception as error:  # noqa: BLE001 - unpickling a damaged file may raise anything
+            _warn(f"machine code in {self.cache_path} cannot be read ({error!r}) and is compiled again")
+            # New entries could not be added to a damaged index either.
             with contextlib.suppress(OSError):
                 Path(self._cache_file._index_path).unlink()
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep machine code."""
+        """Write machine code to the cache."""
         try:
             super().save_overload(sig, data)
         except Exception as error:  # noqa: BLE001 - as above
             self.disable()
-            _warn(f"machine code cannot be kept in {self.cache_path} ({error!r})")
+            _warn(f"machine code cannot be written to {self.cache_path} ({error!r})")
 
 
 def _warn(what: str) -> None:
-    warnings.warn(f"{what}. Kernels are compiled when they are first used, which takes seconds.", stacklevel=2)
+    warnings.warn(f"{what}. Kernels are compiled on first use, which takes seconds.", stacklevel=2)
 
 
 def _compiled(function: _Kernel, kept: bool = True, **options: Any) -> _Kernel:
@@ -80,12 +81,12 @@ def _compiled(function: _Kernel, kept: bool = True, **options: Any) -> _Kernel:
     kernel: Any = njit(nogil=True, error_model="numpy", **options)(function)
     try:
         kernel._cache = _Cache(function) if kept else kernel._cache
-    except RuntimeError:  # numba found no folder to write to
-        _warn("no folder for machine code can be written to; NUMBA_CACHE_DIR names one")
+    except RuntimeError:  # numba found no writable folder
+        _warn("no cache folder for machine code is writable; set NUMBA_CACHE_DIR to one that is")
     template = kernel.get_call_template
 
     def plain(arguments: tuple[types.Type, ...], keywords: dict[str, types.Type]) -> Any:
-        """Compile a callee once, not anew for every constant that is passed to it."""
+        """Compile a callee once, not again for every constant passed to it."""
         return template(tuple(map(_unliteral, arguments)), {k: _unliteral(v) for k, v in keywords.items()})
 
     kernel.get_call_template = plain
@@ -93,31 +94,31 @@ def _compiled(function: _Kernel, kept: bool = True, **options: Any) -> _Kernel:
 
 
 def jit(function: _Kernel) -> _Kernel:
-    """A kernel: without the interpreter's lock, division as in numpy, machine code kept on disk."""
+    """Compile a kernel that releases the GIL, divides as numpy does, and is cached on disk."""
     return _compiled(function)
 
 
 def inlined(function: _Kernel) -> _Kernel:
-    """A kernel that becomes a part of whatever calls it, so that loops over it turn into vector instructions."""
+    """Compile a kernel that is always inlined, so that loops over calls to it can be vectorised."""
     return _compiled(function, forceinline=True)
 
 
 def joined(function: _Kernel) -> _Kernel:
-    """As `inlined`, for a kernel that takes kernels: on disk it is a part of what calls it, and only so."""
+    """As `inlined`, for a kernel with kernels as arguments: it is cached only as a part of its callers."""
     return _compiled(function, kept=False, forceinline=True)
 
 
 def direct(kernel: Any, *arguments: Any) -> Callable[..., Any]:
-    """The compiled function of a kernel, entered without numba's look at the type of every argument.
+    """The compiled function of a kernel, called without numba's type dispatch.
 
-    That look costs as much as a small kernel. Nothing stands guard instead: the caller has made sure that every
-    array is C-contiguous float64 with the number of axes given here (read-only is fine unless it is written to);
-    `float` stands for a float, and `MODEL` for a robot's model, which is read-only everywhere: one type, one
-    compilation.
+    Type dispatch costs as much as a small kernel. Arguments are not checked. The caller ensures that each array is
+    C-contiguous float64 with the number of axes given in `arguments` (it may be read-only unless the kernel writes
+    to it). `float` stands for a float, and `MODEL` for `Robot.model`, which is always read-only, so that there is
+    only one type to compile for.
     """
     if PLAIN:
         return cast(Callable[..., Any], kernel)
-    known = {float: types.float64, MODEL: types.Array(types.float64, 1, "C", readonly=True)}
-    signature = [known[a] if a in known else types.Array(types.float64, a, "C") for a in arguments]
+    named = {float: types.float64, MODEL: types.Array(types.float64, 1, "C", readonly=True)}
+    signature = [named[a] if a in named else types.Array(types.float64, a, "C") for a in arguments]
     entry: Callable[..., Any] = kernel.compile(tuple(signature))
     return entry

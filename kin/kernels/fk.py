@@ -1,7 +1,7 @@
 """Compiled loops on plain arrays: forward kinematics, link frames, Jacobian, manipulability.
 
-Every kernel is serial, releases the GIL, keeps no state and caches its machine code on disk, so any number of
-threads may call at once. The arm comes as one flat float64 array (`Robot.model`):
+Every kernel is serial, releases the GIL and keeps no state, so any number of threads may call it at once. The arm
+is one flat float64 array (`Robot.model`):
 
 ====================  =======================================================================
 ``model[0:3]``        number of rows, number of joints, 1.0 if the convention is modified
@@ -10,12 +10,12 @@ threads may call at once. The arm comes as one flat float64 array (`Robot.model`
 ``model[27+8i: …]``   row i: θ, d, a, cos α, sin α, kind (0 fixed, 1 revolute, 2 prismatic), index into q, 0
 ====================  =======================================================================
 
-One row costs two plane rotations of the running rotation matrix's columns instead of a 4×4 product: rotating
-about z mixes the x and y columns, rotating about x mixes y and z, translations add a multiple of a column.
+A row is applied as two plane rotations of the columns of the running pose instead of a 4×4 product: a rotation
+about z mixes the x and y columns, one about x mixes y and z, and a translation adds a multiple of a column.
 
-Batches go through in blocks of `BLOCK` configurations, laid out entry by entry (all x's, then all y's, …), so that
-one vector instruction serves several configurations. The operations and their order are those of one configuration
-alone: a batch gives the same bits.
+Batches are processed in blocks of `BLOCK` configurations, stored entry by entry (all x's, then all y's, …), so
+that one vector instruction handles several configurations. The operations and their order are the same as for a
+single configuration, so a batch gives the same bits.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from kin.kernels.simd import WIDE, sin_cos, widest
 from kin.transforms import Array
 
 BLOCK = 64
-# Where a block keeps what: BLOCK values each.
+# Offsets of the rows of a block, BLOCK values each.
 _SIN, _COS, _D, _ANGLE, _T0, _T1, _T2, _T3, _T4, _T5, _T6, _T7, _T8, _T9, _T10, _T11, _SPACE = range(
     0, 17 * BLOCK, BLOCK
 )
@@ -39,7 +39,7 @@ _WIDTH = 8
 
 @inlined
 def sine_cosine(angle: float) -> tuple[float, float]:
-    """(sin, cos) of any angle; the library's where the polynomials would lose digits."""
+    """(sin, cos) of any angle; from the C library where the polynomials would lose digits."""
     if abs(angle) <= WIDE:
         return sin_cos(angle)
     return math.sin(angle), math.cos(angle)
@@ -66,7 +66,7 @@ def all_finite_pose(T: Array) -> bool:
 
 @jit
 def _turn_z(T: Array, s: float, c: float, d: float) -> None:
-    """T ← T · Rz(θ) Tz(d), on the three rows that move."""
+    """T ← T · Rz(θ) Tz(d), on the first three rows."""
     for r in range(3):
         x = T[r, 0]
         y = T[r, 1]
@@ -77,7 +77,7 @@ def _turn_z(T: Array, s: float, c: float, d: float) -> None:
 
 @jit
 def _turn_x(T: Array, a: float, ca: float, sa: float) -> None:
-    """T ← T · Tx(a) Rx(α), on the three rows that move."""
+    """T ← T · Tx(a) Rx(α), on the first three rows."""
     for r in range(3):
         y = T[r, 1]
         z = T[r, 2]
@@ -99,7 +99,7 @@ def _load(T: Array, model: Array, start: int) -> None:
 
 @jit
 def copy_pose(T: Array, out: Array) -> None:
-    """out ← T for 4×4 arrays; written out, as numba takes seconds to compile an array assignment."""
+    """out ← T for 4×4 arrays, as a loop: numba takes seconds to compile an array assignment."""
     for r in range(4):
         for c in range(4):
             out[r, c] = T[r, c]
@@ -107,7 +107,7 @@ def copy_pose(T: Array, out: Array) -> None:
 
 @inlined
 def _x_part(model: Array, i: int) -> tuple[float, float, float]:
-    """(a, cos α, sin α) of row i; of the row after the last, nothing."""
+    """(a, cos α, sin α) of row i; those of the identity for the row after the last."""
     if i >= int(model[0]):
         return 0.0, 1.0, 0.0
     k = _HEADER + _WIDTH * i
@@ -142,10 +142,10 @@ def _z_part(model: Array, i: int, q: Array) -> tuple[float, float, float]:
 
 @jit
 def _start(model: Array, T: Array) -> int:
-    """T ← what is before the first z part; returns by how many rows the x part is ahead of the z part it joins.
+    """T ← the transform before the first z part; returns the row offset of the x part after a z part.
 
-    A modified row is x before z. Taking the z part of each row together with the x part of the next, both
-    conventions are one loop.
+    A modified row is x before z. If the z part of each row is combined with the x part of the next one, both
+    conventions share one loop.
     """
     _load(T, model, 3)
     if model[2] == 0.0:
@@ -159,9 +159,9 @@ Rows = tuple[float, float, float, float, float, float, float, float, float, floa
 
 @inlined
 def _before(model: Array, ahead: int) -> Rows:
-    """The three rows of what is before the first z part, as `_start`, but held in registers.
+    """The three rows of the transform before the first z part, as in `_start`, but held in registers.
 
-    Reading back from memory what has just been written there costs as much as the rest of the arm.
+    Reading it back from memory right after writing it takes as long as the rest of the arm.
     """
     x0, y0, z0, p0 = model[3], model[4], model[5], model[6]
     x1, y1, z1, p1 = model[7], model[8], model[9], model[10]
@@ -203,7 +203,7 @@ def fk_into(model: Array, q: Array, T: Array) -> None:
             theta += q[int(model[k + 6])]
         elif model[k + 5] == 2.0:
             d += q[int(model[k + 6])]
-        # `_z_part` written out: called, it doubles the time of the loop.
+        # `_z_part` expanded by hand: a call would double the time of the loop.
         if abs(theta) <= WIDE:
             s, c = sin_cos(theta)
         else:
@@ -226,7 +226,7 @@ def fk_one(model: Array, q: Array, T: Array) -> bool:
 
 @inlined
 def _joint_block(model: Array, i: int, q: Array, first: int, count: int, S: Array) -> int:
-    """S ← sin θ, cos θ, d of row i for a block of configurations; returns how many are not finite."""
+    """S ← sin θ, cos θ, d of row i for a block of configurations; returns how many values are not finite."""
     k = _HEADER + _WIDTH * i
     theta, d, kind, j = model[k], model[k + 1], model[k + 5], int(model[k + 6])
     widest()
@@ -301,7 +301,7 @@ def fk_many(model: Array, q: Array, out: Array) -> bool:
 def positions_many(model: Array, q: Array, out: Array) -> bool:
     """out ← tool points ``(k, 3)`` of configurations ``(k, n)``; False if any of them is not finite.
 
-    From the tool backwards: a row then moves one point instead of a frame.
+    It works backwards from the tool: each row then moves one point instead of a frame.
     """
     widest()
     X, Y, Z = _T0, _T1, _T2
@@ -335,7 +335,7 @@ def positions_many(model: Array, q: Array, out: Array) -> bool:
 
 @jit
 def _apply_row(T: Array, model: Array, i: int, q: Array) -> None:
-    """T ← T · A_i, as its convention has it."""
+    """T ← T · A_i in the convention of the arm."""
     s, c, d = _z_part(model, i, q)
     a, ca, sa = _x_part(model, i)
     if model[2] == 0.0:
@@ -364,7 +364,7 @@ def frames_many(model: Array, q: Array) -> Array:
 def jacobian_into(model: Array, q: Array, J: Array, T: Array, axes: Array) -> None:
     """J ← geometric Jacobian ``(6, n)`` in the base frame, T ← T_base_tool; `axes` ``(n, 7)`` is scratch.
 
-    A joint's axis is the z axis its own Rz/Tz acts along, the same line before and after.
+    The joint axis is the z axis of the frame in which Rz/Tz of its row acts; Rz and Tz leave that line unchanged.
     """
     ahead = 0 if model[2] == 0.0 else 1
     x0, y0, z0, p0, x1, y1, z1, p1, x2, y2, z2, p2 = _before(model, ahead)

@@ -1,17 +1,18 @@
-"""Sine, cosine and arc tangent without branches, so that LLVM turns a loop over them into vector instructions.
+"""Branch-free sine, cosine and arc tangent, so that LLVM vectorises loops over them.
 
-The library's ``sin`` is a call per value; a polynomial is a dozen multiplications, done on four or eight values
-at once. Every choice here is a select, never a jump, and nothing depends on relaxed floating point: NaN stays
-NaN, and one value alone gives the same bits as the same value inside a vector.
+The C library's ``sin`` is one call per value; a polynomial is a dozen multiplications, done on four or eight
+values at once. Every choice is a select, never a jump, and strict floating point is kept: NaN stays NaN, and a
+single value gives the same bits as the same value inside a vector.
 
 - **Sine and cosine.** Reduction ``r = x − k·π/2`` with π/2 in three parts (Cody and Waite, Software Manual for
   the Elementary Functions, 1980), of which the first two multiply k exactly; on |r| ≤ π/4 the polynomials of
-  fdlibm; the last two bits of k pick and sign them.
-- **Arc tangent.** The octant brings the ratio into [0, 1], ``atan t = π/4 + atan((t − 1)/(t + 1))`` into
-  |t| ≤ tan(π/8), one division for both; then a polynomial in t², Chebyshev interpolation computed with 60 digits.
+  fdlibm; the last two bits of k choose between them and give the sign.
+- **Arc tangent.** The octant reduces the ratio to [0, 1] and ``atan t = π/4 + atan((t − 1)/(t + 1))`` to
+  |t| ≤ tan(π/8), with one division for both; then a polynomial in t² (Chebyshev interpolation computed with 60
+  digits).
 
-Measured on millions of values: sine and cosine are off by at most 1.1 ulp for |x| ≤ 1, 1.5 ulp for |x| ≤ 1000 and
-2.3 ulp for |x| ≤ `WIDE`, the arc tangent by at most 2.4 ulp.
+Measured on millions of values, the error of sine and cosine is at most 1.1 ulp for |x| ≤ 1, 1.5 ulp for |x| ≤ 1000
+and 2.3 ulp for |x| ≤ `WIDE`; that of the arc tangent is at most 2.4 ulp.
 """
 
 from __future__ import annotations
@@ -25,9 +26,9 @@ from numba.extending import intrinsic
 
 from kin.kernels.compile import PLAIN, inlined
 
-_build: Callable[[Any], Any] = intrinsic  # a function that writes LLVM's own instructions
+_build: Callable[[Any], Any] = intrinsic  # decorator for functions that emit LLVM instructions
 
-WIDE = 1e5  # rad; up to here k·π/2 is subtracted without an error that counts
+WIDE = 1e5  # rad; up to here the error of subtracting k·π/2 is negligible
 TURN = 2.0 * math.pi
 
 _ROUND = 6755399441055744.0  # 1.5 · 2⁵²: adding it leaves a float rounded to an integer, k in its low bits
@@ -40,7 +41,7 @@ _TAN_PI_8 = 0.41421356237309503
 
 @_build
 def fma(typing: Any, a: Any, b: Any, c: Any) -> Any:
-    """a·b + c, rounded once where the processor has the instruction."""
+    """a·b + c, rounded once if the processor has the instruction."""
     del typing, a, b, c
 
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -53,16 +54,17 @@ def fma(typing: Any, a: Any, b: Any, c: Any) -> Any:
 
 @_build
 def widest(typing: Any) -> Any:
-    """Called in a kernel: let its loops use the processor's widest vectors.
+    """Called in a kernel, allows its loops the widest vectors of the processor.
 
-    LLVM stops at 256 bits where 512 would lower the clock; loops of nothing but arithmetic gain a third even so.
+    By default LLVM stops at 256 bits on processors that lower their clock for 512; purely arithmetic loops are a
+    third faster with 512 even so.
     """
     del typing
 
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         attributes = builder.function.attributes
         if isinstance(attributes, set):
-            set.add(attributes, '"prefer-vector-width"="512"')  # its own add() knows no attributes with values
+            set.add(attributes, '"prefer-vector-width"="512"')  # its own add() rejects attributes with values
         return context.get_dummy_value()
 
     return types.none(), build
@@ -92,7 +94,7 @@ def _float(typing: Any, bits: Any) -> Any:
 
 @inlined
 def sin_cos(x: float) -> tuple[float, float]:
-    """(sin x, cos x) for |x| ≤ `WIDE`; beyond it digits are lost, NaN and infinities give NaN."""
+    """(sin x, cos x) for |x| ≤ `WIDE`; less accurate beyond it. NaN and infinities give NaN."""
     shifted = x * 0.6366197723675814 + _ROUND
     k = shifted - _ROUND
     quadrant = _bits(shifted)
@@ -116,9 +118,9 @@ def sin_cos(x: float) -> tuple[float, float]:
 
 @inlined
 def atan2(y: float, x: float) -> float:
-    """Angle of the vector (x, y) in (−π, π], for lengths from 1e-150 to 1e150; 0.0 for no vector at all.
+    """Angle of the vector (x, y) in (−π, π], for lengths from 1e-150 to 1e150; 0.0 for the zero vector.
 
-    Unlike the library's it takes −0.0 for 0.0: the negative x axis is at π.
+    Unlike the C library's, it treats −0.0 as 0.0: the negative x axis is always at π.
     """
     across, along = abs(y), abs(x)
     steep = across > along
@@ -145,13 +147,13 @@ def atan2(y: float, x: float) -> float:
 
 @inlined
 def rounded(x: float) -> float:
-    """The whole number nearest to x, for |x| < 2⁵¹; of two the even one."""
+    """The nearest integer to x for |x| < 2⁵¹; ties go to the even one."""
     return (x + _ROUND) - _ROUND
 
 
 @inlined
 def wrapped(angle: float) -> float:
-    """The same angle in (−π, π], for one that is at most a turn away from it."""
+    """An angle wrapped to (−π, π]; the argument may be at most one turn outside."""
     down = angle - TURN
     up = angle + TURN
     angle = down if angle > math.pi else angle
@@ -159,7 +161,7 @@ def wrapped(angle: float) -> float:
 
 
 if PLAIN:
-    # LLVM's instructions cannot be called from Python: the library's functions stand in.
+    # LLVM intrinsics cannot be called from Python: use the library functions.
 
     def sin_cos(x: float) -> tuple[float, float]:
         return math.sin(x), math.cos(x)

@@ -67,7 +67,7 @@ def test_what_has_to_be_compiled_is_compiled_for_all_arms_before_ready(monkeypat
                 pass
 
     monkeypatch.setattr(warmup, "_move", move)
-    monkeypatch.setattr(warmup, "_ask_all", lambda robot: asked.append(("all", robot.id)))
+    monkeypatch.setattr(warmup, "_call_all", lambda robot: asked.append(("all", robot.id)))
     cold = False
     kin.warm_up()
     assert asked == [("move", arms[0])], "a warm cache: what is left loads in milliseconds"
