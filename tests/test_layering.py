@@ -34,7 +34,7 @@ RULES: dict[str, set[str]] = {
         *("kin", "numpy", "app.shared", "pydantic", "pydantic_settings", "prometheus_client", "starlette"),
         *("typing_extensions", "distributed"),
     },
-    "app/exports": {"kin", "numpy", "scipy", "trimesh", "app.exports", "app.shared"},
+    "app/exports": {"kin", "numpy", "scipy", "trimesh", "PIL", "app.exports", "app.shared"},
     "app/equations": {"kin", "numpy", "sympy", "app.equations"},
     "app/bench": {"kin", "numpy", "numba", "app.bench"},
     "app/bench/contestants.py": {
@@ -47,7 +47,7 @@ RULES: dict[str, set[str]] = {
         *("app.api", "app.equations", "app.exports", "app.shared"),
     },
     "app/viewer": {
-        *("viser", "trimesh", "numpy", "uvloop", "kin"),
+        *("viser", "trimesh", "numpy", "uvloop", "jinja2", "markupsafe", "kin"),
         *("app.viewer", "app.equations", "app.exports", "app.shared"),
     },
     "app/service": {

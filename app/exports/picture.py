@@ -7,10 +7,7 @@ the workspace really ends.
 
 from __future__ import annotations
 
-import base64
 import math
-import struct
-import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from html import escape
@@ -18,15 +15,17 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
+from app.exports.svg import AxisStyle, Plot, axes, joint_colour, png_url
 from kin import Robot, Section, WorkspaceChunk, WorkspaceFacts
-from kin.transforms import Array
 from kin.workspace import Span
 
 CELLS = 360  # along the longest side
 SIZE = 420.0  # pixels of the longest side
 GAP, MARGIN = 78.0, 64.0  # between views, around all
 INK, SOFT = "#18212b", "#55616e"
-JOINT_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#a8518a", "#b87a00", "#2f8fbf", "#8a5a00")
+AXES = AxisStyle(
+    tick=f'stroke="{SOFT}"', label=f'font-size="11" fill="{SOFT}"', title='font-size="12"', length=5.0, across=44.0
+)
 # Cividis, sampled: dark is rare, bright is often; the same order to people who do not see red or green.
 SCALE = np.array(
     [(0, 34, 78), (24, 53, 110), (63, 75, 109), (94, 96, 110), (122, 119, 121), (153, 143, 116), (188, 170, 100),
@@ -132,26 +131,21 @@ class Picture:
 
     def _view(self, view: View, counts: NDArray[np.int64], box: tuple[float, float]) -> str:
         width, height = box
-        scale = width / max(view.high[0] - view.low[0], 1e-9)
-        image = base64.b64encode(png(coloured(counts))).decode()
+        plot = Plot(
+            0.0, 0.0, width / max(view.high[0] - view.low[0], 1e-9), *zip(view.low, view.high, strict=True)
+        )
+        names = [f"{name.replace('along', 'z')} (mm)" for name in (view.right, view.up)]
         parts = [
             f'<text y="-12" font-size="13" font-weight="600">{escape(view.title)}</text>',
             f'<image width="{width:.1f}" height="{height:.1f}" preserveAspectRatio="none" '
-            f'style="image-rendering:pixelated" href="data:image/png;base64,{image}"/>',
+            f'style="image-rendering:pixelated" href="{png_url(coloured(counts))}"/>',
             f'<rect width="{width:.1f}" height="{height:.1f}" fill="none" stroke="{SOFT}"/>',
-            *_axis(view, 0, width, height, scale),
-            *_axis(view, 1, width, height, scale),
+            axes(plot, (names[0], names[1]), 1e3, AXES),
         ]
         if self._section is not None and view.right == "r":
-
-            def line(points: Array, colour: str, thick: float) -> str:
-                path = " L".join(
-                    f"{(s - view.low[0]) * scale:.2f} {height - (t - view.low[1]) * scale:.2f}" for s, t in points
-                )
-                return f'<path d="M{path}" fill="none" stroke="{colour}" stroke-width="{thick}"/>'
-
-            parts += [line(np.concatenate([curve, curve[:1]]), INK, 1.6) for curve in self._section.curves]
-            parts += [line(arc.points, _colour(arc.joint), 3) for arc in self._section.arcs]
+            line = '<path d="{}" fill="none" stroke="{}" stroke-width="{}"/>'
+            parts += [line.format(plot.path(curve, closed=True), INK, 1.6) for curve in self._section.curves]
+            parts += [line.format(plot.path(arc.points), joint_colour(arc.joint), 3) for arc in self._section.arcs]
             parts.append(_legend(sorted({arc.joint for arc in self._section.arcs}), width + 14.0))
         return "".join(parts)
 
@@ -169,19 +163,6 @@ def coloured(counts: NDArray[np.int64]) -> NDArray[np.uint8]:
     return np.ascontiguousarray(rgba.transpose(1, 0, 2)[::-1])
 
 
-def png(rgba: NDArray[np.uint8]) -> bytes:
-    """A PNG file of RGBA ``(rows, columns, 4)`` (RFC 2083: signature, IHDR, IDAT, IEND)."""
-    rows, columns, _ = rgba.shape
-    lines = b"".join(b"\x00" + line.tobytes() for line in rgba)
-
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    header = struct.pack(">IIBBBBB", columns, rows, 8, 6, 0, 0, 0)
-    image = chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(lines, 6)) + chunk(b"IEND", b"")
-    return b"\x89PNG\r\n\x1a\n" + image
-
-
 def draw(robot: Robot, chunks: Iterable[WorkspaceChunk], facts: WorkspaceFacts, section: Section | None) -> str:
     """The picture of a whole cloud as SVG."""
     picture = Picture(robot, facts, section)
@@ -194,49 +175,13 @@ def _spans(facts: WorkspaceFacts) -> list[tuple[str, Span]]:
     return [("x", facts.x), ("y", facts.y), ("z", facts.z)]
 
 
-def ticks(low: float, high: float) -> list[float]:
-    """Round values between low and high, three to nine of them."""
-    rough = (high - low) / 6
-    power = 10.0 ** math.floor(math.log10(rough))
-    step = next(power * k for k in (1, 2, 5, 10) if power * k >= rough)
-    return [k * step for k in range(math.ceil(low / step), math.floor(high / step) + 1)]
-
-
-def _colour(joint: int) -> str:
-    return JOINT_COLOURS[joint % len(JOINT_COLOURS)]
-
-
 def _legend(joints: list[int], x: float) -> str:
     """Which joint draws which part of the boundary, the others being at stops."""
     return "".join(
-        f'<rect x="{x:.1f}" y="{18 * k}" width="14" height="4" fill="{_colour(joint)}"/>'
+        f'<rect x="{x:.1f}" y="{18 * k}" width="14" height="4" fill="{joint_colour(joint)}"/>'
         f'<text x="{x + 20:.1f}" y="{18 * k + 6}" font-size="12">joint {joint + 1}</text>'
         for k, joint in enumerate(joints)
     )
-
-
-def _axis(view: View, which: int, width: float, height: float, scale: float) -> list[str]:
-    """Ticks and name of the axis to the right (0) or up (1)."""
-    low, high = view.low[which], view.high[which]
-    if high - low < 1e-6:
-        return []
-    name = (view.right, view.up)[which].replace("along", "z")
-    soft, small = f'stroke="{SOFT}"', f'font-size="11" fill="{SOFT}"'
-    parts = []
-    for value in ticks(low, high):
-        x, y = (value - low) * scale, height - (value - low) * scale
-        if which == 0:
-            parts.append(f'<path d="M{x:.1f} {height:.1f}v5" {soft}/>')
-            parts.append(
-                f'<text x="{x:.1f}" y="{height + 18:.1f}" {small} text-anchor="middle">{_mm(value)}</text>'
-            )
-        else:
-            parts.append(f'<path d="M0 {y:.1f}h-5" {soft}/>')
-            parts.append(f'<text x="-8" y="{y + 4:.1f}" {small} text-anchor="end">{_mm(value)}</text>')
-    where = f'x="{width / 2:.1f}" y="{height + 36:.1f}"'
-    if which == 1:
-        where = f'transform="translate(-44 {height / 2:.1f}) rotate(-90)"'
-    return [*parts, f'<text {where} font-size="12" text-anchor="middle">{name} (mm)</text>']
 
 
 def _mm(metres: float) -> str:

@@ -12,7 +12,8 @@ import pytest
 from PIL import Image
 
 import kin
-from app.exports.picture import CELLS, SCALE, SIZE, Picture, coloured, draw, png, ticks
+from app.exports.picture import CELLS, SCALE, SIZE, Picture, coloured, draw
+from app.exports.svg import png, tick_labels, ticks
 
 ARM = kin.get_robot("pioneer5")
 SVG = "{http://www.w3.org/2000/svg}"
@@ -91,7 +92,17 @@ def test_the_boundary_and_its_arcs_are_drawn(drawing, section):
     assert legend == {f"joint {arc.joint + 1}" for arc in section.arcs}
 
 
-def test_an_image_is_read_by_others_as_it_was_meant():
+@pytest.mark.parametrize(
+    ("ends", "unit", "first", "last"),
+    [((-0.4, 0.4), 1e3, "−400", "400"), ((0.0, 0.012), 1e3, "0", "12"), ((-0.4, 0.4), 1.0, "−0.4", "0.4")],
+)
+def test_tick_labels_have_just_enough_decimals(ends, unit, first, last):
+    texts = [text for _, text in tick_labels(*ends, unit)]
+    assert (texts[0], texts[-1]) == (first, last)
+    assert len(set(texts)) == len(texts)
+
+
+def test_a_png_holds_exactly_the_given_pixels():
     rgba = np.random.default_rng(0).integers(0, 256, (5, 7, 4), dtype=np.uint8)
     assert np.array_equal(np.asarray(Image.open(io.BytesIO(png(rgba)))), rgba)
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import viser
 
+from app.exports.svg import Plot, joint_colour
 from app.shared.clouds import Cloud, Clouds, step_back
 from app.viewer.panel import Post
 from app.viewer.tabs.workspace import known, plot
@@ -62,7 +63,7 @@ class SectionPanel:
         self._root = root
         self._post = post
         self._section: Section | None = None
-        self._frame: plot.Frame | None = None
+        self._frame: Plot | None = None
         # The cloud's counts; while a thread adds to them, nobody else touches them. Another cloud gets new ones.
         self._density: plot.Density | None = None
         self._plotting = False
@@ -91,7 +92,7 @@ class SectionPanel:
                 f'<div style="margin:.6em 1em;font-size:.85em">{found.why_not or "There is no section."}</div>'
             )
             return
-        self._section, self._frame = found.section, plot.Frame.of(found.section)
+        self._section, self._frame = found.section, plot.frame_of(found.section)
         self._aside = np.cross(found.section.v, found.section.u)
         self._draw()
         self._draw_outline(found.section)
@@ -176,7 +177,7 @@ class SectionPanel:
         self._outline = self._scene.add_frame(self._root, show_axes=False, position=section.origin)
         lines = [(np.concatenate([c, c[:1]]), PLAIN, 2.0) for c in section.curves]
         for arc in section.arcs:
-            colour = bytes.fromhex(plot.colour_of(arc.joint)[1:])
+            colour = bytes.fromhex(joint_colour(arc.joint)[1:])
             lines.append((arc.points, (colour[0], colour[1], colour[2]), 4.0))
         for k, (points, color, thickness) in enumerate(lines):
             p = points[:, :1] * section.u + points[:, 1:] * section.v

@@ -18,6 +18,7 @@ from fake_browser import FakeBrowser
 from PIL import Image
 
 import kin
+from app.exports.svg import tick_labels
 from app.shared.clouds import DRAWN, Cloud, Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
@@ -183,13 +184,13 @@ def test_wishes_come_back_from_their_state():
 
 def test_the_cloud_in_the_drawing_is_inside_the_boundary_in_the_drawing():
     section = kin.section(PIONEER, resolution=32)
-    frame = plot.Frame.of(section)
+    frame = plot.frame_of(section)
     density = plot.Density(frame)
     points = Cloud(PIONEER, 30_000).slice(0, 30_000).points
     density.add(PIONEER, points)
     assert density.counts.sum() == len(points)
     assert density.parts == 1
-    alpha = np.asarray(Image.open(io.BytesIO(density.picture())))[..., 3]
+    alpha = np.asarray(Image.open(io.BytesIO(base64.b64decode(density.image_url().partition(",")[2]))))[..., 3]
     assert np.array_equal(alpha > 0, density.counts > 0)
     drawn = plot.drawing(section, frame, plot.image(density), USUAL)
     assert "data:image/png;base64," in drawn
@@ -239,7 +240,7 @@ def test_sizes_legend_and_picked_point_follow_the_units(length, scale, decimals)
 )
 def test_the_drawing_of_the_section_follows_the_units(length, ticks):
     section = kin.section(PIONEER, resolution=32)
-    drawn = plot.drawing(section, plot.Frame.of(section), "", Units(length=length))
+    drawn = plot.drawing(section, plot.frame_of(section), "", Units(length=length))
     shown = re.findall(r'text-anchor="middle" style="[^"]*">([−\d.]+)</text>', drawn)
     assert [text for text in ticks if text in shown] == ticks
     assert len({len(text.partition(".")[2]) for text in shown if "." in text or length != "m"}) == 1
@@ -249,7 +250,7 @@ def test_the_drawing_of_the_section_follows_the_units(length, ticks):
 
 
 def test_marks_closer_than_a_millimetre_are_told_apart():
-    texts = [text for _, text in plot._labels((0.0, 0.003), USUAL.lengths)]
+    texts = [text for _, text in tick_labels(0.0, 0.003, USUAL.lengths.scale)]
     assert texts == ["0.0", "0.5", "1.0", "1.5", "2.0", "2.5", "3.0"]
 
 
@@ -713,7 +714,7 @@ def test_section_and_sizes_come_when_they_are_ready(tab):
     tab.set(next(label for label in tab.sliders if label.startswith(("2 ", "Joint 2"))), 25)
     tab.wait(lambda: re.search(r'data-plot="tool".*?cx="([\d.]+)"', tab.html)[1] != before)
     tab.settle()
-    frame = plot.Frame.of(kin.section(robot))
+    frame = plot.frame_of(kin.section(robot))
     r, z = colours.radius_and_height(robot, tab.tool_pose()[None, :3, 3])
     x, y = frame.at(np.stack([r, z], axis=1))[0]
     assert f'cx="{x:.1f}" cy="{y:.1f}"' in tab.html
@@ -722,7 +723,7 @@ def test_section_and_sizes_come_when_they_are_ready(tab):
     tab.draw(4000, seed=24)
     density = plot.Density(frame)
     density.add(robot, whole(robot, 4000, 24).points)
-    expected = base64.b64encode(density.picture()).decode()
+    expected = density.image_url()
     tab.wait(lambda: expected in tab.html, 20.0)  # another cloud's points alone
     tab.click("Cancel")
     tab.wait(lambda: "data:image/png" not in tab.html)
