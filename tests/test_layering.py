@@ -21,6 +21,7 @@ MODEL = {
     "kin.singularity",
     "kin.tolerances",
     "kin.transforms",
+    "kin.units",
 }
 RULES: dict[str, set[str]] = {
     "kin": {"kin", "numpy", "numba"},

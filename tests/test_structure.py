@@ -363,7 +363,6 @@ KNOWN: dict[Rule, set[str]] = {
         "app/viewer/tabs/workspace/wishes.py: wished",
         "app/viewer/tabs/workspace/wishes.py: wishes",
         "app/viewer/tabs/workspace/words.py: told",
-        "app/viewer/units.py: told",
         "kin/chapter.py: whoever",
         "kin/ik/__init__.py: the least offending",
         "kin/ik/__init__.py: told",

@@ -18,9 +18,9 @@ from app.shared.maps import Maps
 from app.shared.store import Store
 from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import Sphere
-from app.viewer.units import Units
 from kin import IKResult, Robot, Task
 from kin.transforms import Array
+from kin.units import Units
 
 
 class Stage(Protocol):

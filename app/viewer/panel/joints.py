@@ -14,9 +14,9 @@ import viser
 
 from app.viewer.panel import Post, assign, listen
 from app.viewer.panel.status import Notice
-from app.viewer.units import Unit, Units
 from kin import InputError, Robot
 from kin.transforms import Array
+from kin.units import Unit, Units
 
 DIGITS = 2
 CLOSED = "\N{BLACK SQUARE}"  # a padlock is missing from many fonts

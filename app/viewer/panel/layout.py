@@ -12,8 +12,8 @@ from app.viewer.panel.share import SharePanel
 from app.viewer.panel.status import Notice, StatusLine
 from app.viewer.panel.target import TargetChoice, default_task
 from app.viewer.panel.view import UnitChoice, ViewOptions, ViewState
-from app.viewer.units import Units
 from kin import Robot, fk
+from kin.units import Units
 
 
 class Panel:

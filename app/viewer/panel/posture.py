@@ -13,8 +13,8 @@ from html import escape
 import viser
 
 from app.viewer.panel import Post, assign, listen
-from app.viewer.units import USUAL, Unit, Units
 from kin import InputError, Redundancy, Robot, branch_names
+from kin.units import DEFAULT_UNITS, Unit, Units
 
 NEAREST = "Nearest"
 STAY = "Stay on this one"
@@ -93,7 +93,7 @@ class FreeSliders:
         self._key: tuple[object, ...] = ()
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
         self._strips: dict[str, viser.GuiHtmlHandle] = {}
-        self._unit = USUAL.angles
+        self._unit = DEFAULT_UNITS.angles
 
     def show(self, free: Sequence[Redundancy], robot: Robot, units: Units, held: str | None = None) -> None:
         """Show these values and ranges; the slider in the visitor's hand (`held`) keeps its value."""

@@ -6,8 +6,8 @@ import math
 
 import viser
 
-from app.viewer.units import Units
 from kin.transforms import Array, wxyz_from_rotation
+from kin.units import Units
 
 
 def roll_pitch_yaw(R: Array) -> tuple[float, float, float]:

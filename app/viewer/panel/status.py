@@ -8,8 +8,8 @@ from typing import Literal
 
 import viser
 
-from app.viewer.units import Units
 from kin import IKResult
+from kin.units import Units
 
 Kind = Literal["reached", "compromise", "limits", "orientation", "unreachable", "hand", "error"]
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import viser
 
 from app.viewer.panel import Post, assign, listen, listen_click
-from app.viewer.units import LENGTHS, Length, Units
 from kin import InputError
+from kin.units import LENGTHS, Length, Units
 
 BRAND = (0, 114, 178)
 BRAND_ON_DARK = (86, 180, 233)

@@ -39,9 +39,9 @@ from app.viewer.session.memory import Memory
 from app.viewer.session.posture import Posture
 from app.viewer.session.worker import Worker
 from app.viewer.tabs import TABS
-from app.viewer.units import USUAL, Units
 from kin import Robot, Task
 from kin.transforms import Array, from_position_wxyz
+from kin.units import DEFAULT_UNITS, Units
 
 WELCOME = Notice("hand", "Ready", "Drag the gizmo at the tool, or move a joint.")
 _ARMS = itertools.count(1)  # a name is never used twice: browsers keep the poses of removed nodes
@@ -75,7 +75,7 @@ class Session(Worker):
         self._welcome = welcome
         self._memory = Memory(self, token, self._guard)
         self._rng = np.random.default_rng()
-        self._units = USUAL
+        self._units = DEFAULT_UNITS
         self.view = ViewState()
         self._dragging = False
         # The pose asked for with the gizmo, for as long as it is the arm's task; None: the gizmo follows the tool.

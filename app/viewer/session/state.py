@@ -23,9 +23,9 @@ import numpy as np
 
 from app.viewer.panel.view import ViewState
 from app.viewer.scene.camera import UP
-from app.viewer.units import LENGTHS, USUAL, Units
 from kin import Robot, Task, branch_names
 from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
+from kin.units import DEFAULT_UNITS, LENGTHS, Units
 
 VERSION = 1
 KEY = "kinboard"  # of the item of the page's storage
@@ -63,7 +63,7 @@ class PageState:
     task: Task | None = None
     branch: str | None = None
     lesson: str | None = None
-    units: Units = USUAL
+    units: Units = DEFAULT_UNITS
     view: ViewState = field(default_factory=ViewState)
     features: dict[str, dict[str, object]] = field(default_factory=dict)
     locks: tuple[int, ...] = ()
@@ -101,7 +101,7 @@ def encode(state: PageState) -> str:
         said["camera"] = position + look_at + (up if up != UP.tolist() else [])
     if not state.units.degrees:
         said["units"] = "rad"
-    if state.units.length != USUAL.length:
+    if state.units.length != DEFAULT_UNITS.length:
         said["length"] = state.units.length
     view = {name: value for name, value in vars(state.view).items() if value != getattr(FRESH, name)}
     if view:
@@ -239,7 +239,7 @@ def _viewpoint(value: object, robot: Robot) -> Array | None:
 
 
 def _units(said: dict[str, Any]) -> Units:
-    length = next((unit for unit in LENGTHS if unit == said.get("length")), USUAL.length)
+    length = next((unit for unit in LENGTHS if unit == said.get("length")), DEFAULT_UNITS.length)
     return Units(said.get("units") != "rad", length)
 
 

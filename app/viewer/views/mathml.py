@@ -16,6 +16,8 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import NewType
 
+from kin.units import fixed
+
 MathML = NewType("MathML", str)
 
 # A bracket is a border with two serifs: short lines painted as gradients, in the colour of the text.
@@ -49,14 +51,6 @@ def op(symbol: str) -> MathML:
     """An operator or bracket, with the spacing of its kind. A hyphen becomes a minus sign."""
     shown = "−" if symbol == "-" else symbol
     return MathML(f'<mo stretchy="false">{escape(shown)}</mo>')
-
-
-def fixed(value: float, decimals: int = 3) -> str:
-    """A number as plain text with so many decimals, a true minus sign, and no minus before a zero."""
-    shown = f"{value:.{decimals}f}"
-    if float(shown) == 0.0:
-        shown = shown.lstrip("-")
-    return shown.replace("-", "−")
 
 
 def number(value: float, decimals: int = 3) -> MathML:

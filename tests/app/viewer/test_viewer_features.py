@@ -21,7 +21,7 @@ from app.viewer.panel import lessons as choice
 from app.viewer.panel import listen
 from app.viewer.server import ViewerServer
 from app.viewer.session import controller as session
-from app.viewer.units import Units
+from kin.units import Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 

@@ -16,9 +16,9 @@ from app.viewer.lessons.dh.page import ABOUT_X, ABOUT_Z, TITLES
 from app.viewer.lessons.dh.steps import Factor, Place, amount, axis, reread, shared_lines, symbol, turns
 from app.viewer.scene.camera import DIRECTION
 from app.viewer.scene.meshes import body, joint_color
-from app.viewer.units import Units
 from kin import Robot
 from kin.transforms import Array, wxyz_from_rotation
+from kin.units import Units
 
 Segments = NDArray[np.float32]
 

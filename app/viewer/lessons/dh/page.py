@@ -22,11 +22,11 @@ from app.viewer.lessons.dh.steps import (
     value,
     verdict,
 )
-from app.viewer.units import Unit, Units
 from app.viewer.views import mathml as m
 from kin import Robot
 from kin.robot import Convention
 from kin.transforms import Array
+from kin.units import Unit, Units
 
 # Okabe and Ito's: blue for what is about or along z, vermilion for x, as the axes of every frame are coloured.
 ABOUT_Z, ABOUT_X = (0, 114, 178), (213, 94, 0)

@@ -14,11 +14,11 @@ from typing import Literal
 import numpy as np
 
 from app.viewer.scene.chain import rotation, translation
-from app.viewer.units import Units
 from kin import Robot, link_frames
 from kin.axes import joint_axes, pairs
 from kin.robot import Convention
 from kin.transforms import Array
+from kin.units import Units
 
 Factor = Literal["theta", "d", "a", "alpha"]
 ORDERS: dict[Convention, tuple[Factor, ...]] = {

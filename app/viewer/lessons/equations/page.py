@@ -11,9 +11,8 @@ import numpy as np
 from app.equations import Book, Equation, Line, Symbol, Values, typeset
 from app.equations.expression import Expression, names
 from app.viewer.panel.status import ink
-from app.viewer.units import Units
-from app.viewer.views.mathml import fixed
 from kin.transforms import Array
+from kin.units import Units, fixed
 
 # Mark, words and colour of each verdict; the colours are Okabe and Ito's.
 LOOKS = {

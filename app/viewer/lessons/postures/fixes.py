@@ -15,9 +15,9 @@ import numpy as np
 
 import kin
 from app.viewer.panel.status import LOOKS, notice
-from app.viewer.units import USUAL, Units
 from kin import IKResult, Robot, Task
 from kin.transforms import Array, rotation_angle
+from kin.units import DEFAULT_UNITS, Units
 
 Kind = Literal["branch", "unlock", "relax", "turn", "move"]
 LESS: dict[Task, tuple[Task, ...]] = {
@@ -55,7 +55,7 @@ def remedies(
     locked: tuple[float | None, ...] | None,
     branch: str | None,
     result: IKResult,
-    units: Units = USUAL,
+    units: Units = DEFAULT_UNITS,
 ) -> Iterator[Fix | None]:
     """What would let the arm reach the target `T` ``(4, 4)``, from the least change to the greatest.
 

@@ -17,12 +17,12 @@ import numpy as np
 import kin
 from app.viewer.panel.posture import parts, short
 from app.viewer.scene.meshes import JOINT_COLORS, Color
-from app.viewer.units import USUAL, Units
 from kin import IKSolution, LimitViolation, Robot, Task
 from kin.ik.branches import is_closed, solve_branches, violations_of
 from kin.ik.candidates import OVERRUN
 from kin.ik.problem import ask
 from kin.transforms import Array
+from kin.units import DEFAULT_UNITS, Units
 
 State = Literal["reachable", "compromise", "blocked", "absent", "unknown"]
 
@@ -69,7 +69,7 @@ def survey(
     task: Task,
     q: Array,
     locked: tuple[float | None, ...] | None = None,
-    units: Units = USUAL,
+    units: Units = DEFAULT_UNITS,
 ) -> tuple[Posture, ...]:
     """All branches for the target `T` ``(4, 4)``, seen from `q` ``(n,)``, in the order of `kin.branch_names`.
 

@@ -25,9 +25,9 @@ from app.viewer.panel import assign, listen
 from app.viewer.panel.status import Notice
 from app.viewer.scene.meshes import JOINT_COLORS, body
 from app.viewer.selfmotion import INSET, SMOOTH, End, ends, free_values, reach_of, self_motion
-from app.viewer.units import Units
 from kin import IKResult, InputError, Redundancy
 from kin.transforms import Array
+from kin.units import Units
 
 FRAME = 1 / 30
 READ_INTERVAL = 0.05

@@ -10,9 +10,9 @@ import numpy as np
 import kin
 from app.viewer.panel.posture import strip_html
 from app.viewer.selfmotion import End
-from app.viewer.units import Unit, Units
 from kin import Redundancy, Robot, Task
 from kin.transforms import Array, rotation_angle, vector_angle
+from kin.units import Unit, Units
 
 # A slider outside a framed folder has a narrower label.
 UNDER_TRACK = "margin:0 3.25em 0 5em"

@@ -33,9 +33,9 @@ from app.viewer.lessons.velocity.rates import (
     task_rates,
 )
 from app.viewer.panel import assign, listen, listen_click
-from app.viewer.units import Unit, Units
 from kin import InputError
 from kin.transforms import Array
+from kin.units import Unit, Units
 
 INTERVAL = 0.05  # s between two updates of the numbers
 HOLD = 10.0  # steps a second while a button is held

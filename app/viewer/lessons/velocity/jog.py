@@ -15,9 +15,9 @@ import numpy as np
 import kin
 from app.viewer.panel.joints import label
 from app.viewer.panel.status import Notice, notice
-from app.viewer.units import USUAL, Units
 from kin import IKResult, IKSolution, Robot, Task
 from kin.transforms import Array, rotation_from_wxyz, vector_angle
+from kin.units import DEFAULT_UNITS, Units
 
 Frame = Literal["base", "tool"]
 Locked = tuple[float | None, ...] | None
@@ -63,7 +63,7 @@ def step(
     amount: float,
     frame: Frame,
     locked: Locked = None,
-    units: Units = USUAL,
+    units: Units = DEFAULT_UNITS,
 ) -> Step:
     """One step of `amount` (m or rad) from q ``(n,)``; `locked` as `kin.solve_ik` takes it; told in `units`.
 

@@ -10,11 +10,11 @@ import numpy as np
 
 from app.viewer.lessons.velocity.rates import Ellipsoid, State, TaskRates, condition, real, state_of
 from app.viewer.panel.status import ink
-from app.viewer.units import Units
-from app.viewer.views.mathml import fixed, ident, sub, text
+from app.viewer.views.mathml import ident, sub, text
 from app.viewer.views.mathml import math as formula
 from kin import Robot, Singularity
 from kin.transforms import Array
+from kin.units import Units, fixed
 
 # Mark, word and colour of each state; the colours are Okabe and Ito's.
 LOOKS: dict[State, tuple[str, str, str]] = {

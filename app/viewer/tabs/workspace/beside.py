@@ -18,9 +18,9 @@ from app.shared.clouds import Cloud, Clouds, step_back
 from app.viewer.panel import Post
 from app.viewer.tabs.workspace import known, plot
 from app.viewer.tabs.workspace.colours import radius_and_height
-from app.viewer.units import Units
 from kin import Robot, Section
 from kin.transforms import Array
+from kin.units import Units
 
 WIDTH = 340  # pixels of the panel
 PLAIN = (110, 110, 110)

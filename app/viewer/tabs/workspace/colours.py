@@ -17,9 +17,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from app.viewer.units import Units
 from kin import Robot, WorkspaceChunk, workspace_slice
 from kin.transforms import Array
+from kin.units import Units
 from kin.workspace import Measure
 from kin.workspace.facts.extremes import base_line
 from kin.workspace.region import Region

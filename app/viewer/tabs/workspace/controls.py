@@ -11,8 +11,8 @@ from app.viewer.panel import Post, assign, listen, listen_click
 from app.viewer.tabs.workspace.colours import BY, MAPS
 from app.viewer.tabs.workspace.cut import AXES, KEEP, Cut
 from app.viewer.tabs.workspace.wishes import LARGEST, MOST, SMALLEST, Wishes
-from app.viewer.units import Units
 from kin import InputError, Robot
+from kin.units import Units
 from kin.workspace import Strategy
 
 STRATEGIES: dict[str, Strategy] = {

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from app.exports.svg import AxisStyle, Plot, axes, joint_colour, png_url
 from app.viewer.tabs.workspace.colours import radius_and_height
-from app.viewer.units import Unit, Units
 from kin import Robot, Section
+from kin.units import Unit, Units
 from kin.workspace import SectionArc
 
 CLOUD = (0, 114, 178)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from app.viewer.units import Unit, Units
 from kin import WorkspaceFacts
+from kin.units import Unit, Units
 from kin.workspace import Estimate, Span
 
 LESS = 5e-4  # m: a hole smaller than this is none on screen

@@ -32,9 +32,9 @@ from app.viewer.tabs.workspace.drawing import Drawing, Look
 from app.viewer.tabs.workspace.flow import Flow
 from app.viewer.tabs.workspace.pick import Candidate, nearest
 from app.viewer.tabs.workspace.wishes import Wishes, default_size
-from app.viewer.units import Units
 from kin import InputError, Robot, WorkspaceFacts
 from kin.transforms import Array, finite_array
+from kin.units import Units
 
 REPORT = 0.2  # s between two reports of progress
 REDRAW = 1.0  # s between two drawings of the section with more points

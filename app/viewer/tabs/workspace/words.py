@@ -7,9 +7,9 @@ from typing import Literal
 import numpy as np
 
 import kin
-from app.viewer.units import Units
 from kin import Robot
 from kin.transforms import Array
+from kin.units import Units
 from kin.workspace.clouds.measures import measured
 from kin.workspace.region import Region
 

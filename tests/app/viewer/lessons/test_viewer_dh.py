@@ -17,7 +17,7 @@ from app.shared.store import Store
 from app.viewer.lessons import dh
 from app.viewer.lessons.dh import draw, page, steps
 from app.viewer.server import ViewerServer
-from app.viewer.units import USUAL, Units
+from kin.units import DEFAULT_UNITS, Units
 
 ROBOTS = [*kin.builtin_robots().values()]
 READINGS = [reading for robot in ROBOTS for reading in (robot, steps.reread(robot))]
@@ -77,7 +77,9 @@ def test_symbols_with_numbers_put_in_are_the_matrix(robot: kin.Robot) -> None:
 
 def test_captions_follow_the_order_of_the_convention() -> None:
     def told(robot: kin.Robot, row: int) -> list[str]:
-        return [steps.caption(robot, steps.place(robot, robot.q_home, 4 * row + k), USUAL) for k in range(1, 5)]
+        return [
+            steps.caption(robot, steps.place(robot, robot.q_home, 4 * row + k), DEFAULT_UNITS) for k in range(1, 5)
+        ]
 
     assert told(PIONEER, 0) == [
         "Row 1 of 6: turn 90.0° about z₀ (θ₁, joint 1).",
@@ -107,7 +109,7 @@ def test_why_two_joints_of_the_printed_table_are_one() -> None:
     assert steps.shared_lines(PRINTED) == [0]
     assert steps.shared_lines(CRAIG) == []
     for robot in (PRINTED, CRAIG):
-        standard, craig = steps.verdict(robot, USUAL)
+        standard, craig = steps.verdict(robot, DEFAULT_UNITS)
         assert standard == (
             "Standard order: row 1 (a₁ = 0, α₁ = 0) leaves z₀ and z₁ one line, so joints 1 and 2 turn about it "
             "together and only θ₁ + θ₂ counts: 7 joints, 6 freedoms."
@@ -123,7 +125,7 @@ def test_freedoms_told_are_the_rank_of_the_jacobian_where_lines_coincide(robot: 
     assert rank <= steps.freedoms(robot)
     if steps.shared_lines(robot):
         assert rank == min(steps.freedoms(robot), 6)
-    assert steps.verdict(robot, USUAL)
+    assert steps.verdict(robot, DEFAULT_UNITS)
 
 
 def test_opposite_turns_about_one_line_count_by_their_difference() -> None:
@@ -138,7 +140,7 @@ rows = [
   { name = "c", a = 1, limits = [-90, 90] },
 ]
 """
-    assert "θ₁ − θ₂ counts" in steps.verdict(kin.parse_robot(text), USUAL)[0]
+    assert "θ₁ − θ₂ counts" in steps.verdict(kin.parse_robot(text), DEFAULT_UNITS)[0]
 
 
 # The page
@@ -151,10 +153,10 @@ def test_every_page_is_well_formed(robot: kin.Robot, symbols: bool) -> None:
     for at in (0.0, 1.0, 2.5, 4.0, float(steps.length(robot))):
         here = steps.place(robot, q, at)
         told = words(
-            page.caption_html(robot, here, USUAL)
+            page.caption_html(robot, here, DEFAULT_UNITS)
             + page.table_html(robot, q, here, RADIANS)
-            + page.matrices_html(robot, here, symbols, USUAL)
-            + page.compare_html(robot, steps.reread(robot), q, here, 0.1, USUAL)
+            + page.matrices_html(robot, here, symbols, DEFAULT_UNITS)
+            + page.compare_html(robot, steps.reread(robot), q, here, 0.1, DEFAULT_UNITS)
             + page.nine_steps_html(robot.convention)
         )
         assert "-" not in re.sub(r"[a-z]-[a-z]", "", told), "every minus is a true one"
@@ -163,7 +165,7 @@ def test_every_page_is_well_formed(robot: kin.Robot, symbols: bool) -> None:
 
 def test_the_table_marks_where_the_walk_is_and_what_joints_move() -> None:
     at = steps.place(CRAIG, CRAIG.q_home, 6.5)
-    html = page.table_html(CRAIG, CRAIG.q_home, at, USUAL)
+    html = page.table_html(CRAIG, CRAIG.q_home, at, DEFAULT_UNITS)
     rows = [*ET.fromstring(html).iter("tr")]
     assert [words(ET.tostring(th, encoding="unicode")) for th in rows[0]] == [
         *(" row", "αᵢ₋₁ °", "aᵢ₋₁ mm", "θᵢ °", "dᵢ mm"),
@@ -177,7 +179,7 @@ def test_the_table_marks_where_the_walk_is_and_what_joints_move() -> None:
 
 def test_symbols_put_constants_in_and_leave_the_joint_open() -> None:
     def entries(robot: kin.Robot, row: int) -> list[str]:
-        html = page.matrices_html(robot, steps.place(robot, robot.q_home, 4 * row + 4), True, USUAL)
+        html = page.matrices_html(robot, steps.place(robot, robot.q_home, 4 * row + 4), True, DEFAULT_UNITS)
         cells = [words(ET.tostring(c, encoding="unicode")) for c in ET.fromstring(f"<d>{html}</d>").iter("mtd")]
         return cells[:16]
 
@@ -194,7 +196,7 @@ def test_symbols_put_constants_in_and_leave_the_joint_open() -> None:
 
 def test_numbers_follow_the_units() -> None:
     at = steps.place(PIONEER, PIONEER.q_home, 4.5)
-    assert "30.0" in page.table_html(PIONEER, PIONEER.q_home, at, USUAL)
+    assert "30.0" in page.table_html(PIONEER, PIONEER.q_home, at, DEFAULT_UNITS)
     radians = words(page.table_html(PIONEER, PIONEER.q_home, at, RADIANS))
     assert "0.524" in radians
     assert "rad" in radians

@@ -18,8 +18,8 @@ from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.lessons.equations import EquationsLesson, page
 from app.viewer.server import ViewerServer
-from app.viewer.units import USUAL, Units
 from kin import chapter
+from kin.units import DEFAULT_UNITS, Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -131,7 +131,7 @@ def test_a_failed_check_is_said_instead_of_shown(tab: FakeBrowser, monkeypatch: 
 
 
 def test_what_was_chosen_can_be_restored() -> None:
-    stage = MagicMock(robot=PIONEER, q=PIONEER.q_home, units=USUAL)
+    stage = MagicMock(robot=PIONEER, q=PIONEER.q_home, units=DEFAULT_UNITS)
     book_later(PIONEER).result(30)
     chosen = EquationsLesson(stage)
     chosen.handle("equation", "(13) a_x ✕ misprinted")
@@ -158,11 +158,11 @@ def test_every_equation_of_every_arm_can_be_shown(robot) -> None:
         text = page.equation_html(found, equation)
         assert text.count("<div") == text.count("</div>")
         assert text.count("<math") == text.count("</math>") > (0 if equation.correct else -1)
-        assert page.symbols_html(found.symbols_of(equation), USUAL)
+        assert page.symbols_html(found.symbols_of(equation), DEFAULT_UNITS)
         if equation.correct is None:
             continue
         values = found.values(equation, robot.q_home, T)
-        assert page.values_html(equation, values, USUAL, 1.0).count("<td") == (
+        assert page.values_html(equation, values, DEFAULT_UNITS, 1.0).count("<td") == (
             2 if equation.verdict == "derived" else 3
         )
         if equation.verdict == "misprinted":
@@ -178,7 +178,7 @@ def test_every_equation_of_every_arm_can_be_shown(robot) -> None:
 def test_names_that_people_typed_are_escaped() -> None:
     rows = (replace(PUMA.rows[0], name="<script>"), *PUMA.rows[1:])
     robot = replace(PUMA, rows=rows)
-    text = page.symbols_html(book(robot).symbols.values(), USUAL)
+    text = page.symbols_html(book(robot).symbols.values(), DEFAULT_UNITS)
     assert "<script>" not in text
     assert "&lt;script&gt;" in text
 
@@ -207,6 +207,6 @@ def test_small_and_vanishing_differences_are_not_called_zero() -> None:
     equation = book(PIONEER).equation("6")
     values = book(PIONEER).values(equation, PIONEER.q_home)
     tiny = replace(values, difference=np.array(1e-6))
-    assert "<b>&lt; 0.1 mm</b>" in page.told(equation, tiny, USUAL, 0.1)[1]
+    assert "<b>&lt; 0.1 mm</b>" in page.told(equation, tiny, DEFAULT_UNITS, 0.1)[1]
     none = replace(values, difference=np.array(0.0))
-    assert page.told(equation, none, USUAL, 0.1)[0] == "✓"
+    assert page.told(equation, none, DEFAULT_UNITS, 0.1)[0] == "✓"

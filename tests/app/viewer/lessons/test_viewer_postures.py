@@ -20,7 +20,7 @@ from app.viewer.lessons.postures.listing import Posture, html, limit_margin, sur
 from app.viewer.panel.joints import label
 from app.viewer.panel.posture import short
 from app.viewer.scene.chain import chain
-from app.viewer.units import USUAL, Units
+from kin.units import DEFAULT_UNITS, Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -122,7 +122,7 @@ def test_an_arm_without_named_branches_has_its_nearest_posture() -> None:
 
 def test_the_row_of_the_list_is_escaped_and_marked() -> None:
     hostile = Posture("shoulder <b> · elbow up", "blocked", "beyond <i>")
-    text = html(PIONEER, (hostile,), hostile.name, frozenset(), USUAL)
+    text = html(PIONEER, (hostile,), hostile.name, frozenset(), DEFAULT_UNITS)
     assert "<b> ·" not in text
     assert "<i>" not in text
     assert "data-here" in text

@@ -17,8 +17,8 @@ from app.viewer import selfmotion
 from app.viewer.lessons.redundancy import told
 from app.viewer.lessons.redundancy.ring import arc_segments, coaxial, elbow_circle, joint_axis, trade_segments
 from app.viewer.panel.joints import label
-from app.viewer.units import RADIANS, USUAL, Units
 from kin import Redundancy
+from kin.units import DEFAULT_UNITS, RADIANS, Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -176,9 +176,9 @@ def test_residuals_are_measured_by_the_task_and_never_rounded_to_nothing() -> No
     assert told.residual(T, held, "pose") == (2e-13, pytest.approx(math.pi / 2))
     assert told.residual(T, held, "approach") == (2e-13, 0.0)
     assert told.residual(T, held, "position") == (2e-13, None)
-    assert told.small(2e-13, USUAL.lengths) == "2·10<sup>−10</sup> mm"
-    assert told.small(0.0, USUAL.lengths) == "0 mm"
-    assert told.small(0.00125, USUAL.lengths) == "1.25 mm"
+    assert told.small(2e-13, DEFAULT_UNITS.lengths) == "2·10<sup>−10</sup> mm"
+    assert told.small(0.0, DEFAULT_UNITS.lengths) == "0 mm"
+    assert told.small(0.00125, DEFAULT_UNITS.lengths) == "1.25 mm"
     assert told.small(0.00125, Units(length="cm").lengths) == "0.125 cm"
     assert told.small(2e-13, Units(length="m").lengths) == "2·10<sup>−13</sup> m"
     assert told.small(0.5, RADIANS) == "0.5000 rad"

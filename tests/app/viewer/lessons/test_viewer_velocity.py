@@ -33,9 +33,9 @@ from app.viewer.lessons.velocity.rates import (
     task_rates,
 )
 from app.viewer.server import ViewerServer
-from app.viewer.units import USUAL, Units
 from kin.singularity import task_jacobian
 from kin.transforms import rotation_angle, rotation_from_wxyz, vector_angle
+from kin.units import DEFAULT_UNITS, Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -433,7 +433,13 @@ def test_a_shared_state_is_restored_and_a_hostile_one_is_ignored() -> None:
         robot = STORE.get("ur5")
         client = SimpleNamespace(gui=server.gui, scene=server.scene, camera=SimpleNamespace(position=np.ones(3)))
         stage = SimpleNamespace(
-            client=client, robot=robot, q=robot.q_home, goal=robot.q_home, task="pose", units=USUAL, dark=False
+            client=client,
+            robot=robot,
+            q=robot.q_home,
+            goal=robot.q_home,
+            task="pose",
+            units=DEFAULT_UNITS,
+            dark=False,
         )
         lesson = VelocityLesson(stage)  # type: ignore[arg-type]
         first = lesson.state()
@@ -449,8 +455,8 @@ def test_a_shared_state_is_restored_and_a_hostile_one_is_ignored() -> None:
         # What was on its way from fields that are gone is not read in the new units.
         stage.units = Units(False, "cm")
         lesson.on_style()
-        lesson.handle(("step", USUAL), 5.0)
-        lesson.handle(("turn", USUAL), 0.2)
+        lesson.handle(("step", DEFAULT_UNITS), 5.0)
+        lesson.handle(("turn", DEFAULT_UNITS), 0.2)
         assert lesson.state() == first
         lesson.handle(("step", stage.units), 5.0)
         lesson.handle(("turn", stage.units), 0.2)

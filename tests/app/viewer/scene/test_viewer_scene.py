@@ -20,8 +20,8 @@ from app.viewer.scene.arm import ArmScene
 from app.viewer.scene.chain import chain
 from app.viewer.scene.meshes import body, joint_color
 from app.viewer.scene.shapes import tube
-from app.viewer.units import USUAL, Units
 from kin.transforms import from_position_wxyz
+from kin.units import DEFAULT_UNITS, Units
 
 ROW = '[[rows]]\nname = "{}"\nkind = "{}"\ntheta = {}\nd = {}\na = {}\nalpha = {}\n'
 
@@ -260,7 +260,7 @@ def rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:
 def test_the_readout_keeps_its_shape_and_shows_no_negative_zero() -> None:
     T = np.eye(4)
     T[:3, 3] = [-1e-9, 0.1234567, -1.5]
-    text = readout.html(T, USUAL)
+    text = readout.html(T, DEFAULT_UNITS)
     assert ">0.0<" in text
     assert "−0.0<" not in text
     assert ">123.5<" in text
@@ -291,7 +291,7 @@ def test_notices_say_what_happened(robot_id: str, shift: tuple[float, ...], titl
     T = kin.fk(robot, robot.q_home)
     T[:3, 3] += shift
     result = kin.solve_ik(robot, T)
-    shown = status.notice(result, USUAL)
+    shown = status.notice(result, DEFAULT_UNITS)
     assert shown.title.startswith(title)
     assert shown.detail.lower() in result.reason.lower()
     assert len(shown.detail) > 10

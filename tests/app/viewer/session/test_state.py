@@ -22,7 +22,7 @@ from app.viewer.panel.view import ViewState
 from app.viewer.server import ViewerServer
 from app.viewer.session import controller
 from app.viewer.session.state import MAX_TEXT, PageState, decode, encode, read_memory
-from app.viewer.units import USUAL, Units
+from kin.units import DEFAULT_UNITS, Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -63,7 +63,7 @@ def test_a_state_survives_as_text_that_any_address_may_carry():
 
 
 def test_an_address_from_before_lengths_had_a_unit_is_in_millimetres():
-    assert there().units == USUAL
+    assert there().units == DEFAULT_UNITS
     assert there(units="rad").units == Units(degrees=False)
     assert there(length="m").units == Units(length="m")
 

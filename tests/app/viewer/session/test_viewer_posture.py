@@ -13,7 +13,7 @@ import kin
 from app.shared.store import Store
 from app.viewer.panel.joints import label
 from app.viewer.panel.posture import short, strip_html
-from app.viewer.units import DEGREES
+from kin.units import DEGREES
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 

@@ -23,7 +23,7 @@ from app.viewer.server import ViewerServer
 from app.viewer.tabs.workspace import colours, cut
 from app.viewer.tabs.workspace.capability import told, voxels
 from app.viewer.tabs.workspace.capability.wishes import MapWishes
-from app.viewer.units import USUAL, Units
+from kin.units import DEFAULT_UNITS, Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -75,16 +75,16 @@ def test_what_is_no_state_restores_nothing(state):
 def test_words_tell_what_the_map_holds():
     found = the_map()
     row = int(found.share.argmax())
-    text = html.unescape(told.picked(found, row, USUAL))
+    text = html.unescape(told.picked(found, row, DEFAULT_UNITS))
     assert f"{found.approachable[row].sum()} of 12 directions" in text
     none = int(np.flatnonzero(found.share == 0.0)[0])
-    assert "none of the set" in told.picked(found, none, USUAL)
-    assert told.WORTH["closed form"] in told.facts(found, None, whole=True, units=USUAL)
-    assert f"{found.volume:.4g}" in told.facts(found, None, whole=True, units=USUAL)
-    assert "so far" in told.facts(found, None, whole=False, units=USUAL)
-    assert "With joints 1, 3 locked. " in told.facts(found, (0.0, None, 0.5), whole=True, units=USUAL)
+    assert "none of the set" in told.picked(found, none, DEFAULT_UNITS)
+    assert told.WORTH["closed form"] in told.facts(found, None, whole=True, units=DEFAULT_UNITS)
+    assert f"{found.volume:.4g}" in told.facts(found, None, whole=True, units=DEFAULT_UNITS)
+    assert "so far" in told.facts(found, None, whole=False, units=DEFAULT_UNITS)
+    assert "With joints 1, 3 locked. " in told.facts(found, (0.0, None, 0.5), whole=True, units=DEFAULT_UNITS)
     empty = kin.capability_join(found.grid, [])
-    assert "0" in told.facts(empty, None, whole=False, units=USUAL)
+    assert "0" in told.facts(empty, None, whole=False, units=DEFAULT_UNITS)
     assert 'data-shown="0"' in told.legend(empty, "share", "viridis", 0.0)
     assert all(set(told.WORTH) >= {kin.capability_grid(r, resolution=2).method} for r in (PIONEER, PUMA))
 

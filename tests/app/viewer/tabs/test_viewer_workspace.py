@@ -26,8 +26,8 @@ from app.viewer.panel.joints import UNLOCK_ALL
 from app.viewer.server import ViewerServer
 from app.viewer.tabs.workspace import colours, cut, flow, known, pick, plot, sizes, words
 from app.viewer.tabs.workspace.wishes import MOST, Wishes, default_size
-from app.viewer.units import USUAL, Units
 from kin.robot import Joint
+from kin.units import DEFAULT_UNITS, Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -64,8 +64,8 @@ def test_a_scale_holds_nearly_all_points(robot, by):
     scale = colours.scale_of(robot, by)
     assert scale.low < scale.high
     assert ((values >= scale.low) & (values <= scale.high)).mean() > 0.98
-    legend = colours.legend(scale, "viridis", USUAL)
-    assert colours.value_text(by, scale.high, USUAL) in legend
+    legend = colours.legend(scale, "viridis", DEFAULT_UNITS)
+    assert colours.value_text(by, scale.high, DEFAULT_UNITS) in legend
     assert colours.MEANING[by].replace("'", "&#x27;") in legend
 
 
@@ -192,11 +192,11 @@ def test_the_cloud_in_the_drawing_is_inside_the_boundary_in_the_drawing():
     assert density.parts == 1
     alpha = np.asarray(Image.open(io.BytesIO(base64.b64decode(density.image_url().partition(",")[2]))))[..., 3]
     assert np.array_equal(alpha > 0, density.counts > 0)
-    drawn = plot.drawing(section, frame, plot.image(density), USUAL)
+    drawn = plot.drawing(section, frame, plot.image(density), DEFAULT_UNITS)
     assert "data:image/png;base64," in drawn
     assert {int(j) for j in re.findall(r'data-arc="(\d)"', drawn)} == {a.joint + 1 for a in section.arcs}
     assert drawn.count("data-arc") == len(section.arcs)
-    assert "data:image" not in plot.drawing(section, frame, "", USUAL)
+    assert "data:image" not in plot.drawing(section, frame, "", DEFAULT_UNITS)
     # Equal scales, z upwards.
     a, b, c = frame.at(np.array([[0.0, 0.0], [0.1, 0.0], [0.0, 0.1]]))
     assert b[0] - a[0] == pytest.approx(a[1] - c[1])
@@ -214,11 +214,11 @@ def test_an_arm_whose_first_joint_slides_has_no_section():
 
 def test_sizes_say_what_is_unknown_yet():
     facts = known.facts(PIONEER, False)
-    table = sizes.html(facts, waiting=True, units=USUAL)
+    table = sizes.html(facts, waiting=True, units=DEFAULT_UNITS)
     assert table.count("computing…") == 2
     assert f"{1000 * facts.reach.largest.value:.1f}" in table
     assert "none" in table
-    assert "unknown" in sizes.html(facts, waiting=False, units=USUAL)
+    assert "unknown" in sizes.html(facts, waiting=False, units=DEFAULT_UNITS)
 
 
 @pytest.mark.parametrize(("length", "scale", "decimals"), [("mm", 1000, 0), ("cm", 100, 1), ("m", 1, 3)])
@@ -250,7 +250,7 @@ def test_the_drawing_of_the_section_follows_the_units(length, ticks):
 
 
 def test_marks_closer_than_a_millimetre_are_told_apart():
-    texts = [text for _, text in tick_labels(0.0, 0.003, USUAL.lengths.scale)]
+    texts = [text for _, text in tick_labels(0.0, 0.003, DEFAULT_UNITS.lengths.scale)]
     assert texts == ["0.0", "0.5", "1.0", "1.5", "2.0", "2.5", "3.0"]
 
 
@@ -498,8 +498,8 @@ def test_the_tab_follows_the_unit_of_length_and_keeps_what_it_shows():
         tab.set("Lengths", "cm")
         tab.wait(lambda: "Cut at (cm)" in tab.sliders)
         # What was on its way from sliders that are gone.
-        post(("at", USUAL), 0.0)
-        post(("size", USUAL), 20.0)
+        post(("at", DEFAULT_UNITS), 0.0)
+        post(("size", DEFAULT_UNITS), 20.0)
         tab.settle()
         assert tab.value("Cut at (cm)") == pytest.approx(20.0)
         assert tab.value("Point size (cm)") == pytest.approx(size / 10)

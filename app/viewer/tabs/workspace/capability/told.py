@@ -10,8 +10,8 @@ from app.viewer.tabs.workspace import colours
 from app.viewer.tabs.workspace.capability.voxels import LEVELS, first_level, largest, levels, values_of
 from app.viewer.tabs.workspace.capability.wishes import By
 from app.viewer.tabs.workspace.words import Locks, grouped, locks
-from app.viewer.units import Units
 from kin import CapabilityMap
+from kin.units import Units
 from kin.workspace.capability.blocks import ROLLS, STARTS, Method
 
 State = Literal["ready", "waiting", "computing", "stopped", "done", "failed"]

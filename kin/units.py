@@ -1,9 +1,9 @@
-"""The units a visitor reads and types: degrees or radians; millimetres, centimetres or metres.
+"""The units in which people read values: degrees or radians; millimetres, centimetres or metres.
 
-Inside, all is radians and metres. A place that shows a value says how finely it means it, in decimals of a degree
-or of a millimetre; a larger unit gets as many more as it needs to say the same: 0.1 mm are 0.01 cm and 0.0001 m.
+All values inside are in radians and metres. Precision is given in decimals of a degree or of a millimetre; a
+larger unit gets as many more decimals as it needs to be equally fine: 0.1 mm is 0.01 cm and 0.0001 m.
 
-What is no plain angle or length stays in SI units whatever was chosen: speeds, volumes, surfaces, manipulability.
+Quantities other than plain angles and lengths (speeds, volumes, areas, manipulability) are always in SI units.
 """
 
 from __future__ import annotations
@@ -13,23 +13,30 @@ import re
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from app.viewer.views.mathml import fixed
-
 Length = Literal["mm", "cm", "m"]
 LENGTHS: tuple[Length, ...] = get_args(Length)
-# A size in a sentence of the core's, which speaks of degrees and millimetres: digits, exponent, unit.
+# A value in a sentence of the core, in degrees or millimetres: digits, exponent, unit.
 _SIZE = re.compile(r"(\d+(?:\.(\d+))?)(e[+-]?\d+)?(°| mm\b)")
-_LONG = 0.01  # m; from here on tenths of a millimetre are left out of a sentence
+_LONG = 0.01  # metres; longer lengths are written without tenths of a millimetre
+_DECIMALS = 1  # of a degree or of a millimetre, in a sentence
+
+
+def fixed(value: float, decimals: int = 3) -> str:
+    """A number with fixed decimals, a true minus sign, and no minus before a zero."""
+    shown = f"{value:.{decimals}f}"
+    if float(shown) == 0.0:
+        shown = shown.lstrip("-")
+    return shown.replace("-", "−")
 
 
 @dataclass(frozen=True)
 class Unit:
-    """How angles or lengths are written.
+    """A unit of angle or length, and how values in it are written.
 
     Attributes:
-        name: of the unit.
-        scale: how many of it are a radian, or a metre.
-        finer: how many decimals more than degrees or millimetres it needs.
+        name: symbol of the unit.
+        scale: how many of it make a radian, or a metre.
+        finer: additional decimals compared with degrees or millimetres.
     """
 
     name: str
@@ -38,39 +45,45 @@ class Unit:
 
     @property
     def suffix(self) -> str:
-        """The name as it follows a number."""
+        """The symbol as it follows a number."""
         return self.name if self.name == "°" else f" {self.name}"
 
     def decimals(self, digits: int) -> int:
-        """Decimals that tell as much as `digits` of a degree or of a millimetre."""
+        """Decimals as fine as `digits` decimals of a degree or of a millimetre."""
         return digits + self.finer
 
     def step(self, digits: int) -> float:
-        """The last of these decimals, in this unit: a slider's step."""
+        """One unit of the last decimal: the step of a slider."""
         return 10.0 ** -self.decimals(digits)
 
     def shown(self, value: float, digits: int = 1) -> float:
-        """A value in radians or metres as a control shows it."""
+        """A value (radians or metres) in this unit, rounded for a control."""
         return round(value * self.scale, self.decimals(digits))
 
     def read(self, shown: float) -> float:
-        """What a control shows, in radians or metres."""
+        """A value in this unit, converted to radians or metres."""
         return shown / self.scale
 
     def number(self, value: float, digits: int = 1) -> str:
-        """A value in radians or metres with fixed decimals, without its unit."""
+        """A value (radians or metres) with fixed decimals, without the unit."""
         return fixed(value * self.scale, self.decimals(digits))
 
     def text(self, value: float, digits: int = 1) -> str:
-        """The same with its unit."""
+        """`number` with the unit."""
         return self.number(value, digits) + self.suffix
 
+    def value(self, value: float) -> str:
+        """A value (radians or metres) for a sentence: one decimal, or in powers of ten if that would show zero."""
+        scaled, digits = value * self.scale, self.decimals(_DECIMALS)
+        small = 0.0 < abs(scaled) < 0.5 * 10.0**-digits
+        return (f"{scaled:.1e}" if small else f"{scaled:.{digits}f}") + self.suffix
+
     def brief(self, value: float) -> str:
-        """A value in radians or metres that somebody has chosen, so a round one: without zeros at its end."""
+        """A round value (radians or metres), such as a chosen step: without trailing zeros."""
         return f"{value * self.scale:.4g}{self.suffix}".replace("-", "−")
 
     def size(self, value: float, digits: int = 1) -> str:
-        """The size of a value for a sentence: never rounded down to a zero that it is not."""
+        """The size of a value for a sentence; one that would round to zero is written as ``< 0.1``."""
         size, least = abs(value) * self.scale, self.step(digits)
         if 0.0 < size < least:
             return f"< {least:.{self.decimals(digits)}f}{self.suffix}"
@@ -83,10 +96,10 @@ _OF_LENGTH: dict[Length, Unit] = {"mm": Unit("mm", 1e3, 0), "cm": Unit("cm", 1e2
 
 @dataclass(frozen=True)
 class Units:
-    """What a visitor has chosen. A control's events carry the units it was made in: see `panel`.
+    """The reader's choice of units.
 
     Attributes:
-        degrees: whether angles are told in degrees, else in radians.
+        degrees: whether angles are written in degrees, else in radians.
         length: the unit of lengths.
     """
 
@@ -103,9 +116,9 @@ class Units:
         """The unit of lengths."""
         return _OF_LENGTH[self.length]
 
-    def of(self, turning: bool) -> Unit:
-        """The unit of what turns (a revolute joint, θ, α), or of what slides."""
-        return self.angles if turning else self.lengths
+    def of(self, is_angle: bool) -> Unit:
+        """The unit of an angle (a revolute joint, θ, α) or of a length (a prismatic joint, d, a)."""
+        return self.angles if is_angle else self.lengths
 
     def angle(self, radians: float) -> str:
         """The size of an angle for a sentence."""
@@ -116,14 +129,14 @@ class Units:
         long = metres == 0.0 or abs(metres) >= _LONG
         return self.lengths.size(metres, 0 if long else 1)
 
-    def motion(self, turning: bool, value: float) -> str:
+    def motion(self, is_angle: bool, value: float) -> str:
         """The size of a joint's motion for a sentence."""
-        return self.angle(value) if turning else self.distance(value)
+        return self.angle(value) if is_angle else self.distance(value)
 
     def retold(self, sentence: str) -> str:
-        """A sentence of the core's, which tells degrees and millimetres, with these units instead."""
+        """A sentence of the core, which is in degrees and millimetres, in these units instead."""
 
-        def told(found: re.Match[str]) -> str:
+        def rewritten(found: re.Match[str]) -> str:
             number, decimals, exponent, name = found.groups(default="")
             turning = name == "°"
             plain, unit = (DEGREES if turning else _OF_LENGTH["mm"]), self.of(turning)
@@ -134,7 +147,7 @@ class Units:
                 return f"{value:.{len(decimals)}e}{unit.suffix}"
             return f"{value:.{unit.decimals(len(decimals))}f}{unit.suffix}"
 
-        return _SIZE.sub(told, sentence)
+        return _SIZE.sub(rewritten, sentence)
 
 
-USUAL = Units()
+DEFAULT_UNITS = Units()

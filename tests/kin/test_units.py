@@ -1,0 +1,123 @@
+"""Units in sentences and on screen: arithmetic, precision, and values that would round to zero."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+
+import numpy as np
+import pytest
+
+import kin
+from kin.units import DEFAULT_UNITS, DEGREES, LENGTHS, RADIANS, Unit, Units
+
+ALL = [Units(degrees, length) for degrees, length in itertools.product((True, False), LENGTHS)]
+MM, CM, M = (Units(length=length).lengths for length in LENGTHS)
+
+
+def test_degrees_and_millimetres_are_the_default() -> None:
+    assert Units() == DEFAULT_UNITS == Units(True, "mm")
+    assert (DEFAULT_UNITS.angles.name, DEFAULT_UNITS.lengths.name) == ("°", "mm")
+
+
+@pytest.mark.parametrize("digits", [0, 1, 2, 3])
+def test_every_length_unit_resolves_the_same(digits: int) -> None:
+    steps = [unit.step(digits) / unit.scale for unit in (MM, CM, M)]
+    assert steps == pytest.approx([1e-3 * 10.0**-digits] * 3)
+
+
+def test_angles_are_never_coarser_in_radians() -> None:
+    for digits in (0, 1, 2):
+        assert RADIANS.step(digits) <= math.radians(DEGREES.step(digits))
+
+
+@pytest.mark.parametrize("units", ALL, ids=str)
+@pytest.mark.parametrize("is_angle", [True, False])
+def test_a_value_shown_by_a_control_is_read_back(units: Units, is_angle: bool) -> None:
+    unit = units.of(is_angle)
+    for value in (0.0, 0.123456, -2.5, 3.0):
+        assert unit.read(unit.shown(value, 2)) == pytest.approx(value, abs=unit.step(2) / unit.scale)
+        assert unit.shown(unit.read(unit.shown(value, 2)), 2) == unit.shown(value, 2)
+
+
+@pytest.mark.parametrize(
+    ("unit", "value", "text"),
+    [
+        (MM, 0.1234, "123.4 mm"),
+        (CM, 0.1234, "12.34 cm"),
+        (M, 0.1234, "0.1234 m"),
+        (M, -1.5, "−1.5000 m"),
+        (MM, -1e-9, "0.0 mm"),
+        (M, -1e-9, "0.0000 m"),
+        (DEGREES, -math.pi, "−180.0°"),
+        (RADIANS, -math.pi, "−3.142 rad"),
+    ],
+)
+def test_a_value_with_its_unit(unit: Unit, value: float, text: str) -> None:
+    assert unit.text(value) == text
+
+
+@pytest.mark.parametrize(
+    ("units", "metres", "text"),
+    [
+        (Units(), 0.00001, "< 0.1 mm"),
+        (Units(length="cm"), 0.00001, "< 0.01 cm"),
+        (Units(length="m"), 0.00001, "< 0.0001 m"),
+        (Units(), 0.00456, "4.6 mm"),
+        (Units(length="cm"), 0.00456, "0.46 cm"),
+        (Units(length="m"), 0.00456, "0.0046 m"),
+        (Units(), 0.1234, "123 mm"),
+        (Units(length="cm"), -0.1234, "12.3 cm"),
+        (Units(length="m"), 0.1234, "0.123 m"),
+        (Units(), 0.0, "0 mm"),
+    ],
+)
+def test_small_lengths_are_not_rounded_to_zero(units: Units, metres: float, text: str) -> None:
+    assert units.distance(metres) == units.motion(False, metres) == text
+
+
+def test_small_angles_are_not_rounded_to_zero() -> None:
+    assert DEFAULT_UNITS.angle(math.radians(0.01)) == "< 0.1°"
+    assert DEFAULT_UNITS.angle(math.radians(-3.21)) == DEFAULT_UNITS.motion(True, math.radians(3.21)) == "3.2°"
+    assert Units(degrees=False).angle(1e-5) == "< 0.001 rad"
+    assert Units(degrees=False).angle(-0.5) == "0.500 rad"
+    assert DEFAULT_UNITS.angle(0.0) == "0.0°"
+
+
+def test_round_values_have_no_trailing_zeros() -> None:
+    assert [unit.brief(0.005) for unit in (MM, CM, M)] == ["5 mm", "0.5 cm", "0.005 m"]
+    assert DEGREES.brief(math.radians(2.0)) == "2°"
+
+
+@pytest.mark.parametrize(
+    ("sentence", "units", "expected"),
+    [
+        ("Out of reach by 120.5 mm: too far.", Units(length="cm"), "Out of reach by 12.05 cm: too far."),
+        ("Out of reach by 120.5 mm: too far.", Units(length="m"), "Out of reach by 0.1205 m: too far."),
+        ("off by 1.2e-03 mm and -3.0°", Units(length="m"), "off by 1.2e-06 m and -3.0°"),
+        ("off by 2.0 mm and -3.0°", Units(degrees=False), "off by 2.0 mm and -0.052 rad"),
+        ("(412 mm from the shoulder)", Units(length="cm"), "(41.2 cm from the shoulder)"),
+        ("8 of 12 branches, a mmm, 3 m", Units(False, "m"), "8 of 12 branches, a mmm, 3 m"),
+    ],
+)
+def test_sentences_of_the_core_are_retold(sentence: str, units: Units, expected: str) -> None:
+    assert units.retold(sentence) == expected
+    assert DEFAULT_UNITS.retold(sentence) == sentence
+
+
+def test_nothing_of_an_answer_is_left_in_the_units_of_the_core() -> None:
+    """Every kind of answer of every arm, retold: no millimetres, no degrees, and the sizes are the same."""
+    rng = np.random.default_rng(2)
+    seen = set()
+    for robot in kin.builtin_robots().values():
+        for k in range(4):
+            T = kin.fk(robot, robot.random_q(rng))
+            T[:3, 3] *= 1.0 + 0.4 * k
+            reason = kin.solve_ik(robot, T).reason
+            retold = Units(False, "m").retold(reason)
+            assert not re.search(r"°| mm\b", retold)
+            seen.update(re.findall(r"°| mm\b", reason))
+            lengths = [float(x) * 1e-3 for x in re.findall(r"([\d.]+(?:e-\d+)?) mm", reason)]
+            assert [float(x) for x in re.findall(r"([\d.]+(?:e-\d+)?) m\b", retold)] == pytest.approx(lengths)
+    assert seen == {"°", " mm"}
