@@ -10,7 +10,7 @@ from reprlib import Repr
 
 
 class KinematicsError(ValueError):
-    """Base class of all errors raised by :mod:`kin`."""
+    """Base class of all errors raised by `kin`."""
 
 
 class InputError(KinematicsError):

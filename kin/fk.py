@@ -73,7 +73,7 @@ def fk(robot: Robot, q: ArrayLike) -> Array:
 def fk_positions(robot: Robot, q: ArrayLike) -> Array:
     """Tool points ``(..., 3)`` in metres in the base frame, for configurations ``(..., n)``.
 
-    The position column of :func:`fk`, computed several times faster.
+    The position column of `fk`, computed several times faster.
     """
     q = _batch(robot, q)
     out = np.empty((*q.shape[:-1], 3))

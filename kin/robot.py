@@ -134,7 +134,7 @@ class Robot:
 
     @cached_property
     def model(self) -> Array:
-        """The arm as one flat array for the compiled kernels; for its layout see :mod:`kin.kernels.fk`."""
+        """The arm as one flat array for the compiled kernels; for its layout see `kin.kernels.fk`."""
         header = [float(len(self.rows)), float(self.n), float(self.convention == "modified")]
         header += self.T_world_base[:3].ravel().tolist() + self.T_last_tool[:3].ravel().tolist()
         q_index = 0

@@ -1,15 +1,17 @@
-"""What README, CONTRIBUTING, CHANGELOG and the Dockerfile say is held against the code."""
+"""README, CONTRIBUTING, CHANGELOG, the pages of docs/ and the Dockerfile agree with the code."""
 
 from __future__ import annotations
 
 import json
+import os
 import re
 import shlex
 import subprocess
 import sys
 import tomllib
+from html.parser import HTMLParser
 from pathlib import Path
-from urllib.parse import urlsplit
+from urllib.parse import unquote, urlsplit
 
 import pytest
 from fastapi.testclient import TestClient
@@ -19,13 +21,20 @@ from app.service.main import create_app
 from app.shared.settings import Settings
 
 ROOT = Path(__file__).parents[1]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
 CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 DOCKERFILE = (ROOT / "Dockerfile").read_text(encoding="utf-8")
+PAGES = {
+    path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
+    for path in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+}
+README = PAGES["README.md"]
 
 
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"^```{language}\n(.*?)^```$", README, re.DOTALL | re.MULTILINE)
+def blocks(language: str, *pages: str) -> list[str]:
+    """The code blocks of a language on the named pages, by default on all of them."""
+    texts = [PAGES[page] for page in pages or PAGES]
+    pattern = rf"^```{language}\n(.*?)^```$"
+    return [block for text in texts for block in re.findall(pattern, text, re.DOTALL | re.MULTILINE)]
 
 
 def table(text: str, header: str) -> list[list[str]]:
@@ -41,7 +50,7 @@ def table(text: str, header: str) -> list[list[str]]:
 
 
 def commands() -> list[tuple[str, list[str]]]:
-    """Each `$ command` of the console blocks with the lines shown under it."""
+    """Each `$ command` of the console blocks, with the lines shown under it."""
     found: list[tuple[str, list[str]]] = []
     for line in "".join(blocks("console")).splitlines():
         if line.startswith("$ "):
@@ -53,7 +62,7 @@ def commands() -> list[tuple[str, list[str]]]:
 
 @pytest.mark.parametrize("code", blocks("python"))
 def test_python_examples_run(code):
-    exec(compile(code, "README.md", "exec"), {})
+    exec(compile(code, "example", "exec"), {})
 
 
 @pytest.mark.parametrize(("command", "shown"), commands(), ids=[command for command, _ in commands()])
@@ -71,7 +80,9 @@ def test_command_line_examples_run_and_print_what_is_shown(command, shown):
 
 
 def test_rest_examples_are_answered():
-    lines = [line for block in blocks("sh") for line in block.splitlines() if line.startswith("curl ")]
+    lines = dict.fromkeys(
+        line for block in blocks("sh") for line in block.splitlines() if line.startswith("curl ")
+    )
     client = TestClient(create_app(Settings()))
     answers = {}
     for line in lines:
@@ -92,11 +103,13 @@ def test_rest_examples_are_answered():
 
 
 def test_the_status_table_lists_every_status():
-    assert [row[0].strip("`") for row in table(README, "`status`")] == [status.value for status in kin.Status]
+    assert [row[0].strip("`") for row in table(PAGES["docs/rest.md"], "`status`")] == [
+        status.value for status in kin.Status
+    ]
 
 
 def test_the_settings_table_is_the_settings():
-    rows = table(README, "variable")
+    rows = table(PAGES["docs/settings.md"], "variable")
     expected = []
     for name, field in Settings.model_fields.items():
         default = list(field.default) if isinstance(field.default, tuple) else field.default
@@ -106,8 +119,8 @@ def test_the_settings_table_is_the_settings():
     assert rows == expected
 
 
-def test_lists_are_read_from_the_environment_as_told(monkeypatch):
-    name, value = re.search(r"`(KINBOARD_ALLOWED_ORIGINS)='([^']+)'`", README).groups()
+def test_lists_are_read_from_the_environment_as_documented(monkeypatch):
+    name, value = re.search(r"`(KINBOARD_ALLOWED_ORIGINS)='([^']+)'`", PAGES["docs/settings.md"]).groups()
     monkeypatch.setenv(name, value)
     assert Settings().allowed_origins == tuple(json.loads(value))
 
@@ -120,15 +133,20 @@ def test_the_robot_file_is_a_robot():
 
 def test_the_built_in_arms_are_named():
     robots = kin.builtin_robots()
-    rows = [(robot_id, row[1]) for row in table(README, "arm") for robot_id in re.findall(r"`(.+?)`", row[0])]
+    rows = [
+        (robot_id, row[1])
+        for row in table(PAGES["docs/robot-files.md"], "arm")
+        for robot_id in re.findall(r"`(.+?)`", row[0])
+    ]
     assert sorted(rows) == sorted((robot.id, str(robot.n)) for robot in robots.values())
     words = {3: "Three", 4: "Four", 5: "Five", 6: "Six", 7: "Seven", 8: "Eight", 9: "Nine", 10: "Ten"}
-    assert f"- {words[len(robots)]} arms are built in" in README
+    assert f"{words[len(robots)]} arms are built in" in PAGES["docs/robot-files.md"]
+    assert f"**{words[len(robots)]} arms**" in README
 
 
 def test_the_two_commands_exist_and_ci_runs_the_second():
-    assert blocks("sh")[0] == "sh scripts/serve.sh\n"
-    assert "sh scripts/test.sh\n" in blocks("sh")
+    assert blocks("sh", "README.md")[0] == "sh scripts/serve.sh\n"
+    assert "sh scripts/test.sh\n" in blocks("sh", "README.md")
     assert (ROOT / "scripts/serve.sh").is_file()
     assert (ROOT / ".ci/run").read_text().splitlines()[-1] == "sh scripts/test.sh"
 
@@ -138,14 +156,90 @@ def test_scripts_are_valid_shell(script):
     subprocess.run(["sh", "-n", script], check=True)
 
 
-@pytest.mark.parametrize("document", ["README.md", "CONTRIBUTING.md", "CHANGELOG.md"])
+def slug(heading: str) -> str:
+    return re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-")
+
+
+@pytest.mark.parametrize("document", [*PAGES, "CONTRIBUTING.md", "CHANGELOG.md"])
 def test_links_between_files_lead_somewhere(document):
-    text = (ROOT / document).read_text(encoding="utf-8")
-    for target in re.findall(r"\]\(([^)\s]+)\)", text):
-        if target.startswith("#"):
-            assert re.search(rf"^#+ {target[1:].replace('-', ' ')}$", text, re.MULTILINE | re.IGNORECASE), target
-        elif "://" not in target:
-            assert (ROOT / target).exists(), target
+    path = ROOT / document
+    for link in re.findall(r"\]\(([^)\s]+)\)", path.read_text(encoding="utf-8")):
+        if "://" in link:
+            continue
+        target, _, anchor = link.partition("#")
+        file = path.parent / unquote(target) if target else path
+        assert file.exists(), link
+        if anchor:
+            headings = re.findall(r"^#+ (.+)$", file.read_text(encoding="utf-8"), re.MULTILINE)
+            assert anchor in map(slug, headings), link
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The built documentation; a warning of MkDocs is an error."""
+    folder = tmp_path_factory.mktemp("site")
+    done = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", folder],
+        cwd=ROOT,
+        env={**os.environ, "NO_MKDOCS_2_WARNING": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+class Resources(HTMLParser):
+    """Collects what a page loads: addresses in `src` and `href` of the elements that fetch."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag in ("link", "script", "img", "iframe", "source", "object", "use", "image"):
+            self.found += [value or "" for name, value in attrs if name in ("src", "href", "data", "srcset")]
+
+
+def loaded(html: str) -> list[str]:
+    parser = Resources()
+    parser.feed(html)
+    return parser.found
+
+
+def test_the_site_loads_nothing_from_the_internet(site):
+    pages = list(site.rglob("*.html"))
+    assert len(pages) > len(PAGES) - 1
+    for page in pages:
+        for address in loaded(page.read_text(encoding="utf-8")):
+            assert not urlsplit(address).netloc, f"{page.name}: {address}"
+    for style in site.rglob("*.css"):
+        assert not re.search(r"url\(['\"]?(https?:)?//", style.read_text(encoding="utf-8")), style.name
+
+
+def test_a_resource_from_the_internet_would_be_found():
+    assert loaded('<link rel="stylesheet" href="https://fonts.example/a.css">') == ["https://fonts.example/a.css"]
+
+
+def test_the_site_has_a_page_per_solver_and_every_public_function(site):
+    for robot in kin.builtin_robots().values():
+        solver = kin.solve_ik(robot, kin.fk(robot, robot.q_home), max_solutions=1).solver
+        assert (site / "background" / solver / "index.html").is_file(), f"{robot.id}: {solver}"
+    python = (site / "python" / "index.html").read_text(encoding="utf-8")
+    for name in kin.__all__:
+        if not name.startswith(("_", "warm_up", "Capability", "capability_", "Workspace", "SectionArc", "Task")):
+            assert f'id="kin.{name}"' in python or f'id="kin.fk.{name}"' in python, name
+
+
+def test_drawings_are_small_and_self_contained():
+    images = list((ROOT / "docs/images").iterdir())
+    assert images
+    for image in images:
+        assert image.stat().st_size < 200_000, image.name
+        if image.suffix == ".svg":
+            links = set(re.findall(r"https?://[^\"'\s<>]+", image.read_text(encoding="utf-8")))
+            assert links <= {"http://www.w3.org/2000/svg"}, image.name
 
 
 def test_every_place_named_in_the_table_exists():
