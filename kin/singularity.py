@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from kin.errors import InputError
 from kin.fk import fk, jacobian
 from kin.robot import Robot
-from kin.solvers import solver_for
+from kin.solvers import closed_form_of
 from kin.solvers.numeric import spread
 from kin.solvers.singular import Singularity
 from kin.transforms import Array
@@ -46,11 +46,11 @@ def singularities(robot: Robot, q: ArrayLike, within: float = math.inf) -> tuple
 
 def singularities_at(robot: Robot, q: Array, within: float) -> tuple[Singularity, ...]:
     """`singularities` of a configuration ``(n,)`` that is known to be sound."""
-    match = solver_for(robot)
+    match = closed_form_of(robot)
     if match is None:
         least = _by_jacobian(robot, q)
         return (least,) if least.distance <= within else ()
-    found = match.solver.singularities(match.geometry, q, within)
+    found = match.singularities(q, within)
     if len(found) < 2:
         return found
     return tuple(sorted(found, key=lambda s: s.distance / (robot.reach if s.unit == "m" else 1.0)))
@@ -83,5 +83,5 @@ def _by_jacobian(robot: Robot, q: Array) -> Singularity:
     J = task_jacobian(robot, q)
     rank = usual_rank(robot)
     least = float(np.linalg.svd(J, compute_uv=False)[rank - 1]) if rank else 0.0
-    meaning = f"smallest singular value of the {J.shape[0]} × {J.shape[1]} Jacobian: the tool's slowest direction"
-    return Singularity("jacobian", meaning, least, "SI")
+    shape = (J.shape[0], J.shape[1])
+    return Singularity("jacobian", "smallest singular value", "slowest direction", least, "SI", shape=shape)

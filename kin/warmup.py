@@ -21,7 +21,7 @@ from kin.fk import fk, fk_positions, jacobian, link_frames, manipulability
 from kin.ik import solve_ik
 from kin.path import solve_path
 from kin.robot import Robot
-from kin.solvers import solver_for
+from kin.solvers import closed_form_of
 from kin.workspace import (
     MEASURES,
     STRATEGIES,
@@ -60,8 +60,8 @@ def one_of_each_family() -> tuple[Robot, ...]:
     """The first built-in arm of each closed form, and the first without one."""
     families: dict[str, Robot] = {}
     for robot in builtin_robots().values():
-        match = solver_for(robot)
-        families.setdefault("" if match is None else match.solver.NAME, robot)
+        match = closed_form_of(robot)
+        families.setdefault("" if match is None else match.name, robot)
     return tuple(families.values())
 
 

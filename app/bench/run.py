@@ -18,7 +18,7 @@ from app.bench.contestants import FLOOR, KINBOARD, OURS, PEERS, RICH, Contestant
 from app.bench.judge import Check, judge_poses, right_sets, share_of_same
 from app.bench.measure import Clock, Turns, measure, ratio
 from app.bench.rows import ROWS, Row, Task, prepare
-from kin.solvers import solver_for
+from kin.solvers import closed_form_of
 from kin.transforms import Array
 
 Say = Callable[[str], None]
@@ -202,8 +202,8 @@ def _comparable(task: Task) -> bool:
     """Whether all contestants ask for the same set: nothing is free, or a joint that can be locked."""
     if task.row.kind != "branches" or task.row.lock is None:
         return task.row.kind == "branches"
-    match = solver_for(task.robot)
-    freedoms = () if match is None else match.solver.freedoms(match.geometry, 0)
+    match = closed_form_of(task.robot)
+    freedoms = () if match is None else match.redundancies(0)
     return any(freedom.joint == task.row.lock for freedom in freedoms)
 
 

@@ -16,7 +16,7 @@ from app.shared.answers.robots import RobotAnswer, robot_answer
 from kin import Robot, jacobian
 from kin.axes import Pair, generic_q, pairs, parallel_groups, size, spherical_groups
 from kin.home import candidates, margins
-from kin.solvers import solver_for
+from kin.solvers import closed_form_of
 
 NEAR_SINGULAR = 0.1  # of the best margin among the poses a home would be chosen from
 LONG, SHORT = 100.0, 0.01  # metres: reaches beyond these are rather another unit
@@ -57,7 +57,7 @@ class CheckAnswer(TypedDict):
 
 def check(robot: Robot, taken: bool = False) -> CheckAnswer:
     """What an arm is; `taken` tells that a built-in one has its id."""
-    match = solver_for(robot)
+    match = closed_form_of(robot)
     between = pairs(robot)
     return {
         "robot": robot_answer(robot),
@@ -65,7 +65,7 @@ def check(robot: Robot, taken: bool = False) -> CheckAnswer:
         "parallel": [list(range(first, last + 1)) for first, last in parallel_groups(robot)],
         "spherical": [list(range(i, i + 3)) for i in spherical_groups(robot)],
         "motions": motions(robot),
-        "solver": "numeric" if match is None else match.solver.NAME,
+        "solver": "numeric" if match is None else match.name,
         "reason": "no closed form fits this arm's axes" if match is None else match.reason,
         "warnings": warnings(robot, between, taken),
     }

@@ -38,8 +38,8 @@ from kin.ik.problem import Frame, Images, Limits, Locks, Preference, Question, S
 from kin.ik.results import BlockedBranch, Cause, IKResult, IKSolution, Redundancy, Status, Task
 from kin.robot import Robot
 from kin.singularity import Singularity, singularities_at
-from kin.solvers import solver_for
-from kin.solvers.common import APPROACH, MASK, POSE, POSITION
+from kin.solvers import closed_form_of
+from kin.solvers.contract import APPROACH, MASK, POSE, POSITION
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -113,8 +113,8 @@ def solve_ik(
 
 def branch_names(robot: Robot) -> tuple[str, ...]:
     """The names of the arm's branches; none for an arm without a closed form."""
-    match = solver_for(robot)
-    return () if match is None else match.solver.BRANCHES
+    match = closed_form_of(robot)
+    return () if match is None else match.branches
 
 
 def branch_of(robot: Robot, q: ArrayLike) -> str:
@@ -122,13 +122,13 @@ def branch_of(robot: Robot, q: ArrayLike) -> str:
 
     Raises `InputError` for an arm whose branches have no names.
     """
-    match = solver_for(robot)
+    match = closed_form_of(robot)
     if match is None:
         raise InputError("robot", robot.id, "an arm with a closed form")
     values = robot.check_q(q)
     if values.ndim != 1:
         raise InputError("q", f"shape {values.shape}", f"one configuration of {robot.n} values")
-    return match.solver.BRANCHES[match.solver.branch_of(match.geometry, values)]
+    return match.branches[match.branch_of(values)]
 
 
 def answer(question: Question) -> IKResult:
@@ -187,7 +187,7 @@ def _result(
     if best is not None:
         singular = singularities_at(question.robot, best.q, TOLERANCES.at_singularity)
     if solver is None:
-        solver = "numeric" if question.match is None else question.match.solver.NAME
+        solver = "numeric" if question.match is None else question.match.name
     return IKResult(
         status=status,
         cause=cause,
@@ -241,7 +241,7 @@ def _wrap_up(
     q.flags.writeable = False
     free, together = redundancy_of(question, branches, order, every)
     assert question.match is not None  # whose branches these are
-    names = question.match.solver.BRANCHES
+    names = question.match.branches
     solutions = []
     for i, own in zip(order, free, strict=True):
         position, rotation, distance, overrun, _ = stats[i]
@@ -400,7 +400,7 @@ def _numeric(question: Question) -> IKResult:
         "",
         messages.solved(len(solutions), question.task, False),
         solutions=solutions,
-        solver="numeric" if closed_form is None else closed_form.solver.NAME,
+        solver="numeric" if closed_form is None else closed_form.name,
     )
 
 
@@ -446,7 +446,7 @@ def _out_of_reach(question: Question, branches: Branches | None) -> IKResult:
         cause, reason = messages.unreachable(question, nearest.q, distance)
         return _result(question, Status.UNREACHABLE, cause, reason, closest=closest, distance=distance)
     oriented = search.nearest_orientation(question, candidates)
-    gap, obstacle = (branches.gap, branches.obstacle) if branches is not None else (0.0, "")
+    gap, obstacle = (branches.gap, branches.obstacle) if branches is not None else (0.0, None)
     return _result(
         question,
         Status.ORIENTATION,

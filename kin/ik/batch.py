@@ -1,25 +1,23 @@
-"""The thin call: all branches of a closed form as a plain array, and nothing else.
+"""The batch call: all branches of a closed form as a plain array, and nothing else.
 
-:func:`kin.solve_ik` answers a question: limits, ranges, a seed, an order, a sentence. Who wants joint values at
-the rate of a control loop, or for a million targets, asks here: no limits, no order, no verification. A solver
-offers it with ``params(geometry)``, a flat array, and two kernels: ``branches_one``, and ``branches_many`` or,
-where a value may differ from target to target, ``branches_each``.
+:func:`kin.solve_ik` applies limits, finds ranges, sorts and words its answers. `ik_branches` is for joint values at
+the rate of a control loop, or for a million targets: no limits, no order, no verification. It calls the batch
+kernels of the arm's closed form (`kin.solvers.contract.BatchKernels`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kin.errors import InputError
 from kin.kernels import fk as fk_kernels
-from kin.kernels.compile import direct
 from kin.robot import Robot
-from kin.solvers import solver_for
+from kin.solvers import closed_form_of
+from kin.solvers.contract import BatchKernels
 from kin.transforms import Array, finite_array
 
 _FLOAT = np.dtype(np.float64)
@@ -29,12 +27,9 @@ _empty, _isinf, _ndarray = np.empty, math.isinf, np.ndarray
 
 
 class _Thin(NamedTuple):
-    """What a call needs of an arm: compiled functions without guard, and their constant arguments."""
+    """What a call needs of an arm: its kernels without argument checks, and their constant arguments."""
 
-    one: Callable[[Array, Array, float, Array, Array], bool | None]
-    many: Callable[[Array, Array, Any, Array, Array], None]
-    each: bool
-    params: Array
+    kernels: BatchKernels
     near: Array
     shape: tuple[int, int]
 
@@ -66,8 +61,8 @@ def ik_branches(robot: Robot, target: ArrayLike, redundancy: ArrayLike = math.na
         T = target
         if T.shape == _POSE and type(redundancy) is float and not _isinf(redundancy):
             out = _empty(thin.shape)
-            finite = thin.one(thin.params, T, redundancy, thin.near, out)
-            if finite or (finite is None and _finite(T.reshape(-1))):  # some kernels do not say
+            kernels = thin.kernels
+            if kernels.one(kernels.params, T, redundancy, thin.near, out):
                 return out
     else:
         T = finite_array("target", target, _POSE)
@@ -76,30 +71,15 @@ def ik_branches(robot: Robot, target: ArrayLike, redundancy: ArrayLike = math.na
     value = _redundancy(redundancy, T.shape[:-2])
     out = np.empty((*T.shape[:-2], *thin.shape))
     targets, rows = T.reshape(-1, 4, 4), out.reshape(-1, *thin.shape)
-    if thin.each or len(value) == 1:
-        thin.many(thin.params, targets, value if thin.each else value.item(), thin.near, rows)
-    else:
-        for one, own, row in zip(targets, value.tolist(), rows, strict=True):
-            thin.one(thin.params, one, own, thin.near, row)
+    thin.kernels.many(thin.kernels.params, targets, value, thin.near, rows)
     return out
 
 
 def _prepare(robot: Robot) -> _Thin:
-    match = solver_for(robot)
+    match = closed_form_of(robot)
     if match is None:
         raise InputError("robot", robot.id, "an arm with a closed form")
-    solver: Any = match.solver
-    each = getattr(solver, "branches_each", None)
-    # A family whose value may differ from target to target needs no second kernel for one that does not.
-    many = (solver.branches_many, 1, 3, float, 1, 3) if each is None else (each, 1, 3, 1, 1, 3)
-    thin = _Thin(
-        direct(solver.branches_one, 1, 2, float, 1, 2),
-        direct(*many),
-        each is not None,
-        solver.params(match.geometry),
-        robot.q_home.copy(),
-        (len(solver.BRANCHES), robot.n),
-    )
+    thin = _Thin(match.kernels.unchecked(), robot.q_home.copy(), (len(match.branches), robot.n))
     robot.__dict__[_CACHE] = thin
     return thin
 

@@ -12,7 +12,7 @@ from kin.ik.candidates import Flags as Flags
 from kin.ik.candidates import finish, judge, ranges, settle
 from kin.ik.problem import Question
 from kin.ik.results import IKSolution, LimitViolation, Redundancy
-from kin.solvers.common import APPROACH, Freedom, Problem
+from kin.solvers.contract import APPROACH, Obstacle, RedundancyParameter, SolverInput
 from kin.transforms import Array
 
 _NO_LIMIT = 1e6
@@ -29,7 +29,7 @@ class Branches:
         closed, good: ``(k,)``, which rows meet the task, and which are inside the limits too if those count.
         order: the good rows, nearest to the seed first, each posture once.
         freedoms: what `values` and `arcs` are about.
-        values, arcs, gap, obstacle: as in `kin.solvers.common.Candidates`.
+        values, arcs, gap, obstacle: as in `kin.solvers.contract.Candidates`.
     """
 
     q: Array
@@ -37,11 +37,11 @@ class Branches:
     closed: Flags
     good: Flags
     order: list[int]
-    freedoms: tuple[Freedom, ...]
+    freedoms: tuple[RedundancyParameter, ...]
     values: Array
     arcs: list[Array]
     gap: float
-    obstacle: str
+    obstacle: Obstacle | None
 
 
 def is_closed(stats: Array) -> Flags:
@@ -64,9 +64,9 @@ def solve_branches(
         values: other values of the freedoms than the question's, NaN where free.
     """
     match = question.match
-    if match is None or not match.solver.handles(match.geometry, code):
+    if match is None or not match.handles(code):
         return None
-    freedoms = question.freedoms if code == question.code else match.solver.freedoms(match.geometry, code)
+    freedoms = question.freedoms if code == question.code else match.redundancies(code)
     if values is None:
         values = question.values if code == question.code else (math.nan,) * len(freedoms)
     seed = question.seed if seed is None else seed
@@ -78,9 +78,7 @@ def solve_branches(
     if not question.respect:
         # Limits to be ignored must not even pull what is free away from the seed.
         lower, upper = np.full_like(lower, -_NO_LIMIT), np.full_like(upper, _NO_LIMIT)
-    found = match.solver.solve(
-        match.geometry, Problem(T, code, values, question.respect, seed, lower, upper, roll)
-    )
+    found = match.solve(SolverInput(T, code, values, question.respect, seed, lower, upper, roll))
     q = np.array(found.q, order="C")
     count = len(q)
     stats, closed, good, order = (

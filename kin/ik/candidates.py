@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from kin.kernels.compile import jit
 from kin.kernels.fk import fk_into
-from kin.solvers.common import APPROACH, MASK, POSE, TURN, nearest_image, relative_pose, wrap
+from kin.solvers.common import TURN, nearest_image, relative_pose, wrap
+from kin.solvers.contract import APPROACH, MASK, POSE
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 

@@ -18,7 +18,7 @@ from kin.ik.branches import Flags, measure, solution, solve_branches
 from kin.ik.candidates import OVERRUN, POSITION_ERROR, ROTATION_ERROR
 from kin.ik.problem import Question
 from kin.ik.results import IKSolution
-from kin.solvers.common import APPROACH, MASK, POSE, POSITION
+from kin.solvers.contract import APPROACH, MASK, POSE, POSITION
 from kin.solvers.numeric import each_of, solve, spread
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array

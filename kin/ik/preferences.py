@@ -9,8 +9,6 @@ one held.
 from __future__ import annotations
 
 import math
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,7 +16,8 @@ from kin.ik.branches import Branches, Flags, is_closed, measure, solve_branches
 from kin.ik.candidates import OVERRUN
 from kin.ik.problem import Question
 from kin.kernels import fk as fk_kernels
-from kin.solvers.common import POSE, POSITION, wrap
+from kin.solvers.common import wrap
+from kin.solvers.contract import POSE, POSITION
 from kin.transforms import Array
 
 _SAMPLES = 24
@@ -73,8 +72,7 @@ def improve(question: Question, branches: Branches, good: Flags) -> None:
         if not math.isnan(question.values[k]):
             continue
         there = rows[~np.isnan(branches.values[rows, k])]
-        many = question.match and getattr(question.match.solver, "branches_each", None)
-        if len(branches.freedoms) == 1 and question.code == POSE and many:
+        if len(branches.freedoms) == 1 and question.code == POSE:
             _improve_together(question, branches, score, there)
         else:
             for row in there.tolist():
@@ -105,12 +103,12 @@ def _try_all(
 ) -> Array:
     """Scores of the values ``(k, m)`` of branches `owner` ``(k,)``; a row is taken over if one is better."""
     assert question.match is not None  # whose branches these are
-    solver: Any = question.match.solver
+    kernels = question.match.kernels
     flat = np.ascontiguousarray(values.reshape(-1))
     whose = np.repeat(owner, values.shape[1])
     out = np.empty((len(flat), len(branches.q), question.robot.n))
     targets = np.ascontiguousarray(np.broadcast_to(question.T, (len(flat), 4, 4)))
-    solver.branches_each(solver.params(question.match.geometry), targets, flat, question.seed, out)
+    kernels.many(kernels.params, targets, flat, question.seed, out)
     q, stats = centred(question, out[np.arange(len(flat)), whose])
     fits = is_closed(stats) & ~np.isnan(flat)
     if question.respect:

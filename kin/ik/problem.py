@@ -19,8 +19,9 @@ from kin.errors import InputError
 from kin.ik.results import Task
 from kin.kernels.checks import straighten
 from kin.robot import Robot
-from kin.solvers import Match, solver_for
-from kin.solvers.common import APPROACH, MASK, POSE, POSITION, TASK_CODES, TURN, Freedom
+from kin.solvers import closed_form_of
+from kin.solvers.common import TURN
+from kin.solvers.contract import APPROACH, MASK, POSE, POSITION, TASK_CODES, ClosedForm, RedundancyParameter
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array, as_transform, finite_array
 
@@ -84,8 +85,8 @@ class Question:
     low: Array
     high: Array
     respect: bool
-    match: Match | None
-    freedoms: tuple[Freedom, ...]
+    match: ClosedForm | None
+    freedoms: tuple[RedundancyParameter, ...]
     values: tuple[float, ...]
     branches: frozenset[int] | None
     all_images: bool
@@ -95,7 +96,7 @@ class Question:
     stop: Callable[[], None] = go_on
 
     @property
-    def given(self) -> tuple[Freedom, ...]:
+    def given(self) -> tuple[RedundancyParameter, ...]:
         """The freedoms whose value was asked for."""
         return tuple(f for f, v in zip(self.freedoms, self.values, strict=True) if not math.isnan(v))
 
@@ -105,11 +106,11 @@ class Question:
 
     def branch_of(self, q: Array) -> int:
         """Branch of a configuration, −1 if the arm's branches have no names."""
-        return -1 if self.match is None else self.match.solver.branch_of(self.match.geometry, q)
+        return -1 if self.match is None else self.match.branch_of(q)
 
     def branch_name(self, branch: int) -> str:
         """Name of a branch."""
-        return "numeric" if self.match is None or branch < 0 else self.match.solver.BRANCHES[branch]
+        return "numeric" if self.match is None or branch < 0 else self.match.branches[branch]
 
     def without_turns(self) -> Question:
         """The same question, each joint's value taken as it is and not for its whole-turn images."""
@@ -191,9 +192,9 @@ def _checked(
             locks = _locked(robot, locked, lower, upper)
     if solver not in ("auto", "numeric"):
         raise InputError("solver", solver, 'one of "auto", "numeric"')
-    match = solver_for(robot) if solver == "auto" else None
-    handled = match is not None and match.solver.handles(match.geometry, code)
-    freedoms = match.solver.freedoms(match.geometry, code) if match is not None and handled else ()
+    match = closed_form_of(robot) if solver == "auto" else None
+    handled = match is not None and match.handles(code)
+    freedoms = match.redundancies(code) if match is not None and handled else ()
     values = _values(robot, redundancy, freedoms)
     turns = usual.turns
     for freedom, value in zip(freedoms, values, strict=True):
@@ -345,7 +346,7 @@ def _span(low: float, high: float) -> str:
 
 
 def _values(
-    robot: Robot, redundancy: float | Mapping[str, float] | None, freedoms: tuple[Freedom, ...]
+    robot: Robot, redundancy: float | Mapping[str, float] | None, freedoms: tuple[RedundancyParameter, ...]
 ) -> tuple[float, ...]:
     """The value asked for, of each freedom; NaN where none is."""
     if redundancy is None:
@@ -375,18 +376,18 @@ def finite_number(field: str, value: object, expected: str) -> float:
     return number
 
 
-def _branches(robot: Robot, match: Match | None, branch: str | Sequence[str], seed: Array) -> frozenset[int]:
+def _branches(robot: Robot, match: ClosedForm | None, branch: str | Sequence[str], seed: Array) -> frozenset[int]:
     """Rows of the branches asked for by whole names, by parts of names, or as the seed's."""
     if match is None:
         raise InputError("branch", branch, f"none: the branches of {robot.id} have no names")
     wishes = [branch] if isinstance(branch, str) else list(branch) if isinstance(branch, Sequence) else []
-    names = match.solver.BRANCHES
+    names = match.branches
     parts = list(dict.fromkeys(part for name in names for part in name.split(" · ")))
     rows: set[int] = set()
     for wish in wishes:
         words = [w.strip() for w in wish.replace(",", "·").split("·")] if isinstance(wish, str) else [""]
         if words == ["seed"]:
-            rows.add(match.solver.branch_of(match.geometry, seed))
+            rows.add(match.branch_of(seed))
             continue
         if any(word not in parts for word in words):
             raise InputError("branch", wish, '"seed", or of these, joined by " · ": ' + ", ".join(parts))

@@ -23,6 +23,7 @@ from kin.fk import fk
 from kin.ik import messages
 from kin.ik.branches import Flags, is_closed, measure, violations_of
 from kin.ik.candidates import POSITION_ERROR, ROTATION_ERROR
+from kin.ik.messages.singularity import short
 from kin.ik.problem import Question
 from kin.ik.results import LimitViolation
 from kin.path.course import Course, Way, has_closed_form
@@ -31,7 +32,8 @@ from kin.path.route import DeadEnd
 from kin.path.waypoint import LEAP, branches_near, continued, descended, nearest
 from kin.robot import Robot
 from kin.singularity import singularities
-from kin.solvers.common import APPROACH, POSE, POSITION, TURN
+from kin.solvers.common import TURN
+from kin.solvers.contract import APPROACH, POSE, POSITION
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array, rotation_from_wxyz, wxyz_from_rotation
 
@@ -191,7 +193,7 @@ def _singular(robot: Robot, q: Array) -> tuple[float, str]:
     for found in singularities(robot, q):
         if found.kind != "algorithmic":
             scale = _NEAR_SINGULAR[found.unit] * (robot.reach if found.unit == "m" else 1.0)
-            out.append((found.distance / scale, found.meaning.partition(": ")[0]))
+            out.append((found.distance / scale, short(found)))
     return min(out)
 
 

@@ -16,7 +16,8 @@ import numpy as np
 from kin.ik import messages
 from kin.ik.problem import Question
 from kin.ik.results import IKResult
-from kin.solvers.common import POSITION, TURN
+from kin.solvers.common import TURN
+from kin.solvers.contract import POSITION
 from kin.transforms import Array
 
 GRID = math.radians(15.0)  # between samples of what is free, for 60 waypoints and more; down to half for fewer
@@ -28,7 +29,7 @@ _PULL = 1e-6  # weight of the start's distance from home
 def has_closed_form(question: Question) -> bool:
     """Whether a closed form answers the task; a lone point leaves too much free and is left to descents."""
     match = question.match
-    return match is not None and question.code != POSITION and match.solver.handles(match.geometry, question.code)
+    return match is not None and question.code != POSITION and match.handles(question.code)
 
 
 def is_sampled(question: Question) -> bool:

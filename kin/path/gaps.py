@@ -11,7 +11,7 @@ from kin.ik.results import Status
 from kin.path.course import Stop, Way
 from kin.path.trellis import shortest
 from kin.path.waypoint import alike
-from kin.solvers.common import POSITION
+from kin.solvers.contract import POSITION
 from kin.transforms import Array
 
 

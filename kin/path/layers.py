@@ -21,7 +21,8 @@ from kin.ik.problem import Question
 from kin.ik.results import Status
 from kin.path.course import Stop, is_sampled
 from kin.path.waypoint import branches_near, descended, distinct, meeting, pool, with_images
-from kin.solvers.common import APPROACH, POSE, Problem, wrap
+from kin.solvers.common import wrap
+from kin.solvers.contract import APPROACH, POSE, SolverInput
 from kin.transforms import Array
 
 _MOST_NODES = 4000  # configurations in a layer
@@ -94,8 +95,8 @@ def _at(question: Question, values: tuple[float, ...]) -> Array:
     """The branches ``(b, n)`` at given values of all that is free: raw, whatever the limits say."""
     match = question.match
     assert match is not None
-    problem = Problem(question.T, question.code, values, False, question.seed, question.lower, question.upper)
-    return match.solver.solve(match.geometry, problem).q
+    problem = SolverInput(question.T, question.code, values, False, question.seed, question.lower, question.upper)
+    return match.solve(problem).q
 
 
 # -- without one --------------------------------------------------------------------------------------------------

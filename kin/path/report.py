@@ -38,7 +38,7 @@ def report(course: Course, stops: list[Stop], q: Array, ends: list[DeadEnd]) -> 
         gaps=gaps,
         position_error=position,
         rotation_error=rotation,
-        solver=match.solver.NAME if match is not None and has_closed_form(way.question) else "numeric",
+        solver=match.name if match is not None and has_closed_form(way.question) else "numeric",
         reason=_summary(way, q, jumps, gaps),
     )
 

@@ -38,7 +38,7 @@ def meeting(question: Question, relaxed: bool, q: Array, near: Array) -> Array:
     """
     if question.branches is not None:
         assert question.match is not None
-        count = len(question.match.solver.BRANCHES)
+        count = len(question.match.branches)
         q = q[[question.allows(i % count) for i in range(len(q))]]
     q, stats = measure(question, q[~np.isnan(q[:, 0])], near)
     good = _meets(stats)

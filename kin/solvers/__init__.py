@@ -1,103 +1,59 @@
-"""The registry of closed-form solvers: one module, one row each, in order of preference.
+"""The registry of closed-form solvers: one module and one row per family of arms, in order of preference.
 
-A solver module offers ``NAME``, ``TITLE``, ``BRANCHES`` (names, one per row of its answers), ``match(robot)`` (its
-geometry, or None if the arm is of another family), ``why(geometry)`` (a clause that says so), ``handles(geometry,
-task)``, ``freedoms(geometry, task)`` (what the task leaves free), ``solve(geometry, problem) -> Candidates``,
-``branch_of(geometry, q)`` (a row of `BRANCHES`) and ``singularities(geometry, q, within)``. It never verifies,
-filters or sorts: :mod:`kin.ik` does that once for all.
-Which family an arm belongs to is read off its axes, never off its name, and neither the convention of its table
-nor which way its joints count keeps it out (:mod:`kin.solvers.mirrored`).
+Which family an arm belongs to is read off its joint axes, never off its name. Neither the convention of its table
+nor the sense in which its joints count keeps it out (:mod:`kin.solvers.reversed`). The contract that every family
+keeps stands in :mod:`kin.solvers.contract`.
 """
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable
 from functools import lru_cache
-from typing import Any, NamedTuple, Protocol, cast
 
 from kin.robot import Robot
 from kin.solvers import collinear7, parallel6, scara4, slide6, srs7, wrist5, wrist6
-from kin.solvers.common import APPROACH, Candidates, Freedom, Problem
-from kin.solvers.mirrored import Mirrored, readings
-from kin.solvers.singular import Singularity
-from kin.transforms import Array
+from kin.solvers.contract import APPROACH, ClosedForm
+from kin.solvers.reversed import ReversedJoints, readings
 
-
-class Solver(Protocol):
-    """What the solver of an arm looks like from outside."""
-
-    NAME: str
-    TITLE: str
-    BRANCHES: tuple[str, ...]
-
-    def why(self, geometry: Any) -> str: ...
-
-    def handles(self, geometry: Any, task: int) -> bool: ...
-
-    def solve(self, geometry: Any, problem: Problem) -> Candidates: ...
-
-    def freedoms(self, geometry: Any, task: int) -> tuple[Freedom, ...]: ...
-
-    def branch_of(self, geometry: Any, q: Array) -> int: ...
-
-    def singularities(self, geometry: Any, q: Array, within: float = math.inf) -> tuple[Singularity, ...]: ...
-
-
-class Family(Solver, Protocol):
-    """What a solver module looks like."""
-
-    def match(self, robot: Robot) -> Any: ...
-
-
-class Match(NamedTuple):
-    """A solver together with the geometry it found in a robot, and what it knows the arm by."""
-
-    solver: Solver
-    geometry: Any
-    reason: str
-
-
-SOLVERS: tuple[Family, ...] = tuple(
-    cast(Family, module) for module in (wrist5, srs7, collinear7, wrist6, parallel6, slide6, scara4)
+FAMILIES: tuple[Callable[[Robot], ClosedForm | None], ...] = (
+    wrist5.match,
+    srs7.match,
+    collinear7.match,
+    wrist6.match,
+    parallel6.match,
+    slide6.match,
+    scara4.match,
 )
 
 
 @lru_cache(maxsize=256)
-def solver_for(robot: Robot) -> Match | None:
-    """The first registered closed form that fits the robot's axes, None if there is none.
+def closed_form_of(robot: Robot) -> ClosedForm | None:
+    """The closed form of the first family that fits the robot's axes, None if there is none.
 
-    Where none fits the robot as it counts, or one that then has to do without approach directions, it is tried
-    with joints counting the other way round.
+    Where none fits the robot as its joints count, or one that then has no approach directions, some joints are
+    read as reversed.
     """
-    found = _first_of(robot)
-    if found is not None and found.solver.handles(found.geometry, APPROACH):
+    found = _first_match(robot)
+    if found is not None and found.handles(APPROACH):
         return found
-    known: list[tuple[tuple[int, ...], Match]] = [] if found is None else [((), found)]
-    for joints, read in readings(robot):
-        # What a family has to do without, only a last axis turned to where the tool looks brings back.
-        match = _first_of(read) if found is None or robot.n - 1 in joints else None
-        if match is not None:
-            known.append((joints, match))
-    if not known:
+    readable: list[tuple[tuple[int, ...], ClosedForm]] = [] if found is None else [((), found)]
+    for joints, table in readings(robot):
+        # Only a last axis turned towards the tool adds approach directions to a family that has none.
+        form = _first_match(table) if found is None or robot.n - 1 in joints else None
+        if form is not None:
+            readable.append((joints, form))
+    if not readable:
         return None
-    joints, (family, geometry, reason) = min(known, key=_burden)
-    if not joints:
-        return Match(family, geometry, reason)
-    solver = Mirrored(family, geometry, joints, robot.n)
-    return Match(solver, geometry, solver.why(geometry))
+    joints, form = min(readable, key=_burden)
+    return ReversedJoints(form, joints, robot.n) if joints else form
 
 
-def _first_of(robot: Robot) -> Match | None:
-    """The first registered closed form that fits the robot as it counts."""
-    for family in SOLVERS:
-        geometry = family.match(robot)
-        if geometry is not None:
-            return Match(family, geometry, family.why(geometry))
-    return None
+def _first_match(robot: Robot) -> ClosedForm | None:
+    """The closed form of the first family that fits the robot as its joints count."""
+    return next((form for match in FAMILIES if (form := match(robot)) is not None), None)
 
 
-def _burden(reading: tuple[tuple[int, ...], Match]) -> tuple[bool, int, int]:
-    """What speaks against a reading: a task lost, joints turned round, lengths that are negative."""
-    joints, (solver, geometry, _) = reading
-    negative = sum(isinstance(part, float) and part < 0.0 for part in geometry)
-    return not solver.handles(geometry, APPROACH), len(joints), negative
+def _burden(reading: tuple[tuple[int, ...], ClosedForm]) -> tuple[bool, int, int]:
+    """What speaks against a reading: no approach directions, reversed joints, negative lengths."""
+    joints, form = reading
+    return not form.handles(APPROACH), len(joints), sum(length < 0.0 for length in form.lengths)

@@ -25,12 +25,7 @@ from kin.kernels.simd import widest, wrapped
 from kin.robot import Robot
 from kin.solvers.blocks import OWN, VALUE, Arc, canonical_of, double, each, one, rows_of
 from kin.solvers.common import (
-    APPROACH,
-    POSE,
     TURN,
-    Candidates,
-    Freedom,
-    Problem,
     chain_of,
     clear,
     copy_row,
@@ -49,14 +44,24 @@ from kin.solvers.common import (
     zyz,
     zyz_breaks,
 )
-from kin.solvers.singular import Entry, Singularity, at, off_line, off_square, stretch, those_within
+from kin.solvers.contract import (
+    APPROACH,
+    POSE,
+    BatchKernels,
+    Candidates,
+    ClosedForm,
+    Obstacle,
+    RedundancyParameter,
+    SolverInput,
+)
+from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, off_perpendicular, those_within
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 NAME = "collinear7"
 TITLE = "closed form, joints 1 and 2 on one line"
-_THETA1 = Freedom("theta1", "θ1", joint=0)
-_ROLL = Freedom("roll", "roll about the approach axis", circular=True)
+_THETA1 = RedundancyParameter("theta1", "θ1", joint=0)
+_ROLL = RedundancyParameter("roll", "roll about the approach axis", circular=True)
 BRANCHES = tuple(
     f"shoulder {s} · elbow {e} · wrist {w}"
     for s in ("left", "right")
@@ -79,8 +84,8 @@ class Geometry(NamedTuple):
     tool_on_axis: bool
 
 
-def match(robot: Robot) -> Geometry | None:
-    """The geometry if axes 1 and 2 are one line, 3 leaves it squarely and 5-6-7 meet in a point."""
+def match(robot: Robot) -> Collinear7 | None:
+    """The closed form if axes 1 and 2 are one line, 3 is perpendicular to it and 5-6-7 meet in a point."""
     chain = chain_of(robot) if robot.n == 7 else None
     chain = chain.twisted((0, -1, -1, 1, -1, 1)) if chain else None
     if chain is None or not is_zero(*chain.a, chain.d[3], chain.d[5]):
@@ -93,7 +98,7 @@ def match(robot: Robot) -> Geometry | None:
     inverse_tool = inverse(tool)
     # The wrist centre in the tool frame: it must stay when the tool rolls about its approach axis.
     on_axis = is_zero(inverse_tool[0, 3], inverse_tool[1, 3])
-    return Geometry(inverse(base), inverse_tool, chain.theta, d3, d5, on_axis)
+    return Collinear7(Geometry(inverse(base), inverse_tool, chain.theta, d3, d5, on_axis))
 
 
 @jit
@@ -269,31 +274,6 @@ def _theta1_intervals(
     return found
 
 
-def solve(geometry: Geometry, problem: Problem) -> Candidates:
-    """All branches, with θ1 and θ2 (and the roll, for an approach task) as near the seed as the limits allow."""
-    g = geometry
-    free_roll = problem.task == APPROACH
-    out = np.empty((8, 9))
-    arcs, rolls = np.empty((64, 3)), np.empty((256, 3))
-    given = free_roll and not math.isnan(problem.values[1])
-    gap, count, roll_count = _solve(
-        problem.T, g.inverse_base, g.inverse_tool, g.offset, g.d3, g.d5, free_roll, problem.values[0],
-        problem.respect_limits, problem.seed, problem.values[1] if given else problem.seed_roll, given,
-        problem.lower, problem.upper, arcs, rolls, out,
-    )  # fmt: skip
-    obstacle = ""
-    if gap > 0.0:
-        obstacle = "with this orientation the horizontal upper arm and the forearm do not meet the wrist centre"
-    if free_roll:
-        return Candidates(out[:, :7], out[:, 7:], (arcs[:count], rolls[:roll_count]), gap, obstacle)
-    return Candidates(out[:, :7], out[:, 7:8], (arcs[:count],), gap, obstacle)
-
-
-def why(geometry: Geometry) -> str:
-    """What makes an arm one of this family."""
-    return "axes 1 and 2 are one line, axis 3 leaves it squarely, and axes 5, 6, 7 meet in one point"
-
-
 # Thin: all branches at one θ1, without limits, ranges and a choice, as :mod:`kin.solvers.blocks` has it. There are
 # two pairs of each angle, one per shoulder. The other six branches are half turns: a sign of θ4 turns θ3 and θ5,
 # one of θ6 turns θ5 and θ7.
@@ -302,13 +282,6 @@ _PAIRS, _END = 12, OWN + 12
 _FIRST, _SECOND, _ROWS = _END + _PAIRS, _END + _PAIRS + 2, _END + _PAIRS + 5  # rows of θ1, θ2, and of all
 _TOOL, _OFFSET, _LENGTHS = 12, 24, 31
 _UNBOUND = 1e6
-
-
-def params(geometry: Geometry) -> Array:
-    """The arm as the thin kernels read it ``(33,)``: base⁻¹ and tool⁻¹ by rows, offsets, d3, d5."""
-    g = geometry
-    offset = [wrap(t) for t in g.offset.tolist()]
-    return np.array([*g.inverse_base[:3].ravel(), *g.inverse_tool[:3].ravel(), *offset, g.d3, g.d5])
 
 
 @inlined
@@ -465,7 +438,7 @@ def _closely(params: Array, T: Array, value: float, near: Array, out: Array) -> 
 
 
 @jit
-def branches_each(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
+def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
     """out ``(N, 8, 7)`` ← all branches of each of the targets T ``(N, 4, 4)``; see `branches_one`.
 
     values: θ1 for each target ``(N,)``, or one for all ``(1,)``.
@@ -486,61 +459,83 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
     return one(_pairs, _angles, _store, _closely, _PAIRS, params, T, value, near, out, S)
 
 
-def handles(geometry: Geometry, task: int) -> bool:
-    """Poses, and an approach direction when it passes through the wrist centre."""
-    return task == POSE or (task == APPROACH and geometry.tool_on_axis)
+class Collinear7(ClosedForm):
+    """The closed form of the arm whose joints 1 and 2 turn about one line."""
 
+    name, title, branches = NAME, TITLE, BRANCHES
+    reason = "axes 1 and 2 are one line, axis 3 is perpendicular to it, and axes 5, 6, 7 meet in one point"
 
-def freedoms(geometry: Geometry, task: int) -> tuple[Freedom, ...]:
-    """θ1, which joint 2 undoes; for an approach direction the roll about it as well."""
-    return (_THETA1, _ROLL) if task == APPROACH else (_THETA1,)
+    def __init__(self, geometry: Geometry) -> None:
+        g = self.geometry = geometry
+        self.lengths = (g.d3, g.d5)
+        # base⁻¹ and tool⁻¹ by rows, offsets, d3, d5.
+        offset = [wrap(t) for t in g.offset.tolist()]
+        params = np.array([*g.inverse_base[:3].ravel(), *g.inverse_tool[:3].ravel(), *offset, g.d3, g.d5])
+        self.kernels = BatchKernels(params, branches_one, branches_many)
 
+    def handles(self, task: int) -> bool:
+        """Poses, and an approach direction when it passes through the wrist centre."""
+        return task == POSE or (task == APPROACH and self.geometry.tool_on_axis)
 
-def branch_of(geometry: Geometry, q: Array) -> int:
-    """The branch a configuration is on: the side of w on which u lies, and the signs of s4 and s6."""
-    t = q + geometry.offset
-    s4 = math.sin(t[3])
-    return 4 * int(math.cos(t[2]) * s4 < 0.0) + 2 * int(s4 < 0.0) + int(math.sin(t[5]) < 0.0)
+    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
+        """θ1, which joint 2 undoes; for an approach direction the roll about it as well."""
+        return (_THETA1, _ROLL) if task == APPROACH else (_THETA1,)
 
+    def solve(self, problem: SolverInput) -> Candidates:
+        """All branches, with θ1 and θ2 (and the roll of an approach task) as near the seed as the limits allow."""
+        g, free_roll = self.geometry, problem.task == APPROACH
+        out = np.empty((8, 9))
+        arcs, rolls = np.empty((64, 3)), np.empty((256, 3))
+        given = free_roll and not math.isnan(problem.values[1])
+        gap, count, roll_count = _solve(
+            problem.T, g.inverse_base, g.inverse_tool, g.offset, g.d3, g.d5, free_roll, problem.values[0],
+            problem.respect_limits, problem.seed, problem.values[1] if given else problem.seed_roll, given,
+            problem.lower, problem.upper, arcs, rolls, out,
+        )  # fmt: skip
+        obstacle = Obstacle("wrist centre off the upper arm and forearm") if gap > 0.0 else None
+        if free_roll:
+            return Candidates(out[:, :7], out[:, 7:], (arcs[:count], rolls[:roll_count]), gap, obstacle)
+        return Candidates(out[:, :7], out[:, 7:8], (arcs[:count],), gap, obstacle)
 
-def singularities(geometry: Geometry, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
-    """How far a configuration ``(7,)`` is from each of the arm's singularities.
+    def branch_of(self, q: Array) -> int:
+        """The branch a configuration is on: the side of w on which u lies, and the signs of s4 and s6."""
+        t = q + self.geometry.offset
+        s4 = math.sin(t[3])
+        return 4 * int(math.cos(t[2]) * s4 < 0.0) + 2 * int(s4 < 0.0) + int(math.sin(t[5]) < 0.0)
 
-    The three are the factors of the determinant without joint 2, d3 d5² s4² c3 s6: there are no others. s4 counts
-    twice, so an elbow nearly straight costs more than a wrist nearly aligned.
-    """
-    g = geometry
-    t = (q + g.offset).tolist()
-    shoulder, elbow, wrist = off_square(t[2]), off_line(t[3]), off_line(t[5])
-    across, along = g.d5 * math.sin(t[3]) * math.cos(t[2]), g.d3 + g.d5 * math.cos(t[3])
-    off_axis = math.hypot(across, along)
-    if min(abs(shoulder), abs(elbow), abs(wrist), off_axis) > within:
-        return ()  # as almost everywhere
-    entries: list[Entry] = [
-        (
-            "elbow",
-            abs(elbow),
-            "rad",
-            lambda: f"elbow {stretch(t[3])} ({at(4, q[3], elbow)}): the hand cannot shift along the arm",
-        ),
-        (
-            "shoulder",
-            abs(shoulder),
-            "rad",
-            lambda: (
-                f"forearm in one plane with axis 1 ({at(3, q[2], shoulder)}): "
-                "the hand cannot shift along the forearm"
+    def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
+        """The three factors of the determinant without joint 2, d3 d5² s4² c3 s6: there are no others.
+
+        s4 counts twice, so an elbow nearly straight costs more than a wrist nearly aligned.
+        """
+        g = self.geometry
+        t = (q + g.offset).tolist()
+        off = (0.0, 0.0, off_perpendicular(t[2]), off_line(t[3]), 0.0, off_line(t[5]))
+        across, along = g.d5 * math.sin(t[3]) * math.cos(t[2]), g.d3 + g.d5 * math.cos(t[3])
+        off_axis = math.hypot(across, along)
+        if min(abs(off[2]), abs(off[3]), abs(off[5]), off_axis) > within:
+            return ()  # as almost everywhere
+
+        def met_at(joint: int) -> tuple[JointValue]:
+            return (JointValue(joint, float(q[joint]) - off[joint]),)
+
+        found = [
+            Singularity("elbow", elbow_at(t[3]), "hand along the arm", abs(off[3]), "rad", met_at(3)),
+            Singularity(
+                "shoulder",
+                "forearm in one plane with axis 1",
+                "hand along the forearm",
+                abs(off[2]),
+                "rad",
+                met_at(2),
             ),
-        ),
-        (
-            "wrist",
-            abs(wrist),
-            "rad",
-            lambda: f"hand in line with the forearm ({at(6, q[5], wrist)}): joints 5 and 7 turn about one line",
-        ),
-    ]
-    if g.d5 >= g.d3 - TOLERANCES.geometry:
-        # Only a forearm at least as long as the upper arm gets back to axis 1; then θ3 is square, too.
-        meaning = "wrist centre on axis 1: the closed form takes θ1 + θ2 from the seed"
-        entries.append(("algorithmic", off_axis, "m", lambda: meaning))
-    return those_within(within, *entries)
+            Singularity(
+                "wrist", "hand along the forearm", "joints 5 and 7 coincide", abs(off[5]), "rad", met_at(5)
+            ),
+        ]
+        if g.d5 >= g.d3 - TOLERANCES.geometry:
+            # Only a forearm at least as long as the upper arm gets back to axis 1; then θ3 is ±90°, too.
+            found.append(
+                Singularity("algorithmic", "wrist centre on axis 1", "azimuth of the forearm", off_axis, "m")
+            )
+        return those_within(within, *found)

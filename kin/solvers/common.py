@@ -16,8 +16,6 @@ Three ideas carry all the solvers:
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -33,9 +31,6 @@ _PER_TURN = 1.0 / TURN
 _SINGULAR = TOLERANCES.singular
 _LIMIT = TOLERANCES.limit
 _MERGE = TOLERANCES.merge
-
-POSE, APPROACH, POSITION, MASK = 0, 1, 2, 3
-TASK_CODES = {"pose": POSE, "approach": APPROACH, "position": POSITION, "mask": MASK}
 
 
 @jit
@@ -345,66 +340,6 @@ def nearest_in_arcs(arcs: Array, first: int, found: int, wish: float) -> float:
         if distance < best_distance:
             best, best_distance = v, distance
     return best
-
-
-class Freedom(NamedTuple):
-    """A parameter that a task leaves free.
-
-    Attributes:
-        name, label: id, and the same for people.
-        joint: index of the joint whose value it is, −1 if it is none.
-        circular: whether its values are angles on a circle, told in (−π, π].
-        rare: free at singular targets only, so that no value can be asked for.
-    """
-
-    name: str
-    label: str
-    joint: int = -1
-    circular: bool = False
-    rare: bool = False
-
-
-@dataclass(slots=True, eq=False)
-class Problem:
-    """What a solver is asked: a target, and how to choose what it leaves free.
-
-    Attributes:
-        T: target pose T_base_tool ``(4, 4)``.
-        task: POSE, APPROACH or POSITION (a mask has no closed form).
-        values: one per freedom of the task, NaN to let the solver choose it near the seed.
-        respect_limits: choose free parameters so that the limits hold, where that is possible.
-        seed, lower, upper: ``(n,)``.
-        seed_roll: angle about the target's z axis from its x axis to the seed tool's (tasks with a free roll).
-    """
-
-    T: Array
-    task: int
-    values: tuple[float, ...]
-    respect_limits: bool
-    seed: Array
-    lower: Array
-    upper: Array
-    seed_roll: float = 0.0
-
-
-@dataclass(slots=True, eq=False)
-class Candidates:
-    """What a solver answers: one configuration per branch, not verified, not filtered, not sorted.
-
-    Attributes:
-        q: ``(branches, n)``, NaN where the branch does not exist. Where two have merged, both are there.
-        values: ``(branches, freedoms)``, the value used, NaN where the freedom is not there.
-        arcs: per freedom ``(k, 3)`` rows (branch, low, high): its values that the limits allow, the other
-            freedoms held.
-        gap: metres by which the geometry does not close when no branch exists.
-        obstacle: a clause that says what does not fit then.
-    """
-
-    q: Array
-    values: Array
-    arcs: tuple[Array, ...]
-    gap: float = 0.0
-    obstacle: str = ""
 
 
 class Chain:

@@ -17,7 +17,6 @@ from kin.kernels.compile import jit
 from kin.kernels.simd import atan2
 from kin.robot import Robot
 from kin.solvers.common import (
-    Problem,
     add_roots,
     excess,
     extend_arcs,
@@ -30,6 +29,7 @@ from kin.solvers.common import (
     split_sum,
     wrap,
 )
+from kin.solvers.contract import SolverInput
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -139,7 +139,7 @@ def rolled(T: Array, angle: float) -> Array:
     return T @ screw_z(angle, 0.0)
 
 
-def free_last(problem: Problem, out: Array) -> Array:
+def free_last(problem: SolverInput, out: Array) -> Array:
     """Put a last joint that only rolls the tool where it may be, in place; returns its arcs ``(k, 3)``.
 
     It stays at the seed's value, inside the limits, or goes where the last of the problem's values wants it.

@@ -14,12 +14,6 @@ Eight branches. The twist between axes 1 and 2 and all offsets may be anything, 
 Singular: s3 = 0 (two elbows merge); x = 0 (two shoulders merge); s5 = 0, where axis 6 is parallel to the three
 and θ6 is free: then axis 4 goes round a circle, and where it meets the end of the elbow's reach or a joint a
 limit is a root of ``a cos ψ + b sin ψ + c = 0``, so the feasible θ6 are exact arcs.
-
-Fast path. `params(geometry)` is the arm as one float64 array, C-contiguous and writable. The compiled
-`branches_one(params, T, value, near, out)` writes all branches of the target T ``(4, 4)`` to out ``(8, 6)``,
-one row per name in `BRANCHES`, NaN where a branch does not exist, angles in (−π, π]; limits are not asked for.
-near ``(6,)`` decides what is free at a singularity; value is θ6 where that is free, NaN to let near decide. The
-same for T ``(N, 4, 4)`` and out ``(N, 8, 6)`` is `branches_many`.
 """
 
 from __future__ import annotations
@@ -35,7 +29,17 @@ from kin.kernels.fk import BLOCK
 from kin.kernels.simd import atan2, widest, wrapped
 from kin.robot import Robot
 from kin.solvers.blocks import OWN, Arc, Entries, canonical_of, double, each, elbow_of, one, rows_of, single
-from kin.solvers.common import APPROACH, POSE, Candidates, Freedom, Problem, clear, copy_row, is_zero, wrap
+from kin.solvers.common import clear, copy_row, is_zero, wrap
+from kin.solvers.contract import (
+    APPROACH,
+    POSE,
+    BatchKernels,
+    Candidates,
+    ClosedForm,
+    Obstacle,
+    RedundancyParameter,
+    SolverInput,
+)
 from kin.solvers.links import (
     canonical,
     free_last,
@@ -48,7 +52,7 @@ from kin.solvers.links import (
     signed_box,
     two_links,
 )
-from kin.solvers.singular import Singularity, at, off_line, stretch, those_within
+from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -60,8 +64,8 @@ BRANCHES = tuple(
     for e in ("up", "down")
     for w in ("no-flip", "flip")
 )
-_SPIN6 = Freedom("theta6", "θ6", joint=5, circular=True, rare=True)
-_THETA6 = Freedom("theta6", "θ6", joint=5)
+_SPIN6 = RedundancyParameter("theta6", "θ6", joint=5, circular=True, rare=True)
+_THETA6 = RedundancyParameter("theta6", "θ6", joint=5)
 _REACH = TOLERANCES.closure_position * 0.1
 _SINGULAR = TOLERANCES.singular
 _MERGE = TOLERANCES.merge
@@ -95,8 +99,8 @@ class Geometry(NamedTuple):
     tool_on_axis: bool
 
 
-def match(robot: Robot) -> Geometry | None:
-    """The geometry if axes 2, 3, 4 are parallel and 1 is not, 4-5 and 5-6 are square, and 5 and 6 meet."""
+def match(robot: Robot) -> Parallel6 | None:
+    """The closed form if axes 2, 3, 4 are parallel and 1 is not, 4-5 and 5-6 are square, and 5 and 6 meet."""
     if robot.n != 6 or not robot.revolute.all():
         return None
     links = links_of(robot, (-1, -1, -1, -1, 1))
@@ -112,17 +116,7 @@ def match(robot: Robot) -> Geometry | None:
         [*pose_params(links.base, links.tool), *links.sign, *links.theta, *shape, *[-_FAR] * 6, *[_FAR] * 6]
     )
     on_axis = is_zero(links.tool[0, 3], links.tool[1, 3], abs(links.tool[2, 2]) - 1.0)
-    return Geometry(params, links.sign, links.theta, a1, a2, a3, a4, d5, beside, on_axis)
-
-
-def why(geometry: Geometry) -> str:
-    """What about the axes made the match, in one sentence."""
-    return "axes 2, 3 and 4 are parallel, and axis 5 is square to axis 4 and meets axis 6 squarely"
-
-
-def params(geometry: Geometry) -> Array:
-    """The arm as the flat array ``(56,)`` that the kernels read."""
-    return geometry.params
+    return Parallel6(Geometry(params, links.sign, links.theta, a1, a2, a3, a4, d5, beside, on_axis))
 
 
 @jit
@@ -464,96 +458,92 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
 
 
 @jit
-def branches_many(params: Array, T: Array, value: float, near: Array, out: Array) -> None:
-    """out ``(N, 8, 6)`` ← all branches of each of the targets T ``(N, 4, 4)``."""
+def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
+    """out ``(N, 8, 6)`` ← all branches of each of the targets T ``(N, 4, 4)``, values ``(N,)`` or ``(1,)``."""
     widest()
-    S, values = np.empty((_ROWS, BLOCK)), np.empty(1)
-    values[0] = value
+    S = np.empty((_ROWS, BLOCK))
     each(_pairs, _angles, _store, _closely, params, T, values, near, out, S)
 
 
-def solve(geometry: Geometry, problem: Problem) -> Candidates:
-    """All branches; with an approach direction only, joint 6 stays or goes where it is asked to be."""
-    g, free_roll = geometry, problem.task == APPROACH
-    out, arcs, free = np.empty((8, 6)), np.empty((128, 3)), np.zeros(8)
-    T, lower, upper = problem.T, problem.lower, problem.upper
-    if free_roll:
-        T, lower, upper = rolled(T, problem.seed_roll), lower.copy(), upper.copy()
-        lower[5], upper[5] = -_FAR, _FAR
-    value = math.nan if free_roll else problem.values[0]
-    gap, count = _branches(g.params, T, value, problem.seed, lower, upper, arcs, free, out)
-    obstacle = "" if gap <= _REACH else "with this orientation the wrist is out of the elbow's reach"
-    if free_roll:
-        ranges = free_last(problem, out)
-        values = out[:, 5:].copy()
-    else:
-        ranges = arcs[:count]
-        values = np.where(free[:, None] == 1.0, out[:, 5:], math.nan)
-    return Candidates(out, values, (ranges,), max(gap, 0.0), obstacle)
+class Parallel6(ClosedForm):
+    """The closed form of an arm with three parallel axes and a wrist."""
 
-
-def handles(geometry: Geometry, task: int) -> bool:
-    """Poses, and an approach direction when it is the last joint's own axis (then that joint is free)."""
-    return task == POSE or (task == APPROACH and geometry.tool_on_axis)
-
-
-def freedoms(geometry: Geometry, task: int) -> tuple[Freedom, ...]:
-    """θ6: for a pose when axis 6 is parallel to axes 2, 3 and 4; for an approach direction always."""
-    return (_THETA6,) if task == APPROACH else (_SPIN6,)
-
-
-def _reach(geometry: Geometry, t: Sequence[float] | Array) -> float:
-    """x of W in the frame that turns with axis 1, metres."""
-    g = geometry
-    A = t[1] + t[2] + t[3]
-    return float(
-        g.a1 + g.a2 * math.cos(t[1]) + g.a3 * math.cos(t[1] + t[2]) + g.a4 * math.cos(A) - g.d5 * math.sin(A)
+    name, title, branches = NAME, TITLE, BRANCHES
+    reason = (
+        "axes 2, 3 and 4 are parallel, and axis 5 is perpendicular to axis 4 and meets axis 6 at a right angle"
     )
 
+    def __init__(self, geometry: Geometry) -> None:
+        g = self.geometry = geometry
+        self.lengths = (g.a1, g.a2, g.a3, g.a4, g.d5, g.beside)
+        self.kernels = BatchKernels(g.params, branches_one, branches_many)
 
-def branch_of(geometry: Geometry, q: Array) -> int:
-    """The branch a configuration is on.
+    def handles(self, task: int) -> bool:
+        """Poses, and an approach direction when it is the last joint's own axis (then that joint is free)."""
+        return task == POSE or (task == APPROACH and self.geometry.tool_on_axis)
 
-    "Left": the arm's plane is on the left of axis 1, seen along the arm. The elbow is "up" when it is above the
-    line from axis 2 to axis 4; the wrist is the sign of θ5.
-    """
-    t = geometry.sign * q + geometry.offset
-    side = -1.0 if _reach(geometry, t) < 0.0 else 1.0
-    right = (side < 0.0) == (geometry.beside >= 0.0)
-    return 4 * int(right) + 2 * int(side * math.sin(t[2]) < 0.0) + int(math.sin(t[4]) < 0.0)
+    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
+        """θ6: for a pose when axis 6 is parallel to axes 2, 3 and 4; for an approach direction always."""
+        return (_THETA6,) if task == APPROACH else (_SPIN6,)
 
+    def solve(self, problem: SolverInput) -> Candidates:
+        """All branches; with an approach direction only, joint 6 stays or takes the value requested."""
+        g, free_roll = self.geometry, problem.task == APPROACH
+        out, arcs, free = np.empty((8, 6)), np.empty((128, 3)), np.zeros(8)
+        T, lower, upper = problem.T, problem.lower, problem.upper
+        if free_roll:
+            T, lower, upper = rolled(T, problem.seed_roll), lower.copy(), upper.copy()
+            lower[5], upper[5] = -_FAR, _FAR
+        value = math.nan if free_roll else problem.values[0]
+        gap, count = _branches(g.params, T, value, problem.seed, lower, upper, arcs, free, out)
+        if free_roll:
+            ranges = free_last(problem, out)
+            values = out[:, 5:].copy()
+        else:
+            ranges = arcs[:count]
+            values = np.where(free[:, None] == 1.0, out[:, 5:], math.nan)
+        obstacle = None if gap <= _REACH else Obstacle("wrist centre beyond the elbow's reach")
+        return Candidates(out, values, (ranges,), max(gap, 0.0), obstacle)
 
-def singularities(geometry: Geometry, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
-    """How far a configuration ``(6,)`` is from each of the arm's singularities.
+    def _x_of_wrist(self, t: Sequence[float] | Array) -> float:
+        """x of W in the frame that turns with axis 1, metres."""
+        g = self.geometry
+        A = t[1] + t[2] + t[3]
+        return float(
+            g.a1 + g.a2 * math.cos(t[1]) + g.a3 * math.cos(t[1] + t[2]) + g.a4 * math.cos(A) - g.d5 * math.sin(A)
+        )
 
-    With x that of W in the frame turning with axis 1, the determinant is ±a2 a3 s3 · x sin α1 · s5.
-    """
-    g = geometry
-    t = (g.sign * q + g.offset).tolist()
-    elbow, reach, wrist = off_line(t[2]), _reach(g, t), off_line(t[4])
-    if min(abs(elbow), abs(reach), abs(wrist)) > within:
-        return ()  # as almost everywhere
-    return those_within(
-        within,
-        (
-            "elbow",
-            abs(elbow),
-            "rad",
-            lambda: f"elbow {stretch(t[2])} ({at(3, q[2], g.sign[2] * elbow)}): axis 4 cannot move along the arm",
-        ),
-        (
-            "shoulder",
-            abs(reach),
-            "m",
-            lambda: "wrist centre beside axis 1, as near to it as it can get: it cannot move along axis 2",
-        ),
-        (
-            "wrist",
-            abs(wrist),
-            "rad",
-            lambda: (
-                f"axis 6 parallel to axes 2, 3 and 4 ({at(5, q[4], g.sign[4] * wrist)}): "
-                "the tool cannot tilt about the third axis"
+    def branch_of(self, q: Array) -> int:
+        """The branch a configuration is on.
+
+        "Left": the arm's plane is on the left of axis 1, seen along the arm. The elbow is "up" when it is above
+        the line from axis 2 to axis 4; the wrist is the sign of θ5.
+        """
+        t = self.geometry.sign * q + self.geometry.offset
+        side = -1.0 if self._x_of_wrist(t) < 0.0 else 1.0
+        right = (side < 0.0) == (self.geometry.beside >= 0.0)
+        return 4 * int(right) + 2 * int(side * math.sin(t[2]) < 0.0) + int(math.sin(t[4]) < 0.0)
+
+    def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
+        """The three factors of the determinant, ±a2 a3 s3 · x sin α1 · s5: there are no others."""
+        g = self.geometry
+        t = (g.sign * q + g.offset).tolist()
+        elbow, x, wrist = off_line(t[2]), self._x_of_wrist(t), off_line(t[4])
+        if min(abs(elbow), abs(x), abs(wrist)) > within:
+            return ()  # as almost everywhere
+        straight, aligned = float(q[2] - g.sign[2] * elbow), float(q[4] - g.sign[4] * wrist)
+        return those_within(
+            within,
+            Singularity(
+                "elbow", elbow_at(t[2]), "axis 4 along the arm", abs(elbow), "rad", (JointValue(2, straight),)
             ),
-        ),
-    )
+            Singularity("shoulder", "wrist centre nearest to axis 1", "wrist centre along axis 2", abs(x), "m"),
+            Singularity(
+                "wrist",
+                "axis 6 parallel to axes 2, 3 and 4",
+                "tilt about the third axis",
+                abs(wrist),
+                "rad",
+                (JointValue(4, aligned),),
+            ),
+        )

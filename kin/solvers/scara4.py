@@ -11,12 +11,6 @@ Two branches. Of the orientations only those turned about the axes can be had: f
 angle and the tool's point is kept; without a slide the height must fit. Whether such an answer will do is
 judged by its residual, outside. When only a point or an approach direction is asked for, ψ is free, and the
 values that reach and limits allow are exact arcs. Singular: s2 = 0 only.
-
-Fast path. `params(geometry)` is the arm as one float64 array, C-contiguous and writable. The compiled
-`branches_one(params, T, value, near, out)` writes all branches of the target T ``(4, 4)`` to out ``(2, n)``,
-one row per name in `BRANCHES`, NaN where a branch does not exist, angles in (−π, π]; limits are not asked for.
-near ``(n,)`` decides what is free at a singularity; value is ignored. The same for T ``(N, 4, 4)`` and out
-``(N, 2, n)`` is `branches_many`.
 """
 
 from __future__ import annotations
@@ -32,17 +26,22 @@ from kin.kernels.simd import widest, wrapped
 from kin.robot import Robot
 from kin.solvers.blocks import OWN, Arc, double, each, elbow_of, in_base, one, rows_of, single
 from kin.solvers.common import (
-    APPROACH,
-    POSE,
-    POSITION,
-    Candidates,
-    Freedom,
-    Problem,
     clear,
     copy_row,
     is_zero,
     split_sum,
     wrap,
+)
+from kin.solvers.contract import (
+    APPROACH,
+    POSE,
+    POSITION,
+    BatchKernels,
+    Candidates,
+    ClosedForm,
+    Obstacle,
+    RedundancyParameter,
+    SolverInput,
 )
 from kin.solvers.links import (
     axes_of,
@@ -53,14 +52,14 @@ from kin.solvers.links import (
     square_to,
     two_links,
 )
-from kin.solvers.singular import Singularity, at, off_line, stretch, those_within
+from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 NAME = "scara4"
 TITLE = "closed form, all axes parallel"
 BRANCHES = ("elbow right", "elbow left")
-_PSI = Freedom("psi", "tool angle ψ", circular=True)
+_PSI = RedundancyParameter("psi", "tool angle ψ", circular=True)
 _REACH = TOLERANCES.closure_position * 0.1
 _SINGULAR = TOLERANCES.singular
 _FAR = 1e6
@@ -89,8 +88,8 @@ class Geometry(NamedTuple):
     upright: bool
 
 
-def match(robot: Robot) -> Geometry | None:
-    """The geometry if all axes are parallel, three joints turn and at most one slides."""
+def match(robot: Robot) -> Scara4 | None:
+    """The closed form if all axes are parallel, three joints turn and at most one slides."""
     turning = np.flatnonzero(robot.revolute).tolist()
     if len(turning) != 3 or robot.n > 4:
         return None
@@ -117,18 +116,7 @@ def match(robot: Robot) -> Geometry | None:
         ]
     )  # fmt: skip
     upright = is_zero(abs(tool[2, 2]) - 1.0)
-    return Geometry(params, order, signs, offset, abs(upper), abs(fore), upright)
-
-
-def why(geometry: Geometry) -> str:
-    """What about the axes made the match, in one sentence."""
-    slide = ", one of them of a joint that slides" if len(geometry.order) == 4 else ""
-    return f"all axes are parallel{slide}"
-
-
-def params(geometry: Geometry) -> Array:
-    """The arm as the flat array ``(46,)`` that the kernels read."""
-    return geometry.params
+    return Scara4(Geometry(params, order, signs, offset, abs(upper), abs(fore), upright))
 
 
 @jit
@@ -300,62 +288,62 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
 
 
 @jit
-def branches_many(params: Array, T: Array, value: float, near: Array, out: Array) -> None:
-    """out ``(N, 2, n)`` ← both branches of each of the targets T ``(N, 4, 4)``."""
+def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
+    """out ``(N, 2, n)`` ← both branches of each of the targets T ``(N, 4, 4)``, values ``(N,)`` or ``(1,)``."""
     widest()
-    S, values = np.empty((_ROWS, BLOCK)), np.empty(1)
-    values[0] = value
+    S = np.empty((_ROWS, BLOCK))
     each(_pairs, _angles, _store, _closely, params, T, values, near, out, S)
 
 
-def solve(geometry: Geometry, problem: Problem) -> Candidates:
-    """Both branches that bring the tool to the target's point, at the angle ψ asked for or the best free one."""
-    out, arcs, psis = np.empty((2, len(geometry.order))), np.empty((64, 3)), np.full(2, math.nan)
-    free = bool(freedoms(geometry, problem.task))
-    value = problem.values[0] if free else math.nan
-    gap, count = _branches(
-        geometry.params, problem.T, problem.task, free, value, problem.seed, problem.lower, problem.upper, arcs,
-        psis, out,
-    )  # fmt: skip
-    exists = bool((~np.isnan(out[:, 0])).any())
-    obstacle = "" if exists else "the last axis is out of the two links' reach"
-    values, ranges = (psis[:, None], (arcs[:count],)) if free else (np.empty((2, 0)), ())
-    return Candidates(out, values, ranges, 0.0 if exists else max(gap, 0.0), obstacle)
+class Scara4(ClosedForm):
+    """The closed form of a SCARA or planar arm."""
 
+    name, title, branches = NAME, TITLE, BRANCHES
 
-def handles(geometry: Geometry, task: int) -> bool:
-    """Points, with an orientation or an approach direction, of which the pipeline judges what tilt is left."""
-    return task in (POSE, APPROACH, POSITION)
+    def __init__(self, geometry: Geometry) -> None:
+        g = self.geometry = geometry
+        self.reason = "all axes are parallel" + ", and one joint slides" * (len(g.order) == 4)
+        self.lengths = (g.a, g.b)
+        self.kernels = BatchKernels(g.params, branches_one, branches_many)
 
+    def handles(self, task: int) -> bool:
+        """Points, with an orientation or an approach direction, whose remaining tilt :mod:`kin.ik` judges."""
+        return task in (POSE, APPROACH, POSITION)
 
-def freedoms(geometry: Geometry, task: int) -> tuple[Freedom, ...]:
-    """The tool's angle about the axes, for a point alone or for a direction along the axes."""
-    return (_PSI,) if task == POSITION or (task == APPROACH and geometry.upright) else ()
+    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
+        """The tool's angle about the axes, for a point alone or for a direction along the axes."""
+        return (_PSI,) if task == POSITION or (task == APPROACH and self.geometry.upright) else ()
 
+    def solve(self, problem: SolverInput) -> Candidates:
+        """Both branches that bring the tool to the target's point, at the requested ψ or the best one."""
+        g = self.geometry
+        out, arcs, psis = np.empty((2, len(g.order))), np.empty((64, 3)), np.full(2, math.nan)
+        free = bool(self.redundancies(problem.task))
+        value = problem.values[0] if free else math.nan
+        gap, count = _branches(
+            g.params, problem.T, problem.task, free, value, problem.seed, problem.lower, problem.upper, arcs, psis,
+            out,
+        )  # fmt: skip
+        exists = bool((~np.isnan(out[:, 0])).any())
+        obstacle = None if exists else Obstacle("last axis beyond the links' reach")
+        values, ranges = (psis[:, None], (arcs[:count],)) if free else (np.empty((2, 0)), ())
+        return Candidates(out, values, ranges, 0.0 if exists else max(gap, 0.0), obstacle)
 
-def _elbow(geometry: Geometry, q: Array) -> float:
-    """θ2: 0 where the arm is straight."""
-    return float(geometry.sign[1] * q[geometry.order[1]] + geometry.offset[1])
+    def _elbow(self, q: Array) -> float:
+        """θ2: 0 where the arm is straight."""
+        g = self.geometry
+        return float(g.sign[1] * q[g.order[1]] + g.offset[1])
 
+    def branch_of(self, q: Array) -> int:
+        """The branch a configuration is on: "right" if the elbow is on the right, seen from above along the arm."""
+        return int(math.sin(self._elbow(q)) < 0.0)
 
-def branch_of(geometry: Geometry, q: Array) -> int:
-    """The branch a configuration is on: "right" if the elbow is on the right, seen from above along the arm."""
-    return int(math.sin(_elbow(geometry, q)) < 0.0)
-
-
-def singularities(geometry: Geometry, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
-    """How far a configuration ``(n,)`` is from the arm's singularity: the determinant is a b s2."""
-    joint = geometry.order[1]
-    off = off_line(_elbow(geometry, q))
-    return those_within(
-        within,
-        (
-            "elbow",
-            abs(off),
-            "rad",
-            lambda: (
-                f"elbow {stretch(_elbow(geometry, q))} ({at(joint + 1, q[joint], geometry.sign[1] * off)}): "
-                "the last axis cannot move along the arm"
-            ),
-        ),
-    )
+    def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
+        """The elbow: the determinant is a b s2."""
+        joint = self.geometry.order[1]
+        elbow = self._elbow(q)
+        off = off_line(elbow)
+        there = (JointValue(joint, float(q[joint] - self.geometry.sign[1] * off)),)
+        return those_within(
+            within, Singularity("elbow", elbow_at(elbow), "last axis along the arm", abs(off), "rad", there)
+        )

@@ -8,7 +8,7 @@ axis 2 at the distance E, so
 - θ2 = atan2(h, X − a1) + atan2(E, S); the wrist is the same.
 
 Eight branches, of which S < 0 is seldom inside the limits. Singular: S = 0; X = 0, where θ1 is free if L = 0;
-s5 = 0. The fast path is that of :mod:`kin.solvers.wrist6`, on this arm's `params`.
+s5 = 0. The batch kernels are those of :mod:`kin.solvers.wrist6`, on this arm's params.
 """
 
 from __future__ import annotations
@@ -24,19 +24,20 @@ from kin.kernels.simd import widest
 from kin.robot import Robot
 from kin.solvers import wrist6
 from kin.solvers.blocks import Arc, Entries, canonical_of, each, one, rows_of
-from kin.solvers.common import Candidates, Freedom, Problem, is_zero, screw_x, screw_z
+from kin.solvers.common import is_zero, screw_x, screw_z
+from kin.solvers.contract import BatchKernels, Obstacle
 from kin.solvers.links import is_square, links_of
-from kin.solvers.singular import Singularity, at, off_line, those_within
+from kin.solvers.singular import JointValue, Singularity, off_line, those_within
 from kin.solvers.wrist6 import (
     BEND,
     FRONT,
     PAIRS,
     ROWS,
     Geometry,
+    Wrist6,
     all_but_third,
     arm_pairs,
     closely,
-    params,
     shape_of,
     shoulder,
     store,
@@ -44,8 +45,6 @@ from kin.solvers.wrist6 import (
 )
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
-
-__all__ = ["params"]
 
 NAME = "slide6"
 TITLE = "closed form, sliding arm with a spherical wrist"
@@ -60,8 +59,8 @@ _SINGULAR = TOLERANCES.singular
 _MERGE = TOLERANCES.merge
 
 
-def match(robot: Robot) -> Geometry | None:
-    """The geometry if axis 2 is square to 1 and to the slide, and 4, 5, 6 meet in a point, neighbours square."""
+def match(robot: Robot) -> Slide6 | None:
+    """The closed form if axis 2 is perpendicular to axis 1 and to the slide, and 4, 5, 6 make a spherical wrist."""
     if robot.n != 6 or robot.revolute.tolist() != [True, True, False, True, True, True]:
         return None
     links = links_of(robot, (-1, -1, -1, -1, 1))
@@ -83,12 +82,7 @@ def match(robot: Robot) -> Geometry | None:
     rest = screw_x(0.0, -twist)[:3, :3] @ screw_z(phase, 0.0)[:3, :3] @ R
     offset[3] += math.atan2(rest[1, 0], rest[0, 0])
     lengths = (float(a[0]), 0.0, 0.0 if is_zero(aside) else aside, 0.0 if is_zero(beside) else beside)
-    return wrist6.pack(links, offset, lengths, phase, twist, slides=True)
-
-
-def why(geometry: Geometry) -> str:
-    """What about the axes made the match, in one sentence."""
-    return "axes 4, 5 and 6 meet in one point, and joint 3 slides square to axis 2, which is square to axis 1"
+    return Slide6(wrist6.pack(links, offset, lengths, phase, twist, slides=True))
 
 
 # Thin, as in :mod:`kin.solvers.wrist6`. How far W is along the slide (front, back) has rows of its own; those of
@@ -156,70 +150,57 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
 
 
 @jit
-def branches_many(params: Array, T: Array, value: float, near: Array, out: Array) -> None:
-    """out ``(N, 8, 6)`` ← all branches of each of the targets T ``(N, 4, 4)``."""
+def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
+    """out ``(N, 8, 6)`` ← all branches of each of the targets T ``(N, 4, 4)``, values ``(N,)`` or ``(1,)``."""
     widest()
-    S, values = np.empty((_ROWS, BLOCK)), np.empty(1)
-    values[0] = value
+    S = np.empty((_ROWS, BLOCK))
     each(_pairs, _angles, store, closely, params, T, values, near, out, S)
 
 
-def solve(geometry: Geometry, problem: Problem) -> Candidates:
-    """All branches; with an approach direction only, joint 6 stays or goes where it is asked to be."""
-    found = wrist6.solve(geometry, problem)
-    obstacle = found.obstacle and "with this orientation the wrist centre is too near to axis 1 or 2"
-    return Candidates(found.q, found.values, found.arcs, found.gap, obstacle)
+class Slide6(Wrist6):
+    """The closed form of a sliding arm: that of `Wrist6`, with another elbow."""
 
-
-def handles(geometry: Geometry, task: int) -> bool:
-    """Poses, and an approach direction when it is the last joint's own axis (then that joint is free)."""
-    return wrist6.handles(geometry, task)
-
-
-def freedoms(geometry: Geometry, task: int) -> tuple[Freedom, ...]:
-    """θ1 where the wrist centre can be on axis 1; for an approach direction joint 6 as well."""
-    return wrist6.freedoms(geometry, task)
-
-
-def _reach(geometry: Geometry, t: Sequence[float] | Array) -> float:
-    """X of the wrist centre: how far it is before axis 1 in the arm's own plane, metres."""
-    return float(geometry.a1 + t[2] * math.cos(t[1]) + geometry.f * math.sin(t[1]))
-
-
-def branch_of(geometry: Geometry, q: Array) -> int:
-    """The branch a configuration is on: sides of axis 1 and of axis 2 that W is on, and the sign of θ5."""
-    t = geometry.sign * q + geometry.offset
-    return 4 * int(_reach(geometry, t) < 0.0) + 2 * int(t[2] < 0.0) + int(math.sin(t[4]) < 0.0)
-
-
-def singularities(geometry: Geometry, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
-    """How far a configuration ``(6,)`` is from each of the arm's singularities: the determinant is ±S X s5."""
-    g = geometry
-    t = (g.sign * q + g.offset).tolist()
-    reach, wrist = _reach(g, t), off_line(t[4])
-    if min(abs(t[2]), abs(reach), abs(wrist)) > within:
-        return ()  # as almost everywhere
-    return those_within(
-        within,
-        (
-            "elbow",
-            abs(t[2]),
-            "m",
-            lambda: "wrist centre level with axis 2: only the slide can move it in the arm's plane",
-        ),
-        (
-            "shoulder",
-            abs(reach),
-            "m",
-            lambda: "wrist centre as near to axis 1 as it can get: it cannot move sideways",
-        ),
-        (
-            "wrist",
-            abs(wrist),
-            "rad",
-            lambda: (
-                f"axes 4 and 6 in line ({at(5, q[4], g.sign[4] * wrist)}): "
-                "the tool cannot tilt about the third axis"
-            ),
-        ),
+    name, title, branches = NAME, TITLE, BRANCHES
+    reason = (
+        "axes 4, 5 and 6 meet in one point, and joint 3 slides perpendicular to axis 2, "
+        "which is perpendicular to axis 1"
     )
+
+    def __init__(self, geometry: Geometry) -> None:
+        super().__init__(geometry)
+        self.kernels = BatchKernels(geometry.params, branches_one, branches_many)
+
+    def _obstacle(self) -> Obstacle:
+        return Obstacle("wrist centre too near to axis 1 or 2")
+
+    def _x_of_wrist(self, t: Sequence[float] | Array) -> float:
+        """X of the wrist centre: how far it is before axis 1 in the arm's own plane, metres."""
+        g = self.geometry
+        return float(g.a1 + t[2] * math.cos(t[1]) + g.f * math.sin(t[1]))
+
+    def branch_of(self, q: Array) -> int:
+        """The branch a configuration is on: sides of axis 1 and of axis 2 that W is on, and the sign of θ5."""
+        t = self.geometry.sign * q + self.geometry.offset
+        return 4 * int(self._x_of_wrist(t) < 0.0) + 2 * int(t[2] < 0.0) + int(math.sin(t[4]) < 0.0)
+
+    def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
+        """The three factors of the determinant, ±S X s5: there are no others."""
+        g = self.geometry
+        t = (g.sign * q + g.offset).tolist()
+        x, wrist = self._x_of_wrist(t), off_line(t[4])
+        if min(abs(t[2]), abs(x), abs(wrist)) > within:
+            return ()  # as almost everywhere
+        aligned = float(q[4] - g.sign[4] * wrist)
+        return those_within(
+            within,
+            Singularity("elbow", "wrist centre level with axis 2", "wrist centre off the slide", abs(t[2]), "m"),
+            Singularity("shoulder", "wrist centre nearest to axis 1", "wrist centre sideways", abs(x), "m"),
+            Singularity(
+                "wrist",
+                "axes 4 and 6 in line",
+                "tilt about the third axis",
+                abs(wrist),
+                "rad",
+                (JointValue(4, aligned),),
+            ),
+        )

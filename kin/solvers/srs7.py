@@ -27,11 +27,6 @@ from kin.kernels.simd import TURN, WIDE, atan2, rounded, sin_cos, widest
 from kin.robot import Robot
 from kin.solvers.blocks import OWN, VALUE, Arc, double, each, in_base, one, rows_of
 from kin.solvers.common import (
-    APPROACH,
-    POSE,
-    Candidates,
-    Freedom,
-    Problem,
     chain_of,
     clear,
     copy_row,
@@ -50,14 +45,24 @@ from kin.solvers.common import (
     zyz,
     zyz_breaks,
 )
-from kin.solvers.singular import Singularity, at, off_line, off_square, stretch, those_within
+from kin.solvers.contract import (
+    APPROACH,
+    POSE,
+    BatchKernels,
+    Candidates,
+    ClosedForm,
+    Obstacle,
+    RedundancyParameter,
+    SolverInput,
+)
+from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, off_perpendicular, those_within
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 NAME = "srs7"
 TITLE = "closed form, S-R-S arm"
-_PSI = Freedom("psi", "arm angle ψ", circular=True)
-_THETA7 = Freedom("theta7", "θ7", joint=6)
+_PSI = RedundancyParameter("psi", "arm angle ψ", circular=True)
+_THETA7 = RedundancyParameter("theta7", "θ7", joint=6)
 BRANCHES = tuple(
     f"shoulder {s} · elbow {e} · wrist {w}"
     for s in ("front", "back")
@@ -82,8 +87,8 @@ class Geometry(NamedTuple):
     tool_on_axis: bool
 
 
-def match(robot: Robot) -> Geometry | None:
-    """The geometry if the robot is an S-R-S arm, by its axes: 1-2-3 and 5-6-7 concurrent, neighbours square."""
+def match(robot: Robot) -> Srs7 | None:
+    """The closed form if the robot is an S-R-S arm, by its axes: 1-2-3 and 5-6-7 concurrent, neighbours square."""
     chain = chain_of(robot) if robot.n == 7 else None
     chain = chain.twisted((-1, 1, -1, 1, -1, 1)) if chain else None
     if chain is None or not is_zero(*chain.a, chain.d[1], chain.d[3], chain.d[5]):
@@ -94,7 +99,7 @@ def match(robot: Robot) -> Geometry | None:
     tool = screw_z(0.0, float(chain.d[6])) @ chain.tool
     on_axis = is_zero(tool[0, 3], tool[1, 3]) and abs(tool[2, 2] - 1.0) < TOLERANCES.geometry
     base = chain.base @ screw_z(0.0, float(chain.d[0]))
-    return Geometry(inverse(base), inverse(tool), chain.theta, d3, d5, bool(on_axis))
+    return Srs7(Geometry(inverse(base), inverse(tool), chain.theta, d3, d5, bool(on_axis)))
 
 
 @jit
@@ -378,44 +383,6 @@ def _solve(
     return 0, 0.0, found
 
 
-def solve(geometry: Geometry, problem: Problem) -> Candidates:
-    """All branches, each at the feasible arm angle nearest to the seed's (or at the given one)."""
-    free_roll = problem.task == APPROACH
-    out = np.empty((8, 8))
-    arcs = np.empty((256, 3))
-    g = geometry
-    code, gap, count = _solve(
-        problem.T, g.inverse_base, g.inverse_tool, g.offset, g.d3, g.d5, free_roll, problem.values[0],
-        problem.respect_limits, problem.seed, problem.lower, problem.upper, arcs, out,
-    )  # fmt: skip
-    values, all_arcs = out[:, 7:], [arcs[:count]]
-    if free_roll:
-        # Joint 7 turns the tool about its own axis and nothing else: it stays, or goes where it is asked to be.
-        if not math.isnan(problem.values[1]):
-            out[:, 6] = np.where(np.isnan(out[:, 6]), math.nan, problem.values[1])
-        values = out[:, [7, 6]]
-        spans = [(i, problem.lower[6], problem.upper[6]) for i in range(8) if not math.isnan(out[i, 6])]
-        all_arcs.append(np.array(spans, dtype=np.float64).reshape(-1, 3))
-    return Candidates(
-        q=out[:, :7],
-        values=values,
-        arcs=tuple(all_arcs),
-        gap=gap,
-        obstacle="" if code == 0 else _obstacle(code, g),
-    )
-
-
-def _obstacle(code: int, g: Geometry) -> str:
-    reach = g.d3 + g.d5 if code == 1 else abs(g.d3 - g.d5)
-    word = "farther than" if code == 1 else "nearer than"
-    return f"with this orientation the wrist centre is {word} {1e3 * reach:.0f} mm from the shoulder"
-
-
-def why(geometry: Geometry) -> str:
-    """What makes an arm one of this family."""
-    return "axes 1, 2, 3 meet in one point and axes 5, 6, 7 in another, with the elbow's axis square to both links"
-
-
 # Thin: all branches at one arm angle, without limits, ranges and a choice, as :mod:`kin.solvers.blocks` has it.
 # One branch is enough: the others are its half turns, a sign of θ2 turns θ1 and θ3, one of θ4 turns θ3 and θ5, one
 # of θ6 turns θ5 and θ7.
@@ -423,13 +390,6 @@ def why(geometry: Geometry) -> str:
 _PAIRS, _END, _ROWS = 7, OWN + 7, OWN + 15
 _TOOL, _OFFSET, _LENGTHS = 12, 24, 31
 _UNBOUND = 1e6
-
-
-def params(geometry: Geometry) -> Array:
-    """The arm as the thin kernels read it ``(33,)``: base⁻¹ and tool⁻¹ by rows, offsets, d3, d5."""
-    g = geometry
-    offset = [wrap(t) for t in g.offset.tolist()]
-    return np.array([*g.inverse_base[:3].ravel(), *g.inverse_tool[:3].ravel(), *offset, g.d3, g.d5])
 
 
 @jit
@@ -598,7 +558,7 @@ def _store(params: Array, S: Array, b: int, out: Array) -> None:
 
 
 @jit
-def branches_each(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
+def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
     """out ``(N, 8, 7)`` ← all branches of each of the targets T ``(N, 4, 4)``; see `branches_one`.
 
     values: the arm angle for each target ``(N,)``, or one for all ``(1,)``.
@@ -619,78 +579,104 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
     return one(_pairs, _angles, _store, _closely, _PAIRS, params, T, value, near, out, S)
 
 
-def handles(geometry: Geometry, task: int) -> bool:
-    """Poses, and an approach direction when it is the last joint's own axis (then that joint is free)."""
-    return task == POSE or (task == APPROACH and geometry.tool_on_axis)
+class Srs7(ClosedForm):
+    """The closed form of an S-R-S arm."""
 
-
-def freedoms(geometry: Geometry, task: int) -> tuple[Freedom, ...]:
-    """The arm angle; for an approach direction joint 7 as well."""
-    return (_PSI, _THETA7) if task == APPROACH else (_PSI,)
-
-
-def branch_of(geometry: Geometry, q: Array) -> int:
-    """The branch a configuration is on: "shoulder", "elbow" and "wrist" are the signs of θ2, θ4, θ6."""
-    s = np.sin(q + geometry.offset)
-    return 4 * int(s[1] < 0.0) + 2 * int(s[3] < 0.0) + int(s[5] < 0.0)
-
-
-def singularities(geometry: Geometry, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
-    """How far a configuration ``(7,)`` is from each of the arm's singularities.
-
-    √det(J Jᵀ) = d3 d5 |s4| |m|, where m spans the motions that keep the tool still. With s4 ≠ 0 it vanishes for
-    s2 = c3 = 0, for s6 = c5 = 0 and for s2 = s6 = 0 only: s2 = 0 or s6 = 0 alone is no singularity of this arm.
-    """
-    g = geometry
-    t = (q + g.offset).tolist()
-    shoulder, across3, elbow = off_line(t[1]), off_square(t[2]), off_line(t[3])
-    across5, wrist = off_square(t[4]), off_line(t[5])
-    side, along = g.d5 * math.sin(t[3]), g.d3 + g.d5 * math.cos(t[3])
-    x = math.cos(t[1]) * math.cos(t[2]) * side + math.sin(t[1]) * along
-    above, before, between = math.hypot(shoulder, across3), math.hypot(wrist, across5), math.hypot(shoulder, wrist)
-    off_axis = math.hypot(x, math.sin(t[2]) * side)
-    if min(abs(elbow), above, before, between, off_axis) > within:
-        return ()  # as almost everywhere
-    return those_within(
-        within,
-        (
-            "elbow",
-            abs(elbow),
-            "rad",
-            lambda: f"elbow {stretch(t[3])} ({at(4, q[3], elbow)}): the hand cannot shift along the arm",
-        ),
-        (
-            "shoulder",
-            above,
-            "rad",
-            lambda: (
-                f"upper arm on axis 1, axes 2 and 4 square ({at(2, q[1], shoulder)}, {at(3, q[2], across3)}): "
-                "the hand cannot shift along the forearm"
-            ),
-        ),
-        (
-            "wrist",
-            before,
-            "rad",
-            lambda: (
-                f"hand in line with the forearm, axes 4 and 6 square ({at(6, q[5], wrist)}, "
-                f"{at(5, q[4], across5)}): the hand cannot shift along the upper arm"
-            ),
-        ),
-        (
-            "wrist",
-            between,
-            "rad",
-            lambda: (
-                f"upper arm on axis 1 and hand in line with the forearm "
-                f"({at(2, q[1], shoulder)}, {at(6, q[5], wrist)}): "
-                "joints 1 and 3 turn about one line, joints 5 and 7 about another"
-            ),
-        ),
-        (
-            "algorithmic",
-            off_axis,
-            "m",
-            lambda: "wrist centre on axis 1: the arm angle ψ loses its reference, the arm no motion",
-        ),
+    name, title, branches = NAME, TITLE, BRANCHES
+    reason = (
+        "axes 1, 2, 3 meet in one point and axes 5, 6, 7 in another, "
+        "with the elbow's axis perpendicular to both links"
     )
+
+    def __init__(self, geometry: Geometry) -> None:
+        g = self.geometry = geometry
+        self.lengths = (g.d3, g.d5)
+        # base⁻¹ and tool⁻¹ by rows, offsets, d3, d5.
+        offset = [wrap(t) for t in g.offset.tolist()]
+        params = np.array([*g.inverse_base[:3].ravel(), *g.inverse_tool[:3].ravel(), *offset, g.d3, g.d5])
+        self.kernels = BatchKernels(params, branches_one, branches_many)
+
+    def handles(self, task: int) -> bool:
+        """Poses, and an approach direction when it is the last joint's own axis (then that joint is free)."""
+        return task == POSE or (task == APPROACH and self.geometry.tool_on_axis)
+
+    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
+        """The arm angle; for an approach direction joint 7 as well."""
+        return (_PSI, _THETA7) if task == APPROACH else (_PSI,)
+
+    def solve(self, problem: SolverInput) -> Candidates:
+        """All branches, each at the feasible arm angle nearest to the seed's (or at the requested one)."""
+        g, free_roll = self.geometry, problem.task == APPROACH
+        out, arcs = np.empty((8, 8)), np.empty((256, 3))
+        code, gap, count = _solve(
+            problem.T, g.inverse_base, g.inverse_tool, g.offset, g.d3, g.d5, free_roll, problem.values[0],
+            problem.respect_limits, problem.seed, problem.lower, problem.upper, arcs, out,
+        )  # fmt: skip
+        values, all_arcs = out[:, 7:], [arcs[:count]]
+        if free_roll:
+            # Joint 7 turns the tool about its own axis and nothing else: it stays, or takes the requested value.
+            if not math.isnan(problem.values[1]):
+                out[:, 6] = np.where(np.isnan(out[:, 6]), math.nan, problem.values[1])
+            values = out[:, [7, 6]]
+            spans = [(i, problem.lower[6], problem.upper[6]) for i in range(8) if not math.isnan(out[i, 6])]
+            all_arcs.append(np.array(spans, dtype=np.float64).reshape(-1, 3))
+        obstacle = None
+        if code == 1:
+            obstacle = Obstacle("wrist centre too far from the shoulder", g.d3 + g.d5)
+        elif code == 2:
+            obstacle = Obstacle("wrist centre too near to the shoulder", abs(g.d3 - g.d5))
+        return Candidates(out[:, :7], values, tuple(all_arcs), gap, obstacle)
+
+    def branch_of(self, q: Array) -> int:
+        """The branch a configuration is on: "shoulder", "elbow" and "wrist" are the signs of θ2, θ4, θ6."""
+        s = np.sin(q + self.geometry.offset)
+        return 4 * int(s[1] < 0.0) + 2 * int(s[3] < 0.0) + int(s[5] < 0.0)
+
+    def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
+        """The zeros of √det(J Jᵀ) = d3 d5 |s4| |m|, where m spans the motions that keep the tool still.
+
+        With s4 ≠ 0 it vanishes for s2 = c3 = 0, for s6 = c5 = 0 and for s2 = s6 = 0 only: s2 = 0 or s6 = 0 alone is
+        no singularity of this arm.
+        """
+        g = self.geometry
+        t = (q + g.offset).tolist()
+        off = (
+            0.0,
+            off_line(t[1]),
+            off_perpendicular(t[2]),
+            off_line(t[3]),
+            off_perpendicular(t[4]),
+            off_line(t[5]),
+        )
+        side, along = g.d5 * math.sin(t[3]), g.d3 + g.d5 * math.cos(t[3])
+        x = math.cos(t[1]) * math.cos(t[2]) * side + math.sin(t[1]) * along
+        above, before = math.hypot(off[1], off[2]), math.hypot(off[5], off[4])
+        both, off_axis = math.hypot(off[1], off[5]), math.hypot(x, math.sin(t[2]) * side)
+        if min(abs(off[3]), above, before, both, off_axis) > within:
+            return ()  # as almost everywhere
+
+        def met_at(*joints: int) -> tuple[JointValue, ...]:
+            return tuple(JointValue(i, float(q[i]) - off[i]) for i in joints)
+
+        return those_within(
+            within,
+            Singularity("elbow", elbow_at(t[3]), "hand along the arm", abs(off[3]), "rad", met_at(3)),
+            Singularity("shoulder", "upper arm on axis 1", "hand along the forearm", above, "rad", met_at(1, 2)),
+            Singularity(
+                "wrist",
+                "hand along the forearm, axes 4 and 6 perpendicular",
+                "hand along the upper arm",
+                before,
+                "rad",
+                met_at(5, 4),
+            ),
+            Singularity(
+                "wrist",
+                "upper arm on axis 1, hand along the forearm",
+                "joints 1 and 3, 5 and 7 coincide",
+                both,
+                "rad",
+                met_at(1, 5),
+            ),
+            Singularity("algorithmic", "wrist centre on axis 1", "reference of the arm angle", off_axis, "m"),
+        )

@@ -13,12 +13,6 @@ Eight branches; no angle is taken from a sine or cosine alone, so none loses dig
 3 to axis 4 and the offsets of the elbow may be anything. Singular: s3 = 0 (two elbows merge); X = 0, where two
 shoulders merge, or, if L = 0, W is on axis 1 and θ1 is free: R03ᵀ R is affine in cos θ1, sin θ1 and the
 feasible θ1 are exact arcs; s5 = 0 (only θ4 ± θ6 matters).
-
-Fast path. `params(geometry)` is the arm as one float64 array, C-contiguous and writable. The compiled
-`branches_one(params, T, value, near, out)` writes all branches of the target T ``(4, 4)`` to out ``(8, 6)``,
-one row per name in `BRANCHES`, NaN where a branch does not exist, angles in (−π, π]; limits are not asked for.
-near ``(6,)`` decides what is free at a singularity; value is θ1 where that is free, NaN to let near decide. The
-same for T ``(N, 4, 4)`` and out ``(N, 8, 6)`` is `branches_many`.
 """
 
 from __future__ import annotations
@@ -35,12 +29,7 @@ from kin.kernels.simd import atan2, widest
 from kin.robot import Robot
 from kin.solvers.blocks import OWN, Arc, Entries, canonical_of, double, each, elbow_of, one, rows_of, single
 from kin.solvers.common import (
-    APPROACH,
-    POSE,
     TURN,
-    Candidates,
-    Freedom,
-    Problem,
     clear,
     copy_row,
     extend_arcs,
@@ -51,6 +40,16 @@ from kin.solvers.common import (
     wrap,
     zyz,
     zyz_breaks,
+)
+from kin.solvers.contract import (
+    APPROACH,
+    POSE,
+    BatchKernels,
+    Candidates,
+    ClosedForm,
+    Obstacle,
+    RedundancyParameter,
+    SolverInput,
 )
 from kin.solvers.links import (
     Links,
@@ -63,7 +62,7 @@ from kin.solvers.links import (
     signed_box,
     two_links,
 )
-from kin.solvers.singular import Singularity, at, off_line, stretch, those_within
+from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -75,8 +74,8 @@ BRANCHES = tuple(
     for e in ("up", "down")
     for w in ("no-flip", "flip")
 )
-_THETA1 = Freedom("theta1", "θ1", joint=0, circular=True, rare=True)
-_THETA6 = Freedom("theta6", "θ6", joint=5)
+_THETA1 = RedundancyParameter("theta1", "θ1", joint=0, circular=True, rare=True)
+_THETA6 = RedundancyParameter("theta6", "θ6", joint=5)
 _REACH = TOLERANCES.closure_position * 0.1
 _SINGULAR = TOLERANCES.singular
 _MERGE = TOLERANCES.merge
@@ -106,8 +105,8 @@ class Geometry(NamedTuple):
     tool_on_axis: bool
 
 
-def match(robot: Robot) -> Geometry | None:
-    """The geometry if axes 2 and 3 are parallel, axis 2 square to axis 1, and 4, 5, 6 meet, neighbours square."""
+def match(robot: Robot) -> Wrist6 | None:
+    """The closed form if axes 2 and 3 are parallel, axis 2 square to axis 1, and 4, 5, 6 meet, neighbours square."""
     if robot.n != 6 or not robot.revolute.all():
         return None
     links = links_of(robot, (-1, -1, -1, -1, 1))
@@ -125,7 +124,7 @@ def match(robot: Robot) -> Geometry | None:
     beside = 0.0 if is_zero(beside) else beside
     offset = links.theta.copy()
     offset[2] += phase
-    return pack(links, offset, (a1, a2, f, beside), phase, float(alpha[2]))
+    return Wrist6(pack(links, offset, (a1, a2, f, beside), phase, float(alpha[2])))
 
 
 def pack(
@@ -143,16 +142,6 @@ def pack(
     )
     on_axis = is_zero(links.tool[0, 3], links.tool[1, 3], abs(links.tool[2, 2]) - 1.0)
     return Geometry(params, links.sign, offset, *lengths, on_axis)
-
-
-def why(geometry: Geometry) -> str:
-    """What about the axes made the match, in one sentence."""
-    return "axes 4, 5 and 6 meet in one point, and axes 2 and 3 are parallel and square to axis 1"
-
-
-def params(geometry: Geometry) -> Array:
-    """The arm as the flat array ``(57,)`` that the kernels read."""
-    return geometry.params
 
 
 @jit
@@ -498,101 +487,111 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
 
 
 @jit
-def branches_many(params: Array, T: Array, value: float, near: Array, out: Array) -> None:
-    """out ``(N, 8, 6)`` ← all branches of each of the targets T ``(N, 4, 4)``."""
+def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
+    """out ``(N, 8, 6)`` ← all branches of each of the targets T ``(N, 4, 4)``, values ``(N,)`` or ``(1,)``."""
     widest()
-    S, values = np.empty((ROWS, BLOCK)), np.empty(1)
-    values[0] = value
+    S = np.empty((ROWS, BLOCK))
     each(_pairs, _angles, store, closely, params, T, values, near, out, S)
 
 
-def solve(geometry: Geometry, problem: Problem) -> Candidates:
-    """All branches; with an approach direction only, joint 6 stays or goes where it is asked to be."""
-    g, free_roll = geometry, problem.task == APPROACH
-    out, arcs = np.empty((8, 6)), np.empty((128, 3))
-    T, lower, upper = problem.T, problem.lower, problem.upper
-    if free_roll:
-        T, lower, upper = rolled(T, problem.seed_roll), lower.copy(), upper.copy()
-        lower[5], upper[5] = -_FAR, _FAR
-    value = math.nan if not _has_axis_point(g) else problem.values[0]
-    gap, count = _branches(g.params, T, value, problem.seed, lower, upper, arcs, out)
-    values, ranges = np.full((8, len(freedoms(g, problem.task))), math.nan), []
-    if _has_axis_point(g):
-        rows = arcs[: max(count, 0)]
-        rows[:, 1:] -= g.offset[0]
-        if g.sign[0] < 0.0:
-            rows[:, 1:] = -rows[:, :0:-1]
-        if count >= 0:
-            values[:, 0] = out[:, 0]
-        ranges.append(rows)
-    if free_roll:
-        ranges.append(free_last(problem, out))
-        values[:, -1] = out[:, 5]
-    obstacle = "" if gap <= _REACH else "with this orientation the wrist centre is out of the elbow's reach"
-    return Candidates(out, values, tuple(ranges), max(gap, 0.0), obstacle)
+class Wrist6(ClosedForm):
+    """The closed form of an elbow arm with a spherical wrist."""
 
+    name, title, branches = NAME, TITLE, BRANCHES
+    reason = "axes 4, 5 and 6 meet in one point, and axes 2 and 3 are parallel and perpendicular to axis 1"
 
-def _has_axis_point(geometry: Geometry) -> bool:
-    """Whether W can be on axis 1."""
-    return geometry.beside == 0.0
+    def __init__(self, geometry: Geometry) -> None:
+        g = self.geometry = geometry
+        self.lengths = (g.a1, g.a2, g.f, g.beside)
+        self.kernels = BatchKernels(g.params, branches_one, branches_many)
 
+    def handles(self, task: int) -> bool:
+        """Poses, and an approach direction when it is the last joint's own axis (then that joint is free)."""
+        return task == POSE or (task == APPROACH and self.geometry.tool_on_axis)
 
-def handles(geometry: Geometry, task: int) -> bool:
-    """Poses, and an approach direction when it is the last joint's own axis (then that joint is free)."""
-    return task == POSE or (task == APPROACH and geometry.tool_on_axis)
+    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
+        """θ1 where the wrist centre can be on axis 1; for an approach direction joint 6 as well."""
+        return (_THETA1,) * self._reaches_axis_1 + (_THETA6,) * (task == APPROACH)
 
+    @property
+    def _reaches_axis_1(self) -> bool:
+        """Whether W can be on axis 1."""
+        return self.geometry.beside == 0.0
 
-def freedoms(geometry: Geometry, task: int) -> tuple[Freedom, ...]:
-    """θ1 where the wrist centre can be on axis 1; for an approach direction joint 6 as well."""
-    return (_THETA1,) * _has_axis_point(geometry) + (_THETA6,) * (task == APPROACH)
+    def solve(self, problem: SolverInput) -> Candidates:
+        """All branches; with an approach direction only, joint 6 stays or takes the value requested."""
+        g, free_roll = self.geometry, problem.task == APPROACH
+        out, arcs = np.empty((8, 6)), np.empty((128, 3))
+        T, lower, upper = problem.T, problem.lower, problem.upper
+        if free_roll:
+            T, lower, upper = rolled(T, problem.seed_roll), lower.copy(), upper.copy()
+            lower[5], upper[5] = -_FAR, _FAR
+        value = problem.values[0] if self._reaches_axis_1 else math.nan
+        gap, count = _branches(g.params, T, value, problem.seed, lower, upper, arcs, out)
+        values, ranges = np.full((8, len(self.redundancies(problem.task))), math.nan), []
+        if self._reaches_axis_1:
+            rows = arcs[: max(count, 0)]
+            rows[:, 1:] -= g.offset[0]
+            if g.sign[0] < 0.0:
+                rows[:, 1:] = -rows[:, :0:-1]
+            if count >= 0:
+                values[:, 0] = out[:, 0]
+            ranges.append(rows)
+        if free_roll:
+            ranges.append(free_last(problem, out))
+            values[:, -1] = out[:, 5]
+        obstacle = None if gap <= _REACH else self._obstacle()
+        return Candidates(out, values, tuple(ranges), max(gap, 0.0), obstacle)
 
+    def _obstacle(self) -> Obstacle:
+        return Obstacle("wrist centre beyond the elbow's reach")
 
-def _reach(geometry: Geometry, t: Sequence[float] | Array) -> float:
-    """X of the wrist centre: how far it is before axis 1 in the arm's own plane, metres."""
-    return float(geometry.a1 + geometry.a2 * math.cos(t[1]) + geometry.f * math.cos(t[1] + t[2]))
+    def _x_of_wrist(self, t: Sequence[float] | Array) -> float:
+        """X of the wrist centre: how far it is before axis 1 in the arm's own plane, metres."""
+        g = self.geometry
+        return float(g.a1 + g.a2 * math.cos(t[1]) + g.f * math.cos(t[1] + t[2]))
 
+    def branch_of(self, q: Array) -> int:
+        """The branch a configuration is on.
 
-def branch_of(geometry: Geometry, q: Array) -> int:
-    """The branch a configuration is on.
+        "Front" is the side of axis 1 the arm faces with the wrist centre before it; the elbow is "up" when it is
+        above the line from the shoulder to the wrist centre; the wrist is the sign of θ5.
+        """
+        t = self.geometry.sign * q + self.geometry.offset
+        side = -1.0 if self._x_of_wrist(t) < 0.0 else 1.0
+        return 4 * int(side < 0.0) + 2 * int(side * math.sin(t[2]) < 0.0) + int(math.sin(t[4]) < 0.0)
 
-    "Front" is the side of axis 1 the arm faces with the wrist centre before it; the elbow is "up" when it is above
-    the line from the shoulder to the wrist centre; the wrist is the sign of θ5.
-    """
-    t = geometry.sign * q + geometry.offset
-    side = -1.0 if _reach(geometry, t) < 0.0 else 1.0
-    return 4 * int(side < 0.0) + 2 * int(side * math.sin(t[2]) < 0.0) + int(math.sin(t[4]) < 0.0)
-
-
-def singularities(geometry: Geometry, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
-    """How far a configuration ``(6,)`` is from each of the arm's singularities.
-
-    The three are the factors of the determinant, −a2 f s3 (a1 + a2 c2 + f c23) s5: there are no others.
-    """
-    g = geometry
-    t = (g.sign * q + g.offset).tolist()
-    elbow, reach, wrist = off_line(t[2]), _reach(g, t), off_line(t[4])
-    if min(abs(elbow), abs(reach), abs(wrist)) > within:
-        return ()  # as almost everywhere
-    where = "on axis 1" if _has_axis_point(g) else "beside axis 1, as near to it as it can get"
-    return those_within(
-        within,
-        (
-            "elbow",
-            abs(elbow),
-            "rad",
-            lambda: (
-                f"elbow {stretch(t[2])} ({at(3, q[2], g.sign[2] * elbow)}): "
-                "the wrist centre cannot move along the arm"
+    def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
+        """The three factors of the determinant, −a2 f s3 (a1 + a2 c2 + f c23) s5: there are no others."""
+        g = self.geometry
+        t = (g.sign * q + g.offset).tolist()
+        elbow, x, wrist = off_line(t[2]), self._x_of_wrist(t), off_line(t[4])
+        if min(abs(elbow), abs(x), abs(wrist)) > within:
+            return ()  # as almost everywhere
+        straight, aligned = float(q[2] - g.sign[2] * elbow), float(q[4] - g.sign[4] * wrist)
+        return those_within(
+            within,
+            Singularity(
+                "elbow",
+                elbow_at(t[2]),
+                "wrist centre along the arm",
+                abs(elbow),
+                "rad",
+                (JointValue(2, straight),),
             ),
-        ),
-        ("shoulder", abs(reach), "m", lambda: f"wrist centre {where}: it cannot move sideways"),
-        (
-            "wrist",
-            abs(wrist),
-            "rad",
-            lambda: (
-                f"axes 4 and 6 in line ({at(5, q[4], g.sign[4] * wrist)}): "
-                "the tool cannot tilt about the third axis"
+            Singularity(
+                "shoulder",
+                "wrist centre on axis 1" if self._reaches_axis_1 else "wrist centre nearest to axis 1",
+                "wrist centre sideways",
+                abs(x),
+                "m",
             ),
-        ),
-    )
+            Singularity(
+                "wrist",
+                "axes 4 and 6 in line",
+                "tilt about the third axis",
+                abs(wrist),
+                "rad",
+                (JointValue(4, aligned),),
+            ),
+        )

@@ -27,7 +27,7 @@ from hypothesis import strategies as st
 
 import kin
 from kin import InputError, Status, singularities, solve_ik
-from kin.solvers import solver_for
+from kin.solvers import closed_form_of
 from kin.transforms import vector_angle
 
 TASK = {"pioneer5": "approach"}
@@ -57,7 +57,7 @@ def pioneer_elbow_inside(rng, q, inside):
 
 def pioneer_shoulder(rng, q, inside):
     """a1 + a2 c2 + d4 c23 = 0, solved for θ2."""
-    g = solver_for(kin.get_robot("pioneer5")).geometry
+    g = closed_form_of(kin.get_robot("pioneer5")).geometry
     while True:
         x, y = g.a2 + g.d4 * math.cos(q[2]), g.d4 * math.sin(q[2])
         if math.hypot(x, y) > g.a1:
@@ -352,7 +352,7 @@ def test_six_joints_without_a_closed_form_are_told_by_the_whole_jacobian():
 def test_five_joints_without_a_closed_form_are_told_by_point_and_approach():
     # Base, three parallel axes, roll: the roll changes nothing about point and approach, so rank 4 is usual.
     robot = arm((0.1, 0, 90), (0, 0.3, 0), (0, 0.3, 0), (0, 0.05, 90), (0.2, 0, 0), home=[0, 0, 0, 0, 0])
-    assert solver_for(robot) is None
+    assert closed_form_of(robot) is None
     q = np.array([0.3, 0.4, 0.5, 0.6, 0.7])
     found = only(robot, q)
     assert "5 × 5" in found.meaning

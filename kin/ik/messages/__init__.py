@@ -8,9 +8,12 @@ from functools import lru_cache
 import numpy as np
 
 from kin.fk import fk, link_frames
+from kin.ik.messages.obstacle import clause_of
+from kin.ik.messages.singularity import short
 from kin.ik.problem import Question
 from kin.ik.results import BlockedBranch, Cause, IKSolution, LimitViolation, Redundancy
 from kin.robot import Robot
+from kin.solvers.contract import Obstacle
 from kin.solvers.singular import Singularity
 from kin.transforms import Array
 
@@ -37,8 +40,8 @@ def solver(question: Question, used: str) -> str:
     if match is None:
         none = "no closed form fits this arm's axes" if question.wanted == "auto" else "asked for"
         return f"{none}: numeric descent from many starts"
-    if used != match.solver.NAME:
-        return f"the closed form ({match.solver.NAME}) does not cover this task or target: numeric descent"
+    if used != match.name:
+        return f"the closed form ({match.name}) does not cover this task or target: numeric descent"
     return match.reason
 
 
@@ -48,8 +51,7 @@ def singular(found: tuple[Singularity, ...], shown: bool) -> str:
     if not real:
         return ""
     where = "there" if shown else "at the closest pose"
-    clause = real[0].meaning.partition(": ")[0]
-    return f" Singular {where}: {clause}."
+    return f" Singular {where}: {short(real[0])}."
 
 
 def limits(
@@ -104,9 +106,9 @@ def mask(closest: IKSolution | None) -> str:
     )
 
 
-def orientation(closest: IKSolution | None, oriented: IKSolution | None, obstacle: str, gap: float) -> str:
+def orientation(closest: IKSolution | None, oriented: IKSolution | None, obstacle: Obstacle | None, gap: float) -> str:
     """The point can be reached, but not with this orientation."""
-    why = f" ({obstacle}, by {millimetres(gap)})" if obstacle and gap > 0.0 else ""
+    why = f" ({clause_of(obstacle)}, by {millimetres(gap)})" if obstacle and gap > 0.0 else ""
     text = f"This orientation cannot be had at this point{why}"
     if oriented is not None:
         text += f"; the nearest attainable one is {degrees(oriented.rotation_error)} away"

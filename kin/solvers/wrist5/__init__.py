@@ -25,13 +25,7 @@ from kin.kernels.simd import widest
 from kin.robot import Robot
 from kin.solvers.blocks import OWN, Arc, double, each, elbow_of, in_base, one, rows_of, single
 from kin.solvers.common import (
-    APPROACH,
-    POSE,
-    POSITION,
     TURN,
-    Candidates,
-    Freedom,
-    Problem,
     add_roots,
     chain_of,
     clear,
@@ -49,7 +43,18 @@ from kin.solvers.common import (
     to_canonical,
     wrap,
 )
-from kin.solvers.singular import Singularity, at, off_line, stretch, those_within
+from kin.solvers.contract import (
+    APPROACH,
+    POSE,
+    POSITION,
+    BatchKernels,
+    Candidates,
+    ClosedForm,
+    Obstacle,
+    RedundancyParameter,
+    SolverInput,
+)
+from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
 from kin.solvers.wrist5 import point
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -62,7 +67,7 @@ BRANCHES = tuple(
     for e in elbows
     for w in ("no-flip", "flip")
 )
-_THETA1 = Freedom("theta1", "θ1", joint=0, circular=True, rare=True)
+_THETA1 = RedundancyParameter("theta1", "θ1", joint=0, circular=True, rare=True)
 _REACH = TOLERANCES.closure_position * 0.1
 _SINGULAR = TOLERANCES.singular
 _EYE = np.eye(4)
@@ -79,8 +84,8 @@ class Geometry(NamedTuple):
     d6: float
 
 
-def match(robot: Robot) -> Geometry | None:
-    """The geometry if axes 2 and 3 are parallel, square to axis 1, and 3-4, 4-5 intersect squarely."""
+def match(robot: Robot) -> Wrist5 | None:
+    """The closed form if axes 2 and 3 are parallel, perpendicular to axis 1, and 3-4, 4-5 meet at right angles."""
     chain = chain_of(robot) if robot.n == 5 else None
     chain = chain.twisted((-1, 0, -1, 1)) if chain else None
     if chain is None or not is_zero(*chain.a[2:], chain.d[1] + chain.d[2]):
@@ -103,7 +108,7 @@ def match(robot: Robot) -> Geometry | None:
         theta[1] += math.pi
         theta[2] -= math.pi
         a2 = -a2
-    return Geometry(inverse(base), theta, a1, a2, d4, float(tool[2, 3]))
+    return Wrist5(Geometry(inverse(base), theta, a1, a2, d4, float(tool[2, 3])))
 
 
 @jit
@@ -228,32 +233,6 @@ def _solve(
     return gap, found
 
 
-def solve(geometry: Geometry, problem: Problem) -> Candidates:
-    """All branches that bring the tool point and the approach direction to the target's.
-
-    Of a point alone θ4 and θ5 are free: that is :mod:`kin.solvers.wrist5.point`.
-    """
-    if problem.task == POSITION:
-        return point.solve(geometry, problem)
-    g = geometry
-    out = np.empty((8, 6))
-    arcs = np.empty((128, 3))
-    gap, count = _solve(
-        problem.T, g.inverse_base, g.offset, g.a1, g.a2, g.d4, g.d6, problem.values[0], problem.seed,
-        problem.lower, problem.upper, arcs, out,
-    )  # fmt: skip
-    arcs = arcs[:count]
-    if count:
-        arcs[:, 1:] -= g.offset[0]
-    obstacle = "" if gap <= _REACH else "the wrist centre is out of the elbow's reach for this approach direction"
-    return Candidates(out[:, :5], out[:, 5:], (arcs,), max(gap, 0.0), obstacle)
-
-
-def why(geometry: Geometry) -> str:
-    """What makes an arm one of this family."""
-    return "axes 2 and 3 are parallel and square to axis 1, axes 3 and 4 meet squarely, and so do 4 and 5"
-
-
 # Thin: all branches, without limits, ranges and a choice, as :mod:`kin.solvers.blocks` has it; the pairs come out
 # of the geometry without any sine or cosine of an angle. Rows of S are θ1, θ3 of each shoulder, then θ2, θ4, θ5 of
 # each shoulder and elbow. The other shoulder is half a turn on in θ1, the other elbow −θ3, the other wrist −θ5 and
@@ -263,13 +242,6 @@ _FRONT, _BEND, _UPPER, _ROLL, _TILT, _END = (OWN + i for i in (0, 1, 3, 7, 11, 1
 _PAIRS, _ROWS = _END - OWN, _END + _END - OWN + 1
 _OFFSET, _LENGTHS = 12, 17
 _UNBOUND = 1e6
-
-
-def params(geometry: Geometry) -> Array:
-    """The arm as the thin kernels read it ``(21,)``: base⁻¹ by rows, offsets, a1, a2, d4, d6."""
-    g = geometry
-    offset = [wrap(t) for t in g.offset.tolist()]
-    return np.array([*g.inverse_base[:3].ravel(), *offset, g.a1, g.a2, g.d4, g.d6])
 
 
 @inlined
@@ -381,7 +353,7 @@ def _closely(params: Array, T: Array, value: float, near: Array, out: Array) -> 
 
 
 @jit
-def branches_each(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
+def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
     """out ``(N, 8, 5)`` ← all branches of each of the targets T ``(N, 4, 4)``; see `branches_one`.
 
     values: θ1 for each target ``(N,)``, or one for all ``(1,)``.
@@ -401,51 +373,82 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
     return one(_pairs, _angles, _store, _closely, _PAIRS, params, T, value, near, out, S)
 
 
-def handles(geometry: Geometry, task: int) -> bool:
-    """A point, with an approach direction or not; for a whole pose the pipeline judges the roll that results."""
-    return task in (POSE, APPROACH, POSITION)
+class Wrist5(ClosedForm):
+    """The closed form of a five-joint elbow arm with a two-axis wrist."""
 
+    name, title, branches = NAME, TITLE, BRANCHES
+    reason = "axes 2 and 3 are parallel and perpendicular to axis 1, axes 3 and 4 meet at a right angle, and so do 4 and 5"
 
-def freedoms(geometry: Geometry, task: int) -> tuple[Freedom, ...]:
-    """θ4 and θ5 for a point alone; otherwise θ1 when the wrist centre is on axis 1, else nothing."""
-    return point.FREEDOMS if task == POSITION else (_THETA1,)
+    def __init__(self, geometry: Geometry) -> None:
+        g = self.geometry = geometry
+        self.lengths = (g.a1, g.a2, g.d4, g.d6)
+        # base⁻¹ by rows, offsets, a1, a2, d4, d6.
+        offset = [wrap(t) for t in g.offset.tolist()]
+        params = np.array([*g.inverse_base[:3].ravel(), *offset, g.a1, g.a2, g.d4, g.d6])
+        self.kernels = BatchKernels(params, branches_one, branches_many)
 
+    def handles(self, task: int) -> bool:
+        """A point, with an approach direction or not; of a whole pose :mod:`kin.ik` judges the roll that results."""
+        return task in (POSE, APPROACH, POSITION)
 
-def branch_of(geometry: Geometry, q: Array) -> int:
-    """The branch a configuration is on.
+    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
+        """θ4 and θ5 for a point alone; otherwise θ1 when the wrist centre is on axis 1, else nothing."""
+        return point.REDUNDANCIES if task == POSITION else (_THETA1,)
 
-    "Front" is the side of axis 1 the arm faces with the wrist centre before it; the elbow is "up" when it is above
-    the line from the shoulder to the wrist centre; the wrist is the sign of θ5.
-    """
-    t = q + geometry.offset
-    reach = geometry.a1 + geometry.a2 * math.cos(t[1]) + geometry.d4 * math.cos(t[1] + t[2])
-    return 4 * int(reach < 0.0) + 2 * int(math.sin(t[2]) < 0.0) + int(math.sin(t[4]) < 0.0)
+    def solve(self, problem: SolverInput) -> Candidates:
+        """All branches that bring the tool point and the approach direction to the target's.
 
+        Of a point alone θ4 and θ5 are free: that is :mod:`kin.solvers.wrist5.point`.
+        """
+        g = self.geometry
+        if problem.task == POSITION:
+            return point.solve(g, problem)
+        out, arcs = np.empty((8, 6)), np.empty((128, 3))
+        gap, count = _solve(
+            problem.T, g.inverse_base, g.offset, g.a1, g.a2, g.d4, g.d6, problem.values[0], problem.seed,
+            problem.lower, problem.upper, arcs, out,
+        )  # fmt: skip
+        arcs = arcs[:count]
+        if count:
+            arcs[:, 1:] -= g.offset[0]
+        obstacle = None if gap <= _REACH else Obstacle("approach direction")
+        return Candidates(out[:, :5], out[:, 5:], (arcs,), max(gap, 0.0), obstacle)
 
-def singularities(geometry: Geometry, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
-    """How far a configuration ``(5,)`` is from each of the arm's singularities, as point and approach task.
+    def branch_of(self, q: Array) -> int:
+        """The branch a configuration is on.
 
-    The three are the factors of the determinant, −a2 d4 s3 (a1 + a2 c2 + d4 c23) s5: there are no others.
-    """
-    g = geometry
-    t = (q + g.offset).tolist()
-    elbow, wrist = off_line(t[2]), off_line(t[4])
-    reach = g.a1 + g.a2 * math.cos(t[1]) + g.d4 * math.cos(t[1] + t[2])
-    if min(abs(elbow), abs(reach), abs(wrist)) > within:
-        return ()  # as almost everywhere
-    return those_within(
-        within,
-        (
-            "elbow",
-            abs(elbow),
-            "rad",
-            lambda: f"elbow {stretch(t[2])} ({at(3, q[2], elbow)}): the wrist centre cannot move along the arm",
-        ),
-        ("shoulder", abs(reach), "m", lambda: "wrist centre on axis 1: it cannot move sideways"),
-        (
-            "wrist",
-            abs(wrist),
-            "rad",
-            lambda: f"tool in line with the forearm ({at(5, q[4], wrist)}): it cannot tilt sideways",
-        ),
-    )
+        "Front" is the side of axis 1 the arm faces with the wrist centre before it; the elbow is "up" when it is
+        above the line from the shoulder to the wrist centre; the wrist is the sign of θ5.
+        """
+        g = self.geometry
+        t = q + g.offset
+        reach = g.a1 + g.a2 * math.cos(t[1]) + g.d4 * math.cos(t[1] + t[2])
+        return 4 * int(reach < 0.0) + 2 * int(math.sin(t[2]) < 0.0) + int(math.sin(t[4]) < 0.0)
+
+    def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
+        """Those of the task point and approach direction.
+
+        The three are the factors of the determinant, −a2 d4 s3 (a1 + a2 c2 + d4 c23) s5: there are no others.
+        """
+        g = self.geometry
+        t = (q + g.offset).tolist()
+        elbow, wrist = off_line(t[2]), off_line(t[4])
+        reach = g.a1 + g.a2 * math.cos(t[1]) + g.d4 * math.cos(t[1] + t[2])
+        if min(abs(elbow), abs(reach), abs(wrist)) > within:
+            return ()  # as almost everywhere
+        straight, aligned = float(q[2]) - elbow, float(q[4]) - wrist
+        return those_within(
+            within,
+            Singularity(
+                "elbow",
+                elbow_at(t[2]),
+                "wrist centre along the arm",
+                abs(elbow),
+                "rad",
+                (JointValue(2, straight),),
+            ),
+            Singularity("shoulder", "wrist centre on axis 1", "wrist centre sideways", abs(reach), "m"),
+            Singularity(
+                "wrist", "tool along the forearm", "tilt sideways", abs(wrist), "rad", (JointValue(4, aligned),)
+            ),
+        )

@@ -47,20 +47,18 @@ import numpy as np
 from kin.kernels.compile import jit
 from kin.solvers.common import (
     TURN,
-    Candidates,
-    Freedom,
-    Problem,
     add_roots,
     excess,
     nearest_image,
 )
+from kin.solvers.contract import Candidates, Obstacle, RedundancyParameter, SolverInput
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 if TYPE_CHECKING:
     from kin.solvers.wrist5 import Geometry
 
-FREEDOMS = (Freedom("theta4", "θ4", joint=3), Freedom("theta5", "θ5", joint=4))
+REDUNDANCIES = (RedundancyParameter("theta4", "θ4", joint=3), RedundancyParameter("theta5", "θ5", joint=4))
 _REACH = TOLERANCES.closure_position * 0.1
 _SLACK = TOLERANCES.limit
 _SAME = 1e-11
@@ -393,7 +391,7 @@ def _fits(
 
 @jit
 def _branch(k: Array, q: Array) -> int:
-    """`wrist5.branch_of` for canonical angles; 8 is added where a sign is a matter of rounding."""
+    """`Wrist5.branch_of` for canonical angles; 8 is added where a sign is a matter of rounding."""
     radial = k[A1] + k[A2] * math.cos(q[1]) + k[D4] * math.cos(q[1] + q[2])
     bend, flip = math.sin(q[2]), math.sin(q[4])
     branch = 0
@@ -891,7 +889,7 @@ def _settle(
             _offer(k, q, near, box, answer)
 
 
-def solve(geometry: Geometry, problem: Problem) -> Candidates:
+def solve(geometry: Geometry, problem: SolverInput) -> Candidates:
     """Per branch, the configuration that brings the tool point to the target's and is nearest to the seed.
 
     `problem.values` are θ4 and θ5 as joint values, kept exactly where they are numbers. Where nothing fits the
@@ -907,7 +905,7 @@ def solve(geometry: Geometry, problem: Problem) -> Candidates:
     k = _constants(g, problem.T)
     gap = _gap(k)
     if gap > _REACH:
-        return Candidates(out, out[:, 3:], (none, none), gap, "the point is out of the arm's reach")
+        return Candidates(out, out[:, 3:], (none, none), gap, Obstacle("point"))
     near = problem.seed + g.offset
     limits = np.array([problem.lower, problem.upper]) + g.offset
     if not problem.respect_limits:
@@ -949,7 +947,7 @@ def solve(geometry: Geometry, problem: Problem) -> Candidates:
             mine = [(branch, t5, t5)]
         tilts += _union(mine)
     arcs = _as_joint(turns, limits[:, 3], g.offset[3]), _as_joint(tilts, limits[:, 4], g.offset[4])
-    return Candidates(out, out[:, 3:], arcs, 0.0, "the point is out of reach with the given joint values")
+    return Candidates(out, out[:, 3:], arcs, 0.0, Obstacle("given joint values"))
 
 
 def _found(answer: Array) -> list[int]:

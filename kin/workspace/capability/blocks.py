@@ -45,8 +45,9 @@ from kin.fk import fk, jacobian, manipulability
 from kin.ik.batch import ik_branches
 from kin.ik.problem import Limits, Locks, ask, finite_number
 from kin.robot import Robot
-from kin.solvers import solver_for
-from kin.solvers.common import APPROACH, POSE, TURN, Freedom, Problem, screw_z
+from kin.solvers import closed_form_of
+from kin.solvers.common import TURN, screw_z
+from kin.solvers.contract import APPROACH, POSE, ClosedForm, RedundancyParameter, SolverInput
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array, frame_from_approach
 from kin.workspace.capability.gauge import BLOCKED, NONE, gauge, seek
@@ -279,31 +280,30 @@ class _Arm:
         self.turns = np.where(robot.revolute, TURN, 0.0)
         self.rolls = _rolls(robot)
         self.frames = np.stack([frame_from_approach(direction) for direction in grid.directions])
-        self.solver: Any = None
-        self.geometry: Any = None
-        self.freedoms: tuple[Freedom, ...] = ()
+        self.form: ClosedForm | None = None
+        self.freedoms: tuple[RedundancyParameter, ...] = ()
         self.values: tuple[float, ...] = (math.nan,)
         self.tried = 1  # rolls about each direction
         self.elsewhere: Robot | None = None
         self.method: Method = "search"
-        match = solver_for(robot)
+        match = closed_form_of(robot)
         if match is not None:
-            self.solver, self.geometry = match.solver, match.geometry
-            exact = match.solver.handles(match.geometry, APPROACH)
+            self.form = match
+            exact = match.handles(APPROACH)
             self.method = "closed form" if exact else "sweep"
-            self.freedoms = match.solver.freedoms(match.geometry, APPROACH) if exact else ()
+            self.freedoms = match.redundancies(APPROACH) if exact else ()
             if not exact:
                 self.tried = ROLLS
             elif not self.rolls and not all(freedom.rare for freedom in self.freedoms):
                 self.tried = SWEEP
-            free = [freedom for freedom in match.solver.freedoms(match.geometry, POSE) if not freedom.rare]
+            free = [freedom for freedom in match.redundancies(POSE) if not freedom.rare]
             self.values = self._values(free, exact)
             if not free and (self.rolls or robot.n > 4):
                 # What a singularity leaves free is taken from home: another home shows where that is.
                 home = (value + 0.3 + 0.2 * i for i, value in enumerate(robot.home))
                 self.elsewhere = replace(robot, home=tuple(home))
 
-    def _values(self, free: list[Freedom], exact: bool) -> tuple[float, ...]:
+    def _values(self, free: list[RedundancyParameter], exact: bool) -> tuple[float, ...]:
         """Values of the arm's own free parameter to try, NaN for the one near the home configuration.
 
         A joint that is free moves no other but those that undo it: its limits are the exact solver's business.
@@ -352,10 +352,11 @@ class _Arm:
                 ik_branches(robot, T[*open_.T]).reshape(len(open_), -1) for robot in (self.robot, self.elsewhere)
             )
             open_ = open_[~np.asarray((here == there) | (np.isnan(here) & np.isnan(there))).all(axis=1)]
+        assert self.form is not None  # the method is "closed form"
         values = (math.nan,) * len(self.freedoms)
         for i, j in open_.tolist():
-            problem = Problem(T[i, j], APPROACH, values, True, self.home, self.lower, self.upper)
-            q = self.solver.solve(self.geometry, problem).q
+            problem = SolverInput(T[i, j], APPROACH, values, True, self.home, self.lower, self.upper)
+            q = self.form.solve(problem).q
             self._gauge(T[i, j], np.ascontiguousarray(q), best[i, j : j + 1])
 
     def _search(self, centres: Array, T: Array, best: Array) -> None:

@@ -9,7 +9,8 @@ import numpy as np
 from kin.ik.candidates import residuals
 from kin.kernels.compile import jit
 from kin.kernels.fk import jacobian_into, volume_of
-from kin.solvers.common import APPROACH, nearest_image
+from kin.solvers.common import nearest_image
+from kin.solvers.contract import APPROACH
 from kin.solvers.numeric import solve
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array

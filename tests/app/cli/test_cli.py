@@ -20,7 +20,7 @@ from app.exports import save
 from app.exports.formats import FORMATS, encode
 from app.shared.clouds import Cloud, Clouds
 from app.shared.settings import Settings
-from kin.solvers import solver_for
+from kin.solvers import closed_form_of
 
 ROOT = Path(__file__).parents[3]
 PIONEER = kin.get_robot("pioneer5")
@@ -345,8 +345,8 @@ def test_check_tells_what_an_arm_is(capsys):
 def test_check_names_the_solver_and_why(capsys):
     for robot in kin.builtin_robots().values():
         got = answer(capsys, "check", ROOT / "kin" / "robots" / f"{robot.id}.toml")
-        match = solver_for(robot)
-        assert got["solver"] == ("numeric" if match is None else match.solver.NAME)
+        match = closed_form_of(robot)
+        assert got["solver"] == ("numeric" if match is None else match.name)
         assert got["reason"]
         assert got["robot"]["branches"] == list(kin.branch_names(robot))
         assert got["motions"] == min(robot.n, 6)

@@ -17,11 +17,11 @@ import kin
 from kin import InputError
 from kin.kernels import simd
 from kin.robot import Joint, Robot
-from kin.solvers import solver_for
-from kin.solvers.common import POSE, Problem
+from kin.solvers import closed_form_of
+from kin.solvers.contract import POSE, SolverInput
 
 ROBOTS = CHAPTER_ARMS
-CLOSED = tuple(robot.id for robot in kin.builtin_robots().values() if solver_for(robot) is not None)
+CLOSED = tuple(robot.id for robot in kin.builtin_robots().values() if closed_form_of(robot) is not None)
 
 
 def moved(robot):
@@ -44,7 +44,7 @@ def singular_targets(robot, count=64):
     """Poses at which joints other than the first are at zero of their closed form, or at a right angle."""
     rng = np.random.default_rng(2)
     q = robot.random_q(rng, count)
-    offset = solver_for(robot).geometry.offset
+    offset = closed_form_of(robot).geometry.offset
     special = rng.random(q.shape) < 0.4
     special[:, 0] = False
     return kin.fk(robot, np.where(special, rng.integers(-1, 2, q.shape) * (math.pi / 2) - offset, q))
@@ -52,9 +52,9 @@ def singular_targets(robot, count=64):
 
 def rich(robot, T, value):
     """The branches of the rich kernels, without limits."""
-    solver, geometry, _ = solver_for(robot)
+    solver, geometry, _ = closed_form_of(robot)
     far = np.full(robot.n, 1e6)
-    return solver.solve(geometry, Problem(T, POSE, (value,), False, robot.q_home.copy(), -far, far)).q
+    return solver.solve(geometry, SolverInput(T, POSE, (value,), False, robot.q_home.copy(), -far, far)).q
 
 
 def turned(a, b):
@@ -132,7 +132,7 @@ def test_the_home_configuration_is_among_its_own_branches(robot):
 @arms
 def test_every_configuration_is_among_the_branches_at_its_own_value(robot):
     q = robot.random_q(np.random.default_rng(3), 300)
-    if solver_for(robot).solver.NAME == "srs7":
+    if closed_form_of(robot).solver.NAME == "srs7":
         values = [
             kin.solve_ik(robot, kin.fk(robot, row), q_seed=row, respect_limits=False).solutions[0]
             for row in q[:20]

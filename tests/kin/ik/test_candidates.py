@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from kin import InputError, fk, get_robot, ik_branches
 from kin.ik.candidates import DISTANCE, finish, judge, ranges, select, settle
 from kin.kernels.checks import straighten
-from kin.solvers.common import POSE
+from kin.solvers.contract import POSE
 from kin.transforms import as_transform, rotation_from_wxyz
 
 angle = st.floats(-10, 10)

@@ -17,8 +17,8 @@ from arms import Draw
 import kin
 from kin import Joint, Robot, Status, solve_ik
 from kin.catalog import parse_robot
-from kin.solvers import parallel6, scara4, slide6, solver_for, wrist6
-from kin.solvers.common import POSE, Problem
+from kin.solvers import parallel6, scara4, slide6, closed_form_of, wrist6
+from kin.solvers.contract import POSE, SolverInput
 from kin.solvers.numeric import spread
 
 PI = math.pi
@@ -124,7 +124,7 @@ def members(family, count, seed=7):
 
 def branches(robot, T, near, value=math.nan):
     """All branches ``(b, n)`` by the fast path."""
-    solver, geometry, _ = solver_for(robot)
+    solver, geometry, _ = closed_form_of(robot)
     out = np.empty((len(solver.BRANCHES), robot.n))
     solver.branches_one(solver.params(geometry), np.array(T), value, np.array(near), out)
     return out
@@ -210,23 +210,23 @@ NAMED = [
 def test_every_configuration_is_among_the_branches_of_its_pose_and_all_of_them_close(family):
     rng = np.random.default_rng(1)
     for robot in members(family, 60):
-        match = solver_for(robot)
+        match = closed_form_of(robot)
         assert match is not None, robot
-        if family != match.solver.NAME:
+        if family != match.name:
             continue  # a member of both
         for q in rng.uniform(-3, 3, (6, robot.n)):
             T = kin.fk(robot, q)
             rows = branches(robot, T, q)
-            assert apart(rows[match.solver.branch_of(match.geometry, q)], q) < 1e-6
+            assert apart(rows[match.branch_of(q)], q) < 1e-6
             assert np.abs(kin.fk(robot, there(rows)) - T).max() < 1e-9
             for i in np.flatnonzero(~np.isnan(rows[:, 0])):
-                assert match.solver.branch_of(match.geometry, rows[i]) == i
+                assert match.branch_of(rows[i]) == i
 
 
 @pytest.mark.parametrize(("robot", "family"), NAMED, ids=[family + "-" + robot.id for robot, family in NAMED])
 def test_named_arms_are_recognised_and_have_all_their_branches(robot, family):
-    match = solver_for(robot)
-    assert family == match.solver.NAME
+    match = closed_form_of(robot)
+    assert family == match.name
     assert match.solver.why(match.geometry)
     rng = np.random.default_rng(2)
     counts = []
@@ -236,7 +236,7 @@ def test_named_arms_are_recognised_and_have_all_their_branches(robot, family):
         assert result.solver == family
         assert apart(result.solutions[0].q, q) < 1e-6
         counts.append(len(there(branches(robot, kin.fk(robot, q), q))))
-    assert max(counts) == len(match.solver.BRANCHES)
+    assert max(counts) == len(match.branches)
 
 
 def mixture(robot, rng):
@@ -266,9 +266,9 @@ def mixture(robot, rng):
 
 def careful(robot, T):
     """The branches of one target by the kernel that limits and ranges are computed with, without limits."""
-    solver, geometry, _ = solver_for(robot)
+    solver, geometry, _ = closed_form_of(robot)
     far = np.full(robot.n, 1e6)
-    return solver.solve(geometry, Problem(T, POSE, (math.nan,), False, robot.q_home.copy(), -far, far)).q
+    return solver.solve(geometry, SolverInput(T, POSE, (math.nan,), False, robot.q_home.copy(), -far, far)).q
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -296,7 +296,7 @@ def test_a_batch_has_the_bits_of_its_targets_one_by_one_and_all_their_branches(f
 @pytest.mark.parametrize("family", FAMILIES)
 def test_the_kernels_tell_of_a_target_that_is_no_numbers(family):
     robot = members(family, 1, seed=3)[0]
-    solver, geometry, _ = solver_for(robot)
+    solver, geometry, _ = closed_form_of(robot)
     T = kin.fk(robot, robot.q_home)
     out = np.empty((len(solver.BRANCHES), robot.n))
     assert solver.branches_one(solver.params(geometry), T, math.nan, robot.q_home.copy(), out)
@@ -344,7 +344,7 @@ def test_an_axis_a_little_off_is_another_arm(family):
     asked = {"wrist6": (0, 1, 3, 4), "parallel6": (1, 2, 3, 4), "slide6": (0, 1, 3, 4), "scara4": (0, 1)}[family]
     checked = 0
     for robot in members(family, 12, seed=5):
-        if robot.convention != "standard" or family != solver_for(robot).solver.NAME:
+        if robot.convention != "standard" or family != closed_form_of(robot).solver.NAME:
             continue
         for row in asked:
             rows = list(robot.rows)
@@ -365,7 +365,7 @@ def test_axes_that_pass_each_other_by_are_another_arm():
 
 def canonical(robot):
     """(solver, geometry, q of canonical angles)."""
-    solver, g, _ = solver_for(robot)
+    solver, g, _ = closed_form_of(robot)
 
     def q_of(t):
         q = g.sign * (np.asarray(t) - g.offset)
@@ -394,7 +394,7 @@ def test_singular_targets_have_answers_that_close(family):
     rng = np.random.default_rng(6)
     seen = set()
     for robot in members(family, 40, seed=6):
-        if family != solver_for(robot).solver.NAME:
+        if family != closed_form_of(robot).solver.NAME:
             continue
         _, g, q_of = canonical(robot)
         for mode in range(1, 8):
@@ -485,9 +485,9 @@ def test_with_axis_6_parallel_to_the_three_the_ranges_of_theta_6_are_exact():
 def test_the_distances_told_are_the_factors_of_the_determinant(family):
     rng = np.random.default_rng(10)
     for robot in members(family, 15, seed=10):
-        if family != solver_for(robot).solver.NAME:
+        if family != closed_form_of(robot).solver.NAME:
             continue
-        solver, g, _ = solver_for(robot)
+        solver, g, _ = closed_form_of(robot)
         ratios = []
         for q in rng.uniform(-3, 3, (5, robot.n)):
             J = kin.jacobian(robot, q)
@@ -591,5 +591,5 @@ def test_a_roll_that_is_free_stays_with_the_seed():
 def test_only_arms_that_can_be_on_axis_1_have_a_free_theta_1():
     beside, over = puma560(), kr6()
     for robot, names in ((beside, []), (over, ["theta1"])):
-        solver, g, _ = solver_for(robot)
+        solver, g, _ = closed_form_of(robot)
         assert [f.name for f in solver.freedoms(g, 0)] == names

@@ -20,7 +20,7 @@ from kin.ik import nearest
 from kin.ik.problem import ask
 from kin.robot import Joint, Robot
 from kin.solvers import numeric
-from kin.solvers.common import APPROACH, MASK, POSE, POSITION
+from kin.solvers.contract import APPROACH, MASK, POSE, POSITION
 from kin.transforms import rotation_angle, rotation_from_wxyz, vector_angle
 
 ROBOTS = tuple(kin.builtin_robots())

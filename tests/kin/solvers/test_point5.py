@@ -9,12 +9,12 @@ import pytest
 
 import kin
 from kin import Status, solve_ik
-from kin.solvers import solver_for
-from kin.solvers.common import POSITION, Problem
+from kin.solvers import closed_form_of
+from kin.solvers.contract import POSITION, SolverInput
 from kin.solvers.wrist5 import point as point5
 
 ROBOT = kin.get_robot("pioneer5")
-GEOMETRY = solver_for(ROBOT).geometry
+GEOMETRY = closed_form_of(ROBOT).geometry
 SLACK = 1e-9
 
 
@@ -27,7 +27,7 @@ def pose_at(point):
 def ask(point, low, high, seed=None, values=(math.nan, math.nan), respect=True):
     seed = ROBOT.q_home.copy() if seed is None else seed
     return point5.solve(
-        GEOMETRY, Problem(pose_at(point), POSITION, values, respect, seed, low.copy(), high.copy())
+        GEOMETRY, SolverInput(pose_at(point), POSITION, values, respect, seed, low.copy(), high.copy())
     )
 
 
@@ -279,7 +279,7 @@ def test_a_range_of_theta4_ends_where_it_says(wide):
                         if ((turned > low) & (turned < high)).all():
                             sines = np.sin(q[[2, 4]])
                             split = np.abs(sines).min() < 1e-6
-                            assert split or solver_for(ROBOT).solver.branch_of(GEOMETRY, q) != branch
+                            assert split or closed_form_of(ROBOT).solver.branch_of(GEOMETRY, q) != branch
     assert ends >= 4
 
 

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kin import Robot, fk, link_frames
-from kin.solvers import solver_for, srs7
+from kin.solvers import closed_form_of, srs7
+from kin.solvers.reversed import ReversedJoints
 from kin.solvers.common import inverse
 from kin.transforms import Array, frame_from_approach
 
@@ -41,10 +42,11 @@ class Circle:
 
 def elbow_circle(robot: Robot, q: Array) -> Circle | None:
     """The circle at a configuration ``(n,)``; None for an arm of another kind."""
-    match = solver_for(robot)
-    if match is None or match.solver.NAME != srs7.NAME:
+    match = closed_form_of(robot)
+    form = match.form if isinstance(match, ReversedJoints) else match
+    if not isinstance(form, srs7.Srs7):
         return None
-    geometry: srs7.Geometry = match.geometry
+    geometry = form.geometry
     M = geometry.inverse_base @ fk(robot, q) @ geometry.inverse_tool
     W = M[:3, 3]
     L = float(np.linalg.norm(W))

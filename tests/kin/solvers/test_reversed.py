@@ -18,7 +18,7 @@ from arms import Draw, nested
 
 import kin
 from kin import Joint, Robot, Status, solve_ik
-from kin.solvers import solver_for
+from kin.solvers import closed_form_of
 from kin.solvers.common import screw_x, screw_z
 from kin.solvers.mirrored import Mirrored, readings
 
@@ -74,11 +74,11 @@ class Pair:
 
     def __init__(self, robot):
         self.robot = robot
-        self.match = solver_for(robot)
+        self.match = closed_form_of(robot)
         self.joints = getattr(self.match.solver, "joints", ())
         self.plain = turned(robot, self.joints)
         self.signs = signs_of(robot, self.joints)
-        assert not isinstance(solver_for(self.plain).solver, Mirrored)
+        assert not isinstance(closed_form_of(self.plain).solver, Mirrored)
 
     def value(self, name, x):
         """A free value of the plain arm as the other one has it."""
@@ -157,42 +157,42 @@ def poses(robot, count, seed=0, inside=True):
 
 @pytest.mark.parametrize("name", ARMS)
 def test_whatever_counts_otherwise_the_arm_keeps_its_family_and_tasks(name):
-    base, n = solver_for(ARMS[name]), ARMS[name].n
+    base, n = closed_form_of(ARMS[name]), ARMS[name].n
     for count in (0, 1, 2, n - 1, n):
         for joints in itertools.combinations(range(n), count):
-            match = solver_for(turned(ARMS[name], joints))
+            match = closed_form_of(turned(ARMS[name], joints))
             assert match is not None, joints
-            assert match.solver.NAME == base.solver.NAME
-            assert match.solver.BRANCHES == base.solver.BRANCHES
+            assert match.name == base.solver.NAME
+            assert match.branches == base.solver.BRANCHES
             for task in range(4):
-                assert match.solver.handles(match.geometry, task) == base.solver.handles(base.geometry, task)
+                assert match.handles(task) == base.solver.handles(base.geometry, task)
             assert len(getattr(match.solver, "joints", ())) <= count
 
 
 @pytest.mark.parametrize("name", ARMS)
 def test_a_single_joint_that_a_closed_form_is_not_used_to_is_the_one_turned_round(name):
     for joint in range(ARMS[name].n):
-        match = solver_for(turned(ARMS[name], (joint,)))
+        match = closed_form_of(turned(ARMS[name], (joint,)))
         strange = joint in STRANGE[name]
         assert isinstance(match.solver, Mirrored) == strange
         assert match.reason.endswith(f"; joint {joint + 1} counts the other way round") == strange
-    assert solver_for(turned(ARMS["iiwa14"], (2, 4))).reason.endswith("; joints 3 and 5 count the other way round")
-    assert solver_for(turned(ARMS["iiwa14"], (2, 4, 6))).reason.endswith(
+    assert closed_form_of(turned(ARMS["iiwa14"], (2, 4))).reason.endswith("; joints 3 and 5 count the other way round")
+    assert closed_form_of(turned(ARMS["iiwa14"], (2, 4, 6))).reason.endswith(
         "joints 3, 5 and 7 count the other way round"
     )
 
 
 def test_arms_of_no_family_are_left_alone():
     for name in ("panda", "ur5", "puma560", "irb120", "stanford", "scara", *ARMS):
-        match = solver_for(kin.get_robot(name))
+        match = closed_form_of(kin.get_robot(name))
         assert (match is None) == (name == "panda")
         assert match is None or not isinstance(match.solver, Mirrored)
     one = Robot(
         "one", "one", "test", "standard", (Joint("j", 0.0, 0.1, 0.2, 0.3, "revolute", (-1.0, 1.0)),), (0.0,)
     )
-    assert solver_for(one) is None
+    assert closed_form_of(one) is None
     snake = [Joint(f"j{i}", 0.0, 0.0, 0.1, PI * (i % 2) if i % 4 < 3 else 1.0, limits=(-1, 1)) for i in range(40)]
-    assert solver_for(Robot("snake", "snake", "test", "standard", tuple(snake), (0.0,) * 40)) is None
+    assert closed_form_of(Robot("snake", "snake", "test", "standard", tuple(snake), (0.0,) * 40)) is None
 
 
 @cases
@@ -358,7 +358,7 @@ def test_the_branches_of_the_arm_itself_are_there_and_named_alike(name, joints):
         here, there = kin.branch_of(base, q), kin.branch_of(robot, q * signs)
         assert names.setdefault(here, there) == there
     assert len(set(names.values())) == len(names)
-    exact = getattr(solver_for(robot).solver, "joints", ()) == joints
+    exact = getattr(closed_form_of(robot).solver, "joints", ()) == joints
     if exact:
         assert all(here == there for here, there in names.items())
     for q, T in poses(base, 3, seed=9):
@@ -418,7 +418,7 @@ def test_a_path(name, joints):
     start, end = (q for q, _ in poses(pair.plain, 2, seed=11))
     way = [kin.fk(pair.plain, start + s * 0.3 * (end - start)) for s in np.linspace(0.0, 1.0, 8)]
     a, b = kin.solve_path(pair.plain, way), kin.solve_path(pair.robot, way)
-    assert a.solver == b.solver == solver_for(pair.plain).solver.NAME
+    assert a.solver == b.solver == closed_form_of(pair.plain).solver.NAME
     assert len(a.jumps) == len(b.jumps)
     assert np.allclose(a.q, b.q * pair.signs, atol=1e-5, equal_nan=True)
 
@@ -501,9 +501,9 @@ def test_tables_from_elsewhere(family):
     as_it_is = 0
     for _ in range(25):
         robot = draw.arm(family)
-        match = solver_for(robot)
+        match = closed_form_of(robot)
         assert match is not None
-        assert family == match.solver.NAME
+        assert family == match.name
         as_it_is += not isinstance(match.solver, Mirrored)
         q = robot.random_q(draw.rng, 3)
         T = kin.fk(robot, q)
@@ -517,7 +517,7 @@ def test_tables_from_elsewhere(family):
             assert np.abs(result.solutions[0].q - seed).max() < 1e-6
             assert result.solutions[0].branch == kin.branch_of(robot, seed)
             assert all(s.branch == kin.branch_of(robot, s.q) for s in result.solutions)
-            assert match.solver.handles(match.geometry, 1) == (
+            assert match.handles(1) == (
                 family == "wrist5" or robot.T_last_tool[0, 3] == 0.0
             )
     assert 0 < as_it_is < 20

@@ -16,21 +16,18 @@ Lines also do not see how a table comes to them, so that rows that do not move m
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from itertools import islice, product
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kin.robot import Joint, Robot
-from kin.solvers.common import POSE, TURN, Candidates, Freedom, Problem, is_zero, screw_z
+from kin.solvers.common import TURN, is_zero, screw_z
+from kin.solvers.contract import POSE, BatchKernels, Candidates, ClosedForm, RedundancyParameter, SolverInput
 from kin.solvers.links import Links, links_of
-from kin.solvers.singular import Singularity, counting_otherwise
+from kin.solvers.singular import JointValue, Singularity
 from kin.transforms import Array
-
-if TYPE_CHECKING:
-    from kin.solvers import Solver
 
 Joints = tuple[int, ...]
 _MOST = 16  # readings of one arm: what has a closed form has four at most
@@ -117,91 +114,98 @@ def _nested(T: Array) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(row) for row in T.tolist())
 
 
-class Mirrored:
-    """A closed form, asked about an arm of which some joints count the other way round.
+class ReversedJoints(ClosedForm):
+    """The closed form of an arm that was read with some joints reversed.
 
-    From outside it is that closed form, with the arm's own joint values. Its geometry is that of the arm turned
-    round, which is the same in space.
+    From outside it is the family's closed form, with the arm's own joint values: everything that belongs to a
+    reversed joint changes its sign.
+
+    Attributes:
+        form: the closed form of the arm as it was read, which is the same in space.
+        joints: indices of the reversed joints.
     """
 
-    def __init__(self, solver: Solver, geometry: Any, joints: Joints, n: int) -> None:
-        self.NAME, self.TITLE, self.BRANCHES = solver.NAME, solver.TITLE, solver.BRANCHES
-        self.solver, self.joints = solver, joints
+    def __init__(self, form: ClosedForm, joints: Joints, n: int) -> None:
+        self.form, self.joints = form, joints
+        self.name, self.title, self.branches, self.lengths = form.name, form.title, form.branches, form.lengths
+        *most, last = (str(i + 1) for i in joints)
+        which = f"joints {', '.join(most)} and {last} are" if most else f"joint {last} is"
+        self.reason = f"{form.reason}; {which} reversed"
         self._signs = np.ones(n)
         self._signs[list(joints)] = -1.0
-        free = [freedom.joint for freedom in solver.freedoms(geometry, POSE)[:1] if not freedom.rare]
-        self.branches_one, self.branches_many, self.branches_each = (
-            kernel and _Around(kernel, self._signs, joints, free)
-            for kernel in (getattr(solver, f"branches_{name}", None) for name in ("one", "many", "each"))
-        )
+        requested = [r.joint for r in form.redundancies(POSE)[:1] if not r.rare]
+        self.kernels = _reversed_kernels(form.kernels, self._signs, joints, requested)
 
-    def why(self, geometry: Any) -> str:
-        """What makes the arm one of the family, and which joints count the other way round."""
-        *most, last = (str(i + 1) for i in self.joints)
-        told = f"joints {', '.join(most)} and {last} count" if most else f"joint {last} counts"
-        return f"{self.solver.why(geometry)}; {told} the other way round"
+    def handles(self, task: int) -> bool:
+        """As the family does."""
+        return self.form.handles(task)
 
-    def handles(self, geometry: Any, task: int) -> bool:
-        """As the closed form does."""
-        return self.solver.handles(geometry, task)
+    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
+        """As the family has them; one that is a joint's value is the arm's own joint's."""
+        return self.form.redundancies(task)
 
-    def freedoms(self, geometry: Any, task: int) -> tuple[Freedom, ...]:
-        """As the closed form has them: those that are a joint's value are the joint's own."""
-        return self.solver.freedoms(geometry, task)
+    def _signs_of(self, task: int) -> list[float]:
+        return [-1.0 if r.joint in self.joints else 1.0 for r in self.form.redundancies(task)]
 
-    def solve(self, geometry: Any, problem: Problem) -> Candidates:
+    def solve(self, problem: SolverInput) -> Candidates:
         """The branches, in the arm's own joint values."""
-        p, own = problem, self.solver.freedoms(geometry, problem.task)
+        p, signs = problem, self._signs_of(problem.task)
         lower, upper = p.lower.copy(), p.upper.copy()
         for i in self.joints:
             lower[i], upper[i] = -p.upper[i], -p.lower[i]
-        signs = [-1.0 if freedom.joint in self.joints else 1.0 for freedom in own]
-        given = tuple([value * sign for value, sign in zip(p.values, signs, strict=True)])
-        seed = p.seed * self._signs
-        found = self.solver.solve(
-            geometry, Problem(p.T, p.task, given, p.respect_limits, seed, lower, upper, p.seed_roll)
-        )
+        values = tuple([value * sign for value, sign in zip(p.values, signs, strict=True)])
+        found = self.form.solve(replace(p, values=values, seed=p.seed * self._signs, lower=lower, upper=upper))
         arcs = [x if sign > 0.0 else _opposite(x) for x, sign in zip(found.arcs, signs, strict=True)]
         return Candidates(found.q * self._signs, found.values * signs, tuple(arcs), found.gap, found.obstacle)
 
-    def branch_of(self, geometry: Any, q: Array) -> int:
+    def branch_of(self, q: Array) -> int:
         """The branch a configuration ``(n,)`` is on."""
-        return self.solver.branch_of(geometry, q * self._signs)
+        return self.form.branch_of(q * self._signs)
 
-    def singularities(self, geometry: Any, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
-        """How far a configuration ``(n,)`` is from each of the arm's singularities."""
-        with counting_otherwise(self.joints):
-            return self.solver.singularities(geometry, q * self._signs, within)
-
-    def params(self, geometry: Any) -> Array:
-        """The arm turned round as the thin kernels read it."""
-        solver: Any = self.solver
-        params: Array = solver.params(geometry)
-        return params
+    def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
+        """As the family has them, met at the arm's own joint values."""
+        signs = self._signs.tolist()
+        return tuple(
+            replace(s, met_at=tuple(JointValue(i, signs[i] * value) for i, value in s.met_at))
+            for s in self.form.singularities(q * self._signs, within)
+        )
 
 
-class _Around:
-    """A thin kernel of the arm turned round, called like that of the arm as it is; see :mod:`kin.ik.batch`.
+@dataclass(frozen=True, eq=False)
+class _ReversedKernels(BatchKernels):
+    """Batch kernels that read and write the joint values of an arm with reversed joints."""
 
-    Like a kernel it can be compiled ahead (`kin.kernels.compile.direct`).
-    """
+    rebuild: Callable[[BatchKernels], BatchKernels]
+    form: BatchKernels
 
-    def __init__(self, kernel: Any, signs: Array, joints: Joints, free: list[int]) -> None:
-        self._kernel, self._signs, self._joints, self._free = kernel, signs, joints, free
-        self._asked = any(joint in joints for joint in free)
+    def unchecked(self) -> BatchKernels:
+        """The same around the family's unchecked kernels."""
+        return self.rebuild(self.form.unchecked())
 
-    def compile(self, signature: tuple[Any, ...]) -> _Around:
-        """The same round the compiled function."""
-        return _Around(self._kernel.compile(signature), self._signs, self._joints, self._free)
 
-    def __call__(self, params: Array, T: Array, value: Any, near: Array, out: Array) -> bool | None:
-        finite: bool | None = self._kernel(params, T, -value if self._asked else value, near * self._signs, out)
-        for joint in self._joints:
+def _reversed_kernels(form: BatchKernels, signs: Array, joints: Joints, requested: list[int]) -> BatchKernels:
+    """The kernels of `form` with the sign of `joints` changed; `requested`: the joint that a value is of, if any."""
+    value_sign = -1.0 if any(joint in joints for joint in requested) else 1.0
+
+    def reverse(out: Array) -> None:
+        for joint in joints:
             column = out[..., joint]
             np.subtract(0.0, column, out=column)
-            if joint not in self._free:  # what may be asked for is told as it was asked
+            if joint not in requested:  # a requested value is returned as it was requested
                 column[column == -math.pi] = math.pi
+
+    def one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
+        finite = form.one(params, T, value_sign * value, near * signs, out)
+        reverse(out)
         return finite
+
+    def many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
+        form.many(params, T, value_sign * values, near * signs, out)
+        reverse(out)
+
+    return _ReversedKernels(
+        form.params, one, many, lambda inner: _reversed_kernels(inner, signs, joints, requested), form
+    )
 
 
 def _opposite(arcs: Array) -> Array:

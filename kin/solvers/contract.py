@@ -1,0 +1,174 @@
+"""The contract of a closed-form solver: the types through which a family of arms is used.
+
+A *family* is a set of arms whose joint axes lie to each other in the same way, so that one set of formulas gives
+all their configurations. It is one module (or folder) with one function ``match(robot) -> ClosedForm | None`` and
+one row in :data:`kin.solvers.FAMILIES`. A `ClosedForm` owns the geometry that it read off the robot's axes.
+
+A closed form neither verifies nor filters, sorts or words its answers: :mod:`kin.ik` does that once for all
+families. It returns facts: arrays, codes and named numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
+
+from kin.kernels.compile import direct
+from kin.solvers.singular import Singularity
+from kin.transforms import Array
+
+POSE, APPROACH, POSITION, MASK = 0, 1, 2, 3
+TASK_CODES = {"pose": POSE, "approach": APPROACH, "position": POSITION, "mask": MASK}
+
+ObstacleCode = Literal[
+    "wrist centre too far from the shoulder",
+    "wrist centre too near to the shoulder",
+    "wrist centre beyond the elbow's reach",
+    "wrist centre too near to axis 1 or 2",
+    "wrist centre off the upper arm and forearm",
+    "last axis beyond the links' reach",
+    "approach direction",
+    "point",
+    "given joint values",
+]
+One = Callable[[Array, Array, float, Array, Array], bool]
+Many = Callable[[Array, Array, Array, Array, Array], None]
+
+
+class RedundancyParameter(NamedTuple):
+    """A parameter that a task leaves free.
+
+    Attributes:
+        name, label: id, and the same for people.
+        joint: index of the joint whose value it is, −1 if it is none.
+        circular: whether its values are angles on a circle, given in (−π, π].
+        rare: free at singular targets only, so that no value can be requested.
+    """
+
+    name: str
+    label: str
+    joint: int = -1
+    circular: bool = False
+    rare: bool = False
+
+
+@dataclass(slots=True, eq=False)
+class SolverInput:
+    """A target, and how to choose what it leaves free.
+
+    Attributes:
+        T: target pose T_base_tool ``(4, 4)``.
+        task: POSE, APPROACH or POSITION (a mask has no closed form).
+        values: one per redundancy parameter of the task, NaN to let the solver choose it near the seed.
+        respect_limits: choose redundancy parameters so that the limits hold, where that is possible.
+        seed, lower, upper: ``(n,)``.
+        seed_roll: angle about the target's z axis from its x axis to the seed tool's (tasks with a free roll).
+    """
+
+    T: Array
+    task: int
+    values: tuple[float, ...]
+    respect_limits: bool
+    seed: Array
+    lower: Array
+    upper: Array
+    seed_roll: float = 0.0
+
+
+class Obstacle(NamedTuple):
+    """Why the geometry does not close when no branch exists.
+
+    Attributes:
+        code: what does not fit.
+        bound: the length it would have to keep to, metres; NaN where no single length decides.
+    """
+
+    code: ObstacleCode
+    bound: float = math.nan
+
+
+@dataclass(slots=True, eq=False)
+class Candidates:
+    """One configuration per branch: not verified, not filtered, not sorted.
+
+    Attributes:
+        q: ``(branches, n)``, NaN where the branch does not exist. Where two have merged, both are there.
+        values: ``(branches, parameters)``, the value used, NaN where the redundancy parameter does not exist.
+        arcs: per redundancy parameter ``(k, 3)`` rows (branch, low, high): its values that the limits allow, the
+            other parameters held.
+        gap: metres by which the geometry does not close when no branch exists.
+        obstacle: what does not fit then.
+    """
+
+    q: Array
+    values: Array
+    arcs: tuple[Array, ...]
+    gap: float = 0.0
+    obstacle: Obstacle | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class BatchKernels:
+    """Compiled functions that write all branches of one target or of many, without limits, order or checks.
+
+    A row that is NaN stands for a branch that does not exist; where two have merged, both rows hold the same
+    joints. Angles are in (−π, π], but for a joint whose value was requested. `many` gives the bits of `one`.
+
+    Attributes:
+        params: the arm as the kernels read it, a C-contiguous float64 array ``(k,)`` that they do not write to.
+        one: ``one(params, T (4, 4), value, near (n,), out (branches, n))``; False if T is not finite. `value` is
+            that of the first redundancy parameter of a pose, NaN to keep it near `near`, which also decides what
+            a singular target leaves free.
+        many: ``many(params, T (N, 4, 4), values (N,) or (1,), near (n,), out (N, branches, n))``: one value per
+            target, or one for all.
+    """
+
+    params: Array
+    one: One
+    many: Many
+
+    def unchecked(self) -> BatchKernels:
+        """The same without a look at the type of every argument, see `kin.kernels.compile.direct`."""
+        return replace(self, one=direct(self.one, 1, 2, float, 1, 2), many=direct(self.many, 1, 3, 1, 1, 3))
+
+
+class ClosedForm(ABC):
+    """The closed form of one arm.
+
+    Attributes:
+        name, title: id of the family, and the same for people.
+        branches: names, one per row of its answers.
+        reason: a clause that says what about the axes makes the arm one of the family.
+        lengths: the signed lengths in its formulas, metres.
+        kernels: its batch kernels.
+    """
+
+    name: str
+    title: str
+    branches: tuple[str, ...]
+    reason: str
+    lengths: tuple[float, ...]
+    kernels: BatchKernels
+
+    @abstractmethod
+    def handles(self, task: int) -> bool:
+        """Whether this task (POSE, APPROACH, POSITION) has a closed form."""
+
+    @abstractmethod
+    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
+        """What a task that it handles leaves free."""
+
+    @abstractmethod
+    def solve(self, problem: SolverInput) -> Candidates:
+        """All branches of a target, each with its redundancy parameters as near the seed as the limits allow."""
+
+    @abstractmethod
+    def branch_of(self, q: Array) -> int:
+        """The branch that a configuration ``(n,)`` is on: a row of `branches`."""
+
+    @abstractmethod
+    def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
+        """The singularities that a configuration ``(n,)`` is no farther from than `within`, in no order."""
