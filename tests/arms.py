@@ -5,15 +5,37 @@ curves and golden inverse kinematics is told of the chapter's arms.
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
+HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])  # Rx(π)
 CHAPTER_ARMS = ("pioneer5", "redundant7", "redundant7-craig")
 
 
 def nested(T):
     """A matrix as a robot has it."""
     return tuple(tuple(row) for row in np.asarray(T).tolist())
+
+
+def reversed_at(robot, joints):
+    """The same arm in space by a table in which `joints` (indices) count the other way round."""
+    rows, base, tool, home = list(robot.rows), np.array(robot.base), np.array(robot.tool), list(robot.home)
+    for i in joints:
+        k, home[i] = robot.joint_rows[i], -home[i]
+        row = rows[k]
+        limits = None if row.limits is None else (-row.limits[1], -row.limits[0])
+        rows[k] = replace(row, theta=-row.theta, d=-row.d, alpha=row.alpha + math.pi, limits=limits)
+        neighbour = k - 1 if robot.convention == "standard" else k + 1
+        if neighbour < 0:
+            base = base @ HALF_TURN
+        elif neighbour == len(rows):
+            tool = HALF_TURN @ tool
+        else:
+            rows[neighbour] = replace(rows[neighbour], alpha=rows[neighbour].alpha + math.pi)
+    rows = [replace(row, alpha=math.remainder(row.alpha, 2 * math.pi)) for row in rows]
+    name = f"{robot.id}-{''.join(str(i + 1) for i in joints)}"
+    return replace(robot, id=name, rows=tuple(rows), home=tuple(home), base=nested(base), tool=nested(tool))
 
 
 class Draw:

@@ -1,7 +1,7 @@
 """The batch call: all branches of a closed form as a plain array, and nothing else.
 
-:func:`kin.solve_ik` applies limits, finds ranges, sorts and words its answers. `ik_branches` is for joint values at
-the rate of a control loop, or for a million targets: no limits, no order, no verification. It calls the batch
+:func:`kin.solve_ik` applies limits, finds ranges, sorts and words its answers. `ik_branches` returns joint values
+at the rate of a control loop, or for a million targets: no limits, no order, no verification. It calls the batch
 kernels of the arm's closed form (`kin.solvers.contract.BatchKernels`).
 """
 

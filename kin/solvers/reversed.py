@@ -184,7 +184,7 @@ class _ReversedKernels(BatchKernels):
 
 
 def _reversed_kernels(form: BatchKernels, signs: Array, joints: Joints, requested: list[int]) -> BatchKernels:
-    """The kernels of `form` with the sign of `joints` changed; `requested`: the joint that a value is of, if any."""
+    """`form` with the signs of `joints` changed; `requested`: the joint whose value may be requested, if any."""
     value_sign = -1.0 if any(joint in joints for joint in requested) else 1.0
 
     def reverse(out: Array) -> None:

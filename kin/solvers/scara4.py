@@ -335,7 +335,7 @@ class Scara4(ClosedForm):
         return float(g.sign[1] * q[g.order[1]] + g.offset[1])
 
     def branch_of(self, q: Array) -> int:
-        """The branch a configuration is on: "right" if the elbow is on the right, seen from above along the arm."""
+        """The branch of a configuration: "right" if the elbow is on the right, seen along the arm from above."""
         return int(math.sin(self._elbow(q)) < 0.0)
 
     def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:

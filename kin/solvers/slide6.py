@@ -60,7 +60,7 @@ _MERGE = TOLERANCES.merge
 
 
 def match(robot: Robot) -> Slide6 | None:
-    """The closed form if axis 2 is perpendicular to axis 1 and to the slide, and 4, 5, 6 make a spherical wrist."""
+    """The closed form if axis 2 is perpendicular to axis 1 and to the slide, and 4, 5, 6 are a spherical wrist."""
     if robot.n != 6 or robot.revolute.tolist() != [True, True, False, True, True, True]:
         return None
     links = links_of(robot, (-1, -1, -1, -1, 1))

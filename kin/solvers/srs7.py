@@ -635,8 +635,8 @@ class Srs7(ClosedForm):
     def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
         """The zeros of √det(J Jᵀ) = d3 d5 |s4| |m|, where m spans the motions that keep the tool still.
 
-        With s4 ≠ 0 it vanishes for s2 = c3 = 0, for s6 = c5 = 0 and for s2 = s6 = 0 only: s2 = 0 or s6 = 0 alone is
-        no singularity of this arm.
+        With s4 ≠ 0 it vanishes for s2 = c3 = 0, for s6 = c5 = 0 and for s2 = s6 = 0 only: s2 = 0 or s6 = 0 alone
+        is no singularity of this arm.
         """
         g = self.geometry
         t = (q + g.offset).tolist()

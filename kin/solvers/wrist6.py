@@ -106,7 +106,7 @@ class Geometry(NamedTuple):
 
 
 def match(robot: Robot) -> Wrist6 | None:
-    """The closed form if axes 2 and 3 are parallel, axis 2 square to axis 1, and 4, 5, 6 meet, neighbours square."""
+    """The closed form if axes 2, 3 are parallel and perpendicular to axis 1, and 4, 5, 6 are a spherical wrist."""
     if robot.n != 6 or not robot.revolute.all():
         return None
     links = links_of(robot, (-1, -1, -1, -1, 1))

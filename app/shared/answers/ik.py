@@ -8,7 +8,9 @@ from typing_extensions import TypedDict
 
 from app.shared.answers.document import documented
 from kin import BlockedBranch, IKResult, IKSolution, Redundancy, Status
+from kin.ik.messages import singularity
 from kin.ik.results import Cause, LimitViolation
+from kin.solvers.singular import Condition, Lost
 
 
 @documented
@@ -77,14 +79,30 @@ class Blocked(TypedDict):
 
 
 @documented
+class JointValueAnswer(TypedDict):
+    """A value of one joint."""
+
+    joint: int
+    """Index of the joint."""
+    value: float
+    """In radians (metres)."""
+
+
+@documented
 class SingularityAnswer(TypedDict):
     """A way in which a configuration is singular."""
 
     kind: Literal["elbow", "shoulder", "wrist", "algorithmic", "jacobian"]
     """Which part of the arm loses a motion; "algorithmic": only the closed form loses a parameter, the arm
-    nothing; "jacobian": told by the least singular value, for arms without a closed form."""
+    loses nothing; "jacobian": judged by the smallest singular value, for arms without a closed form."""
+    condition: Condition
+    """What aligns there."""
+    lost: Lost
+    """What the arm (for "algorithmic": the closed form) loses there."""
+    joints: list[JointValueAnswer]
+    """The joints that decide, with the values at which the condition is met; empty where other lengths decide."""
     meaning: str
-    """The same for people."""
+    """Condition, joint values and loss as one clause."""
     distance: float
     """How far away it is, in `unit`."""
     unit: str
@@ -149,7 +167,15 @@ def ik_answer(result: IKResult) -> IkAnswer:
         "distance": result.distance,
         "redundancy": [_redundancy(free) for free in result.redundancy],
         "singularities": [
-            {"kind": s.kind, "meaning": s.meaning, "distance": s.distance, "unit": s.unit}
+            {
+                "kind": s.kind,
+                "condition": s.condition,
+                "lost": s.lost,
+                "joints": [{"joint": at.joint, "value": at.value} for at in s.met_at],
+                "meaning": singularity.long(s),
+                "distance": s.distance,
+                "unit": s.unit,
+            }
             for s in result.singularities
         ],
     }

@@ -106,7 +106,9 @@ def mask(closest: IKSolution | None) -> str:
     )
 
 
-def orientation(closest: IKSolution | None, oriented: IKSolution | None, obstacle: Obstacle | None, gap: float) -> str:
+def orientation(
+    closest: IKSolution | None, oriented: IKSolution | None, obstacle: Obstacle | None, gap: float
+) -> str:
     """The point can be reached, but not with this orientation."""
     why = f" ({clause_of(obstacle)}, by {millimetres(gap)})" if obstacle and gap > 0.0 else ""
     text = f"This orientation cannot be had at this point{why}"

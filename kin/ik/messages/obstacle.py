@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from kin.solvers.contract import Obstacle, ObstacleCode
 
-_CLAUSES: dict[ObstacleCode, str] = {
+CLAUSES: dict[ObstacleCode, str] = {
     "wrist centre too far from the shoulder": (
         "with this orientation the wrist centre is farther than {bound} from the shoulder"
     ),
@@ -14,9 +14,7 @@ _CLAUSES: dict[ObstacleCode, str] = {
     "wrist centre beyond the elbow's reach": (
         "with this orientation the wrist centre is out of the elbow's reach"
     ),
-    "wrist centre too near to axis 1 or 2": (
-        "with this orientation the wrist centre is too near to axis 1 or 2"
-    ),
+    "wrist centre too near to axis 1 or 2": ("with this orientation the wrist centre is too near to axis 1 or 2"),
     "wrist centre off the upper arm and forearm": (
         "with this orientation the horizontal upper arm and the forearm do not meet the wrist centre"
     ),
@@ -29,4 +27,4 @@ _CLAUSES: dict[ObstacleCode, str] = {
 
 def clause_of(obstacle: Obstacle) -> str:
     """What does not fit, e.g. ``"with this orientation the wrist centre is farther than 660 mm from …"``."""
-    return _CLAUSES[obstacle.code].format(bound=f"{1e3 * obstacle.bound:.0f} mm")
+    return CLAUSES[obstacle.code].format(bound=f"{1e3 * obstacle.bound:.0f} mm")

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from kin.solvers.singular import Condition, Lost, Singularity
 
-_CONDITIONS: dict[Condition, str] = {
+CONDITIONS: dict[Condition, str] = {
     "elbow straight": "elbow straight",
     "elbow folded": "elbow folded",
     "wrist centre level with axis 2": "wrist centre level with axis 2",
@@ -25,7 +25,7 @@ _CONDITIONS: dict[Condition, str] = {
     "axis 6 parallel to axes 2, 3 and 4": "axis 6 parallel to axes 2, 3 and 4",
     "smallest singular value": "smallest singular value of the {rows} × {columns} Jacobian",
 }
-_LOST: dict[Lost, str] = {
+LOSSES: dict[Lost, str] = {
     "wrist centre along the arm": "the wrist centre cannot move along the arm",
     "wrist centre sideways": "the wrist centre cannot move sideways",
     "wrist centre along axis 2": "the wrist centre cannot move along axis 2",
@@ -56,11 +56,11 @@ def short(found: Singularity, angle: Callable[[float], str] = degrees) -> str:
     `angle` words a value in radians in the reader's unit.
     """
     rows, columns = found.shape or (0, 0)
-    clause = _CONDITIONS[found.condition].format(rows=rows, columns=columns)
+    clause = CONDITIONS[found.condition].format(rows=rows, columns=columns)
     values = ", ".join(f"θ{at.joint + 1} = {angle(at.value)}" for at in found.met_at)
     return f"{clause} ({values})" if values else clause
 
 
 def long(found: Singularity, angle: Callable[[float], str] = degrees) -> str:
     """`short`, and what is lost: ``"elbow straight (θ4 = 0°): the hand cannot move along the arm"``."""
-    return f"{short(found, angle)}: {_LOST[found.lost]}"
+    return f"{short(found, angle)}: {LOSSES[found.lost]}"

@@ -377,7 +377,10 @@ class Wrist5(ClosedForm):
     """The closed form of a five-joint elbow arm with a two-axis wrist."""
 
     name, title, branches = NAME, TITLE, BRANCHES
-    reason = "axes 2 and 3 are parallel and perpendicular to axis 1, axes 3 and 4 meet at a right angle, and so do 4 and 5"
+    reason = (
+        "axes 2 and 3 are parallel and perpendicular to axis 1, "
+        "axes 3 and 4 meet at a right angle, and so do axes 4 and 5"
+    )
 
     def __init__(self, geometry: Geometry) -> None:
         g = self.geometry = geometry
@@ -388,7 +391,7 @@ class Wrist5(ClosedForm):
         self.kernels = BatchKernels(params, branches_one, branches_many)
 
     def handles(self, task: int) -> bool:
-        """A point, with an approach direction or not; of a whole pose :mod:`kin.ik` judges the roll that results."""
+        """A point, with or without an approach direction; :mod:`kin.ik` judges the roll that a pose gets."""
         return task in (POSE, APPROACH, POSITION)
 
     def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:

@@ -947,7 +947,8 @@ def solve(geometry: Geometry, problem: SolverInput) -> Candidates:
             mine = [(branch, t5, t5)]
         tilts += _union(mine)
     arcs = _as_joint(turns, limits[:, 3], g.offset[3]), _as_joint(tilts, limits[:, 4], g.offset[4])
-    return Candidates(out, out[:, 3:], arcs, 0.0, Obstacle("given joint values"))
+    obstacle = Obstacle("given joint values") if np.isnan(out).all() else None
+    return Candidates(out, out[:, 3:], arcs, 0.0, obstacle)
 
 
 def _found(answer: Array) -> list[int]:

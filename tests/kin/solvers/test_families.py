@@ -17,7 +17,7 @@ from arms import Draw
 import kin
 from kin import Joint, Robot, Status, solve_ik
 from kin.catalog import parse_robot
-from kin.solvers import parallel6, scara4, slide6, closed_form_of, wrist6
+from kin.solvers import closed_form_of, parallel6, scara4, slide6, wrist6
 from kin.solvers.contract import POSE, SolverInput
 from kin.solvers.numeric import spread
 
@@ -124,9 +124,9 @@ def members(family, count, seed=7):
 
 def branches(robot, T, near, value=math.nan):
     """All branches ``(b, n)`` by the fast path."""
-    solver, geometry, _ = closed_form_of(robot)
-    out = np.empty((len(solver.BRANCHES), robot.n))
-    solver.branches_one(solver.params(geometry), np.array(T), value, np.array(near), out)
+    form = closed_form_of(robot)
+    out = np.empty((len(form.branches), robot.n))
+    form.kernels.one(form.kernels.params, np.array(T), value, np.array(near), out)
     return out
 
 
@@ -227,7 +227,7 @@ def test_every_configuration_is_among_the_branches_of_its_pose_and_all_of_them_c
 def test_named_arms_are_recognised_and_have_all_their_branches(robot, family):
     match = closed_form_of(robot)
     assert family == match.name
-    assert match.solver.why(match.geometry)
+    assert match.reason
     rng = np.random.default_rng(2)
     counts = []
     for q in robot.random_q(rng, 20):
@@ -241,11 +241,12 @@ def test_named_arms_are_recognised_and_have_all_their_branches(robot, family):
 
 def mixture(robot, rng):
     """Targets ``(150, 4, 4)`` in no order: met at random, singular or nearly, moved and maybe out of reach."""
-    solver, g, q_of = canonical(robot)
+    form, q_of = canonical(robot)
+    g = form.geometry
     q = rng.uniform(-3, 3, (150, robot.n))
     eps = rng.choice([0.0, 1e-12, 1e-9, 1e-7], 60)
     for i in range(60):
-        if solver.NAME == "scara4":
+        if form.name == "scara4":
             q[i, g.order[1]] = g.sign[1] * (PI * rng.integers(0, 2) + eps[i] - g.offset[1])
             continue
         t = g.sign * q[i] + g.offset
@@ -256,7 +257,7 @@ def mixture(robot, rng):
         elif kind == 1:
             t[4] = PI * rng.integers(0, 2) + eps[i]
         else:
-            t[2] = (0.0 if solver.NAME == "slide6" else PI * rng.integers(0, 2)) + eps[i]
+            t[2] = (0.0 if form.name == "slide6" else PI * rng.integers(0, 2)) + eps[i]
         q[i] = q_of(t)
     T = kin.fk(robot, q)
     if robot.n > 3:  # a planar arm would leave its plane
@@ -266,9 +267,9 @@ def mixture(robot, rng):
 
 def careful(robot, T):
     """The branches of one target by the kernel that limits and ranges are computed with, without limits."""
-    solver, geometry, _ = closed_form_of(robot)
+    form = closed_form_of(robot)
     far = np.full(robot.n, 1e6)
-    return solver.solve(geometry, SolverInput(T, POSE, (math.nan,), False, robot.q_home.copy(), -far, far)).q
+    return form.solve(SolverInput(T, POSE, (math.nan,), False, robot.q_home.copy(), -far, far)).q
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -296,12 +297,12 @@ def test_a_batch_has_the_bits_of_its_targets_one_by_one_and_all_their_branches(f
 @pytest.mark.parametrize("family", FAMILIES)
 def test_the_kernels_tell_of_a_target_that_is_no_numbers(family):
     robot = members(family, 1, seed=3)[0]
-    solver, geometry, _ = closed_form_of(robot)
+    form = closed_form_of(robot)
     T = kin.fk(robot, robot.q_home)
-    out = np.empty((len(solver.BRANCHES), robot.n))
-    assert solver.branches_one(solver.params(geometry), T, math.nan, robot.q_home.copy(), out)
+    out = np.empty((len(form.branches), robot.n))
+    assert form.kernels.one(form.kernels.params, T, math.nan, robot.q_home.copy(), out)
     T[1, 3] = math.nan
-    assert not solver.branches_one(solver.params(geometry), T, math.nan, robot.q_home.copy(), out)
+    assert not form.kernels.one(form.kernels.params, T, math.nan, robot.q_home.copy(), out)
     assert np.isnan(out).any(axis=1).all()
 
 
@@ -344,7 +345,7 @@ def test_an_axis_a_little_off_is_another_arm(family):
     asked = {"wrist6": (0, 1, 3, 4), "parallel6": (1, 2, 3, 4), "slide6": (0, 1, 3, 4), "scara4": (0, 1)}[family]
     checked = 0
     for robot in members(family, 12, seed=5):
-        if robot.convention != "standard" or family != closed_form_of(robot).solver.NAME:
+        if robot.convention != "standard" or family != closed_form_of(robot).name:
             continue
         for row in asked:
             rows = list(robot.rows)
@@ -364,14 +365,15 @@ def test_axes_that_pass_each_other_by_are_another_arm():
 
 
 def canonical(robot):
-    """(solver, geometry, q of canonical angles)."""
-    solver, g, _ = closed_form_of(robot)
+    """(closed form, q of canonical angles)."""
+    form = closed_form_of(robot)
+    g = form.geometry
 
     def q_of(t):
         q = g.sign * (np.asarray(t) - g.offset)
         return np.where(robot.revolute, (q + PI) % (2 * PI) - PI, q)
 
-    return solver, g, q_of
+    return form, q_of
 
 
 def reach_zero(g, t):
@@ -394,9 +396,10 @@ def test_singular_targets_have_answers_that_close(family):
     rng = np.random.default_rng(6)
     seen = set()
     for robot in members(family, 40, seed=6):
-        if family != closed_form_of(robot).solver.NAME:
+        if family != closed_form_of(robot).name:
             continue
-        _, g, q_of = canonical(robot)
+        form, q_of = canonical(robot)
+        g = form.geometry
         for mode in range(1, 8):
             t = rng.uniform(-3, 3, 6)
             eps = float(rng.choice([0.0, 1e-12, 1e-9, 1e-7]))
@@ -455,7 +458,8 @@ def check_arcs(robot, q, joint, task="pose"):
 def test_with_the_wrist_centre_on_axis_1_the_ranges_of_theta_1_are_exact():
     rows = tuple(replace(row, d=0.4318 * (i == 3)) for i, row in enumerate(puma560().rows))
     robot = narrow(replace(puma560(), rows=rows), (2.5, 3.1, 3.1, 1.5, 1.4, 2.0))
-    _, g, q_of = canonical(robot)
+    form, q_of = canonical(robot)
+    g = form.geometry
     assert g.beside == 0.0
     rng = np.random.default_rng(8)
     some = 0
@@ -485,22 +489,23 @@ def test_with_axis_6_parallel_to_the_three_the_ranges_of_theta_6_are_exact():
 def test_the_distances_told_are_the_factors_of_the_determinant(family):
     rng = np.random.default_rng(10)
     for robot in members(family, 15, seed=10):
-        if family != closed_form_of(robot).solver.NAME:
+        if family != closed_form_of(robot).name:
             continue
-        solver, g, _ = closed_form_of(robot)
+        form = closed_form_of(robot)
+        g = form.geometry
         ratios = []
         for q in rng.uniform(-3, 3, (5, robot.n)):
             J = kin.jacobian(robot, q)
             volume = math.sqrt(np.linalg.det(J.T @ J)) if family == "scara4" else abs(np.linalg.det(J))
-            told = solver.singularities(g, q)
-            factors = math.prod(math.sin(s.distance) if s.unit == "rad" else s.distance for s in told)
+            found = form.singularities(q)
+            factors = math.prod(math.sin(s.distance) if s.unit == "rad" else s.distance for s in found)
             ratios.append(volume / factors)
         if family == "scara4":
             # The tool's lever makes no factor of the reduced Jacobian; only the zeros agree.
             q[g.order[1]] = -g.sign[1] * g.offset[1]
             J = kin.jacobian(robot, q)
             assert np.linalg.svd(J, compute_uv=False)[robot.n - 1] < 1e-12
-            assert solver.singularities(g, q)[0].distance < 1e-12
+            assert form.singularities(q)[0].distance < 1e-12
         else:
             np.testing.assert_allclose(ratios, ratios[0], rtol=1e-6)
 
@@ -591,5 +596,5 @@ def test_a_roll_that_is_free_stays_with_the_seed():
 def test_only_arms_that_can_be_on_axis_1_have_a_free_theta_1():
     beside, over = puma560(), kr6()
     for robot, names in ((beside, []), (over, ["theta1"])):
-        solver, g, _ = closed_form_of(robot)
-        assert [f.name for f in solver.freedoms(g, 0)] == names
+        form = closed_form_of(robot)
+        assert [f.name for f in form.redundancies(0)] == names

@@ -14,7 +14,8 @@ from kin.solvers.contract import POSITION, SolverInput
 from kin.solvers.wrist5 import point as point5
 
 ROBOT = kin.get_robot("pioneer5")
-GEOMETRY = closed_form_of(ROBOT).geometry
+FORM = closed_form_of(ROBOT)
+GEOMETRY = FORM.geometry
 SLACK = 1e-9
 
 
@@ -279,7 +280,7 @@ def test_a_range_of_theta4_ends_where_it_says(wide):
                         if ((turned > low) & (turned < high)).all():
                             sines = np.sin(q[[2, 4]])
                             split = np.abs(sines).min() < 1e-6
-                            assert split or closed_form_of(ROBOT).solver.branch_of(GEOMETRY, q) != branch
+                            assert split or FORM.branch_of(q) != branch
     assert ends >= 4
 
 

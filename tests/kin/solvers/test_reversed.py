@@ -15,38 +15,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from arms import Draw, nested
+from arms import reversed_at as turned
 
 import kin
 from kin import Joint, Robot, Status, solve_ik
 from kin.solvers import closed_form_of
 from kin.solvers.common import screw_x, screw_z
-from kin.solvers.mirrored import Mirrored, readings
+from kin.solvers.reversed import ReversedJoints, readings
 
 PI = math.pi
 ARMS = {name: kin.get_robot(name) for name in ("pioneer5", "redundant7", "redundant7-craig", "iiwa14")}
-HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])
 # Which single joints no closed form is used to, by arm: 7 only in order to have approach directions.
 STRANGE = {"pioneer5": (1, 2, 3), "redundant7": (0, 1, 2, 4), "redundant7-craig": (2, 4, 6), "iiwa14": (2, 4, 6)}
-
-
-def turned(robot, joints):
-    """The same arm in space by a table in which `joints` count the other way round."""
-    rows, base, tool, home = list(robot.rows), np.array(robot.base), np.array(robot.tool), list(robot.home)
-    for i in joints:
-        k, home[i] = robot.joint_rows[i], -home[i]
-        row = rows[k]
-        limits = None if row.limits is None else (-row.limits[1], -row.limits[0])
-        rows[k] = replace(row, theta=-row.theta, d=-row.d, alpha=row.alpha + PI, limits=limits)
-        neighbour = k - 1 if robot.convention == "standard" else k + 1
-        if neighbour < 0:
-            base = base @ HALF_TURN
-        elif neighbour == len(rows):
-            tool = HALF_TURN @ tool
-        else:
-            rows[neighbour] = replace(rows[neighbour], alpha=rows[neighbour].alpha + PI)
-    rows = [replace(row, alpha=math.remainder(row.alpha, 2 * PI)) for row in rows]
-    name = f"{robot.id}-{''.join(str(i + 1) for i in joints)}"
-    return replace(robot, id=name, rows=tuple(rows), home=tuple(home), base=nested(base), tool=nested(tool))
 
 
 def signs_of(robot, joints):
@@ -75,10 +55,10 @@ class Pair:
     def __init__(self, robot):
         self.robot = robot
         self.match = closed_form_of(robot)
-        self.joints = getattr(self.match.solver, "joints", ())
+        self.joints = getattr(self.match, "joints", ())
         self.plain = turned(robot, self.joints)
         self.signs = signs_of(robot, self.joints)
-        assert not isinstance(closed_form_of(self.plain).solver, Mirrored)
+        assert not isinstance(closed_form_of(self.plain), ReversedJoints)
 
     def value(self, name, x):
         """A free value of the plain arm as the other one has it."""
@@ -162,11 +142,11 @@ def test_whatever_counts_otherwise_the_arm_keeps_its_family_and_tasks(name):
         for joints in itertools.combinations(range(n), count):
             match = closed_form_of(turned(ARMS[name], joints))
             assert match is not None, joints
-            assert match.name == base.solver.NAME
-            assert match.branches == base.solver.BRANCHES
+            assert match.name == base.name
+            assert match.branches == base.branches
             for task in range(4):
-                assert match.handles(task) == base.solver.handles(base.geometry, task)
-            assert len(getattr(match.solver, "joints", ())) <= count
+                assert match.handles(task) == base.handles(task)
+            assert len(getattr(match, "joints", ())) <= count
 
 
 @pytest.mark.parametrize("name", ARMS)
@@ -174,19 +154,17 @@ def test_a_single_joint_that_a_closed_form_is_not_used_to_is_the_one_turned_roun
     for joint in range(ARMS[name].n):
         match = closed_form_of(turned(ARMS[name], (joint,)))
         strange = joint in STRANGE[name]
-        assert isinstance(match.solver, Mirrored) == strange
-        assert match.reason.endswith(f"; joint {joint + 1} counts the other way round") == strange
-    assert closed_form_of(turned(ARMS["iiwa14"], (2, 4))).reason.endswith("; joints 3 and 5 count the other way round")
-    assert closed_form_of(turned(ARMS["iiwa14"], (2, 4, 6))).reason.endswith(
-        "joints 3, 5 and 7 count the other way round"
-    )
+        assert isinstance(match, ReversedJoints) == strange
+        assert match.reason.endswith(f"; joint {joint + 1} is reversed") == strange
+    assert closed_form_of(turned(ARMS["iiwa14"], (2, 4))).reason.endswith("; joints 3 and 5 are reversed")
+    assert closed_form_of(turned(ARMS["iiwa14"], (2, 4, 6))).reason.endswith("; joints 3, 5 and 7 are reversed")
 
 
 def test_arms_of_no_family_are_left_alone():
     for name in ("panda", "ur5", "puma560", "irb120", "stanford", "scara", *ARMS):
         match = closed_form_of(kin.get_robot(name))
         assert (match is None) == (name == "panda")
-        assert match is None or not isinstance(match.solver, Mirrored)
+        assert match is None or not isinstance(match, ReversedJoints)
     one = Robot(
         "one", "one", "test", "standard", (Joint("j", 0.0, 0.1, 0.2, 0.3, "revolute", (-1.0, 1.0)),), (0.0,)
     )
@@ -358,7 +336,7 @@ def test_the_branches_of_the_arm_itself_are_there_and_named_alike(name, joints):
         here, there = kin.branch_of(base, q), kin.branch_of(robot, q * signs)
         assert names.setdefault(here, there) == there
     assert len(set(names.values())) == len(names)
-    exact = getattr(closed_form_of(robot).solver, "joints", ()) == joints
+    exact = getattr(closed_form_of(robot), "joints", ()) == joints
     if exact:
         assert all(here == there for here, there in names.items())
     for q, T in poses(base, 3, seed=9):
@@ -375,38 +353,35 @@ def test_the_branches_of_the_arm_itself_are_there_and_named_alike(name, joints):
             )
 
 
-NUMBER = re.compile(r"θ(\d) = (-?[\d.]+)°")
-
-
 @cases
 def test_singularities_tell_the_real_joints_value(name, joints):
     pair = Pair(turned(ARMS[name], joints))
-    told = 0
+    reversed_values = 0
     for q, _ in poses(pair.plain, 20, seed=10):
         expected = kin.singularities(pair.plain, q)
         found = kin.singularities(pair.robot, q * pair.signs)
         assert len(expected) == len(found)
         for a, b in zip(expected, found, strict=True):
-            assert (a.kind, a.unit) == (b.kind, b.unit)
+            assert (a.kind, a.condition, a.lost, a.unit) == (b.kind, b.condition, b.lost, b.unit)
             assert abs(a.distance - b.distance) < 1e-9
-            assert NUMBER.sub("", a.meaning) == NUMBER.sub("", b.meaning)
-            for (i, x), (k, y) in zip(NUMBER.findall(a.meaning), NUMBER.findall(b.meaning), strict=True):
+            for (i, x), (k, y) in zip(a.met_at, b.met_at, strict=True):
                 assert i == k
-                assert abs(float(x) * pair.signs[int(i) - 1] - float(y)) < 2e-3
-                told += int(i) - 1 in pair.joints
+                assert abs(x * pair.signs[i] - y) < 1e-9
+                reversed_values += i in pair.joints
     alone = {"pioneer5": {2, 4}, "redundant7": {2, 3, 5}}.get(name, {1, 2, 3, 4, 5})
-    assert told > 0 or not alone & set(pair.joints)
+    assert reversed_values > 0 or not alone & set(pair.joints)
 
 
 @cases
-def test_the_values_told_are_singular(name, joints):
+def test_the_arm_is_singular_at_the_joint_values_given(name, joints):
     robot = turned(ARMS[name], joints)
     for s in kin.singularities(robot, robot.q_home):
         q = robot.q_home.copy()
-        for i, value in NUMBER.findall(s.meaning):
-            q[int(i) - 1] = math.radians(float(value))
-        there = next(x for x in kin.singularities(robot, q) if x.meaning == s.meaning)
-        assert there.distance < 1e-4 or not NUMBER.search(s.meaning)
+        for i, value in s.met_at:
+            q[i] = value
+        there = next(x for x in kin.singularities(robot, q) if (x.kind, x.lost) == (s.kind, s.lost))
+        assert there.condition == s.condition
+        assert there.distance < 1e-9 or not s.met_at
 
 
 # -- paths and maps -----------------------------------------------------------------------------------------------
@@ -418,7 +393,7 @@ def test_a_path(name, joints):
     start, end = (q for q, _ in poses(pair.plain, 2, seed=11))
     way = [kin.fk(pair.plain, start + s * 0.3 * (end - start)) for s in np.linspace(0.0, 1.0, 8)]
     a, b = kin.solve_path(pair.plain, way), kin.solve_path(pair.robot, way)
-    assert a.solver == b.solver == closed_form_of(pair.plain).solver.NAME
+    assert a.solver == b.solver == closed_form_of(pair.plain).name
     assert len(a.jumps) == len(b.jumps)
     assert np.allclose(a.q, b.q * pair.signs, atol=1e-5, equal_nan=True)
 
@@ -504,7 +479,7 @@ def test_tables_from_elsewhere(family):
         match = closed_form_of(robot)
         assert match is not None
         assert family == match.name
-        as_it_is += not isinstance(match.solver, Mirrored)
+        as_it_is += not isinstance(match, ReversedJoints)
         q = robot.random_q(draw.rng, 3)
         T = kin.fk(robot, q)
         for row in kin.ik_branches(robot, T).swapaxes(0, 1):
@@ -517,7 +492,5 @@ def test_tables_from_elsewhere(family):
             assert np.abs(result.solutions[0].q - seed).max() < 1e-6
             assert result.solutions[0].branch == kin.branch_of(robot, seed)
             assert all(s.branch == kin.branch_of(robot, s.q) for s in result.solutions)
-            assert match.handles(1) == (
-                family == "wrist5" or robot.T_last_tool[0, 3] == 0.0
-            )
+            assert match.handles(1) == (family == "wrist5" or robot.T_last_tool[0, 3] == 0.0)
     assert 0 < as_it_is < 20
