@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
-
-from kin.solvers.singular import Condition, Lost, Singularity
+from kin.solvers.singular import Condition, JointValue, Lost, Singularity
+from kin.units import DEFAULT_UNITS, Units
 
 CONDITIONS: dict[Condition, str] = {
     "elbow straight": "elbow straight",
@@ -45,22 +43,23 @@ LOSSES: dict[Lost, str] = {
 }
 
 
-def degrees(angle: float) -> str:
-    """A joint value in degrees, three decimals at most."""
-    return f"{round(math.degrees(angle), 3) + 0.0:g}°"
+DECIMALS = 3  # of a degree, at most
 
 
-def short(found: Singularity, angle: Callable[[float], str] = degrees) -> str:
-    """What aligns, with the joint values at which it does: ``"elbow straight (θ4 = 0°)"``.
-
-    `angle` words a value in radians in the reader's unit.
-    """
+def short(found: Singularity, units: Units = DEFAULT_UNITS) -> str:
+    """What aligns, with the joint values at which it does: ``"elbow straight (θ4 = 0°)"``."""
     rows, columns = found.shape or (0, 0)
     clause = CONDITIONS[found.condition].format(rows=rows, columns=columns)
-    values = ", ".join(f"θ{at.joint + 1} = {angle(at.value)}" for at in found.met_at)
+    values = ", ".join(_joint_value(at, units) for at in found.met_at)
     return f"{clause} ({values})" if values else clause
 
 
-def long(found: Singularity, angle: Callable[[float], str] = degrees) -> str:
+def long(found: Singularity, units: Units = DEFAULT_UNITS) -> str:
     """`short`, and what is lost: ``"elbow straight (θ4 = 0°): the hand cannot move along the arm"``."""
-    return f"{short(found, angle)}: {LOSSES[found.lost]}"
+    return f"{short(found, units)}: {LOSSES[found.lost]}"
+
+
+def _joint_value(at: JointValue, units: Units) -> str:
+    unit = units.angles
+    value = round(at.value * unit.scale, unit.decimals(DECIMALS)) + 0.0  # no minus before a zero
+    return f"θ{at.joint + 1} = {value:g}{unit.suffix}"

@@ -130,11 +130,11 @@ def warning_html(robot: Robot, found: tuple[Singularity, ...], units: Units, dir
     mark, _, color = LOOKS[state]
     sentences = []
     if first is not None and state == "at":
-        sentences = [units.retold(short(first)), *directions]
+        sentences = [short(first, units), *directions]
     elif first is not None:
         name = "Smallest σ" if first.kind == "jacobian" else first.kind
         away = "" if first.kind == "jacobian" else " away"
-        sentences = [f"{name}, {distance(first, units)}{away}", units.retold(long(first)), *directions[:1]]
+        sentences = [f"{name}, {distance(first, units)}{away}", long(first, units), *directions[:1]]
     detail = " ".join(f"{s[:1].upper()}{s[1:].rstrip('.')}." for s in sentences)
     return (
         f'<div role="status" data-singular="{state}" style="display:flex;gap:.6em;margin:.15em 1em .35em;'
@@ -156,7 +156,7 @@ def others_html(robot: Robot, found: tuple[Singularity, ...], units: Units) -> s
         name = {"algorithmic": "formula only", "jacobian": "smallest σ"}.get(s.kind, s.kind)
         if s.kind == "algorithmic":
             mark, word, color = "·", "–", "inherit"
-        meaning = escape(units.retold(long(s)), quote=True)
+        meaning = escape(long(s, units), quote=True)
         rows += (
             f'<tr title="{meaning}"><td style="padding:0 .5em 0 0;font-weight:700;'
             f'color:{ink(color)};white-space:nowrap">{mark} {word}</td><td style="padding:0">{escape(name)}</td>'
