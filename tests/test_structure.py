@@ -397,10 +397,7 @@ KNOWN: dict[Rule, set[str]] = {
         "kin/solvers/srs7.py: wish",
         "kin/solvers/wrist5/__init__.py: square to",
         "kin/solvers/wrist5/point.py: wish",
-<<<<<<< HEAD
         "kin/solvers/wrist6.py: square to",
-=======
->>>>>>> b031cd5 (Singularity messages take the reader's units)
         "kin/workspace/capability/blocks.py: who wants",
         "kin/workspace/capability/gauge.py: told",
         "kin/workspace/clouds/draw.py: dear",
