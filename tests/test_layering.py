@@ -36,7 +36,7 @@ RULES: dict[str, set[str]] = {
         *("typing_extensions", "distributed"),
     },
     "app/exports": {"kin", "numpy", "scipy", "trimesh", "PIL", "app.exports", "app.shared"},
-    "app/equations": {"kin", "numpy", "sympy", "app.equations"},
+    "app/equations": {"kin", "numpy", "sympy", "app.equations", "app.shared.computations"},
     "app/bench": {"kin", "numpy", "numba", "app.bench"},
     "app/bench/contestants.py": {
         *("kin", "numpy", "numba", "app.bench"),

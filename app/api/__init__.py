@@ -1,7 +1,7 @@
 """The REST door: ``api_routes()`` are those of /api/v1, `install_problem_handlers` the one error shape.
 
 Routes find what they share in ``app.state``: robots in ``store``, ``settings``, ``clouds``, the ``gate`` that
-counts the clouds and maps under way, capability ``maps``, in ``sizes`` those computed, and in ``work`` the
+counts the clouds and maps under way, capability ``maps``, ``summaries`` (sizes and sections), and in ``work`` the
 places to compute in.
 """
 
@@ -13,9 +13,8 @@ from app.api.problems import install_problem_handlers
 from app.api.work import Work
 from app.api.workspace import capability, download, reachable, socket, summary
 from app.api.workspace.flow import Gate
-from app.api.workspace.summary import memory
 
-__all__ = ["Gate", "Work", "api_routes", "complete_document", "install_problem_handlers", "memory"]
+__all__ = ["Gate", "Work", "api_routes", "complete_document", "install_problem_handlers"]
 
 _MODULES = (robots, fk, ik, path, jacobian, equations, download, socket, summary, reachable, capability)
 

@@ -76,12 +76,11 @@ class Work:
         """End all work that still asks for its budget, and all waiting."""
         self.closed = True
 
-    async def wait(self, answer: Future[T]) -> T:
-        """What another thread is computing; raises 503 if that takes too long. It goes on being computed."""
+    async def wait(self, answer: Future[T], budget: Budget) -> T:
+        """The result of another thread; raises 503 if that takes too long. The computation goes on."""
         # Waited for and not awaited: a visitor who leaves must not cancel it for the others.
         wrapped = asyncio.wrap_future(answer)
-        ends = time.monotonic() + self.seconds
-        while not self.closed and (left := ends - time.monotonic()) > 0.0:
+        while not self.closed and (left := budget.left) > 0.0:
             await asyncio.wait((wrapped,), timeout=min(left, LOOK))
             if wrapped.done():
                 return wrapped.result()
@@ -97,11 +96,16 @@ class Budget:
         self._work = work
         self._ends = time.monotonic() + work.seconds
 
+    @property
+    def left(self) -> float:
+        """Seconds until the time is over."""
+        return self._ends - time.monotonic()
+
     def check(self) -> None:
         """Raises 503 when the time is over or the service is being stopped; any thread may ask."""
         if self._work.closed:
             raise stopping()
-        if time.monotonic() > self._ends:
+        if self.left < 0.0:
             raise too_slow(self._work.seconds)
 
 

@@ -1,7 +1,7 @@
 """The equations of one arm, ready to be shown: the chapter's own, or derived ones that have passed their check.
 
-`book` makes them in the calling thread, for REST and scripts. A visitor's worker must not wait for sympy, so it
-asks `book_later` and goes on drawing. Both share one cache.
+`book` returns them when they are ready, for REST and scripts. A visitor's worker must not wait for sympy, so it
+calls `book_later` and goes on drawing. Both share one cache and one thread.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -17,6 +17,7 @@ import numpy as np
 from app.equations.derive import AXES, COLUMNS, Line, derive
 from app.equations.expression import Expression, astray, from_text, names, value
 from app.equations.symbols import Symbol, chapter_symbols
+from app.shared.computations import ComputationCache
 from kin import Robot, chapter, fk, get_robot
 from kin.transforms import Array
 
@@ -180,13 +181,24 @@ class Book:
         known[name] = value(form, known)
 
 
-@lru_cache(maxsize=KEPT)
 def book(robot: Robot) -> Book:
     """The equations of an arm: the chapter's if it prints any, else derived and checked, which may take a second.
 
     Raises:
-        DerivationError: the check failed, by how much the message says.
+        DerivationError: the check failed; the message states the difference.
     """
+    return book_later(robot).result()
+
+
+def book_later(robot: Robot) -> Future[Book]:
+    """Future of `book`, computed in a background thread, one arm after the other. Do not cancel it."""
+    return _BOOKS.get(robot, lambda _: _make(robot))
+
+
+_BOOKS: ComputationCache[Book] = ComputationCache(ThreadPoolExecutor(1, thread_name_prefix="equations"), KEPT)
+
+
+def _make(robot: Robot) -> Book:
     if robot.id in chapter.LENGTHS and robot == get_robot(robot.id):
         return _chapter_book(robot)
     derived = derive(robot)
@@ -195,15 +207,6 @@ def book(robot: Robot) -> Book:
     out = Book(robot, "derived", derived.symbols, derived.lines, equations)
     check(out)
     return out
-
-
-@lru_cache(maxsize=KEPT)
-def book_later(robot: Robot) -> Future[Book]:
-    """The same in a thread of its own, one arm after the other. Its error, if any, is the future's."""
-    return _POOL.submit(book, robot)
-
-
-_POOL = ThreadPoolExecutor(1, thread_name_prefix="equations")
 
 
 def check(found: Book) -> None:

@@ -30,7 +30,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from app.shared.clouds import DRAWN, Cloud, Clouds
+from app.shared.clouds import Cloud, Clouds
 from kin import WorkspaceChunk
 from kin.transforms import Array
 from kin.workspace import Measure
@@ -85,7 +85,7 @@ def table_of(cloud: Cloud, with_q: bool) -> Table:
 
 def slices(clouds: Clouds, cloud: Cloud, with_q: bool) -> Generator[WorkspaceChunk]:
     """The whole cloud in order, in slices of a size that fits its strategy; close it to stop the work."""
-    return clouds.stream(cloud, DESCENDED if cloud.strategy in ("boundary", "volume") else DRAWN, with_q)
+    return clouds.stream(cloud, cloud.part_size, with_q)
 
 
 def encode(

@@ -30,7 +30,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.middleware.cors import CORSMiddleware
 from starlette.responses import PlainTextResponse
 
-from app.api import Gate, Work, api_routes, complete_document, install_problem_handlers, memory
+from app.api import Gate, Work, api_routes, complete_document, install_problem_handlers
 from app.service.startup import Startup
 from app.service.startup import Status as StartupStatus
 from app.service.web.access import Access
@@ -43,10 +43,11 @@ from app.service.workers import supervise
 from app.shared.clouds import Clouds
 from app.shared.maps import Maps
 from app.shared.metrics import CONTENT_TYPE, exposition
-from app.shared.processor import keep_to_one
 from app.shared.security import SecurityHeaders
 from app.shared.settings import Settings
 from app.shared.store import Store
+from app.shared.summaries import Summaries
+from app.shared.threads import pin
 from kin import RobotFileError, __version__
 
 # Seconds that a thread may keep the interpreter while others wait. A drag goes through three threads: beside a
@@ -83,9 +84,9 @@ def create_app(
     """
     store = store or Store(settings.robots)
     bridge = ViewerBridge(settings.allowed_origins, settings.max_visitors)
-    clouds, maps, sizes = Clouds(settings.cloud_memory), Maps(), memory()
+    clouds, maps, summaries = Clouds(settings.cloud_memory), Maps(), Summaries()
     work = Work(settings.max_requests, settings.time_budget)
-    startup = Startup(settings, store, clouds, maps, bridge, on_ready)
+    startup = Startup(settings, store, clouds, maps, summaries, bridge, on_ready)
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
@@ -95,7 +96,7 @@ def create_app(
         await run_in_threadpool(startup.stop)
         clouds.close()
         maps.close()
-        sizes.close()
+        summaries.close()
 
     app = FastAPI(
         title="Kinboard",
@@ -110,7 +111,7 @@ def create_app(
         lifespan=lifespan,
     )
     app.state.store, app.state.settings, app.state.startup = store, settings, startup
-    app.state.clouds, app.state.gate, app.state.sizes = clouds, Gate(settings.max_streams), sizes
+    app.state.clouds, app.state.gate, app.state.summaries = clouds, Gate(settings.max_streams), summaries
     app.state.work = work
     app.state.maps = maps
     install_problem_handlers(app)
@@ -196,7 +197,7 @@ def _serve(
 ) -> int:
     """Serve on one socket, in this process: of several the one of this number."""
     if settings.pin:
-        keep_to_one(number)
+        pin(number)
     if settings.access_log:
         write_to_stderr()
     sys.setswitchinterval(SWITCH)

@@ -13,10 +13,12 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal
 
 from app.service.web.viewer_proxy import ViewerBridge
-from app.shared.clouds import Clouds, step_back
+from app.shared.clouds import Clouds
 from app.shared.maps import Maps
 from app.shared.settings import Settings
 from app.shared.store import Store
+from app.shared.summaries import Summaries
+from app.shared.threads import lower_priority
 from kin import warm_up, warm_up_rest
 
 if TYPE_CHECKING:
@@ -40,6 +42,7 @@ class Startup:
         store: Store,
         clouds: Clouds,
         maps: Maps,
+        summaries: Summaries,
         bridge: ViewerBridge,
         on_ready: Callable[[], None] | None = None,
     ) -> None:
@@ -48,6 +51,7 @@ class Startup:
         self._store = store
         self._clouds = clouds
         self._maps = maps
+        self._summaries = summaries
         self._bridge = bridge
         self._on_ready = on_ready
         self._viewer: ViewerServer | None = None
@@ -86,7 +90,7 @@ class Startup:
             self.status = "failed"
 
     def _warm_up_rest(self) -> None:
-        step_back()
+        lower_priority()
         try:
             warm_up_rest(self._stopping.is_set)
         except Exception:
@@ -98,7 +102,7 @@ class Startup:
             # viser takes half a second to import: the landing page and REST need not wait for it.
             from app.viewer.server import ViewerServer
 
-            viewer = ViewerServer(self._store, self._settings, self._clouds, self._maps)
+            viewer = ViewerServer(self._store, self._settings, self._clouds, self._maps, self._summaries)
             self._bridge.port = viewer.start()
             self._viewer = viewer
         finally:

@@ -16,6 +16,7 @@ import viser
 from app.shared.clouds import Clouds
 from app.shared.maps import Maps
 from app.shared.store import Store
+from app.shared.summaries import Summaries
 from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import Sphere
 from kin import IKResult, Robot, Task
@@ -29,6 +30,7 @@ class Stage(Protocol):
     store: Store
     clouds: Clouds
     maps: Maps
+    summaries: Summaries
 
     @property
     def client(self) -> viser.ClientHandle:

@@ -13,6 +13,7 @@ from app.shared.clouds import Clouds
 from app.shared.maps import Maps
 from app.shared.settings import Settings
 from app.shared.store import Store
+from app.shared.summaries import Summaries
 from app.viewer.panel.status import Notice
 from app.viewer.panel.view import configure_theme
 from app.viewer.quick import quick_loops, remember_hints, wake_in_the_loop
@@ -34,14 +35,23 @@ class ViewerServer:
     """Serves the 3-D page. Bound to 127.0.0.1: the public port bridges to it and decides who may come in.
 
     Args:
-        maps: shared with others; None for some of its own.
+        maps, summaries: shared with REST; None for its own.
     """
 
-    def __init__(self, store: Store, settings: Settings, clouds: Clouds, maps: Maps | None = None) -> None:
+    def __init__(
+        self,
+        store: Store,
+        settings: Settings,
+        clouds: Clouds,
+        maps: Maps | None = None,
+        summaries: Summaries | None = None,
+    ) -> None:
         self._store = store
         self._clouds = clouds
         self._maps = maps or Maps()
         self._owns_maps = maps is None
+        self._summaries = summaries or Summaries()
+        self._owns_summaries = summaries is None
         self._settings = settings
         self._server: viser.ViserServer | None = None
         self._sessions: dict[int, Session] = {}
@@ -80,6 +90,8 @@ class ViewerServer:
                 log.error("a visitor's worker did not end within %s s", PATIENCE)
         if self._owns_maps:
             self._maps.close()
+        if self._owns_summaries:
+            self._summaries.close()
 
     @property
     def visitors(self) -> int:
@@ -95,6 +107,7 @@ class ViewerServer:
             self._store,
             self._clouds,
             self._maps,
+            self._summaries,
             self._pace,
             self._settings.token is not None,
             welcome,

@@ -15,7 +15,7 @@ from app.api.schemas import RobotId, refusals, reply, robot_of, settings_of
 from app.api.work import Budget, work_of
 from app.api.workspace.query import RegionQuery
 from app.shared.answers.capability import CapabilityMapAnswer, capability_map_answer
-from app.shared.maps import Maps, Wanted
+from app.shared.maps import MapRequest, Maps
 
 router = versioned("workspace")
 
@@ -61,10 +61,10 @@ async def capability(
         raise invalid(wrong, hint="`kinboard capability` computes finer maps, or ask the operator for more.")
     robot = robot_of(request, robot_id)
     limits, locked = query.bounds(robot)
-    wanted = Wanted(robot, query.resolution, int(query.directions), limits, locked)
+    wanted = MapRequest(robot, query.resolution, int(query.directions), limits, locked)
     maps: Maps = request.app.state.maps
     with request.app.state.gate.place():
-        budget, reader = Budget(work_of(request)), maps.read(wanted)
+        budget, reader = Budget(work_of(request)), maps.subscribe(wanted)
         try:
             answer = asyncio.wrap_future(reader.future)
             while not answer.done():

@@ -13,6 +13,7 @@ from app.api.problems import FieldError, field_error, from_input_error, invalid,
 from app.api.schemas import LARGEST, Body
 from app.shared.clouds import Cloud
 from app.shared.settings import Settings
+from app.shared.summaries import Bounds, Locks
 from kin import InputError, Robot
 from kin.workspace import Measure, Strategy
 from kin.workspace.region import Region
@@ -20,8 +21,6 @@ from kin.workspace.region import Region
 _OF_CORE = {"limits": "limit", "locked": "lock"}
 _SEEDS = 1 << 64
 
-Bounds = tuple[tuple[float, float] | None, ...]
-Locks = tuple[float | None, ...]
 NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 
 

@@ -21,6 +21,7 @@ from app.shared.clouds import Clouds
 from app.shared.maps import Maps
 from app.shared.metrics import SOLVE_SECONDS
 from app.shared.store import Store
+from app.shared.summaries import Summaries
 from app.viewer.feature import Feature
 from app.viewer.lessons import LESSONS
 from app.viewer.panel import assign
@@ -61,6 +62,7 @@ class Session(Worker):
         store: Store,
         clouds: Clouds,
         maps: Maps,
+        summaries: Summaries,
         pace: Pace,
         token: bool = False,
         welcome: Notice = WELCOME,
@@ -70,6 +72,7 @@ class Session(Worker):
         self.store = store
         self.clouds = clouds
         self.maps = maps
+        self.summaries = summaries
         self._client = client
         self._pace = pace
         self._welcome = welcome

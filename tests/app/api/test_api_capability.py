@@ -107,7 +107,7 @@ def test_one_who_leaves_ends_the_work_and_gives_the_place_back(live, held):
         client.get(f"{ADDRESS}?resolution=30&directions=12", timeout=1.0)
     wait_for(lambda: app.state.gate.open == 0)
     go.set()
-    wait_for(lambda: not app.state.maps._works)
+    wait_for(lambda: len(app.state.maps._maps) == 0)
     assert len(begun) <= 2
 
 

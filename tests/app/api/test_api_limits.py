@@ -15,7 +15,6 @@ from fastapi.testclient import TestClient
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-import app.api.workspace.summary
 import kin
 from app.api.problems import ProblemError
 from app.api.work import Work
@@ -45,7 +44,7 @@ def refused_as_too_slow(answer):
 
 def test_a_batch_that_takes_minutes_is_given_up(hurried, monkeypatch):
     solved = []
-    solve = app.api.ik.solve_ik
+    solve = kin.solve_ik
     monkeypatch.setattr("app.api.ik.solve_ik", lambda *a, **k: solved.append(1) or solve(*a, **k))
     refused_as_too_slow(hurried.post(f"{PANDA}/ik", json={"target": [FAR] * 10_000}))
     assert len(solved) < 1000
@@ -77,7 +76,7 @@ def test_sizes_that_take_long_are_there_when_asked_for_again(hurried, monkeypatc
         done.wait(30)
         return facts(robot, **asked)
 
-    monkeypatch.setattr(app.api.workspace.summary, "workspace_facts", slow)
+    monkeypatch.setattr("app.shared.summaries.workspace_facts", slow)
     refused_as_too_slow(hurried.get(f"{ARM}/workspace/summary?volume=false"))
     done.set()
     deadline = time.monotonic() + 30

@@ -16,11 +16,9 @@ from pydantic import TypeAdapter
 
 import kin
 from app.api import Gate, api_routes, install_problem_handlers
-from app.api.problems import ProblemError
 from app.api.work import Work
-from app.api.workspace import reachable, summary
+from app.api.workspace import reachable
 from app.api.workspace.flow import Pieces
-from app.api.workspace.summary import Memory
 from app.exports.formats import FORMATS, encode
 from app.service.main import create_app
 from app.shared.answers.ik import ReachableAnswer
@@ -28,6 +26,7 @@ from app.shared.answers.workspace import WorkspaceAnswer
 from app.shared.clouds import Cloud, Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
+from app.shared.summaries import Summaries
 
 PIONEER = kin.get_robot("pioneer5")
 SRS = kin.get_robot("redundant7-craig")
@@ -41,13 +40,14 @@ def live():
     app = FastAPI()
     app.state.settings, app.state.store = Settings(), Store()
     app.state.work = Work(16, 300.0)
-    app.state.clouds, app.state.gate, app.state.sizes = Clouds(max_bytes=0, threads=1), Gate(2), Memory(8, 1, 8)
+    app.state.clouds, app.state.gate = Clouds(max_bytes=0, threads=1), Gate(2)
+    app.state.summaries = Summaries(threads=1)
     install_problem_handlers(app)
     app.router.routes.extend(api_routes())
     with serve(app) as port, httpx2.Client(base_url=f"http://127.0.0.1:{port}", trust_env=False, timeout=60) as c:
         yield app, c
     app.state.clouds.close()
-    app.state.sizes.close()
+    app.state.summaries.close()
 
 
 @pytest.fixture
@@ -163,7 +163,7 @@ def test_a_reader_who_leaves_ends_the_work(live, slices):
         assert next(answer.iter_bytes()).startswith(b"KINCLOUD")
         assert app.state.gate.open == 1
     wait_for(lambda: app.state.gate.open == 0)
-    wait_for(lambda: app.state.clouds._pool._work_queue.empty())
+    wait_for(lambda: app.state.clouds._executor._work_queue.empty())
     begun = len(slices)
     time.sleep(0.2)
     assert len(slices) == begun
@@ -309,7 +309,9 @@ def test_what_is_not_wanted_is_null(client):
 def test_the_second_visitor_does_not_wait(client, monkeypatch):
     address = f"{WORKSPACE}/summary?volume=false&lock=5:0.25"
     first = client.get(address)
-    monkeypatch.setattr(summary, "workspace_facts", lambda *args, **options: pytest.fail("computed again"))
+    monkeypatch.setattr(
+        "app.shared.summaries.workspace_facts", lambda *args, **options: pytest.fail("computed again")
+    )
     assert client.get(address).content == first.content
     assert client.get(f"{address}&effort=9&resolution=50").content == first.content  # which have no say here
 
@@ -330,54 +332,6 @@ def test_a_sliding_first_joint_has_no_section(client, tmp_path):
     assert level.status_code == 200
 
 
-@pytest.fixture
-def memory():
-    made = Memory(most=2, threads=1, waiting=2)
-    yield made
-    made.close()
-
-
-def test_those_who_ask_for_the_same_share_one_computation(memory):
-    computed, go = [], threading.Event()
-
-    def compute():
-        computed.append(1)
-        go.wait(10)
-        return {"x": 1}
-
-    answers = [memory.get("key", compute) for _ in range(8)]
-    go.set()
-    assert all(answer.result(10) is answers[0].result() for answer in answers)
-    assert computed == [1]
-
-
-def test_too_many_under_way_are_refused_those_that_are_there_are_not(memory):
-    go = threading.Event()
-    memory.get("there", lambda: "there").result(10)
-    slow = [memory.get(key, lambda: go.wait(10)) for key in ("a", "b")]
-    with pytest.raises(ProblemError, match="2 summaries") as refused:
-        memory.get("c", lambda: "c")
-    assert refused.value.status_code == 503
-    assert memory.get("b", lambda: "not asked") is slow[1]
-    go.set()
-    assert [answer.result(10) for answer in slow] == [True, True]
-    assert memory.get("c", lambda: "c").result(10) == "c"
-
-
-def test_failures_are_told_and_forgotten_and_memory_is_bounded(memory):
-    def now(key, value):
-        return memory.get(key, value).result(10)
-
-    with pytest.raises(ZeroDivisionError):
-        now("a", lambda: 1 / 0)
-    wait_for(lambda: now("a", lambda: "good") == "good")
-    assert now("b", lambda: "b") == "b"
-    assert now("a", lambda: "not asked") == "good"
-    now("c", lambda: "c")  # drops b, asked for longest ago
-    assert now("a", lambda: "not asked") == "good"
-    assert now("b", lambda: "anew") == "anew"
-
-
 def test_visitors_who_leave_do_not_cancel_it_for_others(live, monkeypatch):
     _, client = live
     go = threading.Event()
@@ -387,7 +341,7 @@ def test_visitors_who_leave_do_not_cancel_it_for_others(live, monkeypatch):
         go.wait(10)
         return facts(*args, **options)
 
-    monkeypatch.setattr(summary, "workspace_facts", slow)
+    monkeypatch.setattr("app.shared.summaries.workspace_facts", slow)
     address = f"{WORKSPACE}/summary?volume=false"
     with pytest.raises(httpx2.TimeoutException):
         client.get(address, timeout=0.3)

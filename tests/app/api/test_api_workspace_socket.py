@@ -94,7 +94,7 @@ def test_the_visitor_cancels(port, app):
         _, code, reason = ending(visitor)
     assert (code, reason) == (1000, "cancelled")
     wait_for(lambda: app.state.gate.open == 0)
-    wait_for(lambda: app.state.clouds._pool._work_queue.empty())
+    wait_for(lambda: app.state.clouds._executor._work_queue.empty())
 
 
 @pytest.mark.parametrize("message", ["stop", "", "[" * 50_000, '{"cancel": false}', b"\x01"])
@@ -119,7 +119,7 @@ def test_a_visitor_who_leaves_ends_the_work(port, app, monkeypatch):
         else:
             visitor.close()
     wait_for(lambda: app.state.gate.open == 0)
-    wait_for(lambda: app.state.clouds._pool._work_queue.empty())
+    wait_for(lambda: app.state.clouds._executor._work_queue.empty())
     time.sleep(0.1)
     count = len(begun)
     time.sleep(0.2)

@@ -12,7 +12,7 @@ import schemathesis
 from hypothesis import HealthCheck, settings
 from schemathesis.config import SchemathesisConfig
 
-import app.api.workspace.summary
+import kin
 from app.service.main import create_app
 from app.shared.settings import Settings
 
@@ -55,10 +55,9 @@ schema = contract()
 @pytest.fixture(autouse=True)
 def quick_sizes(monkeypatch):
     """Volumes take seconds and are looked at elsewhere."""
-    facts = app.api.workspace.summary.workspace_facts
+    facts = kin.workspace_facts
     monkeypatch.setattr(
-        app.api.workspace.summary,
-        "workspace_facts",
+        "app.shared.summaries.workspace_facts",
         lambda robot, **asked: facts(robot, **asked | {"effort": 2, "volume": False}),
     )
 

@@ -130,7 +130,7 @@ def test_the_size_is_told_beforehand_where_it_is_told(clouds, name, cloud, with_
 @each_format
 def test_bytes_do_not_depend_on_slices_or_threads(clouds, name, monkeypatch):
     expected = file_of(name, clouds, LIMITED, True)
-    monkeypatch.setattr(formats, "DRAWN", 1000)
+    monkeypatch.setattr("app.shared.clouds.SAMPLED", 1000)
     other = Clouds(max_bytes=0, threads=3)
     try:
         assert file_of(name, other, LIMITED, True) == expected
@@ -176,7 +176,7 @@ def test_viewers_of_point_clouds_read_the_ply_file(clouds, with_q):
 
 @each_format
 def test_memory_does_not_grow_with_the_cloud(clouds, name, monkeypatch):
-    monkeypatch.setattr(formats, "DRAWN", 4096)
+    monkeypatch.setattr("app.shared.clouds.SAMPLED", 4096)
     n = 2_000_000 if name in ("bin", "ply", "npz") else 100_000
     cloud = Cloud(ARM, n)
     for _ in encode(name, clouds, Cloud(ARM, 10)):

@@ -11,12 +11,12 @@ from live_server import wait_for
 
 import kin
 from app.shared import mapreduce
-from app.shared.maps import Maps, Wanted
+from app.shared.maps import MapRequest, Maps
 from kin import InputError
 
 ARM = kin.get_robot("pioneer5")
-SMALL = Wanted(ARM, 8, 12)
-SEVERAL = Wanted(ARM, 30, 12)  # blocks
+SMALL = MapRequest(ARM, 8, 12)
+SEVERAL = MapRequest(ARM, 30, 12)  # blocks
 
 
 @pytest.fixture
@@ -65,7 +65,7 @@ def same(found, robot, **wanted):
 def test_a_map_is_that_of_the_core_with_limits_and_locks(maps):
     limits = (None, (0.0, 1.0), None, None, None)
     locked = (0.3, None, None, None, None)
-    reader = maps.read(Wanted(ARM, 8, 12, limits, locked))
+    reader = maps.subscribe(MapRequest(ARM, 8, 12, limits, locked))
     same(reader.future.result(60), ARM, resolution=8, directions=12, limits=limits, locked=locked)
     assert reader.finished
     assert reader.done == reader.total > 0
@@ -73,19 +73,19 @@ def test_a_map_is_that_of_the_core_with_limits_and_locks(maps):
 
 
 def test_thirty_readers_share_one_computation_and_one_map(maps, slowly):
-    readers = [maps.read(SMALL) for _ in range(30)]
+    readers = [maps.subscribe(SMALL) for _ in range(30)]
     slowly.let(10**6)
     found = readers[0].future.result(60)
     assert all(reader.future.result(60) is found for reader in readers)
     assert slowly.begun == readers[0].total
     for reader in readers:
         reader.leave()
-    assert maps.read(SMALL).future.result(0) is found, "kept for those who come later"
+    assert maps.subscribe(SMALL).future.result(0) is found, "kept for those who come later"
 
 
 def test_a_map_can_be_seen_while_it_grows(maps, slowly, monkeypatch):
-    monkeypatch.setattr("app.shared.maps.PUBLISHED", 0.0)
-    reader = maps.read(SEVERAL)
+    monkeypatch.setattr("app.shared.maps.PUBLISHED_EVERY", 0.0)
+    reader = maps.subscribe(SEVERAL)
     slowly.let(2)
     wait_for(lambda: reader.done == 2)
     wait_for(lambda: reader.latest is not None)
@@ -98,7 +98,7 @@ def test_a_map_can_be_seen_while_it_grows(maps, slowly, monkeypatch):
 
 
 def test_one_who_leaves_stops_nothing_the_last_one_does(maps, slowly):
-    first, second = maps.read(SEVERAL), maps.read(SEVERAL)
+    first, second = maps.subscribe(SEVERAL), maps.subscribe(SEVERAL)
     slowly.let(1)
     wait_for(lambda: first.done == 1)
     first.leave()
@@ -106,7 +106,7 @@ def test_one_who_leaves_stops_nothing_the_last_one_does(maps, slowly):
     slowly.let(1)
     wait_for(lambda: second.done == 2)
     second.leave()
-    again = maps.read(SEVERAL)
+    again = maps.subscribe(SEVERAL)
     assert not again.finished
     again.leave()
 
@@ -124,8 +124,8 @@ def test_one_who_leaves_stops_nothing_the_last_one_does(maps, slowly):
 
 def test_one_that_waits_for_its_turn_can_be_left(slowly):
     maps = Maps(threads=1, at_once=1)
-    busy = maps.read(SEVERAL)
-    waiting = maps.read(SMALL)
+    busy = maps.subscribe(SEVERAL)
+    waiting = maps.subscribe(SMALL)
     wait_for(lambda: slowly.begun == 1)
     assert waiting.total == 0
     waiting.leave()
@@ -136,35 +136,35 @@ def test_one_that_waits_for_its_turn_can_be_left(slowly):
 
 
 def test_memory_is_bounded_and_what_was_asked_for_longest_ago_goes_first():
-    first, second, third = (Wanted(ARM, n, 12) for n in (6, 7, 8))
+    first, second, third = (MapRequest(ARM, n, 12) for n in (6, 7, 8))
     roomy = Maps(threads=1)
     for wanted in (first, second, third):
-        roomy.read(wanted).future.result(60)
+        roomy.subscribe(wanted).future.result(60)
     room = roomy.bytes - 1
     roomy.close()
     maps = Maps(max_bytes=room, threads=1)
-    maps.read(second).future.result(60)
-    kept = maps.read(first).future.result(60)
-    maps.read(third).future.result(60)
+    maps.subscribe(second).future.result(60)
+    kept = maps.subscribe(first).future.result(60)
+    maps.subscribe(third).future.result(60)
     wait_for(lambda: 0 < maps.bytes <= room)
-    assert maps.read(first).latest is kept
-    assert second not in maps._works
+    assert maps.subscribe(first).latest is kept
+    assert second not in maps._maps
     maps.close()
 
 
 def test_a_wrong_description_is_told_to_each_who_asks_and_not_kept(maps):
     for _ in range(2):
         with pytest.raises(InputError, match="directions"):
-            maps.read(Wanted(ARM, 8, 13)).future.result(20)
-        wait_for(lambda: not maps._works)
+            maps.subscribe(MapRequest(ARM, 8, 13)).future.result(20)
+        wait_for(lambda: len(maps._maps) == 0)
 
 
 def test_closing_ends_the_work(maps, slowly):
-    reader = maps.read(SEVERAL)
+    reader = maps.subscribe(SEVERAL)
     slowly.let(1)
     wait_for(lambda: reader.done == 1)
     maps.close()
     slowly.let(10**6)
     with pytest.raises(CancelledError):
         reader.future.result(20)
-    wait_for(lambda: not any(thread.is_alive() for thread in maps._pool._threads))
+    wait_for(lambda: not any(thread.is_alive() for thread in maps._executor._threads))

@@ -14,7 +14,9 @@ import numpy as np
 import viser
 
 from app.exports.svg import Plot, joint_colour
-from app.shared.clouds import Cloud, Clouds, step_back
+from app.shared.clouds import Cloud, Clouds
+from app.shared.summaries import Summaries
+from app.shared.threads import lower_priority
 from app.viewer.panel import Post
 from app.viewer.tabs.workspace import known, plot
 from app.viewer.tabs.workspace.colours import radius_and_height
@@ -30,7 +32,7 @@ def beside(work: Callable[[], None], name: str, post: Post) -> None:
     """Do this in a thread that lets visitors who drag go first; posts ``"failed"`` with the error if it fails."""
 
     def run() -> None:
-        step_back()
+        lower_priority()
         try:
             work()
         except Exception as error:  # noqa: BLE001 - whoever takes the post raises it
@@ -55,7 +57,14 @@ class SectionPanel:
     """
 
     def __init__(
-        self, client: viser.ClientHandle, robot: Robot, clouds: Clouds, root: str, units: Units, post: Post
+        self,
+        client: viser.ClientHandle,
+        robot: Robot,
+        clouds: Clouds,
+        summaries: Summaries,
+        root: str,
+        units: Units,
+        post: Post,
     ) -> None:
         self.robot = robot
         self._scene = client.scene
@@ -81,7 +90,7 @@ class SectionPanel:
         self._panel.dock_left()
         self._panel.set_width(WIDTH)
         self._panel.expand()  # on a phone it would be a closed line at the end of the sheet
-        beside(lambda: post("crossed", (robot, known.cross(robot))), "section", post)
+        beside(lambda: post("crossed", (robot, known.cross(summaries, robot))), "section", post)
 
     def crossed(self, robot: Robot, found: known.Cross, tool: Array) -> None:
         """The section is there; the tool is at `tool` ``(3,)``."""

@@ -1,17 +1,11 @@
-"""Sizes and section of an arm's workspace: seconds of work, done once for all visitors, beside them."""
+"""Sizes and section of an arm's workspace, from the cache that all visitors and REST share."""
 
 from __future__ import annotations
 
-import threading
 from dataclasses import dataclass
-from functools import lru_cache
 
-import kin
+from app.shared.summaries import Summaries
 from kin import Robot, Section, WorkspaceFacts
-
-KEPT = 64  # arms
-
-_one_at_a_time = {"facts": threading.Lock(), "section": threading.Lock()}
 
 
 @dataclass(frozen=True)
@@ -22,25 +16,13 @@ class Cross:
     why_not: str = ""
 
 
-def facts(robot: Robot, volume: bool) -> WorkspaceFacts:
-    """`kin.workspace_facts`; visitors who ask for the same arm wait for one computation."""
-    with _one_at_a_time["facts"]:
-        return _facts(robot, volume)
+def facts(summaries: Summaries, robot: Robot, volume: bool) -> WorkspaceFacts:
+    """Sizes as by `kin.workspace_facts`; waits until they are computed."""
+    return (summaries.facts(robot) if volume else summaries.facts(robot, effort=None)).result()
 
 
-def cross(robot: Robot) -> Cross:
-    """`kin.section` in (r, z); visitors who ask for the same arm wait for one computation."""
-    with _one_at_a_time["section"]:
-        return _cross(robot)
-
-
-@lru_cache(maxsize=KEPT)
-def _facts(robot: Robot, volume: bool) -> WorkspaceFacts:
-    return kin.workspace_facts(robot, volume=volume)
-
-
-@lru_cache(maxsize=KEPT)
-def _cross(robot: Robot) -> Cross:
+def cross(summaries: Summaries, robot: Robot) -> Cross:
+    """The section in (r, z) as by `kin.section`; waits until it is computed."""
     if robot.joints[0].kind != "revolute":
         return Cross(None, "Joint 1 slides: there is no section that it turns.")
-    return Cross(kin.section(robot))
+    return Cross(summaries.section(robot).result())

@@ -546,7 +546,7 @@ class Workspace(Feature):
             stage = self.stage
             self._tool = kin.fk(stage.robot, stage.q)[:3, 3]
             self._panel = SectionPanel(
-                stage.client, stage.robot, stage.clouds, self._new_root(), stage.units, self.post
+                stage.client, stage.robot, stage.clouds, stage.summaries, self._new_root(), stage.units, self.post
             )
 
     def _sizes(self, wanted: bool) -> None:
@@ -554,11 +554,11 @@ class Workspace(Feature):
         self._controls.sizes.content = sizes.WAIT if wanted else ""
         if not wanted:
             return
-        robot = self.stage.robot
+        robot, summaries = self.stage.robot, self.stage.summaries
 
         def work() -> None:
             for volume in (False, True):
-                self.post("facts", (robot, known.facts(robot, volume), volume))
+                self.post("facts", (robot, known.facts(summaries, robot, volume), volume))
 
         beside(work, "sizes", self.post)
 

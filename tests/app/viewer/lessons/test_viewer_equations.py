@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from unittest.mock import MagicMock
 
@@ -14,6 +15,7 @@ from fake_browser import FakeBrowser
 import kin
 from app.equations import book, book_later, books
 from app.shared.clouds import Clouds
+from app.shared.computations import ComputationCache
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.lessons.equations import EquationsLesson, page
@@ -118,16 +120,11 @@ def test_a_failed_check_is_said_instead_of_shown(tab: FakeBrowser, monkeypatch: 
         return replace(derived, entries={**derived.entries, "o_z": derived.entries["o_y"]})
 
     monkeypatch.setattr(books, "derive", wrong)
-    books.book.cache_clear()
-    books.book_later.cache_clear()
-    try:
-        tab.set("Robot", PUMA.name)
-        tab.wait(lambda: "o_z of puma560 is off by" in tab.html)
-        assert 'data-status="error"' in tab.html
-        assert "data-equation" not in tab.html
-    finally:
-        books.book.cache_clear()
-        books.book_later.cache_clear()
+    monkeypatch.setattr(books, "_BOOKS", ComputationCache(ThreadPoolExecutor(1), 4))
+    tab.set("Robot", PUMA.name)
+    tab.wait(lambda: "o_z of puma560 is off by" in tab.html)
+    assert 'data-status="error"' in tab.html
+    assert "data-equation" not in tab.html
 
 
 def test_what_was_chosen_can_be_restored() -> None:

@@ -182,10 +182,15 @@ def tab(service) -> Iterator[Visitor]:
         yield opened
 
 
+def forget_maps(maps: Maps) -> None:
+    for computation in list(maps._maps._computations.values()):
+        maps._maps._forget(computation)
+
+
 @pytest.fixture
 def held(service, monkeypatch):
     """A cold cache, and blocks that are computed only as far as they are let: `held.free += 1`."""
-    service[1]._works.clear()
+    forget_maps(service[1])
 
     class Held:
         free = 0
@@ -247,7 +252,7 @@ def test_locked_joints_are_locked_in_the_map_too(tab):
 
 
 def test_voxels_are_seen_while_the_map_grows_and_stop_keeps_them(tab, held, monkeypatch):
-    monkeypatch.setattr("app.shared.maps.PUBLISHED", 0.0)
+    monkeypatch.setattr("app.shared.maps.PUBLISHED_EVERY", 0.0)
     tab.compute()
     held.free = 1
     tab.wait(lambda: tab.state == "computing" and tab.count() > 0)
@@ -350,14 +355,14 @@ def test_two_visitors_share_one_map_and_the_last_who_leaves_stops_it(service, he
             visitor.settle(0.2)
             visitor.compute()
             visitor.wait(lambda visitor=visitor: visitor.state == "computing")
-        (work,) = maps._works.values()
-        assert work.readers == 2
+        (computation,) = maps._maps._computations.values()
+        assert computation._subscribers == 2
         one.push("Clear")
         one.wait(lambda: one.state == "ready")
-        assert work.readers == 1
-        assert not work.stopped
+        assert computation._subscribers == 1
+        assert not computation._cancelled
     end = time.monotonic() + 10.0
-    while not work.stopped:
+    while not computation._cancelled:
         assert time.monotonic() < end, "a visitor who closes the page wants nothing any more"
         time.sleep(0.02)
     held.free = 10**6
@@ -367,7 +372,7 @@ def test_two_visitors_share_one_map_and_the_last_who_leaves_stops_it(service, he
 
 
 def test_a_failure_is_told_and_the_next_try_succeeds(tab, service, monkeypatch, caplog):
-    service[1]._works.clear()
+    forget_maps(service[1])
     with monkeypatch.context() as broken:
         broken.setattr(mapreduce, "capability_block", lambda grid, block: 1 / 0)
         tab.compute()

@@ -19,9 +19,10 @@ from PIL import Image
 
 import kin
 from app.exports.svg import tick_labels
-from app.shared.clouds import DRAWN, Cloud, Clouds
+from app.shared.clouds import SAMPLED, Cloud, Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
+from app.shared.summaries import Summaries
 from app.viewer.panel.joints import UNLOCK_ALL
 from app.viewer.server import ViewerServer
 from app.viewer.tabs.workspace import colours, cut, flow, known, pick, plot, sizes, words
@@ -31,9 +32,9 @@ from kin.units import DEFAULT_UNITS, Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
-STORE = Store()
+STORE, SUMMARIES = Store(), Summaries()
 PIONEER, PUMA = STORE.get("pioneer5"), STORE.get("puma560")
-N = 2 * DRAWN + 1000  # three parts
+N = 2 * SAMPLED + 1000  # three parts
 HALF = 5e-4  # m: what half precision may cost
 
 
@@ -207,13 +208,13 @@ def test_the_cloud_in_the_drawing_is_inside_the_boundary_in_the_drawing():
 def test_an_arm_whose_first_joint_slides_has_no_section():
     rows = (Joint("slide", kind="prismatic", limits=(0.0, 1.0)), Joint("turn", a=0.5, limits=(-1.0, 1.0)))
     slider = replace(PIONEER, rows=rows, home=(0.0, 0.0))
-    found = known.cross(slider)
+    found = known.cross(SUMMARIES, slider)
     assert found.section is None
     assert "slides" in found.why_not
 
 
 def test_sizes_say_what_is_unknown_yet():
-    facts = known.facts(PIONEER, False)
+    facts = known.facts(SUMMARIES, PIONEER, False)
     table = sizes.html(facts, waiting=True, units=DEFAULT_UNITS)
     assert table.count("computing…") == 2
     assert f"{1000 * facts.reach.largest.value:.1f}" in table
@@ -223,7 +224,7 @@ def test_sizes_say_what_is_unknown_yet():
 
 @pytest.mark.parametrize(("length", "scale", "decimals"), [("mm", 1000, 0), ("cm", 100, 1), ("m", 1, 3)])
 def test_sizes_legend_and_picked_point_follow_the_units(length, scale, decimals):
-    units, facts = Units(length=length), known.facts(PIONEER, False)
+    units, facts = Units(length=length), known.facts(SUMMARIES, PIONEER, False)
     table = sizes.html(facts, True, units)
     assert f">{scale * facts.reach.largest.value:.{decimals + 1}f}<" in table
     assert table.count(f">{length}<") == 7 - table.count(">none<")
@@ -352,7 +353,7 @@ def test_a_cloud_arrives_whole_and_part_by_part(tab):
 
 
 def test_pause_holds_and_start_goes_on(tab):
-    n = 24 * DRAWN
+    n = 24 * SAMPLED
     tab.set("Points", n)
     tab.set("Seed", 12)
     tab.click("Start")
@@ -363,7 +364,7 @@ def test_pause_holds_and_start_goes_on(tab):
     held = tab.count
     assert 0 < held < n
     tab.set("Colour by", "Height")
-    tab.wait(lambda: tab.sent("SceneNodeUpdateMessage") >= held // DRAWN)
+    tab.wait(lambda: tab.sent("SceneNodeUpdateMessage") >= held // SAMPLED)
     tab.settle()
     assert tab.count == held
     assert tab.state == "paused"
@@ -395,13 +396,13 @@ def test_a_page_that_does_not_keep_up_is_not_flooded(tab):
     end = time.monotonic() + 0.7
     while time.monotonic() < end:
         tab._read(0.05)
-    assert tab.count < flow.WINDOW + 2 * DRAWN
+    assert tab.count < flow.WINDOW + 2 * SAMPLED
     assert tab.state == "running"
     tab.click("Cancel")
 
 
 def test_a_dragged_arm_and_a_growing_cloud_share_the_line(tab):
-    n = 8 * DRAWN
+    n = 8 * SAMPLED
     home = kin.fk(PIONEER, PIONEER.q_home)
     tab.grab()
     tab.drag(home)
@@ -518,13 +519,13 @@ def test_the_tab_follows_the_unit_of_length_and_keeps_what_it_shows():
 
 
 def test_a_cut_while_it_streams_loses_nothing(tab):
-    n = 12 * DRAWN
+    n = 12 * SAMPLED
     tab.set("Points", n)
     tab.set("Seed", 16)
     tab.click("Start")
     tab.wait(lambda: tab.count > 0)
     tab.set("Cut", "along the arm")
-    tab.wait(lambda: tab.count > 4 * DRAWN)
+    tab.wait(lambda: tab.count > 4 * SAMPLED)
     tab.set("Cut", "across x")
     tab.done(n)
     tab.settle()
@@ -682,7 +683,7 @@ def test_a_part_that_fails_is_told_pauses_and_can_be_tried_again(tab, monkeypatc
     slice_of = Cloud.slice
 
     def failing(self, start, *args):
-        if start >= DRAWN:
+        if start >= SAMPLED:
             raise RuntimeError("out of chalk")
         return slice_of(self, start, *args)
 
@@ -691,7 +692,7 @@ def test_a_part_that_fails_is_told_pauses_and_can_be_tried_again(tab, monkeypatc
     tab.set("Seed", 21)
     tab.click("Start")
     tab.wait(lambda: "Something went wrong" in tab.html and tab.state == "paused")
-    assert tab.count == DRAWN
+    assert tab.count == SAMPLED
     assert "out of chalk" in caplog.text
     monkeypatch.setattr(Cloud, "slice", slice_of)
     tab.click("Start")

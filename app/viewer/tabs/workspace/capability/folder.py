@@ -15,7 +15,8 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from app.shared.maps import Reader, Wanted
+from app.shared.computations import Subscription
+from app.shared.maps import MapRequest
 from app.viewer.feature import Stage
 from app.viewer.panel import Post, assign, listen, listen_click
 from app.viewer.scene.camera import Sphere
@@ -49,7 +50,7 @@ class Capability:
         self._root = root
         self._wishes = MapWishes()
         self._look = Look(self._wishes.by, colours)
-        self._reader: Reader | None = None
+        self._reader: Subscription[CapabilityMap] | None = None
         self._state: told.State = "ready"
         self._blocks = (0, 0)
         self._locked = stage.locked  # in the map
@@ -113,8 +114,8 @@ class Capability:
         """Have the map of the arm on show that is wished for, and draw it while it grows."""
         self.clear()
         wishes, stage = self._wishes, self._stage
-        self._reader = stage.maps.read(
-            Wanted(stage.robot, wishes.resolution, wishes.directions, locked=stage.locked)
+        self._reader = stage.maps.subscribe(
+            MapRequest(stage.robot, wishes.resolution, wishes.directions, locked=stage.locked)
         )
         self._locked = stage.locked
         self._state = "waiting"
@@ -167,7 +168,7 @@ class Capability:
             self._state = state
             self._report()
 
-    def _finish(self, reader: Reader) -> None:
+    def _finish(self, reader: Subscription[CapabilityMap]) -> None:
         """The map is there, or could not be computed."""
         self.leave()
         error = reader.future.exception()

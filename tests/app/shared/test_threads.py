@@ -7,15 +7,14 @@ import threading
 
 import pytest
 
-from app.shared import processor
-from app.shared.clouds import step_back
+from app.shared import threads
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="Linux only")
 
 
 @pytest.fixture(autouse=True)
 def as_before(monkeypatch):
-    monkeypatch.setattr(processor, "_pinned_from", set())
+    monkeypatch.setattr(threads, "_processors", set())
     before = os.sched_getaffinity(0)
     yield before
     os.sched_setaffinity(0, before)
@@ -30,11 +29,11 @@ def in_thread(act):
 
 
 def test_a_process_keeps_to_one_and_what_computes_may_use_all(as_before):
-    processor.keep_to_one()
+    threads.pin()
     (chosen,) = os.sched_getaffinity(0)
     assert chosen in as_before
     assert in_thread(lambda: None) == {chosen}
-    assert in_thread(step_back) == as_before
+    assert in_thread(threads.lower_priority) == as_before
     assert os.sched_getaffinity(0) == {chosen}, "others stay where they are"
 
 
@@ -42,12 +41,12 @@ def test_workers_keep_to_one_each_in_turn(as_before):
     chosen = []
     for number in range(len(as_before) + 1):
         os.sched_setaffinity(0, as_before)
-        processor.keep_to_one(number)
+        threads.pin(number)
         chosen += os.sched_getaffinity(0)
     assert set(chosen) == as_before
     assert chosen[0] == chosen[-1]
 
 
 def test_without_it_nothing_changes(as_before):
-    processor.spread()
+    threads.unpin()
     assert os.sched_getaffinity(0) == as_before

@@ -1,0 +1,82 @@
+"""Sizes and sections of workspaces, computed once for REST and for all visitors of the viewer.
+
+A volume takes seconds, the other sizes a tenth of one. Computations run to their end even if their caller gives
+up, so a caller who comes again later finds the result. A section takes some 100 kB.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import Future
+
+from app.shared.computations import ComputationCache
+from app.shared.threads import DaemonExecutor, background_threads, lower_priority
+from kin import Robot, Section, WorkspaceFacts, section, workspace_facts
+
+Bounds = tuple[tuple[float, float] | None, ...]
+Locks = tuple[float | None, ...]
+Plane = tuple[tuple[float, ...], tuple[float, ...]]
+
+KEPT = 64  # sizes, and as many sections
+
+
+class Summaries:
+    """Cache of `kin.workspace_facts` and `kin.section`. Any thread may use it.
+
+    Args:
+        kept: how many results of each kind are kept.
+        threads: how many are computed at a time; by default as many as there are processors but one.
+        max_pending: the most computations of each kind that may be pending where a caller asks for the limit.
+    """
+
+    def __init__(self, kept: int = KEPT, threads: int | None = None, max_pending: int = 32) -> None:
+        self._max_pending = max_pending
+        self._executor = DaemonExecutor(threads or background_threads(), "summary", lower_priority)
+        self._facts: ComputationCache[WorkspaceFacts] = ComputationCache(self._executor, kept)
+        self._sections: ComputationCache[Section] = ComputationCache(self._executor, kept)
+
+    def facts(
+        self,
+        robot: Robot,
+        limits: Bounds | None = None,
+        locked: Locks | None = None,
+        effort: int | None = 4,
+        limited: bool = False,
+    ) -> Future[WorkspaceFacts]:
+        """Sizes as by `kin.workspace_facts`; do not cancel the future.
+
+        Args:
+            robot, limits, locked: as there.
+            effort: as there; None: without volume and surface.
+            limited: raise `TooManyPendingError` instead of queueing behind too many computations.
+        """
+
+        def compute(_: object) -> WorkspaceFacts:
+            if effort is None:
+                return workspace_facts(robot, limits=limits, locked=locked, volume=False)
+            return workspace_facts(robot, limits=limits, locked=locked, effort=effort)
+
+        key = (robot, limits, locked, effort)
+        return self._facts.get(key, compute, self._max_pending if limited else None)
+
+    def section(
+        self,
+        robot: Robot,
+        plane: Plane | None = None,
+        limits: Bounds | None = None,
+        locked: Locks | None = None,
+        resolution: int = 96,
+        limited: bool = False,
+    ) -> Future[Section]:
+        """A section as by `kin.section`; do not cancel the future. `limited` as in `facts`."""
+
+        def compute(_: object) -> Section:
+            return section(robot, plane, limits=limits, locked=locked, resolution=resolution)
+
+        key = (robot, plane, limits, locked, resolution)
+        return self._sections.get(key, compute, self._max_pending if limited else None)
+
+    def close(self) -> None:
+        """Start nothing more; returns at once."""
+        self._facts.close()
+        self._sections.close()
+        self._executor.shutdown(wait=False)
