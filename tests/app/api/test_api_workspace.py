@@ -27,6 +27,7 @@ from app.shared.clouds import Cloud, Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.shared.summaries import Summaries
+from app.viewer.tabs.workspace import known
 
 PIONEER = kin.get_robot("pioneer5")
 SRS = kin.get_robot("redundant7-craig")
@@ -314,6 +315,16 @@ def test_the_second_visitor_does_not_wait(client, monkeypatch):
     )
     assert client.get(address).content == first.content
     assert client.get(f"{address}&effort=9&resolution=50").content == first.content  # which have no say here
+
+
+def test_rest_finds_what_the_viewer_has_computed(app, client, monkeypatch):
+    known.facts(app.state.summaries, SRS, volume=False)
+    known.cross(app.state.summaries, SRS)
+    for name in ("workspace_facts", "section"):
+        monkeypatch.setattr(f"app.shared.summaries.{name}", lambda *_, **__: pytest.fail("computed again"))
+    answer = client.get(f"{API}/{SRS.id}/workspace/summary?volume=false&section=true")
+    assert answer.status_code == 200
+    assert answer.json()["section"]["curves"]
 
 
 def test_a_sliding_first_joint_has_no_section(client, tmp_path):
