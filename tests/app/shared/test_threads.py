@@ -28,7 +28,7 @@ def in_thread(act):
     return found[0]
 
 
-def test_a_process_keeps_to_one_and_what_computes_may_use_all(as_before):
+def test_a_pinned_process_stays_pinned_and_background_threads_use_every_processor(as_before):
     threads.pin()
     (chosen,) = os.sched_getaffinity(0)
     assert chosen in as_before
@@ -37,7 +37,7 @@ def test_a_process_keeps_to_one_and_what_computes_may_use_all(as_before):
     assert os.sched_getaffinity(0) == {chosen}, "others stay where they are"
 
 
-def test_workers_keep_to_one_each_in_turn(as_before):
+def test_workers_are_pinned_in_turn(as_before):
     chosen = []
     for number in range(len(as_before) + 1):
         os.sched_setaffinity(0, as_before)
