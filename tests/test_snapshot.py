@@ -832,8 +832,12 @@ def ask_rest(client: TestClient, request: Rest) -> dict[str, Any]:
     response = client.request(
         request.method, request.path, json=body, content=request.content, headers=request.headers
     )
-    told = {name: response.headers[name] for name in HEADERS if name in response.headers}
-    return {"status": response.status_code, **told, "body": _readable(response.content, told["content-type"])}
+    reported = {name: response.headers[name] for name in HEADERS if name in response.headers}
+    return {
+        "status": response.status_code,
+        **reported,
+        "body": _readable(response.content, reported["content-type"]),
+    }
 
 
 def _resolved(client: TestClient, robot: str, value: Any) -> Any:
@@ -871,7 +875,7 @@ def ask_command(command: Command, folder: Path, capsys: Any) -> dict[str, Any]:
         code = cli.main(words)
         out, err = capsys.readouterr()
     answer: dict[str, Any] = {"code": code, "out": _printed(out, "--json" in words), "err": err.splitlines()}
-    if "--help" in words:  # where lines are broken, and how often metavars are told, is Python's own affair
+    if "--help" in words:  # where lines are broken, and how often metavars are reported, is Python's own affair
         answer["out"] = re.sub(r"(-\w) [A-Z]+, (--\w)", r"\1, \2", " ".join(out.split()))
     if command.writes is not None:
         answer["file"] = (folder / command.writes).read_text(encoding="ascii").splitlines()[:8]
@@ -1021,8 +1025,8 @@ def test_users_see_the_same(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "100")
     request = TABLES[area][name]
-    told = ask_rest(client, request) if isinstance(request, Rest) else ask_command(request, tmp_path, capsys)
-    answer = lasting(told)
+    reported = ask_rest(client, request) if isinstance(request, Rest) else ask_command(request, tmp_path, capsys)
+    answer = lasting(reported)
     if renewed is not None:
         renewed[area][name] = answer
         return
@@ -1058,7 +1062,9 @@ def test_every_kind_of_answer_is_kept(kept: dict[str, dict[str, Any]], renewed: 
 def test_no_failure_is_kept(kept: dict[str, dict[str, Any]], renewed: Any) -> None:
     """An internal error is nothing to hold on to."""
     if renewed is None:
-        assert [name for table in kept.values() for name, told in table.items() if told.get("status") == 500] == []
+        assert [
+            name for table in kept.values() for name, reported in table.items() if reported.get("status") == 500
+        ] == []
 
 
 def test_a_difference_is_told_with_its_place() -> None:
