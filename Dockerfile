@@ -1,7 +1,7 @@
 # Kinboard: one port, no root, nothing written, nothing fetched at run time.
 #   docker build -t kinboard .
 #   docker run --rm -p 127.0.0.1:8000:8000 kinboard
-# scripts/image.sh builds it without Docker and proves what README.md says of it.
+# scripts/image.sh builds it without Docker and checks what docs/running.md says about it.
 
 FROM python:3.13-slim-trixie AS build
 ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1 PIP_ROOT_USER_ACTION=ignore
@@ -64,7 +64,7 @@ CMD ["kinboard", "serve"]
 ARG REVISION=unknown
 LABEL org.opencontainers.image.title="Kinboard" \
       org.opencontainers.image.description="An interactive robot-arm kinematics dashboard for the browser." \
-      org.opencontainers.image.version="0.1.0" \
+      org.opencontainers.image.version="0.2.0" \
       org.opencontainers.image.revision=$REVISION \
       org.opencontainers.image.licenses="MIT" \
       org.opencontainers.image.vendor="The Kinboard authors" \

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from kin.errors import InputError
 from kin.kernels import fk as fk_kernels
+from kin.kernels import jacobian as jacobian_kernels
 from kin.kernels.compile import MODEL, direct
 from kin.robot import Robot
 from kin.transforms import Array
@@ -47,7 +48,7 @@ class _Compiled:
 
     @cached_property
     def jacobian_one(self) -> Callable[[Array, Array, Array], bool]:
-        return direct(fk_kernels.jacobian_one, MODEL, 1, 2)
+        return direct(jacobian_kernels.jacobian_one, MODEL, 1, 2)
 
 
 _compiled = _Compiled()
@@ -103,7 +104,7 @@ def jacobian(robot: Robot, q: ArrayLike, frame: Literal["base", "tool"] = "base"
     elif frame != "tool":
         raise InputError("frame", frame, 'one of "base", "tool"')
     q = _writable(robot.check_q(q))
-    J = fk_kernels.jacobian_many(robot.model, q.reshape(-1, robot.n)).reshape(*q.shape[:-1], 6, robot.n)
+    J = jacobian_kernels.jacobian_many(robot.model, q.reshape(-1, robot.n)).reshape(*q.shape[:-1], 6, robot.n)
     if frame == "tool":
         R_T = np.swapaxes(fk(robot, q)[..., :3, :3], -1, -2)
         J = np.concatenate([R_T @ J[..., :3, :], R_T @ J[..., 3:, :]], axis=-2)
@@ -120,7 +121,7 @@ def manipulability(robot: Robot, q: ArrayLike, part: Part = "all") -> Array:
         raise InputError("part", part, "one of " + ", ".join(f'"{name}"' for name in _PARTS))
     first, last = _PARTS[part]
     J = jacobian(robot, q)
-    values = fk_kernels.manipulability_many(J.reshape(-1, 6, robot.n), first, last)
+    values = jacobian_kernels.manipulability_many(J.reshape(-1, 6, robot.n), first, last)
     return values.reshape(J.shape[:-2])
 
 

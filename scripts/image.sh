@@ -1,5 +1,5 @@
 #!/bin/sh
-# Build the image and prove what README.md says of it: on Debian, as root, without Docker.
+# Build the image and check what docs/running.md says about it: on Debian, as root, without Docker.
 #
 # The base image is a stand-in made here from Debian's packages: the same Debian release and Python version as the
 # Dockerfile's, and like that one without bytecode. Everything is kept in one folder, apart from the machine's own
@@ -186,4 +186,4 @@ build
 weigh
 check
 [ "$(uname -m)" != x86_64 ] || check_other_cpus
-say "All is as README.md says"
+say "Everything is as docs/running.md says"

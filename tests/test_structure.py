@@ -197,7 +197,6 @@ KNOWN: dict[Rule, set[str]] = {
         "app/viewer/session/controller.py",
         "app/viewer/tabs/workspace/tab.py",
         "kin/ik/__init__.py",
-        "kin/kernels/fk.py",
         "kin/solvers/collinear7.py",
         "kin/solvers/common.py",
         "kin/solvers/numeric.py",
@@ -225,7 +224,6 @@ KNOWN: dict[Rule, set[str]] = {
     long_signatures: {
         "kin/ik/candidates.py::finish",
         "kin/ik/candidates.py::settle",
-        "kin/kernels/fk.py::_turn",
         "kin/path/trellis.py::_advance",
         "kin/solvers/blocks.py::each",
         "kin/solvers/blocks.py::one",

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from kin.ik.branches import Branches, Flags, is_closed, measure, solve_branches
 from kin.ik.candidates import OVERRUN
 from kin.ik.problem import Question
-from kin.kernels import fk as fk_kernels
+from kin.kernels import jacobian as jacobian_kernels
 from kin.solvers.common import wrap
 from kin.solvers.contract import POSE, POSITION
 from kin.transforms import Array
@@ -39,8 +39,8 @@ def scores(question: Question, q: Array) -> Array:
         margin = np.minimum(q[rows] - question.lower, question.upper - q[rows])[:, counts] / half[counts]
         out[rows] = margin.min(axis=1, initial=1.0)
     else:
-        J = fk_kernels.jacobian_many(question.robot.model, np.ascontiguousarray(q[rows]))
-        out[rows] = fk_kernels.manipulability_many(J, 0, 3 if question.code == POSITION else 6)
+        J = jacobian_kernels.jacobian_many(question.robot.model, np.ascontiguousarray(q[rows]))
+        out[rows] = jacobian_kernels.manipulability_many(J, 0, 3 if question.code == POSITION else 6)
     return out
 
 

@@ -1,4 +1,4 @@
-"""Compiled loops on plain arrays: forward kinematics, link frames, Jacobian, manipulability.
+"""Compiled forward kinematics: tool poses, tool points and link frames.
 
 Every kernel is serial, releases the GIL and keeps no state, so any number of threads may call it at once. The arm
 is one flat float64 array (`Robot.model`):
@@ -33,8 +33,8 @@ BLOCK = 64
 _SIN, _COS, _D, _ANGLE, _T0, _T1, _T2, _T3, _T4, _T5, _T6, _T7, _T8, _T9, _T10, _T11, _SPACE = range(
     0, 17 * BLOCK, BLOCK
 )
-_HEADER = 27
-_WIDTH = 8
+HEADER = 27
+WIDTH = 8
 
 
 @inlined
@@ -106,19 +106,21 @@ def copy_pose(T: Array, out: Array) -> None:
 
 
 @inlined
-def _x_part(model: Array, i: int) -> tuple[float, float, float]:
+def x_part(model: Array, i: int) -> tuple[float, float, float]:
     """(a, cos α, sin α) of row i; those of the identity for the row after the last."""
     if i >= int(model[0]):
         return 0.0, 1.0, 0.0
-    k = _HEADER + _WIDTH * i
+    k = HEADER + WIDTH * i
     return model[k + 2], model[k + 3], model[k + 4]
 
 
+Row = tuple[float, float, float, float]
+
+
 @inlined
-def _turn(
-    x: float, y: float, z: float, p: float, s: float, c: float, d: float, a: float, ca: float, sa: float
-) -> tuple[float, float, float, float]:
-    """One row of T · Rz(θ) Tz(d) Tx(a) Rx(α)."""
+def advance(row: Row, s: float, c: float, d: float, a: float, ca: float, sa: float) -> Row:
+    """One row of T · Rz(θ) Tz(d) Tx(a) Rx(α), from that row of T."""
+    x, y, z, p = row
     p += d * z
     u = c * x + s * y
     y = c * y - s * x
@@ -126,9 +128,9 @@ def _turn(
 
 
 @inlined
-def _z_part(model: Array, i: int, q: Array) -> tuple[float, float, float]:
+def z_part(model: Array, i: int, q: Array) -> tuple[float, float, float]:
     """(sin θ, cos θ, d) of row i."""
-    k = _HEADER + _WIDTH * i
+    k = HEADER + WIDTH * i
     theta = model[k]
     d = model[k + 1]
     kind = model[k + 5]
@@ -141,7 +143,7 @@ def _z_part(model: Array, i: int, q: Array) -> tuple[float, float, float]:
 
 
 @jit
-def _start(model: Array, T: Array) -> int:
+def load_base(model: Array, T: Array) -> int:
     """T ← the transform before the first z part; returns the row offset of the x part after a z part.
 
     A modified row is x before z. If the z part of each row is combined with the x part of the next one, both
@@ -150,7 +152,7 @@ def _start(model: Array, T: Array) -> int:
     _load(T, model, 3)
     if model[2] == 0.0:
         return 0
-    _turn_x(T, model[_HEADER + 2], model[_HEADER + 3], model[_HEADER + 4])
+    _turn_x(T, model[HEADER + 2], model[HEADER + 3], model[HEADER + 4])
     return 1
 
 
@@ -158,8 +160,8 @@ Rows = tuple[float, float, float, float, float, float, float, float, float, floa
 
 
 @inlined
-def _before(model: Array, ahead: int) -> Rows:
-    """The three rows of the transform before the first z part, as in `_start`, but held in registers.
+def base_rows(model: Array, ahead: int) -> Rows:
+    """The three rows of the transform before the first z part, as in `load_base`, but held in registers.
 
     Reading it back from memory right after writing it takes as long as the rest of the arm.
     """
@@ -167,15 +169,15 @@ def _before(model: Array, ahead: int) -> Rows:
     x1, y1, z1, p1 = model[7], model[8], model[9], model[10]
     x2, y2, z2, p2 = model[11], model[12], model[13], model[14]
     if ahead == 1:
-        a, ca, sa = _x_part(model, 0)
-        x0, y0, z0, p0 = _turn(x0, y0, z0, p0, 0.0, 1.0, 0.0, a, ca, sa)
-        x1, y1, z1, p1 = _turn(x1, y1, z1, p1, 0.0, 1.0, 0.0, a, ca, sa)
-        x2, y2, z2, p2 = _turn(x2, y2, z2, p2, 0.0, 1.0, 0.0, a, ca, sa)
+        a, ca, sa = x_part(model, 0)
+        x0, y0, z0, p0 = advance((x0, y0, z0, p0), 0.0, 1.0, 0.0, a, ca, sa)
+        x1, y1, z1, p1 = advance((x1, y1, z1, p1), 0.0, 1.0, 0.0, a, ca, sa)
+        x2, y2, z2, p2 = advance((x2, y2, z2, p2), 0.0, 1.0, 0.0, a, ca, sa)
     return x0, y0, z0, p0, x1, y1, z1, p1, x2, y2, z2, p2
 
 
 @inlined
-def _with_tool(model: Array, rows: Rows, T: Array) -> None:
+def apply_tool(model: Array, rows: Rows, T: Array) -> None:
     """T ← the three rows · tool."""
     x0, y0, z0, p0, x1, y1, z1, p1, x2, y2, z2, p2 = rows
     for k in range(3):
@@ -195,24 +197,24 @@ def _with_tool(model: Array, rows: Rows, T: Array) -> None:
 def fk_into(model: Array, q: Array, T: Array) -> None:
     """T ← T_base_tool(q) for one configuration ``(n,)``; T is ``(4, 4)``."""
     ahead = 0 if model[2] == 0.0 else 1
-    x0, y0, z0, p0, x1, y1, z1, p1, x2, y2, z2, p2 = _before(model, ahead)
+    x0, y0, z0, p0, x1, y1, z1, p1, x2, y2, z2, p2 = base_rows(model, ahead)
     for i in range(int(model[0])):
-        k = _HEADER + _WIDTH * i
+        k = HEADER + WIDTH * i
         theta, d = model[k], model[k + 1]
         if model[k + 5] == 1.0:
             theta += q[int(model[k + 6])]
         elif model[k + 5] == 2.0:
             d += q[int(model[k + 6])]
-        # `_z_part` expanded by hand: a call would double the time of the loop.
+        # `z_part` expanded by hand: a call would double the time of the loop.
         if abs(theta) <= WIDE:
             s, c = sin_cos(theta)
         else:
             s, c = math.sin(theta), math.cos(theta)
-        a, ca, sa = _x_part(model, i + ahead)
-        x0, y0, z0, p0 = _turn(x0, y0, z0, p0, s, c, d, a, ca, sa)
-        x1, y1, z1, p1 = _turn(x1, y1, z1, p1, s, c, d, a, ca, sa)
-        x2, y2, z2, p2 = _turn(x2, y2, z2, p2, s, c, d, a, ca, sa)
-    _with_tool(model, (x0, y0, z0, p0, x1, y1, z1, p1, x2, y2, z2, p2), T)
+        a, ca, sa = x_part(model, i + ahead)
+        x0, y0, z0, p0 = advance((x0, y0, z0, p0), s, c, d, a, ca, sa)
+        x1, y1, z1, p1 = advance((x1, y1, z1, p1), s, c, d, a, ca, sa)
+        x2, y2, z2, p2 = advance((x2, y2, z2, p2), s, c, d, a, ca, sa)
+    apply_tool(model, (x0, y0, z0, p0, x1, y1, z1, p1, x2, y2, z2, p2), T)
 
 
 @jit
@@ -227,7 +229,7 @@ def fk_one(model: Array, q: Array, T: Array) -> bool:
 @inlined
 def _joint_block(model: Array, i: int, q: Array, first: int, count: int, S: Array) -> int:
     """S ← sin θ, cos θ, d of row i for a block of configurations; returns how many values are not finite."""
-    k = _HEADER + _WIDTH * i
+    k = HEADER + WIDTH * i
     theta, d, kind, j = model[k], model[k + 1], model[k + 5], int(model[k + 6])
     widest()
     wide = 0
@@ -263,7 +265,7 @@ def fk_many(model: Array, q: Array, out: Array) -> bool:
     widest()
     S = np.empty(_SPACE)
     T = np.empty((4, 4))
-    ahead = _start(model, T)
+    ahead = load_base(model, T)
     bad = 0
     for first in range(0, q.shape[0], BLOCK):
         count = min(BLOCK, q.shape[0] - first)
@@ -273,14 +275,14 @@ def fk_many(model: Array, q: Array, out: Array) -> bool:
                     S[_T0 + (4 * r + c) * BLOCK + b] = T[r, c]
         for i in range(int(model[0])):
             bad += _joint_block(model, i, q, first, count, S)
-            a, ca, sa = _x_part(model, i + ahead)
+            a, ca, sa = x_part(model, i + ahead)
             for b in range(count):
                 s, c, d = S[_SIN + b], S[_COS + b], S[_D + b]
-                x, y, z, p = _turn(S[_T0 + b], S[_T1 + b], S[_T2 + b], S[_T3 + b], s, c, d, a, ca, sa)
+                x, y, z, p = advance((S[_T0 + b], S[_T1 + b], S[_T2 + b], S[_T3 + b]), s, c, d, a, ca, sa)
                 S[_T0 + b], S[_T1 + b], S[_T2 + b], S[_T3 + b] = x, y, z, p
-                x, y, z, p = _turn(S[_T4 + b], S[_T5 + b], S[_T6 + b], S[_T7 + b], s, c, d, a, ca, sa)
+                x, y, z, p = advance((S[_T4 + b], S[_T5 + b], S[_T6 + b], S[_T7 + b]), s, c, d, a, ca, sa)
                 S[_T4 + b], S[_T5 + b], S[_T6 + b], S[_T7 + b] = x, y, z, p
-                x, y, z, p = _turn(S[_T8 + b], S[_T9 + b], S[_T10 + b], S[_T11 + b], s, c, d, a, ca, sa)
+                x, y, z, p = advance((S[_T8 + b], S[_T9 + b], S[_T10 + b], S[_T11 + b]), s, c, d, a, ca, sa)
                 S[_T8 + b], S[_T9 + b], S[_T10 + b], S[_T11 + b] = x, y, z, p
         for b in range(count):
             for r in range(3):
@@ -307,7 +309,7 @@ def positions_many(model: Array, q: Array, out: Array) -> bool:
     X, Y, Z = _T0, _T1, _T2
     S = np.empty(_SPACE)
     T = np.empty((4, 4))
-    ahead = _start(model, T)
+    ahead = load_base(model, T)
     bad = 0
     for first in range(0, q.shape[0], BLOCK):
         count = min(BLOCK, q.shape[0] - first)
@@ -317,7 +319,7 @@ def positions_many(model: Array, q: Array, out: Array) -> bool:
             S[Z + b] = model[26]
         for i in range(int(model[0]) - 1, -1, -1):
             bad += _joint_block(model, i, q, first, count, S)
-            a, ca, sa = _x_part(model, i + ahead)
+            a, ca, sa = x_part(model, i + ahead)
             for b in range(count):
                 s = S[_SIN + b]
                 c = S[_COS + b]
@@ -336,8 +338,8 @@ def positions_many(model: Array, q: Array, out: Array) -> bool:
 @jit
 def _apply_row(T: Array, model: Array, i: int, q: Array) -> None:
     """T ← T · A_i in the convention of the arm."""
-    s, c, d = _z_part(model, i, q)
-    a, ca, sa = _x_part(model, i)
+    s, c, d = z_part(model, i, q)
+    a, ca, sa = x_part(model, i)
     if model[2] == 0.0:
         _turn_z(T, s, c, d)
         _turn_x(T, a, ca, sa)
@@ -357,115 +359,4 @@ def frames_many(model: Array, q: Array) -> Array:
         for i in range(rows):
             _apply_row(T, model, i, q[j])
             copy_pose(T, out[j, i])
-    return out
-
-
-@jit
-def jacobian_into(model: Array, q: Array, J: Array, T: Array, axes: Array) -> None:
-    """J ← geometric Jacobian ``(6, n)`` in the base frame, T ← T_base_tool; `axes` ``(n, 7)`` is scratch.
-
-    The joint axis is the z axis of the frame in which Rz/Tz of its row acts; Rz and Tz leave that line unchanged.
-    """
-    ahead = 0 if model[2] == 0.0 else 1
-    x0, y0, z0, p0, x1, y1, z1, p1, x2, y2, z2, p2 = _before(model, ahead)
-    for i in range(int(model[0])):
-        k = _HEADER + _WIDTH * i
-        j = int(model[k + 6])
-        if j >= 0:
-            axes[j, 0], axes[j, 1], axes[j, 2] = z0, z1, z2
-            axes[j, 3], axes[j, 4], axes[j, 5] = p0, p1, p2
-            axes[j, 6] = model[k + 5]
-        s, c, d = _z_part(model, i, q)
-        a, ca, sa = _x_part(model, i + ahead)
-        x0, y0, z0, p0 = _turn(x0, y0, z0, p0, s, c, d, a, ca, sa)
-        x1, y1, z1, p1 = _turn(x1, y1, z1, p1, s, c, d, a, ca, sa)
-        x2, y2, z2, p2 = _turn(x2, y2, z2, p2, s, c, d, a, ca, sa)
-    _with_tool(model, (x0, y0, z0, p0, x1, y1, z1, p1, x2, y2, z2, p2), T)
-    for j in range(int(model[1])):
-        zx, zy, zz = axes[j, 0], axes[j, 1], axes[j, 2]
-        if axes[j, 6] == 1.0:
-            rx, ry, rz = T[0, 3] - axes[j, 3], T[1, 3] - axes[j, 4], T[2, 3] - axes[j, 5]
-            J[0, j] = zy * rz - zz * ry
-            J[1, j] = zz * rx - zx * rz
-            J[2, j] = zx * ry - zy * rx
-            J[3, j] = zx
-            J[4, j] = zy
-            J[5, j] = zz
-        else:
-            J[0, j] = zx
-            J[1, j] = zy
-            J[2, j] = zz
-            J[3, j] = 0.0
-            J[4, j] = 0.0
-            J[5, j] = 0.0
-
-
-@jit
-def jacobian_one(model: Array, q: Array, J: Array) -> bool:
-    """J ← geometric Jacobian ``(6, n)`` in the base frame; False if q is not n finite numbers."""
-    if q.shape[0] != int(model[1]):
-        return False
-    T = np.empty((4, 4))
-    jacobian_into(model, q, J, T, np.empty((q.shape[0], 7)))
-    return math.isfinite(T[0, 3])  # as in `fk_one`
-
-
-@jit
-def jacobian_many(model: Array, q: Array) -> Array:
-    """Geometric Jacobians ``(k, 6, n)`` in the base frame of configurations ``(k, n)``."""
-    n = int(model[1])
-    out = np.empty((q.shape[0], 6, n))
-    T = np.empty((4, 4))
-    axes = np.empty((n, 7))
-    for i in range(q.shape[0]):
-        jacobian_into(model, q[i], out[i], T, axes)
-    return out
-
-
-@jit
-def volume_of(A: Array) -> float:
-    """Product of the singular values of A ``(m, k)``, m ≥ k, by Householder QR; A is overwritten."""
-    m, k = A.shape
-    product = 1.0
-    for j in range(k):
-        scale = 0.0
-        for i in range(j, m):
-            scale = max(scale, abs(A[i, j]))
-        if scale == 0.0:
-            return 0.0
-        norm2 = 0.0
-        for i in range(j, m):
-            A[i, j] /= scale
-            norm2 += A[i, j] * A[i, j]
-        norm = math.sqrt(norm2)
-        product *= norm * scale
-        head = A[j, j]
-        pivot = head + math.copysign(norm, head)
-        A[j, j] = pivot
-        half = norm2 + abs(head) * norm
-        for c in range(j + 1, k):
-            dot = 0.0
-            for i in range(j, m):
-                dot += A[i, j] * A[i, c]
-            dot /= half
-            for i in range(j, m):
-                A[i, c] -= dot * A[i, j]
-    return product
-
-
-@jit
-def manipulability_many(J: Array, first: int, last: int) -> Array:
-    """Product of the singular values of rows first…last−1 of Jacobians ``(k, 6, n)``: ``(k,)``."""
-    rows = last - first
-    n = J.shape[2]
-    out = np.empty(J.shape[0])
-    tall = np.empty((max(rows, n), min(rows, n)))
-    for i in range(J.shape[0]):
-        for r in range(rows):
-            for c in range(n):
-                if rows > n:
-                    tall[r, c] = J[i, first + r, c]
-                else:
-                    tall[c, r] = J[i, first + r, c]
-        out[i] = volume_of(tall)
     return out

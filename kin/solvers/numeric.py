@@ -35,7 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kin.kernels.compile import jit
-from kin.kernels.fk import jacobian_into
+from kin.kernels.jacobian import jacobian_into
 from kin.solvers.common import relative_pose
 from kin.solvers.contract import APPROACH, MASK, POSE, POSITION
 from kin.transforms import Array

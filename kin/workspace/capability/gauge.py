@@ -8,7 +8,7 @@ import numpy as np
 
 from kin.ik.candidates import residuals
 from kin.kernels.compile import jit
-from kin.kernels.fk import jacobian_into, volume_of
+from kin.kernels.jacobian import jacobian_into, volume_of
 from kin.solvers.common import nearest_image
 from kin.solvers.contract import APPROACH
 from kin.solvers.numeric import solve

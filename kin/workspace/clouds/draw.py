@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kin.kernels.compile import inlined, jit
-from kin.kernels.fk import BLOCK, _start, _x_part, sine_cosine
+from kin.kernels.fk import BLOCK, HEADER, WIDTH, load_base, sine_cosine, x_part
 from kin.kernels.simd import _ROUND, _bits, _float, fma, widest
 from kin.transforms import Array
 from kin.workspace.clouds.numbers import Words, fraction, scrambled
@@ -24,7 +24,6 @@ from kin.workspace.clouds.numbers import Words, fraction, scrambled
 Points = NDArray[np.float32]
 
 _QUARTERS = 2.0 / math.pi  # per radian
-_HEADER, _WIDTH = 27, 8  # of `Robot.model`, see kin.kernels.fk
 # Where a block keeps what: BLOCK values each.
 _X, _Y, _Z, _ANGLE, _SPACE = range(0, 5 * BLOCK, BLOCK)
 
@@ -82,7 +81,7 @@ def points(
     for j in range(step.shape[0]):
         for b in range(BLOCK):
             ahead_by[j, b] = np.uint64(b) * step[j]
-    ahead = _start(model, T)
+    ahead = load_base(model, T)
     x0, x1, x2, x3 = T[0, 0], T[0, 1], T[0, 2], T[0, 3]
     y0, y1, y2, y3 = T[1, 0], T[1, 1], T[1, 2], T[1, 3]
     z0, z1, z2, z3 = T[2, 0], T[2, 1], T[2, 2], T[2, 3]
@@ -92,9 +91,9 @@ def points(
             S[_Y + b] = model[22]
             S[_Z + b] = model[26]
         for i in range(int(model[0]) - 1, -1, -1):
-            k = _HEADER + _WIDTH * i
+            k = HEADER + WIDTH * i
             theta, d, kind, j = model[k], model[k + 1], model[k + 5], int(model[k + 6])
-            a, ca, sa = _x_part(model, i + ahead)
+            a, ca, sa = x_part(model, i + ahead)
             if kind == 0.0:
                 s, c = sine_cosine(theta)
                 for b in range(BLOCK):

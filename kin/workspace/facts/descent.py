@@ -21,7 +21,8 @@ import math
 import numpy as np
 
 from kin.kernels.compile import jit
-from kin.kernels.fk import fk_into, jacobian_into
+from kin.kernels.fk import fk_into
+from kin.kernels.jacobian import jacobian_into
 from kin.transforms import Array
 
 Room = tuple[Array, Array, Array, Array, Array, Array, Array, Array, Array, Array]

@@ -213,7 +213,7 @@ def test_closing_stops_the_work(name, after, monkeypatch):
     assert len(started) <= after + 2
 
 
-def test_the_layout_of_bin_is_documented_where_it_can_be_found():
-    readme = (Path(__file__).parents[3] / "README.md").read_text(encoding="utf-8")
-    assert "KINCLOUD" in readme
+def test_the_layout_of_bin_is_documented():
+    page = (Path(__file__).parents[3] / "docs" / "formats.md").read_text(encoding="utf-8")
+    assert "KINCLOUD" in page
     assert "KINCLOUD" in formats.__doc__
