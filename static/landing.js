@@ -1,5 +1,5 @@
 "use strict";
-// Every address is relative to this page, so that it works below any path prefix.
+// All addresses are relative to this page, so the page works under any path prefix.
 
 const here = new URL(".", document.baseURI).href;
 const byId = (id) => document.getElementById(id);
@@ -20,12 +20,12 @@ async function readiness() {
 }
 
 async function openViewerWhenReady() {
-  const patient = performance.now() + 6000;
+  const slowAfter = performance.now() + 6000;
   for (;;) {
     const status = await readiness();
     if (status === "ready") break;
-    if (status === "failed") return show("failed", "The viewer could not start; the server’s log says why. REST still answers.");
-    const why = performance.now() > patient ? " The first start on a machine compiles its kernels: about a minute." : "";
+    if (status === "failed") return show("failed", "The viewer could not start; see the log of the server. REST still works.");
+    const why = performance.now() > slowAfter ? " The first start on a machine compiles the kernels, which takes about a minute." : "";
     show("warming", status === "warming" ? "The viewer is warming up…" + why : "Waiting for the server…");
     await new Promise((resolve) => setTimeout(resolve, 400));
   }
@@ -35,7 +35,7 @@ async function openViewerWhenReady() {
   viewer.title = "Interactive 3-D view of the arm, with its controls";
   viewer.allow = "fullscreen; clipboard-write";
   byId("frame").append(viewer);
-  show("ready", "Your own arm: nobody else moves it");
+  show("ready", "This arm is yours; every visitor has their own");
   byId("placeholder").textContent = "Loading the viewer…";
 }
 
@@ -46,12 +46,12 @@ function element(tag, text, className) {
   return node;
 }
 
-// What the address of a shared view holds: see app/viewer/session/state.py.
+// The fragment that restores a view: see app/viewer/session/state.py.
 function viewerWith(robot) {
   return "viewer/#s=" + btoa(JSON.stringify({ v: 1, robot: robot.id })).replace(/=+$/, "");
 }
 
-// An arm of the operator's own has no picture: three links stand for it.
+// Robots added by the operator have no picture; this drawing replaces it.
 function placeholder() {
   const drawing = byId("any-arm").content.firstElementChild.cloneNode(true);
   return document.importNode(drawing, true);
@@ -73,7 +73,7 @@ function card(robot) {
   const title = element("h3", "");
   const link = element("a", robot.name);
   link.href = viewerWith(robot);
-  link.target = "viewer"; // the frame above; a tab of its own before that is there
+  link.target = "viewer"; // the frame above, or a new tab before the frame exists
   link.addEventListener("click", () => byId("viewer").scrollIntoView());
   title.append(link);
   const facts = element("ul", "", "facts");
@@ -98,7 +98,7 @@ async function fillCards() {
   }
 }
 
-// The box in which REST can be tried
+// The form to try REST
 
 const method = () => byId("method").textContent;
 
@@ -108,9 +108,9 @@ function choose(example) {
   byId("path").value = example.dataset.path;
   byId("body").value = example.querySelector("code").textContent;
   byId("body").disabled = example.dataset.method === "GET";
-  byId("body").placeholder = byId("body").disabled ? "A GET has no body: what is asked is in the address." : "";
+  byId("body").placeholder = byId("body").disabled ? "A GET request has no body; its parameters are in the address." : "";
   say("", "");
-  byId("answer").textContent = "Send asks this server.";
+  byId("answer").textContent = "Press Send to call this server.";
 }
 
 function say(kind, text) {
@@ -118,14 +118,14 @@ function say(kind, text) {
   byId("outcome").textContent = text;
 }
 
-// The address must stay on this server, whatever was typed.
+// Whatever was typed, the address stays on this server.
 function address() {
   return here + byId("path").value.trim().replace(/^\/+/, "");
 }
 
 async function send() {
   byId("send").disabled = true;
-  say("", "asking…");
+  say("", "waiting…");
   const began = performance.now();
   try {
     const request = { method: method() };
@@ -144,14 +144,14 @@ async function send() {
   }
 }
 
-// JSON with lists of numbers on one line each, as people write vectors and matrices.
+// JSON with each list of numbers on one line, as vectors and matrices are written.
 function pretty(text) {
   const most = 60000;
   let shown = text;
   try {
     shown = JSON.stringify(JSON.parse(text), null, 2).replace(/\[\s*(-?[\d.][^[\]{}"]*?)\s*\]/g, (_, row) => `[${row.replace(/\s+/g, " ")}]`);
-  } catch { /* not JSON: as it is */ }
-  return shown.length > most ? `${shown.slice(0, most)}\n… and more` : shown;
+  } catch { /* not JSON: shown unchanged */ }
+  return shown.length > most ? `${shown.slice(0, most)}\n… (truncated)` : shown;
 }
 
 function asCurl() {
@@ -174,7 +174,7 @@ function prepareBox() {
   });
 }
 
-// The clipboard is closed to pages served over plain http from another machine.
+// Browsers deny clipboard access to pages served over plain http from another machine.
 async function copy(text) {
   try {
     await navigator.clipboard.writeText(text);
