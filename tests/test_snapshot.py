@@ -1067,7 +1067,7 @@ def test_no_failure_is_kept(kept: dict[str, dict[str, Any]], renewed: Any) -> No
         ] == []
 
 
-def test_a_difference_is_told_with_its_place() -> None:
+def test_a_difference_names_its_place() -> None:
     old = {"a": [1.0, 1e-17, {"b": "far"}], "c": 1, "d": None}
     assert list(differences(old, {"a": [1.0 + 1e-9, 0, {"b": "far"}], "c": 1, "d": None})) == []
     new = {"a": [1.001, 0.0, {"b": "near"}], "c": True, "e": 2}
