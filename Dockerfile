@@ -1,24 +1,24 @@
-# Kinboard: one port, no root; writes nothing and downloads nothing at run time.
+# Kinboard: one port, no root, nothing written, nothing fetched at run time.
 #   docker build -t kinboard .
 #   docker run --rm -p 127.0.0.1:8000:8000 kinboard
 # scripts/image.sh builds it without Docker and checks what docs/running.md says about it.
 
 FROM python:3.13-slim-trixie AS build
 ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1 PIP_ROOT_USER_ACTION=ignore
-# A private package index: --build-arg PIP_INDEX_URL=…, or a mounted pip.conf. Neither becomes part of the image.
+# An index of your own: --build-arg PIP_INDEX_URL=…, or a mounted file and its place. Neither gets into the image.
 ARG PIP_INDEX_URL
 ARG PIP_CONFIG_FILE
 RUN apt-get update -qq && apt-get install -y -qq --no-install-recommends binutils
 WORKDIR /src
-# The environment has no pip: nothing is installed later.
+# The environment has no pip of its own: the image never installs anything later.
 RUN python -m venv --without-pip /opt/kinboard && python -m venv --system-site-packages /opt/tools
-# Dependencies first: they seldom change, so a change of the code rebuilds fast. Both lists are exact, with hashes.
+# Dependencies first: they change seldom, so a change of code rebuilds quickly. Both lists are exact, with hashes.
 COPY requirements.lock requirements-build.lock ./
 RUN install="install --no-compile --require-hashes --only-binary :all:" \
     && pip --python /opt/kinboard/bin/python $install -r requirements.lock \
     && pip --python /opt/tools/bin/python $install -r requirements-build.lock
-# Remove what only developers of these packages need: tests, headers, debug symbols, and the sources of the viewer's
-# page (the built page stays). Libraries in *.libs are kept as they are: strip may break the way they were patched.
+# What only developers of these packages need: their tests, headers, debugging symbols, and the viewer's sources (its
+# built page stays). Libraries in *.libs are left alone: they were patched in a way that strip may break.
 RUN cd /opt/kinboard/lib/python*/site-packages \
     && find . -type d -name tests -prune -exec rm -r {} + \
     && find . -type f \( -name '*.pyi' -o -name '*.h' -o -name '*.pxd' -o -name '*.lib' -o -name '*.a' \) -delete \
@@ -35,10 +35,10 @@ COPY deploy/image /opt/kinboard/image
 
 FROM python:3.13-slim-trixie
 COPY --from=build /opt/kinboard /opt/kinboard
-# numba ignores machine code cached on another CPU model, and compiling takes about a minute. Kernels are therefore
-# compiled for a fixed level that every 64-bit x86 machine of the last decade supports, emulators included. The empty
-# feature list means "the features of the level" instead of "those of the build machine". On ARM, LLVM does not know
-# the level and uses its generic one.
+# Machine code cached on one CPU model is ignored on any other, and compiling takes about a minute. So kernels are
+# compiled here for a fixed level that every 64-bit x86 machine of the last decade has, emulators included; the
+# empty feature list means "what the level has" instead of "what the building machine has". On ARM LLVM does not know
+# the level and falls back to its generic one.
 ARG CPU_LEVEL=x86-64-v2
 ENV PATH=/opt/kinboard/bin:$PATH \
     PYTHONPATH=/opt/kinboard/image \
@@ -51,10 +51,10 @@ ENV PATH=/opt/kinboard/bin:$PATH \
 RUN groupadd --gid 10001 kinboard \
     && useradd --uid 10001 --gid 10001 --no-create-home --home-dir /nonexistent --shell /usr/sbin/nologin kinboard \
     && python /opt/kinboard/image/prepare.py
-# From here on everything is read-only; see deploy/image/kernel_store.py for numba's cache.
+# From here on all of this is only read; deploy/image/kernel_store.py tells how numba is content with that.
 ENV PYTHONDONTWRITEBYTECODE=1 \
     NUMBA_CACHE_LOCATOR_CLASSES=kernel_store.LinkedCacheLocator
-# The user kinboard as a number, because Kubernetes' runAsNonRoot does not resolve names.
+# The user kinboard, as a number: Kubernetes' runAsNonRoot does not look names up.
 USER 10001:10001
 WORKDIR /
 EXPOSE 8000

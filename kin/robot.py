@@ -54,8 +54,7 @@ class Robot:
         id: short name used in URLs, e.g. ``"pioneer5"``.
         rows: all DH rows from base to tool, fixed ones included.
         home: one value per moving joint, inside the limits.
-        base: constant transform before the first row, as nested tuples.
-        tool: constant transform after the last row.
+        base, tool: constant transforms before the first and after the last row, as nested tuples.
         units: the length unit of the robot file ("mm", "cm" or "m"), used when the table is displayed.
     """
 

@@ -2,10 +2,10 @@
 # Build the image and check what docs/running.md says about it: on Debian, as root, without Docker.
 #
 # The base image is a stand-in made here from Debian's packages: the same Debian release and Python version as the
-# Dockerfile's, and like that one without bytecode. Everything is in one folder, separate from the images
-# of this machine; delete it when done:
+# Dockerfile's, and like that one without bytecode. Everything is kept in one folder, apart from the machine's own
+# images; delete it when done:
 #   KINBOARD_IMAGE_WORK    that folder (default /var/tmp/kinboard-image)
-# A private package index or CA bundle is used for building and does not become part of the image:
+# A package index or CA bundle of your own is used while building and does not get into the image:
 #   PIP_INDEX_URL, PIP_EXTRA_INDEX_URL, SSL_CERT_FILE, and the proxies http_proxy, https_proxy, no_proxy
 set -eu
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -25,7 +25,7 @@ say() { printf '\n== %s\n' "$*"; }
 now() { date +%s.%N; }
 since() { echo "$1 $(now)" | awk '{ printf "%.1f", $2 - $1 }'; }
 
-# Separate settings for the tools, so that the configuration and images of this machine stay untouched.
+# The tools' own settings, so that neither the machine's configuration nor its images are touched.
 configure() {
   printf '[engine]\ncgroup_manager = "cgroupfs"\nruntime = "runc"\n[network]\nnetwork_backend = "netavark"\n' \
     >"$work/containers.conf"

@@ -1,4 +1,4 @@
-"""Check a running service over REST and in a browser; used by image.sh.
+"""Visit a running service as programs and people do; used by image.sh.
 
 python scripts/image_check.py URL PICTURE.png
 """
@@ -28,7 +28,7 @@ def main(url: str, picture: Path) -> None:
 
 
 def check_rest(arm: str) -> None:
-    """REST gives the same tool pose as the package, and its IK solutions lead back to that pose."""
+    """The tool's pose is what the package computes, and the joint values found for it lead back there."""
     q = ARM.q_home + 0.1
     T = kin.fk(ARM, q)
     tool = ask(f"{arm}/fk", {"q": q.tolist()})["pose"]
@@ -42,8 +42,8 @@ def check_rest(arm: str) -> None:
 
 def ask(url: str, question: dict[str, object]) -> dict[str, object]:
     request = urllib.request.Request(url, json.dumps(question).encode(), {"Content-Type": "application/json"})
-    direct = urllib.request.build_opener(urllib.request.ProxyHandler({}))
-    with direct.open(request, timeout=30) as answer:
+    straight = urllib.request.build_opener(urllib.request.ProxyHandler({}))
+    with straight.open(request, timeout=30) as answer:
         return json.load(answer)
 
 

@@ -1,7 +1,7 @@
 #!/bin/sh
-# Renew the exact dependencies of the image: requirements.lock and requirements-build.lock, for all platforms at once.
-# Without arguments, only versions that pyproject.toml no longer allows are changed; --upgrade takes the newest version
-# of every package, --upgrade-package NAME of one.
+# Renew the exact dependencies of the image: requirements.lock and requirements-build.lock, for every platform at once.
+# Without arguments only what pyproject.toml no longer allows changes; --upgrade takes the newest of everything, and
+# --upgrade-package NAME of one.
 set -eu
 root=$(cd "$(dirname "$0")/.." && pwd)
 . "$root/scripts/venv.sh"
@@ -9,7 +9,7 @@ root=$(cd "$(dirname "$0")/.." && pwd)
 "$root/.venv/bin/python" -m pip install -q --disable-pip-version-check 'uv>=0.9'
 cd "$root"
 version=$(sed -n 's/^FROM python:\([0-9.]*\)-slim.*/\1/p' Dockerfile | head -n 1)
-lock() { # $1: the requirements to resolve, - for standard input
+lock() { # $1: the list to write; on standard input: what is wanted
   "$root/.venv/bin/uv" pip compile -q --universal --python-version "$version" --generate-hashes --no-header \
     --no-annotate "$@"
 }

@@ -1,7 +1,7 @@
 """Pictures of the built-in arms for the landing page, ``static/robots/*.webp``: ``python scripts/pictures.py``.
 
-The viewer draws each arm in its home configuration on a transparent background, so one picture suits light and
-dark pages. Needs what the browser tests need: playwright, Chromium (KINBOARD_TEST_CHROMIUM) and pillow.
+Each arm is drawn by the viewer itself, at home, on nothing: the background is transparent, so one picture serves
+light and dark pages. Needs what the browser tests need: playwright, Chromium (KINBOARD_TEST_CHROMIUM) and pillow.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from kin import Robot, builtin_robots, link_frames
 
 FOLDER = Path(__file__).parents[1] / "static" / "robots"
 SIZE = (320, 240)
-FINER = 3  # oversampling, for smooth edges
+FINER = 3  # drawn so many times larger: smooth edges
 MARGIN = 10
 TALLEST = 1.05  # height of a picture over its width
-PAD = 0.07  # of the height, below the lowest frame
+PAD = 0.07  # of the whole, for the hand around its frame
 
 
 def draw(client: viser.ClientHandle, robot: Robot) -> Image.Image:
@@ -47,7 +47,7 @@ def draw(client: viser.ClientHandle, robot: Robot) -> Image.Image:
     arm.remove()
     picture = Image.fromarray(pixels)
     left, top, right, bottom = picture.getbbox()
-    # A tall pedestal is cut off, or the arm on it would be tiny; joints and tool stay in the picture.
+    # A tall pedestal runs out of the picture, or the arm on it would be tiny; no joint and no tool does.
     seen = (link_frames(robot, robot.q_home)[:, :3, 3] - position) @ np.column_stack([np.cross(x, z), z])
     lowest = height / 2 * (1.0 - (seen[:, 0] / seen[:, 1] / np.tan(FOV / 2)).min()) + PAD * height
     end = min(bottom, max(round(top + TALLEST * (right - left)), round(lowest)))

@@ -3,7 +3,7 @@
 set -eu
 root=$(cd "$(dirname "$0")/.." && pwd)
 . "$root/scripts/venv.sh"
-unset PYTHONDONTWRITEBYTECODE # otherwise each of hundreds of processes compiles everything it imports
+unset PYTHONDONTWRITEBYTECODE # hundreds of processes are started, each of which would compile all it imports
 install_kinboard "[test]"
 if [ ! -x "${KINBOARD_TEST_CHROMIUM:-/usr/bin/chromium}" ]; then
   apt_install chromium || fail "the browser tests need Chromium. On Debian: sudo apt-get install chromium"
@@ -14,7 +14,7 @@ for proxy in nginx caddy; do
 done
 cd "$root"
 if [ $# -eq 0 ]; then
-  # Compile the kernels while the linters run; otherwise parallel tests compile the same kernels.
+  # Kernels are compiled beside the checks of the code; two rows of tests would both compile the same ones.
   python -c 'import kin; kin.warm_up(); kin.warm_up_rest()' &
   compiling=$!
 fi
@@ -25,6 +25,6 @@ if [ $# -gt 0 ]; then
   exec pytest "$@"
 fi
 wait $compiling
-# Four at a time, because tests often wait. Browser tests and benchmarks run alone.
+# Four at a time, as they often wait; but what draws pictures or measures time wants the machine for itself.
 pytest -n 4 --dist loadfile -m "not slow and not browser and not bench"
 pytest -m "not slow and (browser or bench)"

@@ -2,7 +2,7 @@
 
 fail() { echo "kinboard: $*" >&2; exit 1; }
 
-# Only root can install Debian packages; the caller prints a hint for other users.
+# Debian packages may only be installed by root; anybody else is told what to ask for.
 apt_install() {
   if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
     echo "Installing $* with apt…"
@@ -12,7 +12,7 @@ apt_install() {
   fi
 }
 
-# Unpack a Debian package into .venv/debian: needs no root and starts no service.
+# A Debian package's files in .venv/debian: no root needed, and no service is started on its usual port.
 apt_unpack() {
   command -v apt-get >/dev/null || return 1
   echo "Unpacking $1 from Debian into .venv…"
@@ -32,7 +32,7 @@ find_python() {
       return
     fi
   done
-  fail "needs Python 3.11, 3.12 or 3.13 and found none. Install one or set PYTHON: PYTHON=/path/to/python3.12 sh $0"
+  fail "needs Python 3.11, 3.12 or 3.13 and found none. Install one, or name it: PYTHON=/path/to/python3.12 sh $0"
 }
 
 make_venv() {
@@ -42,20 +42,20 @@ make_venv() {
     apt_install "python$version-venv" ||
       fail "$python lacks the venv module. On Debian or Ubuntu: sudo apt-get install python$version-venv"
   fi
-  "$python" -m venv "$root/.venv" || fail "$python could not create $root/.venv"
+  "$python" -m venv "$root/.venv" || fail "$python could not make $root/.venv"
 }
 
-# $1: an extra such as "[test]", or "". Repeated only when pyproject.toml has changed.
+# $1: what to install, "" or an extra such as "[test]". Done again only when pyproject.toml has changed.
 install_kinboard() {
   stamp="$root/.venv/installed$1"
   [ -x "$root/.venv/bin/python" ] || make_venv
   if [ ! -e "$stamp" ] || [ "$root/pyproject.toml" -nt "$stamp" ]; then
     echo "Installing Kinboard$1 into .venv (a minute or two, once)…"
-    # Few of the installed modules are ever imported; those are compiled on import, if bytecode may be written.
+    # Few of the modules that are installed are ever imported: each is compiled then, if that may be kept.
     compile=--no-compile
     [ -z "${PYTHONDONTWRITEBYTECODE:-}" ] || compile=--compile
     "$root/.venv/bin/python" -m pip install -q $compile --disable-pip-version-check -e "$root$1" ||
-      fail "the installation failed, see the message above. To start over, delete .venv."
+      fail "the installation failed; its message is above. Remove .venv to begin afresh."
     touch "$stamp"
   fi
 }

@@ -1,62 +1,113 @@
-"""What ``kinboard check`` tells of a robot file: what the arm is, who will solve it, and what looks odd.
+"""``kinboard check``: describes the arm of a robot file, names its solver, and warns of likely mistakes.
 
-A file that cannot be read as a robot is refused before this (:mod:`kin.catalog`). What is found here does not
-forbid anything: an arm with warnings works, but perhaps not as its author meant.
+A file that is not a valid robot is rejected earlier, by :mod:`kin.catalog`. Warnings forbid nothing: the arm
+works, but perhaps not as its author intended.
 """
 
 from __future__ import annotations
 
 import math
+from argparse import Namespace
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from typing_extensions import TypedDict
 
+from app.cli.terminal import Units, print_json, table
 from app.shared.answers.robots import RobotAnswer, robot_answer
-from kin import Robot, jacobian
+from kin import Robot, builtin_robots, jacobian, load_robot
 from kin.axes import Pair, generic_q, pairs, parallel_groups, size, spherical_groups
+from kin.catalog import BUILTIN
 from kin.home import candidates, margins
 from kin.solvers import closed_form_of
 
-NEAR_SINGULAR = 0.1  # of the best margin among the poses a home would be chosen from
-LONG, SHORT = 100.0, 0.01  # metres: reaches beyond these are rather another unit
+NEAR_SINGULAR = 0.1  # of the best margin among the candidates for a home pose
+LONG, SHORT = 100.0, 0.01  # m; a reach beyond these suggests a wrong unit
 
 
 class PairAnswer(TypedDict):
-    """How two consecutive axes lie to each other."""
+    """Relation of two consecutive joint axes."""
 
     joints: list[int]
     """Indices of the two moving joints."""
     angle: float
-    """Between the two lines, 0 to π/2 radians."""
+    """Angle between the axes, 0 to π/2 radians."""
     distance: float | None
-    """Shortest distance between the lines in metres; null where one of the joints slides."""
+    """Shortest distance between the axes in metres; null if one of the joints slides."""
     relation: Literal["same line", "parallel", "perpendicular", "oblique"]
-    """What the angle is, and whether parallel lines are one line."""
+    """Kind of the angle; "same line" for coincident axes."""
     intersect: bool
-    """Whether the lines meet."""
+    """Whether the axes intersect."""
 
 
 class CheckAnswer(TypedDict):
-    """Everything ``kinboard check`` finds out."""
+    """Result of ``kinboard check``."""
 
     robot: RobotAnswer
     axes: list[PairAnswer]
     parallel: list[list[int]]
-    """Each longest run of consecutive joints with parallel axes."""
+    """Maximal runs of consecutive joints with parallel axes."""
     spherical: list[list[int]]
-    """Each three consecutive joints whose axes meet in one point."""
+    """Triples of consecutive joints whose axes meet in one point."""
     motions: int
-    """How many independent motions the joints give the tool, at most six."""
+    """Number of independent tool motions, at most six."""
     solver: str
     """The closed form that answers inverse kinematics, or "numeric"."""
     reason: str
-    """Why this one."""
+    """Why this solver was chosen."""
     warnings: list[str]
 
 
+def run(arguments: Namespace) -> int:
+    """Describe the arm of a robot file."""
+    path = Path(arguments.file)
+    robot = load_robot(path)
+    answer = check(robot, robot.id in builtin_robots() and path.resolve().parent != BUILTIN.resolve())
+    if arguments.json:
+        return print_json(answer)
+    units = Units(robot, arguments.rad)
+    print(f"{robot.name} ({robot.id})\n{robot.description or 'No description.'}\nsource: {robot.source}\n")
+    rows = [
+        [str(i + 1), joint.name, joint.kind, units.joint(i, low), units.joint(i, high), units.joint(i, home)]
+        for i, (joint, low, high, home) in enumerate(
+            zip(robot.joints, robot.lower, robot.upper, robot.home, strict=True)
+        )
+    ]
+    print(table(["", "joint", "kind", "lower", "upper", "home"], rows) + "\n")
+    for line in _about(answer, units):
+        print(line)
+    return 0
+
+
+def _about(answer: CheckAnswer, units: Units) -> list[str]:
+    """Lines about joint axes, solver and warnings."""
+    robot = answer["robot"]
+    lines = []
+    for pair in answer["axes"]:
+        a, b = (j + 1 for j in pair["joints"])
+        apart = "" if pair["distance"] is None else f", {units.length(pair['distance'])} {units.of_length} apart"
+        angle = f" ({units.angle(pair['angle'])})" if pair["relation"] == "oblique" else ""
+        where = "" if pair["relation"] == "same line" else ", intersecting" if pair["intersect"] else apart
+        lines.append(f"axes {a} and {b}: {pair['relation']}{angle}{where}")
+    lines += [f"joints {run[0] + 1} to {run[-1] + 1}: parallel axes" for run in answer["parallel"]]
+    lines += [f"joints {run[0] + 1} to {run[-1] + 1}: axes through one point" for run in answer["spherical"]]
+    count = len(robot["branches"])
+    lines += [
+        "",
+        f"convention  {robot['convention']}",
+        f"joints      {robot['n']}, giving the tool {answer['motions']} independent motions",
+        f"reach       {units.length(robot['reach'])} {units.of_length} at most",
+        f"solver      {answer['solver']}: {answer['reason']}",
+        f"branches    {count if count else 'not known in advance: a search finds them one by one'}",
+        "",
+        *(f"warning: {text}" for text in answer["warnings"]),
+    ]
+    return lines if answer["warnings"] else [*lines, "No warnings."]
+
+
 def check(robot: Robot, taken: bool = False) -> CheckAnswer:
-    """What an arm is; `taken` tells that a built-in one has its id."""
+    """Describe an arm; `taken`: a built-in robot has the same id."""
     match = closed_form_of(robot)
     between = pairs(robot)
     return {
@@ -85,25 +136,25 @@ def _pair(pair: Pair) -> PairAnswer:
 
 
 def motions(robot: Robot) -> int:
-    """Rank of the Jacobian at a generic configuration, lengths in units of the arm's size."""
+    """Rank of the Jacobian at a generic configuration, with lengths relative to the size of the arm."""
     J = jacobian(robot, generic_q(robot))
     J[:3] /= size(robot)
     return int(np.linalg.matrix_rank(J, tol=1e-9))
 
 
 def warnings(robot: Robot, between: tuple[Pair, ...], taken: bool) -> list[str]:
-    """What looks odd, one sentence each."""
+    """Likely mistakes, one sentence each."""
     found = []
     if taken:
-        found.append(f'The id "{robot.id}" is that of a built-in robot; a folder of robots may not use it again.')
+        found.append(f'The id "{robot.id}" is that of a built-in robot; robot files in a folder need another id.')
     if not SHORT <= robot.reach <= LONG:
-        found.append(f"The arm reaches {robot.reach:g} m: is units.length what the table is in?")
+        found.append(f"The arm reaches {robot.reach:g} m: check units.length.")
     for i, joint in enumerate(robot.joints):
         if joint.kind == "revolute" and joint.limits and joint.limits[1] - joint.limits[0] > 4 * math.pi + 1e-9:
             span = math.degrees(joint.limits[1] - joint.limits[0])
             found.append(
-                f"Joint {i + 1} ({joint.name}) turns through {span:.0f}°, more than twice round: "
-                "postures come in several whole-turn images."
+                f"Joint {i + 1} ({joint.name}) turns through {span:.0f}°, more than two turns: "
+                "each solution has several images that differ by whole turns."
             )
     for pair in between:
         here, there = pair.joint + 1, pair.joint + 2
@@ -111,8 +162,8 @@ def warnings(robot: Robot, between: tuple[Pair, ...], taken: bool) -> list[str]:
             found.append(f"Joints {here} and {there} turn about the same line: only their sum moves the tool.")
         elif pair.almost:
             found.append(
-                f"The axes of joints {here} and {there} are almost {pair.almost}: a closed form needs that "
-                "exactly; type the table with more digits."
+                f"The axes of joints {here} and {there} are almost {pair.almost}: a closed form needs "
+                "exact values; give the table with more digits."
             )
     found += [
         f'The fixed row "{row.name}" changes nothing.'
@@ -121,7 +172,7 @@ def warnings(robot: Robot, between: tuple[Pair, ...], taken: bool) -> list[str]:
     ]
     margin = margins(robot, np.vstack([robot.q_home, candidates(robot)[0]]))
     if margin[0] < NEAR_SINGULAR * margin.max():
-        found.append("The home pose is near a singularity: from there some motions of the tool need fast joints.")
+        found.append("The home configuration is near a singularity: some tool motions there need fast joints.")
     if robot.n > 6 and motions(robot) < 6:
         found.append(f"{robot.n} joints give the tool only {motions(robot)} independent motions.")
     return found

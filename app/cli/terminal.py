@@ -1,7 +1,6 @@
-"""What commands share: reading arguments as people type them, writing answers as people read them.
+"""What commands share: arguments to core units, results to text.
 
-People type and read degrees and millimetres, or radians and metres with ``--rad``; ``--json`` is always in the
-latter.
+Text is in degrees and millimetres, or with ``--rad`` in radians and metres; ``--json`` is always in the latter.
 """
 
 from __future__ import annotations
@@ -13,18 +12,21 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from app.shared.store import Store
 from kin import InputError, Robot
+from kin.transforms import Array
 
 
 def store_of(arguments: Namespace) -> Store:
-    """The robots that ``--robots`` or the environment adds to the built-in ones, and those."""
+    """The built-in robots and those of the folder named by ``--robots`` or KINBOARD_ROBOTS."""
     folder = arguments.robots or os.environ.get("KINBOARD_ROBOTS")
     return Store(Path(folder) if folder else None)
 
 
 def per_joint(robot: Robot, given: list[tuple[str, list[float]]] | None, field: str, count: int, rad: bool) -> Any:
-    """``--lock 2=30`` or ``--limit 2=0:30``, joints from 1, as one entry per joint in radians (metres)."""
+    """``--lock 2=30`` or ``--limit 2=0:30``, joints counted from 1, as one entry per joint in radians (metres)."""
     if given is None:
         return None
     entries: list[float | list[float] | None] = [None] * robot.n
@@ -40,8 +42,17 @@ def per_joint(robot: Robot, given: list[tuple[str, list[float]]] | None, field: 
     return entries
 
 
+def configuration(robot: Robot, values: list[float], field: str, rad: bool) -> Array:
+    """Joint values as ``(n,)`` in radians (metres); raises `InputError` unless there are n of them."""
+    if len(values) != robot.n:
+        joints = ", ".join(joint.name for joint in robot.joints)
+        raise InputError(field, f"{len(values)} values", f"{robot.n}, one for each of: {joints}")
+    scale = np.where(robot.revolute, math.pi / 180, 1e-3)
+    return robot.check_q(np.array(values) * (1.0 if rad else scale), field)
+
+
 class Units:
-    """How values are shown: degrees and millimetres, or radians and metres."""
+    """Values as text: degrees and millimetres, or radians and metres."""
 
     def __init__(self, robot: Robot, rad: bool) -> None:
         self.rad = rad
@@ -62,7 +73,7 @@ class Units:
 
 
 def table(head: list[str], rows: list[list[str]]) -> str:
-    """Columns under their heads, numbers to the right."""
+    """A text table; columns of numbers are aligned to the right."""
     lines = [head, *rows]
     widths = [max(len(line[k]) for line in lines) for k in range(len(head))]
     numeric = [all(not row[k] or row[k][:1] in "-0123456789" for row in rows) for k in range(len(head))]
@@ -76,11 +87,11 @@ def table(head: list[str], rows: list[list[str]]) -> str:
 
 
 def clean(value: float, digits: int) -> str:
-    """Fixed digits without a minus before zero."""
+    """Fixed-point notation without negative zero."""
     return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 def print_json(answer: object) -> int:
-    """Print an answer on one line; 0, the exit code."""
+    """Print an answer on one line; returns the exit code 0."""
     print(json.dumps(answer, ensure_ascii=False, allow_nan=False))
     return 0

@@ -93,7 +93,7 @@ def encode(
     clouds: Clouds,
     cloud: Cloud,
     with_q: bool = False,
-    watch: Callable[[WorkspaceChunk], None] | None = None,
+    watch: Callable[[WorkspaceChunk], object] | None = None,
 ) -> Bytes:
     """A cloud as the bytes of a file in the format `name`, a row of `FORMATS`; close it to stop the work.
 

@@ -1,10 +1,10 @@
-"""numba's cache folder in a container.
+"""Where numba finds compiled kernels in a container, and where it may keep new ones.
 
-The image contains compiled kernels in a folder that belongs to root and may be on a read-only filesystem, but
-numba uses a cache folder only if it can write to it. Each process therefore gets its own writable folder with
-links to the kernels of the image: nothing is copied, and further kernels are compiled into it.
+The image brings its kernels compiled, in a folder that belongs to root and on a root filesystem that may be
+read-only. numba uses a folder only if it can write to it. So every process gets a folder of its own that begins as
+links to what the image brought: nothing is copied, and a kernel that was not foreseen is compiled and kept beside.
 
-``NUMBA_CACHE_LOCATOR_CLASSES`` names the class below.
+numba is told to come here by ``NUMBA_CACHE_LOCATOR_CLASSES``.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from numba.core.caching import UserProvidedCacheLocator
 
 
 class LinkedCacheLocator(UserProvidedCacheLocator):
-    """Replaces ``NUMBA_CACHE_DIR`` by the folder of links of this process."""
+    """numba's own ``NUMBA_CACHE_DIR``, seen through this process's folder of links."""
 
     def __init__(self, py_func: FunctionType, py_file: str) -> None:
         super().__init__(py_func, py_file)
@@ -29,12 +29,12 @@ class LinkedCacheLocator(UserProvidedCacheLocator):
 
 
 @functools.cache
-def _links(compiled: Path) -> Path:
-    """A writable folder of links to the files in `compiled`; deleted when the process ends."""
+def _links(brought: Path) -> Path:
+    """A writable folder, gone with the process, whose files are links to those in `brought`."""
     own = _writable_folder()
     atexit.register(shutil.rmtree, own, ignore_errors=True)
-    for file in compiled.glob("*/*"):
-        link = own / file.relative_to(compiled)
+    for file in brought.glob("*/*"):
+        link = own / file.relative_to(brought)
         link.parent.mkdir(exist_ok=True)
         link.symlink_to(file)
     return own
@@ -43,5 +43,5 @@ def _links(compiled: Path) -> Path:
 def _writable_folder() -> Path:
     try:
         return Path(tempfile.mkdtemp(prefix="kernels-"))
-    except OSError:  # a read-only root without /tmp; shared memory is always available
+    except OSError:  # a read-only root without a /tmp; shared memory is always there
         return Path(tempfile.mkdtemp(prefix="kernels-", dir="/dev/shm"))

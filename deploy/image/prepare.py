@@ -1,8 +1,8 @@
-"""Last step of building the image: start the service once and visit it.
+"""Last step of building the image: start the service once, as its users will, and visit it.
 
-This leaves compiled kernels in ``NUMBA_CACHE_DIR`` and the bytecode of exactly the modules that a service imports
-(Python's own included: the base image has no bytecode). Otherwise every start of a container would have to create
-them, which takes from seconds to a minute.
+What that leaves behind every start of every container would otherwise make anew, for seconds or a minute: compiled
+kernels in ``NUMBA_CACHE_DIR``, and bytecode of exactly those modules that a service imports. Python's own modules
+are among them; the base image comes without their bytecode.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from websockets.sync.client import connect
 import kin
 
 PORT = 8000
-TIMEOUT = 900  # s; compiling takes long on a small or emulated machine
+PATIENCE = 900  # s; compiling on a small or emulated machine
 FK = "/api/v1/robots/pioneer5/fk"
 PAGES = ("/", "/docs", "/openapi.json", "/static/landing.css", "/viewer/", "/api/v1/robots")
 
@@ -32,24 +32,24 @@ def main() -> int:
             visit()
         finally:
             service.terminate()
-    kin.warm_up_rest()  # the kernels that a starting service does not wait for
+    kin.warm_up_rest()  # what a service does not wait for when it starts
     return service.returncode
 
 
 def wait_until_ready(service: subprocess.Popen[bytes]) -> None:
-    end = time.monotonic() + TIMEOUT
+    end = time.monotonic() + PATIENCE
     while True:
         try:
             ask("/readyz")
             return
         except urllib.error.HTTPError as error:
             if json.load(error)["status"] == "failed":
-                raise SystemExit("the service failed to start; see its message above") from error
-        except OSError:  # not listening yet
+                raise SystemExit("the service could not prepare itself; its message is above") from error
+        except OSError:  # does not listen yet
             if service.poll() is not None:
-                raise SystemExit("the service ended; see its message above") from None
+                raise SystemExit("the service ended; its message is above") from None
         if time.monotonic() > end:
-            raise SystemExit(f"the service was not ready after {TIMEOUT} s")
+            raise SystemExit(f"the service was not ready after {PATIENCE} s")
         time.sleep(1.0)
 
 
@@ -64,8 +64,8 @@ def visit() -> None:
 
 def ask(path: str, body: bytes | None = None) -> None:
     request = urllib.request.Request(f"http://127.0.0.1:{PORT}{path}", body, {"Content-Type": "application/json"})
-    direct = urllib.request.build_opener(urllib.request.ProxyHandler({}))
-    with direct.open(request, timeout=30) as answer:
+    straight = urllib.request.build_opener(urllib.request.ProxyHandler({}))
+    with straight.open(request, timeout=30) as answer:
         answer.read()
 
 

@@ -16,7 +16,7 @@ import pytest
 
 import kin
 from app.cli import parser
-from app.cli.capability import WRITERS
+from app.exports.capability import WRITERS
 from app.shared import mapreduce
 from kin import InputError
 

@@ -1,0 +1,278 @@
+"""Arguments of every command. Imports nothing heavy, so that help and usage errors appear at once."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+UNITS_NOTE = "degrees and millimetres, or radians and metres with --rad"
+ROBOT_HELP = "id of the robot; `kinboard robots` lists them"
+XYZ = ("X", "Y", "Z")
+
+
+def number(text: str) -> float:
+    """A finite number; the minus sign may be the typographic one."""
+    value = float(text.replace("−", "-"))
+    if not abs(value) <= 1e6:
+        raise argparse.ArgumentTypeError(f"{text.strip()!r} is not a number between -1e6 and 1e6")
+    return value
+
+
+def whole_number(text: str) -> int:
+    """A whole number in digits."""
+    return int(text.replace("−", "-"))
+
+
+def count(text: str) -> int:
+    """A whole number, which may be written as 1e6."""
+    value = float(text)
+    if not value.is_integer():
+        raise ValueError
+    return int(value)
+
+
+def named_number(text: str) -> tuple[str, float]:
+    """``NAME=VALUE``, or a bare value with an empty name."""
+    name, _, value = text.rpartition("=")
+    return name.strip(), number(value)
+
+
+def named_numbers(text: str) -> tuple[str, list[float]]:
+    """``NAME=VALUE:VALUE…``."""
+    name, _, values = text.rpartition("=")
+    return name.strip(), [number(value) for value in values.split(":")]
+
+
+# argparse reports "invalid <name> value".
+whole_number.__name__ = count.__name__ = "whole number"
+named_number.__name__ = named_numbers.__name__ = "value"
+
+
+class Parents:
+    """Arguments that several commands share, as parent parsers.
+
+    Attributes:
+        robots: ``--robots``, the folder of further robot files.
+        output: ``--json`` and the units.
+        joints: ``--lock`` and ``--limit``.
+    """
+
+    def __init__(self) -> None:
+        self.robots = argparse.ArgumentParser(add_help=False)
+        self.robots.add_argument("--robots", metavar="FOLDER", help="folder with further robot files (*.toml)")
+        self.output = argparse.ArgumentParser(add_help=False)
+        self.output.add_argument(
+            "--json", action="store_true", help="print the result as JSON, in radians and metres"
+        )
+        unit = self.output.add_mutually_exclusive_group()
+        unit.add_argument(
+            "--deg", dest="rad", action="store_false", default=False, help="degrees and millimetres (default)"
+        )
+        unit.add_argument(
+            "--rad", dest="rad", action="store_true", default=False,
+            help="read and print radians and metres",
+        )  # fmt: skip
+        self.joints = argparse.ArgumentParser(add_help=False)
+        self.joints.add_argument(
+            "--lock", type=named_numbers, action="append", metavar="JOINT=VALUE",
+            help=f"lock a joint (counted from 1) at a value; {UNITS_NOTE}; may be repeated",
+        )  # fmt: skip
+        self.joints.add_argument(
+            "--limit", type=named_numbers, action="append", metavar="JOINT=LOWER:UPPER",
+            help=f"narrow the limits of a joint (counted from 1); {UNITS_NOTE}; may be repeated",
+        )  # fmt: skip
+
+
+def add_serve(commands: Any, parents: Parents) -> argparse.ArgumentParser:
+    """``kinboard serve``."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "serve", parents=[parents.robots], help="serve the dashboard and the REST interface (default)"
+    )
+    parser.add_argument("--host", help="address to listen on (default 127.0.0.1)")
+    parser.add_argument("--port", type=int, help="port to listen on (default 8000; 0 takes any free port)")
+    parser.add_argument("--workers", type=int, metavar="N", help="number of server processes (default 1)")
+    parser.add_argument(
+        "--pin", action="store_true", default=None, help="keep the interpreter of each process on one processor"
+    )
+    parser.add_argument("--root-path", metavar="PREFIX", help="path prefix that a reverse proxy adds")
+    parser.add_argument(
+        "--read-only", action="store_true", default=None,
+        help="visitors without the access token (KINBOARD_TOKEN) may look but not move anything",
+    )  # fmt: skip
+    parser.add_argument("--open", action="store_true", help="open the dashboard in the browser")
+    return parser
+
+
+def add_fk(commands: Any, parents: Parents) -> argparse.ArgumentParser:
+    """``kinboard fk``."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "fk", parents=[parents.robots, parents.output], help="forward kinematics: tool pose for joint values"
+    )
+    parser.add_argument("robot", metavar="ROBOT", help=ROBOT_HELP)
+    parser.add_argument("q", type=number, nargs="+", metavar="Q", help=f"joint values, {UNITS_NOTE}")
+    parser.add_argument("--frames", action="store_true", help="also print the frame after every DH row")
+    return parser
+
+
+def add_ik(commands: Any, parents: Parents) -> argparse.ArgumentParser:
+    """``kinboard ik``."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "ik",
+        parents=[parents.robots, parents.output, parents.joints],
+        help="inverse kinematics: joint values for a tool pose",
+        usage="kinboard ik ROBOT --position X Y Z [--wxyz W X Y Z | --approach X Y Z] [options]",
+    )
+    parser.add_argument("robot", metavar="ROBOT", help=ROBOT_HELP)
+    _add_target(parser)
+    parser.add_argument(
+        "--seed", type=number, nargs="+", metavar="Q",
+        help=f"prefer solutions near this configuration; {UNITS_NOTE}",
+    )  # fmt: skip
+    parser.add_argument(
+        "--redundancy", type=named_number, action="append", metavar="[NAME=]VALUE",
+        help="value of a redundancy parameter of the arm, an angle; may be repeated",
+    )  # fmt: skip
+    parser.add_argument(
+        "--branch", action="append", metavar="NAME",
+        help="only this branch: 'elbow up', 'shoulder front · wrist flip', 'seed'; may be repeated",
+    )  # fmt: skip
+    parser.add_argument(
+        "--prefer", choices=("nearest", "limits", "manipulability"), default="nearest",
+        help="how to choose and sort solutions: nearest to the seed (default), farthest from the joint limits, "
+        "largest manipulability",
+    )  # fmt: skip
+    parser.add_argument(
+        "--solver", choices=("auto", "numeric"), default="auto",
+        help="numeric: search from many starts, even if the arm has a closed form",
+    )  # fmt: skip
+    parser.add_argument("--all", action="store_true", help="print all solutions, not only the best")
+    parser.add_argument(
+        "--images", choices=("nearest", "all"), default="nearest",
+        help="with --all: also solutions that differ by whole turns of a joint, inside the limits",
+    )  # fmt: skip
+    parser.add_argument("--ignore-limits", action="store_true", help="also solutions outside the joint limits")
+    return parser
+
+
+def _add_target(parser: argparse.ArgumentParser) -> None:
+    """The arguments of ``ik`` that say what the tool has to match."""
+    parser.add_argument(
+        "--position", type=number, nargs=3, required=True, metavar=XYZ, help="millimetres (--rad: metres)"
+    )
+    turn = parser.add_mutually_exclusive_group()
+    turn.add_argument("--wxyz", type=number, nargs=4, metavar=("W", *XYZ), help="orientation as a quaternion")
+    turn.add_argument("--approach", type=number, nargs=3, metavar=XYZ, help="direction of the tool's z axis")
+    parser.add_argument(
+        "--task", choices=("pose", "approach", "position"),
+        help="what the tool must match (default: everything that is given)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--mask", nargs="+", choices=("x", "y", "z", "rx", "ry", "rz"), metavar="COORDINATE",
+        help="instead of a task: which of x y z rx ry rz must match",
+    )  # fmt: skip
+    parser.add_argument(
+        "--mask-frame", choices=("tool", "base"), default="tool",
+        help="frame of the mask's coordinates: the target's own (default) or the base frame",
+    )  # fmt: skip
+
+
+def add_robots(commands: Any, parents: Parents) -> argparse.ArgumentParser:
+    """``kinboard robots``."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "robots", parents=[parents.robots, parents.output], help="list the robots, or describe one"
+    )
+    parser.add_argument("robot", nargs="?", metavar="ROBOT", help="id of the robot to describe")
+    return parser
+
+
+def add_workspace(commands: Any, parents: Parents) -> argparse.ArgumentParser:
+    """``kinboard workspace``."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "workspace",
+        parents=[parents.robots, parents.output, parents.joints],
+        help="size of the set of points the tool reaches; with -o a point cloud as a file",
+    )
+    parser.add_argument("robot", metavar="ROBOT", help=ROBOT_HELP)
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", help="write a point cloud in metres to this file; - is standard output"
+    )
+    parser.add_argument(
+        "--picture", metavar="FILE", help="draw the cloud along the three axes, and the section (SVG)"
+    )
+    parser.add_argument(
+        "--hull", metavar="FILE", help="write the convex hull of the cloud as a solid: stl, ply, obj, off, glb"
+    )
+    parser.add_argument(
+        "--format", choices=("csv", "npz", "ply", "ndjson", "bin"),
+        help="format of the point cloud (default: by the ending of its name)",
+    )  # fmt: skip
+    parser.add_argument("-n", type=count, default=100_000, help="number of points, such as 1e6 (default 100000)")
+    parser.add_argument("--seed", type=whole_number, default=0, help="equal seeds give equal clouds (default 0)")
+    parser.add_argument(
+        "--strategy", choices=("uniform", "quasi", "volume", "boundary"), default="uniform",
+        help="uniform: joints sampled uniformly (default); quasi: more evenly; volume: points even in space; "
+        "boundary: points on the envelope",
+    )  # fmt: skip
+    parser.add_argument(
+        "--measure", choices=("manipulability", "limits"), action="append", default=[],
+        help="add a column: manipulability, or the distance to the nearest joint limit (0 to 1); may be repeated",
+    )  # fmt: skip
+    parser.add_argument("--q", action="store_true", help="add the joint values, in radians (metres)")
+    parser.add_argument(
+        "--progress", action=argparse.BooleanOptionalAction,
+        help="show progress on standard error (default: if that is a terminal)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--effort", type=whole_number, default=4, help="2 to 64: precision of volume and surface (default 4)"
+    )
+    return parser
+
+
+def add_bench(commands: Any, parents: Parents) -> argparse.ArgumentParser:
+    """``kinboard bench``."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "bench", help="compare the speed with other libraries; `pip install 'kinboard[bench]'` installs them"
+    )
+    parser.add_argument("--quick", action="store_true", help="fewer targets and rounds: under two minutes")
+    parser.add_argument("--rows", nargs="+", metavar="ROW", help="only these rows, such as fk ik-pioneer5")
+    parser.add_argument("--peers", nargs="+", metavar="PEER", help="only these libraries, or none")
+    parser.add_argument(
+        "--cpu-time", action="store_true", help="measure processor time instead of wall time, for a busy machine"
+    )
+    parser.add_argument("--json", metavar="FILE", help="write all measurements to this file")
+    parser.add_argument("--picture", metavar="FILE", help="write a bar chart to this file (SVG)")
+    return parser
+
+
+def add_check(commands: Any, parents: Parents) -> argparse.ArgumentParser:
+    """``kinboard check``."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "check", parents=[parents.output], help="validate a robot file and describe the arm"
+    )
+    parser.add_argument("file", metavar="FILE", help="robot file (*.toml)")
+    return parser
+
+
+def add_capability(commands: Any, parents: Parents) -> argparse.ArgumentParser:
+    """``kinboard capability``."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "capability",
+        parents=[parents.robots, parents.output, parents.joints],
+        help="capability map: from which directions the tool reaches each place",
+    )
+    parser.add_argument("robot", metavar="ROBOT", help=ROBOT_HELP)
+    size = parser.add_mutually_exclusive_group()
+    size.add_argument("--voxel", type=number, metavar="SIDE", help="side of a voxel, millimetres (--rad: metres)")
+    size.add_argument(
+        "--resolution", type=int, default=25, metavar="N", help="voxels along the longest side (default 25)"
+    )
+    parser.add_argument(
+        "--directions", type=int, default=48, metavar="N", help="directions per voxel: 12, 24, 48 (default) or 96"
+    )
+    parser.add_argument(
+        "--dask", metavar="ADDRESS",
+        help="compute on the workers of this Dask scheduler, such as tcp://host:8786; "
+        "`pip install 'kinboard[cluster]'` installs what that needs",
+    )  # fmt: skip
+    parser.add_argument("-o", "--output", metavar="FILE", help="write the map to a file: .npz, .ply or .csv")
+    return parser

@@ -1,0 +1,36 @@
+"""``kinboard fk``: the pose of the tool for joint values."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+
+from app.cli.terminal import Units, clean, configuration, print_json, store_of, table
+from app.shared.answers.fk import fk_answers
+
+
+def run(arguments: Namespace) -> int:
+    """Print the pose of the tool."""
+    robot = store_of(arguments).get(arguments.robot)
+    q = configuration(robot, arguments.q, "q", arguments.rad)
+    answer = fk_answers(robot, q[None], arguments.frames)[0]
+    if arguments.json:
+        return print_json(answer)
+    units = Units(robot, arguments.rad)
+    rows = [
+        [
+            joint.name,
+            units.joint(i, q[i]),
+            " … ".join(units.joint(i, limit) for limit in joint.limits or ()),
+            "" if robot.lower[i] <= q[i] <= robot.upper[i] else "outside limits",
+        ]
+        for i, joint in enumerate(robot.joints)
+    ]
+    print(f"{robot.name} ({robot.id})\n")
+    print(table(["joint", "value", "limits", ""], rows))
+    frames = [("tool", answer["pose"])] + [(frame["name"], frame["pose"]) for frame in answer["frames"] or ()]
+    rows = [
+        [name, *(units.length(x) for x in pose["position"]), *(f"{clean(w, 5)}" for w in pose["wxyz"])]
+        for name, pose in frames
+    ]
+    print("\n" + table(["frame", *(f"{axis} {units.of_length}" for axis in "xyz"), *"wxyz"], rows))
+    return 0

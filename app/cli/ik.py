@@ -1,0 +1,125 @@
+"""``kinboard ik``: joint values for a target of the tool."""
+
+from __future__ import annotations
+
+import math
+import sys
+from argparse import Namespace
+
+import numpy as np
+
+from app.cli.terminal import Units, configuration, per_joint, print_json, store_of, table
+from app.shared.answers.ik import Blocked, IkAnswer, Solution, ik_answer
+from kin import InputError, Task, solve_ik
+from kin.ik.problem import MASK_NAMES
+from kin.transforms import frame_from_approach, from_position_wxyz
+
+
+def run(arguments: Namespace) -> int:
+    """Print the solutions; 1 if there is no exact one."""
+    robot = store_of(arguments).get(arguments.robot)
+    angle, length = (1.0, 1.0) if arguments.rad else (math.pi / 180, 1e-3)
+    T = from_position_wxyz([x * length for x in arguments.position], arguments.wxyz)
+    if arguments.approach is not None:
+        T[:3, :3] = frame_from_approach(arguments.approach)
+    task = _task(arguments)
+    result = solve_ik(
+        robot,
+        T,
+        task=task,
+        q_seed=None if arguments.seed is None else configuration(robot, arguments.seed, "--seed", arguments.rad),
+        respect_limits=not arguments.ignore_limits,
+        max_solutions=None if arguments.all else 1,
+        redundancy=_redundancy(arguments, angle),
+        limits=per_joint(robot, arguments.limit, "--limit", 2, arguments.rad),
+        locked=per_joint(robot, arguments.lock, "--lock", 1, arguments.rad),
+        branch=arguments.branch,
+        images=arguments.images,
+        prefer=arguments.prefer,
+        solver=arguments.solver,
+        mask=None if arguments.mask is None else [name in arguments.mask for name in MASK_NAMES],
+        mask_frame=arguments.mask_frame,
+    )
+    answer = ik_answer(result)
+    if arguments.json:
+        print_json(answer)
+    else:
+        _print(answer, Units(robot, arguments.rad))
+        if not arguments.rad and np.abs(T[:3, 3]).max() < 5e-3:
+            print("note: --position is in millimetres; --rad makes it metres", file=sys.stderr)
+    return 0 if answer["status"] == "solved" else 1
+
+
+def _print(answer: IkAnswer, units: Units) -> None:
+    print(answer["reason"] + "\n")
+    listed = [(str(k + 1), solution) for k, solution in enumerate(answer["solutions"])]
+    if not listed and answer["closest"]:
+        listed.append(("closest", answer["closest"]))
+    if answer["nearest_orientation"]:
+        listed.append(("nearest orientation", answer["nearest_orientation"]))
+    if listed:
+        print(_solutions(units, listed))
+    for parameter in answer["redundancy"]:
+        ranges = ", ".join(" … ".join(units.angle(x) for x in interval) for interval in parameter["intervals"])
+        print(f"\n{parameter['label']} = {units.angle(parameter['value'])}, possible: {ranges or 'nothing'}")
+    if answer["blocked"]:
+        print("\n" + table(["branch", "would need"], _needs(units, answer["blocked"])))
+
+
+def _solutions(units: Units, listed: list[tuple[str, Solution]]) -> str:
+    """The table of solutions."""
+    count = len(listed[0][1]["q"])
+    head = ["", *(f"q{i + 1}" for i in range(count)), "point error", "rotation error", "posture"]
+    rows = [
+        [
+            name,
+            *(units.joint(i, value) for i, value in enumerate(solution["q"])),
+            f"{units.length(solution['position_error'])} {units.of_length}",
+            units.angle(solution["rotation_error"]),
+            solution["branch"] + ("" if solution["in_limits"] else " (outside limits)"),
+        ]
+        for name, solution in listed
+    ]
+    return table(head, rows)
+
+
+def _task(arguments: Namespace) -> Task:
+    """The task named by ``--task``, or implied by the target; "pose" with a mask."""
+    if arguments.mask:
+        if arguments.task:
+            raise InputError("--task", arguments.task, "no --task together with --mask")
+        if not arguments.wxyz and any(name.startswith("r") for name in arguments.mask):
+            raise InputError("--mask", " ".join(arguments.mask), "--wxyz as well as --position for rx, ry or rz")
+        return "pose"
+    implied: Task = "pose" if arguments.wxyz else "approach" if arguments.approach else "position"
+    task: Task = arguments.task or implied
+    if task == "pose" and not arguments.wxyz:
+        raise InputError("--task", task, "--wxyz as well as --position for a pose")
+    if task == "approach" and not (arguments.approach or arguments.wxyz):
+        raise InputError("--task", task, "--approach or --wxyz as well as --position for an approach")
+    return task
+
+
+def _needs(units: Units, blocked: list[Blocked]) -> list[list[str]]:
+    """The joint values outside the limits that each branch would need."""
+    return [
+        [
+            branch["branch"],
+            ", ".join(
+                f"q{v['joint'] + 1} = {units.joint(v['joint'], v['value'])} "
+                f"(limit {units.joint(v['joint'], v['limit'])})"
+                for v in branch["violations"]
+            ),
+        ]
+        for branch in blocked
+    ]
+
+
+def _redundancy(arguments: Namespace, angle: float) -> float | dict[str, float] | None:
+    """``--redundancy psi=20 --redundancy …`` as values by name in radians, or a single value without a name."""
+    given: list[tuple[str, float]] = arguments.redundancy or []
+    if len(given) == 1 and not given[0][0]:
+        return given[0][1] * angle
+    if any(not name for name, _ in given):
+        raise InputError("--redundancy", given, "NAME=VALUE when more than one is given")
+    return {name: value * angle for name, value in given} or None

@@ -1,0 +1,46 @@
+"""``kinboard robots``: the robots there are, and the DH table of one."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+
+from app.cli.terminal import Units, clean, print_json, store_of, table
+from app.shared.answers.robots import RobotAnswer, robot_answer
+
+
+def run(arguments: Namespace) -> int:
+    """List all robots, or describe one."""
+    store = store_of(arguments)
+    if arguments.robot is not None:
+        robot = store.get(arguments.robot)
+        answer = robot_answer(robot)
+        if arguments.json:
+            return print_json(answer)
+        print(f"{robot.name} ({robot.id})\n{robot.description}\n{robot.source}\n")
+        print(_dh_table(answer, Units(robot, arguments.rad)))
+        return 0
+    answers = [robot_answer(robot) for robot in store.robots]
+    if arguments.json:
+        return print_json({"robots": answers})
+    rows = [
+        [s["id"], str(s["n"]), s["convention"], f"{clean(s['reach'] * 1e3, 0)} mm", s["name"]] for s in answers
+    ]
+    print(table(["robot", "joints", "convention", "reach at most", "name"], rows))
+    return 0
+
+
+def _dh_table(answer: RobotAnswer, units: Units) -> str:
+    limits = {joint["name"]: (joint["index"], joint["limits"]) for joint in answer["joints"]}
+    rows = []
+    for row in answer["rows"]:
+        index, bounds = limits.get(row["name"], (0, None))
+        cells = [
+            units.angle(row["theta"]),
+            units.length(row["d"]),
+            units.length(row["a"]),
+            units.angle(row["alpha"]),
+        ]
+        rows.append([row["name"], row["kind"], *cells, " … ".join(units.joint(index, x) for x in bounds or ())])
+    length = units.of_length
+    head = ["row", "kind", "theta", f"d {length}", f"a {length}", "alpha", "limits"]
+    return f"DH table, {answer['convention']} convention\n\n" + table(head, rows)

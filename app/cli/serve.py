@@ -1,0 +1,33 @@
+"""``kinboard serve``: settings from flags and the environment, then the service."""
+
+from __future__ import annotations
+
+import gc
+import sys
+from argparse import Namespace
+
+from pydantic import ValidationError
+
+from app.cli.startup import no_collections
+from app.shared.settings import Settings
+
+FLAGS = ("host", "port", "root_path", "robots", "read_only", "workers", "pin")  # they override the environment
+
+
+def run(arguments: Namespace) -> int:
+    """Serve until Ctrl-C; 2 for an invalid setting."""
+    given = {name: value for name in FLAGS if (value := getattr(arguments, name)) is not None}
+    try:
+        settings = Settings(**given)
+    except ValidationError as error:
+        for item in error.errors():
+            name = str(item["loc"][0]) if item["loc"] else "settings"
+            variable = f"KINBOARD_{name.upper()}"
+            where = f"--{name.replace('_', '-')} or {variable}" if name in FLAGS else variable
+            print(f"kinboard: {where}: got {item['input']!r}: {item['msg']}", file=sys.stderr)
+        return 2
+    with no_collections():
+        import app.service.main as service
+
+        gc.freeze()  # later collections skip what has been imported
+    return service.run(settings, open_browser=arguments.open)

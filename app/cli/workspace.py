@@ -1,0 +1,147 @@
+"""``kinboard workspace``: sizes of the workspace, or its cloud as a file, a picture or a solid."""
+
+from __future__ import annotations
+
+import sys
+from argparse import Namespace
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from app.cli.terminal import Units, per_joint, print_json, store_of, table
+from app.exports.formats import FORMATS
+from app.exports.picture import draw
+from app.exports.save import opened, reading, save
+from app.shared.answers.workspace import workspace_answer
+from app.shared.clouds import Cloud
+from kin import InputError, Robot, sample_workspace, section, workspace_facts
+
+_INTERRUPTED = 130  # exit code that shells expect after Ctrl-C
+
+
+def run(arguments: Namespace) -> int:
+    """Print the sizes, or write the files that are named."""
+    robot = store_of(arguments).get(arguments.robot)
+    limits = per_joint(robot, arguments.limit, "--limit", 2, arguments.rad)
+    locked = per_joint(robot, arguments.lock, "--lock", 1, arguments.rad)
+    files = (
+        (arguments.output, _cloud_writer),
+        (arguments.picture, _picture_writer),
+        (arguments.hull, _hull_writer),
+    )
+    if any(target is not None for target, _ in files):
+        cloud = _cloud(robot, arguments, limits, locked)
+        # Every name is checked before the first file is written.
+        ready = [write(cloud, target, arguments) for target, write in files if target is not None]
+        return max(write() for write in ready)
+    answer = workspace_answer(workspace_facts(robot, limits=limits, locked=locked, effort=arguments.effort))
+    if arguments.json:
+        return print_json(answer)
+    units = Units(robot, arguments.rad)
+    spans = [
+        *(("x", answer["x"]), ("y", answer["y"]), ("z", answer["z"])),
+        *(("from the axis of joint 1", answer["radius"]), ("from the shoulder", answer["reach"])),
+    ]
+    rows = [
+        [name, units.length(span["least"]["value"]), units.length(span["largest"]["value"])]
+        for name, span in spans
+    ]
+    print(f"{robot.name} ({robot.id})\n")
+    print(table([f"tool point, {units.of_length}", "least", "largest"], rows) + "\n")
+    for name, unit, estimate in (("volume", "m³", answer["volume"]), ("surface", "m²", answer["surface"])):
+        if estimate is not None:
+            print(f"{name:<8} {estimate['value']:.4g} ± {estimate['error']:.1g} {unit}: {estimate['method']}")
+    return 0
+
+
+def _cloud(robot: Robot, arguments: Namespace, limits: Any, locked: Any) -> Cloud:
+    """The cloud as described by the arguments; raises `InputError` for an invalid one before any work begins."""
+    cloud = Cloud(
+        robot,
+        arguments.n,
+        arguments.seed,
+        arguments.strategy,
+        tuple(dict.fromkeys(arguments.measure)),
+        None if limits is None else tuple(pair and tuple(pair) for pair in limits),
+        None if locked is None else tuple(locked),
+    )
+    # Checks its arguments when called, and samples nothing until it is read.
+    sample_workspace(
+        robot,
+        cloud.n,
+        seed=cloud.seed,
+        strategy=cloud.strategy,
+        limits=cloud.limits,
+        locked=cloud.locked,
+        measure=cloud.measures,
+    )
+    return cloud
+
+
+def _cloud_writer(cloud: Cloud, target: str, arguments: Namespace) -> Callable[[], int]:
+    kind = arguments.format or Path(target).suffix.removeprefix(".").lower()
+    if kind not in FORMATS:
+        expected = "a name that ends in " + ", ".join(f".{name}" for name in FORMATS) + ", or --format"
+        raise InputError("--output", target, expected)
+
+    def act() -> str:
+        size = save(cloud, target, kind, arguments.q, _shows_progress(arguments))
+        return f"{cloud.n} points, {size / 1e6:.1f} MB"
+
+    return partial(_writing, target, act)
+
+
+def _picture_writer(cloud: Cloud, target: str, arguments: Namespace) -> Callable[[], int]:
+    if Path(target).suffix.lower() != ".svg":
+        raise InputError("--picture", target, "a name that ends in .svg")
+
+    def act() -> str:
+        robot, limits, locked = cloud.robot, cloud.limits, cloud.locked
+        facts = workspace_facts(robot, limits=limits, locked=locked, effort=arguments.effort)
+        turns = robot.joints[0].kind == "revolute"
+        cut = section(robot, limits=limits, locked=locked) if turns else None
+        with reading(cloud, _shows_progress(arguments)) as chunks, opened(target) as file:
+            file.write(draw(robot, chunks, facts, cut).encode())
+        return f"{cloud.n} points"
+
+    return partial(_writing, target, act)
+
+
+def _hull_writer(cloud: Cloud, target: str, arguments: Namespace) -> Callable[[], int]:
+    from app.exports.hull import hull, kind_of  # trimesh takes a quarter of a second
+
+    kind = kind_of(target)
+
+    def act() -> str:
+        with reading(cloud, _shows_progress(arguments)) as chunks:
+            body = hull(chunks)
+        with opened(target) as file:
+            body.export(file, file_type=kind)
+        return f"{len(body.vertices)} corners, {body.volume:.4g} m³, {body.area:.4g} m²"
+
+    return partial(_writing, target, act)
+
+
+def _shows_progress(arguments: Namespace) -> bool:
+    return sys.stderr.isatty() if arguments.progress is None else bool(arguments.progress)
+
+
+def _writing(target: str, act: Callable[[], str]) -> int:
+    """Write a file and print what is in it; returns 0, 2 if it cannot be written, 130 after Ctrl-C."""
+    try:
+        summary = act()
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        print(f"kinboard: cannot write {target}: {error.strerror or error}", file=sys.stderr)
+        return 2
+    except ImportError as error:
+        print(f"kinboard: this needs {error.name}: pip install 'kinboard[hull]'", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("kinboard: interrupted" + ("; nothing was written" if target != "-" else ""), file=sys.stderr)
+        return _INTERRUPTED
+    if target != "-":
+        print(f"{target}: {summary}")
+    return 0

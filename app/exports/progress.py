@@ -1,0 +1,27 @@
+"""A progress bar on standard error, by tqdm."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+INTERVAL = 0.1  # s between two updates of the bar
+
+
+@contextmanager
+def progress_bar(total: int, unit: str, show: bool) -> Iterator[Callable[[int], object]]:
+    """A bar for as long as the context lasts; call what it yields with the number of units that are newly done.
+
+    Args:
+        total: how many units there are.
+        unit: what is counted, such as "points"; large numbers are shown in thousands and millions of it.
+        show: if false, nothing is shown.
+    """
+    if not show:
+        yield lambda _: None
+        return
+    from tqdm import tqdm  # no command needs it without a terminal
+
+    with tqdm(total=total, unit=f" {unit}", unit_scale=True, mininterval=INTERVAL, file=sys.stderr) as bar:
+        yield bar.update
