@@ -27,9 +27,9 @@ from app.bench import floors
 from app.bench.arms import Arm, ortho
 from app.bench.rows import Task
 from kin.transforms import Array
-from kin.workspace.clouds import draw
-from kin.workspace.clouds.draw import Points
-from kin.workspace.clouds.numbers import streams
+from kin.workspace.region import Region
+from kin.workspace.sampling.kernels import Points, sample_configurations, sample_points
+from kin.workspace.sampling.streams import joint_streams
 
 OURS = "kinboard"
 RICH = "kinboard, rich"
@@ -124,20 +124,19 @@ def _cloud(task: Task) -> list[Contestant]:
     The kernel does the first three steps in one pass; what the pass saves is the difference to their sum.
     """
     robot, count = task.robot, len(task.q)
-    free = np.ones(robot.n, dtype=np.bool_)
-    key, step = streams(0, free, False)
-    low, high = robot.lower.copy(), robot.upper.copy()
+    region = Region.of(robot, None, None)
+    streams = joint_streams(0, region.movable, quasi=False)
     out, q = np.empty((count, 3), dtype=np.float32), np.empty_like(task.q)
 
     def kernel() -> Points:
-        draw.points(robot.model, key, step, False, low, high, 0, out)
+        sample_points(region.arm, streams, 0, out)
         return out
 
     def generator() -> list[kin.WorkspaceChunk]:
         return list(kin.sample_workspace(robot, count))
 
     def numbers() -> None:
-        draw.configurations(key, step, False, low, high, 0, q)
+        sample_configurations(region.arm, streams, 0, q)
 
     exact = kin.fk_positions(robot, task.q)
 

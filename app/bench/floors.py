@@ -12,7 +12,7 @@ import numpy as np
 
 from kin.kernels.compile import jit
 from kin.transforms import Array
-from kin.workspace.clouds.draw import Points
+from kin.workspace.sampling.kernels import Points
 
 
 @jit

@@ -117,6 +117,27 @@ def sin_cos(x: float) -> tuple[float, float]:
 
 
 @inlined
+def sin_cos_quarters(y: float) -> tuple[float, float]:
+    """(sin, cos) of y quarter turns, accurate to 5e-11: enough for float32.
+
+    Half the work of `sin_cos`: quarter turns need no reduction by π, and fewer digits a shorter polynomial.
+    Chebyshev interpolation in r², |r| ≤ ½.
+    """
+    shifted = y + _ROUND
+    r = y - (shifted - _ROUND)
+    quadrant = _bits(shifted)
+    z = r * r
+    p = fma(z, fma(z, 0.00015820628792786513, -0.004681266248964948), 0.07969258272440714)
+    sine = r * fma(z, fma(z, p, -0.6459640961467292), 1.5707963267880989)
+    p = fma(z, fma(z, 0.0009036280586426939, -0.02086006949632079), 0.2536692036544627)
+    cosine = fma(z, fma(z, p, -1.2337005406331254), 0.9999999999524891)
+    odd = (quadrant & 1) != 0
+    s = cosine if odd else sine
+    c = sine if odd else cosine
+    return _float(_bits(s) ^ ((quadrant & 2) << 62)), _float(_bits(c) ^ (((quadrant + 1) & 2) << 62))
+
+
+@inlined
 def atan2(y: float, x: float) -> float:
     """Angle of the vector (x, y) in (−π, π], for lengths from 1e-150 to 1e150; 0.0 for the zero vector.
 

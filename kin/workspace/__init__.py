@@ -1,9 +1,8 @@
-"""The set of points the tool reaches: clouds, sizes, sections.
+"""The set of points the tool reaches: clouds, sizes, sections, capability maps.
 
-Draws depend on nothing but their number (:mod:`kin.workspace.clouds.cloud`). Everything exact rests on one
-compiled descent (:mod:`kin.workspace.facts.descent`), and everything that asks whether a point can be reached on
-one map
-of where descents may begin (:mod:`kin.workspace.facts.atlas`).
+Samples depend on their index alone (:mod:`kin.workspace.clouds.cloud`). All exact results come from one compiled
+descent (:mod:`kin.workspace.search.descent`), and whether a point can be reached is decided with one map of
+starting configurations for it (:mod:`kin.workspace.search.cells`).
 """
 
 from kin.workspace.capability.blocks import (
@@ -17,7 +16,7 @@ from kin.workspace.capability.blocks import (
 )
 from kin.workspace.clouds.cloud import STRATEGIES, Strategy, configuration_at, sample_workspace, workspace_slice
 from kin.workspace.clouds.measures import MEASURES, Measure
-from kin.workspace.facts.summary import workspace_facts
+from kin.workspace.facts import workspace_facts
 from kin.workspace.results import Estimate, Extreme, Section, SectionArc, Span, WorkspaceChunk, WorkspaceFacts
 from kin.workspace.sections.cut import section
 

@@ -1,10 +1,11 @@
-"""What a cloud is drawn from: the box of joint values that limits and locks leave."""
+"""The region of joint values that a workspace belongs to: the box that limits and locks leave."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +16,22 @@ from kin.robot import Robot
 from kin.transforms import Array
 
 
+class BoundedArm(NamedTuple):
+    """An arm and its joint limits as compiled functions take them.
+
+    Attributes:
+        model: the arm, `Robot.model`.
+        lower, upper: ``(n,)`` finite joint limits.
+    """
+
+    model: Array
+    lower: Array
+    upper: Array
+
+
 @dataclass(frozen=True)
 class Region:
-    """An arm and the box its joints may move in; hashable, so that what is learnt about it can be kept.
+    """An arm and the box its joints may move in. Hashable: a key for results that are cached.
 
     Attributes:
         robot: the arm.
@@ -29,25 +43,30 @@ class Region:
 
     @classmethod
     def of(cls, robot: Robot, limits: Limits | None, locked: Locks | None) -> Region:
-        """The region of a request; raises `InputError` naming the wrong limit or lock."""
+        """The region of these options; raises `InputError` naming the wrong limit or lock."""
         question = ask(robot, np.zeros(3), task="position", limits=limits, locked=locked)
         lower = np.where(np.isfinite(question.lower), question.lower, -math.pi)
         upper = np.where(np.isfinite(question.upper), question.upper, math.pi)
         return cls(robot, tuple(zip(lower.tolist(), upper.tolist(), strict=True)))
 
     @cached_property
+    def arm(self) -> BoundedArm:
+        """The region as compiled functions take it."""
+        return BoundedArm(self.robot.model, self.lower, self.upper)
+
+    @cached_property
     def lower(self) -> Array:
-        """Lower ends ``(n,)``."""
+        """Lower limits ``(n,)``."""
         return np.array([low for low, _ in self.bounds])
 
     @cached_property
     def upper(self) -> Array:
-        """Upper ends ``(n,)``."""
+        """Upper limits ``(n,)``."""
         return np.array([high for _, high in self.bounds])
 
     @cached_property
-    def free(self) -> NDArray[np.bool_]:
-        """Which joints can move ``(n,)``."""
+    def movable(self) -> NDArray[np.bool_]:
+        """Which joints are not locked ``(n,)``."""
         return self.upper > self.lower
 
     def __hash__(self) -> int:
@@ -58,8 +77,8 @@ class Region:
         return hash((self.robot, self.bounds))
 
 
-def whole(field: str, value: object, low: int, high: int, expected: str) -> int:
-    """A whole number in [low, high]; raises `InputError` naming `field`."""
+def checked_integer(field: str, value: object, low: int, high: int, expected: str) -> int:
+    """An integer in [low, high]; raises `InputError` naming `field`."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not low <= value <= high:
         raise InputError(field, value, expected)
     return int(value)

@@ -1,4 +1,4 @@
-"""What is told about a workspace: frozen data, nothing computed here."""
+"""Workspace result types (immutable)."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ class WorkspaceChunk:
     """A slice of a cloud of tool points.
 
     Attributes:
-        points: ``(k, 3)`` float32, metres in the base frame. Single precision is what screens and files of point
-            clouds take; a point is off by less than 1e-7 of the arm's size, its configuration by nothing.
-        q: ``(k, n)`` float64 configurations if asked for, else None: `kin.configuration_at` recomputes any.
-        measures: by name, ``(k,)`` float32: ``"manipulability"`` (`kin.manipulability`), ``"limits"``: how far the
-            joint nearest to a stop is from it, 0 at the stop, 1 if every joint is in the middle of its range.
+        points: ``(k, 3)`` float32, metres in the base frame. Single precision is the format of screens and point
+            cloud files; a point is off by less than 1e-7 of the arm's size, its configuration is exact.
+        q: ``(k, n)`` float64 configurations if requested, else None: `kin.configuration_at` recomputes any.
+        measures: by name, ``(k,)`` float32: ``"manipulability"`` (`kin.manipulability`), ``"limits"``: the
+            margin of the joint closest to a limit, 0 at the limit, 1 if every joint is in the middle of its range.
         start: index of the first point in the whole cloud.
         done, total: points up to the end of this slice, and of the whole cloud.
     """
@@ -36,7 +36,7 @@ class WorkspaceChunk:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Extreme:
-    """The least or largest value of a coordinate or distance (m), a configuration ``(n,)`` there, its point."""
+    """The least or largest value of a coordinate or distance (m), with its configuration ``(n,)`` and point."""
 
     value: float
     q: Array
@@ -52,7 +52,7 @@ class Span(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """A number, its standard error, and how it was made. The error shrinks with the number of samples."""
+    """A number, its standard error, and its method. The error falls with the number of samples."""
 
     value: float
     error: float
@@ -65,12 +65,12 @@ class WorkspaceFacts:
 
     Attributes:
         x, y, z: the bounding box, exact to rounding, as least and largest value with their configurations.
-        axis_point, axis: the line of joint 1 (of the base's z axis if joint 1 slides), ``(3,)`` each.
-        shoulder: ``(3,)`` the point of that line nearest to the first joint axis not parallel to it.
-        radius: distance from the line; its least value is the radius of the hole around it.
+        axis_point, axis: the axis of joint 1 (the base's z axis if joint 1 is prismatic), ``(3,)`` each.
+        shoulder: ``(3,)`` the point of that axis nearest to the first joint axis not parallel to it.
+        radius: distance from the axis; its least value is the radius of the hole around it.
         reach: distance from the shoulder; its least value is the radius of the hole around it.
-        volume: m³, None where it was not asked for.
-        surface: m² of the whole boundary, holes included, None where it was not asked for.
+        volume: m³, None if it was not requested.
+        surface: m² of the whole boundary, holes included, None if it was not requested.
     """
 
     x: Span
@@ -87,14 +87,14 @@ class WorkspaceFacts:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SectionArc:
-    """A stretch of a section's boundary that one joint draws while the others are held, mostly at stops.
+    """Part of a section's boundary that one joint traces while the others stand still, mostly at limits.
 
     Attributes:
-        joint: index of the joint that moves; joint 1 of an (r, z) section moves besides without changing it.
-        start, stop: its values at the ends of the stretch.
+        joint: index of the joint that moves; joint 1 of an (r, z) section may move too without changing it.
+        start, stop: its values at the ends of the arc.
         q: ``(n,)`` the configuration at the start.
-        points: ``(k, 2)`` along the stretch, in the section's plane, by forward kinematics.
-        centre, radius: of the circle that it is part of, None if it is none.
+        points: ``(k, 2)`` along the arc, in the section's plane, by forward kinematics.
+        centre, radius: of the circle that it is part of, None if it is not part of one.
     """
 
     joint: int
@@ -111,14 +111,13 @@ class Section:
     """A cut through the workspace.
 
     Attributes:
-        origin, u, v: ``(3,)`` each: the point (s, t) of the section is ``origin + s·u + t·v``. Of an (r, z)
-        section
-            s is the distance from joint 1's line and t the height along it.
+        origin, u, v: ``(3,)`` each: the point (s, t) of the section is ``origin + s·u + t·v``. In
+            an (r, z) section s is the distance from joint 1's axis and t the height along it.
         curves: closed polylines ``(k, 2)`` with the workspace on the left, the last point not repeated; holes run
             the other way round. Vertices lie on the boundary itself, `step` apart at most.
-        arcs: stretches drawn by one joint alone, exact curves.
+        arcs: parts traced by one joint alone, exact curves.
         area: m², of the polygons.
-        step: side of the squares that were looked at; features smaller than it can be missed.
+        step: side of the grid's squares; features smaller than it can be missed.
     """
 
     origin: Array

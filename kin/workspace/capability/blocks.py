@@ -21,9 +21,9 @@ map's `method` says which of these it is:
   rolls are tried, and `SWEEP` values of an arm's own free parameter: narrower ranges are missed.
 - ``"search"``: no closed form. `STARTS` descents per direction: a few that can be had are missed.
 
-Whether a centre that no direction of the set fits is reachable is asked of :mod:`kin.workspace.facts.atlas`, whose
-misses are rare. The best manipulability is that of all branches, at `SWEEP` arm angles or rolls where these are
-free and count; a finer sweep mostly finds one or two per cent more, at the worst a quarter.
+Whether a centre that no direction of the set fits is reachable is asked of :mod:`kin.workspace.search.cells`,
+whose misses are rare. The best manipulability is that of all branches, at `SWEEP` arm angles or rolls where these
+are free and count; a finer sweep mostly finds one or two per cent more, at the worst a quarter.
 
 The grid is an agreement made once; its blocks are independent of each other and can be computed anywhere, in any
 order: `capability_block` gives the same bits in every process on one kind of processor.
@@ -52,9 +52,9 @@ from kin.tolerances import TOLERANCES
 from kin.transforms import Array, frame_from_approach
 from kin.workspace.capability.gauge import BLOCKED, NONE, gauge, seek
 from kin.workspace.capability.sphere import spherical_design
-from kin.workspace.facts.atlas import atlas
-from kin.workspace.facts.extremes import along
-from kin.workspace.region import Region, whole
+from kin.workspace.region import Region, checked_integer
+from kin.workspace.search.cells import cell_map
+from kin.workspace.search.extremes import along
 
 Method = Literal["closed form", "sweep", "search"]
 Rows = NDArray[np.int64]
@@ -181,7 +181,7 @@ def capability_grid(
     spherical_design(directions)
     question = ask(robot, np.zeros(3), task="position", limits=limits, locked=locked)
     bounds = tuple(zip(question.lower.tolist(), question.upper.tolist(), strict=True))
-    count = whole("resolution", resolution, 1, 256, "a whole number from 1 to 256")
+    count = checked_integer("resolution", resolution, 1, 256, "a whole number from 1 to 256")
     region = Region.of(robot, limits, locked)
     box = [along(region, axis) for axis in np.eye(3)]
     low, high = (np.array([getattr(span, end).value for span in box]) for end in ("least", "largest"))
@@ -206,7 +206,9 @@ def capability_block(grid: CapabilityGrid, block: int) -> CapabilityBlock:
 
     Pure: the same bits in every thread and process. The compiled part releases the GIL.
     """
-    number = whole("block", block, 0, len(grid.blocks) - 1, f"a whole number from 0 to {len(grid.blocks) - 1}")
+    number = checked_integer(
+        "block", block, 0, len(grid.blocks) - 1, f"a whole number from 0 to {len(grid.blocks) - 1}"
+    )
     arm = _arm(grid)
     voxels = grid.blocks[number]
     numbers = np.arange(voxels.start, voxels.stop, dtype=np.int64)
@@ -215,7 +217,7 @@ def capability_block(grid: CapabilityGrid, block: int) -> CapabilityBlock:
     found = best.max(axis=1)
     # Where no direction of the set fits, there may still be one in between.
     others = np.flatnonzero(found < 0.0)
-    near, distance = atlas(arm.region).nearest(centres[others], TOLERANCES.closure_position)
+    near, distance = cell_map(arm.region).nearest(centres[others], TOLERANCES.closure_position)
     touched = distance <= TOLERANCES.closure_position
     found[others[touched]] = manipulability(grid.robot, near[touched])
     kept = found >= 0.0
@@ -362,7 +364,7 @@ class _Arm:
     def _search(self, centres: Array, T: Array, best: Array) -> None:
         """Descents, at the centres that are reachable at all, each beginning where the one before ended."""
         weight = min(max(_LEVER * self.robot.reach, 0.03), 1.0)
-        start, distance = atlas(self.region).nearest(centres, TOLERANCES.closure_position)
+        start, distance = cell_map(self.region).nearest(centres, TOLERANCES.closure_position)
         for i in np.flatnonzero(distance <= TOLERANCES.closure_position).tolist():
             q = np.empty((T.shape[1], 1, self.robot.n))
             seek(

@@ -1,1 +1,1 @@
-"""Point clouds of tool positions, drawn reproducibly slice by slice."""
+"""Point clouds of tool positions, computed reproducibly slice by slice."""

@@ -1,9 +1,9 @@
-"""Clouds of tool points, slice by slice: any slice can be computed alone and has the same bits.
+"""Clouds of tool points, slice by slice: any slice can be computed by itself, with the same bits.
 
-A draw is its number: the configuration of draw i depends on the arm, the limits and locks, the strategy, the seed
-and i, never on the chunk it came with, the thread or the draws before. So threads may take slices as they like, a
-longer cloud continues a shorter one, and nobody has to keep configurations: the one behind a point that was
-clicked on is recomputed from the point's index.
+The configuration of sample i depends on the arm, the limits and locks, the strategy, the seed and i alone, never
+on the chunk, the thread or earlier samples. So threads may compute any slices in any order, a longer cloud
+continues a
+shorter one, and configurations need not be stored: that of a point is recomputed from the point's index.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from kin.fk import fk_positions
 from kin.ik.problem import Limits, Locks
 from kin.robot import Robot
 from kin.transforms import Array
-from kin.workspace.clouds.draw import Points, chosen, configurations, points
 from kin.workspace.clouds.measures import Measure, measure_names, measured
-from kin.workspace.clouds.numbers import Words, streams
-from kin.workspace.clouds.targets import aimed
-from kin.workspace.region import Region, whole
+from kin.workspace.clouds.targets import targeted
+from kin.workspace.region import Region, checked_integer
 from kin.workspace.results import WorkspaceChunk
+from kin.workspace.sampling.kernels import Points, configurations_of, sample_configurations, sample_points
+from kin.workspace.sampling.streams import Streams, Words, joint_streams
 
 Strategy = Literal["uniform", "quasi", "boundary", "volume"]
 STRATEGIES: tuple[Strategy, ...] = get_args(Strategy)
@@ -50,25 +50,27 @@ def sample_workspace(
     Args:
         robot: the arm.
         n: how many points, up to 2⁵³.
-        seed: a whole number from 0; another seed is another cloud.
-        strategy: ``"uniform"``: each joint evenly between its stops, pseudo-random; ``"quasi"``: the same, spread
+        seed: a whole number from 0; another seed gives another cloud.
+        strategy: ``"uniform"``: each joint evenly between its limits, pseudo-random; ``"quasi"``: the same, spread
             more evenly by an additive recurrence; ``"volume"``: evenly over the workspace itself; ``"boundary"``:
-            on its envelope. The last two descend towards random places, which takes some ten and a few hundred
-            microseconds a point, and a few seconds once per arm and limits; :mod:`kin.workspace.clouds.targets`
-            tells how far they can be trusted.
-        limits, locked: as in `kin.solve_ik`, respected exactly. A joint without limits draws from ±π.
-        chunk: points per chunk; it changes nothing but the chunks.
+            on its envelope. The last two descend towards random points, which takes some ten and a few hundred
+            microseconds per point, and a few seconds once per arm and limits; :mod:`kin.workspace.clouds.targets`
+            describes their accuracy.
+        limits, locked: as in `kin.solve_ik`, respected exactly. A joint without limits is sampled from ±π.
+        chunk: points per chunk; the points do not depend on it.
         measure: ``"manipulability"``, ``"limits"``, or both.
         with_q: whether chunks carry their configurations.
 
     Raises:
-        InputError: naming the wrong argument, when called and not when the first chunk is taken.
+        InputError: naming the wrong argument, at the call, not when the first chunk is taken.
     """
     total = _count("n", n)
     size = _count("chunk", chunk)
-    draws = _Draws.of(robot, seed, strategy, limits, locked)
+    samples = _Samples.of(robot, seed, strategy, limits, locked)
     names = measure_names(measure)
-    return (draws.slice(start, min(start + size, total), total, names, with_q) for start in range(0, total, size))
+    return (
+        samples.slice(start, min(start + size, total), total, names, with_q) for start in range(0, total, size)
+    )
 
 
 def workspace_slice(
@@ -86,13 +88,13 @@ def workspace_slice(
 ) -> WorkspaceChunk:
     """Points start, …, stop − 1 of the cloud that `sample_workspace` with the same arguments gives, bit by bit.
 
-    The kernels release the GIL: threads may compute slices side by side.
+    The kernels release the GIL: threads may compute slices in parallel.
     """
     total = _count("n", n)
-    first = whole("start", start, 0, total - 1, f"a whole number from 0 to {total - 1}")
-    last = whole("stop", stop, first + 1, total, f"a whole number from {first + 1} to {total}")
-    draws = _Draws.of(robot, seed, strategy, limits, locked)
-    return draws.slice(first, last, total, measure_names(measure), with_q)
+    first = checked_integer("start", start, 0, total - 1, f"a whole number from 0 to {total - 1}")
+    last = checked_integer("stop", stop, first + 1, total, f"a whole number from {first + 1} to {total}")
+    samples = _Samples.of(robot, seed, strategy, limits, locked)
+    return samples.slice(first, last, total, measure_names(measure), with_q)
 
 
 def configuration_at(
@@ -109,24 +111,24 @@ def configuration_at(
     Raises:
         InputError: naming the wrong argument.
     """
-    draws = _Draws.of(robot, seed, strategy, limits, locked)
+    samples = _Samples.of(robot, seed, strategy, limits, locked)
     try:
         indices = np.asarray(index)
-    except (ValueError, RecursionError):  # rows of different lengths, or a list within itself
+    except (ValueError, RecursionError):  # rows of different lengths, or a list that contains itself
         raise InputError("index", index, "a whole number from 0, or an array of them") from None
     if indices.dtype.kind not in "iu" or (indices.size and not 0 <= indices.min() <= indices.max() < MOST):
         raise InputError("index", index, "a whole number from 0, or an array of them")
     flat = np.ascontiguousarray(indices, dtype=np.uint64).reshape(-1)
-    return draws.configurations(flat).reshape(*indices.shape, robot.n)
+    return samples.configurations(flat).reshape(*indices.shape, robot.n)
 
 
 def _count(field: str, value: object) -> int:
-    return whole(field, value, 1, MOST, "a whole number from 1 to 2⁵³")
+    return checked_integer(field, value, 1, MOST, "a whole number from 1 to 2⁵³")
 
 
 @dataclass(frozen=True)
-class _Draws:
-    """All draws there are: what they are made from, checked."""
+class _Samples:
+    """All samples of a region, seed and strategy, checked."""
 
     region: Region
     seed: int
@@ -135,54 +137,48 @@ class _Draws:
     @classmethod
     def of(
         cls, robot: Robot, seed: int, strategy: Strategy, limits: Limits | None, locked: Locks | None
-    ) -> _Draws:
+    ) -> _Samples:
         if strategy not in STRATEGIES:
             raise InputError("strategy", strategy, "one of " + ", ".join(f'"{name}"' for name in STRATEGIES))
-        checked = whole("seed", seed, 0, (1 << 64) - 1, "a whole number from 0 to 2⁶⁴ − 1")
+        checked = checked_integer("seed", seed, 0, (1 << 64) - 1, "a whole number from 0 to 2⁶⁴ − 1")
         return cls(Region.of(robot, limits, locked), checked, strategy)
 
     @property
-    def quasi(self) -> bool:
-        return self.strategy == "quasi"
-
-    @property
-    def aims(self) -> bool:
-        """Whether draws are made by descents."""
+    def by_target(self) -> bool:
+        """Whether samples are made by descents towards targets."""
         return self.strategy in ("boundary", "volume")
 
     @cached_property
-    def streams(self) -> tuple[Words, Words]:
-        return streams(self.seed, self.region.free, self.quasi)
+    def streams(self) -> Streams:
+        """The random numbers of the joints."""
+        return joint_streams(self.seed, self.region.movable, self.strategy == "quasi")
 
     def configurations(self, index: Words) -> Array:
-        """The configurations ``(k, n)`` of draws ``(k,)``."""
-        if self.aims:
-            return aimed(self.region, self.strategy, self.seed, index)
+        """The configurations ``(k, n)`` of samples ``(k,)``."""
+        if self.by_target:
+            return targeted(self.region, self.strategy, self.seed, index)
         q = np.empty((len(index), self.region.robot.n))
-        key, step = self.streams
-        chosen(key, step, self.quasi, self.region.lower, self.region.upper, index, q)
+        configurations_of(self.region.arm, self.streams, index, q)
         return q
 
     def run(self, start: int, stop: int) -> Array:
-        """The configurations ``(k, n)`` of draws start, …, stop − 1."""
-        if self.aims:
+        """The configurations ``(k, n)`` of samples start, …, stop − 1."""
+        if self.by_target:
             return self.configurations(np.arange(start, stop, dtype=np.uint64))
         q = np.empty((stop - start, self.region.robot.n))
-        key, step = self.streams
-        configurations(key, step, self.quasi, self.region.lower, self.region.upper, start, q)
+        sample_configurations(self.region.arm, self.streams, start, q)
         return q
 
     def slice(self, start: int, stop: int, total: int, names: tuple[Measure, ...], with_q: bool) -> WorkspaceChunk:
-        """Draws start, …, stop − 1 of a cloud of `total`."""
+        """Samples start, …, stop − 1 of a cloud of `total`."""
         region = self.region
-        q = self.run(start, stop) if names or with_q or self.aims else None
+        q = self.run(start, stop) if names or with_q or self.by_target else None
         cloud: Points
-        if self.aims and q is not None:
+        if self.by_target and q is not None:
             cloud = fk_positions(region.robot, q).astype(np.float32)
         else:
             cloud = np.empty((stop - start, 3), dtype=np.float32)
-            key, step = self.streams
-            points(region.robot.model, key, step, self.quasi, region.lower, region.upper, start, cloud)
+            sample_points(region.arm, self.streams, start, cloud)
         measures: dict[str, Points] = {}
         if q is not None:
             measures = {name: measured(region, name, q) for name in names}

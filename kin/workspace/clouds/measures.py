@@ -1,4 +1,4 @@
-"""What can be told of each configuration of a cloud, to colour its points by."""
+"""Measures of each configuration of a cloud, to colour its points by."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MEASURES: tuple[Measure, ...] = get_args(Measure)
 
 
 def measure_names(measure: Measure | Sequence[Measure] | None) -> tuple[Measure, ...]:
-    """The measures asked for; raises `InputError` naming a wrong one."""
+    """The requested measures, each once; raises `InputError` for an unknown one."""
     names = (measure,) if isinstance(measure, str) else () if measure is None else measure
     if not isinstance(names, Sequence) or any(name not in MEASURES for name in names):
         raise InputError("measure", measure, "any of " + ", ".join(f'"{name}"' for name in MEASURES))
@@ -26,10 +26,10 @@ def measure_names(measure: Measure | Sequence[Measure] | None) -> tuple[Measure,
 
 
 def measured(region: Region, name: Measure, q: Array) -> NDArray[np.float32]:
-    """A measure ``(k,)`` of configurations ``(k, n)``."""
+    """A measure ``(k,)`` of configurations ``(k, n)``; `WorkspaceChunk.measures` defines them."""
     if name == "manipulability":
         return manipulability(region.robot, q).astype(np.float32)
-    free = region.free
-    half = 0.5 * (region.upper - region.lower)[free]
-    room = np.minimum(q - region.lower, region.upper - q)[:, free] / half
-    return np.asarray(room.min(axis=1, initial=1.0), dtype=np.float32)
+    movable = region.movable
+    half = 0.5 * (region.upper - region.lower)[movable]
+    margin = np.minimum(q - region.lower, region.upper - q)[:, movable] / half
+    return np.asarray(margin.min(axis=1, initial=1.0), dtype=np.float32)

@@ -1,10 +1,11 @@
-"""The stretches of an (r, z) section's boundary that one joint draws alone: exact curves instead of polylines.
+"""The parts of an (r, z) section's boundary that one joint traces alone: exact curves instead of polylines.
 
-A configuration on the envelope has joints at stops, or the arm is singular there; on many stretches all joints but
-one stay where they are, as on the outstretched arm's outer arc. Going round the polyline, the configuration on the
-envelope is found for a place a little outside of each vertex (seen from there it is well told), beginning from
-that of the vertex before; where only one joint moved, the stretch is what forward kinematics of that joint draws.
-It is part of a circle if the joint's line is square to the section, and of a torus' section if not.
+A configuration on the envelope has joints at limits, or the arm is singular there; along many parts of the
+boundary all joints but one stand still, as on the outer arc of the outstretched arm. Vertex after vertex, the
+configuration on the envelope is found by a descent towards a point a little outside of the vertex (from there the
+minimum is well conditioned), starting from that of the vertex before; where only one joint moved, forward
+kinematics of that joint gives the curve. It is part of a circle if the joint axis is perpendicular to the section,
+else of a torus section.
 """
 
 from __future__ import annotations
@@ -15,14 +16,13 @@ import numpy as np
 
 from kin.fk import fk_positions, jacobian
 from kin.transforms import Array
-from kin.workspace.facts.atlas import Atlas, atlas
-from kin.workspace.facts.descent import settle_each
-from kin.workspace.facts.extremes import quadratic
 from kin.workspace.region import Region
 from kin.workspace.results import Section, SectionArc
+from kin.workspace.search.cells import CellMap, cell_map
+from kin.workspace.search.descent import minimise_each, quadratic
 
 _OUTSIDE = 0.25  # of a square's side
-_STILL = 1e-6  # m: a joint that moves the point less from a vertex to the next stays
+_STILL = 1e-6  # m: a joint that moves the point less from a vertex to the next stands still
 _EYE = np.eye(3)
 _SHORTEST = 3  # vertices
 _POINTS = 33
@@ -34,15 +34,15 @@ def arcs_of(region: Region, found: Section) -> tuple[SectionArc, ...]:
     """The arcs of an (r, z) section of a region whose joint 1 turns freely."""
     arcs: list[SectionArc] = []
     for curve in found.curves:
-        arcs += _arcs_of_curve(atlas(region), found, curve)
+        arcs += _arcs_of_curve(cell_map(region), found, curve)
     return tuple(arcs)
 
 
-def _arcs_of_curve(found: Atlas, section: Section, curve: Array) -> list[SectionArc]:
+def _arcs_of_curve(found: CellMap, section: Section, curve: Array) -> list[SectionArc]:
     q = _envelope(found, section, curve)
     count = len(curve)
     steps = [_mover(found.region, q[k], q[(k + 1) % count]) for k in range(count)]
-    # One joint draws it all, or each stretch begins where another joint takes over.
+    # One joint traces the whole curve, or each arc begins where another joint takes over.
     starts = [k for k in range(count) if steps[k] != steps[k - 1]] or [0]
     arcs = []
     for start, end in zip(starts, [*starts[1:], starts[0] + count], strict=True):
@@ -52,8 +52,8 @@ def _arcs_of_curve(found: Atlas, section: Section, curve: Array) -> list[Section
     return arcs
 
 
-def _envelope(found: Atlas, section: Section, curve: Array) -> Array:
-    """Configurations ``(k, n)`` on the envelope next to the vertices, NaN on the line of joint 1."""
+def _envelope(found: CellMap, section: Section, curve: Array) -> Array:
+    """Configurations ``(k, n)`` on the envelope next to the vertices, NaN on the axis of joint 1."""
     along = np.roll(curve, -1, axis=0) - np.roll(curve, 1, axis=0)
     normal = np.stack([along[:, 1], -along[:, 0]], axis=1)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
@@ -68,15 +68,8 @@ def _envelope(found: Atlas, section: Section, curve: Array) -> Array:
             near, d = found.nearest(p[k : k + 1], 0.0, 1, q[k - 1 : k])
             if d[0] <= distance[k] + _ROUND:
                 q[k], distance[k] = near[0], d[0]
-        # To the last digit, as what stays is to be told from what moves.
-        settle_each(
-            found.region.robot.model,
-            quadratic(_EYE, p[k]),
-            found.region.lower,
-            found.region.upper,
-            q[k : k + 1],
-            d,
-        )
+        # To the last digit, to distinguish joints that stand still from joints that move.
+        minimise_each(found.region.arm, quadratic(_EYE, p[k]), q[k : k + 1], d)
     q[(curve[:, 0] < _ROUND) | (places[:, 0] < _ROUND)] = math.nan
     return q
 
@@ -91,31 +84,31 @@ def _mover(region: Region, a: Array, b: Array) -> int | None:
 
 
 def _arc(region: Region, section: Section, q: Array, start: int, end: int, joint: int) -> SectionArc:
-    """The arc from vertex `start` to vertex `end`, to the joint's stops where it ends because of them."""
+    """The arc from vertex `start` to vertex `end`, extended to the joint's limits where it ends at one."""
     count = len(q)
     values = [float(q[k % count, joint]) for k in range(start - 1, end + 2)]
-    first = _to_stop(values[2], values[1], values[0], region.bounds[joint])
-    last = _to_stop(values[-3], values[-2], values[-1], region.bounds[joint])
+    first = _to_limit(values[2], values[1], values[0], region.bounds[joint])
+    last = _to_limit(values[-3], values[-2], values[-1], region.bounds[joint])
     held = q[(start + end) // 2 % count].copy()
-    points = _drawn(region, section, held, joint, np.linspace(first, last, _POINTS))
+    points = _traced(region, section, held, joint, np.linspace(first, last, _POINTS))
     held[joint] = first
     for array in (held, points):
         array.flags.writeable = False
-    # Of a short stretch any curve is a circle: a longer one of the same curve tells.
+    # Any curve is close to a circle along a short arc: a longer part of the same curve is compared.
     middle = 0.5 * (first + last)
     sweep = middle + np.linspace(-_SWEEP, _SWEEP, 9)
-    centre, radius = _circle(_drawn(region, section, held, joint, sweep))
+    centre, radius = _circle(_traced(region, section, held, joint, sweep))
     if centre is None:
-        # A circle that goes on beyond joint 1's line is folded there, but not in its own plane.
-        centre, radius = _circle(_drawn(region, section, held, joint, sweep, folded=False))
+        # A circle that continues beyond joint 1's axis is folded there, but not in its own plane.
+        centre, radius = _circle(_traced(region, section, held, joint, sweep, folded=False))
     return SectionArc(joint, float(first), float(last), held, points, centre, radius)
 
 
-def _drawn(region: Region, section: Section, q: Array, joint: int, values: Array, folded: bool = True) -> Array:
-    """The points ``(k, 2)`` of the section that one joint draws, not folded ``(k, 3)`` in the middle one's plane.
+def _traced(region: Region, section: Section, q: Array, joint: int, values: Array, folded: bool = True) -> Array:
+    """The points ``(k, 2)`` of the section that one joint traces, as (r, z).
 
-    In that plane the distance from joint 1's line has a sign, and the third coordinate is the distance from the
-    plane.
+    With `folded` False: ``(k, 3)``, in the plane through joint 1's axis and the middle point, where the distance
+    from the axis has a sign; the third coordinate is the distance from that plane.
     """
     configurations = np.repeat(q[None], len(values), axis=0)
     configurations[:, joint] = values
@@ -129,13 +122,13 @@ def _drawn(region: Region, section: Section, q: Array, joint: int, values: Array
     return np.stack([across @ ahead, height, across @ np.cross(section.v, ahead)], axis=1)
 
 
-def _to_stop(inner: float, end: float, beyond: float, stops: tuple[float, float]) -> float:
-    """Where an arc ends: at the value beyond its last vertex if that is a stop and no farther than a step."""
-    return beyond if beyond in stops and abs(beyond - end) <= 2.0 * abs(end - inner) else end
+def _to_limit(inner: float, end: float, beyond: float, limits: tuple[float, float]) -> float:
+    """Where an arc ends: at the value beyond its last vertex if that is a limit and no farther than a step."""
+    return beyond if beyond in limits and abs(beyond - end) <= 2.0 * abs(end - inner) else end
 
 
 def _circle(points: Array) -> tuple[tuple[float, float] | None, float | None]:
-    """Centre and radius of the circle that points ``(k, 2)`` or ``(k, 3)`` are on, in the plane, or nothing."""
+    """Centre and radius of the circle through points ``(k, 2)`` or ``(k, 3)`` in the plane, or None."""
     if np.abs(points[:, 2:]).max(initial=0.0) > _ROUND:
         return None, None
     points = points[:, :2]

@@ -1,7 +1,7 @@
-"""Closed curves between the nodes of a grid that are inside and those that are outside: marching squares.
+"""Closed curves between the inside and outside nodes of a grid: marching squares.
 
 Lorensen and Cline's idea (SIGGRAPH 1987) in two dimensions. Each edge of the grid with one end inside carries a
-vertex; each square joins its vertices in pairs. Where a square has four, its inside corners are taken to be apart.
+vertex; each square joins its vertices in pairs. A square with four vertices counts as two separate inside corners.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ def ends(edge: Edge, inside: Flags) -> tuple[tuple[int, int], tuple[int, int]]:
 
 
 def loops(inside: Flags) -> list[list[Edge]]:
-    """The edges that each closed curve crosses, in order, the inside on its left; no node of the rim is inside."""
+    """The edges that each closed curve crosses, in order, the inside on its left; no rim node may be inside."""
     follows: dict[Edge, Edge] = {}
     for i, j in np.argwhere(_mixed(inside)).tolist():
         corners = [bool(inside[c]) for c in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1))]
         sides: list[Edge] = [(i, j, 0), (i + 1, j, 1), (i, j + 1, 0), (i, j, 1)]
-        # Counterclockwise around the square, a curve comes in where inside ends and leaves where it begins again.
+        # Counterclockwise around the square, a curve enters where inside ends and leaves where it begins again.
         enter = [k for k in range(4) if corners[k] and not corners[(k + 1) % 4]]
         leave = [k for k in range(4) if not corners[k] and corners[(k + 1) % 4]]
         for k in enter:
@@ -52,7 +52,7 @@ def loops(inside: Flags) -> list[list[Edge]]:
 
 
 def enclosed(inside: Flags) -> Flags:
-    """The nodes ``(a, b)`` outside that cannot be come to from the rim without crossing the inside."""
+    """The outside nodes ``(a, b)`` that cannot be reached from the rim without crossing the inside."""
     outer = np.zeros_like(inside)
     outer[0], outer[-1], outer[:, 0], outer[:, -1] = True, True, True, True
     outer &= ~inside

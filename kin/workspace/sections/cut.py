@@ -1,14 +1,13 @@
 """A cut through the workspace, with the curves that bound it.
 
-The nodes of a grid in the plane are asked whether the tool reaches them (:mod:`kin.workspace.facts.atlas`), and
-on each edge with one end inside the boundary is closed in on. From outside, the nearest reachable point and the
-direction
-to it give the tangent of the boundary: where it meets the edge, a little outside, is the next place to look,
-halfway where that leads nowhere. Seen from near by, the tangent is the boundary. It is never looked at from nearer
-than needed: descents are slow where the tool just does not reach its target.
+For each node of a grid in the plane, the map (:mod:`kin.workspace.search.cells`) decides whether the tool reaches
+it, and on each edge with one end inside the boundary is located. For a point outside, the nearest reachable point
+and the direction to it give the tangent of the boundary: where it meets the edge, a little outside, is the next
+point to test, or the midpoint where the tangent does not meet the edge. Close to the boundary, the tangent is the
+boundary. No point is tested closer than needed: descents are slow where the tool only just misses its target.
 
-Without a plane the section is that in (r, z), distance from joint 1's line and height along it, whatever joint 1
-does: the cut of a half-plane through the line with the body that a joint 1 without stops would sweep.
+Without a plane the section is that in (r, z), distance from joint 1's axis and height along it, whatever the value
+of joint 1: the cut of a half-plane through the axis with the body that a joint 1 without limits would sweep.
 """
 
 from __future__ import annotations
@@ -25,19 +24,19 @@ from kin.fk import fk_positions
 from kin.ik.problem import Limits, Locks
 from kin.robot import Robot
 from kin.transforms import Array, finite_array
-from kin.workspace.facts.atlas import Atlas, atlas
-from kin.workspace.facts.extremes import base_line
-from kin.workspace.region import Region, whole
+from kin.workspace.region import Region, checked_integer
 from kin.workspace.results import Section
+from kin.workspace.search.cells import CellMap, cell_map
+from kin.workspace.search.extremes import base_axis
 from kin.workspace.sections.arcs import arcs_of
 from kin.workspace.sections.contour import Edge, Flags, enclosed, ends, loops
 
 _EXACT = 1e-6  # of a cube's side
-# Parts of a square's side. From this near, the tangent tells the boundary this far aside: to a part of some 1e-5.
+# Fractions of a square's side. From this close, the tangent gives the boundary this far aside to about 1e-5.
 _NEAR, _ASIDE = 0.04, 0.1
 _NARROW = 1e-4  # of a square's side
 _ROUNDS = 16
-_DOUBTS = 64  # descents from all over for a node in a hole
+_DOUBTS = 64  # descents from all over the workspace for a node in a hole
 ALIKE = 3
 
 
@@ -53,15 +52,15 @@ def section(
 
     Args:
         robot: the arm.
-        plane: a point (m) and a normal of it; None for the section in (r, z) of an arm whose joint 1 turns.
-        limits, locked: as in `kin.solve_ik`. Of an (r, z) section those of joint 1 do not matter.
+        plane: a point (m) and a normal of it; None for the (r, z) section of an arm whose joint 1 is revolute.
+        limits, locked: as in `kin.solve_ik`. An (r, z) section ignores those of joint 1.
         resolution: squares along the longer side of the plane's window, 8 to 1000.
 
     Raises:
         InputError: naming the wrong argument.
     """
     region = Region.of(robot, limits, locked)
-    count = whole("resolution", resolution, 8, 1000, "a whole number from 8 to 1000")
+    count = checked_integer("resolution", resolution, 8, 1000, "a whole number from 8 to 1000")
     if plane is None:
         if robot.joints[0].kind != "revolute":
             raise InputError("plane", None, f"a point and a normal: joint 1 of {robot.id} slides")
@@ -73,25 +72,25 @@ def section(
     if origin.ndim != 1 or normal.ndim != 1 or not length > 0.0:
         raise InputError("plane", plane, "a point and a normal, three numbers each, the normal not zero")
     u, v = _axes(normal / length)
-    return _cut(atlas(region), origin, u, v, -math.inf, count)
+    return _cut(cell_map(region), origin, u, v, -math.inf, count)
 
 
-def opened(region: Region) -> Region:
-    """The same region with joint 1 free to turn all the way."""
+def _turning_freely(region: Region) -> Region:
+    """The same region with joint 1 turning all the way."""
     return replace(region, bounds=((-math.pi, math.pi), *region.bounds[1:]))
 
 
 def profile(region: Region, resolution: int) -> Section:
     """The section in (r, z)."""
-    point, axis, _ = base_line(region)
+    point, axis, _ = base_axis(region)
     u, _ = _axes(axis)
-    turning = opened(region)
-    found = _cut(atlas(turning), point - axis * (point @ axis), u, axis, 0.0, resolution)
+    turning = _turning_freely(region)
+    found = _cut(cell_map(turning), point - axis * (point @ axis), u, axis, 0.0, resolution)
     return replace(found, arcs=arcs_of(turning, found))
 
 
 def _axes(normal: Array) -> tuple[Array, Array]:
-    """Two unit vectors of the plane; upright planes have v upwards, level ones u along x."""
+    """Two unit vectors of the plane; v points up in vertical planes, u along x in horizontal ones."""
     if abs(normal[2]) < 0.9:
         v = np.array([0.0, 0.0, 1.0]) - normal[2] * normal
         v /= np.linalg.norm(v)
@@ -103,7 +102,7 @@ def _axes(normal: Array) -> tuple[Array, Array]:
     return u, v
 
 
-def _cut(found: Atlas, origin: Array, u: Array, v: Array, least: float, resolution: int) -> Section:
+def _cut(found: CellMap, origin: Array, u: Array, v: Array, least: float, resolution: int) -> Section:
     """The section in the plane through `origin`, where s is not below `least`."""
     corners = np.concatenate([found.corners[found.occupied], found.corners[found.occupied] + found.edge]) - origin
     s, t = corners @ u, corners @ v
@@ -111,13 +110,12 @@ def _cut(found: Atlas, origin: Array, u: Array, v: Array, least: float, resoluti
     step = float((high - low).max()) / resolution
     if not step > 0.0:
         return Section(origin, u, v, (), (), 0.0, 0.0)
-    # The first column of nodes of an (r, z) section stands on the line itself, so that r is not cut off at a
-    # square.
+    # The first nodes of an (r, z) section are on the axis itself, so that r is not cut off at a square.
     first = low - step
     shape = np.ceil((high - low) / step).astype(int) + 3
     s, t = first[0] + step * np.arange(shape[0]), first[1] + step * np.arange(shape[1])
     places = np.stack(np.meshgrid(s, t, indexing="ij"), axis=-1)
-    q, distance = _ask_nodes(found, origin, u, v, places, least)
+    q, distance = _test_nodes(found, origin, u, v, places, least)
     inside = distance <= _EXACT * found.size
     curves = tuple(_on_boundary(found, origin, u, v, places, inside, q, loop, least) for loop in loops(inside))
     area = sum(_area(curve) for curve in curves)
@@ -126,8 +124,8 @@ def _cut(found: Atlas, origin: Array, u: Array, v: Array, least: float, resoluti
     return Section(origin, u, v, curves, (), area, step)
 
 
-def _ask_nodes(
-    found: Atlas, origin: Array, u: Array, v: Array, places: Array, least: float
+def _test_nodes(
+    found: CellMap, origin: Array, u: Array, v: Array, places: Array, least: float
 ) -> tuple[Array, Array]:
     """The nearest configuration ``(a, b, n)`` of every node ``(a, b, 2)`` and its distance ``(a, b)``."""
     a, b, _ = places.shape
@@ -137,19 +135,19 @@ def _ask_nodes(
     out = places[..., 0] < least
     exact = _EXACT * found.size
 
-    def again(where: Flags, guess: Array, alike: int = 1) -> None:
+    def retry(where: Flags, guess: Array, alike: int = 1) -> None:
         i, j = np.nonzero(where)
         near, d = found.nearest(p[i, j], exact, alike, guess[i, j])
         better = d < distance[i, j]
         q[i[better], j[better]], distance[i[better], j[better]] = near[better], d[better]
 
-    def ask_neighbours() -> None:
+    def try_from_neighbours() -> None:
         for axis, by in ((0, 1), (0, -1), (1, 1), (1, -1)):
-            again((distance > exact) & (np.roll(distance, by, axis) <= exact) & ~out, np.roll(q, by, axis))
+            retry((distance > exact) & (np.roll(distance, by, axis) <= exact) & ~out, np.roll(q, by, axis))
 
-    # A node said to be missed is tried again from the neighbours that are reached, one in a hole from all over.
-    ask_neighbours()
-    ask_neighbours()
+    # A node that was missed is tried again from neighbours that are reached, one in a hole from all over.
+    try_from_neighbours()
+    try_from_neighbours()
     distance[out] = math.inf
     holes = enclosed(distance <= exact)
     if holes.any():
@@ -157,14 +155,14 @@ def _ask_nodes(
         for k in range(_DOUBTS):
             doubtful = holes & (distance > exact)
             start = starts[k * len(starts) // _DOUBTS]
-            again(doubtful, np.broadcast_to(start, q.shape))
-        ask_neighbours()
+            retry(doubtful, np.broadcast_to(start, q.shape))
+        try_from_neighbours()
         distance[out] = math.inf
     return q, distance
 
 
 def _on_boundary(
-    found: Atlas, origin: Array, u: Array, v: Array, places: Array, inside: Flags, q: Array, loop: list[Edge],
+    found: CellMap, origin: Array, u: Array, v: Array, places: Array, inside: Flags, q: Array, loop: list[Edge],
     least: float,
 ) -> Array:  # fmt: skip
     """The boundary's points ``(k, 2)`` on the edges that a loop crosses."""
@@ -173,10 +171,10 @@ def _on_boundary(
     way = np.array([places[o] for _, o in pairs]) - a
     from_inside = np.array([q[i] for i, _ in pairs])
     step = float(np.abs(way[0]).max())
-    # Parts of the way from a: reached, missed, where to look next, and what the tangent says.
+    # Fractions of the way from a: last reached, first missed, next to test, and the boundary by the tangent.
     reached, missed, ahead = np.zeros(len(a)), np.ones(len(a)), np.ones(len(a))
     answer = np.full(len(a), 0.5)
-    # The line itself bounds an (r, z) section: there is nothing beyond it to be missed.
+    # The axis itself bounds an (r, z) section: there is nothing beyond it to be missed.
     beyond = a[:, 0] + way[:, 0] < least
     answer[beyond] = ((least - a[:, 0]) / np.where(beyond, way[:, 0], 1.0))[beyond]
     open_ = np.flatnonzero(~beyond)
@@ -204,12 +202,12 @@ def _on_boundary(
         done = near_by | ((missed - reached)[open_] < _NARROW)
         open_ = open_[~done]
     curve = a + answer[:, None] * way
-    # Of a stretch of the line itself only the ends are told.
+    # Of a part of the axis itself only the ends are kept.
     on_line = beyond & np.roll(beyond, 1) & np.roll(beyond, -1)
     return np.ascontiguousarray(curve[~on_line])
 
 
 def _area(curve: Array) -> float:
-    """Area that a closed polyline ``(k, 2)`` goes round counterclockwise."""
+    """Area enclosed by a closed polyline ``(k, 2)``, positive if it runs counterclockwise."""
     s, t = curve.T
     return 0.5 * float((s * np.roll(t, -1) - t * np.roll(s, -1)).sum())

@@ -14,9 +14,10 @@ from kin import InputError
 from kin.fk import fk_positions
 from kin.robot import Joint, Robot
 from kin.workspace import MEASURES, STRATEGIES
-from kin.workspace.facts.atlas import atlas
-from kin.workspace.facts.survey import survey, volume_and_surface
 from kin.workspace.region import Region
+from kin.workspace.search.cells import cell_map
+from kin.workspace.search.probes import sampling_probes
+from kin.workspace.volume import from_probes
 
 ALL = tuple(kin.builtin_robots())
 # x, y, z, distance from joint 1's line, distance from the shoulder: least and largest, inside the printed limits.
@@ -201,7 +202,7 @@ def inside_sizes(robot_id, strategy):
 @pytest.mark.parametrize("robot_id", ROBOTS)
 def test_boundary_draws_are_on_the_envelope(robot_id):
     robot = kin.get_robot(robot_id)
-    found = atlas(Region.of(robot, None, None))
+    found = cell_map(Region.of(robot, None, None))
     away = np.random.default_rng(5).normal(size=(26, 3))
     away *= 0.01 * facts(robot_id).reach.largest.value / np.linalg.norm(away, axis=1, keepdims=True)
 
@@ -223,8 +224,8 @@ def halfway(curve):
 @pytest.mark.parametrize("robot_id", ROBOTS)
 def test_volume_draws_are_even_in_space(robot_id):
     robot = kin.get_robot(robot_id)
-    found = atlas(Region.of(robot, None, None))
-    full = (survey(found.region).distance < 1e-3 * found.size).all(axis=1)
+    found = cell_map(Region.of(robot, None, None))
+    full = (sampling_probes(found.region).distance < 1e-3 * found.size).all(axis=1)
 
     def variation(strategy):
         rows = found.rows(cloud(robot, 6000, strategy=strategy).astype(float))
@@ -362,7 +363,7 @@ def test_a_planar_arm_is_a_ring():
 def test_two_ways_to_a_volume_agree():
     robot = kin.get_robot("redundant7")
     revolved = kin.workspace_facts(robot, effort=3)
-    tried, layered = volume_and_surface(Region.of(robot, None, None), 2)
+    tried, layered = from_probes(Region.of(robot, None, None), 2)
     assert revolved.volume.error < 0.002 * revolved.volume.value
     assert abs(tried.value - revolved.volume.value) < 4.0 * math.hypot(tried.error, revolved.volume.error)
     assert abs(layered.value - revolved.surface.value) < 4.0 * math.hypot(layered.error, revolved.surface.error)
@@ -370,7 +371,7 @@ def test_two_ways_to_a_volume_agree():
 
 def test_errors_shrink_with_effort():
     region = Region.of(kin.get_robot("pioneer5"), None, [None, None, None, 0.0, 0.5])
-    few, many = volume_and_surface(region, 2)[0], volume_and_surface(region, 6)[0]
+    few, many = from_probes(region, 2)[0], from_probes(region, 6)[0]
     assert 0.4 * few.error < many.error < 0.8 * few.error
     assert abs(few.value - many.value) < 4.0 * math.hypot(few.error, many.error)
 

@@ -32,7 +32,7 @@ from kin.units import Unit, Units
 ABOUT_Z, ABOUT_X = (0, 114, 178), (213, 94, 0)
 ROW_GROUND = "rgba(128,128,128,.16)"
 TITLES: dict[Convention, str] = {"standard": "Standard order", "modified": "Craig’s order (modified)"}
-WIDTHS = {"mm": 3.3, "cm": 3.3, "m": 3.7}  # em of a column
+WIDTHS = {"mm": 4.2, "cm": 4.2, "m": 4.8}  # em of a column
 MATRIX = 0.74  # em, so that sixteen numbers and a name fit a panel of 300 pixels
 
 NINE_STEPS = (

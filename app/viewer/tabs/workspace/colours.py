@@ -21,8 +21,8 @@ from kin import Robot, WorkspaceChunk, workspace_slice
 from kin.transforms import Array
 from kin.units import Units
 from kin.workspace import Measure
-from kin.workspace.facts.extremes import base_line
 from kin.workspace.region import Region
+from kin.workspace.search.extremes import base_axis
 
 By = Literal["radius", "height", "manipulability", "limits", "one"]
 Colour = tuple[int, int, int]
@@ -72,7 +72,7 @@ def measures(by: By) -> tuple[Measure, ...]:
 @lru_cache(maxsize=256)
 def line(robot: Robot) -> tuple[Array, Array]:
     """A point of joint 1's line and its unit direction, ``(3,)`` each."""
-    point, axis, _ = base_line(Region.of(robot, None, None))
+    point, axis, _ = base_axis(Region.of(robot, None, None))
     return point, axis
 
 

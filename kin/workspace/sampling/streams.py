@@ -1,20 +1,19 @@
-"""Numbers that depend on nothing but where they stand: (seed, joint, index) → [0, 1).
+"""Counter-based random numbers: (seed, joint, index) → [0, 1).
 
-A generator with a state must be run to reach its millionth number. These have none, so any slice of a cloud can be
-computed alone, by any thread, and has the same bits. Each joint's stream is ``x = key + index · step`` in 64-bit
-integers, read as fractions of 2⁶⁴:
+A generator with a state has to be run to reach its millionth number. These numbers depend on their index alone, so
+any slice of a cloud can be computed by itself, in any thread, with the same bits. The stream of a joint is
+``x = key + index · step`` in 64-bit integers, read as fractions of 2⁶⁴:
 
-- **Quasi-random.** The step is an irrational part of 2⁶⁴: the additive recurrence on the generalised golden ratio
-  φ,
-  φ^(d+1) = φ + 1, joint j taking steps of φ^−j (Roberts, The unreasonable effectiveness of quasirandom sequences,
-  2018). The key is the offset that the seed makes. Integers keep it exact at any index.
+- **Quasi-random.** The step is an irrational fraction of 2⁶⁴: the additive recurrence on the generalised golden
+  ratio φ, φ^(d+1) = φ + 1, where joint j advances by φ^−j (Roberts, The unreasonable effectiveness of quasirandom
+  sequences, 2018). The key is an offset that depends on the seed. Integers keep it exact at any index.
 - **Pseudo-random.** The step is odd and x is scrambled: splitmix64 (Steele, Lea and Flood, Fast splittable
-  pseudorandom number generators, OOPSLA 2014), a stream per joint.
+  pseudorandom number generators, OOPSLA 2014), one stream per joint.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,9 +30,22 @@ _30, _27, _31, _11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)
 _PART = 2.0**-53
 
 
+class Streams(NamedTuple):
+    """One stream of numbers per joint.
+
+    Attributes:
+        key, step: ``(n,)`` uint64; number i of joint j is ``key[j] + i · step[j]``.
+        quasi: whether these are the numbers themselves (quasi-random) or have to be scrambled (pseudo-random).
+    """
+
+    key: Words
+    step: Words
+    quasi: bool
+
+
 @inlined
 def scrambled(x: Any) -> Any:
-    """splitmix64's finaliser: every bit of the 64 depends on every bit."""
+    """splitmix64's finaliser: every bit of the result depends on every bit of the 64-bit x."""
     x = (x ^ (x >> _30)) * _FIRST
     x = (x ^ (x >> _27)) * _SECOND
     return x ^ (x >> _31)
@@ -51,22 +63,22 @@ def hashed(key: Any, index: Any) -> Any:
     return scrambled(key + index * _STEP)
 
 
-def streams(seed: int, free: NDArray[np.bool_], quasi: bool) -> tuple[Words, Words]:
-    """Keys and steps ``(n,)`` of the joints' streams; joints that are not free spend no dimension."""
-    n, dimension = len(free), int(free.sum())
+def joint_streams(seed: int, movable: NDArray[np.bool_], quasi: bool) -> Streams:
+    """The joints' streams; a locked joint (False in `movable` ``(n,)``) takes no dimension of the recurrence."""
+    n, dimension = len(movable), int(movable.sum())
     key, step = np.zeros(n, dtype=np.uint64), np.full(n, _GAMMA, dtype=np.uint64)
     steps = _recurrence(dimension)
     rank = 0
     for j in range(n):
-        key[j] = word(seed, j)
-        if quasi and free[j]:
+        key[j] = stream_key(seed, j)
+        if quasi and movable[j]:
             step[j] = steps[rank]
             rank += 1
-    return key, step
+    return Streams(key, step, quasi)
 
 
-def word(seed: int, stream: int) -> int:
-    """The 64-bit key of a stream, as different as can be for neighbouring seeds and streams."""
+def stream_key(seed: int, stream: int) -> int:
+    """The 64-bit key of a stream; neighbouring seeds and streams have unrelated keys."""
     x = seed & _WORD
     for salt in (stream, 0):
         x = (x + _GAMMA * (salt + 1)) & _WORD

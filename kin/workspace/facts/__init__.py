@@ -1,1 +1,0 @@
-"""Sizes of a workspace: bounding box, reach, holes, volume and surface."""

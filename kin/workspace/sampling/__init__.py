@@ -1,0 +1,1 @@
+"""Random configurations inside joint limits, and the tool points they reach: reproducible and compiled."""

@@ -1,0 +1,1 @@
+"""Search for extreme and nearest points of a workspace by descent."""
