@@ -422,7 +422,6 @@ KNOWN: dict[Rule, set[str]] = {
         "tests/kin/test_axes.py: told",
         "tests/kin/test_singularity.py: told",
         "tests/kin/test_singularity.py: wish",
-        "tests/test_snapshot.py: told",
     },
     import_circles: {
         "app/viewer: feature → panel",
