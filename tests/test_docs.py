@@ -232,6 +232,20 @@ def test_the_site_has_a_page_per_solver_and_every_public_function(site):
             assert f'id="kin.{name}"' in python or f'id="kin.fk.{name}"' in python, name
 
 
+def test_the_picture_of_the_architecture_shows_every_room():
+    picture = (ROOT / "docs/images/architecture.svg").read_text(encoding="utf-8")
+    shown = set(re.findall(r">([a-z]+)</text>", picture))
+    rooms = {folder.parent.name for package in ("kin", "app") for folder in (ROOT / package).glob("*/__init__.py")}
+    assert rooms - shown == set()
+
+
+def test_the_glossary_defines_each_term_once():
+    rows = re.findall(r"^\| ([^|]+?) \|.*\|$", PAGES["docs/glossary.md"], re.MULTILINE)
+    terms = [term for term in rows if term not in ("term", "---")]
+    assert len(terms) > 50
+    assert len(terms) == len(set(terms))
+
+
 def test_drawings_are_small_and_self_contained():
     images = list((ROOT / "docs/images").iterdir())
     assert images
