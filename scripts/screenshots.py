@@ -1,0 +1,80 @@
+"""Screenshots of the dashboard for README.md and docs/, ``docs/images/*.webp``.
+
+    kinboard serve --port 8765 &
+    python scripts/screenshots.py http://127.0.0.1:8765/
+
+Each picture is a link that restores a view, and the tab of the panel to open. Needs what the browser tests need:
+playwright, Chromium (KINBOARD_TEST_CHROMIUM) and pillow.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import os
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+from PIL import Image
+from playwright.sync_api import Page, expect, sync_playwright
+
+FOLDER = Path(__file__).parents[1] / "docs" / "images"
+SIZE = {"width": 1280, "height": 720}
+WAIT = 60_000  # ms; software rendering is slow
+
+
+class Shot(NamedTuple):
+    """A picture: its name, the tab of the panel that is open, and the state of the page."""
+
+    name: str
+    tab: str
+    state: dict[str, object]
+    seconds: float = 4.0
+
+
+PUMA = [0.35, 0.75, -2.9, 0.3, 0.7, 0.2]
+CLOUD = {"drawn": True, "n": 300_000, "strategy": "uniform", "axis": "y", "at": 0.0}
+SHOTS = (
+    Shot("dashboard", "Move", {"robot": "puma560", "q": PUMA}),
+    Shot("dh", "Learn", {"robot": "stanford", "lesson": "dh"}),
+    Shot("equations", "Learn", {"robot": "pioneer5", "lesson": "equations"}),
+    Shot("postures", "Learn", {"robot": "puma560", "q": PUMA, "lesson": "postures"}, 8.0),
+    Shot("redundancy", "Learn", {"robot": "iiwa14", "lesson": "redundancy"}, 8.0),
+    Shot("velocity", "Learn", {"robot": "ur5", "lesson": "velocity"}, 8.0),
+    Shot("workspace", "Workspace", {"robot": "irb120", "features": {"workspace": CLOUD}}, 25.0),
+)
+
+
+def take(page: Page, address: str, shot: Shot) -> Image.Image:
+    """Open the view, wait until it stands still, and photograph it."""
+    text = json.dumps({"v": 1, **shot.state}, separators=(",", ":")).encode()
+    page.goto(f"{address}viewer/#s={base64.urlsafe_b64encode(text).decode().rstrip('=')}")
+    expect(page.locator("[data-status]").first).to_be_visible()
+    notice = page.locator("#webgl-software-rendering button")
+    if notice.count():
+        notice.click()
+    page.get_by_role("tab", name=shot.tab).click(force=True)
+    page.mouse.move(5, 5)
+    page.wait_for_timeout(1000 * shot.seconds)
+    return Image.open(io.BytesIO(page.screenshot(timeout=WAIT)))
+
+
+def main(address: str) -> None:
+    """Take all pictures of the service at `address`."""
+    chromium = os.environ.get("KINBOARD_TEST_CHROMIUM", "/usr/bin/chromium")
+    expect.set_options(timeout=WAIT)
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        for shot in SHOTS:
+            page = browser.new_page(viewport=SIZE, color_scheme="light")  # a new visitor for each picture
+            file = FOLDER / f"{shot.name}.webp"
+            take(page, address, shot).convert("RGB").save(file, quality=86, method=6)
+            page.close()
+            print(f"{file.name}: {file.stat().st_size} bytes", flush=True)
+        browser.close()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1].rstrip("/") + "/")
