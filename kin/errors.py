@@ -43,10 +43,10 @@ class RobotFileError(KinematicsError):
 class UnknownRobotError(KinematicsError):
     """No robot has this id; the message lists the valid ids."""
 
-    def __init__(self, robot_id: str, known: tuple[str, ...]) -> None:
+    def __init__(self, robot_id: str, robot_ids: tuple[str, ...]) -> None:
         self.robot_id = robot_id
-        self.known = known
-        super().__init__(f"robot: got {shorten(robot_id)}, expected one of {', '.join(known)}")
+        self.robot_ids = robot_ids
+        super().__init__(f"robot: got {shorten(robot_id)}, expected one of {', '.join(robot_ids)}")
 
 
 def shorten(value: object, length: int = 80) -> str:

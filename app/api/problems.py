@@ -116,10 +116,10 @@ def invalid(*errors: FieldError, hint: str = DOCS_HINT) -> ProblemError:
 
 def unknown_robot(error: UnknownRobotError) -> ProblemError:
     """404 with the robots there are."""
-    known = ", ".join(error.known)
-    field = FieldError(field="robot_id", value=show(error.robot_id), expected=f"one of {known}")
+    robot_ids = ", ".join(error.robot_ids)
+    field = FieldError(field="robot_id", value=show(error.robot_id), expected=f"one of {robot_ids}")
     detail = f"There is no robot {field.value}."
-    hint = f"Known robots: {known}. GET /api/v1/robots describes them."
+    hint = f"Known robots: {robot_ids}. GET /api/v1/robots describes them."
     return ProblemError(404, "unknown-robot", detail, hint, [field])
 
 
