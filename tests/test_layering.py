@@ -122,7 +122,7 @@ def test_every_row_of_the_table_has_its_module(row):
         ("app/api/routes.py", "from app.viewer.server import ViewerServer"),
         ("app/cli/fk.py", "from app.viewer import server"),
         ("app/service/web/viewer_proxy.py", "import viser"),
-        ("kin/solvers/srs7.py", "from kin.ik.results import IKResult"),
+        ("kin/solvers/srs7/batch.py", "from kin.ik.results import IKResult"),
         ("kin/ik/problem.py", "from kin.path import solve_path"),
         ("app/shared/store.py", "from app.api import schemas"),
         ("app/bench/run.py", "import pinocchio"),

@@ -1,0 +1,144 @@
+"""The family as a closed form: recognition by joint axes, the solver contract, singularities."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from kin.robot import Robot
+from kin.solvers.canonical import parameters
+from kin.solvers.collinear7.batch import branches_many, branches_one
+from kin.solvers.collinear7.branches import solve
+from kin.solvers.common import chain_of, inverse, is_zero, screw_z
+from kin.solvers.contract import (
+    APPROACH,
+    POSE,
+    BatchKernels,
+    Candidates,
+    ClosedForm,
+    Obstacle,
+    RedundancyParameter,
+    SolverInput,
+)
+from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, off_perpendicular, those_within
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+NAME = "collinear7"
+TITLE = "closed form, joints 1 and 2 on one line"
+BRANCHES = tuple(
+    f"shoulder {s} · elbow {e} · wrist {w}"
+    for s in ("left", "right")
+    for e in ("up", "down")
+    for w in ("no-flip", "flip")
+)
+_THETA1 = RedundancyParameter("theta1", "θ1", joint=0)
+_ROLL = RedundancyParameter("roll", "roll about the approach axis", circular=True)
+
+
+class Geometry(NamedTuple):
+    """The arm in canonical form: joint values are q = θ − offset."""
+
+    inverse_base: Array
+    inverse_tool: Array
+    offset: Array
+    d3: float
+    d5: float
+    tool_on_axis: bool
+
+
+def match(robot: Robot) -> Collinear7 | None:
+    """The closed form if axes 1 and 2 are one line, 3 is perpendicular to it and 5-6-7 meet in a point."""
+    chain = chain_of(robot) if robot.n == 7 else None
+    chain = chain.twisted((0, -1, -1, 1, -1, 1)) if chain else None
+    if chain is None or not is_zero(*chain.a, chain.d[3], chain.d[5]):
+        return None
+    d3, d5 = float(chain.d[2]), float(chain.d[4])
+    if min(d3, d5) < TOLERANCES.geometry:
+        return None
+    tool = screw_z(0.0, float(chain.d[6])) @ chain.tool
+    base = chain.base @ screw_z(0.0, float(chain.d[0] + chain.d[1]))
+    inverse_tool = inverse(tool)
+    # The wrist centre in the tool frame: it must stay when the tool rolls about its approach axis.
+    on_axis = is_zero(inverse_tool[0, 3], inverse_tool[1, 3])
+    return Collinear7(Geometry(inverse(base), inverse_tool, chain.theta, d3, d5, on_axis))
+
+
+class Collinear7(ClosedForm):
+    """The closed form of the arm whose joints 1 and 2 turn about one line."""
+
+    name, title, branches = NAME, TITLE, BRANCHES
+    reason = "axes 1 and 2 are one line, axis 3 is perpendicular to it, and axes 5, 6, 7 meet in one point"
+
+    def __init__(self, geometry: Geometry) -> None:
+        g = self.geometry = geometry
+        self.lengths = (g.d3, g.d5)
+        params = parameters(g.inverse_base, g.inverse_tool, g.offset, g.d3, g.d5)
+        self.kernels = BatchKernels(params, branches_one, branches_many)
+
+    def handles(self, task: int) -> bool:
+        """Poses, and an approach direction when it passes through the wrist centre."""
+        return task == POSE or (task == APPROACH and self.geometry.tool_on_axis)
+
+    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
+        """θ1, which joint 2 undoes; for an approach direction the roll about it as well."""
+        return (_THETA1, _ROLL) if task == APPROACH else (_THETA1,)
+
+    def solve(self, problem: SolverInput) -> Candidates:
+        """All branches, with θ1 and θ2 (and the roll of an approach task) as near the seed as the limits allow."""
+        free_roll = problem.task == APPROACH
+        out, arcs, rolls = np.empty((8, 9)), np.empty((64, 3)), np.empty((256, 3))
+        roll = problem.values[1] if free_roll else math.nan
+        options = problem.values[0], roll, problem.seed_roll, problem.respect_limits, free_roll
+        gap, count, roll_count = solve(
+            self.kernels.params, problem.T, options, problem.seed, problem.lower, problem.upper, arcs, rolls, out
+        )
+        obstacle = Obstacle("wrist centre off the upper arm and forearm") if gap > 0.0 else None
+        if free_roll:
+            return Candidates(out[:, :7], out[:, 7:], (arcs[:count], rolls[:roll_count]), gap, obstacle)
+        return Candidates(out[:, :7], out[:, 7:8], (arcs[:count],), gap, obstacle)
+
+    def branch_of(self, q: Array) -> int:
+        """The branch a configuration is on: the side of w on which u lies, and the signs of s4 and s6."""
+        t = q + self.geometry.offset
+        s4 = math.sin(t[3])
+        return 4 * int(math.cos(t[2]) * s4 < 0.0) + 2 * int(s4 < 0.0) + int(math.sin(t[5]) < 0.0)
+
+    def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
+        """The three factors of the determinant without joint 2, d3 d5² s4² c3 s6: there are no others.
+
+        s4 counts twice, so an elbow nearly straight costs more than a wrist nearly aligned.
+        """
+        g = self.geometry
+        t = (q + g.offset).tolist()
+        off = (0.0, 0.0, off_perpendicular(t[2]), off_line(t[3]), 0.0, off_line(t[5]))
+        across, along = g.d5 * math.sin(t[3]) * math.cos(t[2]), g.d3 + g.d5 * math.cos(t[3])
+        off_axis = math.hypot(across, along)
+        if min(abs(off[2]), abs(off[3]), abs(off[5]), off_axis) > within:
+            return ()  # as almost everywhere
+
+        def met_at(joint: int) -> tuple[JointValue]:
+            return (JointValue(joint, float(q[joint]) - off[joint]),)
+
+        found = [
+            Singularity("elbow", elbow_at(t[3]), "hand along the arm", abs(off[3]), "rad", met_at(3)),
+            Singularity(
+                "shoulder",
+                "forearm in one plane with axis 1",
+                "hand along the forearm",
+                abs(off[2]),
+                "rad",
+                met_at(2),
+            ),
+            Singularity(
+                "wrist", "hand along the forearm", "joints 5 and 7 coincide", abs(off[5]), "rad", met_at(5)
+            ),
+        ]
+        if g.d5 >= g.d3 - TOLERANCES.geometry:
+            # Only a forearm at least as long as the upper arm gets back to axis 1; then θ3 is ±90°, too.
+            found.append(
+                Singularity("algorithmic", "wrist centre on axis 1", "azimuth of the forearm", off_axis, "m")
+            )
+        return those_within(within, *found)

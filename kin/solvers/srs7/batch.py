@@ -1,0 +1,220 @@
+"""Vectorised kernels: all branches at one arm angle, without limits, intervals or a choice.
+
+The scheme is that of :mod:`kin.solvers.blocks`. One branch is computed per target. The other seven follow from it:
+the sign of θ2 turns θ1 and θ3 by π, that of θ4 turns θ3 and θ5, that of θ6 turns θ5 and θ7.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kin.kernels.compile import inlined, jit, joined
+from kin.kernels.fk import BLOCK
+from kin.kernels.simd import WIDE, sin_cos, widest
+from kin.solvers.blocks import OWN, VALUE, Arc, Entries, double, each, in_base, one, rows_of
+from kin.solvers.canonical import BASE, FOREARM, OFFSET, TOOL, UPPER_ARM
+from kin.solvers.common import shifted, wrap
+from kin.solvers.srs7.branches import solve
+from kin.solvers.srs7.geometry import REACH, radial_of
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+# Rows of a block: OWN + i is y of θ(i + 1), _END + i is x of it, for i < _PAIRS.
+_PAIRS, _END, _ROWS = 7, OWN + 7, OWN + 15
+_SINGULAR = TOLERANCES.singular
+_UNBOUND = 1e6  # rad; joint limits that never bind
+Vector = tuple[float, float, float]
+
+
+@inlined
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@inlined
+def _wrist_centre(u: Vector, v: Vector, w: Vector, p: Vector, base: Entries, tool: Entries) -> Vector:
+    """The translation of base⁻¹ · T · tool⁻¹, with u, v, w, p the columns of T turned by base⁻¹."""
+    x, y, z = tool[3], tool[7], tool[11]
+    return (
+        u[0] * x + v[0] * y + w[0] * z + (p[0] + base[3]),
+        u[1] * x + v[1] * y + w[1] * z + (p[1] + base[7]),
+        u[2] * x + v[2] * y + w[2] * z + (p[2] + base[11]),
+    )
+
+
+@inlined
+def _elbow(W: Vector, d3: float, d5: float) -> tuple[float, float, float, bool, bool]:
+    """cos θ4, sin θ4 ≥ 0, 1/L, whether W is out of reach (cos θ4 is NaN then), whether the arm is straight."""
+    most, least = d3 + d5, abs(d3 - d5)
+    nearest = max(least - REACH, 1e-12)
+    half = 0.5 / (d3 * d5)
+    L2 = W[0] * W[0] + W[1] * W[1] + W[2] * W[2]
+    far, near = most * most - L2, L2 - least * least
+    far = far if far > 0.0 else 0.0
+    near = near if near > 0.0 else 0.0
+    lost = ((most + REACH) ** 2 < L2) | (nearest * nearest > L2)
+    s4 = half * math.sqrt(far * near)
+    c4 = math.nan if lost else 0.5 * half * (near - far)
+    return c4, s4, 1.0 / math.sqrt(L2), lost, far < 1e-14 * near
+
+
+@inlined
+def _frame(u: Vector) -> tuple[Vector, Vector, float]:
+    """e1, e2 of the package docstring, and hypot(ux, uy)."""
+    h = math.sqrt(u[0] * u[0] + u[1] * u[1])
+    inverse_h = 1.0 / h
+    e2x, e2y = u[1] * inverse_h, -u[0] * inverse_h
+    return (e2y * u[2], -e2x * u[2], h), (e2x, e2y, 0.0), h
+
+
+@inlined
+def _arm_angle(value: float, r: Vector, e1: Vector, e2: Vector) -> tuple[float, float, bool]:
+    """sin ψ, cos ψ of a requested arm angle, of the direction r if that is NaN; whether r has no direction."""
+    along1, along2 = _dot(r, e1), r[0] * e2[0] + r[1] * e2[1]
+    amplitude = math.sqrt(along1 * along1 + along2 * along2)
+    s, c = sin_cos(value)
+    requested = c == c
+    c = c if requested else along1 / amplitude
+    s = s if requested else along2 / amplitude
+    return s, c, (not requested) & (amplitude < 1e-12)
+
+
+@inlined
+def _zyz_pairs(x: Vector, y: Vector, first: int, b: int, S: Array) -> bool:
+    """Pairs (y, x) of A, B, C from the first two rows of Rz(A) Ry(B) Rz(C); whether sin B vanishes.
+
+    The x of B, cos B, is written by the caller.
+    """
+    h = math.sqrt(x[2] * x[2] + y[2] * y[2])
+    c, s = x[2] / h, y[2] / h
+    S[OWN + first, b], S[_END + first, b] = y[2], x[2]
+    S[OWN + first + 1, b] = h
+    S[OWN + first + 2, b], S[_END + first + 2, b] = c * y[0] - s * x[0], c * y[1] - s * x[1]
+    return h < _SINGULAR
+
+
+@inlined
+def _shoulder(W: Vector, r: Vector, lengths: tuple[float, float], b: int, S: Array) -> tuple[
+    Vector, Vector, Vector, float, float, bool, bool
+]:  # fmt: skip
+    """x3, y3, z3, cos θ4, sin θ4, whether W is out of reach, whether the pose is singular; pairs of θ1 … θ4."""
+    d3, d5 = lengths
+    c4, s4, inverse_L, lost, straight = _elbow(W, d3, d5)
+    along, rho = (d3 + d5 * c4) * inverse_L, d5 * s4 * inverse_L
+    u = (W[0] * inverse_L, W[1] * inverse_L, W[2] * inverse_L)
+    e1, e2, h = _frame(u)
+    s, c, no_side = _arm_angle(S[VALUE, b], r, e1, e2)
+    q = (c * e1[0] + s * e2[0], c * e1[1] + s * e2[1], c * h)
+    x = (rho * u[0] - along * q[0], rho * u[1] - along * q[1], rho * u[2] - along * q[2])
+    y = (s * e1[0] - c * e2[0], s * e1[1] - c * e2[1], s * h)
+    z = (along * u[0] + rho * q[0], along * u[1] + rho * q[1], along * u[2] + rho * q[2])
+    singular = _zyz_pairs((x[0], y[0], z[0]), (x[1], y[1], z[1]), 0, b, S)
+    S[_END + 1, b] = z[2]
+    S[OWN + 3, b], S[_END + 3, b] = s4, c4
+    return x, y, z, c4, s4, lost, singular | straight | (h < 1e-12) | no_side
+
+
+@inlined
+def _pairs(arm: Array, near: Array, count: int, S: Array) -> int:
+    """The pairs of `count` targets; S[-1] ← 1.0 at singular poses. Returns how many these are.
+
+    A requested arm angle of NaN stands for the elbow's direction at near ``(7,)``.
+    """
+    lengths = arm[UPPER_ARM], arm[FOREARM]
+    base, tool = rows_of(arm, BASE), rows_of(arm, TOOL)
+    t0, t1, t2 = (tool[0], tool[4], tool[8]), (tool[1], tool[5], tool[9]), (tool[2], tool[6], tool[10])
+    r = _seed_direction(arm, near, count, S)
+    found = 0
+    for b in range(count):
+        u, v, w = in_base(base, S, 0, b), in_base(base, S, 1, b), in_base(base, S, 2, b)
+        W = _wrist_centre(u, v, w, in_base(base, S, 3, b), base, tool)
+        x, y, z, c4, s4, lost, singular = _shoulder(W, r, lengths, b, S)
+        # R47 = R04ᵀ R; tool⁻¹, the last factor of R, is multiplied last.
+        f = (c4 * x[0] - s4 * z[0], c4 * x[1] - s4 * z[1], c4 * x[2] - s4 * z[2])
+        g = (s4 * x[0] + c4 * z[0], s4 * x[1] + c4 * z[1], s4 * x[2] + c4 * z[2])
+        f = (_dot(f, u), _dot(f, v), _dot(f, w))
+        y = (_dot(y, u), _dot(y, v), _dot(y, w))
+        g = (_dot(g, u), _dot(g, v), _dot(g, w))
+        x_row, y_row = (_dot(f, t0), _dot(f, t1), _dot(f, t2)), (_dot(y, t0), _dot(y, t1), _dot(y, t2))
+        aligned = _zyz_pairs(x_row, y_row, 4, b, S)
+        S[_END + 5, b] = _dot(g, t2)
+        special = (singular | aligned) & (not lost)
+        S[-1, b] = 1.0 if special else 0.0
+        found += 1 if special else 0
+    return found
+
+
+@inlined
+def _seed_direction(arm: Array, near: Array, count: int, S: Array) -> Vector:
+    """The elbow's direction at near ``(7,)``, zero if every target requests ψ; wraps large requested values."""
+    free, wide = 0, 0
+    for b in range(count):
+        value = S[VALUE, b]
+        free += 0 if value == value else 1
+        wide += 1 if abs(value) > WIDE else 0
+    if wide > 0:
+        for b in range(count):
+            S[VALUE, b] = wrap(S[VALUE, b]) if abs(S[VALUE, b]) > WIDE else S[VALUE, b]
+    if free > 0:
+        return radial_of(shifted(near, arm[OFFSET:UPPER_ARM]), arm[UPPER_ARM], arm[FOREARM])
+    return 0.0, 0.0, 0.0
+
+
+@jit
+def _robust(arm: Array, T: Array, value: float, near: Array, out: Array) -> None:
+    """out ``(8, 7)`` ← all branches, by the kernel that also handles singular poses."""
+    arcs, rows, lower, upper = np.empty((1, 3)), np.empty((8, 8)), np.empty(7), np.empty(7)
+    for i in range(7):
+        lower[i], upper[i] = -_UNBOUND, _UNBOUND
+    no = arcs.shape[0] == 0  # a literal False would compile `solve` a second time
+    solve(arm, T, (value, no, no), near, lower, upper, arcs, rows)
+    for i in range(8):
+        for j in range(7):
+            out[i, j] = rows[i, j]
+
+
+@joined
+def _angles(arc: Arc, arm: Array, near: Array, count: int, S: Array) -> None:
+    """S ← the joint values of `count` targets, from the pairs."""
+    widest()
+    for k in range(_PAIRS):
+        # The second solution: half a turn on for even k (θ1, θ3, θ5, θ7), the other sign for odd k.
+        double(arc, S, OWN + k, OWN + k + 1, _PAIRS, count, 1.0, arm[OFFSET + k], k % 2 == 0)
+
+
+@inlined
+def _store(arm: Array, S: Array, b: int, out: Array) -> None:
+    """out ``(8, 7)`` ← the branches of target b."""
+    for row in range(8):
+        shoulder, elbow, wrist = row >> 2, (row >> 1) & 1, row & 1
+        out[row, 0] = S[_PAIRS * shoulder + OWN, b]
+        out[row, 1] = S[_PAIRS * shoulder + OWN + 1, b]
+        out[row, 2] = S[_PAIRS * (shoulder ^ elbow) + OWN + 2, b]
+        out[row, 3] = S[_PAIRS * elbow + OWN + 3, b]
+        out[row, 4] = S[_PAIRS * (elbow ^ wrist) + OWN + 4, b]
+        out[row, 5] = S[_PAIRS * wrist + OWN + 5, b]
+        out[row, 6] = S[_PAIRS * wrist + OWN + 6, b]
+
+
+@jit
+def branches_many(arm: Array, T: Array, values: Array, near: Array, out: Array) -> None:
+    """out ``(N, 8, 7)`` ← all branches of each of the targets T ``(N, 4, 4)``; see `branches_one`.
+
+    values: the arm angle of each target ``(N,)``, or one for all ``(1,)``.
+    """
+    widest()
+    S = np.empty((_ROWS, BLOCK))
+    each(_pairs, _angles, _store, _robust, arm, T, values, near, out, S)
+
+
+@jit
+def branches_one(arm: Array, T: Array, value: float, near: Array, out: Array) -> bool:
+    """out ``(8, 7)`` ← all branches of the target T ``(4, 4)``, NaN if there is none; False if T is not finite.
+
+    value: the arm angle, NaN for the elbow's direction at near ``(7,)``. `near` also decides the angles that a
+    singular pose leaves free.
+    """
+    S = np.empty((_ROWS, 1))
+    return one(_pairs, _angles, _store, _robust, _PAIRS, arm, T, value, near, out, S)

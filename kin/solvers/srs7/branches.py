@@ -1,0 +1,94 @@
+"""The kernel that finds all branches of one target: joint limits, feasible intervals of ψ, singular poses."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kin.kernels.compile import jit
+from kin.solvers.canonical import HIGH, LOW, NEAR, OFFSET, UPPER_ARM, canonical_box, canonical_pose
+from kin.solvers.common import clear, copy_row, excess, nearest_image, wrap
+from kin.solvers.srs7.geometry import FITS, SHAPE, STAY, angles_at, rotations, seed_arm_angle, sign_of, triangle_of
+from kin.solvers.srs7.redundancy import COLUMNS, PSI, ROWS, intervals, lay_out, shorter_way, squared_step, weigh
+from kin.transforms import Array
+
+_SHORT = 0.05**2  # rad²; a squared step below this is not worth another arm angle
+_UNBOUND = 1e9  # rad; joint limits that never bind
+# (the requested ψ, NaN for the feasible one nearest to the seed's; whether ψ is chosen so that the joint limits
+# hold where that is possible; whether joint 7 is a redundancy parameter as well, which keeps its seed value).
+Options = tuple[float, bool, bool]
+
+
+@jit
+def _box(arm: Array, seed: Array, lower: Array, upper: Array, free_roll: bool) -> Array:
+    """Seed and joint limits ``(7,)`` as a box ``(4, 7)`` of canonical angles."""
+    box = np.empty((4, 7))
+    canonical_box(arm[OFFSET:UPPER_ARM], seed, lower, upper, box)
+    for i in range(7):
+        box[STAY, i] = box[NEAR, i]
+    if free_roll:
+        box[LOW, 6], box[HIGH, 6] = -_UNBOUND, _UNBOUND
+        box[STAY, 6] += 2.0 * math.pi  # limits that span a turn add no arm angle
+    return box
+
+
+@jit
+def solve(
+    arm: Array, T: Array, options: Options, seed: Array, lower: Array, upper: Array, arcs: Array, out: Array
+) -> tuple[int, float, int]:
+    """All branches of a target T ``(4, 4)``: (code of `triangle_of`, gap in metres, number of intervals).
+
+    out ``(8, 8)`` ← seven joint values and ψ of each branch, NaN where there is none; two that have merged are
+    both there. arcs ``(n, 3)`` ← the feasible intervals of ψ, rows (branch, low, high). seed, lower, upper
+    ``(7,)``: joint values.
+    """
+    value, respect_limits, free_roll = options
+    clear(out)
+    M, triangle, parts, W = np.empty((4, 4)), np.empty((4, 3)), np.empty((3, 2, 3, 3)), np.empty((ROWS, COLUMNS))
+    box = _box(arm, seed, lower, upper, free_roll)
+    canonical_pose(arm, T, M)
+    code, gap = triangle_of(arm, M, triangle)
+    if code != FITS:
+        return code, gap, 0
+    bend = triangle[SHAPE, 2]
+    free = math.isnan(value)
+    preferred = seed_arm_angle(arm, box[NEAR], triangle) if free else value
+    joints = 6 if free_roll else 7
+    found = 0
+    for elbow in range(2 if bend > 0.0 else 1):
+        sign = sign_of(elbow, 0)
+        rotations(arm, M, triangle, sign, 0.0, 0.0, 1.0, parts[0])
+        rotations(arm, M, triangle, sign, 1.0, 0.0, 0.0, parts[1])
+        rotations(arm, M, triangle, sign, 0.0, 1.0, 0.0, parts[2])
+        limits, count = lay_out(parts, box, respect_limits, free, W)
+        # Shoulder and wrist are independent: each is weighed once per arm angle and sign.
+        weigh(parts, 0, 3, count, box, W)
+        weigh(parts, 1, joints - 4, count, box, W)
+        misfit = excess(sign * bend, box[LOW, 3], box[HIGH, 3])
+        step = (nearest_image(sign * bend, box[NEAR, 3], box[LOW, 3], box[HIGH, 3]) - box[NEAR, 3]) ** 2
+        for other in range(4):
+            branch = 4 * (other >> 1) + 2 * elbow + (other & 1)
+            psi, found = intervals(branch, misfit, limits, preferred, W, arcs, found)
+            row = out[branch]
+            row[7] = psi if free else value
+            angles_at(arm, M, triangle, branch, row[7], box, row)
+            least = 0.25 * squared_step(row, box, joints) if free else 0.0
+            if least >= 0.25 * _SHORT:
+                # Near sin θ2 = 0 or sin θ6 = 0 an elbow that does not move makes two joints turn against each
+                # other.
+                # A small elbow motion keeps them still: another ψ is taken if it at least halves the step.
+                j = shorter_way(branch, (misfit, step), limits, count, respect_limits, least, W)
+                if j >= 0:
+                    row[7] = W[PSI, j]
+                    angles_at(arm, M, triangle, branch, row[7], box, row)
+    for branch in range(8):
+        for i in range(7):
+            out[branch, i] = wrap(out[branch, i] - arm[OFFSET + i])
+        if free_roll and not math.isnan(out[branch, 7]):
+            out[branch, 6] = min(max(seed[6], lower[6]), upper[6])
+        out[branch, 7] = wrap(out[branch, 7])
+    if bend == 0.0:
+        for branch in (0, 1, 4, 5):
+            copy_row(out, branch, branch + 2)
+    return FITS, 0.0, found

@@ -1,0 +1,166 @@
+"""The S-R-S family as a closed form: recognition by joint axes, the solver contract, singularities."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from kin.robot import Robot
+from kin.solvers.canonical import parameters
+from kin.solvers.common import chain_of, inverse, is_zero, screw_z
+from kin.solvers.contract import (
+    APPROACH,
+    POSE,
+    BatchKernels,
+    Candidates,
+    ClosedForm,
+    Obstacle,
+    RedundancyParameter,
+    SolverInput,
+)
+from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, off_perpendicular, those_within
+from kin.solvers.srs7.batch import branches_many, branches_one
+from kin.solvers.srs7.branches import solve
+from kin.solvers.srs7.geometry import TOO_FAR, TOO_NEAR
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+NAME = "srs7"
+TITLE = "closed form, S-R-S arm"
+BRANCHES = tuple(
+    f"shoulder {s} · elbow {e} · wrist {w}"
+    for s in ("front", "back")
+    for e in ("up", "down")
+    for w in ("no-flip", "flip")
+)
+_PSI = RedundancyParameter("psi", "arm angle ψ", circular=True)
+_THETA7 = RedundancyParameter("theta7", "θ7", joint=6)
+
+
+class Geometry(NamedTuple):
+    """The arm in canonical form: joint values are q = θ − offset."""
+
+    inverse_base: Array
+    inverse_tool: Array
+    offset: Array
+    d3: float
+    d5: float
+    tool_on_axis: bool
+
+
+def match(robot: Robot) -> Srs7 | None:
+    """The closed form if the robot is an S-R-S arm, by its axes: 1-2-3 and 5-6-7 concurrent, neighbours square."""
+    chain = chain_of(robot) if robot.n == 7 else None
+    chain = chain.twisted((-1, 1, -1, 1, -1, 1)) if chain else None
+    if chain is None or not is_zero(*chain.a, chain.d[1], chain.d[3], chain.d[5]):
+        return None
+    d3, d5 = float(chain.d[2]), float(chain.d[4])
+    if min(d3, d5) < TOLERANCES.geometry:
+        return None
+    tool = screw_z(0.0, float(chain.d[6])) @ chain.tool
+    on_axis = is_zero(tool[0, 3], tool[1, 3]) and abs(tool[2, 2] - 1.0) < TOLERANCES.geometry
+    base = chain.base @ screw_z(0.0, float(chain.d[0]))
+    return Srs7(Geometry(inverse(base), inverse(tool), chain.theta, d3, d5, bool(on_axis)))
+
+
+class Srs7(ClosedForm):
+    """The closed form of an S-R-S arm."""
+
+    name, title, branches = NAME, TITLE, BRANCHES
+    reason = (
+        "axes 1, 2, 3 meet in one point and axes 5, 6, 7 in another, "
+        "with the elbow's axis perpendicular to both links"
+    )
+
+    def __init__(self, geometry: Geometry) -> None:
+        g = self.geometry = geometry
+        self.lengths = (g.d3, g.d5)
+        params = parameters(g.inverse_base, g.inverse_tool, g.offset, g.d3, g.d5)
+        self.kernels = BatchKernels(params, branches_one, branches_many)
+
+    def handles(self, task: int) -> bool:
+        """Poses, and an approach direction when it is the last joint's own axis (then that joint is free)."""
+        return task == POSE or (task == APPROACH and self.geometry.tool_on_axis)
+
+    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
+        """The arm angle; for an approach direction joint 7 as well."""
+        return (_PSI, _THETA7) if task == APPROACH else (_PSI,)
+
+    def solve(self, problem: SolverInput) -> Candidates:
+        """All branches, each at the feasible arm angle nearest to the seed's (or at the requested one)."""
+        g, free_roll = self.geometry, problem.task == APPROACH
+        out, arcs = np.empty((8, 8)), np.empty((256, 3))
+        options = problem.values[0], problem.respect_limits, free_roll
+        code, gap, count = solve(
+            self.kernels.params, problem.T, options, problem.seed, problem.lower, problem.upper, arcs, out
+        )
+        values, all_arcs = out[:, 7:], [arcs[:count]]
+        if free_roll:
+            # Joint 7 turns the tool about its own axis and nothing else: it stays, or takes the requested value.
+            if not math.isnan(problem.values[1]):
+                out[:, 6] = np.where(np.isnan(out[:, 6]), math.nan, problem.values[1])
+            values = out[:, [7, 6]]
+            spans = [(i, problem.lower[6], problem.upper[6]) for i in range(8) if not math.isnan(out[i, 6])]
+            all_arcs.append(np.array(spans, dtype=np.float64).reshape(-1, 3))
+        obstacle = None
+        if code == TOO_FAR:
+            obstacle = Obstacle("wrist centre too far from the shoulder", g.d3 + g.d5)
+        elif code == TOO_NEAR:
+            obstacle = Obstacle("wrist centre too near to the shoulder", abs(g.d3 - g.d5))
+        return Candidates(out[:, :7], values, tuple(all_arcs), gap, obstacle)
+
+    def branch_of(self, q: Array) -> int:
+        """The branch a configuration is on: "shoulder", "elbow" and "wrist" are the signs of θ2, θ4, θ6."""
+        s = np.sin(q + self.geometry.offset)
+        return 4 * int(s[1] < 0.0) + 2 * int(s[3] < 0.0) + int(s[5] < 0.0)
+
+    def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
+        """The zeros of √det(J Jᵀ) = d3 d5 |s4| |m|, where m spans the motions that keep the tool still.
+
+        With s4 ≠ 0 it vanishes for s2 = c3 = 0, for s6 = c5 = 0 and for s2 = s6 = 0 only: s2 = 0 or s6 = 0 alone
+        is no singularity of this arm.
+        """
+        g = self.geometry
+        t = (q + g.offset).tolist()
+        off = (
+            0.0,
+            off_line(t[1]),
+            off_perpendicular(t[2]),
+            off_line(t[3]),
+            off_perpendicular(t[4]),
+            off_line(t[5]),
+        )
+        side, along = g.d5 * math.sin(t[3]), g.d3 + g.d5 * math.cos(t[3])
+        x = math.cos(t[1]) * math.cos(t[2]) * side + math.sin(t[1]) * along
+        above, before = math.hypot(off[1], off[2]), math.hypot(off[5], off[4])
+        both, off_axis = math.hypot(off[1], off[5]), math.hypot(x, math.sin(t[2]) * side)
+        if min(abs(off[3]), above, before, both, off_axis) > within:
+            return ()  # as almost everywhere
+
+        def met_at(*joints: int) -> tuple[JointValue, ...]:
+            return tuple(JointValue(i, float(q[i]) - off[i]) for i in joints)
+
+        return those_within(
+            within,
+            Singularity("elbow", elbow_at(t[3]), "hand along the arm", abs(off[3]), "rad", met_at(3)),
+            Singularity("shoulder", "upper arm on axis 1", "hand along the forearm", above, "rad", met_at(1, 2)),
+            Singularity(
+                "wrist",
+                "hand along the forearm, axes 4 and 6 perpendicular",
+                "hand along the upper arm",
+                before,
+                "rad",
+                met_at(5, 4),
+            ),
+            Singularity(
+                "wrist",
+                "upper arm on axis 1, hand along the forearm",
+                "joints 1 and 3, 5 and 7 coincide",
+                both,
+                "rad",
+                met_at(1, 5),
+            ),
+            Singularity("algorithmic", "wrist centre on axis 1", "reference of the arm angle", off_axis, "m"),
+        )

@@ -1,0 +1,85 @@
+"""The kernel that finds all branches for a tool point and an approach direction, also at singular poses."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kin.kernels.compile import jit
+from kin.solvers.canonical import canonical_box
+from kin.solvers.common import clear, copy_row, merged, wrap
+from kin.solvers.wrist5.geometry import A1, A2, D4, D6, OFFSET, REACH, SINGULAR, wrist_angles
+from kin.solvers.wrist5.redundancy import choose_theta1
+from kin.transforms import Array
+
+
+@jit
+def _wrist_centre(arm: Array, T: Array, a: Array) -> tuple[float, float, float]:
+    """wx, wy and h = −wz in the canonical base frame; a ``(3,)`` ← the approach direction."""
+    for i in range(3):
+        a[i] = arm[4 * i] * T[0, 2] + arm[4 * i + 1] * T[1, 2] + arm[4 * i + 2] * T[2, 2]
+    x = arm[0] * T[0, 3] + arm[1] * T[1, 3] + arm[2] * T[2, 3] + arm[3]
+    y = arm[4] * T[0, 3] + arm[5] * T[1, 3] + arm[6] * T[2, 3] + arm[7]
+    z = arm[8] * T[0, 3] + arm[9] * T[1, 3] + arm[10] * T[2, 3] + arm[11]
+    d6 = arm[D6]
+    return x - d6 * a[0], y - d6 * a[1], d6 * a[2] - z
+
+
+@jit
+def _elbow(arm: Array, rho: float, h: float) -> tuple[float, float]:
+    """|θ3| of the planar arm that ends in (ρ, h), and the metres by which it does not reach."""
+    a2, d4 = arm[A2], arm[D4]
+    D2 = rho * rho + h * h
+    D = math.sqrt(D2)
+    miss = max(D - (a2 + d4), abs(a2 - d4) - D)
+    far, near = (a2 + d4) ** 2 - D2, D2 - (a2 - d4) ** 2
+    return merged(2.0 * math.atan2(math.sqrt(max(far, 0.0)), math.sqrt(max(near, 0.0)))), miss
+
+
+@jit
+def solve(
+    arm: Array, T: Array, value: float, seed: Array, lower: Array, upper: Array, arcs: Array, out: Array
+) -> tuple[float, int]:
+    """All branches for the tool point and approach direction of T ``(4, 4)``: (gap in metres, number of
+    intervals).
+
+    out ``(8, 6)`` ← five joint values of each branch and θ1 where it is a redundancy parameter, else NaN; two that
+    have merged are both there. arcs ``(n, 3)`` ← its feasible intervals, rows (branch, low, high), canonical.
+    value: the requested θ1, NaN for a feasible one near the seed. seed, lower, upper ``(5,)``: joint values.
+    """
+    clear(out)
+    a, box = np.empty(3), np.empty((3, 5))
+    canonical_box(arm[OFFSET:A1], seed, lower, upper, box)
+    wx, wy, h = _wrist_centre(arm, T, a)
+    r = math.hypot(wx, wy)
+    on_axis = r < SINGULAR
+    gap = math.inf
+    found = 0
+    for side in range(1 if on_axis else 2):
+        shoulder = 1.0 if side == 0 else -1.0
+        rho = shoulder * r - arm[A1]
+        bend, miss = _elbow(arm, rho, h)
+        gap = min(gap, miss)
+        if miss > REACH:
+            continue
+        for i in range(4 if bend > 0.0 else 2):
+            branch = 4 * side + i
+            row = out[branch]
+            t1, t3 = math.atan2(shoulder * wy, shoulder * wx), bend if i < 2 else -bend
+            t2 = math.atan2(h, rho) - math.atan2(arm[D4] * math.sin(t3), arm[A2] + arm[D4] * math.cos(t3))
+            if on_axis:
+                given = value if math.isnan(value) else value + arm[OFFSET]
+                t1, found = choose_theta1(t2 + t3, a, branch, given, box, arcs, found)
+                row[5] = wrap(t1 - arm[OFFSET])
+            row[0], row[1], row[2] = t1, t2, t3
+            wrist_angles(t1, t2 + t3, a, branch, box, row)
+            for joint in range(5):
+                row[joint] = wrap(row[joint] - arm[OFFSET + joint])
+        if bend == 0.0:
+            copy_row(out, 4 * side, 4 * side + 2)
+            copy_row(out, 4 * side + 1, 4 * side + 3)
+    if on_axis:
+        for branch in range(4):
+            copy_row(out, branch, branch + 4)
+    return gap, found

@@ -1,0 +1,144 @@
+"""The family as a closed form: recognition by joint axes, the solver contract, singularities."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kin.robot import Robot
+from kin.solvers.common import chain_of, inverse, is_zero, screw_x, screw_z
+from kin.solvers.contract import (
+    APPROACH,
+    POSE,
+    POSITION,
+    BatchKernels,
+    Candidates,
+    ClosedForm,
+    Obstacle,
+    RedundancyParameter,
+    SolverInput,
+)
+from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
+from kin.solvers.wrist5 import point
+from kin.solvers.wrist5.batch import branches_many, branches_one
+from kin.solvers.wrist5.branches import solve
+from kin.solvers.wrist5.geometry import OFFSET, REACH, Geometry
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+NAME = "wrist5"
+TITLE = "closed form, elbow arm with a two-axis wrist"
+BRANCHES = tuple(
+    f"shoulder {s} · elbow {e} · wrist {w}"
+    for s, elbows in (("front", ("up", "down")), ("back", ("down", "up")))
+    for e in elbows
+    for w in ("no-flip", "flip")
+)
+_THETA1 = RedundancyParameter("theta1", "θ1", joint=0, circular=True, rare=True)
+
+
+def match(robot: Robot) -> Wrist5 | None:
+    """The closed form if axes 2 and 3 are parallel, perpendicular to axis 1, and 3-4, 4-5 meet at right angles."""
+    chain = chain_of(robot) if robot.n == 5 else None
+    chain = chain.twisted((-1, 0, -1, 1)) if chain else None
+    if chain is None or not is_zero(*chain.a[2:], chain.d[1] + chain.d[2]):
+        return None
+    theta, d = chain.theta, chain.d
+    a1, a2, d4 = float(chain.a[0]), float(chain.a[1]), float(d[3])
+    if min(abs(a2), d4) < TOLERANCES.geometry:
+        return None
+    tool = screw_x(0.0, math.pi / 2) @ screw_z(0.0, float(d[4])) @ chain.tool
+    if abs(tool[2, 2] + 1.0) < TOLERANCES.geometry:
+        theta[4] += math.pi
+        tool = screw_x(0.0, math.pi / 2) @ screw_z(math.pi, float(d[4])) @ chain.tool
+    if not is_zero(tool[0, 3], tool[1, 3], tool[2, 2] - 1.0):
+        return None
+    # In the formulas θ3 = 0 is the straight elbow, a quarter turn from where the common normals align.
+    theta[2] += math.pi / 2
+    base = chain.base @ screw_z(0.0, float(d[0]))
+    if a2 < 0:
+        # A negative length is two half turns: Tx(−a) = Rz(π) Tx(a) Rz(−π).
+        theta[1] += math.pi
+        theta[2] -= math.pi
+        a2 = -a2
+    return Wrist5(Geometry(inverse(base), theta, a1, a2, d4, float(tool[2, 3])))
+
+
+class Wrist5(ClosedForm):
+    """The closed form of a five-joint elbow arm with a two-axis wrist."""
+
+    name, title, branches = NAME, TITLE, BRANCHES
+    reason = (
+        "axes 2 and 3 are parallel and perpendicular to axis 1, "
+        "axes 3 and 4 meet at a right angle, and so do axes 4 and 5"
+    )
+
+    def __init__(self, geometry: Geometry) -> None:
+        g = self.geometry = geometry
+        self.lengths = (g.a1, g.a2, g.d4, g.d6)
+        self.kernels = BatchKernels(g.parameters(), branches_one, branches_many)
+
+    def handles(self, task: int) -> bool:
+        """A point, with or without an approach direction; :mod:`kin.ik` judges the roll that a pose gets."""
+        return task in (POSE, APPROACH, POSITION)
+
+    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
+        """θ4 and θ5 for a point alone; otherwise θ1 when the wrist centre is on axis 1, else nothing."""
+        return point.REDUNDANCIES if task == POSITION else (_THETA1,)
+
+    def solve(self, problem: SolverInput) -> Candidates:
+        """All branches that bring the tool point and the approach direction to the target's.
+
+        Of a point alone θ4 and θ5 are free: that is :mod:`kin.solvers.wrist5.point`.
+        """
+        if problem.task == POSITION:
+            return point.solve(self.geometry, problem)
+        out, arcs, arm = np.empty((8, 6)), np.empty((128, 3)), self.kernels.params
+        gap, count = solve(
+            arm, problem.T, problem.values[0], problem.seed, problem.lower, problem.upper, arcs, out
+        )
+        arcs = arcs[:count]
+        if count:
+            arcs[:, 1:] -= arm[OFFSET]
+        obstacle = None if gap <= REACH else Obstacle("approach direction")
+        return Candidates(out[:, :5], out[:, 5:], (arcs,), max(gap, 0.0), obstacle)
+
+    def branch_of(self, q: Array) -> int:
+        """The branch a configuration is on.
+
+        "Front" is the side of axis 1 the arm faces with the wrist centre before it; the elbow is "up" when it is
+        above the line from the shoulder to the wrist centre; the wrist is the sign of θ5.
+        """
+        g = self.geometry
+        t = q + g.offset
+        reach = g.a1 + g.a2 * math.cos(t[1]) + g.d4 * math.cos(t[1] + t[2])
+        return 4 * int(reach < 0.0) + 2 * int(math.sin(t[2]) < 0.0) + int(math.sin(t[4]) < 0.0)
+
+    def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
+        """Those of the task point and approach direction.
+
+        The three are the factors of the determinant, −a2 d4 s3 (a1 + a2 c2 + d4 c23) s5: there are no others.
+        """
+        g = self.geometry
+        t = (q + g.offset).tolist()
+        elbow, wrist = off_line(t[2]), off_line(t[4])
+        reach = g.a1 + g.a2 * math.cos(t[1]) + g.d4 * math.cos(t[1] + t[2])
+        if min(abs(elbow), abs(reach), abs(wrist)) > within:
+            return ()  # as almost everywhere
+        straight, aligned = float(q[2]) - elbow, float(q[4]) - wrist
+        return those_within(
+            within,
+            Singularity(
+                "elbow",
+                elbow_at(t[2]),
+                "wrist centre along the arm",
+                abs(elbow),
+                "rad",
+                (JointValue(2, straight),),
+            ),
+            Singularity("shoulder", "wrist centre on axis 1", "wrist centre sideways", abs(reach), "m"),
+            Singularity(
+                "wrist", "tool along the forearm", "tilt sideways", abs(wrist), "rad", (JointValue(4, aligned),)
+            ),
+        )

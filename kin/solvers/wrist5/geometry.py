@@ -1,0 +1,54 @@
+"""The arm as its kernels read it, and the wrist angles that point the tool.
+
+Angles are canonical, θ = q + offset; θ3 = 0 is the straight elbow. Lengths are metres.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from kin.kernels.compile import jit
+from kin.solvers.canonical import HIGH, LOW, NEAR
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+# Offsets into the parameter array: the first three rows of base⁻¹, joint offsets, lengths.
+BASE, OFFSET, A1, A2, D4, D6 = 0, 12, 17, 18, 19, 20
+REACH = TOLERANCES.closure_position * 0.1
+SINGULAR = TOLERANCES.singular
+
+
+class Geometry(NamedTuple):
+    """The arm in canonical form: joint values are q = θ − offset."""
+
+    inverse_base: Array
+    offset: Array
+    a1: float
+    a2: float
+    d4: float
+    d6: float
+
+    def parameters(self) -> Array:
+        """The parameter array of the kernels ``(21,)``."""
+        return np.array([*self.inverse_base[:3].ravel(), *self.offset, self.a1, self.a2, self.d4, self.d6])
+
+
+@jit
+def wrist_angles(t1: float, t23: float, a: Array, branch: int, box: Array, out: Array) -> None:
+    """out[3], out[4] ← θ4, θ5 that point the tool along a ``(3,)``, given θ1 and θ23 = θ2 + θ3.
+
+    Bit 0 of the branch is the sign of θ5. Where sin θ5 = 0, θ4 is the seed's, inside its limits (box ``(3, 5)``).
+    """
+    c1, s1, c23, s23 = math.cos(t1), math.sin(t1), math.cos(t23), math.sin(t23)
+    flip = -1.0 if branch & 1 else 1.0
+    level = c1 * a[0] + s1 * a[1]
+    u1 = s23 * level + c23 * a[2]
+    u2 = s1 * a[0] - c1 * a[1]
+    u3 = c23 * level - s23 * a[2]
+    singular = math.hypot(u1, u2) < SINGULAR
+    t4 = min(max(box[NEAR, 3], box[LOW, 3]), box[HIGH, 3]) if singular else math.atan2(-flip * u2, -flip * u1)
+    out[3] = t4
+    out[4] = math.atan2(-(math.cos(t4) * u1 + math.sin(t4) * u2), u3)

@@ -1,0 +1,22 @@
+"""Names of the entries of the small arrays that the kernels of the point solver share, and its thresholds."""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+
+from kin.tolerances import TOLERANCES
+
+# Constants of a problem, k: lengths of the arm; the target's x, y, h = −z, r = hypot(x, y), azimuth, and K.
+A1, A2, D4, D6, X, Y, H, RAD, PHI, KAY = range(10)
+# Columns of a plane: the joint whose limit it is, the four numbers pC, pT, pR, p0, and m and the sign of sin θ5 on
+# it (0 if they vary).
+JOINT, PC, PT, PR, P0, M, S = range(7)
+# Columns of a piece of θ5: the branch, its ends, the sheet, that is 2 · (tool behind axis 1) + (elbow angle < 0).
+BRANCH, START, END, SHEET = range(4)
+REACH = TOLERANCES.closure_position * 0.1
+SLACK = TOLERANCES.limit
+HAIR = 1e-6  # rad or m; closer than this a sign is a matter of rounding
+# Zero as a count. Not a literal: numba compiles a callee again for every literal it is called with.
+ZERO = cast(int, np.int64(0))
