@@ -11,6 +11,7 @@ import sys
 import tomllib
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import get_args
 from urllib.parse import unquote, urlsplit
 
 import pytest
@@ -19,6 +20,7 @@ from fastapi.testclient import TestClient
 import kin
 from app.service.main import create_app
 from app.shared.settings import Settings
+from kin.ik.results import Cause
 
 ROOT = Path(__file__).parents[1]
 CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
@@ -106,6 +108,11 @@ def test_the_status_table_lists_every_status():
     assert [row[0].strip("`") for row in table(PAGES["docs/rest.md"], "`status`")] == [
         status.value for status in kin.Status
     ]
+
+
+def test_the_table_of_causes_lists_every_cause():
+    causes = [row[0].strip("`") for row in table(PAGES["docs/rest.md"], "`cause`")]
+    assert causes == [cause for cause in get_args(Cause) if cause]
 
 
 def test_the_settings_table_is_the_settings():
