@@ -38,7 +38,7 @@ RULES: dict[str, set[str]] = {
     "app/exports": {"kin", "numpy", "scipy", "tqdm", "trimesh", "PIL", "app.exports", "app.shared"},
     "app/equations": {"kin", "numpy", "sympy", "app.equations", "app.shared.computations"},
     "app/bench": {"kin", "numpy", "numba", "app.bench"},
-    "app/bench/contestants.py": {
+    "app/bench/contestants": {
         *("kin", "numpy", "numba", "app.bench"),
         *("eaik", "ik_geo", "ikpy", "pinocchio", "py_opw_kinematics", "roboticstoolbox", "scipy", "spatialmath"),
         "ssik",

@@ -2,6 +2,6 @@
 
 A *row* (:mod:`app.bench.rows`) is a task with targets; a *contestant* (:mod:`app.bench.contestants`) is one way of
 one library to do it. Every contestant first answers all targets and is judged by our forward kinematics
-(:mod:`app.bench.judge`); only then is it timed, in turns with all others (:mod:`app.bench.measure`), so that
-whatever else the machine does befalls all alike. :mod:`app.bench.gate` compares us with a floor of the same run.
+(:mod:`app.bench.judge`); only then is it timed, in turns with all others (:mod:`app.bench.measure`), so that other
+load on the machine affects all of them equally. :mod:`app.bench.gate` compares us with a floor of the same run.
 """

@@ -1,8 +1,8 @@
-"""An arm in the forms other libraries want, all derived from its DH table.
+"""An arm in the forms that other libraries take, all derived from its DH table.
 
 Everything starts from ``T = C_0 Rz(q_1) C_1 Rz(q_2) … Rz(q_n) C_n`` with constant C_i: any DH table, standard or
-modified, with fixed rows anywhere, is of that form. Two tricks make arms of five and seven joints a task for
-solvers that know six only:
+modified, with fixed rows anywhere, is of that form. Two tricks let solvers for six joints solve arms of five and
+seven joints:
 
 - a *virtual roll*: a sixth joint about the tool's z axis makes "point and approach direction" a whole pose;
 - a *locked joint*: one of seven joints at a fixed value becomes part of a constant.
@@ -39,7 +39,7 @@ class Arm:
         return Arm(np.concatenate([self.constants, np.eye(4)[None]]))
 
     def locked(self, joint: int, value: float) -> Arm:
-        """The same arm without a joint, which stays at `value` radians."""
+        """The same arm with one joint locked at `value` radians."""
         before, after = self.constants[joint], self.constants[joint + 1]
         merged = before @ screw_z(value, 0.0) @ after
         return Arm(np.concatenate([self.constants[:joint], merged[None], self.constants[joint + 2 :]]))
@@ -92,7 +92,7 @@ class Arm:
 
     @cached_property
     def family(self) -> str:
-        """Which decomposition fits the six joints: one of ik-geo's constructors, "" for none in closed form."""
+        """Name of the constructor of ik-geo that fits the six joints; "" if there is no closed form."""
         H, P, _ = self.screws
         if self.n != 6:
             return ""
@@ -126,7 +126,7 @@ class Ortho:
 
 
 def ortho(arm: Arm) -> Ortho | None:
-    """The arm as OPW parameters, None if it is of another kind or does not stand on its base's z axis."""
+    """The arm as OPW parameters; None if its geometry differs or axis 1 is not the z axis of the base."""
     if arm.family != "spherical_two_parallel":
         return None
     q = np.zeros(6)
@@ -137,7 +137,7 @@ def ortho(arm: Arm) -> Ortho | None:
     centre = _meeting(points[3], directions[3], points[4], directions[4])
     if centre is None:
         return None
-    # Stand the arm up joint by joint: each turn brings the next piece to where the OPW arm has it.
+    # Bring the arm upright joint by joint: each turn moves the next link to its place in the OPW model.
     q[0] = _turn(directions[0], directions[1], y)
     directions, points, _ = arm.lines(q)
     q[1] = _turn(directions[1], points[2] - points[1], z)
@@ -173,7 +173,7 @@ def ortho(arm: Arm) -> Ortho | None:
 
 
 def arm_of(robot: Robot) -> Arm:
-    """The constants of a robot whose joints all turn."""
+    """The constants of a robot whose joints are all revolute."""
     constants = [robot.T_world_base.copy()]
     for row in robot.rows:
         x = screw_x(row.a, row.alpha)
@@ -193,12 +193,12 @@ def _parallel(u: Array, v: Array) -> bool:
 
 
 def _distance(point: Array, origin: Array, direction: Array) -> float:
-    """Metres between a point and a line."""
+    """Distance of a point from a line in metres."""
     return float(np.linalg.norm(np.cross(point - origin, direction)))
 
 
 def _meeting(p: Array, u: Array, q: Array, v: Array) -> Array | None:
-    """Where the lines p + s u and q + t v meet, None where they do not or are parallel."""
+    """Intersection of the lines p + s u and q + t v; None if they are skew or parallel."""
     normal = np.cross(u, v)
     square = float(normal @ normal)
     if square < _NEAR**2 or abs(float(normal @ (q - p))) / math.sqrt(square) > _NEAR:
@@ -207,7 +207,7 @@ def _meeting(p: Array, u: Array, q: Array, v: Array) -> Array | None:
 
 
 def _turn(axis: Array, vector: Array, wanted: Array) -> float:
-    """Angle about `axis` that brings the part of `vector` square to it onto that of `wanted`."""
+    """Angle about `axis` from `vector` to `wanted`, both projected onto the plane perpendicular to it."""
     return math.atan2(
         float(axis @ np.cross(vector, wanted)), float(vector @ wanted - (axis @ vector) * (axis @ wanted))
     )

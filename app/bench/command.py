@@ -1,4 +1,4 @@
-"""What ``kinboard bench`` does: run, print the tables, write JSON and a picture."""
+"""``kinboard bench``: runs the benchmark, prints tables, writes JSON and a bar chart."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from kin import InputError
 from kin.kernels.fk import fk_one
 
 INSTALL = "pip install 'kinboard[bench]'"
-_INTERRUPTED = 130  # what shells expect after Ctrl-C
+_INTERRUPTED = 130  # exit code that shells expect after Ctrl-C
 
 
 def bench(arguments: Namespace) -> int:
-    """0, or 1 if our own answers are wrong, 2 if it cannot begin, 130 after Ctrl-C.
+    """Returns 0, or 1 if our own answers are wrong, 2 if it cannot start, 130 after Ctrl-C.
 
-    The gate is told and fails nothing here: noise alone can do that, which the tests rule out by trying again.
+    The verdicts of the gate are printed but do not change the exit code: a single run can fail by noise alone.
     """
     settings = Settings(rows=_rows(arguments.rows), peers=_peers(arguments.peers))
     if arguments.quick:
@@ -32,13 +32,13 @@ def bench(arguments: Namespace) -> int:
     if arguments.cpu_time:
         settings = replace(settings, clock=time.process_time_ns)
     files = [_file(name, getattr(arguments, name)) for name in ("json", "picture")]
-    if not hasattr(fk_one, "py_func"):  # what numba compiles keeps its source
-        return _refuse("NUMBA_DISABLE_JIT is set: this would measure uncompiled code; unset it")
+    if not hasattr(fk_one, "py_func"):  # an attribute of compiled functions only
+        return _refuse("NUMBA_DISABLE_JIT is set, so this would measure uncompiled code; unset it")
     missing = [peer.name for peer in settings.peers if not peer.installed]
     if missing and arguments.peers:
-        return _refuse(f"not installed: {', '.join(missing)}. {INSTALL} brings all of them")
+        return _refuse(f"not installed: {', '.join(missing)}. {INSTALL} installs all of them")
     if missing:
-        print(f"kinboard: without {', '.join(missing)}, which {INSTALL} brings", file=sys.stderr)
+        print(f"kinboard: not installed: {', '.join(missing)}; {INSTALL} installs them", file=sys.stderr)
     progress = _Progress(sys.stderr)
     try:
         found = run(settings, progress.say)
@@ -87,7 +87,7 @@ def _peers(names: list[str] | None) -> tuple[Peer, ...]:
 
 
 def _file(name: str, given: str | None) -> Path | None:
-    """A file to be written, refused before the run and not after it."""
+    """Path of a file to write; an invalid one is rejected before the run."""
     if given is None:
         return None
     path = Path(given)
@@ -102,7 +102,7 @@ def _refuse(message: str, code: int = 2) -> int:
 
 
 class _Progress:
-    """One line that is written over on a terminal, lines in a log."""
+    """Status messages: one line that is overwritten on a terminal, separate lines elsewhere."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream

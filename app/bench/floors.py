@@ -1,7 +1,7 @@
-"""What no contestant can be faster than here: the unit in which the gate measures us.
+"""Lower bounds for every contestant on this machine: the unit of the gate.
 
-An *empty call* is what it costs to get from Python into compiled code and back. *Sine and cosine* of every joint
-value are what forward kinematics cannot do without.
+An *empty call* is the cost of a call from Python into compiled code and back. *Sine and cosine* of every joint
+value are needed by any forward kinematics.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from kin.workspace.sampling.kernels import Points
 
 @jit
 def empty_call(model: Array, q: Array) -> float:
-    """Nothing, with the arguments of one pose."""
+    """Does nothing, with the arguments of one pose."""
     return 0.0
 
 
@@ -33,7 +33,7 @@ def sines_and_cosines(q: Array) -> float:
 
 @jit
 def written(out: Points) -> None:
-    """Every value of an array ``(k, 3)`` written once."""
+    """Write every value of an array ``(k, 3)`` once."""
     for i in range(out.shape[0]):
         x = np.float32(i)
         out[i, 0] = x

@@ -1,8 +1,8 @@
 """The regression gate: our times as multiples of a floor that was measured in the same run.
 
-A floor moves with the machine, so a multiple of it means the same on a laptop and in CI. Each side is taken at its
-fastest round, which noise can only slow down. The multiples allowed are two to three times what is measured: they
-catch a compiled path lost or an allocation in a loop, not a few per cent.
+A floor depends on the machine as our times do, so a multiple of it means the same on a laptop and in CI. Both times
+are those of the fastest round, because noise only slows down. The allowed multiples are two to three times the
+measured ones: they catch a lost compiled path or an allocation in a loop, not a few per cent.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Gate:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """A gate with the multiple that was measured."""
+    """A gate with the measured multiple."""
 
     gate: Gate
     floor: str
@@ -36,7 +36,7 @@ class Verdict:
 
     @property
     def passed(self) -> bool:
-        """Whether it stayed below what is allowed."""
+        """Whether the multiple is within the allowed one."""
         return self.multiple <= self.gate.most
 
     def __str__(self) -> str:
@@ -61,14 +61,14 @@ GATES: tuple[Gate, ...] = (
 
 
 def quick_settings() -> Settings:
-    """The rows that have a gate, without peers, by this thread's own clock, which waits for nobody else."""
+    """The rows that have a gate, without peers, by the clock of this thread, which excludes other processes."""
     rows = tuple(row for row in ROWS if row.id in {gate.row for gate in GATES})
     quick = Settings(rows=rows, peers=()).quick()
     return replace(quick, targets=8, rounds=10, clock=time.thread_time_ns)
 
 
 def judge(report: Report, gates: tuple[Gate, ...] = GATES) -> list[Verdict]:
-    """The verdicts of all gates whose row was measured."""
+    """Verdicts of all gates whose row was measured."""
     rows = {row.task.row.id: row for row in report.rows}
     found = []
     for gate in gates:
@@ -83,7 +83,7 @@ def judge(report: Report, gates: tuple[Gate, ...] = GATES) -> list[Verdict]:
 
 
 def slowed(contestant: Contestant, times: int) -> Contestant:
-    """The contestant made to do everything several times over, to see whether a gate notices."""
+    """The contestant with every call repeated, to test that the gate detects it."""
     call: Callable[..., Any] = contestant.call
 
     def slow(*arguments: Any) -> Any:

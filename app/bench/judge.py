@@ -1,4 +1,4 @@
-"""Whether a contestant did the task: every answer is put through our forward kinematics."""
+"""Checks of contestants: every answer is compared with forward kinematics."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from app.bench.rows import Task
 from kin.transforms import Array
 
 ACCURACY = 1e-6
-"""Metres and radians; an answer farther off is none. Closed forms stay a million times below it."""
+"""Metres and radians; answers with a larger error do not count. Closed forms stay a million times below."""
 SAME = 1e-6
-"""Radians modulo whole turns, joint by joint, within which two branches are one."""
+"""Radians, modulo whole turns and joint by joint, within which two solutions are equal."""
 
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """What the judge found over all targets.
+    """Errors and counts over all targets.
 
     Attributes:
-        success: share of targets with at least one right answer.
-        branches: right and distinct answers per target, on average; None for forward kinematics.
-        position_error, rotation_error: the worst among the right answers, metres and radians.
-        wrong: answers per target that are farther off than `ACCURACY`.
-        same: share of targets whose set of branches is ours; None where the sets cannot be compared.
+        success: share of targets with at least one correct answer.
+        branches: correct and distinct answers per target, on average; None for forward kinematics.
+        position_error, rotation_error: largest errors of the correct answers, metres and radians.
+        wrong: answers per target with an error above `ACCURACY`.
+        same: share of targets with the same set of branches as ours; None where sets cannot be compared.
     """
 
     success: float
@@ -55,7 +55,7 @@ def judge_poses(task: Task, poses: list[Array]) -> Check:
 
 
 def right_sets(task: Task, answers: list[Array]) -> tuple[list[Array], Check]:
-    """The right and distinct answers ``(k, n)`` of each target, and the check they give, without `same`."""
+    """The correct and distinct answers ``(k, n)`` of each target, and their check without `same`."""
     kept: list[Array] = []
     position, rotation, wrong = 0.0, 0.0, 0
     for got, T in zip(answers, task.T, strict=True):
@@ -85,7 +85,7 @@ def share_of_same(ours: list[Array], theirs: list[Array]) -> float:
 
 
 def same_set(a: Array, b: Array) -> bool:
-    """Whether two lists of configurations ``(k, n)`` hold the same ones, modulo whole turns."""
+    """Whether two lists of configurations ``(k, n)`` are the same set, modulo whole turns."""
     return len(a) == len(b) and all(bool(_near(b, q).any()) for q in a) and all(bool(_near(a, q).any()) for q in b)
 
 
@@ -103,7 +103,7 @@ def _distinct(q: Array) -> Array:
 
 
 def _angle(poses: Array, T: Array) -> Array:
-    """Angles between rotations, from the chord: exact for small ones, where acos is not."""
+    """Angles between rotations, from the chord, which is accurate for small angles."""
     chord = np.linalg.norm(poses[:, :3, :3] - T[:3, :3], axis=(1, 2)) / math.sqrt(8.0)
     return np.asarray(2.0 * np.arcsin(np.clip(chord, 0.0, 1.0)))
 

@@ -1,9 +1,9 @@
-"""Timing in turns: round after round, each contestant a short while, so that noise befalls all alike.
+"""Timing in turns: in each round every contestant runs for a short while, so that noise affects all equally.
 
-A turn is a loop of calls as long as it takes to fill some milliseconds, the garbage collector off. Times are of
-the wall clock (or of the processor, on a machine that has other things to do), per target, with the loop's own
-cost of some tens of nanoseconds in everyone's. Ratios are taken within each round, between turns a moment apart,
-and then the median of them: a machine that slows down half-way through changes both times and leaves the ratio.
+A turn is a loop of calls that takes some milliseconds, with the garbage collector off. Times are wall times (or
+processor times, on a busy machine) per target; they include some tens of nanoseconds of the loop itself. Ratios are
+taken within each round, between turns a moment apart, and their median is reported: a machine that slows down
+during the run changes both times and leaves the ratio.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Clock = Callable[[], int]
 
 @dataclass(slots=True, eq=False)
 class Turns:
-    """One contestant's times.
+    """The times of one contestant.
 
     Attributes:
         seconds: per target, one entry per round.
@@ -41,7 +41,7 @@ class Turns:
 
     @property
     def best(self) -> float:
-        """Seconds per target in the fastest round: what noise can only add to."""
+        """Seconds per target in the fastest round; noise only adds to it."""
         return min(self.seconds)
 
     @property
@@ -53,13 +53,13 @@ class Turns:
         return (high - low) / self.median
 
     def take(self, clock: Clock) -> None:
-        """One turn."""
+        """Run one turn."""
         inputs = self.contestant.inputs
         chosen = [inputs[(self._next + k) % len(inputs)] for k in range(self.calls)]
         self._next = (self._next + self.calls) % len(inputs)
         call = self.contestant.call
         if self.calls > 1:
-            call(*chosen[-1])  # what the others have driven out of the caches comes back
+            call(*chosen[-1])  # refills the caches after the other contestants
         start = clock()
         for arguments in chosen:
             call(*arguments)
@@ -67,7 +67,7 @@ class Turns:
         self.seconds.append(spent * 1e-9 / (self.calls * self.contestant.per_call))
 
     def calibrate(self, seconds: float, clock: Clock) -> None:
-        """Choose the calls of a turn; whole sweeps over the targets where they fit."""
+        """Choose the number of calls in a turn; a multiple of the number of targets if possible."""
         self.calls = 1
         while True:
             for _ in range(3):
@@ -85,7 +85,7 @@ class Turns:
 
 
 def ratio(of: Turns, to: Turns) -> float:
-    """How many times as long as `to` it takes `of`: the median over the rounds both have."""
+    """Time of `of` relative to `to`: the median over the rounds that both have."""
     return statistics.median(a / b for a, b in zip(of.seconds, to.seconds, strict=False))
 
 
@@ -97,9 +97,9 @@ def measure(
     clock: Clock = time.perf_counter_ns,
     after_round: Callable[[int], None] = lambda _: None,
 ) -> None:
-    """Take turns of about `turn` seconds, in another order each round.
+    """Run turns of about `turn` seconds, in a new order each round.
 
-    When a KeyboardInterrupt passes through, the entries hold what was measured by then.
+    After a KeyboardInterrupt the entries hold what was measured by then.
     """
     order = list(entries)
     shuffler = random.Random(0)

@@ -1,4 +1,4 @@
-"""A run as a table for people, as JSON, and as a picture."""
+"""A run as text tables, as JSON, and as a bar chart."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from app.bench.run import Entry, Report, RowReport, machine
 
 LEGEND = """\
 time            median per pose or target
-noise           distance of the quartiles, relative to the time
+noise           interquartile range, relative to the time
 × thin, × rich  times as long as our thin and our rich call: median of the ratios within each round
-solved          share of targets with a right answer
-branches        right, distinct answers per target
-wrong           answers per target that are farther off than 1e-6
-worst residual  of the right answers, by our forward kinematics
-same set        share of targets whose set of branches is ours"""
+solved          share of targets with a correct answer
+branches        correct, distinct answers per target
+wrong           answers per target with an error above 1e-6
+worst residual  of the correct answers, by our forward kinematics
+same set        share of targets with the same set of branches as ours"""
 _HEAD = ["", "time", "noise", "× thin", "× rich", "solved", "branches", "wrong", "worst residual", "same set"]
 _UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
 
@@ -35,7 +35,7 @@ def table(report: Report) -> str:
 
 
 def notes(report: Report) -> list[str]:
-    """What to know beside the table."""
+    """Lines below the tables: versions, machine, settings, peers that did not take part."""
     lines = [", ".join(f"{name} {version}" for name, version in report.versions.items())]
     lines.append(
         ", ".join(f"{name} {value}" for name, value in machine().items() if name not in ("time", "kinboard"))
@@ -45,15 +45,15 @@ def notes(report: Report) -> list[str]:
         f"{report.rounds} rounds, {sizes}, {_clock(report)}" + (", interrupted" if report.interrupted else "")
     )
     if report.missing:
-        lines.append(f"not installed: {', '.join(report.missing)}; pip install 'kinboard[bench]' brings them")
+        lines.append(f"not installed: {', '.join(report.missing)}; pip install 'kinboard[bench]' installs them")
     if report.skipped:
-        lines.append(f"left out, for want of the arm or of its closed form: {', '.join(report.skipped)}")
+        lines.append(f"skipped, because the arm or its closed form is missing: {', '.join(report.skipped)}")
     lines += [f"{row}: {peer} could not take part: {said}" for row, peer, said in report.refused]
     return lines
 
 
 def as_json(report: Report, verdicts: Sequence[Verdict]) -> dict[str, Any]:
-    """Everything, in seconds, metres and radians; every round's time is there."""
+    """All measurements in seconds, metres and radians, with the times of every round."""
     return {
         "machine": machine(),
         "versions": report.versions,
@@ -119,7 +119,7 @@ def _entry_json(entry: Entry) -> dict[str, Any]:
 
 
 def picture(report: Report) -> str:
-    """Bars on a logarithmic scale, a group per row, as SVG."""
+    """A bar chart on a logarithmic scale, one group per row, as SVG."""
     rows = [(row, _ordered(row)) for row in report.rows]
     times = [entry.turns.median for _, entries in rows for entry in entries]
     if not times:

@@ -1,4 +1,4 @@
-"""The rows of the benchmark: one task each, with targets everybody gets alike."""
+"""The rows of the benchmark: one task each, with the same targets for all contestants."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ class Row:
     Attributes:
         id, title: name on the command line, and for people.
         robot: id of the arm.
-        kind: ``"fk"``; ``"branches"``, all configurations whatever the limits; ``"answer"``, at least one inside
-            the limits, verified; ``"cloud"``, tool points of configurations that the contestant draws itself.
+        kind: ``"fk"``; ``"branches"``, all configurations, ignoring limits; ``"answer"``, at least one inside the
+            limits, verified; ``"cloud"``, tool points of configurations that the contestant samples itself.
         batch: all targets in one call.
-        approach: point and approach direction only; the roll about the tool's axis is free.
-        lock: of a redundant arm, the joint that solvers for six joints keep at `value`.
-        value: what our own free parameter, and the locked joint, is set to, in radians; NaN for no such thing.
+        approach: point and approach direction only; the roll about the tool axis does not matter.
+        lock: for a redundant arm, the joint that solvers for six joints lock at `value`.
+        value: value of the locked joint and of our redundancy parameter in radians; NaN if there is none.
     """
 
     id: str
@@ -41,7 +41,7 @@ class Row:
     value: float = math.nan
 
 
-CLOUD = 16  # batches in a cloud: the call itself must not count, the caches must hold no more than in real life
+CLOUD = 16  # batches in a cloud, so that call overhead is negligible and caches are as full as in real use
 
 ROWS: tuple[Row, ...] = (
     Row("fk", "forward kinematics, one pose", "pioneer5", "fk"),
@@ -79,9 +79,9 @@ class Task:
 
     Attributes:
         q: ``(N, n)`` the configurations the targets were made from, inside the limits.
-        T: ``(N, 4, 4)`` their poses, by plain matrix products and not by our kernels.
+        T: ``(N, 4, 4)`` their poses, by plain matrix products, independent of our kernels.
         arm: the whole arm.
-        six: the arm with six joints, for solvers that know no other; None if there is no such thing.
+        six: the arm with six joints, for solvers that need six; None if there is none.
     """
 
     row: Row

@@ -26,15 +26,15 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How much of it, and how carefully.
+    """What is measured, and how precisely.
 
     Attributes:
-        rows, peers: which; all by default. Ourselves and the floor are always in.
-        targets, batch: targets of a row, and of a row with a batch.
-        rounds: turns each contestant takes.
+        rows, peers: all by default. Kinboard and the floor always take part.
+        targets, batch: number of targets in a row, and in a row that takes a batch.
+        rounds: turns of each contestant.
         turn: seconds of a turn.
         seed: of the random targets.
-        clock: nanoseconds; the wall's, so that a library on several threads hides nothing.
+        clock: nanoseconds; wall time by default, which is fair to libraries with several threads.
     """
 
     rows: tuple[Row, ...] = ROWS
@@ -47,7 +47,7 @@ class Settings:
     clock: Clock = time.perf_counter_ns
 
     def quick(self) -> Settings:
-        """The same in seconds instead of minutes."""
+        """Settings for a run of seconds instead of minutes."""
         return replace(self, targets=16, batch=512, rounds=7, turn=0.004)
 
 
@@ -55,7 +55,7 @@ class Settings:
 class Entry:
     """One contestant of a row: its check (None for a floor), its times, and their ratios to ours.
 
-    That is to our thin and to our rich call; None where the row has no such call.
+    The ratios are to our array-level call and to `kin.solve_ik`; None where the row has no such call.
     """
 
     contestant: Contestant
@@ -78,22 +78,22 @@ class RowReport:
 
     @property
     def floor(self) -> Entry:
-        """What the row's times are measured against by the gate."""
+        """The floor that the gate compares the row's times with."""
         return next(entry for entry in self.entries if entry.contestant.name.startswith("floor"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Report:
-    """What a run found.
+    """Result of a run.
 
     Attributes:
-        rows: those that were measured.
+        rows: the measured rows.
         skipped: ids of rows whose arm is not built in or lacks the closed form they need.
-        versions: of us and of the peers that took part.
+        versions: of Kinboard and of the peers that took part.
         missing: peers that are not installed.
-        refused: (row, peer, what it said) of peers that raised where they should have answered.
-        rounds: rounds that all contestants took part in.
-        interrupted: whether somebody ended the run early.
+        refused: (row, peer, message) of peers that raised instead of answering.
+        rounds: completed rounds.
+        interrupted: whether the run was ended early.
     """
 
     settings: Settings
@@ -107,10 +107,7 @@ class Report:
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """What is wrong with our own answers; nothing, if all is well.
-
-        A numeric search may find nothing; a closed form may not.
-        """
+        """Errors in our own answers. A numeric search may miss a solution; a closed form may not."""
         found = []
         for row in self.rows:
             closed = bool(kin.branch_names(row.task.robot))
@@ -124,7 +121,7 @@ class Report:
 
 
 def run(settings: Settings, say: Say = lambda _: None) -> Report:
-    """Measure; `say` is told what is going on. Ctrl-C during the rounds ends them; what there is is reported."""
+    """Measure, with status messages to `say`. Ctrl-C ends the rounds; what was measured by then is returned."""
     installed = [peer for peer in settings.peers if peer.installed]
     refused: list[tuple[str, str, str]] = []
     prepared: list[tuple[Task, list[tuple[Contestant, Check | None]]]] = []
@@ -168,7 +165,7 @@ def run(settings: Settings, say: Say = lambda _: None) -> Report:
 def _checked(
     task: Task, peers: Sequence[Peer], refused: list[tuple[str, str, str]]
 ) -> list[tuple[Contestant, Check | None]]:
-    """The contestants of a row, each with what the judge says of its answers to all targets."""
+    """The contestants of a row, each with the check of its answers to all targets."""
     found: list[tuple[Contestant, Check | None]] = []
     ours: list[Array] | None = None
     for peer in (KINBOARD, *peers, FLOOR):
@@ -191,7 +188,7 @@ def _checked(
                             check = replace(check, same=share_of_same(ours, sets))
                         found.append((contestant, check))
         except Exception as error:
-            # Whatever is wrong with another library is told, and ends only its own entry.
+            # An error of another library is reported and affects only its own entry.
             if own:
                 raise
             refused.append((task.row.id, peer.name, f"{type(error).__name__}: {error}"))
@@ -199,7 +196,7 @@ def _checked(
 
 
 def _comparable(task: Task) -> bool:
-    """Whether all contestants ask for the same set: nothing is free, or a joint that can be locked."""
+    """Whether all contestants return the same set: no redundancy, or one that a locked joint removes."""
     if task.row.kind != "branches" or task.row.lock is None:
         return task.row.kind == "branches"
     match = closed_form_of(task.robot)
@@ -224,7 +221,7 @@ def _compared(row: RowReport) -> RowReport:
 
 
 def machine() -> dict[str, str]:
-    """What the figures were measured on."""
+    """The machine and the versions of a run."""
     name = platform.processor() or platform.machine()
     cpuinfo = Path("/proc/cpuinfo")
     if cpuinfo.exists():

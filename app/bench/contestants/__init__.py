@@ -1,0 +1,27 @@
+"""One way of one library to do a task. A library that is not installed is left out; that is no error.
+
+The call that a user of the library would write is timed, on one thread, with inputs already in the library's own
+form; `Contestant.read` turns its answer into our joints afterwards, untimed. If a library returns an object from
+which the configurations have to be fetched, fetching them is timed as well.
+
+To add a library, write a function from `Task` to its contestants (none for tasks it cannot do) and add a row to
+`PEERS`.
+"""
+
+from app.bench.contestants import closed_forms, iterative, ours
+from app.bench.contestants.contestant import OURS, RICH, Contestant, Peer, quiet
+
+__all__ = ["FLOOR", "KINBOARD", "OURS", "PEERS", "RICH", "Contestant", "Peer", "quiet"]
+
+KINBOARD = Peer("kinboard", "kin", ours.ours)
+FLOOR = Peer("floor", "kin", ours.floor)
+PEERS: tuple[Peer, ...] = (
+    Peer("numpy", "numpy", ours.plain_numpy),
+    Peer("pin", "pinocchio", iterative.pinocchio),
+    Peer("eaik", "eaik", closed_forms.eaik),
+    Peer("ssik", "ssik", closed_forms.ssik),
+    Peer("ik-geo", "ik_geo", closed_forms.ik_geo),
+    Peer("py-opw-kinematics", "py_opw_kinematics", closed_forms.opw),
+    Peer("roboticstoolbox-python", "roboticstoolbox", iterative.toolbox),
+    Peer("ikpy", "ikpy", iterative.ikpy),
+)

@@ -1,0 +1,108 @@
+"""Kinboard itself, the floors that nothing can beat, and plain numpy."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+import kin
+from app.bench import floors
+from app.bench.contestants.contestant import FLOORS, OURS, RICH, Contestant, no_answers, one_answer
+from app.bench.rows import Task
+from kin.transforms import Array
+from kin.workspace.region import Region
+from kin.workspace.sampling.kernels import Points, sample_configurations, sample_points
+from kin.workspace.sampling.streams import joint_streams
+
+
+def floor(task: Task) -> list[Contestant]:
+    if task.row.batch:
+        q = task.q
+        found = [Contestant(FLOORS[1], floors.sines_and_cosines, [(q,)], no_answers, len(q), floor=True)]
+        if task.row.kind == "cloud":
+            out = np.empty((len(q), 3), dtype=np.float32)
+            found.append(Contestant(FLOORS[2], floors.written, [(out,)], no_answers, len(q), floor=True))
+        return found
+    inputs = [(task.robot.model.copy(), q) for q in task.q]
+    return [Contestant(FLOORS[0], floors.empty_call, inputs, no_answers, floor=True)]
+
+
+def ours(task: Task) -> list[Contestant]:
+    robot, row = task.robot, task.row
+    if row.kind == "cloud":
+        return _cloud(task)
+    if row.kind == "fk" and row.batch:
+        return [Contestant(OURS, kin.fk_positions, [(robot, task.q)], list, len(task.q))]
+    if row.kind == "fk":
+        return [Contestant(OURS, kin.fk, [(robot, q) for q in task.q], one_answer)]
+    if row.kind == "branches" and row.batch:
+        return [Contestant(OURS, kin.ik_branches, [(robot, task.T, row.value)], list, len(task.T))]
+    found = []
+    if row.kind == "branches":
+        found.append(Contestant(OURS, kin.ik_branches, [(robot, T, row.value) for T in task.T], one_answer))
+    kind: kin.Task = "approach" if row.approach else "pose"
+    anywhere = row.kind == "branches"
+    free = None if math.isnan(row.value) else row.value
+
+    def solve(T: Array) -> kin.IKResult:
+        return kin.solve_ik(robot, T, task=kind, respect_limits=not anywhere, redundancy=free)
+
+    found.append(Contestant(RICH, solve, [(T,) for T in task.T], _solutions))
+    return found
+
+
+def _cloud(task: Task) -> list[Contestant]:
+    """The kernel alone, the generator as users call it, and each step of the computation alone.
+
+    The kernel does the first three steps in one pass and saves the difference to their sum.
+    """
+    robot, count = task.robot, len(task.q)
+    region = Region.of(robot, None, None)
+    streams = joint_streams(0, region.movable, quasi=False)
+    out, q = np.empty((count, 3), dtype=np.float32), np.empty_like(task.q)
+
+    def kernel() -> Points:
+        sample_points(region.arm, streams, 0, out)
+        return out
+
+    def generator() -> list[kin.WorkspaceChunk]:
+        return list(kin.sample_workspace(robot, count))
+
+    def numbers() -> None:
+        sample_configurations(region.arm, streams, 0, q)
+
+    exact = kin.fk_positions(robot, task.q)
+
+    def part(name: str, call: Callable[[], Any]) -> Contestant:
+        return Contestant(f"{OURS}, {name} only", call, [()], no_answers, count, floor=True)
+
+    return [
+        Contestant(OURS, kernel, [()], list, count),
+        Contestant("kinboard, generator", generator, [()], _chunks, count),
+        part("numbers", numbers),
+        part("kinematics", lambda: kin.fk_positions(robot, task.q)),
+        part("conversion", lambda: exact.astype(np.float32)),
+        part("encoding", out.tobytes),
+    ]
+
+
+def _chunks(chunks: list[kin.WorkspaceChunk]) -> list[Array]:
+    return [point for chunk in chunks for point in chunk.points]
+
+
+def _solutions(result: kin.IKResult) -> list[Array]:
+    return [np.array([s.q for s in result.solutions])]
+
+
+def plain_numpy(task: Task) -> list[Contestant]:
+    """Plain matrix products. For a cloud, sampling the joint values is not timed."""
+    if task.row.kind == "cloud":
+        return [Contestant("numpy", lambda q: task.arm.fk(q)[:, :3, 3], [(task.q,)], list, len(task.q))]
+    if task.row.kind != "fk":
+        return []
+    if task.row.batch:
+        return [Contestant("numpy", task.arm.fk, [(task.q,)], list, len(task.q))]
+    return [Contestant("numpy", task.arm.fk, [(q,) for q in task.q], one_answer)]
