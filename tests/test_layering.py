@@ -56,7 +56,7 @@ RULES: dict[str, set[str]] = {
         *("app.api", "app.service", "app.shared", "app.viewer"),
     },
     "app/service/web": {
-        *("starlette", "websockets", "msgspec", "kin"),
+        *("starlette", "websockets", "msgspec", "itsdangerous", "kin"),
         *("app.api.problems", "app.service.web", "app.shared"),
     },
     "app/cli": {"kin", "numpy", "pydantic", "typing_extensions", "app.cli", "app.exports", "app.shared"},

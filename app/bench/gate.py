@@ -1,8 +1,8 @@
 """The regression gate: our times as multiples of a floor that was measured in the same run.
 
-A floor depends on the machine as our times do, so a multiple of it means the same on a laptop and in CI. Both times
-are those of the fastest round, because noise only slows down. The allowed multiples are two to three times the
-measured ones: they catch a lost compiled path or an allocation in a loop, not a few per cent.
+A floor depends on the machine as our times do, so a multiple of it means the same on a laptop and in CI. Both
+times are those of the fastest round, because noise only slows down. The allowed multiples are two to three times
+the measured ones: they catch a lost compiled path or an allocation in a loop, not a few per cent.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from app.bench.contestants import OURS, RICH, Contestant
+from app.bench.contestants import OURS, SOLVE_IK, Contestant
 from app.bench.rows import ROWS
 from app.bench.run import Report, Settings
 
@@ -50,13 +50,13 @@ GATES: tuple[Gate, ...] = (
     Gate("fk-batch", OURS, 1.5),
     Gate("workspace", OURS, 0.5),
     Gate("ik-pioneer5", OURS, 15.0),
-    Gate("ik-pioneer5", RICH, 700.0),
+    Gate("ik-pioneer5", SOLVE_IK, 700.0),
     Gate("ik-pioneer5-batch", OURS, 4.0),
     Gate("ik-srs", OURS, 15.0),
     Gate("ik-srs-batch", OURS, 2.5),
     Gate("ik-puma560-batch", OURS, 3.0),
     Gate("ik-ur5-batch", OURS, 3.0),
-    Gate("solve-redundant7-craig", RICH, 1200.0),
+    Gate("solve-redundant7-craig", SOLVE_IK, 1200.0),
 )
 
 

@@ -1,9 +1,9 @@
 """Timing in turns: in each round every contestant runs for a short while, so that noise affects all equally.
 
 A turn is a loop of calls that takes some milliseconds, with the garbage collector off. Times are wall times (or
-processor times, on a busy machine) per target; they include some tens of nanoseconds of the loop itself. Ratios are
-taken within each round, between turns a moment apart, and their median is reported: a machine that slows down
-during the run changes both times and leaves the ratio.
+processor times, on a busy machine) per target; they include some tens of nanoseconds of the loop itself. Ratios
+are taken within each round, between turns a moment apart, and their median is reported: a machine that slows
+down during the run changes both times and leaves the ratio.
 """
 
 from __future__ import annotations

@@ -8,20 +8,21 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
-from app.bench.contestants import OURS, RICH
+from app.bench.contestants import OURS, SOLVE_IK
 from app.bench.gate import Verdict
 from app.bench.run import Entry, Report, RowReport, machine
 
 LEGEND = """\
 time            median per pose or target
 noise           interquartile range, relative to the time
-× thin, × rich  times as long as our thin and our rich call: median of the ratios within each round
+× array         time relative to our array-level call: median of the ratios within each round
+× solve         the same relative to kin.solve_ik
 solved          share of targets with a correct answer
 branches        correct, distinct answers per target
 wrong           answers per target with an error above 1e-6
 worst residual  of the correct answers, by our forward kinematics
 same set        share of targets with the same set of branches as ours"""
-_HEAD = ["", "time", "noise", "× thin", "× rich", "solved", "branches", "wrong", "worst residual", "same set"]
+_HEAD = ["", "time", "noise", "× array", "× solve", "solved", "branches", "wrong", "worst residual", "same set"]
 _UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
 
 
@@ -100,8 +101,8 @@ def _entry_json(entry: Entry) -> dict[str, Any]:
         "median": entry.turns.median,
         "best": entry.turns.best,
         "noise": entry.turns.noise,
-        "to_thin": entry.to_thin,
-        "to_rich": entry.to_rich,
+        "to_array": entry.to_array,
+        "to_solve": entry.to_solve,
         "calls_per_turn": entry.turns.calls,
         "targets_per_call": entry.contestant.per_call,
         "seconds": entry.turns.seconds,
@@ -165,7 +166,7 @@ def picture(report: Report) -> str:
 def _colour(entry: Entry) -> str:
     if entry.contestant.floor:
         return "#b9c2cc"
-    return {OURS: "#1d6fd1", RICH: "#6fa8e6"}.get(entry.contestant.name, "#e0913a")
+    return {OURS: "#1d6fd1", SOLVE_IK: "#6fa8e6"}.get(entry.contestant.name, "#e0913a")
 
 
 def _label(entry: Entry) -> str:
@@ -180,7 +181,7 @@ def _label(entry: Entry) -> str:
 
 def _ordered(row: RowReport) -> list[Entry]:
     """Floor, ours, then the peers by time."""
-    rank = {OURS: 1, RICH: 2}
+    rank = {OURS: 1, SOLVE_IK: 2}
     return sorted(
         row.entries,
         key=lambda e: (0 if e.contestant.floor else rank.get(e.contestant.name, 3), e.turns.median),
@@ -193,7 +194,7 @@ def _cells(entry: Entry) -> list[str]:
         entry.contestant.name,
         _time(entry.turns.median),
         f"{entry.turns.noise:.0%}",
-        *("" if value is None else f"{value:.3g}" for value in (entry.to_thin, entry.to_rich)),
+        *("" if value is None else f"{value:.3g}" for value in (entry.to_array, entry.to_solve)),
     ]
     if check is None:
         return cells + [""] * 5

@@ -14,7 +14,7 @@ import numba
 import numpy as np
 
 import kin
-from app.bench.contestants import FLOOR, KINBOARD, OURS, PEERS, RICH, Contestant, Peer, quiet
+from app.bench.contestants import FLOOR, KINBOARD, OURS, PEERS, SOLVE_IK, Contestant, Peer, quiet
 from app.bench.judge import Check, judge_poses, right_sets, share_of_same
 from app.bench.measure import Clock, Turns, measure, ratio
 from app.bench.rows import ROWS, Row, Task, prepare
@@ -61,8 +61,8 @@ class Entry:
     contestant: Contestant
     check: Check | None
     turns: Turns
-    to_thin: float | None = None
-    to_rich: float | None = None
+    to_array: float | None = None
+    to_solve: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,7 +113,7 @@ class Report:
             closed = bool(kin.branch_names(row.task.robot))
             for entry in row.entries:
                 check = entry.check
-                if check is None or entry.contestant.name not in (OURS, RICH):
+                if check is None or entry.contestant.name not in (OURS, SOLVE_IK):
                     continue
                 if check.wrong or (closed and check.success < 1.0):
                     found.append(f"{row.task.row.id}: {entry.contestant.name} misses targets or answers wrongly")
@@ -206,14 +206,14 @@ def _comparable(task: Task) -> bool:
 
 def _compared(row: RowReport) -> RowReport:
     """The row with its ratios to our two calls."""
-    thin, rich = row.named(OURS), row.named(RICH)
+    array, solve = row.named(OURS), row.named(SOLVE_IK)
     return RowReport(
         row.task,
         tuple(
             replace(
                 entry,
-                to_thin=None if thin is None else ratio(entry.turns, thin.turns),
-                to_rich=None if rich is None else ratio(entry.turns, rich.turns),
+                to_array=None if array is None else ratio(entry.turns, array.turns),
+                to_solve=None if solve is None else ratio(entry.turns, solve.turns),
             )
             for entry in row.entries
         ),

@@ -1,8 +1,8 @@
-"""Everything slow about starting, done beside the running server: the viewer, and the compiled kernels.
+"""The slow part of the start, in threads next to the running server: the viewer and the compiled kernels.
 
-The page answers at once and says "warming up" until ``/readyz`` does not. Kernels come from numba's cache in
-milliseconds, or are compiled on first use, which takes seconds; no visitor should be the one who waits. What few
-ask for in the first minute, such as a cloud of the workspace, is compiled when the service is ready already.
+The landing page is served at once and shows "warming up" until ``/readyz`` reports ready. Kernels are loaded from
+numba's cache in milliseconds, or are compiled, which takes seconds and should delay no visitor. Kernels that are
+rarely needed in the first minute, such as those of workspace clouds, are compiled after the service is ready.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ Status = Literal["warming", "ready", "failed"]
 
 
 class Startup:
-    """Starts the viewer and warms the kernels in a thread of its own; `status` is what ``/readyz`` reports.
+    """Starts the viewer and compiles the kernels in a thread; ``/readyz`` reports `status`.
 
     Args:
-        on_ready: called by that thread when all is warm, just before ``/readyz`` says so.
+        on_ready: called by that thread when everything is ready, just before `status` says so.
     """
 
     def __init__(
@@ -57,16 +57,16 @@ class Startup:
         self._viewer: ViewerServer | None = None
         self._stopping = threading.Event()
         self._viewer_settled = threading.Event()
-        # A daemon: Ctrl-C in the middle of a long compilation must not wait for its end.
+        # A daemon, so that Ctrl-C need not wait for the end of a compilation.
         self._thread = threading.Thread(target=self._run, name="kinboard-startup", daemon=True)
         self._rest = threading.Thread(target=self._warm_up_rest, name="kinboard-warm-up", daemon=True)
 
     def start(self) -> None:
-        """Begin; returns at once."""
+        """Start; returns at once."""
         self._thread.start()
 
     def stop(self) -> None:
-        """End the viewer and what warms up. A compilation under way is left to end with the process."""
+        """Stop the viewer and the compilation of kernels. A kernel being compiled ends with the process."""
         self._stopping.set()
         self._viewer_settled.wait(timeout=5.0)
         self._bridge.port = None
@@ -85,7 +85,7 @@ class Startup:
                 self.status = "ready"
                 self._rest.start()
         except Exception:
-            # REST goes on; /readyz tells whoever watches the service.
+            # REST goes on working; /readyz reports the failure.
             logger.exception("the viewer could not be started, or a kernel could not be compiled")
             self.status = "failed"
 
@@ -94,12 +94,12 @@ class Startup:
         try:
             warm_up_rest(self._stopping.is_set)
         except Exception:
-            # What this kernel is for fails when it is asked for; everything else works.
+            # Requests that need this kernel fail; everything else works.
             logger.exception("a kernel could not be compiled ahead of its use")
 
     def _start_viewer(self) -> None:
         try:
-            # viser takes half a second to import: the landing page and REST need not wait for it.
+            # Importing viser takes half a second, for which the landing page and REST need not wait.
             from app.viewer.server import ViewerServer
 
             viewer = ViewerServer(self._store, self._settings, self._clouds, self._maps, self._summaries)

@@ -1,12 +1,12 @@
-"""Several processes behind one port, and the one that looks after them.
+"""Several worker processes behind one port, and their supervisor.
 
-Each process is a whole service: REST, a viewer, and the visitors whose websockets it holds. Nothing is shared, so
-any of them can answer anything, and a visitor stays with the process that took the connection. Each has a
-listening socket of its own on the same port, and the kernel deals new connections out evenly (``SO_REUSEPORT``);
-with one socket for all, whoever wakes up first in a rush of connections would take them all.
+Each process is a complete service: REST, a viewer, and the visitors connected to it. Processes share nothing, so
+any of them can answer any request, and a visitor stays with the process that accepted the connection. Each has its
+own listening socket on the same port, and the kernel distributes new connections evenly (``SO_REUSEPORT``); with
+one shared socket, the first process to wake up could take all connections of a burst.
 
-A process that is killed is started again; one that gives up would give up again, and ends the service. The socket
-of a dead process is kept open here: whoever comes waits a moment instead of being refused.
+A process that is killed is restarted; one that exits with an error would do so again, and ends the service. The
+supervisor keeps the sockets open, so that connections to a dead process wait instead of being refused.
 """
 
 from __future__ import annotations
@@ -23,24 +23,24 @@ from multiprocessing.context import SpawnProcess
 
 logger = logging.getLogger("kinboard.workers")
 
-Work = Callable[[socket.socket, int], int]
+Serve = Callable[[socket.socket, int], int]
 
 
-def supervise(work: Work, sockets: list[socket.socket], grace: float) -> int:
-    """Run `work` in one process per socket until SIGTERM or Ctrl-C; the exit code.
+def supervise(serve: Serve, sockets: list[socket.socket], grace: float) -> int:
+    """Run `serve` in one process per socket until SIGTERM or Ctrl-C; returns the exit code.
 
     Args:
-        work: serves on its socket, as number so many, until SIGTERM and returns 0, or another code if it cannot;
-            picklable.
+        serve: called with a socket and the number of the process; serves until SIGTERM and returns 0, or another
+            code on failure. Picklable.
         grace: seconds from SIGTERM until a process that has not ended is killed.
     """
     stopping = threading.Event()
     before = {
         number: signal.signal(number, lambda *_: stopping.set()) for number in (signal.SIGTERM, signal.SIGINT)
     }
-    running = [_start(work, each, k) for k, each in enumerate(sockets)]
+    running = [_start(serve, each, k) for k, each in enumerate(sockets)]
     try:
-        code = _watch(work, sockets, running, stopping)
+        code = _watch(serve, sockets, running, stopping)
     finally:
         _end(running, grace)
         for number, handler in before.items():
@@ -48,20 +48,20 @@ def supervise(work: Work, sockets: list[socket.socket], grace: float) -> int:
     return code
 
 
-def _start(work: Work, listener: socket.socket, number: int) -> SpawnProcess:
+def _start(serve: Serve, listener: socket.socket, number: int) -> SpawnProcess:
     process = multiprocessing.get_context("spawn").Process(
-        target=_run, args=(work, listener, number), name="kinboard-worker"
+        target=_run, args=(serve, listener, number), name="kinboard-worker"
     )
     process.start()
     return process
 
 
-def _run(work: Work, listener: socket.socket, number: int) -> None:
-    raise SystemExit(work(listener, number))
+def _run(serve: Serve, listener: socket.socket, number: int) -> None:
+    raise SystemExit(serve(listener, number))
 
 
 def _watch(
-    work: Work, sockets: list[socket.socket], running: list[SpawnProcess], stopping: threading.Event
+    serve: Serve, sockets: list[socket.socket], running: list[SpawnProcess], stopping: threading.Event
 ) -> int:
     while not stopping.is_set():
         wait([process.sentinel for process in running], timeout=0.2)
@@ -70,8 +70,8 @@ def _watch(
                 continue
             if (process.exitcode or 0) > 0:
                 return 1
-            logger.error("worker %s ended with code %s and is started again", process.pid, process.exitcode)
-            running[k] = _start(work, sockets[k], k)
+            logger.error("worker %s ended with code %s and is restarted", process.pid, process.exitcode)
+            running[k] = _start(serve, sockets[k], k)
     return 0
 
 

@@ -1,12 +1,12 @@
 """The blocks of a capability map, computed by threads of this process or by the workers of a Dask cluster.
 
-Map and reduce in the plainest sense: each block is a pure function of the grid and its number, and
-`kin.capability_join` does not mind in which order blocks come. Hence both ways give the same bits (on one kind of
-processor and with one version of Kinboard), and a block whose worker died is simply computed again by another.
+This is a plain map-reduce: each block is a pure function of the grid and its number, and `kin.capability_join`
+accepts blocks in any order. So both ways give the same bits (on one kind of processor and with one version of
+Kinboard), and a block whose worker died is simply computed again by another.
 
-Blocks are handed out as they are finished; closing the iterator cancels those that have not begun. The grid
-carries the whole arm: a worker needs Kinboard, but not the operator's robot files. Dask sends code as pickles: use
-no cluster and no network that you do not trust.
+Blocks are yielded as they are finished; closing the iterator cancels those that have not begun. The grid contains
+the whole arm: a worker needs Kinboard, but not the operator's robot files. Dask sends code as pickles: use only
+clusters and networks that you trust.
 """
 
 from __future__ import annotations
@@ -21,16 +21,18 @@ from typing import Any
 from kin import CapabilityBlock, CapabilityGrid, InputError, capability_block
 
 _CONNECT = 10.0  # s to find the scheduler
-_WORKER = 60.0  # s for the first worker to show up
-_RETRIES = 3  # of a block that failed; one whose worker died is not counted here
+_WORKER = 60.0  # s to wait for the first worker
+_RETRIES = 3  # of a block that failed; a worker's death does not count
 
 
 def run_local(
     grid: CapabilityGrid, threads: int | None = None, begin: Callable[[], None] | None = None
 ) -> Generator[CapabilityBlock]:
-    """The blocks of a grid as they are finished, by so many threads, or as many as there are processors.
+    """The blocks of a grid as they are finished, computed by threads of this process.
 
-    Each thread calls `begin` first, which may lower its priority.
+    Args:
+        threads: how many; by default one per available processor.
+        begin: called by each thread first, for instance to lower its priority.
     """
     pool = ThreadPoolExecutor(threads or _processors(), thread_name_prefix="capability", initializer=begin)
     try:
@@ -44,8 +46,8 @@ def run_local(
 def run_dask(grid: CapabilityGrid, address: str) -> Iterator[CapabilityBlock]:
     """The blocks of a grid as they are finished by the workers of the Dask scheduler at `address`.
 
-    A worker that dies takes nothing along: what it had not delivered is computed by the others, or by those that
-    join while the run lasts. (Dask gives up on a block that was being computed on four workers that died.)
+    The unfinished blocks of a worker that dies are computed by the others, or by workers that join during the run.
+    (Dask gives up on a block after four workers have died computing it.)
 
     Raises:
         InputError: the extra ``cluster`` is not installed, there is no scheduler, no worker, none that has
@@ -83,7 +85,7 @@ def run_dask(grid: CapabilityGrid, address: str) -> Iterator[CapabilityBlock]:
 
 
 def _processors() -> int:
-    """How many processors this process may use."""
+    """Number of processors that this process may use."""
     try:
         return len(os.sched_getaffinity(0))
     except AttributeError:  # not on Linux

@@ -1,6 +1,6 @@
-"""What the service counts about itself, in Prometheus' form at ``/metrics``.
+"""Metrics of the service in the Prometheus format, served at ``/metrics``.
 
-Several worker processes answer as one where ``PROMETHEUS_MULTIPROC_DIR`` names a folder they share.
+Several worker processes report as one if ``PROMETHEUS_MULTIPROC_DIR`` names a folder that they share.
 """
 
 from __future__ import annotations
@@ -15,20 +15,23 @@ from prometheus_client.registry import REGISTRY
 CONTENT_TYPE: Final = "text/plain; version=0.0.4; charset=utf-8"
 _FAST: Final = (1e-4, 2.5e-4, 5e-4, 1e-3, 2.5e-3, 5e-3, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0)
 
-REQUESTS = Counter("kinboard_requests", "Answers by route and status.", ("method", "route", "status"))
+REQUESTS = Counter("kinboard_requests", "Requests by method, route and status.", ("method", "route", "status"))
 REQUEST_SECONDS = Histogram(
-    "kinboard_request_seconds", "From the request to the last byte of the answer.", ("route",), buckets=_FAST
+    "kinboard_request_seconds",
+    "Time from the request to the last byte of the response.",
+    ("route",),
+    buckets=_FAST,
 )
 SOLVE_SECONDS = Histogram(
-    "kinboard_solve_seconds", "Inverse kinematics of one request or drag.", ("door",), buckets=_FAST
+    "kinboard_solve_seconds", "Time of inverse kinematics for one request or drag.", ("door",), buckets=_FAST
 )
 VISITORS = Gauge("kinboard_visitors", "Open tabs of the viewer.", multiprocess_mode="livesum")
-DROPPED = Counter("kinboard_dropped_messages", "What visitors sent and viser never saw.", ("why",))
-STREAMED = Counter("kinboard_stream_bytes", "Bytes of answers that go on and on.", ("stream",))
+DROPPED = Counter("kinboard_dropped_messages", "Messages of visitors that were not passed on to viser.", ("why",))
+STREAMED = Counter("kinboard_stream_bytes", "Bytes sent in streamed responses.", ("stream",))
 
 
 def exposition() -> bytes:
-    """Everything counted, of all processes together."""
+    """All metrics, of all processes together."""
     if "PROMETHEUS_MULTIPROC_DIR" not in os.environ:
         return generate_latest(REGISTRY)
     registry = CollectorRegistry()

@@ -1,8 +1,9 @@
-"""What a browser may do with our pages, and which pages may talk to the viewer.
+"""Content security policies, and the check of a websocket's origin.
 
-The viewer's client can be told by its address (``?websocket=ws://elsewhere``) to obey a foreign server, which
-may then run scripts in our origin: ``connect-src 'self'`` closes that. Browsers do not apply the same-origin
-rule to websockets, so a page on another site could drive a visitor's viewer: the ``Origin`` header tells.
+The query of the viewer's address can name another server (``?websocket=ws://elsewhere``), which could then run
+scripts in our origin: ``connect-src 'self'`` prevents that. Browsers do not apply the same-origin rule to
+websockets, so a page on another site could control a visitor's viewer: the ``Origin`` header shows where the
+page is from.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ PAGE_POLICY = (
 )
 
 # viser's client is one self-unpacking file: inline scripts and styles, workers and images from blobs, WebAssembly
-# whose glue builds its functions from strings. What it may load and whom it may talk to is ours alone.
+# whose glue code builds functions from strings. It may load from and connect to our origin only.
 VIEWER_POLICY = (
     "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval'; "
     "style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self' data:; "
@@ -31,7 +32,7 @@ VIEWER_POLICY = (
 
 
 class SecurityHeaders:
-    """ASGI middleware: a content policy, unless the page brings its own, and no guessing of content types."""
+    """ASGI middleware: a content security policy unless the page has its own, and no content sniffing."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
@@ -53,10 +54,10 @@ class SecurityHeaders:
 
 
 def origin_allowed(headers: Headers, allowed_origins: Iterable[str]) -> bool:
-    """Whether the page that asks is one of ours.
+    """Whether the page that opens a websocket is one of ours or of an allowed origin.
 
     A request without ``Origin`` is not from a page of another site: browsers always send it with a websocket.
-    ``X-Forwarded-Host`` counts because a proxy may rewrite ``Host``, and a page cannot set either of them.
+    ``X-Forwarded-Host`` counts because a proxy may rewrite ``Host``, and a page can set neither.
     """
     origin = headers.get("origin")
     if origin is None:
@@ -70,5 +71,5 @@ def origin_allowed(headers: Headers, allowed_origins: Iterable[str]) -> bool:
 
 
 def _host_and_port(netloc: str) -> str:
-    """Lower case, without a default port: browsers leave it out of ``Origin``, proxies may not of ``Host``."""
+    """Lower case, without a default port, which browsers omit in ``Origin`` but proxies may add to ``Host``."""
     return netloc.lower().removesuffix(":80").removesuffix(":443")

@@ -1,4 +1,4 @@
-"""Settings of the service: command-line flags over ``KINBOARD_…`` environment variables over these defaults."""
+"""Settings of the service: command-line flags override ``KINBOARD_…`` variables, which override the defaults."""
 
 from __future__ import annotations
 
@@ -9,44 +9,56 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 
 
 class Settings(BaseSettings):
-    """Everything an operator can set. Each field is also an environment variable, e.g. ``KINBOARD_PORT``."""
+    """Settings for operators. Each field is also an environment variable, e.g. ``KINBOARD_PORT``."""
 
     model_config = SettingsConfigDict(env_prefix="KINBOARD_", frozen=True)
 
     host: str = Field("127.0.0.1", description="Address to listen on.")
-    port: int = Field(8000, ge=0, le=65535, description="Port to listen on; 0 takes any free one.")
-    root_path: str = Field("", description="Path prefix a reverse proxy serves us under, e.g. /kinboard.")
+    port: int = Field(8000, ge=0, le=65535, description="Port to listen on; 0 takes any free port.")
+    root_path: str = Field("", description="Path prefix that a reverse proxy adds, e.g. /kinboard.")
     robots: Path | None = Field(None, description="Folder with further robot files (*.toml).")
-    max_batch: int = Field(10_000, ge=1, description="Most configurations or targets one request may hold.")
-    max_path: int = Field(1000, ge=1, description="Most waypoints one path may have.")
-    max_points: int = Field(100_000_000, ge=1, description="Most points one cloud of the workspace may have.")
-    max_streams: int = Field(8, ge=1, description="Most clouds and maps one process sends at a time.")
-    max_voxels: int = Field(40, ge=1, le=256, description="Most voxels along one side of a capability map.")
-    max_body: int = Field(8 * 1024 * 1024, ge=1024, description="Largest request body in bytes.")
+    max_batch: int = Field(10_000, ge=1, description="Maximum number of configurations or targets in a request.")
+    max_path: int = Field(1000, ge=1, description="Maximum number of waypoints in a path.")
+    max_points: int = Field(100_000_000, ge=1, description="Maximum number of points in a workspace cloud.")
+    max_streams: int = Field(
+        8, ge=1, description="Maximum number of clouds and capability maps that a process sends at a time."
+    )
+    max_voxels: int = Field(
+        40, ge=1, le=256, description="Maximum number of voxels along one side of a capability map."
+    )
+    max_body: int = Field(8 * 1024 * 1024, ge=1024, description="Maximum size of a request body in bytes.")
     max_requests: int = Field(
-        16, ge=1, le=32, description="Most requests one process computes at a time; others wait for their turn."
+        16, ge=1, le=32, description="Maximum number of requests that a process computes at a time; others wait."
     )
     time_budget: float = Field(
-        30.0, ge=0.1, le=3600, description="Seconds one request may compute, and seconds it may wait for its turn."
+        30.0,
+        ge=0.1,
+        le=3600,
+        description="Seconds that a request may compute, and seconds that it may wait before.",
     )
-    token: SecretStr | None = Field(
-        None, min_length=8, description="Whoever wants in must know it; none: everybody may."
-    )
-    read_only: bool = Field(False, description="Whoever has no token may look, not touch.")
+    token: SecretStr | None = Field(None, min_length=8, description="Access token. Unset: no authentication.")
+    read_only: bool = Field(False, description="Visitors without the access token may look but not move anything.")
     rate_limit: float = Field(
-        0.0, ge=0, allow_inf_nan=False, description="Requests per second of one client; 0: no limit."
+        0.0,
+        ge=0,
+        allow_inf_nan=False,
+        description="Maximum rate of requests per second of one client; 0: no limit.",
     )
-    cors_origins: tuple[str, ...] = Field((), description="Origins whose pages may read REST's answers.")
-    workers: int = Field(1, ge=1, le=64, description="Processes that serve side by side; REST and viewers alike.")
-    pin: bool = Field(False, description="Keep the interpreter of each process on one processor: quicker drags.")
+    cors_origins: tuple[str, ...] = Field((), description="Origins whose pages may read REST answers.")
+    workers: int = Field(
+        1, ge=1, le=64, description="Number of server processes; each serves REST and the viewer."
+    )
+    pin: bool = Field(
+        False, description="Keep the interpreter of each process on one processor, for faster drags."
+    )
     drain: float = Field(
-        5.0, ge=1, le=300, description="Seconds that answers under way may take when the service is told to stop."
+        5.0, ge=1, le=300, description="Seconds that running requests may take after the service is asked to stop."
     )
-    max_visitors: int = Field(200, ge=1, description="Most tabs of the viewer at a time, for each worker.")
-    access_log: bool = Field(False, description="Write each request to stderr, one JSON object a line.")
+    max_visitors: int = Field(200, ge=1, description="Maximum number of open viewer tabs, for each worker.")
+    access_log: bool = Field(False, description="Log each request to stderr, one JSON object per line.")
     cloud_memory: int = Field(
-        512 * 1024 * 1024, ge=0, description="Bytes of workspace clouds kept for all visitors together."
+        512 * 1024 * 1024, ge=0, description="Maximum size in bytes of the cache of workspace clouds."
     )
     allowed_origins: tuple[str, ...] = Field(
-        (), description="Origins, besides our own, whose pages may open the viewer's websocket."
+        (), description="Further origins whose pages may open the viewer's websocket."
     )

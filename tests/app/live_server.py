@@ -11,7 +11,7 @@ from contextlib import contextmanager
 import uvicorn
 from fastapi import FastAPI
 
-from app.service.main import server_config
+from app.service.server import server_config
 
 
 @contextmanager

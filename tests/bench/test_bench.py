@@ -16,7 +16,7 @@ import pytest
 import kin
 from app.bench import command, judge, report
 from app.bench.arms import arm_of, ortho
-from app.bench.contestants import FLOOR, KINBOARD, OURS, PEERS, RICH, Contestant, Peer
+from app.bench.contestants import FLOOR, KINBOARD, OURS, PEERS, SOLVE_IK, Contestant, Peer
 from app.bench.measure import Turns, measure, ratio
 from app.bench.rows import ROWS, prepare
 from app.bench.run import Settings, run
@@ -196,15 +196,15 @@ def test_a_run_without_peers_measures_us_against_the_floor():
     assert found.rounds == 3
     names = [[entry.contestant.name for entry in row.entries] for row in found.rows]
     assert [OURS in n for n in names] == [True, True, True, True, False]
-    assert [RICH in n for n in names] == [False, False, True, False, True]
+    assert [SOLVE_IK in n for n in names] == [False, False, True, False, True]
     both = found.rows[2]
-    assert both.named(OURS).to_thin == both.named(RICH).to_rich == 1.0
-    assert both.named(RICH).check.same == 1.0
-    assert both.named(RICH).to_thin > 1.0
-    assert both.floor.to_thin < 1.0
+    assert both.named(OURS).to_array == both.named(SOLVE_IK).to_solve == 1.0
+    assert both.named(SOLVE_IK).check.same == 1.0
+    assert both.named(SOLVE_IK).to_array > 1.0
+    assert both.floor.to_array < 1.0
 
 
-def test_an_arm_that_is_not_built_in_is_told():
+def test_an_arm_that_is_not_built_in_is_reported():
     row = replace(ROWS_BY_ID["fk"], id="nowhere", robot="nowhere")
     found = run(replace(BRIEF, rows=(row, ROWS_BY_ID["fk"])))
     assert found.skipped == ("nowhere",)
@@ -223,9 +223,9 @@ def test_a_library_that_is_missing_or_fails_ends_nothing():
     assert found.missing == ("absent",)
     assert found.refused == (("fk", "numpy", "ValueError: no such arm"),)
     assert found.rows[0].named("errs").check.success == 0.0
-    told = "\n".join(report.notes(found))
-    assert "not installed: absent" in told
-    assert "numpy could not take part: ValueError: no such arm" in told
+    lines = "\n".join(report.notes(found))
+    assert "not installed: absent" in lines
+    assert "numpy could not take part: ValueError: no such arm" in lines
     assert found.faults == ()
 
 

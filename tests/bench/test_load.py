@@ -73,7 +73,7 @@ def test_every_point_arrives_by_every_way(service):
     assert [row["way"] for row in rows][1:] == ["REST, bin", "REST, websocket", "viewer"]
 
 
-def test_the_steps_of_a_point_are_told_beside_numpy_and_the_floors():
+def test_the_steps_of_a_point_are_reported_next_to_numpy_and_the_floors():
     rows = {row["alone"]: row for row in cloud.alone(quick=True)}
     shares = [row["% of the steps"] for row in rows.values() if not isnan(row["% of the steps"])]
     assert len(shares) == 4
@@ -102,8 +102,8 @@ def test_visitors_leave_nothing_behind(service):
 @pytest.mark.parametrize(
     ("more", "word"), [((0, 0, 1, 0), "1 threads"), ((0, 0, 0, 2), "2 file handles"), ((0, 1 << 28, 0, 0), "kB")]
 )
-def test_whatever_stays_is_told(more, word):
+def test_leaks_are_reported(more, word):
     before = Usage(1.0, 1 << 28, 10, 20)
     after = Usage(*(a + b for a, b in zip((1.0, 1 << 28, 10, 20), more, strict=True)))
-    (told,) = soak.left_behind(before, after, 100)
-    assert word in told
+    (message,) = soak.left_behind(before, after, 100)
+    assert word in message

@@ -9,9 +9,9 @@ To add a library, write a function from `Task` to its contestants (none for task
 """
 
 from app.bench.contestants import closed_forms, iterative, ours
-from app.bench.contestants.contestant import OURS, RICH, Contestant, Peer, quiet
+from app.bench.contestants.contestant import OURS, SOLVE_IK, Contestant, Peer, quiet
 
-__all__ = ["FLOOR", "KINBOARD", "OURS", "PEERS", "RICH", "Contestant", "Peer", "quiet"]
+__all__ = ["FLOOR", "KINBOARD", "OURS", "PEERS", "SOLVE_IK", "Contestant", "Peer", "quiet"]
 
 KINBOARD = Peer("kinboard", "kin", ours.ours)
 FLOOR = Peer("floor", "kin", ours.floor)

@@ -19,7 +19,7 @@ from app.bench.rows import Task
 from kin.transforms import Array
 
 OURS = "kinboard"
-RICH = "kinboard, rich"
+SOLVE_IK = "kinboard, solve_ik"
 FLOORS = ("floor: empty call", "floor: sine, cosine", "floor: points written")
 TOLERANCE = 1e-13  # of iterative solvers, for half the squared error: about 1e-7 m or rad
 

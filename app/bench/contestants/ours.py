@@ -10,7 +10,7 @@ import numpy as np
 
 import kin
 from app.bench import floors
-from app.bench.contestants.contestant import FLOORS, OURS, RICH, Contestant, no_answers, one_answer
+from app.bench.contestants.contestant import FLOORS, OURS, SOLVE_IK, Contestant, no_answers, one_answer
 from app.bench.rows import Task
 from kin.transforms import Array
 from kin.workspace.region import Region
@@ -50,7 +50,7 @@ def ours(task: Task) -> list[Contestant]:
     def solve(T: Array) -> kin.IKResult:
         return kin.solve_ik(robot, T, task=kind, respect_limits=not anywhere, redundancy=free)
 
-    found.append(Contestant(RICH, solve, [(T,) for T in task.T], _solutions))
+    found.append(Contestant(SOLVE_IK, solve, [(T,) for T in task.T], _solutions))
     return found
 
 

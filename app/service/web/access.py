@@ -1,12 +1,12 @@
-"""Who may do what: a token, a way in for browsers, a read-only mode, a limit per client.
+"""Access control: an access token, a login page for browsers, a read-only mode, a rate limit per client.
 
-Without a token everybody may do everything, which is right on one's own machine. With one, programs send it with
-each request (``Authorization: Bearer …``); a browser is shown a page that asks for it once and then carries a
-signed cookie that tells when it ends and nothing else, so that any process of the service can check it. In
-read-only mode whoever has no token may look, not touch: pages, descriptions of robots, and the viewer with an arm
-that can be looked at from all sides but takes no orders.
+Without a token everybody has full access, which is right on one's own machine. With a token, programs send it
+with each request (``Authorization: Bearer …``). A browser is redirected to a login page that asks for it once
+and sets a signed cookie (itsdangerous). The cookie holds only the time of the login, so any worker process can
+check it. In read-only mode visitors without the token may look but not move anything: pages, descriptions of
+robots, and a viewer whose arm takes no commands.
 
-Health checks stay open, and the files of the login page.
+Health checks and the files of the login page are always open.
 """
 
 from __future__ import annotations
@@ -14,84 +14,51 @@ from __future__ import annotations
 import hashlib
 import hmac
 import html
-import ipaddress
 import re
-import time
-from collections import OrderedDict
-from collections.abc import Callable
 from http.cookies import CookieError, SimpleCookie
 from pathlib import Path
 from urllib.parse import parse_qs, quote
 
+from itsdangerous import BadSignature, TimestampSigner
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
 from app.api.problems import ProblemError, respond
+from app.service.web.rate_limit import TokenBucket, client_of
 
 COOKIE = "kinboard"
-LASTS = 30 * 24 * 3600  # seconds
-LOOK_ONLY = "kinboard.look_only"  # set in the scope of a visitor who may not touch
+COOKIE_AGE = 30 * 24 * 3600  # seconds until a login ends
+LOOK_ONLY = "kinboard.look_only"  # set in the scope of a visitor who may not move anything
 OPEN = ("/livez", "/readyz", "/login", "/favicon.ico")
 HEALTH = OPEN[:2]
-READING = ("GET", "HEAD", "OPTIONS")
-TRIES, TRY_EVERY = 5, 10.0  # wrong tokens a client may send at once, and then one in so many seconds
+SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
+TRIES, TRY_EVERY = 5, 10.0  # wrong tokens allowed at once per client, then one in this many seconds
 MAX_FORM = 4096  # bytes
-# What comes after the login: a place of ours, told from the service's root.
+# Where to go after the login: a path of this service, relative to its root.
 _PLACE = re.compile(r"(?!/)(?:[\w.~?=&%+-]|/(?!/))*", re.ASCII)
 
 
-class Bucket:
-    """A budget per client that fills up again: `rate` a second, `burst` at most. Memory is bounded.
-
-    Args:
-        clock: seconds that only grow.
-    """
-
-    MOST = 20_000  # clients remembered; the one heard of longest ago is forgotten first
-
-    def __init__(self, rate: float, burst: float, clock: Callable[[], float] = time.monotonic) -> None:
-        self._rate = rate
-        self._burst = burst
-        self._clock = clock
-        self._left: OrderedDict[str, tuple[float, float]] = OrderedDict()
-
-    def wait(self, client: str) -> float:
-        """Seconds until this client may have one; 0 if now."""
-        left, _ = self._now(client)
-        return max(0.0, (1.0 - left) / self._rate)
-
-    def take(self, client: str) -> None:
-        """Use one up."""
-        left, now = self._now(client)
-        self._left[client] = (left - 1.0, now)
-        self._left.move_to_end(client)
-        if len(self._left) > self.MOST:
-            self._left.popitem(last=False)
-
-    def _now(self, client: str) -> tuple[float, float]:
-        now = self._clock()
-        left, since = self._left.get(client, (self._burst, now))
-        return min(self._burst, left + self._rate * (now - since)), now
-
-
 class Access:
-    """ASGI middleware that lets in, sends to the login page, or refuses.
+    """ASGI middleware that admits a request, redirects it to the login page, or rejects it.
 
     Args:
-        token: what opens everything; None: nothing is asked for.
-        read_only: whoever has no token may look.
-        rate: requests per second of one client, with ten seconds' worth at once; 0: no limit.
-        login_page: HTML with ``{{message}}`` and ``{{next}}`` in it.
+        token: the access token; None: no authentication.
+        read_only: whether requests without the token are read-only.
+        rate: requests per second of one client, in bursts of up to ten seconds' worth; 0: no limit.
+        login_page: HTML with the placeholders ``{{message}}`` and ``{{next}}``.
     """
 
     def __init__(self, app: ASGIApp, token: str | None, read_only: bool, rate: float, login_page: Path) -> None:
         self.app = app
         self._token = token
+        self._signer = None
+        if token is not None:
+            self._signer = TimestampSigner(token, salt="kinboard.login", digest_method=hashlib.sha256)
         self._read_only = read_only
-        self._requests = Bucket(rate, 10.0 * rate) if rate else None
-        self._wrong = Bucket(1.0 / TRY_EVERY, TRIES)
+        self._requests = TokenBucket(rate, 10.0 * rate) if rate else None
+        self._wrong_tokens = TokenBucket(1.0 / TRY_EVERY, TRIES)
         self._login_page = login_page.read_text(encoding="utf-8")
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -106,8 +73,8 @@ class Access:
                 self._count(scope)
             if path == "/login" and request is not None:
                 answer = await self._login(request)
-            elif not (path in OPEN or path.startswith("/static/") or self._known(scope)):
-                self._admit(scope, path)
+            elif not (path in OPEN or path.startswith("/static/") or self._authenticated(scope)):
+                self._admit_anonymous(scope, path)
         except ProblemError as error:
             answer = respond(error)
         except _LoginNeededError:
@@ -117,14 +84,14 @@ class Access:
         if answer is None:
             await self.app(scope, receive, send)
         elif request is None:
-            # Before the handshake: the visitor's browser is told 403.
+            # Before the handshake, so the browser receives a 403.
             await WebSocket(scope, receive, send).close(1008)
         else:
             answer.headers["cache-control"] = "no-store"
             await answer(scope, receive, send)
 
     def _count(self, scope: Scope) -> None:
-        """Raises 429 for a client that asks for too much."""
+        """Count a request; raises 429 above the rate limit."""
         if self._requests is None:
             return
         client = client_of(scope)
@@ -133,8 +100,8 @@ class Access:
             raise too_many("Too many requests from your address.", wait)
         self._requests.take(client)
 
-    def _known(self, scope: Scope) -> bool:
-        """Whether the token came along, or the cookie for it; raises 429 for who is guessing."""
+    def _authenticated(self, scope: Scope) -> bool:
+        """Whether the request has the token or a valid cookie. Raises 401 for a wrong token, 429 after several."""
         if self._token is None:
             return not self._read_only
         headers = dict(scope["headers"])
@@ -142,39 +109,41 @@ class Access:
         if kind.lower() == "bearer":
             self._check(scope, given.strip())
             return True
-        return self._signed(headers.get(b"cookie", b"").decode("latin-1"))
+        return self._has_valid_cookie(headers.get(b"cookie", b"").decode("latin-1"))
 
-    def _admit(self, scope: Scope, path: str) -> None:
-        """Let somebody unknown look, send them to the login page, or refuse."""
+    def _admit_anonymous(self, scope: Scope, path: str) -> None:
+        """Admit a request without the token as read-only; else raise `_LoginNeededError`, 401 or 403."""
         if self._read_only:
             websocket = scope["type"] == "websocket"
-            looks = path.startswith("/viewer") if websocket else scope["method"] in READING
+            looks = path.startswith("/viewer") if websocket else scope["method"] in SAFE_METHODS
             if looks and not re.search(r"/(workspace|capability)\b", path):
                 scope[LOOK_ONLY] = True
                 return
-            hint = "Send the operator's token: Authorization: Bearer …" if self._token else "It is for everybody."
+            hint = (
+                "Send the operator's token: Authorization: Bearer …" if self._token else "It accepts no changes."
+            )
             raise ProblemError(403, "read-only", "This service is read-only.", hint)
-        if scope["type"] == "http" and scope["method"] in READING and not path.startswith("/api/"):
+        if scope["type"] == "http" and scope["method"] in SAFE_METHODS and not path.startswith("/api/"):
             accepted = dict(scope["headers"]).get(b"accept", b"")
             if b"text/html" in accepted:
                 raise _LoginNeededError
-        raise unauthorized("This service wants a token.")
+        raise unauthorized("This service requires an access token.")
 
     def _check(self, scope: Scope, given: str) -> None:
         """Raises 401 for a wrong token, 429 after too many."""
         client = client_of(scope)
-        wait = self._wrong.wait(client)
+        wait = self._wrong_tokens.wait(client)
         if wait > 0.0:
             raise too_many("Too many wrong tokens from your address.", wait)
         if self._token is None or not hmac.compare_digest(given.encode(), self._token.encode()):
-            self._wrong.take(client)
-            raise unauthorized("That is not the token.")
+            self._wrong_tokens.take(client)
+            raise unauthorized("The access token is wrong.")
 
     async def _login(self, request: Request) -> Response:
-        """The page that asks for the token; with the right one, on to where the visitor wanted to go."""
+        """The login page; after the right token, a redirect to the page the visitor came for."""
         place = request.query_params.get("next", "")
         place = place if _PLACE.fullmatch(place) else ""
-        if self._token is None:
+        if self._signer is None:
             return RedirectResponse("./" + place, 303)
         message = ""
         status = 200
@@ -184,7 +153,7 @@ class Access:
                 self._check(request.scope, form.get("token", ""))
                 answer = RedirectResponse("./" + place, 303)
                 answer.set_cookie(
-                    COOKIE, self._sign(int(time.time()) + LASTS), LASTS,
+                    COOKIE, self._signer.sign(b"visitor").decode(), COOKIE_AGE,
                     path=request.scope.get("root_path", "") + "/", httponly=True, samesite="lax",
                     secure=request.url.scheme == "https",
                 )  # fmt: skip
@@ -193,46 +162,29 @@ class Access:
                 message, status = error.problem.detail, error.status_code
         elif request.method not in ("GET", "HEAD"):
             raise ProblemError(
-                405, "method-not-allowed", f"/login does not take {request.method}.", "It takes GET."
+                405, "method-not-allowed", f"/login does not accept {request.method}.", "Use GET or POST."
             )
         page = self._login_page.replace("{{message}}", html.escape(message))
         return HTMLResponse(page.replace("{{next}}", html.escape(quote(place, safe="/"))), status)
 
-    def _sign(self, ends: int) -> str:
-        assert self._token is not None
-        return f"{ends}.{hmac.new(self._token.encode(), f'kinboard {ends}'.encode(), hashlib.sha256).hexdigest()}"
-
-    def _signed(self, cookies: str) -> bool:
-        """Whether there is a cookie that we signed and that has not ended."""
+    def _has_valid_cookie(self, cookies: str) -> bool:
+        """Whether there is a cookie with our signature that is not too old."""
+        if self._signer is None:
+            return False
         try:
             morsel = SimpleCookie(cookies).get(COOKIE)
-        except CookieError:
+            self._signer.unsign("" if morsel is None else morsel.value, max_age=COOKIE_AGE)
+        except (CookieError, BadSignature):
             return False
-        value = "" if morsel is None else morsel.value
-        ends = value.partition(".")[0]
-        if not re.fullmatch(r"[0-9]{1,12}", ends) or int(ends) < time.time():
-            return False
-        return hmac.compare_digest(value.encode(), self._sign(int(ends)).encode())
+        return True
 
 
 class _LoginNeededError(Exception):
-    """A browser without a token wants a page."""
-
-
-def client_of(scope: Scope) -> str:
-    """Whose budget it is: the address, of IPv6 the network, of which one host has as many as it likes."""
-    host = str((scope.get("client") or ("unknown", 0))[0])
-    try:
-        address = ipaddress.ip_address(host)
-    except ValueError:
-        return host
-    if address.version == 4:
-        return host
-    return str(address.ipv4_mapped or ipaddress.ip_network((address, 64), strict=False))
+    """A browser without the token requests a page."""
 
 
 def too_many(detail: str, wait: float) -> ProblemError:
-    """429, with when to come again."""
+    """429, with the time to wait."""
     seconds = max(1, int(wait + 0.999))
     return ProblemError(
         429, "too-many-requests", detail, f"Try again in {seconds} s.", headers={"Retry-After": str(seconds)}
@@ -240,13 +192,13 @@ def too_many(detail: str, wait: float) -> ProblemError:
 
 
 def unauthorized(detail: str) -> ProblemError:
-    """401, with how to do better."""
+    """401, with a hint how to authenticate."""
     hint = "Send the header Authorization: Bearer TOKEN, or open /login in a browser."
     return ProblemError(401, "unauthorized", detail, hint, headers={"WWW-Authenticate": 'Bearer realm="kinboard"'})
 
 
 async def _form(request: Request) -> dict[str, str]:
-    """The fields of a small form; raises 413."""
+    """The fields of a form; raises 413 if it is too large."""
     body = b""
     async for chunk in request.stream():
         body += chunk

@@ -1,7 +1,7 @@
-"""Every request gets an id, is counted, and is written down if the operator wants it: one JSON object a line.
+"""Request ids, metrics, and an optional access log with one JSON object per line.
 
-The id comes back as ``X-Request-ID``; a proxy's own is kept if it is a harmless one, so that its log and ours can
-be laid side by side.
+The id is returned as ``X-Request-ID``. An id set by a proxy is kept if it is short and plain, so that both logs
+can be compared.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ import time
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.service.web.access import client_of
+from app.service.web.rate_limit import client_of
 from app.shared.metrics import REQUEST_SECONDS, REQUESTS
 
 logger = logging.getLogger("kinboard.access")
 
-_HARMLESS = re.compile(rb"[\w.:/+=-]{1,128}", re.ASCII)
+_VALID_ID = re.compile(rb"[\w.:/+=-]{1,128}", re.ASCII)
 _METHODS = frozenset(("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"))
 
 
 class Observe:
-    """ASGI middleware around everything that answers."""
+    """ASGI middleware around everything that answers requests."""
 
     def __init__(self, app: ASGIApp, log: bool) -> None:
         self.app = app
@@ -36,13 +36,14 @@ class Observe:
             await self.app(scope, receive, send)
             return
         given = next((value for name, value in scope["headers"] if name == b"x-request-id"), b"")
-        request_id = given.decode() if _HARMLESS.fullmatch(given) else secrets.token_hex(8)
+        request_id = given.decode() if _VALID_ID.fullmatch(given) else secrets.token_hex(8)
         scope["kinboard.request_id"] = request_id
-        path: str = scope["path"].removeprefix(scope.get("root_path", ""))  # a mounted folder takes its part off
+        # Read now: a mounted folder removes its part of the path.
+        path: str = scope["path"].removeprefix(scope.get("root_path", ""))
         began = time.perf_counter()
         status, sent = 0, 0
 
-        async def watching(message: Message) -> None:
+        async def observed(message: Message) -> None:
             nonlocal status, sent
             kind = message["type"]
             if kind == "http.response.start":
@@ -59,13 +60,13 @@ class Observe:
             await send(message)
 
         try:
-            await self.app(scope, receive, watching)
+            await self.app(scope, receive, observed)
         finally:
-            self._tell(scope, path, status or 500, sent, time.perf_counter() - began)
+            self._record(scope, path, status or 500, sent, time.perf_counter() - began)
 
-    def _tell(self, scope: Scope, path: str, status: int, sent: int, seconds: float) -> None:
+    def _record(self, scope: Scope, path: str, status: int, sent: int, seconds: float) -> None:
         websocket = scope["type"] == "websocket"
-        # What a client makes up must not become a series of its own.
+        # Unknown methods share one label, so that clients cannot create new time series.
         method = "WEBSOCKET" if websocket else scope["method"] if scope["method"] in _METHODS else "OTHER"
         route = _route_of(scope, path)
         REQUESTS.labels(method, route, status).inc()
@@ -87,7 +88,7 @@ class Observe:
 
 
 def write_to_stderr() -> None:
-    """Have lines written, as they are."""
+    """Write the access log to standard error."""
     handler = logging.StreamHandler()
     handler.setFormatter(logging.Formatter("%(message)s"))
     logger.addHandler(handler)
@@ -96,7 +97,7 @@ def write_to_stderr() -> None:
 
 
 def _route_of(scope: Scope, path: str) -> str:
-    """The pattern that the address matched, so that there are as many series as routes, whatever is asked for."""
+    """Pattern of the matched route, so that the number of time series is bounded by the number of routes."""
     if "endpoint" not in scope:
         return "none"
     if path.startswith("/static/"):

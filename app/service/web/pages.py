@@ -1,6 +1,6 @@
-"""Our own pages and their files: the landing page, the API's documentation, everything in ``static/``.
+"""The landing page, the page of the API documentation, and the files in ``static/``.
 
-Every link in them is relative, so they work below any path prefix, and nothing comes from another host.
+All their links are relative, so they work below any path prefix, and nothing is loaded from another host.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from kin import __version__
 
 
 def static_folder() -> Path:
-    """Beside the package in a checkout, inside it once installed."""
+    """The folder of static files: next to the package in a checkout, inside it when installed."""
     package = Path(__file__).parents[2]
     installed = package / "_static"
     return installed if installed.is_dir() else package.parent / "static"
@@ -54,7 +54,7 @@ async def _favicon(_: Request) -> Response:
 
 
 class _FreshStaticFiles(StaticFiles):
-    """Browsers ask again each time (and get a 304), so that an upgrade shows at once."""
+    """Static files that browsers revalidate each time (with a 304), so that an upgrade takes effect at once."""
 
     async def get_response(self, path: str, scope: Scope) -> Response:
         response = await super().get_response(path, scope)

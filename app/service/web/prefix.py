@@ -1,8 +1,8 @@
-"""A path prefix in front of the whole service, as a reverse proxy gives it (``--root-path /kinboard``).
+"""A path prefix in front of the whole service, for reverse proxies (``--root-path /kinboard``).
 
-Some proxies pass the prefix on, some strip it; nobody remembers which one theirs is. Both arrive here, and
-both leave as ASGI asks for it: ``path`` with the prefix, ``root_path`` naming it. Without this, a stripped
-request finds its routes but not the files of a mounted folder.
+Some proxies forward the prefix, some strip it. Both kinds of request become what ASGI specifies: ``path`` with the
+prefix and ``root_path`` set to it. Otherwise a stripped request would find routes but not the files of a mounted
+folder.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ def clean_prefix(root_path: str) -> str:
 
 
 class PathPrefix:
-    """ASGI middleware: serve the same pages with and without the prefix."""
+    """ASGI middleware that serves the same pages with and without the prefix."""
 
     def __init__(self, app: ASGIApp, prefix: str) -> None:
         self.app = app

@@ -9,6 +9,7 @@ import pytest
 import viser
 from fake_browser import FakeBrowser
 from fastapi.testclient import TestClient
+from itsdangerous.encoding import base64_encode, int_to_bytes
 from live_server import serve, wait_for
 from starlette.websockets import WebSocketDisconnect
 from websockets.exceptions import InvalidStatus
@@ -17,7 +18,8 @@ from websockets.typing import Subprotocol
 
 import app.service.web.access as access
 from app.service.main import create_app
-from app.service.web.access import COOKIE, Bucket, client_of
+from app.service.web.access import COOKIE
+from app.service.web.rate_limit import TokenBucket, client_of
 from app.shared.settings import Settings
 from app.viewer.panel.view import ViewState
 from app.viewer.session.state import PageState, encode
@@ -156,7 +158,7 @@ def test_the_way_to_the_login_page_is_relative_to_where_one_is(guarded):
 def test_a_wrong_token_is_told_on_the_page(guarded):
     answer = guarded.post("/login", data={"token": "<script>"})
     assert answer.status_code == 401
-    assert "That is not the token." in answer.text
+    assert "The access token is wrong." in answer.text
     assert "set-cookie" not in answer.headers
     assert [guarded.post("/login", data={"token": "no"}).status_code for _ in range(6)][-1] == 429
 
@@ -186,14 +188,15 @@ def test_a_form_that_is_too_large_is_not_read(guarded):
 @pytest.mark.parametrize("forge", ["later", "unsigned", "empty", "dots", "huge", "nonsense"])
 def test_a_cookie_that_we_did_not_sign_opens_nothing(guarded, forge):
     guarded.post("/login", data={"token": TOKEN})
-    ends, _, signature = guarded.cookies[COOKIE].strip('"').partition(".")
+    text, _, signature = guarded.cookies[COOKIE].rpartition(".")
+    later = base64_encode(int_to_bytes(int(time.time()) + 60)).decode()
     guarded.cookies.clear()
     value = {
-        "later": f"{int(ends) + 1}.{signature}",
-        "unsigned": f"{ends}.",
+        "later": f"visitor.{later}.{signature}",
+        "unsigned": f"{text}.",
         "empty": "",
         "dots": "." * 50,
-        "huge": "9" * 400 + "." + signature,
+        "huge": f"visitor.{'z' * 400}.{signature}",
         "nonsense": "\x7f[]",
     }[forge]
     answer = guarded.get("/api/v1/robots", headers={"cookie": f"{COOKIE}={value}"})
@@ -203,8 +206,8 @@ def test_a_cookie_that_we_did_not_sign_opens_nothing(guarded, forge):
 def test_a_cookie_ends(guarded, monkeypatch):
     guarded.post("/login", data={"token": TOKEN})
     assert guarded.get("/api/v1/robots").status_code == 200
-    after = time.time() + access.LASTS + 10
-    monkeypatch.setattr(access.time, "time", lambda: after)
+    after = time.time() + access.COOKIE_AGE + 10
+    monkeypatch.setattr(time, "time", lambda: after)
     cookie = {"cookie": f"{COOKIE}={guarded.cookies[COOKIE]}"}
     assert guarded.get("/api/v1/robots", headers=cookie).status_code == 401
 
@@ -305,7 +308,7 @@ def test_a_client_that_asks_for_too_much_is_told_when_to_come_again():
 
 def test_a_bucket_fills_up_again_and_forgets_the_oldest(monkeypatch):
     now = [0.0]
-    bucket = Bucket(2.0, 3.0, lambda: now[0])
+    bucket = TokenBucket(2.0, 3.0, lambda: now[0])
     for _ in range(3):
         assert bucket.wait("a") == 0.0
         bucket.take("a")
@@ -316,10 +319,10 @@ def test_a_bucket_fills_up_again_and_forgets_the_oldest(monkeypatch):
     now[0] = 100.0
     bucket.take("a")
     assert bucket.wait("a") == 0.0  # two of three are left, however long it rested
-    monkeypatch.setattr(Bucket, "MOST", 5)
+    monkeypatch.setattr(TokenBucket, "MAX_CLIENTS", 5)
     for name in "bcdefgh":
         bucket.take(name)
-    assert len(bucket._left) == 5
+    assert len(bucket._tokens) == 5
 
 
 @pytest.mark.parametrize(

@@ -280,6 +280,6 @@ def test_the_process_starts_and_a_signal_ends_it_quickly_and_quietly(stop, ready
     ],
 )
 def test_a_service_that_is_open_to_all_says_so_loudly(capfd, monkeypatch, settings, warned):
-    monkeypatch.setattr("app.service.main._Server.run", lambda self, sockets: setattr(self, "started", True))
+    monkeypatch.setattr("app.service.main.Server.run", lambda self, sockets: setattr(self, "started", True))
     assert run(Settings(port=0, **settings)) == 0
     assert ("open to everybody" in capfd.readouterr().err) is warned

@@ -103,7 +103,7 @@ def alone(quick: bool) -> list[dict[str, Any]]:
             "alone": f"{OURS}, kernel" if entry is kernel else entry.contestant.name,
             "ns a point": 1e9 * entry.turns.median,
             "M/s": 1e-6 / entry.turns.median,
-            "× kernel": entry.to_thin,
+            "× kernel": entry.to_array,
             "% of the steps": 100.0 * entry.turns.median / whole if entry.contestant.name in steps else math.nan,
         }
         for entry in row.entries

@@ -1,0 +1,50 @@
+"""Routes for operators: liveness, readiness, metrics."""
+
+from __future__ import annotations
+
+import os
+from typing import Literal
+
+from fastapi import APIRouter, Request, Response
+from pydantic import BaseModel, Field
+from starlette.responses import PlainTextResponse
+
+from app.service.startup import Status
+from app.shared.metrics import CONTENT_TYPE, exposition
+
+router = APIRouter(tags=["service"])
+
+
+class Alive(BaseModel):
+    """The process answers."""
+
+    status: Literal["alive"] = "alive"
+    pid: int = Field(description="Process id; with several workers each answers for itself.")
+
+
+class Readiness(BaseModel):
+    """Whether the kernels that move an arm are compiled and the viewer listens."""
+
+    status: Status
+
+
+@router.get("/metrics", summary="Metrics, for Prometheus", response_class=PlainTextResponse)
+async def metrics() -> Response:
+    return Response(exposition(), media_type=CONTENT_TYPE)
+
+
+@router.get("/livez", summary="Is the process alive?")
+async def livez() -> Alive:
+    return Alive(pid=os.getpid())
+
+
+@router.get(
+    "/readyz",
+    summary="Is the service ready?",
+    responses={503: {"model": Readiness, "description": "Still warming up, or the viewer failed."}},
+)
+async def readyz(request: Request, response: Response) -> Readiness:
+    status: Status = request.app.state.startup.status
+    response.headers["cache-control"] = "no-store"
+    response.status_code = 200 if status == "ready" else 503
+    return Readiness(status=status)
