@@ -4,27 +4,42 @@ set -eu
 root=$(cd "$(dirname "$0")/.." && pwd)
 . "$root/scripts/venv.sh"
 unset PYTHONDONTWRITEBYTECODE # hundreds of processes are started, each of which would compile all it imports
-install_kinboard "[test]"
-if [ ! -x "${KINBOARD_TEST_CHROMIUM:-/usr/bin/chromium}" ]; then
-  apt_install chromium || fail "the browser tests need Chromium. On Debian: sudo apt-get install chromium"
+chromium=${KINBOARD_TEST_CHROMIUM:-/usr/bin/chromium}
+[ -x "$root/.venv/bin/python" ] || make_venv
+installing=
+if [ ! -x "$chromium" ]; then
+  apt_install chromium & # while pip downloads
+  installing=$!
 fi
+install_kinboard "[test]"
+[ -z "$installing" ] || wait "$installing" ||
+  fail "the browser tests need Chromium. On Debian: sudo apt-get install chromium"
 PATH="$root/.venv/bin:$root/.venv/debian/usr/sbin:$root/.venv/debian/usr/bin:$PATH:/usr/sbin"
 for proxy in nginx caddy; do
   command -v $proxy >/dev/null || apt_unpack $proxy || fail "the tests of deploy/ need $proxy in the PATH"
 done
 cd "$root"
-if [ $# -eq 0 ]; then
-  # Kernels are compiled beside the checks of the code; two rows of tests would both compile the same ones.
-  python -c 'import kin; kin.warm_up(); kin.warm_up_rest()' &
-  compiling=$!
+if [ $# -gt 0 ]; then
+  ruff check .
+  ruff format --check .
+  mypy
+  exec pytest "$@"
 fi
+# Kernels are compiled while the code is checked, and before any test: two runs would both compile the same ones.
+python -c 'import kin; kin.warm_up(); kin.warm_up_rest()' &
+compiling=$!
 ruff check .
 ruff format --check .
 mypy
-if [ $# -gt 0 ]; then
-  exec pytest "$@"
-fi
 wait $compiling
-# Four at a time, as they often wait; but what draws pictures or measures time wants the machine for itself.
-pytest -n 4 --dist loadfile -m "not slow and not browser and not bench"
-pytest -m "not slow and (browser or bench)"
+# The browser tests draw on one core and often wait: the other tests run beside them. What measures time runs alone.
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+pytest -m "not slow and browser" >"$log" 2>&1 &
+browsing=$!
+failed=0
+pytest -n 3 --dist loadfile -m "not slow and not browser and not bench" || failed=1
+wait $browsing || failed=1
+cat "$log"
+pytest -m "not slow and bench" || failed=1
+exit $failed

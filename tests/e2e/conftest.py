@@ -1,4 +1,4 @@
-"""The real service, Chromium, and a visitor's page, for all browser tests."""
+"""Fixtures of the browser tests: the service, Chromium, and one tab each in desktop and phone size."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture(scope="session")
 def desktop(browser: Browser, address: str) -> Iterator[Tab]:
-    """One tab for all tests: software rendering compiles its shaders for seconds whenever a page opens."""
+    """The desktop tab of all tests: opening a page costs seconds, as software rendering compiles its shaders."""
     opened = Tab(browser, address, 1280, 720)
     yield opened
     opened.close()
@@ -75,7 +75,7 @@ def desktop(browser: Browser, address: str) -> Iterator[Tab]:
 
 @pytest.fixture(scope="session")
 def phone(browser: Browser, address: str) -> Iterator[Tab]:
-    """One for all that is looked at on a phone."""
+    """The tab in phone size."""
     opened = Tab(browser, address, 390, 844)
     yield opened
     opened.close()
@@ -83,6 +83,6 @@ def phone(browser: Browser, address: str) -> Iterator[Tab]:
 
 @pytest.fixture
 def tab(desktop: Tab) -> Tab:
-    """The tab with the Pioneer arm at home."""
+    """The desktop tab with the Pioneer arm in its home configuration."""
     desktop.show(kin.get_robot("pioneer5"))
     return desktop

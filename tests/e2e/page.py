@@ -1,8 +1,9 @@
-"""One visitor's page in a browser, with the hands and eyes the tests need."""
+"""A browser tab with the dashboard, and the actions and readings of it that the tests need."""
 
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,8 +17,9 @@ from app.viewer.scene import camera
 from app.viewer.scene.meshes import body
 
 ARTIFACTS = Path(__file__).parents[1] / "artifacts"
+PICTURES = "KINBOARD_TEST_PICTURES" in os.environ  # save pictures of the screens: a second or two each
 WAIT = 45_000  # ms; software rendering on a busy machine is slow
-# A third of the work of software rendering is smoothing edges, and half of the rest goes with a coarser picture.
+# Smoothing edges is a third of the work of software rendering, and a coarser picture saves half of the rest.
 PLAIN = """
 const { getContext } = HTMLCanvasElement.prototype;
 HTMLCanvasElement.prototype.getContext = function (kind, options) {
@@ -28,7 +30,7 @@ Object.defineProperty(window, "devicePixelRatio", { get: () => 0.5 });
 
 
 class Tab:
-    """One visitor's page, with the hands and eyes the tests need."""
+    """One browser tab: actions on its controls, and readings of what it shows."""
 
     def __init__(self, browser: Browser, address: str, width: int, height: int) -> None:
         self.page: Page = browser.new_page(viewport={"width": width, "height": height})
@@ -50,7 +52,7 @@ class Tab:
         return self.page.locator("[data-status]")
 
     def row(self, label: str) -> Locator:
-        """The line of the panel with this label."""
+        """The row of the panel with this label."""
         return self.page.get_by_text(label, exact=True).locator("xpath=ancestor::div[.//input or .//button][1]")
 
     def number(self, label: str) -> float:
@@ -62,11 +64,11 @@ class Tab:
         entry.press("Enter")
 
     def open(self, title: str) -> None:
-        """A tab of the panel. They stand still: no need to wait for two frames of the picture to see that."""
+        """Open a tab of the panel. Tabs do not move, so the click need not wait for two equal frames."""
         self.page.get_by_role("tab", name=title).click(force=True)
 
-    def take(self, robot: kin.Robot) -> None:
-        """Have this robot on show."""
+    def select(self, robot: kin.Robot) -> None:
+        """Show this robot."""
         if self.row("Robot").locator("input:visible").first.input_value() != robot.name:
             self.choose("Robot", robot.name)
             expect(self.status.first).to_contain_text(robot.name)
@@ -75,10 +77,10 @@ class Tab:
         self.open("Learn")
         self.choose("Lesson", title)
 
-    def dark(self, wanted: bool) -> None:
-        """A dark page, or a light one."""
+    def set_dark(self, dark: bool) -> None:
+        """Switch to the dark or the light colour scheme."""
         self.open("View")
-        scheme = "dark" if wanted else "light"
+        scheme = "dark" if dark else "light"
         if self.page.locator("html").get_attribute("data-mantine-color-scheme") != scheme:
             self.check("Dark page")
         expect(self.page.locator("html")).to_have_attribute("data-mantine-color-scheme", scheme)
@@ -91,7 +93,7 @@ class Tab:
         self.row(label).locator("input:visible").first.click()
 
     def tool(self) -> list[float]:
-        """x, y, z in mm as the panel shows them."""
+        """x, y, z of the tool in mm as the panel shows them."""
         cells = self.page.locator('table[aria-label="tool pose"] tr').first.locator("td span")
         return [float(text.replace("−", "-")) for text in cells.all_inner_texts()]
 
@@ -102,7 +104,7 @@ class Tab:
             self.page.wait_for_timeout(50)
 
     def pixel(self, robot: kin.Robot, point: np.ndarray, room: Sequence[camera.Sphere] = ()) -> np.ndarray:
-        """Where a point of the scene is on the page, in the default view with room for these spheres."""
+        """Page coordinates of a point of the scene, in the default view with room for these spheres."""
         area = self.page.locator("canvas").first.bounding_box()
         assert area is not None
         position, look_at = camera.view(body(robot), area["width"] / area["height"], room=room)
@@ -132,7 +134,7 @@ class Tab:
         self.page.mouse.up()
 
     def show(self, robot: kin.Robot) -> None:
-        """The robot at home, without a lesson."""
+        """Show the robot in its home configuration, without a lesson."""
         self.open("Learn")
         if self.row("Lesson").locator("input:visible").first.input_value() != "None":
             self.choose("Lesson", "None")
@@ -145,27 +147,35 @@ class Tab:
         self.page.wait_for_timeout(300)
 
     def _area(self) -> Locator:
-        """What of the panel scrolls."""
+        """The scrolling part of the panel."""
         return self.page.locator(".mantine-ScrollArea-viewport:has([data-status])").first
 
     def hidden(self) -> int:
-        """Pixels of the panel that have to be scrolled to."""
+        """Height in pixels of the part of the panel outside of the window."""
         hidden: int = self._area().evaluate("area => area.scrollHeight - area.clientHeight")
         return hidden
 
     def top(self) -> None:
-        """Scroll the panel to its beginning."""
+        """Scroll the panel to the top."""
         self._area().evaluate("area => area.scrollTo(0, 0)")
 
     def picture_of_the_rest(self, name: str) -> None:
-        """A picture of the panel's end, if it does not fit the window."""
-        area = self._area()
-        if self.hidden() > 2:
+        """A picture of the end of the panel, if the panel does not fit the window."""
+        if PICTURES and self.hidden() > 2:
+            area = self._area()
             area.evaluate("area => area.scrollTo(0, area.scrollHeight)")
             area.screenshot(path=ARTIFACTS / f"{name}.png", animations="disabled")
 
     def screenshot(self, name: str) -> None:
-        ARTIFACTS.mkdir(exist_ok=True)
+        """Move the mouse off the controls and, if `PICTURES`, save a picture of the page."""
         self.page.mouse.move(5, 5)
-        self.page.wait_for_timeout(400)
-        self.page.screenshot(path=ARTIFACTS / f"{name}.png")
+        if PICTURES:
+            self.page.wait_for_timeout(400)
+            save_picture(self.page, name)
+
+
+def save_picture(page: Page, name: str, full_page: bool = False) -> None:
+    """Save a picture of a page in tests/artifacts, if `PICTURES`."""
+    if PICTURES:
+        ARTIFACTS.mkdir(exist_ok=True)
+        page.screenshot(path=ARTIFACTS / f"{name}.png", full_page=full_page)

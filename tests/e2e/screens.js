@@ -1,13 +1,13 @@
-// What a machine can see of a screen: called by test_screens.py with axe loaded; gives a list of sentences.
+// Checks of a screen, run by test_screens.py with axe loaded; returns a list of sentences.
 async () => {
   const problems = [];
   const shown = (node) => node.checkVisibility() && node.getClientRects().length > 0;
-  const told = (node) => node.outerHTML.replace(/ (style|class)="[^"]*"/g, "").slice(0, 170);
+  const describe = (node) => node.outerHTML.replace(/ (style|class)="[^"]*"/g, "").slice(0, 170);
   await Promise.all(document.getAnimations().filter((a) => a.effect.getComputedTiming().endTime < 5000).map((a) => a.finished.catch(() => {})));
   const area = document.querySelector("[data-status]")?.closest(".mantine-ScrollArea-viewport");
 
   const failed = document.querySelector("[data-status=error]");
-  if (failed) problems.push(`the page tells of an error: ${failed.textContent}`);
+  if (failed) problems.push(`the page shows an error: ${failed.textContent}`);
 
   // Nothing sticks out.
   const page = document.documentElement;
@@ -24,7 +24,7 @@ async () => {
     for (const node of area.querySelectorAll("*")) {
       const { left, right, width } = node.getBoundingClientRect();
       if (width && shown(node) && (right > box.right + 1 || left < box.left - 1) && !scrolls(node)) {
-        problems.push(`cut off, ${Math.round(left)} to ${Math.round(right)} px: ${told(node)}`);
+        problems.push(`cut off, ${Math.round(left)} to ${Math.round(right)} px: ${describe(node)}`);
       }
     }
   }
@@ -39,10 +39,10 @@ async () => {
     const across = Math.min(boxes[i].right, boxes[k].right) - Math.max(boxes[i].left, boxes[k].left);
     const down = Math.min(boxes[i].bottom, boxes[k].bottom) - Math.max(boxes[i].top, boxes[k].top);
     if (across <= 1 || down <= 1 || a.contains(b) || b.contains(a) || wrapper(a) === wrapper(b)) return;
-    problems.push(`overlap by ${Math.round(across)} × ${Math.round(down)} px: ${told(a)} and ${told(b)}`);
+    problems.push(`overlap by ${Math.round(across)} × ${Math.round(down)} px: ${describe(a)} and ${describe(b)}`);
   }));
 
-  // What axe says.
+  // Findings of axe.
   const tags = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa"];
   const found = await axe.run(
     { exclude: [["canvas"], ["iframe"]] },
@@ -51,7 +51,7 @@ async () => {
   const nodes = (rules) => rules.flatMap(({ id, nodes }) => nodes.map((node) => ({ id, ...node })));
   for (const { id, element, target, any, all, none } of nodes(found.violations)) {
     const node = element ?? document.querySelector(target[0]);
-    problems.push(`${id}: ${[...any, ...all, ...none][0]?.message}: ${node ? told(node) : target}`);
+    problems.push(`${id}: ${[...any, ...all, ...none][0]?.message}: ${node ? describe(node) : target}`);
   }
 
   // Where axe cannot tell the contrast (see-through text, single letters): colours laid over each other.
@@ -79,7 +79,7 @@ async () => {
     const [a, b] = [ink, ground].map((colour) => luminance(over(colour, white)) + 0.05);
     const ratio = Math.max(a, b) / Math.min(a, b);
     const symbol = any.some((check) => check.data?.messageKey === "nonBmp");
-    if (ratio < (symbol ? 3 : 4.5)) problems.push(`contrast ${ratio.toFixed(2)}: ${told(node)}`);
+    if (ratio < (symbol ? 3 : 4.5)) problems.push(`contrast ${ratio.toFixed(2)}: ${describe(node)}`);
   }
   return problems;
 }

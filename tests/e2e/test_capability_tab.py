@@ -1,4 +1,4 @@
-"""The capability map in a real browser: computed, thinned out, cut, clicked on."""
+"""The capability map in a real browser: computing, filtering, cutting and picking."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ def compute(tab: Tab) -> None:
     tab.page.wait_for_timeout(1000)
 
 
-def test_a_map_is_drawn_and_a_click_tells_of_a_voxel(tab: Tab) -> None:
+def test_a_map_is_drawn_and_a_click_shows_the_voxel(tab: Tab) -> None:
     compute(tab)
     found = kin.capability_map(PIONEER, resolution=15, directions=24)
     shown = tab.page.locator("[data-shown]")
     expect(shown).to_have_attribute("data-shown", str(len(found.index)))
-    # One on the outside, towards the eye: nothing is before it.
+    # A voxel on the outside that faces the camera, so that nothing hides it.
     row = int(np.argmax(found.centres @ np.array([0.5, 0.8, 0.3])))
     sides = np.array(found.grid.shape) * found.grid.voxel
     room = [(np.array(found.grid.origin) + sides / 2.0, float(sides.max()) / 2.0)]

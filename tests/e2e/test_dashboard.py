@@ -49,7 +49,7 @@ def test_sliders_by_keyboard_mouse_and_number(tab: Tab) -> None:
     tab.wait_for_tool(kin.fk(PIONEER, home_with(PIONEER, 0, degrees))[:3, 3], within=0.06)
 
 
-def test_dragging_the_gizmo_moves_the_arm_and_out_of_reach_is_said(tab: Tab) -> None:
+def test_dragging_the_gizmo_moves_the_arm_and_reports_out_of_reach(tab: Tab) -> None:
     tab.show(SRS)
     home = kin.fk(SRS, SRS.q_home)
     tab.drag_arrow(SRS, home, axis=2, lengths=-0.6)
@@ -95,7 +95,7 @@ def test_branches_and_the_arm_angle_move_the_arm_and_not_the_tool(tab: Tab) -> N
     assert strip is not None
     assert track is not None
     middle = strip["x"] + strip["width"] * (60 + 180) / 360
-    assert abs(middle - (track["x"] + track["width"] / 2)) < 8, "the strip's mark is under the slider's thumb"
+    assert abs(middle - (track["x"] + track["width"] / 2)) < 8, "the mark of the strip is under the slider's thumb"
     tab.screenshot("posture-light")
     tab.type_number("Arm angle ψ", "150")
     expect(tab.status).to_have_attribute("data-status", "limits")

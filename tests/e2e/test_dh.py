@@ -1,4 +1,4 @@
-"""The lesson on DH tables in a real browser: by keyboard and mouse, light and dark, on a phone."""
+"""The lesson on DH tables in a real browser: keyboard, typeset matrices, comparison of conventions."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def lesson(tab: Tab) -> Iterator[Tab]:
     tab.choose("Lesson", "None")
 
 
-def test_the_walk_by_keyboard_with_typeset_matrices(lesson: Tab) -> None:
+def test_steps_by_keyboard_with_typeset_matrices(lesson: Tab) -> None:
     page = lesson.page
     following = page.get_by_role("button", name="Next")
     following.focus()
@@ -47,7 +47,7 @@ def test_the_walk_by_keyboard_with_typeset_matrices(lesson: Tab) -> None:
     box = matrices.first.bounding_box()
     assert box is not None
     assert box["height"] > 40
-    assert box["width"] > 120, "MathML is laid out, not written in a line"
+    assert box["width"] > 120, "MathML is laid out as a matrix, not in one line"
     widths = {cell.bounding_box()["width"] for cell in matrices.first.locator("mtd").all()}  # type: ignore[index]
     assert max(widths) - min(widths) < 0.5
 
@@ -64,7 +64,7 @@ def test_the_walk_by_keyboard_with_typeset_matrices(lesson: Tab) -> None:
     expect(page.get_by_role("button", name="Play")).to_be_visible()
 
 
-def test_both_readings_side_by_side(lesson: Tab) -> None:
+def test_both_conventions_are_compared(lesson: Tab) -> None:
     page = lesson.page
     lesson.choose("Robot", kin.get_robot("redundant7").name)
     expect(caption(lesson)).to_contain_text("Frame 0")

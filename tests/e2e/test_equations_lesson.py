@@ -1,4 +1,4 @@
-"""The lesson on equations in a real browser: typeset, live, and inside its panel on every screen."""
+"""The lesson on equations in a real browser: typesetting, live values, and fit in the panel."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def off(tab: Tab) -> Locator:
 
 
 def stays_inside(tab: Tab) -> None:
-    """What the lesson shows is no wider than its panel, and nothing is squeezed to nothing."""
+    """Assert that the lesson is no wider than the panel and that every formula is laid out."""
     width = tab.page.viewport_size["width"]
     for part in (shown(tab), off(tab)):
         box = part.bounding_box()
@@ -43,7 +43,7 @@ def stays_inside(tab: Tab) -> None:
         assert box["height"] > 5, "MathML is laid out"
 
 
-def test_equations_are_typeset_marked_and_shown_where_they_are_worst(tab: Tab) -> None:
+def test_equations_are_typeset_and_marked_and_the_largest_error_is_shown(tab: Tab) -> None:
     open_lesson(tab)
     expect(shown(tab)).to_have_attribute("data-verdict", "misprinted")
     expect(tab.page.get_by_text("Equation (6):")).to_be_visible()

@@ -1,4 +1,4 @@
-"""Without a mouse: every control can be reached, seen to be reached, and used."""
+"""Keyboard only: every control can be reached, shows its focus, and works."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import kin
 pytestmark = pytest.mark.browser
 
 PIONEER, PUMA = kin.get_robot("pioneer5"), kin.get_robot("puma560")
-# The small arrows of a number's field are left out by viser: there the arrow keys do the same.
+# viser takes the small arrows of a number field out of the tab order; the arrow keys do the same there.
 NOT_REACHED = """() => {
   const area = document.querySelector("[data-status]").closest(".mantine-ScrollArea-viewport");
   const controls = 'input:not([type="hidden"]), button, summary, [role="slider"], [role="tab"], [role="button"]';
@@ -30,13 +30,13 @@ REACHED = """() => {
 
 
 def walk(tab: Tab) -> None:
-    """Press Tab from the robot's name on until the page has no more controls."""
+    """Press Tab from the robot selector to the last control, and check that every control got the focus."""
     tab.row("Robot").locator("input:visible").first.focus()
     for _ in range(100):
         reached = tab.page.evaluate(REACHED)
         if reached is None:
             break
-        assert reached["seen"], f"no focus to be seen on {reached['what']}"
+        assert reached["seen"], f"no visible focus on {reached['what']}"
         tab.page.keyboard.press("Tab")
     assert tab.page.evaluate(NOT_REACHED) == []
 
@@ -48,7 +48,7 @@ def test_the_move_tab(tab: Tab) -> None:
     before = tab.number("2 rotating elbow")
     page.get_by_role("slider", name="2 rotating elbow").press("ArrowRight")
     expect(tab.row("2 rotating elbow").locator("input:visible").last).to_have_value(f"{before + 0.01:g}")
-    assert not page.evaluate("'escaped' in window"), "viser would turn the view by the same key"
+    assert not page.evaluate("'escaped' in window"), "viser would turn the view with the same key"
 
     lock = page.get_by_role("group", name="Locked").get_by_role("button", name="2", exact=True)
     lock.press("Space")
@@ -65,7 +65,7 @@ def test_the_move_tab(tab: Tab) -> None:
 
 def test_a_lesson(tab: Tab) -> None:
     page = tab.page
-    tab.take(PUMA)
+    tab.select(PUMA)
     page.get_by_role("tab", name="Learn").press("Enter")
     lesson = tab.row("Lesson").locator("input:visible").first
     lesson.press("Enter")
@@ -78,6 +78,6 @@ def test_a_lesson(tab: Tab) -> None:
     walk(tab)
     here = page.locator("[data-here]")
     before = here.get_attribute("data-posture")
-    # What a click on the ghost would do.
+    # The same as a click on the ghost.
     page.get_by_role("group", name="Take").get_by_role("button", name="2", exact=True).press("Space")
     expect(here).not_to_have_attribute("data-posture", str(before))

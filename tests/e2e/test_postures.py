@@ -25,7 +25,7 @@ def learn(tab: Tab, robot: kin.Robot, lesson: str) -> None:
 
 
 def press(tab: Tab, at: np.ndarray) -> None:
-    """Click as a hand does: come near, rest, press, let go."""
+    """Click like a person: approach, pause, press, release."""
     tab.page.mouse.move(*(at - 2).tolist())
     tab.page.wait_for_timeout(200)
     tab.page.mouse.move(*at.tolist())
@@ -57,7 +57,7 @@ def test_a_click_on_a_ghost_in_the_picture_morphs_the_arm(tab: Tab) -> None:
     expect(tab.page.locator("[data-here]")).to_have_attribute("data-posture", here)
 
 
-def test_why_not_and_what_helps(tab: Tab) -> None:
+def test_the_reason_for_no_solution_and_a_remedy(tab: Tab) -> None:
     learn(tab, PUMA, "Postures")
     tab.drag_arrow(PUMA, kin.fk(PUMA, PUMA.q_home), axis=2, lengths=3.0)
     expect(tab.page.locator("[data-why=unreachable]")).to_contain_text("Out of reach by")

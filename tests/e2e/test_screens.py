@@ -1,7 +1,7 @@
-"""Every screen, light and dark, on a desk and on a phone: nothing is cut off or overlaps, all of it can be read.
+"""Layout and contrast of every screen, light and dark, in desktop and phone size.
 
-What a machine can see is asserted (`screens.js`: boxes, and axe-core's rules of WCAG 2.1 A and AA). The rest is
-for eyes: a picture of each screen is kept in tests/artifacts, named tab-lesson-theme.
+`screens.js` checks that nothing is cut off or overlaps, and the rules of WCAG 2.1 A and AA (axe-core). With
+KINBOARD_TEST_PICTURES set, a picture of each screen is saved in tests/artifacts, named tab-lesson-theme.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from axe_playwright_python.base import AXE_SCRIPT
-from page import ARTIFACTS, Tab
+from page import Tab, save_picture
 from playwright.sync_api import Browser, Page, expect
 
 import kin
@@ -20,21 +20,21 @@ from app.service.web.pages import static_folder
 pytestmark = pytest.mark.browser
 
 LOOK = (Path(__file__).parent / "screens.js").read_text(encoding="utf-8")
-COLD = 120_000  # ms; a service that is ready may still be compiling what sections and maps need
-PATIENCE = 12  # looks
-FEW = 4000  # points; the picture is rendered in software
+COLD = 120_000  # ms; a service that is ready may still be compiling the kernels of sections and maps
+ATTEMPTS = 12
+FEW = 4000  # points; the page is rendered in software
 
-# What is found of viser's own and cannot be mended by static/viewer.css and .js: a part of the finding, and why.
-VISERS: dict[str, str] = {}
+# Findings in viser's own parts that static/viewer.css and .js cannot correct: part of the finding, and why.
+ACCEPTED: dict[str, str] = {}
 
 
 def problems(page: Page) -> list[str]:
-    """What is wrong with the screen, one sentence each."""
+    """Findings on the screen, one sentence each."""
     if not page.evaluate("'axe' in window"):
         page.evaluate(AXE_SCRIPT)
     found: list[str] = []
-    for _ in range(PATIENCE):  # folders unfold when a tab opens
-        found = [p for p in page.evaluate(LOOK) if not any(part in p for part in VISERS)]
+    for _ in range(ATTEMPTS):  # folders unfold when a tab opens
+        found = [p for p in page.evaluate(LOOK) if not any(part in p for part in ACCEPTED)]
         if not found:
             break
         page.wait_for_timeout(500)
@@ -43,7 +43,7 @@ def problems(page: Page) -> list[str]:
 
 def lesson(robot: str, title: str, ready: str) -> Callable[[Tab], None]:
     def show(tab: Tab) -> None:
-        tab.take(kin.get_robot(robot))
+        tab.select(kin.get_robot(robot))
         tab.open("Learn")
         tab.choose("Lesson", title)
         if ready:
@@ -54,7 +54,7 @@ def lesson(robot: str, title: str, ready: str) -> Callable[[Tab], None]:
 
 def cloud(tab: Tab) -> None:
     tab.choose_lesson("None")
-    tab.take(kin.get_robot("pioneer5"))
+    tab.select(kin.get_robot("pioneer5"))
     tab.open("Workspace")
     tab.type_number("Points", str(FEW))
     tab.page.get_by_role("button", name="Start").click()
@@ -103,9 +103,9 @@ SCREENS: dict[str, Callable[[Tab], None]] = {
     "workspace-capability": capability,
     "view": view,
 }
-# Every screen is looked at dark on a desk and light on a phone; these the other way round as well.
-ON_A_DESK = ("move", "learn-equations", "learn-postures", "learn-velocity", "workspace-cloud")
-DARK_ON_A_PHONE = ("learn-velocity",)
+# Every screen is checked dark in desktop size and light in phone size; these the other way round as well.
+LIGHT_DESKTOP = ("move", "learn-equations", "learn-postures", "learn-velocity", "workspace-cloud")
+DARK_PHONE = ("learn-velocity",)
 
 
 def walk(tab: Tab, names: tuple[str, ...], suffix: str) -> None:
@@ -116,27 +116,27 @@ def walk(tab: Tab, names: tuple[str, ...], suffix: str) -> None:
         tab.screenshot(f"{name}-{suffix}")
         found[name] = problems(tab.page)
         tab.picture_of_the_rest(f"{name}-{suffix}-below")
-    assert {name: told for name, told in found.items() if told} == {}
+    assert {name: sentences for name, sentences in found.items() if sentences} == {}
 
 
-def test_on_a_desk(tab: Tab) -> None:
-    walk(tab, ON_A_DESK, "light")
+def test_desktop_light(tab: Tab) -> None:
+    walk(tab, LIGHT_DESKTOP, "light")
 
 
-def test_on_a_desk_in_the_dark(tab: Tab) -> None:
-    tab.dark(True)
+def test_desktop_dark(tab: Tab) -> None:
+    tab.set_dark(True)
     walk(tab, tuple(SCREENS), "dark")
-    tab.dark(False)
+    tab.set_dark(False)
 
 
-def test_on_a_phone(phone: Tab) -> None:
+def test_phone_light(phone: Tab) -> None:
     walk(phone, tuple(SCREENS), "phone-light")
 
 
-def test_on_a_phone_in_the_dark(phone: Tab) -> None:
-    phone.dark(True)
-    walk(phone, DARK_ON_A_PHONE, "phone-dark")
-    phone.dark(False)
+def test_phone_dark(phone: Tab) -> None:
+    phone.set_dark(True)
+    walk(phone, DARK_PHONE, "phone-dark")
+    phone.set_dark(False)
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -156,5 +156,5 @@ def test_pages_without_a_viewer(browser: Browser, address: str, scheme: str) -> 
         for width, height in ((1280, 720), (390, 844)):
             page.set_viewport_size({"width": width, "height": height})
             assert problems(page) == []
-            page.screenshot(path=ARTIFACTS / f"{name}-{width}-{scheme}.png", full_page=True)
+            save_picture(page, f"{name}-{width}-{scheme}", full_page=True)
     page.close()

@@ -1,4 +1,4 @@
-"""A link, a reload and a lost connection give the same view again; the landing page, its cards and its box."""
+"""Links, reloads and lost connections restore the view; the landing page, its cards and its request box."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 import msgspec
 import numpy as np
 import pytest
-from page import ARTIFACTS, WAIT, Tab
+from page import WAIT, Tab, save_picture
 from playwright.sync_api import Browser, FrameLocator, Page, expect
 
 import kin
@@ -27,8 +27,8 @@ PIONEER, UR5 = kin.get_robot("pioneer5"), kin.get_robot("ur5")
 ROBOTS = tuple(kin.builtin_robots().values())
 
 
-class Line:
-    """A line to the service that can be cut, as when a cable is pulled and put back."""
+class Proxy:
+    """A TCP proxy in front of the service whose connections can be cut, as by pulling a cable."""
 
     def __init__(self, port: int) -> None:
         self._port = port
@@ -53,7 +53,7 @@ class Line:
             sink.shutdown(socket.SHUT_WR)
 
     def cut(self) -> int:
-        """End every connection; how many there were."""
+        """End every connection; returns how many there were."""
         ends, self._ends = self._ends, []
         for end in ends:
             with contextlib.suppress(OSError):
@@ -67,28 +67,28 @@ class Line:
 
 
 @pytest.fixture(scope="module")
-def line(address: str) -> Iterator[Line]:
+def proxy(address: str) -> Iterator[Proxy]:
     port = urlsplit(address).port
     assert port is not None
-    opened = Line(port)
+    opened = Proxy(port)
     yield opened
     opened.close()
 
 
 @pytest.fixture(scope="module")
-def shared(browser: Browser, line: Line) -> Iterator[Tab]:
-    opened = Tab(browser, line.address, 1280, 720)
+def shared(browser: Browser, proxy: Proxy) -> Iterator[Tab]:
+    opened = Tab(browser, proxy.address, 1280, 720)
     opened.page.context.grant_permissions(["clipboard-read", "clipboard-write"])
     yield opened
     opened.close()
 
 
 def state_of(page: Page) -> PageState:
-    """What the address holds."""
+    """The state that the URL contains."""
     return decode(page.evaluate("new URLSearchParams(location.hash.slice(1)).get('s') ?? ''"), ROBOTS)
 
 
-def wait_for_address(page: Page, key: str) -> None:
+def wait_for_url(page: Page, key: str) -> None:
     page.wait_for_function("key => new URLSearchParams(location.hash.slice(1)).has(key)", arg=key, timeout=WAIT)
 
 
@@ -99,7 +99,7 @@ def turned(degrees: float) -> np.ndarray:
 
 
 def wait_for_tool(page: Page, shown: Page | FrameLocator, T: np.ndarray) -> None:
-    """Wait until the panel tells this pose's position; while a page comes back, it tells nothing."""
+    """Wait until the panel shows the position of this pose; a page that reconnects shows none."""
     wanted = 1000 * T[:3, 3]
     cells = shown.locator('table[aria-label="tool pose"] tr').first.locator("td span")
     end = time.monotonic() + WAIT / 1000
@@ -112,38 +112,38 @@ def wait_for_tool(page: Page, shown: Page | FrameLocator, T: np.ndarray) -> None
 
 
 def cameras(page: Page) -> list[np.ndarray]:
-    """Grows with each place ``(2, 3)`` that a page which connects anew says its camera is at and looks at."""
-    told: list[np.ndarray] = []
+    """A list that grows with each camera ``(2, 3)``, position and target, that a reconnecting page reports."""
+    reported: list[np.ndarray] = []
 
     def note(frame: str | bytes) -> None:
-        said = msgspec.msgpack.decode(frame) if isinstance(frame, bytes) else {}
-        if said.get("type") == "ViewerCameraMessage":
-            told.append(np.array([said["position"], said["look_at"]]))
+        message = msgspec.msgpack.decode(frame) if isinstance(frame, bytes) else {}
+        if message.get("type") == "ViewerCameraMessage":
+            reported.append(np.array([message["position"], message["look_at"]]))
 
     page.on("websocket", lambda socket: socket.on("framesent", note))
-    return told
+    return reported
 
 
-def wait_for_camera(page: Page, told: list[np.ndarray], place: np.ndarray) -> None:
+def wait_for_camera(page: Page, reported: list[np.ndarray], place: np.ndarray) -> None:
     end = time.monotonic() + WAIT / 1000
-    while not told or np.abs(told[-1] - place).max() > 2e-3:
-        assert time.monotonic() < end, f"the camera is at {told[-1:]}, expected {place}"
+    while not reported or np.abs(reported[-1] - place).max() > 2e-3:
+        assert time.monotonic() < end, f"the camera is at {reported[-1:]}, expected {place}"
         page.wait_for_timeout(50)
 
 
 def wait_for_viewpoint(page: Page) -> np.ndarray:
-    """The camera in the address, once it stays."""
+    """The camera in the URL, once it no longer changes."""
     end = time.monotonic() + WAIT / 1000
     before = None
     while (kept := state_of(page).camera) is None or before is None or not np.array_equal(kept, before):
-        assert time.monotonic() < end, "the address tells of no camera"
+        assert time.monotonic() < end, "the URL contains no camera"
         before = kept
         page.wait_for_timeout(1000)
     return kept
 
 
 def orbit(page: Page, right: int, down: int) -> None:
-    """Drag the floor."""
+    """Orbit the view by dragging the floor."""
     area = page.locator("canvas").first.bounding_box()
     assert area is not None
     x, y = area["x"] + 0.12 * area["width"], area["y"] + 0.7 * area["height"]
@@ -153,11 +153,11 @@ def orbit(page: Page, right: int, down: int) -> None:
     page.mouse.up()
 
 
-def test_link_reload_and_lost_connection(shared: Tab, line: Line, browser: Browser) -> None:
+def test_link_reload_and_lost_connection(shared: Tab, proxy: Proxy, browser: Browser) -> None:
     page = shared.page
-    assert page.url == line.address + "viewer/", "a fresh page has a short address"
+    assert page.url == proxy.address + "viewer/", "a fresh page has a short URL"
     shared.type_number("1 rotating base", "37.25")
-    wait_for_address(page, "s")
+    wait_for_url(page, "s")
     assert np.abs(state_of(page).q - turned(37.25)).max() < 1e-9
 
     page.get_by_role("button", name="2", exact=True).click()
@@ -166,10 +166,10 @@ def test_link_reload_and_lost_connection(shared: Tab, line: Line, browser: Brows
     place = wait_for_viewpoint(page)[:2]
     assert np.abs(place - np.stack(camera.view(body(PIONEER), 1.6))).max() > 0.3
     shared.screenshot("share-orbited")
-    told = cameras(page)  # of the connections to come
+    reported = cameras(page)  # of later connections
 
     page.get_by_role("tab", name="View").click()
-    wait_for_address(page, "tab")
+    wait_for_url(page, "tab")
     with page.expect_event("framenavigated", timeout=WAIT):
         shared.check("Dark page")
     shared.screenshot("share-dark")
@@ -186,7 +186,7 @@ def test_link_reload_and_lost_connection(shared: Tab, line: Line, browser: Brows
     expect(shared.status).to_have_attribute("data-status", "hand")
     shared.wait_for_tool(kin.fk(PIONEER, turned(37.25))[:3, 3], within=0.06)
     expect(page.get_by_role("tab", name="View")).to_have_attribute("aria-selected", "true")
-    wait_for_camera(page, told, place)
+    wait_for_camera(page, reported, place)
 
     page.get_by_role("tab", name="Move").click()
     expect(page.get_by_role("button", name=f"{CLOSED}2", exact=True)).to_be_visible()
@@ -195,10 +195,10 @@ def test_link_reload_and_lost_connection(shared: Tab, line: Line, browser: Brows
     shared.screenshot("share-restored")
     page.evaluate("window.sinceLoad = true")
     with page.expect_websocket(timeout=WAIT):
-        assert line.cut() > 0
+        assert proxy.cut() > 0
     wait_for_tool(page, page, kin.fk(PIONEER, turned(60)))
-    assert page.evaluate("window.sinceLoad"), "it was no reload"
-    wait_for_camera(page, told, place)
+    assert page.evaluate("window.sinceLoad"), "the page was not reloaded"
+    wait_for_camera(page, reported, place)
     assert state_of(page).locks == (1,)
 
     other = browser.new_page(viewport={"width": 1280, "height": 720})
@@ -217,9 +217,9 @@ def test_the_landing_page(browser: Browser, address: str, name: str, width: int,
     page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
-    # An arm of an operator, of which there is no picture.
+    # A robot that an operator added has no picture.
     page.route("**/static/robots/scara.webp", lambda route: route.fulfill(status=404))
-    if name != "light":  # one look at the viewer in place is enough: it is drawn in software
+    if name != "light":  # loading the embedded viewer once is enough: it is rendered in software
         page.route("**/readyz", lambda route: route.fulfill(status=503, body='{"status": "warming"}'))
     page.goto(address)
     expect(page.locator(".card h3 a")).to_have_count(len(ROBOTS))
@@ -243,8 +243,7 @@ def test_the_landing_page(browser: Browser, address: str, name: str, width: int,
     page.get_by_role("button", name="Workspace").click()
     page.get_by_role("button", name="Send").click()
     expect(page.locator("#outcome")).to_contain_text("200")
-    ARTIFACTS.mkdir(exist_ok=True)
-    page.screenshot(path=ARTIFACTS / f"landing-{name}.png", full_page=True)
+    save_picture(page, f"landing-{name}", full_page=True)
 
     if name == "light":
         viewer = page.frame_locator("#frame iframe")
@@ -252,6 +251,6 @@ def test_the_landing_page(browser: Browser, address: str, name: str, width: int,
         page.get_by_role("link", name="UR5").click()
         expect(viewer.locator("input[value='UR5']").first).to_be_visible(timeout=WAIT)
         wait_for_tool(page, viewer, kin.fk(UR5, UR5.q_home))
-        page.screenshot(path=ARTIFACTS / "landing-card.png")
+        save_picture(page, "landing-card")
     assert errors == []
     page.close()

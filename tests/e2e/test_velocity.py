@@ -1,4 +1,4 @@
-"""The lesson "Velocity" in a browser: jogging by mouse and keyboard, a singular pose, small and dark pages."""
+"""The lesson "Velocity" in a browser: jogging by mouse and keyboard, a singular pose, a phone."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_jogging_by_click_by_keyboard_and_by_holding(lesson: Tab) -> None:
     assert tops[0] == tops[1] < tops[2] == tops[3], "six in a row"
 
 
-def test_a_singular_pose_with_what_is_lost(lesson: Tab) -> None:
+def test_a_singular_pose_and_the_lost_direction(lesson: Tab) -> None:
     lesson.page.get_by_role("tab", name="Move").click()
     lesson.type_number("5 axis 5", "0")
     lesson.page.get_by_role("tab", name="Learn").click()
@@ -79,7 +79,7 @@ def test_a_singular_pose_with_what_is_lost(lesson: Tab) -> None:
 
 
 def test_seven_columns_fit_a_phone(phone: Tab) -> None:
-    phone.take(IIWA)
+    phone.select(IIWA)
     open_lesson(phone)
     matrix = phone.page.locator('table[aria-label="Jacobian"]')
     expect(matrix.locator("[data-j]")).to_have_count(42)

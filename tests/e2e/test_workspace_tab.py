@@ -1,4 +1,4 @@
-"""The workspace tab in a real browser: a cloud drawn, cut, clicked on and looked at beside its section."""
+"""The workspace tab in a real browser: drawing a cloud, cutting it, picking a point, and the section plot."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from app.viewer.scene.camera import round_points
 pytestmark = pytest.mark.browser
 
 PIONEER = kin.get_robot("pioneer5")
-FEW = 10_000  # the picture is rendered in software
-COLD = 120_000  # ms; a service that is ready may still be compiling what sections need
+FEW = 10_000  # points; the page is rendered in software
+COLD = 120_000  # ms; a service that is ready may still be compiling the kernels of sections
 
 
 def draw(tab: Tab, points: int) -> None:
@@ -31,7 +31,7 @@ def draw(tab: Tab, points: int) -> None:
 def test_a_cloud_is_drawn_and_a_click_moves_the_arm_to_its_point(tab: Tab) -> None:
     draw(tab, FEW)
     points = Cloud(PIONEER, FEW).slice(0, FEW).points.astype(float)
-    # One on the outside, towards the eye: nothing is before it.
+    # A point on the outside that faces the camera, so that nothing hides it.
     room = [round_points(points[: Cloud(PIONEER, FEW).edges[1]])]
     index = int(np.argmax(points @ np.array([0.5, 0.8, 0.0]) - 2.0 * np.abs(points[:, 2] + 0.1)))
     tab.page.mouse.click(*tab.pixel(PIONEER, points[index], room).tolist())
@@ -49,13 +49,13 @@ def test_a_cloud_is_drawn_and_a_click_moves_the_arm_to_its_point(tab: Tab) -> No
     tab.page.mouse.move(360, 540, steps=4)
     tab.page.mouse.up()
     tab.page.wait_for_timeout(500)
-    assert tab.status.inner_text() == before, "turning the view is no click"
+    assert tab.status.inner_text() == before, "orbiting the view picks no point"
     tab.page.get_by_role("button", name="Cancel").click()
     tab.page.get_by_role("tab", name="View").click()
     tab.page.get_by_role("button", name="Reset view").click()
 
 
-def test_a_cut_and_the_section_beside_the_picture(tab: Tab) -> None:
+def test_a_cut_and_the_section_plot(tab: Tab) -> None:
     draw(tab, FEW)
     tab.choose("Colour by", "Manipulability")
     tab.choose("Cut", "along the arm")
