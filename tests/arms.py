@@ -1,7 +1,7 @@
-"""Which of the built-in arms a test is about, and the random parts of which others are made.
+"""Names of built-in arms, arms with reversed joints, and random parts for made-up arms.
 
-Laws that hold for any arm loop over `kin.builtin_robots()`. What is told of closed forms, equations, singular
-curves and golden inverse kinematics is told of the chapter's arms.
+Laws that hold for any arm are tested on all of `kin.builtin_robots()`; closed forms, equations, singular curves
+and golden inverse kinematics on the arms of the chapter.
 """
 
 import math
@@ -14,12 +14,12 @@ CHAPTER_ARMS = ("pioneer5", "redundant7", "redundant7-craig")
 
 
 def nested(T):
-    """A matrix as a robot has it."""
+    """A matrix as nested tuples, the form of `Robot.base` and `Robot.tool`."""
     return tuple(tuple(row) for row in np.asarray(T).tolist())
 
 
 def reversed_at(robot, joints):
-    """The same arm in space by a table in which `joints` (indices) count the other way round."""
+    """The same arm in space, described by a table in which the joints with these indices are reversed."""
     rows, base, tool, home = list(robot.rows), np.array(robot.base), np.array(robot.tool), list(robot.home)
     for i in joints:
         k, home[i] = robot.joint_rows[i], -home[i]
@@ -39,7 +39,7 @@ def reversed_at(robot, joints):
 
 
 class Draw:
-    """Random parts of arms: lengths and twists of either sign, any angle, any pose."""
+    """Random parts of arms: lengths and twists of either sign, angles, poses."""
 
     def __init__(self, seed):
         self.rng = np.random.default_rng(seed)

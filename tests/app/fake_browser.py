@@ -1,4 +1,4 @@
-"""A browser tab without a browser: speaks viser's websocket protocol and keeps what a page would show."""
+"""A browser tab without a browser: speaks viser's websocket protocol and stores what a page would show."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from websockets.sync.client import connect
 
 from kin.transforms import from_position_wxyz, wxyz_from_rotation
 
-ANSWER = 1.5  # s, for what was sent to be answered on a busy machine
+ANSWER = 1.5  # s until a message is answered on a busy machine
 
 
 class FakeBrowser:
-    """One visitor, of viser's own port or of any address, which may need more `options` to connect.
+    """One visitor of viser's own port or of any URL, which may need more `options` to connect.
 
-    `pump` reads messages; everything shown is in `gui`, `values`, `poses` and `visible`. `memory` is what the page
-    answers when asked what it remembers, `kept` what it was told to remember. `camera` is where it was sent to;
-    unlike a real page it tells so only when asked to `look`.
+    `pump` reads messages; everything shown is in `gui`, `values`, `poses` and `visible`. `memory` is the content
+    of the page's storage, `kept` what the service has stored there. `camera` is where the service has moved it;
+    unlike a real page, this one reports it only with `look`.
     """
 
     def __init__(
@@ -49,8 +49,8 @@ class FakeBrowser:
         self.visible: dict[str, bool] = {}
         self.nodes: dict[str, dict[str, Any]] = {}
         self.log: list[dict[str, Any]] = []
-        self._owed = False  # whether something was sent that may yet be answered
-        self.answers = True  # whether it tells what its storage holds, as a page in front does
+        self._owed = False  # whether a message was sent that may still be answered
+        self.answers = True  # whether the page reports its storage, as a page in the foreground does
         self.camera: dict[str, Any] = {"position": (3, 3, 3), "look_at": (0, 0, 0), "up_direction": (0, 0, 1)}
         self._size = {"image_width": width, "image_height": height}
         self.look()
@@ -107,7 +107,7 @@ class FakeBrowser:
         return self.local(self.gizmo)
 
     def tool_pose(self) -> np.ndarray:
-        """The gripper of the arm, by composing every node above it."""
+        """Pose of the gripper, composed from every node above it."""
         name = next(n for n in self.nodes if n.endswith("/gripper") and not n.startswith(self.gizmo))
         T = np.eye(4)
         parts = name.strip("/").split("/")
@@ -119,7 +119,7 @@ class FakeBrowser:
         pose = self.poses.get(name, {})
         return from_position_wxyz(pose.get("position", (0, 0, 0)), pose.get("wxyz", (1, 0, 0, 0)))
 
-    # What the visitor does
+    # Actions of the visitor
 
     def set(self, label: str, value: Any) -> None:
         uuid = self.element(label)
@@ -127,7 +127,7 @@ class FakeBrowser:
         self.send("GuiUpdateMessage", uuid=uuid, updates={"value": value})
 
     def choose(self, robot: str) -> None:
-        """Show another robot, by its name, and wait until it stands there."""
+        """Choose another robot by its name, and wait until it is shown."""
         if self.value("Robot") == robot:
             return
         before = self.gizmo
@@ -154,9 +154,17 @@ class FakeBrowser:
         self.send("TransformControlsDragEndMessage", name=self.gizmo, owner=self.nodes[self.gizmo]["owner"])
 
     def look(self, **camera: Any) -> None:
-        """Tell where the camera is: where it was sent to, but for what is given."""
-        told = {"wxyz": (1, 0, 0, 0), "fov": 1.3, "near": 0.01, "far": 1000, **self._size, **self.camera, **camera}
-        self.send("ViewerCameraMessage", **told)
+        """Report the camera: where the service has moved it, except for the arguments given."""
+        place = {
+            "wxyz": (1, 0, 0, 0),
+            "fov": 1.3,
+            "near": 0.01,
+            "far": 1000,
+            **self._size,
+            **self.camera,
+            **camera,
+        }
+        self.send("ViewerCameraMessage", **place)
 
     def click(self, name: str) -> None:
         """Click a node of the scene."""
@@ -182,7 +190,7 @@ class FakeBrowser:
             self._read(left)
 
     def settle(self, quiet: float = 0.3, timeout: float = 10.0) -> None:
-        """Read messages until none came for `quiet` seconds; the first answer to what was sent may take longer."""
+        """Read messages until none arrives for `quiet` seconds; the first answer may take longer."""
         end = time.monotonic() + timeout
         self._owed, patience = False, ANSWER if self._owed else quiet
         while self._read(patience):
@@ -234,7 +242,7 @@ class FakeBrowser:
                 if m["name"] in self.nodes:
                     self.nodes[m["name"]]["props"].update(m["updates"])
             case "RemoveSceneNodeMessage":
-                # Like the real page, poses stay behind.
+                # As in the real page, the poses of removed nodes remain.
                 self.nodes = {
                     n: v for n, v in self.nodes.items() if n != m["name"] and not n.startswith(m["name"] + "/")
                 }

@@ -1,4 +1,4 @@
-"""Serve an app on a real port for the length of a test, with uvicorn set up as in production."""
+"""Serve an app on a real port during a test, with uvicorn configured as in production."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from app.service.server import server_config
 
 @contextmanager
 def serve(app: FastAPI) -> Iterator[int]:
-    """The port `app` listens on; at the end the server's thread is gone."""
+    """Yields the port that `app` listens on, and stops the server's thread at the end."""
     listener = socket.create_server(("127.0.0.1", 0))
     server = uvicorn.Server(server_config(app))
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
@@ -32,8 +32,8 @@ def serve(app: FastAPI) -> Iterator[int]:
 
 
 def wait_for(condition, seconds: float = 10.0) -> None:
-    """Wait until `condition()` is true; fails the test if it does not become so."""
+    """Wait until `condition()` is true; fails the test after `seconds`."""
     deadline = time.monotonic() + seconds
     while not condition():
-        assert time.monotonic() < deadline, f"not so within {seconds} s"
+        assert time.monotonic() < deadline, f"the condition was not met within {seconds} s"
         time.sleep(0.01)

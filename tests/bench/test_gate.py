@@ -1,4 +1,4 @@
-"""The regression gate: our code against a floor of the same run, and the gate itself against slowed code."""
+"""The regression gate: our code relative to a floor of the same run; and the gate fails for slowed code."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_nothing_has_become_slow():
 
 
 def test_the_gate_notices_slow_code(monkeypatch):
-    """Ten times the work must fail every gate: one that does not is set too high, its code has become faster."""
+    """Ten times the work has to fail every gate: a gate that passes is set too high, as its code became faster."""
     slow = replace(KINBOARD, enter=lambda task: [gate.slowed(c, 10) for c in KINBOARD.enter(task)])
     monkeypatch.setattr("app.bench.run.KINBOARD", slow)
     verdicts = gate.judge(run(replace(gate.quick_settings(), rounds=4)))

@@ -1,4 +1,4 @@
-"""Robot files: what they mean, and how a wrong one is refused."""
+"""Robot files: their meaning, and the errors of wrong ones."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ q = [45, 125]
 """
 
 
-def test_units_are_the_files_own():
+def test_a_file_names_its_units():
     robot = kin.parse_robot(GOOD)
     assert robot.n == 2
     assert robot.rows[0].alpha == pytest.approx(-math.pi / 2)
@@ -56,7 +56,7 @@ def test_units_are_the_files_own():
     assert kin.fk(robot, [0, 0])[:3, 3] == pytest.approx([-0.05, 0.05, 0.6], abs=1e-12)
 
 
-def test_metres_and_radians_too():
+def test_metres_and_radians():
     text = GOOD.replace('length = "mm", angle = "deg"', 'length = "cm", angle = "rad"')
     text = text.replace("[-90, 180]", "[-1.5, 3]").replace("q = [45, 125]", "q = [1, 125]")
     robot = kin.parse_robot(text)
@@ -65,7 +65,7 @@ def test_metres_and_radians_too():
     assert robot.lower[0] == -1.5
 
 
-def test_missing_limits_and_home_get_sensible_ones():
+def test_missing_limits_and_home_get_defaults():
     text = GOOD.replace("limits = [-90, 180]\n", "").replace("limits = [0, 250]\n", "").split("[home]")[0]
     robot = kin.parse_robot(text)
     assert robot.lower == pytest.approx([-math.pi, 0])
@@ -104,7 +104,7 @@ def test_missing_limits_and_home_get_sensible_ones():
         ('id = "bench"', 'id = "bench', "file", "TOML"),
     ],
 )  # fmt: skip
-def test_a_wrong_file_is_refused_by_name(old, new, field, valid, tmp_path):
+def test_an_error_names_the_field_and_what_is_valid(old, new, field, valid, tmp_path):
     assert old in GOOD
     path = tmp_path / "arm.toml"
     path.write_text(GOOD.replace(old, new), encoding="utf-8")
@@ -123,19 +123,19 @@ def test_files_that_cannot_be_read(tmp_path):
         kin.load_robot(tmp_path / "latin.toml")
 
 
-def test_a_mark_of_windows_editors_is_no_error(tmp_path):
+def test_a_byte_order_mark_is_accepted(tmp_path):
     (tmp_path / "arm.toml").write_text(GOOD, encoding="utf-8-sig")
     assert kin.load_robot(tmp_path / "arm.toml") == kin.parse_robot(GOOD)
 
 
 @pytest.mark.parametrize("text", ["x = " + "9" * 5000, "x = " + "[" * 100_000], ids=["digits", "brackets"])
-def test_toml_without_end_is_refused(text):
+def test_endless_toml_is_refused(text):
     with pytest.raises(RobotFileError, match="valid TOML") as caught:
         kin.parse_robot(text, "arm.toml")
     assert len(str(caught.value)) < 300
 
 
-def test_rows_are_needed_and_not_without_end():
+def test_the_number_of_rows_is_limited():
     head = GOOD.split("[[rows]]")[0]
     for text in (head, head + "rows = []", head + '[[rows]]\nkind = "fixed"', head + "[[rows]]\nname='%d'\n" * 40):
         with pytest.raises(RobotFileError) as caught:
@@ -153,7 +153,7 @@ def test_two_files_with_one_id(tmp_path):
 def test_built_in_files_are_named_after_their_robots():
     ids = list(kin.builtin_robots())
     assert sorted(path.stem for path in BUILTIN.glob("*.toml")) == sorted(ids)
-    assert ids[:3] == list(CHAPTER_ARMS)  # a visitor meets these first
+    assert ids[:3] == list(CHAPTER_ARMS)  # these come first in every list
     assert ids[3:] == sorted(ids[3:])
     for robot in kin.builtin_robots().values():
         assert robot.in_limits(robot.q_home)
@@ -184,7 +184,7 @@ def test_random_configurations_stay_inside():
     assert not robot.in_limits(q + 10).any()
 
 
-def test_reach_bounds_every_pose_and_is_endless_without_stops():
+def test_reach_bounds_every_pose_and_is_infinite_without_limits():
     for robot in (*kin.builtin_robots().values(), kin.parse_robot(GOOD)):
         q = robot.random_q(np.random.default_rng(1), 5000)
         origin = robot.T_world_base[:3, 3]

@@ -1,4 +1,4 @@
-"""Which printed equations are right, which are wrong, and by how much."""
+"""Printed equations of the chapter: which are right, which are wrong, and by how much."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_corrected_equals_the_dh_product(equation):
 
 @pytest.mark.parametrize("equation", EVALUABLE, ids=label)
 def test_verdict_and_size_of_the_error(equation):
-    """Right ones are right to rounding error; wrong ones come near their known maximum and never exceed it."""
+    """Right ones hold to rounding error; wrong ones approach their maximum and never exceed it."""
     robot = kin.get_robot(equation.robot_id)
     row = difference(equation, robot.random_q(np.random.default_rng(equation.number), 20_000))
     worst = float(np.abs(row.difference).max())
@@ -88,7 +88,7 @@ def test_verdict_and_size_of_the_error(equation):
 
 
 @pytest.mark.parametrize("equation", [e for e in EVALUABLE if e.verdict == "wrong"], ids=label)
-def test_largest_difference_is_where_and_what_is_said(equation):
+def test_largest_difference_has_the_listed_place_and_size(equation):
     robot = kin.get_robot(equation.robot_id)
     q = np.radians(equation.largest_at)
     assert robot.in_limits(q, 1e-9)
@@ -98,7 +98,7 @@ def test_largest_difference_is_where_and_what_is_said(equation):
 
 @pytest.mark.parametrize("equation", [e for e in EVALUABLE if e.verdict == "wrong"], ids=label)
 def test_a_search_inside_the_limits_finds_that_difference_and_no_larger_one(equation):
-    """The search knows nothing of `largest_at`, so the figure is the maximum over all poses."""
+    """The search does not use `largest_at`, so the figure is the maximum over all poses."""
     robot = kin.get_robot(equation.robot_id)
 
     def size(q):
@@ -113,7 +113,7 @@ AXES = [e for e in EVALUABLE if e.verdict == "wrong" and e.entry[0] != "p"]
 
 
 @pytest.mark.parametrize("equation", AXES, ids=label)
-def test_the_largest_turn_is_where_and_what_is_said_and_no_search_finds_a_larger_one(equation):
+def test_the_largest_turn_has_the_listed_place_and_size_and_is_the_largest(equation):
     robot = kin.get_robot(equation.robot_id)
     q = np.radians(equation.worst_at)
     assert robot.in_limits(q, 1e-9)
@@ -127,7 +127,7 @@ def test_the_largest_turn_is_where_and_what_is_said_and_no_search_finds_a_larger
     assert maximum(robot, turn) == pytest.approx(equation.turn, abs=1e-4)  # the peak at 180° is a sharp one
 
 
-def test_a_turn_is_the_angle_between_the_axis_and_what_is_printed():
+def test_a_turn_is_the_angle_between_the_axis_and_the_printed_vector():
     T = np.eye(4)
     assert chapter.turned(T, (0, 2), np.float64(1.0)) == pytest.approx(math.pi / 4)
     assert chapter.turned(T, (2, 2), np.float64(-0.1)) == pytest.approx(math.pi)
@@ -136,8 +136,8 @@ def test_a_turn_is_the_angle_between_the_axis_and_what_is_printed():
 
 
 @pytest.mark.parametrize(("robot_id", "largest"), [("pioneer5", 1.2346318), ("redundant7", 3.0562825)])
-def test_printed_matrix_is_no_rotation(robot_id, largest):
-    """The misprints show without any reference: RᵀR is not I, by as much as this inside the limits."""
+def test_printed_matrix_is_not_a_rotation(robot_id, largest):
+    """The misprints show without a reference: RᵀR differs from I, by this much inside the limits."""
     robot = kin.get_robot(robot_id)
     assert maximum(robot, lambda q: defect(chapter.matrix(robot_id, q))) == pytest.approx(largest, abs=1e-6)
     q = robot.random_q(np.random.default_rng(0), 1000)

@@ -1,4 +1,4 @@
-"""Forward kinematics, Jacobian and manipulability: golden data, laws over batch shapes, an independent product."""
+"""Forward kinematics, Jacobian and manipulability: golden data, batch shapes, a plain reference implementation."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def move(x=0.0, z=0.0):
 
 
 def product(robot, q):
-    """The DH product written out, as slow and plain as can be: every frame, then the tool."""
+    """The DH product as plain as possible: every frame, then the tool."""
     values = iter(q)
     T = np.array(robot.base)
     frames = []
@@ -98,7 +98,7 @@ def test_golden_poses_and_frames(robot_id, golden):
 
 
 @given(robot=robots(), data=st.data())
-def test_any_arm_equals_the_product_written_out(robot, data):
+def test_any_arm_equals_the_plain_product(robot, data):
     q = np.array(data.draw(st.lists(st.floats(-3, 3), min_size=robot.n, max_size=robot.n)))
     frames, T = product(robot, q)
     assert kin.fk(robot, q) == pytest.approx(T, abs=1e-12)
@@ -107,7 +107,7 @@ def test_any_arm_equals_the_product_written_out(robot, data):
 
 @given(robot=robots(), data=st.data())
 def test_jacobian_equals_central_differences(robot, data):
-    """Columns of J: how the pose moves, in the base frame and in the tool's own."""
+    """Columns of J in the base frame and in the tool frame."""
     q = np.array(data.draw(st.lists(st.floats(-3, 3), min_size=robot.n, max_size=robot.n)))
     h = 1e-5
     J = kin.jacobian(robot, q)
@@ -153,21 +153,21 @@ def test_poses_are_rigid(robot_id):
 
 
 @given(robot=robots(), data=st.data())
-def test_a_batch_gives_the_bits_of_one(robot, data):
-    """Both sides of a block's end, and angles too wide for the polynomials among others."""
+def test_a_batch_gives_the_same_bits_as_single_calls(robot, data):
+    """Sizes on both sides of a block boundary; angles beyond the range of the polynomials."""
     q = robot.random_q(np.random.default_rng(data.draw(st.integers(0, 99))), data.draw(st.integers(1, 140)))
     q[:: data.draw(st.integers(1, 70))] *= data.draw(st.sampled_from([1.0, 1e5, 1e9]))
     batch, points = kin.fk(robot, q), kin.fk_positions(robot, q)
     for row, T in zip(q, batch, strict=True):
         assert np.array_equal(kin.fk(robot, row), T)
-    scale = 10.0 + np.abs(q).max()  # metres, of a prismatic joint
+    scale = 10.0 + np.abs(q).max()  # metres of a prismatic joint
     assert np.abs(points - batch[:, :3, 3]).max() <= 1e-14 * scale
     assert np.array_equal(points[-1], kin.fk_positions(robot, q[-1]))
 
 
 @pytest.mark.parametrize("robot_id", ROBOTS)
 @pytest.mark.parametrize("angle", [99_999.0, 1e6, 1e15])
-def test_many_turns_are_as_exact_as_none(robot_id, angle):
+def test_angles_of_many_turns_are_as_accurate(robot_id, angle):
     robot = kin.get_robot(robot_id)
     q = np.where(robot.revolute, angle, 0.1)
     assert kin.fk(robot, q) == pytest.approx(product(robot, q)[1], abs=1e-9 if angle > 1e6 else 1e-14)
@@ -185,7 +185,7 @@ def test_one_bad_value_in_a_batch_is_found(function, index, value):
     assert caught.value.field == f"q[{index[0]}][{index[1]}]"
 
 
-def test_all_kinds_of_arrays_are_taken():
+def test_arrays_of_any_type_and_layout_are_accepted():
     robot = kin.get_robot("pioneer5")
     q = np.array([1, 2, 1, 0, 1])
     wanted = kin.fk(robot, q.astype(float))
@@ -238,7 +238,7 @@ def test_misuse_of_a_choice_names_what_is_valid(value):
         kin.manipulability(robot, robot.q_home, part=value)
 
 
-def test_whole_numbers_beyond_64_bits_are_still_numbers():
+def test_integers_beyond_64_bits_are_accepted():
     robot = kin.get_robot("pioneer5")
     assert np.array_equal(kin.fk(robot, [2**70, 0, 0, 0, 0]), kin.fk(robot, [2.0**70, 0, 0, 0, 0]))
 
@@ -260,7 +260,7 @@ def test_manipulability_vanishes_where_the_arm_is_singular():
     assert kin.manipulability(arm, arm.q_home) > 1e-3
 
 
-def test_pioneer_determinant_has_its_closed_form():
+def test_determinant_of_the_pioneer_arm_equals_its_closed_form():
     """det of the 5 × 5 Jacobian of point and approach direction: −a2 d4 s3 (a1 + a2c2 + d4c23) s5, signed."""
     robot = kin.get_robot("pioneer5")
     for q in robot.random_q(np.random.default_rng(8), 200):
@@ -272,7 +272,7 @@ def test_pioneer_determinant_has_its_closed_form():
         assert np.linalg.det(J) == pytest.approx(wanted, rel=1e-9, abs=1e-15)
 
 
-def test_many_threads_get_the_serial_answers():
+def test_threads_get_the_same_results_as_serial_calls():
     robot = kin.get_robot("redundant7")
     batches = [robot.random_q(np.random.default_rng(i), 500) for i in range(40)]
 

@@ -1,4 +1,4 @@
-"""Homes of files that name none: inside the limits, off the singularities, the same every time."""
+"""Default home configurations: inside the limits, away from singularities, reproducible."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ HEAD = 'id = "x"\nname = "x"\nsource = "x"\nconvention = "standard"\nunits = { l
 
 
 @pytest.mark.parametrize("robot_id", kin.builtin_robots())
-def test_every_arm_gets_a_pose_it_can_move_from(robot_id):
+def test_the_default_home_of_every_arm_is_not_singular(robot_id):
     robot = kin.get_robot(robot_id)
     home = np.array(default_home(robot))
     assert robot.in_limits(home)
@@ -27,13 +27,13 @@ def test_every_arm_gets_a_pose_it_can_move_from(robot_id):
     assert tuple(home.tolist()) == default_home(replace(robot))
 
 
-def test_a_middle_that_is_good_is_kept():
+def test_the_middle_of_the_limits_is_preferred():
     text = HEAD + "[[rows]]\na = 1\nlimits = [0, 90]\n[[rows]]\na = 1\nlimits = [30, 150]\n"
     assert kin.parse_robot(text).home == pytest.approx((math.pi / 4, math.pi / 2))
 
 
-def test_a_stretched_middle_is_bent_upward():
-    """Two links in a vertical plane: at zero they are one line; of the bent poses the highest is taken."""
+def test_a_stretched_arm_is_bent_upward():
+    """Two links in a vertical plane: collinear at zero; the highest bent pose is chosen."""
     text = HEAD + "[[rows]]\nalpha = 90\n[[rows]]\na = 1\n[[rows]]\na = 1\n"
     robot = kin.parse_robot(text)
     assert robot.home == pytest.approx((0.0, 0.0, math.pi / 4))
@@ -41,12 +41,12 @@ def test_a_stretched_middle_is_bent_upward():
     assert all(joint.limits == (-math.pi, math.pi) for joint in robot.joints)
 
 
-def test_slides_start_half_way():
+def test_prismatic_joints_start_in_the_middle():
     text = HEAD + '[[rows]]\nkind = "prismatic"\nalpha = 90\n[[rows]]\nkind = "prismatic"\nlimits = [1, 2]\n'
     assert kin.parse_robot(text).home == (0.5, 1.5)
 
 
-def test_a_home_that_is_given_is_taken():
+def test_an_explicit_home_is_used():
     text = HEAD + "[[rows]]\na = 1\n[[rows]]\na = 1\n[home]\nq = [0, 0]\n"
     assert kin.parse_robot(text).home == (0.0, 0.0)
 
@@ -65,7 +65,7 @@ rows = st.lists(
 
 @given(rows=rows, unlimited=st.booleans())
 def test_any_chain_has_a_home(rows, unlimited):
-    """Also one whose joints move nothing, or without stops."""
+    """Including arms whose joints move no point or have no limits."""
     limits = None if unlimited else (-2.0, 1.0)
     joints = tuple(Joint(f"{i}", 0.0, d, a, alpha, kind, limits) for i, (d, a, alpha, kind) in enumerate(rows))
     robot = Robot("x", "x", "x", "standard", joints, (0.0,) * len(joints))
@@ -74,7 +74,7 @@ def test_any_chain_has_a_home(rows, unlimited):
     assert np.isfinite(home).all()
 
 
-def test_many_joints_do_not_make_many_candidates():
+def test_the_number_of_candidates_is_bounded():
     joints = tuple(Joint(f"{i}", a=0.1, alpha=0.5 * (-1) ** i, limits=(-1.0, 1.0)) for i in range(32))
     robot = Robot("x", "x", "x", "standard", joints, (0.0,) * 32)
     assert len(candidates(robot)[0]) < 1000

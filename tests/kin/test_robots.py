@@ -1,4 +1,4 @@
-"""The built-in arms against poses that other libraries computed, from joint origins instead of DH rows."""
+"""The built-in arms compared with poses of other libraries, computed from joint origins instead of DH rows."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ def poses(robot_id):
 
 
 def test_every_built_in_arm_has_golden_poses():
-    assert [*CHAPTER_ARMS, *sorted(GOLDEN)] == list(ROBOTS)  # the chapter's have golden files of their own
+    assert [*CHAPTER_ARMS, *sorted(GOLDEN)] == list(ROBOTS)  # those of the chapter have their own golden files
 
 
 @pytest.mark.parametrize("robot_id", GOLDEN)
-def test_poses_are_those_of_another_library(robot_id):
+def test_poses_equal_those_of_another_library(robot_id):
     robot = kin.get_robot(robot_id)
     q, T = poses(robot_id)
     assert len(q) >= 20
@@ -37,7 +37,7 @@ def test_poses_are_those_of_another_library(robot_id):
 
 @pytest.mark.parametrize("robot_id", GOLDEN)
 def test_the_jacobian_is_the_derivative_of_the_golden_poses(robot_id):
-    """J dq against the difference of the poses on either side, whose mean is the golden pose to second order."""
+    """J dq equals the difference of the poses on both sides, whose mean is the golden pose to second order."""
     robot = kin.get_robot(robot_id)
     rng = np.random.default_rng(3)
     for q, T in zip(*poses(robot_id), strict=True):
@@ -50,8 +50,8 @@ def test_the_jacobian_is_the_derivative_of_the_golden_poses(robot_id):
 
 
 @pytest.mark.parametrize("robot_id", ROBOTS)
-def test_home_is_a_good_place_to_start(robot_id):
-    """Off the stops, off every singularity, and above the floor the arm stands on."""
+def test_home_is_away_from_limits_singularities_and_the_floor(robot_id):
+    """Away from limits and singularities, and above the floor."""
     robot = kin.get_robot(robot_id)
     margin = np.minimum(robot.q_home - robot.lower, robot.upper - robot.q_home) / (robot.upper - robot.lower)
     assert margin.min() > 0.05
@@ -60,7 +60,7 @@ def test_home_is_a_good_place_to_start(robot_id):
 
 
 @pytest.mark.parametrize("robot_id", ROBOTS)
-def test_descriptions_teach_in_two_sentences(robot_id):
+def test_descriptions_have_two_sentences(robot_id):
     robot = kin.get_robot(robot_id)
     assert robot.description.count(". ") == 1
     assert robot.description.endswith(".")

@@ -1,4 +1,4 @@
-"""Quaternions, angles and the checks a target goes through."""
+"""Quaternions, rotation angles and the checks of targets."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def about_z(angle):
 
 
 @given(components)
-def test_quaternions_come_back(q):
+def test_quaternions_round_trip(q):
     q = np.array(q) / np.linalg.norm(q)
     R = rotation_from_wxyz(q)
     assert pytest.approx(np.eye(3), abs=1e-14) == R.T @ R
@@ -41,7 +41,7 @@ def test_quaternions_come_back(q):
 
 
 @pytest.mark.parametrize("axis", np.vstack([np.eye(3), [[0.6, 0.8, 0], [0.48, 0.6, 0.64]]]))
-def test_half_turns_come_back(axis):
+def test_half_turns_round_trip(axis):
     R = 2 * np.outer(axis, axis) - np.eye(3)
     q = wxyz_from_rotation(R)
     assert abs(q[0]) < 1e-12
@@ -49,7 +49,7 @@ def test_half_turns_come_back(axis):
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-9, 1e-3, 1.0, 3.0, math.pi - 1e-9, math.pi])
-def test_angles_are_accurate_from_nothing_to_half_a_turn(angle):
+def test_angles_are_accurate_from_zero_to_half_a_turn(angle):
     start = rotation_from_wxyz(np.array([0.3, -0.2, 0.9, 0.1]))
     assert rotation_angle(start, start @ about_z(angle)) == pytest.approx(angle, rel=1e-6, abs=1e-15)
     assert vector_angle(about_z(angle)[:, 0], np.eye(3)[:, 0]) == pytest.approx(angle, rel=1e-6, abs=1e-15)
@@ -63,7 +63,7 @@ def test_an_approach_direction_becomes_a_frame(direction):
     assert R[:, 2] == pytest.approx(np.array(direction) / np.linalg.norm(direction), abs=1e-12)
 
 
-def test_a_target_rounded_by_its_sender_is_made_orthonormal():
+def test_a_rounded_target_is_made_orthonormal():
     T = from_position_wxyz([0.1, 0.2, 0.3], [0.3, -0.2, 0.9, 0.1])
     R = as_transform(np.round(T, 7))[:3, :3]
     assert np.abs(R.T @ R - np.eye(3)).max() < 1e-14
@@ -84,7 +84,7 @@ def test_a_target_rounded_by_its_sender_is_made_orthonormal():
         (lambda T: "up", "target"),
     ],
 )
-def test_what_is_not_a_pose_is_refused(change, field):
+def test_an_invalid_pose_is_refused(change, field):
     with pytest.raises(InputError) as caught:
         as_transform(change(from_position_wxyz([0.1, 0.2, 0.3], [1, 0, 0, 0])))
     assert caught.value.field.startswith(field)

@@ -1,4 +1,4 @@
-"""What is loaded or compiled before anybody asks."""
+"""Warm-up: kernels that are loaded or compiled in advance."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import kin
 from kin import warmup
 
 
-def test_after_the_rest_no_question_needs_another_kernel():
-    """Counted in a process of its own, in which nothing else has asked for kernels."""
+def test_after_warm_up_rest_no_call_compiles_a_kernel():
+    """In a separate process, in which nothing else has loaded kernels."""
     program = """
 import sys
 import kin
@@ -46,7 +46,7 @@ assert after == before, {k: n for k, n in after.items() if before.get(k) != n}
     assert done.returncode == 0, done.stderr
 
 
-def test_the_rest_asks_between_kernels_whether_to_stop(monkeypatch):
+def test_warm_up_rest_can_be_cancelled_between_kernels(monkeypatch):
     steps: list[int] = []
     monkeypatch.setattr(warmup, "_rest", lambda: (lambda i=i: steps.append(i) for i in range(9)))
     kin.warm_up_rest(lambda: len(steps) == 3)
@@ -55,7 +55,7 @@ def test_the_rest_asks_between_kernels_whether_to_stop(monkeypatch):
     assert steps[3:] == list(range(9))
 
 
-def test_what_has_to_be_compiled_is_compiled_for_all_arms_before_ready(monkeypatch):
+def test_kernels_of_all_arms_are_compiled_before_the_service_is_ready(monkeypatch):
     asked: list[tuple[str, str]] = []
     arms = [robot.id for robot in warmup.one_of_each_family()]
     assert len(arms) >= 6

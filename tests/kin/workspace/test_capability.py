@@ -1,4 +1,4 @@
-"""Capability maps: against inverse kinematics asked one by one, whatever the order of blocks, limits and locks."""
+"""Capability maps: compared with `solve_ik`; independent of the order of blocks; limits and locks."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from kin.transforms import frame_from_approach
 from kin.workspace.capability import blocks as capability
 from kin.workspace.capability.sphere import DESIGNS, spherical_design
 
-TILTED = screw_x(0.03, 0.4)  # a tool beside the last axis, and oblique to it
+TILTED = screw_x(0.03, 0.4)  # a tool off the last axis, and oblique to it
 
 
 def tilted(robot_id):
@@ -54,7 +54,7 @@ def target(point, direction):
 
 
 def asked(found, rng, count, **limits):
-    """(reachable, approachable) of voxels drawn at random: the map's answer and `solve_ik`'s, pair by pair."""
+    """(reachable, approachable) of random voxels: pairs of the map's answer and that of `solve_ik`."""
     robot, grid = found.grid.robot, found.grid
     reachable, approachable = dense(found)
     for index in rng.permutation([*np.ndindex(grid.shape)])[:count]:
@@ -102,11 +102,11 @@ def sphere_mean(powers):
     return math.prod(odd) / math.prod(range(1, sum(powers) + 2, 2))
 
 
-# Against inverse kinematics
+# Comparison with inverse kinematics
 
 
 @pytest.mark.parametrize("name", ["pioneer5", "puma560", "ur5", "scara", "redundant7", "redundant7-craig"])
-def test_a_closed_form_map_is_what_inverse_kinematics_says_everywhere(name):
+def test_a_closed_form_map_equals_inverse_kinematics_everywhere(name):
     found = mapped(name)
     assert found.grid.method == "closed form"
     pairs = np.array([*asked(found, np.random.default_rng(1), 25)])
@@ -115,7 +115,7 @@ def test_a_closed_form_map_is_what_inverse_kinematics_says_everywhere(name):
 
 
 @pytest.mark.parametrize(("name", "method"), [("tilted puma560", "sweep"), ("panda", "search")])
-def test_other_maps_claim_nothing_that_is_not_and_miss_little(name, method):
+def test_other_maps_have_no_false_positives_and_few_misses(name, method):
     found = mapped(name, 5)
     assert found.grid.method == method
     claimed, true = np.array([*asked(found, np.random.default_rng(2), 16)]).T
@@ -123,9 +123,9 @@ def test_other_maps_claim_nothing_that_is_not_and_miss_little(name, method):
     assert claimed.sum() > 0.97 * true.sum() > 0
 
 
-def test_what_a_singular_target_leaves_free_is_put_inside_the_limits():
-    # A column of voxels on axis 1: straight down the wrist centre is on that axis too, and θ1 is free. What a
-    # batch of branches takes for it, home, is outside of these limits.
+def test_the_redundancy_of_a_singular_target_is_resolved_inside_the_limits():
+    # A column of voxels on axis 1: with the tool straight down the wrist centre is on that axis too, and θ1 is
+    # arbitrary. The value that a batch of branches chooses, that of home, is outside of these limits.
     robot = kin.get_robot("irb120")
     limits = [(0.5, 1.0), None, None, None, None, None]
     grid = kin.capability_grid(robot, resolution=7, directions=12, limits=limits)
@@ -137,13 +137,13 @@ def test_what_a_singular_target_leaves_free_is_put_inside_the_limits():
 
 
 def in_limits(robot, q):
-    """Which rows have a whole-turn image inside the limits, all joints turning."""
+    """Which rows have a whole-turn image inside the limits; all joints are revolute."""
     low = q + 2 * math.pi * np.ceil((robot.lower - q) / (2 * math.pi))
     return (low <= robot.upper).all(axis=1)
 
 
 @pytest.mark.parametrize("name", ["redundant7", "redundant7-craig"])
-def test_manipulability_is_looked_for_at_several_arm_angles_or_rolls(name):
+def test_manipulability_is_evaluated_at_several_arm_angles_or_rolls(name):
     found = mapped(name)
     robot = found.grid.robot
     ratios = []
@@ -154,7 +154,7 @@ def test_manipulability_is_looked_for_at_several_arm_angles_or_rolls(name):
             q = np.concatenate([kin.ik_branches(robot, T @ screw_z(angle, 0.0)) for angle in angles])
         else:
             q = np.concatenate([kin.ik_branches(robot, T, angle) for angle in angles])
-            q[..., 6] = np.where(np.isnan(q[..., 0]), math.nan, 0.0)  # it rolls the tool, which changes nothing
+            q[..., 6] = np.where(np.isnan(q[..., 0]), math.nan, 0.0)  # rolling the tool changes nothing
         q = q[~np.isnan(q[..., 0])]
         ratios.append(found.manipulability[k] / kin.manipulability(robot, q[in_limits(robot, q)]).max())
     assert len(ratios) > 20
@@ -169,12 +169,12 @@ def test_manipulability_is_the_best_of_all_branches(name):
         T = np.array([target(found.centres[k], d) for d in found.grid.directions[found.approachable[k]]])
         q = kin.ik_branches(robot, T).reshape(-1, robot.n)
         q = q[~np.isnan(q[:, 0])]
-        q[:, -1:] = np.where(name == "puma560", 0.0, q[:, -1:])  # it rolls the tool, which changes nothing
+        q[:, -1:] = np.where(name == "puma560", 0.0, q[:, -1:])  # rolling the tool changes nothing
         best = kin.manipulability(robot, q[in_limits(robot, q)]).max()
         assert found.manipulability[k] == pytest.approx(best, rel=1e-6)
 
 
-# The arithmetic of maps
+# Grid and blocks
 
 
 def same(a, b):
@@ -203,7 +203,7 @@ def test_blocks_in_any_order_thread_and_copy_give_the_same_bits():
     assert part.index.tolist() == grid.index(blocks[1].numbers).tolist()
 
 
-def test_blocks_cut_elsewhere_give_the_same_voxels(monkeypatch):
+def test_blocks_of_another_size_give_the_same_voxels(monkeypatch):
     for name in ("puma560", "panda"):
         grid = kin.capability_grid(arm(name), resolution=4, directions=12)
         whole = kin.capability_join(grid, [kin.capability_block(grid, 0)])
@@ -215,7 +215,7 @@ def test_blocks_cut_elsewhere_give_the_same_voxels(monkeypatch):
             assert same(whole, kin.capability_join(fine, blocks))
 
 
-def test_a_map_says_where_its_voxels_are():
+def test_a_map_knows_the_places_of_its_voxels():
     found = mapped("puma560")
     grid = found.grid
     assert max(grid.shape) == 7
@@ -226,7 +226,7 @@ def test_a_map_says_where_its_voxels_are():
     assert found.share.dtype == found.manipulability.dtype == np.float32
     assert (found.share == found.approachable.mean(axis=1).astype(np.float32)).all()
     assert found.volume == pytest.approx(len(found.index) * grid.voxel**3)
-    # The voxels fill the workspace's box and no more.
+    # The voxels fill the bounding box of the workspace and no more.
     facts = kin.workspace_facts(grid.robot, volume=False)
     low = np.array([span.least.value for span in (facts.x, facts.y, facts.z)])
     high = np.array([span.largest.value for span in (facts.x, facts.y, facts.z)])
@@ -247,7 +247,7 @@ def test_a_finer_map_has_the_volume_of_the_workspace():
 # Limits and locks
 
 
-def test_limits_and_locks_are_those_of_the_question():
+def test_limits_and_locks_are_respected():
     robot = kin.get_robot("puma560")
     asked_for = {
         "limits": [(-1.0, 0.5), None, None, (-0.5, 0.5), None, (2.0, 2.5)],
@@ -255,12 +255,13 @@ def test_limits_and_locks_are_those_of_the_question():
     }
     found = kin.capability_map(robot, resolution=5, directions=12, **asked_for)
     pairs = np.array([*asked(found, np.random.default_rng(5), 40, **asked_for)])
-    # With joint 3 locked four joints are left for five demands: points may be had, directions only by chance.
+    # With joint 3 locked four joints are left for a task of dimension five: points are reachable, directions
+    # rarely.
     assert (pairs[:, 0] == pairs[:, 1]).all()
     assert pairs[:, 0].any()
 
 
-def test_narrower_limits_take_away_only():
+def test_narrower_limits_only_remove_voxels():
     grid = kin.capability_grid(kin.get_robot("redundant7-craig"), resolution=6, directions=24)
     narrow = replace(grid, bounds=((-1.0, 1.0), *grid.bounds[1:4], (-0.3, 0.3), *grid.bounds[5:]))
     wide, less = (
@@ -276,7 +277,7 @@ def made(*joints):
     return Robot("made", "made", "made", "standard", joints, tuple(0.1 for _ in joints))
 
 
-def test_arms_too_small_for_directions_have_points_only():
+def test_arms_with_too_few_joints_for_directions_have_points_only():
     flat = made(Joint("a", a=0.3, limits=(-3.0, 3.0)), Joint("b", a=0.2, limits=(-2.0, 2.0)))
     found = kin.capability_map(flat, resolution=9, directions=12)
     assert found.grid.shape[2] == 1
@@ -286,7 +287,7 @@ def test_arms_too_small_for_directions_have_points_only():
     assert set(found.share.tolist()) == {np.float32(1 / 12).item()}
 
 
-def test_joints_without_limits_may_be_anywhere():
+def test_joints_without_limits_take_any_value():
     robot = kin.get_robot("puma560")
     free = replace(robot, rows=tuple(replace(row, limits=None) for row in robot.rows))
     found = kin.capability_map(free, resolution=5, directions=12)
@@ -313,7 +314,7 @@ def test_joints_without_limits_may_be_anywhere():
         ({"limits": [(1.0, 0.0)] + [None] * 4}, "limits[0]"),
     ],
 )
-def test_misuse_is_refused_by_name(arguments, field):
+def test_misuse_names_the_argument(arguments, field):
     with pytest.raises(InputError) as caught:
         kin.capability_grid(kin.get_robot("pioneer5"), **arguments)
     assert caught.value.field == field

@@ -1,4 +1,4 @@
-"""Workspace: draws by their number alone, exact sizes, sections, against the reference and against each other."""
+"""Clouds, sizes and sections of the workspace, compared with a reference and with each other."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from kin.workspace.search.probes import sampling_probes
 from kin.workspace.volume import from_probes
 
 ALL = tuple(kin.builtin_robots())
-# x, y, z, distance from joint 1's line, distance from the shoulder: least and largest, inside the printed limits.
+# x, y, z, distance from joint 1's axis, distance from the shoulder: least and largest, inside the printed limits.
 REFERENCE = {
     "pioneer5": (
         (-0.486895149, 0.485911099),
@@ -43,8 +43,8 @@ SHOULDER = {"pioneer5": 0.13, "redundant7": 0.30, "redundant7-craig": 0.30}
 FEW = {"uniform": 30_000, "quasi": 30_000, "volume": 2000, "boundary": 400}
 
 
-def cloud(robot, n, **asked):
-    return np.concatenate([chunk.points for chunk in kin.sample_workspace(robot, n, **asked)])
+def cloud(robot, n, **options):
+    return np.concatenate([chunk.points for chunk in kin.sample_workspace(robot, n, **options)])
 
 
 @lru_cache
@@ -65,7 +65,7 @@ GANTRY = chain(
 PLANAR = chain(Joint("a", a=0.3, limits=(-math.pi, math.pi)), Joint("b", a=0.2, limits=(-2.6, 2.6)))
 
 
-# Draws
+# Clouds
 
 
 @pytest.mark.parametrize("strategy", STRATEGIES)
@@ -88,7 +88,7 @@ def test_a_cloud_does_not_depend_on_chunks_threads_or_length(strategy):
 
 
 @pytest.mark.parametrize("strategy", STRATEGIES)
-def test_another_seed_is_another_cloud(strategy):
+def test_another_seed_gives_another_cloud(strategy):
     robot = kin.get_robot("redundant7")
     n = 200
     clouds = [cloud(robot, n, seed=seed, strategy=strategy) for seed in (0, 1, 2**64 - 1)]
@@ -112,7 +112,7 @@ def test_points_are_those_of_their_configurations(robot_id, strategy):
     assert (one == q[-1]).all()
 
 
-def test_a_draw_far_out_in_the_sequence_is_as_good_as_any():
+def test_samples_far_out_in_the_sequence_are_as_good_as_any():
     robot = kin.get_robot("redundant7")
     far = 2**52
     for strategy in ("uniform", "quasi"):
@@ -124,7 +124,7 @@ def test_a_draw_far_out_in_the_sequence_is_as_good_as_any():
         assert (kin.configuration_at(robot, far + 17, strategy=strategy) == chunk.q[17]).all()
 
 
-def test_joints_are_drawn_evenly_and_independently():
+def test_joints_are_sampled_evenly_and_independently():
     robot = kin.get_robot("redundant7")
     q = kin.configuration_at(robot, np.arange(100_000), seed=11)
     part = (q - robot.lower) / (robot.upper - robot.lower)
@@ -134,7 +134,7 @@ def test_joints_are_drawn_evenly_and_independently():
     assert np.abs(np.corrcoef(part[:-1, 0], part[1:, 0])[0, 1]) < 0.016
 
 
-def test_quasi_random_draws_are_more_even():
+def test_quasi_random_samples_are_more_even():
     robot = kin.get_robot("redundant7")
     spread = {}
     for strategy in ("uniform", "quasi"):
@@ -160,7 +160,7 @@ def test_narrowed_limits_and_locks_are_respected_exactly(strategy):
     assert np.abs(fk_positions(robot, q) - points).max() < 1e-7
 
 
-def test_joints_without_limits_draw_from_a_whole_turn():
+def test_joints_without_limits_are_sampled_from_a_whole_turn():
     robot = chain(Joint("a", a=0.3), Joint("b", a=0.2))
     q = kin.configuration_at(robot, np.arange(20_000))
     assert np.abs(q).max() <= math.pi
@@ -200,14 +200,14 @@ def inside_sizes(robot_id, strategy):
 
 
 @pytest.mark.parametrize("robot_id", ROBOTS)
-def test_boundary_draws_are_on_the_envelope(robot_id):
+def test_boundary_samples_are_on_the_envelope(robot_id):
     robot = kin.get_robot(robot_id)
     found = cell_map(Region.of(robot, None, None))
     away = np.random.default_rng(5).normal(size=(26, 3))
     away *= 0.01 * facts(robot_id).reach.largest.value / np.linalg.norm(away, axis=1, keepdims=True)
 
     def share_near(strategy):
-        """Of draws from which a hundredth of the reach leads out of the workspace."""
+        """The fraction of samples within a hundredth of the reach of the outside."""
         around = (cloud(robot, 100, strategy=strategy).astype(float)[:, None] + away).reshape(-1, 3)
         distance = found.nearest(around, 1e-6)[1]
         return (distance.reshape(100, -1) > 1e-6).any(axis=1).mean()
@@ -217,12 +217,12 @@ def test_boundary_draws_are_on_the_envelope(robot_id):
 
 def halfway(curve):
     """Vertices of a closed polyline and points between them, no two farther apart than some millimetres."""
-    beside = np.roll(curve, -1, axis=0)
-    return np.concatenate([curve + k / 8 * (beside - curve) for k in range(8)])
+    following = np.roll(curve, -1, axis=0)
+    return np.concatenate([curve + k / 8 * (following - curve) for k in range(8)])
 
 
 @pytest.mark.parametrize("robot_id", ROBOTS)
-def test_volume_draws_are_even_in_space(robot_id):
+def test_volume_samples_are_even_in_space(robot_id):
     robot = kin.get_robot(robot_id)
     found = cell_map(Region.of(robot, None, None))
     full = (sampling_probes(found.region).distance < 1e-3 * found.size).all(axis=1)
@@ -230,7 +230,7 @@ def test_volume_draws_are_even_in_space(robot_id):
     def variation(strategy):
         rows = found.rows(cloud(robot, 6000, strategy=strategy).astype(float))
         counts = np.bincount(rows[rows >= 0], minlength=len(full))[full]
-        # Over what chance alone makes of even draws.
+        # In excess of the variation that even samples have by chance.
         return math.sqrt(max(counts.var() - counts.mean(), 0.0)) / counts.mean()
 
     assert variation("volume") < 0.25
@@ -251,7 +251,7 @@ def test_measures_belong_to_their_points():
 
 
 @pytest.mark.parametrize(
-    ("asked", "field"),
+    ("arguments", "field"),
     [
         ({"n": 0}, "n"),
         ({"n": 2.5}, "n"),
@@ -273,9 +273,9 @@ def test_measures_belong_to_their_points():
         ({"locked": [None, None, None, None, 2.0]}, "locked[4]"),
     ],
 )
-def test_wrong_arguments_are_named_at_once(asked, field):
+def test_wrong_arguments_are_named_at_the_call(arguments, field):
     with pytest.raises(InputError) as caught:
-        kin.sample_workspace(kin.get_robot("pioneer5"), **{"n": 10, **asked})
+        kin.sample_workspace(kin.get_robot("pioneer5"), **{"n": 10, **arguments})
     assert caught.value.field == field
 
 
@@ -299,7 +299,7 @@ def test_wrong_arguments_are_named_at_once(asked, field):
         (lambda robot: kin.section(GANTRY), "plane"),
     ],
 )
-def test_wrong_questions_are_named(call, field):
+def test_wrong_arguments_of_other_functions_are_named(call, field):
     with pytest.raises(InputError) as caught:
         call(kin.get_robot("pioneer5"))
     assert caught.value.field == field
@@ -309,7 +309,7 @@ def test_wrong_questions_are_named(call, field):
 
 
 @pytest.mark.parametrize("robot_id", ROBOTS)
-def test_sizes_are_those_of_the_reference(robot_id):
+def test_sizes_equal_the_reference(robot_id):
     robot = kin.get_robot(robot_id)
     found = facts(robot_id)
     assert found.shoulder == pytest.approx([0.0, 0.0, SHOULDER[robot_id]], abs=1e-12)
@@ -360,13 +360,13 @@ def test_a_planar_arm_is_a_ring():
     assert ring.area == pytest.approx(math.pi * (0.25 - inner**2), rel=1e-3)
 
 
-def test_two_ways_to_a_volume_agree():
+def test_both_methods_give_the_same_volume():
     robot = kin.get_robot("redundant7")
     revolved = kin.workspace_facts(robot, effort=3)
-    tried, layered = from_probes(Region.of(robot, None, None), 2)
+    volume, surface = from_probes(Region.of(robot, None, None), 2)
     assert revolved.volume.error < 0.002 * revolved.volume.value
-    assert abs(tried.value - revolved.volume.value) < 4.0 * math.hypot(tried.error, revolved.volume.error)
-    assert abs(layered.value - revolved.surface.value) < 4.0 * math.hypot(layered.error, revolved.surface.error)
+    assert abs(volume.value - revolved.volume.value) < 4.0 * math.hypot(volume.error, revolved.volume.error)
+    assert abs(surface.value - revolved.surface.value) < 4.0 * math.hypot(surface.error, revolved.surface.error)
 
 
 def test_errors_shrink_with_effort():
@@ -379,10 +379,10 @@ def test_errors_shrink_with_effort():
 # Sections
 
 
-def test_the_section_of_the_pioneer_arm_is_the_references():
+def test_the_section_of_the_pioneer_arm_equals_the_reference():
     robot = kin.get_robot("pioneer5")
     found = kin.section(robot)
-    # A raster of 2 mm also counts the cells that the boundary crosses: half a cell along its length too much.
+    # The reference, a raster of 2 mm, includes the cells on the boundary: on average half a cell too much.
     rim = sum(np.linalg.norm(curve - np.roll(curve, 1, axis=0), axis=1).sum() for curve in found.curves)
     assert found.area == pytest.approx(0.1879 - 0.001 * rim, abs=0.001)
     upright = kin.section(robot, ([0.0, 0.0, 0.0], [1.0, 0.0, 0.0]))
@@ -405,7 +405,7 @@ def test_no_point_is_outside_of_the_section(robot_id):
     at = np.stack([np.hypot(p[:, 0], p[:, 1]), p[:, 2]], axis=1)
     turns = sum(windings(curve, at) for curve in found.curves)
     outside = at[turns < 0.5]
-    # Chords cut off less than a part of a square.
+    # Chords cut off less than a square.
     edges = np.concatenate([halfway(curve) for curve in found.curves])
     assert len(outside) < 0.02 * len(at)
     if len(outside):
@@ -423,13 +423,13 @@ def windings(curve, at):
 def test_vertices_of_a_section_are_on_the_boundary():
     robot = kin.get_robot("redundant7")
     (curve,) = kin.section(robot, resolution=48).curves
-    # Where the outstretched forearm draws it: a circle about the end of the upper arm, all of it horizontal.
+    # The outstretched forearm traces a circle about the end of the horizontal upper arm.
     around = np.hypot(curve[:, 0] - 0.35, curve[:, 1] - 0.30)
     far = curve[:, 0] > 0.5
     assert np.abs(around[far] - 0.73).max() < 1e-5
 
 
-def test_the_arcs_of_the_pioneer_arm_are_the_references():
+def test_the_arcs_of_the_pioneer_arm_equal_the_reference():
     robot = kin.get_robot("pioneer5")
     found = kin.section(robot)
     front = next(arc for arc in found.arcs if arc.radius and abs(arc.radius - 0.417069130) < 1e-8)
@@ -443,12 +443,12 @@ def test_the_arcs_of_the_pioneer_arm_are_the_references():
     assert back.q[[1, 3, 4]] == pytest.approx(np.radians([150.0, 0.0, 15.0]), abs=1e-7)
     assert math.degrees(back.start) == pytest.approx(0.0, abs=1e-6)
     assert math.degrees(back.stop) == pytest.approx(128.4, abs=0.1)
-    # Joints 4 and 5 bend the tool out of the plane: what joint 3 then draws is a torus' section, no circle.
+    # Joints 4 and 5 bend the tool out of the plane: joint 3 then traces the section of a torus, not a circle.
     assert any(arc.joint == 2 and arc.radius is None for arc in found.arcs)
 
 
 @pytest.mark.parametrize("robot_id", ROBOTS)
-def test_arcs_lie_on_the_boundary_and_are_drawn_by_one_joint(robot_id):
+def test_arcs_lie_on_the_boundary_and_are_traced_by_one_joint(robot_id):
     robot = kin.get_robot(robot_id)
     found = kin.section(robot, resolution=48)
     edges = np.concatenate([halfway(curve) for curve in found.curves])
@@ -465,6 +465,6 @@ def test_arcs_lie_on_the_boundary_and_are_drawn_by_one_joint(robot_id):
             away = np.linalg.norm(arc.points - arc.centre, axis=1)
             folded = np.linalg.norm(arc.points * [-1.0, 1.0] - arc.centre, axis=1)
             assert min(np.ptp(away), np.ptp(folded)) < 1e-8
-    drawn = sum(np.linalg.norm(np.diff(arc.points, axis=0), axis=1).sum() for arc in found.arcs)
+    traced = sum(np.linalg.norm(np.diff(arc.points, axis=0), axis=1).sum() for arc in found.arcs)
     rim = sum(np.linalg.norm(np.diff(curve, axis=0), axis=1).sum() for curve in found.curves)
-    assert drawn > 0.6 * rim
+    assert traced > 0.6 * rim
