@@ -1,8 +1,7 @@
-"""The REST door: ``api_routes()`` are those of /api/v1, `install_problem_handlers` the one error shape.
+"""The REST interface: ``api_routes()`` under /api/v1, and `install_problem_handlers` for error responses.
 
-Routes find what they share in ``app.state``: robots in ``store``, ``settings``, ``clouds``, the ``gate`` that
-counts the clouds and maps under way, capability ``maps``, ``summaries`` (sizes and sections), and in ``work`` the
-places to compute in.
+Routes share objects in ``app.state``: ``settings``, the robots in ``store``, the caches ``clouds``, ``maps`` and
+``summaries``, the limit of concurrent ``streams``, and the slots for computations in ``compute``.
 """
 
 from starlette.routing import BaseRoute
@@ -10,11 +9,11 @@ from starlette.routing import BaseRoute
 from app.api import equations, fk, ik, jacobian, path, robots
 from app.api.document import complete_document
 from app.api.problems import install_problem_handlers
-from app.api.work import Work
+from app.api.work import ComputeSlots
 from app.api.workspace import capability, download, reachable, socket, summary
-from app.api.workspace.flow import Gate
+from app.api.workspace.streaming import StreamLimit
 
-__all__ = ["Gate", "Work", "api_routes", "complete_document", "install_problem_handlers"]
+__all__ = ["ComputeSlots", "StreamLimit", "api_routes", "complete_document", "install_problem_handlers"]
 
 _MODULES = (robots, fk, ik, path, jacobian, equations, download, socket, summary, reachable, capability)
 

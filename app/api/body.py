@@ -1,8 +1,8 @@
-"""Reading a request body with care: typed, bounded while it arrives, and parsed without Python's recursion.
+"""Request bodies: checked type, bounded size, and a JSON parser without recursion in Python.
 
-FastAPI reads the whole body whatever its size and parses it with `json.loads`, whose depth is bounded only by the
-interpreter's stack. `JsonRoute` replaces those two steps and nothing else. NaN and Infinity are let through
-here: a schema then refuses them by the name of their field.
+FastAPI reads a body of any size and parses it with `json.loads`, whose depth is limited only by the interpreter's
+stack. `JsonRoute` replaces those two steps. NaN and Infinity are accepted here: the schema then rejects them with
+the name of their field.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class JsonRequest(Request):
     """A request whose body is JSON of at most ``settings.max_body`` bytes."""
 
     async def body(self) -> bytes:
-        """The body; raises 413 as soon as more than the limit is announced or has arrived."""
+        """The body; raises 413 as soon as its announced or received size exceeds the limit."""
         if not hasattr(self, "_body"):
             limit = self.app.state.settings.max_body
             announced = self.headers.get("content-length", "")
@@ -39,7 +39,7 @@ class JsonRequest(Request):
         return self._body
 
     async def json(self) -> Any:
-        """The parsed body; raises 400 naming the place where it stops being JSON."""
+        """The parsed body; raises 400 naming the position of the syntax error."""
         if not hasattr(self, "_json"):
             try:
                 self._json = from_json(await self.body())
@@ -49,11 +49,11 @@ class JsonRequest(Request):
         return self._json
 
     async def require_json(self) -> None:
-        """Raises 415 for a body that does not say it is JSON."""
+        """Raises 415 if the Content-Type of the body is not JSON."""
         if not await self.body():
             return
         given = self.headers.get("content-type", "")
-        if given == "application/json":  # as nearly everybody says it
+        if given == "application/json":  # the common case
             return
         message = Message()
         message["content-type"] = given or "none/none"
@@ -70,23 +70,23 @@ class JsonRoute(APIRoute):
     """A route that reads its body as `JsonRequest` does."""
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
-        """FastAPI's handler, fed with our kind of request."""
+        """FastAPI's handler, with a `JsonRequest`."""
         handle = super().get_route_handler()
         if self.body_field is None:
             return handle
 
-        async def careful(request: Request) -> Response:
+        async def handle_json(request: Request) -> Response:
             request = JsonRequest(request.scope, request.receive)
             await request.require_json()
             return await handle(request)
 
-        return careful
+        return handle_json
 
 
 def versioned(tag: str) -> APIRouter:
-    """A router for operations of /api/v1 in one chapter of the documentation.
+    """A router for operations under /api/v1 with one tag of the documentation.
 
-    The service takes its routes one by one: routers inside routers are searched several times for each request.
+    The application adds their routes one by one: nested routers are searched several times per request.
     """
     return APIRouter(prefix="/api/v1", tags=[tag], route_class=JsonRoute)
 
@@ -94,5 +94,5 @@ def versioned(tag: str) -> APIRouter:
 def _too_large(limit: int) -> ProblemError:
     detail = f"The request body is larger than {limit} bytes."
     hint = "Split it into several requests, or ask the operator to raise KINBOARD_MAX_BODY."
-    # Closing is what stops the rest from being read.
+    # Closing the connection stops the rest from being read.
     return ProblemError(413, "body-too-large", detail, hint, headers={"Connection": "close"})

@@ -1,4 +1,4 @@
-"""What the OpenAPI document says beyond what FastAPI knows: media types, our robots, and how access is limited."""
+"""Additions to FastAPI's OpenAPI document: media types, ids of the robots, and access control."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _PROBLEM = {"$ref": "#/components/schemas/Problem"}
 
 
 def complete_document(app: FastAPI, store: Store, settings: Settings) -> None:
-    """Has ``/openapi.json`` of `app` say what this very service does."""
+    """Add to ``/openapi.json`` of `app` what depends on this service."""
     plain = app.openapi
 
     def openapi() -> dict[str, Any]:
@@ -45,7 +45,7 @@ def _operations(document: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]
 
 
 def _name_media_type(operation: dict[str, Any]) -> None:
-    """FastAPI files every response model under application/json: moves those of refusals to their own type."""
+    """FastAPI lists every response model as application/json; problem documents get their own media type."""
     for response in operation["responses"].values():
         content = response.get("content", {})
         if content.get("application/json", {}).get("schema") == _PROBLEM:
@@ -53,14 +53,14 @@ def _name_media_type(operation: dict[str, Any]) -> None:
 
 
 def _of_access(settings: Settings) -> dict[str, Any]:
-    """The refusals that depend on how the service is run."""
+    """The error responses that depend on the settings."""
     reasons = {}
     if settings.token is not None:
         reasons["401"] = "The token is missing or wrong."
     if settings.read_only:
         reasons["403"] = "The service is read-only."
     if settings.token is not None or settings.rate_limit:
-        reasons["429"] = "Too many requests; the header Retry-After tells when to come again."
+        reasons["429"] = "Too many requests; the header Retry-After says when to try again."
     return {
         status: {"description": text, "content": {MEDIA_TYPE: {"schema": _PROBLEM}}}
         for status, text in reasons.items()

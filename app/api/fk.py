@@ -21,7 +21,7 @@ from app.api.schemas import (
     robot_of,
     settings_of,
 )
-from app.api.work import Budget, computed, work_of
+from app.api.work import Deadline, compute_slots, computed
 from app.shared.answers.document import documented
 from app.shared.answers.fk import FkAnswer, fk_answers
 
@@ -81,5 +81,5 @@ async def forward_kinematics(
     q, single = schemas.as_configurations(robot, body.q, settings_of(request))
     answer = partial(one_or_all, lambda some: fk_answers(robot, q[some], body.frames), len(q), single)
     if is_warm(request) and len(q) <= FEW:
-        return answer(Budget(work_of(request)))
+        return answer(Deadline(compute_slots(request)))
     return await computed(request, answer)

@@ -25,7 +25,7 @@ from app.api.schemas import (
     settings_of,
 )
 from app.api.targets import Target
-from app.api.work import Budget, computed
+from app.api.work import Deadline, computed
 from app.shared.answers.document import documented
 from app.shared.answers.ik import IkAnswer, ik_answer
 from app.shared.metrics import SOLVE_SECONDS
@@ -139,12 +139,12 @@ async def inverse_kinematics(
     return await computed(request, partial(_solve, robot_of(request, robot_id), body, settings_of(request)))
 
 
-def _solve(robot: Robot, body: IkRequest, settings: Settings, budget: Budget) -> Response:
+def _solve(robot: Robot, body: IkRequest, settings: Settings, deadline: Deadline) -> Response:
     questions, single = body.resolve_all(body.target, settings)
     seeds = _seeds(robot, body, len(questions), settings)
 
     def answer(task: Task, T: Array, seed: Array | None) -> IkAnswer:
-        budget.check()
+        deadline.check()
         return ik_answer(
             solve_ik(
                 robot,
@@ -165,7 +165,7 @@ def _solve(robot: Robot, body: IkRequest, settings: Settings, budget: Budget) ->
         return [answer(task, T, seed) for (task, T), seed in zip(questions[some], seeds[some], strict=True)]
 
     with SOLVE_SECONDS.labels("rest").time():
-        return one_or_all(answers, len(questions), single, budget)
+        return one_or_all(answers, len(questions), single, deadline)
 
 
 def _seeds(robot: Robot, body: IkRequest, count: int, settings: Settings) -> list[Array | None]:

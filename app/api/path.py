@@ -14,7 +14,7 @@ from app.api.body import versioned
 from app.api.problems import FieldError, invalid
 from app.api.schemas import POST_REFUSALS, Configuration, RobotId, example, reply, robot_of, settings_of
 from app.api.targets import Target
-from app.api.work import Budget, computed
+from app.api.work import Deadline, computed
 from app.shared.answers.path import PathAnswer, path_answer
 from app.shared.settings import Settings
 from kin import Robot, solve_path
@@ -85,7 +85,7 @@ async def path_inverse_kinematics(
     return await computed(request, partial(_solve, robot_of(request, robot_id), body, settings_of(request)))
 
 
-def _solve(robot: Robot, body: PathRequest, settings: Settings, budget: Budget) -> Response:
+def _solve(robot: Robot, body: PathRequest, settings: Settings, deadline: Deadline) -> Response:
     schemas.check_batch("targets", len(body.targets), settings, settings.max_path)
     questions = [body.resolve(target, f"targets[{i}]") for i, target in enumerate(body.targets)]
     task = questions[0][0]
@@ -102,7 +102,7 @@ def _solve(robot: Robot, body: PathRequest, settings: Settings, budget: Budget) 
         task=task,
         q_start=q_start,
         max_step=body.max_step,
-        stop=budget.check,
+        stop=deadline.check,
         **body.options,
     )
     return reply(path_answer(result))

@@ -1,10 +1,10 @@
-"""Every refusal in one shape: RFC 9457 problem documents, ``application/problem+json``.
+"""Error responses: RFC 9457 problem documents, ``application/problem+json``.
 
-``type`` is the stable name a program can test, ``detail`` the sentence to show, ``hint`` what to do about it and
-``errors`` the fields that were wrong. A target out of reach is not a problem but an answer (see `app.api.ik`).
+``type`` is a stable name for programs, ``detail`` a sentence to show, ``hint`` says what to do about it, and
+``errors`` lists the invalid fields. A target out of reach is an answer, not a problem (see `app.api.ik`).
 
-Each kind of problem is one row of `KINDS`; a route raises `ProblemError`, and `install_problem_handlers` turns
-that, the framework's own refusals and the core's misuse errors into documents.
+Each kind of problem is one row of `KINDS`. Routes raise `ProblemError`; `install_problem_handlers` turns it,
+errors of the framework and input errors of the core into documents.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from kin.errors import shorten
 
 MEDIA_TYPE = "application/problem+json"
 TAGS = {"one", "many"}  # names of union members, which pydantic puts into error locations
-SHOWN = 10  # most field errors one document lists
+SHOWN = 10  # maximum number of field errors in a document
 DOCS_HINT = "The /docs page shows the schema of every request, with an example that works."
 
 # kind → title; the kind is the last part of `type`.
@@ -36,31 +36,31 @@ KINDS = {
     "malformed-json": "The body is not valid JSON",
     "unknown-robot": "There is no such robot",
     "not-found": "There is nothing at this address",
-    "method-not-allowed": "This address does not take this method",
-    "unauthorized": "A token is needed",
-    "read-only": "Nothing may be asked of this service",
-    "too-many-requests": "Too much is asked for",
+    "method-not-allowed": "The method is not allowed at this address",
+    "unauthorized": "An access token is required",
+    "read-only": "The service is read-only",
+    "too-many-requests": "Too many requests",
     "body-too-large": "The request body is too large",
-    "batch-too-large": "The request holds too many items",
+    "batch-too-large": "The request contains too many items",
     "unsupported-media-type": "The body must be JSON",
-    "invalid-input": "The request holds a value that is not usable",
-    "busy": "The service has its hands full",
-    "too-slow": "The answer takes too long",
-    "internal-error": "Something went wrong on our side",
-    "http-error": "The request was refused",
+    "invalid-input": "The request contains an invalid value",
+    "busy": "The service is busy",
+    "too-slow": "The computation takes too long",
+    "internal-error": "Internal error",
+    "http-error": "The request was rejected",
 }
 
 
 class FieldError(BaseModel):
-    """One value that was not usable."""
+    """One invalid value."""
 
-    field: str = Field(description="Where it is in the request, e.g. `q[2]` or `target.wxyz`.", examples=["q[2]"])
+    field: str = Field(description="Its place in the request, e.g. `q[2]` or `target.wxyz`.", examples=["q[2]"])
     value: str = Field(description="What was given, shortened.", examples=['"ninety"'])
     expected: str = Field(description="What would be valid.", examples=["a valid number"])
 
 
 class Problem(BaseModel):
-    """Why a request was refused (RFC 9457)."""
+    """Why a request was rejected (RFC 9457)."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -75,16 +75,16 @@ class Problem(BaseModel):
         }
     )
 
-    type: str = Field(description="Stable name of the kind of problem, for programs.")
+    type: str = Field(description="Stable identifier of the kind of problem, for programs.")
     title: str = Field(description="The kind of problem in words.")
     status: int = Field(description="The HTTP status code.")
-    detail: str = Field(description="What was wrong this time, in one sentence.")
+    detail: str = Field(description="What was wrong with this request, in one sentence.")
     hint: str = Field(description="What to do about it.")
-    errors: list[FieldError] = Field(description="The values that were wrong; empty if none in particular.")
+    errors: list[FieldError] = Field(description="The invalid values; empty for other kinds of problems.")
 
 
 class ProblemError(HTTPException):
-    """A refusal. `kind` is a row of `KINDS`."""
+    """An error response. `kind` is a row of `KINDS`."""
 
     def __init__(
         self,
@@ -107,7 +107,7 @@ class ProblemError(HTTPException):
 
 
 def invalid(*errors: FieldError, hint: str = DOCS_HINT) -> ProblemError:
-    """422: the first error in words, all of them (up to `SHOWN`) in `errors`."""
+    """422: the first error in the detail, all of them (up to `SHOWN`) in `errors`."""
     first = errors[0]
     more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
     detail = f"{first.field}: got {first.value}, expected {first.expected}{more}"
@@ -115,16 +115,16 @@ def invalid(*errors: FieldError, hint: str = DOCS_HINT) -> ProblemError:
 
 
 def unknown_robot(error: UnknownRobotError) -> ProblemError:
-    """404 with the robots there are."""
+    """404 with the ids of all robots."""
     robot_ids = ", ".join(error.robot_ids)
     field = FieldError(field="robot_id", value=show(error.robot_id), expected=f"one of {robot_ids}")
     detail = f"There is no robot {field.value}."
-    hint = f"Known robots: {robot_ids}. GET /api/v1/robots describes them."
+    hint = f"Robots: {robot_ids}. GET /api/v1/robots describes them."
     return ProblemError(404, "unknown-robot", detail, hint, [field])
 
 
 def install_problem_handlers(app: FastAPI) -> None:
-    """Makes every refusal of `app`, unhandled errors included, a problem document."""
+    """Make every error response of `app`, unhandled exceptions included, a problem document."""
     app.add_exception_handler(StarletteHTTPException, _http_error)
     app.add_exception_handler(RequestValidationError, _validation_error)
     app.add_exception_handler(UnknownRobotError, _unknown_robot)
@@ -133,7 +133,7 @@ def install_problem_handlers(app: FastAPI) -> None:
 
 
 def show(value: object) -> str:
-    """A value as its sender wrote it, in JSON, shortened; of long lists and of objects only their make-up."""
+    """A value as JSON, shortened; of long lists the length, of objects the keys."""
     if isinstance(value, list | tuple):
         if len(value) <= 8 and not any(isinstance(item, list | dict) for item in value):
             return "[" + ", ".join(show(item) for item in value) + "]"
@@ -146,7 +146,7 @@ def show(value: object) -> str:
 
 
 def shorten_text(text: str, length: int = 80) -> str:
-    """Text cut to a length that fits a message."""
+    """Text cut to `length` characters."""
     return text if len(text) <= length else text[: length - 1] + "…"
 
 
@@ -164,13 +164,13 @@ async def _http_error(request: Request, error: Exception) -> Response:
     headers = dict(error.headers or {})
     if error.status_code == 404:
         return respond(
-            ProblemError(404, "not-found", f"Nothing answers at {path}.", "See /docs for what there is.")
+            ProblemError(404, "not-found", f"There is nothing at {path}.", "See /docs for all addresses.")
         )
     if error.status_code == 405:
-        if methods := _methods_at(request):  # a mounted folder tells its own
+        if methods := _methods_at(request):  # a mounted folder sets its own
             headers["Allow"] = ", ".join(methods)
-        hint = f"It takes {headers['Allow']}." if "Allow" in headers else DOCS_HINT
-        detail = f"{path} does not take {request.method}."
+        hint = f"Allowed: {headers['Allow']}." if "Allow" in headers else DOCS_HINT
+        detail = f"{path} does not allow {request.method}."
         return respond(ProblemError(405, "method-not-allowed", detail, hint, headers=headers))
     kind = "bad-request" if error.status_code == 400 else "http-error"
     detail = str(error.detail) or HTTPStatus(error.status_code).phrase
@@ -178,7 +178,7 @@ async def _http_error(request: Request, error: Exception) -> Response:
 
 
 def _methods_at(request: Request) -> list[str]:
-    """What an address takes: each method may be a route of its own, and the one that refuses knows only that."""
+    """Methods of an address: each may be a route of its own, and the route that rejects knows only one."""
     taken: set[str] = set()
     for route in request.app.routes:
         if isinstance(route, Route) and route.matches(request.scope)[0] is not Match.NONE:
@@ -202,19 +202,19 @@ async def _input_error(request: Request, error: Exception) -> Response:
 
 
 async def _internal_error(request: Request, error: Exception) -> Response:
-    # What happened belongs into the log (the server re-raises after this answer), not to the client.
+    # The cause is for the log (the server re-raises the exception after this response), not for the client.
     detail = "The request was understood, but answering it failed."
-    hint = "Please report it with the request you sent; the server's log has the cause."
+    hint = "Please report it with the request you sent; the log of the server has the cause."
     return respond(ProblemError(500, "internal-error", detail, hint))
 
 
 def from_input_error(error: InputError, prefix: str = "") -> FieldError:
-    """A misuse error of the core as a field error."""
+    """An input error of the core as a field error."""
     return FieldError(field=prefix + error.field, value=error.value, expected=error.expected)
 
 
 def field_error(item: dict[str, Any]) -> FieldError:
-    """One of pydantic's errors in our words."""
+    """An error of pydantic as a field error."""
     field = ""
     for part in item["loc"][1:]:
         if part not in TAGS:

@@ -1,4 +1,4 @@
-"""What requests share: numbers, configurations, the robot of the address, and the answer as JSON."""
+"""Parts that requests share: numbers, configurations, the robot of the URL, and JSON responses."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_val
 from pydantic_core import to_json
 
 from app.api.problems import FieldError, Problem, ProblemError, invalid, show
-from app.api.work import Budget
+from app.api.work import Deadline
 from app.shared.settings import Settings
 from app.shared.store import Store
 from kin import InputError, Robot
 from kin.transforms import Array
 
 LARGEST = 1e6
-AT_ONCE = 256  # answers alive at a time
+CHUNK = 256  # answers in memory at a time
 
 # A number beyond a million metres or radians is a mistake, and its square may not even be a number.
 Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False, strict=True)]
 
 
 def numbers(count: int) -> Any:
-    """Field constraints of a list of exactly `count` numbers; the first wrong item ends the search."""
+    """Field constraints of a list of exactly `count` numbers; validation stops at the first invalid item."""
     return Field(min_length=count, max_length=count, fail_fast=True)
 
 
 def integral(value: object) -> object:
-    """JSON knows one kind of number: 10.0 is as good as 10."""
+    """JSON has one kind of number, so 10.0 is accepted as the integer 10."""
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
@@ -39,27 +39,27 @@ Vector4 = Annotated[list[Number], numbers(4)]
 Configuration = Annotated[list[Number], Field(min_length=1, fail_fast=True)]
 
 
-def one_or_many(value: object) -> str:
-    """Whether a list holds one configuration or several: told by its first item, so errors speak of one case."""
+def configurations_tag(value: object) -> str:
+    """Whether a list is one configuration or several, by its first item, so that errors are about one case."""
     return "many" if isinstance(value, list) and value and isinstance(value[0], list) else "one"
 
 
 Configurations = Annotated[
     Annotated[Configuration, Tag("one")]
     | Annotated[list[Configuration], Field(min_length=1, fail_fast=True), Tag("many")],
-    Discriminator(one_or_many),
+    Discriminator(configurations_tag),
 ]
 
 
 class Body(BaseModel):
-    """A request body: unknown fields are refused by name, as a misspelt option must not be ignored."""
+    """A request body. Unknown fields are rejected by name, because a misspelt option must not be ignored."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     @model_validator(mode="before")
     @classmethod
-    def no_strangers(cls, data: Any) -> Any:
-        """Refuses a field the schema does not have, listing those it has."""
+    def forbid_unknown(cls, data: Any) -> Any:
+        """Rejects a field that the schema does not have, listing those it has."""
         if isinstance(data, dict):
             for name, value in data.items():
                 if name not in cls.model_fields:
@@ -69,7 +69,7 @@ class Body(BaseModel):
         return data
 
 
-# Plain functions of the request: a dependency of FastAPI's costs ten times as much as forward kinematics.
+# Plain functions of the request: a FastAPI dependency takes ten times as long as forward kinematics.
 
 
 def store_of(request: Request) -> Store:
@@ -80,14 +80,14 @@ def store_of(request: Request) -> Store:
 
 
 def settings_of(request: Request) -> Settings:
-    """What the operator has set."""
+    """The settings of this service."""
     settings = request.app.state.settings
     assert isinstance(settings, Settings)
     return settings
 
 
 def is_warm(request: Request) -> bool:
-    """Whether no kernel of forward kinematics can still be compiling."""
+    """Whether the kernels of forward kinematics are compiled."""
     return bool(request.app.state.startup.status == "ready")
 
 
@@ -95,23 +95,23 @@ RobotId = Annotated[str, Path(description="Id of the robot, as listed by GET /ro
 
 
 def robot_of(request: Request, robot_id: str) -> Robot:
-    """A robot of this service by its id; raises `UnknownRobotError`, which is answered with 404."""
+    """A robot of this service by its id; raises `UnknownRobotError`, which becomes a 404."""
     return store_of(request).get(robot_id)
 
 
 _REFUSALS: dict[int, str] = {
     400: "The body is not valid JSON.",
-    404: "There is no such robot; the document lists those there are.",
-    413: "The body, or the batch in it, is larger than this service accepts.",
-    415: "The body does not say it is JSON.",
-    422: "A value is not usable; the document names the field, the value and what is valid.",
-    500: "Answering failed.",
-    503: "Busy, or the answer takes too long; the header Retry-After tells when it is worth another try.",
+    404: "There is no such robot; the document lists the valid ids.",
+    413: "The body, or the batch in it, is larger than this service allows.",
+    415: "The Content-Type of the body is not JSON.",
+    422: "A value is invalid; the document names the field, the value and what is valid.",
+    500: "Internal error.",
+    503: "Busy, or the computation takes too long; the header Retry-After says when to try again.",
 }
 
 
 def refusals(*statuses: int) -> dict[int | str, dict[str, Any]]:
-    """The documented refusals of an operation."""
+    """The documented error responses of an operation."""
     return {status: {"model": Problem, "description": _REFUSALS[status]} for status in statuses}
 
 
@@ -124,7 +124,7 @@ def example(summary: str, value: dict[str, Any]) -> dict[str, Any]:
 
 
 def reply(content: object) -> Response:
-    """`content` as JSON, written by compiled code without validating it again."""
+    """`content` as JSON, serialised by compiled code without validation."""
     return Response(_json(content), media_type="application/json")
 
 
@@ -132,19 +132,21 @@ def _json(content: object) -> bytes:
     return to_json(content, inf_nan_mode="null")
 
 
-def one_or_all(answers: Callable[[slice], Sequence[object]], count: int, single: bool, budget: Budget) -> Response:
-    """The answer itself when one thing was asked, ``{"results": [...]}`` in the same order when a list was.
+def one_or_all(
+    answers: Callable[[slice], Sequence[object]], count: int, single: bool, deadline: Deadline
+) -> Response:
+    """The answer itself to a single item, ``{"results": [...]}`` in the same order to a list.
 
-    `answers` gives those of a range of the questions. A range is written out before the next is answered: a
-    hundred thousand live lists would cost more in garbage collection than in work. Raises 503 when the time of
-    the request is over.
+    `answers` computes those of a range of items. A range is serialised before the next is computed: garbage
+    collection of a hundred thousand live lists would take longer than the computation. Raises 503 after the
+    deadline.
     """
     if single:
         return reply(answers(slice(0, 1))[0])
-    ranges = (slice(start, start + AT_ONCE) for start in range(0, count, AT_ONCE))
+    ranges = (slice(start, start + CHUNK) for start in range(0, count, CHUNK))
     parts = []
     for each in ranges:
-        budget.check()
+        deadline.check()
         parts.append(_json(list(answers(each)))[1:-1])
     return Response(b'{"results":[' + b",".join(parts) + b"]}", media_type="application/json")
 

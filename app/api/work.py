@@ -1,8 +1,8 @@
-"""How long one request may compute, and how many may at a time.
+"""Limits of computation: how many requests compute at a time, and for how long.
 
-Requests that compute run in threads, of which there are few: so each needs a place, and who finds none waits for
-one without a thread. From then on its time runs. Nothing can end a thread from outside: the work itself asks its
-`Budget` between one question and the next, and stops when that raises.
+Requests that compute run in threads, of which there are few. So each needs a slot, and waits for a free one
+without occupying a thread. Its time starts when it has a slot. A thread cannot be ended from outside: the
+computation calls `Deadline.check` between targets, and ends when that raises.
 """
 
 from __future__ import annotations
@@ -22,110 +22,110 @@ from app.api.problems import ProblemError
 T = TypeVar("T")
 RETRY_AFTER = 2  # seconds
 RETRY_SLOW = 30
-LOOK = 0.2  # seconds between two looks whether the service is being stopped
+POLL = 0.2  # seconds between two checks whether the service is being stopped
 
 
 def busy(detail: str, setting: str = "") -> ProblemError:
-    """503, with when to come again and what the operator could raise."""
+    """503, with the time to wait and the setting that an operator could raise."""
     hint = "Try again in a moment" + (f", or ask the operator to raise {setting}." if setting else ".")
     return ProblemError(503, "busy", detail, hint, headers={"Retry-After": str(RETRY_AFTER)})
 
 
 def stopping() -> ProblemError:
-    """503 for what was not done when the service had to end."""
+    """503 for a request that was cut short because the service is stopping."""
     return busy("The service is being stopped.")
 
 
 def too_slow(
-    seconds: float, what: str = "Ask for less at a time, or try again when the service is less busy"
+    seconds: float, advice: str = "Request less at a time, or try again when the service is less busy"
 ) -> ProblemError:
-    """503 for what takes more than its time."""
-    detail = f"It was not done after {seconds:g} s, the most one request may compute."
-    hint = f"{what}; the operator can raise KINBOARD_TIME_BUDGET."
+    """503 for a request that has used up its time."""
+    detail = f"The request was not finished after {seconds:g} s, the time limit of one request."
+    hint = f"{advice}; the operator can raise KINBOARD_TIME_BUDGET."
     return ProblemError(503, "too-slow", detail, hint, headers={"Retry-After": str(RETRY_SLOW)})
 
 
-class Work:
-    """The places of one process. All but `closed` belongs to the event loop, so nothing is locked.
+class ComputeSlots:
+    """The slots of one process. All but `closed` is used by the event loop only, so nothing is locked.
 
     Args:
         most: how many requests compute at a time.
-        seconds: how long each may, and how long one waits for its turn.
+        seconds: time limit of each, and the longest time to wait for a slot.
     """
 
     def __init__(self, most: int, seconds: float) -> None:
         self.seconds = seconds
         self.closed = False
         self._most = most
-        self._places = asyncio.Semaphore(most)
+        self._slots = asyncio.Semaphore(most)
 
     @asynccontextmanager
-    async def place(self) -> AsyncIterator[Budget]:
-        """A place and its time, as long as the context lasts; raises 503 if none becomes free in time."""
+    async def slot(self) -> AsyncIterator[Deadline]:
+        """A slot for as long as the context lasts, and its deadline; raises 503 if none becomes free in time."""
         try:
             async with asyncio.timeout(self.seconds):
-                await self._places.acquire()
+                await self._slots.acquire()
         except TimeoutError:
-            raise busy(f"{self._most} requests are being computed, the most at a time.") from None
+            raise busy(f"{self._most} requests are being computed, which is the maximum.") from None
         try:
-            yield Budget(self)
+            yield Deadline(self)
         finally:
-            self._places.release()
+            self._slots.release()
 
     def close(self) -> None:
-        """End all work that still asks for its budget, and all waiting."""
+        """End all computations that check their deadline, and all waiting."""
         self.closed = True
 
-    async def wait(self, answer: Future[T], budget: Budget) -> T:
+    async def wait(self, answer: Future[T], deadline: Deadline) -> T:
         """The result of another thread; raises 503 if that takes too long. The computation goes on."""
-        # Waited for and not awaited: a visitor who leaves must not cancel it for the others.
+        # Waited for instead of awaited: a client that leaves must not cancel it for the others.
         wrapped = asyncio.wrap_future(answer)
-        while not self.closed and (left := budget.left) > 0.0:
-            await asyncio.wait((wrapped,), timeout=min(left, LOOK))
+        while not self.closed and (left := deadline.left) > 0.0:
+            await asyncio.wait((wrapped,), timeout=min(left, POLL))
             if wrapped.done():
                 return wrapped.result()
         if self.closed:
             raise stopping()
-        raise too_slow(self.seconds, "It goes on being computed: ask again in a while, or for less")
+        raise too_slow(self.seconds, "The computation goes on: repeat the request later, or request less")
 
 
-class Budget:
-    """The time of one request."""
+class Deadline:
+    """The time limit of one request."""
 
-    def __init__(self, work: Work) -> None:
+    def __init__(self, work: ComputeSlots) -> None:
         self._work = work
         self._ends = time.monotonic() + work.seconds
 
     @property
     def left(self) -> float:
-        """Seconds until the time is over."""
+        """Seconds until the deadline."""
         return self._ends - time.monotonic()
 
     def check(self) -> None:
-        """Raises 503 when the time is over or the service is being stopped; any thread may ask."""
+        """Raises 503 after the deadline, or when the service is being stopped. Any thread may call it."""
         if self._work.closed:
             raise stopping()
         if self.left < 0.0:
             raise too_slow(self._work.seconds)
 
 
-def work_of(request: Request) -> Work:
-    """The places of this process."""
-    work = request.app.state.work
-    assert isinstance(work, Work)
+def compute_slots(request: Request) -> ComputeSlots:
+    """The slots of this process."""
+    work = request.app.state.compute
+    assert isinstance(work, ComputeSlots)
     return work
 
 
-async def computed(request: Request, answer: Callable[[Budget], T]) -> T:
-    """What `answer` computes in a thread within its budget; raises 503 without a place, or when time is over."""
-    async with work_of(request).place() as budget:
-        return await run_in_threadpool(answer, budget)
+async def computed(request: Request, answer: Callable[[Deadline], T]) -> T:
+    """Result of `answer`, computed in a thread; raises 503 if there is no slot, or after the deadline."""
+    async with compute_slots(request).slot() as deadline:
+        return await run_in_threadpool(answer, deadline)
 
 
-async def _budget(request: Request) -> AsyncIterator[Budget]:
-    async with work_of(request).place() as budget:
-        yield budget
+async def _deadline(request: Request) -> AsyncIterator[Deadline]:
+    async with compute_slots(request).slot() as deadline:
+        yield deadline
 
 
-# For answers that are sent while they are computed: the place is kept until the last byte has left.
-BudgetDep = Annotated[Budget, Depends(_budget)]
+# For responses that are sent while they are computed: the slot is kept until the last byte has been sent.
+DeadlineDep = Annotated[Deadline, Depends(_deadline)]

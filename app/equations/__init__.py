@@ -1,7 +1,7 @@
-"""An arm's forward kinematics as equations for people: typeset, evaluated, and compared with the arm itself.
+"""Forward kinematics of an arm as equations: typeset, evaluated, and compared with the DH product.
 
-The chapter's two arms have the equations it prints; any other gets a closed form derived from its DH table. Both
-doors, REST and the viewer, read them from a `Book`.
+The two arms of the chapter have its printed equations; any other arm gets a closed form derived from its DH table.
+REST and the viewer read them from a `Book`.
 """
 
 from app.equations.books import Book, DerivationError, Equation, Values, book, book_later, check

@@ -23,13 +23,13 @@ from kin.transforms import Array
 
 Verdict = Literal["right", "misprinted", "unreadable", "derived"]
 
-CHECKED = 1000  # random configurations a derived form must agree in
-AGREES = 1e-12  # of the arm's size, and of 1 for directions
+CHECKED = 1000  # random configurations at which a derived form is checked
+AGREES = 1e-12  # tolerance, relative to the size of the arm; absolute for directions
 KEPT = 64  # books
 
 
 class DerivationError(RuntimeError):
-    """A derived closed form disagrees with forward kinematics, so it is not shown."""
+    """A derived closed form disagrees with forward kinematics."""
 
 
 @dataclass(frozen=True)
@@ -119,21 +119,21 @@ class Book:
         return self._by_id[key]
 
     def values(self, equation: Equation, q: Array, T_base_tool: Array | None = None) -> Values:
-        """An equation that can be read, at configurations ``(..., n)``; their poses may be given if known."""
+        """An equation that can be read, at configurations ``(..., n)``; their poses may be given."""
         return self._values(equation, q, fk(self.robot, q) if T_base_tool is None else T_base_tool, {})
 
     def compare(self, q: Array) -> list[tuple[Equation, Values]]:
         """Every equation that can be read, at configurations ``(..., n)``."""
         T = fk(self.robot, q)
-        known: dict[str, Array] = {}
-        return [(e, self._values(e, q, T, known)) for e in self.equations if e.correct is not None]
+        values: dict[str, Array] = {}
+        return [(e, self._values(e, q, T, values)) for e in self.equations if e.correct is not None]
 
-    def _values(self, equation: Equation, q: Array, T: Array, known: dict[str, Array]) -> Values:
+    def _values(self, equation: Equation, q: Array, T: Array, values: dict[str, Array]) -> Values:
         forms = [form for form in (equation.printed, equation.correct) if form is not None]
         for form in forms:
             for name in names(form):
-                self._value(name, q, known)
-        *printed, correct = (np.broadcast_to(value(form, known), q.shape[:-1]) for form in forms)
+                self._value(name, q, values)
+        *printed, correct = (np.broadcast_to(value(form, values), q.shape[:-1]) for form in forms)
         dh = T[(..., *equation.index)]
         shown = printed[0] if printed else correct
         turn = chapter.turned(T, equation.index, shown)
@@ -151,7 +151,7 @@ class Book:
         return [line for line in self.lines if line.name in wanted]
 
     def symbols_of(self, equation: Equation) -> list[Symbol]:
-        """What its names stand for, those of its intermediate results included."""
+        """The symbols in it and in its intermediate results."""
         forms = [equation.printed, equation.correct, *(line.expression for line in self.lines_of(equation))]
         found = {name for form in forms if form is not None for name in names(form)}
         return [symbol for name, symbol in self.symbols.items() if name in found]
@@ -168,17 +168,17 @@ class Book:
     def _entries(self) -> dict[str, Expression]:
         return {e.entry: e.correct for e in self.equations if e.correct is not None}
 
-    def _value(self, name: str, q: Array, known: dict[str, Array]) -> None:
-        """Add what a name is worth to `known`, and before it whatever that takes."""
-        if name in known:
+    def _value(self, name: str, q: Array, values: dict[str, Array]) -> None:
+        """Add the value of a name to `values`, after the values it depends on."""
+        if name in values:
             return
         if name in self.symbols:
-            known[name] = self.symbols[name].value(q)
+            values[name] = self.symbols[name].value(q)
             return
         form = self._lines[name].expression if name in self._lines else self._entries[name]
         for inner in names(form):
-            self._value(inner, q, known)
-        known[name] = value(form, known)
+            self._value(inner, q, values)
+        values[name] = value(form, values)
 
 
 def book(robot: Robot) -> Book:
@@ -214,7 +214,7 @@ def check(found: Book) -> None:
     robot = found.robot
     q = robot.random_q(np.random.default_rng(0), CHECKED)
     size = robot.reach + float(np.linalg.norm(robot.T_world_base[:3, 3]))
-    if not math.isfinite(size):  # a slide without stops
+    if not math.isfinite(size):  # a prismatic joint without limits
         size = 1.0 + float(np.abs(q).max())
     for equation, values in found.compare(q):
         error = float(np.abs(values.correct - values.dh).max())

@@ -13,7 +13,8 @@ Multiplying the rows out blindly gives correct and useless pages. Four ideas kee
    An arm whose entries get longer than `LONGEST` is cut in two: the axes x4, y4, z4 and the origin p4 of a frame
    in the middle, and n', o', a', p', the tool as seen from there. Then n = x4 n'_x + y4 n'_y + z4 n'_z.
 
-sympy is imported on first use: it takes most of a second, and who asks for no equations should not wait for it.
+sympy is imported on first use: it takes most of a second, for which requests without derived equations should
+not wait.
 """
 
 from __future__ import annotations
@@ -142,7 +143,7 @@ class _Derivation:
 
     def result(self) -> Derived:
         self._walk()
-        # Nested products double with each link: what is sure to be too long is not even tried.
+        # Nested products double with each link: what is certainly too long is not tried.
         count = math.ceil(len(self._links) / MOST_LINKS) or 1
         while True:
             self._lines = []
@@ -173,7 +174,7 @@ class _Derivation:
         rows = len(self.robot.rows)
         tool = self.robot.T_last_tool
         self._move_by(tool, "t", "tool")
-        # What the last link adds along its z axis is told as a multiple of a, unless that is all there is.
+        # The part of the last link along its z axis is written as a multiple of a, unless there is nothing else.
         if self._links and not self._link.empty and _no_rotation(tool):
             self._along = self._link.along_tool
             self._link.p[2] = self.sp.Integer(0)
@@ -327,7 +328,7 @@ def _no_rotation(T: Array) -> bool:
     return all(T[r, c] == float(r == c) for r in range(3) for c in range(3))
 
 
-# From sympy's order, which is nobody's, to one that people write
+# From the order of sympy to the order of textbooks
 
 
 def _tree(expression: Any) -> Expression:

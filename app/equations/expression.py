@@ -1,6 +1,6 @@
-"""An equation's right-hand side as one tree, from which its value and every way of showing it come.
+"""The right-hand side of an equation as a tree, from which its value and its typeset forms are made.
 
-What is shown and what is computed cannot drift apart: `value`, `latex` and `mathml` (:mod:`app.equations.typeset`)
+The shown and the computed form are always the same: `value`, `latex` and `mathml` (:mod:`app.equations.typeset`)
 walk the same tree. The chapter's equations get theirs from the text of :mod:`kin.chapter`, in the order of the
 print; derived ones get theirs from sympy, in an order that people would write.
 """
@@ -21,7 +21,7 @@ from kin.transforms import Array
 
 @dataclass(frozen=True, slots=True)
 class Name:
-    """A symbol: c1, s23, d6, n_x. What it stands for is told by a `Symbol` or a `Line` of the same name."""
+    """A symbol: c1, s23, d6, n_x. A `Symbol` or a `Line` of the same name defines it."""
 
     id: str
 
@@ -91,7 +91,7 @@ def names(expression: Expression) -> list[str]:
 
 
 def size(expression: Expression) -> int:
-    """How many names and numbers are written down: how long it is to read."""
+    """Number of names and numbers in it, a measure of its length."""
     match expression:
         case Negative(of=inner):
             return size(inner)
@@ -101,7 +101,7 @@ def size(expression: Expression) -> int:
 
 
 def terms(expression: Expression) -> tuple[Expression, ...]:
-    """What is added up on the outside; the expression alone if nothing is."""
+    """The outer terms of a sum; otherwise the expression itself."""
     return expression.terms if isinstance(expression, Sum) else (expression,)
 
 

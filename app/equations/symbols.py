@@ -1,4 +1,4 @@
-"""What the names in an arm's equations stand for."""
+"""The symbols in the equations of an arm."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Symbol:
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """Part of an angle: a joint's value or a constant of the table; `sign` is −1 where the axis is turned over."""
+    """Part of an angle: a joint value or a constant of the table; `sign` is −1 for a reversed axis."""
 
     label: str  # "2" for θ2, "β2" for the constant in row 2
     sign: int

@@ -4,7 +4,7 @@ Each format is a generator of bytes over the slices of a cloud. The bytes depend
 slices. Numbers in text have the digits it takes to read the same float back: 9 for the points and measures, which
 are float32, up to 17 for configurations, which are float64.
 
-``bin`` is the format for programs that want nothing between them and the numbers, all little-endian:
+``bin`` is the simplest format for programs, all little-endian:
 
 =========  ======  =======================================================================================
 bytes      type    meaning
@@ -38,11 +38,11 @@ from kin.workspace import Measure
 MAGIC, VERSION = b"KINCLOUD", 1
 _HEADER = struct.Struct("<8sHHIQ")
 _ALIGNED = 64
-# Rows formatted at once: Python's lock is held for some milliseconds only, so that a server stays responsive.
+# Rows formatted at once: the interpreter lock is held for some milliseconds only, so a server stays responsive.
 BLOCK = 4096
 # Points of a slice where each takes a descent: whoever leaves, or presses Ctrl-C, waits for a slice at most.
 DESCENDED = 1 << 10
-KEPT = 64 << 20  # bytes of further columns that npz holds back rather than computing the cloud again
+KEPT = 64 << 20  # bytes of columns that npz keeps in memory instead of computing the cloud again
 
 Bytes = Generator[bytes]
 Source = Callable[[tuple[Measure, ...], bool], Generator[WorkspaceChunk]]
@@ -50,7 +50,7 @@ Source = Callable[[tuple[Measure, ...], bool], Generator[WorkspaceChunk]]
 
 @dataclass(frozen=True)
 class Table:
-    """What is written: a row per point, x, y, z first.
+    """The table to write: a row per point, x, y, z first.
 
     Attributes:
         n: how many points.
@@ -79,12 +79,12 @@ class Table:
 
 
 def table_of(cloud: Cloud, with_q: bool) -> Table:
-    """What is written of a cloud."""
+    """The table of a cloud."""
     return Table(cloud.n, cloud.measures, cloud.robot.n if with_q else 0)
 
 
 def slices(clouds: Clouds, cloud: Cloud, with_q: bool) -> Generator[WorkspaceChunk]:
-    """The whole cloud in order, in slices of a size that fits its strategy; close it to stop the work."""
+    """The whole cloud in order, in slices of a size that fits its strategy; close it to stop the computation."""
     return clouds.stream(cloud, cloud.part_size, with_q)
 
 
@@ -95,7 +95,7 @@ def encode(
     with_q: bool = False,
     watch: Callable[[WorkspaceChunk], object] | None = None,
 ) -> Bytes:
-    """A cloud as the bytes of a file in the format `name`, a row of `FORMATS`; close it to stop the work.
+    """A cloud as the bytes of a file in the format `name`, a row of `FORMATS`; close it to stop the computation.
 
     `watch` is shown each slice before it is written. A format may go through the cloud several times.
     """
@@ -179,7 +179,7 @@ def _digits(table: Table) -> list[str]:
 
 
 def _text(table: Table, row: str, source: Source) -> Bytes:
-    """One pattern for a whole block of rows: half the time of a pattern per row."""
+    """One format string for a whole block of rows, which takes half the time of one per row."""
     block = row * BLOCK
     with closing(source(table.measures, table.joints > 0)) as chunks:
         for chunk in chunks:
@@ -191,7 +191,7 @@ def _text(table: Table, row: str, source: Source) -> Bytes:
 
 
 def _npz(table: Table, source: Source) -> Bytes:
-    """One array after the other, although the cloud tells them side by side.
+    """One array after the other, although a cloud computes them together.
 
     What is not due yet is held back while it is little. Otherwise the cloud, the same every time, is computed anew
     for each array.
@@ -218,13 +218,13 @@ def _npz(table: Table, source: Source) -> Bytes:
 
 
 def _npz_passes(table: Table) -> int:
-    """How often the cloud is computed: once if what is not due yet can be held back, else once for each array."""
+    """How often the cloud is computed: once if the later arrays fit in memory, else once per array."""
     later = table.n * (4 * len(table.measures) + 8 * table.joints)
     return 1 if later <= KEPT else 1 + len(table.measures) + (table.joints > 0)
 
 
 def _array(table: Table, source: Source, name: str, kind: str, held: dict[str, list[bytes]]) -> Bytes:
-    """The bytes of one array of an npz file; those of `held` are filled along with the points."""
+    """The bytes of one array of an npz file; the arrays of `held` are filled together with the points."""
     if name in held:
         yield from held.pop(name)
         return
@@ -240,12 +240,12 @@ def _array(table: Table, source: Source, name: str, kind: str, held: dict[str, l
                 if chunk.q is not None:
                     held["q"].append(chunk.q.astype("<f8", copy=False).tobytes())
             values = chunk.points if name == "points" else chunk.q if name == "q" else chunk.measures[name]
-            assert values is not None  # as it was asked for
+            assert values is not None  # requested above
             yield values.astype(kind, copy=False).tobytes()
 
 
 class _Sink:
-    """What a zip file is written to, and taken from piece by piece; it cannot seek, as a connection cannot."""
+    """The sink of a zip file, read piece by piece. It cannot seek, like a connection."""
 
     def __init__(self) -> None:
         self._pieces: list[bytes] = []
@@ -255,10 +255,10 @@ class _Sink:
         return len(data)
 
     def flush(self) -> None:
-        """Nothing waits anywhere."""
+        """Does nothing: there is no buffer."""
 
     def take(self) -> bytes:
-        """What has been written since the last time."""
+        """The bytes written since the last call."""
         data = b"".join(self._pieces)
         self._pieces.clear()
         return data
@@ -266,7 +266,7 @@ class _Sink:
 
 @dataclass(frozen=True)
 class Format:
-    """A format of files.
+    """A file format.
 
     Attributes:
         name: what it is asked by, and the end of file names.

@@ -1,4 +1,4 @@
-"""The convex hull of a cloud, as a body for other programs: what a fence around the arm would have to enclose.
+"""The convex hull of a cloud as a solid for other programs, for instance to plan a fence around the arm.
 
 Only the corners found so far are kept, so the cloud may be as large as one likes. The hull is that of points
 inside the workspace and grows towards the true one with their number, fastest with points on the envelope.
@@ -18,7 +18,7 @@ SUFFIXES = ("stl", "ply", "obj", "off", "glb")
 
 
 def kind_of(path: str) -> str:
-    """The file type that a name asks for; raises `InputError`."""
+    """The file type of a file name; raises `InputError`."""
     kind = Path(path).suffix.removeprefix(".").lower()
     if kind not in SUFFIXES:
         raise InputError("--hull", path, "a name that ends in " + ", ".join(f".{name}" for name in SUFFIXES))
@@ -40,7 +40,7 @@ def hull(chunks: Iterable[WorkspaceChunk]) -> trimesh.Trimesh:
         points = np.concatenate([corners, chunk.points.astype(np.float64)])
         try:
             corners, solid = points[ConvexHull(points).vertices], True
-        except (QhullError, ValueError):  # flat as yet
+        except (QhullError, ValueError):  # flat so far
             corners, solid = points, False
     if not solid:
         raise InputError("hull", f"{len(corners)} points", "at least four that are not in one plane")

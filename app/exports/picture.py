@@ -1,4 +1,4 @@
-"""A workspace on paper: the cloud seen along the three axes, and its section, as one SVG.
+"""A drawing of a workspace: the cloud seen along the three axes, and its section, as one SVG.
 
 Each view counts how many points fall into each of its cells and colours the counts, so a picture is as large for
 a billion points as for a thousand. All four views have one scale. The section shows what the counts cannot: where
@@ -26,7 +26,7 @@ INK, SOFT = "#18212b", "#55616e"
 AXES = AxisStyle(
     tick=f'stroke="{SOFT}"', label=f'font-size="11" fill="{SOFT}"', title='font-size="12"', length=5.0, across=44.0
 )
-# Cividis, sampled: dark is rare, bright is often; the same order to people who do not see red or green.
+# Cividis, sampled: dark is rare, bright is frequent. The order is the same for people with colour blindness.
 SCALE = np.array(
     [(0, 34, 78), (24, 53, 110), (63, 75, 109), (94, 96, 110), (122, 119, 121), (153, 143, 116), (188, 170, 100),
      (224, 199, 78), (254, 232, 56)],
@@ -36,7 +36,7 @@ SCALE = np.array(
 
 @dataclass(frozen=True)
 class View:
-    """One of the four: which coordinates go right and up, and their ranges (m)."""
+    """One of the four views: the coordinates along its axes, and their ranges (m)."""
 
     title: str
     right: str
@@ -46,7 +46,7 @@ class View:
 
 
 class Picture:
-    """Counts points as they come, draws at the end.
+    """Counts points chunk by chunk, and draws at the end.
 
     Args:
         facts: of the same robot and limits; they give the frame.
@@ -63,7 +63,7 @@ class Picture:
             for eye, a, b in (("z, from above", "x", "y"), ("y", "x", "z"), ("x", "y", "z"))
         ]
         if section is not None:
-            # Whatever joint 1 does, the tool is within the section.
+            # The tool is within the section for every value of joint 1.
             corners = np.concatenate(section.curves) if section.curves else np.zeros((1, 2))
             low, high = corners.min(axis=0), corners.max(axis=0)
             title = "section through the axis of joint 1"
@@ -79,7 +79,7 @@ class Picture:
         self._points += len(p)
         columns = dict(zip("xyz", p.T, strict=True))
         if self._section is not None:
-            # The section's own axes: across and along the line of joint 1.
+            # The axes of the section: perpendicular to the axis of joint 1, and along it.
             off = p - self._section.origin
             columns["along"] = off @ self._section.v
             columns["r"] = np.linalg.norm(off - columns["along"][:, None] * self._section.v, axis=1)
@@ -90,7 +90,7 @@ class Picture:
             counts += np.bincount(flat, minlength=counts.size).reshape(counts.shape)
 
     def svg(self) -> str:
-        """The picture."""
+        """The drawing as SVG."""
         boxes = [(self._pixels(v.high[0] - v.low[0]), self._pixels(v.high[1] - v.low[1])) for v in self._views]
         columns = [max(box[0] for k, box in enumerate(boxes) if k % 2 == c) for c in (0, 1)]
         rows = [max(box[1] for k, box in enumerate(boxes) if k // 2 == r) for r in (0, 1)]
@@ -151,7 +151,7 @@ class Picture:
 
 
 def coloured(counts: NDArray[np.int64]) -> NDArray[np.uint8]:
-    """RGBA ``(rows, columns, 4)`` of counts ``(right, up)``, the top row first; cells with nothing are clear."""
+    """RGBA ``(rows, columns, 4)`` of counts ``(right, up)``, the top row first; empty cells are transparent."""
     level = np.log1p(counts.astype(np.float64))
     level /= max(float(level.max()), 1e-9)
     place = level * (len(SCALE) - 1)
@@ -164,7 +164,7 @@ def coloured(counts: NDArray[np.int64]) -> NDArray[np.uint8]:
 
 
 def draw(robot: Robot, chunks: Iterable[WorkspaceChunk], facts: WorkspaceFacts, section: Section | None) -> str:
-    """The picture of a whole cloud as SVG."""
+    """The drawing of a whole cloud as SVG."""
     picture = Picture(robot, facts, section)
     for chunk in chunks:
         picture.add(chunk)
@@ -176,7 +176,7 @@ def _spans(facts: WorkspaceFacts) -> list[tuple[str, Span]]:
 
 
 def _legend(joints: list[int], x: float) -> str:
-    """Which joint draws which part of the boundary, the others being at stops."""
+    """Legend: the joint that traces each part of the boundary while the others are at their limits."""
     return "".join(
         f'<rect x="{x:.1f}" y="{18 * k}" width="14" height="4" fill="{joint_colour(joint)}"/>'
         f'<text x="{x + 20:.1f}" y="{18 * k + 6}" font-size="12">joint {joint + 1}</text>'

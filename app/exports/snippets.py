@@ -1,4 +1,4 @@
-"""The arm on show as code: the same questions asked with other tools.
+"""The current arm and configuration as code for other tools.
 
 Each snippet asks where the tool is at this configuration and how it gets to this target. The first three ask this
 service or this library and get our answers; the Robotics Toolbox and MATLAB get the arm itself, written out as its
@@ -28,7 +28,7 @@ LOCAL = "http://127.0.0.1:8000/"
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """What a snippet asks about.
+    """The subject of a snippet.
 
     Attributes:
         robot: the arm.
@@ -235,8 +235,8 @@ def _link(row: Joint, suffix: str) -> str:
     values = {**own, "a": row.a, "alpha": row.alpha, "offset": row.d if slides else row.theta}
     # A slide is drawn from 0 to its end there: without limits the toolbox refuses it.
     limits = f", qlim={_list(np.array(row.limits))}" if row.limits is not None else ""
-    told = ", ".join(f"{name}={_text(value)}" for name, value in values.items() if value != 0.0)
-    return f"{'Prismatic' if slides else 'Revolute'}{suffix}({(told + limits).removeprefix(', ')})"
+    fields = ", ".join(f"{name}={_text(value)}" for name, value in values.items() if value != 0.0)
+    return f"{'Prismatic' if slides else 'Revolute'}{suffix}({(fields + limits).removeprefix(', ')})"
 
 
 def _text(value: float) -> str:

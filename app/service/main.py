@@ -22,7 +22,7 @@ from fastapi import FastAPI
 from starlette.concurrency import run_in_threadpool
 from starlette.middleware.cors import CORSMiddleware
 
-from app.api import Gate, Work, api_routes, complete_document, install_problem_handlers
+from app.api import ComputeSlots, StreamLimit, api_routes, complete_document, install_problem_handlers
 from app.service import status
 from app.service.server import Greeting, Server, is_loopback, listen, url_of
 from app.service.startup import Startup
@@ -63,7 +63,7 @@ def create_app(
     store = store or Store(settings.robots)
     bridge = ViewerBridge(settings.allowed_origins, settings.max_visitors)
     clouds, maps, summaries = Clouds(settings.cloud_memory), Maps(), Summaries()
-    work = Work(settings.max_requests, settings.time_budget)
+    work = ComputeSlots(settings.max_requests, settings.time_budget)
     startup = Startup(settings, store, clouds, maps, summaries, bridge, on_ready)
 
     @asynccontextmanager
@@ -90,7 +90,7 @@ def create_app(
     state = app.state
     state.store, state.settings, state.startup = store, settings, startup
     state.clouds, state.maps, state.summaries = clouds, maps, summaries
-    state.gate, state.work = Gate(settings.max_streams), work
+    state.streams, state.compute = StreamLimit(settings.max_streams), work
     install_problem_handlers(app)
     complete_document(app, store, settings)
     app.router.routes.extend([*api_routes(), *page_routes(), *bridge.routes()])

@@ -46,7 +46,7 @@ class Server(uvicorn.Server):
 
     def __init__(self, app: FastAPI, drain: float, greeting: Greeting | None) -> None:
         super().__init__(server_config(app, drain))
-        self._end_work = app.state.work.close
+        self._end_work = app.state.compute.close
         self._drain = drain
         self._greeting = greeting
 

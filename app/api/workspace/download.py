@@ -1,4 +1,4 @@
-"""A cloud of tool points as a file, sent while it is computed."""
+"""A cloud of tool points as a file, computed while it is sent."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from pydantic import Field
 
 from app.api.body import versioned
 from app.api.schemas import RobotId, refusals, robot_of, settings_of
-from app.api.workspace.flow import Flow
 from app.api.workspace.query import CloudQuery
+from app.api.workspace.streaming import ComputedResponse
 from app.exports.formats import FORMATS, encode, table_of
 
 router = versioned("workspace")
@@ -21,13 +21,13 @@ _CONTENT: dict[str, Any] = {
     for each in FORMATS.values()
 }
 _HEADERS: dict[str, Any] = {
-    "x-cloud-count": {"description": "How many points.", "schema": {"type": "integer"}},
+    "x-cloud-count": {"description": "Number of points.", "schema": {"type": "integer"}},
     "x-cloud-columns": {"description": "Names of the columns, separated by commas.", "schema": {"type": "string"}},
 }
 
 
 class DownloadQuery(CloudQuery):
-    """Which cloud, and in which format."""
+    """Parameters of a cloud, and its format."""
 
     format: Literal["ndjson", "csv", "bin", "ply", "npz"] = Field(
         "ndjson", description="; ".join(f"{each.name}: {each.meaning}" for each in FORMATS.values()) + "."
@@ -36,20 +36,20 @@ class DownloadQuery(CloudQuery):
 
 @router.get(
     "/robots/{robot_id}/workspace",
-    summary="Points the tool reaches",
+    summary="Point cloud of the workspace",
     response_class=Response,
     responses={
-        200: {"description": "The cloud, a point after the other.", "content": _CONTENT, "headers": _HEADERS},
+        200: {"description": "The cloud, point by point.", "content": _CONTENT, "headers": _HEADERS},
         **refusals(404, 422, 500, 503),
     },
 )
 async def workspace(request: Request, robot_id: RobotId, query: Annotated[DownloadQuery, Query()]) -> Response:
-    """A cloud of tool points in the base frame, metres, sent while it is computed, of any size in little memory.
+    """A cloud of tool points in the base frame, in metres, computed while it is sent.
 
-    The same question always gets the same bytes, and a larger cloud begins with the points of a smaller one.
-    Columns are x, y, z, then the measures asked for, then the joint values q1, q2, … where `q` is asked for. `bin`
-    begins with: `KINCLOUD`, version (uint16), columns (uint16), where rows begin (uint32), count (uint64), all
-    little-endian, and the names of the columns, separated by commas and filled up with spaces.
+    Equal requests get equal bytes, and a larger cloud begins with the points of a smaller one. Columns are x, y,
+    z, then the requested measures, then with `q` the joint values q1, q2, …. A `bin` file begins with
+    `KINCLOUD`, version (uint16), number of columns (uint16), offset of the first row (uint32), number of points
+    (uint64), all little-endian, then the names of the columns, separated by commas and padded with spaces.
     """
     robot = robot_of(request, robot_id)
     cloud = query.cloud(robot, settings_of(request))
@@ -63,4 +63,4 @@ async def workspace(request: Request, robot_id: RobotId, query: Annotated[Downlo
         headers["content-length"] = str(kind.size(table))
     state = request.app.state
     pieces = encode(query.format, state.clouds, cloud, query.q)
-    return Flow(pieces, "workspace", kind.media_type, headers, state.gate)
+    return ComputedResponse(pieces, "workspace", kind.media_type, headers, state.streams)

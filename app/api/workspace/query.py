@@ -1,4 +1,4 @@
-"""What can be asked about a workspace in an address: limits and locks, and which cloud."""
+"""Query parameters of workspace requests: limits, locks, and the description of a cloud."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from kin import InputError, Robot
 from kin.workspace import Measure, Strategy
 from kin.workspace.region import Region
 
-_OF_CORE = {"limits": "limit", "locked": "lock"}
+_FIELD_OF_CORE = {"limits": "limit", "locked": "lock"}
 _SEEDS = 1 << 64
 
 NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 
 
-def _told(values: int) -> Any:
-    """What the document says of a joint and its values; it is refused in our own words."""
+def _joint_values(values: int) -> Any:
+    """Constraints of ``JOINT:VALUE…`` for the OpenAPI document; `_per_joint` validates and explains errors."""
     return Field(max_length=100, json_schema_extra={"pattern": rf"^[0-9]+(:{NUMBER}){{{values}}}$"})
 
 
@@ -33,23 +33,23 @@ _MANY = Field(max_length=100)
 
 
 class RegionQuery(Body):
-    """How far the joints may move."""
+    """Joint limits and locks."""
 
-    limit: Annotated[list[Annotated[str, _told(2)]], _MANY] = Field(
+    limit: Annotated[list[Annotated[str, _joint_values(2)]], _MANY] = Field(
         [],
-        description="Narrower limits of a joint, `JOINT:LOWER:UPPER`, joints counted from 1, radians (metres); "
+        description="Narrower limits of a joint, `JOINT:LOWER:UPPER`, joints counted from 1, in radians (metres); "
         "may be repeated, once per joint.",
         examples=[["1:-0.5:0.5"]],
     )
-    lock: Annotated[list[Annotated[str, _told(1)]], _MANY] = Field(
+    lock: Annotated[list[Annotated[str, _joint_values(1)]], _MANY] = Field(
         [],
-        description="A joint kept at a value, `JOINT:VALUE`, joints counted from 1, radians (metres); may be "
+        description="Lock a joint at a value, `JOINT:VALUE`, joints counted from 1, in radians (metres); may be "
         "repeated, once per joint.",
         examples=[["3:0.2"]],
     )
 
     def bounds(self, robot: Robot) -> tuple[Bounds | None, Locks | None]:
-        """Limits and locks as the core takes them; raises 422 naming the one that is wrong."""
+        """Limits and locks as arguments of the core; raises 422 naming the invalid one."""
         pairs, limit_at = _per_joint(robot, "limit", self.limit, 2)
         values, lock_at = _per_joint(robot, "lock", self.lock, 1)
         limits = tuple((p[0], p[1]) if p else None for p in pairs) if self.limit else None
@@ -57,11 +57,11 @@ class RegionQuery(Body):
         try:
             Region.of(robot, limits, locked)
         except InputError as error:
-            # The core counts from 0 and knows nothing of the order in which they were given.
+            # The core counts joints from 0 and does not know the order of the parameters.
             found = re.fullmatch(r"(limits|locked)\[(\d+)\]", error.field)
             if found is None:
                 raise
-            name, joint = _OF_CORE[found[1]], int(found[2])
+            name, joint = _FIELD_OF_CORE[found[1]], int(found[2])
             k = (limit_at if name == "limit" else lock_at)[joint]
             given = getattr(self, name)[k]
             wrong = FieldError(field=f"{name}[{k}]", value=show(given), expected=error.expected)
@@ -70,40 +70,43 @@ class RegionQuery(Body):
 
 
 class CloudQuery(RegionQuery):
-    """Which cloud."""
+    """Description of a cloud."""
 
-    n: int = Field(10_000, ge=1, description="How many points.", examples=[1000])
-    # The largest seed is beyond what JSON schemas of programs in other languages hold exactly.
+    n: int = Field(10_000, ge=1, description="Number of points.", examples=[1000])
+    # The largest seed is more than JSON schemas in other languages can represent exactly.
     seed: Annotated[int, WithJsonSchema({"type": "integer", "minimum": 0})] = Field(
-        0, ge=0, lt=_SEEDS, description="Another seed, from 0 to 2⁶⁴ − 1, is another cloud; the same, the same."
+        0, ge=0, lt=_SEEDS, description="Seed from 0 to 2⁶⁴ − 1. Equal seeds give equal clouds."
     )
     strategy: Strategy = Field(
         "uniform",
-        description="uniform: each joint evenly between its stops. quasi: the same, spread more evenly. volume: "
-        "evenly over the workspace. boundary: on its envelope. The last two take some ten to a few hundred "
-        "microseconds a point, and seconds before the first.",
+        description="uniform: each joint uniformly between its limits. quasi: the same, more evenly (low "
+        "discrepancy). volume: evenly over the workspace. boundary: on its envelope. The last two take ten to a "
+        "few hundred microseconds per point, and seconds before the first.",
     )
     measure: list[Measure] = Field(
         [],
         max_length=8,
-        description="A further column: manipulability, as `all` of the Jacobian's answer, or limits, how far the "
-        "joint nearest to a stop is from it, 0 there and 1 in the middle; may be repeated.",
+        description="A further column: manipulability, as `all` in the answer of `jacobian`, or limits, the "
+        "relative distance to the nearest joint limit, 0 at a limit and 1 in the middle; may be repeated.",
     )
-    q: bool = Field(False, description="Whether the configurations come along, radians (metres).")
+    q: bool = Field(False, description="Whether to include the configurations, in radians (metres).")
 
     def cloud(self, robot: Robot, settings: Settings) -> Cloud:
-        """The cloud asked for; raises 422 naming what is wrong."""
+        """The cloud; raises 422 naming the invalid parameter."""
         if self.n > settings.max_points:
             most = settings.max_points
             wrong = FieldError(field="n", value=str(self.n), expected=f"a whole number from 1 to {most}")
-            raise invalid(wrong, hint="Ask for several clouds with different seeds, or the operator for more.")
+            raise invalid(
+                wrong,
+                hint="Request several clouds with different seeds; the operator can raise KINBOARD_MAX_POINTS.",
+            )
         limits, locked = self.bounds(robot)
         measures = tuple(dict.fromkeys(self.measure))
         return Cloud(robot, self.n, self.seed, self.strategy, measures, limits, locked)
 
 
 def read_cloud_query(parameters: QueryParams) -> CloudQuery:
-    """The query of a websocket's address, which FastAPI would refuse without a word; raises 422."""
+    """The query of a websocket URL, for which FastAPI would not explain errors; raises 422."""
     repeated = {name for name, field in CloudQuery.model_fields.items() if _is_list(field.annotation)}
     given: dict[str, Any] = {
         name: parameters.getlist(name) if name in repeated else parameters[name] for name in parameters
@@ -124,7 +127,7 @@ def _is_list(annotation: Any) -> bool:
 def _per_joint(
     robot: Robot, field: str, given: list[str], count: int
 ) -> tuple[list[list[float] | None], dict[int, int]]:
-    """``3:0.2`` and the like as `count` values for each joint, and where in the list a joint was given."""
+    """``3:0.2`` and the like as `count` values for each joint, and the position of each joint in the list."""
     entries: list[list[float] | None] = [None] * robot.n
     places: dict[int, int] = {}
     form = "JOINT:VALUE" if count == 1 else "JOINT:LOWER:UPPER"
@@ -137,13 +140,13 @@ def _per_joint(
             raise invalid(FieldError(field=f"{field}[{k}]", value=show(text), expected=expected))
         i = int(joint) - 1
         if i in places:
-            expected = f"each joint once; {field}[{places[i]}] has this one already"
+            expected = f"each joint once; {field}[{places[i]}] is for the same joint"
             raise invalid(FieldError(field=f"{field}[{k}]", value=show(text), expected=expected))
         entries[i], places[i] = values, k
     return entries, places
 
 
 def number(text: str) -> float:
-    """A number, NaN for what is none or too large to be meant."""
+    """A number; NaN if it is not one or implausibly large."""
     value = float(text) if re.fullmatch(NUMBER, text) else math.nan
     return value if abs(value) <= LARGEST else math.nan

@@ -1,4 +1,4 @@
-"""Whether targets can be reached: the verdict of inverse kinematics on many of them."""
+"""Reachability of many targets, decided by inverse kinematics."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from app.api.body import versioned
 from app.api.problems import Problem, ProblemError
 from app.api.schemas import POST_REFUSALS, RobotId, example, reply, robot_of, settings_of
 from app.api.targets import Target
-from app.api.work import Budget, BudgetDep
-from app.api.workspace.flow import Flow
+from app.api.work import Deadline, DeadlineDep
+from app.api.workspace.streaming import ComputedResponse
 from app.shared.answers.document import documented
 from app.shared.answers.ik import ReachableAnswer, reachable_answer
 from kin import Robot, Task, solve_ik
@@ -25,7 +25,7 @@ from kin.transforms import Array
 
 router = versioned("workspace")
 
-# Targets judged between two looks whether anybody still waits: one out of reach may take some ten milliseconds.
+# Targets between two checks of the deadline and the client: one out of reach may take some ten milliseconds.
 AT_ONCE = 16
 
 EXAMPLES = {
@@ -49,12 +49,12 @@ EXAMPLES = {
 
 
 class ReachableRequest(Asked):
-    """Which targets."""
+    """Targets, and options of inverse kinematics."""
 
     target: Annotated[
         Annotated[Target, Tag("one")] | Annotated[list[Target], Field(min_length=1, fail_fast=True), Tag("many")],
         Discriminator(one_or_many),
-    ] = Field(description="One target, or a list of targets, each judged on its own.")
+    ] = Field(description="One target, or a list of independent targets.")
 
 
 @documented
@@ -64,34 +64,34 @@ class ReachableAnswers(TypedDict):
     results: list[ReachableAnswer]
     """One per target, in the same order."""
     problem: NotRequired[Problem]
-    """Why there are fewer than were asked for: the time of the request was over. Absent if all are there."""
+    """Why results are missing: the time limit of the request was reached. Absent if all are there."""
 
 
 @router.post(
     "/robots/{robot_id}/reachable",
-    summary="Which targets can be reached",
+    summary="Reachability of targets",
     response_model=ReachableAnswer | ReachableAnswers,
     responses=POST_REFUSALS,
 )
 def reachable(
     request: Request,
     robot_id: RobotId,
-    budget: BudgetDep,
+    deadline: DeadlineDep,
     body: Annotated[ReachableRequest, Body(openapi_examples=EXAMPLES)],
 ) -> Response:
-    """Whether each target can be reached inside the limits, and if not, why, by how much, and what comes closest.
+    """Whether each target can be reached inside the limits; if not, why, by how much, and what comes closest.
 
-    It is the verdict of `ik`, checked by forward kinematics, without its list of solutions. A target in reach
-    takes a tenth of a millisecond, one out of reach some milliseconds: a list is answered while it is worked on,
-    and work ends when nobody listens any more.
+    The result is that of `ik`, verified by forward kinematics, without the list of solutions. A reachable target
+    takes a tenth of a millisecond, others some milliseconds. The answer to a list is sent while it is computed,
+    and the computation ends when the client leaves.
     """
     robot = robot_of(request, robot_id)
     questions, single = body.resolve_all(body.target, settings_of(request))
     if single:
         return reply(_answers(robot, body, questions)[0])
-    # What is wrong with the options shows in the first piece, while it can still be said.
-    pieces = _pieces(robot, body, questions, budget)
-    return Flow(_resumed(next(pieces), pieces), "reachable", "application/json")
+    # Invalid options show in the first piece, while the status of the response can still be set.
+    pieces = _pieces(robot, body, questions, deadline)
+    return ComputedResponse(_resumed(next(pieces), pieces), "reachable", "application/json")
 
 
 def _answers(robot: Robot, body: ReachableRequest, questions: list[tuple[Task, Array]]) -> list[ReachableAnswer]:
@@ -101,12 +101,12 @@ def _answers(robot: Robot, body: ReachableRequest, questions: list[tuple[Task, A
 
 
 def _pieces(
-    robot: Robot, body: ReachableRequest, questions: list[tuple[Task, Array]], budget: Budget
+    robot: Robot, body: ReachableRequest, questions: list[tuple[Task, Array]], deadline: Deadline
 ) -> Generator[bytes]:
-    """``{"results": [...]}``, some at a time; what was done in time, and the problem, if it was not all."""
+    """``{"results": [...]}`` in pieces, with the problem if not all were computed in time."""
     for start in range(0, len(questions), AT_ONCE):
         try:
-            budget.check()
+            deadline.check()
         except ProblemError as error:
             if not start:
                 raise

@@ -1,4 +1,4 @@
-"""A cloud of tool points over a websocket: float32 rows as binary messages, how far it is as text messages."""
+"""A cloud of tool points over a websocket: float32 rows as binary messages, progress as text messages."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from starlette.websockets import WebSocketDisconnect, WebSocketState
 
 from app.api.body import versioned
 from app.api.problems import Problem, ProblemError, unknown_robot
-from app.api.workspace.flow import Pieces
 from app.api.workspace.query import read_cloud_query
+from app.api.workspace.streaming import ThreadedGenerator
 from app.exports.formats import slices, table_of
 from app.shared.clouds import Cloud
 from app.shared.metrics import STREAMED
@@ -26,7 +26,7 @@ from kin import UnknownRobotError
 logger = logging.getLogger("kinboard.workspace")
 router = versioned("workspace")
 
-TOLD_EVERY = 0.1  # seconds between two messages of progress
+PROGRESS_EVERY = 0.1  # seconds between two progress messages
 
 # Close codes of RFC 6455.
 DONE, POLICY, UNSUPPORTED, FAILED, LATER = 1000, 1008, 1003, 1011, 1013
@@ -38,18 +38,18 @@ _Ending = tuple[int, str] | None
 
 @router.websocket("/robots/{robot_id}/workspace/stream")
 async def stream(visitor: WebSocket, robot_id: str) -> None:
-    """One visitor's cloud, from the handshake to whichever comes first: its end, a cancellation, a farewell."""
+    """One client's cloud, from the handshake to its end, a cancellation or a disconnect."""
     state = visitor.app.state
     if not origin_allowed(visitor.headers, state.settings.allowed_origins):
-        logger.warning("refused a websocket from a page of %.200r", visitor.headers.get("origin"))
+        logger.warning("rejected a websocket from a page of %.200r", visitor.headers.get("origin"))
         await visitor.close()  # before the handshake: a 403
         return
-    # Browsers tell a page nothing of a handshake that was refused: it is accepted to say what was wrong.
+    # Browsers give a page no reason for a rejected handshake, so it is accepted and the problem sent as a message.
     await visitor.accept()
     try:
         query = read_cloud_query(visitor.query_params)
         cloud = query.cloud(state.store.get(robot_id), state.settings)
-        with state.gate.place():
+        with state.streams.slot():
             ending = await _carry(visitor, cloud, query.q)
     except UnknownRobotError as error:
         ending = await _refuse(visitor, unknown_robot(error).problem)
@@ -57,14 +57,14 @@ async def stream(visitor: WebSocket, robot_id: str) -> None:
         ending = await _refuse(visitor, error.problem)
     except Exception:
         logger.exception("a workspace stream failed")
-        ending = FAILED, "Something went wrong on our side."
+        ending = FAILED, "Internal error."
     if ending is not None and visitor.client_state is WebSocketState.CONNECTED:
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):  # left in this very moment
             await visitor.close(*ending)
 
 
 async def _carry(visitor: WebSocket, cloud: Cloud, with_q: bool) -> _Ending:
-    """Send the cloud until it is whole or the visitor wants no more."""
+    """Send the cloud until it is complete or the client cancels."""
     tasks = asyncio.create_task(_send(visitor, cloud, with_q)), asyncio.create_task(_listen(visitor))
     try:
         ended, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -77,49 +77,49 @@ async def _carry(visitor: WebSocket, cloud: Cloud, with_q: bool) -> _Ending:
 
 async def _send(visitor: WebSocket, cloud: Cloud, with_q: bool) -> _Ending:
     table = table_of(cloud, with_q)
-    chunks = Pieces(slices(visitor.app.state.clouds, cloud, with_q))
-    begun = told = time.perf_counter()
+    chunks = ThreadedGenerator(slices(visitor.app.state.clouds, cloud, with_q))
+    begun = reported = time.perf_counter()
     try:
-        await _tell(visitor, type="start", total=table.n, columns=table.columns)
+        await _send_text(visitor, type="start", total=table.n, columns=table.columns)
         while (chunk := await run_in_threadpool(chunks.take)) is not None:
             rows = table.single(chunk).tobytes()
             await visitor.send_bytes(rows)
             STREAMED.labels("workspace").inc(len(rows))
             now = time.perf_counter()
-            if chunk.done == chunk.total or now - told >= TOLD_EVERY:
-                told = now
+            if chunk.done == chunk.total or now - reported >= PROGRESS_EVERY:
+                reported = now
                 rate = chunk.done / max(now - begun, 1e-9)
-                await _tell(
+                await _send_text(
                     visitor, type="progress", done=chunk.done, total=chunk.total, points_per_second=round(rate)
                 )
     except WebSocketDisconnect:
         return None
     finally:
-        await run_in_threadpool(chunks.close)  # waits for the slice at hand
+        await run_in_threadpool(chunks.close)  # waits for the current slice
     return DONE, "done"
 
 
 async def _listen(visitor: WebSocket) -> _Ending:
-    """What the visitor says ends the stream, one way or the other."""
+    """Any message of the client ends the stream."""
     event = await visitor.receive()
     if event["type"] == "websocket.disconnect":
         return None
     try:
-        said = json.loads(event.get("text") or "")
+        message = json.loads(event.get("text") or "")
     except (ValueError, RecursionError):
-        said = None
-    if said == {"cancel": True}:
+        message = None
+    if message == {"cancel": True}:
         return DONE, "cancelled"
-    return UNSUPPORTED, 'The only message that is understood is {"cancel": true}.'
+    return UNSUPPORTED, 'The only valid message is {"cancel": true}.'
 
 
 async def _refuse(visitor: WebSocket, problem: Problem) -> _Ending:
-    """Tell the problem as REST would, then close with its sentence, cut to what fits."""
+    """Send the problem document, then close with its detail, cut to the length of a close reason."""
     with contextlib.suppress(WebSocketDisconnect):
-        await _tell(visitor, type="problem", problem=problem.model_dump())
+        await _send_text(visitor, type="problem", problem=problem.model_dump())
     reason = problem.detail.encode()[:_LONGEST].decode(errors="ignore")
     return LATER if problem.status == 503 else POLICY, reason
 
 
-async def _tell(visitor: WebSocket, **message: Any) -> None:
+async def _send_text(visitor: WebSocket, **message: Any) -> None:
     await visitor.send_text(json.dumps(message, ensure_ascii=False))

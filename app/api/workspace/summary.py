@@ -1,4 +1,4 @@
-"""How large the workspace is: bounding box, reach, holes, volume, surface, and its section."""
+"""Size of the workspace: bounding box, reach, holes, volume, surface, and its section."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pydantic import Field
 from app.api.body import versioned
 from app.api.problems import FieldError, invalid, show
 from app.api.schemas import RobotId, refusals, reply, robot_of
-from app.api.work import Budget, busy, work_of
+from app.api.work import Deadline, busy, compute_slots
 from app.api.workspace.query import NUMBER, RegionQuery, number
 from app.shared.answers.workspace import WorkspaceAnswer, workspace_answer
 from app.shared.computations import TooManyPendingError
@@ -23,25 +23,24 @@ router = versioned("workspace")
 
 
 class SummaryQuery(RegionQuery):
-    """What is wanted."""
+    """Parameters of a summary."""
 
     volume: bool = Field(
-        True, description="Whether volume and surface are wanted: seconds the first time, the rest a tenth of one."
+        True,
+        description="Whether to compute volume and surface, which takes seconds; the rest takes 0.1 s.",
     )
-    effort: int = Field(
-        4, ge=2, le=16, description="How much work goes into volume and surface; errors shrink with it."
-    )
+    effort: int = Field(4, ge=2, le=16, description="Precision of volume and surface; larger values take longer.")
     section: bool = Field(
-        False, description="Whether the section in r and z is wanted, with the arcs of its boundary."
+        False, description="Whether to include the section in r and z, with the arcs of its boundary."
     )
     plane: str | None = Field(
         None,
         max_length=200,
-        description="The section in this plane instead, `X:Y:Z:NX:NY:NZ`: a point of it in metres, and a normal.",
+        description="Section in this plane instead, `X:Y:Z:NX:NY:NZ`: a point in metres, and a normal.",
         examples=["0:0:0.1:0:0:1"],
         json_schema_extra={"pattern": rf"^{NUMBER}(:{NUMBER}){{5}}$"},
     )
-    resolution: int = Field(96, ge=8, le=400, description="Squares along the longer side of the section.")
+    resolution: int = Field(96, ge=8, le=400, description="Grid squares along the longer side of the section.")
 
     def cut(self) -> Plane | None:
         """Point and normal of the plane; raises 422."""
@@ -56,16 +55,16 @@ class SummaryQuery(RegionQuery):
 
 @router.get(
     "/robots/{robot_id}/workspace/summary",
-    summary="Sizes of the workspace",
+    summary="Size of the workspace",
     response_model=WorkspaceAnswer,
     responses=refusals(404, 422, 500, 503),
 )
 async def summary(request: Request, robot_id: RobotId, query: Annotated[SummaryQuery, Query()]) -> Response:
     """Bounding box, reach and holes, exact and with configurations; volume and surface with their errors.
 
-    `section` adds the cut with a half-plane through the line of joint 1: closed curves and the arcs they are made
-    of; `plane` the cut with any plane instead. Answers are kept for a while, so only the first visitor waits for
-    the seconds they take; who is told that it takes too long finds it when coming again.
+    `section` adds the section with a half-plane through the axis of joint 1: closed curves and the arcs of their
+    boundary; `plane` the section with any plane instead. Answers are cached for a while and shared. A request that
+    is refused because it takes too long can be repeated: the computation goes on.
     """
     robot = robot_of(request, robot_id)
     limits, locked = query.bounds(robot)
@@ -74,8 +73,8 @@ async def summary(request: Request, robot_id: RobotId, query: Annotated[SummaryQ
         expected = f"false: joint 1 of {robot.id} slides, so there is no section in r and z"
         raise invalid(FieldError(field="section", value="true", expected=expected))
     summaries: Summaries = request.app.state.summaries
-    work = work_of(request)
-    budget = Budget(work)
+    work = compute_slots(request)
+    deadline = Deadline(work)
     cut: Future[Section] | None = None
     try:
         facts = summaries.facts(robot, limits, locked, query.effort if query.volume else None, limited=True)
@@ -83,8 +82,8 @@ async def summary(request: Request, robot_id: RobotId, query: Annotated[SummaryQ
             cut = summaries.section(robot, plane, limits, locked, query.resolution, limited=True)
     except TooManyPendingError as error:
         raise busy(f"{error.pending} summaries are being computed already.") from None
-    sizes = await work.wait(facts, budget)
+    sizes = await work.wait(facts, deadline)
     found = None
     if cut is not None:
-        found = await work.wait(cut, budget)
+        found = await work.wait(cut, deadline)
     return reply(workspace_answer(sizes, found))

@@ -1,4 +1,4 @@
-"""What a visitor of the viewer may send, looked at before it reaches viser.
+"""Inspection of the messages that visitors send to viser.
 
 viser trusts its clients: it starts a task per message, lets one set any attribute of a control, takes uploads into
 memory and opens a tunnel to the public internet when asked to. All visitors share its event loop. So the bridge
@@ -43,11 +43,11 @@ _decoder = msgspec.msgpack.Decoder(dict[str, Any])
 
 
 class MalformedMessageError(ValueError):
-    """Not a message of viser's protocol at all."""
+    """Not a message of viser's protocol."""
 
 
-class Budget:
-    """Messages that one visitor may send: `rate` a second, `burst` at once."""
+class MessageLimit:
+    """Rate limit of one visitor's messages: `rate` a second, `burst` at once."""
 
     def __init__(self, rate: float, burst: float) -> None:
         self._rate = rate
@@ -56,7 +56,7 @@ class Budget:
         self._since: float | None = None
 
     def spend(self, now: float) -> float:
-        """Use one up; the seconds to wait before the next is read."""
+        """Count a message; returns the seconds to wait before the next one is read."""
         since = now if self._since is None else self._since
         self._left = min(self._burst, self._left + self._rate * (now - since)) - 1.0
         self._since = now
@@ -64,7 +64,7 @@ class Budget:
 
 
 def admitted(message: bytes, look_only: bool) -> bool:
-    """Whether a message goes on to viser; what does not is dropped.
+    """Whether a message is passed on to viser; others are dropped.
 
     Args:
         look_only: whether this visitor may look, not touch: then only camera and memory go on.
@@ -80,7 +80,7 @@ def admitted(message: bytes, look_only: bool) -> bool:
         raise MalformedMessageError("not a message of the viewer") from error
     kind = fields.get("type")
     if kind == "GuiUpdateMessage":
-        # viser sets whatever attribute is named.
+        # viser sets the attribute named in the message, whatever it is.
         updates = fields.get("updates")
         if not isinstance(updates, dict) or set(updates) - {"value"}:
             return False

@@ -1,14 +1,13 @@
-"""The viewer on the public port: its page, and its websocket carried to the internal viser server.
+"""The viewer on the public port: its page, and a bridge from its websocket to the internal viser server.
 
-viser listens on a port of its own, reachable from this machine only. Visitors see one port: this module hands
-out viser's page under ``/viewer/`` and carries each websocket's messages both ways, unchanged. The page dials
-its own address without the trailing slash, so both spellings are routes.
+viser listens on a port of its own, reachable from this machine only. Visitors see one port: this module serves
+viser's page under ``/viewer/`` and forwards the messages of each websocket both ways, unchanged. The page connects
+to its own address without the trailing slash, so both forms are routes.
 
-What visitors send is looked at first (:mod:`app.service.web.inspection`); who sends nonsense is disconnected, and
-nobody else notices. A slow visitor must not make us hoard: with ``max_queue=1`` and both pumps waiting for the
-other side to
-take a message, what waits is left in viser's own windowed buffer, and TCP pushes back from there. Whoever takes
-nothing for a minute is let go.
+Messages of visitors are inspected first (:mod:`app.service.web.inspection`); a visitor who sends invalid ones is
+disconnected without affecting others. A slow visitor must not fill our memory: with ``max_queue=1`` and both pumps
+waiting until the other side takes a message, the backlog stays in viser's bounded buffer, with back pressure by
+TCP. A visitor who reads nothing for a minute is disconnected.
 """
 
 from __future__ import annotations
@@ -32,13 +31,13 @@ from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.typing import Subprotocol
 
 from app.service.web.access import LOOK_ONLY
-from app.service.web.inspection import BURST, RATE, Budget, MalformedMessageError, admitted
+from app.service.web.inspection import BURST, RATE, MalformedMessageError, MessageLimit, admitted
 from app.shared.metrics import DROPPED, STREAMED, VISITORS
 from app.shared.security import VIEWER_POLICY, origin_allowed
 
 logger = logging.getLogger("kinboard.bridge")
 
-# Seconds that one message may take to leave: what a visitor does not read waits in our memory.
+# Seconds that sending one message may take: unread messages wait in our memory.
 PATIENCE = 60.0
 
 _PAGE = (
@@ -88,7 +87,7 @@ class ViewerBridge:
         ]
 
     async def page(self, request: Request) -> Response:
-        """viser's page under our content policy; 503 and a page that tries again until viser listens."""
+        """viser's page with our content policy; until viser listens, 503 and a page that tries again."""
         if self.port is None:
             return HTMLResponse(_WARMING_PAGE, status_code=503, headers={"retry-after": "1"})
         if self.visitors >= self._max_visitors:
@@ -154,14 +153,14 @@ async def _carry(visitor: WebSocket, upstream: ClientConnection) -> None:
     code, reason = ended.pop().result()
     await upstream.close(code, reason)
     if visitor.client_state is WebSocketState.CONNECTED:
-        # Whoever left in this very moment has nothing to be told.
+        # A visitor who has just left cannot receive the close frame.
         with contextlib.suppress(WebSocketDisconnect):
             await visitor.close(code, reason)
 
 
 async def _to_viser(visitor: WebSocket, upstream: ClientConnection) -> _Ending:
     look_only = bool(visitor.scope.get(LOOK_ONLY, False))
-    budget = Budget(RATE, BURST)
+    limit = MessageLimit(RATE, BURST)
     try:
         while True:
             event = await visitor.receive()
@@ -179,8 +178,8 @@ async def _to_viser(visitor: WebSocket, upstream: ClientConnection) -> _Ending:
                 await upstream.send(data)
             else:
                 DROPPED.labels("refused").inc()
-            # A flood is not read faster than it may go on: it waits in the sender's own buffers.
-            if (wait := budget.spend(time.monotonic())) > 0.0:
+            # Messages above the rate are not read: they wait in the buffers of the sender.
+            if (wait := limit.spend(time.monotonic())) > 0.0:
                 await asyncio.sleep(wait)
     except ConnectionClosed:
         return _ending_of(upstream)
@@ -228,7 +227,7 @@ class _Page:
 
     def __init__(self, html: bytes) -> None:
         html = html.replace(b"<title>Viser</title>", b"<title>Kinboard viewer</title>", 1)
-        # Before viser's own script, which it prepares the page for.
+        # Before viser's own script, for which it prepares the page.
         self._html = html.replace(b"<head>", b"<head>" + _OURS, 1)
         self._gzipped = gzip.compress(self._html, 6)
         self._headers = {
@@ -247,7 +246,7 @@ class _Page:
 
 
 def _fetch_page(port: int) -> _Page:
-    # Straight to our own machine: urllib would ask the environment for a proxy first.
+    # Directly to this machine: urllib would use a proxy named in the environment.
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
     try:
         connection.request("GET", "/")

@@ -12,7 +12,7 @@ from live_server import serve, wait_for
 from pydantic import TypeAdapter
 
 import kin
-from app.api import Gate, Work, api_routes, install_problem_handlers
+from app.api import ComputeSlots, StreamLimit, api_routes, install_problem_handlers
 from app.shared import mapreduce
 from app.shared.answers.capability import CapabilityMapAnswer, capability_answer
 from app.shared.maps import Maps
@@ -28,7 +28,7 @@ def live():
     """REST alone on a real port, one map at a time, and a client: leaving and waiting need a connection."""
     app = FastAPI()
     app.state.settings, app.state.store = Settings(), Store()
-    app.state.maps, app.state.gate, app.state.work = Maps(threads=1), Gate(1), Work(4, 60.0)
+    app.state.maps, app.state.streams, app.state.compute = Maps(threads=1), StreamLimit(1), ComputeSlots(4, 60.0)
     install_problem_handlers(app)
     app.router.routes.extend(api_routes())
     with serve(app) as port, httpx2.Client(base_url=f"http://127.0.0.1:{port}", trust_env=False, timeout=60) as c:
@@ -93,7 +93,7 @@ def test_a_wrong_value_is_named(client, app, query, field, said):
     error = answer.json()["errors"][0]
     assert error["field"] == field
     assert said in error["expected"]
-    assert app.state.gate.open == 0
+    assert app.state.streams.open == 0
 
 
 def test_an_unknown_robot_is_a_404(client):
@@ -105,7 +105,7 @@ def test_one_who_leaves_ends_the_work_and_gives_the_place_back(live, held):
     go, begun = held
     with pytest.raises(httpx2.TimeoutException):
         client.get(f"{ADDRESS}?resolution=30&directions=12", timeout=1.0)
-    wait_for(lambda: app.state.gate.open == 0)
+    wait_for(lambda: app.state.streams.open == 0)
     go.set()
     wait_for(lambda: len(app.state.maps._maps) == 0)
     assert len(begun) <= 2
@@ -128,11 +128,11 @@ def test_too_many_at_a_time_are_told_to_come_again(live, held):
 
 def test_a_map_that_takes_too_long_is_given_up(live, held):
     app, client = live
-    app.state.work.seconds = 0.2
+    app.state.compute.seconds = 0.2
     answer = client.get(f"{ADDRESS}?resolution=5&directions=12")
     assert answer.status_code == 503
     assert answer.json()["type"] == "urn:kinboard:problem:too-slow"
-    assert app.state.gate.open == 0
+    assert app.state.streams.open == 0
 
 
 def test_a_failure_is_a_500_and_is_not_kept(client, monkeypatch, caplog):

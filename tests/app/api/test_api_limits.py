@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 import kin
 from app.api.problems import ProblemError
-from app.api.work import Work
+from app.api.work import ComputeSlots
 from app.service.main import create_app
 from app.shared.settings import Settings
 
@@ -87,16 +87,16 @@ def test_sizes_that_take_long_are_there_when_asked_for_again(hurried, monkeypatc
 
 def test_who_finds_no_place_waits_for_one_and_then_is_refused():
     async def ask():
-        work = Work(1, 0.05)
-        async with work.place():
+        work = ComputeSlots(1, 0.05)
+        async with work.slot():
             with pytest.raises(ProblemError) as refused:
-                async with work.place():
+                async with work.slot():
                     pytest.fail("there was no place")
-        async with work.place() as budget:  # free again
-            budget.check()
+        async with work.slot() as deadline:  # free again
+            deadline.check()
         work.close()
         with pytest.raises(ProblemError):
-            budget.check()
+            deadline.check()
         return refused.value.problem
 
     problem = asyncio.run(ask())

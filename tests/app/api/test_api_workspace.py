@@ -15,10 +15,10 @@ from live_server import serve, wait_for
 from pydantic import TypeAdapter
 
 import kin
-from app.api import Gate, api_routes, install_problem_handlers
-from app.api.work import Work
+from app.api import StreamLimit, api_routes, install_problem_handlers
+from app.api.work import ComputeSlots
 from app.api.workspace import reachable
-from app.api.workspace.flow import Pieces
+from app.api.workspace.streaming import ThreadedGenerator
 from app.exports.formats import FORMATS, encode
 from app.service.main import create_app
 from app.shared.answers.ik import ReachableAnswer
@@ -40,8 +40,8 @@ def live():
     """REST alone on a real port, two streams at a time, and a client: leaving and waiting need a connection."""
     app = FastAPI()
     app.state.settings, app.state.store = Settings(), Store()
-    app.state.work = Work(16, 300.0)
-    app.state.clouds, app.state.gate = Clouds(max_bytes=0, threads=1), Gate(2)
+    app.state.compute = ComputeSlots(16, 300.0)
+    app.state.clouds, app.state.streams = Clouds(max_bytes=0, threads=1), StreamLimit(2)
     app.state.summaries = Summaries(threads=1)
     install_problem_handlers(app)
     app.router.routes.extend(api_routes())
@@ -162,8 +162,8 @@ def test_a_reader_who_leaves_ends_the_work(live, slices):
     app, client = live
     with client.stream("GET", f"{WORKSPACE}?n=100000000&format=bin") as answer:
         assert next(answer.iter_bytes()).startswith(b"KINCLOUD")
-        assert app.state.gate.open == 1
-    wait_for(lambda: app.state.gate.open == 0)
+        assert app.state.streams.open == 1
+    wait_for(lambda: app.state.streams.open == 0)
     wait_for(lambda: app.state.clouds._executor._work_queue.empty())
     begun = len(slices)
     time.sleep(0.2)
@@ -194,21 +194,21 @@ def test_streams_are_counted_and_the_rest_goes_on(live):
         assert (
             client.post(f"{API}/pioneer5/reachable", json={"target": [{"position": [0, 0, 9]}]}).status_code == 200
         )
-    wait_for(lambda: app.state.gate.open == 0)
+    wait_for(lambda: app.state.streams.open == 0)
     assert client.get(f"{WORKSPACE}?n=10").status_code == 200
 
 
 def test_refused_and_finished_streams_give_their_place_back(client, app):
     for query in ("n=10", "n=0", "n=1000000001", "limit=9:0:1", "n=100000&format=npz"):
         client.get(f"{WORKSPACE}?{query}")
-        assert app.state.gate.open == 0
+        assert app.state.streams.open == 0
 
 
 def test_the_gate_frees_a_place_whatever_happens():
-    gate = Gate(1)
-    with pytest.raises(ZeroDivisionError), gate.place():
+    gate = StreamLimit(1)
+    with pytest.raises(ZeroDivisionError), gate.slot():
         raise ZeroDivisionError
-    with gate.place(), pytest.raises(Exception, match="1 clouds"), gate.place():
+    with gate.slot(), pytest.raises(Exception, match="1 clouds"), gate.slot():
         pass
     assert gate.open == 0
 
@@ -225,7 +225,7 @@ def test_pieces_are_closed_by_any_thread_after_the_piece_at_hand():
         finally:
             closed.append(threading.get_ident())
 
-    pieces = Pieces(work())
+    pieces = ThreadedGenerator(work())
     with ThreadPoolExecutor(2) as threads:
         taken = threads.submit(pieces.take)
         working.wait(10)

@@ -14,7 +14,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 import kin
-from app.api import Gate, api_routes
+from app.api import StreamLimit, api_routes
 from app.api.workspace import socket as socket_module
 from app.shared.clouds import Cloud, Clouds
 from app.shared.settings import Settings
@@ -30,7 +30,7 @@ def app() -> Iterator[FastAPI]:
     app = FastAPI()
     app.state.settings = Settings(allowed_origins=("https://school.example",))
     app.state.store = Store()
-    app.state.clouds, app.state.gate = Clouds(max_bytes=0, threads=1), Gate(2)
+    app.state.clouds, app.state.streams = Clouds(max_bytes=0, threads=1), StreamLimit(2)
     app.router.routes.extend(api_routes())
     yield app
     app.state.clouds.close()
@@ -93,7 +93,7 @@ def test_the_visitor_cancels(port, app):
         visitor.send('{"cancel": true}')
         _, code, reason = ending(visitor)
     assert (code, reason) == (1000, "cancelled")
-    wait_for(lambda: app.state.gate.open == 0)
+    wait_for(lambda: app.state.streams.open == 0)
     wait_for(lambda: app.state.clouds._executor._work_queue.empty())
 
 
@@ -104,7 +104,7 @@ def test_other_messages_are_not_understood(port, app, message):
         _, code, reason = ending(visitor)
     assert code == 1003
     assert "cancel" in reason
-    wait_for(lambda: app.state.gate.open == 0)
+    wait_for(lambda: app.state.streams.open == 0)
 
 
 def test_a_visitor_who_leaves_ends_the_work(port, app, monkeypatch):
@@ -118,7 +118,7 @@ def test_a_visitor_who_leaves_ends_the_work(port, app, monkeypatch):
             visitor.socket.close()
         else:
             visitor.close()
-    wait_for(lambda: app.state.gate.open == 0)
+    wait_for(lambda: app.state.streams.open == 0)
     wait_for(lambda: app.state.clouds._executor._work_queue.empty())
     time.sleep(0.1)
     count = len(begun)
@@ -174,7 +174,7 @@ def test_too_many_streams_are_asked_to_come_back(port, app):
             messages, code, _ = ending(third)
         assert json.loads(messages[0])["problem"]["type"].endswith("busy")
         assert code == 1013
-    wait_for(lambda: app.state.gate.open == 0)
+    wait_for(lambda: app.state.streams.open == 0)
     with visit(port, "n=10") as again:
         assert ending(again)[1] == 1000
 
@@ -188,7 +188,7 @@ def test_a_failure_is_told_and_logged(port, app, monkeypatch, caplog):
         _, code, reason = ending(visitor)
     assert (code, reason) == (1011, "Something went wrong on our side.")
     assert "a bug" in caplog.text
-    assert app.state.gate.open == 0
+    assert app.state.streams.open == 0
 
 
 @pytest.mark.parametrize("origin", ["https://evil.example", "null"])

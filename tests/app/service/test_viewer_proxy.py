@@ -19,7 +19,7 @@ from websockets.sync.client import connect
 from websockets.sync.server import ServerConnection
 from websockets.sync.server import serve as serve_websocket
 
-from app.service.web.inspection import BURST, RATE, Budget
+from app.service.web.inspection import BURST, RATE, MessageLimit
 from app.service.web.viewer_proxy import ViewerBridge
 
 PROTOCOL = "viser-v9.9.9"
@@ -276,11 +276,11 @@ def test_a_flood_is_slowed_down_and_the_others_do_not_wait(port, viser):
 
 
 def test_a_budget_lets_a_hand_move_freely_and_fills_up_again():
-    budget = Budget(10.0, 5.0)
-    assert [budget.spend(0.0) for _ in range(5)] == [0.0] * 5
-    assert budget.spend(0.0) == pytest.approx(0.1)
-    assert budget.spend(1000.0) == 0.0
-    assert [budget.spend(1000.0) for _ in range(5)][-1] == pytest.approx(0.1)
+    limit = MessageLimit(10.0, 5.0)
+    assert [limit.spend(0.0) for _ in range(5)] == [0.0] * 5
+    assert limit.spend(0.0) == pytest.approx(0.1)
+    assert limit.spend(1000.0) == 0.0
+    assert [limit.spend(1000.0) for _ in range(5)][-1] == pytest.approx(0.1)
 
 
 def test_a_reader_who_takes_nothing_is_let_go(port, viser, monkeypatch):

@@ -1,4 +1,4 @@
-"""Answers that are computed while they are sent, and stop being computed when nobody takes them any more."""
+"""Responses that are computed while they are sent. The computation ends when the client leaves."""
 
 from __future__ import annotations
 
@@ -19,18 +19,20 @@ logger = logging.getLogger("kinboard.workspace")
 T = TypeVar("T")
 
 
-class Gate:
-    """How many streams may flow at a time; the event loop's alone, so it needs no lock."""
+class StreamLimit:
+    """Limits the number of concurrent streams. Used by the event loop only, so it needs no lock."""
 
     def __init__(self, most: int) -> None:
         self._most = most
         self.open = 0
 
     @contextmanager
-    def place(self) -> Iterator[None]:
-        """A place as long as the context lasts; raises 503 if there is none."""
+    def slot(self) -> Iterator[None]:
+        """A slot for as long as the context lasts; raises 503 if there is none."""
         if self.open >= self._most:
-            raise busy(f"{self.open} clouds and maps are under way, the most at a time.", "KINBOARD_MAX_STREAMS")
+            raise busy(
+                f"{self.open} clouds and maps are being sent, which is the maximum.", "KINBOARD_MAX_STREAMS"
+            )
         self.open += 1
         try:
             yield
@@ -38,8 +40,8 @@ class Gate:
             self.open -= 1
 
 
-class Pieces(Generic[T]):
-    """A generator that is run by threads, one at a time, and may be closed by any."""
+class ThreadedGenerator(Generic[T]):
+    """A generator whose pieces are computed by any thread, one at a time, and that any thread may close."""
 
     def __init__(self, pieces: Generator[T]) -> None:
         self._pieces = pieces
@@ -51,26 +53,26 @@ class Pieces(Generic[T]):
             return next(self._pieces, None)
 
     def close(self) -> None:
-        """Ends the work, after the piece that is being made."""
+        """End the computation after the current piece."""
         with self._lock:
             self._pieces.close()
 
 
 class _StoppedError(Exception):
-    """The service ends before the answer does."""
+    """The service ends before the response does."""
 
 
-class Flow(StreamingResponse):
-    """Bytes sent as they are computed, each piece in a thread.
+class ComputedResponse(StreamingResponse):
+    """A response whose bytes are computed piece by piece in threads while it is sent.
 
-    A reader who is slow holds the computation back; one who leaves ends it: the generator is closed before the
-    request is over, whatever ends it.
+    A slow client slows the computation down; a client that leaves ends it: the generator is always closed before
+    the request ends.
 
     Args:
-        pieces: what is sent.
-        name: what the bytes are counted as in the metrics.
-        media_type, headers: of the answer.
-        gate: where a place is needed.
+        pieces: the bytes to send.
+        name: label of the bytes in the metrics.
+        media_type, headers: of the response.
+        limit: the limit of concurrent streams, if it applies.
     """
 
     def __init__(
@@ -79,29 +81,29 @@ class Flow(StreamingResponse):
         name: str,
         media_type: str,
         headers: dict[str, str] | None = None,
-        gate: Gate | None = None,
+        limit: StreamLimit | None = None,
     ) -> None:
-        self._pieces = Pieces(pieces)
+        self._pieces = ThreadedGenerator(pieces)
         self._name = name
-        self._gate = gate
+        self._limit = limit
         super().__init__(self._in_threads(), headers=headers, media_type=media_type)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        self._work = scope["app"].state.work
+        self._slots = scope["app"].state.compute
         try:
-            with self._gate.place() if self._gate else nullcontext():
+            with self._limit.slot() if self._limit else nullcontext():
                 await super().__call__(scope, receive, send)
         except _StoppedError:
-            # An answer without its end: the server closes the connection, and the reader can tell.
-            logger.warning("an answer under way was cut off, as the service is being stopped")
+            # The response is incomplete: the server closes the connection, which shows the client that it is.
+            logger.warning("a response was cut off because the service is being stopped")
         finally:
-            # At once: a reader who leaves is told of after the piece at hand. Only a server that is being stopped
-            # may have to wait here.
+            # Returns at once, because a disconnect is only noticed between pieces. Only a server that is being
+            # stopped may have to wait here.
             self._pieces.close()
 
     async def _in_threads(self) -> AsyncIterator[bytes]:
         while (piece := await run_in_threadpool(self._pieces.take)) is not None:
-            if self._work.closed and self._gate:
+            if self._slots.closed and self._limit:
                 raise _StoppedError
             if piece:
                 STREAMED.labels(self._name).inc(len(piece))
