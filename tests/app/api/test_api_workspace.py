@@ -134,7 +134,7 @@ def test_all_strategies_and_all_arms(client):
         ("limit=1:nan:1", "limit[0]", '"1:nan:1"', "JOINT:LOWER:UPPER"),
         ("limit=2:0:1&limit=1:-9:9", "limit[1]", '"1:-9:9"', "inside the joint's own"),
         ("limit=2:1:0.5", "limit[0]", '"2:1:0.5"', "not below"),
-        ("limit=2:0:1&limit=2:0:1", "limit[1]", '"2:0:1"', "limit[0] has this one"),
+        ("limit=2:0:1&limit=2:0:1", "limit[1]", '"2:0:1"', "limit[0] is for the same joint"),
         ("lock=3:a", "lock[0]", '"3:a"', "JOINT:VALUE"),
         ("lock=5:0.1&lock=2:9", "lock[1]", '"2:9"', "inside the limits"),
         ("lock=²:1", "lock[0]", '"²:1"', "joint from 1 to 5"),

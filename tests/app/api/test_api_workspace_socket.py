@@ -59,7 +59,7 @@ def ending(visitor) -> tuple[list[bytes | str], int, str]:
 
 
 def test_the_rows_are_the_cloud_and_progress_leads_to_its_end(port, monkeypatch):
-    monkeypatch.setattr(socket_module, "TOLD_EVERY", 0.0)
+    monkeypatch.setattr(socket_module, "PROGRESS_EVERY", 0.0)
     with visit(port, "n=200000&seed=5&strategy=quasi&measure=limits&q=true&limit=1:0:0.5&lock=3:0.2") as visitor:
         messages, code, reason = ending(visitor)
     assert (code, reason) == (1000, "done")
@@ -186,7 +186,7 @@ def test_a_failure_is_told_and_logged(port, app, monkeypatch, caplog):
     monkeypatch.setattr(Cloud, "slice", broken)
     with visit(port, "n=10") as visitor:
         _, code, reason = ending(visitor)
-    assert (code, reason) == (1011, "Something went wrong on our side.")
+    assert (code, reason) == (1011, "Internal error.")
     assert "a bug" in caplog.text
     assert app.state.streams.open == 0
 

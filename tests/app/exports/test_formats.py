@@ -209,7 +209,7 @@ def test_closing_stops_the_work(name, after, monkeypatch):
         next(pieces)
     pieces.close()
     mine.close()
-    mine._pool.shutdown(wait=True)
+    mine._executor.shutdown(wait=True)
     assert len(started) <= after + 2
 
 
