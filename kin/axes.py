@@ -1,16 +1,19 @@
-"""How a robot's joint axes lie to each other: what decides whether an arm has a closed form, and which.
+"""The joint axes of a robot as lines in space: the one place where a robot's table is read as geometry.
 
-An axis is a line in space: the line a revolute joint turns about, or the direction a prismatic joint slides along
-(a direction only: a slide may be drawn anywhere). Of two lines, two figures tell everything: the angle between
-them and the shortest distance between them. Lines are *parallel* at angle 0, *perpendicular* at 90°, they
-*intersect* at distance 0, and both at once makes them *one line*.
+An axis is a line: the line a revolute joint turns about, or the direction a prismatic joint slides along (a
+direction only: a slide may be drawn anywhere). A table of DH rows has many spellings: two conventions, twists of
+either sign, fixed rows, joints that count in either sense. The lines have one.
 
-Between two consecutive joints lies one rigid link, so these relations belong to the arm, not to a configuration.
-Three consecutive axes through one point form a *spherical group*, a wrist or a shoulder: turning about them
-leaves the point where it is, which splits position from orientation (Pieper, The kinematics of manipulators under
-computer control, Stanford 1968). Three parallel axes do the same for motion in a plane.
+**Relations.** Two numbers describe how two lines lie: the angle between them and the shortest distance between
+them. Lines are *parallel* at angle 0, *perpendicular* at 90°, they *intersect* at distance 0, and both at once
+makes them *one line*. Between two consecutive joints lies one rigid link, so these relations belong to the arm,
+not to a configuration. Three consecutive axes through one point form a *spherical group*, a wrist or a shoulder:
+turning about them leaves the point where it is, which splits position from orientation (Pieper, The kinematics of
+manipulators under computer control, Stanford 1968). Three parallel axes do the same for motion in a plane.
 
-The axes are read off the Jacobian, so conventions, fixed rows, base and tool need no cases of their own.
+**Links.** `links_of` joins each line to the next by their common normal, and so writes every arm down in one and
+the same way, between what is left of base and tool. Whether an arm belongs to a family with a closed form is then
+a matter of which twists are 0° or 90° and which lengths vanish.
 """
 
 from __future__ import annotations
@@ -18,12 +21,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from kin.fk import fk, jacobian
-from kin.robot import Robot
+from kin.robot import Robot, exact_cos_sin
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -35,13 +37,13 @@ NEARLY = 2e-3
 
 @dataclass(frozen=True, eq=False)
 class Axis:
-    """A joint's axis in the base frame.
+    """A joint's axis in the base frame, with every joint at 0.
 
     Attributes:
         joint: index of the moving joint.
         slides: whether the joint is prismatic; `point` then means nothing.
-        point: the point of the axis nearest to the tool ``(3,)``, metres.
-        direction: unit vector ``(3,)``.
+        point: a point of the axis ``(3,)``, metres.
+        direction: unit vector ``(3,)`` in the sense in which the joint counts.
     """
 
     joint: int
@@ -77,20 +79,51 @@ class Pair:
         return self.parallel and self.intersect
 
 
-def joint_axes(robot: Robot, q: ArrayLike | None = None) -> tuple[Axis, ...]:
-    """Every joint's axis at a configuration ``(n,)``; at a generic one, no angle of which is special, by default.
+class Lines(NamedTuple):
+    """The joint axes as lines, with every joint at 0, in the base frame.
 
-    A revolute column of the Jacobian is (ω × r, ω) with r from the axis to the tool point; r is recovered as
-    (ω × r) × ω.
+    Attributes:
+        z: directions ``(n, 3)``, unit vectors.
+        points: a point of each ``(n, 3)``, metres.
+        sign: ``(n,)`` −1.0 where the joint counts against the direction given here.
+        T_base_tool: ``(4, 4)``.
     """
-    q = generic_q(robot) if q is None else robot.check_q(q)
-    J, tool = jacobian(robot, q), fk(robot, q)[:3, 3]
-    axes = []
-    for i, turns in enumerate(robot.revolute.tolist()):
-        linear, angular = J[:3, i], J[3:, i]
-        point = tool - np.cross(linear, angular)
-        axes.append(Axis(i, not turns, point, angular if turns else linear))
-    return tuple(axes)
+
+    z: Array
+    points: Array
+    sign: Array
+    T_base_tool: Array
+
+
+def lines_of(robot: Robot, as_counted: bool = False) -> Lines:
+    """The joint axes of a robot, whatever the spelling of its table.
+
+    An axis that is antiparallel to the one before is turned round, and so is the first if it points down in the
+    robot's base: these joints have sign −1. Not so with `as_counted`.
+    """
+    T = robot.T_world_base.copy()
+    z, points, sign = np.empty((robot.n, 3)), np.empty((robot.n, 3)), np.ones(robot.n)
+    joint = 0
+    for row in robot.rows:
+        parts = [screw_z(row.theta, row.d), screw_x(row.a, row.alpha)]
+        turning = 0 if robot.convention == "standard" else 1
+        for k, part in enumerate(parts if turning == 0 else parts[::-1]):
+            if k == turning and row.kind != "fixed":
+                z[joint], points[joint] = T[:3, 2], T[:3, 3]
+                joint += 1
+            T = T @ part
+    up = robot.T_world_base[:3, 2]
+    for i in range(0 if as_counted else robot.n):
+        before = z[i - 1] if i else up
+        if z[i] @ before < -TOLERANCES.geometry and (i == 0 or is_zero(*np.cross(before, z[i]))):
+            z[i], sign[i] = -z[i], -1.0
+    return Lines(z, points, sign, T @ robot.T_last_tool)
+
+
+def joint_axes(robot: Robot) -> tuple[Axis, ...]:
+    """Every joint's axis, in the sense in which the joint counts."""
+    lines, turns = lines_of(robot, as_counted=True), robot.revolute.tolist()
+    return tuple(Axis(i, not turns[i], lines.points[i], lines.z[i]) for i in range(robot.n))
 
 
 def generic_q(robot: Robot) -> Array:
@@ -107,9 +140,9 @@ def size(robot: Robot) -> float:
     return float(total + np.linalg.norm(robot.T_last_tool[:3, 3])) or 1.0
 
 
-def pairs(robot: Robot, q: ArrayLike | None = None) -> tuple[Pair, ...]:
-    """How each axis lies to the next one: n − 1 pairs, the same at every configuration."""
-    return tuple(_pair(a, b, size(robot)) for a, b in pairwise(joint_axes(robot, q)))
+def pairs(robot: Robot) -> tuple[Pair, ...]:
+    """How each axis lies to the next one: n − 1 pairs."""
+    return tuple(_pair(a, b, size(robot)) for a, b in pairwise(joint_axes(robot)))
 
 
 def _pair(a: Axis, b: Axis, scale: float) -> Pair:
@@ -135,14 +168,14 @@ def _pair(a: Axis, b: Axis, scale: float) -> Pair:
     return Pair(a.joint, angle, distance, parallel, square, meet, almost)
 
 
-def spherical_groups(robot: Robot, q: ArrayLike | None = None) -> tuple[int, ...]:
+def spherical_groups(robot: Robot) -> tuple[int, ...]:
     """First joint of each three consecutive axes that meet in one point, neighbours not being one line.
 
     A shoulder, an elbow and a wrist may share joints: four axes through one point are two groups.
     """
-    axes, found = joint_axes(robot, q), []
+    axes, found = joint_axes(robot), []
     near = TOLERANCES.geometry * size(robot)
-    for i, (first, second) in enumerate(pairwise(pairs(robot, q))):
+    for i, (first, second) in enumerate(pairwise(pairs(robot))):
         if not (first.intersect and second.intersect) or first.parallel or second.parallel:
             continue
         a, b, c = axes[i : i + 3]
@@ -159,10 +192,10 @@ def _meeting(a: Axis, b: Axis) -> Array:
     return np.asarray(b.point + along * b.direction)
 
 
-def parallel_groups(robot: Robot, q: ArrayLike | None = None) -> tuple[tuple[int, int], ...]:
+def parallel_groups(robot: Robot) -> tuple[tuple[int, int], ...]:
     """(first, last) joint of each longest run of consecutive parallel axes, slides included."""
     found: list[tuple[int, int]] = []
-    for pair in pairs(robot, q):
+    for pair in pairs(robot):
         if not pair.parallel:
             continue
         if found and found[-1][1] == pair.joint:
@@ -170,3 +203,110 @@ def parallel_groups(robot: Robot, q: ArrayLike | None = None) -> tuple[tuple[int
         else:
             found.append((pair.joint, pair.joint + 1))
     return tuple(found)
+
+
+class Links(NamedTuple):
+    """A serial arm as ``base · L1 L2 … Ln · tool``, read off its axes as lines.
+
+    ``Li = Rz(theta_i) Tz(d_i) Tx(a_i) Rx(alpha_i)``; joint i adds ``sign_i q_i`` to theta_i if it turns, to d_i if
+    it slides. The last link has neither d nor a nor twist, these are in `tool`; theta_1 = d_1 = 0.
+    """
+
+    base: Array
+    sign: Array
+    theta: Array
+    d: Array
+    a: Array
+    alpha: Array
+    tool: Array
+
+
+def links_of(robot: Robot, twists: tuple[int, ...], as_counted: bool = False) -> Links:
+    """The robot as `Links`, each twist with the sign in `twists` (one per joint but the last), zero or π.
+
+    Common normals make the frames: so neither the convention nor fixed rows show in the result, and of parallel
+    axes all offsets along them are in the last one's d.
+
+    A twist is π only with `as_counted`, see `lines_of`.
+    """
+    z, points, sign, end = lines_of(robot, as_counted)
+    theta, d, a, alpha = (np.zeros(robot.n) for _ in range(4))
+    origin, incoming = points[0], np.zeros(3)
+    base = frame = np.eye(4)
+    for i, sense in enumerate(twists):
+        cross, between = np.cross(z[i], z[i + 1]), points[i + 1] - origin
+        sine = float(np.linalg.norm(cross))
+        if sine < TOLERANCES.geometry:
+            foot, across = origin, between - z[i] * (between @ z[i])
+            alpha[i] = 0.0 if z[i] @ z[i + 1] > 0.0 else math.pi
+            a[i] = float(np.linalg.norm(across))
+            if a[i] < TOLERANCES.geometry:
+                a[i], across = 0.0, incoming if incoming.any() else perpendicular_to(z[i])
+            x = across / np.linalg.norm(across)
+            origin = origin + a[i] * x
+        else:
+            x = sense * cross / sine
+            alpha[i] = sense * math.atan2(sine, z[i] @ z[i + 1])
+            a[i] = between @ x
+            foot = origin + z[i] * (np.cross(between, z[i + 1]) @ cross / sine**2)
+            origin = points[i + 1] + z[i + 1] * (np.cross(between, z[i]) @ cross / sine**2)
+        if i == 0:
+            base = frame_of(x, z[0], foot)
+        else:
+            theta[i] = math.atan2(np.cross(incoming, x) @ z[i], incoming @ x)
+            d[i] = (foot - frame[:3, 3]) @ z[i]
+        incoming = x
+        frame = frame_of(x, z[i + 1], origin)
+    return Links(base, sign, theta, d, a, alpha, inverse(frame) @ end)
+
+
+def counted_from_base(links: Links, robot: Robot) -> Links:
+    """The same links, with θ1 counted from the x axis of the robot's own base instead of a common normal."""
+    x, y = (links.base[:3, :2].T @ robot.T_world_base[:3, 0]).tolist()
+    start = math.atan2(y, x) if not is_zero(x, y) else 0.0
+    theta = links.theta.copy()
+    theta[0] -= start
+    return links._replace(base=links.base @ screw_z(start, 0.0), theta=theta)
+
+
+def screw_z(theta: float, d: float) -> Array:
+    """``Rz(theta) Tz(d)``."""
+    c, s = exact_cos_sin(theta)
+    return np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, d], [0, 0, 0, 1.0]])
+
+
+def screw_x(a: float, alpha: float) -> Array:
+    """``Tx(a) Rx(alpha)``."""
+    c, s = exact_cos_sin(alpha)
+    return np.array([[1, 0, 0, a], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1.0]])
+
+
+def inverse(T: Array) -> Array:
+    """Inverse of a rigid transform ``(4, 4)``."""
+    out = np.eye(4)
+    out[:3, :3] = T[:3, :3].T
+    out[:3, 3] = -T[:3, :3].T @ T[:3, 3]
+    return out
+
+
+def frame_of(x: Array, z: Array, origin: Array) -> Array:
+    """The frame with these axes x and z (perpendicular unit vectors) and this origin ``(4, 4)``."""
+    T = np.eye(4)
+    T[:3, 0], T[:3, 1], T[:3, 2], T[:3, 3] = x, np.cross(z, x), z, origin
+    return T
+
+
+def perpendicular_to(z: Array) -> Array:
+    """Any unit vector perpendicular to the unit vector z."""
+    x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
+    return np.asarray(x / np.linalg.norm(x))
+
+
+def is_perpendicular(angle: float) -> bool:
+    """Whether an angle is 90° or −90° within the geometric tolerance."""
+    return abs(abs(angle) - 0.5 * math.pi) < TOLERANCES.geometry
+
+
+def is_zero(*values: float) -> bool:
+    """Whether all lengths vanish within the geometric tolerance."""
+    return all(abs(v) < TOLERANCES.geometry for v in values)

@@ -16,8 +16,8 @@ from functools import cached_property
 
 import numpy as np
 
+from kin.axes import screw_x, screw_z
 from kin.robot import Robot
-from kin.solvers.common import screw_x, screw_z
 from kin.transforms import Array
 
 _NEAR = 1e-9

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from kin.kernels.compile import jit
 from kin.kernels.fk import fk_into
-from kin.solvers.common import TURN, nearest_image, relative_pose, wrap
+from kin.solvers.common import TURN, nearest_image, wrap
 from kin.solvers.contract import APPROACH, MASK, POSE
+from kin.solvers.pose import relative_pose
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 

@@ -17,8 +17,8 @@ from kin.kernels.fk import fk_into
 from kin.path.course import Course, Stop, has_closed_form
 from kin.path.trellis import shortest
 from kin.path.waypoint import branches_near, descended, meeting
-from kin.solvers.common import relative_pose
 from kin.solvers.contract import APPROACH, MASK, POSE, POSITION
+from kin.solvers.pose import relative_pose
 from kin.transforms import Array
 
 # Rounds, share of the cost that is not worth another one, hardest pull on a jump; stiffness across the tangent and

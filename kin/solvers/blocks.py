@@ -1,13 +1,13 @@
-"""The thin kernels' way through many targets: in blocks, by loops that turn into vector instructions.
+"""The batch kernels' way through many targets: in blocks, by loops that turn into vector instructions.
 
 A block of `BLOCK` targets is laid out entry by entry in one array S ``(rows, BLOCK)``. What a family computes of a
 target is then a loop along the rows of S, without jumps and calls, several targets to an instruction:
 
 1. *pairs*: every angle of every branch as (y, x), from the poses and values in the first rows of S. Where there is
-   no branch, one of the two is NaN; a target beside a singularity is marked by 1.0 in the last row.
+   no branch, one of the two is NaN; a target near a singularity is marked by 1.0 in the last row.
 2. *angles*: the arc tangents of all pairs, which are most of the work, and joint values of them.
 3. *store*: the rows of the answer, gathered from S.
-4. *closely*: a marked target once more, by the careful kernel that limits and ranges are computed with, too.
+4. *careful*: a marked target once more, by the kernel that limits and ranges are computed with, too.
 
 One target is a block of one, the same operations in the same order: so a batch gives the bits of one.
 """
@@ -17,6 +17,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+import numpy as np
+
 from kin.kernels.compile import inlined, joined
 from kin.kernels.fk import BLOCK, all_finite_pose
 from kin.kernels.simd import TURN, atan2, rounded, widest, wrapped
@@ -24,26 +26,29 @@ from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 _REACH = TOLERANCES.closure_position * 0.1
-# Rows of S: the first three rows of the pose, the value asked for, a family's own from OWN on, and last the mark.
+# Rows of S: the first three rows of the pose, the requested value, a family's own from OWN on, and last the mark.
 VALUE, OWN, _MARK = 12, 13, -1
 
 Pairs = Callable[[Array, Array, int, Array], int]
 Arc = Callable[[Array, int, int, int], float]
 Angles = Callable[[Arc, Array, Array, int, Array], None]
 Store = Callable[[Array, Array, int, Array], None]
-Closely = Callable[[Array, Array, float, Array, Array], None]
+Careful = Callable[[Array, Array, float, Array, Array], None]
 Entries = tuple[float, float, float, float, float, float, float, float, float, float, float, float]
 
 
 @joined
 def each(
-    pairs: Pairs, angles: Angles, store: Store, closely: Closely, params: Array, T: Array, values: Array,
-    near: Array, out: Array, S: Array,
+    pairs: Pairs, angles: Angles, store: Store, careful: Careful, layout: tuple[int, int], params: Array, T: Array,
+    request: tuple[Array, Array], out: Array,
 ) -> None:  # fmt: skip
-    """out ``(N, branches, n)`` ← all branches of each of the targets T ``(N, 4, 4)``; S is ``(rows, BLOCK)``.
+    """out ``(N, branches, n)`` ← all branches of each of the targets T ``(N, 4, 4)``.
 
-    values: what is asked for of each target ``(N,)``, or of all ``(1,)``.
+    layout: as in `one`. request: a value for each target ``(N,)``, or one for all ``(1,)``; the configuration
+    ``(n,)`` to stay near.
     """
+    values, near = request
+    S = np.empty((layout[0], BLOCK))
     last = values.shape[0] - 1
     for first in range(0, T.shape[0], BLOCK):
         count = min(BLOCK, T.shape[0] - first)
@@ -60,24 +65,28 @@ def each(
             for b in range(count):
                 if S[_MARK, b] > 0.0:
                     i = first + b
-                    closely(params, T[i], values[min(i, last)], near, out[i])
+                    careful(params, T[i], values[min(i, last)], near, out[i])
 
 
 @joined
 def one(
-    pairs: Pairs, angles: Angles, store: Store, closely: Closely, size: int, params: Array, T: Array, value: float,
-    near: Array, out: Array, S: Array,
+    pairs: Pairs, angles: Angles, store: Store, careful: Careful, layout: tuple[int, int], params: Array, T: Array,
+    request: tuple[float, Array], out: Array,
 ) -> bool:  # fmt: skip
-    """out ``(branches, n)`` ← all branches of T ``(4, 4)``; S is ``(rows, 1)``. False if T is not finite.
+    """out ``(branches, n)`` ← all branches of T ``(4, 4)``. False if T is not finite.
 
-    size: how many pairs there are: S[OWN + k], S[OWN + size + k].
+    layout: how many rows S has, and how many pairs there are: S[OWN + k], S[OWN + pairs + k]. request: the value,
+    and the configuration ``(n,)`` to stay near.
     """
+    value, near = request
+    rows, size = layout
+    S = np.empty((rows, 1))
     for r in range(3):
         for c in range(4):
             S[4 * r + c, 0] = T[r, c]
     S[VALUE, 0] = value
     if pairs(params, near, S.shape[1], S) > 0:
-        closely(params, T, value, near, out)
+        careful(params, T, value, near, out)
     else:
         # Vectors go down the one column: all arc tangents in one loop.
         for k in range(OWN, OWN + size):
@@ -125,8 +134,8 @@ def canonical_of(k: Entries, t: Entries, S: Array, b: int) -> Entries:
 def elbow_of(x: float, y: float, a: float, b: float) -> tuple[float, float, float, bool]:
     """The elbow of a planar arm of links a, b that ends in (x, y): c, s ≥ 0, 1/D²; c is NaN if it does not close.
 
-    The last is whether it is straight or folded, or ends so near to the first axis, that it is to be looked at
-    closely. See :func:`kin.solvers.links.two_links`.
+    The last is whether it is so nearly straight or folded, or ends so near to the first axis, that it needs the
+    careful kernel. See :func:`kin.solvers.planar.two_links`.
     """
     D2 = x * x + y * y
     most, least = a + b, abs(a - b)

@@ -17,12 +17,11 @@ from __future__ import annotations
 import numpy as np
 
 from kin.kernels.compile import jit
-from kin.solvers.links import canonical
+from kin.solvers.common import HIGH, LOW, NEAR
+from kin.solvers.pose import canonical
 from kin.transforms import Array
 
 BASE, TOOL, OFFSET, UPPER_ARM, FOREARM = 0, 12, 24, 31, 32
-# Rows of a box: the seed and the joint limits.
-NEAR, LOW, HIGH = range(3)
 
 
 def parameters(inverse_base: Array, inverse_tool: Array, offset: Array, d3: float, d5: float) -> Array:

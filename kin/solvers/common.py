@@ -22,12 +22,13 @@ import numpy as np
 from kin.kernels.compile import jit
 from kin.kernels.fk import sine_cosine
 from kin.kernels.simd import atan2
-from kin.robot import Robot, exact_cos_sin
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 TURN = 2.0 * math.pi
 _PER_TURN = 1.0 / TURN
+UNBOUNDED = 1e6  # of a limit that never binds
+NEAR, LOW, HIGH = range(3)  # rows of a box: seed and joint limits
 _SINGULAR = TOLERANCES.singular
 _LIMIT = TOLERANCES.limit
 _MERGE = TOLERANCES.merge
@@ -244,39 +245,6 @@ def to_canonical(T: Array, inverse_base: Array, inverse_tool: Array, out: Array)
 
 
 @jit
-def relative_pose(T: Array, target: Array, in_tool: bool, e: Array) -> None:
-    """e ← (Δp, φ) ``(6,)``: where T is, seen from the target, in the target's frame or in the base frame.
-
-    φ is the rotation vector of Rₜᵀ R (target's frame) or R Rₜᵀ (base frame), |φ| ≤ π.
-    """
-    for i in range(3):
-        if in_tool:
-            e[i] = 0.0
-            for r in range(3):
-                e[i] += target[r, i] * (T[r, 3] - target[r, 3])
-        else:
-            e[i] = T[i, 3] - target[i, 3]
-    # Twice the vector part of R Rₜᵀ, in the base frame; Rₜᵀ carries it over into the target's frame.
-    x = y = z = trace = 0.0
-    for c in range(3):
-        x += T[2, c] * target[1, c] - T[1, c] * target[2, c]
-        y += T[0, c] * target[2, c] - T[2, c] * target[0, c]
-        z += T[1, c] * target[0, c] - T[0, c] * target[1, c]
-        trace += T[0, c] * target[0, c] + T[1, c] * target[1, c] + T[2, c] * target[2, c]
-    sine = math.sqrt(x * x + y * y + z * z)
-    angle = math.atan2(sine, trace - 1.0)
-    k = angle / sine if sine > 1e-14 else 0.5
-    if sine <= 1e-14 and trace < 0.0:
-        # Exactly opposite: any axis is as good, the target's own x axis is turned about.
-        x, y, z, k = target[0, 0], target[1, 0], target[2, 0], math.pi
-    for i in range(3):
-        if in_tool:
-            e[3 + i] = k * (target[0, i] * x + target[1, i] * y + target[2, i] * z)
-        else:
-            e[3 + i] = k * (x if i == 0 else (y if i == 1 else z))
-
-
-@jit
 def misfit_of(angles: Array, low: Array, high: Array, first: int, last: int) -> float:
     """Sum over the angles first…last−1 of how far outside its limits each one is."""
     total = 0.0
@@ -340,92 +308,3 @@ def nearest_in_arcs(arcs: Array, first: int, found: int, wish: float) -> float:
         if distance < best_distance:
             best, best_distance = v, distance
     return best
-
-
-class Chain:
-    """A robot of revolute joints rewritten as ``base · Z1 X1 Z2 X2 … Zn · tool``, whatever its convention.
-
-    ``Zi = Rz(q_i + theta_i) Tz(d_i)`` and ``Xi = Tx(a_i) Rx(alpha_i)``; both conventions, fixed rows at either
-    end and constant tools reduce to it, so each closed form is matched once.
-    """
-
-    def __init__(self, base: Array, theta: Array, d: Array, a: Array, alpha: Array, tool: Array) -> None:
-        self.base, self.theta, self.d, self.a, self.alpha, self.tool = base, theta, d, a, alpha, tool
-
-    def twisted(self, pattern: tuple[int, ...]) -> Chain | None:
-        """The same arm with the twists ``pattern`` (in quarter turns, one per joint but the last), or None.
-
-        ``Tx(a) Rx(90°) = Rz(π) Tx(−a) Rx(−90°) Rz(π)``: a twist of the wrong sign is exchanged for half turns
-        of its two neighbours.
-        """
-        theta, a, alpha = self.theta.copy(), self.a.copy(), self.alpha.copy()
-        for i, quarter in enumerate(pattern):
-            wanted = quarter * math.pi / 2
-            if abs(wrap(alpha[i] - wanted)) < TOLERANCES.geometry:
-                continue
-            if quarter == 0 or abs(wrap(alpha[i] + wanted)) >= TOLERANCES.geometry:
-                return None
-            theta[i] += math.pi
-            theta[i + 1] += math.pi
-            a[i] = -a[i]
-            alpha[i] = wanted
-        return Chain(self.base, theta, self.d, a, alpha, self.tool)
-
-
-def chain_of(robot: Robot) -> Chain | None:
-    """The robot as a `Chain`, or None if it has prismatic joints or a fixed offset in the middle."""
-    if not robot.revolute.all():
-        return None
-    base, tool = robot.T_world_base.copy(), np.eye(4)
-    theta, d, a, alpha = (np.zeros(robot.n) for _ in range(4))
-    joint = -1
-    for row in robot.rows:
-        z_part, x_part = (row.theta, row.d), (row.a, row.alpha)
-        parts = (
-            [("z", z_part), ("x", x_part)] if robot.convention == "standard" else [("x", x_part), ("z", z_part)]
-        )
-        for axis, (first, second) in parts:
-            moving = axis == "z" and row.kind != "fixed"
-            constant = screw_z(first, second) if axis == "z" else screw_x(first, second)
-            if moving:
-                joint += 1
-                theta[joint], d[joint] = first, second
-            elif joint < 0:
-                base = base @ constant
-            elif joint == robot.n - 1:
-                tool = tool @ constant
-            elif axis == "z":
-                if first or second:
-                    if a[joint] or alpha[joint]:
-                        return None
-                    theta[joint] += first
-                    d[joint] += second
-            else:
-                a[joint] += first
-                alpha[joint] += second
-    return Chain(base, theta, d, a, alpha, tool @ robot.T_last_tool)
-
-
-def screw_z(theta: float, d: float) -> Array:
-    """``Rz(theta) Tz(d)``."""
-    c, s = exact_cos_sin(theta)
-    return np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, d], [0, 0, 0, 1.0]])
-
-
-def screw_x(a: float, alpha: float) -> Array:
-    """``Tx(a) Rx(alpha)``."""
-    c, s = exact_cos_sin(alpha)
-    return np.array([[1, 0, 0, a], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1.0]])
-
-
-def inverse(T: Array) -> Array:
-    """Inverse of a rigid transform ``(4, 4)``."""
-    out = np.eye(4)
-    out[:3, :3] = T[:3, :3].T
-    out[:3, 3] = -T[:3, :3].T @ T[:3, 3]
-    return out
-
-
-def is_zero(*values: float) -> bool:
-    """Whether all lengths vanish within the geometric tolerance."""
-    return all(abs(v) < TOLERANCES.geometry for v in values)

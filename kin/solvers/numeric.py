@@ -36,8 +36,8 @@ from numpy.typing import NDArray
 
 from kin.kernels.compile import jit
 from kin.kernels.jacobian import jacobian_into
-from kin.solvers.common import relative_pose
 from kin.solvers.contract import APPROACH, MASK, POSE, POSITION
+from kin.solvers.pose import relative_pose
 from kin.transforms import Array
 
 # Steps of one descent at most, and of one step (radians, metres) at most.

@@ -1,16 +1,15 @@
-"""An arm read with some of its joints counting the other way round, and a closed form asked about that arm.
+"""Arms with reversed joints: the arm is read with some joints reversed, and the signs of their values are changed.
 
-Which way a joint counts is a choice of whoever writes the table: with joint 3 of an arm turned round and θ3 → −θ3
-it is the same arm. A closed form has made its own choice. Where an arm fits none as it is, its axes as lines in
-space (:mod:`kin.solvers.links`) say which joints would have to count otherwise:
+The sense in which a joint counts is a choice of the table's author: with joint 3 turned round and θ3 → −θ3 it is
+the same arm. A family has made its own choice. Where an arm fits none as it is, its axes as lines
+(:mod:`kin.axes`) show which joints have to be reversed:
 
-- Of parallel neighbours all count the same way.
+- Parallel neighbours count in the same sense.
 - From one link to the next the way along an axis between two others goes forward, so that d3, d4, d5 > 0.
 - The tool looks along the last axis, not against it.
 
-What is still open is read with as few joints turned round as possible. The closed form then answers for that arm,
-and what is said of a joint turned round changes its sign: values, limits (which change places), intervals.
-Lines also do not see how a table comes to them, so that rows that do not move may stand anywhere in it.
+What is still open is read with as few reversed joints as possible. The closed form then solves that arm, and every
+number that belongs to a reversed joint changes its sign: values, limits (which change places), intervals.
 """
 
 from __future__ import annotations
@@ -22,10 +21,10 @@ from itertools import islice, product
 
 import numpy as np
 
+from kin.axes import Links, counted_from_base, is_zero, links_of
 from kin.robot import Joint, Robot
-from kin.solvers.common import TURN, is_zero, screw_z
+from kin.solvers.common import TURN
 from kin.solvers.contract import POSE, BatchKernels, Candidates, ClosedForm, RedundancyParameter, SolverInput
-from kin.solvers.links import Links, links_of
 from kin.solvers.singular import JointValue, Singularity
 from kin.transforms import Array
 
@@ -35,7 +34,7 @@ _HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])  # Rx(π)
 
 
 def readings(robot: Robot) -> Iterator[tuple[Joints, Robot]]:
-    """The arm as a plain standard table, with the joints (indices) in it that count the other way round.
+    """The arm as a plain standard table, with the joints (indices) that are reversed in it.
 
     The fewest joints come first, and possibly none. The tables have neither limits nor home.
     """
@@ -48,7 +47,7 @@ def readings(robot: Robot) -> Iterator[tuple[Joints, Robot]]:
 
 
 def _choices(robot: Robot, links: Links) -> list[list[Joints]]:
-    """For each run of parallel axes the joints that may be turned round, in one or two ways."""
+    """For each run of parallel axes the joints that may be reversed, in one or two ways."""
     starts = [i for i in range(robot.n) if i == 0 or links.alpha[i - 1] != 0.0]
     found = []
     for first, end in zip(starts, [*starts[1:], robot.n], strict=True):
@@ -70,21 +69,12 @@ def _choices(robot: Robot, links: Links) -> list[list[Joints]]:
 
 
 def _table(robot: Robot, links: Links, joints: Joints) -> Robot:
-    """The arm of these links, as the robot counts, but for `joints`.
+    """The arm of these links, in which all joints count as in the robot, but for `joints`.
 
     ``Rz(θ) Tz(d) = Rx(π) Rz(−θ) Tz(−d) Rx(π)``, and half turns about x join the twists before and after.
     """
     turned = [(i in joints) != (sign < 0.0) for i, sign in enumerate(links.sign.tolist())]
-    # Lines do not tell from where the first and the last angle are counted. Here that is the x axis of the robot's
-    # own base, and where the tool looks along the frame's y axis if it does not look along the last joint's.
-    x, y = (links.base[:3, :2].T @ robot.T_world_base[:3, 0]).tolist()
-    start = math.atan2(y, x)
-    x, y = links.tool[:2, 2].tolist()
-    end = 0.0 if is_zero(x, y) else math.atan2(-x, y)
-    base, tool = links.base @ screw_z(start, 0.0), screw_z(-end, 0.0) @ links.tool
-    theta = links.theta.copy()
-    theta[0] -= start
-    theta[-1] += end
+    links = counted_from_base(links, robot)
     rows = []
     for i, joint in enumerate(robot.joints):
         after = turned[i + 1] if i + 1 < robot.n else turned[i]
@@ -93,7 +83,7 @@ def _table(robot: Robot, links: Links, joints: Joints) -> Robot:
         rows.append(
             Joint(
                 joint.name,
-                sense * float(theta[i]),
+                sense * float(links.theta[i]),
                 sense * float(links.d[i]),
                 float(links.a[i]),
                 math.remainder(twist, TURN),
@@ -105,8 +95,8 @@ def _table(robot: Robot, links: Links, joints: Joints) -> Robot:
         convention="standard",
         rows=tuple(rows),
         home=(0.0,) * robot.n,
-        base=_nested(base @ _HALF_TURN if turned[0] else base),
-        tool=_nested(_HALF_TURN @ tool if turned[-1] else tool),
+        base=_nested(links.base @ _HALF_TURN if turned[0] else links.base),
+        tool=_nested(_HALF_TURN @ links.tool if turned[-1] else links.tool),
     )
 
 

@@ -20,18 +20,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kin.axes import frame_of, is_zero, lines_of, perpendicular_to
 from kin.kernels.compile import inlined, jit, joined
-from kin.kernels.fk import BLOCK
 from kin.kernels.simd import widest, wrapped
 from kin.robot import Robot
 from kin.solvers.blocks import OWN, Arc, double, each, elbow_of, in_base, one, rows_of, single
-from kin.solvers.common import (
-    clear,
-    copy_row,
-    is_zero,
-    split_sum,
-    wrap,
-)
+from kin.solvers.common import HIGH, LOW, NEAR, UNBOUNDED, clear, copy_row, split_sum, wrap
 from kin.solvers.contract import (
     APPROACH,
     POSE,
@@ -43,15 +37,8 @@ from kin.solvers.contract import (
     RedundancyParameter,
     SolverInput,
 )
-from kin.solvers.links import (
-    axes_of,
-    frame_of,
-    planar_free,
-    pose_params,
-    signed_box,
-    square_to,
-    two_links,
-)
+from kin.solvers.planar import planar_free, two_links
+from kin.solvers.pose import pose_params, signed_box
 from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -62,10 +49,11 @@ BRANCHES = ("elbow right", "elbow left")
 _PSI = RedundancyParameter("psi", "tool angle ψ", circular=True)
 _REACH = TOLERANCES.closure_position * 0.1
 _SINGULAR = TOLERANCES.singular
-_FAR = 1e6
-# Layout of params: base⁻¹ (12), tool (12), a, b, then of the joints θ1, θ2, θ3, slide their index in q (−1: none),
-# sign and offset, and the limits that never bind.
-_A, _B, _JOINT, _SIGN, _OFFSET, _LOW, _HIGH, _SIZE = 24, 25, 26, 30, 34, 38, 42, 46
+# Layout of the parameter array: the first three rows of base⁻¹ and of the tool; the two links; for θ1, θ2, θ3 and
+# the height the index of the joint (−1: none), its sign and offset; joint limits that never bind; whether the tool
+# is upright.
+_BASE, _TOOL, _A, _B, _JOINT, _SIGN, _OFFSET, _LOW, _HIGH, _UPRIGHT = 0, 12, 24, 25, 26, 30, 34, 38, 42, 46
+_TOOL_X, _TOOL_Y, _TOOL_Z = 15, 19, 23  # entries of the tool: where its point is
 
 
 class Geometry(NamedTuple):
@@ -93,30 +81,28 @@ def match(robot: Robot) -> Scara4 | None:
     turning = np.flatnonzero(robot.revolute).tolist()
     if len(turning) != 3 or robot.n > 4:
         return None
-    z, points, sign, end = axes_of(robot)
+    lines = lines_of(robot)
+    z, points = lines.z, lines.points
     if not is_zero(*np.cross(z[0], z).ravel()):
         return None
     # ψ is the sum of the joint angles: x of this frame is where it is counted from.
-    base = frame_of(square_to(z[0]), z[0], points[turning[0]])
+    base = frame_of(perpendicular_to(z[0]), z[0], points[turning[0]])
     x, y, _ = base[:3, :3].T @ (points[turning] - base[:3, 3]).T
     upper, fore = complex(x[1] - x[0], y[1] - y[0]), complex(x[2] - x[1], y[2] - y[1])
     if min(abs(upper), abs(fore)) < TOLERANCES.geometry:
         return None
     first, second = (math.atan2(link.imag, link.real) for link in (upper, fore))
     order = (*turning, *(i for i in range(robot.n) if i not in turning))
-    signs = np.append(sign[list(order)], [1.0] * (4 - robot.n))
+    sign = np.append(lines.sign[list(order)], [1.0] * (4 - robot.n))
     offset = np.array([first, second - first, -second, 0.0])
     wrist = frame_of(base[:3, 0], z[0], base[:3, 3] + base[:3, 0] * x[2] + base[:3, 1] * y[2])
-    tool = np.linalg.inv(wrist) @ end
-    joints = [*order, *[-1] * (4 - robot.n)]
-    params = np.array(
-        [
-            *pose_params(base, np.eye(4))[:12], *tool[:3].ravel(), abs(upper), abs(fore), *joints, *signs, *offset,
-            *[-_FAR] * 4, *[_FAR] * 4,
-        ]
-    )  # fmt: skip
+    tool = np.linalg.inv(wrist) @ lines.T_base_tool
     upright = is_zero(abs(tool[2, 2]) - 1.0)
-    return Scara4(Geometry(params, order, signs, offset, abs(upper), abs(fore), upright))
+    lengths, joints = [abs(upper), abs(fore)], [*order, *[-1] * (4 - robot.n)]
+    limits = [*[-UNBOUNDED] * 4, *[UNBOUNDED] * 4]
+    pose = [*pose_params(base, np.eye(4))[:_TOOL], *tool[:3].ravel()]
+    params = np.array([*pose, *lengths, *joints, *sign, *offset, *limits, float(upright)])
+    return Scara4(Geometry(params, order, sign, offset, abs(upper), abs(fore), upright))
 
 
 @jit
@@ -134,55 +120,57 @@ def _held(params: Array, T: Array, task: int) -> tuple[float, float, float, floa
     for j in range(2 if task == APPROACH else 0, 3):
         x_j = p[0] * T[0, j] + p[1] * T[1, j] + p[2] * T[2, j]
         y_j = p[4] * T[0, j] + p[5] * T[1, j] + p[6] * T[2, j]
-        cosine += x_j * p[12 + j] + y_j * p[16 + j]
-        sine += y_j * p[12 + j] - x_j * p[16 + j]
+        cosine += x_j * p[_TOOL + j] + y_j * p[_TOOL + 4 + j]
+        sine += y_j * p[_TOOL + j] - x_j * p[_TOOL + 4 + j]
     return x, y, z, math.atan2(sine, cosine)
 
 
 @jit
 def _put(params: Array, out: Array, row: int, t1: float, t2: float, t3: float, z: float) -> None:
     """out[row] ← joint values of canonical angles and of the tool's height."""
-    out[row, int(params[26])] = wrap(params[30] * (t1 - params[34]))
-    out[row, int(params[27])] = wrap(params[31] * (t2 - params[35]))
-    out[row, int(params[28])] = wrap(params[32] * (t3 - params[36]))
-    if params[29] >= 0.0:
-        out[row, int(params[29])] = params[33] * (z - params[23] - params[37])
+    out[row, int(params[_JOINT])] = wrap(params[_SIGN] * (t1 - params[_OFFSET]))
+    out[row, int(params[_JOINT + 1])] = wrap(params[_SIGN + 1] * (t2 - params[_OFFSET + 1]))
+    out[row, int(params[_JOINT + 2])] = wrap(params[_SIGN + 2] * (t3 - params[_OFFSET + 2]))
+    slide = int(params[_JOINT + 3])
+    if slide >= 0:
+        out[row, slide] = params[_SIGN + 3] * (z - params[_TOOL_Z] - params[_OFFSET + 3])
 
 
 @jit
-def _box(params: Array, near: Array, lower: Array, upper: Array, out_near: Array, low: Array, high: Array) -> None:
-    """out_near, low, high ``(4,)`` ← seed and limits of θ1, θ2, θ3; the last place is for no joint."""
-    a, b, c = np.zeros(4), np.zeros(4), np.zeros(4)
+def _box(params: Array, near: Array, lower: Array, upper: Array) -> Array:
+    """Seed and limits of θ1, θ2, θ3 ``(3, 4)``; the last column stands for no joint."""
+    a, b, c, box = np.zeros(4), np.zeros(4), np.zeros(4), np.empty((3, 4))
     for i in range(3):
-        k = int(params[26 + i])
+        k = int(params[_JOINT + i])
         a[i], b[i], c[i] = near[k], lower[k], upper[k]
-    signed_box(a, b, c, params[30:34], params[34:38], out_near, low, high)
+    signed_box(a, b, c, params[_SIGN:_OFFSET], params[_OFFSET:_LOW], box)
+    return box
 
 
 @jit
 def _branches(
-    params: Array, T: Array, task: int, free: bool, value: float, near: Array, lower: Array, upper: Array,
-    arcs: Array, psis: Array, out: Array,
+    params: Array, T: Array, task: int, value: float, near: Array, lower: Array, upper: Array, arcs: Array,
+    out: Array,
 ) -> tuple[float, int]:  # fmt: skip
-    """Both branches; with ψ free, the one nearest to the seed's or `value`: (gap, number of arcs of ψ).
+    """out ``(2, n)`` ← both branches: (gap in metres, number of arcs of ψ).
 
-    psis ``(2,)`` ← ψ of each row if it is free; left alone otherwise.
+    ψ is free for a point, and for an approach direction along the axes. It is then `value`, or near the seed's if
+    that is NaN, and out has one column more for it.
     """
     clear(out)
     x, y, z, psi = _held(params, T, task)
-    a, b, p, q = params[_A], params[_B], params[15], params[19]
-    if free:
-        box, low, high, angles = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
-        _box(params, near, lower, upper, box, low, high)
-        wish = value if not math.isnan(value) else box[0] + box[1] + box[2]
-        found = min(0, arcs.shape[0])  # a bare 0 would have what it is passed to compiled once more
+    a, b, p, q = params[_A], params[_B], params[_TOOL_X], params[_TOOL_Y]
+    if task == POSITION or (task == APPROACH and params[_UPRIGHT] != 0.0):
+        box, angles = _box(params, near, lower, upper), np.empty(4)
+        fixed = not math.isnan(value)
+        wanted = value if fixed else box[NEAR, 0] + box[NEAR, 1] + box[NEAR, 2]
+        arm = (x, y, p, q, a, b)
+        found = 0
         for ei in range(2):
-            up = 1.0 if ei == 0 else -1.0
-            psis[ei], found = planar_free(
-                x, y, p, q, a, b, up, 0.0, 0.0, wish, not math.isnan(value), ei, box, low, high, arcs, found,
-                angles,
-            )  # fmt: skip
-            if not math.isnan(psis[ei]):
+            last = (1.0 if ei == 0 else -1.0, 0.0, 0.0)
+            psi, found = planar_free(arm, last, (wanted, fixed), ei, box, arcs, found, angles)
+            if not math.isnan(psi):
+                out[ei, out.shape[1] - 1] = psi
                 _put(params, out, ei, angles[0], angles[1], angles[2], z)
         # How far the circle that the third axis may be on is from the reach of the two links.
         R, rho = math.hypot(x, y), math.hypot(p, q)
@@ -198,16 +186,16 @@ def _branches(
         t1, t2 = middle - up * half, up * bend
         if cx * cx + cy * cy < _SINGULAR * _SINGULAR:
             # The third axis on the first: only θ1 + θ3 counts.
-            box, low, high = np.empty(4), np.empty(4), np.empty(4)
-            _box(params, near, lower, upper, box, low, high)
-            t1 = split_sum(psi - t2, box[0], low[0], high[0], box[2], low[2], high[2])
+            box = _box(params, near, lower, upper)
+            seed, low, high = box[NEAR], box[LOW], box[HIGH]
+            t1 = split_sum(psi - t2, seed[0], low[0], high[0], seed[2], low[2], high[2])
         _put(params, out, ei, t1, t2, psi - t1 - t2, z)
     if bend == 0.0:
         copy_row(out, 0, 1)
     return miss, 0
 
 
-# Thin: both branches of a pose, without limits, ranges and a choice, as :mod:`kin.solvers.blocks` has it. Rows
+# Batch kernels: both branches of a pose, without limits, ranges or a choice, see :mod:`kin.solvers.blocks`. Rows
 # of S are θ2, of which the other is −θ2, ψ, and θ1 of both branches; θ3 is what ψ leaves.
 _BEND, _SUM, _UPPER, _END = OWN, OWN + 1, OWN + 2, OWN + 4
 _PAIRS, _HEIGHT, _ROWS = _END - OWN, _END + _END - OWN, _END + _END - OWN + 2
@@ -217,8 +205,8 @@ _TINY = 1e-20  # where ψ is anything
 
 @inlined
 def _pairs(params: Array, near: Array, count: int, S: Array) -> int:
-    """The pairs of `count` targets; S[-1] ← 1.0 for those to be looked at closely, and how many these are."""
-    k, t = rows_of(params, 0), rows_of(params, 12)
+    """The pairs of `count` targets; S[-1] ← 1.0 for those that need the careful kernel, and how many these are."""
+    k, t = rows_of(params, _BASE), rows_of(params, _TOOL)
     a, b = params[_A], params[_B]
     sign, height = params[_SIGN + 3], params[_OFFSET + 3]
     found = 0
@@ -274,25 +262,22 @@ def _store(params: Array, S: Array, b: int, out: Array) -> None:
 
 
 @jit
-def _closely(params: Array, T: Array, value: float, near: Array, out: Array) -> None:
-    """out ``(2, n)`` ← the branches by `_branches`, which is at home in singularities."""
-    lower, upper, free = params[_LOW:_HIGH], params[_HIGH:_SIZE], params.shape[0] == 0
-    _branches(params, T, POSE, free, value, near, lower, upper, out[:0], params[:0], out)
+def _careful(params: Array, T: Array, value: float, near: Array, out: Array) -> None:
+    """out ``(2, n)`` ← the branches by `_branches`, which also handles singular targets."""
+    _branches(params, T, POSE, value, near, params[_LOW:_HIGH], params[_HIGH:_UPRIGHT], out[:0], out)
 
 
 @jit
 def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
     """out ``(2, n)`` ← both branches of the target T ``(4, 4)``; False if T is not finite."""
-    S = np.empty((_ROWS, 1))
-    return one(_pairs, _angles, _store, _closely, _PAIRS, params, T, value, near, out, S)
+    return one(_pairs, _angles, _store, _careful, (_ROWS, _PAIRS), params, T, (value, near), out)
 
 
 @jit
 def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
     """out ``(N, 2, n)`` ← both branches of each of the targets T ``(N, 4, 4)``, values ``(N,)`` or ``(1,)``."""
     widest()
-    S = np.empty((_ROWS, BLOCK))
-    each(_pairs, _angles, _store, _closely, params, T, values, near, out, S)
+    each(_pairs, _angles, _store, _careful, (_ROWS, _PAIRS), params, T, (values, near), out)
 
 
 class Scara4(ClosedForm):
@@ -316,18 +301,16 @@ class Scara4(ClosedForm):
 
     def solve(self, problem: SolverInput) -> Candidates:
         """Both branches that bring the tool to the target's point, at the requested ψ or the best one."""
-        g = self.geometry
-        out, arcs, psis = np.empty((2, len(g.order))), np.empty((64, 3)), np.full(2, math.nan)
+        g, n = self.geometry, len(self.geometry.order)
         free = bool(self.redundancies(problem.task))
+        out, arcs = np.empty((2, n + free)), np.empty((64, 3))
         value = problem.values[0] if free else math.nan
-        gap, count = _branches(
-            g.params, problem.T, problem.task, free, value, problem.seed, problem.lower, problem.upper, arcs, psis,
-            out,
-        )  # fmt: skip
+        p = problem
+        gap, count = _branches(g.params, p.T, p.task, value, p.seed, p.lower, p.upper, arcs, out)
         exists = bool((~np.isnan(out[:, 0])).any())
         obstacle = None if exists else Obstacle("last axis beyond the links' reach")
-        values, ranges = (psis[:, None], (arcs[:count],)) if free else (np.empty((2, 0)), ())
-        return Candidates(out, values, ranges, 0.0 if exists else max(gap, 0.0), obstacle)
+        ranges = (arcs[:count],) if free else ()
+        return Candidates(out[:, :n], out[:, n:], ranges, 0.0 if exists else max(gap, 0.0), obstacle)
 
     def _elbow(self, q: Array) -> float:
         """θ2: 0 where the arm is straight."""

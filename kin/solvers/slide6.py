@@ -1,8 +1,8 @@
 """Arms that slide in and out and have a spherical wrist: the Stanford arm (Scheinman 1969) and its kin.
 
 As in :mod:`kin.solvers.wrist6` the pose fixes the wrist centre W = (X, L, −h) in the frame that turns with axis 1,
-in front or at the back. The third joint is a slide square to axis 2 instead of a forearm that turns. It runs past
-axis 2 at the distance E, so
+in front or at the back. The third joint is a slide perpendicular to axis 2 instead of a forearm that turns. It
+runs past axis 2 at the distance E, so
 
 - S = ±√((X − a1)² + h² − E²) is how far W is along it, out or through to the other side;
 - θ2 = atan2(h, X − a1) + atan2(E, S); the wrist is the same.
@@ -16,33 +16,29 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
+from kin.axes import is_perpendicular, is_zero, links_of, screw_x, screw_z
 from kin.kernels.compile import inlined, jit, joined
-from kin.kernels.fk import BLOCK
 from kin.kernels.simd import widest
 from kin.robot import Robot
-from kin.solvers import wrist6
 from kin.solvers.blocks import Arc, Entries, canonical_of, each, one, rows_of
-from kin.solvers.common import is_zero, screw_x, screw_z
 from kin.solvers.contract import BatchKernels, Obstacle
-from kin.solvers.links import is_square, links_of
 from kin.solvers.singular import JointValue, Singularity, off_line, those_within
-from kin.solvers.wrist6 import (
+from kin.solvers.wrist6.batch import (
     BEND,
     FRONT,
     PAIRS,
     ROWS,
-    Geometry,
-    Wrist6,
+    Twist,
     all_but_third,
     arm_pairs,
-    closely,
+    careful,
     shape_of,
     shoulder,
     store,
     turned,
 )
+from kin.solvers.wrist6.closed_form import Wrist6
+from kin.solvers.wrist6.geometry import BASE, OFFSET, SIGN, TOOL, Geometry, has_spherical_wrist, pack
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -65,7 +61,7 @@ def match(robot: Robot) -> Slide6 | None:
         return None
     links = links_of(robot, (-1, -1, -1, -1, 1))
     a, d, alpha = links.a, links.d, links.alpha
-    if not all(is_square(alpha[i]) for i in (0, 1, 3, 4)) or not is_zero(a[3], a[4], d[4]):
+    if not (is_perpendicular(alpha[0]) and is_perpendicular(alpha[1]) and has_spherical_wrist(links)):
         return None
     # W as seen from the slide; the slide's own frame is a quarter turn about x from that of axis 2.
     to_wrist = screw_z(links.theta[2], 0.0) @ screw_x(a[2], alpha[2]) @ screw_z(0.0, d[3])
@@ -82,20 +78,20 @@ def match(robot: Robot) -> Slide6 | None:
     rest = screw_x(0.0, -twist)[:3, :3] @ screw_z(phase, 0.0)[:3, :3] @ R
     offset[3] += math.atan2(rest[1, 0], rest[0, 0])
     lengths = (float(a[0]), 0.0, 0.0 if is_zero(aside) else aside, 0.0 if is_zero(beside) else beside)
-    return Slide6(wrist6.pack(links, offset, lengths, phase, twist, slides=True))
+    return Slide6(pack(links, offset, lengths, phase, twist, slides=True))
 
 
-# Thin, as in :mod:`kin.solvers.wrist6`. How far W is along the slide (front, back) has rows of its own; those of
-# θ3 have no pairs, and what is found there is written over.
+# The batch kernels are those of :mod:`kin.solvers.wrist6.batch`. How far W is along the slide (front, back) has
+# rows of its own; those of θ3 have no pairs, and are written over.
 _ALONG, _ROWS = ROWS - 1, ROWS + 2
 
 
 @inlined
 def _side(
-    M: Entries, X: float, scale: float, lengths: tuple[float, float, float],
-    stands: tuple[float, float, float, float], S: Array, back: int, b: int,
+    M: Entries, X: float, scale: float, lengths: tuple[float, float, float], twist: Twist, S: Array, back: int,
+    b: int,
 ) -> bool:  # fmt: skip
-    """All pairs of the shoulder with W at X, scale = 1/r²; whether one is to be looked at closely."""
+    """All pairs of the shoulder with W at X, scale = 1/r²; whether one needs the careful kernel."""
     a1, f, beside = lengths
     s1, c1, R = turned(M, X, beside, scale)
     x, h, apart = X - a1, -M[11], abs(f)
@@ -106,23 +102,23 @@ def _side(
     along = math.nan if distance + _REACH < apart else along
     S[FRONT + back, b], S[PAIRS + FRONT + back, b] = s1, c1 + 0.0 * along
     S[_ALONG + back, b] = along
-    close0 = arm_pairs(x, h, along, -f, 1.0, 0.0, inverse, R, stands, S, 2 * back, b)
-    close1 = arm_pairs(x, h, -along, -f, 1.0, 0.0, inverse, R, stands, S, 2 * back + 1, b)
+    close0 = arm_pairs(x, h, (along, -f, 1.0, 0.0, inverse), R, twist, S, 2 * back, b)
+    close1 = arm_pairs(x, h, (-along, -f, 1.0, 0.0, inverse), R, twist, S, 2 * back + 1, b)
     return close0 | close1 | (along < _MERGE * apart + _SINGULAR)
 
 
 @inlined
 def _pairs(params: Array, near: Array, count: int, S: Array) -> int:
-    """The pairs of `count` targets; S[-1] ← 1.0 for those to be looked at closely, and how many these are."""
-    base, tool = rows_of(params, 0), rows_of(params, 12)
-    a1, _, f, beside, stands = shape_of(params)
+    """The pairs of `count` targets; S[-1] ← 1.0 for those that need the careful kernel, and how many these are."""
+    base, tool = rows_of(params, BASE), rows_of(params, TOOL)
+    a1, _, f, beside, twist = shape_of(params)
     lengths = (a1, f, beside)
     found = 0
     for b in range(count):
         M = canonical_of(base, tool, S, b)
         X, scale, close = shoulder(M[3], M[7], beside)
-        close0 = _side(M, X, scale, lengths, stands, S, 0, b)
-        close1 = _side(M, -X, scale, lengths, stands, S, 1, b)
+        close0 = _side(M, X, scale, lengths, twist, S, 0, b)
+        close1 = _side(M, -X, scale, lengths, twist, S, 1, b)
         marked = close | close0 | close1
         S[-1, b] = 1.0 if marked else 0.0
         found += 1 if marked else 0
@@ -134,7 +130,7 @@ def _angles(arc: Arc, params: Array, near: Array, count: int, S: Array) -> None:
     """S ← the joint values of `count` targets, from the pairs."""
     widest()
     all_but_third(arc, params, count, S)
-    sign, offset = params[26], params[32]
+    sign, offset = params[SIGN + 2], params[OFFSET + 2]
     for k in range(2):
         for b in range(count):
             along = S[_ALONG + k, b]
@@ -145,16 +141,14 @@ def _angles(arc: Arc, params: Array, near: Array, count: int, S: Array) -> None:
 @jit
 def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
     """out ``(8, 6)`` ← all branches of the target T ``(4, 4)``; False if T is not finite."""
-    S = np.empty((_ROWS, 1))
-    return one(_pairs, _angles, store, closely, PAIRS, params, T, value, near, out, S)
+    return one(_pairs, _angles, store, careful, (_ROWS, PAIRS), params, T, (value, near), out)
 
 
 @jit
 def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
     """out ``(N, 8, 6)`` ← all branches of each of the targets T ``(N, 4, 4)``, values ``(N,)`` or ``(1,)``."""
     widest()
-    S = np.empty((_ROWS, BLOCK))
-    each(_pairs, _angles, store, closely, params, T, values, near, out, S)
+    each(_pairs, _angles, store, careful, (_ROWS, PAIRS), params, T, (values, near), out)
 
 
 class Slide6(Wrist6):

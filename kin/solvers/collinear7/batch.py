@@ -11,7 +11,6 @@ import math
 import numpy as np
 
 from kin.kernels.compile import inlined, jit, joined
-from kin.kernels.fk import BLOCK
 from kin.kernels.simd import widest, wrapped
 from kin.solvers.blocks import OWN, VALUE, Arc, Entries, canonical_of, double, each, one, rows_of
 from kin.solvers.canonical import BASE, FOREARM, OFFSET, TOOL, UPPER_ARM
@@ -152,8 +151,7 @@ def branches_many(arm: Array, T: Array, values: Array, near: Array, out: Array) 
     values: θ1 for each target ``(N,)``, or one for all ``(1,)``.
     """
     widest()
-    S = np.empty((_ROWS, BLOCK))
-    each(_pairs, _angles, _store, _robust, arm, T, values, near, out, S)
+    each(_pairs, _angles, _store, _robust, (_ROWS, _PAIRS), arm, T, (values, near), out)
 
 
 @jit
@@ -163,5 +161,4 @@ def branches_one(arm: Array, T: Array, value: float, near: Array, out: Array) ->
     value: θ1, which is returned unchanged; NaN to move joints 1 and 2 by equal amounts from near ``(7,)``. `near`
     also decides the angles that a singular pose leaves free.
     """
-    S = np.empty((_ROWS, 1))
-    return one(_pairs, _angles, _store, _robust, _PAIRS, arm, T, value, near, out, S)
+    return one(_pairs, _angles, _store, _robust, (_ROWS, _PAIRS), arm, T, (value, near), out)

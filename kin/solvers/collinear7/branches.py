@@ -7,18 +7,22 @@ import math
 import numpy as np
 
 from kin.kernels.compile import jit
-from kin.solvers.canonical import (
-    FOREARM,
+from kin.solvers.canonical import FOREARM, OFFSET, UPPER_ARM, canonical_box, canonical_pose
+from kin.solvers.collinear7.redundancy import at_roll, choose_roll, roll_parts, theta1_intervals
+from kin.solvers.common import (
     HIGH,
     LOW,
     NEAR,
-    OFFSET,
-    UPPER_ARM,
-    canonical_box,
-    canonical_pose,
+    clear,
+    copy_row,
+    lay_probes,
+    merged,
+    misfit_of,
+    split_sum,
+    wrap,
+    zyz,
+    zyz_breaks,
 )
-from kin.solvers.collinear7.redundancy import at_roll, choose_roll, roll_parts, theta1_intervals
-from kin.solvers.common import clear, copy_row, lay_probes, merged, misfit_of, split_sum, wrap, zyz, zyz_breaks
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 

@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kin.axes import counted_from_base, inverse, is_perpendicular, is_zero, links_of, screw_z
 from kin.robot import Robot
 from kin.solvers.canonical import parameters
 from kin.solvers.collinear7.batch import branches_many, branches_one
 from kin.solvers.collinear7.branches import solve
-from kin.solvers.common import chain_of, inverse, is_zero, screw_z
 from kin.solvers.contract import (
     APPROACH,
     POSE,
@@ -51,19 +51,20 @@ class Geometry(NamedTuple):
 
 def match(robot: Robot) -> Collinear7 | None:
     """The closed form if axes 1 and 2 are one line, 3 is perpendicular to it and 5-6-7 meet in a point."""
-    chain = chain_of(robot) if robot.n == 7 else None
-    chain = chain.twisted((0, -1, -1, 1, -1, 1)) if chain else None
-    if chain is None or not is_zero(*chain.a, chain.d[3], chain.d[5]):
+    if robot.n != 7 or not robot.revolute.all():
         return None
-    d3, d5 = float(chain.d[2]), float(chain.d[4])
+    links = counted_from_base(links_of(robot, (1, -1, -1, 1, -1, 1), as_counted=True), robot)
+    square = links.alpha[0] == 0.0 and all(is_perpendicular(twist) for twist in links.alpha[1:6])
+    if not square or not is_zero(*links.a, links.d[3], links.d[5]):
+        return None
+    d3, d5 = float(links.d[2]), float(links.d[4])
     if min(d3, d5) < TOLERANCES.geometry:
         return None
-    tool = screw_z(0.0, float(chain.d[6])) @ chain.tool
-    base = chain.base @ screw_z(0.0, float(chain.d[0] + chain.d[1]))
-    inverse_tool = inverse(tool)
+    base = links.base @ screw_z(0.0, float(links.d[1]))
+    inverse_tool = inverse(links.tool)
     # The wrist centre in the tool frame: it must stay when the tool rolls about its approach axis.
     on_axis = is_zero(inverse_tool[0, 3], inverse_tool[1, 3])
-    return Collinear7(Geometry(inverse(base), inverse_tool, chain.theta, d3, d5, on_axis))
+    return Collinear7(Geometry(inverse(base), inverse_tool, links.theta, d3, d5, on_axis))
 
 
 class Collinear7(ClosedForm):

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from kin.kernels.compile import jit
-from kin.solvers.canonical import HIGH, LOW, NEAR, OFFSET, canonical_pose
-from kin.solvers.common import TURN, extend_arcs, misfit_of, nearest_in_arcs, zyz
+from kin.solvers.canonical import OFFSET, canonical_pose
+from kin.solvers.common import HIGH, LOW, NEAR, TURN, extend_arcs, misfit_of, nearest_in_arcs, zyz
 from kin.transforms import Array
 
 

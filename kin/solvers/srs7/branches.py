@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from kin.kernels.compile import jit
-from kin.solvers.canonical import HIGH, LOW, NEAR, OFFSET, UPPER_ARM, canonical_box, canonical_pose
-from kin.solvers.common import clear, copy_row, excess, nearest_image, wrap
+from kin.solvers.canonical import OFFSET, UPPER_ARM, canonical_box, canonical_pose
+from kin.solvers.common import HIGH, LOW, NEAR, clear, copy_row, excess, nearest_image, wrap
 from kin.solvers.srs7.geometry import FITS, SHAPE, STAY, angles_at, rotations, seed_arm_angle, sign_of, triangle_of
 from kin.solvers.srs7.redundancy import COLUMNS, PSI, ROWS, intervals, lay_out, shorter_way, squared_step, weigh
 from kin.transforms import Array

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kin.axes import counted_from_base, inverse, is_perpendicular, is_zero, links_of
 from kin.robot import Robot
 from kin.solvers.canonical import parameters
-from kin.solvers.common import chain_of, inverse, is_zero, screw_z
 from kin.solvers.contract import (
     APPROACH,
     POSE,
@@ -52,17 +52,18 @@ class Geometry(NamedTuple):
 
 def match(robot: Robot) -> Srs7 | None:
     """The closed form if the robot is an S-R-S arm, by its axes: 1-2-3 and 5-6-7 concurrent, neighbours square."""
-    chain = chain_of(robot) if robot.n == 7 else None
-    chain = chain.twisted((-1, 1, -1, 1, -1, 1)) if chain else None
-    if chain is None or not is_zero(*chain.a, chain.d[1], chain.d[3], chain.d[5]):
+    if robot.n != 7 or not robot.revolute.all():
         return None
-    d3, d5 = float(chain.d[2]), float(chain.d[4])
+    links = counted_from_base(links_of(robot, (-1, 1, -1, 1, -1, 1), as_counted=True), robot)
+    square = all(is_perpendicular(twist) for twist in links.alpha[:6])
+    if not square or not is_zero(*links.a, links.d[1], links.d[3], links.d[5]):
+        return None
+    d3, d5 = float(links.d[2]), float(links.d[4])
     if min(d3, d5) < TOLERANCES.geometry:
         return None
-    tool = screw_z(0.0, float(chain.d[6])) @ chain.tool
+    tool = links.tool
     on_axis = is_zero(tool[0, 3], tool[1, 3]) and abs(tool[2, 2] - 1.0) < TOLERANCES.geometry
-    base = chain.base @ screw_z(0.0, float(chain.d[0]))
-    return Srs7(Geometry(inverse(base), inverse(tool), chain.theta, d3, d5, bool(on_axis)))
+    return Srs7(Geometry(inverse(links.base), inverse(tool), links.theta, d3, d5, bool(on_axis)))
 
 
 class Srs7(ClosedForm):

@@ -11,8 +11,8 @@ import numpy as np
 
 from kin.kernels.compile import jit
 from kin.kernels.fk import sine_cosine
-from kin.solvers.canonical import FOREARM, HIGH, LOW, NEAR, UPPER_ARM
-from kin.solvers.common import merged, zyz
+from kin.solvers.canonical import FOREARM, UPPER_ARM
+from kin.solvers.common import HIGH, LOW, NEAR, merged, zyz
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 

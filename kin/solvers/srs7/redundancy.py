@@ -14,8 +14,17 @@ import numpy as np
 
 from kin.kernels.compile import inlined, jit
 from kin.kernels.simd import TURN, atan2, rounded, sin_cos, widest
-from kin.solvers.canonical import HIGH, LOW, NEAR
-from kin.solvers.common import extend_arcs, lay_probes, nearest_image, nearest_in_arcs, zyz, zyz_breaks
+from kin.solvers.common import (
+    HIGH,
+    LOW,
+    NEAR,
+    extend_arcs,
+    lay_probes,
+    nearest_image,
+    nearest_in_arcs,
+    zyz,
+    zyz_breaks,
+)
 from kin.solvers.srs7.geometry import STAY
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array

@@ -11,7 +11,6 @@ import math
 import numpy as np
 
 from kin.kernels.compile import inlined, jit, joined
-from kin.kernels.fk import BLOCK
 from kin.kernels.simd import widest
 from kin.solvers.blocks import OWN, Arc, double, each, elbow_of, in_base, one, rows_of, single
 from kin.solvers.wrist5.branches import solve
@@ -128,8 +127,7 @@ def branches_many(arm: Array, T: Array, values: Array, near: Array, out: Array) 
     values: θ1 for each target ``(N,)``, or one for all ``(1,)``.
     """
     widest()
-    S = np.empty((_ROWS, BLOCK))
-    each(_pairs, _angles, _store, _robust, arm, T, values, near, out, S)
+    each(_pairs, _angles, _store, _robust, (_ROWS, _PAIRS), arm, T, (values, near), out)
 
 
 @jit
@@ -139,5 +137,4 @@ def branches_one(arm: Array, T: Array, value: float, near: Array, out: Array) ->
     value: θ1 where the wrist centre is on axis 1, NaN for that of near ``(5,)``. `near` also decides θ4 where
     sin θ5 vanishes.
     """
-    S = np.empty((_ROWS, 1))
-    return one(_pairs, _angles, _store, _robust, _PAIRS, arm, T, value, near, out, S)
+    return one(_pairs, _angles, _store, _robust, (_ROWS, _PAIRS), arm, T, (value, near), out)

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from kin.axes import counted_from_base, inverse, is_perpendicular, is_zero, links_of
 from kin.robot import Robot
-from kin.solvers.common import chain_of, inverse, is_zero, screw_x, screw_z
 from kin.solvers.contract import (
     APPROACH,
     POSE,
@@ -40,29 +40,24 @@ _THETA1 = RedundancyParameter("theta1", "θ1", joint=0, circular=True, rare=True
 
 def match(robot: Robot) -> Wrist5 | None:
     """The closed form if axes 2 and 3 are parallel, perpendicular to axis 1, and 3-4, 4-5 meet at right angles."""
-    chain = chain_of(robot) if robot.n == 5 else None
-    chain = chain.twisted((-1, 0, -1, 1)) if chain else None
-    if chain is None or not is_zero(*chain.a[2:], chain.d[1] + chain.d[2]):
+    if robot.n != 5 or not robot.revolute.all():
         return None
-    theta, d = chain.theta, chain.d
-    a1, a2, d4 = float(chain.a[0]), float(chain.a[1]), float(d[3])
-    if min(abs(a2), d4) < TOLERANCES.geometry:
+    links = counted_from_base(links_of(robot, (-1, 1, -1, 1), as_counted=True), robot)
+    a, d, alpha, tool = links.a, links.d, links.alpha, links.tool
+    square = all(is_perpendicular(alpha[i]) for i in (0, 2, 3)) and alpha[1] == 0.0
+    if not square or not is_zero(a[2], a[3], d[2]) or min(a[1], d[3]) < TOLERANCES.geometry:
         return None
-    tool = screw_x(0.0, math.pi / 2) @ screw_z(0.0, float(d[4])) @ chain.tool
-    if abs(tool[2, 2] + 1.0) < TOLERANCES.geometry:
-        theta[4] += math.pi
-        tool = screw_x(0.0, math.pi / 2) @ screw_z(math.pi, float(d[4])) @ chain.tool
-    if not is_zero(tool[0, 3], tool[1, 3], tool[2, 2] - 1.0):
+    # The tool looks across axis 5, and its point is on the line through the wrist centre that it looks along.
+    approach, tip = tool[:3, 2], tool[:3, 3]
+    d6 = float(tip @ approach)
+    if not is_zero(math.hypot(approach[0], approach[1]) - 1.0, *(tip - d6 * approach)):
         return None
-    # In the formulas θ3 = 0 is the straight elbow, a quarter turn from where the common normals align.
+    theta = links.theta.copy()
+    # In the formulas θ3 = 0 is the straight elbow, a quarter turn from where the common normals align, and at
+    # θ5 = 0 the tool looks along the forearm.
     theta[2] += math.pi / 2
-    base = chain.base @ screw_z(0.0, float(d[0]))
-    if a2 < 0:
-        # A negative length is two half turns: Tx(−a) = Rz(π) Tx(a) Rz(−π).
-        theta[1] += math.pi
-        theta[2] -= math.pi
-        a2 = -a2
-    return Wrist5(Geometry(inverse(base), theta, a1, a2, d4, float(tool[2, 3])))
+    theta[4] = math.atan2(-approach[0], approach[1])
+    return Wrist5(Geometry(inverse(links.base), theta, float(a[0]), float(a[1]), float(d[3]), d6))
 
 
 class Wrist5(ClosedForm):

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kin.kernels.compile import jit
-from kin.solvers.canonical import HIGH, LOW, NEAR
+from kin.solvers.common import HIGH, LOW, NEAR
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 

@@ -40,13 +40,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from kin.axes import screw_z
 from kin.errors import InputError
 from kin.fk import fk, jacobian, manipulability
 from kin.ik.batch import ik_branches
 from kin.ik.problem import Limits, Locks, ask, finite_number
 from kin.robot import Robot
 from kin.solvers import closed_form_of
-from kin.solvers.common import TURN, screw_z
+from kin.solvers.common import TURN
 from kin.solvers.contract import APPROACH, POSE, ClosedForm, RedundancyParameter, SolverInput
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array, frame_from_approach

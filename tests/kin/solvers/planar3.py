@@ -54,7 +54,7 @@ def match(robot):
     """The closed form if the arm has three parallel revolute axes along z."""
     if robot.n != 3 or not robot.revolute.all():
         return None
-    axes = joint_axes(robot, np.zeros(3))
+    axes = joint_axes(robot)
     if any(abs(axis.direction[2] - 1.0) > 1e-9 for axis in axes):
         return None
     T = fk(robot, np.zeros(3))

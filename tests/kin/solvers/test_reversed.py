@@ -19,8 +19,8 @@ from arms import reversed_at as turned
 
 import kin
 from kin import Joint, Robot, Status, solve_ik
+from kin.axes import screw_x, screw_z
 from kin.solvers import closed_form_of
-from kin.solvers.common import screw_x, screw_z
 from kin.solvers.reversed import ReversedJoints, readings
 
 PI = math.pi

@@ -14,8 +14,8 @@ import pytest
 
 import kin
 from kin import InputError
+from kin.axes import screw_x, screw_z
 from kin.robot import Joint, Robot
-from kin.solvers.common import screw_x, screw_z
 from kin.transforms import frame_from_approach
 from kin.workspace.capability import blocks as capability
 from kin.workspace.capability.sphere import DESIGNS, spherical_design

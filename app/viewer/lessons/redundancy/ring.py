@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kin import Robot, fk, link_frames
+from kin.axes import inverse
 from kin.solvers import closed_form_of, srs7
-from kin.solvers.common import inverse
 from kin.solvers.reversed import ReversedJoints
 from kin.transforms import Array, frame_from_approach
 

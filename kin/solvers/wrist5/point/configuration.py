@@ -10,8 +10,7 @@ import math
 import numpy as np
 
 from kin.kernels.compile import jit
-from kin.solvers.canonical import HIGH, LOW, NEAR
-from kin.solvers.common import TURN, excess, nearest_image
+from kin.solvers.common import HIGH, LOW, NEAR, TURN, excess, nearest_image
 from kin.solvers.wrist5.point.constants import A1, A2, D4, D6, HAIR, PHI, RAD, REACH, SLACK, H
 from kin.solvers.wrist5.point.newton import closes
 from kin.transforms import Array

@@ -11,8 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from kin.kernels.compile import jit
-from kin.solvers.canonical import HIGH, LOW, NEAR
-from kin.solvers.common import nearest_image
+from kin.solvers.common import HIGH, LOW, NEAR, nearest_image
 from kin.solvers.wrist5.point.configuration import branch_at, fits, keep_best
 from kin.solvers.wrist5.point.constants import BRANCH, END, HAIR, JOINT, RAD, SHEET, START, ZERO, M
 from kin.solvers.wrist5.point.intervals import SAME, Row, merge, nearest

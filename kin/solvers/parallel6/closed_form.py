@@ -1,0 +1,131 @@
+"""The closed form of an arm with three parallel axes: matching, redundancy, branches, singularities."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from kin.robot import Robot
+from kin.solvers.common import UNBOUNDED
+from kin.solvers.contract import (
+    APPROACH,
+    POSE,
+    BatchKernels,
+    Candidates,
+    ClosedForm,
+    Obstacle,
+    RedundancyParameter,
+    SolverInput,
+)
+from kin.solvers.parallel6.batch import branches_many, branches_one
+from kin.solvers.parallel6.branches import solve
+from kin.solvers.parallel6.geometry import Geometry, geometry_of
+from kin.solvers.pose import free_last, rolled
+from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+NAME = "parallel6"
+TITLE = "closed form, three parallel axes and a wrist"
+BRANCHES = tuple(
+    f"shoulder {s} · elbow {e} · wrist {w}"
+    for s in ("left", "right")
+    for e in ("up", "down")
+    for w in ("no-flip", "flip")
+)
+_SPIN6 = RedundancyParameter("theta6", "θ6", joint=5, circular=True, rare=True)
+_THETA6 = RedundancyParameter("theta6", "θ6", joint=5)
+_REACH = TOLERANCES.closure_position * 0.1
+
+
+def match(robot: Robot) -> Parallel6 | None:
+    """The closed form if the robot has three parallel axes and a wrist."""
+    geometry = geometry_of(robot)
+    return None if geometry is None else Parallel6(geometry)
+
+
+class Parallel6(ClosedForm):
+    """The closed form of an arm with three parallel axes and a wrist."""
+
+    name, title, branches = NAME, TITLE, BRANCHES
+    reason = (
+        "axes 2, 3 and 4 are parallel, and axis 5 is perpendicular to axis 4 and meets axis 6 at a right angle"
+    )
+
+    def __init__(self, geometry: Geometry) -> None:
+        g = self.geometry = geometry
+        self.lengths = (g.a1, g.a2, g.a3, g.a4, g.d5, g.beside)
+        self.kernels = BatchKernels(g.params, branches_one, branches_many)
+
+    def handles(self, task: int) -> bool:
+        """Poses, and an approach direction when it is the last joint's own axis (then that joint is free)."""
+        return task == POSE or (task == APPROACH and self.geometry.tool_on_axis)
+
+    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
+        """θ6: for a pose when axis 6 is parallel to axes 2, 3 and 4; for an approach direction always."""
+        return (_THETA6,) if task == APPROACH else (_SPIN6,)
+
+    def solve(self, problem: SolverInput) -> Candidates:
+        """All branches; with an approach direction only, joint 6 stays or takes the value requested."""
+        g, free_roll = self.geometry, problem.task == APPROACH
+        out, arcs = np.empty((8, 7)), np.empty((128, 3))
+        T, lower, upper = problem.T, problem.lower, problem.upper
+        if free_roll:
+            T, lower, upper = rolled(T, problem.seed_roll), lower.copy(), upper.copy()
+            lower[5], upper[5] = -UNBOUNDED, UNBOUNDED
+        value = math.nan if free_roll else problem.values[0]
+        gap, count = solve(g.params, T, value, problem.seed, lower, upper, arcs, out)
+        q, free = out[:, :6], out[:, 6:]
+        if free_roll:
+            ranges = free_last(problem, q)
+            values = q[:, 5:].copy()
+        else:
+            ranges = arcs[:count]
+            values = np.where(free == 1.0, q[:, 5:], math.nan)
+        obstacle = None if gap <= _REACH else Obstacle("wrist centre beyond the elbow's reach")
+        return Candidates(q, values, (ranges,), max(gap, 0.0), obstacle)
+
+    def _x_of_wrist(self, t: Sequence[float] | Array) -> float:
+        """x of W in the frame that turns with axis 1, metres."""
+        g = self.geometry
+        A = t[1] + t[2] + t[3]
+        return float(
+            g.a1 + g.a2 * math.cos(t[1]) + g.a3 * math.cos(t[1] + t[2]) + g.a4 * math.cos(A) - g.d5 * math.sin(A)
+        )
+
+    def branch_of(self, q: Array) -> int:
+        """The branch a configuration is on.
+
+        "Left": the arm's plane is on the left of axis 1, seen along the arm. The elbow is "up" when it is above
+        the line from axis 2 to axis 4; the wrist is the sign of θ5.
+        """
+        t = self.geometry.sign * q + self.geometry.offset
+        side = -1.0 if self._x_of_wrist(t) < 0.0 else 1.0
+        right = (side < 0.0) == (self.geometry.beside >= 0.0)
+        return 4 * int(right) + 2 * int(side * math.sin(t[2]) < 0.0) + int(math.sin(t[4]) < 0.0)
+
+    def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
+        """The three factors of the determinant, ±a2 a3 s3 · x sin α1 · s5: there are no others."""
+        g = self.geometry
+        t = (g.sign * q + g.offset).tolist()
+        elbow, x, wrist = off_line(t[2]), self._x_of_wrist(t), off_line(t[4])
+        if min(abs(elbow), abs(x), abs(wrist)) > within:
+            return ()  # as almost everywhere
+        straight, aligned = float(q[2] - g.sign[2] * elbow), float(q[4] - g.sign[4] * wrist)
+        return those_within(
+            within,
+            Singularity(
+                "elbow", elbow_at(t[2]), "axis 4 along the arm", abs(elbow), "rad", (JointValue(2, straight),)
+            ),
+            Singularity("shoulder", "wrist centre nearest to axis 1", "wrist centre along axis 2", abs(x), "m"),
+            Singularity(
+                "wrist",
+                "axis 6 parallel to axes 2, 3 and 4",
+                "tilt about the third axis",
+                abs(wrist),
+                "rad",
+                (JointValue(4, aligned),),
+            ),
+        )
