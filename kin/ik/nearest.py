@@ -64,10 +64,9 @@ def solve_numerically(question: Question, budget: int = BUDGET) -> Found:
     """
     out = question.seed.copy()
     weight = min(max(_LEVER * question.robot.reach, _LEAST_LEVER), _MOST_LEVER)
-    error, starts = solve(
-        question.robot.model, question.T, question.code, question.mask, weight, question.low, question.high,
-        question.turns, budget, _EXACT * min(1.0, weight), out,
-    )  # fmt: skip
+    goal = (question.T, question.code, question.mask, weight)
+    bounds = (question.low, question.high, question.turns)
+    error, starts = solve(question.robot.model, goal, bounds, budget, _EXACT * min(1.0, weight), out)
     return Found(out, float(error), int(starts))
 
 
@@ -98,10 +97,9 @@ def _descend(
 ) -> tuple[Array, Array]:
     """Where the descents end ``(m, n)``, and their errors ``(m,)``; m < k if the search was over before."""
     q, errors = np.array(starts, order="C"), np.empty(len(starts))
-    count = each_of(
-        question.robot.model, question.T, code, question.mask, weight, question.low, question.high,
-        question.turns, enough, meetings, q, errors,
-    )  # fmt: skip
+    goal = (question.T, code, question.mask, weight)
+    bounds = (question.low, question.high, question.turns)
+    count = each_of(question.robot.model, goal, bounds, enough, meetings, q, errors)
     return q[:count], errors[:count]
 
 

@@ -94,6 +94,6 @@ def seek(
                 near, closest = j, along
         for j in range(n):
             out[j] = start[j] if near < 0 else q[near, 0, j]
-        error, _ = solve(model, T[i], APPROACH, mask, weight, lower, upper, turns, budget, enough, out)
+        error, _ = solve(model, (T[i], APPROACH, mask, weight), (lower, upper, turns), budget, enough, out)
         for j in range(n):
             q[i, 0, j] = out[j] if error <= enough else math.nan

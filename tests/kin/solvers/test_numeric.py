@@ -21,6 +21,7 @@ from kin.ik.problem import ask
 from kin.robot import Joint, Robot
 from kin.solvers import numeric
 from kin.solvers.contract import APPROACH, MASK, POSE, POSITION
+from kin.solvers.numeric.error import look, quadratic_model
 from kin.transforms import rotation_angle, rotation_from_wxyz, vector_angle
 
 ROBOTS = tuple(kin.builtin_robots())
@@ -71,10 +72,10 @@ def cost_of(question, code, weight, q, bent=True):
     """E²/2, the gradient ``(n,)`` and the Hessian ``(n, n)`` that the descent uses."""
     n = question.robot.n
     J, T, axes, e = np.empty((6, n)), np.empty((4, 4)), np.empty((n, 7)), np.empty(6)
-    arguments = (question.T, code, question.mask, weight)
-    cost = numeric._look(question.robot.model, q, *arguments, J, T, axes, e)
+    goal = (question.T, code, question.mask, weight)
+    cost = look(question.robot.model, q, goal, (J, T, axes), e)
     H, g = np.zeros((n, n)), np.empty(n)
-    numeric._model(T, *arguments, bent, J, e, np.empty(6), H, g)
+    quadratic_model(goal, bent, J, T, e, np.empty(6), H, g)
     return cost, -g, np.tril(H) + np.tril(H, -1).T
 
 
