@@ -1,9 +1,9 @@
 """How near a configuration is to losing a direction of motion.
 
-At a singularity the joints together cannot move the tool in some direction, and just beside it a slow motion of
-the tool takes fast joints. For arms with a closed form the singular sets are known exactly, so each is told with
-what aligns there and how far away it is, as an angle or a length. For any other arm one figure stands for all of
-them: the smallest singular value of the Jacobian, the least speed of the tool that one unit of joint speed buys.
+At a singularity the joints together cannot move the tool in some direction, and near one a slow motion of the tool
+takes fast joints. For arms with a closed form the singular sets are known exactly: each is reported with what
+aligns there and how far away it is, as an angle or a length. For any other arm one number stands for all of them: the
+smallest singular value of the Jacobian, the least tool speed per unit of joint speed.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ __all__ = ["Singularity", "singularities"]
 
 
 def singularities(robot: Robot, q: ArrayLike, within: float = math.inf) -> tuple[Singularity, ...]:
-    """Every way in which the configuration `q` ``(n,)`` may be singular, the nearest first.
+    """The singularities of the arm and their distances from a configuration `q` ``(n,)``, the nearest first.
 
-    To put angles and lengths in one order, a length counts as the angle at which it is seen from the arm's reach:
+    To sort angles and lengths together, a length counts as the angle at which it is seen from the arm's reach:
     metres divided by `Robot.reach`. Of equals, what costs a motion comes before what only the closed form loses.
 
     An arm of the 5-joint family is judged by its task, the tool's point and approach direction; 7-joint arms by
-    the whole pose. Only those `within` a distance are told. An arm without a closed form has one entry of kind
+    the whole pose. Only those `within` a distance are returned. An arm without a closed form has one entry of kind
     ``"jacobian"``, see `task_jacobian`.
 
     Raises:
@@ -45,19 +45,19 @@ def singularities(robot: Robot, q: ArrayLike, within: float = math.inf) -> tuple
 
 
 def singularities_at(robot: Robot, q: Array, within: float) -> tuple[Singularity, ...]:
-    """`singularities` of a configuration ``(n,)`` that is known to be sound."""
-    match = closed_form_of(robot)
-    if match is None:
+    """`singularities` of a configuration ``(n,)`` that has been checked."""
+    form = closed_form_of(robot)
+    if form is None:
         least = _by_jacobian(robot, q)
         return (least,) if least.distance <= within else ()
-    found = match.singularities(q, within)
+    found = form.singularities(q, within)
     if len(found) < 2:
         return found
     return tuple(sorted(found, key=lambda s: s.distance / (robot.reach if s.unit == "m" else 1.0)))
 
 
 def task_jacobian(robot: Robot, q: Array) -> Array:
-    """The rows of the Jacobian that `n` joints can be asked for ``(..., m, n)``, at ``(..., n)``.
+    """The rows of the Jacobian that `n` joints can control ``(..., m, n)``, at ``(..., n)``.
 
     Six joints or more: all six. Five: the velocity of the tool point and the turning of the approach direction,
     about the tool's x and y axes (m = 5). Fewer: the velocity of the tool point (m = 3).
@@ -73,7 +73,7 @@ def task_jacobian(robot: Robot, q: Array) -> Array:
 
 @lru_cache(maxsize=256)
 def usual_rank(robot: Robot) -> int:
-    """How many directions the arm has almost everywhere: a flat arm, for one, never leaves its plane."""
+    """The rank of `task_jacobian` almost everywhere: a planar arm, for one, never leaves its plane."""
     J = task_jacobian(robot, spread(robot.lower, robot.upper, 16))
     return int(np.linalg.matrix_rank(J, rtol=1e-9).max())
 

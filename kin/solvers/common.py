@@ -1,12 +1,12 @@
-"""Pieces every closed form shares: angle extraction, sums of two angles, limits, and feasible arcs.
+"""Kernels that the closed forms share: angles of a rotation, sums of two angles, limits, and feasible arcs.
 
-Three ideas carry all the solvers:
+Three ideas are common to all families:
 
 - **Z-Y-Z with a known first angle.** A rotation ``Rz(A) Ry(B) Rz(C)`` gives A from its third column up to the
   sign of sin B. B and C are then computed *given* A, so that the product reproduces the rotation to rounding
-  error however small sin B is. Only when sin B vanishes is A free; then just A ± C matters and the sum is
-  split as near the seed as the limits allow.
-- **Images.** A joint whose limits span more than a turn has several values θ + 2πk for one posture.
+  error however small sin B is. Only where sin B vanishes is A free; then only A ± C matters, and the sum
+  is split as near the seed as the limits allow.
+- **Images.** A joint whose limits span more than a turn has several values θ + 2πk for one configuration in space.
 - **Arcs.** If a rotation depends on a free angle ψ as ``M0 + M1 cos ψ + M2 sin ψ``, the values of ψ where one
   of its three angles meets a limit are roots of ``a cos ψ + b sin ψ + c = 0``. Between neighbouring roots
   nothing changes, so one test per arc decides it: the feasible set is exact, not sampled (Shimizu et al., IEEE
@@ -42,7 +42,7 @@ def wrap(angle: float) -> float:
 
 @jit
 def merged(angle: float) -> float:
-    """A double root as one: below `TOLERANCES.merge` the angle is rounding error under a square root."""
+    """0.0 for an angle below `TOLERANCES.merge`, which is rounding error under the root of a double solution."""
     return 0.0 if angle < _MERGE else angle
 
 
@@ -161,7 +161,7 @@ def zyz_breaks(
     Angles whose limits span a whole turn never bind.
     """
     for side in range(2):
-        # A joint held still has one stop, not two.
+        # A locked joint has one limit, not two.
         if high[first] - low[first] < TURN and (side == 0 or high[first] > low[first]):
             t = low[first] if side == 0 else high[first]
             s, c = sine_cosine(t)
@@ -204,7 +204,7 @@ def circular_clamp(value: float, low: float, high: float) -> float:
 
 @jit
 def clear(out: Array) -> None:
-    """out ← NaN everywhere ``(k, m)``; written out, as numba takes seconds to compile an array assignment."""
+    """out ← NaN everywhere ``(k, m)``. A loop, because numba takes seconds to compile an array assignment."""
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             out[i, j] = math.nan
@@ -299,12 +299,13 @@ def extend_arcs(arcs: Array, first: int, found: int, branch: int, probes: Array,
 
 
 @jit
-def nearest_in_arcs(arcs: Array, first: int, found: int, wish: float) -> float:
-    best = wish
+def nearest_in_arcs(arcs: Array, first: int, found: int, wanted: float) -> float:
+    """The angle of the arcs first…found−1 that is nearest to the wanted one; that one itself if there is no arc."""
+    best = wanted
     best_distance = math.inf
     for i in range(first, found):
-        v = circular_clamp(wish, arcs[i, 1], arcs[i, 2])
-        distance = abs(wrap(v - wish))
+        v = circular_clamp(wanted, arcs[i, 1], arcs[i, 2])
+        distance = abs(wrap(v - wanted))
         if distance < best_distance:
             best, best_distance = v, distance
     return best
