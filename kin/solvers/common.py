@@ -300,7 +300,7 @@ def extend_arcs(arcs: Array, first: int, found: int, branch: int, probes: Array,
 
 @jit
 def nearest_in_arcs(arcs: Array, first: int, found: int, wanted: float) -> float:
-    """The angle of the arcs first…found−1 that is nearest to the wanted one; that one itself if there is no arc."""
+    """The angle of the arcs first…found−1 nearest to the wanted one; that one itself if there is no arc."""
     best = wanted
     best_distance = math.inf
     for i in range(first, found):
