@@ -227,24 +227,6 @@ def shifted(values: Array, offset: Array) -> Array:
 
 
 @jit
-def to_canonical(T: Array, inverse_base: Array, inverse_tool: Array, out: Array) -> None:
-    """out ← base⁻¹ · T · tool⁻¹ for 4×4 arrays."""
-    for r in range(3):
-        x = inverse_base[r, 0] * T[0, 0] + inverse_base[r, 1] * T[1, 0] + inverse_base[r, 2] * T[2, 0]
-        y = inverse_base[r, 0] * T[0, 1] + inverse_base[r, 1] * T[1, 1] + inverse_base[r, 2] * T[2, 1]
-        z = inverse_base[r, 0] * T[0, 2] + inverse_base[r, 1] * T[1, 2] + inverse_base[r, 2] * T[2, 2]
-        p = (
-            inverse_base[r, 0] * T[0, 3]
-            + inverse_base[r, 1] * T[1, 3]
-            + inverse_base[r, 2] * T[2, 3]
-            + inverse_base[r, 3]
-        )
-        for c in range(3):
-            out[r, c] = x * inverse_tool[0, c] + y * inverse_tool[1, c] + z * inverse_tool[2, c]
-        out[r, 3] = x * inverse_tool[0, 3] + y * inverse_tool[1, 3] + z * inverse_tool[2, 3] + p
-
-
-@jit
 def misfit_of(angles: Array, low: Array, high: Array, first: int, last: int) -> float:
     """Sum over the angles first…last−1 of how far outside its limits each one is."""
     total = 0.0

@@ -51,7 +51,7 @@ class Geometry(NamedTuple):
 
 
 def match(robot: Robot) -> Srs7 | None:
-    """The closed form if the robot is an S-R-S arm, by its axes: 1-2-3 and 5-6-7 concurrent, neighbours square."""
+    """The closed form if axes 1, 2, 3 meet, axes 5, 6, 7 meet, and neighbouring axes are perpendicular."""
     if robot.n != 7 or not robot.revolute.all():
         return None
     links = counted_from_base(links_of(robot, (-1, 1, -1, 1, -1, 1), as_counted=True), robot)

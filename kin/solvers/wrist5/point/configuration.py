@@ -11,7 +11,7 @@ import numpy as np
 
 from kin.kernels.compile import jit
 from kin.solvers.common import HIGH, LOW, NEAR, TURN, excess, nearest_image
-from kin.solvers.wrist5.point.constants import A1, A2, D4, D6, HAIR, PHI, RAD, REACH, SLACK, H
+from kin.solvers.wrist5.point.constants import A1, A2, AMBIGUOUS, D4, D6, PHI, RAD, REACH, SLACK, H
 from kin.solvers.wrist5.point.newton import closes
 from kin.transforms import Array
 
@@ -49,7 +49,7 @@ def fits(k: Array, t4: float, t5: float, sheet: int, box: Array, q: Array) -> bo
     """q ``(5,)`` ← the configuration on a sheet; whether it exists and is inside all limits.
 
     With the arm stretched or R = 0, a rounding error of 1e-16 in the point is 1e-8 in the angles. So a
-    configuration less than `HAIR` outside its limits is moved to the nearest one inside, if there is one.
+    configuration less than `AMBIGUOUS` outside its limits is moved to the nearest one inside, if there is one.
     """
     low, high = box[LOW], box[HIGH]
     if excess(t5, low[4], high[4]) > 0.0 or excess(t4, low[3], high[3]) > 0.0:
@@ -60,11 +60,11 @@ def fits(k: Array, t4: float, t5: float, sheet: int, box: Array, q: Array) -> bo
     for i in range(3):
         if high[i] - low[i] < TURN:
             over += excess(q[i], low[i], high[i])
-    if 0.0 < over < HAIR:
+    if 0.0 < over < AMBIGUOUS:
         floor, ceiling, J, e, spare = np.empty(5), np.empty(5), np.empty((3, 5)), np.empty(3), np.empty(5)
         for i in range(5):
             x = nearest_image(q[i], q[i], low[i], high[i])
-            slack = HAIR if i < 3 else SLACK
+            slack = AMBIGUOUS if i < 3 else SLACK
             floor[i], ceiling[i] = max(low[i], x - slack), min(high[i], x + slack)
             q[i] = min(max(x, floor[i]), ceiling[i])
         return closes(k, floor, ceiling, J, e, spare, q)
@@ -83,7 +83,7 @@ def branch_at(k: Array, q: Array) -> int:
         branch += 2
     if flip < 0.0:
         branch += 1
-    if min(abs(radial), abs(bend), abs(flip)) < HAIR:
+    if min(abs(radial), abs(bend), abs(flip)) < AMBIGUOUS:
         branch += 8
     return branch
 

@@ -13,9 +13,9 @@ import numpy as np
 from kin.kernels.compile import jit
 from kin.solvers.common import HIGH, LOW, NEAR, nearest_image
 from kin.solvers.wrist5.point.configuration import branch_at, fits, keep_best
-from kin.solvers.wrist5.point.constants import BRANCH, END, HAIR, JOINT, RAD, SHEET, START, ZERO, M
+from kin.solvers.wrist5.point.constants import AMBIGUOUS, BRANCH, END, JOINT, RAD, SHEET, START, ZERO, M
 from kin.solvers.wrist5.point.intervals import SAME, Row, merge, nearest
-from kin.solvers.wrist5.point.newton import approach
+from kin.solvers.wrist5.point.newton import move_near
 from kin.solvers.wrist5.point.planes import planes_of
 from kin.solvers.wrist5.point.theta4 import find_spots
 from kin.solvers.wrist5.point.theta5 import theta5_intervals, window
@@ -84,7 +84,7 @@ def _refine(k: Array, best: Array, box: Array, limits: Array, relaxed: bool, ans
                 # Stay on the branch: it is named by the signs of sin θ3 and sin θ5.
                 turn = math.floor(q[i] / math.pi)
                 floor[i], ceiling[i] = max(low[i], turn * math.pi), min(high[i], (turn + 1.0) * math.pi)
-        if approach(k, aims, floor, ceiling, q):
+        if move_near(k, aims, floor, ceiling, q):
             keep_best(k, q, near, limits, answer)
 
 
@@ -125,7 +125,7 @@ def _edges(k: Array, planes: list[list[float]], start: float, stop: float) -> li
     point.
     """
     out = [start, stop] if stop > start else [start]
-    if k[RAD] < HAIR or any(plane[JOINT] == 0.0 and abs(plane[M]) < HAIR for plane in planes):
+    if k[RAD] < AMBIGUOUS or any(plane[JOINT] == 0.0 and abs(plane[M]) < AMBIGUOUS for plane in planes):
         quarters = (nearest_image(0.5 * math.pi * i, 0.5 * (start + stop), start, stop) for i in range(4))
         out += [t4 for t4 in quarters if start <= t4 <= stop]
     return out
