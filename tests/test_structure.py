@@ -208,9 +208,6 @@ KNOWN: dict[Rule, set[str]] = {
         "kin/path/trellis.py::_advance",
         "kin/workspace/capability/gauge.py::seek",
     },
-    cut_sentences: {
-        "app/viewer/panel/status.py::_without_repeating",
-    },
     banned_words: {
         "app/api/asked.py: wish",
         "app/api/asked.py: wishes",
@@ -322,11 +319,7 @@ KNOWN: dict[Rule, set[str]] = {
         "tests/app/viewer/test_viewer_quick.py: told",
         "tests/app/viewer/test_viewer_units.py: told",
         "tests/bench/test_bench.py: calm",
-        "tests/kin/ik/test_candidates.py: told",
-        "tests/kin/ik/test_ik_options.py: told",
         "tests/kin/ik/test_ik_options.py: wish",
-        "tests/kin/ik/test_ik_options.py: wishes",
-        "tests/kin/path/test_path.py: told",
         "tests/kin/solvers/test_families.py: told",
         "tests/kin/solvers/test_numeric.py: told",
         "tests/kin/solvers/test_point5.py: told",

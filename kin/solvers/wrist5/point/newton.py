@@ -89,7 +89,7 @@ def closes(k: Array, low: Array, high: Array, J: Array, e: Array, x: Array, q: A
 
 @jit
 def move_near(k: Array, near: Array, low: Array, high: Array, q: Array) -> bool:
-    """Move q, in place, along the configurations that reach the point inside [low, high], as near to a box as it gets.
+    """Move q, in place, towards a box, along the configurations inside [low, high] that reach the point.
 
     near ``(2, 5)``: lower and upper corner of that box. Each step goes to the projection of the nearest point of
     the box onto the tangent space, or as far towards it as the distance decreases. Returns whether q reaches the
