@@ -12,7 +12,7 @@ from app.viewer.tabs.workspace.capability.wishes import By
 from app.viewer.tabs.workspace.words import Locks, grouped, locks
 from kin import CapabilityMap
 from kin.units import Units
-from kin.workspace.capability.blocks import ROLLS, STARTS, Method
+from kin.workspace.capability.evaluation import ROLLS, STARTS, Method
 
 State = Literal["ready", "waiting", "computing", "stopped", "done", "failed"]
 SYMBOLS: dict[State, str] = {

@@ -1,4 +1,4 @@
-"""Compiled: which targets are met by which of their configurations inside the limits, and how well."""
+"""Compiled: the best manipulability among the configurations that reach a target inside the limits."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ from kin.solvers.contract import APPROACH
 from kin.solvers.numeric import solve
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
+from kin.workspace.region import BoundedArm
 
-# What is told of a target that nothing meets; less than any manipulability.
+# Values less than any manipulability: for a target without configurations, and for one with configurations of
+# which none is inside the limits.
 NONE, BLOCKED = -2.0, -1.0
 _POSITION = TOLERANCES.closure_position
 _ROTATION = TOLERANCES.closure_rotation
@@ -23,23 +25,22 @@ _LIMIT = TOLERANCES.limit
 
 
 @jit
-def gauge(
-    model: Array, T: Array, q: Array, lower: Array, upper: Array, turns: Array, rolls: bool, best: Array
-) -> None:
-    """Raise best ``(k,)`` to the largest manipulability among the configurations that meet each target.
+def raise_best(arm: BoundedArm, turns: Array, rolls: bool, T: Array, q: Array, best: Array) -> None:
+    """Raise best ``(k,)`` to the largest manipulability among the configurations that reach each target.
 
-    A configuration counts if forward kinematics says that it brings the tool to the target's point and approach
-    direction, and a whole-turn image of it is inside the limits. `BLOCKED` is told where there are configurations,
-    but none that counts; best stays where there are none.
+    A configuration counts if, by forward kinematics, it brings the tool to the target's point and approach
+    direction, and a whole-turn image of it is inside the limits. best is raised to `BLOCKED` where there are
+    configurations but none of them counts, and stays as it is where there are none.
 
     Args:
-        model: the arm.
+        arm: the arm and its limits, which may be infinite here.
+        turns: ``(n,)`` 2π for a revolute joint, else 0.
+        rolls: whether the last joint only rolls the tool, so that its value is arbitrary.
         T: targets ``(k, 4, 4)``.
-        q: configurations of each ``(k, rows, n)``, NaN for one that does not exist.
-        lower, upper, turns: ``(n,)``; turns is 2π for a joint that turns, else 0.
-        rolls: whether the last joint does nothing but roll the tool, so that its value is free.
+        q: configurations of each target ``(k, rows, n)``, NaN for one that does not exist.
         best: in and out.
     """
+    model, lower, upper = arm.model, arm.lower, arm.upper
     n = lower.shape[0]
     tall, wide = max(n, 6), min(n, 6)
     x, e, mask = np.empty(n), np.empty(6), np.empty(7)
@@ -75,14 +76,24 @@ def gauge(
 
 
 @jit
-def seek(
-    model: Array, T: Array, lower: Array, upper: Array, turns: Array, weight: float, budget: int, enough: float,
-    start: Array, q: Array,
-) -> None:  # fmt: skip
-    """q ``(k, 1, n)`` ← a configuration that brings the tool to each target's point and approach direction.
+def search_each(
+    arm: BoundedArm, turns: Array, T: Array, weight: float, budget: int, enough: float, start: Array, q: Array
+) -> None:
+    """q ``(k, 1, n)`` ← a configuration that brings the tool to each target's point and approach direction, or
+    NaN.
 
-    For arms without a closed form: `kin.solvers.numeric.solve` with `budget` starts, of which the first is what
-    was found for the nearest direction among the targets before, or `start` ``(n,)``. NaN where nothing was found.
+    For arms without a closed form. Each target is searched for by `kin.solvers.numeric.solve`; the first start is
+    the configuration found for the nearest direction among the targets before, or `start`.
+
+    Args:
+        arm: the arm and its limits.
+        turns: ``(n,)`` 2π for a revolute joint, else 0.
+        T: targets ``(k, 4, 4)`` that differ in orientation only.
+        weight: metres per radian of the orientation error.
+        budget: starts per target.
+        enough: residual at which a target counts as reached.
+        start: ``(n,)``.
+        q: result.
     """
     n = start.shape[0]
     mask, out = np.ones(7), np.empty(n)
@@ -94,6 +105,6 @@ def seek(
                 near, closest = j, along
         for j in range(n):
             out[j] = start[j] if near < 0 else q[near, 0, j]
-        error, _ = solve(model, T[i], APPROACH, mask, weight, lower, upper, turns, budget, enough, out)
+        error, _ = solve(arm.model, T[i], APPROACH, mask, weight, arm.lower, arm.upper, turns, budget, enough, out)
         for j in range(n):
             q[i, 0, j] = out[j] if error <= enough else math.nan
