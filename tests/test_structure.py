@@ -229,7 +229,6 @@ KNOWN: dict[Rule, set[str]] = {
         "kin/solvers/wrist6.py::_aligned",
         "kin/solvers/wrist6.py::_on_axis",
         "kin/solvers/wrist6.py::arm_pairs",
-        "kin/workspace/capability/gauge.py::seek",
     },
     cut_sentences: {
         "app/viewer/panel/status.py::_without_repeating",
@@ -314,8 +313,6 @@ KNOWN: dict[Rule, set[str]] = {
         "kin/solvers/scara4.py: square to",
         "kin/solvers/scara4.py: wish",
         "kin/solvers/slide6.py: square to",
-        "kin/workspace/capability/blocks.py: who wants",
-        "kin/workspace/capability/gauge.py: told",
         "tests/app/api/test_api_answers.py: told",
         "tests/app/api/test_api_capability.py: told",
         "tests/app/api/test_api_capability.py: who asks",
