@@ -40,40 +40,40 @@ EXAMPLES = {
 
 @documented
 class Formula(TypedDict):
-    """An equation, typeset twice from one source."""
+    """An expression or equation, typeset as MathML and LaTeX."""
 
     mathml: str
     """A whole `<math>` element."""
     latex: str
-    """The same for math mode."""
+    """The same in LaTeX, for math mode."""
 
 
 @documented
 class SymbolAnswer(TypedDict):
-    """A name in the equations."""
+    """A symbol of the equations."""
 
     id: str
     """The name in plain letters, such as `c23` or `d6`."""
     mathml: str
     """The name as a whole `<math>` element."""
     latex: str
-    """The same for math mode."""
+    """The same in LaTeX, for math mode."""
     meaning: str
-    """What it stands for, such as `cos(θ2 + θ3)`."""
+    """Its meaning, such as `cos(θ2 + θ3)`."""
     value: float | None
-    """Its value if that is the same in every configuration, in `unit`; else null."""
+    """Its value in `unit` if it does not depend on the configuration; else null."""
     unit: Literal["m", ""]
-    """metres for lengths and the travel of sliding joints; empty for pure numbers."""
+    """m for lengths and values of prismatic joints; empty for pure numbers."""
 
 
 @documented
 class LineAnswer(TypedDict):
-    """An intermediate result with a name of its own."""
+    """A named intermediate result."""
 
     id: str
     """The name in plain letters."""
     formula: Formula
-    """What it is."""
+    """Its definition."""
 
 
 @documented
@@ -87,20 +87,20 @@ class EquationAnswer(TypedDict):
     reference: int | None
     """Number in the source chapter; null for a derived equation."""
     verdict: Literal["right", "misprinted", "unreadable", "derived"]
-    """What is to be thought of it. "derived": not from the chapter, checked against forward kinematics."""
+    """Whether the printed equation is correct. "derived": not printed, checked by forward kinematics."""
     as_printed: Formula | None
     """As the chapter prints it; null for a derived equation and for one that cannot be read."""
     corrected: Formula | None
-    """The right form of a misprinted equation; else null."""
+    """The correct form of a misprinted equation; else null."""
     derived: Formula | None
     """The closed form derived from the DH table; null for an equation of the chapter."""
     note: str
     """What is wrong with the printed form; empty if nothing is."""
     worst_q: list[float] | None
-    """Of a misprinted equation, a configuration inside the limits, in radians, in which the tool is farthest from
-    where this entry puts it, or its axis turned farthest; else null."""
+    """For a misprinted equation, the configuration inside the limits, in radians, at which the error of
+    the tool point or of the axis is largest; else null."""
     uses: list[str]
-    """Names in it, and in what it needs: ids of `symbols` and of `lines`; other equations are not listed."""
+    """Ids of the `symbols` and `lines` that it depends on; other equations are not listed."""
 
 
 @documented
@@ -112,14 +112,14 @@ class EquationsAnswer(TypedDict):
     equations: list[EquationAnswer]
     """In the chapter's order; derived ones position first."""
     symbols: list[SymbolAnswer]
-    """What the names stand for."""
+    """The symbols."""
     lines: list[LineAnswer]
-    """Intermediate results, each using only those before it."""
+    """Intermediate results; each uses only earlier ones."""
 
 
 @documented
 class EquationValue(TypedDict):
-    """What one equation gives in one configuration."""
+    """Value of one equation at one configuration."""
 
     id: str
     """Which equation."""
@@ -132,20 +132,19 @@ class EquationValue(TypedDict):
     dh: float
     """By the product of the DH matrices, in `unit`."""
     difference: float
-    """Of what is printed, or else derived, from the DH product, in `unit`."""
+    """Difference of the printed (or else derived) value from the DH product, in `unit`."""
     turn: float
-    """For an axis (n, o, a) the same as an angle in radians: between the axis and what it becomes with this one
-    entry replaced. 0 for p."""
+    """For an axis (n, o, a) the angle in radians between it and the axis with this entry replaced; 0 for p."""
     unit: Literal["m", ""]
-    """metres for p; empty for n, o, a, which are pure numbers."""
+    """m for p; empty for n, o, a, which are pure numbers."""
 
 
 @documented
 class EquationValues(TypedDict):
-    """Every equation in one configuration."""
+    """Values of all equations at one configuration."""
 
     values: list[EquationValue]
-    """Of every equation that can be read, in order."""
+    """One for every readable equation, in order."""
 
 
 @documented
@@ -167,7 +166,7 @@ def equations(request: Request, robot_id: RobotId) -> Response:
 
     For the arms of the source chapter: each of its equations as printed, and corrected where it is misprinted. For
     any other arm: a closed form derived from its DH table, checked against forward kinematics before it is shown.
-    The first request for such an arm may take a second.
+    The first request for such an arm may take some seconds.
     """
     found = book(robot_of(request, robot_id))
     return reply(
@@ -198,7 +197,7 @@ class EquationsRequest(schemas.Body):
 async def equation_values(
     request: Request, robot_id: RobotId, body: Annotated[EquationsRequest, Body(openapi_examples=EXAMPLES)]
 ) -> Response:
-    """Every equation as printed and corrected (or derived), beside the product of the DH matrices.
+    """Values of every equation as printed and corrected (or derived), and of the product of the DH matrices.
 
     One configuration gets one answer; a list gets `{"results": [...]}` in the same order.
     """

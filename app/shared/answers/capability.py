@@ -15,66 +15,66 @@ from kin import CapabilityMap
 
 @documented
 class CapabilityAnswer(TypedDict):
-    """A capability map in numbers: from which directions the voxels of the workspace can be approached."""
+    """Figures of a capability map: from which directions the tool reaches the voxels of the workspace."""
 
     robot: str
     """Id of the arm."""
     method: Literal["closed form", "sweep", "search"]
-    """How directions were decided. "closed form": exactly; "sweep": with some rolls about each, so that one that
-    few rolls fit may be missing; "search": by descents, which miss a few."""
+    """How directions were tested. "closed form": exactly; "sweep": at some rolls about each, so that a direction
+    that is possible at few rolls may be missed; "search": numerically, which misses a few."""
     directions: int
-    """How many directions were asked for, spread evenly over the sphere."""
+    """Number of tested directions, spread evenly over the sphere."""
     voxel: float
     """Side of a voxel in metres."""
     origin: list[float]
-    """The least corner of the grid: x, y, z in metres."""
+    """The corner of the grid with the smallest x, y, z, in metres."""
     shape: list[int]
-    """Voxels along x, y, z."""
+    """Number of voxels along x, y, z."""
     reachable: int
-    """Voxels whose centre the tool point reaches, with any orientation."""
+    """Number of voxels whose centre the tool point reaches, with any orientation."""
     volume: float
     """Their volume in m³."""
     mean_share: float
-    """Mean of their shares: which part of the directions the tool can be brought to a centre along, 0 to 1."""
+    """Mean share of the directions along which the tool can approach their centres, 0 to 1."""
     best_share: float
     """The largest share."""
     best_share_at: list[float] | None
-    """Centre of the voxel that has it, in metres; null if no direction fits anywhere."""
+    """Centre of the voxel with the largest share, in metres; null if no direction is possible anywhere."""
     best_manipulability: float
-    """The largest manipulability found at any centre, as `all` of the Jacobian's answer."""
+    """The largest manipulability found at any centre, as `all` in the answer of `jacobian`."""
     best_manipulability_at: list[float] | None
-    """Centre of the voxel that has it, in metres; null if it is 0 everywhere."""
+    """Centre of that voxel, in metres; null if it is 0 everywhere."""
 
 
 @documented
 class VoxelAnswer(TypedDict):
-    """The reachable voxels of a capability map, one entry each, in one order."""
+    """The reachable voxels of a capability map, one entry each, in the same order in all lists."""
 
     centres: Matrix
     """Their centres: x, y, z in metres."""
     share: list[float]
-    """Share of the directions along which the tool can be brought there, 0 to 1; 0 where it gets there with others
-    only."""
+    """Share of the directions along which the tool can approach the centre, 0 to 1; 0 if only directions between
+    the tested ones are possible."""
     manipulability: list[float]
-    """The best manipulability found there."""
+    """The largest manipulability found there."""
     approachable: list[str] | None
-    """Which directions fit, "1" or "0" for each; null unless asked for."""
+    """Possible directions, "1" or "0" for each; null unless requested."""
 
 
 @documented
 class CapabilityMapAnswer(TypedDict):
-    """A capability map: its numbers, its directions, its voxels."""
+    """A capability map: figures, directions, voxels."""
 
     summary: CapabilityAnswer
-    """The map in numbers."""
+    """Figures of the map."""
     directions: Matrix
-    """The directions of the tool's z axis that were asked for, unit vectors in the base frame."""
+    """The tested directions of the tool's z axis, unit vectors in the base frame."""
     voxels: VoxelAnswer
-    """The voxels that are reachable; all others of the grid are not."""
+    """The reachable voxels; all others of the grid are unreachable."""
 
 
 def capability_answer(found: CapabilityMap) -> CapabilityAnswer:
-    """The numbers that sum up a map by `kin.capability_map`."""
+    """Figures of a map by `kin.capability_map`."""
     grid = found.grid
     return {
         "robot": grid.robot.id,
@@ -94,7 +94,7 @@ def capability_answer(found: CapabilityMap) -> CapabilityAnswer:
 
 
 def capability_map_answer(found: CapabilityMap, approachable: bool = False) -> CapabilityMapAnswer:
-    """A whole map by `kin.capability_map`; `approachable`: with the directions of each voxel."""
+    """A whole map by `kin.capability_map`; `approachable`: include the directions of each voxel."""
     fits = ["".join("01"[fit] for fit in row) for row in found.approachable.tolist()] if approachable else None
     return {
         "summary": capability_answer(found),

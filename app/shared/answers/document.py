@@ -13,10 +13,10 @@ T = TypeVar("T")
 
 
 def documented(cls: type[T]) -> type[T]:
-    """Lets REST take field descriptions from the strings under the fields.
+    """Decorator: REST takes the descriptions of the fields from the strings under them.
 
-    Set by name, so that the command line never has to import pydantic. Pydantic's own `use_attribute_docstrings`
-    reads the source when the service starts, whether or not anybody asks for the schemas: a quarter of a second.
+    The attribute is set by name, so that the command line need not import pydantic. Pydantic's own
+    `use_attribute_docstrings` would read the source at each start of the service, which takes 0.25 s.
     """
     setattr(cls, "__pydantic_config__", {"json_schema_extra": _describe})  # noqa: B010
     return cls
@@ -30,7 +30,7 @@ def _describe(schema: dict[str, Any], cls: type) -> None:
 
 @cache
 def _field_texts(module: str) -> dict[str, dict[str, str]]:
-    """Of each class of a module, its fields and the string under each."""
+    """For each class of a module, its fields and the string under each."""
     classes = [
         node for node in ast.parse(inspect.getsource(sys.modules[module])).body if isinstance(node, ast.ClassDef)
     ]

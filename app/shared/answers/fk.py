@@ -13,7 +13,7 @@ Matrix = list[list[float]]
 
 @documented
 class Pose(TypedDict):
-    """A rigid transform, given twice: as a matrix, and as a position with a quaternion."""
+    """A rigid transform, as a matrix and as a position with a quaternion."""
 
     matrix: Matrix
     """4×4 homogeneous transform in the base frame, row by row; the last column is the position in metres."""
@@ -30,7 +30,7 @@ class Frame(TypedDict):
     name: str
     """Name of the row of the DH table the frame follows."""
     pose: Pose
-    """Where it is, in the base frame."""
+    """Its pose in the base frame."""
 
 
 @documented
@@ -40,13 +40,13 @@ class FkAnswer(TypedDict):
     pose: Pose
     """Pose of the tool in the base frame."""
     in_limits: bool
-    """Whether every joint is inside its limits. Forward kinematics answers either way."""
+    """Whether every joint is inside its limits. The pose is computed in either case."""
     frames: list[Frame] | None
-    """Frame after every DH row, base to tool, fixed rows included; null unless asked for with `frames`."""
+    """Frame after every DH row, base to tool, fixed rows included; null unless requested with `frames`."""
 
 
 def poses(T: Array) -> list[Pose]:
-    """Transforms ``(k, 4, 4)`` one by one."""
+    """Poses of transforms ``(k, 4, 4)``."""
     columns = zip(T.tolist(), T[:, :3, 3].tolist(), wxyz_from_rotation(T[:, :3, :3]).tolist(), strict=True)
     return [{"matrix": matrix, "position": position, "wxyz": wxyz} for matrix, position, wxyz in columns]
 

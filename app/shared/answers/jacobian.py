@@ -18,24 +18,24 @@ class Manipulability(TypedDict):
     """Yoshikawa's manipulability: the product of the singular values of the Jacobian; 0 at a singularity."""
 
     all: float
-    """Of all six rows (metres and radians mixed)."""
+    """Of all six rows (mixed units)."""
     linear: float
-    """Of the three linear rows (m³ for an arm whose joints all turn)."""
+    """Of the three linear rows (m³ if all joints are revolute)."""
     angular: float
-    """Of the three angular rows (no unit)."""
+    """Of the three angular rows (dimensionless)."""
 
 
 @documented
 class JacobianAnswer(TypedDict):
-    """The Jacobian of one configuration and what it says about moving from there."""
+    """The Jacobian of one configuration, its singular values and the manipulability."""
 
     jacobian: Matrix
     """6×n, row by row: rows 0–2 give the tool point's linear velocity (m per rad, or m per m for a sliding
     joint), rows 3–5 its angular velocity (rad per rad, or 0)."""
     manipulability: Manipulability
-    """How far from a singularity."""
+    """Distance from a singularity; 0 at one."""
     singular_values: list[float]
-    """Of the whole Jacobian, largest first (min(6, n) values; metres and radians mixed)."""
+    """Singular values of the whole Jacobian, largest first (min(6, n) values; mixed units)."""
 
 
 def jacobian_answers(robot: Robot, q: Array, frame: Literal["base", "tool"] = "base") -> list[JacobianAnswer]:

@@ -14,18 +14,18 @@ from kin import Joint, Robot, branch_names
 
 @documented
 class JointAnswer(TypedDict):
-    """A joint that moves: q[index] belongs to it."""
+    """A moving joint; q[index] is its value."""
 
     index: int
     """Index into q, from 0."""
     name: str
     """Name of the joint, and of its row in the DH table."""
     kind: Literal["revolute", "prismatic"]
-    """Whether the joint turns or slides."""
+    """revolute: it turns. prismatic: it slides."""
     unit: Literal["rad", "m"]
-    """Unit of its value: radians if it turns, metres if it slides."""
+    """Unit of its value: rad if revolute, m if prismatic."""
     limits: list[float] | None
-    """[lower, upper] in that unit; null if it has no stops."""
+    """[lower, upper] in that unit; null if it is unlimited."""
     home: float
     """Its value in the home configuration, in that unit."""
 
@@ -37,11 +37,11 @@ class RowAnswer(TypedDict):
     name: str
     """Name of the row."""
     kind: Literal["revolute", "prismatic", "fixed"]
-    """What the row's joint does; a fixed row moves nothing (a tool, an adapter)."""
+    """Kind of the joint; a fixed row does not move (a tool, an adapter)."""
     theta: float
-    """Rotation about z in radians, without the joint's value."""
+    """Rotation about z in radians, without the joint value."""
     d: float
-    """Translation along z in metres, without the joint's value."""
+    """Translation along z in metres, without the joint value."""
     a: float
     """Translation along x in metres."""
     alpha: float
@@ -53,24 +53,24 @@ class RobotAnswer(TypedDict):
     """Everything that defines an arm: T_base_tool = base · A_1 … A_m · tool, with one A per DH row."""
 
     id: str
-    """Short name used in addresses."""
+    """Short name, used in URLs."""
     name: str
-    """Name for people."""
+    """Display name."""
     description: str
-    """What kind of arm it is."""
+    """Short description of the arm."""
     n: int
     """Number of moving joints, the length of q."""
     branches: list[str]
     """Names of the arm's inverse-kinematics branches; empty for an arm without a closed form."""
     convention: Literal["standard", "modified"]
-    """How a DH row is read. standard: Rz(θ) Tz(d) Tx(a) Rx(α). modified (Craig): Rx(α) Tx(a) Rz(θ) Tz(d)."""
+    """DH convention. standard: Rz(θ) Tz(d) Tx(a) Rx(α). modified (Craig): Rx(α) Tx(a) Rz(θ) Tz(d)."""
     reach: float
     """An upper bound of the tool's distance from the base origin, in metres."""
 
     source: str
-    """Where the numbers come from."""
+    """Source of the numbers."""
     units: str
-    """Length unit of the arm's own table, for showing it as its source does. Everything here is in metres."""
+    """Length unit of the table in the robot file, for display. All lengths here are in metres."""
     rows: list[RowAnswer]
     """The DH table, base to tool, fixed rows included."""
     joints: list[JointAnswer]
@@ -108,7 +108,7 @@ def robot_answer(robot: Robot) -> RobotAnswer:
 
 
 def _joint(index: int, joint: Joint, home: float) -> JointAnswer:
-    # JSON has no infinity: a joint without stops says null.
+    # JSON has no infinity: the limits of an unlimited joint are null.
     bounded = joint.limits is not None and all(map(isfinite, joint.limits))
     return {
         "index": index,

@@ -12,84 +12,84 @@ from kin.workspace import Span
 
 @documented
 class ExtremeAnswer(TypedDict):
-    """The least or largest value of a coordinate or distance."""
+    """The smallest or largest value of a coordinate or distance."""
 
     value: float
     """Its value in metres, exact to rounding."""
     q: list[float]
-    """A configuration that has it, in radians (metres)."""
+    """A configuration that attains it, in radians (metres)."""
     point: list[float]
-    """The tool point there, x, y, z in metres."""
+    """The tool point of that configuration, x, y, z in metres."""
 
 
 @documented
 class SpanAnswer(TypedDict):
-    """From the least to the largest."""
+    """Smallest and largest value."""
 
     least: ExtremeAnswer
-    """The least value."""
+    """The smallest value."""
     largest: ExtremeAnswer
     """The largest value."""
 
 
 @documented
 class EstimateAnswer(TypedDict):
-    """A number with its standard error."""
+    """An estimate with its standard error."""
 
     value: float
-    """The number, in m³ (volume) or m² (surface)."""
+    """The estimate, in m³ (volume) or m² (surface)."""
     error: float
-    """Its standard error, in the same unit; more `effort` makes it smaller."""
+    """Its standard error, in the same unit; a larger `effort` reduces it."""
     method: str
-    """How it was made."""
+    """Method of the estimate."""
 
 
 @documented
 class ArcAnswer(TypedDict):
-    """A stretch of a section's boundary that one joint draws alone."""
+    """Part of a section's boundary that is traced by one joint."""
 
     joint: int
     """Index of the joint that moves."""
     start: float
-    """Its value at the beginning of the stretch, in radians (metres)."""
+    """Its value at the start of the arc, in radians (metres)."""
     stop: float
     """Its value at the end, in radians (metres)."""
     q: list[float]
-    """The configuration at the beginning, in radians (metres)."""
+    """The configuration at the start, in radians (metres)."""
     points: Matrix
-    """Points [r, z] along the stretch, in metres, by forward kinematics."""
+    """Points [r, z] along the arc, in metres, by forward kinematics."""
     centre: list[float] | None
-    """Centre [r, z] in metres of the circle it is part of; null if it is part of none."""
+    """Centre [r, z] in metres of its circle; null if it is not circular."""
     radius: float | None
-    """Radius of that circle in metres; null if it is part of none."""
+    """Radius of that circle in metres; null if it is not circular."""
 
 
 @documented
 class SectionAnswer(TypedDict):
-    """The cut of the workspace with a half-plane through the line of joint 1, whatever joint 1 does.
+    """Section of the workspace with a half-plane through the axis of joint 1, for all values of joint 1.
 
-    The point [r, z] of the section is origin + r·u + z·v. Or the cut with the plane that was asked for: then u and
-    v are any two axes of it, v upright if the plane is, and there are no arcs."""
+    The point [r, z] of the section is origin + r·u + z·v. For a section with the requested plane, u and v are two
+    axes of the plane (v vertical if the plane is), and there are no arcs."""
 
     origin: list[float]
-    """Where r and z are 0: x, y, z in metres."""
+    """The point with r = z = 0: x, y, z in metres."""
     u: list[float]
     """Direction of r."""
     v: list[float]
-    """Direction of z, along the line of joint 1."""
+    """Direction of z, along the axis of joint 1."""
     curves: list[Matrix]
-    """Closed polylines of points [r, z] in metres, the workspace on their left; holes run the other way round."""
+    """Closed polylines of points [r, z] in metres with the workspace on their left; holes run the opposite way."""
     arcs: list[ArcAnswer]
-    """Stretches of the boundary that one joint draws alone: exact curves."""
+    """Parts of the boundary that are traced by one joint: exact curves."""
     area: float
     """Area in m²."""
     step: float
-    """Side in metres of the squares that were looked at; what is smaller can be missed."""
+    """Side in metres of the grid squares; smaller details may be missed."""
 
 
 @documented
 class WorkspaceAnswer(TypedDict):
-    """Sizes of the set of points the tool reaches inside the limits, in the base frame."""
+    """Size of the set of points that the tool reaches inside the limits, in the base frame."""
 
     x: SpanAnswer
     """The bounding box along x."""
@@ -98,21 +98,21 @@ class WorkspaceAnswer(TypedDict):
     z: SpanAnswer
     """The bounding box along z."""
     axis_point: list[float]
-    """A point of the line of joint 1 (of the base's z axis if joint 1 slides), in metres."""
+    """A point of the axis of joint 1 (of the z axis of the base if joint 1 slides), in metres."""
     axis: list[float]
-    """Direction of that line."""
+    """Direction of that axis."""
     shoulder: list[float]
-    """The point of that line nearest to the first joint axis that is not parallel to it, in metres."""
+    """The point of that axis nearest to the first joint axis that is not parallel to it, in metres."""
     radius: SpanAnswer
-    """Distance from that line; the least is the radius of the hole around it."""
+    """Distance from that axis; the smallest is the radius of the hole around it."""
     reach: SpanAnswer
-    """Distance from the shoulder; the least is the radius of the hole around it."""
+    """Distance from the shoulder; the smallest is the radius of the hole around it."""
     volume: EstimateAnswer | None
-    """Volume in m³; null where it was not asked for."""
+    """Volume in m³; null if not requested."""
     surface: EstimateAnswer | None
-    """Area of the whole boundary in m², holes included; null where volume was not asked for."""
+    """Area of the whole boundary in m², holes included; null if volume was not requested."""
     section: SectionAnswer | None
-    """The section in r and z, or in a plane; null unless asked for."""
+    """The section in r and z, or in a plane; null unless requested."""
 
 
 def workspace_answer(facts: WorkspaceFacts, cut: Section | None = None) -> WorkspaceAnswer:
