@@ -10,9 +10,11 @@ from kin._version import __version__
 from kin.catalog import builtin_robots, get_robot, load_folder, load_robot, parse_robot
 from kin.errors import InputError, KinematicsError, RobotFileError, UnknownRobotError
 from kin.fk import fk, fk_positions, jacobian, link_frames, manipulability
-from kin.ik import branch_names, branch_of, solve_ik
+from kin.ik import IKOptions, JointConstraints, branch_names, branch_of, solve_ik
 from kin.ik.batch import ik_branches
-from kin.ik.results import BlockedBranch, IKResult, IKSolution, LimitViolation, Redundancy, Status, Task
+from kin.ik.details import LimitViolation, Redundancy
+from kin.ik.options import Task
+from kin.ik.results import BlockedBranch, IKResult, IKSolution, Status
 from kin.path import PathGap, PathJump, PathResult, solve_path
 from kin.robot import Joint, Robot
 from kin.singularity import Singularity, singularities
@@ -45,10 +47,12 @@ __all__ = [
     "CapabilityMap",
     "Estimate",
     "Extreme",
+    "IKOptions",
     "IKResult",
     "IKSolution",
     "InputError",
     "Joint",
+    "JointConstraints",
     "KinematicsError",
     "LimitViolation",
     "PathGap",

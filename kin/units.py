@@ -9,14 +9,11 @@ Quantities other than plain angles and lengths (speeds, volumes, areas, manipula
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 Length = Literal["mm", "cm", "m"]
 LENGTHS: tuple[Length, ...] = get_args(Length)
-# A value in a sentence of the core, in degrees or millimetres: digits, exponent, unit.
-_SIZE = re.compile(r"(\d+(?:\.(\d+))?)(e[+-]?\d+)?(°| mm\b)")
 _LONG = 0.01  # metres; longer lengths are written without tenths of a millimetre
 _DECIMALS = 1  # of a degree or of a millimetre, in a sentence
 
@@ -132,22 +129,6 @@ class Units:
     def motion(self, is_angle: bool, value: float) -> str:
         """The size of a joint's motion for a sentence."""
         return self.angle(value) if is_angle else self.distance(value)
-
-    def retold(self, sentence: str) -> str:
-        """A sentence of the core, which is in degrees and millimetres, in these units instead."""
-
-        def rewritten(found: re.Match[str]) -> str:
-            number, decimals, exponent, name = found.groups(default="")
-            turning = name == "°"
-            plain, unit = (DEGREES if turning else _OF_LENGTH["mm"]), self.of(turning)
-            if unit == plain:
-                return found[0]
-            value = plain.read(float(number + exponent)) * unit.scale
-            if exponent:
-                return f"{value:.{len(decimals)}e}{unit.suffix}"
-            return f"{value:.{unit.decimals(len(decimals))}f}{unit.suffix}"
-
-        return _SIZE.sub(rewritten, sentence)
 
 
 DEFAULT_UNITS = Units()

@@ -9,6 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from kin.ik import IKOptions, IKProblem, JointConstraints
+
 HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])  # Rx(π)
 CHAPTER_ARMS = ("pioneer5", "redundant7", "redundant7-craig")
 
@@ -61,3 +63,8 @@ class Draw:
         T = np.eye(4)
         T[:3, :3], T[:3, 3] = R * np.linalg.det(R), self.rng.uniform(-0.3, 0.3, 3)
         return nested(T)
+
+
+def problem_of(robot, target, q_seed=None, limits=None, locked=None, **options):
+    """The checked problem of `kin.solve_ik` with these keywords."""
+    return IKProblem.of(robot, target, IKOptions(constraints=JointConstraints(limits, locked), **options), q_seed)

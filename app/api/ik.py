@@ -1,7 +1,8 @@
-"""Inverse kinematics: where the tool should be in, joint values out, or why there are none."""
+"""Inverse kinematics: a target in, joint values out, or the reason why there are none."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import Annotated, Literal
 
@@ -10,8 +11,8 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag
 from typing_extensions import TypedDict
 
 from app.api import schemas
-from app.api.asked import Asked, one_or_many
 from app.api.body import versioned
+from app.api.options import OptionsBody, single_or_list
 from app.api.problems import FieldError, invalid
 from app.api.schemas import (
     POST_REFUSALS,
@@ -30,7 +31,8 @@ from app.shared.answers.document import documented
 from app.shared.answers.ik import IkAnswer, ik_answer
 from app.shared.metrics import SOLVE_SECONDS
 from app.shared.settings import Settings
-from kin import Robot, Task, solve_ik
+from kin import IKOptions, Robot, Task
+from kin.ik import solve
 from kin.transforms import Array
 
 router = versioned("kinematics")
@@ -74,12 +76,12 @@ EXAMPLES = {
 }
 
 
-class IkRequest(Asked):
-    """Where the tool should go, and which answers are wanted."""
+class IkRequest(OptionsBody):
+    """Where the tool should go, and which solutions are returned."""
 
     target: Annotated[
         Annotated[Target, Tag("one")] | Annotated[list[Target], Field(min_length=1, fail_fast=True), Tag("many")],
-        Discriminator(one_or_many),
+        Discriminator(single_or_list),
     ] = Field(description="One target, or a list of targets, each answered on its own.")
     q_seed: Configurations | None = Field(
         None,
@@ -100,17 +102,29 @@ class IkRequest(Asked):
     )
     prefer: Literal["nearest", "limits", "manipulability"] = Field(
         "nearest",
-        description="How to choose what is free, and how to sort: nearest to the seed, farthest from the joint "
-        "limits, or most manipulable.",
+        description="How to choose redundancy parameters, and how to sort: nearest to the seed, farthest from the "
+        "joint limits, or largest manipulability.",
     )
     redundancy: FreeValues | None = Field(
         None,
-        description="Values in radians for free parameters by name, such as `psi` (see `redundancy` in the "
-        "answers); a bare number is for the first one. By default the feasible value chosen by `prefer`.",
+        description="Values in radians of redundancy parameters by name, such as `psi` (see `redundancy` in the "
+        "answers); a bare number is the value of the first one. By default the feasible value chosen by `prefer`.",
     )
     solver: Literal["auto", "numeric"] = Field(
         "auto", description="numeric: descend from many starts, even where the arm has a closed form."
     )
+
+    def options(self, task: Task) -> IKOptions:
+        """These fields as options of the core."""
+        return replace(
+            super().options(task),
+            respect_limits=self.respect_limits,
+            images=self.images,
+            prefer=self.prefer,
+            max_solutions=self.max_solutions,
+            redundancy=self.redundancy,
+            solver=self.solver,
+        )
 
 
 @documented
@@ -132,40 +146,28 @@ async def inverse_kinematics(
 ) -> Response:
     """Every configuration that brings the tool to a target, nearest to the seed first, or why there is none.
 
-    A target that cannot be reached is answered with 200: `status` tells the kind of answer, `reason` says it in a
-    sentence, `closest` is the nearest the arm gets. One target gets one answer; a list gets
-    `{"results": [...]}` in the same order. Each solution's errors are measured by forward kinematics.
+    A target that cannot be reached is answered with 200: `status` and `cause` are codes, `details` are the numbers
+    behind them, `reason` is a sentence, `closest` is the closest configuration. One target gets one answer; a list
+    gets `{"results": [...]}` in the same order. Each solution's errors are measured by forward kinematics.
     """
     return await computed(request, partial(_solve, robot_of(request, robot_id), body, settings_of(request)))
 
 
 def _solve(robot: Robot, body: IkRequest, settings: Settings, deadline: Deadline) -> Response:
-    questions, single = body.resolve_all(body.target, settings)
-    seeds = _seeds(robot, body, len(questions), settings)
+    targets, single = body.resolve_all(body.target, settings)
+    seeds = _seeds(robot, body, len(targets), settings)
+
+    options = {task: body.options(task) for task, _ in targets}
 
     def answer(task: Task, T: Array, seed: Array | None) -> IkAnswer:
         deadline.check()
-        return ik_answer(
-            solve_ik(
-                robot,
-                T,
-                task=task,
-                q_seed=seed,
-                respect_limits=body.respect_limits,
-                images=body.images,
-                prefer=body.prefer,
-                max_solutions=body.max_solutions,
-                redundancy=body.redundancy,
-                solver=body.solver,
-                **body.options,
-            )
-        )
+        return ik_answer(solve(robot, T, options[task], seed))
 
     def answers(some: slice) -> list[IkAnswer]:
-        return [answer(task, T, seed) for (task, T), seed in zip(questions[some], seeds[some], strict=True)]
+        return [answer(task, T, seed) for (task, T), seed in zip(targets[some], seeds[some], strict=True)]
 
     with SOLVE_SECONDS.labels("rest").time():
-        return one_or_all(answers, len(questions), single, deadline)
+        return one_or_all(answers, len(targets), single, deadline)
 
 
 def _seeds(robot: Robot, body: IkRequest, count: int, settings: Settings) -> list[Array | None]:

@@ -9,15 +9,16 @@ from fastapi import Body, Request, Response
 from pydantic import Field
 
 from app.api import schemas
-from app.api.asked import Asked
 from app.api.body import versioned
+from app.api.options import OptionsBody
 from app.api.problems import FieldError, invalid
 from app.api.schemas import POST_REFUSALS, Configuration, RobotId, example, reply, robot_of, settings_of
 from app.api.targets import Target
 from app.api.work import Deadline, computed
 from app.shared.answers.path import PathAnswer, path_answer
 from app.shared.settings import Settings
-from kin import Robot, solve_path
+from kin import Robot
+from kin.path import solve
 
 router = versioned("kinematics")
 
@@ -46,7 +47,7 @@ EXAMPLES = {
 }
 
 
-class PathRequest(Asked):
+class PathRequest(OptionsBody):
     """Where the tool should go, one waypoint after the other."""
 
     targets: list[Target] = Field(
@@ -78,8 +79,8 @@ async def path_inverse_kinematics(
 ) -> Response:
     """One continuous joint path through all targets: as few jumps as possible, then as little motion as possible.
 
-    Branches, whole turns and free parameters are chosen for the path as a whole, so that no joint winds up to its
-    stop where another start would have avoided it. Each jump that is left is told with its place and reason; a
+    Branches, whole turns and redundancy parameters are chosen for the path as a whole, so that no joint turns up
+    to its limit where another start would have avoided it. Each remaining jump has its place, cause and numbers; a
     waypoint that cannot be reached is a gap, and the path holds the closest configuration there.
     """
     return await computed(request, partial(_solve, robot_of(request, robot_id), body, settings_of(request)))
@@ -87,22 +88,14 @@ async def path_inverse_kinematics(
 
 def _solve(robot: Robot, body: PathRequest, settings: Settings, deadline: Deadline) -> Response:
     schemas.check_batch("targets", len(body.targets), settings, settings.max_path)
-    questions = [body.resolve(target, f"targets[{i}]") for i, target in enumerate(body.targets)]
-    task = questions[0][0]
-    for i, (other, _) in enumerate(questions):
+    targets = [body.resolve(target, f"targets[{i}]") for i, target in enumerate(body.targets)]
+    task = targets[0][0]
+    for i, (other, _) in enumerate(targets):
         if other != task:
             expected = f"a target for task {task}, as the first one, or `task` for all of them"
             raise invalid(FieldError(field=f"targets[{i}]", value=f"a target for task {other}", expected=expected))
     q_start = None
     if body.q_start is not None:
         q_start = schemas.as_configurations(robot, body.q_start, settings, "q_start")[0][0]
-    result = solve_path(
-        robot,
-        [T for _, T in questions],
-        task=task,
-        q_start=q_start,
-        max_step=body.max_step,
-        stop=deadline.check,
-        **body.options,
-    )
-    return reply(path_answer(result))
+    poses = [T for _, T in targets]
+    return reply(path_answer(solve(robot, poses, body.options(task), q_start, body.max_step, deadline.check)))

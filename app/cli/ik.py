@@ -10,9 +10,11 @@ import numpy as np
 
 from app.cli.terminal import Units, configuration, per_joint, print_json, store_of, table
 from app.shared.answers.ik import Blocked, IkAnswer, Solution, ik_answer
-from kin import InputError, Task, solve_ik
-from kin.ik.problem import MASK_NAMES
+from kin import IKOptions, InputError, JointConstraints, Task
+from kin.ik import solve
+from kin.ik.options import MASK_NAMES
 from kin.transforms import frame_from_approach, from_position_wxyz
+from kin.units import Units as ReaderUnits
 
 
 def run(arguments: Namespace) -> int:
@@ -23,27 +25,28 @@ def run(arguments: Namespace) -> int:
     if arguments.approach is not None:
         T[:3, :3] = frame_from_approach(arguments.approach)
     task = _task(arguments)
-    result = solve_ik(
-        robot,
-        T,
+    q_seed = None if arguments.seed is None else configuration(robot, arguments.seed, "--seed", arguments.rad)
+    limits = per_joint(robot, arguments.limit, "--limit", 2, arguments.rad)
+    locked = per_joint(robot, arguments.lock, "--lock", 1, arguments.rad)
+    options = IKOptions(
         task=task,
-        q_seed=None if arguments.seed is None else configuration(robot, arguments.seed, "--seed", arguments.rad),
+        mask=None if arguments.mask is None else [name in arguments.mask for name in MASK_NAMES],
+        mask_frame=arguments.mask_frame,
+        constraints=JointConstraints(limits, locked),
         respect_limits=not arguments.ignore_limits,
-        max_solutions=None if arguments.all else 1,
-        redundancy=_redundancy(arguments, angle),
-        limits=per_joint(robot, arguments.limit, "--limit", 2, arguments.rad),
-        locked=per_joint(robot, arguments.lock, "--lock", 1, arguments.rad),
         branch=arguments.branch,
         images=arguments.images,
         prefer=arguments.prefer,
+        redundancy=_redundancy(arguments, angle),
+        max_solutions=None if arguments.all else 1,
         solver=arguments.solver,
-        mask=None if arguments.mask is None else [name in arguments.mask for name in MASK_NAMES],
-        mask_frame=arguments.mask_frame,
     )
+    result = solve(robot, T, options, q_seed)
     answer = ik_answer(result)
     if arguments.json:
         print_json(answer)
     else:
+        print(result.explain(ReaderUnits(not arguments.rad, "m" if arguments.rad else "mm")).text + "\n")
         _print(answer, Units(robot, arguments.rad))
         if not arguments.rad and np.abs(T[:3, 3]).max() < 5e-3:
             print("note: --position is in millimetres; --rad makes it metres", file=sys.stderr)
@@ -51,7 +54,7 @@ def run(arguments: Namespace) -> int:
 
 
 def _print(answer: IkAnswer, units: Units) -> None:
-    print(answer["reason"] + "\n")
+    """Print the solutions, the redundancy parameters, and the postures outside the limits."""
     listed = [(str(k + 1), solution) for k, solution in enumerate(answer["solutions"])]
     if not listed and answer["closest"]:
         listed.append(("closest", answer["closest"]))
@@ -63,7 +66,7 @@ def _print(answer: IkAnswer, units: Units) -> None:
         ranges = ", ".join(" … ".join(units.angle(x) for x in interval) for interval in parameter["intervals"])
         print(f"\n{parameter['label']} = {units.angle(parameter['value'])}, possible: {ranges or 'nothing'}")
     if answer["blocked"]:
-        print("\n" + table(["branch", "would need"], _needs(units, answer["blocked"])))
+        print("\n" + table(["posture", "outside the limits"], _needs(units, answer["blocked"])))
 
 
 def _solutions(units: Units, listed: list[tuple[str, Solution]]) -> str:
@@ -101,7 +104,7 @@ def _task(arguments: Namespace) -> Task:
 
 
 def _needs(units: Units, blocked: list[Blocked]) -> list[list[str]]:
-    """The joint values outside the limits that each branch would need."""
+    """The joint values of each posture that are outside the limits."""
     return [
         [
             branch["branch"],

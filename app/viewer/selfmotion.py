@@ -12,9 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 import kin
-from kin import IKResult, Redundancy, Robot, Task
-from kin.ik import answer
-from kin.ik.problem import ask
+from kin import IKOptions, IKResult, JointConstraints, Redundancy, Robot, Task
+from kin.ik.problem import prepare
 from kin.transforms import Array
 
 SMOOTH = 0.6  # rad of one joint in one event: more than that is no motion but another posture
@@ -50,9 +49,10 @@ def free_values(robot: Robot, T: Array, task: Task, q: Array, locked: Locks) -> 
     """What the task leaves free at `q` ``(n,)``, on the branch it is on; not what only a singularity sets free."""
     target = T[:3, 3] if task == "position" else T
     seed = "seed" if kin.branch_names(robot) else None
-    question = ask(robot, target, task=task, q_seed=q, locked=locked, branch=seed, max_solutions=1)
-    rare = {freedom.name for freedom in question.freedoms if freedom.rare}
-    return tuple(item for item in answer(question).redundancy if item.name not in rare)
+    options = IKOptions(task=task, constraints=JointConstraints(locked=locked), branch=seed, max_solutions=1)
+    rare = {parameter.name for parameter in prepare(robot, options).redundancies if parameter.rare}
+    found = kin.ik.solve(robot, target, options, q)
+    return tuple(item for item in found.redundancy if item.name not in rare)
 
 
 def circular(item: Redundancy) -> bool:

@@ -22,19 +22,19 @@ from kin.transforms import Array, finite_array
 
 _FLOAT = np.dtype(np.float64)
 _POSE = (4, 4)
-_CACHE = "_thin"
+_CACHE = "_batch"
 _empty, _isinf, _ndarray = np.empty, math.isinf, np.ndarray
 
 
-class _Thin(NamedTuple):
-    """What a call needs of an arm: its kernels without argument checks, and their constant arguments."""
+class _Prepared(NamedTuple):
+    """What a call needs to know of an arm: its kernels without argument checks, and their constant arguments."""
 
     kernels: BatchKernels
     near: Array
     shape: tuple[int, int]
 
     def __reduce__(self) -> tuple[type[None], tuple[()]]:
-        """Machine code cannot be pickled: the copy of an arm prepares itself anew."""
+        """Machine code cannot be pickled: the copy of an arm prepares its own."""
         return type(None), ()
 
 
@@ -42,46 +42,47 @@ def ik_branches(robot: Robot, target: ArrayLike, redundancy: ArrayLike = math.na
     """All closed-form branches ``(..., branches, n)`` for poses T_base_tool ``(..., 4, 4)``, radians (metres).
 
     Row i is branch i of :func:`kin.branch_names`, NaN where it does not exist; where two have merged, both rows
-    hold the same joints. Angles are in (−π, π], but for a joint whose value is asked for. Limits are not asked for
-    and nothing is verified; a rotation is taken to be one. Of an arm with five joints the roll about the tool's z
-    axis is whatever it is.
+    hold the same joint values. Angles are in (−π, π], except for a joint whose value is requested. Limits are not
+    applied and nothing is verified; the rotation is assumed to be orthonormal. An arm with five joints does not
+    meet the rotation about the tool's z axis.
 
     Args:
         robot: an arm with a closed form.
         target: one pose, or any batch of them.
-        redundancy: value of the arm's first free parameter (θ1 or the arm angle ψ, radians), one for all targets
-            or one for each; NaN leaves it near the home configuration. So is what a singularity leaves free.
+        redundancy: value of the arm's first redundancy parameter (θ1 or the arm angle ψ, radians), one for all
+            targets or one for each; NaN keeps it near the home configuration. Joint values that a singular target
+            leaves undetermined are also near that configuration.
 
     Raises:
-        InputError: an arm without closed form, a target or a redundancy that is no array of finite numbers of that
-            shape (a redundancy may be NaN).
+        InputError: an arm without a closed form; a target or redundancy that is not an array of finite numbers of
+            that shape (a redundancy may be NaN).
     """
-    thin = robot.__dict__.get(_CACHE) or _prepare(robot)
+    prepared = robot.__dict__.get(_CACHE) or _prepare(robot)
     if type(target) is _ndarray and target.dtype is _FLOAT and target.flags.c_contiguous:
         T = target
         if T.shape == _POSE and type(redundancy) is float and not _isinf(redundancy):
-            out = _empty(thin.shape)
-            kernels = thin.kernels
-            if kernels.one(kernels.params, T, redundancy, thin.near, out):
+            out = _empty(prepared.shape)
+            kernels = prepared.kernels
+            if kernels.one(kernels.params, T, redundancy, prepared.near, out):
                 return out
     else:
         T = finite_array("target", target, _POSE)
     if T.shape[-2:] != _POSE or not _finite(T.reshape(-1)):
         finite_array("target", target, _POSE)
     value = _redundancy(redundancy, T.shape[:-2])
-    out = np.empty((*T.shape[:-2], *thin.shape))
-    targets, rows = T.reshape(-1, 4, 4), out.reshape(-1, *thin.shape)
-    thin.kernels.many(thin.kernels.params, targets, value, thin.near, rows)
+    out = np.empty((*T.shape[:-2], *prepared.shape))
+    targets, rows = T.reshape(-1, 4, 4), out.reshape(-1, *prepared.shape)
+    prepared.kernels.many(prepared.kernels.params, targets, value, prepared.near, rows)
     return out
 
 
-def _prepare(robot: Robot) -> _Thin:
+def _prepare(robot: Robot) -> _Prepared:
     match = closed_form_of(robot)
     if match is None:
         raise InputError("robot", robot.id, "an arm with a closed form")
-    thin = _Thin(match.kernels.unchecked(), robot.q_home.copy(), (len(match.branches), robot.n))
-    robot.__dict__[_CACHE] = thin
-    return thin
+    prepared = _Prepared(match.kernels.unchecked(), robot.q_home.copy(), (len(match.branches), robot.n))
+    robot.__dict__[_CACHE] = prepared
+    return prepared
 
 
 def _redundancy(value: ArrayLike, shape: tuple[int, ...]) -> Array:

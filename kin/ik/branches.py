@@ -1,4 +1,4 @@
-"""Branches of one question: asked of the closed form, brought to their best whole turns, measured by FK."""
+"""The branches of one problem: rows of the closed form at their best whole turns, measured by FK."""
 
 from __future__ import annotations
 
@@ -9,26 +9,27 @@ import numpy as np
 
 from kin.fk import fk
 from kin.ik.candidates import Flags as Flags
-from kin.ik.candidates import finish, judge, ranges, settle
-from kin.ik.problem import Question
-from kin.ik.results import IKSolution, LimitViolation, Redundancy
+from kin.ik.candidates import Rows, accept, measure_rows, ranges, unchecked
+from kin.ik.details import JointKind, LimitViolation, Redundancy
+from kin.ik.problem import IKProblem
+from kin.ik.results import IKSolution
 from kin.solvers.contract import APPROACH, Obstacle, RedundancyParameter, SolverInput
 from kin.transforms import Array
 
 _NO_LIMIT = 1e6
-_EVERYWHERE = ((-math.pi, math.pi),)
+_WHOLE_CIRCLE = ((-math.pi, math.pi),)
 
 
 @dataclass(slots=True, eq=False)
 class Branches:
-    """One row per branch; where two have merged, both rows hold the same joints.
+    """One row per branch; where two have merged, both rows hold the same joint values.
 
     Attributes:
         q: ``(k, n)``, NaN where the branch does not exist.
         stats: ``(k, 5)``, columns as in :mod:`kin.ik.candidates`.
-        closed, good: ``(k,)``, which rows meet the task, and which are inside the limits too if those count.
-        order: the good rows, nearest to the seed first, each posture once.
-        freedoms: what `values` and `arcs` are about.
+        closed, good: ``(k,)``, which rows meet the task, and which of them the limits allow (if they count).
+        order: the good rows, nearest to the seed first, each configuration once.
+        redundancies: the redundancy parameters of `values` and `arcs`.
         values, arcs, gap, obstacle: as in `kin.solvers.contract.Candidates`.
     """
 
@@ -37,7 +38,7 @@ class Branches:
     closed: Flags
     good: Flags
     order: list[int]
-    freedoms: tuple[RedundancyParameter, ...]
+    redundancies: tuple[RedundancyParameter, ...]
     values: Array
     arcs: list[Array]
     gap: float
@@ -45,101 +46,93 @@ class Branches:
 
 
 def is_closed(stats: Array) -> Flags:
-    """Which rows of statistics ``(k, 5)`` meet the task, whatever the limits say ``(k,)``."""
+    """Which rows of statistics ``(k, 5)`` meet the task, whether or not inside the limits ``(k,)``."""
     closed, good = np.empty((2, len(stats)), dtype=bool)
-    judge(stats, False, closed, good)
+    accept(stats, False, closed, good)
     return closed
 
 
 def solve_branches(
-    question: Question, T: Array, code: int, seed: Array | None = None, values: tuple[float, ...] | None = None
+    problem: IKProblem, T: Array, code: int, seed: Array | None = None, values: tuple[float, ...] | None = None
 ) -> Branches | None:
     """The branches of the arm's closed form for target `T` ``(4, 4)``, None if it has none for this task.
 
     Args:
-        question: limits, seed, and the task the rows are measured against.
-        T: target of the closed form; the errors are told against the question's own.
+        problem: limits, seed, and the target and task that the rows are measured against.
+        T: target of the closed form; the errors are measured against the problem's own.
         code: task of the closed form.
-        seed: another seed than the question's.
-        values: other values of the freedoms than the question's, NaN where free.
+        seed: another seed than the problem's.
+        values: other values of the redundancy parameters than the problem's, NaN to let them be chosen.
     """
-    match = question.match
-    if match is None or not match.handles(code):
+    closed_form = problem.closed_form
+    if closed_form is None or not closed_form.handles(code):
         return None
-    freedoms = question.freedoms if code == question.code else match.redundancies(code)
+    redundancies = problem.redundancies if code == problem.code else closed_form.redundancies(code)
     if values is None:
-        values = question.values if code == question.code else (math.nan,) * len(freedoms)
-    seed = question.seed if seed is None else seed
+        values = problem.values if code == problem.code else (math.nan,) * len(redundancies)
+    seed = problem.seed if seed is None else seed
     roll = 0.0
-    if code == APPROACH and "roll" in [freedom.name for freedom in freedoms]:
-        x = fk(question.robot, seed)[:3, 0]
+    if code == APPROACH and "roll" in [parameter.name for parameter in redundancies]:
+        x = fk(problem.robot, seed)[:3, 0]
         roll = math.atan2(float(T[:3, 1] @ x), float(T[:3, 0] @ x))
-    lower, upper = question.lower, question.upper
-    if not question.respect:
-        # Limits to be ignored must not even pull what is free away from the seed.
+    lower, upper = problem.lower, problem.upper
+    if not problem.respect:
+        # Limits that are ignored must not pull redundancy parameters away from the seed either.
         lower, upper = np.full_like(lower, -_NO_LIMIT), np.full_like(upper, _NO_LIMIT)
-    found = match.solve(SolverInput(T, code, values, question.respect, seed, lower, upper, roll))
+    found = closed_form.solve(SolverInput(T, code, values, problem.respect, seed, lower, upper, roll))
     q = np.array(found.q, order="C")
-    count = len(q)
-    stats, closed, good, order = (
-        np.empty((count, 5)),
-        np.empty(count, bool),
-        np.empty(count, bool),
-        np.empty(count, int),
-    )
-    count = settle(
-        question.robot.model, question.T, question.code, question.mask, seed, question.seed, question.lower,
-        question.upper, question.turns, question.respect, q, stats, closed, good, order,
-    )  # fmt: skip
+    k = len(q)
+    rows = Rows(q, np.empty((k, 5)), np.empty(k, bool), np.empty(k, bool), np.empty(k, int))
+    count = unchecked()(problem.requirement, problem.T, seed, problem.seed, rows)
     return Branches(
-        q, stats, closed, good, order[:count].tolist(), freedoms, found.values, list(found.arcs), found.gap,
-        found.obstacle,
+        q, rows.stats, rows.closed, rows.good, rows.order[:count].tolist(), redundancies, found.values,
+        list(found.arcs), found.gap, found.obstacle,
     )  # fmt: skip
 
 
 def measure(
-    question: Question, q: Array, near: Array | None = None, code: int | None = None
+    problem: IKProblem, q: Array, near: Array | None = None, code: int | None = None
 ) -> tuple[Array, Array]:
     """Configurations ``(k, n)`` at their best images, with their statistics ``(k, 5)`` by FK."""
     q = np.array(q, order="C")
     stats = np.empty((q.shape[0], 5))
-    finish(
-        question.robot.model, question.T, question.code if code is None else code, question.mask,
-        question.seed if near is None else near, question.seed, question.lower, question.upper, question.turns,
-        question.respect, q, stats,
-    )  # fmt: skip
+    requirement = problem.requirement
+    if code is not None:
+        requirement = requirement._replace(task=code)
+    near = problem.seed if near is None else near
+    measure_rows(requirement, problem.T, near, problem.seed, q, stats)
     return q, stats
 
 
 def solution(
-    question: Question, q: Array, stats: Array, branch: int | None = None, compromise: str | None = None
+    problem: IKProblem, q: Array, stats: Array, branch: int | None = None, compromise: str | None = None
 ) -> IKSolution:
-    """A row as a result; its branch is worked out where it is not known."""
+    """A row as a solution; its branch is computed if it is not given."""
     q = q.copy()
     q.flags.writeable = False
-    branch = question.branch_of(q) if branch is None else branch
+    branch = problem.branch_of(q) if branch is None else branch
     position, rotation, distance, overrun, _ = stats.tolist()
-    name = question.branch_name(branch)
+    name = problem.branch_name(branch)
     return IKSolution(q, name, position, rotation, overrun == 0.0, distance, (), compromise)
 
 
 def redundancy_of(
-    question: Question, branches: Branches, rows: list[int], every: Flags
+    problem: IKProblem, branches: Branches, rows: list[int], every: Flags
 ) -> tuple[list[tuple[Redundancy, ...]], tuple[Redundancy, ...]]:
-    """What is free on each branch of `rows`: the value used, and its ranges; and for the first of them with the
+    """The redundancy parameters of each branch in `rows`: values and ranges; and those of the first row with the
     ranges of all branches in `every` ``(k,)``.
 
-    A joint's own value follows its whole-turn image. Without limits an angle may be anything.
+    A parameter that is a joint's value follows its whole-turn image. Without limits an angle may have any value.
     """
     found: list[tuple[Redundancy, ...]] = [()] * len(rows)
     together: tuple[Redundancy, ...] = ()
-    for k, freedom in enumerate(branches.freedoms):
+    for k, parameter in enumerate(branches.redundancies):
         there = branches.values[:, k].tolist()
         if not rows or all(map(math.isnan, there)):
             continue
-        values = there if freedom.joint < 0 else branches.q[:, freedom.joint].tolist()
-        intervals = _intervals(question, branches.arcs[k], rows, every, freedom.circular)
-        name, label = freedom.name, freedom.label
+        values = there if parameter.joint < 0 else branches.q[:, parameter.joint].tolist()
+        intervals = _intervals(problem, branches.arcs[k], rows, every, parameter.circular)
+        name, label = parameter.name, parameter.label
         for i, row in enumerate(rows):
             if not math.isnan(there[row]):
                 found[i] += (Redundancy(name, label, values[row], intervals[i]),)
@@ -149,24 +142,25 @@ def redundancy_of(
 
 
 def _intervals(
-    question: Question, arcs: Array, rows: list[int], every: Flags, circular: bool
+    problem: IKProblem, arcs: Array, rows: list[int], every: Flags, circular: bool
 ) -> list[tuple[tuple[float, float], ...]]:
-    """Ranges of each row's branch, and those of all branches in `every`."""
+    """Ranges on each branch in `rows`, and those of all branches in `every`."""
     out = np.empty((4 * len(arcs) + 2, 3))
-    count = ranges(arcs, np.array(rows), every, circular, out) if question.respect else -1
+    count = ranges(arcs, np.array(rows), every, circular, out) if problem.respect else -1
     if count < 0:
-        return [_EVERYWHERE] * (len(rows) + 1)
+        return [_WHOLE_CIRCLE] * (len(rows) + 1)
     found: list[tuple[tuple[float, float], ...]] = [()] * (len(rows) + 1)
     for row, low, high in out[:count].tolist():
         found[int(row)] += ((low, high),)
     return found
 
 
-def violations_of(question: Question, q: Array) -> tuple[LimitViolation, ...]:
-    """The stops that configuration q ``(n,)`` breaks."""
+def violations_of(problem: IKProblem, q: Array) -> tuple[LimitViolation, ...]:
+    """The joint values of configuration q ``(n,)`` that are outside the limits."""
     found = []
-    for i, joint in enumerate(question.robot.joints):
-        if not question.lower[i] <= q[i] <= question.upper[i]:
-            limit = question.lower[i] if q[i] < question.lower[i] else question.upper[i]
-            found.append(LimitViolation(i, joint.name, float(q[i]), float(limit)))
+    for i, joint in enumerate(problem.robot.joints):
+        if not problem.lower[i] <= q[i] <= problem.upper[i]:
+            limit = problem.lower[i] if q[i] < problem.lower[i] else problem.upper[i]
+            kind: JointKind = "prismatic" if joint.kind == "prismatic" else "revolute"
+            found.append(LimitViolation(i, joint.name, float(q[i]), float(limit), kind, problem.locked[i]))
     return tuple(found)

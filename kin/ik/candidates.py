@@ -1,13 +1,20 @@
-"""One compiled pass over raw candidates: images inside the limits, residuals by FK, distances to the seed."""
+"""Measuring candidates: one compiled pass over the raw rows of a solver.
+
+Each row is brought to its best whole-turn image, its residuals are measured by forward kinematics, and rows are
+accepted, sorted and freed of duplicates. Solvers do nothing of this.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kin.kernels.compile import jit
+from kin.kernels.compile import MODEL, direct, jit, record, row_of
 from kin.kernels.fk import fk_into
 from kin.solvers.common import TURN, nearest_image, relative_pose, wrap
 from kin.solvers.contract import APPROACH, MASK, POSE
@@ -20,7 +27,47 @@ _POSITION = TOLERANCES.closure_position
 _ROTATION = TOLERANCES.closure_rotation
 _LIMIT = TOLERANCES.limit
 _MERGE = TOLERANCES.merge
+# Columns of the statistics of a row: errors (m, rad), distance to the seed, sum of what is outside the limits,
+# roll.
 POSITION_ERROR, ROTATION_ERROR, DISTANCE, OVERRUN, ROLL = range(5)
+
+
+class Requirement(NamedTuple):
+    """What rows are measured against, but for the target; arrays are C-contiguous float64.
+
+    Attributes:
+        model: the arm, as in `kin.kernels.fk`.
+        mask: ``(7,)`` weights of the six error coordinates, and 1.0 if they are in the base frame.
+        lower, upper: ``(n,)`` joint limits.
+        turns: ``(n,)`` 2π for a joint with whole-turn images, else 0.0.
+        task: code of the task.
+        respect: whether rows outside the limits are refused.
+    """
+
+    model: Array
+    mask: Array
+    lower: Array
+    upper: Array
+    turns: Array
+    task: int
+    respect: bool
+
+
+class Rows(NamedTuple):
+    """Candidates of one target, written by `measure_and_sort`.
+
+    Attributes:
+        q: ``(k, n)``, NaN rows stay NaN.
+        stats: ``(k, 5)`` statistics.
+        closed, good: ``(k,)`` which rows meet the task, and which of them are accepted.
+        order: ``(k,)`` accepted rows, nearest to the seed first.
+    """
+
+    q: Array
+    stats: Array
+    closed: Flags
+    good: Flags
+    order: Whole
 
 
 @jit
@@ -57,15 +104,14 @@ def residuals(T: Array, target: Array, task: int, mask: Array, e: Array) -> tupl
 
 
 @jit
-def finish(
-    model: Array, target: Array, task: int, mask: Array, near: Array, seed: Array, lower: Array, upper: Array,
-    turns: Array, respect: bool, q: Array, stats: Array,
-) -> None:  # fmt: skip
+def measure_rows(
+    requirement: Requirement, target: Array, near: Array, seed: Array, q: Array, stats: Array
+) -> None:
     """Bring each row of q ``(k, n)`` to its best image, in place, and fill stats ``(k, 5)``; NaN rows stay NaN.
 
-    The best image is inside the limits and nearest to `near`; the distance is told from `seed`. `turns` is 2π for
-    a joint that has images and 0 for one that has none.
+    The best image is inside the limits and nearest to `near`; the distance is that to `seed`.
     """
+    lower, upper, turns = requirement.lower, requirement.upper, requirement.turns
     T = np.empty((4, 4))
     e = np.empty(6)
     for k in range(q.shape[0]):
@@ -77,7 +123,7 @@ def finish(
         overrun = 0.0
         for i in range(q.shape[1]):
             x = q[k, i]
-            low, high = (lower[i], upper[i]) if respect else (-math.inf, math.inf)
+            low, high = (lower[i], upper[i]) if requirement.respect else (-math.inf, math.inf)
             if turns[i] > 0.0:
                 x = nearest_image(x, near[i], low, high)
             if x < lower[i]:
@@ -92,15 +138,15 @@ def finish(
                     overrun += x - upper[i]
             q[k, i] = x
             distance += (x - seed[i]) ** 2
-        fk_into(model, q[k], T)
-        stats[k, 0], stats[k, 1], stats[k, 4] = residuals(T, target, task, mask, e)
+        fk_into(requirement.model, q[k], T)
+        stats[k, 0], stats[k, 1], stats[k, 4] = residuals(T, target, requirement.task, requirement.mask, e)
         stats[k, 2] = math.sqrt(distance)
         stats[k, 3] = overrun
 
 
 @jit
-def judge(stats: Array, respect: bool, closed: Flags, good: Flags) -> int:
-    """closed, good ``(k,)`` ← which rows meet the task, and which are inside the limits too; returns how many."""
+def accept(stats: Array, respect: bool, closed: Flags, good: Flags) -> int:
+    """closed, good ``(k,)`` ← which rows meet the task, and which of them the limits allow; how many those are."""
     count = 0
     for k in range(stats.shape[0]):
         closed[k] = stats[k, POSITION_ERROR] <= _POSITION and stats[k, ROTATION_ERROR] <= _ROTATION
@@ -115,7 +161,7 @@ def ranges(arcs: Array, rows: Whole, together: Flags, circular: bool, out: Array
     """out ``(m, 3)`` ← rows (k, low, high): the intervals of branch rows[k], sorted and joined, then those of all
     branches in `together` (k = len(rows)); returns their number, or −1 if an end is not finite.
 
-    On a circle they are told in (−π, π], one across the seam as two, the whole of it as one.
+    On a circle they are in (−π, π]: one across ±π is given as two, the whole circle as one.
     """
     n = rows.shape[0]
     total = 0
@@ -143,7 +189,7 @@ def ranges(arcs: Array, rows: Whole, together: Flags, circular: bool, out: Array
 
 @jit
 def _put(out: Array, k: int, first: int, total: int, low: float, high: float) -> int:
-    """Insert an interval into the sorted, disjoint ones out[first:total], joining what it touches."""
+    """Insert an interval into the sorted, disjoint ones out[first:total] and join those that it touches."""
     i = first
     while i < total and out[i, 2] < low - 1e-12:
         i += 1
@@ -166,7 +212,7 @@ def _put(out: Array, k: int, first: int, total: int, low: float, high: float) ->
 
 @jit
 def select(q: Array, key: Array) -> tuple[Whole, int]:
-    """Rows of q ``(k, n)`` with a finite key, by rising key, equal ones once: (rows, count); uses up `key`."""
+    """Rows of q ``(k, n)`` with a finite key, by rising key, equal rows once: (rows, count); overwrites `key`."""
     kept = np.empty(q.shape[0], dtype=np.int64)
     count = 0
     for _ in range(q.shape[0]):
@@ -192,21 +238,26 @@ def select(q: Array, key: Array) -> tuple[Whole, int]:
 
 
 @jit
-def settle(
-    model: Array, target: Array, task: int, mask: Array, near: Array, seed: Array, lower: Array, upper: Array,
-    turns: Array, respect: bool, q: Array, stats: Array, closed: Flags, good: Flags, order: Whole,
-) -> int:  # fmt: skip
-    """`finish`, `judge`, and order ← the good rows as `select` takes them, nearest to the seed first: how many.
+def measure_and_sort(requirement: Requirement, target: Array, near: Array, seed: Array, rows: Rows) -> int:
+    """`measure_rows`, `accept`, and `select` of the accepted rows by distance to the seed; returns their number.
 
-    Every target goes through this, and a call from Python costs as much as a row does.
+    One kernel, since every target passes through it and a call from Python costs as much as a row.
     """
-    finish(model, target, task, mask, near, seed, lower, upper, turns, respect, q, stats)
-    if judge(stats, respect, closed, good) == 0:
+    measure_rows(requirement, target, near, seed, rows.q, rows.stats)
+    if accept(rows.stats, requirement.respect, rows.closed, rows.good) == 0:
         return 0
-    key = np.empty(q.shape[0])
-    for k in range(q.shape[0]):
-        key[k] = stats[k, DISTANCE] if good[k] else math.inf
-    kept, count = select(q, key)
+    key = np.empty(rows.q.shape[0])
+    for k in range(rows.q.shape[0]):
+        key[k] = rows.stats[k, DISTANCE] if rows.good[k] else math.inf
+    kept, count = select(rows.q, key)
     for k in range(count):
-        order[k] = kept[k]
+        rows.order[k] = kept[k]
     return count
+
+
+@cache
+def unchecked() -> Callable[[Requirement, Array, Array, Array, Rows], int]:
+    """`measure_and_sort` without type dispatch: arrays must be C-contiguous and of the types given in `Rows`."""
+    requirement = record(Requirement, MODEL, 1, 1, 1, 1, int, bool)
+    rows = record(Rows, 2, 2, row_of(bool), row_of(bool), row_of(int))
+    return direct(measure_and_sort, requirement, 2, 1, 1, rows)

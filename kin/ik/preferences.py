@@ -1,9 +1,9 @@
-"""Which answer is preferred, where the task leaves something free.
+"""Preferences: which values redundancy parameters get.
 
-The solvers themselves choose the free value nearest to the seed. The other preferences look for the best value on
-each branch: samples over its exact feasible ranges, then a closing zoom round the best of them. Outside those
-ranges nothing is ever tried, so the choice is always feasible. Of two free values each is sought with the other
-one held.
+The solvers choose the value nearest to the seed. The other preferences search each branch for the best value:
+samples over its exact feasible ranges, then a finer and finer grid around the best sample. Values outside those
+ranges are never tried, so the choice is always feasible. Two redundancy parameters are searched one after the
+other.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from kin.ik.branches import Branches, Flags, is_closed, measure, solve_branches
 from kin.ik.candidates import OVERRUN
-from kin.ik.problem import Question
+from kin.ik.problem import IKProblem
 from kin.kernels import jacobian as jacobian_kernels
 from kin.solvers.common import wrap
 from kin.solvers.contract import POSE, POSITION
@@ -25,28 +25,29 @@ _SAMPLES = 24
 _ZOOMS = 4
 
 
-def scores(question: Question, q: Array) -> Array:
-    """How well configurations ``(k, n)`` do what is preferred ``(k,)``, more is better; −∞ for NaN rows.
+def scores(problem: IKProblem, q: Array) -> Array:
+    """Score of configurations ``(k, n)`` by the preference ``(k,)``, larger is better; −∞ for NaN rows.
 
-    ``limits``: the least margin to a stop, as a share of half the joint's range. ``manipulability``: Yoshikawa's
-    figure, of the linear rows when only the point matters.
+    ``limits``: the smallest distance to a joint limit, as a share of half the joint's range. ``manipulability``:
+    Yoshikawa's measure, of the linear rows if the task is a position.
     """
     out = np.full(len(q), -math.inf)
     rows = ~np.isnan(q[:, 0])
-    if question.prefer == "limits":
-        half = 0.5 * (question.upper - question.lower)
+    if problem.options.prefer == "limits":
+        half = 0.5 * (problem.upper - problem.lower)
         counts = np.isfinite(half) & (half > 0.0)
-        margin = np.minimum(q[rows] - question.lower, question.upper - q[rows])[:, counts] / half[counts]
+        margin = np.minimum(q[rows] - problem.lower, problem.upper - q[rows])[:, counts] / half[counts]
         out[rows] = margin.min(axis=1, initial=1.0)
     else:
-        J = jacobian_kernels.jacobian_many(question.robot.model, np.ascontiguousarray(q[rows]))
-        out[rows] = jacobian_kernels.manipulability_many(J, 0, 3 if question.code == POSITION else 6)
+        J = jacobian_kernels.jacobian_many(problem.robot.model, np.ascontiguousarray(q[rows]))
+        out[rows] = jacobian_kernels.manipulability_many(J, 0, 3 if problem.code == POSITION else 6)
     return out
 
 
-def ranks(question: Question, q: Array, distance: Array) -> Array:
-    """Place of each configuration ``(k, n)`` in the preferred order ``(k,)``; of equals the nearer comes first."""
-    worth = scores(question, q)
+def ranks(problem: IKProblem, q: Array, distance: Array) -> Array:
+    """Rank of each configuration ``(k, n)`` by the preference ``(k,)``; of equal scores the nearer one is
+    first."""
+    worth = scores(problem, q)
     finite = worth[np.isfinite(worth)]
     scale = float(np.abs(finite).max(initial=0.0)) or 1.0
     order = np.lexsort((distance, -np.round(worth / scale, 7)))
@@ -55,33 +56,33 @@ def ranks(question: Question, q: Array, distance: Array) -> Array:
     return out
 
 
-def centred(question: Question, q: Array) -> tuple[Array, Array]:
-    """Rows ``(k, n)`` at the images the preference wants, with their statistics ``(k, 5)``."""
+def centred(problem: IKProblem, q: Array) -> tuple[Array, Array]:
+    """Rows ``(k, n)`` at the images that score best, with their statistics ``(k, 5)``."""
     near = None
-    if question.prefer == "limits":
-        middle = 0.5 * (question.lower + question.upper)
-        near = np.where(np.isfinite(middle), middle, question.seed)
-    return measure(question, q, near)
+    if problem.options.prefer == "limits":
+        middle = 0.5 * (problem.lower + problem.upper)
+        near = np.where(np.isfinite(middle), middle, problem.seed)
+    return measure(problem, q, near)
 
 
-def improve(question: Question, branches: Branches, good: Flags) -> None:
-    """Bring every good row of `branches`, in place, to its best free values."""
-    branches.q, branches.stats = centred(question, branches.q)
-    score = scores(question, branches.q)
+def improve(problem: IKProblem, branches: Branches, good: Flags) -> None:
+    """Set the redundancy parameters of every good row of `branches`, in place, to their best values."""
+    branches.q, branches.stats = centred(problem, branches.q)
+    score = scores(problem, branches.q)
     rows = np.flatnonzero(good)
-    for k in range(len(branches.freedoms)):
-        if not math.isnan(question.values[k]):
+    for k in range(len(branches.redundancies)):
+        if not math.isnan(problem.values[k]):
             continue
         there = rows[~np.isnan(branches.values[rows, k])]
-        if len(branches.freedoms) == 1 and question.code == POSE:
-            _improve_together(question, branches, score, there)
+        if len(branches.redundancies) == 1 and problem.code == POSE:
+            _improve_together(problem, branches, score, there)
         else:
             for row in there.tolist():
-                _improve_row(question, branches, score, row, k)
+                _improve_row(problem, branches, score, row, k)
 
 
-def _improve_together(question: Question, branches: Branches, score: Array, rows: NDArray[np.intp]) -> None:
-    """The best value of the one freedom on each of `rows`, all samples of all branches in one thin call."""
+def _improve_together(problem: IKProblem, branches: Branches, score: Array, rows: NDArray[np.intp]) -> None:
+    """The best value of the only parameter on each of `rows`: all samples of all branches in one batch call."""
     arcs = branches.arcs[0]
     arcs = arcs[np.isin(arcs[:, 0], rows)]
     if not len(arcs):
@@ -93,47 +94,47 @@ def _improve_together(question: Question, branches: Branches, score: Array, rows
     grid = np.arange(count.max())
     values = np.where(grid < count[:, None], low[:, None] + step[:, None] * grid, math.nan)
     for _ in range(_ZOOMS + 1):
-        reached = _try_all(question, branches, score, owner, np.minimum(values, high[:, None]))
+        reached = _try_all(problem, branches, score, owner, np.minimum(values, high[:, None]))
         best = values[np.arange(len(values)), reached.argmax(axis=1)]
         values = np.clip(best[:, None] + step[:, None] * np.linspace(-0.8, 0.8, 7), low[:, None], high[:, None])
         step = 0.27 * step
 
 
 def _try_all(
-    question: Question, branches: Branches, score: Array, owner: NDArray[np.intp], values: Array
+    problem: IKProblem, branches: Branches, score: Array, owner: NDArray[np.intp], values: Array
 ) -> Array:
-    """Scores of the values ``(k, m)`` of branches `owner` ``(k,)``; a row is taken over if one is better."""
-    assert question.match is not None  # whose branches these are
-    kernels = question.match.kernels
+    """Scores of the values ``(k, m)`` on branches `owner` ``(k,)``; a better one replaces the branch's row."""
+    assert problem.closed_form is not None  # whose branches these are
+    kernels = problem.closed_form.kernels
     flat = np.ascontiguousarray(values.reshape(-1))
     whose = np.repeat(owner, values.shape[1])
-    out = np.empty((len(flat), len(branches.q), question.robot.n))
-    targets = np.ascontiguousarray(np.broadcast_to(question.T, (len(flat), 4, 4)))
-    kernels.many(kernels.params, targets, flat, question.seed, out)
-    q, stats = centred(question, out[np.arange(len(flat)), whose])
+    out = np.empty((len(flat), len(branches.q), problem.robot.n))
+    targets = np.ascontiguousarray(np.broadcast_to(problem.T, (len(flat), 4, 4)))
+    kernels.many(kernels.params, targets, flat, problem.seed, out)
+    q, stats = centred(problem, out[np.arange(len(flat)), whose])
     fits = is_closed(stats) & ~np.isnan(flat)
-    if question.respect:
+    if problem.respect:
         fits &= stats[:, OVERRUN] == 0.0
-    reached = np.where(fits, scores(question, q), -math.inf)
+    reached = np.where(fits, scores(problem, q), -math.inf)
     for i in np.argsort(-reached, kind="stable").tolist():
         row = whose[i]
         if reached[i] > score[row]:
             score[row] = reached[i]
             branches.q[row], branches.stats[row] = q[i], stats[i]
-            branches.values[row, 0] = wrap(flat[i]) if branches.freedoms[0].circular else flat[i]
+            branches.values[row, 0] = wrap(flat[i]) if branches.redundancies[0].circular else flat[i]
     return reached.reshape(values.shape)
 
 
-def _improve_row(question: Question, branches: Branches, score: Array, row: int, k: int) -> None:
-    """The best value of freedom `k` on one branch, the other freedoms held."""
+def _improve_row(problem: IKProblem, branches: Branches, score: Array, row: int, k: int) -> None:
+    """The best value of parameter `k` on one branch, the other parameters held."""
     held = [
-        float(branches.q[row, freedom.joint] if freedom.joint >= 0 else branches.values[row, i])
-        for i, freedom in enumerate(branches.freedoms)
+        float(branches.q[row, parameter.joint] if parameter.joint >= 0 else branches.values[row, i])
+        for i, parameter in enumerate(branches.redundancies)
     ]
     arcs = branches.arcs[k]
-    if len(branches.freedoms) > 1:
-        # The ranges at hand may belong to other values of the other freedoms.
-        arcs = _solve(question, branches, row, [v if i != k else math.nan for i, v in enumerate(held)]).arcs[k]
+    if len(branches.redundancies) > 1:
+        # The present ranges may belong to other values of the other parameters.
+        arcs = _solve(problem, branches, row, [v if i != k else math.nan for i, v in enumerate(held)]).arcs[k]
     arcs = arcs[arcs[:, 0] == row][:, 1:]
     total = float((arcs[:, 1] - arcs[:, 0]).sum())
     for low, high in arcs.tolist():
@@ -141,21 +142,21 @@ def _improve_row(question: Question, branches: Branches, score: Array, row: int,
         step = (high - low) / max(count - 1, 1)
         values = np.linspace(low, high, count)
         for _ in range(_ZOOMS if high > low else 1):
-            reached = [_try(question, branches, score, row, k, held, value) for value in values.tolist()]
+            reached = [_try(problem, branches, score, row, k, held, value) for value in values.tolist()]
             best = float(values[int(np.argmax(reached))])
             values = np.clip(best + step * np.linspace(-0.8, 0.8, 7), low, high)
             step *= 0.27
 
 
 def _try(
-    question: Question, branches: Branches, score: Array, row: int, k: int, held: list[float], value: float
+    problem: IKProblem, branches: Branches, score: Array, row: int, k: int, held: list[float], value: float
 ) -> float:
-    """The score of one value; the row is taken over if it is better than what it had."""
-    tried = _solve(question, branches, row, [value if i == k else h for i, h in enumerate(held)])
-    q, stats = centred(question, tried.q[row : row + 1])
-    if not is_closed(stats)[0] or (question.respect and stats[0, OVERRUN] > 0.0):
+    """The score of one value; a better one replaces the row."""
+    tried = _solve(problem, branches, row, [value if i == k else h for i, h in enumerate(held)])
+    q, stats = centred(problem, tried.q[row : row + 1])
+    if not is_closed(stats)[0] or (problem.respect and stats[0, OVERRUN] > 0.0):
         return -math.inf
-    reached = float(scores(question, q)[0])
+    reached = float(scores(problem, q)[0])
     if reached > score[row]:
         score[row] = reached
         branches.q[row], branches.stats[row], branches.values[row] = q[0], stats[0], tried.values[row]
@@ -165,8 +166,8 @@ def _try(
     return reached
 
 
-def _solve(question: Question, branches: Branches, row: int, values: list[float]) -> Branches:
-    """The branches at these values, near what the row is now."""
-    found = solve_branches(question, question.T, question.code, branches.q[row].copy(), tuple(values))
-    assert found is not None  # the same closed form has just answered
+def _solve(problem: IKProblem, branches: Branches, row: int, values: list[float]) -> Branches:
+    """The branches at these values, near the present row."""
+    found = solve_branches(problem, problem.T, problem.code, branches.q[row].copy(), tuple(values))
+    assert found is not None  # the same closed form gave the row
     return found

@@ -1,15 +1,17 @@
-"""What an inverse-kinematics question is answered with: frozen data, nothing computed here."""
+"""IK result types."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Literal, NamedTuple
+from typing import Literal
 
+from kin.ik.details import Details, LimitViolation, Redundancy
+from kin.ik.messages import Explanation, explain
 from kin.solvers.singular import Singularity
 from kin.transforms import Array
+from kin.units import DEFAULT_UNITS, Units
 
-Task = Literal["pose", "approach", "position"]
 Cause = Literal[
     "",
     "roll",
@@ -25,11 +27,11 @@ Cause = Literal[
 
 
 class Status(StrEnum):
-    """What kind of answer an `IKResult` is.
+    """The kind of answer that an `IKResult` is.
 
-    ``solved``: exact answers. ``approximate``: an arm of few joints gave something up. ``limits``: branches exist,
-    each beyond a stop. ``orientation``: the point can be reached, not with this orientation. ``unreachable``: the
-    point cannot be reached, or not on the branch asked for.
+    ``solved``: exact solutions. ``approximate``: an arm of few joints meets a part of the task. ``limits``:
+    postures exist, all of them outside the joint limits. ``orientation``: the point can be reached, but not with
+    this orientation. ``unreachable``: the point cannot be reached, or not on the requested branch.
     """
 
     SOLVED = "solved"
@@ -39,36 +41,23 @@ class Status(StrEnum):
     UNREACHABLE = "unreachable"
 
 
-class Redundancy(NamedTuple):
-    """A parameter the task leaves free: id, label, the value used, and all values the limits allow.
-
-    Of several free parameters each is told with the others held at their values. An angle that is no joint's value
-    (``psi``, ``roll``) is told in (−π, π], a range across the seam as two.
-    """
-
-    name: str
-    label: str
-    value: float
-    intervals: tuple[tuple[float, float], ...]
-
-
 @dataclass(slots=True, eq=False)
 class IKSolution:
-    """One configuration, with what forward kinematics says about it.
+    """One configuration, with errors measured by forward kinematics.
 
     Attributes:
         q: ``(n,)`` joint values, radians or metres, read-only.
         branch: name of the branch, e.g. ``"shoulder front · elbow up · wrist no-flip"``; ``"numeric"`` for an arm
             whose branches have no names.
-        position_error: metres between its tool point and the target's (of a mask: along its coordinates).
+        position_error: distance of the tool point from the target's, metres (of a mask: along its coordinates).
         rotation_error: radians; the whole angle for a pose, the angle between the approach directions for an
             approach, 0 for a position, the masked part of the rotation vector for a mask.
         in_limits: whether every joint is inside its limits.
         distance: 2-norm of q − seed.
-        redundancy: what the task leaves free on this branch.
-        compromise: None for an exact answer; ``"roll"``: point and approach direction are exact, the roll about
-            it is given up; ``"rotation"``: the point is exact, the orientation as near as it gets;
-            ``"closest"``: the nearest configuration there is.
+        redundancy: the redundancy parameters on this branch.
+        compromise: None for an exact solution; ``"roll"``: point and approach direction are exact, the rotation
+            about it is not; ``"rotation"``: the point is exact, the orientation as near as possible;
+            ``"closest"``: the closest configuration found.
     """
 
     q: Array
@@ -81,19 +70,9 @@ class IKSolution:
     compromise: str | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class LimitViolation:
-    """A joint that would have to pass its stop: index, name, the value it would need, the stop (rad or m)."""
-
-    joint: int
-    name: str
-    value: float
-    limit: float
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class BlockedBranch:
-    """A branch that exists but breaks limits: its name, its configuration ``(n,)``, and the stops in its way."""
+    """A posture outside the joint limits: its branch, its configuration ``(n,)``, and what is outside."""
 
     branch: str
     q: Array
@@ -105,22 +84,24 @@ class IKResult:
     """The answer to one target.
 
     Attributes:
-        status, cause, reason: what kind of answer it is, why, and both in a sentence.
-        solutions: in the order asked for (compromises: by what they give up); empty unless solved or approximate.
-        closest: the configuration inside the limits with the least ``√(|Δp|² + (0.1 m · angle)²)`` found when
-            there is no exact answer; on the branches asked for. None when there is an exact answer.
-        nearest_orientation: the configuration with the exact point and the least rotation error (status
+        status, cause: the kind of answer and its cause, as codes.
+        details: the numbers behind them; see :mod:`kin.ik.details`.
+        solutions: in the requested order (compromises: by their error); empty unless solved or approximate.
+        closest: without an exact solution, the configuration inside the limits with the smallest
+            ``√(|Δp|² + (0.1 m · angle)²)`` found on the requested branches, else None.
+        nearest_orientation: the configuration with the exact point and the smallest rotation error (status
             ``orientation``), None if none was found.
-        blocked: every branch that only the limits forbid, the least offending first (status ``limits``).
-        solver, solver_reason: what found the answer, and why it was chosen.
-        distance: metres by which the point is out of reach, 0 if the point itself can be reached.
-        redundancy: what the task leaves free: the best solution's values, with the ranges of all branches.
-        singularities: those the configuration in `best` is at.
+        blocked: every posture that is outside the limits, the closest to them first (status ``limits``).
+        solver, solver_reason: name of the method that found the answer, and why it was chosen.
+        task: the task that was solved for.
+        distance: metres by which the point is out of reach, 0 if the point can be reached.
+        redundancy: the redundancy parameters of the best solution, with the ranges of all branches together.
+        singularities: those that the configuration `best` is at.
     """
 
     status: Status
     cause: Cause
-    reason: str
+    details: Details
     solutions: tuple[IKSolution, ...]
     closest: IKSolution | None
     solver: str
@@ -134,10 +115,19 @@ class IKResult:
 
     @property
     def best(self) -> IKSolution | None:
-        """The configuration to show: the first solution, else the closest one."""
+        """The configuration to show: the first solution, else the closest configuration."""
         return self.solutions[0] if self.solutions else self.closest
 
     @property
     def violations(self) -> tuple[LimitViolation, ...]:
-        """The stops the least offending branch would break."""
+        """The joint values outside the limits on the posture that is closest to the limits."""
         return self.blocked[0].violations if self.blocked else ()
+
+    @property
+    def reason(self) -> str:
+        """The answer in a sentence, in degrees and millimetres."""
+        return self.explain().text
+
+    def explain(self, units: Units = DEFAULT_UNITS) -> Explanation:
+        """The answer in words, with a headline and a detail, in any units."""
+        return explain(self.details, self.cause, self.task, self.singularities, units)

@@ -113,12 +113,33 @@ def direct(kernel: Any, *arguments: Any) -> Callable[..., Any]:
 
     Type dispatch costs as much as a small kernel. Arguments are not checked. The caller ensures that each array is
     C-contiguous float64 with the number of axes given in `arguments` (it may be read-only unless the kernel writes
-    to it). `float` stands for a float, and `MODEL` for `Robot.model`, which is always read-only, so that there is
-    only one type to compile for.
+    to it). `float`, `int` and `bool` stand for a number, `MODEL` for `Robot.model`, which is always read-only, so
+    that there is only one type to compile for; `row_of` makes arrays of other numbers, `record` named tuples.
     """
     if PLAIN:
         return cast(Callable[..., Any], kernel)
-    named = {float: types.float64, MODEL: types.Array(types.float64, 1, "C", readonly=True)}
-    signature = [named[a] if a in named else types.Array(types.float64, a, "C") for a in arguments]
-    entry: Callable[..., Any] = kernel.compile(tuple(signature))
+    entry: Callable[..., Any] = kernel.compile(tuple(map(_type_of, arguments)))
     return entry
+
+
+def row_of(kind: type) -> Any:
+    """The type of an array with one axis of `int` or `bool` values, for `direct`."""
+    return types.Array(_NUMBERS[kind], 1, "C")
+
+
+def record(cls: type, *fields: Any) -> Any:
+    """The type of a named tuple `cls` whose fields are described as the arguments of `direct` are."""
+    return types.NamedTuple(tuple(map(_type_of, fields)), cls)
+
+
+_NUMBERS: dict[type, Any] = {float: types.float64, int: types.int64, bool: types.boolean}
+
+
+def _type_of(argument: Any) -> Any:
+    if isinstance(argument, types.Type):
+        return argument
+    if argument == MODEL:
+        return types.Array(types.float64, 1, "C", readonly=True)
+    if isinstance(argument, type):
+        return _NUMBERS[argument]
+    return types.Array(types.float64, argument, "C")

@@ -1,19 +1,21 @@
 """Path inverse kinematics: a sequence of poses solved to one continuous joint path.
 
-Each pose has many configurations: branches, values of what is free, whole turns. Choosing the nearest one pose by
-pose walks into dead ends: a joint winds up to its stop although it could have started a turn lower. Here the whole
-path is chosen at once, as the shortest way through layers:
+Each pose has many configurations: branches, values of redundancy parameters, whole turns. Choosing the nearest one
+pose by pose runs into dead ends: a joint turns up to its limit although it could have started a turn lower. Here
+the whole path is chosen at once, as the shortest path through layers:
 
-1. :mod:`kin.path.layers` gives each waypoint a layer of configurations, at most 4000, so 0.2 MB a waypoint for
-   seven joints. They are made and measured in :mod:`kin.path.waypoint`.
-2. :mod:`kin.path.trellis` finds the way through the layers with the fewest jumps and, of these, the least sum of
-   squared joint motion. A step is a *jump* if some joint moves more than `max_step`
-   (:mod:`kin.path.course`).
-3. :mod:`kin.path.route` repairs what samples miss, and :mod:`kin.path.smooth` draws their staircase straight.
+1. :mod:`kin.path.layers` gives each waypoint a layer of configurations, at most 4000, which is 0.2 MB per waypoint
+   for seven joints. They are computed and measured in :mod:`kin.path.configurations`.
+2. :mod:`kin.path.viterbi` finds the path through the layers with the fewest jumps and, of these, the smallest sum
+   of squared joint motion. A step is a *jump* if some joint moves more than `max_step`
+   (:mod:`kin.path.waypoints`).
+3. :mod:`kin.path.search` repairs what samples miss, and :mod:`kin.path.smoothing` straightens their staircase.
 4. :mod:`kin.path.gaps` fills in the waypoints that cannot be met.
-5. :mod:`kin.path.causes` finds out why each jump is forced; :mod:`kin.path.report` tells it.
+5. :mod:`kin.path.causes` finds out why each jump is forced, :mod:`kin.path.report` assembles the result, and
+   :mod:`kin.path.messages` words it.
 
-Where layers are numeric continuations instead of samples of a closed form, the fewest jumps *found* are told.
+Where layers are numeric continuations instead of samples of a closed form, the number of jumps is the smallest
+*found*.
 """
 
 from __future__ import annotations
@@ -26,18 +28,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kin.errors import InputError
-from kin.ik.problem import Frame, Limits, Locks, ask, finite_number, go_on, pose_of
-from kin.ik.results import Task
-from kin.path.course import Course, Way
+from kin.ik.options import Frame, IKOptions, JointConstraints, Limits, Locks, Task, finite_number
+from kin.ik.problem import IKProblem, never_cancel, pose_of
+from kin.path.details import JumpCause
 from kin.path.gaps import fill_gaps
-from kin.path.layers import stops_at
+from kin.path.layers import layered
 from kin.path.report import report
-from kin.path.results import JumpCause, PathGap, PathJump, PathResult
-from kin.path.route import DeadEnd, route
+from kin.path.results import PathGap, PathJump, PathResult
+from kin.path.search import DeadEnd, best_path
+from kin.path.waypoints import LayerSequence, PathSettings
 from kin.robot import Robot
 from kin.transforms import Array
 
-__all__ = ["JumpCause", "PathGap", "PathJump", "PathResult", "solve_path"]
+__all__ = ["JumpCause", "PathGap", "PathJump", "PathResult", "solve", "solve_path"]
+
+MAX_STEP = 0.5
 
 
 def solve_path(
@@ -51,50 +56,60 @@ def solve_path(
     limits: Limits | None = None,
     locked: Locks | None = None,
     branch: str | Sequence[str] | None = None,
-    max_step: float = 0.5,
-    stop: Callable[[], None] = go_on,
+    max_step: float = MAX_STEP,
+    stop: Callable[[], None] = never_cancel,
 ) -> PathResult:
     """One joint path through all `targets`: as few jumps as possible, then as little joint motion as possible.
+
+    `kin.path.solve` takes the options as one value.
 
     Args:
         robot: the arm.
         targets: T_base_tool ``(k, 4, 4)``, k ≥ 1; for ``task="position"`` also points ``(k, 3)`` in metres.
         task, mask, mask_frame, limits, locked, branch: as in `kin.solve_ik`, for every waypoint; the branch
-            ``"seed"`` is the one `q_start` is on.
+            ``"seed"`` is that of `q_start`.
         q_start: ``(n,)`` where the arm is. The way from there to the first waypoint counts as motion, but never as
-            a jump: the path begins at its first waypoint. Without it the path may start anywhere, and of equally
-            good paths the one that starts nearest to the home pose is taken.
+            a jump: the path begins at its first waypoint. Without it the path may start anywhere; of equally good
+            paths, the one that starts nearest to the home pose is taken.
         max_step: the most a joint may move between neighbouring waypoints: radians, or 4 per metre.
-        stop: called now and then; it ends the work by raising what then comes out of here.
+        stop: called now and then; cancels the computation by raising.
 
     Raises:
         InputError: a malformed target (named ``targets[i]``) or option. An unreachable target is not an error.
     """
+    options = IKOptions(
+        task=task, mask=mask, mask_frame=mask_frame, constraints=JointConstraints(limits, locked), branch=branch
+    )
+    return solve(robot, targets, options, q_start, max_step, stop)
+
+
+def solve(
+    robot: Robot,
+    targets: Sequence[ArrayLike] | Array,
+    options: IKOptions,
+    q_start: ArrayLike | None = None,
+    max_step: float = MAX_STEP,
+    stop: Callable[[], None] = never_cancel,
+) -> PathResult:
+    """`solve_path` with the options in one value.
+
+    Of the options, those that choose among the solutions of one target (`images`, `prefer`, `max_solutions`) have
+    no effect: the path chooses.
+    """
     if q_start is not None and robot.check_q(q_start, "q_start").ndim != 1:
         raise InputError("q_start", q_start, f"one configuration of {robot.n} values")
-    question = ask(
-        robot,
-        np.eye(4),
-        task=task,
-        mask=mask,
-        mask_frame=mask_frame,
-        q_seed=q_start,
-        limits=limits,
-        locked=locked,
-        branch=branch,
-    )
-    question = replace(question, stop=stop)
+    problem = replace(IKProblem.of(robot, np.eye(4), options, q_start), stop=stop)
     step = _checked_step(max_step)
-    poses = _checked_targets(targets, question.code)
-    way = Way.of(question, step, q_start is not None, len(poses))
-    stops = stops_at([replace(question, T=T) for T in poses], way.grid)
-    course = Course.through(way, stops)
-    q = np.full((len(stops), robot.n), math.nan)
+    poses = _checked_targets(targets, problem.code)
+    settings = PathSettings.of(problem, step, q_start is not None, len(poses))
+    waypoints = layered([replace(problem, T=T) for T in poses], settings.grid)
+    sequence = LayerSequence.of(settings, waypoints)
+    q = np.full((len(waypoints), robot.n), math.nan)
     ends: list[DeadEnd] = []
-    if course.stops:
-        q[course.at], ends = route(course)
-    fill_gaps(way, stops, q)
-    return report(course, stops, q, ends)
+    if sequence.waypoints:
+        q[sequence.at], ends = best_path(sequence)
+    fill_gaps(settings, waypoints, q)
+    return report(sequence, waypoints, q, ends)
 
 
 def _checked_step(value: float) -> float:

@@ -1,4 +1,5 @@
-"""Gaps: where no configuration is exact, one about as close as can be that the neighbours reach without a leap."""
+"""Gaps: waypoints without an exact solution get a close configuration that their neighbours reach without a
+jump."""
 
 from __future__ import annotations
 
@@ -8,30 +9,31 @@ from kin.ik import nearest
 from kin.ik.branches import measure
 from kin.ik.candidates import POSITION_ERROR, ROTATION_ERROR
 from kin.ik.results import Status
-from kin.path.course import Stop, Way
-from kin.path.trellis import shortest
-from kin.path.waypoint import alike
+from kin.path.configurations import alike
+from kin.path.viterbi import shortest
+from kin.path.waypoints import PathSettings, Waypoint
 from kin.solvers.contract import POSITION
 from kin.transforms import Array
 
 
-def fill_gaps(way: Way, stops: list[Stop], q: Array) -> None:
-    """The rows of q ``(k, n)`` that are NaN, in place: close configurations, chosen as one way with their ends.
+def fill_gaps(settings: PathSettings, waypoints: list[Waypoint], q: Array) -> None:
+    """Fill the NaN rows of q ``(k, n)``, in place, with close configurations, chosen as one path with its ends.
 
-    Candidates come from descents that start where the arm is before, where it is behind and in between, so that it
-    follows a target out of reach and back without turning over; and from `kin.solve_ik`'s search over all limits.
+    Candidates come from descents that start at the configuration before the gap, at the one after it and between
+    the two, so that the arm follows a target out of reach and back without changing its posture; and from the
+    search of `kin.solve_ik` over all limits.
     """
     gaps = np.flatnonzero(np.isnan(q[:, 0])).tolist()
-    home = np.clip(way.question.seed, way.question.lower, way.question.upper)
+    home = np.clip(settings.problem.seed, settings.problem.lower, settings.problem.upper)
     forth, back = q.copy(), q.copy()
     for i in gaps:
         if i and not np.isnan(forth[i - 1, 0]):
-            forth[i] = _closest(stops[i], forth[i - 1])
+            forth[i] = _closest(waypoints[i], forth[i - 1])
         elif len(gaps) == len(q):
-            forth[i] = _closest(stops[i], home)
+            forth[i] = _closest(waypoints[i], home)
     for i in reversed(gaps):
         if i + 1 < len(q) and not np.isnan(back[i + 1, 0]):
-            back[i] = _closest(stops[i], back[i + 1])
+            back[i] = _closest(waypoints[i], back[i + 1])
     solved = np.flatnonzero(~np.isnan(q[:, 0]))
     layers = [row[None] for row in q]
     for i in gaps:
@@ -39,38 +41,39 @@ def fill_gaps(way: Way, stops: list[Stop], q: Array) -> None:
         if len(sides) == 2:
             behind, before = solved[solved > i].min(), solved[solved < i].max()
             share = (i - before) / (behind - before)
-            sides.append(_closest(stops[i], sides[0] + share * (sides[1] - sides[0])))
-        layers[i] = _as_close(stops[i], np.array(sides))
+            sides.append(_closest(waypoints[i], sides[0] + share * (sides[1] - sides[0])))
+        layers[i] = _as_close(waypoints[i], np.array(sides))
     if gaps:
-        trellis = shortest(way, layers, [1] * len(layers), np.zeros(q.shape[1]), way.max_step)
+        trellis = shortest(settings, layers, [1] * len(layers), np.zeros(q.shape[1]), settings.max_step)
         q[gaps] = trellis.path(layers)[gaps]
 
 
-def _closest(stop: Stop, start: Array) -> Array:
+def _closest(waypoint: Waypoint, start: Array) -> Array:
     """A configuration ``(n,)`` as close to the target as a descent from `start` gets.
 
     Where the point can be met, but not the orientation, the point comes first. Where the descent leaves the
-    branches asked for, the arm stays.
+    requested branches, the arm stays.
     """
-    question, q = stop.asked, start
-    question.stop()
-    if stop.gap is not None and stop.gap.status is Status.APPROXIMATE:
+    problem, q = waypoint.requested, start
+    problem.stop()
+    if waypoint.gap is not None and waypoint.gap.status is Status.APPROXIMATE:
         for weight in (nearest.ORIENTATION_WEIGHT, 1e-2, 1e-4):
-            q, _ = nearest.descend(question, question.code, q[None], weight)
-        q, _ = nearest.descend(question, POSITION, q[None], 1.0)
+            q, _ = nearest.descend(problem, problem.code, q[None], weight)
+        q, _ = nearest.descend(problem, POSITION, q[None], 1.0)
     else:
-        q, _ = nearest.descend(question, question.code, q[None], nearest.ORIENTATION_WEIGHT)
-    if question.branches is not None and not question.allows(question.branch_of(q)):
-        return np.clip(start, question.lower, question.upper)
+        q, _ = nearest.descend(problem, problem.code, q[None], nearest.ORIENTATION_WEIGHT)
+    if problem.branches is not None and not problem.allows(problem.branch_of(q)):
+        return np.clip(start, problem.lower, problem.upper)
     return q
 
 
-def _as_close(stop: Stop, q: Array) -> Array:
-    """Of the configurations ``(m, n)`` and the best one known those about as close to the target as the best."""
-    question = stop.asked
-    best = stop.gap.best if stop.gap is not None else None
+def _as_close(waypoint: Waypoint, q: Array) -> Array:
+    """Of the configurations ``(m, n)`` and the waypoint's own answer those about as close to the target as the
+    best."""
+    problem = waypoint.requested
+    best = waypoint.gap.best if waypoint.gap is not None else None
     if best is not None:
-        q = np.concatenate([q, measure(question, best.q[None], q[0])[0]])
-    q, stats = measure(question.without_turns(), q)
+        q = np.concatenate([q, measure(problem, best.q[None], q[0])[0]])
+    q, stats = measure(problem.without_turns(), q)
     miss = np.hypot(stats[:, POSITION_ERROR], nearest.ORIENTATION_WEIGHT * stats[:, ROTATION_ERROR])
     return np.ascontiguousarray(q[alike(miss, float(miss.min()))])

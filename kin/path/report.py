@@ -1,33 +1,41 @@
-"""What is told of a path: errors measured by forward kinematics, jumps, gaps, and the whole in a sentence."""
+"""The path as a result: errors measured by forward kinematics, jumps with their causes, gaps."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from kin.ik import messages
-from kin.ik.branches import measure, solution
+from kin.ik.branches import measure
 from kin.ik.candidates import POSITION_ERROR, ROTATION_ERROR
+from kin.ik.details import RollError
 from kin.ik.results import Status
 from kin.path.causes import jump_at
-from kin.path.course import Course, Stop, Way, has_closed_form
-from kin.path.results import PathGap, PathJump, PathResult
-from kin.path.route import DeadEnd
+from kin.path.details import JointMove
+from kin.path.results import PathGap, PathResult
+from kin.path.search import DeadEnd
+from kin.path.waypoints import LayerSequence, PathSettings, Waypoint, has_closed_form
 from kin.transforms import Array
 
 
-def report(course: Course, stops: list[Stop], q: Array, ends: list[DeadEnd]) -> PathResult:
-    """The path ``(k, n)`` through all waypoints, jumps with their causes, gaps with their reasons."""
-    way = course.way
+def report(sequence: LayerSequence, waypoints: list[Waypoint], q: Array, ends: list[DeadEnd]) -> PathResult:
+    """The path ``(k, n)`` through all waypoints, with jumps, gaps and measured errors."""
+    settings = sequence.settings
     stats = np.concatenate(
-        [measure(stop.asked.without_turns(), row[None])[1] for stop, row in zip(stops, q, strict=True)]
+        [
+            measure(waypoint.requested.without_turns(), row[None])[1]
+            for waypoint, row in zip(waypoints, q, strict=True)
+        ]
     )
-    leaps = way.leaps(q, [1] * len(q))
-    # The jump number t is what the ways with fewer than t jumps end in; one beside a gap is looked at by itself.
-    free = [i for i in leaps if stops[i].gap is None and stops[i - 1].gap is None]
-    forced = dict(zip(free, ends, strict=True)) if len(free) == len(ends) else {}
-    jumps = tuple(jump_at(course, q, i, forced.get(i)) for i in leaps)
-    gaps = tuple(_gap(stop, i, q[i], stats[i]) for i, stop in enumerate(stops) if stop.gap or stop.relaxed)
-    match = way.question.match
+    steps = settings.jumps(q, [1] * len(q))
+    # The t-th jump is where the paths with fewer than t jumps end; a jump next to a gap is examined by itself.
+    between = [i for i in steps if waypoints[i].gap is None and waypoints[i - 1].gap is None]
+    forced = dict(zip(between, ends, strict=True)) if len(between) == len(ends) else {}
+    jumps = tuple(jump_at(sequence, q, i, forced.get(i)) for i in steps)
+    gaps = tuple(
+        _gap(waypoint, i, float(stats[i, ROTATION_ERROR]))
+        for i, waypoint in enumerate(waypoints)
+        if waypoint.gap or waypoint.relaxed
+    )
+    closed_form = settings.problem.closed_form
     position, rotation = stats[:, POSITION_ERROR].copy(), stats[:, ROTATION_ERROR].copy()
     for array in (q, position, rotation):
         array.flags.writeable = False
@@ -38,32 +46,24 @@ def report(course: Course, stops: list[Stop], q: Array, ends: list[DeadEnd]) -> 
         gaps=gaps,
         position_error=position,
         rotation_error=rotation,
-        solver=match.name if match is not None and has_closed_form(way.question) else "numeric",
-        reason=_summary(way, q, jumps, gaps),
+        solver=closed_form.name if closed_form is not None and has_closed_form(settings.problem) else "numeric",
+        largest_step=_largest_step(settings, q),
     )
 
 
-def _gap(stop: Stop, index: int, q: Array, stats: Array) -> PathGap:
-    if stop.gap is not None:
-        return PathGap(index, stop.gap.status, stop.gap.reason, stop.gap.distance)
-    reason = messages.approximate(stop.asked, solution(stop.asked, q, stats, compromise="roll"), ())
-    return PathGap(index, Status.APPROXIMATE, reason, 0.0)
+def _gap(waypoint: Waypoint, index: int, rotation_error: float) -> PathGap:
+    found = waypoint.gap
+    if found is None:
+        details = RollError(waypoint.requested.robot.n, rotation_error)
+        return PathGap(index, Status.APPROXIMATE, "roll", details, waypoint.requested.task, 0.0)
+    return PathGap(
+        index, found.status, found.cause, found.details, found.task, found.distance, found.singularities
+    )
 
 
-def _summary(way: Way, q: Array, jumps: tuple[PathJump, ...], gaps: tuple[PathGap, ...]) -> str:
-    count = "one waypoint" if len(q) == 1 else f"{len(q)} waypoints"
-    if jumps:
-        where = ", ".join(f"before waypoint {jump.index} ({jump.cause})" for jump in jumps[:4])
-        more = f" and {len(jumps) - 4} more" if len(jumps) > 4 else ""
-        number = "one jump" if len(jumps) == 1 else f"{len(jumps)} jumps"
-        text = f"{count} with {number}: {where}{more}."
-    elif len(q) == 1:
-        text = "One waypoint."
-    else:
-        moves = way.moves(q[:-1], q[1:]).max(axis=0)
-        widest = int(np.argmax(moves))
-        text = f"Continuous through {count}: the largest step is {way.told(widest, float(moves[widest]))}."
-    if gaps:
-        which = ", ".join(str(gap.index) for gap in gaps[:8]) + (", …" if len(gaps) > 8 else "")
-        text += f" No exact answer at {len(gaps)} of {count}: {which}."
-    return text
+def _largest_step(settings: PathSettings, q: Array) -> JointMove | None:
+    if len(q) == 1:
+        return None
+    moves = settings.moves(q[:-1], q[1:]).max(axis=0)
+    widest = int(np.argmax(moves))
+    return settings.joint_move(widest, float(moves[widest]))

@@ -1,45 +1,79 @@
-"""A path and what is told about it: frozen data."""
+"""Path result types."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
-from kin.ik.results import Status
+from kin.ik.details import Details
+from kin.ik.messages import explain
+from kin.ik.results import Cause, Status
+from kin.path import messages
+from kin.path.details import JointMove, JumpCause, JumpDetails, Place
+from kin.solvers.singular import Singularity
 from kin.transforms import Array
-
-JumpCause = Literal["limits", "singularity", "branch", "spacing"]
+from kin.units import DEFAULT_UNITS, Units
 
 
 @dataclass(frozen=True, slots=True)
 class PathJump:
-    """A step that cannot be followed without a leap.
+    """A step of the path that is not continuous.
 
     Attributes:
-        index: the leap is between waypoint `index` − 1 and waypoint `index`.
+        index: the jump is between waypoint `index` − 1 and waypoint `index`.
         joints: indices of the joints that move more than the largest step allowed.
-        step: the largest of these motions: radians, or 4 per metre for a sliding joint.
-        cause: ``"limits"``: the motion goes on continuously, but beyond a stop; ``"singularity"``: so near to a
-            singularity that joints must turn fast; ``"branch"``: the branch being followed ends;
-            ``"spacing"``: the motion is continuous, the waypoints are just too far apart for the largest step.
-        reason: the same as a sentence, with the joint, the stop and the waypoints where it happens.
+        step: the largest of these motions: radians, or 4 per metre for a prismatic joint.
+        widest: the joint that moves most, and its motion.
+        cause: ``"limits"``: the motion would go on, but outside the joint limits; ``"singularity"``: at or near a
+            singularity joints must turn fast; ``"branch"``: the branch being followed ends; ``"spacing"``: the
+            motion is continuous, but the waypoints are too far apart for the largest step.
+        place: where the continuous motion ends.
+        details: the numbers behind the cause, see :mod:`kin.path.details`.
     """
 
     index: int
     joints: tuple[int, ...]
     step: float
+    widest: JointMove
     cause: JumpCause
-    reason: str
+    place: Place
+    details: JumpDetails
+
+    @property
+    def reason(self) -> str:
+        """The jump in a sentence, in degrees and millimetres."""
+        return self.explain()
+
+    def explain(self, units: Units = DEFAULT_UNITS) -> str:
+        """The jump in a sentence, in any units."""
+        return messages.jump(self.index, self.joints, self.widest, self.place, self.details, units)
 
 
 @dataclass(frozen=True, slots=True)
 class PathGap:
-    """A waypoint without an exact answer: its index, and `kin.solve_ik`'s status, sentence and missing metres."""
+    """A waypoint without an exact solution.
+
+    Attributes:
+        index: which waypoint.
+        status, cause, details, task, singularities: as in the `kin.IKResult` of the waypoint.
+        distance: metres by which the waypoint is out of reach, 0 if its point can be reached.
+    """
 
     index: int
     status: Status
-    reason: str
+    cause: Cause
+    details: Details
+    task: str
     distance: float
+    singularities: tuple[Singularity, ...] = ()
+
+    @property
+    def reason(self) -> str:
+        """The gap in a sentence, in degrees and millimetres."""
+        return self.explain()
+
+    def explain(self, units: Units = DEFAULT_UNITS) -> str:
+        """The gap in a sentence, in any units."""
+        return explain(self.details, self.cause, self.task, self.singularities, units).text
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,13 +82,13 @@ class PathResult:
 
     Attributes:
         q: ``(k, n)``, inside the limits, read-only. In a gap: the closest configuration; of about equally close
-            ones one that its neighbours can reach without a leap.
+            ones, one that its neighbours can reach without a jump.
         continuous: whether there is no jump.
-        jumps, gaps: by rising index. A waypoint at which an arm of five joints keeps point and approach direction
-            and gives up the roll is a gap of status ``approximate``.
+        jumps, gaps: by rising index. A waypoint at which an arm of five joints meets point and approach direction
+            but not the rotation about it is a gap of status ``approximate``.
         position_error, rotation_error: ``(k,)``, measured by forward kinematics, as in `kin.IKSolution`.
         solver: name of the closed form, ``"numeric"`` if the arm has none for this task.
-        reason: the whole in a sentence.
+        largest_step: the largest motion of a joint between neighbours; None for a single waypoint.
     """
 
     q: Array
@@ -64,4 +98,15 @@ class PathResult:
     position_error: Array
     rotation_error: Array
     solver: str
-    reason: str
+    largest_step: JointMove | None
+
+    @property
+    def reason(self) -> str:
+        """The whole path in a sentence, in degrees and millimetres."""
+        return self.explain()
+
+    def explain(self, units: Units = DEFAULT_UNITS) -> str:
+        """The whole path in a sentence, in any units."""
+        jumps = [(jump.index, jump.cause) for jump in self.jumps]
+        gaps = [gap.index for gap in self.gaps]
+        return messages.summary(len(self.q), self.largest_step, jumps, gaps, units)

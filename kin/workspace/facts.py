@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kin.ik.problem import Limits, Locks
+from kin.ik.options import Limits, Locks
 from kin.robot import Robot
 from kin.solvers.common import TURN
 from kin.workspace.region import Region, checked_integer

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kin.errors import InputError
-from kin.ik.problem import Limits, Locks, ask
+from kin.ik.options import JointConstraints, Limits, Locks
 from kin.robot import Robot
 from kin.transforms import Array
 
@@ -44,9 +44,9 @@ class Region:
     @classmethod
     def of(cls, robot: Robot, limits: Limits | None, locked: Locks | None) -> Region:
         """The region of these options; raises `InputError` naming the wrong limit or lock."""
-        question = ask(robot, np.zeros(3), task="position", limits=limits, locked=locked)
-        lower = np.where(np.isfinite(question.lower), question.lower, -math.pi)
-        upper = np.where(np.isfinite(question.upper), question.upper, math.pi)
+        lower, upper, _ = JointConstraints(limits, locked).bounds(robot)
+        lower = np.where(np.isfinite(lower), lower, -math.pi)
+        upper = np.where(np.isfinite(upper), upper, math.pi)
         return cls(robot, tuple(zip(lower.tolist(), upper.tolist(), strict=True)))
 
     @cached_property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
+from dataclasses import replace
 from itertools import chain
 from typing import Annotated, NotRequired
 
@@ -11,8 +12,8 @@ from pydantic import Discriminator, Field, Tag
 from pydantic_core import to_json
 from typing_extensions import TypedDict
 
-from app.api.asked import Asked, one_or_many
 from app.api.body import versioned
+from app.api.options import OptionsBody, single_or_list
 from app.api.problems import Problem, ProblemError
 from app.api.schemas import POST_REFUSALS, RobotId, example, reply, robot_of, settings_of
 from app.api.targets import Target
@@ -20,7 +21,8 @@ from app.api.work import Deadline, DeadlineDep
 from app.api.workspace.streaming import ComputedResponse
 from app.shared.answers.document import documented
 from app.shared.answers.ik import ReachableAnswer, reachable_answer
-from kin import Robot, Task, solve_ik
+from kin import Robot, Task
+from kin.ik import solve
 from kin.transforms import Array
 
 router = versioned("workspace")
@@ -48,12 +50,12 @@ EXAMPLES = {
 }
 
 
-class ReachableRequest(Asked):
+class ReachableRequest(OptionsBody):
     """Targets, and options of inverse kinematics."""
 
     target: Annotated[
         Annotated[Target, Tag("one")] | Annotated[list[Target], Field(min_length=1, fail_fast=True), Tag("many")],
-        Discriminator(one_or_many),
+        Discriminator(single_or_list),
     ] = Field(description="One target, or a list of independent targets.")
 
 
@@ -86,25 +88,24 @@ def reachable(
     and the computation ends when the client leaves.
     """
     robot = robot_of(request, robot_id)
-    questions, single = body.resolve_all(body.target, settings_of(request))
+    targets, single = body.resolve_all(body.target, settings_of(request))
     if single:
-        return reply(_answers(robot, body, questions)[0])
+        return reply(_answers(robot, body, targets)[0])
     # Invalid options show in the first piece, while the status of the response can still be set.
-    pieces = _pieces(robot, body, questions, deadline)
+    pieces = _pieces(robot, body, targets, deadline)
     return ComputedResponse(_resumed(next(pieces), pieces), "reachable", "application/json")
 
 
-def _answers(robot: Robot, body: ReachableRequest, questions: list[tuple[Task, Array]]) -> list[ReachableAnswer]:
-    return [
-        reachable_answer(solve_ik(robot, T, task=task, max_solutions=1, **body.options)) for task, T in questions
-    ]
+def _answers(robot: Robot, body: ReachableRequest, targets: list[tuple[Task, Array]]) -> list[ReachableAnswer]:
+    options = {task: replace(body.options(task), max_solutions=1) for task, _ in targets}
+    return [reachable_answer(solve(robot, T, options[task])) for task, T in targets]
 
 
 def _pieces(
-    robot: Robot, body: ReachableRequest, questions: list[tuple[Task, Array]], deadline: Deadline
+    robot: Robot, body: ReachableRequest, targets: list[tuple[Task, Array]], deadline: Deadline
 ) -> Generator[bytes]:
     """``{"results": [...]}`` in pieces, with the problem if not all were computed in time."""
-    for start in range(0, len(questions), AT_ONCE):
+    for start in range(0, len(targets), AT_ONCE):
         try:
             deadline.check()
         except ProblemError as error:
@@ -112,7 +113,7 @@ def _pieces(
                 raise
             yield b'],"problem":' + to_json(error.problem) + b"}"
             return
-        answers = _answers(robot, body, questions[start : start + AT_ONCE])
+        answers = _answers(robot, body, targets[start : start + AT_ONCE])
         yield (b"," if start else b'{"results":[') + to_json(answers, inf_nan_mode="null")[1:-1]
     yield b"]}"
 

@@ -6,24 +6,29 @@ from typing import Literal, cast
 
 from typing_extensions import TypedDict
 
+from app.shared.answers.details import IkDetails, JumpDetailsAnswer, details_answer, jump_details_answer
 from app.shared.answers.document import documented
 from app.shared.answers.fk import Matrix
 from kin import PathResult
+from kin.ik.results import Cause
 
 
 @documented
 class JumpAnswer(TypedDict):
-    """A step that cannot be followed without a leap."""
+    """A step of the path that is not continuous."""
 
     index: int
-    """The leap is between waypoint index − 1 and waypoint index, counted from 0."""
+    """The jump is between waypoint index − 1 and waypoint index, counted from 0."""
     joints: list[int]
-    """The joints that leap, as indices into q."""
+    """The joints that jump, as indices into q."""
     step: float
     """The largest of their motions, in radians (4 per metre for a sliding joint)."""
     cause: Literal["limits", "singularity", "branch", "spacing"]
-    """"limits": the motion goes on, but beyond a stop. "singularity": joints must turn fast beside one. "branch":
-    the branch being followed ends. "spacing": the waypoints are too far apart for `max_step`."""
+    """"limits": the motion would go on, but outside the joint limits. "singularity": at or near one, joints must
+    turn fast. "branch": the branch being followed ends. "spacing": the waypoints are too far apart for
+    `max_step`."""
+    details: JumpDetailsAnswer
+    """The numbers behind `cause`."""
     reason: str
     """The same in a sentence for people."""
 
@@ -35,7 +40,11 @@ class GapAnswer(TypedDict):
     index: int
     """Which waypoint, counted from 0."""
     status: Literal["approximate", "limits", "orientation", "unreachable"]
-    """What kind of answer `ik` gives there."""
+    """The kind of answer that `ik` gives there."""
+    cause: Cause
+    """Its cause, as in the answers of `ik`."""
+    details: IkDetails
+    """The numbers behind `cause`, as in the answers of `ik`."""
     reason: str
     """Its sentence for people."""
     distance: float
@@ -75,6 +84,7 @@ def path_answer(result: PathResult) -> PathAnswer:
                 "joints": list(jump.joints),
                 "step": jump.step,
                 "cause": jump.cause,
+                "details": jump_details_answer(jump),
                 "reason": jump.reason,
             }
             for jump in result.jumps
@@ -83,6 +93,8 @@ def path_answer(result: PathResult) -> PathAnswer:
             {
                 "index": gap.index,
                 "status": cast(Literal["approximate", "limits", "orientation", "unreachable"], gap.status.value),
+                "cause": gap.cause,
+                "details": details_answer(gap.details),
                 "reason": gap.reason,
                 "distance": gap.distance,
             }

@@ -9,6 +9,7 @@ from typing import Literal
 import viser
 
 from kin import IKResult
+from kin.ik.details import OrientationNotMet, OutOfReach, OutsideLimits, RollError, RotationError, Solved
 from kin.units import Units
 
 Kind = Literal["reached", "compromise", "limits", "orientation", "unreachable", "hand", "error"]
@@ -41,35 +42,28 @@ class Notice:
 
 def notice(result: IKResult, units: Units) -> Notice:
     """The answer to a target, in words for people."""
-    kind, title = _headline(result, units)
-    return Notice(kind, title, _without_repeating(title, units.retold(result.reason)))
+    explanation = result.explain(units)
+    kind, title = _headline(result, explanation.headline, units)
+    return Notice(kind, title, explanation.detail)
 
 
-def _headline(result: IKResult, units: Units) -> tuple[Kind, str]:
-    if result.status == "solved":
-        return "reached", "Reached"
-    if result.status == "approximate":
-        best = result.best
-        error = best.rotation_error if best is not None else 0.0
-        name = "roll" if best is not None and best.compromise == "roll" else "rotation"
-        return "compromise", f"Reached with {name} error {units.angle(error)}"
-    if result.status == "limits":
-        numbers = [str(v.joint + 1) for v in result.violations]
-        which = "joint " + numbers[0] if len(numbers) == 1 else "joints " + ", ".join(numbers)
-        return "limits", f"Out of limits: {which}" if numbers else "Out of limits"
-    if result.status == "orientation":
-        return "orientation", "Orientation not attainable here"
-    if result.cause == "branch":
-        return "unreachable", "No solution on the chosen branch"
-    return "unreachable", f"Out of reach by {units.distance(result.distance)}"
-
-
-def _without_repeating(title: str, reason: str) -> str:
-    """The reason without its opening words when the headline has just said them."""
-    opening, colon, rest = reason.partition(": ")
-    if colon and opening.split()[0] == title.split()[0]:
-        return rest[:1].upper() + rest[1:]
-    return reason
+def _headline(result: IKResult, headline: str, units: Units) -> tuple[Kind, str]:
+    """The kind of notice and its title: `headline`, or a shorter one with rounded numbers."""
+    match result.details:
+        case Solved():
+            return "reached", headline
+        case RollError(_, error):
+            return "compromise", f"Reached with roll error {units.angle(error)}"
+        case RotationError(_, error):
+            return "compromise", f"Point reached, orientation off by {units.angle(error)}"
+        case OutsideLimits(_, violations):
+            numbers = ", ".join(str(v.joint + 1) for v in violations)
+            return "limits", f"{headline}: joint{'s' if len(violations) > 1 else ''} {numbers}"
+        case OrientationNotMet():
+            return "orientation", "Orientation not possible here"
+        case OutOfReach(distance) if distance > 0.0:
+            return "unreachable", f"Out of reach by {units.distance(distance)}"
+    return "unreachable", headline
 
 
 def html(shown: Notice) -> str:

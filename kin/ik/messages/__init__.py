@@ -1,200 +1,161 @@
-"""Sentences for people: what an inverse-kinematics answer means, in degrees and millimetres."""
+"""Sentences about IK answers, made from codes and numbers in the reader's units.
+
+This is the only place where answers of :mod:`kin.ik` become words. An `Explanation` has a headline and a detail,
+so that a page can set them apart; its `text` is both in one.
+"""
 
 from __future__ import annotations
 
-import math
-from functools import lru_cache
+from typing import NamedTuple
 
-import numpy as np
-
-from kin.fk import fk, link_frames
+from kin.ik.details import (
+    Details,
+    MaskNotMet,
+    NotOnBranch,
+    OrientationNotMet,
+    OutOfReach,
+    OutsideLimits,
+    RollError,
+    RotationError,
+    Solved,
+)
 from kin.ik.messages.obstacle import clause_of
 from kin.ik.messages.singularity import short
-from kin.ik.problem import Question
-from kin.ik.results import BlockedBranch, Cause, IKSolution, LimitViolation, Redundancy
-from kin.robot import Robot
-from kin.solvers.contract import Obstacle
+from kin.ik.messages.values import count, listed, need, ranges
 from kin.solvers.singular import Singularity
-from kin.transforms import Array
+from kin.units import Units
 
-_WHAT = {
+_TASKS = {
     "pose": "pose",
     "approach": "point and approach direction",
     "position": "point",
     "mask": "set of coordinates",
 }
+_SIDES = {
+    "too far": "the point is too far away",
+    "too near": "the point is too close to the shoulder",
+    "around the axis": "the point is in the hole around the first axis",
+    "outside": "the point is outside the workspace that the joint limits leave",
+}
 
 
-@lru_cache(maxsize=256)
-def solved(count: int, task: str, redundant: bool) -> str:
-    """Reached, with how many branches."""
-    ways = "one configuration" if count == 1 else f"{count} configurations"
-    family = ", each with a free parameter" if redundant and count > 1 else ""
-    family = " with a free parameter" if redundant and count == 1 else family
-    return f"Reached: {ways}{family} for this {_WHAT[task]}."
+class Explanation(NamedTuple):
+    """An answer in words.
+
+    Attributes:
+        headline: the outcome, without a full stop.
+        body: why, without a full stop, beginning in lower case; empty if the headline says it all.
+        note: a further sentence, or empty.
+    """
+
+    headline: str
+    body: str = ""
+    note: str = ""
+
+    @property
+    def text(self) -> str:
+        """Everything in one line, e.g. ``"Out of reach by 12.0 mm: the point is too far away."``."""
+        body = f": {self.body}" if self.body else ""
+        return f"{self.headline}{body}.{self.note and ' '}{self.note}"
+
+    @property
+    def detail(self) -> str:
+        """Everything but the headline, as sentences."""
+        body = f"{self.body[0].upper()}{self.body[1:]}." if self.body else ""
+        return " ".join(filter(None, (body, self.note)))
 
 
-def solver(question: Question, used: str) -> str:
-    """Why the answer comes from the solver it comes from."""
-    match = question.match
-    if match is None:
-        none = "no closed form fits this arm's axes" if question.wanted == "auto" else "asked for"
-        return f"{none}: numeric descent from many starts"
-    if used != match.name:
-        return f"the closed form ({match.name}) does not cover this task or target: numeric descent"
-    return match.reason
+def explain(
+    details: Details,
+    cause: str,
+    task: str,
+    singularities: tuple[Singularity, ...],
+    units: Units,
+) -> Explanation:
+    """The facts of an answer in words.
+
+    Args:
+        details, cause: what is known of the answer.
+        task: ``"pose"``, ``"approach"``, ``"position"`` or ``"mask"``.
+        singularities: those of the solution, or of the closest configuration where there is no solution.
+        units: of all numbers.
+    """
+    headline, body = _outcome(details, cause, task, units)
+    solved = isinstance(details, Solved | RollError | RotationError)
+    return Explanation(headline, body, _singular(singularities, "This" if solved else "The closest", units))
 
 
-def singular(found: tuple[Singularity, ...], shown: bool) -> str:
-    """A further sentence if the configuration is singular; `shown`: it is the answer, not the closest one."""
-    real = [s for s in found if s.kind != "algorithmic"] if found else found
-    if not real:
-        return ""
-    where = "there" if shown else "at the closest pose"
-    return f" Singular {where}: {short(real[0])}."
+def _outcome(details: Details, cause: str, task: str, units: Units) -> tuple[str, str]:
+    """Headline and body."""
+    angle, length = units.angles.value, units.lengths.value
+    match details:
+        case Solved(number, redundant):
+            parameter = f", {'each ' if number > 1 else ''}with a redundancy parameter," if redundant else ""
+            return (
+                "Reached",
+                f"{count(number, 'configuration', 'configurations')}{parameter} for this {_TASKS[task]}",
+            )
+        case RollError(joints, error):
+            kept = f"{joints} joints keep the point and the approach direction, not the roll about it"
+            return f"Reached with roll error {angle(error)}", kept
+        case RotationError(joints, error, violation):
+            why = f"{joints} joints cannot hold this orientation at this point"
+            if violation is not None:
+                why = f"the approach direction would need {need(violation, units)}"
+            return f"Point reached, orientation off by {angle(error)}", why
+        case OutsideLimits():
+            return "Outside the limits", _outside(details, units)
+        case NotOnBranch(elsewhere, outside):
+            why = f"{count(outside, 'other branch exists', 'other branches exist')}, outside the joint limits"
+            if elsewhere:
+                reach = count(elsewhere, "configuration reaches", "configurations reach")
+                why = f"{reach} this target on other branches"
+            return "No solution on the chosen branch", why
+        case MaskNotMet(position, rotation):
+            headline = "These coordinates cannot be met together"
+            if position is None or rotation is None:
+                return f"{headline} on the chosen branch", ""
+            return headline, f"the closest configuration is off by {length(position)} and {angle(rotation)}"
+        case OutOfReach(distance):
+            by = f" by {length(distance)}" if distance > 0.0 else ""
+            return f"Out of reach{by}", _SIDES[cause]
+        case OrientationNotMet():
+            return "The arm cannot hold this orientation at this point", _orientation(details, units)
 
 
-def limits(
-    question: Question, blocked: tuple[BlockedBranch, ...], redundancy: tuple[Redundancy, ...], others: int
-) -> str:
-    """Which joint would have to go where, for the branch that breaks the limits least."""
-    first = blocked[0]
-    needs = "; ".join(_need(question, v) for v in first.violations)
-    given = [f.label for f in question.given]
-    place = f" with the given {' and '.join(given)}" if given else ""
-    which = "the least offending branch" if len(blocked) > 1 else "the only branch"
-    text = f"Out of limits{place}: {which} ({first.branch}) would need {needs}."
-    if len(blocked) > 1:
-        rest = len(blocked) - 1
-        text += f" {_count(rest)} other {_plural(rest, 'branch', 'branches')} would need more."
-    if given and any(r.intervals for r in redundancy):
-        free = next(r for r in redundancy if r.intervals)
-        ranges = ", ".join(f"{degrees(a)} … {degrees(b)}" for a, b in free.intervals)
-        text += f" Possible {free.label}: {ranges}."
-    if others:
-        fits = _plural(others, "configuration on another branch fits", "configurations on other branches fit")
-        text += f" {_count(others)} {fits}."
+def _outside(details: OutsideLimits, units: Units) -> str:
+    """Which joints would be where, on the posture that is closest to the limits."""
+    which = "the posture closest to the limits" if details.branches > 1 else "the posture"
+    given = ", ".join(f"{r.label} = {units.angles.value(r.value)}" for r in details.requested)
+    needs = listed([need(violation, units) for violation in details.violations])
+    text = f"{f'with {given} ' if given else ''}{which} ({details.branch}) needs {needs}"
+    if details.branches > 1:
+        others = count(details.branches - 1, "other posture is", "other postures are")
+        text += f". {others[0].upper()}{others[1:]} outside the limits too"
+    possible = [r for r in details.requested if r.intervals]
+    for r in possible:
+        text += f". Possible {r.label}: {ranges(r.intervals, units)}"
+    if details.elsewhere:
+        others = count(details.elsewhere, "configuration is", "configurations are")
+        text += f". {others[0].upper()}{others[1:]} inside the limits on branches that were not chosen"
     return text
 
 
-def other_branch(fits: int, exist: int) -> str:
-    """The branch asked for is not there."""
-    if fits:
-        others = f"{_count(fits).lower()} {_plural(fits, 'configuration reaches', 'configurations reach')}"
-        return f"No solution on the chosen branch: {others} this target on other branches."
-    return f"No solution on the chosen branch: other branches ({exist}) exist, but the joint limits forbid them."
+def _orientation(details: OrientationNotMet, units: Units) -> str:
+    """What does not fit, the nearest orientation, and the closest configuration."""
+    angle, length = units.angles.value, units.lengths.value
+    parts = []
+    if details.obstacle is not None and details.gap is not None:
+        parts.append(f"{clause_of(details.obstacle, units)}, by {length(details.gap)}")
+    if details.nearest_rotation is not None:
+        parts.append(f"the nearest orientation found is {angle(details.nearest_rotation)} away")
+    if details.position_error is not None and details.rotation_error is not None:
+        off = f"{length(details.position_error)} and {angle(details.rotation_error)}"
+        parts.append(f"the closest pose found is off by {off}")
+    return "; ".join(parts)
 
 
-def approximate(question: Question, best: IKSolution, blocked: tuple[BlockedBranch, ...]) -> str:
-    """What an arm with too few joints gave up."""
-    if best.compromise == "roll":
-        return (
-            f"Reached with roll error {degrees(best.rotation_error)}: {question.robot.n} joints keep the point "
-            "and the approach direction, not the roll about it."
-        )
-    why = f": the approach direction would need {_need(question, blocked[0].violations[0])}" if blocked else ""
-    return f"Point reached, orientation off by {degrees(best.rotation_error)}{why}."
-
-
-def mask(closest: IKSolution | None) -> str:
-    """The coordinates of a mask cannot all be met."""
-    if closest is None:
-        return "These coordinates cannot be met together on the chosen branch."
-    return (
-        "These coordinates cannot be met together: the closest configuration is off by "
-        f"{millimetres(closest.position_error)} and {degrees(closest.rotation_error)}."
-    )
-
-
-def orientation(
-    closest: IKSolution | None, oriented: IKSolution | None, obstacle: Obstacle | None, gap: float
-) -> str:
-    """The point can be reached, but not with this orientation."""
-    why = f" ({clause_of(obstacle)}, by {millimetres(gap)})" if obstacle and gap > 0.0 else ""
-    text = f"This orientation cannot be had at this point{why}"
-    if oriented is not None:
-        text += f"; the nearest attainable one is {degrees(oriented.rotation_error)} away"
-    if closest is not None:
-        text += (
-            f"; the closest pose is off by {millimetres(closest.position_error)} "
-            f"and {degrees(closest.rotation_error)}"
-        )
-    return text + "."
-
-
-def unreachable(question: Question, q: Array, distance: float) -> tuple[Cause, str]:
-    """How far the point is out of reach, and on which side; q ``(n,)`` is nearest to it."""
-    cause = _side(question, q)
-    side = {
-        "too far": "too far away",
-        "too near": "too near to the arm",
-        "around the axis": "in the hole around the first axis",
-    }.get(cause, "outside the workspace the joint limits leave")
-    return cause, f"Out of reach by {millimetres(distance)}: the point is {side}."
-
-
-def _side(question: Question, q: Array) -> Cause:
-    """Whether the point is outside the workspace or inside a hole of it, seen from the shoulder.
-
-    The shoulder is taken on the first joint's axis at the second joint's height. In a hole the way out tells which
-    one: straight away from the axis, or away from the shoulder.
-    """
-    robot = question.robot
-    first = link_frames(robot, q)[0]
-    axis = robot.T_world_base[:3, 2] if robot.convention == "standard" else first[:3, 2]
-    foot = robot.T_world_base[:3, 3]
-    shoulder = foot + axis * float(axis @ (first[:3, 3] - foot))
-    reached = fk(robot, q)[:3, 3] - shoulder
-    wanted = question.T[:3, 3] - shoulder
-    far, near = float(np.linalg.norm(wanted)), float(np.linalg.norm(reached))
-    if far > near + 1e-6:
-        return "too far"
-    out = reached - wanted
-    radial = out - axis * float(axis @ out)
-    away = float(out @ wanted) / far if far > 1e-9 else math.inf
-    off_axis = [float(np.linalg.norm(v - axis * float(axis @ v))) for v in (wanted, reached)]
-    if (
-        robot.joints[0].kind == "revolute"
-        and off_axis[1] > off_axis[0] + 1e-6
-        and np.linalg.norm(radial) > away - 1e-9
-    ):
-        return "around the axis"
-    return "too near" if far < near - 1e-6 else "outside"
-
-
-def _need(question: Question, violation: LimitViolation) -> str:
-    robot, index = question.robot, violation.joint
-    stop = "locked at" if question.locked[index] else "limit"
-    value, limit = (joint_value(robot, index, x) for x in (violation.value, violation.limit))
-    return f"{joint(robot, index)} at {value} ({stop} {limit})"
-
-
-def joint(robot: Robot, index: int) -> str:
-    """A joint for a sentence: its number, and its name if that is another."""
-    name, number = robot.joints[index].name, f"joint {index + 1}"
-    return number if name.lower() in (number, str(index + 1)) else f"{number} ({name})"
-
-
-def joint_value(robot: Robot, index: int, value: float) -> str:
-    """A joint's value or motion for a sentence."""
-    return degrees(value) if robot.joints[index].kind == "revolute" else millimetres(value)
-
-
-def _count(number: int) -> str:
-    return "One" if number == 1 else str(number)
-
-
-def _plural(number: int, one: str, many: str) -> str:
-    return one if number == 1 else many
-
-
-def degrees(angle: float) -> str:
-    """An angle for a sentence: one decimal, or enough to show that it is not zero."""
-    value = math.degrees(angle)
-    return f"{value:.1f}°" if abs(value) >= 0.05 or value == 0 else f"{value:.1e}°"
-
-
-def millimetres(length: float) -> str:
-    """A length for a sentence: one decimal, or enough to show that it is not zero."""
-    value = 1e3 * length
-    return f"{value:.1f} mm" if abs(value) >= 0.05 or value == 0 else f"{value:.1e} mm"
+def _singular(found: tuple[Singularity, ...], which: str, units: Units) -> str:
+    """A sentence about a singular configuration; singularities of the closed form alone do not count."""
+    real = [s for s in found if s.kind != "algorithmic"]
+    return f"{which} configuration is singular: {short(real[0], units)}." if real else ""

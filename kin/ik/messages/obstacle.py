@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from kin.solvers.contract import Obstacle, ObstacleCode
+from kin.units import DEFAULT_UNITS, Units
 
 CLAUSES: dict[ObstacleCode, str] = {
     "wrist centre too far from the shoulder": (
@@ -25,6 +26,6 @@ CLAUSES: dict[ObstacleCode, str] = {
 }
 
 
-def clause_of(obstacle: Obstacle) -> str:
+def clause_of(obstacle: Obstacle, units: Units = DEFAULT_UNITS) -> str:
     """What does not fit, e.g. ``"with this orientation the wrist centre is farther than 660 mm from …"``."""
-    return CLAUSES[obstacle.code].format(bound=f"{1e3 * obstacle.bound:.0f} mm")
+    return CLAUSES[obstacle.code].format(bound=units.lengths.text(obstacle.bound, 0))

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from kin.errors import InputError
 from kin.fk import manipulability
-from kin.ik.problem import Limits, Locks, ask, finite_number
+from kin.ik.options import JointConstraints, Limits, Locks, finite_number
 from kin.robot import Robot
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -156,8 +156,8 @@ def capability_grid(
         InputError: naming the wrong argument; also a voxel so small that there would be more than 2²⁴.
     """
     spherical_design(directions)
-    question = ask(robot, np.zeros(3), task="position", limits=limits, locked=locked)
-    bounds = tuple(zip(question.lower.tolist(), question.upper.tolist(), strict=True))
+    lower, upper, _ = JointConstraints(limits, locked).bounds(robot)
+    bounds = tuple(zip(lower.tolist(), upper.tolist(), strict=True))
     count = checked_integer("resolution", resolution, 1, 256, "a whole number from 1 to 256")
     region = Region.of(robot, limits, locked)
     box = [along(region, axis) for axis in np.eye(3)]

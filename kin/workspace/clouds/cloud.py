@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from kin.errors import InputError
 from kin.fk import fk_positions
-from kin.ik.problem import Limits, Locks
+from kin.ik.options import Limits, Locks
 from kin.robot import Robot
 from kin.transforms import Array
 from kin.workspace.clouds.measures import Measure, measure_names, measured

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from kin.errors import InputError
 from kin.fk import fk_positions
-from kin.ik.problem import Limits, Locks
+from kin.ik.options import Limits, Locks
 from kin.robot import Robot
 from kin.transforms import Array, finite_array
 from kin.workspace.region import Region, checked_integer

@@ -99,7 +99,7 @@ def test_every_target_may_have_its_own_value(robot):
 
 
 @arms
-def test_the_rich_kernels_give_the_same_branches(robot):
+def test_the_solver_gives_the_same_branches_as_its_batch_kernels(robot):
     T = targets(robot, 300)
     thin = kin.ik_branches(robot, T, 0.3)
     difference = turned(thin, np.array([rich(robot, pose, 0.3) for pose in T]))
@@ -309,7 +309,7 @@ def test_sine_and_cosine_are_the_librarys_to_the_last_places(scale):
     assert ulps(c, np.cos(x)) <= 3.0
 
 
-def test_sine_and_cosine_beside_multiples_of_a_right_angle():
+def test_sine_and_cosine_near_multiples_of_a_right_angle():
     k = np.arange(-60_000.0, 60_000.0)
     for step in (0.0, 1e-12, -1e-7, 1e-3):
         x = k * (math.pi / 2) + step
@@ -328,7 +328,7 @@ def test_arc_tangent_is_the_librarys_to_the_last_places():
         assert ulps(out, np.arctan2(y, x)) <= 3.0
 
 
-def test_arc_tangent_on_the_axes_and_of_nothing():
+def test_arc_tangent_on_the_axes_and_of_zero():
     y = np.array([0.0, 0.0, 0.0, -0.0, 1.0, -1.0, 1.0, -1.0, math.nan, 1.0])
     x = np.array([0.0, 1.0, -1.0, -1.0, 0.0, 0.0, 1.0, -1.0, 1.0, math.nan])
     wanted = np.array([0, 0, math.pi, math.pi, math.pi / 2, -math.pi / 2, math.pi / 4, -3 * math.pi / 4])
@@ -338,7 +338,7 @@ def test_arc_tangent_on_the_axes_and_of_nothing():
     assert np.isnan(out[8:]).all()
 
 
-def test_sine_and_cosine_of_no_number_are_no_number():
+def test_sine_and_cosine_of_nan_are_nan():
     x = np.array([math.nan, math.inf, -math.inf] * 5)
     s, c = np.empty_like(x), np.empty_like(x)
     many_sin_cos(x, s, c)

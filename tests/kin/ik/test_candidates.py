@@ -11,7 +11,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kin import InputError, fk, get_robot, ik_branches
-from kin.ik.candidates import DISTANCE, finish, judge, ranges, select, settle
+from kin.ik.candidates import (
+    DISTANCE,
+    Requirement,
+    Rows,
+    accept,
+    measure_and_sort,
+    measure_rows,
+    ranges,
+    select,
+    unchecked,
+)
 from kin.kernels.checks import straighten
 from kin.solvers.contract import POSE
 from kin.transforms import as_transform, rotation_from_wxyz
@@ -19,7 +29,7 @@ from kin.transforms import as_transform, rotation_from_wxyz
 angle = st.floats(-10, 10)
 
 
-def told(arcs, rows, together, circular):
+def joined(arcs, rows, together, circular):
     out = np.full((4 * len(arcs) + 2, 3), math.nan)
     count = ranges(np.array(arcs, dtype=float).reshape(-1, 3), np.array(rows), together, circular, out)
     return count, [[(a, b) for k, a, b in out[: max(count, 0)].tolist() if k == i] for i in range(len(rows) + 1)]
@@ -30,7 +40,7 @@ def told(arcs, rows, together, circular):
 def test_ranges_hold_exactly_what_their_arcs_hold(arcs, circular):
     arcs = [(b, low, low + width) for b, low, width in arcs]
     together = np.array([True, False, True])
-    _, found = told(arcs, [2, 0], together, circular)
+    _, found = joined(arcs, [2, 0], together, circular)
     wanted = [[a for a in arcs if a[0] == 2], [a for a in arcs if a[0] == 0], [a for a in arcs if a[0] != 1]]
     for intervals, mine in zip(found, wanted, strict=True):
         assert intervals == sorted(intervals)
@@ -42,14 +52,14 @@ def test_ranges_hold_exactly_what_their_arcs_hold(arcs, circular):
                 assert any(low <= x <= high for low, high in intervals) == (depth > 0)
 
 
-def test_a_range_without_a_stop_is_told_as_such():
-    assert told([(0, -math.inf, 1.0)], [0], np.array([True]), False)[0] == -1
-    assert told([], [0], np.array([True]), False) == (0, [[], []])
-    assert told([(0, 3.0, 3.5)], [0], np.array([False]), True)[1][0] == [
+def test_an_unbounded_range_is_reported():
+    assert joined([(0, -math.inf, 1.0)], [0], np.array([True]), False)[0] == -1
+    assert joined([], [0], np.array([True]), False) == (0, [[], []])
+    assert joined([(0, 3.0, 3.5)], [0], np.array([False]), True)[1][0] == [
         pytest.approx((-math.pi, 3.5 - 2 * math.pi)),
         pytest.approx((3.0, math.pi)),
     ]
-    assert told([(0, 1.0, 9.0)], [0], np.array([True]), True)[1] == [[(-math.pi, math.pi)]] * 2
+    assert joined([(0, 1.0, 9.0)], [0], np.array([True]), True)[1] == [[(-math.pi, math.pi)]] * 2
 
 
 def test_rows_are_taken_by_rising_key_and_once():
@@ -61,27 +71,27 @@ def test_rows_are_taken_by_rising_key_and_once():
 
 
 @pytest.mark.parametrize("respect", [True, False])
-def test_rows_are_settled_in_one_call_as_step_by_step(respect):
+@pytest.mark.parametrize("kernel", [lambda: measure_and_sort, unchecked], ids=["dispatched", "unchecked"])
+def test_rows_are_measured_and_sorted_in_one_call_as_step_by_step(respect, kernel):
     arm = get_robot("puma560")
     rng = np.random.default_rng(3)
     q = rng.uniform(1.4 * arm.lower, 1.4 * arm.upper, (8, arm.n))
     q[3], q[5] = math.nan, q[2] + 2.0 * math.pi
     T, turns = fk(arm, q[2]), np.full(arm.n, 2.0 * math.pi)
     q[0] = ik_branches(arm, T)[4]
-    seed, whole = rng.uniform(arm.lower, arm.upper), np.array([1.0] * 6 + [0.0])
-    given = (arm.model, T, POSE, whole, seed, seed, arm.lower.copy(), arm.upper.copy(), turns, respect)
-    rows, stats = q.copy(), np.empty((8, 5))
-    closed, good, order = np.empty(8, bool), np.empty(8, bool), np.empty(8, np.int64)
-    count = settle(*given, rows, stats, closed, good, order)
-    rows_twin, stats_twin = q.copy(), np.empty((8, 5))
-    finish(*given, rows_twin, stats_twin)
-    closed_twin, good_twin = np.empty((2, 8), bool)
-    judge(stats_twin, respect, closed_twin, good_twin)
-    kept, expected = select(rows_twin, np.where(good_twin, stats_twin[:, DISTANCE], math.inf))
-    assert np.array_equal(rows, rows_twin, equal_nan=True)
-    assert np.array_equal(stats, stats_twin, equal_nan=True)
-    assert (closed.tolist(), good.tolist()) == (closed_twin.tolist(), good_twin.tolist())
-    assert order[:count].tolist() == kept[:expected].tolist()
+    seed, mask = rng.uniform(arm.lower, arm.upper), np.array([1.0] * 6 + [0.0])
+    requirement = Requirement(arm.model, mask, arm.lower.copy(), arm.upper.copy(), turns, POSE, respect)
+    rows = Rows(q.copy(), np.empty((8, 5)), np.empty(8, bool), np.empty(8, bool), np.empty(8, np.int64))
+    count = kernel()(requirement, T, seed, seed, rows)
+    twin, stats = q.copy(), np.empty((8, 5))
+    measure_rows(requirement, T, seed, seed, twin, stats)
+    closed, good = np.empty((2, 8), bool)
+    accept(stats, respect, closed, good)
+    kept, expected = select(twin, np.where(good, stats[:, DISTANCE], math.inf))
+    assert np.array_equal(rows.q, twin, equal_nan=True)
+    assert np.array_equal(rows.stats, stats, equal_nan=True)
+    assert (rows.closed.tolist(), rows.good.tolist()) == (closed.tolist(), good.tolist())
+    assert rows.order[:count].tolist() == kept[:expected].tolist()
     assert closed[[0, 2, 5]].all()
     assert closed.sum() == 3
     assert count == len({0, 2} & set(np.flatnonzero(good).tolist()))
@@ -94,9 +104,9 @@ def test_what_meets_the_task_and_the_limits():
         dtype=float,
     )
     closed, good = np.empty((2, 5), dtype=bool)
-    assert judge(stats, True, closed, good) == 1
+    assert accept(stats, True, closed, good) == 1
     assert (closed.tolist(), good.tolist()) == ([True, True, False, False, False], [True] + [False] * 4)
-    assert judge(stats, False, closed, good) == 2
+    assert accept(stats, False, closed, good) == 2
     assert good.tolist() == closed.tolist()
 
 

@@ -54,7 +54,7 @@ def assert_exact(robot, target, result, task="pose"):
 
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 def test_all_golden_branches_and_no_others(robot_id, golden):
-    """The 50-digit branch sets, complete, for the same value of the free parameter."""
+    """The 50-digit branch sets, complete, for the same value of the redundancy parameter."""
     robot = kin.get_robot(robot_id)
     five = robot.n == 5
     for case in golden(robot_id)["ik"]:
@@ -66,12 +66,12 @@ def test_all_golden_branches_and_no_others(robot_id, golden):
         wanted = np.array(case["branches"])
         assert len(found) == len(wanted)
         for q in wanted:
-            # Near a singularity the angles are known to fewer digits than the pose.
+            # Near a singularity the angles have fewer exact digits than the pose.
             assert angle_gap(found, q).min() < 1e-9
 
 
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
-def test_thin_call_gives_the_same_branches(robot_id, golden):
+def test_the_batch_call_gives_the_same_branches(robot_id, golden):
     robot = kin.get_robot(robot_id)
     case = golden(robot_id)["ik"][0]
     q = kin.ik_branches(robot, np.array(case["T"]), case.get("theta1", case.get("psi", math.nan)))
@@ -81,7 +81,7 @@ def test_thin_call_gives_the_same_branches(robot_id, golden):
 
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 @pytest.mark.parametrize("task", ["pose", "approach"])
-def test_round_trip_leaves_nothing_unsolved(robot_id, task):
+def test_every_round_trip_is_solved(robot_id, task):
     """20 000 random in-limit configurations: each is reached again from an unrelated seed."""
     robot = kin.get_robot(robot_id)
     rng = np.random.default_rng(2026)
@@ -136,7 +136,7 @@ def test_golden_edge_postures_are_reached(robot_id, golden):
 
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 @pytest.mark.parametrize("share", [0.1, 0.4])
-def test_narrowed_limits_still_leave_nothing_unsolved(robot_id, share):
+def test_every_round_trip_inside_narrowed_limits_is_solved(robot_id, share):
     """Limits cut at random to a part of their range: the feasible arcs are found, however small."""
     from dataclasses import replace
 
@@ -173,7 +173,7 @@ def test_solutions_are_exact_ordered_and_deterministic(robot_id, fractions):
 
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 def test_the_seed_itself_is_found_first(robot_id):
-    """Asked for the pose it is in, the arm stays where it is."""
+    """For the pose it is in, the arm stays where it is."""
     robot = kin.get_robot(robot_id)
     for q in robot.random_q(np.random.default_rng(3), 200):
         best = solve_ik(robot, kin.fk(robot, q), q_seed=q).best
@@ -190,7 +190,7 @@ def test_whole_turns_follow_the_seed(robot_id):
         assert np.degrees(best.q[6]) == pytest.approx(last, abs=1e-6)
 
 
-def test_limits_refuse_and_name_the_joint():
+def test_solutions_outside_the_limits_are_refused_and_the_joint_is_named():
     robot = kin.get_robot("pioneer5")
     q = np.radians([90, 40, 60, 30, 60])
     result = solve_ik(robot, kin.fk(robot, q), task="approach")
@@ -255,15 +255,15 @@ def test_dragging_out_of_reach_does_not_make_the_arm_jump(robot_id):
     assert max(steps[-20:]) < math.radians(5)
 
 
-def test_too_near_says_so():
+def test_a_point_too_close_is_reported():
     robot = kin.get_robot("redundant7-craig")
     result = solve_ik(robot, (0.0, 0.0, 0.30), task="position")
     assert result.status is Status.UNREACHABLE
     assert result.distance == pytest.approx(0.210978668, abs=1e-6)
-    assert "too near" in result.reason
+    assert "too close to the shoulder" in result.reason
 
 
-def test_orientation_that_cannot_be_had():
+def test_an_impossible_orientation_is_reported():
     """At the rim of the workspace the tool can only point outwards."""
     robot = kin.get_robot("redundant7-craig")
     T = np.eye(4)
@@ -272,15 +272,15 @@ def test_orientation_that_cannot_be_had():
     assert result.status is Status.ORIENTATION
     assert result.cause == "orientation"
     assert result.distance == 0.0
-    assert "orientation cannot be had" in result.reason
+    assert "cannot hold this orientation" in result.reason
     nearest = result.nearest_orientation
     assert nearest.position_error <= 1e-9
     assert robot.in_limits(nearest.q)
-    assert f"nearest attainable one is {math.degrees(nearest.rotation_error):.1f}° away" in result.reason
+    assert f"nearest orientation found is {math.degrees(nearest.rotation_error):.1f}° away" in result.reason
 
 
 @pytest.mark.parametrize(("roll", "mean"), [(1, 0.29), (5, 1.54), (20, 5.50)])
-def test_five_joints_off_their_manifold_give_two_honest_answers(roll, mean):
+def test_five_joints_give_two_compromises_for_a_pose_off_their_manifold(roll, mean):
     """A pose turned about the approach axis: keep the direction (error = roll) or spread it (a third)."""
     robot = kin.get_robot("pioneer5")
     rng = np.random.default_rng(5)
@@ -299,12 +299,12 @@ def test_five_joints_off_their_manifold_give_two_honest_answers(roll, mean):
             assert robot.in_limits(s.q)
         assert spread.rotation_error <= kept.rotation_error + 1e-9
         lefts.append(math.degrees(spread.rotation_error))
-    # The quoted averages are over all configurations; 60 of them, some at a stop, scatter round it.
+    # The quoted averages are over all configurations; 60 of them, some at a limit, scatter around them.
     assert 0.6 * mean < np.mean(lefts) < 1.6 * mean
 
 
-def test_approach_out_of_limits_still_keeps_the_point():
-    """The nearest orientation with the exact point, when the approach direction itself is beyond a stop."""
+def test_an_approach_outside_the_limits_still_keeps_the_point():
+    """The nearest orientation with the exact point, when the approach direction itself is outside the limits."""
     robot = kin.get_robot("pioneer5")
     q = np.radians([90, 40, 60, 30, 44])
     refused = 0
@@ -342,7 +342,7 @@ def test_closest_beats_a_dense_search(robot_id):
         assert mine <= metric.min() + 1e-9
 
 
-def test_redundancy_is_reported_and_taken():
+def test_redundancy_is_reported_and_can_be_requested():
     robot = kin.get_robot("redundant7-craig")
     q = np.radians([20, 40, 30, 60, 10, 30, 5])
     target = kin.fk(robot, q)
@@ -358,7 +358,7 @@ def test_redundancy_is_reported_and_taken():
 
 @pytest.mark.parametrize("robot_id", SEVEN)
 def test_intervals_are_exactly_the_values_that_work(robot_id):
-    """Inside the reported intervals a given value is solved; a little outside it is refused."""
+    """Inside the reported intervals a requested value is solved; a little outside it is refused."""
     robot = kin.get_robot(robot_id)
     checked = 0
     for q in robot.random_q(np.random.default_rng(23), 40):
@@ -368,7 +368,7 @@ def test_intervals_are_exactly_the_values_that_work(robot_id):
         assert all(solve_ik(robot, target, redundancy=float(v)).status is Status.SOLVED for v in inside)
         for low, high in intervals:
             for v in (low - 1e-4, high + 1e-4):
-                # Both parameters are angles: a value and its whole-turn images ask for the same.
+                # Both parameters are angles: a value and its whole-turn images are equivalent.
                 images = [v + 2 * math.pi * turn for turn in (-2, -1, 0, 1, 2)]
                 if any(a <= image <= b for a, b in intervals for image in images):
                     continue
@@ -448,7 +448,7 @@ def test_a_mounted_arm_with_other_lengths_and_twist_signs_is_still_closed_form()
         assert_exact(robot, target, result)
 
 
-def test_an_arm_of_no_known_family_is_solved_numerically():
+def test_an_arm_without_a_closed_form_is_solved_numerically():
     text = """
     id = "odd"
     name = "odd"

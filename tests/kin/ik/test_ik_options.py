@@ -1,10 +1,11 @@
-"""What can be asked of inverse kinematics besides a target: branches, limits, locks, images, masks and more."""
+"""The options of inverse kinematics: branches, limits, locks, images, masks, preferences, redundancy."""
 
 from __future__ import annotations
 
 import itertools
 import math
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,8 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kin
-from kin import InputError, Status, solve_ik
+from kin import IKOptions, InputError, JointConstraints, Status, solve_ik
 from kin.transforms import rotation_angle, rotation_from_wxyz, vector_angle
+from kin.units import Units
 
 SEVEN = ("redundant7", "redundant7-craig")
 TASKS = ("pose", "approach", "position")
@@ -30,7 +32,7 @@ def rotation_vector(R):
 
 
 def meets(T, target, task):
-    """Whether the tool pose T does what the task asks."""
+    """Whether the tool pose T meets the task."""
     close = np.abs(T[:3, 3] - target[:3, 3]).max() <= 1e-9
     if task == "pose":
         return close and rotation_angle(T[:3, :3], target[:3, :3]) <= 1e-9
@@ -42,7 +44,7 @@ def meets(T, target, task):
 
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 def test_names_belong_to_postures_whatever_the_target(robot_id):
-    """The name of every solution is the name its joints have, and the same for all tasks."""
+    """The name of every solution is that of its configuration, for all tasks."""
     robot = kin.get_robot(robot_id)
     assert len(set(kin.branch_names(robot))) == 8
     rng = np.random.default_rng(1)
@@ -69,7 +71,9 @@ def test_a_filter_leaves_exactly_its_branches(robot_id, task):
             names = [n for n in kin.branch_names(robot) if all(w in n.split(" · ") for w in words.split(" · "))]
             result = solve_ik(robot, target, task=task, q_seed=q, branch=wish)
             assert {s.branch for s in result.solutions} <= set(names)
-            if task != "position":  # where two freedoms are left, the choice on a branch depends on the others
+            if (
+                task != "position"
+            ):  # with two redundancy parameters, the choice on a branch depends on the other branches
                 wanted = [s for s in every.solutions if s.branch in names]
                 assert [s.q.tolist() for s in result.solutions] == [s.q.tolist() for s in wanted]
             if wish in ("seed", kin.branch_of(robot, q)):
@@ -79,7 +83,7 @@ def test_a_filter_leaves_exactly_its_branches(robot_id, task):
                 assert result.cause in ("branch", "joint limits", "outside")
 
 
-def test_several_wishes_are_a_union():
+def test_several_branch_names_are_a_union():
     robot = kin.get_robot("redundant7-craig")
     target = kin.fk(robot, robot.home)
     one, two = ("shoulder front · elbow up · wrist flip", "shoulder back, wrist no-flip")
@@ -88,7 +92,7 @@ def test_several_wishes_are_a_union():
     assert len(both) == 3
 
 
-def test_a_branch_that_is_not_there_is_told_from_one_behind_a_stop():
+def test_a_missing_branch_is_distinguished_from_one_outside_the_limits():
     robot = kin.get_robot("pioneer5")
     target = kin.fk(robot, robot.home)
     every = {s.branch for s in solve_ik(robot, target, task="approach", respect_limits=False).solutions}
@@ -100,7 +104,7 @@ def test_a_branch_that_is_not_there_is_told_from_one_behind_a_stop():
     result = solve_ik(robot, target, task="approach", branch=behind)
     assert (result.status, result.cause) == (Status.LIMITS, "joint limits")
     assert [b.branch for b in result.blocked] == [behind]
-    assert "One configuration on another branch fits" in result.reason
+    assert "One configuration is inside the limits on branches that were not chosen" in result.reason
 
 
 # Limits and locks
@@ -189,7 +193,7 @@ MASKS = [m for m in itertools.product((False, True), repeat=6) if any(m)]
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 @pytest.mark.parametrize("frame", ["tool", "base"])
 def test_every_mask_is_met_in_its_frame(robot_id, frame):
-    """All 63 masks: the coordinates asked for vanish, by a logarithm of our own."""
+    """All 63 masks: the masked coordinates are zero, by a logarithm of our own."""
     robot = kin.get_robot(robot_id)
     rng = np.random.default_rng(6)
     for mask in MASKS:
@@ -224,7 +228,7 @@ def test_masks_that_are_tasks_are_answered_as_these():
     assert solve_ik(robot, target, mask=(True,) * 5 + (False,), mask_frame="base").task == "mask"
 
 
-def test_a_mask_that_cannot_be_met_says_by_how_much():
+def test_a_mask_that_cannot_be_met_reports_by_how_much():
     robot = kin.get_robot("redundant7-craig")
     T = np.eye(4)
     T[2, 3] = 3.0
@@ -235,14 +239,14 @@ def test_a_mask_that_cannot_be_met_says_by_how_much():
     assert robot.in_limits(result.closest.q)
 
 
-# Preferences and free values
+# Preferences and redundancy parameters
 
 
 @pytest.mark.parametrize("robot_id", SEVEN)
 @pytest.mark.parametrize("task", ["pose", "approach"])
 @pytest.mark.parametrize("prefer", ["limits", "manipulability"])
 def test_the_preferred_value_beats_a_sweep(robot_id, task, prefer):
-    """No value of a fine sweep over the free parameter, on any branch, is better than the one chosen."""
+    """No value of a fine sweep over the redundancy parameter, on any branch, is better than the one chosen."""
     robot = kin.get_robot(robot_id)
 
     def worth(q):
@@ -262,13 +266,13 @@ def test_the_preferred_value_beats_a_sweep(robot_id, task, prefer):
             for v in np.linspace(low, high, 40)
             for s in solve_ik(robot, target, task=task, q_seed=q, redundancy={free.name: float(v)}).solutions
         ]
-        # Of two free values the sweep moves one only, and the search is along one at a time.
+        # Of two parameters the sweep moves only one, and the search is along one at a time.
         assert max(swept) <= values[0] + (1e-3 if len(result.redundancy) == 1 else 1e-2) * abs(values[0]) + 1e-9
         assert meets(kin.fk(robot, result.solutions[0].q), target, task)
 
 
 @pytest.mark.parametrize("robot_id", SEVEN)
-def test_two_free_values_can_both_be_given(robot_id):
+def test_two_redundancy_parameters_can_both_be_requested(robot_id):
     robot = kin.get_robot(robot_id)
     for q in robot.random_q(np.random.default_rng(9), 20):
         target = kin.fk(robot, q)
@@ -286,8 +290,8 @@ def test_two_free_values_can_both_be_given(robot_id):
         assert meets(kin.fk(robot, s.q), target, "approach")
 
 
-def test_a_given_joint_value_is_not_moved_by_a_whole_turn():
-    """θ1 = −200° is asked for, so θ1 = −200° it is, even though 160° would be nearer to the seed."""
+def test_a_requested_joint_value_is_not_moved_by_a_whole_turn():
+    """θ1 = −200° is requested and kept, although 160° would be nearer to the seed."""
     robot = kin.get_robot("redundant7")
     q = np.radians([-200, 30, 20, 40, 50, 60, 70])
     result = solve_ik(robot, kin.fk(robot, q), redundancy={"theta1": float(q[0])})
@@ -328,12 +332,12 @@ def test_the_ranges_of_a_branch_are_exact(robot_id):
     assert ends > 30
 
 
-def test_asking_for_a_forbidden_value_names_the_joint_and_the_possible_ones():
+def test_a_requested_value_outside_the_limits_names_the_joint_and_the_possible_values():
     robot = kin.get_robot("redundant7-craig")
     target = kin.fk(robot, robot.home)
     result = solve_ik(robot, target, redundancy={"psi": math.pi}, q_seed=robot.home, branch="seed")
     assert result.status is Status.LIMITS
-    assert "with the given arm angle ψ" in result.reason
+    assert "with arm angle ψ = " in result.reason
     low, high = result.redundancy[0].intervals[0]
     assert f"Possible arm angle ψ: {math.degrees(low):.1f}° … {math.degrees(high):.1f}°" in result.reason
 
@@ -342,8 +346,8 @@ def test_asking_for_a_forbidden_value_names_the_joint_and_the_possible_ones():
 
 
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
-def test_every_blocked_branch_says_what_it_would_need(robot_id):
-    """The values named are the ones the branch has, the stops are the ones it breaks, the least offence first."""
+def test_every_blocked_branch_reports_its_violations(robot_id):
+    """The values are those of the branch, the limits are those it exceeds; the closest branch is first."""
     robot = kin.get_robot(robot_id)
     rng = np.random.default_rng(12)
     blocked = 0
@@ -399,7 +403,7 @@ def test_a_singular_answer_says_which_kind(degrees, said):
     q[4] = math.pi / 2 if said else q[4]
     result = solve_ik(robot, kin.fk(robot, q), q_seed=q)
     assert result.status is Status.SOLVED
-    assert ("Singular there" in result.reason) is said
+    assert ("configuration is singular" in result.reason) is said
     assert bool([s for s in result.singularities if s.kind == "wrist"]) is said
 
 
@@ -480,7 +484,7 @@ def test_nearest_orientation_beats_a_dense_search(robot_id):
     ("arguments", "field", "said"),
     [
         ({"limits": [[0, 1]]}, "limits", "7 pairs"),
-        ({"limits": "wide"}, "limits", "7 pairs"),
+        ({"limits": "wide"}, "limits", "pairs"),
         ({"limits": [None] * 6 + [[1, 0]]}, "limits[6]", "not below"),
         ({"limits": [None] * 6 + [[0, math.nan]]}, "limits[6][1]", "finite"),
         ({"limits": [None] * 6 + [5]}, "limits[6]", "lower limit"),
@@ -507,7 +511,7 @@ def test_nearest_orientation_beats_a_dense_search(robot_id):
         ({"redundancy": {"theta9": 1.0}}, "redundancy", "psi"),
         ({"redundancy": {"psi": math.inf}}, "redundancy.psi", "finite"),
         ({"redundancy": {"psi": "up"}}, "redundancy.psi", "finite"),
-        ({"redundancy": 1.0, "task": "position"}, "redundancy", "no free parameter"),
+        ({"redundancy": 1.0, "task": "position"}, "redundancy", "no redundancy parameter"),
         ({"max_solutions": 1.5}, "max_solutions", "whole number"),
     ],
 )
@@ -529,7 +533,7 @@ def test_the_closed_form_can_be_switched_off():
             target = kin.fk(robot, q)
             result = solve_ik(robot, target, task=task, solver="numeric")
             assert (result.status, result.solver) == (Status.SOLVED, "numeric")
-            assert result.solver_reason == "asked for: numeric descent from many starts"
+            assert result.solver_reason == "requested: numeric descent from many starts"
             assert robot.in_limits(result.solutions[0].q)
             reached = kin.fk(robot, result.solutions[0].q)
             assert np.abs(reached[:3, 3] - target[:3, 3]).max() < 1e-9
@@ -556,3 +560,69 @@ def test_results_survive_pickling():
     copy = pickle.loads(pickle.dumps(arm))
     assert copy == arm
     assert np.array_equal(kin.fk(copy, copy.q_home), kin.fk(arm, arm.q_home))
+
+
+# Options as one value
+
+
+def test_options_are_values():
+    """Equal options are one key, whether made of lists, arrays or tuples; a bool is no number."""
+    lists = IKOptions(
+        mask=[True] * 3 + [False] * 3,
+        constraints=JointConstraints(limits=[None, [0, 1]], locked=np.array([0.5, 0.25])),
+        branch=["elbow up"],
+        redundancy={"psi": 1},
+    )
+    tuples = IKOptions(
+        mask=(True,) * 3 + (False,) * 3,
+        constraints=JointConstraints(limits=(None, (0.0, 1.0)), locked=(0.5, 0.25)),
+        branch="elbow up",
+        redundancy=(("psi", 1.0),),
+    )
+    assert lists == tuples
+    assert hash(lists) == hash(tuples)
+    assert {lists: 1}[tuples] == 1
+    assert replace(lists, max_solutions=2) != lists
+    copy = pickle.loads(pickle.dumps(lists))
+    assert copy == lists
+    assert "_hash" not in vars(copy), "hashes of strings differ between processes"
+    with pytest.raises(InputError, match="max_solutions"):
+        IKOptions(max_solutions=True)
+
+
+def test_keywords_and_options_give_the_same_answer():
+    arm = kin.get_robot("redundant7-craig")
+    rng = np.random.default_rng(8)
+    q, seed = arm.random_q(rng), arm.random_q(rng)
+    locked = [None, None, float(q[2]), None, None, None, None]
+    limits = [[-2.0, 2.0], *[None] * 6]
+    options = IKOptions(constraints=JointConstraints(limits, locked), branch="seed", prefer="limits")
+    one = solve_ik(arm, kin.fk(arm, q), q_seed=seed, limits=limits, locked=locked, branch="seed", prefer="limits")
+    other = kin.ik.solve(arm, kin.fk(arm, q), options, seed)
+    assert (one.status, one.reason, one.details) == (other.status, other.reason, other.details)
+    assert [s.q.tolist() for s in one.solutions] == [s.q.tolist() for s in other.solutions]
+
+
+def test_the_branch_of_the_seed_follows_each_seed():
+    """Prepared options are shared by all seeds; the branch of the seed is not."""
+    arm = kin.get_robot("redundant7-craig")
+    T, options = kin.fk(arm, arm.q_home), IKOptions(branch="seed")
+    seeds = arm.random_q(np.random.default_rng(4), 20)
+    names = set()
+    for seed in seeds:
+        for found in kin.ik.solve(arm, T, options, seed).solutions:
+            assert found.branch == kin.branch_of(arm, seed)
+            names.add(found.branch)
+    assert len(names) > 1
+
+
+def test_an_explanation_has_a_headline_and_a_detail_in_any_units():
+    arm = kin.get_robot("pioneer5")
+    result = solve_ik(arm, [2.0, 0.0, 0.0], task="position")
+    distance = result.details.distance
+    assert result.distance == distance
+    text = result.explain(Units(False, "m"))
+    assert text.headline == f"Out of reach by {distance:.4f} m"
+    assert text.detail.startswith("The point is too far away.")
+    assert text.text.startswith(f"{text.headline}: the point is too far away.")
+    assert result.reason.startswith(f"Out of reach by {1e3 * distance:.1f} mm: ")

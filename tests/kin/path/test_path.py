@@ -8,13 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from arms import CHAPTER_ARMS
+from arms import CHAPTER_ARMS, problem_of
 
 import kin
 from kin import InputError, Status, solve_ik
-from kin.ik.problem import ask
 from kin.path import solve_path
-from kin.path.waypoint import meeting
+from kin.path.configurations import meeting
 from kin.transforms import rotation_angle, vector_angle
 
 ROBOTS = CHAPTER_ARMS
@@ -52,7 +51,7 @@ def wave(robot, rng, count):
 
 
 def limited(robot, *degrees):
-    """The robot with other limits, in degrees, one pair or None (no stops) per joint."""
+    """The robot with other limits, in degrees, one pair or None (no limits) per joint."""
     pairs = iter(degrees)
     rows = tuple(
         row
@@ -114,7 +113,7 @@ def test_smooth_motions_are_followed_without_a_jump(robot_id):
 
 @pytest.mark.parametrize("robot_id", ROBOTS)
 @pytest.mark.parametrize("task", ["approach", "position"])
-def test_tasks_that_leave_more_free_are_followed_too(robot_id, task):
+def test_redundant_tasks_are_followed_too(robot_id, task):
     robot = kin.get_robot(robot_id)
     rng = np.random.default_rng(5)
     for _ in range(3):
@@ -128,7 +127,7 @@ def test_tasks_that_leave_more_free_are_followed_too(robot_id, task):
 
 
 def test_a_mask_is_followed():
-    """Only the height and the level of the tool: the other coordinates are as free as they can be."""
+    """Only the height and the level of the tool; the other coordinates may have any value."""
     robot = kin.get_robot(SRS)
     path = wave(robot, np.random.default_rng(8), 20)
     targets = kin.fk(robot, path)
@@ -141,7 +140,7 @@ def test_a_mask_is_followed():
 
 
 @pytest.mark.parametrize("robot_id", [PRINTED, SRS])
-def test_the_free_value_does_not_chatter(robot_id):
+def test_the_redundancy_parameter_does_not_chatter(robot_id):
     """The tool goes along a slow arc: second differences of the joints are far below a grid of samples."""
     robot = kin.get_robot(robot_id)
     path = np.radians([10, 40, 20, 60, 30, 50, 10]) + np.sin(np.linspace(0, 2, 61))[:, None] * np.radians(
@@ -181,16 +180,16 @@ def test_a_single_waypoint_is_the_solution_nearest_to_the_start():
         assert solve_path(robot, [kin.fk(robot, q)]).gaps == ()
 
 
-def test_what_is_polished_stays_on_its_turn():
+def test_polished_configurations_stay_on_their_turn():
     """A row that misses by 1e-8, with θ7 at 200°: it is corrected there, not at −160°, which home is nearer to."""
     robot = kin.get_robot(SRS)
     near = np.radians([10, 40, 20, 60, 30, 50, 200])
-    question = ask(robot, kin.fk(robot, near))
+    problem = problem_of(robot, kin.fk(robot, near))
     rows = near + 1e-8 * np.array([[1, 0, 0, 0, 0, 0, 0]])
-    assert meeting(question, False, rows, near) == pytest.approx(near[None], abs=1e-7)
+    assert meeting(problem, False, rows, near) == pytest.approx(near[None], abs=1e-7)
 
 
-# -- whole turns and stops ----------------------------------------------------------------------------------------
+# -- whole turns and limits ---------------------------------------------------------------------------------------
 
 
 def roll_path(start_degrees, sweep, count):
@@ -213,7 +212,7 @@ def test_a_long_turn_is_started_on_the_right_turn():
 
 
 def test_a_turn_that_is_too_long_unwinds_once_and_names_joint_7():
-    """700° do not fit into 540°: one jump, at the latest where θ7 has come to its stop."""
+    """700° do not fit into 540°: one jump, at the latest where θ7 reaches its limit."""
     robot, targets = roll_path(0.0, 700.0, 29)
     result = solve_path(robot, targets)
     assert_exact(robot, targets, result)
@@ -221,19 +220,19 @@ def test_a_turn_that_is_too_long_unwinds_once_and_names_joint_7():
     assert jump.cause == "limits"
     assert 6 in jump.joints
     assert jump.step > math.pi / 2
-    assert "joint 7 reaches its stop at 270.0°" in jump.reason
-    # From −212.9° at best (over all arm angles) the stop is 482.9° away.
+    assert "joint 7 reaches its limit of 270.0°" in jump.reason
+    # From −212.9° at best (over all arm angles) the limit is 482.9° away.
     assert 700 - 540 <= 25 * jump.index <= 483 + 25
     assert result.reason == f"29 waypoints with one jump: before waypoint {jump.index} (limits)."
     rest = np.delete(np.abs(np.diff(result.q, axis=0)).max(axis=1), jump.index - 1)
     assert rest.max() < 0.5
 
 
-def test_turning_backwards_names_the_other_stop():
+def test_turning_backwards_names_the_other_limit():
     robot, targets = roll_path(0.0, -600.0, 25)
     (jump,) = solve_path(robot, targets, locked=[None, None, 0.0, None, 0.0, None, None], branch="seed").jumps
     assert jump.cause == "limits"
-    assert "joint 7 reaches its stop at -270.0°" in jump.reason
+    assert "joint 7 reaches its limit of -270.0°" in jump.reason
 
 
 def test_every_further_turn_costs_one_more_jump():
@@ -246,7 +245,7 @@ def test_every_further_turn_costs_one_more_jump():
     assert all(jump.joints == (6,) and jump.step == pytest.approx(math.radians(335)) for jump in result.jumps)
 
 
-def test_joints_without_stops_turn_for_ever():
+def test_joints_without_limits_turn_forever():
     robot, targets = roll_path(0.0, 1000.0, 41)
     endless = limited(robot, (-270, 270), (-110, 110), (-180, 180), (-110, 110), (-180, 180), (-90, 90), None)
     result = solve_path(endless, targets, q_start=np.radians([0, 30, 0, 60, 0, 45, 0]))
@@ -296,8 +295,8 @@ def test_singularities_are_crossed_without_a_flip(robot_id, joint, base):
     assert squares(result.q) < 2.5 * squares(path)
 
 
-def test_a_singular_stretch_hands_an_angle_over():
-    """θ6 = 0 for 20 waypoints, where only θ5 + θ7 is known; before and behind, θ5 differs by 100°."""
+def test_an_angle_changes_smoothly_where_a_singular_stretch_leaves_it_open():
+    """θ6 = 0 for 20 waypoints, where only θ5 + θ7 is determined; before and after, θ5 differs by 100°."""
     robot = kin.get_robot(PRINTED)
     turn = np.concatenate([np.zeros(10), np.linspace(0, 100, 20), np.full(10, 100)])
     tilt = np.concatenate([np.linspace(20, 2, 10), np.zeros(20), np.linspace(2, 20, 10)])
@@ -311,7 +310,7 @@ def test_a_singular_stretch_hands_an_angle_over():
 
 
 def test_the_wrist_centre_passes_over_the_first_axis():
-    """The 5-joint arm reaches over its own shoulder: θ1 is free for one waypoint, and stays."""
+    """The 5-joint arm reaches over its own shoulder: θ1 is undetermined at one waypoint, and keeps its value."""
     robot = kin.get_robot("pioneer5")
     a1, a2, d4, t2 = 0.07, 0.16, 0.14, math.radians(75)
     over = math.acos(-(a1 + a2 * math.cos(t2)) / d4) - t2
@@ -325,7 +324,7 @@ def test_the_wrist_centre_passes_over_the_first_axis():
     assert np.abs(result.q - path).max() < 1e-6
 
 
-def test_a_pass_too_close_to_a_singularity_is_told():
+def test_a_pass_too_close_to_a_singularity_is_reported():
     """Past the wrist singularity at 1°: joints 5 and 7 must turn by nearly 180° within a step or two."""
     robot = kin.get_robot(PRINTED)
     sides = np.radians(np.linspace(-20, 20, 21))
@@ -344,7 +343,7 @@ def test_a_pass_too_close_to_a_singularity_is_told():
         assert {4, 6} <= set(jump.joints)
 
 
-def test_poses_too_far_apart_are_told_as_that():
+def test_poses_too_far_apart_are_reported_as_such():
     robot = kin.get_robot("pioneer5")
     targets = [kin.fk(robot, np.radians([a, 40, 60, 30, 30])) for a in (10, 50, 90, 100, 110)]
     result = solve_path(robot, targets)
@@ -357,15 +356,15 @@ def test_poses_too_far_apart_are_told_as_that():
     for jump, (a, b) in zip(result.jumps, itertools.pairwise(targets), strict=False):
         shift, turn = 1e3 * np.linalg.norm(b[:3, 3] - a[:3, 3]), math.degrees(rotation_angle(a[:3, :3], b[:3, :3]))
         assert jump.reason == (
-            f"Between waypoints {jump.index - 1} and {jump.index} joint 1 (rotating base) leaps by 40.0°: there "
+            f"Between waypoints {jump.index - 1} and {jump.index} joint 1 (rotating base) jumps by 40.0°: there "
             f"they are too far apart for steps of 28.6°: the tool moves by {shift:.1f} mm "
             f"and turns by {turn:.1f}°."
         )
     assert solve_path(robot, targets, max_step=0.7).continuous
 
 
-def test_only_what_a_mask_asks_for_counts_as_the_tools_motion():
-    """Three waypoints far apart, of which only the height is asked for: 50 mm up, and no way at all."""
+def test_only_masked_coordinates_count_as_tool_motion():
+    """Three waypoints far apart, of which only the height counts: 50 mm up, and no motion at all."""
     robot = kin.get_robot("pioneer5")
     T = kin.fk(robot, robot.home)
     targets = [T, moved(T, -0.4, 0.3, 0.05), turned(moved(T, 0.5, 0.0, 0.05), 90.0, "x")]
@@ -376,7 +375,7 @@ def test_only_what_a_mask_asks_for_counts_as_the_tools_motion():
     assert jump.reason.endswith("too far apart for steps of 1.1°: the tool moves by 50.0 mm.")
 
 
-def test_the_end_of_a_branch_is_told():
+def test_the_end_of_a_branch_is_reported():
     """The wrist centre comes in along a ray, from where only the front of the shoulder reaches, to near axis 2.
 
     There the front would need a forearm as long as the upper arm; only the back reaches.
@@ -421,12 +420,12 @@ def test_out_of_reach_and_back(robot_id):
     rest = [i for i in range(17) if i not in missing]
     assert result.position_error[rest].max() <= 1e-9
     assert robot.in_limits(result.q).all()
-    assert f"No exact answer at {len(missing)} of 17 waypoints: {missing[0]}" in result.reason
+    assert f"No exact solution at {len(missing)} of 17 waypoints: {missing[0]}" in result.reason
     within = [i for i in missing[1:] if i - 1 in missing]
     assert np.abs(np.diff(result.q, axis=0)[np.array(within) - 1]).max() < 0.5
 
 
-def test_an_orientation_that_cannot_be_had_is_a_gap():
+def test_an_impossible_orientation_is_a_gap():
     robot = kin.get_robot(SRS)
     T = kin.fk(robot, np.array(robot.home))
     targets = [moved(T, 0.02 * i, 0.0, 0.0) for i in range(12)]
@@ -437,7 +436,7 @@ def test_an_orientation_that_cannot_be_had_is_a_gap():
     assert_exact(robot, targets, result, rows=rest)
 
 
-def test_nothing_at_all_can_be_reached():
+def test_a_path_out_of_reach_is_all_gaps():
     robot = kin.get_robot("pioneer5")
     targets = [(0.1 * i, 3.0, 0.0) for i in range(5)]
     result = solve_path(robot, targets, task="position")
@@ -447,7 +446,7 @@ def test_nothing_at_all_can_be_reached():
 
 
 @pytest.mark.parametrize("roll", [1.0, 20.0])
-def test_five_joints_keep_point_and_direction_and_tell_the_roll(roll):
+def test_five_joints_keep_point_and_direction_and_report_the_roll(roll):
     robot = kin.get_robot("pioneer5")
     path = wave(robot, np.random.default_rng(6), 25)
     targets = kin.fk(robot, path)
@@ -464,7 +463,7 @@ def test_five_joints_keep_point_and_direction_and_tell_the_roll(roll):
     assert np.abs(result.q - path).max() < 1e-6
 
 
-def test_a_direction_beyond_a_stop_keeps_the_point():
+def test_a_direction_outside_the_limits_keeps_the_point():
     robot = kin.get_robot("pioneer5")
     path = np.radians([[90, 40, 60, 30, t] for t in np.linspace(30, 60, 16)])
     wide = limited(robot, (0, 180), (0, 150), (0, 150), (0, 85), (15, 80))
@@ -504,7 +503,7 @@ def test_narrowed_limits_hold_everywhere(robot_id):
 
 @pytest.mark.parametrize("robot_id", [PRINTED, SRS])
 def test_locked_joints_stay(robot_id):
-    """With joint 3 held the arms have no freedom left: the motion they came from is the only one."""
+    """With joint 3 held the arms are not redundant: the motion they came from is the only one."""
     robot = kin.get_robot(robot_id)
     locked = [0.3 if robot_id == PRINTED else None, None, 0.4 if robot_id == SRS else None, None, None, None, None]
     joint = next(i for i, value in enumerate(locked) if value is not None)
@@ -518,7 +517,7 @@ def test_locked_joints_stay(robot_id):
     assert squares(result.q) <= squares(path) * (1 + 1e-6)
 
 
-def test_a_lock_in_the_way_is_told():
+def test_a_lock_in_the_way_is_reported():
     robot = kin.get_robot("pioneer5")
     path = np.radians([[90, 40, 60, t, 30] for t in np.linspace(20, 40, 9)])
     result = solve_path(robot, kin.fk(robot, path), task="approach", locked=[None, None, None, path[0, 3], None])
@@ -527,8 +526,8 @@ def test_a_lock_in_the_way_is_told():
     assert "joint 4 (rotating wrist) at 22.5° (locked at 20.0°)" in result.gaps[0].reason
 
 
-def test_a_lock_that_forces_a_jump_is_told():
-    """θ1 is what the arm has free: held where the motion began, the branch comes to its end."""
+def test_a_lock_that_forces_a_jump_is_reported():
+    """θ1 is the redundancy parameter: held at its first value, the branch ends."""
     robot = kin.get_robot(PRINTED)
     path = wave(robot, np.random.default_rng(7), 16)
     locked = [path[0, 0], *[None] * 6]
@@ -540,7 +539,7 @@ def test_a_lock_that_forces_a_jump_is_told():
 
 
 @pytest.mark.parametrize("branch", ["elbow down", "shoulder back", "shoulder front · elbow up · wrist flip"])
-def test_the_path_stays_on_the_branches_asked_for(branch):
+def test_the_path_stays_on_the_requested_branches(branch):
     robot = kin.get_robot(SRS)
     path = np.radians([10, 40, 20, 60, 30, 50, 10]) + np.linspace(0, 1, 21)[:, None] * np.radians([40] * 7)
     path[:, 5] = np.radians(np.linspace(50, 30, 21))
@@ -594,7 +593,7 @@ def test_no_other_choice_of_solutions_is_better(case, started):
     assert several > 4
 
 
-def test_the_free_value_is_the_best_of_a_fine_grid():
+def test_the_redundancy_parameter_is_the_best_of_a_fine_grid():
     """Two poses of the S-R-S arm: no pair of arm angles on a one-degree grid has less motion."""
     robot = kin.get_robot(SRS)
     start = np.radians([10, 40, 20, 60, 30, 50, 10])
@@ -614,7 +613,7 @@ def test_the_free_value_is_the_best_of_a_fine_grid():
 
 
 @pytest.mark.parametrize("robot_id", ROBOTS)
-def test_the_same_question_gets_the_same_path(robot_id):
+def test_the_same_problem_has_the_same_path(robot_id):
     robot = kin.get_robot(robot_id)
     targets = kin.fk(robot, wave(robot, np.random.default_rng(77), 12))
     first, second = (solve_path(robot, targets) for _ in range(2))
@@ -622,7 +621,7 @@ def test_the_same_question_gets_the_same_path(robot_id):
     assert first.reason == second.reason
 
 
-def test_an_arm_of_no_known_family_follows_too():
+def test_an_arm_without_a_closed_form_follows_too():
     text = """
     id = "odd"
     name = "odd"
@@ -654,7 +653,7 @@ def test_an_arm_of_no_known_family_follows_too():
     assert jump.joints == (2,)
     assert jump.step == pytest.approx(0.6)
     assert jump.cause == "spacing"
-    assert "joint 3 leaps by 150.0 mm: there they are too far apart for steps of 125.0 mm" in jump.reason
+    assert "joint 3 jumps by 150.0 mm: there they are too far apart for steps of 125.0 mm" in jump.reason
 
 
 @pytest.mark.parametrize(

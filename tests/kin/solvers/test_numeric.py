@@ -14,10 +14,10 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from arms import problem_of
 
 import kin
 from kin.ik import nearest
-from kin.ik.problem import ask
 from kin.robot import Joint, Robot
 from kin.solvers import numeric
 from kin.solvers.contract import APPROACH, MASK, POSE, POSITION
@@ -67,12 +67,12 @@ def task_of(robot):
     return "approach" if robot.n == 5 else "pose"
 
 
-def cost_of(question, code, weight, q, bent=True):
+def cost_of(problem, code, weight, q, bent=True):
     """E²/2, the gradient ``(n,)`` and the Hessian ``(n, n)`` that the descent uses."""
-    n = question.robot.n
+    n = problem.robot.n
     J, T, axes, e = np.empty((6, n)), np.empty((4, 4)), np.empty((n, 7)), np.empty(6)
-    arguments = (question.T, code, question.mask, weight)
-    cost = numeric._look(question.robot.model, q, *arguments, J, T, axes, e)
+    arguments = (problem.T, code, problem.mask, weight)
+    cost = numeric._look(problem.robot.model, q, *arguments, J, T, axes, e)
     H, g = np.zeros((n, n)), np.empty(n)
     numeric._model(T, *arguments, bent, J, e, np.empty(6), H, g)
     return cost, -g, np.tril(H) + np.tril(H, -1).T
@@ -89,12 +89,12 @@ def test_gradient_and_second_derivatives_are_those_of_the_error(code):
         robot = chain(rng, 6, convention)
         mask = (True, False, True, True, True, False) if code == MASK else None
         for frame in ("tool", "base"):
-            question = ask(robot, kin.fk(robot, robot.random_q(rng)), mask=mask, mask_frame=frame)
+            problem = problem_of(robot, kin.fk(robot, robot.random_q(rng)), mask=mask, mask_frame=frame)
             q = robot.random_q(rng)
-            cost, gradient, hessian = cost_of(question, code, 0.3, q, bent=code != MASK)
+            cost, gradient, hessian = cost_of(problem, code, 0.3, q, bent=code != MASK)
             assert cost > 1e-3
             for i, step in enumerate(h * np.eye(robot.n)):
-                (after, up, _), (before, down, _) = (cost_of(question, code, 0.3, q + s) for s in (step, -step))
+                (after, up, _), (before, down, _) = (cost_of(problem, code, 0.3, q + s) for s in (step, -step))
                 assert gradient[i] == pytest.approx((after - before) / (2 * h), abs=1e-8)
                 if code != MASK:
                     assert hessian[i] == pytest.approx((up - down) / (2 * h), abs=1e-7)
@@ -108,12 +108,12 @@ def test_a_descent_ends_where_no_small_step_helps(robot_id, task):
     rng = np.random.default_rng(2)
     ended = 0
     for _ in range(12):
-        question = ask(robot, somewhere(rng), task=task)
+        problem = problem_of(robot, somewhere(rng), task=task)
         starts = robot.random_q(rng, 4)
-        ends, found = nearest.descend_each(question, question.code, starts, 0.1)
+        ends, found = nearest.descend_each(problem, problem.code, starts, 0.1)
         for q, error in zip(ends, found, strict=True):
             assert robot.in_limits(q)
-            cost, gradient, _ = cost_of(question, question.code, 0.1, q)
+            cost, gradient, _ = cost_of(problem, problem.code, 0.1, q)
             assert error == pytest.approx(math.sqrt(2 * cost), abs=1e-12)
             pushed = np.where(q == robot.lower, np.minimum(gradient, 0.0), gradient)
             pushed = np.where(q == robot.upper, np.maximum(gradient, 0.0), pushed)
@@ -127,7 +127,7 @@ def test_a_joint_of_a_turn_or_more_has_no_stop_and_a_narrow_gap_is_leapt():
         rows = [Joint(str(i), a=0.3, limits=(-math.radians(half), math.radians(half))) for i in range(3)]
         robot = Robot("planar", "planar", "made up", "standard", tuple(rows), (0.0, 0.0, 0.0))
         target = kin.fk(robot, np.radians([goal, 40, 30]))
-        found = nearest.solve_numerically(ask(robot, target, q_seed=np.radians([seed, 35, 35])))
+        found = nearest.solve_numerically(problem_of(robot, target, q_seed=np.radians([seed, 35, 35])))
         assert found.starts == 1
         assert robot.in_limits(found.q)
         turns = (math.radians(goal) - found.q[0]) / TURN
@@ -146,7 +146,7 @@ def test_random_chains_reach_what_they_can_reach(n, convention):
         robot = chain(rng, n, convention)
         for q, seed in zip(robot.random_q(rng, 8), robot.random_q(rng, 8), strict=True):
             target = kin.fk(robot, q)
-            found = nearest.solve_numerically(ask(robot, target, q_seed=seed))
+            found = nearest.solve_numerically(problem_of(robot, target, q_seed=seed))
             position, rotation = errors(robot, target, found.q)
             assert max(position, rotation) <= 1e-9, (robot.rows, q.tolist(), seed.tolist(), found)
             assert robot.in_limits(found.q)
@@ -160,8 +160,8 @@ def test_every_mask(frame):
     for mask in itertools.islice(itertools.product((False, True), repeat=6), 1, None):
         robot = chain(rng, 6)
         target = kin.fk(robot, robot.random_q(rng))
-        question = ask(robot, target, mask=mask, mask_frame=frame, q_seed=robot.random_q(rng))
-        found = nearest.solve_numerically(question)
+        problem = problem_of(robot, target, mask=mask, mask_frame=frame, q_seed=robot.random_q(rng))
+        found = nearest.solve_numerically(problem)
         R, S = target[:3, :3], kin.fk(robot, found.q)
         away = S[:3, 3] - target[:3, 3]
         turned = S[:3, :3] @ R.T
@@ -181,7 +181,7 @@ def test_limits_are_kept_to_the_bit_and_locked_joints_stay():
         robot = chain(rng, 7)
         locks = [None] * 7
         locks[2] = float(np.clip(0.1, robot.lower[2], robot.upper[2]))
-        found = nearest.solve_numerically(ask(robot, somewhere(rng), locked=locks, task="position"), 20)
+        found = nearest.solve_numerically(problem_of(robot, somewhere(rng), locked=locks, task="position"), 20)
         assert (robot.lower <= found.q).all()
         assert (found.q <= robot.upper).all()
         assert found.q[2] == locks[2]
@@ -199,7 +199,7 @@ def test_narrowed_limits():
             high = low + 0.25 * width
             target = kin.fk(robot, rng.uniform(low, high))
             limits = np.c_[low, high].tolist()
-            found = nearest.solve_numerically(ask(robot, target, task=task_of(robot), limits=limits))
+            found = nearest.solve_numerically(problem_of(robot, target, task=task_of(robot), limits=limits))
             assert max(errors(robot, target, found.q, task_of(robot))) <= 1e-9
             assert (low <= found.q).all()
             assert (found.q <= high).all()
@@ -211,7 +211,7 @@ def test_the_seed_comes_first():
     for robot in kin.builtin_robots().values():
         for q in robot.random_q(rng, 20):
             target = kin.fk(robot, q)
-            found = nearest.solve_numerically(ask(robot, target, task=task_of(robot), q_seed=q))
+            found = nearest.solve_numerically(problem_of(robot, target, task=task_of(robot), q_seed=q))
             assert found.starts == 1
             assert found.q == pytest.approx(q, abs=1e-9)
 
@@ -220,9 +220,9 @@ def test_out_of_reach_the_budget_is_used_up_and_the_best_minimum_told():
     robot = kin.get_robot("redundant7-craig")
     target = np.eye(4)
     target[:3, 3] = (2.0, 0.0, 0.30)
-    question = ask(robot, target, task="position")
+    problem = problem_of(robot, target, task="position")
     for budget in (1, 7, 60):
-        found = nearest.solve_numerically(question, budget)
+        found = nearest.solve_numerically(problem, budget)
         assert found.starts == budget
         assert robot.in_limits(found.q)
         assert found.error == pytest.approx(errors(robot, target, found.q, "position")[0], abs=1e-12)
@@ -233,21 +233,21 @@ def test_a_larger_budget_never_ends_worse():
     rng = np.random.default_rng(12)
     robot = kin.get_robot("redundant7")
     for _ in range(10):
-        question = ask(robot, somewhere(rng))
-        ends = [nearest.solve_numerically(question, budget).error for budget in (1, 4, 16, 64)]
+        problem = problem_of(robot, somewhere(rng))
+        ends = [nearest.solve_numerically(problem, budget).error for budget in (1, 4, 16, 64)]
         assert all(later <= sooner + 1e-9 for sooner, later in itertools.pairwise(ends))
 
 
-def test_same_question_same_answer_in_any_thread():
+def test_the_same_problem_has_the_same_solution_in_any_thread():
     rng = np.random.default_rng(13)
-    questions = [
-        ask(robot, kin.fk(robot, q), task=task_of(robot), q_seed=seed)
+    problems = [
+        problem_of(robot, kin.fk(robot, q), task=task_of(robot), q_seed=seed)
         for robot in kin.builtin_robots().values()
         for q, seed in zip(robot.random_q(rng, 60), robot.random_q(rng, 60), strict=True)
     ]
-    serial = [nearest.solve_numerically(question) for question in questions]
+    serial = [nearest.solve_numerically(problem) for problem in problems]
     with ThreadPoolExecutor(8) as pool:
-        threaded = list(pool.map(nearest.solve_numerically, questions))
+        threaded = list(pool.map(nearest.solve_numerically, problems))
     for one, other in zip(serial, threaded, strict=True):
         assert one.q.tolist() == other.q.tolist()
         assert one[1:] == other[1:]
@@ -259,12 +259,12 @@ def test_restarts_are_the_points_of_spread():
     rng = np.random.default_rng(14)
     later = 0
     for q in robot.random_q(rng, 400):
-        question = ask(robot, kin.fk(robot, q), q_seed=robot.random_q(rng))
-        found = nearest.solve_numerically(question)
+        problem = problem_of(robot, kin.fk(robot, q), q_seed=robot.random_q(rng))
+        found = nearest.solve_numerically(problem)
         if found.starts > 1:
             later += 1
             start = numeric.spread(robot.lower, robot.upper, found.starts)[found.starts - 2]
-            again = nearest.solve_numerically(question.near(start), 1)
+            again = nearest.solve_numerically(problem.near(start), 1)
             assert again.q == pytest.approx(found.q, abs=1e-6)
     assert later >= 1
 
@@ -280,10 +280,10 @@ def test_closest_is_as_close_as_four_hundred_descents_get(robot_id):
     missed = 0
     for task in ("pose", "approach", "position"):
         for _ in range(8):
-            question = ask(robot, somewhere(rng), task=task)
-            mine = nearest.mismatch(nearest.closest(question, None))
-            starts = nearest.starting_points(question, count=400)
-            _, ends = nearest.descend_each(question, question.code, starts, nearest.ORIENTATION_WEIGHT)
+            problem = problem_of(robot, somewhere(rng), task=task)
+            mine = nearest.mismatch(nearest.closest(problem, None))
+            starts = nearest.starting_points(problem, count=400)
+            _, ends = nearest.descend_each(problem, problem.code, starts, nearest.ORIENTATION_WEIGHT)
             missed += mine > ends.min() + 1e-6
     assert missed <= 1
 
@@ -298,9 +298,9 @@ def prove(robot, count, seed):
     targets = kin.fk(robot, q)
     missed, starts, seconds = [], np.zeros(count), np.zeros(count)
     for i in range(count):
-        question = ask(robot, targets[i], task=task_of(robot), q_seed=seeds[i], solver="numeric")
+        problem = problem_of(robot, targets[i], task=task_of(robot), q_seed=seeds[i], solver="numeric")
         before = time.thread_time()
-        found = nearest.solve_numerically(question)
+        found = nearest.solve_numerically(problem)
         seconds[i] = time.thread_time() - before
         starts[i] = found.starts
         assert robot.in_limits(found.q)

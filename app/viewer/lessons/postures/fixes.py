@@ -123,7 +123,7 @@ def html(result: IKResult | None, branch: str | None, units: Units) -> str:
     if result is None:
         title, detail, color, symbol = "Nothing is missed", "The target is where the tool is.", "#0072b2", "✓"
     elif result.status == "solved":
-        title, detail, color, symbol = "Reached", units.retold(result.reason), LOOKS["reached"][1], "✓"
+        title, detail, color, symbol = "Reached", result.explain(units).text, LOOKS["reached"][1], "✓"
     else:
         said = notice(result, units)
         symbol, color = LOOKS[said.kind]

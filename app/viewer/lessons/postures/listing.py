@@ -17,10 +17,10 @@ import numpy as np
 import kin
 from app.viewer.panel.posture import parts, short
 from app.viewer.scene.meshes import JOINT_COLORS, Color
-from kin import IKSolution, LimitViolation, Robot, Task
+from kin import IKOptions, IKSolution, JointConstraints, LimitViolation, Robot, Task
 from kin.ik.branches import is_closed, solve_branches, violations_of
 from kin.ik.candidates import OVERRUN
-from kin.ik.problem import ask
+from kin.ik.problem import IKProblem
 from kin.transforms import Array
 from kin.units import DEFAULT_UNITS, Units
 
@@ -110,8 +110,9 @@ def _left_out(
 ) -> dict[str, Posture]:
     """What the closed form knows of each branch; nothing if it does not cover the task."""
     # Of a pose, an arm of five joints keeps point and approach: that is where its branches are.
-    question = ask(robot, T, task="approach" if task == "pose" and robot.n < 6 else task, q_seed=q, locked=locked)
-    branches = solve_branches(question, question.T, question.code)
+    kept: Task = "approach" if task == "pose" and robot.n < 6 else task
+    problem = IKProblem.of(robot, T, IKOptions(task=kept, constraints=JointConstraints(locked=locked)), q)
+    branches = solve_branches(problem, problem.T, problem.code)
     if branches is None:
         return {}
     closed = is_closed(branches.stats)
@@ -120,7 +121,7 @@ def _left_out(
         if not closed[i]:
             found[name] = Posture(name, "absent", "not here")
         elif branches.stats[i, OVERRUN] > 0.0:
-            words = beyond(robot, violations_of(question, branches.q[i]), question.locked, units)
+            words = beyond(robot, violations_of(problem, branches.q[i]), problem.locked, units)
             found[name] = Posture(name, "blocked", words, branches.q[i].copy())
         else:
             found[name] = Posture(name, "absent", "the same as another")  # two branches have merged

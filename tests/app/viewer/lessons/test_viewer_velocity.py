@@ -224,7 +224,7 @@ def test_at_a_stop_or_out_of_reach_nothing_moves_and_the_reason_is_told() -> Non
         down = kin.jacobian(scara, q)[2, slide] * sign
         made = step(scara, q, "pose", 2, 0.02 * math.copysign(1.0, down), "base")
         assert made.q is None
-        assert "Not moved: out of limits" in made.told.title
+        assert "Not moved: outside the limits" in made.told.title
         assert made.told.detail
 
 

@@ -178,7 +178,7 @@ def test_a_limit_is_named_by_joint_number(port: int) -> None:
         tab.drag(T)
         tab.release()
         tab.wait(lambda: 'data-status="limits"' in tab.html)
-        assert f"Out of limits: joint {expected.violations[0].joint + 1}" in tab.html
+        assert f"Outside the limits: joint {expected.violations[0].joint + 1}" in tab.html
 
 
 def test_home_random_and_units(port: int) -> None:

@@ -1,8 +1,8 @@
-"""What can be asked of the arm besides where to go: the fields that ``ik`` and ``ik/path`` share."""
+"""Options of ``ik``, ``ik/path`` and ``reachable``: task, joint constraints, branch."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag
 
@@ -10,26 +10,27 @@ from app.api import schemas
 from app.api.schemas import Number, numbers
 from app.api.targets import Target
 from app.shared.settings import Settings
-from kin import Task
+from kin import IKOptions, JointConstraints, Task
 from kin.transforms import Array
 
 
-def one_or_many(value: object) -> str:
-    """Whether one thing was sent or a list of them."""
+def single_or_list(value: object) -> str:
+    """Tag of a value that may be one item or a list of items."""
     return "many" if isinstance(value, list) else "one"
 
 
 Mask = Annotated[list[Annotated[bool, Field(strict=True)]], numbers(6)]
 Pair = Annotated[list[Number], numbers(2)]
-Wish = Annotated[str, Field(max_length=200)]
-Wishes = Annotated[
-    Annotated[Wish, Tag("one")] | Annotated[list[Wish], Field(min_length=1, max_length=16), Tag("many")],
-    Discriminator(one_or_many),
+BranchName = Annotated[str, Field(max_length=200)]
+BranchNames = Annotated[
+    Annotated[BranchName, Tag("one")]
+    | Annotated[list[BranchName], Field(min_length=1, max_length=16), Tag("many")],
+    Discriminator(single_or_list),
 ]
 
 
-class Asked(schemas.Body):
-    """The task, and what the joints may do."""
+class OptionsBody(schemas.Body):
+    """Task, joint constraints, branch."""
 
     task: Task | None = Field(
         None,
@@ -40,11 +41,11 @@ class Asked(schemas.Body):
     mask: Mask | None = Field(
         None,
         description="Instead of a task: which of the six coordinates x, y, z, rx, ry, rz of the error must "
-        "vanish; the last three are the rotation vector from the target to the tool.",
+        "be zero; the last three are the rotation vector from the target to the tool.",
     )
     mask_frame: Literal["tool", "base"] = Field(
         "tool",
-        description="Whether the mask's coordinates are told in the target's own frame or in the base frame.",
+        description="Frame of the mask's coordinates: the target's own (tool) or the base frame.",
     )
     limits: list[Pair | None] | None = Field(
         None,
@@ -55,23 +56,28 @@ class Asked(schemas.Body):
         None,
         description="Joint values to keep, in radians (metres), one per joint; null for a joint that may move.",
     )
-    branch: Wishes | None = Field(
+    branch: BranchNames | None = Field(
         None,
         description="Only these branches: a name as in `branches` of the robot, parts of one such as `elbow up`, "
-        "`seed` for the branch the seed is on, or a list of these.",
+        "`seed` for the branch of the seed, or a list of these.",
     )
 
-    @property
-    def options(self) -> dict[str, Any]:
-        """These fields but for the task, as `kin.solve_ik` and `kin.solve_path` take them by name."""
-        return {name: getattr(self, name) for name in ("mask", "mask_frame", "limits", "locked", "branch")}
+    def options(self, task: Task) -> IKOptions:
+        """These fields as options of the core, for a task that the targets may imply."""
+        return IKOptions(
+            task=task,
+            mask=self.mask,
+            mask_frame=self.mask_frame,
+            constraints=JointConstraints(self.limits, self.locked),
+            branch=self.branch,
+        )
 
     def resolve_all(
         self, target: Target | list[Target], settings: Settings
     ) -> tuple[list[tuple[Task, Array]], bool]:
-        """What `resolve` gives for one target or for a list, and whether it was one.
+        """`resolve` of one target or of each in a list, and whether it was one.
 
-        All are read before anything is answered: a mistake in the last one costs nothing. Raises 413 for too many.
+        All are read before anything is computed: a mistake in the last one costs nothing. Raises 413 for too many.
         """
         if isinstance(target, Target):
             return [self.resolve(target, "target")], True
@@ -79,9 +85,9 @@ class Asked(schemas.Body):
         return [self.resolve(each, f"target[{i}]") for i, each in enumerate(target)], False
 
     def resolve(self, target: Target, field: str) -> tuple[Task, Array]:
-        """The task as the core takes it, and the target's pose ``(4, 4)``; raises `ProblemError` naming `field`.
+        """The task, and the target's pose ``(4, 4)``; raises `ProblemError` naming `field`.
 
-        A mask without rotations takes a target that is a point alone.
+        With a mask without rotations, a target may be a point alone.
         """
         if self.mask is None:
             return target.resolve(self.task, field)

@@ -1,0 +1,129 @@
+"""Which kind of answer a problem has.
+
+1. A closed form covers the task: its branches inside the limits are the solutions (`_solved`).
+2. Without it, or for a task it does not cover: numeric descents (`_numeric`).
+3. No solution: :mod:`kin.ik.failures` finds out why, and what comes closest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kin.fk import fk
+from kin.ik import failures, preferences
+from kin.ik import nearest as search
+from kin.ik.assembly import by_key, make_result, solutions_of
+from kin.ik.branches import Branches, Flags, is_closed, measure, solution, solve_branches
+from kin.ik.candidates import DISTANCE, OVERRUN
+from kin.ik.details import NotOnBranch, Solved
+from kin.ik.images import with_images
+from kin.ik.problem import IKProblem
+from kin.ik.results import IKResult, Status
+from kin.solvers.contract import APPROACH, POSE, POSITION
+from kin.transforms import Array
+
+
+def answer(problem: IKProblem) -> IKResult:
+    """The answer to a checked problem."""
+    branches = solve_branches(problem, problem.T, problem.code)
+    if branches is None:
+        return _numeric(problem)
+    if branches.order and problem.branches is None:
+        return _solved(problem, branches, branches.good)
+    closed, good = branches.closed, branches.good
+    if not branches.order and not problem.requested:  # a descent would change a requested value
+        good = search.polish(problem, branches.q, branches.stats)
+        closed |= good
+    allowed = np.array([problem.allows(i) for i in range(len(closed))])
+    if (good & allowed).any():
+        return _solved(problem, branches, good & allowed)
+    if (closed & allowed).any():
+        return failures.outside_limits(problem, branches, closed & allowed, good)
+    if closed.any():
+        return failures.not_on_branch(problem, branches, closed, good)
+    if problem.robot.n < 6 and problem.code == POSE:
+        return failures.compromise(problem, branches, allowed)
+    return failures.out_of_reach(problem, branches)
+
+
+def _solved(problem: IKProblem, branches: Branches, good: Flags) -> IKResult:
+    """The rows in `good` ``(k,)`` are the solutions."""
+    if problem.options.prefer != "nearest":
+        preferences.improve(problem, branches, good)
+        order = by_key(branches.q, good, preferences.ranks(problem, branches.q, branches.stats[:, DISTANCE]))
+    elif good is branches.good:
+        order = branches.order
+    else:
+        order = by_key(branches.q, good, branches.stats[:, DISTANCE])
+    solutions, redundancy = solutions_of(problem, branches, order, good)
+    if problem.options.images == "all":
+        solutions = with_images(problem, solutions)
+        if redundancy and solutions[0].redundancy:
+            redundancy = tuple(
+                r._replace(value=own.value) for r, own in zip(redundancy, solutions[0].redundancy, strict=True)
+            )
+    details = Solved(len(solutions), bool(redundancy))
+    return make_result(problem, Status.SOLVED, "", details, solutions=solutions, redundancy=redundancy)
+
+
+def _numeric(problem: IKProblem) -> IKResult:
+    """A task or an arm without a closed form: descents from many starts.
+
+    Where the arm has a closed form for whole poses, it adds the other branches of the poses found.
+    """
+    prefer = problem.options.prefer
+    if problem.branches is None and prefer == "nearest":
+        pool = search.solve_numerically(problem).q[None]
+    else:
+        starts = search.starting_points(problem, count=4 * search.STARTS)
+        pool = search.descend_each(problem, problem.code, starts, 1.0)[0]
+    q, stats = _usable(problem, *measure(problem, pool))
+    if not len(q):
+        return failures.out_of_reach(problem, None)
+    related = [_same_pose(problem, row) for row in q]
+    q = np.concatenate([q, *related])
+    if prefer == "nearest":
+        q, stats = measure(problem, q)
+        key = stats[:, DISTANCE].copy()
+    else:
+        q, stats = preferences.centred(problem, q)
+        key = preferences.ranks(problem, q, stats[:, DISTANCE])
+    # The best one of each branch: several descents may end on the same branch.
+    best: dict[int, int] = {}
+    for i in np.argsort(key, kind="stable").tolist():
+        branch = problem.branch_of(q[i])
+        if problem.allows(branch) and len(_usable(problem, q[i : i + 1], stats[i : i + 1])[0]):
+            best.setdefault(branch, i)
+    if not best:
+        details = NotOnBranch(len({problem.branch_of(row) for row in q}), 0)
+        closest = search.closest(problem, None)
+        return make_result(problem, Status.UNREACHABLE, "branch", details, closest=closest)
+    solutions = tuple(solution(problem, q[i], stats[i], branch) for branch, i in best.items())
+    if problem.options.images == "all":
+        solutions = with_images(problem, solutions)
+    closed_form = problem.closed_form if len(related[0]) else None
+    return make_result(
+        problem,
+        Status.SOLVED,
+        "",
+        Solved(len(solutions), False),
+        solutions=solutions,
+        solver="numeric" if closed_form is None else closed_form.name,
+    )
+
+
+def _usable(problem: IKProblem, q: Array, stats: Array) -> tuple[Array, Array]:
+    """The rows that meet the task inside the limits."""
+    rows = is_closed(stats)
+    if problem.respect:
+        rows = rows & (stats[:, OVERRUN] == 0.0)
+    return q[rows], stats[rows]
+
+
+def _same_pose(problem: IKProblem, q: Array) -> Array:
+    """The branches ``(k, n)`` of the closed form at the pose of q ``(n,)``."""
+    T = fk(problem.robot, q)
+    if problem.code == POSITION:
+        T[:3, 3] = problem.T[:3, 3]
+    found = solve_branches(problem, T, POSE if problem.robot.n >= 6 else APPROACH, q)
+    return np.empty((0, problem.robot.n)) if found is None else found.q[~np.isnan(found.q[:, 0])]

@@ -1,0 +1,88 @@
+"""From measured rows to results: order, solutions with their redundancy, and the result with what is singular."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kin.ik.branches import Branches, Flags, redundancy_of
+from kin.ik.candidates import select
+from kin.ik.details import Details, Redundancy
+from kin.ik.problem import IKProblem
+from kin.ik.results import BlockedBranch, Cause, IKResult, IKSolution, Status
+from kin.singularity import Singularity, singularities_at
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+
+def by_key(q: Array, rows: Flags, key: Array) -> list[int]:
+    """The flagged rows of q ``(k, n)`` by rising key, each configuration once."""
+    kept, count = select(q, np.where(rows, key, math.inf))
+    order: list[int] = kept[:count].tolist()
+    return order
+
+
+def solutions_of(
+    problem: IKProblem, branches: Branches, order: list[int], every: Flags, compromise: str | None = None
+) -> tuple[tuple[IKSolution, ...], tuple[Redundancy, ...]]:
+    """Rows as solutions in this order, and the redundancy of the rows in `every` together."""
+    q, stats = branches.q.copy(), branches.stats.tolist()
+    q.flags.writeable = False
+    each, together = redundancy_of(problem, branches, order, every)
+    assert problem.closed_form is not None  # whose branches these are
+    names = problem.closed_form.branches
+    solutions = []
+    for i, own in zip(order, each, strict=True):
+        position, rotation, distance, overrun, _ = stats[i]
+        solutions.append(IKSolution(q[i], names[i], position, rotation, overrun == 0.0, distance, own, compromise))
+    return tuple(solutions), together
+
+
+def make_result(
+    problem: IKProblem,
+    status: Status,
+    cause: Cause,
+    details: Details,
+    *,
+    solutions: tuple[IKSolution, ...] = (),
+    closest: IKSolution | None = None,
+    solver: str | None = None,
+    blocked: tuple[BlockedBranch, ...] = (),
+    distance: float = 0.0,
+    nearest_orientation: IKSolution | None = None,
+    redundancy: tuple[Redundancy, ...] = (),
+) -> IKResult:
+    """A result, with the singularities of the configuration it shows."""
+    best = solutions[0] if solutions else closest
+    singular: tuple[Singularity, ...] = ()
+    if best is not None:
+        singular = singularities_at(problem.robot, best.q, TOLERANCES.at_singularity)
+    if solver is None:
+        solver = "numeric" if problem.closed_form is None else problem.closed_form.name
+    return IKResult(
+        status=status,
+        cause=cause,
+        details=details,
+        solutions=solutions[: problem.options.max_solutions],
+        closest=closest,
+        solver=solver,
+        solver_reason=_solver_reason(problem, solver),
+        task=problem.task,
+        blocked=blocked,
+        distance=distance,
+        nearest_orientation=nearest_orientation,
+        redundancy=redundancy,
+        singularities=singular,
+    )
+
+
+def _solver_reason(problem: IKProblem, used: str) -> str:
+    """Why the answer comes from this solver."""
+    closed_form = problem.closed_form
+    if closed_form is None:
+        why = "no closed form fits this arm's axes" if problem.options.solver == "auto" else "requested"
+        return f"{why}: numeric descent from many starts"
+    if used != closed_form.name:
+        return f"the closed form ({closed_form.name}) does not cover this task or target: numeric descent"
+    return closed_form.reason

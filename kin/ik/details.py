@@ -1,0 +1,153 @@
+"""The facts behind an IK answer, as numbers: one type per kind of answer.
+
+`kin.IKResult.details` holds one of these. :mod:`kin.ik.messages` makes the sentence from it. Lengths are in
+metres, angles in radians, values of prismatic joints in metres.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+from kin.solvers.contract import Obstacle
+
+JointKind = Literal["revolute", "prismatic"]
+
+
+@dataclass(frozen=True, slots=True)
+class LimitViolation:
+    """A joint value outside the joint's limits.
+
+    Attributes:
+        joint, name: index and name of the joint.
+        value: the value that is outside.
+        limit: the limit it exceeds.
+        kind: whether the joint turns or slides, which tells the unit of both.
+        locked: whether the limit is the value at which the joint is locked.
+    """
+
+    joint: int
+    name: str
+    value: float
+    limit: float
+    kind: JointKind = "revolute"
+    locked: bool = False
+
+
+class Redundancy(NamedTuple):
+    """A redundancy parameter: id, label, the value used, and all values that the limits allow.
+
+    With several parameters, the ranges of each hold for the present values of the others. An angle that is not the
+    value of a joint (``psi``, ``roll``) is in (−π, π]; a range across ±π is given as two.
+    """
+
+    name: str
+    label: str
+    value: float
+    intervals: tuple[tuple[float, float], ...]
+
+
+class Solved(NamedTuple):
+    """Exact solutions exist.
+
+    Attributes:
+        configurations: how many were found; `max_solutions` may return fewer.
+        redundant: whether the task leaves a redundancy parameter.
+    """
+
+    configurations: int
+    redundant: bool
+
+
+class RollError(NamedTuple):
+    """An arm of few joints meets point and approach direction, not the rotation about it.
+
+    Attributes:
+        joints: number of joints of the arm.
+        rotation_error: rotation that is left.
+    """
+
+    joints: int
+    rotation_error: float
+
+
+class RotationError(NamedTuple):
+    """An arm of few joints meets the point, not the orientation.
+
+    Attributes:
+        joints: number of joints of the arm.
+        rotation_error: rotation that is left, the smallest found.
+        violation: the limit that keeps the arm from the approach direction; None if no limit does.
+    """
+
+    joints: int
+    rotation_error: float
+    violation: LimitViolation | None
+
+
+class OutsideLimits(NamedTuple):
+    """Postures exist, but all of them are outside the limits.
+
+    Attributes:
+        branch: the posture that is closest to the limits.
+        violations: its joint values outside the limits.
+        branches: how many postures are outside the limits, this one included.
+        requested: the redundancy parameters whose values were requested, with the values that would do.
+        elsewhere: how many solutions there are on branches that were not requested.
+    """
+
+    branch: str
+    violations: tuple[LimitViolation, ...]
+    branches: int
+    requested: tuple[Redundancy, ...]
+    elsewhere: int
+
+
+class NotOnBranch(NamedTuple):
+    """The requested branch does not exist at the target.
+
+    Attributes:
+        elsewhere: how many solutions there are on other branches.
+        outside_limits: how many other branches exist, but outside the limits.
+    """
+
+    elsewhere: int
+    outside_limits: int
+
+
+class MaskNotMet(NamedTuple):
+    """The coordinates of a mask cannot be met together.
+
+    Attributes:
+        position_error, rotation_error: those of the closest configuration; None if the branch has none.
+    """
+
+    position_error: float | None
+    rotation_error: float | None
+
+
+class OutOfReach(NamedTuple):
+    """The point cannot be reached: by how many metres."""
+
+    distance: float
+
+
+class OrientationNotMet(NamedTuple):
+    """The point can be reached, but not with this orientation.
+
+    Attributes:
+        obstacle, gap: what does not fit geometrically, and by how many metres; None if nothing is known.
+        nearest_rotation: rotation from the target to the nearest orientation found at this point.
+        position_error, rotation_error: those of the closest configuration; None if the branch has none.
+    """
+
+    obstacle: Obstacle | None
+    gap: float | None
+    nearest_rotation: float | None
+    position_error: float | None
+    rotation_error: float | None
+
+
+Details = (
+    Solved | RollError | RotationError | OutsideLimits | NotOnBranch | MaskNotMet | OutOfReach | OrientationNotMet
+)

@@ -1,0 +1,182 @@
+"""Answers without a solution: why there is none, and what comes closest.
+
+Each function is one cause. Descents come first in all of them: where branches merge, a descent may meet a target
+that every row of the closed form misses by rounding error, and then the problem is solved after all.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TypeGuard
+
+import numpy as np
+
+from kin.fk import fk, link_frames
+from kin.ik import nearest as search
+from kin.ik.assembly import by_key, make_result, solutions_of
+from kin.ik.branches import Branches, Flags, is_closed, measure, redundancy_of, violations_of
+from kin.ik.candidates import DISTANCE, OVERRUN, ROLL
+from kin.ik.details import (
+    Details,
+    MaskNotMet,
+    NotOnBranch,
+    OrientationNotMet,
+    OutOfReach,
+    OutsideLimits,
+    RollError,
+    RotationError,
+    Solved,
+)
+from kin.ik.problem import IKProblem
+from kin.ik.results import BlockedBranch, Cause, IKResult, IKSolution, Status
+from kin.solvers.contract import APPROACH, MASK, POSITION
+from kin.transforms import Array
+
+
+def outside_limits(problem: IKProblem, branches: Branches, rows: Flags, good: Flags) -> IKResult:
+    """The postures in `rows` exist, but all of them are outside the limits; `good` are solutions elsewhere."""
+    closest = search.closest(problem, branches.q)
+    if _is_solution(closest, problem):
+        return _found_by_descent(problem, closest)
+    order = by_key(branches.q, rows, branches.stats[:, OVERRUN])
+    blocked = _blocked(problem, branches.q, order)
+    redundancy = redundancy_of(problem, branches, order[:1], rows)[1]
+    names = [parameter.name for parameter in problem.requested]
+    details = OutsideLimits(
+        branch=blocked[0].branch,
+        violations=blocked[0].violations,
+        branches=len(blocked),
+        requested=tuple(r for r in redundancy if r.name in names),
+        elsewhere=len(by_key(branches.q, good, branches.stats[:, DISTANCE])),
+    )
+    return make_result(
+        problem,
+        Status.LIMITS,
+        "joint limits",
+        details,
+        closest=closest,
+        blocked=blocked,
+        distance=search.nearest_to_point(problem, closest)[1],
+        redundancy=redundancy,
+    )
+
+
+def not_on_branch(problem: IKProblem, branches: Branches, closed: Flags, good: Flags) -> IKResult:
+    """The requested branch does not exist at this target; others do."""
+    closest = search.closest(problem, branches.q)
+    if _is_solution(closest, problem):
+        return _found_by_descent(problem, closest)
+    fits, exist = (len(by_key(branches.q, rows, branches.stats[:, DISTANCE])) for rows in (good, closed))
+    return make_result(problem, Status.UNREACHABLE, "branch", NotOnBranch(fits, exist - fits), closest=closest)
+
+
+def compromise(problem: IKProblem, branches: Branches, allowed: Flags) -> IKResult:
+    """An arm with fewer than six joints cannot reach every pose: what it can meet of this one.
+
+    First the solutions that meet point and approach direction, with a rotation about it left (the smallest first);
+    then the one that meets the point with the smallest rotation error.
+    """
+    stats = branches.stats
+    approach_q, approach_stats = measure(problem, branches.q, code=APPROACH)
+    possible = allowed & is_closed(approach_stats)
+    rows = possible & (stats[:, OVERRUN] == 0.0) if problem.respect else possible
+    solutions, _ = solutions_of(problem, branches, by_key(branches.q, rows, np.abs(stats[:, ROLL])), rows, "roll")
+    oriented = search.nearest_orientation(problem, branches.q if rows.any() else None)
+    if oriented is not None and (problem.branches is None or problem.allows(problem.branch_of(oriented.q))):
+        solutions += (oriented,)
+    if not solutions:
+        return out_of_reach(problem, branches)
+    blocked: tuple[BlockedBranch, ...] = ()
+    if not rows.any() and possible.any():
+        blocked = _blocked(problem, approach_q, by_key(approach_q, possible, approach_stats[:, OVERRUN]))
+    first, joints = solutions[0], problem.robot.n
+    details: Details = RollError(joints, first.rotation_error)
+    if first.compromise != "roll":
+        details = RotationError(joints, first.rotation_error, blocked[0].violations[0] if blocked else None)
+    closest = search.closest(problem, branches.q)
+    return make_result(
+        problem,
+        Status.APPROXIMATE,
+        "roll" if first.compromise == "roll" else "rotation",
+        details,
+        solutions=solutions,
+        closest=min((*solutions, *filter(None, (closest,))), key=search.mismatch),
+        blocked=blocked,
+    )
+
+
+def out_of_reach(problem: IKProblem, branches: Branches | None) -> IKResult:
+    """No configuration: either the point is out of reach, or the orientation is not possible there."""
+    candidates = None if branches is None else branches.q
+    closest = search.closest(problem, candidates)
+    if _is_solution(closest, problem):
+        return _found_by_descent(problem, closest)
+    nearest, distance = search.nearest_to_point(problem, closest)
+    position, rotation = (None, None) if closest is None else (closest.position_error, closest.rotation_error)
+    if problem.code == MASK:
+        details: Details = MaskNotMet(position, rotation)
+        return make_result(problem, Status.UNREACHABLE, "outside", details, closest=closest, distance=distance)
+    if problem.code == POSITION and problem.branches is None:
+        closest = nearest
+    if distance > 0.0 or problem.code == POSITION:
+        cause, details = side_of(problem, nearest.q), OutOfReach(distance)
+        return make_result(problem, Status.UNREACHABLE, cause, details, closest=closest, distance=distance)
+    oriented = search.nearest_orientation(problem, candidates)
+    fits = branches is None or branches.obstacle is None or not branches.gap > 0.0
+    details = OrientationNotMet(
+        obstacle=None if fits or branches is None else branches.obstacle,
+        gap=None if fits or branches is None else branches.gap,
+        nearest_rotation=None if oriented is None else oriented.rotation_error,
+        position_error=position,
+        rotation_error=rotation,
+    )
+    return make_result(
+        problem, Status.ORIENTATION, "orientation", details, closest=closest, nearest_orientation=oriented
+    )
+
+
+def side_of(problem: IKProblem, q: Array) -> Cause:
+    """On which side of the workspace the target's point is; q ``(n,)`` is the configuration nearest to it.
+
+    Distances are those from the shoulder, the point of the first joint axis at the height of the second joint. In
+    a hole of the workspace the way out tells which one it is: straight away from the axis, or away from the
+    shoulder.
+    """
+    robot = problem.robot
+    first = link_frames(robot, q)[0]
+    axis = robot.T_world_base[:3, 2] if robot.convention == "standard" else first[:3, 2]
+    foot = robot.T_world_base[:3, 3]
+    shoulder = foot + axis * float(axis @ (first[:3, 3] - foot))
+    reached = fk(robot, q)[:3, 3] - shoulder
+    target = problem.T[:3, 3] - shoulder
+    far, near = float(np.linalg.norm(target)), float(np.linalg.norm(reached))
+    if far > near + 1e-6:
+        return "too far"
+    out = reached - target
+    radial = out - axis * float(axis @ out)
+    away = float(out @ target) / far if far > 1e-9 else math.inf
+    off_axis = [float(np.linalg.norm(v - axis * float(axis @ v))) for v in (target, reached)]
+    if (
+        robot.joints[0].kind == "revolute"
+        and off_axis[1] > off_axis[0] + 1e-6
+        and np.linalg.norm(radial) > away - 1e-9
+    ):
+        return "around the axis"
+    return "too near" if far < near - 1e-6 else "outside"
+
+
+def _blocked(problem: IKProblem, q: Array, order: list[int]) -> tuple[BlockedBranch, ...]:
+    """Rows of q ``(k, n)`` that only the limits forbid."""
+    return tuple(BlockedBranch(problem.branch_name(i), q[i].copy(), violations_of(problem, q[i])) for i in order)
+
+
+def _is_solution(closest: IKSolution | None, problem: IKProblem) -> TypeGuard[IKSolution]:
+    """Whether a descent met the task after all; it would have changed values that were requested."""
+    return closest is not None and not problem.requested and search.is_exact(problem, closest)
+
+
+def _found_by_descent(problem: IKProblem, found: IKSolution) -> IKResult:
+    """A descent met the task where every branch of the closed form misses by rounding error."""
+    found = replace(found, compromise=None)
+    return make_result(problem, Status.SOLVED, "", Solved(1, False), solutions=(found,), solver="numeric")

@@ -1,0 +1,132 @@
+"""Configurations that meet one waypoint: near a given configuration, from descents, at every whole turn.
+
+Every configuration of a path comes from here and has been measured by forward kinematics: a row of the closed form
+where there is one, the end of a descent where there is none.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kin.ik import nearest as search
+from kin.ik.branches import Branches, Flags, is_closed, measure, solve_branches
+from kin.ik.candidates import OVERRUN, POSITION_ERROR, ROLL, ROTATION_ERROR, select
+from kin.ik.problem import IKProblem
+from kin.path.waypoints import WIDE, LayerSequence, PathSettings, has_closed_form
+from kin.solvers.common import TURN
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+POOL = 24  # starts of descents, and the most of their ends that are kept
+LARGE = 0.125  # a larger motion between neighbouring waypoints makes a search for a nearer solution worthwhile
+_HAIR = 1e-6
+
+
+def branches_near(problem: IKProblem, seed: Array, values: tuple[float, ...] | None = None) -> Branches:
+    """The branches nearest to a seed ``(n,)``, of a problem that a closed form covers."""
+    problem.stop()
+    found = solve_branches(problem, problem.T, problem.code, seed, values)
+    assert found is not None
+    return found
+
+
+def meeting(problem: IKProblem, relaxed: bool, q: Array, near: Array) -> Array:
+    """The rows of whole sets of branches ``(sets · b, n)`` that meet the task inside the limits.
+
+    They come at the whole turns nearest to `near`; of rows that give up the roll (`relaxed`) only those with about
+    the smallest roll error.
+    """
+    if problem.branches is not None:
+        assert problem.closed_form is not None
+        count = len(problem.closed_form.branches)
+        q = q[[problem.allows(i % count) for i in range(len(q))]]
+    q, stats = measure(problem, q[~np.isnan(q[:, 0])], near)
+    good = _meets(stats)
+    miss = stats[:, POSITION_ERROR] + stats[:, ROTATION_ERROR] + stats[:, OVERRUN]
+    hair = np.flatnonzero(~good & (miss < _HAIR))[:8]
+    if len(hair):
+        missed, figures = q[hair], stats[hair]
+        good[hair] = search.polish(problem.near(near), missed, figures)
+        q[hair], stats[hair] = missed, figures
+    if relaxed and good.any():
+        roll = np.abs(stats[:, ROLL])
+        good &= alike(roll, float(roll[good].min()))
+    return np.asarray(q[good])
+
+
+def _meets(stats: Array) -> Flags:
+    return np.asarray(is_closed(stats) & (stats[:, OVERRUN] == 0.0))
+
+
+def alike(miss: Array, least: float) -> Flags:
+    """Which errors are nearly as small as the smallest one: the difference is not worth a jump."""
+    return np.asarray(miss <= 1.05 * least + 1e-3)
+
+
+def descended(problem: IKProblem, starts: Array) -> Array:
+    """Where descents from the starts ``(k, n)`` end, if they meet the problem ``(m, n)``: each once."""
+    problem.stop()
+    if not len(starts):
+        return starts
+    q, _ = search.descend_each(problem, problem.code, starts, 1.0)
+    q, stats = measure(problem.without_turns(), q)
+    q = q[_meets(stats)]
+    if problem.branches is not None:
+        q = q[[problem.allows(problem.branch_of(row)) for row in q]]
+    return distinct(q, problem.seed)[:POOL]
+
+
+def pool(problem: IKProblem) -> Array:
+    """Configurations ``(m, n)`` that meet the problem, from descents that start all over the limits."""
+    return descended(problem, search.starting_points(problem, count=POOL))
+
+
+def distinct(q: Array, near: Array) -> Array:
+    """The rows ``(m, n)``, each once, nearest to `near` first."""
+    kept, count = select(np.ascontiguousarray(q), np.linalg.norm(q - near, axis=1))
+    return np.asarray(q[kept[:count]])
+
+
+def with_images(problem: IKProblem, q: Array) -> Array:
+    """Every row ``(m, n)`` at all its whole-turn images inside the limits; joints on a circle as they are."""
+    for i in np.flatnonzero(problem.turns > 0.0).tolist():
+        low, high = problem.lower[i], problem.upper[i]
+        if not TURN - 1e-8 <= high - low <= WIDE:
+            continue
+        first = np.ceil((low - TOLERANCES.limit - q[:, i]) / TURN)
+        count = (np.floor((high + TOLERANCES.limit - q[:, i]) / TURN) - first + 1.0).astype(np.int64)
+        rows = np.repeat(np.arange(len(q)), count)
+        turn = first[rows] + np.arange(len(rows)) - np.repeat(np.cumsum(count) - count, count)
+        q = q[rows]
+        q[:, i] = np.clip(q[:, i] + TURN * turn, low, high)
+    return np.ascontiguousarray(q)
+
+
+def nearest(settings: PathSettings, problem: IKProblem, relaxed: bool, q: Array) -> Array | None:
+    """The configuration nearest to q ``(n,)`` that meets the problem."""
+    found = np.empty((0, len(q)))
+    if has_closed_form(problem):
+        found = meeting(problem, relaxed, branches_near(problem, q).q, q)
+    if not len(found) or settings.moves(found, q).max(axis=1).min() > LARGE:
+        found = np.concatenate([found, descended(problem, q[None])])
+    return np.asarray(found[np.argmin(settings.moves(found, q).max(axis=1))]) if len(found) else None
+
+
+def continued(
+    sequence: LayerSequence, s: int, q: Array, direction: int, allowed: float
+) -> list[tuple[int, Array]]:
+    """The motion from q at waypoint s of the sequence on to the nearest solution, again and again, until it jumps.
+
+    Pairs of a waypoint of the sequence and the configuration there; `direction` is 1 or −1.
+    """
+    out = []
+    while 0 <= s + direction < len(sequence.waypoints):
+        span = sequence.spans[max(s, s + direction)]
+        s += direction
+        waypoint = sequence.waypoints[s]
+        found = nearest(sequence.settings, waypoint.problem, waypoint.relaxed, q)
+        if found is None or sequence.settings.largest_move(found, q) > allowed * span:
+            break
+        q = found
+        out.append((s, found))
+    return out
