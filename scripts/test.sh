@@ -1,5 +1,6 @@
 #!/bin/sh
 # Set everything up in .venv, then run every check. Arguments go to pytest, e.g. tests/kin, or -m browser.
+# With KINBOARD_TEST_PICTURES=1 the browser tests save pictures of the screens in tests/artifacts.
 set -eu
 root=$(cd "$(dirname "$0")/.." && pwd)
 . "$root/scripts/venv.sh"

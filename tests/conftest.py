@@ -1,18 +1,14 @@
-"""Property tests draw new examples at every run at home, the same ones in CI: there, red must mean a change."""
+"""Profiles of hypothesis: new random examples in every local run, always the same ones in CI.
+
+A test that fails in CI then fails because of a change, not by chance.
+"""
 
 from __future__ import annotations
 
 import os
 
-import pytest
 from hypothesis import settings
 
-settings.register_profile("home", deadline=None)
+settings.register_profile("local", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True)
-settings.load_profile("ci" if os.environ.get("CI") else "home")
-
-
-def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption(
-        "--snapshot-update", action="store_true", help="write the answers of test_snapshot.py to its files anew"
-    )
+settings.load_profile("ci" if os.environ.get("CI") else "local")

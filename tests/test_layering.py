@@ -1,4 +1,4 @@
-"""Who may import whom, held by a walk over the syntax tree of every module."""
+"""Which modules a folder may import, checked on the syntax tree of every module."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def imports(source: str) -> set[str]:
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"line {node.lineno}: relative imports hide who is meant"
+            assert node.level == 0, f"line {node.lineno}: relative imports hide which module is meant"
             # `from app.shared import store` may import the module app.shared.store.
             found |= {f"{node.module}.{alias.name}" for alias in node.names}
     return found
