@@ -88,9 +88,8 @@ def closes(k: Array, low: Array, high: Array, J: Array, e: Array, x: Array, q: A
 
 
 @jit
-def approach(k: Array, near: Array, low: Array, high: Array, q: Array) -> bool:
-    """Move q, in place, along the configurations inside [low, high] that reach the point, to the one nearest a
-    box.
+def move_near(k: Array, near: Array, low: Array, high: Array, q: Array) -> bool:
+    """Move q, in place, along the configurations in [low, high] that reach the point, to the nearest to a box.
 
     near ``(2, 5)``: lower and upper corner of that box. Each step goes to the projection of the nearest point of
     the box onto the tangent space, or as far towards it as the distance decreases. Returns whether q reaches the

@@ -16,7 +16,7 @@ from kin.solvers.common import nearest_image
 from kin.solvers.wrist5.point.configuration import branch_at, fits, keep_best
 from kin.solvers.wrist5.point.constants import BRANCH, END, HAIR, JOINT, RAD, SHEET, START, ZERO, M
 from kin.solvers.wrist5.point.intervals import SAME, Row, merge, nearest
-from kin.solvers.wrist5.point.newton import approach
+from kin.solvers.wrist5.point.newton import move_near
 from kin.solvers.wrist5.point.planes import planes_of
 from kin.solvers.wrist5.point.theta4 import find_spots
 from kin.solvers.wrist5.point.theta5 import theta5_intervals, window
@@ -85,7 +85,7 @@ def _refine(k: Array, best: Array, box: Array, limits: Array, relaxed: bool, ans
                 # Stay on the branch: it is named by the signs of sin θ3 and sin θ5.
                 turn = math.floor(q[i] / math.pi)
                 floor[i], ceiling[i] = max(low[i], turn * math.pi), min(high[i], (turn + 1.0) * math.pi)
-        if approach(k, aims, floor, ceiling, q):
+        if move_near(k, aims, floor, ceiling, q):
             keep_best(k, q, near, limits, answer)
 
 
