@@ -1,8 +1,8 @@
 "use strict";
-// Runs before viser's own script, in its page. It gives the page a memory of its own tab: the state that the server
-// tells is kept in the address and in sessionStorage, and told again to whoever asks after a reload or a lost
-// connection. The server reaches it through viser's access to localStorage, which all tabs of a browser share: our
-// one item is taken out of there.
+// Runs in viser's page, before viser's own script. It stores the page's state per tab: the state that the server sends
+// is kept in the URL and in sessionStorage, and returned to the server after a reload or a lost connection. The server
+// uses viser's access to localStorage for this. All tabs of a browser share localStorage, so our one item is
+// redirected.
 (() => {
   const ITEM = "viser-user:kinboard";
   const STATE = "kinboard-state";
@@ -10,22 +10,22 @@
   const { getItem, setItem } = Storage.prototype;
   const replaceState = history.replaceState.bind(history);
 
-  // A browser may forbid storage; then the address alone remembers.
+  // A browser may forbid storage; then only the URL keeps the state.
   const recall = (name) => { try { return getItem.call(sessionStorage, name); } catch { return null; } };
   const keep = (name, value) => { try { setItem.call(sessionStorage, name, value); } catch { /* see above */ } };
 
-  const told = new URLSearchParams(location.hash.slice(1));
-  const shared = told.has("s");
-  let state = told.get("s") ?? recall(STATE) ?? "";
-  let tab = told.get("tab") ?? (shared ? "" : recall(TAB)) ?? "";
+  const fragment = new URLSearchParams(location.hash.slice(1));
+  const shared = fragment.has("s");
+  let state = fragment.get("s") ?? recall(STATE) ?? "";
+  let tab = fragment.get("tab") ?? (shared ? "" : recall(TAB)) ?? "";
   if (shared) { keep(STATE, state); keep(TAB, tab); }
 
-  // Neither a foreign server nor a recording, whatever the address says.
+  // Never connect to another server or play a recording, whatever the URL contains.
   const query = new URLSearchParams(location.search);
   query.delete("websocket");
   query.delete("playbackPath");
   const page = location.pathname + (query.size ? `?${query}` : "");
-  // viser derives the websocket's address from the page's, where a fragment is an error: it comes back below.
+  // viser derives the websocket's address from the page's, where a fragment is an error: `show` restores it.
   replaceState(null, "", page);
 
   function show() {
@@ -35,7 +35,7 @@
     replaceState(null, "", parts.length ? `${page}#${parts.join("&")}` : page);
   }
 
-  // viser would write the websocket's address into the page's, and a shared link would carry it elsewhere.
+  // viser would write the websocket's address into the page's URL, and a shared link would contain it.
   history.replaceState = show;
   addEventListener("hashchange", () => location.reload());
 
@@ -54,15 +54,15 @@
   const tabs = () => [...document.querySelectorAll('[role="tab"]')];
   const label = (node) => node.textContent.trim();
 
-  // The controls come some time after the question for the state; they open at the first tab.
+  // The controls appear some time after the state was requested, with the first tab open.
   function openTab(until) {
     if (!tab || performance.now() > until) return;
-    const wanted = tabs().find((node) => label(node) === tab);
-    if (!wanted || document.querySelector("[data-status]") === null) setTimeout(openTab, 100, until);
-    else if (wanted.getAttribute("aria-selected") !== "true") {
+    const found = tabs().find((node) => label(node) === tab);
+    if (!found || document.querySelector("[data-status]") === null) setTimeout(openTab, 100, until);
+    else if (found.getAttribute("aria-selected") !== "true") {
       // The panel's own tabs listen to the keyboard and to dragging, those of a phone's sheet to clicks.
-      wanted.dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true, cancelable: true }));
-      wanted.click();
+      found.dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true, cancelable: true }));
+      found.click();
     }
   }
 
@@ -80,13 +80,13 @@
   addEventListener("click", noteTab);
   addEventListener("keyup", noteTab);
 
-  // What viser leaves without a name or out of the keyboard's reach.
+  // Accessibility: names and keyboard access that viser does not provide.
 
   const NAMELESS = '[role="slider"][aria-label=""], [role="progressbar"]:not([aria-label]), input:not([type="hidden"]):not([aria-label])';
   const FOLDER = ".mantine-Paper-root > .mantine-Paper-root:has(> .tabler-icon-chevron-up, > .tabler-icon-chevron-down)";
   const name = (node, text) => { if (node && text) node.setAttribute("aria-label", text); };
 
-  /** The label of the line of the panel that a control is in: the nearest box around both has only that one. */
+  /** The label of a control's line in the panel: the nearest box around the control with exactly one label. */
   function lineLabel(node) {
     for (let box = node.parentElement; box; box = box.parentElement) {
       const labels = box.querySelectorAll("label");
@@ -122,7 +122,7 @@
   addEventListener("DOMContentLoaded", () => {
     const changes = new MutationObserver(() => { waiting ||= setTimeout(() => { waiting = 0; complete(); }, 150); });
     changes.observe(document.body, { subtree: true, childList: true, attributes: true, attributeFilter: ["aria-hidden"] });
-    // A control's arrow keys are its own: viser would also turn the view by them.
+    // Arrow keys on a control must not rotate the view as well.
     for (const kind of ["keydown", "keyup"]) {
       document.body.addEventListener(kind, (event) => {
         if (event.key.startsWith("Arrow") && event.target.matches("input, textarea, [role]")) event.stopPropagation();
@@ -140,7 +140,7 @@
       await navigator.clipboard.writeText(code.textContent);
       return true;
     } catch {
-      // Pages served over plain http from another machine have no clipboard: select the text for the visitor.
+      // Pages served over plain HTTP from another machine have no clipboard: select the text instead.
       getSelection().selectAllChildren(code);
       return document.execCommand("copy");
     }

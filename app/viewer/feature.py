@@ -1,9 +1,9 @@
-"""A part of the page with a life of its own: the workspace tab, each lesson.
+"""Features: parts of the page with their own controls and drawings, such as the workspace tab and each lesson.
 
-A feature is made from a :class:`Stage`, which is all that it may know of the visitor's session: the arm on show,
-where it is and where it is heading, the visitor's scene and panel, and what a feature may ask for. Its controls
-post, as every control does; its methods are called by the visitor's worker, one at a time, inside
-``client.atomic()``. So a feature needs no lock, and what it sends arrives as one picture with the arm.
+A feature sees its visitor's session only through :class:`Stage`: the robot, where the arm is and where it is
+heading, the visitor's scene and panel, and the actions that features may request. Controls post their events; the
+methods of a feature are called by the visitor's worker, one at a time, inside ``client.atomic()``. So a feature
+needs no locks, and what it sends appears together with the arm's new pose.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from kin.units import Units
 
 
 class Stage(Protocol):
-    """What the session offers to features."""
+    """The part of a visitor's session that features may use."""
 
     store: Store
     clouds: Clouds
@@ -38,79 +38,79 @@ class Stage(Protocol):
 
     @property
     def robot(self) -> Robot:
-        """The arm on show."""
+        """The selected robot."""
 
     @property
     def task(self) -> Task:
-        """How much of a target the arm is to match."""
+        """How much of the target pose the arm must match."""
 
     @property
     def goal(self) -> Array:
-        """The configuration ``(n,)`` the arm is heading for, or is at."""
+        """The configuration ``(n,)`` the arm is moving to, or has reached."""
 
     @property
     def q(self) -> Array:
-        """The configuration ``(n,)`` in the picture."""
+        """The configuration ``(n,)`` shown in the scene."""
 
     @property
     def target(self) -> Array | None:
-        """The pose ``(4, 4)`` asked for with the gizmo while it is the arm's task, else None."""
+        """The target pose ``(4, 4)``; None while the target follows the tool."""
 
     @property
     def locked(self) -> tuple[float | None, ...] | None:
-        """The value each joint is locked at, None for a joint that may move; None if none is locked."""
+        """The value of each locked joint, None for a joint that may move; None if no joint is locked."""
 
     @property
     def branch(self) -> str | None:
-        """The branch asked for, as `kin.solve_ik` takes it."""
+        """The requested branch, as `kin.solve_ik` takes it."""
 
     @property
     def units(self) -> Units:
-        """The units angles and lengths are shown in."""
+        """The units in which angles and lengths are shown."""
 
     @property
     def dark(self) -> bool:
         """Whether the page is dark."""
 
     def post(self, key: Hashable, value: object = None) -> None:
-        """Have `Feature.handle` called by the worker; any thread may. The newest value of a key wins."""
+        """Queue an event for the worker; thread-safe. A newer value replaces a queued one of the same key."""
 
-    def go(self, q: Array, why: Notice | None = None, at_once: bool = False) -> None:
-        """Send the arm to a configuration ``(n,)``, the target following; the status says `why`.
+    def move_to(self, q: Array, notice: Notice | None = None, at_once: bool = False) -> None:
+        """Move the arm to a configuration ``(n,)``; the target follows the tool, the status shows `notice`.
 
-        Eased, unless it is to be there `at_once`: between two configurations easing takes the tool off its target.
+        The motion is eased unless `at_once`: between two configurations, easing takes the tool off its target.
         """
 
-    def ask(self, T_base_tool: Array) -> None:
-        """Make this pose ``(4, 4)`` the target, as if the gizmo had been put there."""
+    def set_target(self, T_base_tool: Array) -> None:
+        """Make this pose ``(4, 4)`` the target, as if the gizmo had been dragged there."""
 
-    def require(self, task: Task) -> None:
-        """Ask for this much of the target from now on."""
+    def set_task(self, task: Task) -> None:
+        """Change how much of the target pose the arm must match."""
 
     def unlock(self, joint: int | None = None) -> None:
-        """Unlock a joint; None: all of them."""
+        """Unlock one joint; None: all joints."""
 
-    def any_branch(self) -> None:
-        """Let any branch take the target."""
+    def allow_any_branch(self) -> None:
+        """Drop the request for a particular branch."""
 
-    def tell(self, notice: Notice) -> None:
+    def notify(self, notice: Notice) -> None:
         """Show a notice in the status line."""
 
-    def make_room(self, room: Sequence[Sphere]) -> None:
-        """Have the default view show these spheres too, and only these; a view the visitor has chosen stays."""
+    def fit_view(self, spheres: Sequence[Sphere]) -> None:
+        """Make the default view show these spheres as well as the arm. A view chosen by the visitor stays."""
 
 
 class Feature:
     """One feature of one visitor. Override what is needed; build controls in ``__init__``.
 
-    Whatever container is open when a feature is made is where its controls go.
+    Controls go into the container that is open when the feature is constructed.
 
     Attributes:
-        key: its short name, in messages and in the shared address.
-        title: what the visitor reads.
-        about: a lesson in a sentence, for who has to choose one.
-        due: the worker sleeps at most so many seconds and then calls `tick`; it does so after every other event
-            too. None: no ticks.
+        key: short name, used in events and in the shared URL.
+        title: name shown to the visitor.
+        about: one-sentence description, for the list of lessons.
+        due: the worker sleeps at most this many seconds and then calls `tick`; it also does so after every other
+            event. None: no ticks.
     """
 
     key: ClassVar[str]
@@ -122,40 +122,40 @@ class Feature:
         self.due: float | None = None
 
     def post(self, key: Hashable, value: object = None) -> None:
-        """Post to this feature's own `handle`. Give it to controls (`panel.listen`); any thread may call it."""
+        """Queue an event for this feature's `handle`; thread-safe. Pass it to controls (`panel.listen`)."""
         self.stage.post(("feature", self.key, key), value)
 
     def handle(self, key: Hashable, value: object) -> None:
-        """Act on what was posted; raises `kin.InputError` for a value that no control of ours sends."""
+        """Process a queued event; raises `kin.InputError` for a value that none of our controls sends."""
         raise KeyError(key)
 
     def on_robot(self) -> None:
-        """Another arm is on show. Not called for the first one: that is there when the feature is made."""
+        """Another robot was selected. Not called for the robot that is there when the feature is constructed."""
 
-    def on_picture(self, T_base_tool: Array) -> None:
-        """The picture shows the arm at another ``stage.q``, its tool at this pose ``(4, 4)``."""
+    def on_pose(self, T_base_tool: Array) -> None:
+        """The scene shows the arm at another ``stage.q``, with the tool at this pose ``(4, 4)``."""
 
-    def on_answer(self, result: IKResult) -> None:
-        """A target was answered."""
+    def on_result(self, result: IKResult) -> None:
+        """Inverse kinematics was solved for a target."""
 
-    def on_question(self) -> None:
-        """The task, the branch asked for, or what is locked was changed."""
+    def on_request(self) -> None:
+        """The task, the requested branch, or the locked joints changed."""
 
     def on_style(self) -> None:
-        """The units, or dark or light, were changed."""
+        """The units, or the colours of the page, changed."""
 
     def tick(self, now: float) -> None:
-        """Go on with what takes time, ten milliseconds at most: pictures wait. `now` is `time.perf_counter`'s."""
+        """Continue long work, for at most ten milliseconds: frames wait. `now` is `time.perf_counter`'s."""
 
     def state(self) -> dict[str, object]:
-        """What the visitor has set, as JSON: what a shared address restores."""
+        """The visitor's settings as JSON; a shared URL restores them."""
         return {}
 
     def restore(self, state: dict[str, object]) -> None:
-        """Set what `state` told; what is missing or wrong is left as it is."""
+        """Apply settings that `state` returned; missing or invalid ones are ignored."""
 
     def on_leave(self) -> None:
-        """The visitor has left: let go of what is shared with others. There is no page any more."""
+        """The visitor has disconnected: release what is shared with others. The page no longer exists."""
 
     def remove(self) -> None:
-        """Take everything out of scene and panel."""
+        """Remove everything from scene and panel."""

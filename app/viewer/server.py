@@ -1,4 +1,4 @@
-"""The viewer door: a viser server on the loopback interface, one session per connected browser tab."""
+"""The viewer: a viser server on the loopback interface, with one page per connected browser tab."""
 
 from __future__ import annotations
 
@@ -16,26 +16,27 @@ from app.shared.store import Store
 from app.shared.summaries import Summaries
 from app.viewer.panel.status import Notice
 from app.viewer.panel.view import configure_theme
-from app.viewer.quick import quick_loops, remember_hints, wake_in_the_loop
 from app.viewer.scene.motion import Pace
-from app.viewer.session.controller import WELCOME, Session
+from app.viewer.session.page import WELCOME, VisitorPage
+from app.viewer.session.services import Services
+from app.viewer.viser_patches import cache_type_hints, set_events_in_their_loop, uvloop_event_loops
 
 log = logging.getLogger(__name__)
 
-PATIENCE = 5.0
-RESTARTS = 3  # of one visitor's worker: what fails that often will go on failing
+STOP_TIMEOUT = 5.0  # s for a worker to end
+RESTARTS = 3  # of one visitor's worker; after that, it is assumed to fail again
 RESTARTED = Notice(
     "error",
-    "Started again",
-    "Something went wrong on our side, so this page begins afresh; the log has the cause.",
+    "Page restarted",
+    "An internal error occurred and the page was reset. The server log has the details.",
 )
 
 
 class ViewerServer:
-    """Serves the 3-D page. Bound to 127.0.0.1: the public port bridges to it and decides who may come in.
+    """Serves the 3-D page on 127.0.0.1. The public port forwards to it and checks access.
 
     Args:
-        maps, summaries: shared with REST; None for its own.
+        maps, summaries: shared with REST; None: the viewer creates and closes its own.
     """
 
     def __init__(
@@ -46,81 +47,73 @@ class ViewerServer:
         maps: Maps | None = None,
         summaries: Summaries | None = None,
     ) -> None:
-        self._store = store
-        self._clouds = clouds
-        self._maps = maps or Maps()
+        self._services = Services(store, clouds, maps or Maps(), summaries or Summaries(), Pace())
         self._owns_maps = maps is None
-        self._summaries = summaries or Summaries()
         self._owns_summaries = summaries is None
         self._settings = settings
         self._server: viser.ViserServer | None = None
-        self._sessions: dict[int, Session] = {}
+        self._pages: dict[int, VisitorPage] = {}
         self._lock = threading.Lock()
-        self._pace = Pace()
 
     def start(self) -> int:
         """Start listening on a free port of 127.0.0.1 and return that port."""
         if self._server is not None:
             raise RuntimeError("the viewer is already running")
-        remember_hints()
-        wake_in_the_loop()
-        # viser prints an address that no visitor should use
-        with contextlib.redirect_stdout(io.StringIO()), quick_loops():
+        cache_type_hints()
+        set_events_in_their_loop()
+        # viser prints its own address, which visitors must not use
+        with contextlib.redirect_stdout(io.StringIO()), uvloop_event_loops():
             server = viser.ViserServer(host="127.0.0.1", port=0, label="Kinboard", verbose=False)
         self._server = server
         configure_theme(server.gui, dark=False)
         _light(server.scene)
-        server.on_client_connect(self._welcome)
-        server.on_client_disconnect(self._farewell)
+        server.on_client_connect(self._connect)
+        server.on_client_disconnect(self._disconnect)
         return server.get_port()
 
     def stop(self) -> None:
-        """End every session and the server; returns when their threads are gone."""
+        """End every page and the server; returns when their threads have ended."""
         server, self._server = self._server, None
         if server is None:
             return
         with self._lock:
-            sessions, self._sessions = list(self._sessions.values()), {}
-        for session in sessions:
-            session.end()
+            pages, self._pages = list(self._pages.values()), {}
+        for page in pages:
+            page.end()
         with contextlib.redirect_stdout(io.StringIO()):
             server.stop()
-        for session in sessions:
-            if not session.join(PATIENCE):
-                log.error("a visitor's worker did not end within %s s", PATIENCE)
+        for page in pages:
+            if not page.join(STOP_TIMEOUT):
+                log.error("a visitor's worker did not end within %s s", STOP_TIMEOUT)
         if self._owns_maps:
-            self._maps.close()
+            self._services.maps.close()
         if self._owns_summaries:
-            self._summaries.close()
+            self._services.summaries.close()
 
     @property
     def visitors(self) -> int:
-        """How many tabs are connected."""
-        return len(self._sessions)
+        """The number of connected tabs."""
+        return len(self._pages)
 
-    async def _welcome(self, client: viser.ClientHandle) -> None:
-        self._begin(client, WELCOME, RESTARTS)
+    async def _connect(self, client: viser.ClientHandle) -> None:
+        self._start_page(client, WELCOME, RESTARTS)
 
-    def _begin(self, client: viser.ClientHandle, welcome: Notice, restarts: int) -> None:
-        session = Session(
+    def _start_page(self, client: viser.ClientHandle, welcome: Notice, restarts: int) -> None:
+        page = VisitorPage(
             client,
-            self._store,
-            self._clouds,
-            self._maps,
-            self._summaries,
-            self._pace,
+            self._services,
             self._settings.token is not None,
             welcome,
-            lambda: self._again(client, restarts),
+            lambda: self._restart(client, restarts),
         )
         with self._lock:
-            self._sessions[client.client_id] = session
-        session.start()
+            self._pages[client.client_id] = page
+        page.start()
 
-    def _again(self, client: viser.ClientHandle, restarts: int) -> None:
-        """Begin afresh with a visitor whose worker failed; called by that worker as the last thing it does."""
+    def _restart(self, client: viser.ClientHandle, restarts: int) -> None:
+        """Restart the page of a visitor whose worker failed; called last by that worker."""
         with self._lock:
-            left = self._sessions.pop(client.client_id, None) is None
+            left = self._pages.pop(client.client_id, None) is None
         if left:
             return
         if restarts == 0:
@@ -131,20 +124,20 @@ class ViewerServer:
         client.gui.reset()
         client.scene.reset()
         configure_theme(client.gui, dark=False)
-        self._begin(client, RESTARTED, restarts - 1)
+        self._start_page(client, RESTARTED, restarts - 1)
 
-    async def _farewell(self, client: viser.ClientHandle) -> None:
+    async def _disconnect(self, client: viser.ClientHandle) -> None:
         with self._lock:
-            session = self._sessions.pop(client.client_id, None)
-        if session is not None:
-            session.end()
+            page = self._pages.pop(client.client_id, None)
+        if page is not None:
+            page.end()
 
 
 def _light(scene: viser.SceneApi) -> None:
-    """Daylight from above and a little from below.
+    """Light from above and a little from below.
 
-    Instead of viser's environment map: preparing that takes a machine without a graphics card ten seconds and
-    more, in which the page stands still.
+    This replaces viser's environment map, whose preparation blocks the page for ten seconds or more on a machine
+    without a graphics card.
     """
     scene.configure_environment_map(None)
     scene.configure_default_lights(enabled=True, cast_shadow=True)

@@ -27,7 +27,7 @@ def test_sliders_by_keyboard_mouse_and_number(tab: Tab) -> None:
     tab.type_number("1 rotating base", "37.25")
     tab.wait_for_tool(kin.fk(PIONEER, home_with(PIONEER, 0, 37.25))[:3, 3], within=0.06)
     assert tab.number("1 rotating base") == 37.25
-    expect(tab.status).to_contain_text("Moved by joints")
+    expect(tab.status).to_contain_text("Joints moved by hand")
 
     thumb = tab.row("1 rotating base").get_by_role("slider").first
     thumb.focus()
@@ -78,7 +78,7 @@ def test_branches_and_the_arm_angle_move_the_arm_and_not_the_tool(tab: Tab) -> N
     tab.show(SRS)
     home = kin.fk(SRS, SRS.q_home)[:3, 3]
     name = next(n for n in kin.branch_names(SRS) if "back" in n and "elbow up" in n and "no-flip" in n)
-    tab.choose("Branch", "back · up · no-flip")
+    tab.choose("Posture", "back · up · no-flip")
     expect(tab.status).to_contain_text("Reached")
     expect(tab.page.locator("[data-branch]")).to_have_text(f"now: {name}")
     tab.wait_for_tool(home, within=0.06)
@@ -89,8 +89,8 @@ def test_branches_and_the_arm_angle_move_the_arm_and_not_the_tool(tab: Tab) -> N
     assert kin.branch_of(SRS, q) == name
     assert np.abs(kin.fk(SRS, q)[:3, 3] - home).max() < 5e-4
     assert abs(q[0]) > 0.2, "the elbow swung out"
-    expect(tab.page.locator("[data-free=psi]")).to_contain_text("feasible: −111.7 … 111.7°")
-    strip = tab.page.locator("[data-free=psi] > div").first.bounding_box()
+    expect(tab.page.locator("[data-redundancy=psi]")).to_contain_text("feasible: −111.7 … 111.7°")
+    strip = tab.page.locator("[data-redundancy=psi] > div").first.bounding_box()
     track = tab.row("Arm angle ψ").get_by_role("slider").first.bounding_box()
     assert strip is not None
     assert track is not None

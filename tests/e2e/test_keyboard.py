@@ -56,11 +56,11 @@ def test_the_move_tab(tab: Tab) -> None:
     page.get_by_role("button", name="Unlock all").press("Enter")
     expect(tab.status).to_contain_text("No joint is locked")
 
-    folder = page.get_by_role("button", name="Posture", exact=True)
+    folder = page.get_by_role("button", name="Posture and redundancy", exact=True)
     for key, state in (("Enter", "false"), ("Space", "true")):
         folder.press(key)
         expect(folder).to_have_attribute("aria-expanded", state)
-    expect(page.get_by_text("Branch", exact=True)).to_be_visible()
+    expect(page.get_by_text("Posture", exact=True)).to_be_visible()
 
 
 def test_a_lesson(tab: Tab) -> None:
@@ -79,5 +79,5 @@ def test_a_lesson(tab: Tab) -> None:
     here = page.locator("[data-here]")
     before = here.get_attribute("data-posture")
     # The same as a click on the ghost.
-    page.get_by_role("group", name="Take").get_by_role("button", name="2", exact=True).press("Space")
+    page.get_by_role("group", name="Go").get_by_role("button", name="2", exact=True).press("Space")
     expect(here).not_to_have_attribute("data-posture", str(before))

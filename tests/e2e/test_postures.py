@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from app.viewer.lessons.postures.listing import survey
 from page import Tab
 from playwright.sync_api import expect
 
 import kin
 from app.viewer.lessons.postures.ghosts import places
-from app.viewer.lessons.postures.listing import survey
 
 pytestmark = pytest.mark.browser
 
@@ -53,7 +53,7 @@ def test_a_click_on_a_ghost_in_the_picture_morphs_the_arm(tab: Tab) -> None:
     taken = tab.page.locator("[data-here]").get_attribute("data-posture")
     assert taken in {p.name for p in postures if p.can_be_had and p.name != here}
     tab.wait_for_tool(T[:3, 3], within=0.06)
-    tab.row("Take").get_by_role("button", name=str(list(kin.branch_names(PUMA)).index(here) + 1)).click()
+    tab.row("Go").get_by_role("button", name=str(list(kin.branch_names(PUMA)).index(here) + 1)).click()
     expect(tab.page.locator("[data-here]")).to_have_attribute("data-posture", here)
 
 
@@ -65,7 +65,7 @@ def test_the_reason_for_no_solution_and_a_remedy(tab: Tab) -> None:
     expect(button).to_be_visible()
     tab.screenshot("why-not")
     button.click()
-    expect(tab.page.locator("[data-why]")).to_contain_text("Nothing is missed")
+    expect(tab.page.locator("[data-why]")).to_contain_text("Target reached")
     expect(button).to_have_count(0)
 
 
@@ -78,25 +78,25 @@ def test_the_cone_and_the_rings_of_five_joints(tab: Tab) -> None:
 def test_the_ring_of_arm_angles(tab: Tab) -> None:
     learn(tab, SRS, "Redundancy")
     p = kin.fk(SRS, SRS.q_home)[:3, 3]
-    tab.type_number("Swing ψ to", "70")
-    expect(tab.row("Swing ψ to").locator("input:visible").last).to_have_value("70")
+    tab.type_number("Set ψ (tool held)", "70")
+    expect(tab.row("Set ψ (tool held)").locator("input:visible").last).to_have_value("70")
     tab.page.wait_for_timeout(1500)
     tab.wait_for_tool(p, within=0.06)
     expect(tab.page.locator("[data-residual]")).to_contain_text("Tool held to")
-    expect(tab.page.locator("[data-stops]")).to_contain_text("stop of joint 6")
-    strip = tab.page.locator("[data-free=psi]:visible > div").first.bounding_box()
-    track = tab.row("Swing ψ to").get_by_role("slider").first.bounding_box()
+    expect(tab.page.locator("[data-limits]")).to_contain_text("limit of joint 6")
+    strip = tab.page.locator("[data-redundancy=psi]:visible > div").first.bounding_box()
+    track = tab.row("Set ψ (tool held)").get_by_role("slider").first.bounding_box()
     assert strip is not None
     assert track is not None
     middle = strip["x"] + strip["width"] * (70 + 180) / 360
     assert abs(middle - (track["x"] + track["width"] / 2)) < 8, "the mark is under the slider's thumb"
     tab.screenshot("redundancy-ring")
     learn(tab, PRINTED, "Redundancy")
-    expect(tab.page.locator("[data-idea]")).to_contain_text("Axes 1 and 2 are one line")
+    expect(tab.page.locator("[data-idea]")).to_contain_text("The axes of joints 1 and 2 coincide")
     tab.screenshot("redundancy-trade")
 
 
-def test_padlocks(tab: Tab) -> None:
+def test_lock_buttons(tab: Tab) -> None:
     tab.show(PUMA)
     tab.row("Locked").get_by_role("button", name="2", exact=True).click()
     expect(tab.status).to_contain_text("Joint 2 locked")

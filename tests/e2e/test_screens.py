@@ -97,7 +97,7 @@ SCREENS: dict[str, Callable[[Tab], None]] = {
     "learn-equations": lesson("pioneer5", "Equations", "[data-equation]"),
     "learn-postures": lesson("puma560", "Postures", "[data-posture]"),
     "learn-velocity": lesson("puma560", "Velocity", "[data-singular]"),
-    "learn-redundancy": lesson("redundant7-craig", "Redundancy", "[data-stops]"),
+    "learn-redundancy": lesson("redundant7-craig", "Redundancy", "[data-limits]"),
     "workspace-cloud": cloud,
     "workspace-section": section,
     "workspace-capability": capability,

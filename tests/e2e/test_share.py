@@ -16,7 +16,7 @@ from page import WAIT, Tab, save_picture
 from playwright.sync_api import Browser, FrameLocator, Page, expect
 
 import kin
-from app.viewer.panel.joints import CLOSED
+from app.viewer.panel.joints import LOCKED
 from app.viewer.scene import camera
 from app.viewer.scene.meshes import body
 from app.viewer.session.state import PageState, decode
@@ -161,7 +161,7 @@ def test_link_reload_and_lost_connection(shared: Tab, proxy: Proxy, browser: Bro
     assert np.abs(state_of(page).q - turned(37.25)).max() < 1e-9
 
     page.get_by_role("button", name="2", exact=True).click()
-    expect(page.get_by_role("button", name=f"{CLOSED}2", exact=True)).to_be_visible()
+    expect(page.get_by_role("button", name=f"{LOCKED}2", exact=True)).to_be_visible()
     orbit(page, 260, -60)
     place = wait_for_viewpoint(page)[:2]
     assert np.abs(place - np.stack(camera.view(body(PIONEER), 1.6))).max() > 0.3
@@ -189,7 +189,7 @@ def test_link_reload_and_lost_connection(shared: Tab, proxy: Proxy, browser: Bro
     wait_for_camera(page, reported, place)
 
     page.get_by_role("tab", name="Move").click()
-    expect(page.get_by_role("button", name=f"{CLOSED}2", exact=True)).to_be_visible()
+    expect(page.get_by_role("button", name=f"{LOCKED}2", exact=True)).to_be_visible()
     shared.type_number("1 rotating base", "60")
     page.wait_for_function("link => !link.includes(location.hash.split('&')[0])", arg=link, timeout=WAIT)
     shared.screenshot("share-restored")

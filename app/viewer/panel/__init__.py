@@ -1,18 +1,20 @@
-"""The control panel: one idea per module.
+"""The control panel: one group of controls per module.
 
-Every piece is built from a visitor's own `viser.GuiApi` and a `post` function. Its callbacks do nothing but post
-into the visitor's inbox; its `show…` methods are called by the visitor's worker. Assigning a value here makes
-viser call the callbacks too, with ``event.client is None``: those calls are ignored, or moving the gizmo would
-move the sliders would move the gizmo.
+Every group is built from a visitor's own `viser.GuiApi` and a `post` function. Its callbacks only post into the
+visitor's inbox; its `show…` methods are called by the visitor's worker. Assigning a value here makes viser call
+the callbacks too, with ``event.client is None``. Those calls are ignored; otherwise moving the gizmo would move
+the sliders, which would move the gizmo.
 
-A control that shows a value in a unit is made anew when the unit changes, and posts under a key that holds the
-`Units` it was made in: an event that was on its way meanwhile is told apart from those of its successor.
+A control that shows a value in a unit is replaced when the unit changes, and its key contains the `Units` it was
+created with. So an event that was already on its way can be told from those of its successor.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from typing import Any
+
+import viser
 
 Post = Callable[[Hashable, object], None]
 
@@ -27,8 +29,14 @@ def listen(handle: Any, post: Post, key: Hashable) -> None:
 
 
 def assign(handle: Any, value: object) -> None:
-    """Show another value in an input element. (Its type stubs call `value` read-only.)"""
+    """Show another value in an input element. (The type stubs declare `value` read-only.)"""
     handle.value = value
+
+
+def update_html(element: viser.GuiHtmlHandle, content: str) -> None:
+    """Show other HTML in an element; unchanged HTML is not sent."""
+    if element.content != content:
+        element.content = content
 
 
 def listen_click(handle: Any, post: Post, keys: dict[str, Hashable]) -> None:

@@ -1,6 +1,6 @@
-"""One slider per joint, with exact entry, limits, and the unit of the visitor's choice; a padlock for each.
+"""One slider per joint, with exact entry, limits and the chosen unit, and a lock for each joint.
 
-A padlock keeps a joint where it is whenever inverse kinematics moves the arm; by hand it still moves.
+A locked joint keeps its value whenever inverse kinematics moves the arm; its slider still moves it.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from kin.transforms import Array
 from kin.units import Unit, Units
 
 DIGITS = 2
-CLOSED = "\N{BLACK SQUARE}"  # a padlock is missing from many fonts
+LOCKED = "\N{BLACK SQUARE}"  # many fonts have no padlock
 UNLOCK_ALL = "Unlock all"
 LOCK_HINT = (
-    "A locked joint stays at its value while the arm follows a target; its slider still moves it. "
-    f"Click a number to lock that joint, or to unlock it: {CLOSED} marks what is locked."
+    "A locked joint keeps its value while the arm follows a target; its slider still moves it. "
+    f"Click a number to lock or unlock that joint: {LOCKED} marks a locked joint."
 )
 
 
@@ -34,19 +34,19 @@ def label(robot: Robot, index: int) -> str:
     return f"Joint {number}" if name.lower() == f"joint {number}" else f"{number} {name}"
 
 
-def padlocks(locked: Sequence[bool]) -> tuple[str, ...]:
-    """The buttons of the padlocks: one number per joint, with a symbol if it is locked."""
-    buttons = tuple(f"{CLOSED}{i + 1}" if shut else str(i + 1) for i, shut in enumerate(locked))
+def lock_buttons(locked: Sequence[bool]) -> tuple[str, ...]:
+    """The labels of the lock buttons: one number per joint, with a symbol if it is locked."""
+    buttons = tuple(f"{LOCKED}{i + 1}" if lock else str(i + 1) for i, lock in enumerate(locked))
     return (*buttons, UNLOCK_ALL) if any(locked) else buttons
 
 
 def lock_notice(locked: Sequence[bool]) -> Notice:
-    """What a visitor is told who has locked or unlocked a joint."""
-    numbers = [str(i + 1) for i, shut in enumerate(locked) if shut]
+    """The message after a joint was locked or unlocked."""
+    numbers = [str(i + 1) for i, lock in enumerate(locked) if lock]
     if not numbers:
         return Notice("hand", "No joint is locked", "Every joint may move to follow a target.")
     joints = "Joint " + numbers[0] if len(numbers) == 1 else "Joints " + ", ".join(numbers)
-    detail = "A target leaves what is locked where it is; its slider still moves it."
+    detail = "The arm reaches targets with the other joints; sliders still move locked joints."
     return Notice("hand", f"{joints} locked", detail)
 
 
@@ -54,7 +54,7 @@ class JointSliders:
     """The sliders of one robot in the visitor's units; rebuilt when either changes.
 
     Posts ``("joint", robot id, i, units)`` with the slider's value in screen units, and
-    ``("lock", robot id, i)`` with whether the joint is to be locked (i is None for all joints).
+    ``("lock", robot id, i)`` with whether to lock the joint (i is None for all joints).
     """
 
     def __init__(
@@ -85,30 +85,30 @@ class JointSliders:
                 )
                 listen(slider, post, ("joint", robot.id, i, units))
                 self._sliders.append(slider)
-            self._locks = gui.add_button_group("Locked", padlocks(locked), hint=LOCK_HINT)
+            self._locks = gui.add_button_group("Locked", lock_buttons(locked), hint=LOCK_HINT)
         self._listen_locks(post)
 
     def read(self, index: int, value: object) -> float:
-        """A slider's value as radians or metres, inside the limits; raises `InputError` for anything else."""
+        """A slider's value in radians or metres, within the limits; raises `InputError` for anything else."""
         if not isinstance(value, int | float) or not math.isfinite(value):
             raise InputError(f"joint {index + 1}", value, "a finite number")
         raw = self._unit(index).read(float(value))
         return float(np.clip(raw, self.robot.lower[index], self.robot.upper[index]))
 
-    def show(self, q: Array, held: int | None = None) -> None:
-        """Set every slider but the one in the visitor's hand, which would jump back under the pointer.
+    def show(self, q: Array, dragged: int | None = None) -> None:
+        """Set every slider but the one that the visitor drags, which would jump under the pointer.
 
-        That one is set too if what was typed into it lies beyond a stop.
+        That one is set too if the value typed into it is outside the limits.
         """
         for i, slider in enumerate(self._sliders):
-            if i != held or not slider.min <= slider.value <= slider.max:
+            if i != dragged or not slider.min <= slider.value <= slider.max:
                 value = self._unit(i).shown(float(q[i]), DIGITS)
                 assign(slider, min(max(value, slider.min), slider.max))
 
     def show_locks(self, locked: Sequence[bool]) -> None:
         """Show which joints are locked ``(n,)``."""
-        if self._locks.options != padlocks(locked):
-            self._locks.options = padlocks(locked)
+        if self._locks.options != lock_buttons(locked):
+            self._locks.options = lock_buttons(locked)
 
     def _unit(self, index: int) -> Unit:
         return self._units.of(self.robot.joints[index].kind == "revolute")
@@ -119,15 +119,15 @@ class JointSliders:
             if event.client is None:
                 return
             shown = str(event.target.value)
-            number = shown.removeprefix(CLOSED)
+            number = shown.removeprefix(LOCKED)
             if shown == UNLOCK_ALL:
                 post(("lock", self.robot.id, None), False)
             elif number.isdecimal() and 1 <= int(number) <= self.robot.n:
-                # What the click asks for, not "the other state": two quick clicks arrive as one.
+                # Post the requested state, not a toggle: two quick clicks arrive as one.
                 post(("lock", self.robot.id, int(number) - 1), shown == number)
 
     def remove(self) -> None:
-        """Take the sliders out of the panel."""
+        """Remove the sliders from the panel."""
         self._locks.remove()
         for slider in self._sliders:
             slider.remove()

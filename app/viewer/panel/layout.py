@@ -1,4 +1,4 @@
-"""What stands where in the panel."""
+"""The layout of the panel."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from app.viewer.panel import Post, listen, listen_click
 from app.viewer.panel.readout import PoseReadout
 from app.viewer.panel.share import SharePanel
 from app.viewer.panel.status import Notice, StatusLine
-from app.viewer.panel.target import TargetChoice, default_task
+from app.viewer.panel.target import DEFAULT_TASK, TargetChoice
 from app.viewer.panel.view import UnitChoice, ViewOptions, ViewState
 from kin import Robot, fk
 from kin.units import Units
@@ -24,7 +24,7 @@ class Panel:
         tabs: titles of the features' tabs.
 
     Attributes:
-        joints, posture: folders to be filled for each arm.
+        joints, posture: folders that are filled for each robot.
         learn: the tab for lessons.
         tabs: the features' tabs.
     """
@@ -50,8 +50,8 @@ class Panel:
             self.joints = gui.add_folder("Joints")
             buttons = gui.add_button_group("Go to", ("Home", "Random"))
             listen_click(buttons, post, {"Home": "home", "Random": "random"})
-            self.target = TargetChoice(gui, default_task(robot), post)
-            self.posture = gui.add_folder("Posture")
+            self.target = TargetChoice(gui, DEFAULT_TASK, post)
+            self.posture = gui.add_folder("Posture and redundancy")
         self.learn = group.add_tab("Learn") if learn else None
         self.tabs = [group.add_tab(title) for title in tabs]
         with group.add_tab("View"):

@@ -1,89 +1,86 @@
-"""Which posture takes a pose: the branch, and the value of what the task leaves free.
+"""Controls for the posture: the branch, and the redundancy parameters.
 
-The strip under a free value's slider shows the values the joint limits allow, for the branch the arm is on and the
-tool as it is now. It is exact: it comes from the core's arcs, not from trying.
+The track below a parameter's slider shows the values that the joint limits allow, for the present branch and tool
+pose. The ranges are exact: the core computes them in closed form.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from html import escape
 
 import viser
 
-from app.viewer.panel import Post, assign, listen
+from app.viewer.panel import Post, assign, listen, update_html
+from app.viewer.views.templates import render
 from kin import InputError, Redundancy, Robot, branch_names
 from kin.units import DEFAULT_UNITS, Unit, Units
 
-NEAREST = "Nearest"
-STAY = "Stay on this one"
+CLOSEST = "Closest"
+KEEP = "Keep current"
 BRANCH_HINT = (
-    "Which of the arm's postures may take the pose. Nearest: whichever needs the least motion. "
-    "Stay on this one: never change it while dragging. Or one of them by name: {parts}."
+    "The posture in which the arm reaches the target. Closest: the one with the least joint motion. "
+    "Keep current: the posture never changes while dragging. Or a particular one: {parts}."
 )
-FEASIBLE = "#009e73"
-# The slider's own track begins and ends here: its label and its number field have fixed widths.
-UNDER_TRACK = "margin:0 3.25em 0 6em"
+SLIDER_HINT = (
+    "Moves the arm while the tool stays where it is. The green bar shows the values that the joint limits allow."
+)
 
 
 def short(name: str) -> str:
-    """A branch's name without the words that every branch shares: ``front · up · no-flip``."""
+    """A branch's name without the words that all branches share: ``front · up · no-flip``."""
     return " · ".join(part.split(" ", 1)[-1] for part in name.split(" · "))
 
 
 def parts(robot: Robot) -> str:
-    """What the parts of the short names are about: ``shoulder · elbow · wrist``."""
+    """The words that all branches share: ``shoulder · elbow · wrist``."""
     names = branch_names(robot)
     return " · ".join(part.split(" ", 1)[0] for part in names[0].split(" · ")) if names else ""
 
 
 class BranchChoice:
-    """The branch dropdown of one robot, and the line that names the branch the arm is on."""
+    """The posture dropdown of one robot, and the line with the name of the arm's present branch."""
 
     def __init__(self, gui: viser.GuiApi, robot: Robot, post: Post) -> None:
         self._names = {short(name): name for name in branch_names(robot)}
-        options = (NEAREST, STAY, *self._names) if self._names else (NEAREST,)
+        options = (CLOSEST, KEEP, *self._names) if self._names else (CLOSEST,)
         self._choice = gui.add_dropdown(
-            "Branch", options, initial_value=NEAREST, hint=BRANCH_HINT.format(parts=parts(robot))
+            "Posture", options, initial_value=CLOSEST, hint=BRANCH_HINT.format(parts=parts(robot))
         )
         listen(self._choice, post, ("branch", robot.id))
         self._now = ""
         self._line = gui.add_html("")
 
     def read(self, value: object) -> str | None:
-        """A choice as `kin.solve_ik` takes it; raises `InputError` for one that is not on the list."""
-        if value == NEAREST:
+        """A choice as `kin.solve_ik` takes it; raises `InputError` for an unknown one."""
+        if value == CLOSEST:
             return None
-        if value == STAY and self._names:
+        if value == KEEP and self._names:
             return "seed"
         if value not in self._names:
-            raise InputError("branch", value, "one of " + ", ".join((NEAREST, STAY, *self._names)))
+            raise InputError("branch", value, "one of " + ", ".join((CLOSEST, KEEP, *self._names)))
         return self._names[str(value)]
 
     def choose(self, branch: str | None) -> None:
-        """Select a choice, told as `kin.solve_ik` takes it."""
-        assign(self._choice, NEAREST if branch is None else STAY if branch == "seed" else short(branch))
+        """Select a choice, given as `kin.solve_ik` takes it."""
+        assign(self._choice, CLOSEST if branch is None else KEEP if branch == "seed" else short(branch))
 
     def show(self, branch: str) -> None:
-        """Name the branch the arm is on."""
+        """Show the name of the arm's present branch."""
         if branch != self._now and self._names:
             self._now = branch
-            self._line.content = (
-                '<div style="margin:-.2em 1em .4em;font-size:.78em;opacity:.8" data-branch="'
-                f'{escape(branch, quote=True)}">now: {escape(branch)}</div>'
-            )
+            self._line.content = render("panel/branch", name=branch, text=branch)
 
     def remove(self) -> None:
-        """Take it out of the panel."""
+        """Remove it from the panel."""
         self._choice.remove()
         self._line.remove()
 
 
-class FreeSliders:
-    """A slider with its feasible strip for each free value; made anew when other values are free.
+class RedundancySliders:
+    """A slider with its feasible ranges for each redundancy parameter; rebuilt when the parameters change.
 
-    Posts ``("free", robot id, name, units)`` with the slider's value in screen units.
+    Posts ``("redundancy", robot id, name, units)`` with the slider's value in screen units.
     """
 
     def __init__(self, gui: viser.GuiApi, folder: viser.GuiFolderHandle, post: Post) -> None:
@@ -92,45 +89,46 @@ class FreeSliders:
         self._post = post
         self._key: tuple[object, ...] = ()
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
-        self._strips: dict[str, viser.GuiHtmlHandle] = {}
+        self._tracks: dict[str, viser.GuiHtmlHandle] = {}
         self._unit = DEFAULT_UNITS.angles
 
-    def show(self, free: Sequence[Redundancy], robot: Robot, units: Units, held: str | None = None) -> None:
-        """Show these values and ranges; the slider in the visitor's hand (`held`) keeps its value."""
-        key = (robot.id, units, *(item.name for item in free))
+    def show(
+        self, parameters: Sequence[Redundancy], robot: Robot, units: Units, dragged: str | None = None
+    ) -> None:
+        """Show these values and ranges; the slider that the visitor drags keeps its value."""
+        key = (robot.id, units, *(item.name for item in parameters))
         if key != self._key:
             self.remove()
             self._key = key
-            self._make(free, robot, units)
-        for item in free:
+            self._make(parameters, robot, units)
+        for item in parameters:
             slider = self._sliders[item.name]
             value = self._unit.shown(item.value)
-            if item.name != held:
+            if item.name != dragged:
                 assign(slider, min(max(value, slider.min), slider.max))
-            strip = strip_html(item, float(slider.min), float(slider.max), self._unit)
-            if self._strips[item.name].content != strip:
-                self._strips[item.name].content = strip
+            track = feasible_html(item, float(slider.min), float(slider.max), self._unit)
+            update_html(self._tracks[item.name], track)
 
     def read(self, name: str, value: object) -> float:
         """A slider's value in radians; raises `InputError` for anything but a finite number."""
         if name not in self._sliders:
-            raise InputError("free parameter", name, "one of " + ", ".join(self._sliders))
+            raise InputError("redundancy parameter", name, "one of " + ", ".join(self._sliders))
         if not isinstance(value, int | float) or not math.isfinite(value):
             raise InputError(name, value, "a finite number")
         return self._unit.read(float(value))
 
     def remove(self) -> None:
-        """Take the sliders out of the panel."""
+        """Remove the sliders from the panel."""
         for slider in self._sliders.values():
             slider.remove()
-        for strip in self._strips.values():
-            strip.remove()
-        self._sliders, self._strips, self._key = {}, {}, ()
+        for track in self._tracks.values():
+            track.remove()
+        self._sliders, self._tracks, self._key = {}, {}, ()
 
-    def _make(self, free: Sequence[Redundancy], robot: Robot, units: Units) -> None:
+    def _make(self, parameters: Sequence[Redundancy], robot: Robot, units: Units) -> None:
         self._unit = unit = units.angles
         with self._folder:
-            for item in free:
+            for item in parameters:
                 low, high = -math.pi, math.pi
                 if item.name.startswith("theta"):
                     joint = robot.joints[int(item.name.removeprefix("theta")) - 1]
@@ -142,38 +140,29 @@ class FreeSliders:
                     max=most,
                     step=unit.step(1),
                     initial_value=min(max(unit.shown(item.value), least), most),
-                    hint="Moves the arm while the target stays met. The strip shows the values the limits allow.",
+                    hint=SLIDER_HINT,
                 )
-                listen(slider, self._post, ("free", robot.id, item.name, units))
+                listen(slider, self._post, ("redundancy", robot.id, item.name, units))
                 self._sliders[item.name] = slider
-                self._strips[item.name] = self._gui.add_html("")
+                self._tracks[item.name] = self._gui.add_html("")
 
 
-def strip_html(item: Redundancy, low: float, high: float, unit: Unit, under: str = UNDER_TRACK) -> str:
-    """The feasible ranges as bars on a line from `low` to `high` (screen units), and in words.
+def feasible_html(item: Redundancy, low: float, high: float, unit: Unit, narrow: bool = False) -> str:
+    """The feasible ranges as bars on a track from `low` to `high` (in the shown unit), and in words.
 
-    `under`: margins that put the line under a slider's track.
+    `narrow`: the track is below a slider with a narrow label, outside a framed folder.
     """
     span = high - low
 
     def percent(value: float) -> float:
         return 100.0 * min(max((value * unit.scale - low) / span, 0.0), 1.0)
 
-    bars = "".join(
-        f'<span style="position:absolute;top:0;bottom:0;left:{percent(a):.2f}%;'
-        f'width:max(2px,{percent(b) - percent(a):.2f}%);background:{FEASIBLE};border-radius:2px"></span>'
-        for a, b in item.intervals
-    )
-    mark = (
-        f'<span style="position:absolute;top:-3px;bottom:-3px;left:calc({percent(item.value):.2f}% - 1px);'
-        'width:2px;background:currentColor"></span>'
-    )
     ranges = ", ".join(f"{unit.number(a)} … {unit.text(b)}" for a, b in item.intervals[:4])
-    words = f"feasible: {ranges}" if ranges else "no value is feasible"
-    return (
-        f'<div data-free="{escape(item.name)}" style="margin:-.2em 1em .4em">'
-        f'<div style="position:relative;height:6px;{under};border-radius:3px;'
-        f'background:rgba(128,128,128,.28)" aria-hidden="true">{bars}{mark}</div>'
-        '<div style="font-size:.74em;line-height:1.6;opacity:.8;font-variant-numeric:tabular-nums">'
-        f"{escape(words)}</div></div>"
+    return render(
+        "panel/feasible",
+        name=item.name,
+        bars=[(f"{percent(a):.2f}", f"{percent(b) - percent(a):.2f}") for a, b in item.intervals],
+        now=f"{percent(item.value):.2f}",
+        words=f"feasible: {ranges}" if ranges else "no value is feasible",
+        narrow=narrow,
     )

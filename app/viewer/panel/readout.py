@@ -1,11 +1,13 @@
-"""The tool's pose in numbers: fixed decimals in tabular figures, so that digits change but never move."""
+"""The tool's pose in numbers, with fixed decimals in tabular figures: digits change but never move."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import viser
 
+from app.viewer.views.templates import render
 from kin.transforms import Array, wxyz_from_rotation
 from kin.units import Units
 
@@ -26,32 +28,17 @@ def html(T_base_tool: Array, units: Units) -> str:
     turned = [angles.scale * a for a in roll_pitch_yaw(T_base_tool[:3, :3])]
     quaternion = wxyz_from_rotation(T_base_tool[:3, :3]).tolist()
     rows = (
-        ("x y z", position, lengths.decimals(1), lengths.name),
-        ("roll pitch yaw", turned, angles.decimals(1), angles.name),
-        ("wxyz", quaternion, 3, ""),
+        ("x y z", _numbers(position, lengths.decimals(1)), lengths.name),
+        ("roll pitch yaw", _numbers(turned, angles.decimals(1)), angles.name),
+        ("quaternion w x y z", _numbers(quaternion, 3), ""),
     )
-    body = "".join(
-        f'<tr><th style="text-align:left;font-weight:500;opacity:.75;padding:0">{name}</th>'
-        f'<td style="text-align:right;padding:0;white-space:nowrap"{"" if unit else " colspan=2"}>'
-        + "".join(_cell(v, decimals, 4.6 if unit else 3.7) for v in values)
-        + (
-            f'</td><td style="padding:0 0 0 .3em;width:1.9em;opacity:.75">{unit}</td></tr>'
-            if unit
-            else "</td></tr>"
-        )
-        for name, values, decimals, unit in rows
-    )
-    return (
-        '<table aria-label="tool pose" style="width:calc(100% - 2em);margin:.1em 1em .8em;'
-        f'border-collapse:collapse;font-size:.78em;line-height:1.55;font-variant-numeric:tabular-nums">{body}</table>'
-    )
+    return render("panel/readout", rows=rows)
 
 
-def _cell(value: float, decimals: int, width: float) -> str:
-    text = f"{value:.{decimals}f}"
-    if float(text) in (0.0, -180.0):
-        text = text.lstrip("-")
-    return f'<span style="display:inline-block;width:{width}em">{text.replace("-", "−")}</span>'
+def _numbers(values: Sequence[float], decimals: int) -> list[str]:
+    texts = (f"{value:.{decimals}f}" for value in values)
+    # A value that may have either sign, ±0 or ±180°, must not flicker.
+    return [(t.lstrip("-") if float(t) in (0.0, -180.0) else t).replace("-", "−") for t in texts]
 
 
 class PoseReadout:

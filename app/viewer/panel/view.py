@@ -1,8 +1,8 @@
-"""What is shown and how: units, frames, labels, axes, page colours, camera."""
+"""Options of the display: units, frames, labels, axes, page colours, camera."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import viser
 
@@ -16,7 +16,7 @@ BRAND_ON_DARK = (86, 180, 233)
 
 @dataclass
 class ViewState:
-    """The visitor's choices; they outlive a change of robot."""
+    """The visitor's choices; they are kept when another robot is selected."""
 
     frames: bool = False
     labels: bool = True
@@ -32,17 +32,17 @@ class UnitChoice:
         listen(radians, post, "radians")
         self._length: Length = units.length
         self._lengths = gui.add_dropdown(
-            "Lengths", LENGTHS, initial_value=units.length, hint="Unit of all lengths, shown and typed"
+            "Lengths", LENGTHS, initial_value=units.length, hint="Unit of all lengths"
         )
         listen(self._lengths, post, "lengths")
 
-    def read_length(self, value: object) -> Length:
-        """A choice of the dropdown; raises `InputError` for one that is not on its list."""
+    def with_length(self, units: Units, value: object) -> Units:
+        """The units with the chosen unit of length; raises `InputError` for an unknown one."""
         if value not in LENGTHS:
             assign(self._lengths, self._length)
             raise InputError("lengths", value, "one of " + ", ".join(LENGTHS))
         self._length = value
-        return self._length
+        return replace(units, length=self._length)
 
 
 class ViewOptions:
@@ -50,10 +50,10 @@ class ViewOptions:
 
     def __init__(self, gui: viser.GuiApi, state: ViewState, post: Post) -> None:
         for name, text, hint in (
-            ("frames", "Link frames", "Frame of every DH row: x red, y green, z blue"),
-            ("labels", "Frame labels", "Name of each frame at the tip of its z axis"),
-            ("axes", "Joint axes", "The line each joint turns about or slides along; the arrow is positive"),
-            ("dark", "Dark page", "Dark or light colours"),
+            ("frames", "Link frames", "The frame of every DH row: x red, y green, z blue"),
+            ("labels", "Frame labels", "The name of each frame, at the tip of its z axis"),
+            ("axes", "Joint axes", "The axis of each joint; its arrow shows the positive direction"),
+            ("dark", "Dark page", "Dark instead of light colours"),
         ):
             listen(gui.add_checkbox(text, getattr(state, name), hint=hint), post, ("view", name))
         group = gui.add_button_group("Camera", ("Reset view",))
@@ -61,7 +61,7 @@ class ViewOptions:
 
 
 def configure_theme(gui: viser.GuiApi, dark: bool) -> None:
-    """The page's colours. No share button: it would open a public tunnel to a private demo."""
+    """Set the page's colours, and hide viser's share button: it would open a public tunnel to the service."""
     gui.configure_theme(
         dark_mode=dark,
         brand_color=BRAND_ON_DARK if dark else BRAND,

@@ -1,1 +1,1 @@
-"""The 3-D scene of one visitor: arm, gizmo and camera."""
+"""The 3-D scene: the arm's meshes, easing, the gizmo and the camera."""

@@ -1,7 +1,7 @@
-"""One arm in a viser scene: nodes are made once, afterwards only poses are assigned.
+"""One arm in a viser scene: nodes are created once, afterwards only poses are assigned.
 
-`ArmScene` needs a `viser.SceneApi` and nothing else, so it works on a visitor's private scene and, in tests, on
-a server that no browser ever visits.
+`ArmScene` needs only a `viser.SceneApi`, so it works on a visitor's private scene and, in tests, on a server
+without browsers.
 """
 
 from __future__ import annotations
@@ -12,20 +12,17 @@ from typing import Any
 import numpy as np
 import viser
 
-from app.viewer.quick import assign, keep_private
 from app.viewer.scene.chain import turn
+from app.viewer.scene.gizmo_axes import GizmoAxes
 from app.viewer.scene.meshes import Part, body
-from app.viewer.scene.offer import Offer
+from app.viewer.viser_patches import assign, keep_private
 from kin import Robot, fk, link_frames
 from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
 
-SMALL = (
-    "trim",
-    "axis",
-    "approach",
-)  # their shadows would cost as much as those of the bodies, and nobody sees them
+# Parts without shadows: these would cost as much as the shadows of the bodies, and are not visible.
+NO_SHADOW = ("trim", "axis", "approach")
 STILL, NO_TURN = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
-SAME = 1e-9  # rad or m: a hundredth of what a browser's numbers tell apart
+SAME = 1e-9  # rad or m: smaller changes are below the precision of a browser's numbers
 GAP_COLOR = (213, 94, 0)
 GRID_LIGHT = {"cell_color": (214, 219, 226), "section_color": (176, 184, 196)}
 GRID_DARK = {"cell_color": (58, 64, 74), "section_color": (88, 96, 110)}
@@ -38,11 +35,11 @@ class ArmScene:
 
     Args:
         root: prefix of all node names. Use a new one for each arm of a scene: the browser keeps the pose of a
-            removed node and gives it to the next node of that name, whose own pose is not sent when it is zero.
+            removed node and gives it to the next node of that name, whose own pose is not sent if it is zero.
 
     Attributes:
-        gizmo: the transform controls; the visitor drags them, `place_gizmo` moves them. Where not every turn is
-            offered, it has arrows only, and a ring for each turn hangs on it (`offer`).
+        gizmo: the transform controls; the visitor drags them, `place_gizmo` moves them. If some rotations are not
+            available, the gizmo has only arrows, and each available ring is a child node (`set_gizmo_axes`).
     """
 
     def __init__(self, scene: viser.SceneApi, robot: Robot, dark: bool = False, root: str = "/arm") -> None:
@@ -74,12 +71,12 @@ class ArmScene:
         )
         self._top += [self.gizmo, self._gap]
         self._rings: list[viser.TransformControlsHandle] = []
-        self._offers = 0
+        self._ring_sets = 0
         self.show(robot.q_home)
         self.place_gizmo(fk(robot, robot.q_home))
 
     def show(self, q: Array) -> None:
-        """Pose every joint node for a configuration ``(n,)``; untouched joints cost nothing."""
+        """Pose every joint node for a configuration ``(n,)``; unchanged joints cost nothing."""
         shown = self._shown
         for i, (link, node, value) in enumerate(
             zip(self.body.chain.links[1:], self._joints, q.tolist(), strict=True)
@@ -93,31 +90,31 @@ class ArmScene:
                 assign(node, wxyz=turn(link.wxyz, value))
 
     def place_gizmo(self, T_base_tool: Array) -> None:
-        """Move the gizmo. Never call it while the visitor holds it."""
+        """Move the gizmo. Never call this while the visitor holds it."""
         assign(self.gizmo, T_base_tool[:3, 3], wxyz_from_rotation(T_base_tool[:3, :3]))
         for ring in self._rings:
             assign(ring, STILL, NO_TURN)
 
     @property
     def gizmo_pose(self) -> Array:
-        """Where the gizmo is ``(4, 4)``, its rings aside."""
+        """The pose ``(4, 4)`` of the gizmo itself, without its rings."""
         return from_position_wxyz(self.gizmo.position, self.gizmo.wxyz)
 
-    def offer(self, offer: Offer) -> list[viser.TransformControlsHandle]:
-        """Give the gizmo these arrows and rings; returns the rings that are nodes of their own.
+    def set_gizmo_axes(self, axes: GizmoAxes) -> list[viser.TransformControlsHandle]:
+        """Give the gizmo these arrows and rings; returns the rings that are separate nodes.
 
-        Those hang on the gizmo: their pose is told in its frame. One set of controls cannot leave out a single
-        ring, as a ring is drawn wherever both axes of its plane are active.
+        Separate rings are children of the gizmo: their pose is in its frame. One set of controls cannot hide a
+        single ring, because viser draws a ring wherever both axes of its plane are active.
         """
         for ring in self._rings:
             ring.remove()
-        self._offers += 1
-        some = any(offer.rings) and not (all(offer.rings) and all(offer.arrows))
-        self.gizmo.active_axes = offer.arrows
-        self.gizmo.disable_rotations = some or not any(offer.rings)
+        self._ring_sets += 1
+        separate = any(axes.rings) and not (all(axes.rings) and all(axes.arrows))
+        self.gizmo.active_axes = axes.arrows
+        self.gizmo.disable_rotations = separate or not any(axes.rings)
         self._rings = [
             self._scene.add_transform_controls(
-                f"{self.gizmo.name}/ring-{'xyz'[axis]}-{self._offers}",
+                f"{self.gizmo.name}/ring-{'xyz'[axis]}-{self._ring_sets}",
                 scale=0.26 * self.body.radius,
                 line_width=4.0,
                 active_axes=(axis != 0, axis != 1, axis != 2),
@@ -127,14 +124,14 @@ class ArmScene:
                 opacity=0.95,
             )
             for axis in range(3)
-            if some and offer.rings[axis]
+            if separate and axes.rings[axis]
         ]
         for ring in self._rings:
             keep_private(ring)
         return self._rings
 
     def show_gap(self, tool: Array, target: Array | None) -> None:
-        """Draw a line and a ghost gripper from the tool point to an unreached target ``(3,)``; None hides them."""
+        """Draw a line to an unreached target ``(3,)``, and a ghost gripper there; None hides both."""
         self._gap.visible = self._ghost.visible = target is not None
         if target is not None:
             self._gap.points = np.array([[tool, target]], dtype=np.float32)
@@ -145,7 +142,7 @@ class ArmScene:
             node.visible = visible
 
     def show_labels(self, visible: bool) -> None:
-        """Show or hide the names of the frames."""
+        """Show or hide the frames' names."""
         for node in self._labels:
             node.visible = visible
 
@@ -159,12 +156,12 @@ class ArmScene:
         self._grid.visible = visible
 
     def use_dark(self, dark: bool) -> None:
-        """Grid colours for a dark or a light page."""
+        """Use the grid colours of a dark or a light page."""
         colors = GRID_DARK if dark else GRID_LIGHT
         self._grid.cell_color, self._grid.section_color = colors["cell_color"], colors["section_color"]
 
     def remove(self) -> None:
-        """Take everything out of the scene."""
+        """Remove everything from the scene."""
         for node in self._top:
             node.remove()
 
@@ -199,7 +196,7 @@ class ArmScene:
                 position, wxyz = link.pose(q)
                 self._joints.append(self._scene.add_frame(name, show_axes=False, position=position, wxyz=wxyz))
             for part in parts:
-                # On the parent's node there may be a part of the same name already.
+                # The parent's node may already have a part of the same name.
                 node = (
                     self._add(parent, part, link.T_parent_axis, name=f"{part.name}-{link.index + 1}")
                     if part.fixed_to_parent
@@ -232,7 +229,7 @@ class ArmScene:
             position=T[:3, 3],
             wxyz=wxyz_from_rotation(T[:3, :3]),
             visible=visible,
-            cast_shadow=opacity is None and part.name not in SMALL,
+            cast_shadow=opacity is None and part.name not in NO_SHADOW,
         )
 
     def _add_frame(self, parent: str, row: int, T: Array) -> None:
@@ -249,7 +246,7 @@ class ArmScene:
             )
         )
         text = f"frame {row + 1}" if row + 1 < len(self.robot.rows) else "tool"
-        # At the tip of z, not at the origin, and each further out: the frames of one wrist share their origin.
+        # At the tip of z, each further out than the last: the frames of one wrist share their origin.
         origins = self._home_frames[:, :3, 3]
         crowd = int((np.linalg.norm(origins[:row] - origins[row], axis=1) < 1e-6).sum())
         self._labels.append(

@@ -1,8 +1,8 @@
-"""Where a visitor looks from: a default view that fits the arm and the window, until the visitor moves the camera.
+"""The visitor's camera: a default view that fits the arm and the window, until the visitor moves the camera.
 
-A link made on one screen is opened on another. Beside a docked panel a viewpoint is what it is, whatever the size.
-On a phone the width is what limits, and the panel is a sheet that covers the lower part: what is chosen there is
-told as the viewpoint that shows the same beside a docked panel.
+A link made on one screen is opened on another. With a docked panel, a viewpoint is independent of the window's
+size. On a phone the width is the limit, and the panel is a sheet that covers the lower part of the window: a
+viewpoint chosen there is saved as the one that shows the same with a docked panel.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ FOV = math.radians(38)
 DIRECTION = np.array([0.80, 0.92, 0.46])
 UP = np.array([0.0, 0.0, 1.0])
 NARROW = 700  # pixels
-LOOK_EVERY = 0.25  # seconds: a moving camera is told of thirty times a second
-PATIENCE = 10.0  # seconds for a page to draw where it was sent; a lesson may have sent it elsewhere meanwhile
+LOOK_EVERY = 0.25  # seconds; a moving camera reports thirty times a second
+PATIENCE = 10.0  # seconds for a page to reach the viewpoint it was sent to; a lesson may move it meanwhile
 FARTHEST = 1e6  # metres; viser's own limit of zooming out is 1e4
-SAME = 1e-3  # of the distance to what is looked at
+SAME = 1e-3  # tolerance, relative to the distance to the look-at point
 _MARGIN = 1.06  # of the sphere around the arm
-_SEEN = 0.4  # of the window's height, above a sheet
+_SEEN = 0.4  # share of the window's height above a sheet
 Sphere = tuple[Array, float]  # centre ``(3,)`` and radius, m
 
 
 def round_points(points: NDArray[np.floating]) -> Sphere:
-    """A sphere that holds points ``(n, 3)``, n > 0: round the middle of their box."""
+    """A sphere around points ``(n, 3)``, n > 0, about the centre of their bounding box."""
     center = (points.min(axis=0) + points.max(axis=0)).astype(float) / 2.0
     return center, float(np.linalg.norm(points - center, axis=1).max())
 
 
 def round_both(one: Sphere, other: Sphere) -> Sphere:
-    """The smallest sphere that holds two."""
+    """The smallest sphere around two spheres."""
     out = other[0] - one[0]
     apart = float(np.linalg.norm(out))
     if apart + other[1] <= one[1]:
@@ -51,16 +51,16 @@ def round_both(one: Sphere, other: Sphere) -> Sphere:
 
 
 def view(body: Body, aspect: float, sheet: bool = False, room: Sequence[Sphere] = ()) -> tuple[Array, Array]:
-    """Camera position and look-at point ``(3,)`` that show the whole of the arm in a window of this aspect.
+    """Camera position and look-at point ``(3,)`` that show the whole arm in a window of this aspect ratio.
 
-    In a portrait window the width is what limits. On a phone the panel is a `sheet` that covers the lower part:
-    there the arm goes above it. `room`: what else is to be seen.
+    In a portrait window the width is the limit. On a phone the panel is a `sheet` that covers the lower part of
+    the window; the arm is then placed above it. `room`: spheres that must be visible as well.
     """
     center, radius = body.center, body.radius
     for sphere in room:
         center, radius = round_both((center, radius), sphere)
     margin, lift = _framed(aspect, sheet)
-    # The way up is seen aslant.
+    # The vertical is foreshortened.
     upright = math.hypot(*DIRECTION[:2]) / float(np.linalg.norm(DIRECTION))
     center = center - UP * lift * radius / upright
     distance = margin * radius / math.sin(_half_angle(aspect))
@@ -68,9 +68,9 @@ def view(body: Body, aspect: float, sheet: bool = False, room: Sequence[Sphere] 
 
 
 def on_sheet(viewpoint: Array, aspect: float) -> Array:
-    """What shows above a phone's sheet what a viewpoint ``(3, 3)`` shows beside a docked panel.
+    """The viewpoint that shows above a phone's sheet what `viewpoint` ``(3, 3)`` shows with a docked panel.
 
-    Rows of a viewpoint: the camera's position, the point it looks at, and the direction that is up.
+    Rows of a viewpoint: camera position, look-at point, and up direction.
     """
     farther, drop = _sheet(aspect)
     return _moved(viewpoint, farther, -drop)
@@ -86,17 +86,18 @@ class VisitorCamera:
     """The camera of one visitor. Posts ``"looked"`` a few times a second while the visitor moves it.
 
     Attributes:
-        sheet: whether the panel is a phone's sheet. Asked once: a docked panel makes the picture narrower.
-        chosen: the viewpoint ``(3, 3)`` the visitor has chosen, as beside a docked panel; None: the default view.
+        sheet: whether the panel is a phone's sheet. Determined once, because a docked panel makes the canvas
+            narrower.
+        chosen: the viewpoint ``(3, 3)`` the visitor has chosen, as with a docked panel; None: the default view.
     """
 
     def __init__(self, client: viser.ClientHandle, post: Post) -> None:
         self._camera = client.camera
         self._post = post
         self._posted_at = 0.0
-        self._told = self._here()
-        # Where the page was sent to, since when, and whether it has been there. Until then it tells of the view
-        # before, which nobody has chosen.
+        self._reported = self._here()
+        # The viewpoint the page was sent to, when, and whether it has arrived. Until then it reports the previous
+        # viewpoint, which nobody has chosen.
         self._aimed, self._aimed_at, self._arrived = np.zeros((3, 3)), 0.0, False
         self.sheet = self._camera.image_width < NARROW
         self.chosen: Array | None = None
@@ -105,7 +106,7 @@ class VisitorCamera:
         self._camera.on_update(self._on_update)
 
     def aim(self, body: Body) -> None:
-        """Move to the default view; that of another arm has room for nothing else."""
+        """Move to the default view; for another arm, the extra spheres are dropped."""
         if body is not self._body:
             self._body, self._room = body, ()
         self._camera.fov = FOV
@@ -113,21 +114,21 @@ class VisitorCamera:
         self.chosen = None
         self._go(np.stack([*view(body, self._aspect, self.sheet, self._room), UP]))
 
-    def make_room(self, room: Sequence[Sphere]) -> None:
-        """Have the default view show these spheres too, from now on; a view that is `chosen` stays as it is."""
-        before, self._room = self._room, tuple(room)
+    def fit(self, spheres: Sequence[Sphere]) -> None:
+        """Make the default view show these spheres as well; a `chosen` view stays as it is."""
+        before, self._room = self._room, tuple(spheres)
         self.look()
-        if self._body is not None and self.chosen is None and (before or room):
+        if self._body is not None and self.chosen is None and (before or spheres):
             self.aim(self._body)
 
     def restore(self, viewpoint: Array) -> None:
-        """Move to a viewpoint that was `chosen` in this window or in another."""
+        """Move to a viewpoint that was `chosen` in this or another window."""
         self.chosen = viewpoint
         self._go(on_sheet(viewpoint, self._aspect) if self.sheet else viewpoint)
 
     def look(self) -> None:
-        """Bring `chosen` up to date."""
-        here = self._told
+        """Update `chosen`."""
+        here = self._reported
         settled = self._arrived or time.perf_counter() - self._aimed_at > PATIENCE
         if settled and here is not None and not _same(here, self._aimed):
             self._aimed, self._arrived = here, True
@@ -140,14 +141,15 @@ class VisitorCamera:
 
     def _go(self, viewpoint: Array) -> None:
         self._aimed, self._aimed_at = viewpoint, time.perf_counter()
-        self._arrived = self._told is not None and _same(self._told, viewpoint)  # then it has no reason to tell
+        # The page reports only changes.
+        self._arrived = self._reported is not None and _same(self._reported, viewpoint)
         position, look_at, up = viewpoint
         self._camera.up_direction = up
         self._camera.position = position
         self._camera.look_at = look_at
 
     def _here(self) -> Array | None:
-        """The viewpoint that the page told last; None for nonsense."""
+        """The viewpoint that the page reported last; None if it is invalid."""
         camera = self._camera
         try:
             here = np.array([camera.position, camera.look_at, camera.up_direction], float)
@@ -156,7 +158,7 @@ class VisitorCamera:
         return here if here.shape == (3, 3) and (np.abs(here) < FARTHEST).all() else None
 
     async def _on_update(self, _: viser.CameraHandle) -> None:
-        self._told = here = self._here()
+        self._reported = here = self._here()
         if not self._arrived and here is not None:
             self._arrived = _same(here, self._aimed)
         now = time.perf_counter()
@@ -170,7 +172,7 @@ def _half_angle(aspect: float) -> float:
 
 
 def _framed(aspect: float, sheet: bool) -> tuple[float, float]:
-    """What the sphere around the arm needs, in its radii: half the picture's narrow side, and how far to go up."""
+    """Half the narrow side of the picture and the upward shift, in radii of the sphere around the arm."""
     if not sheet or aspect >= 1.0:
         return _MARGIN, 0.0
     margin = max(_MARGIN, aspect * _MARGIN / _SEEN)
@@ -178,7 +180,7 @@ def _framed(aspect: float, sheet: bool) -> tuple[float, float]:
 
 
 def _sheet(aspect: float) -> tuple[float, float]:
-    """How many times farther a camera is on a phone, and how much lower it looks, in distances of the other."""
+    """How many times farther the camera is on a phone, and how much lower it looks, relative to its distance."""
     if aspect >= 1.0:
         return 1.0, 0.0
     margin, lift = _framed(aspect, True)
@@ -187,7 +189,7 @@ def _sheet(aspect: float) -> tuple[float, float]:
 
 
 def _moved(viewpoint: Array, farther: float, lift: float) -> Array:
-    """Look in the same direction from so many times as far, the picture `lift` distances higher."""
+    """Scale the camera's distance by `farther`, and raise the look-at point by `lift` times that distance."""
     position, look_at, up = viewpoint
     back = position - look_at
     upright = up * (back @ back) - back * (up @ back)

@@ -1,7 +1,7 @@
-"""A robot's rows regrouped for the screen: one node per moving joint, each the parent of the next.
+"""A robot's DH rows regrouped for the scene: one node per moving joint, each the parent of the next.
 
-With nodes nested like the arm itself, moving a revolute joint means assigning one quaternion, whichever
-convention the table uses:
+With nodes nested like the arm itself, moving a revolute joint means assigning one quaternion, in either
+convention:
 
     T_base_tool = G_1 M(q_1) G_2 M(q_2) … G_n M(q_n) E
 
@@ -28,11 +28,11 @@ class Link:
     """A rigid piece: what moves with one joint, up to the next one.
 
     Attributes:
-        index: number of the moving joint it hangs on, −1 for the base.
+        index: index of the moving joint that carries it, −1 for the base.
         joint: that joint's row, None for the base.
         T_parent_axis: G_k ``(4, 4)``; z is the joint's axis, in coordinates of the previous link.
         path: centre line ``(k, 3)`` from the axis to the next joint (or the tool), in the link's coordinates.
-        frames: (row number, T_link_frame) of each DH row's frame that rides on this link.
+        frames: (row number, T_link_frame) of each DH row's frame that moves with this link.
     """
 
     index: int
@@ -56,7 +56,7 @@ class Link:
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """All links from the base on, and the tool's place on the last one."""
+    """All links, base first, and the tool's pose on the last one."""
 
     links: tuple[Link, ...]
     T_last_tool: Array

@@ -1,4 +1,4 @@
-"""What the hand does with the gizmo, as it is posted."""
+"""Events of the gizmo, as they are posted."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from app.viewer.panel import Post
 
 
 class Pull(NamedTuple):
-    """One event of the gizmo, or of a ring that hangs on it.
+    """One event of the gizmo, or of a ring attached to it.
 
     Attributes:
-        phase: start, update or end.
-        position, wxyz: its pose, m; a ring's is told in the gizmo's frame.
+        phase: start, update or end of a drag.
+        position, wxyz: pose of the gizmo (m); of a ring, in the gizmo's frame.
         ring: whether it is a ring of its own.
     """
 
@@ -25,7 +25,7 @@ class Pull(NamedTuple):
 
 
 def listen(handle: viser.TransformControlsHandle, ring: bool, post: Post) -> None:
-    """Post ``"gizmo"`` with a `Pull` whenever the visitor moves it."""
+    """Post ``"gizmo"`` with a `Pull` whenever the visitor drags it."""
 
     @handle.on_update
     async def _(event: viser.TransformControlsEvent) -> None:

@@ -1,13 +1,13 @@
-"""Bodies for any arm, made from its DH geometry alone.
+"""Meshes of any arm, generated from its DH parameters alone.
 
-Each link is a smooth tube along its DH centre line. Each joint is a coloured housing around its axis, and how it
-sits tells how it moves:
+Each link is a smooth tube along its DH centre line. Each joint is a coloured housing around its axis, whose shape
+shows how the joint moves:
 
 - a **hinge** (the link leaves at right angles to the axis) is a drum across the arm;
 - a **roll** joint (the link leaves along the axis) is a collar round the tube;
 - a **slide** (prismatic) is a square sleeve with a square bar through it.
 
-Wrists and shoulders put several joints on one point. There a collar moves outward along its own axis until it
+Wrists and shoulders have several joints at one point. There a collar moves outward along its own axis until it
 clears its neighbour, and each further drum is slimmer and longer than the one before, like nested gimbals.
 """
 
@@ -48,9 +48,10 @@ PROBES = 8000
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """One mesh of one colour, in the coordinates of the node it hangs on.
+    """One mesh of one colour, in the coordinates of its node.
 
-    `fixed_to_parent` puts it on the previous link, in this joint's axis frame: a sleeve that a bar slides through.
+    `fixed_to_parent` attaches it to the previous link, in this joint's axis frame: a sleeve that a bar slides
+    through.
     """
 
     name: str
@@ -61,15 +62,15 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """Everything drawn of a robot.
+    """All meshes of a robot.
 
     Attributes:
-        chain: the nodes.
+        chain: the links.
         parts: per link (base first), its meshes.
         gripper: the tool's meshes in the tool frame, z being the approach direction.
-        pedestal: what carries the base, in world coordinates.
+        pedestal: supports the base, in world coordinates.
         floor: height of the floor (m), below everything the arm can reach.
-        center, radius: a sphere ``(3,)``, m that the camera should show.
+        center, radius: the sphere ``(3,)``, m that the camera should show.
         size: radius of the thickest link (m), the unit of all decoration.
     """
 
@@ -85,7 +86,7 @@ class Body:
 
 @lru_cache(maxsize=32)
 def body(robot: Robot) -> Body:
-    """The robot's body; the same object for every visitor."""
+    """The robot's meshes; the same object for every visitor."""
     links = chain(robot)
     size = _thickness(robot, links)
     grip = _grip_length(links, size, robot)
@@ -106,7 +107,7 @@ def body(robot: Robot) -> Body:
 
 
 def joint_color(index: int) -> Color:
-    """The colour of a moving joint, by its number."""
+    """The colour of a moving joint, by its index."""
     return JOINT_COLORS[index % len(JOINT_COLORS)]
 
 
@@ -115,12 +116,12 @@ def _thickness(robot: Robot, links: Chain) -> float:
     steps = [np.linalg.norm(np.diff(link.path, axis=0), axis=1) for link in links.links]
     lengths = np.concatenate([*steps, [robot.reach]])
     size = max(robot.reach, 0.05)
-    shortest = float(lengths[lengths > 0.04 * size].min(initial=robot.reach))  # a shorter step is only a jog
+    shortest = float(lengths[lengths > 0.04 * size].min(initial=robot.reach))  # shorter steps are only offsets
     return max(min(0.032 * size, 0.3 * shortest), 0.014 * size)
 
 
 def _tip(links: Chain, size: float) -> float:
-    """Thickness of the last link as a share of the first: slim enough for a flange close to the wrist."""
+    """Thickness of the last link relative to the first: slim enough for a flange close to the wrist."""
     path = links.links[-1].path
     if len(path) < 2:
         return 0.62
@@ -133,11 +134,11 @@ def _taper(index: int, n: int, tip: float) -> float:
 
 def _grip_length(links: Chain, size: float, robot: Robot) -> float:
     path = links.links[-1].path
-    wanted = min(3.2 * size, 0.11 * max(robot.reach, 0.05))
+    length = min(3.2 * size, 0.11 * max(robot.reach, 0.05))
     if len(path) < 2:
         strokes = [j.limits[1] - j.limits[0] for j in robot.joints if j.kind == "prismatic" and j.limits]
-        return min(wanted, 0.4 * min(strokes, default=math.inf))  # room to leave the sleeve it hangs from
-    return min(wanted, 0.62 * float(np.linalg.norm(path[-1] - path[-2])))
+        return min(length, 0.4 * min(strokes, default=math.inf))  # short enough to leave its sleeve
+    return min(length, 0.62 * float(np.linalg.norm(path[-1] - path[-2])))
 
 
 def _link_parts(link: Link, r: float, crowd: int, grip: float, links: Chain) -> tuple[Part, ...]:
@@ -146,7 +147,7 @@ def _link_parts(link: Link, r: float, crowd: int, grip: float, links: Chain) -> 
     if grip > 0.0 and len(path) > 1 and link is links.links[-1]:
         step = path[-1] - path[-2]
         length = float(np.linalg.norm(step))
-        if step @ links.T_last_tool[:3, 2] > 0.9 * length:  # the gripper takes the place of the tube's end
+        if step @ links.T_last_tool[:3, 2] > 0.9 * length:  # the gripper replaces the end of the tube
             path = np.vstack([path[:-1], path[-1] - step / length * min(grip, 0.95 * length)])
     parts = [Part("link", tube(path, r), LINK_COLOR)] if len(path) > 1 else []
     if link.joint is None:
@@ -157,7 +158,7 @@ def _link_parts(link: Link, r: float, crowd: int, grip: float, links: Chain) -> 
     along = _leaves_along(link)
     if along:
         middle = 0.85 * r + (1.75 * r if crowd else 0.15 * r)
-        if link is links.links[-1]:  # the fingers stay free
+        if link is links.links[-1]:  # clear of the fingers
             middle = max(min(middle, float(np.linalg.norm(link.path[1])) - 0.45 * grip - 0.85 * r), 0.85 * r)
         return (*parts, *_collar(r, along, along * middle, color))
     ahead = float(links.T_last_tool[2, 2])
@@ -168,7 +169,7 @@ def _link_parts(link: Link, r: float, crowd: int, grip: float, links: Chain) -> 
 
 
 def _leaves_along(link: Link) -> int:
-    """+1 or −1 when the link leaves its joint along the axis, 0 for a hinge."""
+    """+1 or −1 if the link leaves its joint along the axis, 0 for a hinge."""
     if len(link.path) < 2:
         return 0
     step = link.path[1] - link.path[0]
@@ -202,7 +203,7 @@ def _collar(r: float, along: int, middle: float, color: Color) -> list[Part]:
 
 
 def _slide(link: Link, r: float, color: Color, grip: float) -> list[Part]:
-    """A sleeve, and a bar so long that it is in the sleeve at both ends of the stroke."""
+    """A sleeve, and a bar long enough to stay in the sleeve at both ends of the stroke."""
     assert link.joint is not None
     low, high = link.joint.limits or (0.0, 8 * r)
     bar = 0.75 * r
@@ -215,7 +216,7 @@ def _slide(link: Link, r: float, color: Color, grip: float) -> list[Part]:
 
 
 def _axis(r: float, low: float, high: float, arrow: bool = True) -> trimesh.Trimesh:
-    """A thin rod along z whose arrow head tells which way is positive."""
+    """A thin rod along z; its arrow head shows the positive direction."""
     rod = cylinder(0.13 * r, low, high)
     return merged([rod, cone(0.38 * r, high - 0.2 * r, high + 0.8 * r)]) if arrow else rod
 
@@ -251,14 +252,14 @@ def _pedestal(robot: Robot, size: float, floor: float) -> Part:
 
 
 def _extent(robot: Robot) -> Array:
-    """Lowest and highest coordinates ``(2, 3)`` that any frame of the arm reaches, by a fixed sample."""
+    """Lowest and highest coordinates ``(2, 3)`` of the arm's frames, in a fixed sample of configurations."""
     q = robot.random_q(np.random.default_rng(7), PROBES)
     points = link_frames(robot, q)[..., :3, 3].reshape(-1, 3)
     return np.array([points.min(axis=0), points.max(axis=0)])
 
 
 def _view_sphere(robot: Robot, floor: float, size: float) -> tuple[Array, float]:
-    """A sphere round the arm at home and most of its pedestal."""
+    """A sphere around the arm at home and most of its pedestal."""
     points = [robot.T_world_base[:3, 3], *link_frames(robot, robot.q_home)[:, :3, 3]]
     points.append(np.array([*robot.T_world_base[:2, 3], 0.55 * floor]))
     corners = np.array([np.min(points, axis=0), np.max(points, axis=0)])

@@ -1,9 +1,9 @@
 """Easing: the shown configuration glides to the solved one instead of jumping there.
 
-A gizmo drag gives at most twenty solutions a second; a screen shows sixty pictures. Between two solutions the
-shown configuration moves along a straight line in joint space (the way joints really move), fast first and
-slower towards the end, and ends *exactly* on the solution. A new solution restarts from wherever the arm is
-shown, so easing never delays a solve. Joint space also keeps every picture a configuration inside the limits.
+A gizmo drag gives at most twenty solutions a second; a screen shows sixty frames. Between two solutions the shown
+configuration moves along a straight line in joint space, fast first and slower towards the end, and ends *exactly*
+on the solution. A new solution restarts from the shown configuration, so easing never delays a solve. In joint
+space, every shown configuration is within the limits.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ import numpy as np
 from kin.transforms import Array
 
 FRAME = 1 / 60
-SHORTEST = 0.05  # one browser event to the next: dragging then looks continuous
+SHORTEST = 0.05  # s from one browser event to the next: dragging then looks continuous
 LONGEST = 0.6
-SPEED = 6.0  # rad/s of the joint that travels furthest (m/s × 4 for a prismatic one)
+SPEED = 6.0  # rad/s of the joint that travels furthest (weighted, for a prismatic joint)
 
 
 class Motion:
-    """Where the shown configuration is at a given time.
+    """The shown configuration as a function of time.
 
     Args:
-        q: where to begin ``(n,)``.
+        q: first configuration ``(n,)``.
         weights: radians per unit of each joint, so that metres and radians can share one speed.
     """
 
@@ -36,11 +36,11 @@ class Motion:
 
     @property
     def goal(self) -> Array:
-        """Where the motion ends ``(n,)``."""
+        """The end ``(n,)`` of the motion."""
         return self._goal
 
     def aim(self, goal: Array, now: float, ease: bool = True) -> None:
-        """Head for `goal` from the configuration shown at time `now` (seconds)."""
+        """Start a motion to `goal` from the configuration shown at time `now` (seconds)."""
         self._start = self.at(now)
         self._goal = np.array(goal)
         travel = float((np.abs(self._goal - self._start) * self._weights).max())
@@ -58,22 +58,23 @@ class Motion:
 
 
 class Pace:
-    """How often moving arms may be redrawn, shared by all visitors of a server.
+    """How often moving arms are redrawn; shared by all visitors of a server.
 
-    A picture costs half a millisecond of processor time and more, on its way from the solution to the visitor.
-    Thirty visitors dragging at sixty pictures a second would fill a core and make everybody late, so visitors
-    share a budget: few get smooth easing, many get fewer pictures, and beyond that each solution is shown at once.
-    The numbers beside the picture cost as much again and have a budget of their own.
+    A frame costs half a millisecond of processor time or more on its way from the solution to the visitor. Thirty
+    visitors dragging at sixty frames a second would saturate a core and delay everybody. So visitors share a
+    limited
+    rate: a few get smooth easing, more get fewer frames, and beyond that each solution is shown at once. The
+    numbers in the panel cost as much again and have a rate of their own.
     """
 
-    def __init__(self, pictures_per_second: float = 600.0, readings_per_second: float = 100.0) -> None:
-        self._budget = pictures_per_second
+    def __init__(self, frames_per_second: float = 600.0, readings_per_second: float = 100.0) -> None:
+        self._frames = frames_per_second
         self._readings = readings_per_second
         self._moving: set[int] = set()
         self._lock = threading.Lock()
 
     def moving(self, visitor: int, is_moving: bool) -> None:
-        """Tell whether this visitor's arm is moving, or about to, as the visitor holds the gizmo."""
+        """Report whether this visitor's arm is moving, or may move because the visitor holds the gizmo."""
         if (visitor in self._moving) == is_moving:
             return
         with self._lock:
@@ -81,8 +82,8 @@ class Pace:
 
     @property
     def interval(self) -> float:
-        """Seconds between two pictures of one visitor."""
-        return max(FRAME, len(self._moving) / self._budget)
+        """Seconds between two frames of one visitor."""
+        return max(FRAME, len(self._moving) / self._frames)
 
     @property
     def reading(self) -> float:
@@ -91,5 +92,5 @@ class Pace:
 
     @property
     def eases(self) -> bool:
-        """Whether easing is worth it: it is not, once it would show less than one picture per event."""
+        """Whether to ease; not if it would show less than one frame per event."""
         return self.interval < SHORTEST

@@ -1,7 +1,7 @@
-"""The few solids an arm is made of: lathed parts, swept tubes, boxes.
+"""The solids of an arm: solids of revolution, tubes and boxes.
 
-The browser smooths shading over vertices that faces share. So a round side shares them, and an edge that should
-look sharp has its vertices twice.
+The browser smooths shading across vertices that faces share. So a round side shares its vertices, and a sharp edge
+has its vertices twice.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ SEGMENTS = 28
 
 
 def lathe(profile: ArrayLike) -> trimesh.Trimesh:
-    """The solid of revolution about z of a profile ``(k, 2)`` of (radius, z), from bottom to top; edges sharp."""
+    """The solid of revolution about z of a profile ``(k, 2)`` of (radius, z), bottom to top, with sharp edges."""
     points = np.asarray(profile, dtype=float)
     angles = np.linspace(0.0, 2 * np.pi, SEGMENTS, endpoint=False)
     ring = np.column_stack([np.cos(angles), np.sin(angles)])
@@ -33,7 +33,7 @@ def lathe(profile: ArrayLike) -> trimesh.Trimesh:
 
 
 def cylinder(radius: float, low: float, high: float, bevel: float = 0.12) -> trimesh.Trimesh:
-    """A cylinder about z between two heights, its rims bevelled by a share of the radius."""
+    """A cylinder about z between two heights, its rims bevelled by a fraction of the radius."""
     b = min(bevel * radius, 0.4 * (high - low))
     return lathe(
         [(0, low), (radius - b, low), (radius, low + b), (radius, high - b), (radius - b, high), (0, high)]
@@ -73,7 +73,7 @@ def tube(path: Array, radius: float) -> trimesh.Trimesh:
         steps /= np.linalg.norm(steps, axis=1, keepdims=True)
         tangents = np.vstack([steps[:1], steps[:-1] + steps[1:], steps[-1:]])
         lengths = np.linalg.norm(tangents, axis=1, keepdims=True)
-        # A centre line that doubles back has no mean direction at its turning point.
+        # Where the centre line doubles back, the mean direction is undefined.
         before = np.vstack([steps[:1], steps])
         tangents = np.where(lengths > 1e-6, tangents / np.maximum(lengths, 1e-6), before)
     centers, radii = [], []
@@ -89,7 +89,7 @@ def tube(path: Array, radius: float) -> trimesh.Trimesh:
     side = frame_from_approach(directions[0])[:, 0]
     rings, faces = [], []
     for k, (center, r, direction) in enumerate(zip(centers, radii, directions, strict=True)):
-        # Parallel transport: carry the side vector along instead of choosing it anew, so the tube does not twist.
+        # Parallel transport of the side vector, so that the tube does not twist.
         side = side - direction * (side @ direction)
         norm = float(np.linalg.norm(side))
         side = side / norm if norm > 1e-6 else frame_from_approach(direction)[:, 0]

@@ -1,1 +1,1 @@
-"""One visitor: the controller, its worker thread and inbox, and what a link restores."""
+"""One visitor's session: the arm's controller, the page, the worker thread and its inbox, and saved state."""

@@ -1,9 +1,9 @@
-"""A newest-value-wins inbox: what callbacks post into and one worker takes from.
+"""An inbox that keeps only the newest value of each key: callbacks post, one worker takes.
 
 A browser sends up to twenty drag events a second, and a solve may take longer than the gap between two of them.
-A queue would make the arm lag further and further behind the hand. Here a key holds one value only: posting
-again replaces the value and moves the key to the end, so the worker always sees the newest value of each thing,
-in the order in which they were last touched.
+With a queue the arm would fall further and further behind the pointer. Here, posting a key again replaces its
+value and moves the key to the end. So the worker always sees the newest value of each key, in the order of the
+last posts.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Hashable
 
 
 class Inbox:
-    """Any thread may post; one thread takes. Waiting is blocking: an idle visitor costs no processor time."""
+    """Any thread may post; one thread takes. Waiting blocks, so an idle visitor costs no processor time."""
 
     def __init__(self) -> None:
         self._changed = threading.Condition()
@@ -26,7 +26,7 @@ class Inbox:
         return self._closed
 
     def post(self, key: Hashable, value: object = None) -> None:
-        """Make `value` the newest one of `key`. Never blocks for long; ignored once closed."""
+        """Make `value` the newest one of `key`. Ignored once the inbox is closed."""
         with self._changed:
             if self._closed:
                 return
@@ -35,10 +35,10 @@ class Inbox:
             self._changed.notify()
 
     def take(self, timeout: float | None = None) -> list[tuple[Hashable, object]] | None:
-        """Everything posted since the last call, oldest touch first.
+        """All values posted since the last call, ordered by their last post.
 
-        Waits until something is there. An empty list means that `timeout` seconds passed first; None means
-        closed, whatever is left inside: a visitor who is gone wants no answer.
+        Waits until there is one. Returns an empty list after `timeout` seconds, and None once the inbox is closed,
+        even if values are left: a disconnected visitor needs no answer.
         """
         with self._changed:
             self._changed.wait_for(lambda: self._values or self._closed, timeout)
@@ -48,7 +48,7 @@ class Inbox:
         return list(taken.items())
 
     def close(self) -> None:
-        """Wake the worker for the last time."""
+        """Discard all values and wake the worker for the last time."""
         with self._changed:
             self._closed = True
             self._values.clear()

@@ -1,12 +1,12 @@
-"""What a visitor has set, as a short text: what the page's address holds, and what a reload restores.
+"""The state of a page as a short text: the page's URL holds it, and a reload restores it.
 
-The text is JSON in base64url, so that any address may carry it. It names only what differs from a fresh page: what
-a visitor never touched is whatever the page that opens it begins with. It comes back from anywhere: from an old
-version of this program, cut off by a mail client, or written by somebody with bad intentions. So `decode` never
-raises; what it cannot use, it leaves out.
+The text is JSON in base64url, so that any URL may carry it. It contains only what differs from a fresh page;
+everything else takes the defaults of the page that opens it. The text may come from an old version of this
+program, truncated by a mail client, or from somebody with bad intentions. So `decode` never raises; it ignores
+what it cannot use.
 
-The page keeps the text for its own tab (``static/viewer.js``): viser's calls that read and write a browser's
-`localStorage` reach it there.
+``static/viewer.js`` stores the text for its own tab: viser's calls that read and write a browser's `localStorage`
+are redirected there.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
 from kin.units import DEFAULT_UNITS, LENGTHS, Units
 
 VERSION = 1
-KEY = "kinboard"  # of the item of the page's storage
+KEY = "kinboard"  # of the item in the page's storage
 MAX_TEXT = 16_000  # characters; the bridge refuses messages of 64 KiB
-FARTHEST = 1000.0  # metres of a target from the base, or of a camera
-# Nine digits are a nanometre: a shared configuration is the same for every purpose, in half the text.
+FARTHEST = 1000.0  # m: the largest coordinate of a target or a camera
+# Nine digits are a nanometre: a shared configuration is practically exact, in half the text.
 DIGITS = 9
-CAMERA_DIGITS = 4  # of metres: nobody sees the difference
-CAMERA_ROOM = 100.0  # how much nearer or farther than an arm's reach a camera may be
+CAMERA_DIGITS = 4  # of metres; finer differences are invisible
+CAMERA_RANGE = 100.0  # largest ratio of a camera's distance to the arm's reach, and the reverse
 
 FRESH = ViewState()
 _ADDRESS = re.compile(r"https?://[A-Za-z0-9._:%\[\]-]+/[A-Za-z0-9._~%/-]*")
@@ -42,19 +42,19 @@ _ADDRESS = re.compile(r"https?://[A-Za-z0-9._:%\[\]-]+/[A-Za-z0-9._~%/-]*")
 
 @dataclass(frozen=True, eq=False)
 class PageState:
-    """What a shared address restores; None and empty: as on a fresh page.
+    """The state that a shared URL restores; None and empty: as on a fresh page.
 
     Attributes:
-        robot: id of the arm.
-        q: configuration ``(n,)`` inside the limits.
-        target: pose ``(4, 4)`` that was asked for and is not reached, else None.
-        branch: as `kin.solve_ik` takes it.
-        lesson: key of the lesson on show.
+        robot: id of the robot.
+        q: configuration ``(n,)`` within the limits.
+        target: target pose ``(4, 4)`` that the tool does not have yet, else None.
+        branch: requested branch, as `kin.solve_ik` takes it.
+        lesson: key of the open lesson.
         units: of angles and lengths.
-        features: `Feature.state` of each feature by its key, unread.
-        locks: indices of the joints that are locked, each at its value in `q`.
+        features: `Feature.state` of each feature by its key; not validated here.
+        locks: indices of the locked joints; each is locked at its value in `q`.
         camera: viewpoint ``(3, 3)`` as `VisitorCamera.chosen`; None: the default view.
-        missing: the arm that was asked for, if there is none of that id here.
+        missing: the requested robot's id, if this service does not have that robot.
     """
 
     robot: str | None = None
@@ -72,8 +72,8 @@ class PageState:
 
 
 @dataclass(frozen=True)
-class PageMemory:
-    """What a page knows of itself: the address of the service as its visitor sees it, and the state it kept."""
+class StoredPage:
+    """The contents of a page's storage: the service's address as the visitor sees it, and the encoded state."""
 
     address: str = ""
     state: str = ""
@@ -82,87 +82,88 @@ class PageMemory:
 def encode(state: PageState) -> str:
     """The state as a text of letters, digits, ``-`` and ``_``.
 
-    What the features tell is left out when the text would be longer than `decode` reads.
+    The states of the features are left out if the text would be longer than `decode` accepts.
     """
-    said: dict[str, Any] = {"v": VERSION}
+    data: dict[str, Any] = {"v": VERSION}
     if state.robot is not None:
-        said["robot"] = state.robot
+        data["robot"] = state.robot
     if state.q is not None:
-        said["q"] = _rounded(state.q)
+        data["q"] = _rounded(state.q)
     if state.target is not None:
-        said["target"] = _rounded(state.target[:3, 3]) + _rounded(wxyz_from_rotation(state.target[:3, :3]))
+        data["target"] = _rounded(state.target[:3, 3]) + _rounded(wxyz_from_rotation(state.target[:3, :3]))
     for name in ("task", "branch", "lesson"):
         if getattr(state, name) is not None:
-            said[name] = getattr(state, name)
+            data[name] = getattr(state, name)
     if state.locks:
-        said["locks"] = list(state.locks)
+        data["locks"] = list(state.locks)
     if state.camera is not None:
         position, look_at, up = (_rounded(row, CAMERA_DIGITS) for row in state.camera)
-        said["camera"] = position + look_at + (up if up != UP.tolist() else [])
+        data["camera"] = position + look_at + (up if up != UP.tolist() else [])
     if not state.units.degrees:
-        said["units"] = "rad"
+        data["units"] = "rad"
     if state.units.length != DEFAULT_UNITS.length:
-        said["length"] = state.units.length
+        data["length"] = state.units.length
     view = {name: value for name, value in vars(state.view).items() if value != getattr(FRESH, name)}
     if view:
-        said["view"] = view
+        data["view"] = view
     if state.features:
-        said["features"] = state.features
-    text = _pack(said)
+        data["features"] = state.features
+    text = _pack(data)
     if len(text) > MAX_TEXT:
-        said.pop("features", None)
-        text = _pack(said)
+        data.pop("features", None)
+        text = _pack(data)
     return text
 
 
 def decode(text: str, robots: Sequence[Robot]) -> PageState:
-    """The state that a text tells, as far as it can be used with these arms; never raises.
+    """The state in a text, as far as it is valid for these robots; never raises.
 
-    Without a usable arm, whatever belongs to an arm is left out too. Lessons and features know best what they
-    can use: their parts are not looked into.
+    Without a valid robot, everything that depends on a robot is ignored. The states of lessons and features are
+    not
+    validated here: `Feature.restore` does that.
     """
-    said = _unpack(text)
-    if said.get("v") != VERSION:
+    data = _unpack(text)
+    if data.get("v") != VERSION:
         return PageState()
-    asked = said.get("robot", robots[0].id)
-    robot = next((r for r in robots if r.id == asked), None)
-    lesson = said.get("lesson")
-    features = said.get("features")
+    requested = data.get("robot", robots[0].id)
+    robot = next((r for r in robots if r.id == requested), None)
+    lesson = data.get("lesson")
+    features = data.get("features")
     common: dict[str, Any] = {
         "lesson": lesson if isinstance(lesson, str) else None,
-        "units": _units(said),
-        "view": _view(said.get("view")),
+        "units": _units(data),
+        "view": _view(data.get("view")),
         "features": _features(features),
     }
     if robot is None:
-        return PageState(missing=asked[:80] if isinstance(asked, str) else "", **common)
-    task, branch = said.get("task"), said.get("branch")
-    known = ("seed", *branch_names(robot)) if branch_names(robot) else ()
+        return PageState(missing=requested[:80] if isinstance(requested, str) else "", **common)
+    task, branch = data.get("task"), data.get("branch")
+    valid = ("seed", *branch_names(robot)) if branch_names(robot) else ()
     return PageState(
         robot=robot.id,
-        q=_configuration(said.get("q"), robot),
-        target=_pose(said.get("target")),
+        q=_configuration(data.get("q"), robot),
+        target=_pose(data.get("target")),
         task=task if task in _TASKS else None,
-        branch=branch if branch in known else None,
-        locks=_joints(said.get("locks"), robot),
-        camera=_viewpoint(said.get("camera"), robot),
+        branch=branch if branch in valid else None,
+        locks=_joints(data.get("locks"), robot),
+        camera=_viewpoint(data.get("camera"), robot),
         **common,
     )
 
 
-def read_memory(text: str | None) -> PageMemory:
-    """What a page answered; what is no address or no text is left empty."""
-    said = _parse(text or "")
-    address, state = said.get("address"), said.get("state")
+def read_stored_page(text: str | None) -> StoredPage:
+    """Parse the contents of a page's storage; invalid parts are left empty."""
+    data = _parse(text or "")
+    address, state = data.get("address"), data.get("state")
     usable = isinstance(address, str) and len(address) < 500 and _ADDRESS.fullmatch(address)
-    return PageMemory(str(address) if usable else "", state if isinstance(state, str) else "")
+    return StoredPage(str(address) if usable else "", state if isinstance(state, str) else "")
 
 
 _TASKS: tuple[Task, ...] = get_args(Task)
 
 
-def _pack(said: dict[str, Any]) -> str:
-    text = json.dumps(said, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+def _pack(data: dict[str, Any]) -> str:
+    text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return base64.urlsafe_b64encode(text.encode()).rstrip(b"=").decode()
 
 
@@ -178,10 +179,10 @@ def _unpack(text: str) -> dict[str, Any]:
 
 def _parse(text: str) -> dict[str, Any]:
     try:
-        said = json.loads(text)
+        data = json.loads(text)
     except (ValueError, RecursionError):
         return {}
-    return said if isinstance(said, dict) else {}
+    return data if isinstance(data, dict) else {}
 
 
 def _rounded(values: Array, digits: int = DIGITS) -> list[float]:
@@ -218,9 +219,9 @@ def _pose(value: object) -> Array | None:
 
 
 def _joints(value: object, robot: Robot) -> tuple[int, ...]:
-    told = value if isinstance(value, list) else []
-    known = {item for item in told if type(item) is int and 0 <= item < robot.n}  # True is an int too
-    return tuple(sorted(known))
+    items = value if isinstance(value, list) else []
+    valid = {item for item in items if type(item) is int and 0 <= item < robot.n}  # True is an int too
+    return tuple(sorted(valid))
 
 
 def _viewpoint(value: object, robot: Robot) -> Array | None:
@@ -229,25 +230,26 @@ def _viewpoint(value: object, robot: Robot) -> Array | None:
     if numbers is None or np.abs(numbers).max() > FARTHEST:
         return None
     position, look_at, up = numbers.reshape(3, 3)
-    away = float(np.linalg.norm(position - look_at))
-    aside = float(np.linalg.norm(look_at - robot.T_world_base[:3, 3]))
-    if not robot.reach / CAMERA_ROOM <= away <= robot.reach * CAMERA_ROOM or aside > robot.reach * CAMERA_ROOM:
+    nearest, farthest = robot.reach / CAMERA_RANGE, robot.reach * CAMERA_RANGE
+    distance = float(np.linalg.norm(position - look_at))
+    offset = float(np.linalg.norm(look_at - robot.T_world_base[:3, 3]))
+    if not nearest <= distance <= farthest or offset > farthest:
         return None
     if not math.isclose(float(np.linalg.norm(up)), 1.0, abs_tol=1e-3):
         return None
     return numbers.reshape(3, 3)
 
 
-def _units(said: dict[str, Any]) -> Units:
-    length = next((unit for unit in LENGTHS if unit == said.get("length")), DEFAULT_UNITS.length)
-    return Units(said.get("units") != "rad", length)
+def _units(data: dict[str, Any]) -> Units:
+    length = next((unit for unit in LENGTHS if unit == data.get("length")), DEFAULT_UNITS.length)
+    return Units(data.get("units") != "rad", length)
 
 
 def _view(value: object) -> ViewState:
-    told = value if isinstance(value, dict) else {}
-    return ViewState(**{name: told[name] for name in vars(FRESH) if isinstance(told.get(name), bool)})
+    options = value if isinstance(value, dict) else {}
+    return ViewState(**{name: options[name] for name in vars(FRESH) if isinstance(options.get(name), bool)})
 
 
 def _features(value: object) -> dict[str, dict[str, object]]:
-    told = value if isinstance(value, dict) else {}
-    return {key: state for key, state in told.items() if isinstance(state, dict)}
+    states = value if isinstance(value, dict) else {}
+    return {key: state for key, state in states.items() if isinstance(state, dict)}

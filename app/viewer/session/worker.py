@@ -1,7 +1,7 @@
-"""One thread that acts, and an inbox for everybody who wants it to.
+"""A worker thread and its inbox.
 
-Callbacks of the browser post and return. The worker takes everything that is new and makes one step of it; it
-sleeps as long as nothing is to be done. What a worker touches needs no lock, because nobody else touches it.
+Browser callbacks post events and return. The worker takes all new events and processes them in one step; it sleeps
+while there is nothing to do. State that only the worker touches needs no lock.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ log = logging.getLogger(__name__)
 
 
 class Worker:
-    """The thread of one visitor. `start`, `post`, `end` and `join` may be called by any thread.
+    """The thread of one visitor. `start`, `post`, `end` and `join` are thread-safe.
 
     Args:
-        visitor: its number, for the log.
-        failed: called as the last thing by a worker that cannot go on.
+        visitor: the visitor's number, for the log.
+        failed: called last by a worker that cannot continue.
     """
 
     def __init__(self, visitor: int, failed: Callable[[], None] | None = None) -> None:
@@ -32,43 +32,43 @@ class Worker:
         self._thread = threading.Thread(target=self._run, name=f"visitor-{visitor}", daemon=True)
 
     def start(self) -> None:
-        """Build the visitor's page and begin to answer."""
+        """Build the visitor's page and start processing events."""
         self._thread.start()
 
     def post(self, key: Hashable, value: object = None) -> None:
-        """Tell the worker that the visitor did something."""
+        """Queue an event; a newer value replaces a queued one of the same key."""
         self._inbox.post(key, value)
 
     def end(self) -> None:
-        """Let the worker finish."""
+        """Tell the worker to finish."""
         self._inbox.close()
 
     def join(self, timeout: float | None = None) -> bool:
-        """Wait for the worker to finish; whether it did."""
+        """Wait for the worker to finish; returns whether it has."""
         self._thread.join(timeout)
         return not self._thread.is_alive()
 
-    # What a visitor's worker does
+    # To be overridden
 
     def _build(self) -> None:
-        """Before everything else."""
+        """Runs first: build the page."""
         raise NotImplementedError
 
     def _step(self, batch: list[tuple[Hashable, object]]) -> None:
-        """Act on what was posted; on nothing, when `_rest` is over."""
+        """Process the events of a batch; the batch is empty after `_timeout` seconds without an event."""
         raise NotImplementedError
 
     @property
-    def _rest(self) -> float | None:
-        """Seconds the worker may sleep if nothing happens."""
+    def _timeout(self) -> float | None:
+        """How long (s) the worker may sleep if nothing happens; None: until the next event."""
         raise NotImplementedError
 
     def _report(self, notice: Notice) -> None:
-        """Show what went wrong."""
+        """Show an error to the visitor."""
         raise NotImplementedError
 
     def _leave(self) -> None:
-        """After everything else: there is no page any more."""
+        """Runs last: the page no longer exists."""
         raise NotImplementedError
 
     # The thread
@@ -76,7 +76,7 @@ class Worker:
     def _run(self) -> None:
         try:
             self._build()
-            while (batch := self._inbox.take(self._rest)) is not None:
+            while (batch := self._inbox.take(self._timeout)) is not None:
                 self._guard(lambda batch=batch: self._step(batch))  # type: ignore[misc]
         except BaseException:
             gone = self._inbox.closed
@@ -87,21 +87,21 @@ class Worker:
         finally:
             self._leave()
 
-    def _guard(self, act: Callable[[], None]) -> None:
-        """Run one step; an error is logged and shown, and the worker lives on."""
+    def _guard(self, action: Callable[[], None]) -> None:
+        """Run an action; an error is logged and shown, and the worker continues."""
         try:
-            act()
+            action()
         except Exception as error:
             if self._inbox.closed:
-                log.debug("visitor %s left in mid-motion: %s", self._visitor, error)
+                log.debug("visitor %s disconnected during a step: %s", self._visitor, error)
                 return
             log.exception("visitor %s", self._visitor)
             self._show_error(error)
 
     def _show_error(self, error: Exception) -> None:
         expected = isinstance(error, kin.KinematicsError)
-        detail = str(error) if expected else f"{type(error).__name__}; the server's log has the details."
+        detail = str(error) if expected else f"{type(error).__name__}; see the server log for details."
         try:
-            self._report(Notice("error", "Not understood" if expected else "Something went wrong", detail))
+            self._report(Notice("error", "Invalid input" if expected else "Something went wrong", detail))
         except Exception:
             log.exception("visitor %s: the error could not be shown", self._visitor)

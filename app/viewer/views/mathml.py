@@ -1,13 +1,13 @@
-"""Typeset mathematics for the panel: MathML, which browsers draw by themselves.
+"""Typeset mathematics for the panel, as MathML, which browsers render natively.
 
-Small functions that put one piece of markup round others. A leaf (`ident`, `text`, `op`, `number`) takes plain
-text and escapes it; everything else takes and gives :data:`MathML`, so that a type checker keeps the two apart.
-`math` closes a formula: it goes into an HTML or Markdown element of viser.
+Each function wraps pieces of markup. A leaf (`ident`, `text`, `op`, `number`) takes plain text and escapes it; all
+others take and return :data:`MathML`, so that a type checker keeps the two apart. `math` completes a formula, for
+a template or an HTML element of viser.
 
 >>> math(sub(ident("T"), text("02")), op("="), number(-1, 0))[:26]
 '<math style="font-size:1em'
 
-Brackets do not stretch with the fonts most machines have: `matrix` draws its own, as borders.
+Brackets do not stretch with the fonts of most machines: `matrix` draws its own, as borders.
 """
 
 from __future__ import annotations
@@ -16,11 +16,13 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import NewType
 
+from markupsafe import Markup
+
 from kin.units import fixed
 
 MathML = NewType("MathML", str)
 
-# A bracket is a border with two serifs: short lines painted as gradients, in the colour of the text.
+# A bracket is a border with two serifs, short lines drawn as gradients in the text colour.
 _SERIFS = ",".join(
     f"linear-gradient(currentColor,currentColor) {corner}/.3em .09em no-repeat"
     for corner in ("left top", "left bottom", "right top", "right bottom")
@@ -31,19 +33,20 @@ _BRACKETS = (
 )
 
 
-def math(*parts: MathML, alt: str = "", size: float = 1.0) -> str:
-    """A whole formula as HTML. `alt` is what a screen reader says instead; `size` is in em."""
+def math(*parts: MathML, alt: str = "", size: float = 1.0) -> Markup:
+    """A complete formula as HTML. `alt` is the text for screen readers; `size` is in em."""
     label = f' aria-label="{escape(alt, quote=True)}"' if alt else ""
-    return f'<math style="font-size:{size:g}em;font-variant-numeric:tabular-nums"{label}>{"".join(parts)}</math>'
+    style = f"font-size:{size:g}em;font-variant-numeric:tabular-nums"
+    return Markup(f'<math style="{style}"{label}>{"".join(parts)}</math>')
 
 
 def ident(name: str) -> MathML:
-    """A variable. A single letter comes out slanted, as mathematics has it; a longer name upright."""
+    """A variable. A single letter is italic, as usual in mathematics, a longer name upright."""
     return MathML(f"<mi>{escape(name)}</mi>")
 
 
 def text(words: str) -> MathML:
-    """Upright words or labels, blanks kept."""
+    """Upright words or labels; blanks are kept."""
     return MathML(f"<mtext>{escape(words)}</mtext>")
 
 
@@ -59,7 +62,7 @@ def number(value: float, decimals: int = 3) -> MathML:
 
 
 def short(value: float, decimals: int = 3) -> MathML:
-    """`number` without the zeros that say nothing: for constants, which do not flicker."""
+    """`number` without trailing zeros, for constants."""
     shown = fixed(value, decimals)
     return MathML(f"<mn>{shown.rstrip('0').rstrip('.') if '.' in shown else shown}</mn>")
 
@@ -70,7 +73,7 @@ def row(*parts: MathML) -> MathML:
 
 
 def neg(part: MathML) -> MathML:
-    """Minus a piece; the sign is close to it, as a sign and not a difference."""
+    """Minus a piece, with the spacing of a sign, not of a difference."""
     return row(MathML('<mo form="prefix">−</mo>'), part)
 
 
@@ -102,7 +105,7 @@ def func(name: str, argument: MathML) -> MathML:
 
 
 def mark(part: MathML, color: str) -> MathML:
-    """A piece on a ground of this CSS colour."""
+    """A piece on a background of this CSS colour."""
     return MathML(f'<mrow style="background:{escape(color, quote=True)};border-radius:.2em">{part}</mrow>')
 
 
@@ -115,9 +118,9 @@ def matrix(
 
     Args:
         rows: its entries.
-        width: of each column in em, entries flush right: numbers that change then never move. None: as wide as
-            the entries need, centred.
-        marks: ground colours (CSS) of entries, by row and column from 0.
+        width: of each column in em, with entries aligned right, so that changing numbers never move. None: as wide
+            as the entries, centred.
+        marks: background colours (CSS) of entries, by row and column from 0.
     """
     align = "center" if width is None else "right"
     size = "" if width is None else f";width:{width:g}em;min-width:{width:g}em"

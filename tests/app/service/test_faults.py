@@ -32,7 +32,7 @@ from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.server import RESTARTS, ViewerServer
-from app.viewer.session.controller import Session
+from app.viewer.session.controller import ArmController
 
 ROOT = Path(__file__).parents[3]
 ARM = kin.get_robot("pioneer5")
@@ -157,22 +157,22 @@ def port() -> Iterator[int]:
     server.stop()
 
 
-def test_a_worker_that_dies_is_replaced_and_the_visitor_told(port, monkeypatch, caplog):
-    draw = Session._draw
+def test_a_worker_that_dies_is_replaced_and_the_visitor_informed(port, monkeypatch, caplog):
+    draw = ArmController.draw
     deaths: list[str] = []
 
-    def dies(self: Session, fresh: bool) -> None:
+    def dies(self: ArmController, fresh: bool) -> None:
         if fresh and not deaths:
             deaths.append(threading.current_thread().name)
-            raise SystemExit  # which no guard takes for an error
+            raise SystemExit  # the guard catches only exceptions
         draw(self, fresh)
 
     with FakeBrowser(port) as tab:
         tab.settle()
         arm = tab.gizmo
-        monkeypatch.setattr(Session, "_draw", dies)
+        monkeypatch.setattr(ArmController, "draw", dies)
         tab.set("1 rotating base", 10.0)
-        tab.wait(lambda: "Started again" in tab.html)
+        tab.wait(lambda: "Page restarted" in tab.html)
         tab.settle()
         assert tab.gizmo != arm
         assert np.allclose(tab.tool_pose(), kin.fk(ARM, ARM.q_home), atol=1e-6)
@@ -183,13 +183,13 @@ def test_a_worker_that_dies_is_replaced_and_the_visitor_told(port, monkeypatch, 
     assert "a visitor's worker failed" in caplog.text
 
 
-def test_a_worker_that_cannot_even_begin_is_not_replaced_for_ever(port, monkeypatch, caplog):
+def test_a_worker_that_never_starts_is_not_replaced_forever(port, monkeypatch, caplog):
     with FakeBrowser(port) as tab:
         tab.settle()
-        monkeypatch.setattr(Session, "_draw", lambda *_, **__: sys.exit())
+        monkeypatch.setattr(ArmController, "draw", lambda *_, **__: sys.exit())
         monkeypatch.setattr(app.viewer.panel.layout, "StatusLine", lambda *_: 1 / 0)
         tab.set("1 rotating base", 10.0)
-        # Each new worker asks the page what it remembers, so the page has to listen.
+        # Each new worker asks the page for its stored state, so the page must answer.
         wait_for(lambda: tab._read(0.01) is None or "is not started again" in caplog.text)
     assert caplog.text.count("ZeroDivisionError: division by zero") == RESTARTS
 

@@ -17,10 +17,10 @@ from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer import lessons
 from app.viewer.feature import Feature
-from app.viewer.panel import lessons as choice
 from app.viewer.panel import listen
 from app.viewer.server import ViewerServer
-from app.viewer.session import controller as session
+from app.viewer.session import lessons as choice
+from app.viewer.session import page
 from kin.units import Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -53,17 +53,17 @@ class Witness(Feature):
         if value == 8:
             self.due = 0.01
         if value == 7:
-            self.stage.go(self.stage.robot.lower)
+            self.stage.move_to(self.stage.robot.lower)
 
     def on_robot(self):
         self.note("robot", self.stage.robot.id)
 
-    def on_picture(self, T_base_tool):
+    def on_pose(self, T_base_tool):
         assert np.allclose(T_base_tool, kin.fk(self.stage.robot, self.stage.q))
-        self.note("picture")
+        self.note("pose")
 
-    def on_answer(self, result):
-        self.note("answer", result.status)
+    def on_result(self, result):
+        self.note("result", result.status)
 
     def on_style(self):
         self.note("style", self.stage.units, self.stage.dark)
@@ -84,8 +84,8 @@ class Pupil(Witness):
 
 @pytest.fixture
 def tab(monkeypatch: pytest.MonkeyPatch) -> Iterator[FakeBrowser]:
-    monkeypatch.setattr(session, "TABS", (Witness,))
-    monkeypatch.setattr(session, "LESSONS", (Pupil,))
+    monkeypatch.setattr(page, "TABS", (Witness,))
+    monkeypatch.setattr(page, "LESSONS", (Pupil,))
     monkeypatch.setattr(choice, "LESSONS", (Pupil,))
     Witness.calls.clear()
     Witness.threads.clear()
@@ -108,10 +108,10 @@ def test_a_tab_is_told_what_happens_by_the_visitors_worker_alone(tab: FakeBrowse
     tab.set("Witness", 3)
     told(tab, "handle", "slider", 3)
     tab.set("1 rotating base", 50)
-    told(tab, "picture")
+    told(tab, "pose")
     T = kin.fk(PIONEER, PIONEER.q_home)
     tab.drag(T)
-    told(tab, "answer", "solved")
+    told(tab, "result", "solved")
     tab.set("Radians", True)
     told(tab, "style", Units(degrees=False), False)
     tab.set("Lengths", "cm")
@@ -163,7 +163,7 @@ def test_one_lesson_at_a_time(tab: FakeBrowser) -> None:
 def test_a_lesson_that_there_is_not_is_refused_by_name(tab: FakeBrowser) -> None:
     tab.set("Lesson", "Astrology")
     tab.wait(lambda: "Astrology" in tab.html)
-    assert "Not understood" in tab.html
+    assert "Invalid input" in tab.html
     tab.wait(lambda: tab.value("Lesson") == "None")
 
 
@@ -172,5 +172,5 @@ def test_every_lesson_says_what_it_is_about() -> None:
 
 
 def test_keys_and_titles_are_unique() -> None:
-    features = [*lessons.LESSONS, *session.TABS]
+    features = [*lessons.LESSONS, *page.TABS]
     assert len({f.key for f in features}) == len({f.title for f in features}) == len(features)

@@ -74,7 +74,7 @@ def test_a_sliding_joint_is_moved_in_the_unit_and_late_events_are_dropped(server
         tab.settle()
         T = tab.tool_pose()
         # 100 of the slider that is gone were millimetres; as metres they would mean the stop.
-        *_, session = server._sessions.values()
+        *_, session = server._pages.values()
         session.post(("joint", SCARA.id, 2, Units()), 100.0)
         tab.settle()
         assert np.array_equal(tab.tool_pose(), T)
@@ -129,6 +129,6 @@ def test_a_unit_that_there_is_not_is_refused_by_name(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
         tab.set("Lengths", "inch")
-        tab.wait(lambda: "Not understood" in tab.html)
+        tab.wait(lambda: "Invalid input" in tab.html)
         assert "one of mm, cm, m" in tab.html
         tab.wait(lambda: tab.value("Lengths") == "mm")

@@ -1,8 +1,8 @@
-"""Lesson: a DH table step by step.
+"""The lesson "DH table step by step".
 
-A large frame walks from the base to the tool, one elementary motion of the table after another, on the arm as
-it stands. `steps` knows the walk, `page` writes what the panel shows of it, `draw` puts it into the scene; here
-is the player that moves it on, and what the visitor can set.
+A large frame moves from the base to the tool, one elementary motion of the table after another, on the arm in its
+present configuration. `steps` computes the walk, `views` the HTML of the panel, and `drawing` draws it in the
+scene. This module has the player and its controls.
 """
 
 from __future__ import annotations
@@ -15,32 +15,32 @@ import numpy as np
 import viser
 
 from app.viewer.feature import Feature, Stage
-from app.viewer.lessons.dh import page
-from app.viewer.lessons.dh.draw import OtherDrawing, WalkDrawing, aside
+from app.viewer.lessons.dh import views
+from app.viewer.lessons.dh.drawing import OtherDrawing, WalkDrawing, aside
 from app.viewer.lessons.dh.steps import MOTIONS, ORDERS, length, place, value
-from app.viewer.panel import assign, listen
+from app.viewer.panel import assign, listen, update_html
 from app.viewer.scene import camera
 from app.viewer.scene.meshes import body
 from kin import InputError, link_frames
 from kin.transforms import Array
 
-PICTURE = 1 / 30  # s between pictures while it plays
-READ = 0.1  # s between texts: nobody reads faster
+FRAME = 1 / 30  # s between frames while playing
+READ = 0.1  # s between updates of the texts
 MOTION_TIME = 1.3  # s for one motion at speed 1
-REST = 0.5  # s of rest after each; for a zero, which has nothing to show, the only time it takes
+REST = 0.5  # s of rest after each motion; a motion by zero takes only this time
 SPEEDS = {"Half": 0.5, "Normal": 1.0, "Double": 2.0}
 BUTTONS, WHILE_PLAYING = ("Back", "Play", "Next"), ("Back", "Pause", "Next")
 
 
-_fresh = count(1)  # for node names: the browser gives the pose of a removed node to the next of its name
+_fresh = count(1)  # for node names: browsers give the pose of a removed node to the next one of that name
 
 
 class DHLesson(Feature):
-    """The walk through the table of the arm on show."""
+    """The walk through the table of the selected robot."""
 
     key = "dh"
     title = "DH table step by step"
-    about = "How four motions a row lead from the base to the tool, one after another."
+    about = "How four motions per row lead from the base to the tool, one after another."
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
@@ -62,21 +62,19 @@ class DHLesson(Feature):
             float(len(stage.robot.rows)),
             0.01,
             0.0,
-            hint="Frame 0 is the base; at 2 row 2 is done; a quarter is one motion. Arrow keys move it finely.",
+            hint="0: frame 0 at the base; 2: row 2 complete; a quarter is one motion. Arrow keys move it finely.",
         )
         listen(self._slider, self.post, "at")
         self._buttons = gui.add_button_group(
-            "Motion", BUTTONS, hint="Back and Next: to the end of the motion before or after"
+            "Motion", BUTTONS, hint="Back and Next: to the end of the previous or next motion"
         )
         self._listen_buttons()
         self._table = gui.add_html("")
         self._matrices = gui.add_html("")
-        self._symbols_box = gui.add_checkbox(
-            "Symbols", False, hint="Aᵢ with its joint left open, constants put in"
-        )
+        self._symbols_box = gui.add_checkbox("Symbols", False, hint="Aᵢ with its joint variable as a symbol")
         listen(self._symbols_box, self.post, "symbols")
         self._compare_box = gui.add_checkbox(
-            "Compare conventions", False, hint="The same numbers read in the other order, beside the arm"
+            "Compare conventions", False, hint="The same numbers in the other convention, next to the arm"
         )
         listen(self._compare_box, self.post, "compare")
         self._comparison = gui.add_html("", visible=False)
@@ -112,17 +110,17 @@ class DHLesson(Feature):
     def on_robot(self) -> None:
         self._pause()
         self._at = 0.0
-        self._take_drawings()
-        self._view = None  # the session has aimed the camera anew
+        self._remove_drawings()
+        self._view = None  # the page has moved the camera already
         self._start()
 
-    def on_picture(self, T_base_tool: Array) -> None:
+    def on_pose(self, T_base_tool: Array) -> None:
         read = time.perf_counter() - self._read_at >= READ
         self._draw(names=read)
         if read:
             self._write()
         else:
-            # The last of a motion's pictures may be one of these: `tick` writes what they left out.
+            # This may be the last frame of a motion: `tick` then updates the texts.
             self._stale = True
             self.due = self.due or READ
 
@@ -164,8 +162,8 @@ class DHLesson(Feature):
         self._go(self._at)
 
     def remove(self) -> None:
-        self._take_drawings()
-        self._aim_back()
+        self._remove_drawings()
+        self._restore_camera()
 
     # The player
 
@@ -175,7 +173,7 @@ class DHLesson(Feature):
         @self._buttons.on_click
         async def _(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
             if event.client is not None:
-                # Each under a key of its own: of two presses under one, the second would replace the first.
+                # Each press has a key of its own: a second press under the same key would replace the first.
                 self.post(("press", next(presses)), event.target.value)
 
     def _press(self, button: object) -> None:
@@ -189,10 +187,10 @@ class DHLesson(Feature):
                 self._play()
 
     def _motions(self, rows: object) -> float:
-        """The slider's rows in motions; raises `kin.InputError` for what is no number."""
+        """The slider's rows in motions; raises `kin.InputError` for anything but a number."""
         if not isinstance(rows, int | float) or not math.isfinite(rows):
             raise InputError("row", rows, "a finite number")
-        # Rounded, lest 1.25 rows become a hair more than five motions.
+        # Rounded, so that 1.25 rows are not slightly more than five motions.
         return self._inside(round(float(rows) * MOTIONS, 6))
 
     def _inside(self, at: float) -> float:
@@ -209,7 +207,7 @@ class DHLesson(Feature):
             self._at = 0.0
         self._playing = True
         self._last = self._rest_until = time.perf_counter()
-        self.due = PICTURE
+        self.due = FRAME
         self._buttons.options = WHILE_PLAYING
 
     def _pause(self) -> None:
@@ -220,8 +218,8 @@ class DHLesson(Feature):
             assign(self._slider, self._at / MOTIONS)
 
     def _advance(self, now: float) -> None:
-        """Go on by the time since the last picture; rest at the end of each motion, where it can be read."""
-        # After a long silence it goes on where it was, rather than leap.
+        """Advance by the time since the last frame; rest at the end of each motion, to let it be read."""
+        # After a long pause it continues where it was, without a jump.
         passed = min(now - self._last, 0.1)
         self._last = now
         if now < self._rest_until:
@@ -236,41 +234,41 @@ class DHLesson(Feature):
         if self._at >= length(robot):
             self._pause()
 
-    # What the visitor sees
+    # Scene and panel
 
     def _start(self) -> None:
-        """Show the walk on the arm that is there now."""
+        """Show the walk on the selected robot."""
         robot = self.stage.robot
         self._slider.max = float(len(robot.rows))
         assign(self._slider, self._at / MOTIONS)
-        self._nine.content = page.nine_steps_html(robot.convention)
+        self._nine.content = views.nine_steps_html(robot.convention)
         frames = link_frames(robot, robot.q_home)
         self._drawing = WalkDrawing(self.stage.client.scene, robot, frames, f"/dh-{next(_fresh)}")
         self._show_other(aim=True)
         self._draw()
         self._write()
 
-    def _take_drawings(self) -> None:
+    def _remove_drawings(self) -> None:
         for drawing in (self._drawing, self._other):
             if drawing is not None:
                 drawing.remove()
         self._drawing = self._other = None
 
     def _show_other(self, aim: bool = False) -> None:
-        """The other reading beside the arm, if it is to be compared; `aim`: and the camera on both."""
+        """Show or hide the table in the other convention; `aim`: with the camera on both arms."""
         if self._compare and self._other is None:
             self._other = OtherDrawing(self.stage.client.scene, self.stage.robot, f"/dh-{next(_fresh)}")
             if aim:
-                self._aim_at_both()
+                self._show_both()
             self._draw()
         elif not self._compare and self._other is not None:
             self._other.remove()
             self._other = None
-            self._aim_back()
+            self._restore_camera()
         self._comparison.visible = self._compare
 
     def _draw(self, names: bool = True) -> None:
-        """Bring the scene up to date; without `names` the tags of frames wait: they cost as much as the rest."""
+        """Update the scene; without `names`, the labels of frames are left out: they cost as much as the rest."""
         robot, q = self.stage.robot, self.stage.q
         if self._drawing is None:
             return
@@ -281,23 +279,23 @@ class DHLesson(Feature):
             self._other.show(place(self._other.robot, q, self._at, others), frames, others, names)
 
     def _write(self) -> None:
-        """Bring the texts up to date."""
+        """Update the texts."""
         self._read_at = time.perf_counter()
         self._stale = False
         robot, q, units = self.stage.robot, self.stage.q, self.stage.units
         at = place(robot, q, self._at)
-        _put(self._caption, page.caption_html(robot, at, units))
-        _put(self._table, page.table_html(robot, q, at, units))
-        _put(self._matrices, page.matrices_html(robot, at, self._symbols, units))
+        update_html(self._caption, views.caption_html(robot, at, units))
+        update_html(self._table, views.table_html(robot, q, at, units))
+        update_html(self._matrices, views.matrices_html(robot, at, self._symbols, units))
         if self._other is not None:
             other = self._other.robot
             tools = [link_frames(reading, q)[-1, :3, 3] for reading in (robot, other)]
-            apart = float(np.linalg.norm(tools[0] - tools[1]))
+            distance = float(np.linalg.norm(tools[0] - tools[1]))
             there = place(other, q, self._at)
-            _put(self._comparison, page.compare_html(robot, other, q, there, apart, units))
+            update_html(self._comparison, views.compare_html(robot, other, q, there, distance, units))
 
-    def _aim_at_both(self) -> None:
-        """Move the camera until arm and skeleton are in view, in the direction it looks already."""
+    def _show_both(self) -> None:
+        """Move the camera back until arm and skeleton are in view, without changing its direction."""
         eye = self.stage.client.camera
         robot = self.stage.robot
         aspect = eye.image_width / eye.image_height if eye.image_height > 0 else 1.6
@@ -310,8 +308,8 @@ class DHLesson(Feature):
         eye.look_at = look_at
         self._view = (*before, np.array(eye.position))
 
-    def _aim_back(self) -> None:
-        """Undo `_aim_at_both`, unless the visitor has moved the camera since."""
+    def _restore_camera(self) -> None:
+        """Undo `_show_both`, unless the visitor has moved the camera since."""
         if self._view is None:
             return
         position, look_at, left_at = self._view
@@ -319,9 +317,3 @@ class DHLesson(Feature):
         eye = self.stage.client.camera
         if np.allclose(eye.position, left_at, atol=1e-3):
             eye.position, eye.look_at = position, look_at
-
-
-def _put(element: viser.GuiHtmlHandle, content: str) -> None:
-    """Show a text, and send it only if it is another one."""
-    if element.content != content:
-        element.content = content

@@ -1,7 +1,7 @@
 """A DH table as a walk: one elementary motion after another carries a frame from the base to the tool.
 
-A place on the walk is a number `at`: how many of the motions are done, four to a row, with the share of the one
-under way as its fraction. At 4, 8, … a frame has arrived: that is ``T_0i``.
+A place on the walk is a number `at`: the number of completed motions, four per row, with the completed share of
+the present motion as its fraction. At 4, 8, … a frame is complete: that is ``T_0i``.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ _LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Where the walk is.
+    """A place on the walk.
 
     Attributes:
-        row: index of the row under way, or just done.
-        motion: index in that row of the motion under way, or just done; −1 at the start of all.
-        share: of that motion, 0 to 1.
-        factor, value: what it applies, in radians or metres; the whole value, not the share.
+        row: index of the row in progress, or just completed.
+        motion: index in that row of the motion in progress, or just completed; −1 at the very start.
+        share: completed share of that motion, 0 to 1.
+        factor, value: the parameter it applies, and its whole value (rad or m).
         T_0_before: the frame before that motion ``(4, 4)``, in the base frame.
         T_0_now: the moving frame ``(4, 4)``, in the base frame.
         A: the row's product so far ``(4, 4)``.
@@ -57,12 +57,12 @@ class Place:
 
     @property
     def placed(self) -> int:
-        """How many frames beyond the base's stand at their places."""
+        """The number of completed frames, without the base's."""
         return self.row + int(self.motion == MOTIONS - 1 and self.share == 1.0)
 
 
 def reread(robot: Robot) -> Robot:
-    """The arm that the same table describes when its rows are read in the other convention's order."""
+    """The arm that the same table describes in the other convention."""
     return replace(robot, id=f"{robot.id}-reread", convention=OTHER[robot.convention])
 
 
@@ -72,7 +72,7 @@ def length(robot: Robot) -> int:
 
 
 def turns(factor: Factor) -> bool:
-    """Whether a motion turns; else it slides."""
+    """Whether a motion is a rotation, else a translation."""
     return factor in ("theta", "alpha")
 
 
@@ -87,7 +87,7 @@ def elementary(factor: Factor, value: float) -> Array:
 
 
 def value(robot: Robot, row: int, factor: Factor, q: Array) -> float:
-    """θ, d, a or α of a row at a configuration ``(n,)``: the constant, and the joint's value where that acts."""
+    """θ, d, a or α of a row at a configuration ``(n,)``, with the joint's value if it is the variable."""
     joint = robot.rows[row]
     constant = float(getattr(joint, factor))
     if MOVED.get(joint.kind) != factor:
@@ -96,12 +96,12 @@ def value(robot: Robot, row: int, factor: Factor, q: Array) -> float:
 
 
 def place(robot: Robot, q: Array, at: float, frames: Array | None = None) -> Place:
-    """Where the walk is after `at` motions, for a configuration ``(n,)``.
+    """The place after `at` motions, for a configuration ``(n,)``.
 
-    `frames` are ``link_frames(robot, q)`` if they are known already.
+    `frames` is ``link_frames(robot, q)``, if computed already.
     """
     at = min(max(at, 0.0), float(length(robot)))
-    # The motion that ends at a whole number is done there; the next one has not begun.
+    # At a whole number a motion is complete; the next one has not begun.
     number = math.ceil(at) - 1
     row, motion = divmod(number, MOTIONS) if number >= 0 else (0, -1)
     share = at - number if number >= 0 else 0.0
@@ -121,9 +121,9 @@ def place(robot: Robot, q: Array, at: float, frames: Array | None = None) -> Pla
 
 @dataclass(frozen=True, eq=False)
 class Symbolic:
-    """A matrix that is linear in what a joint moves: the sum of a constant ``(4, 4)`` for each of `names`.
+    """A matrix as a linear combination of functions of the joint variable: one ``(4, 4)`` coefficient per name.
 
-    `names` are "1", and "cos" and "sin" of the joint's value, or "q", the value itself.
+    `names` are "1", and "cos" and "sin" of the variable, or "q", the variable itself.
     """
 
     names: tuple[str, ...]
@@ -131,7 +131,7 @@ class Symbolic:
 
 
 def symbolic(robot: Robot, row: int, motions: int = MOTIONS) -> Symbolic:
-    """The first `motions` factors of a row's matrix, its constants put in, what the joint moves left open."""
+    """The product of the first `motions` factors of a row, as a function of its joint variable."""
     joint = robot.rows[row]
     open_ = MOVED.get(joint.kind)
     names: tuple[str, ...] = ("1",)
@@ -147,7 +147,7 @@ def symbolic(robot: Robot, row: int, motions: int = MOTIONS) -> Symbolic:
 
 
 def _open(factor: Factor) -> tuple[tuple[str, ...], Array]:
-    """Rz or Tz of an unknown: its names and their constants ``(names, 4, 4)``."""
+    """Rz or Tz of a variable: the names and their coefficients ``(names, 4, 4)``."""
     rest = np.eye(4)
     if factor == "theta":
         cosine, sine = np.zeros((4, 4)), np.zeros((4, 4))
@@ -160,12 +160,12 @@ def _open(factor: Factor) -> tuple[tuple[str, ...], Array]:
 
 
 def low(number: int) -> str:
-    """A number as an index: ₁₂."""
+    """A number as a subscript: ₁₂."""
     return str(number).translate(_LOWERED)
 
 
 def index(robot: Robot, row: int, factor: Factor) -> int:
-    """The number that a row's value carries: Craig counts a and α from the link before, so his are one less."""
+    """The index of a row's parameter: Craig's a and α have the index of the previous link, one less."""
     return row if robot.convention == "modified" and factor in ("a", "alpha") else row + 1
 
 
@@ -175,7 +175,7 @@ def symbol(robot: Robot, row: int, factor: Factor) -> str:
 
 
 def axis_name(robot: Robot, row: int, factor: Factor) -> str:
-    """The axis of a motion as the textbooks call it: z₁ is the joint's line, x₂ the common normal beside it."""
+    """The name of a motion's axis in the textbooks: z₁ is the joint axis, x₂ the common normal after it."""
     number = row + (1 if (axis(factor) == 2) == (robot.convention == "modified") else 0)
     return "xyz"[axis(factor)] + low(number)
 
@@ -186,9 +186,9 @@ def amount(factor: Factor, shown: float, units: Units) -> str:
 
 
 def caption(robot: Robot, at: Place, units: Units) -> str:
-    """The motion under way in words."""
+    """The present motion in words."""
     if at.motion < 0:
-        return "Frame 0 stands on the base. Each row of the table now carries a copy of it to the next frame."
+        return "Frame 0 is at the base. Each row of the table carries a copy of it to the next frame."
     joint = robot.rows[at.row]
     name = symbol(robot, at.row, at.factor)
     line = axis_name(robot, at.row, at.factor)
@@ -197,8 +197,8 @@ def caption(robot: Robot, at: Place, units: Units) -> str:
     if MOVED.get(joint.kind) == at.factor:
         mover = f", joint {robot.joint_rows.index(at.row) + 1}"
     if at.value == 0.0 and not mover:
-        nothing = "nothing to turn about" if turns(at.factor) else "nothing to slide along"
-        words = f"{name} = 0, {nothing} {line}"
+        none = "no rotation about" if turns(at.factor) else "no translation along"
+        words = f"{name} = 0, {none} {line}"
     else:
         verb = "turn {} about {}" if turns(at.factor) else "slide {} along {}"
         words = verb.format(amount(at.factor, at.value, units), line) + f" ({name}{mover})"
@@ -206,51 +206,49 @@ def caption(robot: Robot, at: Place, units: Units) -> str:
     return opening + words + end
 
 
-def shared_lines(robot: Robot) -> list[int]:
-    """Indices of joints that turn about the same line as the next one."""
+def coaxial_joints(robot: Robot) -> list[int]:
+    """Indices of joints that turn about the same axis as the next one."""
     return [pair.joint for pair in pairs(robot) if pair.one_line]
 
 
-def freedoms(robot: Robot) -> int:
-    """How many of the joints are not just another turn about the line of the joint before."""
-    return robot.n - len(shared_lines(robot))
+def degrees_of_freedom(robot: Robot) -> int:
+    """The number of joints that do not share the axis of the previous joint."""
+    return robot.n - len(coaxial_joints(robot))
 
 
 @lru_cache(maxsize=64)
 def verdict(robot: Robot, units: Units) -> tuple[str, ...]:
-    """What each reading makes of the table, and which of its numbers decides it, in words."""
+    """The arm that each convention makes of the table, and the numbers that decide it, in words."""
     readings = sorted((robot, reread(robot)), key=lambda r: r.convention, reverse=True)
-    if any(shared_lines(reading) for reading in readings):
+    if any(coaxial_joints(reading) for reading in readings):
         return tuple(_lines(reading, units) for reading in readings)
     return (
-        "In neither order do two neighbouring joints share a line. The arms differ all the same: "
-        "a row’s a and α come after its joint in the standard order, and before it in Craig’s.",
+        "In neither convention do two neighbouring joints share an axis. The arms differ nevertheless: "
+        "a row’s a and α follow its joint in the standard convention, and precede it in Craig’s.",
     )
 
 
 def _lines(robot: Robot, units: Units) -> str:
-    """Which neighbouring joints share a line when the table is read so, and why."""
-    opening = "Standard order: " if robot.convention == "standard" else "Craig’s order: "
-    shared = shared_lines(robot)
+    """Which neighbouring joints share an axis in this convention, and why."""
+    opening = "Standard convention: " if robot.convention == "standard" else "Craig’s convention: "
+    shared = coaxial_joints(robot)
     if not shared:
-        first = shared_lines(reread(robot))[0]
+        first = coaxial_joints(reread(robot))[0]
         link = _link(robot, first, units)
-        return (
-            f"{opening}{link} stands between joints {first + 1} and {first + 2}, and all {robot.n} joints count."
-        )
-    told = "; ".join(
-        f"{_link(robot, k, units)} leaves {_axes(robot, k)} one line, so joints {k + 1} and {k + 2} turn "
-        f"about it together and only {_sum(robot, k)} counts"
+        return f"{opening}{link} is between joints {first + 1} and {first + 2}, and all {robot.n} axes differ."
+    reasons = "; ".join(
+        f"{_link(robot, k, units)} makes {_axes(robot, k)} coincide, so joints {k + 1} and {k + 2} turn "
+        f"about the same axis and only {_sum(robot, k)} matters"
         for k in shared
     )
-    return f"{opening}{told}: {robot.n} joints, {freedoms(robot)} freedoms."
+    return f"{opening}{reasons}: {robot.n} joints, {degrees_of_freedom(robot)} degrees of freedom."
 
 
 def _link(robot: Robot, k: int, units: Units) -> str:
-    """The numbers between joints k and k + 1."""
+    """The parameters between joints k and k + 1."""
     before, after = robot.joint_rows[k], robot.joint_rows[k + 1]
     if after - before > 1:
-        return f"what the rows {before + 1} to {after + 1} say"
+        return f"the product of rows {before + 1} to {after + 1}"
     row = before if robot.convention == "standard" else after
     factors: tuple[Factor, ...] = ("a", "alpha")
     numbers = (
@@ -267,7 +265,7 @@ def _axes(robot: Robot, k: int) -> str:
 
 
 def _sum(robot: Robot, k: int) -> str:
-    """What of two turns about one line can be told from outside."""
+    """The combination of two joints with the same axis that moves the tool."""
     first, second = joint_axes(robot)[k : k + 2]
     sign = "+" if first.direction @ second.direction > 0.0 else "−"
     return f"θ{low(robot.joint_rows[k] + 1)} {sign} θ{low(robot.joint_rows[k + 1] + 1)}"

@@ -1,7 +1,7 @@
-"""Equations: each entry of the tool's pose as a formula, its value here, and where a misprint leads.
+"""The lesson "Equations": each entry of the tool's pose as a formula, its value, and the effect of a misprint.
 
-The chapter's arms have its equations, as printed and corrected; a misprinted one puts its point or axis into the
-picture as well, beside the tool's own. Any other arm has the closed form derived from its DH table.
+The chapter's arms have its equations, as printed and corrected; a misprinted one is also drawn in the scene, as
+its point or axis next to the tool's own. For any other arm, the closed form is derived from its DH table.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ import viser
 
 from app.equations import Book, DerivationError, Equation, book_later
 from app.viewer.feature import Feature, Stage
-from app.viewer.lessons.equations import page
-from app.viewer.panel import assign, listen
+from app.viewer.lessons.equations import views
+from app.viewer.panel import assign, listen, update_html
 from app.viewer.panel.status import Notice
 from kin import InputError, fk
 from kin.transforms import Array
 
 INTERVAL = 0.05  # s between two updates of the numbers
-# Vermillion and bluish green, darker by the gamma that the picture adds to lines.
+# Vermilion and bluish green, darkened because the scene applies gamma to lines.
 PRINTED, TRUE = (170, 29, 0), (0, 87, 43)
 _fresh = count()
 
@@ -34,28 +34,26 @@ class EquationsLesson(Feature):
 
     key = "equations"
     title = "Equations"
-    about = "What the chapter prints, what is right, and by how much the tool is off otherwise."
+    about = "The chapter's equations, their corrections, and the error of each misprint."
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
         gui = stage.client.gui
         self._book: Book | None = None
         self._future: Future[Book] | None = None
-        self._wanted: object = None  # id of an equation to show as soon as there is a book
-        self._largest = 0.0  # how far off the equation on show can be, in metres or radians
+        self._requested: object = None  # id of the equation to show as soon as there is a book
+        self._largest = 0.0  # largest error of the shown equation, m or rad
         self._equation: Equation | None = None
         self._T: Array = fk(stage.robot, stage.q)
         self._shown_at = 0.0
         self._about = gui.add_html("")
-        self._choice = gui.add_dropdown(
-            "Equation", ("…",), hint="Which entry of the tool's pose [n o a p] to look at"
-        )
+        self._choice = gui.add_dropdown("Equation", ("…",), hint="The entry of the tool's pose [n o a p] to show")
         listen(self._choice, self.post, "equation")
-        # What moves comes first: it is to be seen while joints or the gizmo are dragged.
+        # The values come first, to be visible while joints or the gizmo are dragged.
         self._values = gui.add_html("")
         self._button = gui.add_button(
-            "Show where it is worst",
-            hint="Moves the arm to the pose, inside its limits, where this misprint shows most",
+            "Show the worst pose",
+            hint="Moves the arm to the pose, within its limits, where this misprint has the largest effect",
             visible=False,
         )
 
@@ -78,7 +76,7 @@ class EquationsLesson(Feature):
             case "ready":
                 self._take()
             case "worst":
-                self._go_to_the_worst()
+                self._move_to_worst()
             case _:
                 super().handle(key, value)
 
@@ -93,7 +91,7 @@ class EquationsLesson(Feature):
         else:
             future.add_done_callback(lambda _: self.post("ready"))
 
-    def on_picture(self, T_base_tool: Array) -> None:
+    def on_pose(self, T_base_tool: Array) -> None:
         self._T = T_base_tool
         if time.perf_counter() - self._shown_at >= INTERVAL:
             self._show_values()
@@ -112,90 +110,89 @@ class EquationsLesson(Feature):
         return {"equation": self._equation.id} if self._equation is not None else {}
 
     def restore(self, state: dict[str, object]) -> None:
-        wanted = state.get("equation")
+        requested = state.get("equation")
         if self._book is None:
-            self._wanted = wanted
+            self._requested = requested
             return
         for equation in self._book.equations:
-            if equation.id == wanted:
+            if equation.id == requested:
                 self._show(equation)
 
     def remove(self) -> None:
-        self._clear_picture()
+        self._clear_scene()
         for handle in (self._about, self._choice, self._text, self._values, self._button, self._folder):
             handle.remove()
 
     def _take(self) -> None:
-        """The book has arrived, or the reason why there is none."""
+        """Take the derived book, or the reason why there is none."""
         if self._future is None or not self._future.done() or self._book is not None:
-            return  # of an arm no longer on show
+            return  # of a robot that is no longer selected
         try:
             self._book = self._future.result()
         except DerivationError as error:
             self._empty(f"No equations: {error}.")
-            self.stage.tell(Notice("error", "No equations for this arm", str(error)))
+            self.stage.notify(Notice("error", "No equations for this arm", str(error)))
             return
         except Exception:
             self._empty("The equations of this arm could not be derived.")
             raise
-        self._about.content = page.message(page.summary(self._book))
-        self._choice.options = tuple(page.label(e) for e in self._book.equations)
+        self._about.content = views.message(views.summary(self._book))
+        self._choice.options = tuple(views.label(e) for e in self._book.equations)
         self._choice.visible = True
         self._show(self._first(self._book))
-        self._wanted = None
+        self._requested = None
 
     def _first(self, book: Book) -> Equation:
-        """The one to begin with: the one asked for, else the first misprint, else the first that can be read."""
+        """The equation to start with: the requested one, else the first misprint, else the first readable one."""
         readable = [e for e in book.equations if e.correct is not None]
-        wanted = [e for e in book.equations if e.id == self._wanted]
-        return next(iter([*wanted, *(e for e in readable if e.verdict == "misprinted"), *readable]))
+        requested = [e for e in book.equations if e.id == self._requested]
+        return next(iter([*requested, *(e for e in readable if e.verdict == "misprinted"), *readable]))
 
     def _choose(self, value: object) -> None:
         if self._book is None:
             return
-        known = {page.label(e): e for e in self._book.equations}
-        if value not in known:
+        equations = {views.label(e): e for e in self._book.equations}
+        if value not in equations:
             if self._equation is not None:
-                assign(self._choice, page.label(self._equation))
-            raise InputError("equation", value, "one of " + ", ".join(known))
-        self._show(known[str(value)])
+                assign(self._choice, views.label(self._equation))
+            raise InputError("equation", value, "one of " + ", ".join(equations))
+        self._show(equations[str(value)])
 
     def _show(self, equation: Equation) -> None:
         assert self._book is not None
         self._equation = equation
-        assign(self._choice, page.label(equation))
-        self._text.content = page.equation_html(self._book, equation)
+        assign(self._choice, views.label(equation))
+        self._text.content = views.equation_html(self._book, equation)
         self._button.visible = equation.verdict == "misprinted"
         self._folder.visible = equation.correct is not None
         self._show_symbols()
         self._largest = self._most(equation)
-        self._clear_picture()
+        self._clear_scene()
         self._show_values()
 
     def _most(self, equation: Equation) -> float:
-        """How far off a misprinted equation is at its worst, in metres or radians."""
+        """The largest error of a misprinted equation, m or rad."""
         assert self._book is not None
         if not equation.worst:
             return 0.0
         values = self._book.values(equation, np.array(equation.worst))
         return abs(float(values.difference)) if equation.is_length else float(values.turn)
 
-    def _go_to_the_worst(self) -> None:
+    def _move_to_worst(self) -> None:
         if self._equation is None or not self._equation.worst:
             return
         equation = self._equation
         units = self.stage.units
-        off = units.distance(self._largest) if equation.is_length else units.angle(self._largest)
-        detail = f"As printed, {equation.entry} is off by {off} here."
-        why = Notice("hand", f"Equation ({equation.number}) at its worst", detail)
-        self.stage.go(np.array(equation.worst), why)
+        error = units.distance(self._largest) if equation.is_length else units.angle(self._largest)
+        detail = f"As printed, {equation.entry} is off by {error} here."
+        notice = Notice("hand", f"Equation ({equation.number}) at its worst", detail)
+        self.stage.move_to(np.array(equation.worst), notice)
 
     def _show_symbols(self) -> None:
         if self._book is None or self._equation is None:
             return
-        content = page.symbols_html(self._book.symbols_of(self._equation), self.stage.units)
-        if self._symbols.content != content:
-            self._symbols.content = content
+        content = views.symbols_html(self._book.symbols_of(self._equation), self.stage.units)
+        update_html(self._symbols, content)
 
     def _show_values(self) -> None:
         self.due = None
@@ -204,19 +201,16 @@ class EquationsLesson(Feature):
         if self._book is None or equation is None:
             return
         if equation.correct is None:
-            self._values.content = (
-                f'<div style="margin:.1em 1em .4em;font-size:.8em">{page.verdict_html(equation)}</div>'
-            )
+            update_html(self._values, views.unreadable_html(equation))
             return
         values = self._book.values(equation, self.stage.q, self._T)
-        content = page.values_html(equation, values, self.stage.units, self._largest)
-        if self._values.content != content:
-            self._values.content = content
+        content = views.values_html(equation, values, self.stage.units, self._largest)
+        update_html(self._values, content)
         if equation.verdict == "misprinted":
-            self._draw(page.segments(equation, values, self._T, 0.2 * self.stage.robot.reach))
+            self._draw(views.segments(equation, values, self._T, 0.2 * self.stage.robot.reach))
 
     def _draw(self, lines: Array) -> None:
-        """The misprint as lines, its far end labelled."""
+        """Draw the misprint as lines, with a label at the far end."""
         scene = self.stage.client.scene
         if not self._nodes:
             root = f"/equations-{next(_fresh)}"
@@ -230,14 +224,14 @@ class EquationsLesson(Feature):
         self._segments.points = lines.astype(np.float32)
         self._label.position = tuple(lines[0, 1].tolist())
 
-    def _clear_picture(self) -> None:
+    def _clear_scene(self) -> None:
         for node in self._nodes:
             node.remove()
         self._nodes = []
 
     def _empty(self, message: str) -> None:
-        """Nothing to choose from, but a sentence."""
-        self._clear_picture()
-        self._about.content = page.message(message)
+        """Show a sentence instead of equations."""
+        self._clear_scene()
+        self._about.content = views.message(message)
         self._text.content = self._values.content = self._symbols.content = ""
         self._choice.visible = self._button.visible = self._folder.visible = False

@@ -1,10 +1,11 @@
-"""The lesson "Postures": every way to take a target, and why not if there is none.
+"""The lesson "Postures": all ways to reach a target, and the reason if there is none.
 
-All branches of the target stand in the picture as numbered ghosts; the list tells how far each is from a stop and
-how freely it moves. A click on a ghost, or on its number, sends the arm there. With a target that is missed stand
-the reason and what would help. For an arm of five joints, the approach directions it can have there are drawn.
+All branches of the target appear in the scene as numbered ghosts; the list gives the distance of each from the
+joint limits, and its manipulability. A click on a ghost, or on its number, moves the arm there. If the target is
+missed, the reason and possible remedies are shown. For an arm of five joints, the possible approach directions are
+drawn.
 
-Surveys are made at most ten times a second, remedies only once nothing is moving.
+The list is updated at most ten times a second; remedies are searched only when nothing is moving.
 """
 
 from __future__ import annotations
@@ -19,30 +20,31 @@ import viser
 
 import kin
 from app.viewer.feature import Feature, Stage
-from app.viewer.lessons.postures import fixes
+from app.viewer.lessons.postures import remedies
 from app.viewer.lessons.postures.directions import has_cone, patch, reachable, share
-from app.viewer.lessons.postures.fixes import Fix, remedies
 from app.viewer.lessons.postures.ghosts import Ghosts
-from app.viewer.lessons.postures.listing import Posture, html, survey
-from app.viewer.panel import assign, listen, listen_click
+from app.viewer.lessons.postures.remedies import Remedy, Request
+from app.viewer.lessons.postures.survey import CLOSEST, Posture, html, survey
+from app.viewer.panel import assign, listen, listen_click, update_html
 from app.viewer.panel.posture import short
 from app.viewer.panel.status import Notice
 from app.viewer.scene.meshes import body
+from app.viewer.views.templates import render
 from kin import IKResult, InputError
 from kin.transforms import Array
 
 SURVEY_INTERVAL = 0.1
 CONE_INTERVAL = 0.2
-QUIET = 0.25  # seconds without an answer, after which remedies are looked for
+QUIET = 0.25  # seconds without a new result before remedies are searched
 HIDDEN = "\N{WHITE CIRCLE}"
 CONE_COLOR = (0, 158, 115)
-GO_HINT = "Send the arm to this posture. A click on its ghost does the same."
-GHOST_HINT = f"Show or hide the ghost of one posture: {HIDDEN} marks what is hidden"
-MASTER_HINT = "All postures of the target as translucent doubles of the arm; grey ones lie beyond a stop"
-CONE_HINT = "Where the tool's arrow may point with its tip at the target, inside the limits; padlocks do not count"
-UNNAMED = (
-    "The branches of this arm have no names: it has no closed form, and only the nearest posture is looked for."
+MOVE_HINT = "Moves the arm to this posture. A click on its ghost does the same."
+GHOST_HINT = f"Shows or hides the ghost of one posture: {HIDDEN} marks a hidden one"
+ALL_GHOSTS_HINT = "Shows all postures as translucent copies of the arm; grey ones are outside the limits"
+CONE_HINT = (
+    "The possible directions of the tool's arrow with its tip at the target, within the limits; locks ignored"
 )
+UNNAMED = "This arm has no closed form. Its branches have no names, and only the closest posture is searched."
 _NUMBERS = count(1)
 
 
@@ -51,7 +53,7 @@ class Postures(Feature):
 
     key = "postures"
     title = "Postures"
-    about = "All the ways to reach one target, and why there is none."
+    about = "All ways to reach a target, and the reason if there is none."
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
@@ -64,10 +66,10 @@ class Postures(Feature):
         self._key: tuple[object, ...]  # what was surveyed
         self._cone_key: tuple[object, ...]
         self._result: IKResult | None
-        self._search: Iterator[Fix | None] | None
-        self._fixes: dict[int, tuple[Fix, viser.GuiButtonHandle]]
-        self._master: viser.GuiCheckboxHandle
-        with stage.client.gui.add_folder(None) as self._place:
+        self._search: Iterator[Remedy | None] | None
+        self._remedies: dict[int, tuple[Remedy, viser.GuiButtonHandle]]
+        self._ghosts_box: viser.GuiCheckboxHandle
+        with stage.client.gui.add_folder(None) as self._container:
             pass
         self._build()
 
@@ -77,7 +79,7 @@ class Postures(Feature):
         match key:
             case ("go", int(index)):
                 self._go(index)
-            case ("eye", int(index), bool(show)) if 0 <= index < len(self._names):
+            case ("ghost", int(index), bool(show)) if 0 <= index < len(self._names):
                 (self._hidden.discard if show else self._hidden.add)(self._names[index])
                 self._show()
             case "ghosts":
@@ -86,10 +88,10 @@ class Postures(Feature):
             case "cone":
                 self._cone_on = bool(value)
                 self._wake()
-            case ("fix", int(number)):
-                # A late click on a button that has gone means nothing.
-                if number in self._fixes:
-                    self._mend(self._fixes[number][0])
+            case ("remedy", int(number)):
+                # A late click on a button that has been removed is ignored.
+                if number in self._remedies:
+                    self._apply_remedy(self._remedies[number][0])
             case _:
                 raise InputError("posture", key, "a control of this lesson")
 
@@ -98,18 +100,18 @@ class Postures(Feature):
         self._hidden.clear()
         self._build()
 
-    def on_picture(self, T_base_tool: Array) -> None:
+    def on_pose(self, T_base_tool: Array) -> None:
         self._wake()
 
-    def on_answer(self, result: IKResult) -> None:
+    def on_result(self, result: IKResult) -> None:
         self._result = result
         self._answered = time.perf_counter()
-        self._drop_fixes()
+        self._drop_remedies()
         self._search = None
-        self._say()
+        self._show_reason()
         self._wake()
 
-    def on_question(self) -> None:
+    def on_request(self) -> None:
         self._key = ()
         self._wake()
 
@@ -117,9 +119,9 @@ class Postures(Feature):
         self._key = ()
         if self.stage.units != self._units:
             self._units = self.stage.units
-            self._say()
-            # What the remedies say is in the old units: they are looked for anew.
-            self._drop_fixes()
+            self._show_reason()
+            # The remedies' texts are in the old units: search again.
+            self._drop_remedies()
             self._search = None
         self._wake()
 
@@ -133,17 +135,17 @@ class Postures(Feature):
         if self._cone is not None:
             self._draw_cone(now)
         if stage.target is None and self._result is not None:
-            # The arm has taken the target, or was sent elsewhere.
+            # The arm has reached the target, or was moved elsewhere.
             self._result, self._search = None, None
-            self._drop_fixes()
-            self._say()
+            self._drop_remedies()
+            self._show_reason()
         if self._result is None or self._result.status == "solved" or self._searched:
             return
         quiet = now - self._answered
         if quiet < QUIET:
             self._wake(QUIET - quiet)
         else:
-            self._look_for_fixes()
+            self._search_remedies()
 
     def state(self) -> dict[str, object]:
         return {"ghosts": self._ghosts_on, "cone": self._cone_on, "hidden": sorted(self._hidden)}
@@ -152,7 +154,7 @@ class Postures(Feature):
         ghosts, cone, hidden = state.get("ghosts"), state.get("cone"), state.get("hidden")
         if isinstance(ghosts, bool):
             self._ghosts_on = ghosts
-            assign(self._master, ghosts)
+            assign(self._ghosts_box, ghosts)
         if isinstance(cone, bool):
             self._cone_on = cone
             if self._cone_box is not None:
@@ -165,29 +167,29 @@ class Postures(Feature):
 
     def remove(self) -> None:
         self._clear()
-        self._place.remove()
+        self._container.remove()
 
     # Controls
 
     def _build(self) -> None:
-        """Everything that depends on the arm."""
+        """Build everything that depends on the robot."""
         gui, scene, robot = self.stage.client.gui, self.stage.client.scene, self.stage.robot
-        self._names = kin.branch_names(robot) or ("nearest",)
+        self._names = kin.branch_names(robot) or (CLOSEST,)
         self._postures, self._key, self._cone_key = (), (), ()
         self._surveyed = self._drawn = self._answered = 0.0
-        self._result, self._search, self._searched, self._fixes = None, None, False, {}
+        self._result, self._search, self._searched, self._remedies = None, None, False, {}
         numbers = tuple(str(i + 1) for i in range(len(self._names)))
-        with self._place:
-            self._why = gui.add_html(fixes.html(None, None, self.stage.units))
-            with gui.add_folder(None) as self._fix_place:
+        with self._container:
+            self._why = gui.add_html(remedies.html(None, None, self.stage.units))
+            with gui.add_folder(None) as self._remedy_container:
                 pass
-            self._to = gui.add_button_group("Take", numbers, hint=GO_HINT)
+            self._to = gui.add_button_group("Go", numbers, hint=MOVE_HINT)
             listen_click(self._to, self.post, {number: ("go", i) for i, number in enumerate(numbers)})
             self._list = gui.add_html("")
-            self._master = gui.add_checkbox("Ghosts", self._ghosts_on, hint=MASTER_HINT)
-            listen(self._master, self.post, "ghosts")
-            self._eyes = gui.add_button_group("Show", self._eye_labels(), hint=GHOST_HINT)
-            self._listen_eyes()
+            self._ghosts_box = gui.add_checkbox("Ghosts", self._ghosts_on, hint=ALL_GHOSTS_HINT)
+            listen(self._ghosts_box, self.post, "ghosts")
+            self._ghost_buttons = gui.add_button_group("Show", self._ghost_labels(), hint=GHOST_HINT)
+            self._listen_ghost_buttons()
             self._cone_box: viser.GuiCheckboxHandle | None = None
             self._cone_line: viser.GuiHtmlHandle | None = None
             self._note: viser.GuiHtmlHandle | None = None
@@ -196,9 +198,7 @@ class Postures(Feature):
                 listen(self._cone_box, self.post, "cone")
                 self._cone_line = gui.add_html("")
             if not kin.branch_names(robot):
-                self._note = gui.add_html(
-                    f'<div style="margin:0 1em .5em;font-size:.8em;opacity:.8">{UNNAMED}</div>'
-                )
+                self._note = gui.add_html(render("panel/note", text=UNNAMED))
         self._root = f"/{self.key}-{next(_NUMBERS)}"
         self._top = scene.add_frame(self._root, show_axes=False)
         self._ghosts = Ghosts(scene, robot, len(self._names), self._root, self._clicked)
@@ -214,9 +214,16 @@ class Postures(Feature):
         self._wake()
 
     def _clear(self) -> None:
-        self._drop_fixes()
+        self._drop_remedies()
         self._top.remove()
-        controls: list[Any] = [self._why, self._fix_place, self._list, self._to, self._master, self._eyes]
+        controls: list[Any] = [
+            self._why,
+            self._remedy_container,
+            self._list,
+            self._to,
+            self._ghosts_box,
+            self._ghost_buttons,
+        ]
         controls += [c for c in (self._cone_box, self._cone_line, self._note) if c is not None]
         for control in controls:
             control.remove()
@@ -224,15 +231,15 @@ class Postures(Feature):
     def _clicked(self, index: int) -> None:
         self.post(("go", index))
 
-    def _listen_eyes(self) -> None:
-        @self._eyes.on_click
+    def _listen_ghost_buttons(self) -> None:
+        @self._ghost_buttons.on_click
         async def _(event: Any) -> None:
             shown = str(event.target.value)
             number = shown.removeprefix(HIDDEN)
             if event.client is not None and number.isdecimal():
-                self.post(("eye", int(number) - 1, shown != number))
+                self.post(("ghost", int(number) - 1, shown != number))
 
-    def _eye_labels(self) -> tuple[str, ...]:
+    def _ghost_labels(self) -> tuple[str, ...]:
         return tuple(
             f"{HIDDEN}{i + 1}" if name in self._hidden else str(i + 1) for i, name in enumerate(self._names)
         )
@@ -248,9 +255,9 @@ class Postures(Feature):
         return kin.fk(self.stage.robot, self.stage.goal) if target is None else target
 
     @property
-    def _here(self) -> str:
+    def _present(self) -> str:
         names = kin.branch_names(self.stage.robot)
-        return kin.branch_of(self.stage.robot, self.stage.goal) if names else "nearest"
+        return kin.branch_of(self.stage.robot, self.stage.goal) if names else CLOSEST
 
     def _survey(self, now: float) -> None:
         stage, T = self.stage, self._target
@@ -262,83 +269,80 @@ class Postures(Feature):
         self._show()
 
     def _show(self) -> None:
-        here = self._here
+        present = self._present
         seen = frozenset(set(self._names) - self._hidden) if self._ghosts_on else frozenset()
-        content = html(self.stage.robot, self._postures, here, seen, self.stage.units)
-        if content != self._list.content:
-            self._list.content = content
-        if self._eyes.options != self._eye_labels():
-            self._eyes.options = self._eye_labels()
-        # The arm itself stands where its own ghost would.
-        self._ghosts.show(self._postures, seen - {here})
+        content = html(self.stage.robot, self._postures, present, seen, self.stage.units)
+        update_html(self._list, content)
+        if self._ghost_buttons.options != self._ghost_labels():
+            self._ghost_buttons.options = self._ghost_labels()
+        # The arm itself is where its own ghost would be.
+        self._ghosts.show(self._postures, seen - {present})
 
     def _go(self, index: int) -> None:
         if not 0 <= index < len(self._postures):
             return
         posture = self._postures[index]
         name = short(posture.name)
-        if posture.can_be_had and posture.q is not None:
-            self.stage.go(
+        if posture.available and posture.q is not None:
+            self.stage.move_to(
                 posture.q, Notice("hand", f"Posture {index + 1}: {name}", "The tool stays where it was.")
             )
         else:
-            self.stage.tell(Notice("limits", f"Not to be had: {name}", f"{posture.words.capitalize()}."))
+            self.stage.notify(Notice("limits", f"Not available: {name}", f"{posture.words.capitalize()}."))
 
     # Why not
 
-    def _say(self) -> None:
-        content = fixes.html(self._result, self.stage.branch, self.stage.units)
-        if content != self._why.content:
-            self._why.content = content
+    def _show_reason(self) -> None:
+        update_html(self._why, remedies.html(self._result, self.stage.branch, self.stage.units))
 
-    def _look_for_fixes(self) -> None:
-        """One step of the search, and then another one as soon as nothing else is to be done."""
+    def _search_remedies(self) -> None:
+        """Run one step of the search; the next one follows as soon as the worker is idle."""
         stage = self.stage
         if self._search is None:
             assert self._result is not None
-            self._search = remedies(
-                stage.robot, self._target, stage.task, stage.goal, stage.locked, stage.branch, self._result,
-                stage.units,
-            )  # fmt: skip
+            request = Request(
+                stage.robot, self._target, stage.task, stage.goal, stage.locked, stage.branch, self._result
+            )
+            self._search = remedies.remedies(request, stage.units)
         try:
-            fix = next(self._search)
+            remedy = next(self._search)
         except StopIteration:
             self._search, self._searched = None, True
             return
-        if fix is not None:
-            self._offer(fix)
+        if remedy is not None:
+            self._offer(remedy)
         self._wake()
 
-    def _offer(self, fix: Fix) -> None:
+    def _offer(self, remedy: Remedy) -> None:
         number = next(_NUMBERS)
-        with self._fix_place:
-            button = self.stage.client.gui.add_button(fix.label, hint=fix.hint or None)
-        self._fixes[number] = (fix, button)
+        with self._remedy_container:
+            button = self.stage.client.gui.add_button(remedy.label, hint=remedy.hint or None)
+        self._remedies[number] = (remedy, button)
 
         @button.on_click
         async def _(event: Any) -> None:
             if event.client is not None:
-                self.post(("fix", number))
+                self.post(("remedy", number))
 
-    def _drop_fixes(self) -> None:
+    def _drop_remedies(self) -> None:
         self._searched = False
-        for _, button in self._fixes.values():
+        for _, button in self._remedies.values():
             button.remove()
-        self._fixes.clear()
+        self._remedies.clear()
 
-    def _mend(self, fix: Fix) -> None:
-        match fix.kind:
+    def _apply_remedy(self, remedy: Remedy) -> None:
+        match remedy.kind:
             case "branch":
-                self.stage.any_branch()
+                self.stage.allow_any_branch()
             case "unlock":
-                self.stage.unlock(fix.joint)
+                self.stage.unlock(remedy.joint)
             case "relax":
-                assert fix.task is not None
-                self.stage.require(fix.task)
+                assert remedy.task is not None
+                self.stage.set_task(remedy.task)
             case "turn" | "move":
-                assert fix.q is not None
-                said = "Target turned" if fix.kind == "turn" else "Target moved"
-                self.stage.go(fix.q, Notice("hand", said, "It is where the tool can be."))
+                assert remedy.q is not None
+                title = "Target turned" if remedy.kind == "turn" else "Target moved"
+                self.stage.move_to(remedy.q, Notice("hand", title, "The tool can reach it there."))
         self._wake()
 
     # The cone of approach directions
@@ -373,8 +377,5 @@ class Postures(Feature):
                 opacity=0.32, side="double", cast_shadow=False, receive_shadow=False,
             )  # fmt: skip
         assert self._cone_line is not None
-        told = f"{100.0 * share(mask):.0f} % of all directions can be had at this point"
-        self._cone_line.content = (
-            f'<div data-cone="{share(mask):.3f}" style="margin:-.3em 1em .5em;font-size:.78em;opacity:.8;'
-            f'font-variant-numeric:tabular-nums">{told}</div>'
-        )
+        found = share(mask)
+        self._cone_line.content = render("postures/cone", share=f"{found:.3f}", percent=f"{100.0 * found:.0f}")

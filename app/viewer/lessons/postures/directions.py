@@ -1,7 +1,8 @@
-"""The cone of approach directions: from where a five-joint arm can come to a point.
+"""The cone of approach directions: the directions from which a five-joint arm can reach a point.
 
-Point and approach direction are five demands, met by five joints: at a given point the directions that the limits
-allow are a region on the sphere. It is found by solving the closed form for a fine mesh of directions at once.
+Point and approach direction have five dimensions, as many as the arm has joints. So at a given point, the
+directions that the limits allow are a region on the unit sphere. It is found by solving the closed form for a fine
+mesh of directions in one batch.
 """
 
 from __future__ import annotations
@@ -19,9 +20,9 @@ from kin import Robot
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
-FINENESS = 4
+SUBDIVISIONS = 4
 _TURN = 2.0 * math.pi
-_FAR = 1e6  # where a joint without stops has them
+_FAR = 1e6  # stands in for a missing joint limit
 
 
 class Sphere(NamedTuple):
@@ -35,7 +36,7 @@ class Sphere(NamedTuple):
 @lru_cache(maxsize=1)
 def sphere() -> Sphere:
     """An icosphere: about 2600 directions, 4° apart."""
-    ball = trimesh.creation.icosphere(subdivisions=FINENESS)
+    ball = trimesh.creation.icosphere(subdivisions=SUBDIVISIONS)
     directions = np.array(ball.vertices, dtype=float)
     frames = np.tile(np.eye(4), (len(directions), 1, 1))
     aside = np.where(np.abs(directions[:, 2:]) < 0.9, (0.0, 0.0, 1.0), (0.0, 1.0, 0.0))
@@ -46,16 +47,16 @@ def sphere() -> Sphere:
 
 
 def has_cone(robot: Robot) -> bool:
-    """Whether the arm's approach directions at a point are a matter of limits: five joints in closed form."""
+    """Whether the cone can be computed: for arms of five joints with a closed form."""
     return robot.n == 5 and bool(kin.branch_names(robot))
 
 
 def reachable(robot: Robot, point: Array) -> NDArray[np.bool_]:
-    """Which of the sphere's directions ``(m,)`` the tool can have at `point` ``(3,)``, inside the limits."""
+    """Which of the sphere's directions ``(m,)`` are possible at `point` ``(3,)`` within the limits."""
     targets = sphere().frames.copy()
     targets[:, :3, 3] = point
     q = kin.ik_branches(robot, targets)
-    # The image of each angle that is nearest to the middle of its limits; a NaN fits nowhere.
+    # Each angle, modulo 2π, nearest to the middle of its limits; NaN fails the comparison.
     lower, upper = np.maximum(robot.lower, -_FAR), np.minimum(robot.upper, _FAR)
     middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
     off = q - middle
@@ -73,5 +74,5 @@ def patch(mask: NDArray[np.bool_]) -> tuple[Array, NDArray[np.int64]]:
 
 
 def share(mask: NDArray[np.bool_]) -> float:
-    """The share of all directions that can be had."""
+    """The share of all directions that are possible."""
     return float(mask.mean())

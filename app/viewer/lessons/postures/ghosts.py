@@ -1,7 +1,7 @@
-"""Ghosts: light doubles of the arm, one node each, posed by sending a few hundred bytes.
+"""Ghosts: translucent copies of the arm, one node each, posed by sending a few hundred bytes.
 
-A ghost is one cylinder many times over, along each link and, short and wide, about each axis. The browser draws
-all of them in one call, and a new posture is a new list of their places.
+A ghost consists of instances of one cylinder: along each link and, short and wide, about each axis. The browser
+draws all of them in one call, and a new posture is a new list of their poses.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 import viser
 
-from app.viewer.lessons.postures.listing import BLOCKED_COLOR, COLORS, Posture
+from app.viewer.lessons.postures.survey import BLOCKED_COLOR, COLORS, Posture
 from app.viewer.scene.chain import chain
 from app.viewer.scene.meshes import body
 from kin import Robot
@@ -27,10 +27,10 @@ _SHORT = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Skeleton:
-    """What a ghost is made of.
+    """The cylinders of a ghost.
 
     Attributes:
-        links: index of the link each piece rides on ``(m,)``, 0 for the base.
+        links: index of the link that carries each piece ``(m,)``, 0 for the base.
         T_link_piece: ``(m, 4, 4)``; the piece is a cylinder about z from 0 to 1.
         scales: ``(m, 3)``, metres.
     """
@@ -65,7 +65,7 @@ def skeleton(robot: Robot) -> Skeleton:
 
 
 def link_poses(robot: Robot, q: Array) -> Array:
-    """Where each link is ``(k, n + 1, 4, 4)``, the base first, for configurations ``(k, n)``."""
+    """Poses ``(k, n + 1, 4, 4)`` of all links, base first, for configurations ``(k, n)``."""
     links = chain(robot).links
     found = np.empty((len(q), robot.n + 1, 4, 4))
     T = np.broadcast_to(np.eye(4), (len(q), 4, 4))
@@ -84,12 +84,12 @@ def link_poses(robot: Robot, q: Array) -> Array:
 
 
 def places(robot: Robot, q: Array) -> tuple[Array, Array, Array]:
-    """Where the pieces are at q ``(k, n)``: ``(k, m, 3)``, wxyz ``(k, m, 4)``; where the numbers go ``(k, 3)``."""
+    """Positions ``(k, m, 3)`` and wxyz ``(k, m, 4)`` of the pieces at q ``(k, n)``; label points ``(k, 3)``."""
     bones = skeleton(robot)
     frames = link_poses(robot, q)
     T = frames[:, bones.links] @ bones.T_link_piece
     middle = 0.5 * (T[..., :3, 3] + (T[..., :3, 2] * bones.scales[:, None, 2] + T[..., :3, 3]))
-    # The piece that tells the ghosts apart best: an elbow, more often than not.
+    # The label goes to the piece whose positions differ most, usually an elbow.
     apart = np.linalg.norm(middle - middle.mean(axis=0), axis=2).sum(axis=0)
     return T[..., :3, 3], wxyz_from_rotation(T[..., :3, :3]), middle[:, int(apart.argmax())]
 
@@ -97,7 +97,7 @@ def places(robot: Robot, q: Array) -> tuple[Array, Array, Array]:
 class Ghosts:
     """The ghosts of one arm in a visitor's scene, below the node `root`.
 
-    `clicked` gets a ghost's number; viser calls it from a thread of its own.
+    `clicked` receives a ghost's number; viser calls it from another thread.
     """
 
     def __init__(
@@ -131,9 +131,9 @@ class Ghosts:
             self._labels.append(scene.add_label(f"{root}/name/{i + 1}", str(i + 1), visible=False))
 
     def show(self, postures: tuple[Posture, ...], shown: frozenset[str]) -> None:
-        """Draw the ghosts of these branches; unchanged ones cost nothing."""
-        wanted = [p.q is not None and p.name in shown for p in postures]
-        rows = [i for i, w in enumerate(wanted) if w]
+        """Draw the ghosts of these branches; unchanged ones are not sent again."""
+        visible = [p.q is not None and p.name in shown for p in postures]
+        rows = [i for i, w in enumerate(visible) if w]
         named: dict[tuple[float, ...], str] = {}
         if rows:
             q = np.array([postures[i].q for i in rows])
@@ -143,7 +143,7 @@ class Ghosts:
                 at = tuple((np.round(anchors[k] / self._size) * self._size).tolist())
                 named[at] = f"{named[at]} · {i + 1}" if at in named else str(i + 1)
         for i, node in enumerate(self._nodes):
-            _set_visible(node, i < len(wanted) and wanted[i])
+            _set_visible(node, i < len(visible) and visible[i])
         names = list(named.items())
         for i, label in enumerate(self._labels):
             if i < len(names):
@@ -155,17 +155,17 @@ class Ghosts:
 
     def _pose(self, i: int, posture: Posture, positions: Array, wxyz: Array) -> None:
         assert posture.q is not None
-        key = (posture.can_be_had, posture.q.tobytes())
+        key = (posture.available, posture.q.tobytes())
         if key == self._shown[i]:
             return
         self._shown[i] = key
         node = self._nodes[i]
         node.batched_positions = positions.astype(np.float32)
         node.batched_wxyzs = wxyz.astype(np.float32)
-        opacity = OPACITY if posture.can_be_had else FAINT
+        opacity = OPACITY if posture.available else FAINT
         if node.opacity != opacity:
             node.opacity = opacity
-            color = COLORS[i % len(COLORS)] if posture.can_be_had else BLOCKED_COLOR
+            color = COLORS[i % len(COLORS)] if posture.available else BLOCKED_COLOR
             node.batched_colors = np.array(color, dtype=np.uint8)
 
 

@@ -1,7 +1,7 @@
-"""The ring of arm angles, and the trade of two joints on one line: geometry, without a scene.
+"""Geometry of the ring of arm angles, and of the trade of two coaxial joints, without a scene.
 
-In an arm with a spherical shoulder and wrist the elbow turns on a circle about the line from shoulder to wrist.
-The arm angle ψ says where on it: 0 where the elbow is highest (:mod:`kin.solvers.srs7`).
+In an arm with a spherical shoulder and wrist, the elbow can move on a circle about the line from shoulder to
+wrist. The arm angle ψ is its position there: 0 where the elbow is highest (:mod:`kin.solvers.srs7`).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from kin.solvers.reversed import ReversedJoints
 from kin.transforms import Array, frame_from_approach
 
 STEPS = 144
-FLAT = 1e-6  # m; a circle smaller than that is a straight arm
+FLAT = 1e-6  # m; with a smaller circle, the arm is straight
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class Circle:
 
 
 def elbow_circle(robot: Robot, q: Array) -> Circle | None:
-    """The circle at a configuration ``(n,)``; None for an arm of another kind."""
+    """The circle at a configuration ``(n,)``; None for another kind of arm."""
     match = closed_form_of(robot)
     form = match.form if isinstance(match, ReversedJoints) else match
     if not isinstance(form, srs7.Srs7):
@@ -69,7 +69,7 @@ def elbow_circle(robot: Robot, q: Array) -> Circle | None:
 def arc_segments(circle: Circle, intervals: Iterable[tuple[float, float]], scale: float) -> tuple[Array, Array]:
     """The whole circle as short chords ``(k, 2, 3)``, and which of them are feasible ``(k,)``.
 
-    A chord is cut where a range ends, so that the ends are exact.
+    Chords are split at the ends of the ranges, so the ends are exact.
     """
     ranges = list(intervals)
     marks = {-math.pi + 2.0 * math.pi * i / STEPS for i in range(STEPS + 1)}
@@ -82,7 +82,7 @@ def arc_segments(circle: Circle, intervals: Iterable[tuple[float, float]], scale
 
 
 def coaxial(robot: Robot) -> bool:
-    """Whether joints 1 and 2 turn about one line: then one can take back what the other does."""
+    """Whether joints 1 and 2 have the same axis: then one can turn back what the other turns."""
     if robot.n < 2 or not robot.revolute[:2].all():
         return False
     axes = [joint_axis(robot, robot.q_home, i) for i in (0, 1)]
@@ -101,13 +101,14 @@ def joint_axis(robot: Robot, q: Array, joint: int) -> tuple[Array, Array]:
 
 
 def trade_segments(robot: Robot, q: Array, radius: float) -> tuple[Array, NDArray[np.int64]]:
-    """Arcs of θ1 and, going on from its end, of θ2 about their common line, as chords ``(k, 2, 3)``; and
-    whose each is ``(k,)``: 0 and 1 for the joints, 2 for the ray at the end of both, which stays where it is in a
-    trade.
+    """Arcs of θ1 and, from its end on, of θ2 about their common axis, as chords ``(k, 2, 3)``.
+
+    Also returns what each chord ``(k,)`` belongs to: 0 and 1 for the joints, 2 for the ray at the end of both,
+    which does not move in a trade.
     """
     (_, z), (p, other) = (joint_axis(robot, q, joint) for joint in (0, 1))
-    turns = float(q[0]), float(q[1] * np.sign(z @ other))  # both as joint 1 counts
-    x, y, _ = frame_from_approach(z).T  # the same for all configurations: the line does not move
+    turns = float(q[0]), float(q[1] * np.sign(z @ other))  # both with the sign of joint 1
+    x, y, _ = frame_from_approach(z).T  # the same for all configurations: the axis does not move
     chords: list[Array] = []
     numbers: list[int] = []
     start = 0.0

@@ -1,7 +1,7 @@
-"""The lesson "Velocity": the Jacobian where the arm is, and where it loses a direction.
+"""The lesson "Velocity": the Jacobian at the present configuration, and the directions lost at singularities.
 
-What belongs to a picture (ellipsoid, arrows) moves with each picture. Numbers, sentences and the search for
-singularities follow at `INTERVAL`: nobody reads faster, and a panel is long.
+Ellipsoid and arrows are updated with each frame. Numbers, sentences and the search for singularities follow at
+`INTERVAL`: nobody reads faster, and their HTML is long.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import viser
 
 import kin
 from app.viewer.feature import Feature, Stage
-from app.viewer.lessons.velocity import told
+from app.viewer.lessons.velocity import views
 from app.viewer.lessons.velocity.drawing import Drawing
 from app.viewer.lessons.velocity.jog import BUTTONS, Frame, Press, Step, button, step
 from app.viewer.lessons.velocity.rates import (
@@ -32,7 +32,7 @@ from app.viewer.lessons.velocity.rates import (
     state_of,
     task_rates,
 )
-from app.viewer.panel import assign, listen, listen_click
+from app.viewer.panel import assign, listen, listen_click, update_html
 from kin import InputError
 from kin.transforms import Array
 from kin.units import Unit, Units
@@ -49,21 +49,11 @@ ELLIPSOIDS: dict[str, Ellipsoid | None] = {
 }
 STEPS = (1e-4, 0.1)  # m
 TURNS = (math.radians(0.1), math.radians(30.0))  # rad
-FRAME_HINT = "Whose axes the rows of the Jacobian and the jog buttons mean; the point is the tool's in both"
-COLUMN_HINT = "Draws this joint's column at the tool: straight arrow v, round arrow ω; again: no more"
-ELLIPSOID_HINT = (
-    "Velocities the joints can give the tool, or forces they can hold: each strong where the other is slow"
-)
+FRAME_HINT = "Whose axes the Jacobian's rows and the jog buttons refer to; the reference point is the tool point"
+COLUMN_HINT = "Draws this joint's column at the tool: straight arrow v, round arrow ω; a second click removes it"
+ELLIPSOID_HINT = "Velocities that the joints can give the tool, or forces that they can hold: strong where slow"
 STEP_HINT = "Length of one step along an axis"
 TURN_HINT = "Angle of one step about an axis"
-# viser gives each button a line of its own; this puts six side by side.
-_BOX = "div:has(>div>[data-jog])"
-GRID = (
-    f"<style>{_BOX}{{display:grid;grid-template-columns:repeat(6,minmax(0,1fr));column-gap:.25em;padding-inline:.4em}}"
-    f"{_BOX}>div:not(:has(>button)){{grid-column:1/-1}}{_BOX}>div:has(>button){{margin-inline:0!important}}"
-    f"{_BOX}>div>button{{padding:0}}</style>"
-    '<div data-jog style="font-size:.74em;opacity:.75;margin:.1em 1em .4em">Press and hold to repeat.</div>'
-)
 _NUMBERS = count(1)
 V = TypeVar("V")
 Field = viser.GuiNumberHandle[float]
@@ -74,7 +64,7 @@ class VelocityLesson(Feature):
 
     key = "velocity"
     title = "Velocity"
-    about = "What the tool can do from here: Jacobian, ellipsoids, singularities."
+    about = "The velocities and forces of the tool: Jacobian, ellipsoids, singularities."
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
@@ -115,7 +105,7 @@ class VelocityLesson(Feature):
 
     def _build_jog(self, gui: viser.GuiApi) -> None:
         self._make_fields()
-        gui.add_html(GRID, order=3)
+        gui.add_html(views.jog_html(), order=3)
         for number, (axis, sign) in enumerate(BUTTONS):
             verb = "Turns the tool about" if axis > 2 else "Moves the tool along"
             handle = gui.add_button(
@@ -129,7 +119,7 @@ class VelocityLesson(Feature):
     def _listen_jog(self, handle: viser.GuiButtonHandle, number: int) -> None:
         press = Press()
 
-        # Each press has a key of its own, so that no tap is lost; within one, a slow worker skips repeats.
+        # Each press has a key of its own, so that no tap is lost; a slow worker skips repeats of one press.
         async def held(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
             if event.client is not None and press.held(time.monotonic()):
                 self.post(("jog", number, press.number))
@@ -142,9 +132,9 @@ class VelocityLesson(Feature):
         handle.on_click(clicked)
 
     def _make_fields(self) -> None:
-        """How far one step is, in the units of now."""
+        """The fields for the size of a step, in the present units."""
         gui, units = self.stage.client.gui, self.stage.units
-        self._units_made = units
+        self._field_units = units
 
         def field(name: str, unit: Unit, value: float, ends: tuple[float, float], hint: str, order: int) -> Field:
             low, high = (unit.shown(end) for end in ends)
@@ -189,12 +179,12 @@ class VelocityLesson(Feature):
             self._columns.remove()
         self._use_robot()
 
-    def on_picture(self, T_base_tool: Array) -> None:
+    def on_pose(self, T_base_tool: Array) -> None:
         self._draw(self.stage.q, T_base_tool)
         self.due = max(0.0, INTERVAL - (time.perf_counter() - self._shown_at))
 
     def on_style(self) -> None:
-        if self.stage.units != self._units_made:
+        if self.stage.units != self._field_units:
             self._step_field.remove()
             self._turn_field.remove()
             with self._jog_folder:
@@ -243,27 +233,27 @@ class VelocityLesson(Feature):
     def remove(self) -> None:
         self._drawing.remove()
 
-    # What can be done
+    # Jogging
 
     def _jog(self, axis: int, sign: int) -> None:
         stage = self.stage
         amount = sign * (self._step if axis < 3 else self._turn)
-        asked = (stage.robot, stage.goal.tobytes(), stage.task, axis, amount, self._frame, stage.locked)
-        if asked == self._refused:
-            return  # a button held at a stop would have the same refusal worked out ten times a second
+        request = (stage.robot, stage.goal.tobytes(), stage.task, axis, amount, self._frame, stage.locked)
+        if request == self._refused:
+            return  # a button held at a limit: the same request would be solved ten times a second
         made: Step = step(
             stage.robot, stage.goal, stage.task, axis, amount, self._frame, stage.locked, stage.units
         )
         if made.q is None:
-            self._refused = asked
-            stage.tell(made.told)
+            self._refused = request
+            stage.notify(made.notice)
         else:
-            stage.go(made.q, made.told)
+            stage.move_to(made.q, made.notice)
 
     # What is shown
 
     def _use_robot(self) -> None:
-        """Drawings, scales and column buttons of the arm on show."""
+        """Create drawings, scales and column buttons of the selected robot."""
         stage, robot = self.stage, self.stage.robot
         self._chosen, self._refused = None, ()
         self._drawing = Drawing(stage.client.scene, robot, f"/velocity-{next(_NUMBERS)}")
@@ -279,22 +269,22 @@ class VelocityLesson(Feature):
         self._show_numbers()
 
     def _scale(self, kind: Ellipsoid) -> float:
-        """What `told.SAMPLE` of the picture stands for: such that the ellipsoid at home has a fitting size."""
+        """The value that `views.SAMPLE` represents in the scene: the ellipsoid at home then has a fitting size."""
         robot = self.stage.robot
         semi = semi_axes(axes_of(part_of(kin.jacobian(robot, robot.q_home), kind)).values, kind)
         usual = semi[np.isfinite(semi) & (semi > 1e-6) & (semi < 1e6)]
         longest = float(usual.max()) if len(usual) else 1.0
-        return nice(told.SAMPLE * longest / (0.42 * self._drawing.radius))
+        return nice(views.SAMPLE * longest / (0.42 * self._drawing.radius))
 
     def _draw(self, q: Array, T_base_tool: Array) -> None:
-        """What moves with each picture."""
+        """Update what moves with each frame."""
         self._J = J = kin.jacobian(self.stage.robot, q)
         self._T = T_base_tool
         self._drawing.place(T_base_tool[:3, 3])
         self._axes = None
         if self._kind is not None:
             self._axes = axes_of(part_of(J, self._kind))
-            lengths = semi_axes(self._axes.values, self._kind) * (told.SAMPLE / self._scales[self._kind])
+            lengths = semi_axes(self._axes.values, self._kind) * (views.SAMPLE / self._scales[self._kind])
             self._cut = self._drawing.show_ellipsoid(self._kind, self._axes.R, lengths)
         else:
             self._drawing.hide_ellipsoid()
@@ -302,28 +292,28 @@ class VelocityLesson(Feature):
             self._drawing.show_column(None, None)
         else:
             column = J[:, self._chosen]
-            self._drawing.show_column(column[:3] * (told.SAMPLE / self._scales["velocity"]), column[3:])
+            self._drawing.show_column(column[:3] * (views.SAMPLE / self._scales["velocity"]), column[3:])
 
     def _show_numbers(self) -> None:
-        """What is read, and the singularities."""
+        """Update numbers, sentences and singularities."""
         self._shown_at, self.due = time.perf_counter(), None
         stage, robot, J, T = self.stage, self.stage.robot, self._J, self._T
         R = T[:3, :3]
         rows = J if self._frame == "base" else np.vstack([R.T @ J[:3], R.T @ J[3:]])
-        _tell(self._matrix, told.matrix_html(robot, rows, self._frame, self._chosen))
-        _tell(self._units, told.units_html(robot, self._frame))
-        _tell(self._column, told.column_html(robot, J, self._chosen))
+        update_html(self._matrix, views.matrix_html(robot, rows, self._frame, self._chosen))
+        update_html(self._units, views.units_html(robot, self._frame))
+        update_html(self._column, views.column_html(robot, J, self._chosen))
         self._show_singularities(R)
         rates = task_rates(robot, stage.q)
         linear, angular = axes_of(J[:3]).values, axes_of(J[3:]).values
-        _tell(self._values, told.values_html(robot, rates, linear, angular))
+        update_html(self._values, views.values_html(robot, rates, linear, angular))
         if self._kind is None or self._axes is None:
-            _tell(self._ellipsoid, "")
+            update_html(self._ellipsoid, "")
             return
         semi = semi_axes(self._axes.values, self._kind)
         scale = self._scales[self._kind]
-        _tell(self._ellipsoid, told.ellipsoid_html(robot, self._kind, semi, scale, self._cut, stage.units))
-        self._drawing.write_values(told.label_texts(semi), np.asarray(stage.client.camera.position))
+        update_html(self._ellipsoid, views.ellipsoid_html(robot, self._kind, semi, scale, self._cut, stage.units))
+        self._drawing.write_values(views.label_texts(semi), np.asarray(stage.client.camera.position))
 
     def _show_singularities(self, R_base_tool: Array) -> None:
         stage, robot = self.stage, self.stage.robot
@@ -335,14 +325,9 @@ class VelocityLesson(Feature):
             rates = task_rates(robot, stage.q)
             twists = lost(rates) if state == "at" else rates.twists[-1:]
         self._drawing.show_lost(twists, state == "at")
-        words = [told.lost_words(twist, R_base_tool, slowest=state == "near") for twist in twists]
-        _tell(self._warning, told.warning_html(robot, found, stage.units, words))
-        _tell(self._others, told.others_html(robot, found, stage.units))
-
-
-def _tell(element: viser.GuiHtmlHandle, html: str) -> None:
-    if element.content != html:
-        element.content = html
+        words = [views.lost_words(twist, R_base_tool, slowest=state == "near") for twist in twists]
+        update_html(self._warning, views.warning_html(robot, found, stage.units, words))
+        update_html(self._others, views.others_html(robot, found, stage.units))
 
 
 def _one_of(field: str, value: object, options: dict[str, V]) -> V:
@@ -352,7 +337,7 @@ def _one_of(field: str, value: object, options: dict[str, V]) -> V:
 
 
 def _number(field: str, value: object, limits: tuple[float, float], unit: Unit) -> float:
-    """What was typed in this unit, in radians or metres."""
+    """A number typed in this unit, in radians or metres."""
     low, high = (unit.shown(limit) for limit in limits)
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
         raise InputError(field, value, f"a number from {low:g} to {high:g}")

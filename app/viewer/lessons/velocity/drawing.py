@@ -1,6 +1,6 @@
-"""The lesson's drawings at the tool: ellipsoid, a column's arrows, lost directions.
+"""The lesson's drawings at the tool: ellipsoid, arrows of a column, lost directions.
 
-Nodes are made once for an arm and then placed: the ellipsoid is a unit sphere with a rotation and three scales.
+Nodes are created once for an arm and then posed: the ellipsoid is a unit sphere with a rotation and three scales.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ COLORS: dict[Ellipsoid, tuple[int, int, int]] = {
 }
 COLUMN, LOST, SLOW = (0, 114, 178), (213, 40, 0), (184, 122, 0)
 AXIS_LINE = (90, 90, 90)
-# Shares of the radius of the sphere round the arm.
+# Relative to the radius of the sphere around the arm.
 FLAT, LONGEST = 0.004, 1.1
 RING, LOST_RING, LOST_ARROW = 0.13, 0.2, 0.36
 MOST_LOST = 3
@@ -34,7 +34,7 @@ CHOICES = np.array([(1.0, b, c) for b in (1.0, -1.0) for c in (1.0, -1.0)])
 
 
 class Drawing:
-    """The drawings for one arm, below the node `root`; call it from the visitor's worker."""
+    """The drawings for one arm, below the node `root`; the visitor's worker calls it."""
 
     def __init__(self, scene: viser.SceneApi, robot: Robot, root: str) -> None:
         self.radius = body(robot).radius
@@ -43,7 +43,7 @@ class Drawing:
         self._kind: Ellipsoid | None = None
         self._tips = np.zeros(3)
         self._R = np.eye(3)
-        # Everything about the ellipsoid hangs on its principal axes: turning them is one message.
+        # All parts of the ellipsoid are children of its principal axes: rotating it is one message.
         self._body = scene.add_frame(f"{root}/body", show_axes=False, visible=False)
         sphere = trimesh.creation.icosphere(subdivisions=3)
         self._ellipsoid = scene.add_mesh_simple(
@@ -99,13 +99,13 @@ class Drawing:
         )
 
     def place(self, tool: Array) -> None:
-        """Bring everything to the tool point ``(3,)``."""
+        """Move everything to the tool point ``(3,)``."""
         self._root.position = tool
 
     def show_ellipsoid(self, kind: Ellipsoid, R: Array, lengths: Array) -> bool:
         """Draw an ellipsoid with axes R ``(3, 3)`` and semi-axes `lengths` ``(3,)`` in metres.
 
-        Flat ones are drawn as thin discs, endless ones cut; whether one was cut.
+        Flat ellipsoids are drawn as thin discs, very long ones truncated; returns whether it was truncated.
         """
         shown = np.clip(lengths, FLAT * self.radius, LONGEST * self.radius)
         if kind != self._kind:
@@ -119,14 +119,14 @@ class Drawing:
         return bool((lengths > LONGEST * self.radius).any())
 
     def write_values(self, texts: tuple[str, str, str], eye: Array) -> None:
-        """Name the axes of the ellipsoid by their values, as seen from a point ``(3,)``."""
+        """Label the axes of the ellipsoid with their values, as seen from a point ``(3,)``."""
         ends = np.diag(self._tips * sides(self._R * self._tips, eye - self._root.position))
         for label, text, end in zip(self._labels, texts, ends, strict=True):
             label.text = text
             label.position = end
 
     def hide_ellipsoid(self) -> None:
-        """Take the ellipsoid out of the picture."""
+        """Hide the ellipsoid."""
         self._kind = None
         self._body.visible = False
 
@@ -142,7 +142,7 @@ class Drawing:
             self._turn.wxyz = wxyz_along(angular)
 
     def show_lost(self, twists: Array, certain: bool) -> None:
-        """Draw double arrows along and about twists ``(k, 6)``; red where they are lost, amber where only slow."""
+        """Draw double arrows along and about twists ``(k, 6)``: red if lost, amber if only slow."""
         color = LOST if certain else SLOW
         arrows = []
         for twist in twists[:MOST_LOST]:
@@ -162,22 +162,22 @@ class Drawing:
                 node.color = color
 
     def remove(self) -> None:
-        """Take everything out of the scene."""
+        """Remove everything from the scene."""
         self._root.remove()
 
 
 def sides(tips: Array, towards: Array) -> Array:
-    """Which end of each axis to write at, ±1 ``(3,)``: the choice that keeps the texts farthest apart on screen.
+    """The end of each axis to label, ±1 ``(3,)``: the choice that keeps the labels farthest apart on screen.
 
     Args:
-        tips: the axes' ends as columns ``(3, 3)``, from their common middle.
-        towards: from there to the eye ``(3,)``.
+        tips: the axes' ends as columns ``(3, 3)``, relative to their common centre.
+        towards: vector ``(3,)`` from there to the eye.
     """
     ahead = towards / max(float(np.linalg.norm(towards)), 1e-9)
     flat = (tips - np.outer(ahead, ahead @ tips)).T
     ends = CHOICES[:, :, None] * flat
     apart = np.linalg.norm(ends - np.roll(ends, 1, axis=1), axis=2).min(axis=1)
-    # The first of equals: an arm that moves does not make the texts jump without need.
+    # The first of equals: the labels of a moving arm must not jump needlessly.
     best: Array = CHOICES[int(np.argmax(apart > apart.max() - 1e-3 * np.abs(tips).max()))]
     return best
 
@@ -188,7 +188,7 @@ def _set_visible(node: viser.SceneNodeHandle, visible: bool) -> None:
 
 
 def wxyz_along(direction: Array) -> tuple[float, float, float, float]:
-    """The shortest turn that takes z to a direction ``(3,)`` that is not zero."""
+    """The shortest rotation that takes z to a nonzero direction ``(3,)``."""
     x, y, z = (direction / np.linalg.norm(direction)).tolist()
     if z < -1.0 + 1e-12:
         return 0.0, 1.0, 0.0, 0.0
@@ -198,7 +198,7 @@ def wxyz_along(direction: Array) -> tuple[float, float, float, float]:
 
 @lru_cache(maxsize=2)
 def ring_arrow(double: bool) -> trimesh.Trimesh:
-    """An arrow bent round z, counter-clockwise, of radius 1; with a head at either end if `double`."""
+    """A circular arrow about z, counter-clockwise, of radius 1; with a head at each end if `double`."""
     first, last = math.radians(35.0 if double else 0.0), math.radians(290.0)
     angles = np.linspace(first, last, 40)
     path = np.column_stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)])

@@ -1,7 +1,8 @@
-"""Jogging: the tool by one step along or about an axis, the joints following on their branch.
+"""Jogging: the tool moves by one step along or about an axis, and the joints follow on their branch.
 
-A step is made exactly or not at all. Not at all too if a joint would have to jump, as it does for a short step
-beside a singularity: the motion from one configuration to the other would swing the tool away.
+A step is made exactly or not at all. It is not made either if a joint would have to jump, as it does for a short
+step
+near a singularity: the motion between the two configurations would swing the tool away.
 """
 
 from __future__ import annotations
@@ -24,17 +25,17 @@ Locked = tuple[float | None, ...] | None
 NAMES = ("x", "y", "z", "rx", "ry", "rz")
 BUTTONS = tuple((axis, sign) for axis in range(6) for sign in (-1, 1))
 
-# The most that a joint may turn (rad) or slide (m) in one step.
+# The largest motion of a joint (rad or m) in one step.
 SMOOTH = 0.6
 _TURNED = 1e-6  # rad
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """Where a step leads, or None if it is not made; and what the visitor is told."""
+    """The configuration ``(n,)`` after a step, or None if the step is not made; and a message."""
 
     q: Array | None
-    told: Notice
+    notice: Notice
 
 
 def button(axis: int, sign: int) -> str:
@@ -65,21 +66,21 @@ def step(
     locked: Locked = None,
     units: Units = DEFAULT_UNITS,
 ) -> Step:
-    """One step of `amount` (m or rad) from q ``(n,)``; `locked` as `kin.solve_ik` takes it; told in `units`.
+    """One step of `amount` (m or rad) from q ``(n,)``; `locked` as `kin.solve_ik` takes it.
 
-    An arm with fewer than six joints gives up the roll, one with fewer than five the orientation; a step is then
-    made all the same, and what it gave up is told.
+    An arm with fewer than six joints cannot keep the roll, one with fewer than five the orientation; the step is
+    then made nevertheless, and the message reports the error.
     """
     T = kin.fk(robot, q)
-    wanted = moved(T, axis, amount, frame)
-    if axis > 2 and (why := _left_out(task, T, wanted)):
+    goal = moved(T, axis, amount, frame)
+    if axis > 2 and (why := _not_in_task(task, T, goal)):
         return Step(None, Notice("hand", "Not moved", why))
-    target = wanted[:3, 3] if task == "position" else wanted
-    # A singularity may be crossed to another branch, as long as the joints move smoothly.
+    target = goal[:3, 3] if task == "position" else goal
+    # The arm may pass through a singularity to another branch, as long as the joints move smoothly.
     refused: list[Step] = []
     for branch in ("seed", None) if kin.branch_names(robot) else (None,):
         result = kin.solve_ik(robot, target, task=task, q_seed=q, branch=branch, locked=locked, max_solutions=1)
-        found = _judged(robot, q, T, axis, amount, frame, result, units)
+        found = _to_step(robot, q, T, axis, amount, frame, result, units)
         if found.q is not None:
             return found
         if result.cause != "branch":
@@ -87,26 +88,27 @@ def step(
     return refused[0]
 
 
-def _left_out(task: Task, T: Array, wanted: Array) -> str:
-    """Why a turn is not made: the task does not ask for it."""
+def _not_in_task(task: Task, T: Array, goal: Array) -> str:
+    """Why a rotation is not made: the task leaves it open."""
     if task == "position":
-        return "“Match: Point only” leaves the orientation free. Ask for the full pose to turn the tool."
-    if task == "approach" and vector_angle(T[:3, 2], wanted[:3, 2]) < _TURNED:
-        return "“Match: Point + approach” leaves the roll free. Ask for the full pose to turn it."
+        return "The task “Point only” leaves the orientation open. Choose the full pose to rotate the tool."
+    if task == "approach" and vector_angle(T[:3, 2], goal[:3, 2]) < _TURNED:
+        return "The task “Point + approach” leaves the roll open. Choose the full pose to change it."
     return ""
 
 
-def _judged(
+def _to_step(
     robot: Robot, q: Array, T: Array, axis: int, amount: float, frame: Frame, result: IKResult, units: Units
 ) -> Step:
-    """An answer as a step: taken if it is exact in all that this arm can keep, and near."""
+    """A result as a step: made if it is as exact as this arm allows, and near."""
     best = result.solutions[0] if result.solutions else None
-    given = _given_up(robot, T, axis, result, units)
-    if best is None or given is None:
+    error = _error_message(robot, T, axis, result, units)
+    if best is None or error is None:
         if best is not None:
             return Step(None, Notice("orientation", "Not moved", _too_few(robot, axis, best, units)))
-        said = notice(result, units)
-        return Step(None, Notice(said.kind, f"Not moved: {said.title[:1].lower()}{said.title[1:]}", said.detail))
+        reason = notice(result, units)
+        title = f"Not moved: {reason.title[:1].lower()}{reason.title[1:]}"
+        return Step(None, Notice(reason.kind, title, reason.detail))
     off = np.abs(best.q - q)
     worst = int(off.argmax())
     if off[worst] > SMOOTH:
@@ -116,19 +118,19 @@ def _judged(
             Notice(
                 "limits",
                 "Not moved: a joint would have to jump",
-                f"{label(robot, worst)} by {turn}: a singularity is close, or the step is too long.",
+                f"{label(robot, worst)} by {turn}: a singularity is near, or the step is too long.",
             ),
         )
     size = units.of(axis > 2).brief(abs(amount))
     verb = "along" if axis < 3 else "about"
     title = f"Jogged {size} {verb} {'+' if amount > 0 else '−'}{NAMES[axis][-1]} of the {frame}"
-    if given:
-        return Step(best.q, Notice("compromise", title, given))
+    if error:
+        return Step(best.q, Notice("compromise", title, error))
     return Step(best.q, Notice("reached", title, "Exactly, " + _how(robot, q, best.q)))
 
 
-def _given_up(robot: Robot, T: Array, axis: int, result: IKResult, units: Units) -> str | None:
-    """What the best answer gives up, in words; None if that is more than such an arm must."""
+def _error_message(robot: Robot, T: Array, axis: int, result: IKResult, units: Units) -> str | None:
+    """The error of the best solution in words; None if it is larger than necessary for this arm."""
     if result.status == "solved":
         return ""
     best = result.solutions[0] if result.solutions else None
@@ -154,7 +156,7 @@ def _too_few(robot: Robot, axis: int, best: IKSolution, units: Units) -> str:
 
 
 def _how(robot: Robot, before: Array, after: Array) -> str:
-    """What became of the branch."""
+    """How the branch changed."""
     if not kin.branch_names(robot):
         return "with the joints moving smoothly."
     now = kin.branch_of(robot, after)
@@ -164,14 +166,14 @@ def _how(robot: Robot, before: Array, after: Array) -> str:
 
 
 class Press:
-    """Tells the steps of one button from what the browser sends while it is held.
+    """Derives the steps of one button from the events that the browser sends.
 
-    Held by mouse or finger, a button reports at once and then again and again, and a click when it is let go; by
-    keyboard only the click comes. So that a tap is one step, repeats count only after `DELAY`.
+    A button held by mouse or finger sends repeated reports and, on release, a click; with the keyboard only the
+    click comes. A tap is one step, because repeats count only after `DELAY`.
     """
 
     DELAY = 0.5  # s
-    GAP = 2.0  # s without a report: the click that ended the press was lost
+    GAP = 2.0  # s without a report, after which the click that ended the press is considered lost
 
     def __init__(self) -> None:
         self._since: float | None = None
@@ -179,7 +181,7 @@ class Press:
         self.number = 0
 
     def held(self, now: float) -> bool:
-        """A report that the button is down; whether that is a step."""
+        """Process a report that the button is down; returns whether it is a step."""
         if self._since is None or now - self._last > self.GAP:
             self._since = now
             self.number += 1
@@ -187,7 +189,7 @@ class Press:
         return now == self._since or now - self._since >= self.DELAY
 
     def clicked(self, now: float) -> bool:
-        """A click; whether that is a step."""
+        """Process a click; returns whether it is a step."""
         alone = self._since is None or now - self._last > self.GAP
         self._since = None
         self.number += alone

@@ -1,1 +1,1 @@
-"""The workspace tab: clouds of tool points in the picture, their sizes, their section."""
+"""The workspace tab: clouds of tool points, their sizes and section, and the capability map."""

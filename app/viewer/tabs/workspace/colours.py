@@ -1,9 +1,10 @@
-"""What points are coloured by, with which colours, and the legend that says so.
+"""The colours of points: the coloured quantity, its scale, the colour map, and the legend.
 
-A scale must not move while a cloud grows, and two visitors must see the same one: so its ends come from the arm
-alone, from a few thousand evenly spread draws. What lies beyond an end has the colour of that end.
+A scale must not change while a cloud grows, and must be the same for all visitors. So its ends are determined by
+the robot alone, from a few thousand evenly spread configurations. Values beyond an end have the colour of that
+end.
 
-The maps are uniform to the eye and read alike with all common kinds of colour vision: cividis (Nuñez, Anderson and
+The maps are perceptually uniform and legible with all common kinds of colour vision: cividis (Nuñez, Anderson and
 Renslow, PLOS ONE 13(7), 2018), viridis and inferno (van der Walt and Smith, 2015, CC0), sixteen samples of each.
 """
 
@@ -11,12 +12,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from html import escape
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.viewer.views.templates import render
 from kin import Robot, WorkspaceChunk, workspace_slice
 from kin.transforms import Array
 from kin.units import Units
@@ -47,17 +48,17 @@ MEANING: dict[By, str] = {
     "radius": "distance from joint 1's axis",
     "height": "height above the base",
     "manipulability": "manipulability (Yoshikawa)",
-    "limits": "room to the nearest joint limit, of half its range",
+    "limits": "distance to the nearest joint limit, relative to half its range",
 }
-# Okabe and Ito's blue and orange: the arm's own cloud in one colour, and that of another arm.
+# Okabe and Ito's blue and orange, for the robot's own cloud and that of another one.
 OWN: Colour = (0, 114, 178)
 OTHER: Colour = (230, 159, 0)
-LOOKED_AT = 4096  # draws that tell the ends of a scale
+SAMPLES = 4096  # configurations that determine the ends of a scale
 
 
 @dataclass(frozen=True)
 class Scale:
-    """From a quantity to a colour: its values from `low` to `high`."""
+    """A linear scale from a quantity to a colour, from `low` to `high`."""
 
     by: By
     low: float
@@ -65,27 +66,27 @@ class Scale:
 
 
 def measures(by: By) -> tuple[Measure, ...]:
-    """What a cloud has to measure to be coloured so."""
+    """The measures of a cloud that this colouring needs."""
     return ("manipulability",) if by == "manipulability" else ("limits",) if by == "limits" else ()
 
 
 @lru_cache(maxsize=256)
-def line(robot: Robot) -> tuple[Array, Array]:
-    """A point of joint 1's line and its unit direction, ``(3,)`` each."""
+def axis_of_joint_1(robot: Robot) -> tuple[Array, Array]:
+    """A point of joint 1's axis and its unit direction, ``(3,)`` each."""
     point, axis, _ = base_axis(Region.of(robot, None, None))
     return point, axis
 
 
 def radius_and_height(robot: Robot, points: Array | NDArray[np.float32]) -> tuple[Array, Array]:
-    """Distance from joint 1's line and height along it ``(k,)`` of points ``(k, 3)``, as in an (r, z) section."""
-    point, axis = line(robot)
+    """Distance from joint 1's axis and height along it ``(k,)`` of points ``(k, 3)``, as in an (r, z) section."""
+    point, axis = axis_of_joint_1(robot)
     height = points @ axis
     across = points - point - (height - float(point @ axis))[:, None] * axis
     return np.sqrt(np.einsum("ki,ki->k", across, across)), height
 
 
 def quantity(robot: Robot, by: By, chunk: WorkspaceChunk) -> Array:
-    """What each point ``(k,)`` of a chunk is coloured by."""
+    """The coloured quantity of each point ``(k,)`` of a chunk."""
     if by == "radius":
         return radius_and_height(robot, chunk.points)[0]
     if by == "height":
@@ -95,10 +96,10 @@ def quantity(robot: Robot, by: By, chunk: WorkspaceChunk) -> Array:
 
 @lru_cache(maxsize=256)
 def scale_of(robot: Robot, by: By) -> Scale:
-    """The scale of an arm: of a margin and of manipulability from 0, all up to the largest value seen."""
+    """The scale of a robot, up to the largest sampled value; from 0 for margins and manipulability."""
     if by == "one":
         return Scale(by, 0.0, 1.0)
-    chunk = workspace_slice(robot, LOOKED_AT, 0, LOOKED_AT, strategy="quasi", measure=measures(by) or None)
+    chunk = workspace_slice(robot, SAMPLES, 0, SAMPLES, strategy="quasi", measure=measures(by) or None)
     values = quantity(robot, by, chunk)
     low = float(values.min()) if by in ("radius", "height") else 0.0
     return Scale(by, low, max(float(values.max()), low + 1e-9))
@@ -123,37 +124,25 @@ def paint(values: Array, scale: Scale, name: str) -> Bytes:
 
 
 def legend(scale: Scale, name: str, units: Units) -> str:
-    """The scale as a bar with its end values, and in words."""
+    """The scale as a colour bar with its end values, and in words."""
     low, high = (value_text(scale.by, value, units) for value in (scale.low, scale.high))
     return bar(scale.by, low, high, MEANING[scale.by], name)
 
 
 def bar(key: str, low: str, high: str, meaning: str, name: str) -> str:
-    """All colours of a map from `low` to `high`, and what they mean; `key` marks the element."""
+    """All colours of a map from `low` to `high`, and their meaning; `key` identifies the element."""
     stops = ", ".join("#" + c for c in MAPS[name].split())
-    return (
-        f'<div data-legend="{key}" style="margin:.2em 1em .5em;font-size:.76em;line-height:1.5">'
-        f'<div role="img" aria-label="colours from {low} to {high}" style="height:.9em;border-radius:3px;'
-        f'border:1px solid rgba(128,128,128,.4);background:linear-gradient(to right, {stops})"></div>'
-        '<div style="display:flex;justify-content:space-between;font-variant-numeric:tabular-nums">'
-        f"<span>{low}</span><span>{high}</span></div>"
-        f'<div style="opacity:.8">{escape(meaning)}</div></div>'
-    )
+    return render("workspace/colour_bar", key=key, low=low, high=high, stops=stops, meaning=meaning)
 
 
 def names_legend(names: list[tuple[Colour, str]]) -> str:
-    """Which colour is whose."""
-    rows = "".join(
-        '<div style="display:flex;gap:.5em;align-items:baseline"><span aria-hidden="true" style="flex:none;'
-        f'width:.9em;height:.9em;border-radius:50%;background:rgb{colour};align-self:center"></span>'
-        f"<span>{word}: {escape(name)}</span></div>"
-        for (colour, name), word in zip(names, ("blue", "orange"), strict=False)
-    )
-    return f'<div data-legend="names" style="margin:.2em 1em .5em;font-size:.8em;line-height:1.6">{rows}</div>'
+    """The colour of each robot."""
+    rows = [(colour, word, name) for (colour, name), word in zip(names, ("blue", "orange"), strict=False)]
+    return render("workspace/names", names=rows)
 
 
 def value_text(by: By, value: float, units: Units) -> str:
-    """A quantity for people, with its unit."""
+    """A quantity as text, with its unit."""
     if by in ("radius", "height"):
         return units.lengths.text(value, 0)
     return f"{100.0 * value:.0f} %" if by == "limits" else f"{value:.3g}"

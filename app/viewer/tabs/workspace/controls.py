@@ -1,4 +1,4 @@
-"""The controls of the workspace tab. They post what they are set to, in core units, under the name of the wish."""
+"""The controls of the workspace tab. They post their values under the names of the settings."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import viser
 from app.viewer.panel import Post, assign, listen, listen_click
 from app.viewer.tabs.workspace.colours import BY, MAPS
 from app.viewer.tabs.workspace.cut import AXES, KEEP, Cut
-from app.viewer.tabs.workspace.wishes import LARGEST, MOST, SMALLEST, Wishes
+from app.viewer.tabs.workspace.settings import MAX_POINTS, MAX_SIZE, MIN_SIZE, WorkspaceSettings
 from kin import InputError, Robot
 from kin.units import Units
 from kin.workspace import Strategy
@@ -21,18 +21,29 @@ STRATEGIES: dict[str, Strategy] = {
     "even in space": "volume",
     "envelope only": "boundary",
 }
-PRESETS = {"10 k": 10_000, "100 k": 100_000, "1 M": 1_000_000, "4 M": MOST}
+PRESETS = {"10 k": 10_000, "100 k": 100_000, "1 M": 1_000_000, "4 M": MAX_POINTS}
 NONE = "none"
 FINE = 3  # decimals of a millimetre
+STRATEGY_HINT = (
+    "Joints at random: each joint anywhere between its limits. Joints spread evenly: the same with fewer "
+    "clusters. Even "
+    "in space: the same density everywhere. Envelope only: the boundary. The last two take longer."
+)
+CLOUD_HINT = (
+    "Start: sample points, or continue after a pause; locked joints keep their values. Pause: stop for now. "
+    "Cancel: "
+    "stop and remove the points."
+)
+CUT_HINT = "Along the arm: the vertical plane of the arm's present pose. The cut moves in steps."
 
 
 class Controls:
-    """Everything that can be set. `read` turns what a control has posted into a wish's value."""
+    """All controls of the tab. `read` converts a posted value into the value of a setting."""
 
     def __init__(
         self,
         gui: viser.GuiApi,
-        wishes: Wishes,
+        settings: WorkspaceSettings,
         robot: Robot,
         robots: tuple[Robot, ...],
         units: Units,
@@ -52,10 +63,10 @@ class Controls:
         }
         self._handles: dict[str, Any] = {}
         self._at: viser.GuiSliderHandle[float] | None = None
-        self._build(wishes)
+        self._build(settings)
 
     def read(self, name: str, value: object) -> object:
-        """A control's value as a wish takes it; raises `InputError` for what is not on a list."""
+        """A control's value as a setting takes it; raises `InputError` for an unknown choice."""
         if name in self._choices:
             if value not in self._choices[name]:
                 raise InputError(name, value, "one of " + ", ".join(self._choices[name]))
@@ -63,32 +74,32 @@ class Controls:
         return value
 
     def read_length(self, value: object, units: Units) -> object:
-        """The same for the sliders that are lengths; None for what comes from one that is gone."""
+        """The same for sliders of lengths; None for an event of a slider that has been replaced."""
         if units != self._units:
             return None
         return units.lengths.read(value) if isinstance(value, int | float) else value
 
-    def use(self, units: Units, wishes: Wishes, cut: Cut | None) -> None:
-        """Offer lengths in these units."""
+    def use_units(self, units: Units, settings: WorkspaceSettings, cut: Cut | None) -> None:
+        """Show lengths in these units."""
         if units == self._units:
             return
         self._units = units
         self._handles["size"].remove()
-        self._add_size(wishes.size)
-        self.show_cut(cut, wishes.at)
+        self._add_size(settings.size)
+        self.show_cut(cut, settings.at)
 
-    def show(self, wishes: Wishes) -> None:
+    def show(self, settings: WorkspaceSettings) -> None:
         """Set every control."""
         for name, handle in self._handles.items():
-            assign(handle, self._written(name, getattr(wishes, name)))
+            assign(handle, self._written(name, getattr(settings, name)))
 
-    def of_robot(self, robot: Robot) -> None:
-        """Offer the other arms for comparison."""
+    def use_robot(self, robot: Robot) -> None:
+        """Offer the other robots for comparison."""
         self._choices["compare"] = self._others(robot)
         self._handles["compare"].options = tuple(self._choices["compare"])
 
     def show_cut(self, cut: Cut | None, at: float) -> None:
-        """A slider that moves through this cut's slabs, or none."""
+        """Show a slider for this cut, or none."""
         if self._at is not None:
             self._at.remove()
             self._at = None
@@ -103,115 +114,77 @@ class Controls:
                 max=unit.shown(cut.high, FINE),
                 step=unit.shown(cut.step, FINE),
                 initial_value=unit.shown(at, FINE),
-                hint="Where the cut is: how far from the base along the cut's direction",
+                hint="Position of the cut: distance from the base along the cut's direction",
             )
-        listen(self._at, self._post, ("at", self._units))
+        listen(self._at, self._post, ("length", "at", self._units))
 
-    def _build(self, wishes: Wishes) -> None:
+    def _build(self, settings: WorkspaceSettings) -> None:
+        self._build_cloud(settings)
+        self._build_colours(settings)
+        with self._gui.add_folder(None) as self._size_container:
+            pass
+        self._add_size(settings.size)
+        self._folder = self._gui.add_folder("Cut open")
+        with self._folder:
+            self._add_dropdown("axis", "Cut", None, CUT_HINT)
+            self._add_dropdown("keep", "Keep", settings.keep, "Which side of the cut is visible")
+            self._handles["keep"].visible = False
+        with self._gui.add_folder("Look closer"):
+            self._build_tools(settings)
+
+    def _build_cloud(self, settings: WorkspaceSettings) -> None:
         gui = self._gui
-        self._add("n", gui.add_number("Points", wishes.n, min=1, max=MOST, step=1, hint=f"1 to {MOST:,} points"))
-        presets = gui.add_button_group(" ", tuple(PRESETS), hint="Usual numbers of points")
+        hint = f"1 to {MAX_POINTS:,} points"
+        self._add("n", gui.add_number("Points", settings.n, min=1, max=MAX_POINTS, step=1, hint=hint))
+        presets = gui.add_button_group(" ", tuple(PRESETS), hint="Common numbers of points")
         for label, number in PRESETS.items():
             listen_click(presets, self._post, {label: ("preset", number)})
-        self._add(
-            "strategy",
-            gui.add_dropdown(
-                "Drawn",
-                tuple(STRATEGIES),
-                initial_value=self._written("strategy", wishes.strategy),
-                hint="Joints at random: each joint anywhere between its limits. Spread evenly: the same with less "
-                "clumping. Even in space: as many points in each cubic centimetre. Envelope only: the outside. "
-                "The last two take longer.",
-            ),
-        )
-        self._add("seed", gui.add_number("Seed", wishes.seed, min=0, step=1, hint="Another seed, another draw"))
-        group = gui.add_button_group(
-            "Cloud",
-            ("Start", "Pause", "Cancel"),
-            hint="Start: draw, or go on after a pause; joints that are locked stay where they are. Pause: hold. "
-            "Cancel: stop and take the points away.",
-        )
-        listen_click(group, self._post, {"Start": "start", "Pause": "pause", "Cancel": "cancel"})
+        self._add_dropdown("strategy", "Sampling", settings.strategy, STRATEGY_HINT)
+        hint = "Another seed gives other random configurations"
+        self._add("seed", gui.add_number("Seed", settings.seed, min=0, step=1, hint=hint))
+        buttons = gui.add_button_group("Cloud", ("Start", "Pause", "Cancel"), hint=CLOUD_HINT)
+        listen_click(buttons, self._post, {"Start": "start", "Pause": "pause", "Cancel": "cancel"})
         self.bar = gui.add_progress_bar(0.0)
         self.line = gui.add_html("")
-        self._add(
-            "by",
-            gui.add_dropdown(
-                "Colour by", tuple(BY), initial_value=self._written("by", wishes.by), hint="What a colour tells"
-            ),
-        )
-        self._add(
-            "map",
-            gui.add_dropdown(
-                "Colours",
-                tuple(MAPS),
-                initial_value=wishes.map,
-                hint="All three can be told apart with every common kind of colour vision",
-            ),
-        )
-        self.legend = gui.add_html("")
-        with gui.add_folder(None) as self._size_place:
-            pass
-        self._add_size(wishes.size)
-        self._folder = gui.add_folder("Cut open")
-        with self._folder:
-            self._add(
-                "axis",
-                gui.add_dropdown(
-                    "Cut",
-                    (NONE, *AXES),
-                    initial_value=NONE,
-                    hint="Along the arm: the upright plane the arm is in now. The cut moves in steps.",
-                ),
-            )
-            self._add("keep", gui.add_dropdown("Keep", tuple(KEEP), initial_value="one side", visible=False))
-        with gui.add_folder("Look closer"):
-            self._add(
-                "clicks",
-                gui.add_checkbox(
-                    "Click on a point",
-                    wishes.clicks,
-                    hint="The arm moves to the configuration that drew the point",
-                ),
-            )
-            self.picked = gui.add_html("")
-            self._add(
-                "compare",
-                gui.add_dropdown(
-                    "Compare with",
-                    tuple(self._choices["compare"]),
-                    initial_value=NONE,
-                    hint="Another arm's cloud in the same picture, each in one colour",
-                ),
-            )
-            self._add(
-                "section",
-                gui.add_checkbox(
-                    "Section plot",
-                    wishes.section,
-                    hint="The section in (r, z), its boundary, and the tool in it; no joint locked",
-                ),
-            )
-            self._add(
-                "sizes",
-                gui.add_checkbox(
-                    "Sizes", wishes.sizes, hint="Bounding box, reach, holes, volume and surface; no joint locked"
-                ),
-            )
-            self.sizes = gui.add_html("")
+
+    def _build_colours(self, settings: WorkspaceSettings) -> None:
+        self._add_dropdown("by", "Colour by", settings.by, "The quantity that the colours show")
+        hint = "All three maps are legible with every common kind of colour vision"
+        self._add_dropdown("map", "Colours", settings.map, hint)
+        self.legend = self._gui.add_html("")
+
+    def _build_tools(self, settings: WorkspaceSettings) -> None:
+        hint = "A click on a point moves the arm to the configuration that produced it"
+        self._add_checkbox("clicks", "Click on a point", settings.clicks, hint)
+        self.picked = self._gui.add_html("")
+        hint = "Another robot's cloud in the same scene, each in one colour"
+        self._add_dropdown("compare", "Compare with", None, hint)
+        hint = "The section in (r, z), its boundary, and the tool in it; locked joints are ignored"
+        self._add_checkbox("section", "Section plot", settings.section, hint)
+        hint = "Bounding box, reach, holes, volume and surface; locked joints are ignored"
+        self._add_checkbox("sizes", "Sizes", settings.sizes, hint)
+        self.sizes = self._gui.add_html("")
+
+    def _add_dropdown(self, name: str, label: str, value: object, hint: str) -> None:
+        initial = self._written(name, value)
+        handle = self._gui.add_dropdown(label, tuple(self._choices[name]), initial_value=initial, hint=hint)
+        self._add(name, handle)
+
+    def _add_checkbox(self, name: str, label: str, value: bool, hint: str) -> None:
+        self._add(name, self._gui.add_checkbox(label, value, hint=hint))
 
     def _add_size(self, size: float) -> None:
         unit = self._units.lengths
-        with self._size_place:
+        with self._size_container:
             self._handles["size"] = self._gui.add_slider(
                 f"Point size ({unit.name})",
-                min=unit.shown(SMALLEST, FINE),
-                max=unit.shown(LARGEST, FINE),
-                step=unit.shown(SMALLEST, FINE),
+                min=unit.shown(MIN_SIZE, FINE),
+                max=unit.shown(MAX_SIZE, FINE),
+                step=unit.shown(MIN_SIZE, FINE),
                 initial_value=unit.shown(size, FINE),
                 hint="Diameter of a point",
             )
-        listen(self._handles["size"], self._post, ("size", self._units))
+        listen(self._handles["size"], self._post, ("length", "size", self._units))
 
     def _add(self, name: str, handle: Any) -> None:
         self._handles[name] = handle

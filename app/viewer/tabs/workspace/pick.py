@@ -1,32 +1,45 @@
-"""Which point of a cloud was clicked on.
+"""Picking a point of a cloud with a click.
 
-Point clouds do not take clicks in the browser; the page tells the ray under the pointer instead. Points whose disc
-the ray goes through are hit, and the hit nearest to the eye is meant; where none is hit, the point nearest to the
-ray as seen by the eye is, within a finger's width. Only an index is found so: the configuration is recomputed
-from it, exactly.
+Point clouds do not receive clicks in the browser; the page sends the ray under the pointer instead. The ray hits
+the points whose discs it passes through, and of these the one nearest to the eye is picked. If it hits none, the
+point at the smallest angle from the ray is picked, within a finger's width. The search gives an index only; the
+configuration is recomputed from it, exactly.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import viser
 from numpy.typing import NDArray
 
-from kin.transforms import Array
+import kin
+from app.shared.clouds import Cloud
+from app.viewer.feature import Stage
+from app.viewer.panel import Post, update_html
+from app.viewer.panel.status import Notice
+from app.viewer.tabs.workspace import views
+from app.viewer.tabs.workspace.background import run_in_background
+from app.viewer.tabs.workspace.cloud_nodes import CloudNodes
+from app.viewer.tabs.workspace.controls import Controls
+from kin import InputError
+from kin.transforms import Array, finite_array
 
-PIXEL = math.radians(0.06)  # of a picture 38° high
-HIT, NEAR = 2.5 * PIXEL, 14.0 * PIXEL  # from the ray, seen from the eye
+MARK_COLOUR = (213, 94, 0)
+PIXEL = math.radians(0.06)  # with a field of view of 38°
+HIT, NEAR = 2.5 * PIXEL, 14.0 * PIXEL  # angles from the ray, seen from the eye
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A point that may be meant. The least candidate is the one.
+    """A point that may be picked. The smallest candidate wins.
 
     Attributes:
-        hit: whether the ray goes through its disc.
-        value: distance from the eye (m) of a hit, angle from the ray (rad) of the others.
+        hit: whether the ray passes through its disc.
+        value: distance from the eye (m) for a hit, angle from the ray (rad) otherwise.
         index: of the point in its cloud.
         point: ``(3,)``.
     """
@@ -37,8 +50,110 @@ class Candidate:
     point: Array
 
     def before(self, other: Candidate | None) -> bool:
-        """Whether this one is meant rather than the other."""
+        """Whether this one wins over the other."""
         return other is None or (not self.hit, self.value, self.index) < (not other.hit, other.value, other.index)
+
+
+class PointPicker:
+    """Finds the clicked point and moves the arm to its configuration.
+
+    Posts ``"click"`` and ``"picked"`` to itself; `post` returns them.
+
+    Args:
+        new_root: returns a node name that was never used before.
+    """
+
+    def __init__(self, stage: Stage, controls: Controls, new_root: Callable[[], str], post: Post) -> None:
+        self._stage = stage
+        self._controls = controls
+        self._new_root = new_root
+        self._post = post
+        self._searches = 0  # number of the newest search; older ones stop
+        self._mark: viser.IcosphereHandle | None = None
+        self._callback: Callable[[viser.SceneClickEvent], None] | None = None
+        # The picked point: its cloud, index, configuration and position.
+        self._picked: tuple[Cloud, int, Array, Array] | None = None
+
+    def listen(self, active: bool) -> None:
+        """Start or stop receiving clicks."""
+        scene = self._stage.client.scene
+        if self._callback is not None and not active:
+            scene.remove_click_callback(self._callback)
+            self._callback = None
+        elif self._callback is None and active:
+
+            async def clicked(event: viser.SceneClickEvent) -> None:
+                self._post("click", (event.ray_origin, event.ray_direction))
+
+            self._callback = scene.on_click()(clicked)  # type: ignore[arg-type]
+
+    def search(self, ray: object, nodes: CloudNodes, size: float) -> None:
+        """Search the cloud for the clicked point, in a background thread; `size` of a point (m)."""
+        if not isinstance(ray, tuple) or len(ray) != 2:
+            return
+        origin, direction = finite_array("ray", ray[0], (3,)), finite_array("ray", ray[1], (3,))
+        length = float(np.linalg.norm(direction))
+        if not length > 0.0:
+            raise InputError("ray", ray, "a direction that is not zero")
+        self._searches += 1
+        number = self._searches
+        cloud, parts, visible = nodes.cloud, nodes.parts, nodes.visible_points()
+
+        def search() -> None:
+            best: Candidate | None = None
+            for i in range(parts):
+                if number != self._searches:
+                    return  # another click, or the cloud was removed
+                chunk = self._stage.clouds.part(cloud, i).result()
+                found = nearest(chunk.points, chunk.start, visible(chunk.points), origin, direction / length, size)
+                if found is not None and found.before(best):
+                    best = found
+            q = None
+            if best is not None:
+                q = kin.configuration_at(
+                    cloud.robot, best.index, seed=cloud.seed, strategy=cloud.strategy, locked=cloud.locked
+                )
+            self._post("picked", (number, cloud, best, q, size))
+
+        run_in_background(search, "pick", self._post)
+
+    def take(self, number: int, cloud: Cloud, found: Candidate | None, q: Array | None, size: float) -> None:
+        """Take the result of a search: mark the point, and move the arm there."""
+        if number != self._searches:
+            return
+        if found is None or q is None:
+            self._picked = None
+            self._controls.picked.content = views.nothing_picked()
+            return
+        point = kin.fk(cloud.robot, q)[:3, 3]
+        self._remove_mark()
+        radius = max(1.2 * size, 0.008 * cloud.robot.reach)
+        self._mark = self._stage.client.scene.add_icosphere(
+            self._new_root(), radius=radius, color=MARK_COLOUR, position=point
+        )
+        self._picked = (cloud, found.index, q, point)
+        self.refresh()
+        title = f"Moved to point {views.grouped(found.index)}"
+        self._stage.move_to(q, Notice("hand", title, "The configuration that produced this point."))
+
+    def refresh(self) -> None:
+        """Show the picked point in the present units."""
+        if self._picked is not None:
+            cloud, index, q, point = self._picked
+            content = views.picked(cloud.robot, cloud.locked, index, q, point, self._stage.units)
+            update_html(self._controls.picked, content)
+
+    def clear(self) -> None:
+        """Forget the picked point, and stop a search."""
+        self._searches += 1
+        self._remove_mark()
+        self._picked = None
+        self._controls.picked.content = ""
+
+    def _remove_mark(self) -> None:
+        if self._mark is not None:
+            self._mark.remove()
+            self._mark = None
 
 
 def nearest(
@@ -49,12 +164,12 @@ def nearest(
     direction: Array,
     size: float,
 ) -> Candidate | None:
-    """The point of a part that a ray means, None if all are far from it.
+    """The point of a part that a ray picks, None if all are far from it.
 
     Args:
         points: ``(k, 3)``.
         start: index of the first one.
-        visible: which ``(k,)`` are seen, None for all.
+        visible: which points ``(k,)`` are visible, None for all.
         origin, direction: of the ray ``(3,)``, a unit vector.
         size: diameter of a drawn point (m).
     """

@@ -1,56 +1,94 @@
-"""The sizes of a workspace in words and numbers."""
+"""The sizes of a workspace: bounding box, reach, holes, volume and surface, computed in the background."""
 
 from __future__ import annotations
 
 import math
 
-from kin import WorkspaceFacts
+from markupsafe import Markup
+
+from app.viewer.feature import Stage
+from app.viewer.panel import Post, update_html
+from app.viewer.tabs.workspace.background import run_in_background
+from app.viewer.tabs.workspace.controls import Controls
+from app.viewer.views.templates import render
+from kin import Robot, WorkspaceFacts
 from kin.units import Unit, Units
 from kin.workspace import Estimate, Span
 
-LESS = 5e-4  # m: a hole smaller than this is none on screen
-WAIT = '<div style="margin:.2em 1em .5em;font-size:.8em;opacity:.8">Computing…</div>'
+SMALLEST_HOLE = 5e-4  # m; smaller holes are not reported
+
+
+class Sizes:
+    """The table of sizes. Posts ``"facts"`` to itself; `post` returns it to `take`."""
+
+    def __init__(self, stage: Stage, controls: Controls, post: Post) -> None:
+        self._stage = stage
+        self._controls = controls
+        self._post = post
+        self._visible = False
+        self._found: tuple[WorkspaceFacts, bool] | None = None  # sizes, and whether they are complete
+
+    def show(self, visible: bool) -> None:
+        """Compute and show the sizes of the selected robot, or hide them."""
+        self._visible, self._found = visible, None
+        wait = render("panel/note", text="Computing…") if visible else ""
+        update_html(self._controls.sizes, wait)
+        if not visible:
+            return
+        robot, summaries = self._stage.robot, self._stage.summaries
+
+        def work() -> None:
+            # Volume and surface take longer than the rest.
+            self._post("facts", (robot, summaries.facts(robot, effort=None).result(), False))
+            self._post("facts", (robot, summaries.facts(robot).result(), True))
+
+        run_in_background(work, "sizes", self._post)
+
+    def take(self, robot: Robot, found: WorkspaceFacts, complete: bool) -> None:
+        """Take computed sizes, unless they are of a robot that is no longer selected."""
+        if self._visible and robot == self._stage.robot:
+            self._found = (found, complete)
+            self.refresh()
+
+    def refresh(self) -> None:
+        """Show the sizes in the present units."""
+        if self._found is not None:
+            found, complete = self._found
+            update_html(self._controls.sizes, html(found, not complete, self._stage.units))
 
 
 def html(facts: WorkspaceFacts, waiting: bool, units: Units) -> str:
-    """Bounding box, reach, holes, volume and surface as a small table; `waiting` for the last two."""
+    """The sizes as a table; `waiting`: volume and surface are still being computed."""
     unit = units.lengths
     rows = [
         *((name, _span(span, unit), unit.name) for name, span in (("x", facts.x), ("y", facts.y), ("z", facts.z))),
         ("reach from the shoulder", unit.number(facts.reach.largest.value), unit.name),
-        ("hole around the shoulder", _hole(facts.reach, unit), unit.name),
+        ("hole around the shoulder", *_hole(facts.reach, unit)),
         ("reach from joint 1's axis", unit.number(facts.radius.largest.value), unit.name),
-        ("hole around the axis", _hole(facts.radius, unit), unit.name),
+        ("hole around the axis", *_hole(facts.radius, unit)),
         ("volume", _estimate(facts.volume, waiting), "m³"),
         ("surface", _estimate(facts.surface, waiting), "m²"),
     ]
-    body = "".join(
-        f'<tr><th style="text-align:left;font-weight:500;opacity:.75;padding:0">{name}</th>'
-        f'<td style="text-align:right;padding:0;white-space:nowrap">{value}</td>'
-        f'<td style="padding:0 0 0 .3em;width:1.9em;opacity:.75">{name_of_unit if value != NONE else ""}</td></tr>'
-        for name, value, name_of_unit in rows
-    )
-    return (
-        '<table aria-label="sizes of the workspace" style="width:calc(100% - 2em);margin:.1em 1em .5em;'
-        f'border-collapse:collapse;font-size:.78em;line-height:1.6;font-variant-numeric:tabular-nums">{body}</table>'
-    )
-
-
-NONE = "none"
+    return render("panel/facts", label="sizes of the workspace", rows=rows, note="")
 
 
 def _span(span: Span, unit: Unit) -> str:
     return f"{unit.number(span.least.value)} … {unit.number(span.largest.value)}"
 
 
-def _hole(span: Span, unit: Unit) -> str:
-    return NONE if span.least.value < LESS else f"radius {unit.number(span.least.value)}"
+def _hole(span: Span, unit: Unit) -> tuple[str, str]:
+    """The radius of a hole and its unit."""
+    if span.least.value < SMALLEST_HOLE:
+        return "none", ""
+    return f"radius {unit.number(span.least.value)}", unit.name
 
 
 def _estimate(estimate: Estimate | None, waiting: bool) -> str:
-    """A number with its error, neither with digits that the error makes meaningless."""
+    """A number with its error, without digits that the error makes meaningless."""
     if estimate is None:
         return "computing…" if waiting else "unknown"
     error = max(estimate.error, 1e-12)
     digits = min(max(1 - math.floor(math.log10(error)), 0), 6)
-    return f'<span title="{estimate.method}">{estimate.value:.{digits}f} ± {error:.{digits}f}</span>'
+    return Markup('<span title="{}">{} ± {}</span>').format(
+        estimate.method, f"{estimate.value:.{digits}f}", f"{error:.{digits}f}"
+    )

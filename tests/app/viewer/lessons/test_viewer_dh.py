@@ -15,7 +15,7 @@ from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.lessons import dh
-from app.viewer.lessons.dh import draw, page, steps
+from app.viewer.lessons.dh import drawing, steps, views
 from app.viewer.server import ViewerServer
 from kin.units import DEFAULT_UNITS, Units
 
@@ -89,9 +89,9 @@ def test_captions_follow_the_order_of_the_convention() -> None:
     ]
     assert told(CRAIG, 1) == [
         "Row 2 of 8: turn −90.0° about x₁ (α₁).",
-        "Row 2 of 8: a₁ = 0, nothing to slide along x₁.",
+        "Row 2 of 8: a₁ = 0, no translation along x₁.",
         "Row 2 of 8: turn 30.0° about z₂ (θ₂, joint 2).",
-        "Row 2 of 8: d₂ = 0, nothing to slide along z₂. Frame 2 is placed.",
+        "Row 2 of 8: d₂ = 0, no translation along z₂. Frame 2 is placed.",
     ]
     assert told(SCARA, 2)[1] == "Row 3 of 4: slide 150.0 mm along z₂ (d₃, joint 3)."
 
@@ -106,25 +106,25 @@ def test_the_two_built_in_readings_are_each_others() -> None:
 
 
 def test_why_two_joints_of_the_printed_table_are_one() -> None:
-    assert steps.shared_lines(PRINTED) == [0]
-    assert steps.shared_lines(CRAIG) == []
+    assert steps.coaxial_joints(PRINTED) == [0]
+    assert steps.coaxial_joints(CRAIG) == []
     for robot in (PRINTED, CRAIG):
         standard, craig = steps.verdict(robot, DEFAULT_UNITS)
         assert standard == (
-            "Standard order: row 1 (a₁ = 0, α₁ = 0) leaves z₀ and z₁ one line, so joints 1 and 2 turn about it "
-            "together and only θ₁ + θ₂ counts: 7 joints, 6 freedoms."
+            "Standard convention: row 1 (a₁ = 0, α₁ = 0) makes z₀ and z₁ coincide, so joints 1 and 2 turn about "
+            "the same axis and only θ₁ + θ₂ matters: 7 joints, 6 degrees of freedom."
         )
         assert craig == (
-            "Craig’s order: row 2 (a₁ = 0, α₁ = −90.0°) stands between joints 1 and 2, and all 7 joints count."
+            "Craig’s convention: row 2 (a₁ = 0, α₁ = −90.0°) is between joints 1 and 2, and all 7 axes differ."
         )
 
 
 @pytest.mark.parametrize("robot", READINGS, ids=lambda r: f"{r.id}-{r.convention}")
-def test_freedoms_told_are_the_rank_of_the_jacobian_where_lines_coincide(robot: kin.Robot) -> None:
+def test_degrees_of_freedom_are_the_rank_of_the_jacobian_where_axes_coincide(robot: kin.Robot) -> None:
     rank = np.linalg.matrix_rank(kin.jacobian(robot, some_q(robot)), tol=1e-9)
-    assert rank <= steps.freedoms(robot)
-    if steps.shared_lines(robot):
-        assert rank == min(steps.freedoms(robot), 6)
+    assert rank <= steps.degrees_of_freedom(robot)
+    if steps.coaxial_joints(robot):
+        assert rank == min(steps.degrees_of_freedom(robot), 6)
     assert steps.verdict(robot, DEFAULT_UNITS)
 
 
@@ -140,7 +140,7 @@ rows = [
   { name = "c", a = 1, limits = [-90, 90] },
 ]
 """
-    assert "θ₁ − θ₂ counts" in steps.verdict(kin.parse_robot(text), DEFAULT_UNITS)[0]
+    assert "θ₁ − θ₂ matters" in steps.verdict(kin.parse_robot(text), DEFAULT_UNITS)[0]
 
 
 # The page
@@ -153,11 +153,11 @@ def test_every_page_is_well_formed(robot: kin.Robot, symbols: bool) -> None:
     for at in (0.0, 1.0, 2.5, 4.0, float(steps.length(robot))):
         here = steps.place(robot, q, at)
         told = words(
-            page.caption_html(robot, here, DEFAULT_UNITS)
-            + page.table_html(robot, q, here, RADIANS)
-            + page.matrices_html(robot, here, symbols, DEFAULT_UNITS)
-            + page.compare_html(robot, steps.reread(robot), q, here, 0.1, DEFAULT_UNITS)
-            + page.nine_steps_html(robot.convention)
+            views.caption_html(robot, here, DEFAULT_UNITS)
+            + views.table_html(robot, q, here, RADIANS)
+            + views.matrices_html(robot, here, symbols, DEFAULT_UNITS)
+            + views.compare_html(robot, steps.reread(robot), q, here, 0.1, DEFAULT_UNITS)
+            + views.nine_steps_html(robot.convention)
         )
         assert "-" not in re.sub(r"[a-z]-[a-z]", "", told), "every minus is a true one"
         assert "nan" not in told
@@ -165,21 +165,21 @@ def test_every_page_is_well_formed(robot: kin.Robot, symbols: bool) -> None:
 
 def test_the_table_marks_where_the_walk_is_and_what_joints_move() -> None:
     at = steps.place(CRAIG, CRAIG.q_home, 6.5)
-    html = page.table_html(CRAIG, CRAIG.q_home, at, DEFAULT_UNITS)
+    html = views.table_html(CRAIG, CRAIG.q_home, at, DEFAULT_UNITS)
     rows = [*ET.fromstring(html).iter("tr")]
     assert [words(ET.tostring(th, encoding="unicode")) for th in rows[0]] == [
         *(" row", "αᵢ₋₁ °", "aᵢ₋₁ mm", "θᵢ °", "dᵢ mm"),
     ]
-    assert ["background" in row.attrib["style"] for row in rows[1:]] == [i == 1 for i in range(8)]
+    assert [row.get("class") == "kb-here" for row in rows[1:]] == [i == 1 for i in range(8)]
     assert [cell.text for cell in rows[2]] == ["2", "−90.0", "0.0", "30.0", "0.0"]
-    assert ["box-shadow" in cell.attrib["style"] for cell in rows[2]] == [False, False, False, True, False]
-    bold = [[c for c, cell in enumerate(row) if "underline" in cell.attrib["style"]] for row in rows[1:]]
+    assert ["--kb-mark" in cell.get("style", "") for cell in rows[2]] == [False, False, False, True, False]
+    bold = [[c for c, cell in enumerate(row) if cell.get("class") == "kb-variable"] for row in rows[1:]]
     assert bold == [[3]] * 7 + [[]]
 
 
 def test_symbols_put_constants_in_and_leave_the_joint_open() -> None:
     def entries(robot: kin.Robot, row: int) -> list[str]:
-        html = page.matrices_html(robot, steps.place(robot, robot.q_home, 4 * row + 4), True, DEFAULT_UNITS)
+        html = views.matrices_html(robot, steps.place(robot, robot.q_home, 4 * row + 4), True, DEFAULT_UNITS)
         cells = [words(ET.tostring(c, encoding="unicode")) for c in ET.fromstring(f"<d>{html}</d>").iter("mtd")]
         return cells[:16]
 
@@ -196,8 +196,8 @@ def test_symbols_put_constants_in_and_leave_the_joint_open() -> None:
 
 def test_numbers_follow_the_units() -> None:
     at = steps.place(PIONEER, PIONEER.q_home, 4.5)
-    assert "30.0" in page.table_html(PIONEER, PIONEER.q_home, at, DEFAULT_UNITS)
-    radians = words(page.table_html(PIONEER, PIONEER.q_home, at, RADIANS))
+    assert "30.0" in views.table_html(PIONEER, PIONEER.q_home, at, DEFAULT_UNITS)
+    radians = words(views.table_html(PIONEER, PIONEER.q_home, at, RADIANS))
     assert "0.524" in radians
     assert "rad" in radians
     assert "turn 0.524 rad about z₁" in steps.caption(PIONEER, at, RADIANS)
@@ -210,13 +210,13 @@ def test_lengths_follow_the_units(length: str, d: str, d_short: str) -> None:
     units, q = Units(length=length), PIONEER.q_home
     at = steps.place(PIONEER, q, 2.0)
     assert f"slide {d} {length} along z₀ (d₁)" in steps.caption(PIONEER, at, units)
-    table = words(page.table_html(PIONEER, q, at, units))
+    table = words(views.table_html(PIONEER, q, at, units))
     assert f"dᵢ {length}" in table
     assert d in table
-    assert f"lengths in {length}" in page.matrices_html(PIONEER, at, False, units)
-    assert f">{d}<" in page.matrices_html(PIONEER, at, False, units)
-    assert f">{d_short}<" in page.matrices_html(PIONEER, at, True, units)
-    apart = page.compare_html(PIONEER, steps.reread(PIONEER), q, at, 0.13, units)
+    assert f"lengths in {length}" in views.matrices_html(PIONEER, at, False, units)
+    assert f">{d}<" in views.matrices_html(PIONEER, at, False, units)
+    assert f">{d_short}<" in views.matrices_html(PIONEER, at, True, units)
+    apart = views.compare_html(PIONEER, steps.reread(PIONEER), q, at, 0.13, units)
     assert f"{d} {length} apart" in apart
 
 
@@ -226,7 +226,7 @@ def test_lengths_follow_the_units(length: str, d: str, d_short: str) -> None:
 @pytest.mark.parametrize("factor", ["theta", "alpha"])
 @pytest.mark.parametrize("angle", [0.7, -2.9, 6.0])
 def test_an_arc_ends_where_the_turn_ends(factor: steps.Factor, angle: float) -> None:
-    lines = draw.arc(steps.axis(factor), 2.0, angle)
+    lines = drawing.arc(steps.axis(factor), 2.0, angle)
     start = np.eye(3)[0 if factor == "theta" else 2]
     turned = steps.elementary(factor, angle)[:3, :3] @ start
     assert np.allclose(lines[2, 0], 2.0 * start, atol=1e-6)
@@ -238,14 +238,14 @@ def test_an_arc_ends_where_the_turn_ends(factor: steps.Factor, angle: float) -> 
 @pytest.mark.parametrize("distance", [0.3, -0.3])
 def test_a_ruler_is_as_long_as_the_slide(distance: float) -> None:
     for factor in ("d", "a"):
-        line = draw.ruler(steps.axis(factor), 0.1, distance)[2]
+        line = drawing.ruler(steps.axis(factor), 0.1, distance)[2]
         assert np.allclose(line[1] - line[0], steps.elementary(factor, distance)[:3, 3], atol=1e-7)
 
 
 @pytest.mark.parametrize("robot", READINGS, ids=lambda r: f"{r.id}-{r.convention}")
 def test_a_skeleton_hangs_together_and_bends_at_right_angles(robot: kin.Robot) -> None:
     frames = kin.link_frames(robot, some_q(robot))
-    bones = draw.skeleton(robot, frames)
+    bones = drawing.skeleton(robot, frames)
     assert np.allclose(bones[1:, 0], bones[:-1, 1], atol=1e-6)
     assert np.allclose(bones[1::2, 1], frames[:, :3, 3], atol=1e-6)
     lengths = np.linalg.norm(bones[:, 1] - bones[:, 0], axis=1)
@@ -278,7 +278,7 @@ def tab(served: tuple[ViewerServer, int]) -> Iterator[FakeBrowser]:
 
 def lesson_of(server: ViewerServer) -> dh.DHLesson:
     """Of the newest visitor."""
-    session = server._sessions[max(server._sessions)]
+    session = server._pages[max(server._pages)]
     shown = session.lessons.shown
     assert isinstance(shown, dh.DHLesson)
     return shown
@@ -363,7 +363,7 @@ def test_another_arm_starts_anew_in_its_own_order(tab: FakeBrowser) -> None:
     tab.set("Row", 3)
     tab.settle()
     tab.set("Robot", CRAIG.name)
-    tab.wait(lambda: "Craig’s order" in tab.html)
+    tab.wait(lambda: "Craig’s convention" in tab.html)
     tab.settle()
     assert tab.value("Row") == 0.0
     assert tab.gui[tab.element("Row")]["props"]["max"] == 8
@@ -373,18 +373,18 @@ def test_another_arm_starts_anew_in_its_own_order(tab: FakeBrowser) -> None:
 
 def test_symbols_and_comparison_on_request_and_gone_with_the_lesson(tab: FakeBrowser) -> None:
     tab.set("Robot", PRINTED.name)
-    tab.wait(lambda: "Standard order" in tab.html)
+    tab.wait(lambda: "Standard convention" in tab.html)
     tab.settle()
     assert "cos" not in tab.html
     tab.set("Symbols", True)
     tab.set("Row", 2)
     tab.wait(lambda: "cos" in tab.html)
     tab.set("Compare conventions", True)
-    tab.wait(lambda: "7 joints, 6 freedoms" in tab.html)
-    beside = next(n for n in tab.nodes if n.endswith("/beside/moving"))
-    tab.wait(lambda: np.allclose(tab.local(beside), at(CRAIG, PRINTED.q_home, 8), atol=5e-5))
+    tab.wait(lambda: "7 joints, 6 degrees of freedom" in tab.html)
+    other = next(n for n in tab.nodes if n.endswith("/other/moving"))
+    tab.wait(lambda: np.allclose(tab.local(other), at(CRAIG, PRINTED.q_home, 8), atol=5e-5))
     texts = [m["props"]["text"] for n, m in tab.nodes.items() if n.startswith("/dh-") and "text" in m["props"]]
-    assert "joints 1 and 2: one line" in texts
+    assert "joints 1 and 2: one axis" in texts
     tab.set("Lesson", "None")
     tab.wait(lambda: "Row" not in tab.sliders)
     tab.settle()

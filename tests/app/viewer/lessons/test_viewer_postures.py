@@ -12,11 +12,11 @@ from fake_browser import FakeBrowser
 
 import kin
 from app.shared.store import Store
-from app.viewer.lessons.postures import fixes
+from app.viewer.lessons.postures import remedies
 from app.viewer.lessons.postures.directions import has_cone, patch, reachable, share, sphere
-from app.viewer.lessons.postures.fixes import Fix, remedies
 from app.viewer.lessons.postures.ghosts import link_poses, places, skeleton
-from app.viewer.lessons.postures.listing import Posture, html, limit_margin, survey
+from app.viewer.lessons.postures.remedies import Remedy, Request
+from app.viewer.lessons.postures.survey import Posture, html, limit_margin, survey
 from app.viewer.panel.joints import label
 from app.viewer.panel.posture import short
 from app.viewer.scene.chain import chain
@@ -58,8 +58,8 @@ def test_the_list_says_of_every_branch_what_the_core_says(robot: kin.Robot) -> N
             blocked += 1
             assert alone.status == "limits"
             numbers = {str(v.joint + 1) for v in alone.violations}
-            (told,) = re.findall(r"beyond stop of joint (\d)", posture.words)
-            assert told in numbers
+            (joint,) = re.findall(r"outside limit of joint (\d)", posture.words)
+            assert joint in numbers
             assert posture.q is not None
             assert not robot.in_limits(posture.q, 1e-9)
         else:
@@ -68,7 +68,7 @@ def test_the_list_says_of_every_branch_what_the_core_says(robot: kin.Robot) -> N
     assert any(p.state == "reachable" for p in found)
 
 
-def test_how_far_beyond_a_stop_is_told_in_the_unit_of_the_visitor() -> None:
+def test_the_excess_over_a_limit_is_given_in_the_units_of_the_visitor() -> None:
     found = survey(PIONEER, home(PIONEER), "approach", PIONEER.q_home)
     worst = next(p for p in found if p.state == "blocked")
     assert worst.q is not None
@@ -83,10 +83,10 @@ def test_what_is_missed_is_told_in_the_unit_of_the_visitor(length: str) -> None:
     units, T = Units(length=length), home(PUMA)
     T[0, 3] += 2.0
     result = kin.solve_ik(PUMA, T, q_seed=PUMA.q_home)
-    why = fixes.html(result, None, units)
+    why = remedies.html(result, None, units)
     assert f"Out of reach by {units.distance(result.distance)}" in why
     assert "mm" not in why
-    found = remedies(PUMA, T, "position", PUMA.q_home, None, None, result, units)
+    found = remedies.remedies(Request(PUMA, T, "position", PUMA.q_home, None, None, result), units)
     (move,) = [fix for fix in found if fix is not None and fix.kind == "move"]
     assert re.search(rf" \d+\.\d+ {length} away$", move.hint)
 
@@ -106,7 +106,7 @@ def test_a_compromise_tells_what_is_given_up() -> None:
     assert any(p.state == "compromise" and p.words == "roll off by 90.0°" for p in found)
 
 
-def test_the_margin_is_that_of_the_nearest_stop() -> None:
+def test_the_margin_is_that_of_the_nearest_limit() -> None:
     q = PIONEER.q_home.copy()
     q[3] = PIONEER.upper[3] - 0.02
     assert limit_margin(PIONEER, q) == (pytest.approx(0.02), 3)
@@ -114,7 +114,7 @@ def test_the_margin_is_that_of_the_nearest_stop() -> None:
 
 def test_an_arm_without_named_branches_has_its_nearest_posture() -> None:
     (only,) = survey(PANDA, home(PANDA), "pose", PANDA.q_home)
-    assert only.can_be_had
+    assert only.available
     far = home(PANDA)
     far[:3, 3] *= 5
     assert [p.state for p in survey(PANDA, far, "pose", PANDA.q_home)] == ["absent"]
@@ -145,21 +145,27 @@ def test_ghosts_stand_where_the_arm_would(robot: kin.Robot) -> None:
 # Why not
 
 
-def fixes_for(robot: kin.Robot, T: np.ndarray, task: kin.Task = "pose", locked=None, branch=None) -> list[Fix]:
+def remedies_for(
+    robot: kin.Robot, T: np.ndarray, task: kin.Task = "pose", locked=None, branch=None
+) -> list[Remedy]:
     target = T[:3, 3] if task == "position" else T
     q = robot.q_home
     result = kin.solve_ik(robot, target, task=task, q_seed=q, locked=locked, branch=branch)
-    return [fix for fix in remedies(robot, T, task, q, locked, branch, result) if fix is not None]
+    return [
+        remedy
+        for remedy in remedies.remedies(Request(robot, T, task, q, locked, branch, result))
+        if remedy is not None
+    ]
 
 
 def test_nothing_is_offered_for_a_target_that_is_reached() -> None:
-    assert fixes_for(SRS, home(SRS)) == []
+    assert remedies_for(SRS, home(SRS)) == []
 
 
 def test_a_point_out_of_reach_can_only_be_moved() -> None:
     T = home(SRS)
     T[:3, 3] *= 3
-    (fix,) = fixes_for(SRS, T)
+    (fix,) = remedies_for(SRS, T)
     assert fix.kind == "move"
     assert fix.q is not None
     assert np.linalg.norm(kin.fk(SRS, fix.q)[:3, 3]) < np.linalg.norm(T[:3, 3])
@@ -171,7 +177,7 @@ def test_an_orientation_that_cannot_be_had_is_turned_or_asked_less_of() -> None:
     T[:3, :3] = [[0, 0, -1], [0, 1, 0], [1, 0, 0]]
     result = kin.solve_ik(PUMA, T, q_seed=PUMA.q_home)
     assert result.status == "orientation"
-    fixes = {fix.kind: fix for fix in fixes_for(PUMA, T)}
+    fixes = {fix.kind: fix for fix in remedies_for(PUMA, T)}
     assert fixes["relax"].task == "position"
     turned = fixes["turn"].q
     assert turned is not None
@@ -183,17 +189,17 @@ def test_a_lock_and_a_branch_in_the_way_are_named() -> None:
     T = home(PUMA)
     T[:3, 3] += (0.0, 0.08, 0.0)
     locked = (float(PUMA.q_home[0]), *(None,) * 5)
-    kinds = [(fix.kind, fix.joint) for fix in fixes_for(PUMA, T, locked=locked)]
+    kinds = [(fix.kind, fix.joint) for fix in remedies_for(PUMA, T, locked=locked)]
     assert kinds[0] == ("unlock", 0)
     blocked = next(p for p in survey(PUMA, home(PUMA), "pose", PUMA.q_home) if p.state == "blocked")
-    assert fixes_for(PUMA, home(PUMA), branch=blocked.name)[0].kind == "branch"
+    assert remedies_for(PUMA, home(PUMA), branch=blocked.name)[0].kind == "branch"
 
 
 def test_locks_that_only_together_are_in_the_way_are_unlocked_together() -> None:
     T = home(PUMA)
     T[:3, 3] += (0.05, 0.08, 0.02)
     locked = tuple(PUMA.q_home.tolist()[:3]) + (None,) * 3
-    fixes = [fix for fix in fixes_for(PUMA, T, locked=locked) if fix.kind == "unlock"]
+    fixes = [fix for fix in remedies_for(PUMA, T, locked=locked) if fix.kind == "unlock"]
     assert [fix.joint for fix in fixes] == [None]
 
 
@@ -270,7 +276,7 @@ def test_the_list_marks_the_branch_the_arm_is_on(tab: FakeBrowser) -> None:
 def test_a_click_on_a_ghost_morphs_the_arm_into_it(tab: FakeBrowser) -> None:
     tab.choose(PUMA.name)
     postures = survey(PUMA, home(PUMA), "pose", PUMA.q_home)
-    index = next(i for i, p in enumerate(postures) if p.can_be_had and p.name != here(tab))
+    index = next(i for i, p in enumerate(postures) if p.available and p.name != here(tab))
     wanted = postures[index]
     tab.click(ghosts(tab)[str(index + 1)])
     tab.settle()
@@ -280,17 +286,17 @@ def test_a_click_on_a_ghost_morphs_the_arm_into_it(tab: FakeBrowser) -> None:
     assert str(index + 1) not in shown(tab), "the arm stands where its ghost would"
 
 
-def test_a_number_sends_the_arm_and_one_beyond_a_stop_says_why(tab: FakeBrowser) -> None:
+def test_a_number_moves_the_arm_and_one_outside_limits_gives_the_reason(tab: FakeBrowser) -> None:
     tab.choose(PUMA.name)
     states = list(rows(tab).values())
     names = kin.branch_names(PUMA)
     blocked = states.index("blocked")
-    tab.set("Take", str(blocked + 1))
+    tab.set("Go", str(blocked + 1))
     tab.wait(lambda: 'data-status="limits"' in tab.html)
-    assert "Beyond stop of joint" in tab.html
+    assert "Outside limit of joint" in tab.html
     assert here(tab) == kin.branch_of(PUMA, PUMA.q_home)
     other = next(i for i, s in enumerate(states) if s == "reachable" and names[i] != here(tab))
-    tab.set("Take", str(other + 1))
+    tab.set("Go", str(other + 1))
     tab.settle()
     assert here(tab) == names[other]
     assert short(names[other]) in tab.html
@@ -361,18 +367,18 @@ def test_one_click_asks_for_less_and_one_unlocks(tab: FakeBrowser) -> None:
     assert 'data-why="approximate"' in tab.html
     tab.set("Match point + approach only", True)
     tab.settle(0.6)
-    assert tab.value("Match") == "Point + approach"
+    assert tab.value("Target must match") == "Point + approach"
     assert 'data-status="reached"' in tab.html
 
 
 def test_one_click_lets_any_branch_do_it(tab: FakeBrowser) -> None:
     tab.choose(PUMA.name)
     blocked = next(name for name, state in rows(tab).items() if state == "blocked")
-    tab.set("Branch", short(blocked))
+    tab.set("Posture", short(blocked))
     tab.settle(0.6)
-    tab.set("Let any posture do it", True)
+    tab.set("Allow any posture", True)
     tab.settle()
-    assert tab.value("Branch") == "Nearest"
+    assert tab.value("Posture") == "Closest"
     assert np.allclose(tab.tool_pose(), home(PUMA), atol=1e-6)
 
 
@@ -394,11 +400,11 @@ def test_leaving_the_lesson_leaves_nothing(tab: FakeBrowser) -> None:
     tab.set("Lesson", "None")
     tab.settle()
     assert not [n for n in tab.nodes if n.startswith("/postures")]
-    assert not {"Take", "Show", "Ghosts"} & {m["props"].get("label") for m in tab.gui.values()}
+    assert not {"Go", "Show", "Ghosts"} & {m["props"].get("label") for m in tab.gui.values()}
 
 
 def test_hostile_wishes_change_nothing(tab: FakeBrowser) -> None:
-    for name, value in (("Take", "99"), ("Take", "<b>"), ("Show", "99"), ("Show", ""), ("Show", "x1")):
+    for name, value in (("Go", "99"), ("Go", "<b>"), ("Show", "99"), ("Show", ""), ("Show", "x1")):
         tab.set(name, value)
     tab.settle()
     assert np.allclose(tab.tool_pose(), home(PIONEER), atol=1e-9)

@@ -13,8 +13,8 @@ from fake_browser import FakeBrowser
 
 import kin
 from app.shared.store import Store
-from app.viewer import selfmotion
-from app.viewer.lessons.redundancy import told
+from app.viewer import self_motion
+from app.viewer.lessons.redundancy import views
 from app.viewer.lessons.redundancy.ring import arc_segments, coaxial, elbow_circle, joint_axis, trade_segments
 from app.viewer.panel.joints import label
 from kin import Redundancy
@@ -39,22 +39,22 @@ def test_only_what_may_be_asked_for_is_free() -> None:
     straight = np.array([0.3, -0.9, 1.1, 0.4, 0.0, 0.2])
     T = kin.fk(UR5, straight)
     assert kin.solve_ik(UR5, T, q_seed=straight, branch="seed").redundancy, "free at the singularity only"
-    assert selfmotion.free_values(UR5, T, "pose", straight, None) == ()
-    free = selfmotion.free_values(PIONEER, home(PIONEER), "position", PIONEER.q_home, None)
+    assert self_motion.redundancy_at(UR5, T, "pose", straight, None) == ()
+    free = self_motion.redundancy_at(PIONEER, home(PIONEER), "position", PIONEER.q_home, None)
     assert [item.name for item in free] == ["theta4", "theta5"]
 
 
 @pytest.mark.parametrize("robot", [SRS, IIWA, PRINTED], ids=lambda robot: robot.id)
-def test_each_end_is_a_stop_of_the_joint_that_is_named(robot: kin.Robot) -> None:
+def test_each_end_is_a_limit_of_the_named_joint(robot: kin.Robot) -> None:
     T, q = home(robot), robot.q_home
-    (item,) = selfmotion.free_values(robot, T, "pose", q, None)
-    found = selfmotion.ends(robot, T, "pose", q, None, item)
+    (item,) = self_motion.redundancy_at(robot, T, "pose", q, None)
+    found = self_motion.ends(robot, T, "pose", q, None, item)
     assert len(found) == 2 * len(item.intervals)
     for end in found:
         inside = math.copysign(1e-6, item.value - end.value)
         if not any(low <= end.value + inside <= high for low, high in item.intervals):
             inside = -inside
-        result = selfmotion.self_motion(robot, T, "pose", q, None, item.name, end.value + inside)
+        result = self_motion.self_motion(robot, T, "pose", q, None, item.name, end.value + inside)
         there = result.solutions[0].q
         room = min(there[end.joint] - robot.lower[end.joint], robot.upper[end.joint] - there[end.joint])
         assert abs(room) < 1e-4
@@ -66,12 +66,12 @@ def test_each_end_is_a_stop_of_the_joint_that_is_named(robot: kin.Robot) -> None
 def test_a_range_across_the_seam_is_one_range() -> None:
     pi = math.pi
     split = Redundancy("psi", "arm angle ψ", 3.0, ((-pi, -2.0), (-1.0, 1.0), (2.5, pi)))
-    assert selfmotion.reach_of(split) == (2.5, pytest.approx(2 * pi - 2.0))
-    assert selfmotion.reach_of(split._replace(value=-2.5)) == (pytest.approx(2.5 - 2 * pi), -2.0)
-    assert selfmotion.reach_of(split._replace(value=0.0)) == (-1.0, 1.0)
-    assert selfmotion.reach_of(split._replace(value=1.5)) is None
-    assert selfmotion.reach_of(Redundancy("psi", "", 1.0, ((-pi, pi),))) == (-pi, pi)
-    assert selfmotion.reach_of(Redundancy("theta1", "", 3.0, ((-pi, -2.0), (2.5, pi)))) == (2.5, pi)
+    assert self_motion.range_of(split) == (2.5, pytest.approx(2 * pi - 2.0))
+    assert self_motion.range_of(split._replace(value=-2.5)) == (pytest.approx(2.5 - 2 * pi), -2.0)
+    assert self_motion.range_of(split._replace(value=0.0)) == (-1.0, 1.0)
+    assert self_motion.range_of(split._replace(value=1.5)) is None
+    assert self_motion.range_of(Redundancy("psi", "", 1.0, ((-pi, pi),))) == (-pi, pi)
+    assert self_motion.range_of(Redundancy("theta1", "", 3.0, ((-pi, -2.0), (2.5, pi)))) == (2.5, pi)
 
 
 # Geometry
@@ -83,7 +83,7 @@ def test_the_elbow_is_on_its_circle_at_the_arm_angle(robot: kin.Robot) -> None:
     for q in robot.random_q(rng, 10):
         circle = elbow_circle(robot, q)
         assert circle is not None
-        (free,) = selfmotion.free_values(robot, kin.fk(robot, q), "pose", q, None)
+        (free,) = self_motion.redundancy_at(robot, kin.fk(robot, q), "pose", q, None)
         points = kin.link_frames(robot, q)[:, :3, 3]
         assert np.linalg.norm(points - circle.at(free.value), axis=1).min() < 1e-9
         for point in (circle.shoulder, circle.wrist):
@@ -114,7 +114,7 @@ def test_joints_on_one_line_may_count_against_each_other(joint: int) -> None:
     robot = with_joint_turned_round(PRINTED, joint)
     assert coaxial(robot)
     q = robot.q_home + 0.3
-    (free,) = selfmotion.free_values(robot, kin.fk(robot, q), "pose", q, None)
+    (free,) = self_motion.redundancy_at(robot, kin.fk(robot, q), "pose", q, None)
     (low, high) = free.intervals[0]
     rays = []
     for value in (low + 1e-3, 0.5 * (low + high), high - 1e-3):
@@ -151,7 +151,7 @@ def test_two_joints_on_one_line_are_found_and_their_sum_does_not_move_in_a_trade
     assert np.allclose(a[i == 2], b[k == 2])
     tips = [chords[numbers == 0][-1, 1] for chords, numbers in ((a, i), (b, k))]
     assert np.linalg.norm(tips[1] - tips[0]) > 0.05
-    assert np.allclose(told.elbow_of(PRINTED, q), told.elbow_of(PRINTED, traded), atol=1e-12)
+    assert np.allclose(views.frame_origins(PRINTED, q), views.frame_origins(PRINTED, traded), atol=1e-12)
 
 
 @pytest.mark.parametrize("robot", STORE.robots, ids=lambda robot: robot.id)
@@ -173,32 +173,32 @@ def test_residuals_are_measured_by_the_task_and_never_rounded_to_nothing() -> No
     T = np.eye(4)
     T[:3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
     T[0, 3] = 2e-13
-    assert told.residual(T, held, "pose") == (2e-13, pytest.approx(math.pi / 2))
-    assert told.residual(T, held, "approach") == (2e-13, 0.0)
-    assert told.residual(T, held, "position") == (2e-13, None)
-    assert told.small(2e-13, DEFAULT_UNITS.lengths) == "2·10<sup>−10</sup> mm"
-    assert told.small(0.0, DEFAULT_UNITS.lengths) == "0 mm"
-    assert told.small(0.00125, DEFAULT_UNITS.lengths) == "1.25 mm"
-    assert told.small(0.00125, Units(length="cm").lengths) == "0.125 cm"
-    assert told.small(2e-13, Units(length="m").lengths) == "2·10<sup>−13</sup> m"
-    assert told.small(0.5, RADIANS) == "0.5000 rad"
-    assert "1·10<sup>−4</sup> cm, 0.5000 rad.<br>Elbow moved 0 cm." in told.residual_html(
+    assert views.residual(T, held, "pose") == (2e-13, pytest.approx(math.pi / 2))
+    assert views.residual(T, held, "approach") == (2e-13, 0.0)
+    assert views.residual(T, held, "position") == (2e-13, None)
+    assert views.small(2e-13, DEFAULT_UNITS.lengths) == "2·10<sup>−10</sup> mm"
+    assert views.small(0.0, DEFAULT_UNITS.lengths) == "0 mm"
+    assert views.small(0.00125, DEFAULT_UNITS.lengths) == "1.25 mm"
+    assert views.small(0.00125, Units(length="cm").lengths) == "0.125 cm"
+    assert views.small(2e-13, Units(length="m").lengths) == "2·10<sup>−13</sup> m"
+    assert views.small(0.5, RADIANS) == "0.5000 rad"
+    assert "1·10<sup>−4</sup> cm, 0.5000 rad.<br>Elbow moved 0 cm." in views.residual_html(
         1e-6, 0.5, 0.0, Units(False, "cm")
     )
 
 
-def test_what_is_free_is_told_for_every_arm_and_task() -> None:
-    def said(robot: kin.Robot, task: kin.Task) -> str:
-        free = selfmotion.free_values(robot, home(robot), task, robot.q_home, None)
-        swings = elbow_circle(robot, robot.q_home) is not None
-        return told.idea(robot, task, free, coaxial(robot), swings)
+def test_the_redundancy_is_explained_for_every_arm_and_task() -> None:
+    def idea(robot: kin.Robot, task: kin.Task) -> str:
+        free = self_motion.redundancy_at(robot, home(robot), task, robot.q_home, None)
+        elbow = elbow_circle(robot, robot.q_home) is not None
+        return views.idea(robot, task, free, coaxial(robot), elbow)
 
-    assert said(PUMA, "pose").startswith("Nothing is free: 6 joints for the 6 demands")
-    assert said(PRINTED, "pose") == told.TRADE
-    assert said(SRS, "pose") == told.SWING
-    assert "θ4 and θ5 may be anything" in said(PIONEER, "position")
-    assert said(PANDA, "pose").startswith("One of 7 joints is free")
-    assert said(PANDA, "position").startswith("Four motions are free")
+    assert idea(PUMA, "pose").startswith("No redundancy: 6 joints, task dimension 6")
+    assert idea(PRINTED, "pose") == views.TRADE
+    assert idea(SRS, "pose") == views.ELBOW
+    assert "θ4 and θ5 can have any value" in idea(PIONEER, "position")
+    assert idea(PANDA, "pose").startswith("Redundancy 1: 7 joints, task dimension 6")
+    assert idea(PANDA, "position").startswith("Redundancy 4: 7 joints, task dimension 3")
 
 
 # In the page
@@ -228,7 +228,7 @@ def swing(tab: FakeBrowser, name: str, degrees: float) -> list[np.ndarray]:
 
 
 def free_label(tab: FakeBrowser) -> str:
-    (name,) = [s for s in tab.sliders if s.startswith("Swing ")]
+    (name,) = [s for s in tab.sliders if s.startswith("Set ")]
     return name
 
 
@@ -248,21 +248,21 @@ def test_the_tool_stays_in_every_picture_of_a_swing(tab: FakeBrowser, robot: kin
 
 def test_the_end_of_the_range_names_the_joint(tab: FakeBrowser) -> None:
     tab.choose(SRS.name)
-    (free,) = selfmotion.free_values(SRS, home(SRS), "pose", SRS.q_home, None)
+    (free,) = self_motion.redundancy_at(SRS, home(SRS), "pose", SRS.q_home, None)
     swing(tab, free_label(tab), 170)
     assert tab.value(free_label(tab)) == pytest.approx(math.degrees(free.intervals[0][1]), abs=0.1)
-    assert "Joint 6 meets its stop" in tab.html
-    assert "stop of joint 6" in re.findall(r"data-stops.*?</table>", tab.html)[-1]
+    assert "Joint 6 is at its limit" in tab.html
+    assert "limit of joint 6" in re.findall(r"(?s)data-limits.*?</table>", tab.html)[-1]
 
 
-def test_the_ring_is_drawn_with_its_stops_and_goes_with_the_lesson(tab: FakeBrowser) -> None:
+def test_the_ring_is_drawn_with_its_ends_and_goes_with_the_lesson(tab: FakeBrowser) -> None:
     tab.choose(SRS.name)
     tab.wait(lambda: any("/feasible-" in n for n in tab.nodes))
-    tab.wait(lambda: sum("/stop-name-" in n for n in tab.nodes) == 2)
+    tab.wait(lambda: sum("/end-" in n and n.endswith("-name") for n in tab.nodes) == 2)
     circle = elbow_circle(SRS, SRS.q_home)
-    (free,) = selfmotion.free_values(SRS, home(SRS), "pose", SRS.q_home, None)
+    (free,) = self_motion.redundancy_at(SRS, home(SRS), "pose", SRS.q_home, None)
     assert circle is not None
-    label_at = [tab.local(n)[:3, 3] for n in tab.nodes if "/stop-name-" in n]
+    label_at = [tab.local(n)[:3, 3] for n in tab.nodes if "/end-" in n and n.endswith("-name")]
     expected = [circle.at(value) - circle.center for value in free.intervals[0]]
     for point, direction in zip(label_at, expected, strict=True):
         out = point - circle.center
@@ -272,10 +272,10 @@ def test_the_ring_is_drawn_with_its_stops_and_goes_with_the_lesson(tab: FakeBrow
     assert not [n for n in tab.nodes if n.startswith("/redundancy")]
 
 
-def test_back_and_forth_turns_round_at_the_stops_until_a_target_is_dragged(tab: FakeBrowser) -> None:
+def test_a_sweep_turns_round_at_the_limits_until_a_target_is_dragged(tab: FakeBrowser) -> None:
     tab.choose(SRS.name)
     swing(tab, free_label(tab), 100)
-    tab.set("Swing", True)
+    tab.set("Sweep", True)
     values = []
 
     def seen() -> bool:
@@ -289,14 +289,14 @@ def test_back_and_forth_turns_round_at_the_stops_until_a_target_is_dragged(tab: 
     tab.grab()
     tab.drag(T)
     tab.release()
-    tab.wait(lambda: tab.value("Swing") is False)
+    tab.wait(lambda: tab.value("Sweep") is False)
     tab.settle()
     assert np.allclose(tab.tool_pose(), T, atol=1e-6)
 
 
 def test_a_trade_is_told_as_one(tab: FakeBrowser) -> None:
     tab.choose(PRINTED.name)
-    assert "Axes 1 and 2 are one line" in tab.html
+    assert "The axes of joints 1 and 2 coincide" in tab.html
     swing(tab, free_label(tab), 45)
     assert "Elbow moved" in tab.html
     trade = [n for n in tab.nodes if "/trade-" in n]
@@ -305,17 +305,17 @@ def test_a_trade_is_told_as_one(tab: FakeBrowser) -> None:
     assert not [n for n in tab.nodes if "/feasible-" in n]
 
 
-def test_the_choice_between_two_free_values(tab: FakeBrowser) -> None:
+def test_the_choice_between_two_redundancy_at(tab: FakeBrowser) -> None:
     tab.choose(PIONEER.name)
-    assert "Nothing is free" in tab.html
-    assert not [s for s in tab.sliders if s.startswith("Swing")]
-    tab.set("Match", "Point only")
-    tab.wait(lambda: "Swing θ4 to" in tab.sliders)
+    assert "No redundancy" in tab.html
+    assert not [s for s in tab.sliders if s.startswith("Sweep")]
+    tab.set("Target must match", "Point only")
+    tab.wait(lambda: "Set θ4 (tool held)" in tab.sliders)
     tab.settle()
-    tab.set("Free value", "θ5")
-    tab.wait(lambda: "Swing θ5 to" in tab.sliders)
+    tab.set("Parameter", "θ5")
+    tab.wait(lambda: "Set θ5 (tool held)" in tab.sliders)
     p = home(PIONEER)[:3, 3]
-    poses = swing(tab, "Swing θ5 to", 40)
+    poses = swing(tab, "Set θ5 (tool held)", 40)
     assert max(np.abs(pose[:3, 3] - p).max() for pose in poses) < 1e-6
     assert tab.value("5 pivoting wrist") == pytest.approx(40, abs=0.01)
 

@@ -17,7 +17,7 @@ import kin
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
-from app.viewer.lessons.velocity import VelocityLesson, told
+from app.viewer.lessons.velocity import VelocityLesson, views
 from app.viewer.lessons.velocity.drawing import ring_arrow, sides, wxyz_along
 from app.viewer.lessons.velocity.jog import BUTTONS, Press, button, moved, step
 from app.viewer.lessons.velocity.rates import (
@@ -132,12 +132,12 @@ def test_far_near_and_at(robot: kin.Robot) -> None:
 def test_directions_in_words() -> None:
     R = kin.fk(STORE.get("irb120"), STORE.get("irb120").q_home)[:3, :3]
     tilted = np.array([[0.8, 0.0, 0.6], [0.0, 1.0, 0.0], [-0.6, 0.0, 0.8]])
-    assert told.axis_name(np.array([0.0, -1.0, 0.0]), R) == "base y"
-    assert told.axis_name(tilted[:, 2] * 3.0, tilted) == "tool z"
-    assert told.axis_name(np.array([-1.0, -1.0, 0.0]), tilted) == "(0.71, 0.71, 0.00)"
-    assert told.lost_words(np.array([0, 1.0, 0, 0, 0, 0]), R) == "Cannot move along base y."
-    assert told.lost_words(np.array([0, 0, 0, 1.0, 0, 0]), R) == "Cannot turn about base x."
-    assert "without turning" in told.lost_words(np.array([0, 0.6, 0, 0.8, 0, 0]), R)
+    assert views.axis_name(np.array([0.0, -1.0, 0.0]), R) == "base y"
+    assert views.axis_name(tilted[:, 2] * 3.0, tilted) == "tool z"
+    assert views.axis_name(np.array([-1.0, -1.0, 0.0]), tilted) == "(0.71, 0.71, 0.00)"
+    assert views.lost_words(np.array([0, 1.0, 0, 0, 0, 0]), R) == "Cannot move along base y."
+    assert views.lost_words(np.array([0, 0, 0, 1.0, 0, 0]), R) == "Cannot turn about base x."
+    assert "without turning" in views.lost_words(np.array([0, 0.6, 0, 0.8, 0, 0]), R)
 
 
 def test_round_arrows_turn_about_their_axis() -> None:
@@ -160,7 +160,7 @@ def test_a_step_moves_the_tool_exactly(six_joints: kin.Robot, axis: int, frame: 
     amount = 0.004 if axis < 3 else math.radians(1.5)
     T = kin.fk(robot, robot.q_home)
     made = step(robot, robot.q_home, "pose", axis, amount, frame)
-    assert made.q is not None, made.told
+    assert made.q is not None, made.notice
     after = kin.fk(robot, made.q)
     wanted = moved(T, axis, amount, frame)
     assert np.abs(after - wanted).max() < 1e-8
@@ -182,12 +182,12 @@ def test_five_joints_keep_point_and_approach_and_say_what_they_give_up() -> None
     after = kin.fk(robot, made.q)
     assert after[:3, 3] - T[:3, 3] == pytest.approx([0.01, 0.0, 0.0], abs=1e-8)
     assert vector_angle(after[:3, 2], T[:3, 2]) < 1e-8
-    assert made.told.kind == "compromise"
-    assert "roll is off by" in made.told.detail
+    assert made.notice.kind == "compromise"
+    assert "roll is off by" in made.notice.detail
     roll = step(robot, robot.q_home, "pose", 5, 0.02, "tool")
     assert roll.q is None
-    assert "5 joints cannot" in roll.told.detail
-    assert step(robot, robot.q_home, "approach", 0, 0.01, "base").told.kind == "reached"
+    assert "5 joints cannot" in roll.notice.detail
+    assert step(robot, robot.q_home, "approach", 0, 0.01, "base").notice.kind == "reached"
 
 
 def test_what_the_task_leaves_free_is_not_jogged() -> None:
@@ -195,27 +195,27 @@ def test_what_the_task_leaves_free_is_not_jogged() -> None:
     for task, axis, frame in (("position", 3, "base"), ("approach", 5, "tool")):
         made = step(robot, robot.q_home, task, axis, 0.02, frame)
         assert made.q is None
-        assert "leaves" in made.told.detail
+        assert "leaves" in made.notice.detail
     made = step(robot, robot.q_home, "position", 1, 0.01, "base")
     assert made.q is not None
-    assert made.told.kind == "reached"
+    assert made.notice.kind == "reached"
 
 
 def test_a_scara_lifts_and_swings_but_does_not_tilt() -> None:
     robot = STORE.get("scara")
     for axis, amount in ((0, -0.005), (2, -0.005), (5, 0.02)):
         made = step(robot, robot.q_home, "pose", axis, amount, "base")
-        assert made.q is not None, (axis, made.told)
+        assert made.q is not None, (axis, made.notice)
     made = step(robot, robot.q_home, "pose", 3, 0.02, "base")
     assert made.q is None
-    assert "Not moved" in made.told.title
+    assert "Not moved" in made.notice.title
 
 
-def test_at_a_stop_or_out_of_reach_nothing_moves_and_the_reason_is_told() -> None:
+def test_at_a_limit_or_out_of_reach_nothing_moves_and_the_reason_is_given() -> None:
     robot = STORE.get("irb120")
     made = step(robot, robot.q_home, "pose", 2, 5.0, "base")
     assert made.q is None
-    assert made.told.title.startswith("Not moved: out of reach")
+    assert made.notice.title.startswith("Not moved: out of reach")
     scara = STORE.get("scara")
     q = scara.q_home.copy()
     slide = [j.kind for j in scara.joints].index("prismatic")
@@ -224,8 +224,8 @@ def test_at_a_stop_or_out_of_reach_nothing_moves_and_the_reason_is_told() -> Non
         down = kin.jacobian(scara, q)[2, slide] * sign
         made = step(scara, q, "pose", 2, 0.02 * math.copysign(1.0, down), "base")
         assert made.q is None
-        assert "Not moved: outside the limits" in made.told.title
-        assert made.told.detail
+        assert "Not moved: outside the limits" in made.notice.title
+        assert made.notice.detail
 
 
 def test_a_jump_of_the_joints_is_refused_for_what_it_is() -> None:
@@ -235,8 +235,8 @@ def test_a_jump_of_the_joints_is_refused_for_what_it_is() -> None:
     sideways = [step(robot, q, "pose", axis, math.radians(2.0), "tool") for axis in (3, 4)]
     refused = [made for made in sideways if made.q is None]
     assert refused
-    assert "a joint would have to jump" in refused[0].told.title
-    assert "a singularity is close" in refused[0].told.detail
+    assert "a joint would have to jump" in refused[0].notice.title
+    assert "a singularity is near" in refused[0].notice.detail
 
 
 def test_a_locked_joint_stays_where_it_is() -> None:
@@ -248,7 +248,7 @@ def test_a_locked_joint_stays_where_it_is() -> None:
     all_locked = tuple(robot.q_home.tolist())
     made = step(robot, robot.q_home, "pose", 0, 0.005, "base", all_locked)
     assert made.q is None
-    assert made.told.title.startswith("Not moved")
+    assert made.notice.title.startswith("Not moved")
 
 
 def test_a_tap_is_one_step_and_holding_repeats() -> None:
@@ -348,19 +348,19 @@ def test_jogging_moves_the_tool_by_the_step(tab: FakeBrowser) -> None:
     tab.settle()
     assert tab.tool_pose()[:3, 3] == pytest.approx(T[:3, 3] + [0, 0.0125, -0.0125], abs=1e-9), "one tap, one step"
     tab.set("Step, mm", -3)
-    tab.wait(lambda: "Not understood" in tab.html)
+    tab.wait(lambda: "Invalid input" in tab.html)
 
 
 def test_steps_and_sentences_follow_the_unit_of_length(tab: FakeBrowser) -> None:
     robot = STORE.get("irb120")
     use(tab, robot)
     tab.set("Step, mm", 12.5)
-    assert "100 mm in the picture are" in tab.html
+    assert "100 mm in the scene are" in tab.html
     for length, shown, sample in (("cm", 1.25, "10 cm"), ("m", 0.0125, "0.1 m")):
         tab.set("Lengths", length)
         tab.wait(lambda length=length: f"Step, {length}" in labels(tab))  # type: ignore[misc]
         assert tab.value(f"Step, {length}") == pytest.approx(shown)
-        tab.wait(lambda sample=sample: f"{sample} in the picture are" in tab.html)  # type: ignore[misc]
+        tab.wait(lambda sample=sample: f"{sample} in the scene are" in tab.html)  # type: ignore[misc]
         T = tab.tool_pose()
         press(tab, "+z")
         tab.wait(lambda T=T: np.allclose(tab.tool_pose()[2, 3], T[2, 3] + 0.0125, atol=1e-9))  # type: ignore[misc]
@@ -382,8 +382,8 @@ def test_distances_to_a_singularity_follow_the_units() -> None:
     found = next(s for s in kin.singularities(robot, robot.q_home) if s.unit == "m")
     for length in ("mm", "cm", "m"):
         units = Units(length=length)
-        assert told.distance(found, units) == units.distance(found.distance)
-        assert f">{units.distance(found.distance)}<" in told.others_html(robot, (found,), units)
+        assert views.distance(found, units) == units.distance(found.distance)
+        assert f">{units.distance(found.distance)}<" in views.others_html(robot, (found,), units)
 
 
 def test_a_singular_pose_is_told_with_its_kind_and_what_is_lost(tab: FakeBrowser) -> None:

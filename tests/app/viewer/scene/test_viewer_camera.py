@@ -216,12 +216,12 @@ def test_the_camera_steps_back_for_what_is_drawn_and_leaves_a_chosen_view_alone(
     def distance() -> float:
         return float(np.linalg.norm(lens.position - lens.look_at) / np.linalg.norm(near - arm.center))
 
-    of_visitor.make_room(room)
+    of_visitor.fit(room)
     assert distance() > 1.5
-    of_visitor.make_room([])
+    of_visitor.fit([])
     assert np.array_equal(lens.position, near), "and comes near again"
     of_visitor.restore(ASIDE)
-    of_visitor.make_room(room)
+    of_visitor.fit(room)
     assert np.array_equal(lens.position, ASIDE[0]), "it is the visitor's now"
     of_visitor.aim(arm)
     assert distance() > 1.5, "until asked to"

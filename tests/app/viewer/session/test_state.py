@@ -17,11 +17,11 @@ from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.feature import Feature
 from app.viewer.panel import listen
-from app.viewer.panel.joints import UNLOCK_ALL, label, padlocks
+from app.viewer.panel.joints import UNLOCK_ALL, label, lock_buttons
 from app.viewer.panel.view import ViewState
 from app.viewer.server import ViewerServer
-from app.viewer.session import controller
-from app.viewer.session.state import MAX_TEXT, PageState, decode, encode, read_memory
+from app.viewer.session import page
+from app.viewer.session.state import MAX_TEXT, PageState, decode, encode, read_stored_page
 from kin.units import DEFAULT_UNITS, Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -205,14 +205,14 @@ def test_features_that_say_too_much_are_left_out_of_the_text():
     ],
 )
 def test_a_page_may_call_its_service_by_an_address_and_by_nothing_else(address, usable):
-    memory = read_memory(json.dumps({"address": address, "state": "abc"}))
+    memory = read_stored_page(json.dumps({"address": address, "state": "abc"}))
     assert memory.address == (address if usable else "")
     assert memory.state == "abc"
 
 
 @pytest.mark.parametrize("text", [None, "", "[]", "{", '{"state": 7}'])
 def test_a_page_that_answers_nonsense_remembers_nothing(text):
-    assert read_memory(text).state == ""
+    assert read_stored_page(text).state == ""
 
 
 # In a session
@@ -242,11 +242,11 @@ class Counter(Feature):
 @pytest.fixture(scope="module")
 def port() -> Iterator[int]:
     kin.warm_up()
-    before, controller.TABS = controller.TABS, (Counter,)
+    before, page.TABS = page.TABS, (Counter,)
     server = ViewerServer(STORE, Settings(token="very secret"), Clouds())
     yield server.start()
     server.stop()
-    controller.TABS = before
+    page.TABS = before
 
 
 def remembering(state: str, address: str = "https://arms.example/kin/") -> str:
@@ -268,10 +268,10 @@ def test_a_link_shows_the_same_view_and_a_lost_connection_brings_it_back(port):
     state = PageState("puma560", q, far, "position", "seed", None, RADIANS_CM, view, {"counter": {"count": 4}})
     with FakeBrowser(port, memory=remembering(encode(state))) as tab:
         tab.settle()
-        assert (tab.value("Robot"), tab.value("Match"), tab.value("Branch")) == (
+        assert (tab.value("Robot"), tab.value("Target must match"), tab.value("Posture")) == (
             PUMA.name,
             "Point only",
-            "Stay on this one",
+            "Keep current",
         )
         assert (tab.value("Radians"), tab.value("Link frames"), tab.value("Dark page"), tab.value("Count")) == (
             True,
@@ -358,7 +358,7 @@ def test_a_feature_that_cannot_restore_takes_nothing_else_along(port, caplog):
 def test_a_robot_that_is_not_here_is_named(port):
     with FakeBrowser(port, memory=remembering(packed({"v": 1, "robot": "<b>mine</b>"}))) as tab:
         tab.settle()
-        assert "There is no robot “&lt;b&gt;mine&lt;/b&gt;” here." in tab.html
+        assert "This service has no robot “&lt;b&gt;mine&lt;/b&gt;”." in tab.html
 
 
 def options(tab: FakeBrowser) -> tuple[str, ...]:
@@ -370,7 +370,7 @@ def test_locked_joints_come_back_locked_where_they_were(port):
     state = PageState("puma560", q, locks=(1,), features={"counter": {"count": 2}})
     with FakeBrowser(port, memory=remembering(encode(state))) as tab:
         tab.settle()
-        assert options(tab) == padlocks([False, True, False, False, False, False])
+        assert options(tab) == lock_buttons([False, True, False, False, False, False])
         assert "Ready" in tab.html
         T = kin.fk(PUMA, q)
         T[:3, 3] *= 0.97
@@ -390,7 +390,7 @@ def test_a_task_that_comes_back_has_its_rings(port):
     cobra = STORE.get("scara")
     with FakeBrowser(port, memory=remembering(encode(PageState("scara", cobra.q_home, task="position")))) as tab:
         tab.settle()
-        assert tab.value("Match") == "Point only"
+        assert tab.value("Target must match") == "Point only"
         assert not [n for n in tab.nodes if n.startswith(f"{tab.gizmo}/ring")]
         assert tab.nodes[tab.gizmo]["props"]["disable_rotations"]
 
@@ -401,5 +401,5 @@ def test_another_language(port):
         tab.set("Copy as", "MATLAB")
         tab.wait(lambda: "rigidBodyTree" in tab.html)
         tab.set("Copy as", "COBOL")
-        tab.wait(lambda: "Not understood" in tab.html)
+        tab.wait(lambda: "Invalid input" in tab.html)
         assert tab.value("Copy as") == "MATLAB"

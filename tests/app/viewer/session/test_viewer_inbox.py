@@ -112,8 +112,8 @@ def test_without_easing_the_goal_is_shown_at_once() -> None:
     assert motion.at(0.0) == pytest.approx(1.0)
 
 
-def test_visitors_share_a_budget_of_pictures() -> None:
-    pace = Pace(pictures_per_second=600.0)
+def test_visitors_share_a_rate_of_frames() -> None:
+    pace = Pace(frames_per_second=600.0)
     for visitor in range(10):
         pace.moving(visitor, True)
     assert pace.interval == pytest.approx(FRAME)

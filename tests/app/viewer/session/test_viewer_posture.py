@@ -12,7 +12,7 @@ from fake_browser import FakeBrowser
 import kin
 from app.shared.store import Store
 from app.viewer.panel.joints import label
-from app.viewer.panel.posture import short, strip_html
+from app.viewer.panel.posture import feasible_html, short
 from kin.units import DEGREES
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -38,7 +38,7 @@ def test_every_branch_can_be_chosen_and_the_tool_stays(port: int) -> None:
         assert branch_shown(tab) == kin.branch_of(SRS, SRS.q_home)
         seen = []
         for name in kin.branch_names(SRS):
-            tab.set("Branch", short(name))
+            tab.set("Posture", short(name))
             tab.settle()
             q = q_of(tab, SRS)
             assert kin.branch_of(SRS, q) == branch_shown(tab) == name
@@ -54,7 +54,7 @@ def test_a_chosen_branch_is_kept_while_dragging_and_left_by_hand(port: int) -> N
     with FakeBrowser(port) as tab:
         tab.choose(SRS.name)
         name = next(n for n in kin.branch_names(SRS) if "elbow down" in n)
-        tab.set("Branch", short(name))
+        tab.set("Posture", short(name))
         tab.settle()
         T = kin.fk(SRS, SRS.q_home)
         tab.grab()
@@ -67,15 +67,15 @@ def test_a_chosen_branch_is_kept_while_dragging_and_left_by_hand(port: int) -> N
         assert np.allclose(tab.tool_pose(), T, atol=1e-6)
         tab.set("Joint 4", 60)
         tab.settle()
-        assert tab.value("Branch") == "Nearest"
+        assert tab.value("Posture") == "Closest"
 
 
 def test_a_branch_that_is_not_there_says_so(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
-        tab.set("Match", "Point + approach")
+        tab.set("Target must match", "Point + approach")
         name = next(n for n in kin.branch_names(PIONEER) if n.endswith("wrist flip"))
-        tab.set("Branch", short(name))
+        tab.set("Posture", short(name))
         tab.wait(lambda: 'data-status="limits"' in tab.html or 'data-status="unreachable"' in tab.html)
         assert name in tab.html or "chosen branch" in tab.html
 
@@ -85,7 +85,7 @@ def test_the_free_slider_moves_the_arm_and_not_the_tool(port: int, robot: kin.Ro
     T = kin.fk(robot, robot.q_home)
     with FakeBrowser(port) as tab:
         tab.choose(robot.name)
-        (name,) = tab.sliders_in("Posture")
+        (name,) = tab.sliders_in("Posture and redundancy")
         (free,) = kin.solve_ik(robot, T, q_seed=robot.q_home, branch="seed").redundancy
         low, high = next((a, b) for a, b in free.intervals if a <= free.value <= b)
         before = q_of(tab, robot)
@@ -118,18 +118,18 @@ def test_beyond_the_feasible_range_the_arm_stops_at_its_end_and_says_which_joint
 
 def test_the_strip_draws_and_words_the_ranges() -> None:
     free = kin.Redundancy("psi", "arm angle ψ", 0.0, ((-math.pi, -math.pi / 2), (0.0, math.pi / 2)))
-    strip = strip_html(free, -180, 180, DEGREES)
-    assert strip.count("background:#009e73") == 2
+    strip = feasible_html(free, -180, 180, DEGREES)
+    assert strip.count("kb-range") == 2
     assert "left:50.00%;width:max(2px,25.00%)" in strip
     assert "feasible: −180.0 … −90.0°, 0.0 … 90.0°" in strip
-    nothing = strip_html(kin.Redundancy("psi", "arm angle ψ", 0.0, ()), -180, 180, DEGREES)
+    nothing = feasible_html(kin.Redundancy("psi", "arm angle ψ", 0.0, ()), -180, 180, DEGREES)
     assert "no value is feasible" in nothing
 
 
 def test_hostile_choices_are_refused_and_the_session_lives(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.choose(SRS.name)
-        for name, value in (("Branch", "<b>up</b>"), ("Arm angle ψ", math.nan), ("Arm angle ψ", -math.inf)):
+        for name, value in (("Posture", "<b>up</b>"), ("Arm angle ψ", math.nan), ("Arm angle ψ", -math.inf)):
             tab.set(name, value)
             tab.wait(lambda: 'data-status="error"' in tab.html)
             assert "<b>up" not in tab.html
@@ -167,6 +167,6 @@ def test_another_task_after_a_drag_leaves_free_what_it_leaves_free(port: int) ->
         tab.release()
         tab.wait(lambda: "Reached" in tab.html)
         tab.settle()
-        assert 'data-free="theta7"' not in tab.html
-        tab.set("Match", "Point + approach")
-        tab.wait(lambda: 'data-free="theta7"' in tab.html)
+        assert 'data-redundancy="theta7"' not in tab.html
+        tab.set("Target must match", "Point + approach")
+        tab.wait(lambda: 'data-redundancy="theta7"' in tab.html)

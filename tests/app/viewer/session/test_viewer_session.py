@@ -158,7 +158,7 @@ def test_the_five_joint_arm_names_the_roll_it_gives_up_and_the_task_can_be_relax
         tab.release()
         tab.wait(lambda: "Reached with roll error" in tab.html)
         assert 'data-status="compromise"' in tab.html
-        tab.set("Match", "Point + approach")
+        tab.set("Target must match", "Point + approach")
         tab.wait(lambda: 'data-status="reached"' in tab.html)
         tab.settle()
         assert np.allclose(tab.tool_pose()[:3, 2:], T[:3, 2:], atol=1e-6)
@@ -173,7 +173,7 @@ def test_a_limit_is_named_by_joint_number(port: int) -> None:
     assert expected.status == kin.Status.LIMITS
     with FakeBrowser(port) as tab:
         tab.settle()
-        tab.set("Match", "Point + approach")
+        tab.set("Target must match", "Point + approach")
         tab.grab()
         tab.drag(T)
         tab.release()
@@ -230,7 +230,7 @@ HOSTILE = [
     ("slider NaN", lambda t: t.set("1 rotating base", math.nan)),
     ("slider infinity", lambda t: t.set("1 rotating base", math.inf)),
     ("unknown robot", lambda t: t.set("Robot", "<script>alert(1)</script>")),
-    ("unknown task", lambda t: t.set("Match", "everything")),
+    ("unknown task", lambda t: t.set("Target must match", "everything")),
     ("gizmo NaN", lambda t: t.drag(position=(math.nan, 0, 0), wxyz=(1, 0, 0, 0))),
     ("gizmo without direction", lambda t: t.drag(position=(0.1, 0, 0), wxyz=(0, 0, 0, 0))),
 ]

@@ -21,8 +21,8 @@ from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.server import ViewerServer
 from app.viewer.tabs.workspace import colours, cut
-from app.viewer.tabs.workspace.capability import told, voxels
-from app.viewer.tabs.workspace.capability.wishes import MapWishes
+from app.viewer.tabs.workspace.capability import views, voxels
+from app.viewer.tabs.workspace.capability.settings import MapSettings
 from kin.units import DEFAULT_UNITS, Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -36,7 +36,7 @@ def the_map(robot: kin.Robot = PIONEER, directions: int = 12) -> kin.CapabilityM
     return kin.capability_map(robot, resolution=LENGTH, directions=directions)
 
 
-# Levels, wishes, words
+# Levels, settings, words
 
 
 def test_levels_are_equal_steps_and_hold_what_is_on_their_edge():
@@ -60,43 +60,43 @@ def test_levels_are_equal_steps_and_hold_what_is_on_their_edge():
 )
 def test_a_wrong_wish_is_named_and_in_an_address_ignored(name, value):
     with pytest.raises(kin.InputError, match=name):
-        MapWishes().having(name, value)
+        MapSettings().with_value(name, value)
     other = "least" if name != "least" else "directions"
-    assert MapWishes().restored({name: value, other: 0.5 if other == "least" else 96}) == replace(
-        MapWishes(), **{other: 0.5 if other == "least" else 96}
+    assert MapSettings().restored({name: value, other: 0.5 if other == "least" else 96}) == replace(
+        MapSettings(), **{other: 0.5 if other == "least" else 96}
     )
 
 
 @pytest.mark.parametrize("state", [None, 3, "x", [1]])
 def test_what_is_no_state_restores_nothing(state):
-    assert MapWishes().restored(state) == MapWishes()
+    assert MapSettings().restored(state) == MapSettings()
 
 
 def test_words_tell_what_the_map_holds():
     found = the_map()
     row = int(found.share.argmax())
-    text = html.unescape(told.picked(found, row, DEFAULT_UNITS))
+    text = html.unescape(views.picked(found, row, DEFAULT_UNITS))
     assert f"{found.approachable[row].sum()} of 12 directions" in text
     none = int(np.flatnonzero(found.share == 0.0)[0])
-    assert "none of the set" in told.picked(found, none, DEFAULT_UNITS)
-    assert told.WORTH["closed form"] in told.facts(found, None, whole=True, units=DEFAULT_UNITS)
-    assert f"{found.volume:.4g}" in told.facts(found, None, whole=True, units=DEFAULT_UNITS)
-    assert "so far" in told.facts(found, None, whole=False, units=DEFAULT_UNITS)
-    assert "With joints 1, 3 locked. " in told.facts(found, (0.0, None, 0.5), whole=True, units=DEFAULT_UNITS)
+    assert "not along any" in views.picked(found, none, DEFAULT_UNITS)
+    assert views.CERTAINTY["closed form"] in views.facts(found, None, complete=True, units=DEFAULT_UNITS)
+    assert f"{found.volume:.4g}" in views.facts(found, None, complete=True, units=DEFAULT_UNITS)
+    assert "so far" in views.facts(found, None, complete=False, units=DEFAULT_UNITS)
+    assert "With joints 1, 3 locked. " in views.facts(found, (0.0, None, 0.5), complete=True, units=DEFAULT_UNITS)
     empty = kin.capability_join(found.grid, [])
-    assert "0" in told.facts(empty, None, whole=False, units=DEFAULT_UNITS)
-    assert 'data-shown="0"' in told.legend(empty, "share", "viridis", 0.0)
-    assert all(set(told.WORTH) >= {kin.capability_grid(r, resolution=2).method} for r in (PIONEER, PUMA))
+    assert "0" in views.facts(empty, None, complete=False, units=DEFAULT_UNITS)
+    assert 'data-shown="0"' in views.legend(empty, "share", "viridis", 0.0)
+    assert all(set(views.CERTAINTY) >= {kin.capability_grid(r, resolution=2).method} for r in (PIONEER, PUMA))
 
 
 @pytest.mark.parametrize(("length", "scale", "decimals"), [("mm", 1000, 0), ("cm", 100, 1), ("m", 1, 3)])
 def test_lengths_follow_the_units(length, scale, decimals):
     found, units = the_map(), Units(length=length)
     row = int(found.share.argmax())
-    assert f">{scale * found.grid.voxel:.{decimals + 1}f}<" in told.facts(found, None, True, units)
+    assert f">{scale * found.grid.voxel:.{decimals + 1}f}<" in views.facts(found, None, True, units)
     x = f"{scale * found.centres[row, 0]:.{decimals}f}".replace("-", "−")
-    assert f">{x} " in told.picked(found, row, units)
-    for text in (told.facts(found, None, True, units), told.picked(found, row, units)):
+    assert f">{x} " in views.picked(found, row, units)
+    for text in (views.facts(found, None, True, units), views.picked(found, row, units)):
         assert f">{length}<" in text
 
 
@@ -234,7 +234,7 @@ def test_a_map_is_drawn_whole_in_its_colours_and_then_rests(tab):
             assert at[tuple(np.round(1e4 * place.astype(float)).astype(int))] == tuple(rgb)
         corners = m["props"]["vertices"].reshape(-1, 3)
         assert np.ptp(corners, axis=0) == pytest.approx(voxels.FILL * found.grid.voxel)
-    assert told.WORTH["closed form"] in html.unescape(tab.html)
+    assert views.CERTAINTY["closed form"] in html.unescape(tab.html)
     sent = tab.sent("BatchedMeshesMessage")
     tab.settle()
     assert tab.sent("BatchedMeshesMessage") == sent
@@ -385,7 +385,7 @@ def test_a_failure_is_told_and_the_next_try_succeeds(tab, service, monkeypatch, 
 def test_wrong_values_are_told_and_leave_the_page_alive(tab):
     for label, value in (("Grid", "huge"), ("Directions", 12), ("Voxels show", None)):
         tab.set(label, value)
-        tab.wait(lambda: "Not understood" in tab.html)
+        tab.wait(lambda: "Invalid input" in tab.html)
     tab.compute()
     tab.done(len(the_map().index))
 
@@ -394,7 +394,7 @@ def test_an_address_restores_the_map(service):
     port, _, server = service
     with Visitor(port) as tab:
         tab.settle(0.2)
-        feature = server._sessions[max(server._sessions)]._tabs[0]
+        feature = server._pages[max(server._pages)]._tabs[0]
         state = {"resolution": LENGTH, "directions": 12, "by": "manipulability", "least": 0.4, "drawn": True}
         with feature.stage.client.atomic():
             feature.restore({"capability": state, "map": "viridis"})

@@ -25,8 +25,10 @@ from app.shared.store import Store
 from app.shared.summaries import Summaries
 from app.viewer.panel.joints import UNLOCK_ALL
 from app.viewer.server import ViewerServer
-from app.viewer.tabs.workspace import colours, cut, flow, known, pick, plot, sizes, words
-from app.viewer.tabs.workspace.wishes import MOST, Wishes, default_size
+from app.viewer.tabs.workspace import colours, cut, pick, send_window, sizes, views
+from app.viewer.tabs.workspace.section import plot
+from app.viewer.tabs.workspace.section.panel import find_section
+from app.viewer.tabs.workspace.settings import MAX_POINTS, WorkspaceSettings, default_size
 from kin.robot import Joint
 from kin.units import DEFAULT_UNITS, Units
 
@@ -67,7 +69,7 @@ def test_a_scale_holds_nearly_all_points(robot, by):
     assert ((values >= scale.low) & (values <= scale.high)).mean() > 0.98
     legend = colours.legend(scale, "viridis", DEFAULT_UNITS)
     assert colours.value_text(by, scale.high, DEFAULT_UNITS) in legend
-    assert colours.MEANING[by].replace("'", "&#x27;") in legend
+    assert colours.MEANING[by].replace("'", "&#39;") in legend
 
 
 def test_radius_and_height_are_those_of_the_section():
@@ -95,7 +97,7 @@ def _pose(x, y, tilt):
 def test_what_is_left_of_a_cut_ends_where_the_slider_says(axis):
     points = Cloud(PIONEER, 20_000).slice(0, 20_000).points
     made = cut.cut_of([PIONEER, PUMA], axis, PIONEER.q_home)
-    assert made.count <= cut.MOST
+    assert made.count <= cut.MAX_SLABS
     slab = made.slabs(points)
     along = points @ np.array(made.normal)
     for k in (0, 1, made.count // 2, made.count):
@@ -112,7 +114,7 @@ def test_what_is_left_of_a_cut_ends_where_the_slider_says(axis):
 def test_the_arms_plane_holds_the_tool_and_the_axis():
     q = PIONEER.random_q(np.random.default_rng(1))
     normal = np.array(cut.cut_of([PIONEER], "arm", q).normal)
-    point, axis = colours.line(PIONEER)
+    point, axis = colours.axis_of_joint_1(PIONEER)
     assert abs(normal @ axis) < 1e-12
     assert abs(normal @ (kin.fk(PIONEER, q)[:3, 3] - point)) < 1e-12
     assert np.linalg.norm(normal) == pytest.approx(1.0)
@@ -149,13 +151,13 @@ def test_the_point_nearest_to_the_eye_that_the_ray_goes_through():
     assert found(seen).before(None)
 
 
-# Wishes
+# WorkspaceSettings
 
 
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        *(("n", v) for v in (0, MOST + 1, 1.5, "many", None, True, math.nan, math.inf, [])),
+        *(("n", v) for v in (0, MAX_POINTS + 1, 1.5, "many", None, True, math.nan, math.inf, [])),
         *(("seed", v) for v in (-1, 0.5, 1e300, {})),
         *(("size", v) for v in ("x", math.nan, None, False)),
         *(("strategy", v) for v in ("guess", None, 3, ["uniform"])),
@@ -166,26 +168,28 @@ def test_the_point_nearest_to_the_eye_that_the_ray_goes_through():
     ],
 )
 def test_a_wrong_wish_is_named_and_in_an_address_ignored(name, value):
-    wishes = Wishes(n=77)
+    settings = WorkspaceSettings(n=77)
     with pytest.raises(kin.InputError, match="points" if name == "n" else name):
-        wishes.having(name, value, ("puma560",))
-    assert wishes.restored({name: value, "seed": 3 if name != "seed" else value}, ("puma560",)) == replace(
-        wishes, seed=3 if name != "seed" else 0
+        settings.with_value(name, value, ("puma560",))
+    assert settings.restored({name: value, "seed": 3 if name != "seed" else value}, ("puma560",)) == replace(
+        settings, seed=3 if name != "seed" else 0
     )
 
 
-def test_wishes_come_back_from_their_state():
-    wishes = Wishes(5, "quasi", 9, "limits", "viridis", 0.002, "arm", 0.01, "slice", "puma560", True, True, False)
-    assert Wishes().restored(wishes.state(), ("puma560",)) == wishes
-    assert Wishes().restored({**wishes.state(), "unheard": 1}, ()) == replace(wishes, compare=None)
+def test_settings_come_back_from_their_state():
+    settings = WorkspaceSettings(
+        5, "quasi", 9, "limits", "viridis", 0.002, "arm", 0.01, "slice", "puma560", True, True, False
+    )
+    assert WorkspaceSettings().restored(settings.state(), ("puma560",)) == settings
+    assert WorkspaceSettings().restored({**settings.state(), "unheard": 1}, ()) == replace(settings, compare=None)
 
 
 # Plot and numbers
 
 
 def test_the_cloud_in_the_drawing_is_inside_the_boundary_in_the_drawing():
-    section = kin.section(PIONEER, resolution=32)
-    frame = plot.frame_of(section)
+    found = kin.section(PIONEER, resolution=32)
+    frame = plot.frame_of(found)
     density = plot.Density(frame)
     points = Cloud(PIONEER, 30_000).slice(0, 30_000).points
     density.add(PIONEER, points)
@@ -193,28 +197,27 @@ def test_the_cloud_in_the_drawing_is_inside_the_boundary_in_the_drawing():
     assert density.parts == 1
     alpha = np.asarray(Image.open(io.BytesIO(base64.b64decode(density.image_url().partition(",")[2]))))[..., 3]
     assert np.array_equal(alpha > 0, density.counts > 0)
-    drawn = plot.drawing(section, frame, plot.image(density), DEFAULT_UNITS)
+    drawn = plot.plot_html(found, frame, plot.image(density), DEFAULT_UNITS)
     assert "data:image/png;base64," in drawn
-    assert {int(j) for j in re.findall(r'data-arc="(\d)"', drawn)} == {a.joint + 1 for a in section.arcs}
-    assert drawn.count("data-arc") == len(section.arcs)
-    assert "data:image" not in plot.drawing(section, frame, "", DEFAULT_UNITS)
+    assert {int(j) for j in re.findall(r'data-arc="(\d)"', drawn)} == {a.joint + 1 for a in found.arcs}
+    assert drawn.count("data-arc") == len(found.arcs)
+    assert "data:image" not in plot.plot_html(found, frame, "", DEFAULT_UNITS)
     # Equal scales, z upwards.
     a, b, c = frame.at(np.array([[0.0, 0.0], [0.1, 0.0], [0.0, 0.1]]))
     assert b[0] - a[0] == pytest.approx(a[1] - c[1])
     x, y = frame.at(np.array([0.2, 0.05]))
-    assert f'cx="{x:.1f}" cy="{y:.1f}"' in plot.dot(frame, 0.2, 0.05)
+    assert f'cx="{x:.1f}" cy="{y:.1f}"' in plot.tool_html(frame, 0.2, 0.05)
 
 
 def test_an_arm_whose_first_joint_slides_has_no_section():
     rows = (Joint("slide", kind="prismatic", limits=(0.0, 1.0)), Joint("turn", a=0.5, limits=(-1.0, 1.0)))
     slider = replace(PIONEER, rows=rows, home=(0.0, 0.0))
-    found = known.cross(SUMMARIES, slider)
-    assert found.section is None
-    assert "slides" in found.why_not
+    found = find_section(SUMMARIES, slider)
+    assert found is None
 
 
 def test_sizes_say_what_is_unknown_yet():
-    facts = known.facts(SUMMARIES, PIONEER, False)
+    facts = SUMMARIES.facts(PIONEER, effort=None).result()
     table = sizes.html(facts, waiting=True, units=DEFAULT_UNITS)
     assert table.count("computing…") == 2
     assert f"{1000 * facts.reach.largest.value:.1f}" in table
@@ -224,14 +227,14 @@ def test_sizes_say_what_is_unknown_yet():
 
 @pytest.mark.parametrize(("length", "scale", "decimals"), [("mm", 1000, 0), ("cm", 100, 1), ("m", 1, 3)])
 def test_sizes_legend_and_picked_point_follow_the_units(length, scale, decimals):
-    units, facts = Units(length=length), known.facts(SUMMARIES, PIONEER, False)
+    units, facts = Units(length=length), SUMMARIES.facts(PIONEER, effort=None).result()
     table = sizes.html(facts, True, units)
     assert f">{scale * facts.reach.largest.value:.{decimals + 1}f}<" in table
     assert table.count(f">{length}<") == 7 - table.count(">none<")
     scales = colours.scale_of(PIONEER, "radius")
     assert f"{scale * scales.high:.{decimals}f} {length}" in colours.legend(scales, "viridis", units)
     point = np.array([0.1234, -0.2, 0.0])
-    text = words.picked(PIONEER, None, 7, PIONEER.q_home, point, units)
+    text = views.picked(PIONEER, None, 7, PIONEER.q_home, point, units)
     assert f">{scale * 0.1234:.{decimals + 1}f} &nbsp; −{scale * 0.2:.{decimals + 1}f} " in text
     assert f">{length}<" in text
 
@@ -240,9 +243,9 @@ def test_sizes_legend_and_picked_point_follow_the_units(length, scale, decimals)
     ("length", "ticks"), [("mm", ["0", "100", "200"]), ("cm", ["0", "10", "20"]), ("m", ["0.0", "0.1", "0.2"])]
 )
 def test_the_drawing_of_the_section_follows_the_units(length, ticks):
-    section = kin.section(PIONEER, resolution=32)
-    drawn = plot.drawing(section, plot.frame_of(section), "", Units(length=length))
-    shown = re.findall(r'text-anchor="middle" style="[^"]*">([−\d.]+)</text>', drawn)
+    found = kin.section(PIONEER, resolution=32)
+    drawn = plot.plot_html(found, plot.frame_of(found), "", Units(length=length))
+    shown = re.findall(r'text-anchor="middle" class="kb-axis">([−\d.]+)</text>', drawn)
     assert [text for text in ticks if text in shown] == ticks
     assert len({len(text.partition(".")[2]) for text in shown if "." in text or length != "m"}) == 1
     assert f"axis, {length}</text>" in drawn
@@ -256,13 +259,13 @@ def test_marks_closer_than_a_millimetre_are_told_apart():
 
 
 def test_progress_in_words():
-    assert words.rate(2_345_678) == "2.35 M"
-    assert words.rate(940.4) == "940 "
-    line = words.progress("paused", 5000, 100_000, 12_300.0)
+    assert views.rate(2_345_678) == "2.35 M"
+    assert views.rate(940.4) == "940 "
+    line = views.progress("paused", 5000, 100_000, 12_300.0)
     assert 'data-cloud="paused"' in line
     assert "12.3 k points/s" in line
-    assert "points/s" not in words.progress("ready", 0, 10, 0.0)
-    assert ">joint 2 locked<" in words.progress("ready", 0, 10, 0.0, (None, 0.0, None))
+    assert "points/s" not in views.progress("ready", 0, 10, 0.0)
+    assert ">joint 2 locked<" in views.progress("ready", 0, 10, 0.0, (None, 0.0, None))
     assert "locked" not in line
 
 
@@ -377,7 +380,7 @@ def test_pause_holds_and_start_goes_on(tab):
 
 
 def test_cancel_takes_everything_away_for_good(tab):
-    tab.set("Points", MOST)
+    tab.set("Points", MAX_POINTS)
     tab.set("Seed", 13)
     tab.click("Start")
     tab.wait(lambda: tab.count > 0)
@@ -390,13 +393,13 @@ def test_cancel_takes_everything_away_for_good(tab):
 
 def test_a_page_that_does_not_keep_up_is_not_flooded(tab):
     tab.answers = False
-    tab.set("Points", MOST)
+    tab.set("Points", MAX_POINTS)
     tab.click("Start")
-    tab.wait(lambda: tab.count >= flow.WINDOW)
+    tab.wait(lambda: tab.count >= send_window.WINDOW)
     end = time.monotonic() + 0.7
     while time.monotonic() < end:
         tab._read(0.05)
-    assert tab.count < flow.WINDOW + 2 * SAMPLED
+    assert tab.count < send_window.WINDOW + 2 * SAMPLED
     assert tab.state == "running"
     tab.click("Cancel")
 
@@ -480,7 +483,7 @@ def test_the_tab_follows_the_unit_of_length_and_keeps_what_it_shows():
     server = ViewerServer(STORE, Settings(), Clouds())
     with Visitor(server.start()) as tab:
         tab.settle(0.2)
-        (session,) = server._sessions.values()
+        (session,) = server._pages.values()
         post = session._tabs[0].post
         tab.draw(2000, seed=17)
         tab.set("Cut", "across z (level)")
@@ -550,7 +553,7 @@ def test_a_click_moves_the_arm_to_the_configuration_of_the_point(tab):
     points = whole(PIONEER, N, 17).points
     index = int(np.argmax(points @ np.array([1.0, 1.0, 0.3])))  # on the outside, towards the eye
     tab.send("ScenePointerMessage", **ray_to(points[index].astype(float), np.array([2.0, 2.0, 0.6])))
-    tab.wait(lambda: f"Moved to point {words.grouped(index)}" in tab.html)
+    tab.wait(lambda: f"Moved to point {views.grouped(index)}" in tab.html)
     q = kin.configuration_at(PIONEER, index, seed=17)
     tab.wait(lambda: np.allclose(tab.tool_pose(), kin.fk(PIONEER, q), atol=1e-9))
     tab.settle()
@@ -603,7 +606,7 @@ def test_locked_joints_are_locked_in_the_cloud_too(tab):
     assert np.abs(tab.points() - chunk.points).max() < HALF
     index = int(np.argmax(chunk.points @ np.array([1.0, 1.0, 0.3])))
     tab.send("ScenePointerMessage", **ray_to(chunk.points[index].astype(float), np.array([2.0, 2.0, 0.6])))
-    tab.wait(lambda: f"Moved to point {words.grouped(index)}" in tab.html)
+    tab.wait(lambda: f"Moved to point {views.grouped(index)}" in tab.html)
     q = kin.configuration_at(PIONEER, index, seed=30, locked=locked)
     tab.wait(lambda: np.allclose(tab.tool_pose(), kin.fk(PIONEER, q), atol=1e-9))
     tab.set("Compare with", PUMA.name)
@@ -634,7 +637,7 @@ def test_two_arms_in_one_picture_each_in_its_colour(tab):
 
 
 def test_another_robot_clears_the_cloud(tab):
-    tab.set("Points", MOST)
+    tab.set("Points", MAX_POINTS)
     tab.set("Cut", "along the arm")
     tab.set("Compare with", PUMA.name)
     tab.click("Start")
@@ -671,9 +674,9 @@ def test_a_second_visitor_gets_the_parts_from_the_cache(tab, service, monkeypatc
 
 
 def test_wrong_numbers_are_told_and_leave_the_page_alive(tab):
-    for label, value in (("Points", 0), ("Seed", -1), ("Drawn", "by hand"), ("Cut", "in half")):
+    for label, value in (("Points", 0), ("Seed", -1), ("Sampling", "by hand"), ("Cut", "in half")):
         tab.set(label, value)
-        tab.wait(lambda value=value: f"got {value!r}" in html.unescape(tab.html) and "Not understood" in tab.html)
+        tab.wait(lambda value=value: f"got {value!r}" in html.unescape(tab.html) and "Invalid input" in tab.html)
     tab.set("Points", 1)
     tab.set("Seed", 0)
     tab.draw(1000)
@@ -751,7 +754,7 @@ def test_an_address_restores_the_tab(service):
     server = ViewerServer(STORE, Settings(), clouds)
     with Visitor(server.start()) as tab:
         tab.settle(0.2)
-        feature = next(iter(server._sessions.values()))._tabs[0]
+        feature = next(iter(server._pages.values()))._tabs[0]
         with feature.stage.client.atomic():
             feature.restore({"n": 3000, "seed": 5, "axis": "z", "at": 0.1, "by": "nonsense", "drawn": True})
         feature.post("more")

@@ -1,8 +1,8 @@
-"""A capability map in the picture: boxes a little smaller than their cells, so that one sees in between.
+"""A capability map in the scene: boxes slightly smaller than their cells, so that the inside is visible.
 
-The voxels are sorted by value into levels, one node of the scene each. So moving the threshold sends nothing but
-which levels are hidden. Whatever else is changed, the map itself as it grows, colours or the cut, makes new nodes:
-some hundred kilobytes, which is why the caller does it a few times a second at most.
+The voxels are sorted by value into levels, one node of the scene each. So moving the threshold only changes which
+levels are hidden. Everything else, a growing map, other colours or the cut, creates new nodes of some hundred
+kilobytes; the caller therefore does it a few times a second at most.
 """
 
 from __future__ import annotations
@@ -15,25 +15,25 @@ import viser
 from numpy.typing import NDArray
 
 from app.viewer.scene.shapes import box
-from app.viewer.tabs.workspace.capability.wishes import By
+from app.viewer.tabs.workspace.capability.settings import By
 from app.viewer.tabs.workspace.colours import Scale, paint
 from app.viewer.tabs.workspace.cut import Cut
 from kin import CapabilityMap
 from kin.transforms import Array
 
 LEVELS = 25
-FILL = 0.7  # side of a box, of its cell's
-LIT = 0.7  # of a colour: the scene's light makes up for it, so that faces look like the legend
+FILL = 0.7  # side of a box, relative to its cell
+LIT = 0.7  # factor on colours: with the scene's light, faces then look like the legend
 PICKED = (213, 94, 0)
-REACH = 2.6  # cells: length of the arrows at the voxel that was clicked on
+ARROW_LENGTH = 2.6  # cells
 
-# Node clicked on and instance there.
+# Receives the clicked node's level and the instance.
 Clicked = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """How the map is drawn: by which quantity, in which colours, and which slabs of which cut are seen."""
+    """How the map is drawn: quantity, colours, cut, and the visible slabs."""
 
     by: By
     map: str
@@ -42,29 +42,29 @@ class Look:
 
 
 def values_of(found: CapabilityMap, by: By) -> NDArray[np.float32]:
-    """What each voxel ``(k,)`` is coloured by."""
+    """The coloured quantity of each voxel ``(k,)``."""
     return found.share if by == "share" else found.manipulability
 
 
 def largest(found: CapabilityMap, by: By) -> float:
-    """The largest of these values, 0 if there is none."""
+    """The largest of these values; 0 without voxels."""
     return float(values_of(found, by).max(initial=0.0))
 
 
 def levels(values: NDArray[np.float32]) -> NDArray[np.int64]:
     """The level ``(k,)`` of each value, 0 to ``LEVELS − 1``, in equal steps up to the largest."""
     most = max(float(values.max(initial=0.0)), 1e-12)
-    # Shares are fractions of each other: one that is on an edge belongs above it.
+    # Shares are fractions: a value on the boundary of two levels belongs to the upper one.
     return np.minimum(LEVELS * (values.astype(np.float64) / most) + 1e-4, LEVELS - 1).astype(np.int64)
 
 
 def first_level(least: float) -> int:
-    """The lowest level that is shown where `least` of the largest value is asked for."""
+    """The lowest visible level for a threshold `least`, relative to the largest value."""
     return min(round(LEVELS * least), LEVELS - 1)
 
 
 def uncut(found: CapabilityMap, look: Look) -> NDArray[np.bool_]:
-    """Which voxels ``(k,)`` the cut leaves: those whose centre it leaves."""
+    """Which voxels ``(k,)`` the cut shows: those with a visible centre."""
     if look.cut is None or look.shown is None:
         return np.ones(len(found.index), dtype=bool)
     return look.shown[look.cut.slabs(found.centres.astype(np.float32))]
@@ -75,7 +75,7 @@ class Voxels:
 
     Args:
         root: prefix of all node names, never used before in this scene.
-        clicked: called from any thread with a voxel's level and its place there.
+        clicked: called from any thread with a voxel's level and its index there.
     """
 
     def __init__(
@@ -113,20 +113,20 @@ class Voxels:
                 self._listen(node, k, clicked)
 
     def show(self, least: float) -> None:
-        """Hide what is below this share of the largest value."""
+        """Hide voxels below this share of the largest value."""
         first = first_level(least)
         for k, node in self._nodes.items():
             if node.visible != (k >= first):
                 node.visible = k >= first
 
     def voxel(self, level: int, instance: int) -> int | None:
-        """The voxel's row in the map, None if there is none such."""
+        """The voxel's row in the map, None if there is none."""
         if 0 <= level < LEVELS and 0 <= instance < len(self._rows[level]):
             return int(self._rows[level][instance])
         return None
 
     def remove(self) -> None:
-        """Take it out of the scene."""
+        """Remove the map from the scene."""
         self._top.remove()
 
     def _listen(self, node: viser.BatchedMeshHandle, level: int, clicked: Clicked) -> None:
@@ -137,13 +137,13 @@ class Voxels:
 
 
 def mark(scene: viser.SceneApi, root: str, found: CapabilityMap, row: int) -> viser.FrameHandle:
-    """A cage around a voxel, and an arrow along each direction it can be approached from, up to its centre."""
+    """Mark a voxel: its edges, and an arrow to its centre along each possible approach direction."""
     centre, side = found.centres[row], found.grid.voxel
     top = scene.add_frame(root, show_axes=False, position=centre)
     scene.add_line_segments(f"{root}/cage", edges(side).astype(np.float32), PICKED, thickness=0.06 * side)
     along = found.grid.directions[found.approachable[row]]
     if len(along):
-        arrows = np.stack([-REACH * side * along, -0.1 * side * along], axis=1)
+        arrows = np.stack([-ARROW_LENGTH * side * along, -0.1 * side * along], axis=1)
         scene.add_arrows(
             f"{root}/arrows",
             arrows.astype(np.float32),

@@ -1,0 +1,299 @@
+"""The walk through a DH table in the scene: a large moving frame, the completed frames, and the present parameter.
+
+Links hide their own axes. So rotations are drawn as arcs at a distance from the joint, and lengths as in an
+engineering drawing: next to what they measure, between two extension lines. The table in the other convention is
+drawn as a skeleton to one side.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from app.viewer.lessons.dh.steps import Factor, Place, amount, axis, coaxial_joints, reread, symbol, turns
+from app.viewer.lessons.dh.views import ABOUT_X, ABOUT_Z, TITLES
+from app.viewer.scene.camera import DIRECTION
+from app.viewer.scene.meshes import body, joint_color
+from kin import Robot
+from kin.transforms import Array, wxyz_from_rotation
+from kin.units import Units
+
+Segments = NDArray[np.float32]
+
+GREY = (128, 134, 145)
+AXES = ((204, 0, 0), (51, 153, 0), (0, 0, 204))  # x, y, z, as viser paints the axes of a frame
+ARC = 32  # segments
+# In units of the arm's thickness.
+MOVING, PLACED, RADIUS, ASIDE = 8.0, 4.5, 6.0, 4.0
+
+
+def arc(axis_: int, radius: float, angle: float) -> Segments:
+    """A rotation about z from x, or about x from z: first and last ray, arc, arrow head ``(ARC + 4, 2, 3)``."""
+    angles = np.linspace(0.0, angle, ARC + 1)
+    # About x, the arc starts at z and goes towards −y, as z itself does.
+    c, s, o = np.cos(angles), np.sin(angles), np.zeros(ARC + 1)
+    way = radius * (np.stack([c, s, o], 1) if axis_ == 2 else np.stack([o, -s, c], 1))
+    along = way[-1] - way[-2]
+    along = along / (float(np.linalg.norm(along)) or 1.0)
+    back = min(0.16 * radius, radius * abs(angle) / 2)
+    lines = np.zeros((ARC + 4, 2, 3), np.float32)
+    lines[:2, 1] = 1.12 * way[[0, -1]]
+    lines[2:-2, 0], lines[2:-2, 1] = way[:-1], way[1:]
+    lines[-2:, 0] = way[-1]
+    lines[-2:, 1] = way[-1] - back * along + np.array([[-0.5], [0.5]]) * back / radius * way[-1]
+    return lines
+
+
+def ruler(axis_: int, aside: float, distance: float) -> Segments:
+    """A translation along z or x, at `aside` in y: extension and dimension lines, arrow heads ``(7, 2, 3)``."""
+    e, y = np.eye(3)[axis_], np.eye(3)[1]
+    start, end = aside * y, aside * y + distance * e
+    back = math.copysign(min(0.16 * aside, abs(distance) / 2), distance)
+    barbs = [
+        (tip, tip + way * back * e + side * 0.4 * abs(back) * y)
+        for tip, way in ((start, 1.0), (end, -1.0))
+        for side in (-1.0, 1.0)
+    ]
+    witness = [(np.zeros(3), 1.12 * start), (distance * e, distance * e + 1.12 * start)]
+    return np.array([*witness, (start, end), *barbs], dtype=np.float32)
+
+
+def middle(factor: Factor, shown: float, radius: float, aside: float) -> Array:
+    """The place ``(3,)`` of the value's label, in the frame before the motion."""
+    if turns(factor):
+        c, s = 1.3 * radius * math.cos(shown / 2), 1.3 * radius * math.sin(shown / 2)
+        return np.array([c, s, 0.0]) if axis(factor) == 2 else np.array([0.0, -s, c])
+    at = np.array([0.0, 1.35 * aside, 0.0])
+    at[axis(factor)] = shown / 2
+    return at
+
+
+def triads(frames: Array, size: float) -> Segments:
+    """x, y and z of frames ``(k, 4, 4)`` as lines ``(3k, 2, 3)``."""
+    origins = np.repeat(frames[:, None, :3, 3], 3, axis=1)
+    tips = origins + size * np.swapaxes(frames[:, :3, :3], 1, 2)
+    return np.stack([origins, tips], axis=2).reshape(-1, 2, 3).astype(np.float32)
+
+
+def triad_colors(count: int) -> NDArray[np.uint8]:
+    """Colours of the lines of `count` `triads`."""
+    axes = np.array([linear(color) for color in AXES])
+    return np.tile(np.repeat(axes[:, None], 2, axis=1), (count, 1, 1))
+
+
+def linear(color: tuple[int, int, int]) -> NDArray[np.uint8]:
+    """A screen colour as viser needs it at the ends of lines: it takes those as linear intensities."""
+    return np.round(255.0 * (np.array(color) / 255.0) ** 2.2).astype(np.uint8)
+
+
+def skeleton(robot: Robot, frames: Array) -> Segments:
+    """The links as lines ``(2 rows, 2, 3)``: along z by d and along x by a, in the convention's order."""
+    start = np.concatenate([robot.T_world_base[None], frames[:-1]])
+    origin, end = start[:, :3, 3], frames[:, :3, 3]
+    if robot.convention == "standard":
+        bend = origin + start[:, :3, 2] * ((end - origin) * start[:, :3, 2]).sum(1, keepdims=True)
+    else:
+        bend = origin + start[:, :3, 0] * ((end - origin) * start[:, :3, 0]).sum(1, keepdims=True)
+    return (
+        np.stack([np.stack([origin, bend], 1), np.stack([bend, end], 1)], 1).reshape(-1, 2, 3).astype(np.float32)
+    )
+
+
+def joint_axis(robot: Robot, frames: Array, joint: int, reach: float) -> Segments:
+    """The axis of a moving joint ``(1, 2, 3)``, to a distance `reach` on both sides."""
+    row = robot.joint_rows[joint]
+    # In a standard table a joint turns about z of the frame before its row.
+    line = row - 1 if robot.convention == "standard" else row
+    T = frames[line] if line >= 0 else robot.T_world_base
+    return np.array([[T[:3, 3] - reach * T[:3, 2], T[:3, 3] + reach * T[:3, 2]]], dtype=np.float32)
+
+
+class WalkDrawing:
+    """The walk on the arm itself. Not thread-safe: the visitor's worker calls it.
+
+    Args:
+        root: prefix of all node names; a different one for each arm of a scene.
+    """
+
+    def __init__(self, scene: viser.SceneApi, robot: Robot, frames: Array, root: str) -> None:
+        self._scene = scene
+        self._robot = robot
+        self._size = body(robot).size
+        self._root = scene.add_frame(root, show_axes=False)
+        self._name = root
+        self._moving = moving_frame(scene, f"{root}/moving", self._size)
+        all_frames = np.concatenate([robot.T_world_base[None], frames])
+        self._heights = [_height(all_frames, i) for i in range(len(all_frames))]
+        self._labels = [
+            scene.add_label(f"{root}/name-{i}", f"frame {i}", anchor="center-center", visible=False)
+            for i in range(len(all_frames))
+        ]
+        self._value = scene.add_label(
+            f"{root}/value", "", anchor="center-center", visible=False, font_screen_scale=1.15
+        )
+        self._placed: viser.LineSegmentsHandle | None = None
+        self._count = -1
+        self._quantity: viser.LineSegmentsHandle | None = None
+        self._applied: tuple[int, int] | None = None
+        self._made = 0
+
+    def show(self, at: Place, frames: Array, units: Units, names: bool) -> None:
+        """Show a place, with the arm's ``link_frames``; `names`: update the labels of frames as well."""
+        pose(self._moving, at.T_0_now)
+        self._show_placed(np.concatenate([self._robot.T_world_base[None], frames[: at.placed]]), names)
+        self._show_quantity(at, units)
+
+    def remove(self) -> None:
+        """Remove everything from the scene."""
+        self._root.remove()
+
+    def _show_placed(self, frames: Array, names: bool) -> None:
+        points = triads(frames, PLACED * self._size)
+        if len(frames) == self._count and self._placed is not None:
+            self._placed.points = points
+        else:
+            if self._placed is not None:
+                self._placed.remove()
+            self._count = len(frames)
+            colors = triad_colors(len(frames))
+            self._placed = self._lines("placed", points, colors, 0.26)
+            for i, label in enumerate(self._labels):
+                label.visible = i < len(frames)
+            names = True
+        if not names:
+            return
+        for label, height, T in zip(self._labels, self._heights, frames, strict=False):
+            label.position = T[:3, 3] + height * PLACED * self._size * T[:3, 2]
+
+    def _show_quantity(self, at: Place, units: Units) -> None:
+        shown = at.value * at.share
+        there = at.motion >= 0 and at.value != 0.0
+        self._value.visible = there
+        if not there:
+            self._forget_quantity()
+            return
+        about = axis(at.factor)
+        radius, aside = RADIUS * self._size, ASIDE * self._size
+        points = arc(about, radius, shown) if turns(at.factor) else ruler(about, aside, shown)
+        R, p = at.T_0_before[:3, :3].astype(np.float32), at.T_0_before[:3, 3].astype(np.float32)
+        points = points @ R.T + p
+        if self._applied == (at.row, at.motion) and self._quantity is not None:
+            self._quantity.points = points
+        else:
+            self._forget_quantity()
+            colors = np.empty((len(points), 2, 3), np.uint8)
+            colors[:2], colors[2:] = linear(GREY), linear(ABOUT_Z if about == 2 else ABOUT_X)
+            self._quantity = self._lines("quantity", points, colors, 0.42)
+            self._applied = (at.row, at.motion)
+        whole = amount(at.factor, at.value, units)
+        so_far = "= " if at.share == 1.0 else f"{amount(at.factor, shown, units)} of "
+        self._value.text = f"{symbol(self._robot, at.row, at.factor)} {so_far}{whole}"
+        self._value.position = R @ middle(at.factor, shown, radius, aside) + p
+
+    def _forget_quantity(self) -> None:
+        if self._quantity is not None:
+            self._quantity.remove()
+            self._quantity, self._applied = None, None
+
+    def _lines(
+        self, name: str, points: Segments, colors: NDArray[np.uint8], width: float
+    ) -> viser.LineSegmentsHandle:
+        self._made += 1
+        return self._scene.add_line_segments(
+            f"{self._name}/{name}-{self._made}", points, colors, thickness=width * self._size
+        )
+
+
+class OtherDrawing:
+    """The table in the other convention: a skeleton next to the arm, and on both the joint axes that differ."""
+
+    def __init__(self, scene: viser.SceneApi, robot: Robot, root: str) -> None:
+        self.robot = reread(robot)
+        self._pair = (robot, self.robot)
+        self._size = body(robot).size
+        self.offset = aside(robot)
+        self._root = scene.add_frame(root, show_axes=False)
+        other = f"{root}/other"
+        scene.add_frame(other, show_axes=False, position=self.offset)
+        self._moving = moving_frame(scene, f"{other}/moving", self._size)
+        k = len(robot.rows)
+        nothing = np.zeros((1, 2, 3), np.float32)
+        self._bones = scene.add_line_segments(
+            f"{other}/bones", np.repeat(nothing, 2 * k, 0), GREY, thickness=1.1 * self._size
+        )
+        colors = triad_colors(k + 1)
+        self._frames = scene.add_line_segments(
+            f"{other}/frames", np.repeat(nothing, 3 * k + 3, 0), colors, thickness=0.26 * self._size
+        )
+        reach = 3.0 * self._size
+        for reading, parent in zip(self._pair, (root, other), strict=True):
+            base = reading.T_world_base[:3, 3] - np.array([0.0, 0.0, reach])
+            scene.add_label(f"{parent}/title", TITLES[reading.convention], position=base, anchor="top-center")
+        joints = sorted({j for r in self._pair for k in coaxial_joints(r) for j in (k, k + 1)})
+        self._lines = []
+        for reading, parent in zip(self._pair, (root, other), strict=True):
+            coaxial = coaxial_joints(reading)
+            for j in joints:
+                # Two joints on one axis have one label, at the outer tip.
+                name = f"joints {j} and {j + 1}: one axis" if j - 1 in coaxial else f"joint {j + 1}"
+                text = "" if j in coaxial else name
+                line = scene.add_line_segments(
+                    f"{parent}/line-{j + 1}", nothing, joint_color(j), thickness=0.3 * self._size
+                )
+                label = scene.add_label(
+                    f"{parent}/line-{j + 1}-name", text, anchor="center-left", visible=bool(text)
+                )
+                self._lines.append((reading, j, line, label))
+
+    def show(self, at: Place, frames: Array, frames_other: Array, names: bool) -> None:
+        """Show a place of the other table, with the ``link_frames`` of both; `names`: as for `WalkDrawing`."""
+        pose(self._moving, at.T_0_now)
+        self._bones.points = skeleton(self.robot, frames_other)
+        all_frames = np.concatenate([self.robot.T_world_base[None], frames_other])
+        self._frames.points = triads(all_frames, PLACED * self._size)
+        for reading, joint, line, label in self._lines:
+            points = joint_axis(
+                reading, frames_other if reading is self.robot else frames, joint, 11.0 * self._size
+            )
+            line.points = points
+            if names:
+                label.position = points[0, 1]
+
+    def remove(self) -> None:
+        """Remove everything from the scene."""
+        self._root.remove()
+
+
+def moving_frame(scene: viser.SceneApi, name: str, size: float) -> viser.FrameHandle:
+    """A large frame with labelled axes."""
+    frame = scene.add_frame(
+        name,
+        axes_length=MOVING * size,
+        axes_radius=0.17 * size,
+        origin_radius=0.4 * size,
+        origin_color=(230, 159, 0),
+    )
+    for tip, letter in zip(np.eye(3), "xyz", strict=True):
+        scene.add_label(f"{name}/{letter}", letter, position=1.1 * MOVING * size * tip, anchor="center-center")
+    return frame
+
+
+def pose(node: viser.SceneNodeHandle, T: Array) -> None:
+    """Set a node's pose ``(4, 4)``. viser ignores changes below 1e-5, which are invisible here."""
+    node.position = T[:3, 3]
+    node.wxyz = wxyz_from_rotation(T[:3, :3])
+
+
+def aside(robot: Robot) -> Array:
+    """The place ``(3,)`` of the other arm: to the left of the arm in the default view, out of its reach."""
+    left = np.array([DIRECTION[1], -DIRECTION[0], 0.0])
+    return 1.4 * body(robot).radius * left / np.linalg.norm(left)
+
+
+def _height(frames: Array, i: int) -> float:
+    """The distance of a frame's label, in lengths of its z axis: the frames of a wrist share their origin."""
+    crowd = int((np.linalg.norm(frames[:i, :3, 3] - frames[i, :3, 3], axis=1) < 1e-6).sum())
+    return 1.2 + 0.5 * crowd

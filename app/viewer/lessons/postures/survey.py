@@ -1,0 +1,199 @@
+"""All postures for one target: which are available, how good they are, and what rules out the others.
+
+`kin.solve_ik` gives the available ones. The closed form tells why the others are not: a branch may violate a joint
+limit, which is reported with the joint and the excess, or have no real solution.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+
+import kin
+from app.viewer.panel.posture import parts, short
+from app.viewer.scene.meshes import JOINT_COLORS, Color
+from app.viewer.views.templates import render
+from kin import IKOptions, IKSolution, JointConstraints, LimitViolation, Robot, Task
+from kin.ik.branches import is_closed, solve_branches, violations_of
+from kin.ik.candidates import OVERRUN
+from kin.ik.problem import IKProblem
+from kin.transforms import Array
+from kin.units import DEFAULT_UNITS, Units
+
+State = Literal["reachable", "compromise", "blocked", "absent", "unknown"]
+
+# The joints' colours, with a darker yellow; grey for the eighth posture, and another grey for postures outside the
+# limits.
+COLORS: tuple[Color, ...] = (*JOINT_COLORS[:6], (200, 180, 30), (110, 110, 110))
+BLOCKED_COLOR: Color = (150, 150, 150)
+_PROBES = 2000
+CLOSEST = "closest"  # the one posture of an arm whose branches have no names
+_SLIDE = 4.0  # rad/m: weight of prismatic joints, to compare margins of both kinds
+
+
+@dataclass(frozen=True, eq=False)
+class Posture:
+    """One branch at one target.
+
+    Attributes:
+        name: the branch's name, as `kin.solve_ik` takes it.
+        state: reachable; a compromise; blocked by joint limits; absent, without a real solution; or unknown.
+        words: the same in words.
+        q: its configuration ``(n,)``, outside the limits if blocked; None if there is none.
+        margin: distance (rad or m) to the nearest joint limit; inf without limits; 0 unless available.
+        joint: index of the joint nearest to its limit, −1 without limits.
+        manipulability: Yoshikawa's measure.
+        share: the same, relative to the arm's best.
+    """
+
+    name: str
+    state: State
+    words: str
+    q: Array | None = None
+    margin: float = 0.0
+    joint: int = -1
+    manipulability: float = 0.0
+    share: float = 0.0
+
+    @property
+    def available(self) -> bool:
+        """Whether the arm can move there."""
+        return self.state in ("reachable", "compromise")
+
+
+def survey(
+    robot: Robot,
+    T: Array,
+    task: Task,
+    q: Array,
+    locked: tuple[float | None, ...] | None = None,
+    units: Units = DEFAULT_UNITS,
+) -> tuple[Posture, ...]:
+    """All branches for the target `T` ``(4, 4)``, with the seed `q` ``(n,)``, in the order of `kin.branch_names`.
+
+    An arm whose branches have no names has one posture: the closest one found, if any.
+    """
+    target = T[:3, 3] if task == "position" else T
+    result = kin.solve_ik(robot, target, task=task, q_seed=q, locked=locked)
+    solutions: dict[str, IKSolution] = {}
+    for found in result.solutions:
+        solutions.setdefault(found.branch, found)
+    names = kin.branch_names(robot)
+    if not names:
+        one = next(iter(solutions.values()), None)
+        return (
+            Posture(CLOSEST, "absent", "none found") if one is None else _available(robot, CLOSEST, one, units),
+        )
+    rest = {} if len(solutions) == len(names) else _unavailable(robot, T, task, q, locked, units)
+    return tuple(
+        _available(robot, name, solutions[name], units)
+        if name in solutions
+        else rest.get(name, Posture(name, "unknown", "not searched"))
+        for name in names
+    )
+
+
+def _available(robot: Robot, name: str, solution: IKSolution, units: Units) -> Posture:
+    q = solution.q
+    margin, joint = limit_margin(robot, q)
+    value = float(kin.manipulability(robot, q))
+    state: State = "compromise" if solution.compromise else "reachable"
+    words = "reachable"
+    if solution.compromise:
+        words = f"{solution.compromise} off by {units.angle(solution.rotation_error)}"
+    share = min(1.0, value / best_manipulability(robot))
+    return Posture(name, state, words, q, margin, joint, value, share)
+
+
+def _unavailable(
+    robot: Robot, T: Array, task: Task, q: Array, locked: tuple[float | None, ...] | None, units: Units
+) -> dict[str, Posture]:
+    """The branches that the closed form rules out, and why; empty if it does not cover the task."""
+    # An arm of five joints matches point and approach of a pose; its branches are those of that task.
+    kept: Task = "approach" if task == "pose" and robot.n < 6 else task
+    problem = IKProblem.of(robot, T, IKOptions(task=kept, constraints=JointConstraints(locked=locked)), q)
+    branches = solve_branches(problem, problem.T, problem.code)
+    if branches is None:
+        return {}
+    closed = is_closed(branches.stats)
+    found = {}
+    for i, name in enumerate(kin.branch_names(robot)):
+        if not closed[i]:
+            found[name] = Posture(name, "absent", "no real solution")
+        elif branches.stats[i, OVERRUN] > 0.0:
+            words = limit_violation(robot, violations_of(problem, branches.q[i]), problem.locked, units)
+            found[name] = Posture(name, "blocked", words, branches.q[i].copy())
+        else:
+            found[name] = Posture(name, "absent", "same as another")  # two branches coincide
+    return found
+
+
+def limit_margin(robot: Robot, q: Array) -> tuple[float, int]:
+    """The smallest distance (rad or m) of a joint to its limit, and that joint; (inf, −1) without limits."""
+    weights = np.where(robot.revolute, 1.0, _SLIDE)
+    room = np.minimum(q - robot.lower, robot.upper - q)
+    joint = int(np.argmin(room * weights))
+    return (float(max(room[joint], 0.0)), joint) if math.isfinite(room[joint]) else (math.inf, -1)
+
+
+@lru_cache(maxsize=256)
+def best_manipulability(robot: Robot) -> float:
+    """The largest value in a fixed sample of configurations; 1.0 for an arm that is always singular."""
+    q = robot.random_q(np.random.default_rng(11), _PROBES)
+    return float(kin.manipulability(robot, q).max()) or 1.0
+
+
+def limit_violation(
+    robot: Robot, violations: tuple[LimitViolation, ...], locked: tuple[bool, ...], units: Units
+) -> str:
+    """``outside limit of joint 3 by 12.0°``: the largest violation, and the number of others."""
+    if not violations:
+        return "outside limits"
+    worst = max(violations, key=lambda v: abs(v.value - v.limit))
+    by = units.motion(robot.revolute[worst.joint], worst.value - worst.limit)
+    more = f", and {len(violations) - 1} more" if len(violations) > 1 else ""
+    number = worst.joint + 1
+    if locked[worst.joint]:
+        return f"joint {number} is locked {by} away{more}"
+    return f"outside limit of joint {number} by {by}{more}"
+
+
+def html(robot: Robot, postures: tuple[Posture, ...], present: str, shown: frozenset[str], units: Units) -> str:
+    """The list: a numbered row for each branch, the arm's `present` one marked; `shown`: those with a ghost."""
+    rows = [
+        _row(robot, i, posture, posture.name == present, posture.name in shown, units)
+        for i, posture in enumerate(postures)
+    ]
+    return render("postures/list", parts=parts(robot), rows=rows)
+
+
+def _row(robot: Robot, index: int, posture: Posture, here: bool, shown: bool, units: Units) -> dict[str, object]:
+    """The values of one row of the template."""
+    r, g, b = COLORS[index % len(COLORS)] if posture.available else BLOCKED_COLOR
+    status = "outside limits" if posture.state == "blocked" else posture.words
+    detail = posture.words if posture.state == "blocked" else ""
+    if posture.available:
+        detail = "no limits"
+        if posture.joint >= 0:
+            margin = units.motion(robot.revolute[posture.joint], posture.margin)
+            detail = f"{margin} to limit of joint {posture.joint + 1}"
+        if posture.state == "compromise":
+            status, detail = "", f"{posture.words} · {detail}"
+    return {
+        "name": posture.name,
+        "title": short(posture.name),
+        "state": posture.state,
+        "available": posture.available,
+        "here": here,
+        "filled": shown or here,
+        "color": f"rgb({r},{g},{b})",
+        "ink": "#000" if 0.3 * r + 0.59 * g + 0.11 * b > 105.0 else "#fff",
+        "status": status,
+        "detail": detail,
+        "manipulability": f"{posture.manipulability:.4f}",
+        "percent": f"{100.0 * posture.share:.0f}",
+    }

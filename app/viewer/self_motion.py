@@ -1,0 +1,105 @@
+"""Self-motion: motions of the arm that keep the tool in place.
+
+The core gives the feasible ranges of a redundancy parameter exactly. This module answers what a page asks about
+them: the configuration for a value, the range reachable from the present value, and the joint limit at each end.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+import kin
+from kin import IKOptions, IKResult, JointConstraints, Redundancy, Robot, Task
+from kin.ik.problem import prepare
+from kin.transforms import Array
+
+SMOOTH = 0.6  # rad; a larger step of a joint in one event is a jump to another posture
+INSET = 1e-6  # rad; the end of a range is evaluated this far inside it
+AT_LIMIT = 1e-4  # rad or m
+_SEAM = 1e-9
+Locks = tuple[float | None, ...] | None
+
+
+@dataclass(frozen=True)
+class End:
+    """An end of a feasible range: the value, and the joint whose limit is met there (−1: none)."""
+
+    value: float
+    joint: int
+
+
+def self_motion(robot: Robot, T: Array, task: Task, q: Array, locked: Locks, name: str, value: float) -> IKResult:
+    """Solve for the target `T` ``(4, 4)`` with a redundancy parameter set.
+
+    A solution near `q` ``(n,)`` is preferred; if there is none, the solution on the branch of `q` is returned.
+    """
+    target = T[:3, 3] if task == "position" else T
+    for branch in (None, "seed"):
+        result = kin.solve_ik(
+            robot, target, task=task, q_seed=q, locked=locked, branch=branch, redundancy={name: value},
+            max_solutions=1,
+        )  # fmt: skip
+        if result.solutions and float(np.abs(result.solutions[0].q - q).max()) < SMOOTH:
+            break
+    return result
+
+
+def redundancy_at(robot: Robot, T: Array, task: Task, q: Array, locked: Locks) -> tuple[Redundancy, ...]:
+    """The redundancy parameters of a task at `q` ``(n,)``, on its branch, without those of singular poses only."""
+    target = T[:3, 3] if task == "position" else T
+    seed = "seed" if kin.branch_names(robot) else None
+    options = IKOptions(task=task, constraints=JointConstraints(locked=locked), branch=seed, max_solutions=1)
+    rare = {parameter.name for parameter in prepare(robot, options).redundancies if parameter.rare}
+    found = kin.ik.solve(robot, target, options, q)
+    return tuple(item for item in found.redundancy if item.name not in rare)
+
+
+def circular(item: Redundancy) -> bool:
+    """Whether a parameter is periodic, and not a joint's own value."""
+    return not item.name.startswith("theta")
+
+
+def range_of(item: Redundancy) -> tuple[float, float] | None:
+    """The feasible range that contains the present value, in which ±π may lie; None if there is none.
+
+    A range across ±π is given with an upper end beyond π, or a lower end below −π.
+    """
+    ranges = [r for r in item.intervals if r[0] - INSET <= item.value <= r[1] + INSET]
+    if not ranges:
+        return None
+    low, high = ranges[0]
+    if not circular(item) or (low <= -math.pi + _SEAM and high >= math.pi - _SEAM):
+        return low, high
+    if high >= math.pi - _SEAM:
+        after = next((r for r in item.intervals if r[0] <= -math.pi + _SEAM), None)
+        return (low, after[1] + 2.0 * math.pi) if after else (low, high)
+    if low <= -math.pi + _SEAM:
+        before = next((r for r in item.intervals if r[1] >= math.pi - _SEAM), None)
+        return (before[0] - 2.0 * math.pi, high) if before else (low, high)
+    return low, high
+
+
+def ends(robot: Robot, T: Array, task: Task, q: Array, locked: Locks, item: Redundancy) -> tuple[End, ...]:
+    """The ends of all feasible ranges, each with the joint whose limit is met; ±π of a periodic one is no end."""
+    found = []
+    target = T[:3, 3] if task == "position" else T
+    branch = "seed" if kin.branch_names(robot) else None
+    for low, high in item.intervals:
+        for value, inside in ((low, min(low + INSET, high)), (high, max(high - INSET, low))):
+            if circular(item) and abs(abs(value) - math.pi) < _SEAM:
+                continue
+            result = kin.solve_ik(
+                robot, target, task=task, q_seed=q, locked=locked, branch=branch, redundancy={item.name: inside},
+                max_solutions=1,
+            )  # fmt: skip
+            joint = -1
+            if result.solutions:
+                there = result.solutions[0].q
+                room = np.minimum(there - robot.lower, robot.upper - there)
+                nearest = int(np.argmin(room))
+                joint = nearest if room[nearest] < AT_LIMIT else -1
+            found.append(End(value, joint))
+    return tuple(found)

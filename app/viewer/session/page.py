@@ -1,0 +1,399 @@
+"""One visitor's page: panel, status line, features, camera and saved state, driven by one worker thread.
+
+Browser callbacks post events into the inbox and return. The worker takes all new events, processes them, and sends
+one consistent update. While the arm is moving it also wakes up for the next frame; otherwise it sleeps. Nothing
+here is locked, because nothing here is shared.
+
+The arm itself belongs to the :class:`~app.viewer.session.controller.ArmController`.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import replace
+
+import viser
+
+import kin
+from app.viewer.feature import Feature
+from app.viewer.lessons import LESSONS
+from app.viewer.panel import assign
+from app.viewer.panel.joints import JointSliders, lock_notice
+from app.viewer.panel.layout import Panel
+from app.viewer.panel.status import Notice, StatusLine
+from app.viewer.panel.target import TASKS
+from app.viewer.panel.view import ViewState, configure_theme
+from app.viewer.scene.camera import Sphere, VisitorCamera
+from app.viewer.session.controller import ArmController
+from app.viewer.session.lessons import LessonChoice
+from app.viewer.session.persistence import Persistence
+from app.viewer.session.posture import PosturePanel
+from app.viewer.session.services import Services
+from app.viewer.session.worker import Worker
+from app.viewer.tabs import TABS
+from kin import IKResult, Robot, Task
+from kin.transforms import Array
+from kin.units import DEFAULT_UNITS, Units
+
+WELCOME = Notice("hand", "Ready", "Drag the coloured arrows at the gripper, or move a joint slider.")
+BY_HAND = Notice("hand", "Joints moved by hand", "The target follows the tool.")
+
+
+class VisitorPage(Worker):
+    """The page of one visitor.
+
+    The methods that `Worker` calls thread-safe may be called by any thread; everything else belongs to the worker.
+    The page is the :class:`~app.viewer.feature.Stage` of its features, the listener of its arm's controller, and
+    the :class:`~app.viewer.session.persistence.SavedPage` of its persistence.
+
+    Args:
+        token: whether programs must send an access token.
+        failed: called last by a worker that cannot continue.
+    """
+
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        services: Services,
+        token: bool = False,
+        welcome: Notice = WELCOME,
+        failed: Callable[[], None] | None = None,
+    ) -> None:
+        super().__init__(client.client_id, failed)
+        self.store = services.store
+        self.clouds = services.clouds
+        self.maps = services.maps
+        self.summaries = services.summaries
+        self.arm = ArmController(client, services.pace, self.post, self)
+        self.view = ViewState()
+        self.lessons: LessonChoice | None = None
+        self.client = client
+        self._pace = services.pace
+        self._welcome = welcome
+        self._persistence = Persistence(self, token, self._guard)
+        self.units = DEFAULT_UNITS
+        self._tabs: list[Feature] = []
+        # Which numbers in the panel are out of date, and when they were updated last.
+        self._readout_due = self._sliders_due = False
+        self._updated_at = 0.0
+        self._dragged: int | None = None  # the joint whose slider the visitor holds
+        # Created by the worker when it builds the page.
+        self.camera: VisitorCamera
+        self.posture: PosturePanel
+        self._panel: Panel
+        self._status: StatusLine
+        self._sliders: JointSliders
+        # Events by the first part of their key. A handler takes the other parts, and the value.
+        self._handlers: dict[str, Callable[..., None]] = {
+            "gizmo": self.arm.pull,
+            "joint": self._on_slider,
+            "redundancy": self._on_redundancy,
+            "lock": self._on_lock,
+            "branch": self._on_branch_choice,
+            "feature": self._on_feature,
+            "lesson": lambda title: self.lessons.choose(title) if self.lessons is not None else None,
+            "robot": self._on_robot_choice,
+            "task": self._on_task,
+            "radians": lambda radians: self._use_units(replace(self.units, degrees=not radians)),
+            "lengths": lambda name: self._use_units(self._panel.units.with_length(self.units, name)),
+            "home": lambda _: self._move_by_hand(self.arm.move_home),
+            "random": lambda _: self._move_by_hand(self.arm.move_to_random),
+            "recall": lambda _: self._move_by_hand(self.arm.recall_target),
+            "copy-as": lambda name: self._panel.share.choose(name),
+            "view": self._on_view,
+            "camera": lambda _: self.camera.aim(self.arm.scene.body),
+            "looked": lambda _: None,  # the viewpoint is read when the camera rests
+        }
+
+    # Stage: what features may use
+
+    @property
+    def robot(self) -> Robot:
+        return self.arm.robot
+
+    @property
+    def task(self) -> Task:
+        return self.arm.task
+
+    @property
+    def goal(self) -> Array:
+        return self.arm.goal
+
+    @property
+    def q(self) -> Array:
+        return self.arm.q
+
+    @property
+    def target(self) -> Array | None:
+        return self.arm.target
+
+    @property
+    def locked(self) -> tuple[float | None, ...] | None:
+        return self.arm.locked
+
+    @property
+    def branch(self) -> str | None:
+        return self.arm.branch
+
+    @property
+    def dark(self) -> bool:
+        return self.view.dark
+
+    def move_to(self, q: Array, notice: Notice | None = None, at_once: bool = False) -> None:
+        self.arm.move_to(q, ease=not at_once)
+        self._status.show(notice or BY_HAND)
+
+    def set_target(self, T_base_tool: Array) -> None:
+        self.arm.set_target(T_base_tool)
+
+    def set_task(self, task: Task) -> None:
+        self._panel.target.show(task)
+        self.arm.set_task(task)
+
+    def unlock(self, joint: int | None = None) -> None:
+        self._change_lock(joint, False)
+
+    def allow_any_branch(self) -> None:
+        self.arm.allow_any_branch()
+
+    def notify(self, notice: Notice) -> None:
+        self._status.show(notice)
+
+    def fit_view(self, spheres: Sequence[Sphere]) -> None:
+        self.camera.fit(spheres)
+
+    # SavedPage: what persistence may use besides
+
+    @property
+    def features(self) -> list[Feature]:
+        """The tabs, and the open lesson."""
+        lesson = self.lessons.shown if self.lessons is not None else None
+        return [*self._tabs, lesson] if lesson is not None else self._tabs
+
+    def set_locks(self, locks: Sequence[bool]) -> None:
+        """Lock exactly these joints ``(n,)``."""
+        self._sliders.show_locks(locks)
+        self.arm.set_locks(locks)
+
+    def set_branch(self, branch: str) -> None:
+        """Request a branch from the next target on."""
+        self.arm.branch = branch
+        self.posture.choose(branch)
+
+    # Reports of the arm's controller
+
+    def on_pose(self, T_base_tool: Array) -> None:
+        self._readout_due = True
+        self._for_features(lambda feature: feature.on_pose(T_base_tool))
+
+    def on_goal(self, dragged: int | None) -> None:
+        self._sliders_due, self._dragged = True, dragged
+
+    def on_result(self, result: IKResult) -> None:
+        self.posture.use_result(result)
+        self._status.show_result(result, self.units)
+        self._for_features(lambda feature: feature.on_result(result))
+
+    def on_request(self) -> None:
+        self.posture.show()
+        self._for_features(lambda feature: feature.on_request())
+
+    def on_branch(self, branch: str | None) -> None:
+        self.posture.choose(branch)
+
+    # Worker
+
+    @property
+    def _timeout(self) -> float | None:
+        times = [feature.due for feature in self.features if feature.due is not None]
+        if self.arm.moving:
+            times.append(self._pace.interval)
+        elif self._persistence.due is not None and not self.arm.dragging:
+            times.append(max(0.0, self._persistence.due - time.perf_counter()))
+        if self._readout_due or self._sliders_due:
+            times.append(max(0.0, self._updated_at + self._pace.reading - time.perf_counter()))
+        return min(times, default=None)
+
+    def _report(self, notice: Notice) -> None:
+        self._status.show(notice)
+        self.client.flush()
+
+    def _leave(self) -> None:
+        self.arm.leave()
+        self._for_features(lambda feature: feature.on_leave())
+
+    def _step(self, batch: list[tuple[Hashable, object]]) -> None:
+        with self.client.atomic():
+            for key, value in batch:
+                # Guarded one by one, so that one bad value does not discard the others.
+                self._guard(lambda key=key, value=value: self._handle(key, value))  # type: ignore[misc]
+            self.arm.draw(fresh=bool(batch))
+            now = time.perf_counter()
+            for feature in self.features:
+                if feature.due is not None:
+                    self._guard(lambda feature=feature: feature.tick(now))  # type: ignore[misc]
+        self.client.flush()
+        if time.perf_counter() - self._updated_at >= self._pace.reading:
+            self._update_numbers()
+        if batch:
+            self._persistence.postpone(now)
+        elif not (self.arm.moving or self.arm.dragging) and self._persistence.rested(now):
+            self._guard(self._persistence.save)
+
+    def _handle(self, key: Hashable, value: object) -> None:
+        name, *arguments = key if isinstance(key, tuple) else (key,)
+        if name not in self._handlers:
+            raise KeyError(key)
+        self._handlers[name](*arguments, value)
+
+    def _update_numbers(self) -> None:
+        """Update the numbers in the panel: after the scene, because that takes longer than posing the joints."""
+        if not (self._readout_due or self._sliders_due):
+            return
+        self._updated_at = time.perf_counter()
+        with self.client.atomic():
+            if self._readout_due:
+                self._readout_due = False
+                self._panel.readout.show(kin.fk(self.robot, self.q), self.units)
+            if self._sliders_due:
+                self._sliders_due = False
+                self._sliders.show(self.goal, self._dragged)
+                self.posture.show()
+
+    def _for_features(self, action: Callable[[Feature], None]) -> None:
+        """Call every feature; an error of one does not stop the others."""
+        for feature in self.features:
+            self._guard(lambda feature=feature: action(feature))  # type: ignore[misc]
+
+    # Events of the panel
+
+    def _move_by_hand(self, motion: Callable[[], None]) -> None:
+        motion()
+        self._status.show(BY_HAND)
+
+    def _on_slider(self, robot_id: str, index: int, units: Units, value: object) -> None:
+        # An event of sliders that have been replaced since is ignored.
+        if (robot_id, units) == (self.robot.id, self.units):
+            self.arm.move_joint(index, self._sliders.read(index, value))
+            self._status.show(BY_HAND)
+
+    def _on_redundancy(self, robot_id: str, name: str, units: Units, value: object) -> None:
+        """Move through the self-motion while the tool is held."""
+        if (robot_id, units) != (self.robot.id, self.units):
+            return
+        q, result = self.posture.move(name, value)
+        self._status.show_result(result, self.units)
+        if q is not None:
+            self.arm.slide_along(q)
+
+    def _on_lock(self, robot_id: str, joint: int | None, lock: object) -> None:
+        if robot_id == self.robot.id:
+            self._change_lock(joint, bool(lock))
+
+    def _change_lock(self, joint: int | None, lock: bool) -> None:
+        """Lock or unlock one joint, or all of them, at the value it is heading for."""
+        joints = range(self.robot.n) if joint is None else (joint,)
+        locks = [lock if i in joints else before for i, before in enumerate(self.arm.locks)]
+        self._status.show(lock_notice(locks))
+        self.set_locks(locks)
+
+    def _on_branch_choice(self, robot_id: str, value: object) -> None:
+        """Move to the same pose on another branch, and stay on that branch."""
+        if robot_id == self.robot.id:
+            self.arm.switch_branch(self.posture.read(value))
+            self._for_features(lambda feature: feature.on_request())
+
+    def _on_feature(self, name: str, key: Hashable, value: object) -> None:
+        for feature in self.features:
+            if feature.key == name:
+                feature.handle(key, value)
+
+    def _on_robot_choice(self, value: object) -> None:
+        name = str(value)
+        robot = next((r for r in self.store.robots if r.name == name), None)
+        if robot is None:
+            assign(self._panel.robot, self.robot.name)
+            robot = self.store.get(name)  # raises with the list of valid ones
+        if robot == self.robot:
+            return
+        self._sliders.remove()
+        self.posture.remove()
+        self._use_robot(robot)
+        self._status.show(Notice("hand", robot.name, robot.description))
+        self._for_features(lambda feature: feature.on_robot())
+
+    def _on_task(self, value: object) -> None:
+        if value not in TASKS:
+            self._panel.target.show(self.task)
+            raise kin.InputError("task", value, "one of " + ", ".join(TASKS))
+        self.arm.set_task(TASKS[str(value)])
+
+    def _use_units(self, units: Units) -> None:
+        self.units = units
+        self._status.use(units)
+        self._sliders.remove()
+        self._sliders = self._make_sliders()
+        self.posture.show()
+        self._readout_due = True
+        self._for_features(lambda feature: feature.on_style())
+
+    def _on_view(self, name: str, value: object) -> None:
+        setattr(self.view, name, bool(value))
+        if name == "dark":
+            configure_theme(self.client.gui, self.view.dark)
+            self._for_features(lambda feature: feature.on_style())
+        self._apply_view()
+
+    # Building
+
+    def _build(self) -> None:
+        gui = self.client.gui
+        saved = self._persistence.load()
+        self.units, self.view = saved.units, saved.view
+        robot = self.store.get(saved.robot) if saved.robot is not None else self.store.robots[0]
+        with self.client.atomic():
+            if self.view.dark:
+                configure_theme(gui, True)
+            self.camera = VisitorCamera(self.client, self.post)
+            if not self.camera.sheet:
+                gui.main_panel.dock_right()
+            titles = [tab.title for tab in TABS]
+            self._panel = Panel(
+                gui, self.store.robots, robot, self.units, self.view, self._welcome, bool(LESSONS), titles,
+                self.post,
+            )  # fmt: skip
+            self._status = self._panel.status
+            self.posture = PosturePanel(self, self._panel.posture, self.post)
+            self._use_robot(robot, saved.q)
+            if self._panel.learn is not None:
+                self.lessons = LessonChoice(gui, self._panel.learn, self, self.post)
+            for tab, container in zip(TABS, self._panel.tabs, strict=True):
+                with container:
+                    self._tabs.append(tab(self))
+            self._persistence.restore(saved)
+            self.arm.draw(fresh=False)
+            self._persistence.begin(self._panel.share)
+        self.client.flush()
+
+    def _use_robot(self, robot: Robot, q: Array | None = None) -> None:
+        """Show another robot, at its home configuration or at `q` ``(n,)``, in a fitting view."""
+        self.arm.use(robot, q, self.view.dark)
+        self._readout_due = True
+        self._panel.target.show(self.task)
+        self._sliders = self._make_sliders()
+        self.posture.use_robot()
+        self._apply_view()
+        self.camera.aim(self.arm.scene.body)
+
+    def _make_sliders(self) -> JointSliders:
+        return JointSliders(
+            self.client.gui, self._panel.joints, self.robot, self.goal, self.arm.locks, self.units, self.post
+        )
+
+    def _apply_view(self) -> None:
+        scene = self.arm.scene
+        scene.show_frames(self.view.frames)
+        scene.show_labels(self.view.labels)
+        scene.show_axes(self.view.axes)
+        scene.use_dark(self.view.dark)

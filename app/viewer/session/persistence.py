@@ -1,0 +1,154 @@
+"""Saving and restoring the state of a page, and the links and code that the page offers to share.
+
+The state is stored in the browser: in the page's URL and in the storage of its tab. The service keeps nothing of a
+visitor who leaves. When a page connects, for the first time or after a lost connection, the service reads the
+stored state; from then on it stores every state in which the visitor pauses. What is stored is a `PageState`.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+import kin
+from app.exports.snippets import LOCAL, Moment
+from app.viewer.feature import Feature, Stage
+from app.viewer.panel.share import SharePanel
+from app.viewer.panel.status import Notice
+from app.viewer.panel.view import ViewState
+from app.viewer.scene.camera import VisitorCamera
+from app.viewer.session.controller import ArmController
+from app.viewer.session.lessons import LessonChoice
+from app.viewer.session.state import KEY, PageState, StoredPage, decode, encode, read_stored_page
+
+log = logging.getLogger(__name__)
+
+SAVE_AFTER = 0.5  # seconds of rest before the state is saved
+ANSWER_WITHIN = 10.0  # seconds for the page to send its stored state; it may still be starting
+
+
+class SavedPage(Stage, Protocol):
+    """What is saved of a page, in addition to what features see."""
+
+    arm: ArmController
+    camera: VisitorCamera
+    view: ViewState
+    lessons: LessonChoice | None
+
+    @property
+    def features(self) -> list[Feature]:
+        """The tabs, and the open lesson."""
+
+    def set_locks(self, locks: Sequence[bool]) -> None:
+        """Lock exactly these joints ``(n,)``."""
+
+    def set_branch(self, branch: str) -> None:
+        """Request a branch from the next target on."""
+
+
+class Persistence:
+    """Saves and restores one page. Not thread-safe: the visitor's worker calls it.
+
+    Args:
+        token: whether programs must send an access token.
+        guard: runs an action that may fail; the rest is restored in any case.
+
+    Attributes:
+        due: when the state is to be saved if nothing more happens (`time.perf_counter`'s); None: it is saved.
+    """
+
+    def __init__(self, page: SavedPage, token: bool, guard: Callable[[Callable[[], None]], None]) -> None:
+        self._page = page
+        self._token = token
+        self._guard = guard
+        self._address = LOCAL
+        self._saved = ""
+        self._share: SharePanel
+        self.due: float | None = None
+
+    def load(self) -> PageState:
+        """Read the stored state from the browser. A page that does not answer starts fresh."""
+        client = self._page.client
+        try:
+            stored = read_stored_page(client.local_storage.get_item(KEY, timeout=ANSWER_WITHIN))
+        except (RuntimeError, TimeoutError) as error:  # storage forbidden, page gone, no answer
+            log.debug("visitor %s has no stored state: %s", client.client_id, error)
+            stored = StoredPage()
+        self._address = stored.address or LOCAL
+        return decode(stored.state, self._page.store.robots)
+
+    def restore(self, saved: PageState) -> None:
+        """Apply the rest of a state to a page that shows its robot; what cannot be applied is reported."""
+        page = self._page
+        if saved.locks:
+            page.set_locks([i in saved.locks for i in range(page.robot.n)])
+        if saved.task not in (None, page.task):
+            page.set_task(saved.task)
+        if saved.branch is not None:
+            page.set_branch(saved.branch)
+        target, lessons, lesson, camera = saved.target, page.lessons, saved.lesson, saved.camera
+        if target is not None:
+            self._guard(lambda: page.arm.restore_target(target, saved.q))
+        if lessons is not None and lesson is not None:
+            self._guard(lambda: lessons.open(lesson))
+        for feature in page.features:
+            if feature.key in saved.features:
+                state = saved.features[feature.key]
+                self._guard(lambda feature=feature, state=state: feature.restore(state))  # type: ignore[misc]
+        if camera is not None:  # after the lessons, which may move it too
+            self._guard(lambda: page.camera.restore(camera))
+        if saved.missing:
+            detail = f"This service has no robot “{saved.missing}”."
+            page.notify(Notice("error", "The link needs another robot", detail))
+
+    def begin(self, share: SharePanel) -> None:
+        """Take the present state as saved; from now on `share` offers the saved state."""
+        self._share = share
+        self._saved = encode(self._snapshot())
+        self._update_share()
+
+    def postpone(self, now: float) -> None:
+        """The visitor did something: wait for the next rest."""
+        self.due = now + SAVE_AFTER
+
+    def rested(self, now: float) -> bool:
+        """Whether it is time to `save`; True once after each rest."""
+        if self.due is None or now < self.due:
+            return False
+        self.due = None
+        return True
+
+    def save(self) -> None:
+        """Store the present state in the browser, unless it is stored already."""
+        self._page.camera.look()
+        text = encode(self._snapshot())
+        if text != self._saved:
+            self._saved = text
+            self._page.client.local_storage.set_item(KEY, text)
+            self._update_share()
+            self._page.client.flush()
+
+    def _snapshot(self) -> PageState:
+        page = self._page
+        lesson = page.lessons.shown if page.lessons is not None else None
+        states = {feature.key: feature.state() for feature in page.features}
+        return PageState(
+            robot=page.robot.id,
+            q=page.goal,
+            target=page.target,
+            task=page.task,
+            branch=page.branch,
+            lesson=None if lesson is None else lesson.key,
+            units=page.units,
+            view=page.view,
+            features={key: state for key, state in states.items() if state},
+            locks=tuple(i for i, lock in enumerate(page.arm.locks) if lock),
+            camera=page.camera.chosen,
+        )
+
+    def _update_share(self) -> None:
+        page = self._page
+        target = kin.fk(page.robot, page.goal) if page.target is None else page.target
+        moment = Moment(page.robot, page.goal, target, page.task, self._address, self._token)
+        self._share.show(f"{self._address}viewer/#s={self._saved}", moment)

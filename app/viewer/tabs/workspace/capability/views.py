@@ -1,0 +1,95 @@
+"""Texts of a capability map: progress, legend, numbers, and the picked voxel."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from markupsafe import Markup
+
+from app.viewer.tabs.workspace import colours
+from app.viewer.tabs.workspace.capability.settings import By
+from app.viewer.tabs.workspace.capability.voxels import LEVELS, first_level, largest, levels, values_of
+from app.viewer.tabs.workspace.views import GAP, Locks, grouped, locks
+from app.viewer.views.templates import render
+from kin import CapabilityMap
+from kin.units import Units
+from kin.workspace.capability.evaluation import ROLLS, STARTS, Method
+
+State = Literal["ready", "waiting", "computing", "stopped", "done", "failed"]
+SYMBOLS: dict[State, str] = {
+    "ready": "○",
+    "waiting": "◔",
+    "computing": "▶",
+    "stopped": "■",
+    "done": "✓",
+    "failed": "✕",
+}
+MEANING: dict[By, str] = {
+    "share": "share of possible approach directions",
+    "manipulability": "best manipulability (Yoshikawa)",
+}
+CERTAINTY: dict[Method, str] = {
+    "closed form": "Exact: a missing direction is impossible.",
+    "sweep": f"{ROLLS} rolls were tried about each direction: directions with few possible rolls may be missing.",
+    "search": f"Searched with {STARTS} descents each: a few possible directions may be missing.",
+}
+
+
+def progress(state: State, done: int, total: int) -> str:
+    """The line below the progress bar."""
+    counts = (grouped(done), grouped(total)) if total else ("", "")
+    return render("workspace/map_progress", state=state, symbol=SYMBOLS[state], done=counts[0], total=counts[1])
+
+
+def value_text(by: By, value: float) -> str:
+    """A value as text."""
+    return f"{100.0 * value:.3g} %" if by == "share" else f"{value:.3g}"
+
+
+def legend(found: CapabilityMap, by: By, name: str, least: float) -> str:
+    """The colours of the values, and the number of visible voxels."""
+    values = values_of(found, by)
+    most = largest(found, by)
+    first = first_level(least)
+    shown = int((levels(values) >= first).sum())
+    limit = f"at least {value_text(by, first / LEVELS * most)}: " if first else ""
+    return render(
+        "workspace/shown",
+        bar=Markup(colours.bar(f"map-{by}", value_text(by, 0.0), value_text(by, most), MEANING[by], name)),
+        shown=shown,
+        text=f"{limit}{grouped(shown)} of {grouped(len(values))} voxels",
+    )
+
+
+def facts(found: CapabilityMap, locked: Locks, complete: bool, units: Units) -> str:
+    """Size and shares, which joints were locked, and how certain a missing direction is."""
+    count, share = len(found.index), found.share
+    best = float(found.manipulability.max(initial=0.0))
+    mean = float(share.mean(dtype=np.float64)) if count else 0.0
+    rows = (
+        ("voxel", units.lengths.number(found.grid.voxel), units.lengths.name),
+        ("reachable", grouped(count), ""),
+        ("their volume", f"{found.volume:.4g}", "m³"),
+        ("mean share", f"{100.0 * mean:.3g}", "%"),
+        ("best share", f"{100.0 * float(share.max(initial=0.0)):.3g}", "%"),
+        ("best manipulability", f"{best:.3g}", ""),
+    )
+    note = CERTAINTY[found.grid.method] if complete else "Of the part computed so far."
+    if locked is not None:
+        note = f"With {locks(locked)}. {note}"
+    return render("panel/facts", label="capability in numbers", rows=rows, note=note)
+
+
+def picked(found: CapabilityMap, row: int, units: Units) -> str:
+    """The numbers of the clicked voxel."""
+    centre = GAP.join(units.lengths.number(v, 0) for v in found.centres[row].tolist())
+    possible, count = int(found.approachable[row].sum()), found.grid.count
+    rows = (
+        ("centre x y z", centre, units.lengths.name),
+        ("approached from", f"{possible} of {count} directions", ""),
+        ("share", f"{100.0 * possible / count:.3g}", "%"),
+        ("best manipulability", f"{float(found.manipulability[row]):.3g}", ""),
+    )
+    note = "" if possible else "Reachable, but not along any of these directions."
+    return render("panel/facts", label="picked voxel", rows=rows, note=note)

@@ -1,0 +1,268 @@
+"""The cloud of the selected robot and, for comparison, of another one: start, pause, progress, colours, legend.
+
+The worker paints and sends one part of a cloud at a time, so a dragged arm never waits for more than one. The
+parts themselves are computed by :mod:`app.shared.clouds`.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.shared.clouds import Cloud
+from app.viewer.feature import Stage
+from app.viewer.panel import assign, update_html
+from app.viewer.scene.camera import Sphere
+from app.viewer.scene.motion import FRAME
+from app.viewer.tabs.workspace import colours, views
+from app.viewer.tabs.workspace.cloud_nodes import CloudNodes, Look
+from app.viewer.tabs.workspace.controls import Controls
+from app.viewer.tabs.workspace.cut import Cut
+from app.viewer.tabs.workspace.send_window import SendWindow
+from app.viewer.tabs.workspace.settings import WorkspaceSettings
+from kin import Robot
+
+REPORT = 0.2  # s between two reports of progress
+REST = 0.25  # s between two ticks while waiting for something that wakes the worker by itself
+MOVING_INTERVAL = 0.12  # s between two parts while the arm moves
+
+
+class CloudView:
+    """The clouds in one visitor's scene. Not thread-safe: the visitor's worker calls it.
+
+    Args:
+        new_root: returns a prefix of node names that was never used before.
+        wake: called from any thread when there may be something to do.
+
+    Attributes:
+        settings: the settings of the tab; the tab updates them.
+        nodes: the clouds in the scene: none; or the robot's own, and possibly that of the other robot.
+    """
+
+    def __init__(
+        self,
+        stage: Stage,
+        controls: Controls,
+        settings: WorkspaceSettings,
+        window: SendWindow,
+        new_root: Callable[[], str],
+        wake: Callable[[], None],
+    ) -> None:
+        self.settings = settings
+        self.nodes: list[CloudNodes] = []
+        self._stage = stage
+        self._controls = controls
+        self._window = window
+        self._new_root = new_root
+        self._wake = wake
+        self._running = False
+        self._cut: Cut | None = None
+        self._slabs: NDArray[np.bool_] | None = None
+        # When the clock for the speed was started last, and its time before that.
+        self._started = self._elapsed = 0.0
+        self._reported = self._sent = 0.0
+
+    # Start, pause, clear
+
+    def start(self) -> bool:
+        """Sample a new cloud, or continue a paused one if only its look was changed; whether it is a new one."""
+        cloud = Cloud(
+            self._stage.robot, self.settings.n, self.settings.seed, self.settings.strategy,
+            locked=self._stage.locked,
+        )  # fmt: skip
+        if self.nodes and not self._running and self.unfinished and self._is_shown(cloud):
+            self._run(True)
+            return False
+        self.clear()
+        self._set_clock(True)
+        self.nodes = [self._add(cloud, 0)]
+        if self.other is not None:
+            self.nodes.append(self._add(replace(cloud, robot=self.other, locked=None), 1))
+        self.report()
+        return True
+
+    def pause(self) -> None:
+        """Pause, or continue."""
+        if self.nodes and self.unfinished:
+            self._run(not self._running)
+
+    def clear(self) -> None:
+        """Stop and remove everything."""
+        for nodes in self.nodes:
+            nodes.remove()
+        self.nodes = []
+        self._running = False
+        self._elapsed = 0.0
+        self.show_legend()
+        self.report()
+
+    @property
+    def other(self) -> Robot | None:
+        """The robot to compare with."""
+        return None if self.settings.compare is None else self._stage.store.get(self.settings.compare)
+
+    @property
+    def busy(self) -> bool:
+        """Whether parts are being drawn or computed."""
+        return any(nodes.busy for nodes in self.nodes)
+
+    @property
+    def unfinished(self) -> bool:
+        """Whether parts are missing."""
+        return self.busy or any(nodes.parts < nodes.cloud.parts for nodes in self.nodes)
+
+    @property
+    def extents(self) -> list[Sphere]:
+        """Spheres around the clouds."""
+        return [nodes.extent for nodes in self.nodes if nodes.extent is not None]
+
+    def _is_shown(self, cloud: Cloud) -> bool:
+        """Whether this cloud is in the scene, regardless of its measures."""
+        return replace(self.nodes[0].cloud, measures=cloud.measures) == cloud
+
+    def _add(self, cloud: Cloud, which: int) -> CloudNodes:
+        nodes = CloudNodes(
+            self._stage.client.scene,
+            self._stage.clouds,
+            cloud,
+            self._look(which),
+            self.settings.size,
+            self._new_root(),
+            self._wake,
+        )
+        nodes.show(self._slabs)
+        nodes.resume(self._running)
+        return nodes
+
+    def _run(self, running: bool) -> None:
+        self._set_clock(running)
+        for nodes in self.nodes:
+            nodes.resume(running)
+        self.report()
+
+    def _set_clock(self, running: bool) -> None:
+        """Start or stop the clock for the speed."""
+        now = time.perf_counter()
+        if self._running:
+            self._elapsed += now - self._started
+        self._started, self._running = now, running
+
+    # Progress
+
+    def advance(self, now: float, moving: bool) -> None:
+        """Send one part of the cloud that is behind; `moving`: frames of the arm have priority."""
+        if not self.nodes:
+            return
+        ready = [nodes for nodes in self.nodes if nodes.ready]
+        if ready and self._may_send(now, moving):
+            self._sent = now
+            try:
+                self._window.sent(min(ready, key=lambda nodes: nodes.points).step())
+            except Exception:
+                self._set_clock(False)
+                for nodes in self.nodes:
+                    nodes.running = False
+                self.report()
+                raise
+            if not self._controls.legend.content:
+                self.show_legend()
+        if not self.busy:
+            if self._running:
+                self._set_clock(False)
+            self.report()
+        elif now - self._reported >= REPORT:
+            self.report()
+
+    def next_tick(self, now: float, moving: bool) -> float | None:
+        """Seconds until `advance` should be called again."""
+        if not self.nodes or not (self._running or self.busy):
+            return None
+        if not any(nodes.ready for nodes in self.nodes):
+            return REST
+        return FRAME if self._may_send(now, moving) else min(REST, MOVING_INTERVAL)
+
+    def _may_send(self, now: float, moving: bool) -> bool:
+        return self._window.is_open(moving) and (not moving or now - self._sent >= MOVING_INTERVAL)
+
+    def report(self) -> None:
+        """Update progress bar and line."""
+        now = time.perf_counter()
+        self._reported = now
+        drawn = sum(nodes.points for nodes in self.nodes)
+        total = sum(nodes.cloud.n for nodes in self.nodes)
+        elapsed = self._elapsed + (now - self._started if self._running else 0.0)
+        state: views.State = "ready"
+        if self.nodes:
+            more = drawn < total
+            state = "running" if self._running and more else "paused" if more else "done"
+            if state == "running" and not drawn and elapsed > REST:
+                state = "preparing"
+            if self.busy and not self._running:
+                state = "recolouring"
+        speed = drawn / elapsed if elapsed > 0.0 else 0.0
+        locked = self.nodes[0].cloud.locked if self.nodes else self._stage.locked
+        line = views.progress(state, drawn, total or self.settings.n, speed, locked)
+        percent = round(100.0 * drawn / total, 1) if total else 0.0
+        update_html(self._controls.line, line)
+        if self._controls.bar.value != percent:
+            assign(self._controls.bar, percent)
+
+    # Look
+
+    def recolour(self) -> None:
+        """Draw in the colours of the settings."""
+        for which, nodes in enumerate(self.nodes):
+            nodes.relook(self._look(which))
+        self.show(self._slabs)
+        self.show_legend()
+
+    def resize(self) -> None:
+        """Draw points of the size in the settings."""
+        for nodes in self.nodes:
+            nodes.resize(self.settings.size)
+
+    def set_cut(self, cut: Cut | None, slabs: NDArray[np.bool_] | None) -> None:
+        """Cut in another direction, or not at all, and show only these slabs ``(count,)``."""
+        self._cut, self._slabs = cut, slabs
+        self.recolour()
+
+    def show(self, slabs: NDArray[np.bool_] | None) -> None:
+        """Show only these slabs ``(count,)`` of the cut."""
+        self._slabs = slabs
+        for nodes in self.nodes:
+            nodes.show(slabs)
+
+    def compare(self) -> None:
+        """Draw the cloud of the robot to compare with, or none."""
+        for nodes in self.nodes[1:]:
+            nodes.remove()
+        del self.nodes[1:]
+        other = self.other
+        if self.nodes and other is not None:
+            own = self.nodes[0].cloud
+            if self.nodes[0].parts == own.parts and not self._running:
+                self._set_clock(True)
+            self.nodes.append(self._add(replace(own, robot=other, measures=(), locked=None), 1))
+
+    def show_legend(self) -> None:
+        """Update the legend. It is empty without points, because it needs sampled data."""
+        if not any(nodes.parts for nodes in self.nodes):
+            update_html(self._controls.legend, "")
+            return
+        robot, other = self._stage.robot, self.other
+        if other is not None:
+            content = colours.names_legend([(colours.OWN, robot.name), (colours.OTHER, other.name)])
+        elif self.settings.by == "one":
+            content = colours.names_legend([(colours.OWN, robot.name)])
+        else:
+            scale = colours.scale_of(robot, self.settings.by)
+            content = colours.legend(scale, self.settings.map, self._stage.units)
+        update_html(self._controls.legend, content)
+
+    def _look(self, which: int) -> Look:
+        by: colours.By = "one" if self.other is not None else self.settings.by
+        return Look(by, self.settings.map, (colours.OWN, colours.OTHER)[which], self._cut)

@@ -1,0 +1,176 @@
+"""The section of the workspace: its plot in a panel of its own, and its outline in the scene."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import viser
+
+from app.exports.svg import Plot, joint_colour
+from app.shared.clouds import Cloud
+from app.shared.summaries import Summaries
+from app.viewer.feature import Stage
+from app.viewer.panel import Post, update_html
+from app.viewer.tabs.workspace.background import run_in_background
+from app.viewer.tabs.workspace.colours import radius_and_height
+from app.viewer.tabs.workspace.section import plot
+from app.viewer.views.templates import render
+from kin import Robot, Section
+from kin.transforms import Array
+from kin.units import Units
+
+WIDTH = 340  # pixels of the panel
+PLAIN = (110, 110, 110)
+
+
+@dataclass(frozen=True)
+class Plotted:
+    """The image of counted points."""
+
+    density: plot.Density
+    image: str
+
+
+def find_section(summaries: Summaries, robot: Robot) -> Section | None:
+    """The (r, z) section of a robot; None if joint 1 is prismatic. Waits for a shared computation."""
+    return summaries.section(robot).result() if robot.joints[0].kind == "revolute" else None
+
+
+class SectionPanel:
+    """A panel to the left of the scene. Posts ``"section-found"`` and ``"plotted"`` to itself.
+
+    Args:
+        root: prefix of node names, never used before in this scene.
+    """
+
+    def __init__(self, stage: Stage, root: str, post: Post) -> None:
+        client, robot, summaries = stage.client, stage.robot, stage.summaries
+        self.robot = robot
+        self._scene = client.scene
+        self._clouds = stage.clouds
+        self._root = root
+        self._post = post
+        self._section: Section | None = None
+        self._frame: Plot | None = None
+        # The cloud's counts; while a thread adds to them, only that thread uses them. Another cloud gets new ones.
+        self._density: plot.Density | None = None
+        self._plotting = False
+        self._image = ""
+        self._units = stage.units
+        self._outline: viser.FrameHandle | None = None
+        self._angle = math.nan
+        self._left = np.zeros(3)
+        self._panel = client.gui.add_panel()
+        with self._panel.add_tab("Section (r, z)"):
+            self._html = client.gui.add_html(render("workspace/section_note", text="Computing the section…"))
+            self._dot = client.gui.add_html("")
+        self._panel.dock_left()
+        self._panel.set_width(WIDTH)
+        self._panel.expand()  # on a phone it would be collapsed at the end of the sheet
+        run_in_background(lambda: post("section-found", (robot, find_section(summaries, robot))), "section", post)
+
+    def take(self, robot: Robot, found: Section | None, tool: Array) -> None:
+        """Show a computed section; the tool is at `tool` ``(3,)``."""
+        if robot != self.robot or self._section is not None:
+            return
+        if found is None or not found.curves:
+            text = "No section: joint 1 is prismatic." if found is None else "The section is empty."
+            self._html.content = render("workspace/section_note", text=text)
+            return
+        self._section, self._frame = found, plot.frame_of(found)
+        self._left = np.cross(found.v, found.u)
+        self._draw()
+        self._draw_outline(found)
+        self.tool_at(tool)
+
+    def tool_at(self, tool: Array) -> None:
+        """Move the dot to the tool ``(3,)``, and turn the outline into its plane."""
+        if self._section is None or self._frame is None:
+            return
+        r, z = radius_and_height(self.robot, tool[None])
+        update_html(self._dot, plot.tool_html(self._frame, float(r[0]), float(z[0])))
+        self.turn(tool)
+
+    def turn(self, tool: Array) -> None:
+        """Turn the outline into the plane of joint 1's axis and the tool ``(3,)``."""
+        section = self._section
+        if section is None or self._outline is None:
+            return
+        across = tool - section.origin
+        x, y = float(across @ section.u), float(across @ self._left)
+        angle = math.atan2(y, x) if math.hypot(x, y) > 1e-6 else 0.0
+        if angle != self._angle:
+            self._angle = angle
+            half = 0.5 * angle
+            self._outline.wxyz = np.array([math.cos(half), *(math.sin(half) * section.v)])
+
+    def count(self, cloud: Cloud, parts: int) -> bool:
+        """Start counting a cloud's first parts into the plot; False if there are no new ones, or if busy."""
+        if self._frame is None or self._section is None or self._plotting:
+            return False
+        if self._density is not None and self._density.parts >= parts:
+            return False
+        density = self._density = self._density or plot.Density(self._frame)
+        self._plotting = True
+
+        def work() -> None:
+            for i in range(density.parts, parts):
+                if self._density is not density:
+                    return  # another cloud, or none
+                density.add(cloud.robot, self._clouds.part(cloud, i).result().points)
+            self._post("plotted", Plotted(density, plot.image(density)))
+
+        run_in_background(work, "plot", self._post)
+        return True
+
+    def show_cloud(self, made: Plotted) -> None:
+        """Show a finished image of the points."""
+        if made.density is self._density:
+            self._plotting = False
+            self._image = made.image
+            self._draw()
+
+    def use(self, units: Units) -> None:
+        """Plot in these units."""
+        if units != self._units:
+            self._units = units
+            self._draw()
+
+    def drop_cloud(self) -> None:
+        """Remove the cloud from the plot; the section stays."""
+        self._density = None
+        self._plotting = False
+        self._image = ""
+        self._draw()
+
+    def remove(self) -> None:
+        """Close the panel and remove the outline."""
+        self._panel.remove()
+        if self._outline is not None:
+            self._outline.remove()
+            self._outline = None
+        self._section = self._frame = self._density = None
+
+    def _draw(self) -> None:
+        if self._section is not None and self._frame is not None:
+            self._html.content = plot.plot_html(self._section, self._frame, self._image, self._units)
+
+    def _draw_outline(self, section: Section) -> None:
+        """Draw the boundary and its arcs as lines in the plane of joint 1's axis and the tool."""
+        self._outline = self._scene.add_frame(self._root, show_axes=False, position=section.origin)
+        lines = [(np.concatenate([c, c[:1]]), PLAIN, 2.0) for c in section.curves]
+        for arc in section.arcs:
+            colour = bytes.fromhex(joint_colour(arc.joint)[1:])
+            lines.append((arc.points, (colour[0], colour[1], colour[2]), 4.0))
+        for k, (points, color, thickness) in enumerate(lines):
+            p = points[:, :1] * section.u + points[:, 1:] * section.v
+            self._scene.add_line_segments(
+                f"{self._root}/{k}",
+                np.stack([p[:-1], p[1:]], axis=1).astype(np.float32),
+                color,
+                thickness=thickness,
+                thickness_units="screen",
+            )
+        self._angle = math.nan

@@ -1,0 +1,67 @@
+"""Flow control: limits how much of a cloud is on its way to the browser.
+
+The server produces a million points in the time in which a slow connection carries ten thousand. Sent data waits
+in a queue, and the frames of a dragged arm wait behind it. So the server sends the page a question now and then,
+which the page answers after it has processed everything sent before. Until then, only a limited number of points
+may be unconfirmed, fewer while the arm moves.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Callable
+
+import viser
+
+WINDOW = 1 << 18  # unconfirmed points
+WHILE_MOVING = 1 << 16
+ANSWER_WITHIN = 30.0  # s; a page in the background does not answer
+QUESTION = "kinboard-workspace"  # a key that is never set: any answer will do
+
+
+class SendWindow:
+    """Counts sent and confirmed points. One thread calls `sent` and `is_open`.
+
+    Args:
+        arrived: called from another thread whenever points were confirmed.
+    """
+
+    def __init__(self, client: viser.ClientHandle, arrived: Callable[[], None]) -> None:
+        self._client = client
+        self._notify = arrived
+        self._sent = 0
+        self._arrived = 0
+        self._asking = False
+        self._lock = threading.Lock()
+
+    def is_open(self, moving: bool) -> bool:
+        """Whether more points may be sent; `moving`: the arm is in motion, and its frames have priority."""
+        return self._sent - self._arrived < (WHILE_MOVING if moving else WINDOW)
+
+    def sent(self, points: int) -> None:
+        """Count points that were just sent."""
+        with self._lock:
+            self._sent += points
+            if self._asking or self._sent == self._arrived:
+                return
+            self._asking = True
+        threading.Thread(target=self._ask, name="workspace-window", daemon=True).start()
+
+    def _ask(self) -> None:
+        """Ask until all points are confirmed."""
+        while True:
+            with self._lock:
+                mark = self._sent
+                if mark == self._arrived:
+                    self._asking = False
+                    return
+            self._wait()
+            self._arrived = mark
+            self._notify()
+
+    def _wait(self) -> None:
+        # A missing answer (page gone, asleep, or without storage) counts as one, or nothing would ever be sent
+        # again.
+        with contextlib.suppress(TimeoutError, RuntimeError):
+            self._client.local_storage.get_item(QUESTION, timeout=ANSWER_WITHIN)

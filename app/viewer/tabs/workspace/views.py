@@ -1,0 +1,80 @@
+"""Texts of the workspace tab: progress, the picked point, and joint locks. Changing numbers never move."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from markupsafe import Markup
+
+import kin
+from app.viewer.views.templates import render
+from kin import Robot
+from kin.transforms import Array
+from kin.units import Units
+from kin.workspace.clouds.measures import measured
+from kin.workspace.region import Region
+
+Locks = tuple[float | None, ...] | None
+State = Literal["ready", "preparing", "running", "paused", "recolouring", "done"]
+SYMBOLS: dict[State, str] = {
+    "ready": "○",
+    "preparing": "◔",
+    "running": "▶",
+    "paused": "❚❚",
+    "recolouring": "◐",
+    "done": "✓",
+}
+
+
+GAP = Markup(" &nbsp; ")  # between coordinates
+
+
+def grouped(number: int) -> str:
+    """A whole number in groups of three digits."""
+    return f"{number:,}".replace(",", "\u202f")
+
+
+def rate(points_per_second: float) -> str:
+    """A rate with three significant digits."""
+    for limit, scale, unit in ((1e6, 1e6, " M"), (1e3, 1e3, " k")):
+        if points_per_second >= limit:
+            return f"{points_per_second / scale:.3g}{unit}"
+    return f"{points_per_second:.3g} "
+
+
+def locks(locked: Locks) -> str:
+    """The joints locked in a cloud or a map, in words; empty if none."""
+    joints = [str(i + 1) for i, value in enumerate(locked or ()) if value is not None]
+    return f"joint{'s' if len(joints) > 1 else ''} {', '.join(joints)} locked" if joints else ""
+
+
+def progress(state: State, drawn: int, total: int, speed: float, locked: Locks = None) -> str:
+    """The line below the progress bar, and a second line if joints are locked."""
+    return render(
+        "workspace/progress",
+        state=state,
+        symbol=SYMBOLS[state],
+        done=grouped(drawn),
+        total=grouped(total),
+        rate=f"{rate(speed)} points/s" if drawn and speed > 0.0 else "",
+        note=locks(locked),
+    )
+
+
+def picked(robot: Robot, locked: Locks, index: int, q: Array, point: Array, units: Units) -> str:
+    """The numbers of the clicked point of a cloud with these joints locked."""
+    manipulability = float(kin.manipulability(robot, q))
+    margin = float(measured(Region.of(robot, None, locked), "limits", np.asarray(q)[None])[0])
+    rows = (
+        ("point", grouped(index), ""),
+        ("x y z", GAP.join(units.lengths.number(v) for v in point.tolist()), units.lengths.name),
+        ("manipulability", f"{manipulability:.3g}", ""),
+        ("limit margin", f"{100.0 * margin:.0f}", "%"),
+    )
+    return render("panel/facts", label="picked point", rows=rows, note="")
+
+
+def nothing_picked() -> str:
+    """The message after a click far from all points."""
+    return render("panel/note", text="No point near that click.")

@@ -1,0 +1,36 @@
+"""Renders the HTML of the panel from the files in ``templates/``.
+
+Values are escaped unless they are `Markup`, such as formulas. Styles are CSS classes from ``static/viewer.css``,
+which the viewer proxy adds to viser's page. Only computed values (positions, widths, colours of data) are inline
+styles.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
+
+_ENVIRONMENT = Environment(
+    loader=FileSystemLoader(Path(__file__).parent / "templates"),
+    autoescape=True,
+    undefined=StrictUndefined,
+    trim_blocks=True,
+    lstrip_blocks=True,
+    auto_reload=False,
+)
+
+
+def render(name: str, /, **values: object) -> str:
+    """The template ``templates/<name>.html`` with these values.
+
+    The result is a plain string, which viser can send. Wrap it in `Markup` to use it as a value of another
+    template.
+    """
+    return _template(name).render(values)
+
+
+@cache
+def _template(name: str) -> Template:
+    return _ENVIRONMENT.get_template(f"{name}.html")

@@ -1,0 +1,154 @@
+"""What is done past viser's own ways: the same messages and pages, exact, and none where nothing changed."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import io
+import threading
+import typing
+
+import numpy as np
+import pytest
+import viser
+from viser import _assignable_props_api as props
+from viser._messages import SetPositionMessage, TransformControlsUpdateMessage
+from viser.infra import _async_message_buffer as buffers
+
+from app.viewer.viser_patches import assign, cache_type_hints, keep_private, set_events_in_their_loop
+
+PLACE, TURN = (0.1, -0.2, 0.3), (0.5, -0.5, 0.5, 0.5)
+
+
+@pytest.fixture
+def wire(monkeypatch):
+    """A scene's messages as they go on the wire, and the scene."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    messages = []
+    monkeypatch.setattr(server.scene, "_queue_scene_message", queue_into(messages, server.scene))
+    yield messages, server.scene
+    with contextlib.redirect_stdout(io.StringIO()):
+        server.stop()
+
+
+def queue_into(messages, scene):
+    send = scene._queue_scene_message
+
+    def queue(message):
+        send(message)
+        messages.append(message.as_serializable_dict())
+
+    return queue
+
+
+@pytest.mark.parametrize("given", [tuple, list, np.array])
+def test_what_is_sent_is_what_the_setters_send(wire, given):
+    messages, scene = wire
+    node = scene.add_frame("/a")
+    messages.clear()
+    node.position, node.wxyz = PLACE, TURN
+    expected = list(messages)
+    assert [m["type"] for m in expected] == ["SetPositionMessage", "SetOrientationMessage"]
+    other = scene.add_frame("/a")
+    messages.clear()
+    assign(other, given(PLACE), given(TURN))
+    assert messages == expected
+    assert other.position.tolist() == list(PLACE)
+    assert other.wxyz.tolist() == list(TURN)
+
+
+def test_the_smallest_step_is_sent_and_a_repetition_is_not(wire):
+    messages, scene = wire
+    node = scene.add_frame("/a")
+    assign(node, PLACE, TURN)
+    messages.clear()
+    assign(node, PLACE, TURN)
+    assign(node)
+    assert messages == []
+    near = (np.nextafter(PLACE[0], 1.0), *PLACE[1:])
+    assign(node, near)
+    assert [m["position"] for m in messages] == [near]
+
+
+def test_the_array_given_can_be_used_again(wire):
+    _, scene = wire
+    node = scene.add_frame("/a")
+    place = np.array(PLACE)
+    assign(node, place)
+    place[:] = 7.0
+    assert node.position.tolist() == list(PLACE)
+
+
+def test_a_removed_node_is_not_brought_back(wire):
+    messages, scene = wire
+    node = scene.add_frame("/a")
+    node.remove()
+    messages.clear()
+    with pytest.raises(RuntimeError, match="/a was removed"):
+        assign(node, PLACE)
+    assert messages == []
+
+
+def test_a_private_gizmo_repeats_nothing_and_is_heard_all_the_same(wire):
+    messages, scene = wire
+    heard = []
+    for private, expected in ((False, ["SetOrientationMessage", "SetPositionMessage"]), (True, [])):
+        gizmo = scene.add_transform_controls("/g")
+        if private:
+            keep_private(gizmo)
+
+        @gizmo.on_update
+        async def _(event):
+            heard.append((event.phase, event.target.position.tolist()))
+
+        messages.clear()
+        moved = TransformControlsUpdateMessage("/g", wxyz=TURN, position=PLACE)
+        asyncio.run(scene._handle_transform_controls_updates(7, moved))
+        assert [m["type"] for m in messages] == expected
+    assert heard == 2 * [("update", list(PLACE))]
+
+
+def test_hints_are_looked_up_once_and_are_the_same(wire, monkeypatch):
+    _, scene = wire
+    monkeypatch.setattr(props, "get_type_hints", typing.get_type_hints)
+    theirs = scene.add_frame("/theirs")._prop_hints
+    cache_type_hints()
+    first, second = scene.add_frame("/first"), scene.add_frame("/second")
+    assert first._prop_hints is second._prop_hints
+    assert first._prop_hints == theirs
+    first.axes_length = 0.25
+    assert first.axes_length == 0.25
+    with pytest.raises(AttributeError):
+        _ = first.no_such_thing
+
+
+def test_messages_of_other_threads_wake_the_reader_in_its_own(monkeypatch):
+    """Viser's own event would be set, and its waiters woken, by the thread that pushes."""
+    monkeypatch.setattr(buffers.AsyncMessageBuffer, "__init__", buffers.AsyncMessageBuffer.__init__)
+    set_events_in_their_loop()
+    set_events_in_their_loop()  # once is enough
+    woken, count = [], 3000
+
+    async def read():
+        buffer = buffers.AsyncMessageBuffer(asyncio.get_running_loop(), persistent_messages=False)
+        buffer.window_duration_sec = 0.0
+        assert type(buffer.message_event) is not asyncio.Event
+        wake = asyncio.Event.set
+        monkeypatch.setattr(asyncio.Event, "set", lambda event: (woken.append(threading.get_ident()), wake(event)))
+
+        def push():
+            for k in range(count):
+                buffer.push(SetPositionMessage(f"/{k}", PLACE))
+
+        pushing = threading.Thread(target=push)
+        pushing.start()
+        seen = 0
+        async for window in buffer.window_generator(0):
+            seen += len(window)
+            if seen == count:
+                break
+        pushing.join()
+
+    asyncio.run(asyncio.wait_for(read(), 20))
+    assert set(woken) == {threading.get_ident()}
