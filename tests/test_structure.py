@@ -200,7 +200,6 @@ KNOWN: dict[Rule, set[str]] = {
         "app/viewer/tabs/workspace/controls.py::_build",
     },
     banned_words: {
-        "app/exports/formats.py: whoever",
         "app/viewer/feature.py: told",
         "app/viewer/lessons/dh/draw.py: told",
         "app/viewer/lessons/dh/steps.py: told",
@@ -266,7 +265,6 @@ KNOWN: dict[Rule, set[str]] = {
         "tests/app/service/test_main.py: told",
         "tests/app/service/test_viewer_proxy.py: told",
         "tests/app/service/test_workers.py: told",
-        "tests/app/shared/test_clouds.py: whoever",
         "tests/app/shared/test_maps.py: told",
         "tests/app/shared/test_maps.py: who asks",
         "tests/app/viewer/lessons/test_viewer_dh.py: told",
