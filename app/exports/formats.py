@@ -40,7 +40,7 @@ _HEADER = struct.Struct("<8sHHIQ")
 _ALIGNED = 64
 # Rows formatted at once: the interpreter lock is held for some milliseconds only, so a server stays responsive.
 BLOCK = 4096
-# Points of a slice where each takes a descent: whoever leaves, or presses Ctrl-C, waits for a slice at most.
+# Points of a slice if each is found by descent: a disconnect or Ctrl-C takes effect after a slice at most.
 DESCENDED = 1 << 10
 KEPT = 64 << 20  # bytes of columns that npz keeps in memory instead of computing the cloud again
 
@@ -85,7 +85,7 @@ def table_of(cloud: Cloud, with_q: bool) -> Table:
 
 def slices(clouds: Clouds, cloud: Cloud, with_q: bool) -> Generator[WorkspaceChunk]:
     """The whole cloud in order, in slices of a size that fits its strategy; close it to stop the computation."""
-    return clouds.stream(cloud, cloud.part_size, with_q)
+    return clouds.stream(cloud, DESCENDED if cloud.by_descent else cloud.part_size, with_q)
 
 
 def encode(

@@ -39,14 +39,19 @@ class Cloud:
     locked: tuple[float | None, ...] | None = None
 
     @property
+    def by_descent(self) -> bool:
+        """Whether each point is found by a descent, which takes long, instead of sampled."""
+        return self.strategy in ("boundary", "volume")
+
+    @property
     def part_size(self) -> int:
         """Points of all parts but the first ones and the last."""
-        return DESCENDED if self.strategy in ("boundary", "volume") else SAMPLED
+        return DESCENDED if self.by_descent else SAMPLED
 
     @cached_property
     def edges(self) -> tuple[int, ...]:
         """Where parts begin and end, from 0 to n: part i is points ``edges[i]`` to ``edges[i + 1] − 1``."""
-        size = FIRST if self.part_size == DESCENDED else SAMPLED
+        size = FIRST if self.by_descent else SAMPLED
         edges = [0]
         while edges[-1] < self.n:
             edges.append(min(edges[-1] + size, self.n))

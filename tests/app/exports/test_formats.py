@@ -15,7 +15,7 @@ import trimesh
 import kin
 from app.exports import formats
 from app.exports.formats import FORMATS, encode, table_of
-from app.shared.clouds import DESCENDED, Cloud, Clouds
+from app.shared.clouds import Cloud, Clouds
 
 ARM = kin.get_robot("pioneer5")
 N = 2 * formats.BLOCK + 77
@@ -139,10 +139,10 @@ def test_bytes_do_not_depend_on_slices_or_threads(clouds, name, monkeypatch):
 
 
 def test_draws_that_take_descents_come_in_small_slices(clouds):
-    cloud = Cloud(ARM, 3 * DESCENDED // 2, strategy="volume")
+    cloud = Cloud(ARM, 3 * formats.DESCENDED // 2, strategy="volume")
     seen = []
     rows = b"".join(encode("bin", clouds, cloud, watch=seen.append))
-    assert [len(chunk.points) for chunk in seen] == [DESCENDED, DESCENDED // 2]
+    assert [len(chunk.points) for chunk in seen] == [formats.DESCENDED, formats.DESCENDED // 2]
     assert np.array_equal(read_bin(rows)[1], whole(cloud).points)
 
 

@@ -1,4 +1,4 @@
-"""Clouds shared by many readers: the same bits whoever computes them, once for all, bounded in memory."""
+"""Clouds shared by many readers: the same bits in any order, once for all, bounded in memory."""
 
 import os
 import sys
