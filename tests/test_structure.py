@@ -191,23 +191,6 @@ RULES: dict[Rule, Sources] = {
 
 KNOWN: dict[Rule, set[str]] = {
     banned_words: {
-<<<<<<< HEAD
-        "app/exports/formats.py: whoever",
-=======
-        "app/viewer/feature.py: told",
-        "app/viewer/lessons/dh/draw.py: told",
-        "app/viewer/lessons/dh/steps.py: told",
-        "app/viewer/lessons/equations/page.py: told",
-        "app/viewer/lessons/postures/__init__.py: told",
-        "app/viewer/lessons/postures/fixes.py: told",
-        "app/viewer/lessons/postures/listing.py: told",
-        "app/viewer/lessons/redundancy/__init__.py: told",
-        "app/viewer/lessons/redundancy/__init__.py: wish",
-        "app/viewer/lessons/redundancy/__init__.py: wished",
-        "app/viewer/lessons/velocity/__init__.py: told",
-        "app/viewer/lessons/velocity/jog.py: told",
-        "app/viewer/lessons/velocity/told.py: told",
->>>>>>> main
         "app/viewer/panel/__init__.py: told",
         "tests/app/api/test_api_answers.py: told",
         "tests/app/api/test_api_capability.py: told",
