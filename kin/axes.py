@@ -13,7 +13,8 @@ manipulators under computer control, Stanford 1968). Three parallel axes do the 
 
 **Links.** `links_of` joins each line to the next by their common normal, and so writes every arm down in one and
 the same way, between what is left of base and tool. Whether an arm belongs to a family with a closed form is then
-a matter of which twists are 0° or 90° and which lengths vanish.
+a matter of which twists are 0° or 90° and which lengths vanish. `links_by_rows` gives the same form with the exact
+numbers of the table, for tables that are spelled like it.
 """
 
 from __future__ import annotations
@@ -221,15 +222,13 @@ class Links(NamedTuple):
     tool: Array
 
 
-def links_of(robot: Robot, twists: tuple[int, ...], as_counted: bool = False) -> Links:
-    """The robot as `Links`, each twist with the sign in `twists` (one per joint but the last), zero or π.
+def links_of(robot: Robot, twists: tuple[int, ...]) -> Links:
+    """The robot as `Links`, each twist with the sign in `twists` (one per joint but the last) or zero.
 
     Common normals make the frames: so neither the convention nor fixed rows show in the result, and of parallel
     axes all offsets along them are in the last one's d.
-
-    A twist is π only with `as_counted`, see `lines_of`.
     """
-    z, points, sign, end = lines_of(robot, as_counted)
+    z, points, sign, end = lines_of(robot)
     theta, d, a, alpha = (np.zeros(robot.n) for _ in range(4))
     origin, incoming = points[0], np.zeros(3)
     base = frame = np.eye(4)
@@ -238,7 +237,6 @@ def links_of(robot: Robot, twists: tuple[int, ...], as_counted: bool = False) ->
         sine = float(np.linalg.norm(cross))
         if sine < TOLERANCES.geometry:
             foot, across = origin, between - z[i] * (between @ z[i])
-            alpha[i] = 0.0 if z[i] @ z[i + 1] > 0.0 else math.pi
             a[i] = float(np.linalg.norm(across))
             if a[i] < TOLERANCES.geometry:
                 a[i], across = 0.0, incoming if incoming.any() else perpendicular_to(z[i])
@@ -260,13 +258,58 @@ def links_of(robot: Robot, twists: tuple[int, ...], as_counted: bool = False) ->
     return Links(base, sign, theta, d, a, alpha, inverse(frame) @ end)
 
 
-def counted_from_base(links: Links, robot: Robot) -> Links:
-    """The same links, with θ1 counted from the x axis of the robot's own base instead of a common normal."""
-    x, y = (links.base[:3, :2].T @ robot.T_world_base[:3, 0]).tolist()
-    start = math.atan2(y, x) if not is_zero(x, y) else 0.0
-    theta = links.theta.copy()
-    theta[0] -= start
-    return links._replace(base=links.base @ screw_z(start, 0.0), theta=theta)
+def links_by_rows(robot: Robot, quarters: tuple[int, ...]) -> Links | None:
+    """The robot as `Links` with the numbers of its table, and the twists `quarters` (in quarter turns).
+
+    None if it has prismatic joints or a fixed offset between two joints, or if a twist is another one. Other than
+    with `links_of` nothing is computed that stands in the table, all signs are +1.0, theta_1 and d_1 are those of
+    the table, and so are the last link's, which are not in `tool`.
+
+    ``Tx(a) Rx(90°) = Rz(π) Tx(−a) Rx(−90°) Rz(π)``: a twist of the wrong sign is exchanged for half turns of its
+    two neighbours.
+    """
+    links = _links_of_table(robot) if robot.revolute.all() else None
+    if links is None:
+        return None
+    theta, a, alpha = links.theta, links.a, links.alpha
+    for i, quarter in enumerate(quarters):
+        wanted = quarter * math.pi / 2
+        if is_zero(math.remainder(alpha[i] - wanted, 2.0 * math.pi)):
+            continue
+        if quarter == 0 or not is_zero(math.remainder(alpha[i] + wanted, 2.0 * math.pi)):
+            return None
+        theta[i] += math.pi
+        theta[i + 1] += math.pi
+        a[i] = -a[i]
+        alpha[i] = wanted
+    return links
+
+
+def _links_of_table(robot: Robot) -> Links | None:
+    """The rows of a table with revolute joints as `Links`; None with a fixed offset between two joints."""
+    base, tool = robot.T_world_base.copy(), np.eye(4)
+    theta, d, a, alpha = (np.zeros(robot.n) for _ in range(4))
+    joint = -1
+    for row in robot.rows:
+        z_part, x_part = ("z", row.theta, row.d), ("x", row.a, row.alpha)
+        for axis, first, second in (z_part, x_part) if robot.convention == "standard" else (x_part, z_part):
+            constant = screw_z(first, second) if axis == "z" else screw_x(first, second)
+            if axis == "z" and row.kind != "fixed":
+                joint += 1
+                theta[joint], d[joint] = first, second
+            elif joint < 0:
+                base = base @ constant
+            elif joint == robot.n - 1:
+                tool = tool @ constant
+            elif axis == "x":
+                a[joint] += first
+                alpha[joint] += second
+            elif first or second:
+                if a[joint] or alpha[joint]:
+                    return None
+                theta[joint] += first
+                d[joint] += second
+    return Links(base, np.ones(robot.n), theta, d, a, alpha, tool @ robot.T_last_tool)
 
 
 def screw_z(theta: float, d: float) -> Array:

@@ -21,7 +21,7 @@ from itertools import islice, product
 
 import numpy as np
 
-from kin.axes import Links, counted_from_base, is_zero, links_of
+from kin.axes import Links, is_zero, links_of, screw_z
 from kin.robot import Joint, Robot
 from kin.solvers.common import TURN
 from kin.solvers.contract import POSE, BatchKernels, Candidates, ClosedForm, RedundancyParameter, SolverInput
@@ -74,7 +74,16 @@ def _table(robot: Robot, links: Links, joints: Joints) -> Robot:
     ``Rz(θ) Tz(d) = Rx(π) Rz(−θ) Tz(−d) Rx(π)``, and half turns about x join the twists before and after.
     """
     turned = [(i in joints) != (sign < 0.0) for i, sign in enumerate(links.sign.tolist())]
-    links = counted_from_base(links, robot)
+    # Lines do not show from where the first and the last angle are counted. Here that is the x axis of the robot's
+    # own base, and where the tool looks along the frame's y axis if it does not look along the last joint's.
+    x, y = (links.base[:3, :2].T @ robot.T_world_base[:3, 0]).tolist()
+    start = math.atan2(y, x)
+    x, y = links.tool[:2, 2].tolist()
+    end = 0.0 if is_zero(x, y) else math.atan2(-x, y)
+    base, tool = links.base @ screw_z(start, 0.0), screw_z(-end, 0.0) @ links.tool
+    theta = links.theta.copy()
+    theta[0] -= start
+    theta[-1] += end
     rows = []
     for i, joint in enumerate(robot.joints):
         after = turned[i + 1] if i + 1 < robot.n else turned[i]
@@ -83,7 +92,7 @@ def _table(robot: Robot, links: Links, joints: Joints) -> Robot:
         rows.append(
             Joint(
                 joint.name,
-                sense * float(links.theta[i]),
+                sense * float(theta[i]),
                 sense * float(links.d[i]),
                 float(links.a[i]),
                 math.remainder(twist, TURN),
@@ -95,8 +104,8 @@ def _table(robot: Robot, links: Links, joints: Joints) -> Robot:
         convention="standard",
         rows=tuple(rows),
         home=(0.0,) * robot.n,
-        base=_nested(links.base @ _HALF_TURN if turned[0] else links.base),
-        tool=_nested(_HALF_TURN @ links.tool if turned[-1] else links.tool),
+        base=_nested(base @ _HALF_TURN if turned[0] else base),
+        tool=_nested(_HALF_TURN @ tool if turned[-1] else tool),
     )
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.axes import counted_from_base, inverse, is_perpendicular, is_zero, links_of, screw_z
+from kin.axes import inverse, is_zero, links_by_rows, screw_z
 from kin.robot import Robot
 from kin.solvers.canonical import parameters
 from kin.solvers.collinear7.batch import branches_many, branches_one
@@ -51,17 +51,15 @@ class Geometry(NamedTuple):
 
 def match(robot: Robot) -> Collinear7 | None:
     """The closed form if axes 1 and 2 are one line, 3 is perpendicular to it and 5-6-7 meet in a point."""
-    if robot.n != 7 or not robot.revolute.all():
-        return None
-    links = counted_from_base(links_of(robot, (1, -1, -1, 1, -1, 1), as_counted=True), robot)
-    square = links.alpha[0] == 0.0 and all(is_perpendicular(twist) for twist in links.alpha[1:6])
-    if not square or not is_zero(*links.a, links.d[3], links.d[5]):
+    links = links_by_rows(robot, (0, -1, -1, 1, -1, 1)) if robot.n == 7 else None
+    if links is None or not is_zero(*links.a, links.d[3], links.d[5]):
         return None
     d3, d5 = float(links.d[2]), float(links.d[4])
     if min(d3, d5) < TOLERANCES.geometry:
         return None
-    base = links.base @ screw_z(0.0, float(links.d[1]))
-    inverse_tool = inverse(links.tool)
+    tool = screw_z(0.0, float(links.d[6])) @ links.tool
+    base = links.base @ screw_z(0.0, float(links.d[0] + links.d[1]))
+    inverse_tool = inverse(tool)
     # The wrist centre in the tool frame: it must stay when the tool rolls about its approach axis.
     on_axis = is_zero(inverse_tool[0, 3], inverse_tool[1, 3])
     return Collinear7(Geometry(inverse(base), inverse_tool, links.theta, d3, d5, on_axis))

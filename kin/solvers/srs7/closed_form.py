@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.axes import counted_from_base, inverse, is_perpendicular, is_zero, links_of
+from kin.axes import inverse, is_zero, links_by_rows, screw_z
 from kin.robot import Robot
 from kin.solvers.canonical import parameters
 from kin.solvers.contract import (
@@ -52,18 +52,16 @@ class Geometry(NamedTuple):
 
 def match(robot: Robot) -> Srs7 | None:
     """The closed form if axes 1, 2, 3 meet, axes 5, 6, 7 meet, and neighbouring axes are perpendicular."""
-    if robot.n != 7 or not robot.revolute.all():
-        return None
-    links = counted_from_base(links_of(robot, (-1, 1, -1, 1, -1, 1), as_counted=True), robot)
-    square = all(is_perpendicular(twist) for twist in links.alpha[:6])
-    if not square or not is_zero(*links.a, links.d[1], links.d[3], links.d[5]):
+    links = links_by_rows(robot, (-1, 1, -1, 1, -1, 1)) if robot.n == 7 else None
+    if links is None or not is_zero(*links.a, links.d[1], links.d[3], links.d[5]):
         return None
     d3, d5 = float(links.d[2]), float(links.d[4])
     if min(d3, d5) < TOLERANCES.geometry:
         return None
-    tool = links.tool
+    tool = screw_z(0.0, float(links.d[6])) @ links.tool
     on_axis = is_zero(tool[0, 3], tool[1, 3]) and abs(tool[2, 2] - 1.0) < TOLERANCES.geometry
-    return Srs7(Geometry(inverse(links.base), inverse(tool), links.theta, d3, d5, bool(on_axis)))
+    base = links.base @ screw_z(0.0, float(links.d[0]))
+    return Srs7(Geometry(inverse(base), inverse(tool), links.theta, d3, d5, bool(on_axis)))
 
 
 class Srs7(ClosedForm):

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from kin.axes import counted_from_base, inverse, is_perpendicular, is_zero, links_of
+from kin.axes import inverse, is_zero, links_by_rows, screw_x, screw_z
 from kin.robot import Robot
 from kin.solvers.contract import (
     APPROACH,
@@ -40,24 +40,28 @@ _THETA1 = RedundancyParameter("theta1", "θ1", joint=0, circular=True, rare=True
 
 def match(robot: Robot) -> Wrist5 | None:
     """The closed form if axes 2 and 3 are parallel, perpendicular to axis 1, and 3-4, 4-5 meet at right angles."""
-    if robot.n != 5 or not robot.revolute.all():
+    links = links_by_rows(robot, (-1, 0, -1, 1)) if robot.n == 5 else None
+    if links is None or not is_zero(*links.a[2:], links.d[1] + links.d[2]):
         return None
-    links = counted_from_base(links_of(robot, (-1, 1, -1, 1), as_counted=True), robot)
-    a, d, alpha, tool = links.a, links.d, links.alpha, links.tool
-    square = all(is_perpendicular(alpha[i]) for i in (0, 2, 3)) and alpha[1] == 0.0
-    if not square or not is_zero(a[2], a[3], d[2]) or min(a[1], d[3]) < TOLERANCES.geometry:
+    theta, d = links.theta, links.d
+    a1, a2, d4 = float(links.a[0]), float(links.a[1]), float(d[3])
+    if min(abs(a2), d4) < TOLERANCES.geometry:
         return None
-    # The tool looks across axis 5, and its point is on the line through the wrist centre that it looks along.
-    approach, tip = tool[:3, 2], tool[:3, 3]
-    d6 = float(tip @ approach)
-    if not is_zero(math.hypot(approach[0], approach[1]) - 1.0, *(tip - d6 * approach)):
+    tool = screw_x(0.0, math.pi / 2) @ screw_z(0.0, float(d[4])) @ links.tool
+    if abs(tool[2, 2] + 1.0) < TOLERANCES.geometry:
+        theta[4] += math.pi
+        tool = screw_x(0.0, math.pi / 2) @ screw_z(math.pi, float(d[4])) @ links.tool
+    if not is_zero(tool[0, 3], tool[1, 3], tool[2, 2] - 1.0):
         return None
-    theta = links.theta.copy()
-    # In the formulas θ3 = 0 is the straight elbow, a quarter turn from where the common normals align, and at
-    # θ5 = 0 the tool looks along the forearm.
+    # In the formulas θ3 = 0 is the straight elbow, a quarter turn from where the common normals align.
     theta[2] += math.pi / 2
-    theta[4] = math.atan2(-approach[0], approach[1])
-    return Wrist5(Geometry(inverse(links.base), theta, float(a[0]), float(a[1]), float(d[3]), d6))
+    base = links.base @ screw_z(0.0, float(d[0]))
+    if a2 < 0:
+        # A negative length is two half turns: Tx(−a) = Rz(π) Tx(a) Rz(−π).
+        theta[1] += math.pi
+        theta[2] -= math.pi
+        a2 = -a2
+    return Wrist5(Geometry(inverse(base), theta, a1, a2, d4, float(tool[2, 3])))
 
 
 class Wrist5(ClosedForm):
