@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from app.viewer.lessons.postures.listing import survey
+from app.viewer.lessons.postures.survey import survey
 from page import Tab
 from playwright.sync_api import expect
 

@@ -27,7 +27,7 @@ from app.shared.clouds import Cloud, Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.shared.summaries import Summaries
-from app.viewer.tabs.workspace import known
+from app.viewer.tabs.workspace.section.panel import find_section
 
 PIONEER = kin.get_robot("pioneer5")
 SRS = kin.get_robot("redundant7-craig")
@@ -318,8 +318,8 @@ def test_the_second_visitor_does_not_wait(client, monkeypatch):
 
 
 def test_rest_finds_what_the_viewer_has_computed(app, client, monkeypatch):
-    known.facts(app.state.summaries, SRS, volume=False)
-    known.cross(app.state.summaries, SRS)
+    app.state.summaries.facts(SRS, effort=None).result()  # as the tab's sizes ask for them
+    assert find_section(app.state.summaries, SRS) is not None
     for name in ("workspace_facts", "section"):
         monkeypatch.setattr(f"app.shared.summaries.{name}", lambda *_, **__: pytest.fail("computed again"))
     answer = client.get(f"{API}/{SRS.id}/workspace/summary?volume=false&section=true")
