@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from app.viewer.lessons.postures.survey import survey
 from page import Tab
 from playwright.sync_api import expect
 
 import kin
 from app.viewer.lessons.postures.ghosts import places
+from app.viewer.lessons.postures.survey import survey
 
 pytestmark = pytest.mark.browser
 
