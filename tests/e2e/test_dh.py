@@ -18,7 +18,7 @@ TITLE = "DH table step by step"
 def open_lesson(tab: Tab) -> None:
     tab.page.get_by_role("tab", name="Learn").click()
     tab.choose("Lesson", TITLE)
-    expect(caption(tab)).to_contain_text("Frame 0 stands on the base")
+    expect(caption(tab)).to_contain_text("Frame 0 is at the base")
 
 
 def caption(tab: Tab):

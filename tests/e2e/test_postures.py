@@ -44,14 +44,14 @@ def test_a_click_on_a_ghost_in_the_picture_morphs_the_arm(tab: Tab) -> None:
     postures = survey(PUMA, T, "pose", PUMA.q_home)
     here = kin.branch_of(PUMA, PUMA.q_home)
     expect(tab.page.locator("[data-here]")).to_have_attribute("data-posture", here)
-    wanted = next(p for p in postures if p.can_be_had and p.name != here)
+    wanted = next(p for p in postures if p.available and p.name != here)
     assert wanted.q is not None
     for point in places(PUMA, np.array([wanted.q]))[0][0][4:]:
         press(tab, tab.pixel(PUMA, point))
         if tab.page.locator("[data-here]").get_attribute("data-posture") != here:
             break
     taken = tab.page.locator("[data-here]").get_attribute("data-posture")
-    assert taken in {p.name for p in postures if p.can_be_had and p.name != here}
+    assert taken in {p.name for p in postures if p.available and p.name != here}
     tab.wait_for_tool(T[:3, 3], within=0.06)
     tab.row("Go").get_by_role("button", name=str(list(kin.branch_names(PUMA)).index(here) + 1)).click()
     expect(tab.page.locator("[data-here]")).to_have_attribute("data-posture", here)

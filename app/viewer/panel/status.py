@@ -9,7 +9,7 @@ import viser
 
 from app.viewer.views.templates import render
 from kin import IKResult
-from kin.ik.details import OrientationNotMet, OutOfReach, OutsideLimits, RollError, RotationError, Solved
+from kin.ik.details import OrientationNotMet, OutsideLimits, RollError, RotationError, Solved
 from kin.units import Units
 
 Kind = Literal["reached", "compromise", "limits", "orientation", "unreachable", "hand", "error"]
@@ -38,27 +38,20 @@ class Notice:
 def notice(result: IKResult, units: Units) -> Notice:
     """The result for a target as a message."""
     explanation = result.explain(units)
-    kind, title = _headline(result, explanation.headline, units)
-    return Notice(kind, title, explanation.detail)
+    return Notice(_kind(result), explanation.title, explanation.detail)
 
 
-def _headline(result: IKResult, headline: str, units: Units) -> tuple[Kind, str]:
-    """The kind of notice and its title: `headline`, or a shorter one with rounded numbers."""
+def _kind(result: IKResult) -> Kind:
     match result.details:
         case Solved():
-            return "reached", headline
-        case RollError(_, error):
-            return "compromise", f"Reached with roll error {units.angle(error)}"
-        case RotationError(_, error):
-            return "compromise", f"Point reached, orientation off by {units.angle(error)}"
-        case OutsideLimits(_, violations):
-            numbers = ", ".join(str(v.joint + 1) for v in violations)
-            return "limits", f"{headline}: joint{'s' if len(violations) > 1 else ''} {numbers}"
+            return "reached"
+        case RollError() | RotationError():
+            return "compromise"
+        case OutsideLimits():
+            return "limits"
         case OrientationNotMet():
-            return "orientation", "Orientation not possible here"
-        case OutOfReach(distance) if distance > 0.0:
-            return "unreachable", f"Out of reach by {units.distance(distance)}"
-    return "unreachable", headline
+            return "orientation"
+    return "unreachable"
 
 
 def html(shown: Notice) -> str:

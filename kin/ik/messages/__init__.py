@@ -1,7 +1,7 @@
 """Sentences about IK answers, made from codes and numbers in the reader's units.
 
-This is the only place where answers of :mod:`kin.ik` become words. An `Explanation` has a headline and a detail,
-so that a page can set them apart; its `text` is both in one.
+This is the only place where answers of :mod:`kin.ik` become words. An `Explanation` has a title and a detail
+for a page that sets them apart; its `text` is one line.
 """
 
 from __future__ import annotations
@@ -43,11 +43,13 @@ class Explanation(NamedTuple):
     """An answer in words.
 
     Attributes:
+        title: the outcome for a narrow place: short, with rounded numbers, without a full stop.
         headline: the outcome, without a full stop.
         body: why, without a full stop, beginning in lower case; empty if the headline says it all.
         note: a further sentence, or empty.
     """
 
+    title: str
     headline: str
     body: str = ""
     note: str = ""
@@ -82,7 +84,25 @@ def explain(
     """
     headline, body = _outcome(details, cause, task, units)
     solved = isinstance(details, Solved | RollError | RotationError)
-    return Explanation(headline, body, _singular(singularities, "This" if solved else "The closest", units))
+    note = _singular(singularities, "This" if solved else "The closest", units)
+    return Explanation(_title(details, headline, units), headline, body, note)
+
+
+def _title(details: Details, headline: str, units: Units) -> str:
+    """The headline, or a shorter one with rounded numbers."""
+    match details:
+        case RollError(_, error):
+            return f"Reached with roll error {units.angle(error)}"
+        case RotationError(_, error):
+            return f"Point reached, orientation off by {units.angle(error)}"
+        case OutsideLimits(_, violations):
+            numbers = ", ".join(str(v.joint + 1) for v in violations)
+            return f"{headline}: joint{'s' if len(violations) > 1 else ''} {numbers}"
+        case OrientationNotMet():
+            return "Orientation not possible here"
+        case OutOfReach(distance) if distance > 0.0:
+            return f"Out of reach by {units.distance(distance)}"
+    return headline
 
 
 def _outcome(details: Details, cause: str, task: str, units: Units) -> tuple[str, str]:

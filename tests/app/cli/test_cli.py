@@ -21,6 +21,7 @@ from app.exports.formats import FORMATS, encode
 from app.shared.clouds import Cloud, Clouds
 from app.shared.settings import Settings
 from kin.solvers import closed_form_of
+from kin.workspace import MEASURES, STRATEGIES
 
 ROOT = Path(__file__).parents[3]
 PIONEER = kin.get_robot("pioneer5")
@@ -38,6 +39,19 @@ def answer(capsys, *words, code=0):
     got, out, err = run(capsys, *words, "--json")
     assert (got, err) == (code, "")
     return json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
+
+
+# -- arguments -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("option", "choices"), [("--measure", MEASURES), ("--strategy", STRATEGIES), ("--format", tuple(FORMATS))]
+)
+def test_the_choices_of_a_cloud_are_those_of_the_core(capsys, option, choices):
+    """They are written out in the parser, which starts without importing the core."""
+    code, _, err = run(capsys, "workspace", "pioneer5", option, "nonsense")
+    assert code == 2
+    assert set(re.findall(r"\w+", err.partition("choose from")[2])) == set(choices)
 
 
 # -- fk --------------------------------------------------------------------------------------------------------
