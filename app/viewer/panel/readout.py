@@ -30,7 +30,7 @@ def html(T_base_tool: Array, units: Units) -> str:
     rows = (
         ("x y z", _numbers(position, lengths.decimals(1)), lengths.name),
         ("roll pitch yaw", _numbers(turned, angles.decimals(1)), angles.name),
-        ("quaternion w x y z", _numbers(quaternion, 3), ""),
+        ("w x y z", _numbers(quaternion, 3), ""),
     )
     return render("panel/readout", rows=rows)
 
