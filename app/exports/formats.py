@@ -268,13 +268,13 @@ class _Sink:
 class Format:
     """A file format.
 
-    Attributes:
-        name: what it is asked by, and the end of file names.
-        media_type: for HTTP.
-        meaning: for people.
-        encode: the bytes of the file.
-        size: how many bytes there will be, None if that is only known at the end.
-        passes: how often it goes through the cloud.
+        Attributes:
+    name: its identifier in requests, and the extension of its files.
+            media_type: the HTTP media type.
+            meaning: a description for users.
+            encode: yields the bytes of the file.
+            size: the number of bytes, None if it is only known at the end.
+            passes: how often it iterates over the cloud.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""The benchmark itself: what it asks, how it judges, how it times, and what it prints."""
+"""The benchmark itself: its targets, its checks of answers, its timing and its output."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def brief(*ids, peers=()):
 
 
 def by_screws(arm, q):
-    """The product of exponentials of an arm's axes and offsets, as other libraries read them."""
+    """The product of exponentials of an arm's axes and offsets, in the form other libraries use."""
     H, P, tool = arm.screws
     T = np.eye(4)
     for h, p, angle in zip(H, P, q, strict=False):
@@ -87,7 +87,7 @@ def answers_of(task):
     return [q for arguments in thin.inputs for q in thin.read(thin.call(*arguments))]
 
 
-def test_right_answers_are_accepted_and_whole_turns_are_no_difference():
+def test_right_answers_are_accepted_up_to_whole_turns():
     task = prepare(ROWS_BY_ID["ik-pioneer5"], 6, 1)
     ours = answers_of(task)
     sets, check = judge.right_sets(task, ours)
@@ -99,7 +99,7 @@ def test_right_answers_are_accepted_and_whole_turns_are_no_difference():
 
 
 @pytest.mark.parametrize("off", [3e-6, -0.1])
-def test_an_answer_that_is_off_is_none(off):
+def test_an_inaccurate_answer_is_rejected(off):
     task = prepare(ROWS_BY_ID["ik-pioneer5"], 6, 1)
     sets, check = judge.right_sets(task, [q + np.array([0, off, 0, 0, 0]) for q in answers_of(task)])
     assert check.success == 0.0
@@ -107,7 +107,7 @@ def test_an_answer_that_is_off_is_none(off):
     assert not any(len(q) for q in sets)
 
 
-def test_a_missing_branch_and_a_double_one_are_seen():
+def test_missing_and_duplicate_branches_are_detected():
     task = prepare(ROWS_BY_ID["ik-srs"], 4, 1)
     ours = answers_of(task)
     sets, check = judge.right_sets(task, ours)
@@ -120,7 +120,7 @@ def test_a_missing_branch_and_a_double_one_are_seen():
     assert judge.share_of_same(fewer, twice) == 1.0
 
 
-def test_an_answer_beyond_the_limits_is_none_where_limits_count():
+def test_an_answer_outside_the_limits_is_rejected_where_limits_apply():
     row = ROWS_BY_ID["solve-redundant7-craig"]
     task = prepare(row, 4, 1)
     beyond = task.q + np.array([0, 2 * math.pi, 0, 0, 0, 0, 0])
@@ -128,7 +128,7 @@ def test_an_answer_beyond_the_limits_is_none_where_limits_count():
     assert judge.right_sets(task, [q[None] for q in beyond])[1].success == 0.0
 
 
-def test_a_wrong_pose_is_seen():
+def test_a_wrong_pose_is_detected():
     task = prepare(ROWS_BY_ID["fk"], 4, 1)
     assert judge.judge_poses(task, list(task.T)).success == 1.0
     shifted = task.T.copy()
@@ -141,7 +141,7 @@ def test_a_wrong_pose_is_seen():
 
 
 class Machine:
-    """A clock that only moves when somebody works, on a machine that gets slower and slower."""
+    """A clock that advances only with work, on a machine that gets slower and slower."""
 
     def __init__(self):
         self.now = 0.0
@@ -158,7 +158,7 @@ class Machine:
         return Turns(Contestant(name, work, [(k,) for k in range(5)], lambda _: [], per_call))
 
 
-def test_ratios_survive_a_machine_that_slows_down():
+def test_ratios_are_robust_to_a_machine_that_slows_down():
     machine = Machine()
     fast, slow = machine.worker("fast", 1000), machine.worker("slow", 3000)
     measure([fast, slow], 40, 1e-5, clock=machine.clock)
@@ -168,7 +168,7 @@ def test_ratios_survive_a_machine_that_slows_down():
     assert fast.noise > 0.1
 
 
-def test_contestants_take_turns_and_targets_are_all_used():
+def test_contestants_take_turns_and_every_target_is_used():
     machine = Machine()
     workers = [machine.worker(name, 1000, per_call=4) for name in "abc"]
     measure(workers, 6, 3e-6, clock=machine.clock)
@@ -211,7 +211,7 @@ def test_an_arm_that_is_not_built_in_is_reported():
     assert "nowhere" in "\n".join(report.notes(found))
 
 
-def test_a_library_that_is_missing_or_fails_ends_nothing():
+def test_a_library_that_is_missing_or_fails_does_not_end_the_run():
     def fails(task):
         raise ValueError("no such arm")
 
@@ -229,13 +229,13 @@ def test_a_library_that_is_missing_or_fails_ends_nothing():
     assert found.faults == ()
 
 
-def test_our_own_faults_are_ours(monkeypatch):
+def test_wrong_answers_of_kinboard_are_reported_as_faults(monkeypatch):
     monkeypatch.setattr(kin, "ik_branches", lambda robot, T, value: np.zeros((8, robot.n)))
     found = run(brief("ik-srs"))
     assert found.faults == (f"ik-srs: {OURS} misses targets or answers wrongly",)
 
 
-def test_an_interrupted_run_reports_what_there_is():
+def test_an_interrupted_run_reports_its_results_so_far():
     def stop(words):
         if words.startswith("round 2"):
             raise KeyboardInterrupt
@@ -274,7 +274,7 @@ def bench(capsys, *words):
     return code, out, err
 
 
-def test_the_command_prints_and_writes_the_same(capsys, quick, tmp_path):
+def test_the_command_prints_and_writes_the_same_report(capsys, quick, tmp_path):
     files = tmp_path / "bench.json", tmp_path / "bench.svg"
     words = (
         "--quick",
@@ -306,7 +306,7 @@ def test_the_command_prints_and_writes_the_same(capsys, quick, tmp_path):
     assert OURS in drawn
 
 
-def test_processor_time_can_be_asked_for(capsys, quick):
+def test_processor_time_can_be_selected(capsys, quick):
     code, out, _ = bench(capsys, "--quick", "--rows", "fk", "--peers", "none", "--cpu-time")
     assert code == 0
     assert "processor time" in out
@@ -321,13 +321,13 @@ def test_processor_time_can_be_asked_for(capsys, quick):
         (("--picture", "/"), "folder that exists"),
     ],
 )
-def test_what_cannot_be_run_is_said_before_the_run(capsys, words, said):
+def test_invalid_arguments_are_refused_before_the_run(capsys, words, said):
     code, out, err = bench(capsys, *words)
     assert (code, out) == (2, "")
     assert said in err
 
 
-def test_a_peer_that_was_asked_for_must_be_there(capsys, monkeypatch):
+def test_a_requested_peer_must_be_installed(capsys, monkeypatch):
     monkeypatch.setattr(Peer, "installed", property(lambda self: self.module != "eaik"))
     code, out, err = bench(capsys, "--peers", "eaik", "numpy")
     assert (code, out) == (2, "")
@@ -341,7 +341,7 @@ def test_uncompiled_code_is_not_measured(capsys, monkeypatch):
     assert "NUMBA_DISABLE_JIT" in err
 
 
-def test_ctrl_c_before_the_first_round_is_calm(capsys, monkeypatch):
+def test_ctrl_c_before_the_first_round_exits_with_a_message(capsys, monkeypatch):
     def stopped(settings, say):
         raise KeyboardInterrupt
 
@@ -351,16 +351,16 @@ def test_ctrl_c_before_the_first_round_is_calm(capsys, monkeypatch):
     assert err.splitlines()[-1] == "kinboard: stopped before anything was measured"
 
 
-def test_the_extra_brings_every_peer():
+def test_the_extra_installs_every_peer():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extra = {re.match(r"[\w-]+", wanted).group() for wanted in project["optional-dependencies"]["bench"]}
     assert extra - {"scipy"} == {peer.name for peer in PEERS} - {"numpy"}
 
 
-def test_every_row_has_a_floor_and_us():
+def test_every_row_has_a_floor_and_kinboard():
     for row in ROWS:
         task = prepare(row, 2, 1)
         if task is not None:
-            # Clouds have two: what they compute, and what they write.
+            # Clouds have two rows: computing and writing.
             assert [c.floor for c in FLOOR.enter(task)] == [True] * (2 if row.kind == "cloud" else 1)
             assert KINBOARD.enter(task)

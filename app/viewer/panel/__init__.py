@@ -6,7 +6,7 @@ the callbacks too, with ``event.client is None``. Those calls are ignored; other
 the sliders, which would move the gizmo.
 
 A control that shows a value in a unit is replaced when the unit changes, and its key contains the `Units` it was
-created with. So an event that was already on its way can be told from those of its successor.
+created with. So an event that was already on its way is not mistaken for one of its successor.
 """
 
 from __future__ import annotations

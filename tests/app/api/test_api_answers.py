@@ -1,4 +1,4 @@
-"""REST: what comes back for good questions, checked against the core and against forward kinematics."""
+"""REST: responses to valid requests, checked against the core and against forward kinematics."""
 
 import asyncio
 import json
@@ -30,7 +30,7 @@ def random_q(robot, count, seed=0):
 
 
 def check_shape(kind, answer):
-    """The answer is what the published schema of this kind says, nothing more."""
+    """The answer matches the published schema of this kind and has no other keys."""
     assert TypeAdapter(kind).validate_python(answer, strict=True) == answer  # validating drops unknown keys
 
 
@@ -44,8 +44,8 @@ def test_the_list_of_robots_describes_every_robot_in_order(client):
 
 
 @each_robot
-def test_a_robot_described_can_be_rebuilt(client, robot):
-    """Only with what REST says, forward kinematics comes out the same."""
+def test_a_robot_can_be_rebuilt_from_its_description(client, robot):
+    """A robot built from the REST description alone has the same forward kinematics."""
     answer = client.get(f"/api/v1/robots/{robot.id}").json()
     check_shape(RobotAnswer, answer)
     rebuilt = kin.Robot(
@@ -83,7 +83,7 @@ def test_fk_of_one_configuration(client, robot):
 
 @each_robot
 def test_fk_of_a_list_keeps_its_order_and_a_list_of_one_is_a_list(client, robot):
-    q = random_q(robot, 600)  # more than are answered at a time
+    q = random_q(robot, 600)  # more than one block
     answers = post(client, robot, "fk", q=q.tolist())["results"]
     assert np.array_equal([answer["pose"]["matrix"] for answer in answers], kin.fk(robot, q))
     alone = post(client, robot, "fk", q=q[:1].tolist())
@@ -102,7 +102,7 @@ def test_fk_frames_follow_the_rows_of_the_table(client, robot):
 
 
 @each_robot
-def test_fk_says_when_a_joint_is_beyond_its_stop(client, robot):
+def test_fk_reports_a_joint_outside_its_limits(client, robot):
     q = robot.upper + 0.01 * np.eye(robot.n)[-1]
     assert post(client, robot, "fk", q=q.tolist())["in_limits"] is False
     assert post(client, robot, "fk", q=robot.upper.tolist())["in_limits"] is True
@@ -144,8 +144,8 @@ def closes(robot, pose, solution, task):
 
 @each_robot
 @pytest.mark.parametrize("task", ["pose", "approach", "position"])
-def test_ik_answers_what_fk_said(client, robot, task):
-    """A pose as fk gives it is a target as it stands, and every solution leads back to it."""
+def test_ik_solves_the_poses_of_fk(client, robot, task):
+    """A pose in the form fk returns is a valid target, and every solution reaches it."""
     for q in random_q(robot, 4, seed=1):
         pose = post(client, robot, "fk", q=q.tolist())["pose"]
         answer = post(client, robot, "ik", target=pose, task=task)
@@ -185,20 +185,22 @@ def test_ik_agrees_with_the_core(client, robot):
     task = "approach" if robot.n < 6 else "pose"
     answer = post(client, robot, "ik", target={"matrix": T.tolist()}, task=task, q_seed=seed.tolist())
     result = kin.solve_ik(robot, T, task=task, q_seed=seed)
-    # A descent carries the last digit of the target, which is made a rotation once more here, into the free elbow.
+    # REST normalises the rotation again; a descent passes that rounding on to the redundant elbow.
     near = 1e-9 if kin.branch_names(robot) else 1e-5
     assert np.allclose([s["q"] for s in answer["solutions"]], [s.q for s in result.solutions], rtol=0, atol=near)
     assert [s["branch"] for s in answer["solutions"]] == [s.branch for s in result.solutions]
     assert (answer["reason"], answer["solver"]) == (result.reason, result.solver)
     assert answer["solver_reason"] == result.solver_reason
     assert [free["name"] for free in answer["redundancy"]] == [free.name for free in result.redundancy]
-    for told, free, own in zip(
+    for found, free, own in zip(
         answer["redundancy"], result.redundancy, answer["solutions"][0]["redundancy"], strict=True
     ):
-        assert np.allclose(told["intervals"], free.intervals, rtol=0, atol=1e-9)
-        assert told["value"] == own["value"]
+        assert np.allclose(found["intervals"], free.intervals, rtol=0, atol=1e-9)
+        assert found["value"] == own["value"]
         for interval in own["intervals"]:
-            assert any(low - 1e-9 <= interval[0] and interval[1] <= high + 1e-9 for low, high in told["intervals"])
+            assert any(
+                low - 1e-9 <= interval[0] and interval[1] <= high + 1e-9 for low, high in found["intervals"]
+            )
 
 
 @each_robot
@@ -210,12 +212,12 @@ def test_ik_of_a_list_with_one_seed_or_one_each(client, robot):
     own = post(client, robot, "ik", target=targets, task=task, q_seed=q.tolist())["results"]
     for i, target in enumerate(targets):
         assert same[i] == post(client, robot, "ik", target=target, task=task, q_seed=q[0].tolist())
-        # Seeded with the very configuration that made the target, the nearest answer is that configuration.
+        # The seed is the configuration that generated the target, so it is the nearest solution.
         assert own[i]["solutions"][0]["distance"] < 1e-6
 
 
 @pytest.mark.parametrize("robot_id", ["redundant7", "redundant7-craig"])
-def test_the_redundancy_asked_for_is_the_one_used(client, robot_id):
+def test_the_requested_redundancy_is_used(client, robot_id):
     robot = kin.get_robot(robot_id)
     pose = post(client, robot, "fk", q=list(robot.home))["pose"]
     (free,) = post(client, robot, "ik", target=pose)["redundancy"]
@@ -231,7 +233,7 @@ def test_the_redundancy_asked_for_is_the_one_used(client, robot_id):
 
 
 @each_robot
-def test_ik_options_cut_and_widen_the_answer(client, robot):
+def test_ik_options_shorten_and_extend_the_answer(client, robot):
     task = "approach" if robot.n < 6 else "pose"
     target = {"matrix": kin.fk(robot, random_q(robot, 1, seed=5)[0]).tolist()}
     inside = post(client, robot, "ik", target=target, task=task)["solutions"]
@@ -256,9 +258,9 @@ def test_out_of_reach_is_an_answer(client, robot):
     assert "Out of reach" in answer["reason"]
 
 
-def test_limits_in_the_way_are_named(client):
+def test_violated_limits_are_named(client):
     robot = kin.get_robot("pioneer5")
-    q = np.array([1.5, 0.6, 0.8, 0.5, 1.3])  # the last joint is 29° beyond its stop
+    q = np.array([1.5, 0.6, 0.8, 0.5, 1.3])  # the last joint is 29° outside its limits
     answer = post(client, robot, "ik", target={"matrix": kin.fk(robot, q).tolist()}, task="approach")
     assert answer["status"] == "limits"
     assert answer["solutions"] == []
@@ -269,7 +271,7 @@ def test_limits_in_the_way_are_named(client):
     assert answer["closest"]["in_limits"] is True
 
 
-def test_what_a_five_joint_arm_gives_up_is_said(client):
+def test_the_compromise_of_a_five_joint_arm_is_reported(client):
     robot = kin.get_robot("pioneer5")
     T = kin.fk(robot, random_q(robot, 1, seed=6)[0])
     c, s = np.cos(0.1), np.sin(0.1)
@@ -300,8 +302,8 @@ def test_extreme_but_finite_numbers_never_put_nan_into_an_answer(client):
 @pytest.mark.parametrize(
     ("status", "count", "inline"), [("ready", 3, True), ("warming", 3, False), ("ready", 40, False)]
 )
-def test_a_few_poses_hold_nobody_up_and_more_get_a_thread(app, client, monkeypatch, status, count, inline):
-    """On the event loop only what is quick for sure: while kernels may be compiling, nothing."""
+def test_few_poses_run_on_the_event_loop_and_more_in_a_thread(app, client, monkeypatch, status, count, inline):
+    """Only short computations run on the event loop, and none while kernels may be compiling."""
     on_the_loop = []
 
     def watched(robot, q, frames):

@@ -25,7 +25,7 @@ ADDRESS = "/api/v1/robots/pioneer5/capability"
 
 @pytest.fixture
 def live():
-    """REST alone on a real port, one map at a time, and a client: leaving and waiting need a connection."""
+    """REST alone on a real port, one map at a time, and a client: disconnecting needs a real connection."""
     app = FastAPI()
     app.state.settings, app.state.store = Settings(), Store()
     app.state.maps, app.state.streams, app.state.compute = Maps(threads=1), StreamLimit(1), ComputeSlots(4, 60.0)
@@ -38,7 +38,7 @@ def live():
 
 @pytest.fixture
 def held(monkeypatch):
-    """Blocks are computed only once the event is set; which were begun."""
+    """(event, blocks): a block is computed once the event is set; `blocks` lists those that were started."""
     go, begun, compute = threading.Event(), [], mapreduce.capability_block
 
     def block(grid, number):
@@ -68,7 +68,7 @@ def test_the_answer_is_the_map_of_the_core(client):
     assert np.array_equal(fits, found.approachable)
 
 
-def test_the_second_who_asks_does_not_wait(client, monkeypatch):
+def test_a_repeated_request_is_served_from_the_cache(client, monkeypatch):
     first = client.get(f"{ADDRESS}?resolution=6&directions=12")
     assert first.json()["voxels"]["approachable"] is None
     monkeypatch.setattr(mapreduce, "capability_block", None)
@@ -100,7 +100,7 @@ def test_an_unknown_robot_is_a_404(client):
     assert client.get("/api/v1/robots/nobody/capability").status_code == 404
 
 
-def test_one_who_leaves_ends_the_work_and_gives_the_place_back(live, held):
+def test_a_client_that_disconnects_cancels_the_map_and_frees_its_slot(live, held):
     app, client = live
     go, begun = held
     with pytest.raises(httpx2.TimeoutException):
@@ -111,7 +111,7 @@ def test_one_who_leaves_ends_the_work_and_gives_the_place_back(live, held):
     assert len(begun) <= 2
 
 
-def test_too_many_at_a_time_are_told_to_come_again(live, held):
+def test_requests_beyond_the_limit_get_a_503_with_retry_after(live, held):
     _, client = live
     go, begun = held
     answers = []
@@ -126,7 +126,7 @@ def test_too_many_at_a_time_are_told_to_come_again(live, held):
     assert answers[0].status_code == 200
 
 
-def test_a_map_that_takes_too_long_is_given_up(live, held):
+def test_a_map_that_takes_too_long_is_abandoned(live, held):
     app, client = live
     app.state.compute.seconds = 0.2
     answer = client.get(f"{ADDRESS}?resolution=5&directions=12")
@@ -135,7 +135,7 @@ def test_a_map_that_takes_too_long_is_given_up(live, held):
     assert app.state.streams.open == 0
 
 
-def test_a_failure_is_a_500_and_is_not_kept(client, monkeypatch, caplog):
+def test_a_failure_is_a_500_and_is_not_cached(client, monkeypatch, caplog):
     with monkeypatch.context() as broken:
         broken.setattr(mapreduce, "capability_block", lambda grid, block: 1 / 0)
         assert client.get(f"{ADDRESS}?resolution=5&directions=24").status_code == 500

@@ -53,16 +53,16 @@ def test_every_arm_has_its_equations(client, robot):
 
 
 @pytest.mark.parametrize("robot_id", list(chapter.LENGTHS))
-def test_the_chapters_equations_are_told_with_their_verdicts(client, robot_id):
+def test_the_chapters_equations_are_listed_with_their_verdicts(client, robot_id):
     answer = get(client, kin.get_robot(robot_id))
     verdicts = {"right": "right", "wrong": "misprinted", "garbled": "unreadable"}
-    for told, equation in zip(answer["equations"], chapter.equations(robot_id), strict=True):
-        assert (told["reference"], told["name"], told["note"]) == (equation.number, equation.entry, equation.note)
-        assert told["verdict"] == verdicts[equation.verdict]
-        assert (told["as_printed"] is None) == (equation.verdict == "garbled")
+    for row, equation in zip(answer["equations"], chapter.equations(robot_id), strict=True):
+        assert (row["reference"], row["name"], row["note"]) == (equation.number, equation.entry, equation.note)
+        assert row["verdict"] == verdicts[equation.verdict]
+        assert (row["as_printed"] is None) == (equation.verdict == "garbled")
         wrong = equation.verdict == "wrong"
-        assert (told["corrected"] is not None) == wrong
-        assert told["worst_q"] == (np.radians(equation.worst_at).tolist() if wrong else None)
+        assert (row["corrected"] is not None) == wrong
+        assert row["worst_q"] == (np.radians(equation.worst_at).tolist() if wrong else None)
 
 
 def test_lengths_are_in_metres_and_angles_have_no_value(client):
@@ -83,17 +83,17 @@ def test_values_of_one_and_of_a_list(client, robot):
     assert TypeAdapter(EquationValues).validate_python(one, strict=True) == one
     T = kin.fk(robot, q)
     for k, answer in enumerate(answers):
-        for told in answer["values"]:
-            equation = book(robot).equation(told["id"])
-            assert told["dh"] == T[(k, *equation.index)]
-            assert told["corrected"] == pytest.approx(told["dh"], abs=1e-12)
-            shown = told["corrected"] if told["printed"] is None else told["printed"]
-            assert told["difference"] == pytest.approx(shown - told["dh"], abs=1e-15)
+        for row in answer["values"]:
+            equation = book(robot).equation(row["id"])
+            assert row["dh"] == T[(k, *equation.index)]
+            assert row["corrected"] == pytest.approx(row["dh"], abs=1e-12)
+            shown = row["corrected"] if row["printed"] is None else row["printed"]
+            assert row["difference"] == pytest.approx(shown - row["dh"], abs=1e-15)
             if equation.verdict != "misprinted":
-                assert abs(told["difference"]) < 1e-12
-                assert told["turn"] < 1e-12
-    for told, again in zip(answers[7]["values"], one["values"], strict=True):
-        assert told["dh"] == again["dh"]
+                assert abs(row["difference"]) < 1e-12
+                assert row["turn"] < 1e-12
+    for row, again in zip(answers[7]["values"], one["values"], strict=True):
+        assert row["dh"] == again["dh"]
 
 
 def test_a_misprint_shows_in_the_values(client):

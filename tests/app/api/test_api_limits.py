@@ -1,4 +1,4 @@
-"""REST: how long a request may compute, how many may at a time, and what hostile input costs."""
+"""REST: limits on the computing time of a request and on concurrent requests, and the cost of hostile input."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from app.shared.settings import Settings
 
 ARM = "/api/v1/robots/pioneer5"
 PANDA = "/api/v1/robots/panda"
-FAR = {"position": [5.0, 0.0, 0.0], "wxyz": [1.0, 0.0, 0.0, 0.0]}  # for the Panda some tenths of a second each
+FAR = {"position": [5.0, 0.0, 0.0], "wxyz": [1.0, 0.0, 0.0, 0.0]}  # takes the Panda some tenths of a second each
 HURRIED = Settings(time_budget=0.1)
 
 
@@ -43,7 +43,7 @@ def refused_as_too_slow(answer):
 # -- time ------------------------------------------------------------------------------------------------------
 
 
-def test_a_batch_that_takes_minutes_is_given_up(hurried, monkeypatch):
+def test_a_batch_that_takes_too_long_is_abandoned(hurried, monkeypatch):
     solved = []
     solve = ik.solve
     monkeypatch.setattr(ik, "solve", lambda *a, **k: solved.append(1) or solve(*a, **k))
@@ -51,7 +51,7 @@ def test_a_batch_that_takes_minutes_is_given_up(hurried, monkeypatch):
     assert len(solved) < 1000
 
 
-def test_a_path_that_takes_minutes_is_given_up(hurried):
+def test_a_path_that_takes_too_long_is_abandoned(hurried):
     panda = kin.get_robot("panda")
     rng = np.random.default_rng(1)
     places = [kin.fk(panda, panda.random_q(rng))[:3, 3].tolist() for _ in range(1000)]
@@ -61,7 +61,7 @@ def test_a_path_that_takes_minutes_is_given_up(hurried):
     refused_as_too_slow(hurried.post(f"{PANDA}/ik/path", json={"targets": [FAR] * 1000}))
 
 
-def test_targets_judged_in_time_are_told_and_that_there_are_more(hurried):
+def test_targets_checked_in_time_are_returned_with_a_problem(hurried):
     answer = hurried.post(f"{PANDA}/reachable", json={"target": [FAR] * 200})
     assert answer.status_code == 200
     document = answer.json()
@@ -69,7 +69,7 @@ def test_targets_judged_in_time_are_told_and_that_there_are_more(hurried):
     assert document["problem"]["type"] == "urn:kinboard:problem:too-slow"
 
 
-def test_sizes_that_take_long_are_there_when_asked_for_again(hurried, monkeypatch):
+def test_a_summary_that_took_too_long_is_cached_for_the_next_request(hurried, monkeypatch):
     done = threading.Event()
     facts = kin.workspace_facts
 
@@ -86,13 +86,13 @@ def test_sizes_that_take_long_are_there_when_asked_for_again(hurried, monkeypatc
     assert again.status_code == 200
 
 
-def test_who_finds_no_place_waits_for_one_and_then_is_refused():
+def test_a_request_without_a_slot_waits_and_is_then_refused():
     async def ask():
         work = ComputeSlots(1, 0.05)
         async with work.slot():
             with pytest.raises(ProblemError) as refused:
                 async with work.slot():
-                    pytest.fail("there was no place")
+                    pytest.fail("the slot was taken")
         async with work.slot() as deadline:  # free again
             deadline.check()
         work.close()
@@ -104,8 +104,8 @@ def test_who_finds_no_place_waits_for_one_and_then_is_refused():
     assert (problem.status, problem.type) == (503, "urn:kinboard:problem:busy")
 
 
-def test_heavy_requests_leave_threads_to_the_others():
-    """As many as there are places, and more that wait: a page that needs a thread is still answered."""
+def test_heavy_requests_leave_threads_for_other_requests():
+    """With every slot taken and more requests waiting, a page that needs a thread is still served."""
     service = create_app(Settings(max_requests=2, time_budget=3.0))
     with TestClient(service, raise_server_exceptions=False) as client:
         asking = [
@@ -160,7 +160,7 @@ NUMBERS = (
 
 @pytest.mark.parametrize("what", ROUTES)
 @pytest.mark.parametrize("number", NUMBERS)
-def test_odd_numbers_anywhere(client, what, number):
+def test_odd_numbers_in_every_field(client, what, number):
     text = json.dumps(GOOD[what])
     at = text.rindex("0.") if "0." in text else 0
     end = min(i for i in (text.find(c, at) for c in ",]") if i > 0)
@@ -195,11 +195,11 @@ def test_odd_numbers_anywhere(client, what, number):
 def test_odd_bodies(client, what, content):
     began = time.process_time()
     refused(post(client, what, content))
-    assert time.process_time() - began < 5.0  # some milliseconds; of work, so that a busy machine does not matter
+    assert time.process_time() - began < 5.0  # takes milliseconds; processor time does not depend on other load
 
 
 @pytest.mark.parametrize("what", ROUTES)
-def test_of_a_key_given_twice_the_last_counts(client, what):
+def test_the_last_value_of_a_duplicate_key_is_used(client, what):
     name = next(iter(GOOD[what]))
     text = json.dumps(GOOD[what])
     assert post(client, what, text[:-1] + f', "{name}": 3}}').status_code == 422
@@ -207,7 +207,7 @@ def test_of_a_key_given_twice_the_last_counts(client, what):
 
 
 @pytest.mark.parametrize("what", ROUTES)
-def test_in_pieces_of_no_announced_length(client, what):
+def test_chunked_bodies_without_a_content_length(client, what):
     text = json.dumps(GOOD[what]).encode()
     answer = post(client, what, iter([text[:3], b"", text[3:]]))
     assert answer.status_code == 200, answer.text
@@ -215,7 +215,7 @@ def test_in_pieces_of_no_announced_length(client, what):
 
 @pytest.mark.parametrize("what", ROUTES)
 @pytest.mark.parametrize("encoding", ["gzip", "br", "identity, gzip"])
-def test_a_packed_body_is_not_unpacked(client, what, encoding):
+def test_a_compressed_body_is_not_decompressed(client, what, encoding):
     assert refused(post(client, what, gzip.compress(b"{}"), content_encoding=encoding))["status"] in (400, 415)
 
 

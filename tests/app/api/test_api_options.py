@@ -50,7 +50,7 @@ def test_every_option_reaches_the_core(client, options):
     assert [s.q.tolist() for s in plain.solutions] != [s.q.tolist() for s in result.solutions], "it has an effect"
 
 
-def test_blocked_branches_orientation_and_singularities_are_told(client):
+def test_blocked_branches_orientation_and_singularities_are_reported(client):
     beyond = np.radians([0, 30, 0, 118, 0, 40, 0])
     answer = post(client, SRS, "ik", target=target_of(SRS, beyond))
     assert (answer["status"], answer["cause"]) == ("limits", "joint limits")
@@ -65,7 +65,7 @@ def test_blocked_branches_orientation_and_singularities_are_told(client):
     assert "elbow" in [s["kind"] for s in answer["singularities"]]
 
 
-def test_a_mask_of_positions_takes_a_bare_point(client):
+def test_a_mask_of_positions_accepts_a_point_without_orientation(client):
     p = kin.fk(PIONEER, PIONEER.home)[:3, 3].tolist()
     answer = post(client, PIONEER, "ik", target={"position": p}, mask=[True, True, True, False, False, False])
     assert (answer["status"], answer["task"]) == ("solved", "position")
@@ -94,7 +94,7 @@ def test_a_path_agrees_with_the_core(client, robot):
     assert answer["reason"] == result.reason
 
 
-def test_gaps_of_a_path_are_told(client):
+def test_gaps_of_a_path_are_reported(client):
     points = [[-0.018, 0.31, -0.181], [-0.018, 0.9, -0.171]]
     answer = post(client, PIONEER, "ik/path", targets=[{"position": p} for p in points])
     (gap,) = answer["gaps"]

@@ -1,4 +1,4 @@
-"""REST: clouds of the workspace as files, its sizes, and whether targets are in it."""
+"""REST: workspace clouds as files, workspace dimensions, and reachability of targets."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ WORKSPACE = f"{API}/pioneer5/workspace"
 
 @pytest.fixture
 def live():
-    """REST alone on a real port, two streams at a time, and a client: leaving and waiting need a connection."""
+    """REST alone on a real port, two streams at a time, and a client: disconnecting needs a real connection."""
     app = FastAPI()
     app.state.settings, app.state.store = Settings(), Store()
     app.state.compute = ComputeSlots(16, 300.0)
@@ -53,7 +53,7 @@ def live():
 
 @pytest.fixture
 def slices(monkeypatch):
-    """Where the slices that were computed begin, as they are begun."""
+    """The start of each slice, appended when its computation starts."""
     begun = []
     slice_of = Cloud.slice
 
@@ -97,11 +97,11 @@ def test_a_cloud_is_the_file_of_its_format(client, app, name):
     assert answer.headers["content-disposition"] == f'attachment; filename="pioneer5-quasi-5000.{name}"'
     assert answer.headers["x-cloud-count"] == "5000"
     assert answer.headers["x-cloud-columns"] == "x,y,z,limits,manipulability,q1,q2,q3,q4,q5"
-    told = answer.headers.get("content-length")
-    assert told == (None if kind.size is None else str(len(answer.content)))
+    length = answer.headers.get("content-length")
+    assert length == (None if kind.size is None else str(len(answer.content)))
 
 
-def test_what_is_not_asked_for_is_the_plain_cloud(client, app):
+def test_defaults_give_the_plain_cloud(client, app):
     answer = client.get(WORKSPACE)
     assert answer.content == b"".join(encode("ndjson", app.state.clouds, Cloud(PIONEER, 10_000)))
     assert answer.headers["x-cloud-columns"] == "x,y,z"
@@ -158,7 +158,7 @@ def test_an_unknown_robot_is_a_404(client):
     assert client.post(f"{API}/nobody/reachable", json={"target": {"position": [0, 0, 0]}}).status_code == 404
 
 
-def test_a_reader_who_leaves_ends_the_work(live, slices):
+def test_a_reader_that_disconnects_cancels_the_cloud(live, slices):
     app, client = live
     with client.stream("GET", f"{WORKSPACE}?n=100000000&format=bin") as answer:
         assert next(answer.iter_bytes()).startswith(b"KINCLOUD")
@@ -171,19 +171,19 @@ def test_a_reader_who_leaves_ends_the_work(live, slices):
     assert begun < 1000  # of 1526
 
 
-def test_a_slow_reader_holds_the_work_back(live, slices):
+def test_a_slow_reader_slows_the_computation(live, slices):
     _, client = live
     with client.stream("GET", f"{WORKSPACE}?n=100000000&format=bin") as answer:
         next(answer.iter_bytes())
-        time.sleep(1.0)  # plenty for a gigabyte, were nothing holding it back
+        time.sleep(1.0)  # enough for a gigabyte without backpressure
         assert len(slices) < 100
 
 
-def test_streams_are_counted_and_the_rest_goes_on(live):
+def test_streams_are_limited_and_other_requests_are_served(live):
     app, client = live
     endless = f"{WORKSPACE}?n=100000000&format=bin"
     with client.stream("GET", endless) as first, client.stream("GET", endless) as second:
-        parts = [stream.iter_bytes() for stream in (first, second)]  # kept: one that is dropped may hang up
+        parts = [stream.iter_bytes() for stream in (first, second)]  # held: a dropped one may hang up
         assert all(next(part) for part in parts)
         refused = client.get(f"{WORKSPACE}?n=10")
         assert refused.status_code == 503
@@ -198,13 +198,13 @@ def test_streams_are_counted_and_the_rest_goes_on(live):
     assert client.get(f"{WORKSPACE}?n=10").status_code == 200
 
 
-def test_refused_and_finished_streams_give_their_place_back(client, app):
+def test_refused_and_finished_streams_free_their_slot(client, app):
     for query in ("n=10", "n=0", "n=1000000001", "limit=9:0:1", "n=100000&format=npz"):
         client.get(f"{WORKSPACE}?{query}")
         assert app.state.streams.open == 0
 
 
-def test_the_gate_frees_a_place_whatever_happens():
+def test_the_gate_frees_a_slot_in_every_case():
     gate = StreamLimit(1)
     with pytest.raises(ZeroDivisionError), gate.slot():
         raise ZeroDivisionError
@@ -213,7 +213,7 @@ def test_the_gate_frees_a_place_whatever_happens():
     assert gate.open == 0
 
 
-def test_pieces_are_closed_by_any_thread_after_the_piece_at_hand():
+def test_pieces_can_be_closed_by_any_thread_after_the_current_piece():
     working, go, closed = threading.Event(), threading.Event(), []
 
     def work():
@@ -238,23 +238,23 @@ def test_pieces_are_closed_by_any_thread_after_the_piece_at_hand():
     assert pieces.take() is None
 
 
-# -- sizes -------------------------------------------------------------------------------------------------------
+# -- dimensions --------------------------------------------------------------------------------------------------
 
 
 def span(found):
     return [(end.value, end.q.tolist(), end.point.tolist()) for end in found]
 
 
-def told(answer):
+def extent(answer):
     return [(answer[end]["value"], answer[end]["q"], answer[end]["point"]) for end in ("least", "largest")]
 
 
-def test_the_summary_is_what_the_core_says(client):
+def test_the_summary_agrees_with_the_core(client):
     answer = client.get(f"{WORKSPACE}/summary?section=true&resolution=24&effort=2").json()
     TypeAdapter(WorkspaceAnswer).validate_python(answer, strict=True)
     facts = kin.workspace_facts(PIONEER, effort=2)
     for name in ("x", "y", "z", "radius", "reach"):
-        assert told(answer[name]) == span(getattr(facts, name))
+        assert extent(answer[name]) == span(getattr(facts, name))
     for name in ("axis_point", "axis", "shoulder"):
         assert answer[name] == getattr(facts, name).tolist()
     for name in ("volume", "surface"):
@@ -287,38 +287,38 @@ def test_any_plane_can_be_cut(client):
 @pytest.mark.parametrize(
     "plane", ["", "0:0:0.1", "0:0:0.1:0:0:0", "0:0:0:0:0:nan", "0:0:0:1e-300:0:0", "a:0:0:0:0:1", "0:0:1e99:0:0:1"]
 )
-def test_what_is_no_plane_is_refused(client, plane):
+def test_an_invalid_plane_is_refused(client, plane):
     answer = client.get(f"{WORKSPACE}/summary?volume=false&plane={plane}")
     assert answer.status_code == 422
     assert answer.json()["errors"][0]["field"] == "plane"
 
 
-def test_limits_and_locks_count(client):
+def test_limits_and_locks_are_respected(client):
     limits, locked = [None, (0.5, 1.0), None, None, None], [0.25, None, None, None, None]
     answer = client.get(f"{WORKSPACE}/summary?volume=false&limit=2:0.5:1&lock=1:0.25").json()
     facts = kin.workspace_facts(PIONEER, limits=limits, locked=locked, volume=False)
-    assert told(answer["x"]) == span(facts.x)
-    assert told(answer["x"]) != span(kin.workspace_facts(PIONEER, volume=False).x)
+    assert extent(answer["x"]) == span(facts.x)
+    assert extent(answer["x"]) != span(kin.workspace_facts(PIONEER, volume=False).x)
 
 
-def test_what_is_not_wanted_is_null(client):
+def test_parts_that_are_not_requested_are_null(client):
     answer = client.get(f"{WORKSPACE}/summary?volume=false").json()
     assert answer["volume"] is answer["surface"] is answer["section"] is None
     assert answer["x"]["largest"]["value"] > 0.4
 
 
-def test_the_second_visitor_does_not_wait(client, monkeypatch):
+def test_a_repeated_summary_is_served_from_the_cache(client, monkeypatch):
     address = f"{WORKSPACE}/summary?volume=false&lock=5:0.25"
     first = client.get(address)
     monkeypatch.setattr(
         "app.shared.summaries.workspace_facts", lambda *args, **options: pytest.fail("computed again")
     )
     assert client.get(address).content == first.content
-    assert client.get(f"{address}&effort=9&resolution=50").content == first.content  # which have no say here
+    assert client.get(f"{address}&effort=9&resolution=50").content == first.content  # no effect here
 
 
-def test_rest_finds_what_the_viewer_has_computed(app, client, monkeypatch):
-    app.state.summaries.facts(SRS, effort=None).result()  # as the tab's sizes ask for them
+def test_rest_uses_what_the_viewer_has_computed(app, client, monkeypatch):
+    app.state.summaries.facts(SRS, effort=None).result()  # as the workspace tab requests them
     assert find_section(app.state.summaries, SRS) is not None
     for name in ("workspace_facts", "section"):
         monkeypatch.setattr(f"app.shared.summaries.{name}", lambda *_, **__: pytest.fail("computed again"))
@@ -327,7 +327,7 @@ def test_rest_finds_what_the_viewer_has_computed(app, client, monkeypatch):
     assert answer.json()["section"]["curves"]
 
 
-def test_a_sliding_first_joint_has_no_section(client, tmp_path):
+def test_an_arm_with_a_prismatic_first_joint_has_no_section(client, tmp_path):
     (tmp_path / "rail.toml").write_text(
         'id = "rail"\nname = "Rail"\nsource = "this test"\nconvention = "standard"\n'
         'units = { length = "m", angle = "deg" }\n'
@@ -343,7 +343,7 @@ def test_a_sliding_first_joint_has_no_section(client, tmp_path):
     assert level.status_code == 200
 
 
-def test_visitors_who_leave_do_not_cancel_it_for_others(live, monkeypatch):
+def test_a_visitor_who_disconnects_does_not_cancel_the_summary_for_others(live, monkeypatch):
     _, client = live
     go = threading.Event()
     facts = kin.workspace_facts
@@ -373,12 +373,12 @@ def ask(client, robot, status=200, **body):
 
 
 @pytest.mark.parametrize("robot", [PIONEER, SRS, kin.get_robot("scara")], ids=lambda robot: robot.id)
-def test_every_point_of_a_cloud_can_be_reached_and_others_are_told_apart(client, robot):
+def test_every_point_of_a_cloud_is_reachable_and_points_outside_are_not(client, robot):
     cloud = Cloud(robot, reachable.AT_ONCE + 5, strategy="quasi")
     inside = cloud.slice(0, cloud.n).points.astype(float)
     outside = inside + np.array([0.0, 0.0, 3.0 * robot.reach])
     points = np.concatenate([inside, outside])
-    # A point in single precision may be a hair outside of an arm that reaches no volume.
+    # If the workspace has no volume, rounding to single precision may put a point slightly outside.
     results = ask(client, robot, target=[{"position": p.tolist()} for p in points])["results"]
     for p, answer in zip(points, results, strict=True):
         TypeAdapter(ReachableAnswer).validate_python(answer, strict=True)
@@ -392,7 +392,7 @@ def test_every_point_of_a_cloud_can_be_reached_and_others_are_told_apart(client,
     assert all(answer["distance"] > 0.9 * robot.reach for answer in results[len(inside) :])
 
 
-def test_one_target_of_each_form_and_limits_count(client):
+def test_targets_of_every_form_are_accepted_and_limits_are_respected(client):
     q = np.array(SRS.home)
     pose = {"matrix": kin.fk(SRS, q).tolist()}
     answer = ask(client, SRS, target=pose)
@@ -405,7 +405,7 @@ def test_one_target_of_each_form_and_limits_count(client):
     )
     p, z = kin.fk(PIONEER, PIONEER.home)[:3, 3].tolist(), kin.fk(PIONEER, PIONEER.home)[:3, 2].tolist()
     assert ask(client, PIONEER, target={"position": p, "approach": z})["reachable"]
-    # Five joints get to a whole pose up to its roll: that is not reaching it.
+    # Five joints meet a pose except for its roll, so the pose is not reachable.
     turned = ask(client, PIONEER, target={"position": p, "wxyz": [0.3, 0.5, -0.2, 0.7]})
     assert (turned["reachable"], turned["status"]) == (False, "approximate")
     assert turned["reason"]
@@ -424,7 +424,7 @@ def test_one_target_of_each_form_and_limits_count(client):
         ({"target": {"position": [0, 0, 0]}, "q_seed": [0] * 7}, "q_seed"),
     ],
 )
-def test_a_wrong_question_is_refused_by_name(client, body, field):
+def test_an_invalid_request_is_refused_and_names_the_field(client, body, field):
     assert ask(client, SRS, 422, **body)["errors"][0]["field"] == field
 
 
@@ -433,7 +433,7 @@ def test_too_many_targets_are_refused(client, app):
     assert str(most) in ask(client, SRS, 413, target=[{"position": [0, 0, 0]}] * (most + 1))["detail"]
 
 
-def test_judging_ends_when_nobody_listens(live, monkeypatch):
+def test_checking_targets_stops_when_the_client_disconnects(live, monkeypatch):
     _, client = live
     judged = []
     solve = reachable.solve

@@ -1,4 +1,4 @@
-"""The websocket of clouds: the same rows as the file, progress, cancellation, refusals that say why."""
+"""The websocket of clouds: the same rows as the file, progress, cancellation, refusals with a reason."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def visit(port, query="", robot="pioneer5", **options):
 
 
 def ending(visitor) -> tuple[list[bytes | str], int, str]:
-    """Everything that still comes, close code and reason."""
+    """The remaining messages, the close code and the reason."""
     messages: list[bytes | str] = []
     while True:
         try:
@@ -58,7 +58,7 @@ def ending(visitor) -> tuple[list[bytes | str], int, str]:
             return messages, close.code, close.reason
 
 
-def test_the_rows_are_the_cloud_and_progress_leads_to_its_end(port, monkeypatch):
+def test_the_rows_are_the_cloud_and_progress_reaches_its_end(port, monkeypatch):
     monkeypatch.setattr(socket_module, "PROGRESS_EVERY", 0.0)
     with visit(port, "n=200000&seed=5&strategy=quasi&measure=limits&q=true&limit=1:0:0.5&lock=3:0.2") as visitor:
         messages, code, reason = ending(visitor)
@@ -79,7 +79,7 @@ def test_the_rows_are_the_cloud_and_progress_leads_to_its_end(port, monkeypatch)
     assert all(p["total"] == 200_000 and p["points_per_second"] > 0 for p in progress)
 
 
-def test_a_cloud_in_one_piece_tells_its_end_too(port):
+def test_a_cloud_in_one_piece_reports_its_end(port):
     with visit(port, "n=10") as visitor:
         messages, code, _ = ending(visitor)
     assert [type(m) for m in messages] == [str, bytes, str]
@@ -87,7 +87,7 @@ def test_a_cloud_in_one_piece_tells_its_end_too(port):
     assert code == 1000
 
 
-def test_the_visitor_cancels(port, app):
+def test_a_visitor_can_cancel(port, app):
     with visit(port, ENDLESS) as visitor:
         visitor.recv(timeout=10)
         visitor.send('{"cancel": true}')
@@ -98,7 +98,7 @@ def test_the_visitor_cancels(port, app):
 
 
 @pytest.mark.parametrize("message", ["stop", "", "[" * 50_000, '{"cancel": false}', b"\x01"])
-def test_other_messages_are_not_understood(port, app, message):
+def test_other_messages_are_refused(port, app, message):
     with visit(port, ENDLESS) as visitor:
         visitor.send(message)
         _, code, reason = ending(visitor)
@@ -107,7 +107,7 @@ def test_other_messages_are_not_understood(port, app, message):
     wait_for(lambda: app.state.streams.open == 0)
 
 
-def test_a_visitor_who_leaves_ends_the_work(port, app, monkeypatch):
+def test_a_visitor_who_disconnects_cancels_the_cloud(port, app, monkeypatch):
     begun = []
     slice_of = Cloud.slice
     monkeypatch.setattr(Cloud, "slice", lambda self, *rest: begun.append(1) or slice_of(self, *rest))
@@ -126,15 +126,15 @@ def test_a_visitor_who_leaves_ends_the_work(port, app, monkeypatch):
     assert len(begun) == count < 1000
 
 
-def test_a_slow_visitor_holds_the_work_back(port, monkeypatch):
+def test_a_slow_visitor_slows_the_computation(port, monkeypatch):
     begun = []
     slice_of = Cloud.slice
     monkeypatch.setattr(Cloud, "slice", lambda self, *rest: begun.append(1) or slice_of(self, *rest))
     with visit(port, ENDLESS, max_queue=1) as visitor:
         visitor.recv(timeout=10)
-        time.sleep(1.0)  # plenty for a gigabyte, were nothing holding it back
+        time.sleep(1.0)  # enough for a gigabyte without backpressure
         assert len(begun) < 100
-        # Even one who does not read is heard.
+        # A visitor who does not read can still cancel.
         visitor.send('{"cancel": true}')
         assert ending(visitor)[1:] == (1000, "cancelled")
 
@@ -153,7 +153,7 @@ def test_a_slow_visitor_holds_the_work_back(port, monkeypatch):
         (f"strategy={'ö' * 200}", "pioneer5", "invalid-input", "strategy: got"),
     ],
 )
-def test_a_refusal_says_why_as_rest_does(port, query, robot, kind, said):
+def test_a_refusal_has_the_same_reason_as_in_rest(port, query, robot, kind, said):
     with visit(port, query, robot) as visitor:
         messages, code, reason = ending(visitor)
     (message,) = [json.loads(m) for m in messages]
@@ -165,7 +165,7 @@ def test_a_refusal_says_why_as_rest_does(port, query, robot, kind, said):
     assert message["problem"]["detail"].startswith(reason)
 
 
-def test_too_many_streams_are_asked_to_come_back(port, app):
+def test_streams_beyond_the_limit_are_closed_with_try_again_later(port, app):
     slow = {"max_queue": 1, "close_timeout": 0.2}
     with visit(port, ENDLESS, **slow) as first, visit(port, ENDLESS, **slow) as second:
         first.recv(timeout=10)
@@ -179,7 +179,7 @@ def test_too_many_streams_are_asked_to_come_back(port, app):
         assert ending(again)[1] == 1000
 
 
-def test_a_failure_is_told_and_logged(port, app, monkeypatch, caplog):
+def test_a_failure_is_reported_and_logged(port, app, monkeypatch, caplog):
     def broken(*args):
         raise ZeroDivisionError("a bug")
 
@@ -192,14 +192,14 @@ def test_a_failure_is_told_and_logged(port, app, monkeypatch, caplog):
 
 
 @pytest.mark.parametrize("origin", ["https://evil.example", "null"])
-def test_pages_of_others_are_kept_out(port, origin, caplog):
+def test_foreign_origins_are_refused(port, origin, caplog):
     with pytest.raises(InvalidStatus) as refused:
         visit(port, "n=1", origin=origin)
     assert refused.value.response.status_code == 403
     assert origin in caplog.text
 
 
-def test_pages_of_ours_and_of_those_allowed_come_in(port):
+def test_own_and_allowed_origins_are_accepted(port):
     for origin in (f"http://127.0.0.1:{port}", "https://school.example", None):
         with visit(port, "n=1", origin=origin) as visitor:
             assert ending(visitor)[1] == 1000

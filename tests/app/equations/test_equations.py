@@ -1,4 +1,4 @@
-"""Equations of every arm: what is shown is what is computed, and what is computed is the arm."""
+"""Equations of every arm: the typeset form has the computed values, and the computed values fit the arm."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def random_q(robot, count, seed=0):
     return robot.random_q(np.random.default_rng(seed), count)
 
 
-# -- reading back what is shown, by readers that know nothing of our trees ------------------------------------
+# -- reading the typeset forms back, by parsers independent of our expressions ----------------------------------
 
 
 def read_mathml(text, values):
@@ -121,8 +121,8 @@ def all_values(found, q):
 
 
 @each_robot
-def test_what_is_shown_is_what_is_computed(robot):
-    """MathML and LaTeX, read back, give the very value, for every equation and intermediate result."""
+def test_typeset_equations_have_the_computed_values(robot):
+    """MathML and LaTeX, parsed, give the exact value of every equation and intermediate result."""
     found = book(robot)
     values = all_values(found, random_q(robot, 20))
     shown = [(line.name, line.expression) for line in found.lines]
@@ -174,8 +174,8 @@ def test_the_chapters_order_and_brackets_are_kept():
     assert not found.lines_of(found.equation("19"))
 
 
-def test_misprints_are_told_term_by_term():
-    """Of every wrong equation the very terms its note speaks of."""
+def test_misprints_are_marked_term_by_term():
+    """In every wrong equation exactly the terms that its note mentions are marked."""
     pioneer, redundant = map(book, CHAPTER)
     wrong = {e.id: [i for i, mark in enumerate(e.wrong_terms) if mark] for e in pioneer.equations if e.worst}
     assert wrong == {"6": [2], "13": [1]}
@@ -189,7 +189,7 @@ def test_misprints_are_told_term_by_term():
 
 
 @pytest.mark.parametrize("robot", CHAPTER, ids=lambda robot: robot.id)
-def test_nothing_is_worse_than_the_worst_pose(robot):
+def test_no_pose_has_a_larger_difference_than_the_worst_pose(robot):
     found = book(robot)
     q = random_q(robot, 100_000, seed=5)
     for equation, values in found.compare(q):
@@ -211,8 +211,8 @@ def test_nothing_is_worse_than_the_worst_pose(robot):
 
 
 @each_robot
-def test_the_derived_form_is_the_arm(robot):
-    """Of every arm of the catalogue, the chapter's own included."""
+def test_the_derived_form_has_the_values_of_forward_kinematics(robot):
+    """For every arm of the catalogue, the chapter's own included."""
     derived = derive(robot)
     q = random_q(robot, 2000, seed=1)
     values = {name: symbol.value(q) for name, symbol in derived.symbols.items()}
@@ -227,7 +227,7 @@ def test_the_derived_form_is_the_arm(robot):
 
 
 @each_robot
-def test_a_derived_form_is_short_and_says_what_its_names_are(robot):
+def test_a_derived_form_is_short_and_defines_its_names(robot):
     derived = derive(robot)
     forms = [*derived.entries.values(), *(line.expression for line in derived.lines)]
     assert max(map(size, forms)) <= LONGEST
@@ -241,7 +241,7 @@ def latex_of(robot_id, entry):
     return typeset.latex(derive(kin.get_robot(robot_id)).entries[entry]).replace(r" \, ", "").replace("\\left", "")
 
 
-def test_what_a_textbook_would_write():
+def test_derived_forms_match_the_textbooks():
     assert latex_of("pioneer5", "p_x") == r"c_{1}(a_{1} + a_{2}c_{2} + d_{4}c_{23}\right) + d_{6}a_{x}"
     assert latex_of("pioneer5", "p_z") == "d_{1} - a_{2}s_{2} - d_{4}s_{23} + d_{6}a_{z}"
     assert latex_of("scara", "n_x") == "c_{12-4}"
@@ -252,7 +252,7 @@ def test_what_a_textbook_would_write():
 
 
 def odd_robot(rng, convention):
-    """An arm with nothing nice about it: any angle, any length, slides, fixed rows, base and tool anywhere."""
+    """A general arm: any angle, any length, prismatic joints, fixed rows, any base and tool."""
     rows = []
     for i in range(rng.integers(1, 9)):
         kind = rng.choice(["revolute", "revolute", "prismatic", "fixed"]) if i else "revolute"
@@ -277,7 +277,7 @@ def odd_robot(rng, convention):
 @pytest.mark.parametrize("seed", range(12))
 def test_any_arm_can_be_derived(seed, convention):
     robot = odd_robot(np.random.default_rng(seed), convention)
-    found = book(robot)  # which checks itself
+    found = book(robot)  # `book` verifies the equations
     values = all_values(found, random_q(robot, 5))
     for equation in found.equations:
         text = typeset.mathml(equation.correct, equation.entry)
@@ -294,7 +294,7 @@ def test_a_long_arm_is_cut_into_readable_pieces():
     assert any("''" in line.name for line in found.lines)
 
 
-def test_the_same_arm_is_derived_once_and_another_one_of_its_name_anew(monkeypatch):
+def test_an_arm_is_derived_once_and_another_arm_of_the_same_name_again(monkeypatch):
     robot = kin.get_robot("pioneer5")
     assert book(robot) is book(robot)
     rows = (replace(robot.rows[0], d=0.2), *robot.rows[1:])
@@ -355,6 +355,6 @@ def test_multiplying_out():
     assert expanded(from_text("-c1*(-s2)")) == expanded(from_text("c1*s2"))
 
 
-def test_names_that_are_not_ours_are_refused():
+def test_unknown_names_are_refused():
     with pytest.raises(ValueError, match="not a name"):
         typeset.glyphs("1x")

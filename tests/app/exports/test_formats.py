@@ -1,4 +1,4 @@
-"""Clouds as files: every format says what the core says, in little memory, the same bytes however it is cut."""
+"""Clouds as files: every format agrees with the core, in bounded memory, whatever the slices."""
 
 import csv
 import io
@@ -49,11 +49,11 @@ def file_of(name, clouds, cloud, with_q=False):
 
 
 def columns_of(chunk):
-    """All columns side by side ``(k, c)``, as the core tells them."""
+    """All columns side by side ``(k, c)``, computed by the core."""
     return np.column_stack([chunk.points, *chunk.measures.values(), *([] if chunk.q is None else [chunk.q])])
 
 
-# Each reads a file with nothing but what its documentation says: names of the columns, and the rows.
+# Each reads a file using only the documentation of its format and returns the column names and the rows.
 
 
 def read_ndjson(data):
@@ -106,7 +106,7 @@ READERS = {"ndjson": read_ndjson, "csv": read_csv, "bin": read_bin, "ply": read_
 
 @each_format
 @each_cloud
-def test_a_file_says_what_the_core_says(clouds, name, cloud, with_q):
+def test_a_file_agrees_with_the_core(clouds, name, cloud, with_q):
     names, rows = READERS[name](file_of(name, clouds, cloud, with_q))
     expected = columns_of(whole(cloud, with_q))
     assert names == list(table_of(cloud, with_q).columns)
@@ -120,7 +120,7 @@ def test_a_file_says_what_the_core_says(clouds, name, cloud, with_q):
 
 @each_format
 @each_cloud
-def test_the_size_is_told_beforehand_where_it_is_told(clouds, name, cloud, with_q):
+def test_a_size_announced_beforehand_is_exact(clouds, name, cloud, with_q):
     kind = FORMATS[name]
     if kind.size is not None:
         assert kind.size(table_of(cloud, with_q)) == len(file_of(name, clouds, cloud, with_q))
@@ -138,7 +138,7 @@ def test_bytes_do_not_depend_on_slices_or_threads(clouds, name, monkeypatch):
         other.close()
 
 
-def test_draws_that_take_descents_come_in_small_slices(clouds):
+def test_samples_that_need_a_descent_come_in_small_slices(clouds):
     cloud = Cloud(ARM, 3 * formats.DESCENDED // 2, strategy="volume")
     seen = []
     rows = b"".join(encode("bin", clouds, cloud, watch=seen.append))
@@ -146,7 +146,7 @@ def test_draws_that_take_descents_come_in_small_slices(clouds):
     assert np.array_equal(read_bin(rows)[1], whole(cloud).points)
 
 
-def test_an_npz_file_is_the_same_whether_columns_are_held_back_or_computed_again(clouds, monkeypatch):
+def test_an_npz_file_is_the_same_with_buffered_and_recomputed_columns(clouds, monkeypatch):
     seen = []
     held = b"".join(encode("npz", clouds, LIMITED, True, seen.append))
     assert sum(chunk.done - chunk.start for chunk in seen) == N

@@ -1,4 +1,4 @@
-"""Who gets in, who may only look, and who is asked to slow down. Half of these tests try to get in."""
+"""Authentication, read-only access and rate limits. Half of these tests are attempted intrusions."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def application():
 
 @pytest.fixture
 def guarded(application):
-    # Everybody is a new client: tokens guessed in one test do not count in the next.
+    # Each test is a new client: wrong tokens in one test do not count in the next.
     global _next
     _next += 1
     return TestClient(
@@ -59,7 +59,7 @@ def guarded(application):
 _next = 0
 
 
-def test_without_a_token_everybody_may_do_everything():
+def test_without_a_configured_token_everything_is_allowed():
     client = client_with()
     assert client.post(FK, json=Q).status_code == 200
     assert client.get("/", headers=PAGE).status_code == 200
@@ -69,7 +69,7 @@ def test_without_a_token_everybody_may_do_everything():
 @pytest.mark.parametrize(
     "path", ["/api/v1/robots", FK, "/docs", "/openapi.json", "/viewer/", "/", "/no-such-thing"]
 )
-def test_with_a_token_nothing_answers_without_it(guarded, path):
+def test_with_a_configured_token_requests_without_it_are_refused(guarded, path):
     answer = guarded.get(path)
     assert answer.status_code == 401
     assert answer.headers["content-type"] == "application/problem+json"
@@ -97,11 +97,11 @@ def test_health_and_the_login_page_stay_open(guarded, path):
         "/livez%00/../../api/v1/robots",
     ],
 )
-def test_no_spelling_of_an_address_leads_around(guarded, path):
+def test_no_spelling_of_an_address_bypasses_the_token(guarded, path):
     assert "pioneer5" not in guarded.get(path).text
 
 
-def test_a_program_with_the_token_gets_in(guarded):
+def test_the_token_is_accepted_in_the_header(guarded):
     assert guarded.post(FK, json=Q, headers=HEADER).status_code == 200
     assert guarded.post(FK, json=Q, headers={"authorization": f"bearer  {TOKEN} "}).status_code == 200
 
@@ -119,12 +119,12 @@ def test_a_program_with_the_token_gets_in(guarded):
         "Bearer null",
     ],
 )
-def test_anything_else_in_the_header_does_not(guarded, value):
+def test_any_other_header_is_refused(guarded, value):
     answer = guarded.post(FK, json=Q, headers={"authorization": value.encode("latin-1")})
     assert answer.status_code == 401
 
 
-def test_guessing_is_slowed_down_and_does_not_lock_others_out(guarded, application):
+def test_guessing_tokens_is_rate_limited_and_locks_no_one_else_out(guarded, application):
     wrong = {"authorization": "Bearer guess"}
     codes = [guarded.get("/api/v1/robots", headers=wrong).status_code for _ in range(8)]
     assert codes == [401] * access.TRIES + [429] * 3
@@ -135,7 +135,7 @@ def test_guessing_is_slowed_down_and_does_not_lock_others_out(guarded, applicati
     assert other.get("/api/v1/robots", headers=HEADER).status_code == 200
 
 
-def test_a_browser_is_asked_once_and_then_brought_to_where_it_wanted(guarded):
+def test_a_browser_logs_in_once_and_is_redirected_to_the_requested_page(guarded):
     sent = guarded.get("/docs", headers=PAGE)
     assert (sent.status_code, sent.headers["location"]) == (303, "login?next=docs")
     page = guarded.get("/login?next=docs")
@@ -151,11 +151,11 @@ def test_a_browser_is_asked_once_and_then_brought_to_where_it_wanted(guarded):
     assert guarded.post(FK, json=Q).status_code == 200
 
 
-def test_the_way_to_the_login_page_is_relative_to_where_one_is(guarded):
+def test_the_redirect_to_the_login_page_is_relative(guarded):
     assert guarded.get("/viewer/", headers=PAGE).headers["location"] == "../login?next=viewer/"
 
 
-def test_a_wrong_token_is_told_on_the_page(guarded):
+def test_a_wrong_token_is_refused(guarded):
     answer = guarded.post("/login", data={"token": "<script>"})
     assert answer.status_code == 401
     assert "The access token is wrong." in answer.text
@@ -176,7 +176,7 @@ def test_a_wrong_token_is_told_on_the_page(guarded):
         "/etc",
     ],
 )
-def test_the_login_page_sends_nobody_elsewhere(guarded, place):
+def test_the_login_page_redirects_to_no_other_site(guarded, place):
     answer = guarded.post("/login", params={"next": place}, data={"token": TOKEN})
     assert answer.headers["location"] == "./"
 
@@ -186,7 +186,7 @@ def test_a_form_that_is_too_large_is_not_read(guarded):
 
 
 @pytest.mark.parametrize("forge", ["later", "unsigned", "empty", "dots", "huge", "nonsense"])
-def test_a_cookie_that_we_did_not_sign_opens_nothing(guarded, forge):
+def test_a_cookie_with_a_wrong_signature_is_refused(guarded, forge):
     guarded.post("/login", data={"token": TOKEN})
     text, _, signature = guarded.cookies[COOKIE].rpartition(".")
     later = base64_encode(int_to_bytes(int(time.time()) + 60)).decode()
@@ -203,7 +203,7 @@ def test_a_cookie_that_we_did_not_sign_opens_nothing(guarded, forge):
     assert answer.status_code == 401
 
 
-def test_a_cookie_ends(guarded, monkeypatch):
+def test_a_cookie_expires(guarded, monkeypatch):
     guarded.post("/login", data={"token": TOKEN})
     assert guarded.get("/api/v1/robots").status_code == 200
     after = time.time() + access.COOKIE_AGE + 10
@@ -212,7 +212,7 @@ def test_a_cookie_ends(guarded, monkeypatch):
     assert guarded.get("/api/v1/robots", headers=cookie).status_code == 401
 
 
-def test_a_cookie_of_another_token_opens_nothing(guarded):
+def test_a_cookie_of_another_token_is_refused(guarded):
     other = client_with(token="another token")
     other.post("/login", data={"token": "another token"})
     cookie = {"cookie": f"{COOKIE}={other.cookies[COOKIE]}"}
@@ -220,14 +220,14 @@ def test_a_cookie_of_another_token_opens_nothing(guarded):
     assert guarded.get("/api/v1/robots", headers=cookie).status_code == 401
 
 
-def test_over_https_the_cookie_never_travels_in_clear(application):
+def test_the_cookie_is_secure_over_https(application):
     client = TestClient(
         application, base_url="https://kin.example", client=("10.8.8.8", 1), follow_redirects=False
     )
     assert "secure" in client.post("/login", data={"token": TOKEN}).headers["set-cookie"].lower()
 
 
-def test_below_a_prefix(application):
+def test_login_works_below_a_path_prefix(application):
     client = client_with(token=TOKEN, root_path="/arm")
     sent = client.get("/arm/viewer/", headers=PAGE)
     assert sent.headers["location"] == "../login?next=viewer/"
@@ -243,7 +243,7 @@ def test_a_websocket_needs_the_token_too(guarded, path):
     assert refused.value.code == 1008
 
 
-def test_who_is_logged_in_gets_a_viewer():
+def test_a_logged_in_browser_gets_a_viewer():
     application = create_app(Settings(token=TOKEN))  # type: ignore[arg-type]
     with serve(application) as port:
         address = f"ws://127.0.0.1:{port}/viewer"
@@ -257,7 +257,7 @@ def test_who_is_logged_in_gets_a_viewer():
 # Read-only
 
 
-def test_read_only_answers_questions_of_reading_and_refuses_work():
+def test_read_only_serves_reads_and_refuses_computations():
     client = client_with(read_only=True)
     assert client.get("/", headers=PAGE).status_code == 200
     assert client.get("/api/v1/robots").status_code == 200
@@ -268,7 +268,7 @@ def test_read_only_answers_questions_of_reading_and_refuses_work():
         pass
 
 
-def test_read_only_is_for_those_without_the_token():
+def test_read_only_does_not_restrict_clients_with_the_token():
     client = client_with(read_only=True, token=TOKEN)
     assert client.get("/api/v1/robots").status_code == 200
     assert client.post(FK, json=Q).status_code == 403
@@ -276,7 +276,7 @@ def test_read_only_is_for_those_without_the_token():
     assert client.get("/api/v1/robots", headers={"authorization": "Bearer wrong"}).status_code == 401
 
 
-def test_whoever_may_only_look_sees_the_arm_a_link_shows_and_cannot_move_it():
+def test_a_read_only_visitor_sees_the_arm_of_a_link_and_cannot_move_it():
     application = create_app(Settings(read_only=True))
     memory = json.dumps({"state": encode(PageState("pioneer5", view=ViewState(frames=True)))})
     with serve(application) as port:
@@ -292,10 +292,10 @@ def test_whoever_may_only_look_sees_the_arm_a_link_shows_and_cannot_move_it():
             assert (tab.tool_pose() == before).all()
 
 
-# How much
+# Rate limits
 
 
-def test_a_client_that_asks_for_too_much_is_told_when_to_come_again():
+def test_too_many_requests_get_a_429_with_retry_after():
     client = client_with(rate_limit=1.0)
     codes = [client.get("/api/v1/robots").status_code for _ in range(12)]
     assert codes[:10] == [200] * 10
@@ -318,7 +318,7 @@ def test_a_bucket_fills_up_again_and_forgets_the_oldest(monkeypatch):
     assert bucket.wait("a") == 0.0
     now[0] = 100.0
     bucket.take("a")
-    assert bucket.wait("a") == 0.0  # two of three are left, however long it rested
+    assert bucket.wait("a") == 0.0  # two of three remain, however long the pause
     monkeypatch.setattr(TokenBucket, "MAX_CLIENTS", 5)
     for name in "bcdefgh":
         bucket.take(name)
@@ -338,7 +338,7 @@ def test_a_budget_belongs_to_an_address_or_network(host, client):
     assert client_of({"client": (host, 1)}) == client
 
 
-def test_pages_of_other_origins_read_answers_only_if_the_operator_says_so():
+def test_other_origins_read_answers_only_if_configured():
     asking = {"origin": "https://school.example"}
     assert "access-control-allow-origin" not in client_with().get("/api/v1/robots", headers=asking).headers
     client = client_with(cors_origins=("https://school.example",), token=TOKEN)

@@ -1,4 +1,4 @@
-"""What goes wrong around the service: a stop in mid-answer, workers that fail, broken files, full disks."""
+"""Faults around the service: a stop during a response, workers that fail, broken files, full disks."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from app.viewer.session.controller import ArmController
 
 ROOT = Path(__file__).parents[3]
 ARM = kin.get_robot("pioneer5")
-FAR = {"position": [5.0, 0.0, 0.0], "wxyz": [1.0, 0.0, 0.0, 0.0]}  # for the Panda some tenths of a second each
+FAR = {"position": [5.0, 0.0, 0.0], "wxyz": [1.0, 0.0, 0.0, 0.0]}  # takes the Panda some tenths of a second each
 
 
 # -- SIGTERM ---------------------------------------------------------------------------------------------------
@@ -61,7 +61,7 @@ def service(**environment: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
 
 
 class Asking(threading.Thread):
-    """A request under way."""
+    """A request in progress."""
 
     def __init__(self, base: str, robot: str, what: str, body: object) -> None:
         super().__init__()
@@ -80,7 +80,7 @@ class Asking(threading.Thread):
 
 
 def stopped(process: subprocess.Popen[str], within: float) -> str:
-    """What it had to say at its end, which has to come in time."""
+    """The error output of the process, which must end in time."""
     began = time.monotonic()
     process.send_signal(signal.SIGTERM)
     _, errors = process.communicate(timeout=60)
@@ -90,7 +90,7 @@ def stopped(process: subprocess.Popen[str], within: float) -> str:
     return errors
 
 
-def test_an_answer_under_way_arrives_whole_and_visitors_are_told():
+def test_a_stop_completes_answers_in_progress_and_notifies_visitors():
     with service(KINBOARD_DRAIN="30") as (process, base):
         asking = Asking(base, "panda", "ik", {"target": [FAR] * 12, "max_solutions": 1})
         with connect(f"ws://{base}/viewer", subprotocols=[f"viser-v{viser.__version__}"], proxy=None) as visitor:
@@ -107,8 +107,8 @@ def test_an_answer_under_way_arrives_whole_and_visitors_are_told():
     assert closed.value.rcvd.code in (1001, 1012)
 
 
-def test_what_takes_too_long_is_given_up_in_time():
-    """A batch of minutes, a cloud of minutes as a file and over a websocket, sizes of minutes."""
+def test_a_stop_abandons_long_computations_in_time():
+    """A batch, a cloud as a file and over a websocket, and a summary, each of which would take minutes."""
     with service(KINBOARD_DRAIN="4") as (process, base):
         asking = Asking(base, "panda", "ik", {"target": [FAR] * 5000})
         waiting = Asking(base, "panda", "workspace/summary?effort=16", None)
@@ -198,7 +198,7 @@ def test_a_worker_that_never_starts_is_not_replaced_forever(port, monkeypatch, c
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("content", "message"),
     [
         (b"\x00\xff\xfe", "UTF-8"),
         (b"id = ", "valid TOML"),
@@ -207,11 +207,11 @@ def test_a_worker_that_never_starts_is_not_replaced_forever(port, monkeypatch, c
         (b"", "odd.toml"),
     ],
 )
-def test_a_corrupt_robot_file_ends_the_start_with_a_message(content, told, tmp_path, capfd):
+def test_a_corrupt_robot_file_ends_the_start_with_a_message(content, message, tmp_path, capfd):
     (tmp_path / "odd.toml").write_bytes(content)
     assert run(Settings(port=0, robots=tmp_path)) == 1
     error = capfd.readouterr().err
-    assert told in error
+    assert message in error
     assert "odd.toml" in error
     assert "Traceback" not in error
 
@@ -225,12 +225,12 @@ def test_a_folder_of_robots_that_cannot_be_read_ends_the_start_with_a_message(tm
     assert "Permission denied" in capfd.readouterr().err
 
 
-def test_a_full_disk_is_said_plainly(capsys):
+def test_a_full_disk_is_reported(capsys):
     assert main(["workspace", "pioneer5", "-n", "100000", "-o", "/dev/full", "--format", "csv"]) == 2
     assert "No space left on device" in capsys.readouterr().err
 
 
-def test_of_a_file_that_does_not_fit_nothing_is_left(tmp_path, capsys):
+def test_a_file_that_does_not_fit_is_removed(tmp_path, capsys):
     resource = pytest.importorskip("resource")
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
@@ -256,16 +256,16 @@ def twice(x):
 
 
 def twice(folder: Path, before: str = "") -> dict[str, object]:
-    """What a new process makes of a kernel in this folder: result, hits of the cache, warnings."""
+    """Run a kernel of this folder in a new process: its result, cache hits and warnings."""
     code = f"""
         import json, sys, warnings
         {before}
-        with warnings.catch_warnings(record=True) as told:
+        with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             import kernel
             result = kernel.twice(1.5)
         hits = sum(kernel.twice.stats.cache_hits.values())
-        print(json.dumps({{"result": result, "hits": hits, "told": [str(w.message) for w in told]}}))
+        print(json.dumps({{"result": result, "hits": hits, "warnings": [str(w.message) for w in caught]}}))
     """
     (folder / "kernel.py").write_text(KERNEL)
     env = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
@@ -278,18 +278,18 @@ def twice(folder: Path, before: str = "") -> dict[str, object]:
 
 
 @pytest.mark.parametrize(("ending", "left"), [("nbi", 7), ("nbc", 0), ("nbc", 200)])
-def test_what_is_left_of_machine_code_is_thrown_away(tmp_path, ending, left):
-    assert twice(tmp_path) == {"result": 3.0, "hits": 0, "told": []}
+def test_truncated_machine_code_is_discarded(tmp_path, ending, left):
+    assert twice(tmp_path) == {"result": 3.0, "hits": 0, "warnings": []}
     (file,) = (tmp_path / "__pycache__").glob(f"*.{ending}")
     file.write_bytes(file.read_bytes()[:left])
     found = twice(tmp_path)
     assert (found["result"], found["hits"]) == (3.0, 0)
-    (told,) = found["told"]
-    assert "cannot be read" in told
-    assert twice(tmp_path) == {"result": 3.0, "hits": 1, "told": []}
+    (message,) = found["warnings"]
+    assert "cannot be read" in message
+    assert twice(tmp_path) == {"result": 3.0, "hits": 1, "warnings": []}
 
 
-def test_without_a_folder_to_write_to_kernels_work_and_one_warning_says_so(tmp_path):
+def test_kernels_work_without_a_writable_cache_and_warn_once(tmp_path):
     refused = """
         import numba.core.caching as caching
         def refuse(self): raise OSError(30, "Read-only file system")
@@ -298,11 +298,11 @@ def test_without_a_folder_to_write_to_kernels_work_and_one_warning_says_so(tmp_p
     """
     found = twice(tmp_path, textwrap.dedent(refused).replace("\n", "\n        "))
     assert found["result"] == 3.0
-    (told,) = found["told"]
-    assert "NUMBA_CACHE_DIR" in told
+    (message,) = found["warnings"]
+    assert "NUMBA_CACHE_DIR" in message
 
 
-def test_a_full_disk_keeps_no_machine_code_and_one_warning_says_so(tmp_path):
+def test_kernels_work_on_a_full_disk_and_warn_once(tmp_path):
     refused = """
         import numba.core.caching as caching
         def refuse(self, key, data): raise OSError(28, "No space left on device")
@@ -310,5 +310,5 @@ def test_a_full_disk_keeps_no_machine_code_and_one_warning_says_so(tmp_path):
     """
     found = twice(tmp_path, textwrap.dedent(refused).replace("\n", "\n        "))
     assert found["result"] == 3.0
-    (told,) = found["told"]
-    assert "No space left on device" in told
+    (message,) = found["warnings"]
+    assert "No space left on device" in message

@@ -45,7 +45,7 @@ def client() -> Iterator[TestClient]:
         yield client
 
 
-def test_alive_and_ready(client):
+def test_livez_and_readyz(client):
     alive = client.get("/livez")
     assert (alive.status_code, alive.json()) == (200, {"status": "alive", "pid": os.getpid()})
     ready = client.get("/readyz")
@@ -53,25 +53,25 @@ def test_alive_and_ready(client):
     assert ready.headers["cache-control"] == "no-store"
 
 
-def test_while_warming_the_page_and_livez_answer_and_readyz_says_so(monkeypatch):
+def test_during_warm_up_pages_are_served_and_readyz_reports_warming(monkeypatch):
     warm = threading.Event()
     monkeypatch.setattr(app.service.startup, "warm_up", lambda: warm.wait(30))
-    told = []
-    with TestClient(create_app(Settings(), on_ready=lambda: told.append("ready"))) as client:
+    events = []
+    with TestClient(create_app(Settings(), on_ready=lambda: events.append("ready"))) as client:
         for _ in range(3):
             answer = client.get("/readyz")
             assert (answer.status_code, answer.json()) == (503, {"status": "warming"})
             assert client.get("/livez").status_code == 200
             assert client.get("/").status_code == 200
             assert client.get("/api/v1/robots").status_code == 200
-        assert told == []
+        assert events == []
         warm.set()
         wait_for(lambda: client.get("/readyz").json() == {"status": "ready"})
-        assert told == ["ready"]
+        assert events == ["ready"]
         assert client.get("/readyz").status_code == 200
 
 
-def test_a_viewer_that_fails_is_never_ready_but_rest_goes_on(monkeypatch, caplog):
+def test_rest_is_served_when_the_viewer_fails(monkeypatch, caplog):
     def fail(self):
         raise OSError("no port left")
 
@@ -96,7 +96,7 @@ def test_stopping_ends_the_viewer_and_the_thread_that_started_it(monkeypatch):
     wait_for(lambda: not [thread for thread in threading.enumerate() if thread.name == "kinboard-startup"])
 
 
-def test_what_few_ask_for_is_warmed_when_ready_and_stopping_ends_that(monkeypatch):
+def test_rare_kernels_are_compiled_when_ready_until_the_service_stops(monkeypatch):
     begun, ended = threading.Event(), threading.Event()
 
     def rest(stop):
@@ -113,7 +113,7 @@ def test_what_few_ask_for_is_warmed_when_ready_and_stopping_ends_that(monkeypatc
     assert ended.wait(10)
 
 
-def test_a_kernel_that_cannot_be_compiled_ahead_is_told_and_the_service_stays_ready(monkeypatch, caplog):
+def test_a_failure_to_compile_ahead_is_logged_and_the_service_stays_ready(monkeypatch, caplog):
     def rest(stop):
         raise RuntimeError("disk full")
 
@@ -125,7 +125,7 @@ def test_a_kernel_that_cannot_be_compiled_ahead_is_told_and_the_service_stays_re
 
 
 @pytest.mark.parametrize("page", ["/", "/docs"])
-def test_pages_refer_to_our_own_files_only_and_each_is_there(client, page):
+def test_pages_refer_only_to_own_files_that_exist(client, page):
     html = client.get(page).text
     links = [link for link in LINK.findall(html) if not link.startswith("#")]
     assert len(links) >= 4
@@ -136,7 +136,7 @@ def test_pages_refer_to_our_own_files_only_and_each_is_there(client, page):
 
 
 @pytest.mark.parametrize("page", ["/", "/docs"])
-def test_pages_have_no_inline_script_or_style_and_a_policy_that_forbids_them(client, page):
+def test_pages_have_no_inline_code_and_a_policy_that_forbids_it(client, page):
     answer = client.get(page)
     assert not re.search(r"<script(?![^>]*\bsrc=)|\bon\w+=|<style|\bstyle=", answer.text)
     policy = answer.headers["content-security-policy"]
@@ -145,7 +145,7 @@ def test_pages_have_no_inline_script_or_style_and_a_policy_that_forbids_them(cli
     assert answer.headers["x-content-type-options"] == "nosniff"
 
 
-def test_no_file_of_ours_names_another_host():
+def test_static_files_name_no_other_host():
     files = [f for f in static_folder().glob("*") if f.suffix in (".html", ".css", ".js", ".svg")]
     assert len(files) >= 6
     for file in files:
@@ -154,7 +154,7 @@ def test_no_file_of_ours_names_another_host():
     assert "validatorUrl: null" in (static_folder() / "docs.js").read_text()
 
 
-def test_the_landing_pages_examples_are_answered_as_they_stand(client):
+def test_the_examples_of_the_landing_page_work(client):
     pattern = r'data-method="(\w+)" data-path="([^"]+)">[^<]+<code hidden>([^<]*)</code>'
     answers = {}
     for method, path, body in re.findall(pattern, client.get("/").text):
@@ -166,7 +166,7 @@ def test_the_landing_pages_examples_are_answered_as_they_stand(client):
     assert answers["ik"]["status"] == "solved"
 
 
-def test_every_built_in_arm_has_a_small_picture():
+def test_every_built_in_arm_has_a_thumbnail():
     pictures = {file.stem: file for file in (static_folder() / "robots").iterdir()}
     assert set(pictures) == set(builtin_robots())
     for file in pictures.values():
@@ -174,7 +174,7 @@ def test_every_built_in_arm_has_a_small_picture():
         assert file.stat().st_size < 15_000
 
 
-def test_viser_gets_its_memory_before_its_own_script(client):
+def test_the_stored_state_is_loaded_before_the_script_of_viser(client):
     html = client.get("/viewer/").text
     assert html.index('<script src="../static/viewer.js"></script>') < html.index("<script data-p")
     assert html.index('<link rel="stylesheet" href="../static/viewer.css">') < html.index("<script data-p")
@@ -192,7 +192,7 @@ def test_the_old_addresses_of_the_documentation_do_not_exist(client):
 
 @pytest.mark.parametrize("sent", ["", "/kinboard"], ids=["proxy strips the prefix", "proxy passes it on"])
 @pytest.mark.parametrize("setting", ["/kinboard", "kinboard/"])
-def test_behind_a_path_prefix(sent, setting):
+def test_the_service_works_behind_a_path_prefix(sent, setting):
     with (
         serve(create_app(Settings(root_path=setting))) as port,
         httpx2.Client(base_url=f"http://127.0.0.1:{port}{sent}", trust_env=False, timeout=30) as browser,
@@ -209,7 +209,7 @@ def test_behind_a_path_prefix(sent, setting):
             assert len(visitor.recv(timeout=20)) > 16
 
 
-def test_a_port_in_use_is_said_plainly(capfd):
+def test_a_port_in_use_is_reported(capfd):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         assert run(Settings(port=port)) == 1
@@ -220,19 +220,19 @@ def test_a_port_in_use_is_said_plainly(capfd):
     assert captured.out == ""
 
 
-def test_a_wrong_folder_of_robots_is_said_plainly(capfd, tmp_path):
+def test_a_wrong_folder_of_robots_is_reported(capfd, tmp_path):
     assert run(Settings(port=0, robots=tmp_path / "nowhere")) == 1
     captured = capfd.readouterr()
     assert "nowhere" in captured.err
     assert "Traceback" not in captured.err
 
 
-SOON = 30  # s, of which a busy machine may take most
+SOON = 30  # s; a loaded machine may need most of it
 
 
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("ready", [False, True], ids=["while warming", "when ready"])
-def test_the_process_starts_and_a_signal_ends_it_quickly_and_quietly(stop, ready):
+def test_the_process_starts_and_a_signal_stops_it_without_errors(stop, ready):
     code = (
         "import sys; from app.service.main import run; from app.shared.settings import Settings; "
         "sys.exit(run(Settings()))"
@@ -279,7 +279,7 @@ def test_the_process_starts_and_a_signal_ends_it_quickly_and_quietly(stop, ready
         ({"host": "0.0.0.0", "read_only": True}, False),
     ],
 )
-def test_a_service_that_is_open_to_all_says_so_loudly(capfd, monkeypatch, settings, warned):
+def test_a_public_service_without_a_token_logs_a_warning(capfd, monkeypatch, settings, warned):
     monkeypatch.setattr("app.service.main.Server.run", lambda self, sockets: setattr(self, "started", True))
     assert run(Settings(port=0, **settings)) == 0
     assert ("open to everybody" in capfd.readouterr().err) is warned

@@ -26,7 +26,7 @@ PROTOCOL = "viser-v9.9.9"
 
 
 def said(word: str, **fields: object) -> bytes:
-    """A message as our page sends them."""
+    """A message as sent by our page."""
     return msgspec.msgpack.encode({"type": "GuiUpdateMessage", "uuid": word, "updates": {"value": 1}} | fields)
 
 
@@ -34,7 +34,7 @@ HELLO = said("hello")
 
 
 class StandIn:
-    """Echoes what it gets; a few messages make it misbehave."""
+    """Echoes every message; a few messages make it misbehave."""
 
     def __init__(self) -> None:
         self.received: list[bytes | str] = []
@@ -114,7 +114,7 @@ def visit(port: int, path: str = "/viewer", **options):
 
 
 @pytest.mark.parametrize("path", ["/viewer", "/viewer/"])
-def test_bytes_travel_both_ways_unchanged_with_the_subprotocol(port, viser, path):
+def test_bytes_are_passed_unchanged_in_both_directions(port, viser, path):
     with visit(port, path) as visitor:
         assert visitor.subprotocol == PROTOCOL
         for message in (HELLO, said("é", updates={"value": [1.5, None, b"\x00\xff"]})):
@@ -194,7 +194,7 @@ def test_pages_of_other_sites_are_refused(port, viser, origin, headers, caplog):
         {"kind": "GuiUpdateMessage"},
     ],
 )
-def test_what_a_visitor_has_no_business_sending_is_dropped(port, viser, fields):
+def test_messages_that_a_visitor_may_not_send_are_dropped(port, viser, fields):
     with visit(port) as visitor:
         visitor.send(msgspec.msgpack.encode(fields))
         visitor.send(HELLO)
@@ -223,7 +223,7 @@ def nested(depth: int) -> bytes:
     ],
     ids=lambda message: f"{len(message)} bytes",
 )
-def test_nonsense_ends_the_connection_it_came_on_and_no_other(port, viser, message):
+def test_an_invalid_message_closes_only_its_own_connection(port, viser, message):
     with visit(port) as honest, visit(port) as visitor:
         visitor.send(message)
         with pytest.raises(ConnectionClosed) as end:
@@ -235,11 +235,11 @@ def test_nonsense_ends_the_connection_it_came_on_and_no_other(port, viser, messa
     assert viser.received == [HELLO]
 
 
-def test_a_huge_message_is_not_even_read(viser, bridge):
+def test_a_huge_message_is_not_read(viser, bridge):
     app = FastAPI()
     app.router.routes.extend(bridge.routes())
     with serve(app) as port, visit(port) as visitor:
-        with contextlib.suppress(ConnectionClosed):  # we may be told in the middle of it
+        with contextlib.suppress(ConnectionClosed):  # the connection may be closed while sending
             visitor.send(bytes(10_000_000))
         with pytest.raises(ConnectionClosed) as end:
             visitor.recv(timeout=10)
@@ -247,7 +247,7 @@ def test_a_huge_message_is_not_even_read(viser, bridge):
     assert viser.received == []
 
 
-def test_a_flood_is_slowed_down_and_the_others_do_not_wait(port, viser):
+def test_a_flood_is_throttled_without_delaying_other_visitors(port, viser):
     stop = threading.Event()
 
     def pour() -> None:
@@ -275,7 +275,7 @@ def test_a_flood_is_slowed_down_and_the_others_do_not_wait(port, viser):
         flooding.join(10)
 
 
-def test_a_budget_lets_a_hand_move_freely_and_fills_up_again():
+def test_a_budget_allows_fast_dragging_and_refills():
     limit = MessageLimit(10.0, 5.0)
     assert [limit.spend(0.0) for _ in range(5)] == [0.0] * 5
     assert limit.spend(0.0) == pytest.approx(0.1)
@@ -283,7 +283,7 @@ def test_a_budget_lets_a_hand_move_freely_and_fills_up_again():
     assert [limit.spend(1000.0) for _ in range(5)][-1] == pytest.approx(0.1)
 
 
-def test_a_reader_who_takes_nothing_is_let_go(port, viser, monkeypatch):
+def test_a_visitor_who_does_not_read_is_disconnected(port, viser, monkeypatch):
     monkeypatch.setattr("app.service.web.viewer_proxy.PATIENCE", 0.3)
     with visit(port, max_queue=1, close_timeout=0.1) as visitor:
         visitor.send(said("flood"))
@@ -291,7 +291,7 @@ def test_a_reader_who_takes_nothing_is_let_go(port, viser, monkeypatch):
         assert viser.sent < 100, "how much the sockets on the way hold differs by tens of megabytes"
 
 
-def test_when_all_places_are_taken_a_page_says_so(viser):
+def test_a_visitor_beyond_the_limit_gets_a_page_that_says_so(viser):
     bridge = ViewerBridge(max_visitors=2)
     bridge.port = viser.port
     app = FastAPI()
@@ -312,7 +312,7 @@ def test_when_all_places_are_taken_a_page_says_so(viser):
             assert three.recv(timeout=10) == HELLO
 
 
-def test_viser_ends_the_connection_and_the_visitor_learns_why(port):
+def test_the_close_reason_of_viser_reaches_the_visitor(port):
     with visit(port) as visitor:
         visitor.send(said("close"))
         with pytest.raises(ConnectionClosed) as end:
@@ -321,7 +321,7 @@ def test_viser_ends_the_connection_and_the_visitor_learns_why(port):
     assert (end.value.rcvd.code, end.value.rcvd.reason) == (4001, "bye")
 
 
-def test_viser_lost_closes_the_visitor(port):
+def test_losing_viser_closes_the_visitors_connection(port):
     with visit(port) as visitor:
         visitor.send(said("drop"))
         with pytest.raises(ConnectionClosed) as end:
@@ -331,7 +331,7 @@ def test_viser_lost_closes_the_visitor(port):
 
 
 @pytest.mark.parametrize(("code", "seen"), [(1000, 1000), (1001, 1001), (4242, 4242)])
-def test_the_visitor_leaves_and_viser_learns_it(port, viser, code, seen):
+def test_a_visitor_who_leaves_closes_the_connection_to_viser(port, viser, code, seen):
     with visit(port) as visitor:
         visitor.send(HELLO)
         visitor.recv(timeout=10)
@@ -339,7 +339,7 @@ def test_the_visitor_leaves_and_viser_learns_it(port, viser, code, seen):
     wait_for(lambda: viser.endings == [seen])
 
 
-def test_the_visitor_vanishes_and_nothing_is_left(port, viser):
+def test_a_visitor_who_vanishes_leaves_no_connection_behind(port, viser):
     for _ in range(10):
         visitor = visit(port)
         visitor.send(HELLO)
@@ -349,7 +349,7 @@ def test_the_visitor_vanishes_and_nothing_is_left(port, viser):
     wait_for(lambda: len(viser.endings) == 10)
 
 
-def test_text_is_not_of_this_protocol(port, viser):
+def test_text_messages_are_refused(port, viser):
     with visit(port) as visitor:
         visitor.send("text")
         with pytest.raises(ConnectionClosed) as end:
@@ -360,18 +360,18 @@ def test_text_is_not_of_this_protocol(port, viser):
     wait_for(lambda: len(viser.endings) == 1)
 
 
-def test_a_slow_reader_holds_viser_back_instead_of_filling_our_memory(port, viser):
+def test_a_slow_reader_slows_viser_and_memory_stays_bounded(port, viser):
     with visit(port, max_queue=1) as visitor:
         visitor.send(said("flood"))
         wait_for(lambda: viser.sent > 0)
-        time.sleep(1.0)  # plenty for 200 MB over loopback, were nothing holding it back
+        time.sleep(1.0)  # enough for 200 MB over loopback without backpressure
         assert viser.sent < 100, "how much the sockets on the way hold differs by tens of megabytes"
         for k in range(200):
             message = visitor.recv(timeout=10)
             assert int.from_bytes(message[:4], "little") == k
 
 
-def test_before_the_viewer_listens(port, bridge):
+def test_a_visitor_before_the_viewer_listens(port, bridge):
     bridge.port = None
     page = httpx2.get(f"http://127.0.0.1:{port}/viewer/", trust_env=False)
     assert page.status_code == 503
@@ -380,7 +380,7 @@ def test_before_the_viewer_listens(port, bridge):
     assert turned_away(port) == (1013, "The viewer is warming up.")
 
 
-def test_a_viewer_that_went_away_is_worth_another_try(port, viser, caplog):
+def test_a_lost_viewer_closes_with_try_again_later(port, viser, caplog):
     viser.stop()
     assert turned_away(port) == (1013, "The viewer does not answer.")
     assert "does not answer" in caplog.text
@@ -393,7 +393,7 @@ def turned_away(port: int) -> tuple[int, str]:
     return end.value.rcvd.code, end.value.rcvd.reason
 
 
-def test_the_page_is_visers_under_our_policy(port):
+def test_the_page_of_viser_is_served_with_our_policy(port):
     with httpx2.Client(base_url=f"http://127.0.0.1:{port}", trust_env=False) as browser:
         page = browser.get("/viewer/")
         assert page.text == "<html><title>Kinboard viewer</title>page</html>"
@@ -409,7 +409,7 @@ def test_the_page_is_visers_under_our_policy(port):
         assert "http" not in page.headers["content-security-policy"]
 
 
-def test_the_address_without_slash_leads_to_the_page(port):
+def test_the_address_without_a_slash_redirects_to_the_page(port):
     answer = httpx2.get(f"http://127.0.0.1:{port}/viewer?a=b", trust_env=False)
     assert answer.status_code == 307
     assert answer.headers["location"] == "viewer/?a=b"

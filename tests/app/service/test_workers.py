@@ -53,7 +53,7 @@ def pids(port: int) -> list[int]:
 
 
 def ready(port: int) -> set[int]:
-    """The processes that say they are ready, each asked over one connection that is kept."""
+    """The processes that are ready, each requested over one persistent connection."""
     found = set()
     for _ in range(16):
         with httpx2.Client(base_url=f"http://127.0.0.1:{port}", trust_env=False, timeout=20) as kept:
@@ -62,7 +62,7 @@ def ready(port: int) -> set[int]:
     return found
 
 
-def test_both_processes_answer_and_share_the_work(service):
+def test_both_processes_answer_and_share_the_requests(service):
     answers = pids(service[1])
     assert len(set(answers)) == 2
     assert min(answers.count(pid) for pid in set(answers)) >= 5
@@ -84,7 +84,7 @@ def test_a_visitor_stays_with_the_process_that_took_the_connection(service):
             tab.close()
 
 
-def test_counters_of_all_processes_are_told_together(service):
+def test_counters_are_summed_over_all_processes(service):
     port = service[1]
 
     def counted() -> float:
@@ -98,7 +98,7 @@ def test_counters_of_all_processes_are_told_together(service):
     assert counted() == before + 40
 
 
-def test_a_process_that_dies_is_started_again_and_the_other_goes_on(service):
+def test_a_process_that_dies_is_restarted_and_the_other_keeps_running(service):
     port = service[1]
     victim, other = sorted(set(pids(port)))
     os.kill(victim, signal.SIGKILL)
@@ -106,7 +106,7 @@ def test_a_process_that_dies_is_started_again_and_the_other_goes_on(service):
     assert other in pids(port)
 
 
-def test_one_signal_ends_them_all(service):
+def test_one_signal_stops_all_processes(service):
     process, port = service
     children = set(pids(port))
     with FakeBrowser(port, path="/viewer"):
@@ -131,18 +131,18 @@ def _ignores(code: int, listener: socket.socket, number: int) -> int:
     return code
 
 
-def test_what_fails_at_once_is_not_started_over_and_over():
+def test_a_process_that_fails_at_once_is_not_restarted_forever():
     with socket.create_server(("127.0.0.1", 0)) as one, socket.create_server(("127.0.0.1", 0)) as two:
         assert supervise(_fails, [one, two], 1.0) == 1
 
 
-def test_who_does_not_end_is_killed(caplog):
+def test_a_process_that_does_not_stop_is_killed(caplog):
     with socket.create_server(("127.0.0.1", 0)) as one:
         assert supervise(partial(_ignores, 0), [one], 0.5) == 0
     assert "is killed" in caplog.text
 
 
-def test_a_port_in_use_is_found_although_sockets_are_shared(capfd):
+def test_a_port_in_use_is_detected_although_sockets_are_shared(capfd):
     with socket.create_server(("127.0.0.1", 0), reuse_port=True) as taken:
         assert run(Settings(port=taken.getsockname()[1], workers=2)) == 1
     assert "cannot listen on" in capfd.readouterr().err

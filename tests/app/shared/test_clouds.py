@@ -103,7 +103,7 @@ def test_a_part_that_is_larger_than_the_memory_is_answered_and_not_kept():
     clouds.close()
 
 
-def test_a_reader_who_leaves_stops_the_work(clouds, monkeypatch):
+def test_a_reader_that_leaves_cancels_the_computation(clouds, monkeypatch):
     began = []
     slice_of = Cloud.slice
 

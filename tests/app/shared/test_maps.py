@@ -1,4 +1,4 @@
-"""Capability maps shared by many readers: computed once, seen while they grow, stopped by the last who leaves."""
+"""Capability maps shared by many readers: computed once, visible while growing, cancelled by the last reader."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def maps():
 
 
 class Slowly:
-    """Blocks that wait to be let through, and how many were begun."""
+    """Holds blocks back until `let` releases them, and counts those that were started."""
 
     def __init__(self, monkeypatch):
         self.begun = 0
@@ -97,12 +97,12 @@ def test_a_map_can_be_seen_while_it_grows(maps, slowly, monkeypatch):
     assert {tuple(i) for i in part.index.tolist()} <= {tuple(i) for i in whole.index.tolist()}
 
 
-def test_one_who_leaves_stops_nothing_the_last_one_does(maps, slowly):
+def test_only_the_last_reader_who_leaves_cancels_the_map(maps, slowly):
     first, second = maps.subscribe(SEVERAL), maps.subscribe(SEVERAL)
     slowly.let(1)
     wait_for(lambda: first.done == 1)
     first.leave()
-    first.leave()  # which counts once
+    first.leave()  # counted once
     slowly.let(1)
     wait_for(lambda: second.done == 2)
     second.leave()
@@ -111,7 +111,7 @@ def test_one_who_leaves_stops_nothing_the_last_one_does(maps, slowly):
     again.leave()
 
     def over():
-        slowly.let(1)  # one by one: a thread is through several before the one that collects them has its turn
+        slowly.let(1)  # one by one: a thread may finish several before the collecting thread runs
         return second.future.done()
 
     wait_for(over)
@@ -122,7 +122,7 @@ def test_one_who_leaves_stops_nothing_the_last_one_does(maps, slowly):
     assert maps.bytes == 0
 
 
-def test_one_that_waits_for_its_turn_can_be_left(slowly):
+def test_a_queued_map_can_be_cancelled(slowly):
     maps = Maps(threads=1, at_once=1)
     busy = maps.subscribe(SEVERAL)
     waiting = maps.subscribe(SMALL)
@@ -135,7 +135,7 @@ def test_one_that_waits_for_its_turn_can_be_left(slowly):
     maps.close()
 
 
-def test_memory_is_bounded_and_what_was_asked_for_longest_ago_goes_first():
+def test_memory_is_bounded_and_the_least_recently_used_map_is_evicted():
     first, second, third = (MapRequest(ARM, n, 12) for n in (6, 7, 8))
     roomy = Maps(threads=1)
     for wanted in (first, second, third):
@@ -152,14 +152,14 @@ def test_memory_is_bounded_and_what_was_asked_for_longest_ago_goes_first():
     maps.close()
 
 
-def test_a_wrong_description_is_told_to_each_who_asks_and_not_kept(maps):
+def test_an_invalid_request_fails_for_every_caller_and_is_not_cached(maps):
     for _ in range(2):
         with pytest.raises(InputError, match="directions"):
             maps.subscribe(MapRequest(ARM, 8, 13)).future.result(20)
         wait_for(lambda: len(maps._maps) == 0)
 
 
-def test_closing_ends_the_work(maps, slowly):
+def test_closing_cancels_computations(maps, slowly):
     reader = maps.subscribe(SEVERAL)
     slowly.let(1)
     wait_for(lambda: reader.done == 1)

@@ -1,4 +1,4 @@
-"""Lessons and tabs in a visitor's page: when they are called, and that none can hurt the page."""
+"""Lessons and tabs in a visitor's page: when they are called, and that errors in them stay contained."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ PIONEER, OTHER = STORE.get("pioneer5"), STORE.get("puma560")
 
 
 class Witness(Feature):
-    """Writes down what it is told."""
+    """Records its calls."""
 
     key = "witness"
     title = "Witness"
@@ -96,36 +96,36 @@ def tab(monkeypatch: pytest.MonkeyPatch) -> Iterator[FakeBrowser]:
     server.stop()
 
 
-def told(tab: FakeBrowser, *call: object, times: int = 1) -> None:
+def wait_for_call(tab: FakeBrowser, *call: object, times: int = 1) -> None:
     end = time.monotonic() + 10.0
     while Witness.calls.count(call) < times:
         tab._read(0.05)
         assert time.monotonic() < end, Witness.calls
 
 
-def test_a_tab_is_told_what_happens_by_the_visitors_worker_alone(tab: FakeBrowser) -> None:
+def test_a_tab_is_called_by_the_worker_of_the_visitor_alone(tab: FakeBrowser) -> None:
     assert Witness.calls[0] == ("made", "pioneer5")
     tab.set("Witness", 3)
-    told(tab, "handle", "slider", 3)
+    wait_for_call(tab, "handle", "slider", 3)
     tab.set("1 rotating base", 50)
-    told(tab, "pose")
+    wait_for_call(tab, "pose")
     T = kin.fk(PIONEER, PIONEER.q_home)
     tab.drag(T)
-    told(tab, "result", "solved")
+    wait_for_call(tab, "result", "solved")
     tab.set("Radians", True)
-    told(tab, "style", Units(degrees=False), False)
+    wait_for_call(tab, "style", Units(degrees=False), False)
     tab.set("Lengths", "cm")
-    told(tab, "style", Units(False, "cm"), False)
+    wait_for_call(tab, "style", Units(False, "cm"), False)
     tab.set("Dark page", True)
-    told(tab, "style", Units(False, "cm"), True)
+    wait_for_call(tab, "style", Units(False, "cm"), True)
     tab.set("Robot", OTHER.name)
-    told(tab, "robot", "puma560")
+    wait_for_call(tab, "robot", "puma560")
     assert len(Witness.threads) == 1
 
 
-def test_a_feature_gets_its_ticks_and_then_rests(tab: FakeBrowser) -> None:
+def test_a_feature_gets_its_ticks_and_then_none(tab: FakeBrowser) -> None:
     tab.set("Witness", 8)
-    told(tab, "tick", times=5)
+    wait_for_call(tab, "tick", times=5)
     tab.settle()
     assert Witness.calls.count(("tick",)) == 5
 
@@ -135,7 +135,7 @@ def test_a_feature_moves_the_arm(tab: FakeBrowser) -> None:
     tab.wait(lambda: np.allclose(tab.tool_pose(), kin.fk(PIONEER, PIONEER.lower), atol=1e-9))
 
 
-def test_a_feature_that_breaks_says_so_and_the_page_lives_on(
+def test_an_error_in_a_feature_is_reported_and_the_page_keeps_working(
     tab: FakeBrowser, caplog: pytest.LogCaptureFixture
 ) -> None:
     tab.set("Witness", 9)
@@ -147,27 +147,27 @@ def test_a_feature_that_breaks_says_so_and_the_page_lives_on(
 
 def test_one_lesson_at_a_time(tab: FakeBrowser) -> None:
     assert len([c for c in Witness.calls if c[0] == "made"]) == 1
-    assert "Learns &amp; reports." in tab.html, "what there is to choose from"
+    assert "Learns &amp; reports." in tab.html, "the list of lessons"
     tab.set("Lesson", "Pupil")
-    told(tab, "made", "pioneer5")
+    wait_for_call(tab, "made", "pioneer5")
     tab.wait(lambda: "Learns" not in tab.html)
     tab.wait(lambda: "Pupil" in tab.sliders)
     tab.set("Pupil", 4)
-    told(tab, "handle", "slider", 4)
+    wait_for_call(tab, "handle", "slider", 4)
     tab.set("Lesson", "None")
-    told(tab, "remove")
+    wait_for_call(tab, "remove")
     tab.wait(lambda: "Pupil" not in tab.sliders)
     tab.wait(lambda: "Learns &amp; reports." in tab.html)
 
 
-def test_a_lesson_that_there_is_not_is_refused_by_name(tab: FakeBrowser) -> None:
+def test_an_unknown_lesson_is_refused_by_name(tab: FakeBrowser) -> None:
     tab.set("Lesson", "Astrology")
     tab.wait(lambda: "Astrology" in tab.html)
     assert "Invalid input" in tab.html
     tab.wait(lambda: tab.value("Lesson") == "None")
 
 
-def test_every_lesson_says_what_it_is_about() -> None:
+def test_every_lesson_has_a_short_description() -> None:
     assert all(lesson.about.endswith(".") and len(lesson.about) < 100 for lesson in lessons.LESSONS)
 
 

@@ -39,7 +39,7 @@ def port(server: ViewerServer) -> int:
 
 
 def numbers(tab: FakeBrowser) -> list[float]:
-    """x, y, z as the readout shows them."""
+    """x, y, z as shown in the readout."""
     table = tab.html.split('aria-label="tool pose"', 1)[1].split("</tr>", 1)[0]
     return [float(x.replace("−", "-")) for x in re.findall(r">([−\d.]+)</span>", table)]
 
@@ -73,7 +73,7 @@ def test_a_sliding_joint_is_moved_in_the_unit_and_late_events_are_dropped(server
         tab.wait(lambda: ">m</td>" in tab.html)
         tab.settle()
         T = tab.tool_pose()
-        # 100 of the slider that is gone were millimetres; as metres they would mean the stop.
+        # 100 from the replaced slider is in millimetres; read as metres it would be clamped to the limit.
         *_, session = server._pages.values()
         session.post(("joint", SCARA.id, 2, Units()), 100.0)
         tab.settle()
@@ -84,7 +84,7 @@ def test_a_sliding_joint_is_moved_in_the_unit_and_late_events_are_dropped(server
         tab.wait(lambda: np.allclose(tab.tool_pose(), kin.fk(SCARA, q), atol=1e-9))
 
 
-def test_an_answer_on_show_is_told_again_in_the_new_units(port: int) -> None:
+def test_the_displayed_answer_is_converted_to_the_new_units(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
         tab.choose(SRS.name)
@@ -101,7 +101,7 @@ def test_an_answer_on_show_is_told_again_in_the_new_units(port: int) -> None:
         tab.drag(T)
         tab.release()
         tab.wait(lambda: f"Out of reach by {far + 1.0:.1f}" in tab.html)
-        # What is no answer stays as it was told.
+        # A status without an answer stays the same.
         tab.set("Go to", "Home")
         tab.wait(lambda: 'data-status="hand"' in tab.html)
         tab.set("Lengths", "cm")
@@ -110,7 +110,7 @@ def test_an_answer_on_show_is_told_again_in_the_new_units(port: int) -> None:
         assert 'data-status="hand"' in tab.html
 
 
-def test_the_unit_is_remembered_and_restored(port: int) -> None:
+def test_the_unit_is_stored_and_restored(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
         tab.set("Lengths", "cm")
@@ -125,7 +125,7 @@ def test_the_unit_is_remembered_and_restored(port: int) -> None:
         assert tab.value(label(SCARA, 2)) == pytest.approx(100 * SCARA.q_home[2])
 
 
-def test_a_unit_that_there_is_not_is_refused_by_name(port: int) -> None:
+def test_an_unknown_unit_is_refused_by_name(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
         tab.set("Lengths", "inch")

@@ -1,4 +1,4 @@
-"""The lesson on DH tables: the walk is forward kinematics; page and scene show the same place of it."""
+"""The lesson on DH tables: the walk follows forward kinematics; page and scene show the same step."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def words(html: str) -> str:
 
 
 @pytest.mark.parametrize("robot", READINGS, ids=lambda r: f"{r.id}-{r.convention}")
-def test_at_the_end_of_each_row_stands_its_frame(robot: kin.Robot) -> None:
+def test_each_row_ends_at_its_frame(robot: kin.Robot) -> None:
     q = some_q(robot)
     frames = kin.link_frames(robot, q)
     for row, T in enumerate(frames):
@@ -49,14 +49,14 @@ def test_at_the_end_of_each_row_stands_its_frame(robot: kin.Robot) -> None:
 
 
 @pytest.mark.parametrize("robot", [PIONEER, CRAIG, SCARA], ids=lambda r: r.id)
-def test_between_motions_the_frame_goes_on_without_a_leap(robot: kin.Robot) -> None:
+def test_the_frame_moves_continuously_between_motions(robot: kin.Robot) -> None:
     q = some_q(robot)
     walk = [steps.place(robot, q, at).T_0_now for at in np.arange(0.0, steps.length(robot), 0.01)]
     largest = np.abs(np.diff(walk, axis=0)).max()
     assert largest < 0.02 * max(1.0, np.abs(q).max())
 
 
-def test_a_share_of_a_motion_is_that_share_of_its_value() -> None:
+def test_a_fraction_of_a_motion_is_that_fraction_of_its_value() -> None:
     at = steps.place(PIONEER, PIONEER.q_home, 4.5)
     assert (at.row, at.motion, at.share, at.factor, at.placed) == (1, 0, 0.5, "theta", 1)
     assert np.allclose(at.A, steps.elementary("theta", np.radians(15)))
@@ -64,7 +64,7 @@ def test_a_share_of_a_motion_is_that_share_of_its_value() -> None:
 
 
 @pytest.mark.parametrize("robot", READINGS, ids=lambda r: f"{r.id}-{r.convention}")
-def test_symbols_with_numbers_put_in_are_the_matrix(robot: kin.Robot) -> None:
+def test_symbols_with_numbers_inserted_give_the_matrix(robot: kin.Robot) -> None:
     q = some_q(robot)
     for row in range(len(robot.rows)):
         free = q[robot.joint_rows.index(row)] if row in robot.joint_rows else 0.0
@@ -76,36 +76,36 @@ def test_symbols_with_numbers_put_in_are_the_matrix(robot: kin.Robot) -> None:
 
 
 def test_captions_follow_the_order_of_the_convention() -> None:
-    def told(robot: kin.Robot, row: int) -> list[str]:
+    def captions(robot: kin.Robot, row: int) -> list[str]:
         return [
             steps.caption(robot, steps.place(robot, robot.q_home, 4 * row + k), DEFAULT_UNITS) for k in range(1, 5)
         ]
 
-    assert told(PIONEER, 0) == [
+    assert captions(PIONEER, 0) == [
         "Row 1 of 6: turn 90.0° about z₀ (θ₁, joint 1).",
         "Row 1 of 6: slide 130.0 mm along z₀ (d₁).",
         "Row 1 of 6: slide 70.0 mm along x₁ (a₁).",
         "Row 1 of 6: turn −90.0° about x₁ (α₁). Frame 1 is placed.",
     ]
-    assert told(CRAIG, 1) == [
+    assert captions(CRAIG, 1) == [
         "Row 2 of 8: turn −90.0° about x₁ (α₁).",
         "Row 2 of 8: a₁ = 0, no translation along x₁.",
         "Row 2 of 8: turn 30.0° about z₂ (θ₂, joint 2).",
         "Row 2 of 8: d₂ = 0, no translation along z₂. Frame 2 is placed.",
     ]
-    assert told(SCARA, 2)[1] == "Row 3 of 4: slide 150.0 mm along z₂ (d₃, joint 3)."
+    assert captions(SCARA, 2)[1] == "Row 3 of 4: slide 150.0 mm along z₂ (d₃, joint 3)."
 
 
 # The comparison
 
 
-def test_the_two_built_in_readings_are_each_others() -> None:
+def test_the_two_built_in_conventions_convert_into_each_other() -> None:
     q = some_q(PRINTED)
     assert np.allclose(kin.fk(steps.reread(PRINTED), q), kin.fk(CRAIG, q))
     assert np.allclose(kin.fk(steps.reread(CRAIG), q), kin.fk(PRINTED, q))
 
 
-def test_why_two_joints_of_the_printed_table_are_one() -> None:
+def test_two_joints_of_the_printed_table_share_an_axis() -> None:
     assert steps.coaxial_joints(PRINTED) == [0]
     assert steps.coaxial_joints(CRAIG) == []
     for robot in (PRINTED, CRAIG):
@@ -128,7 +128,7 @@ def test_degrees_of_freedom_are_the_rank_of_the_jacobian_where_axes_coincide(rob
     assert steps.verdict(robot, DEFAULT_UNITS)
 
 
-def test_opposite_turns_about_one_line_count_by_their_difference() -> None:
+def test_opposite_joints_on_one_axis_act_by_their_difference() -> None:
     text = """
 id = "folded"
 name = "folded"
@@ -152,18 +152,18 @@ def test_every_page_is_well_formed(robot: kin.Robot, symbols: bool) -> None:
     q = some_q(robot)
     for at in (0.0, 1.0, 2.5, 4.0, float(steps.length(robot))):
         here = steps.place(robot, q, at)
-        told = words(
+        text = words(
             views.caption_html(robot, here, DEFAULT_UNITS)
             + views.table_html(robot, q, here, RADIANS)
             + views.matrices_html(robot, here, symbols, DEFAULT_UNITS)
             + views.compare_html(robot, steps.reread(robot), q, here, 0.1, DEFAULT_UNITS)
             + views.nine_steps_html(robot.convention)
         )
-        assert "-" not in re.sub(r"[a-z]-[a-z]", "", told), "every minus is a true one"
-        assert "nan" not in told
+        assert "-" not in re.sub(r"[a-z]-[a-z]", "", text), "every minus is a true one"
+        assert "nan" not in text
 
 
-def test_the_table_marks_where_the_walk_is_and_what_joints_move() -> None:
+def test_the_table_marks_the_current_step_and_the_joint_variables() -> None:
     at = steps.place(CRAIG, CRAIG.q_home, 6.5)
     html = views.table_html(CRAIG, CRAIG.q_home, at, DEFAULT_UNITS)
     rows = [*ET.fromstring(html).iter("tr")]
@@ -177,7 +177,7 @@ def test_the_table_marks_where_the_walk_is_and_what_joints_move() -> None:
     assert bold == [[3]] * 7 + [[]]
 
 
-def test_symbols_put_constants_in_and_leave_the_joint_open() -> None:
+def test_symbols_insert_constants_and_keep_the_joint_variable() -> None:
     def entries(robot: kin.Robot, row: int) -> list[str]:
         html = views.matrices_html(robot, steps.place(robot, robot.q_home, 4 * row + 4), True, DEFAULT_UNITS)
         cells = [words(ET.tostring(c, encoding="unicode")) for c in ET.fromstring(f"<d>{html}</d>").iter("mtd")]
@@ -225,7 +225,7 @@ def test_lengths_follow_the_units(length: str, d: str, d_short: str) -> None:
 
 @pytest.mark.parametrize("factor", ["theta", "alpha"])
 @pytest.mark.parametrize("angle", [0.7, -2.9, 6.0])
-def test_an_arc_ends_where_the_turn_ends(factor: steps.Factor, angle: float) -> None:
+def test_an_arc_ends_where_the_rotation_ends(factor: steps.Factor, angle: float) -> None:
     lines = drawing.arc(steps.axis(factor), 2.0, angle)
     start = np.eye(3)[0 if factor == "theta" else 2]
     turned = steps.elementary(factor, angle)[:3, :3] @ start
@@ -236,14 +236,14 @@ def test_an_arc_ends_where_the_turn_ends(factor: steps.Factor, angle: float) -> 
 
 
 @pytest.mark.parametrize("distance", [0.3, -0.3])
-def test_a_ruler_is_as_long_as_the_slide(distance: float) -> None:
+def test_a_ruler_is_as_long_as_the_translation(distance: float) -> None:
     for factor in ("d", "a"):
         line = drawing.ruler(steps.axis(factor), 0.1, distance)[2]
         assert np.allclose(line[1] - line[0], steps.elementary(factor, distance)[:3, 3], atol=1e-7)
 
 
 @pytest.mark.parametrize("robot", READINGS, ids=lambda r: f"{r.id}-{r.convention}")
-def test_a_skeleton_hangs_together_and_bends_at_right_angles(robot: kin.Robot) -> None:
+def test_a_skeleton_is_connected_and_bends_at_right_angles(robot: kin.Robot) -> None:
     frames = kin.link_frames(robot, some_q(robot))
     bones = drawing.skeleton(robot, frames)
     assert np.allclose(bones[1:, 0], bones[:-1, 1], atol=1e-6)
@@ -277,7 +277,7 @@ def tab(served: tuple[ViewerServer, int]) -> Iterator[FakeBrowser]:
 
 
 def lesson_of(server: ViewerServer) -> dh.DHLesson:
-    """Of the newest visitor."""
+    """The lesson of the newest visitor."""
     session = server._pages[max(server._pages)]
     shown = session.lessons.shown
     assert isinstance(shown, dh.DHLesson)
@@ -298,7 +298,7 @@ def at(robot: kin.Robot, q: np.ndarray, motions: float) -> np.ndarray:
     return steps.place(robot, q, motions).T_0_now
 
 
-def test_scrubbing_moves_the_frame_and_says_where_it_is(tab: FakeBrowser) -> None:
+def test_the_slider_moves_the_frame_and_updates_the_caption(tab: FakeBrowser) -> None:
     tab.set("Row", 1.9)
     tab.wait(lambda: shows(tab, at(PIONEER, PIONEER.q_home, 7.6)))
     tab.wait(lambda: "Row 2 of 6: α₂ = 0" in tab.html)
@@ -309,13 +309,13 @@ def test_scrubbing_moves_the_frame_and_says_where_it_is(tab: FakeBrowser) -> Non
     assert "frame 1" in labels
 
 
-def test_a_row_that_is_no_number_is_refused(tab: FakeBrowser) -> None:
+def test_a_row_that_is_not_a_number_is_refused(tab: FakeBrowser) -> None:
     tab.set("Row", float("nan"))
     tab.wait(lambda: "a finite number" in tab.html)
 
 
 def test_next_and_back_go_to_the_ends_of_motions(tab: FakeBrowser) -> None:
-    # Pressed quickly, each counts.
+    # Every one of several quick clicks takes effect.
     for _ in range(5):
         tab.set("Motion", "Next")
     tab.wait(lambda: tab.value("Row") == 1.25)
@@ -328,7 +328,7 @@ def test_next_and_back_go_to_the_ends_of_motions(tab: FakeBrowser) -> None:
     tab.wait(lambda: shows(tab, at(PIONEER, PIONEER.q_home, 1)))
 
 
-def test_playing_walks_to_the_end_and_rests(tab: FakeBrowser, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_playing_goes_to_the_end_and_stops(tab: FakeBrowser, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dh, "MOTION_TIME", 0.05)
     monkeypatch.setattr(dh, "REST", 0.01)
     tab.set("Motion", "Play")
@@ -346,7 +346,7 @@ def test_playing_walks_to_the_end_and_rests(tab: FakeBrowser, monkeypatch: pytes
     assert tab.value("Row") < 1.0
 
 
-def test_the_arm_moves_everything(tab: FakeBrowser) -> None:
+def test_moving_the_arm_updates_the_lesson(tab: FakeBrowser) -> None:
     tab.set("Row", 3)
     tab.settle()
     tab.set("1 rotating base", 20.0)
@@ -359,7 +359,7 @@ def test_the_arm_moves_everything(tab: FakeBrowser) -> None:
     tab.wait(lambda: ">0.349<" in tab.html)
 
 
-def test_another_arm_starts_anew_in_its_own_order(tab: FakeBrowser) -> None:
+def test_another_arm_restarts_the_walk_in_its_own_convention(tab: FakeBrowser) -> None:
     tab.set("Row", 3)
     tab.settle()
     tab.set("Robot", CRAIG.name)
@@ -371,7 +371,7 @@ def test_another_arm_starts_anew_in_its_own_order(tab: FakeBrowser) -> None:
     tab.wait(lambda: shows(tab, kin.link_frames(CRAIG, CRAIG.q_home)[-1]))
 
 
-def test_symbols_and_comparison_on_request_and_gone_with_the_lesson(tab: FakeBrowser) -> None:
+def test_symbols_and_comparison_are_optional_and_removed_with_the_lesson(tab: FakeBrowser) -> None:
     tab.set("Robot", PRINTED.name)
     tab.wait(lambda: "Standard convention" in tab.html)
     tab.settle()
@@ -391,7 +391,7 @@ def test_symbols_and_comparison_on_request_and_gone_with_the_lesson(tab: FakeBro
     assert not [n for n in tab.nodes if n.startswith("/dh-")]
 
 
-def test_the_lesson_opened_again_begins_at_the_base(tab: FakeBrowser) -> None:
+def test_a_reopened_lesson_starts_at_the_base(tab: FakeBrowser) -> None:
     tab.set("Row", 3)
     tab.wait(lambda: shows(tab, at(PIONEER, PIONEER.q_home, 12)))
     tab.set("Lesson", "None")
@@ -402,7 +402,7 @@ def test_the_lesson_opened_again_begins_at_the_base(tab: FakeBrowser) -> None:
     assert shows(tab, np.eye(4)), "and does not take over the pose of a node of the same name"
 
 
-def test_a_shared_address_restores_what_was_set_and_ignores_nonsense(
+def test_a_shared_address_restores_the_settings_and_ignores_invalid_ones(
     served: tuple[ViewerServer, int], tab: FakeBrowser
 ) -> None:
     lesson = lesson_of(served[0])

@@ -1,4 +1,4 @@
-"""The lesson "Postures": the list, the ghosts, why a target is missed and what helps, the cone of directions."""
+"""The lesson "Postures": the list, the ghosts, causes and remedies of a missed target, the cone of directions."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def home(robot: kin.Robot) -> np.ndarray:
 
 
 @pytest.mark.parametrize("robot", SOME, ids=lambda robot: robot.id)
-def test_the_list_says_of_every_branch_what_the_core_says(robot: kin.Robot) -> None:
+def test_the_list_agrees_with_the_core_for_every_branch(robot: kin.Robot) -> None:
     T = home(robot)
     task: kin.Task = "approach" if robot.n < 6 else "pose"
     found = survey(robot, T, task, robot.q_home)
@@ -68,7 +68,7 @@ def test_the_list_says_of_every_branch_what_the_core_says(robot: kin.Robot) -> N
     assert any(p.state == "reachable" for p in found)
 
 
-def test_the_excess_over_a_limit_is_given_in_the_units_of_the_visitor() -> None:
+def test_the_excess_over_a_limit_follows_the_units() -> None:
     found = survey(PIONEER, home(PIONEER), "approach", PIONEER.q_home)
     worst = next(p for p in found if p.state == "blocked")
     assert worst.q is not None
@@ -79,7 +79,7 @@ def test_the_excess_over_a_limit_is_given_in_the_units_of_the_visitor() -> None:
 
 
 @pytest.mark.parametrize("length", ["cm", "m"])
-def test_what_is_missed_is_told_in_the_unit_of_the_visitor(length: str) -> None:
+def test_the_distance_to_a_missed_target_follows_the_units(length: str) -> None:
     units, T = Units(length=length), home(PUMA)
     T[0, 3] += 2.0
     result = kin.solve_ik(PUMA, T, q_seed=PUMA.q_home)
@@ -91,7 +91,7 @@ def test_what_is_missed_is_told_in_the_unit_of_the_visitor(length: str) -> None:
     assert re.search(rf" \d+\.\d+ {length} away$", move.hint)
 
 
-def test_a_lock_that_is_in_the_way_is_told_as_one() -> None:
+def test_a_blocking_lock_is_reported_as_a_lock() -> None:
     T = home(PUMA)
     other = next(s for s in kin.solve_ik(PUMA, T).solutions if abs(s.q[0] - PUMA.q_home[0]) > 0.5)
     locked = (float(PUMA.q_home[0]), *(None,) * 5)
@@ -99,20 +99,20 @@ def test_a_lock_that_is_in_the_way_is_told_as_one() -> None:
     assert "joint 1 is locked" in next(p for p in found if p.name == other.branch).words
 
 
-def test_a_compromise_tells_what_is_given_up() -> None:
+def test_a_compromise_names_its_error() -> None:
     T = home(PIONEER)
     T[:3, :3] = T[:3, :3] @ np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
     found = survey(PIONEER, T, "pose", PIONEER.q_home)
     assert any(p.state == "compromise" and p.words == "roll off by 90.0°" for p in found)
 
 
-def test_the_margin_is_that_of_the_nearest_limit() -> None:
+def test_the_margin_is_the_distance_to_the_nearest_limit() -> None:
     q = PIONEER.q_home.copy()
     q[3] = PIONEER.upper[3] - 0.02
     assert limit_margin(PIONEER, q) == (pytest.approx(0.02), 3)
 
 
-def test_an_arm_without_named_branches_has_its_nearest_posture() -> None:
+def test_an_arm_without_named_branches_lists_the_nearest_posture() -> None:
     (only,) = survey(PANDA, home(PANDA), "pose", PANDA.q_home)
     assert only.available
     far = home(PANDA)
@@ -132,7 +132,7 @@ def test_the_row_of_the_list_is_escaped_and_marked() -> None:
 
 
 @pytest.mark.parametrize("robot", STORE.robots, ids=lambda robot: robot.id)
-def test_ghosts_stand_where_the_arm_would(robot: kin.Robot) -> None:
+def test_ghosts_are_posed_as_the_arm_would_be(robot: kin.Robot) -> None:
     q = robot.random_q(np.random.default_rng(3), 4)
     frames = link_poses(robot, q)
     assert np.allclose(frames[:, -1] @ chain(robot).T_last_tool, kin.fk(robot, q), atol=1e-12)
@@ -142,7 +142,7 @@ def test_ghosts_stand_where_the_arm_would(robot: kin.Robot) -> None:
     assert anchors.shape == (4, 3)
 
 
-# Why not
+# Causes and remedies
 
 
 def remedies_for(
@@ -158,11 +158,11 @@ def remedies_for(
     ]
 
 
-def test_nothing_is_offered_for_a_target_that_is_reached() -> None:
+def test_a_reached_target_has_no_remedies() -> None:
     assert remedies_for(SRS, home(SRS)) == []
 
 
-def test_a_point_out_of_reach_can_only_be_moved() -> None:
+def test_the_only_remedy_for_a_point_out_of_reach_is_moving_it() -> None:
     T = home(SRS)
     T[:3, 3] *= 3
     (fix,) = remedies_for(SRS, T)
@@ -171,7 +171,7 @@ def test_a_point_out_of_reach_can_only_be_moved() -> None:
     assert np.linalg.norm(kin.fk(SRS, fix.q)[:3, 3]) < np.linalg.norm(T[:3, 3])
 
 
-def test_an_orientation_that_cannot_be_had_is_turned_or_asked_less_of() -> None:
+def test_an_impossible_orientation_can_be_turned_or_the_task_reduced() -> None:
     T = home(PUMA)
     T[:3, 3] = (0.75, 0.0, 0.2)
     T[:3, :3] = [[0, 0, -1], [0, 1, 0], [1, 0, 0]]
@@ -185,7 +185,7 @@ def test_an_orientation_that_cannot_be_had_is_turned_or_asked_less_of() -> None:
     assert "move" in fixes
 
 
-def test_a_lock_and_a_branch_in_the_way_are_named() -> None:
+def test_a_blocking_lock_and_a_blocking_branch_are_named() -> None:
     T = home(PUMA)
     T[:3, 3] += (0.0, 0.08, 0.0)
     locked = (float(PUMA.q_home[0]), *(None,) * 5)
@@ -195,7 +195,7 @@ def test_a_lock_and_a_branch_in_the_way_are_named() -> None:
     assert remedies_for(PUMA, home(PUMA), branch=blocked.name)[0].kind == "branch"
 
 
-def test_locks_that_only_together_are_in_the_way_are_unlocked_together() -> None:
+def test_locks_that_block_only_jointly_are_unlocked_together() -> None:
     T = home(PUMA)
     T[:3, 3] += (0.05, 0.08, 0.02)
     locked = tuple(PUMA.q_home.tolist()[:3]) + (None,) * 3
@@ -206,7 +206,7 @@ def test_locks_that_only_together_are_in_the_way_are_unlocked_together() -> None
 # The cone
 
 
-def test_the_cone_holds_the_directions_that_the_solver_finds() -> None:
+def test_the_cone_contains_the_directions_that_the_solver_reaches() -> None:
     point = home(PIONEER)[:3, 3]
     mask = reachable(PIONEER, point)
     assert 0.0 < share(mask) < 0.5
@@ -250,7 +250,7 @@ def q_of(tab: FakeBrowser, robot: kin.Robot) -> np.ndarray:
 
 
 def ghosts(tab: FakeBrowser) -> dict[str, str]:
-    """Node of each ghost by its number."""
+    """The node of each ghost, by its number."""
     return {n.rsplit("/", 1)[1]: n for n, m in tab.nodes.items() if m["type"] == "BatchedMeshesMessage"}
 
 
@@ -286,7 +286,7 @@ def test_a_click_on_a_ghost_morphs_the_arm_into_it(tab: FakeBrowser) -> None:
     assert str(index + 1) not in shown(tab), "the arm stands where its ghost would"
 
 
-def test_a_number_moves_the_arm_and_one_outside_limits_gives_the_reason(tab: FakeBrowser) -> None:
+def test_a_number_moves_the_arm_or_explains_why_it_is_outside_limits(tab: FakeBrowser) -> None:
     tab.choose(PUMA.name)
     states = list(rows(tab).values())
     names = kin.branch_names(PUMA)
@@ -319,7 +319,7 @@ def test_ghosts_can_be_hidden_one_by_one_and_all_together(tab: FakeBrowser) -> N
     assert shown(tab) == before
 
 
-def test_the_list_follows_the_target_and_rests_when_nothing_changes(tab: FakeBrowser) -> None:
+def test_the_list_follows_the_target_and_is_not_sent_again_unchanged(tab: FakeBrowser) -> None:
     tab.choose(PUMA.name)
     T = home(PUMA)
     tab.grab()
@@ -336,7 +336,7 @@ def test_the_list_follows_the_target_and_rests_when_nothing_changes(tab: FakeBro
     assert not tab.log
 
 
-def test_why_not_and_one_click_that_moves_the_target(tab: FakeBrowser) -> None:
+def test_a_missed_target_is_explained_and_one_click_moves_it(tab: FakeBrowser) -> None:
     tab.choose(PUMA.name)
     T = home(PUMA)
     T[:3, 3] = (3.0, 0.0, 0.5)
@@ -350,7 +350,7 @@ def test_why_not_and_one_click_that_moves_the_target(tab: FakeBrowser) -> None:
     assert "Nearest reachable pose" not in [m["props"].get("label") for m in tab.gui.values()]
 
 
-def test_one_click_asks_for_less_and_one_unlocks(tab: FakeBrowser) -> None:
+def test_one_click_reduces_the_task_and_one_unlocks(tab: FakeBrowser) -> None:
     tab.choose(PUMA.name)
     tab.set("Locked", "1")
     tab.settle()
@@ -371,7 +371,7 @@ def test_one_click_asks_for_less_and_one_unlocks(tab: FakeBrowser) -> None:
     assert 'data-status="reached"' in tab.html
 
 
-def test_one_click_lets_any_branch_do_it(tab: FakeBrowser) -> None:
+def test_one_click_allows_any_branch(tab: FakeBrowser) -> None:
     tab.choose(PUMA.name)
     blocked = next(name for name, state in rows(tab).items() if state == "blocked")
     tab.set("Posture", short(blocked))
@@ -394,7 +394,7 @@ def test_the_cone_is_drawn_for_five_joints_and_can_be_hidden(tab: FakeBrowser) -
     assert not [n for n in tab.nodes if "/cone" in n]
 
 
-def test_leaving_the_lesson_leaves_nothing(tab: FakeBrowser) -> None:
+def test_leaving_the_lesson_removes_its_nodes_and_controls(tab: FakeBrowser) -> None:
     for robot in (PANDA, SRS):
         tab.choose(robot.name)
     tab.set("Lesson", "None")
@@ -403,7 +403,7 @@ def test_leaving_the_lesson_leaves_nothing(tab: FakeBrowser) -> None:
     assert not {"Go", "Show", "Ghosts"} & {m["props"].get("label") for m in tab.gui.values()}
 
 
-def test_hostile_wishes_change_nothing(tab: FakeBrowser) -> None:
+def test_invalid_input_changes_nothing(tab: FakeBrowser) -> None:
     for name, value in (("Go", "99"), ("Go", "<b>"), ("Show", "99"), ("Show", ""), ("Show", "x1")):
         tab.set(name, value)
     tab.settle()

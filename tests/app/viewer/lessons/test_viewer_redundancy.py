@@ -1,4 +1,4 @@
-"""The lesson "Redundancy": the tool is held, the ring is exact, a trade of two joints is told as one."""
+"""The lesson "Redundancy": the tool is held, the ring is exact, the trade of two coaxial joints is explained."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def home(robot: kin.Robot) -> np.ndarray:
 # Self-motion
 
 
-def test_only_what_may_be_asked_for_is_free() -> None:
+def test_redundancy_parameters_are_those_that_can_be_requested() -> None:
     straight = np.array([0.3, -0.9, 1.1, 0.4, 0.0, 0.2])
     T = kin.fk(UR5, straight)
     assert kin.solve_ik(UR5, T, q_seed=straight, branch="seed").redundancy, "free at the singularity only"
@@ -45,7 +45,7 @@ def test_only_what_may_be_asked_for_is_free() -> None:
 
 
 @pytest.mark.parametrize("robot", [SRS, IIWA, PRINTED], ids=lambda robot: robot.id)
-def test_each_end_is_a_limit_of_the_named_joint(robot: kin.Robot) -> None:
+def test_each_end_of_a_range_is_a_limit_of_the_named_joint(robot: kin.Robot) -> None:
     T, q = home(robot), robot.q_home
     (item,) = self_motion.redundancy_at(robot, T, "pose", q, None)
     found = self_motion.ends(robot, T, "pose", q, None, item)
@@ -91,7 +91,7 @@ def test_the_elbow_is_on_its_circle_at_the_arm_angle(robot: kin.Robot) -> None:
 
 
 def with_joint_turned_round(robot: kin.Robot, joint: int) -> kin.Robot:
-    """The same arm in space, by a standard table in which a joint counts the other way round."""
+    """The same arm in space, by a standard table with one joint reversed."""
     rows, home, base = list(robot.rows), list(robot.home), np.array(robot.base)
     row, home[joint] = rows[joint], -home[joint]
     assert row.limits is not None
@@ -105,12 +105,12 @@ def with_joint_turned_round(robot: kin.Robot, joint: int) -> kin.Robot:
 
 
 @pytest.mark.parametrize("joint", [0, 2, 4, 6])
-def test_the_elbow_is_on_its_circle_whichever_way_a_joint_counts(joint: int) -> None:
+def test_the_elbow_is_on_its_circle_with_reversed_joints(joint: int) -> None:
     test_the_elbow_is_on_its_circle_at_the_arm_angle(with_joint_turned_round(IIWA, joint))
 
 
 @pytest.mark.parametrize("joint", [0, 1])
-def test_joints_on_one_line_may_count_against_each_other(joint: int) -> None:
+def test_coaxial_joints_may_have_opposite_directions(joint: int) -> None:
     robot = with_joint_turned_round(PRINTED, joint)
     assert coaxial(robot)
     q = robot.q_home + 0.3
@@ -125,7 +125,7 @@ def test_joints_on_one_line_may_count_against_each_other(joint: int) -> None:
     assert np.allclose(rays, rays[0])
 
 
-def test_no_circle_for_other_arms() -> None:
+def test_other_arms_have_no_circle() -> None:
     assert all(elbow_circle(robot, robot.q_home) is None for robot in (PIONEER, PRINTED, PUMA, PANDA))
 
 
@@ -140,7 +140,7 @@ def test_the_arcs_of_the_ring_end_where_the_ranges_end() -> None:
     assert not arc_segments(circle, (), 1.0)[1].any()
 
 
-def test_two_joints_on_one_line_are_found_and_their_sum_does_not_move_in_a_trade() -> None:
+def test_coaxial_joints_are_found_and_a_trade_keeps_their_sum() -> None:
     assert [robot.id for robot in STORE.robots if coaxial(robot)] == ["redundant7"]
     q = PRINTED.q_home.copy()
     traded = q.copy()
@@ -155,7 +155,7 @@ def test_two_joints_on_one_line_are_found_and_their_sum_does_not_move_in_a_trade
 
 
 @pytest.mark.parametrize("robot", STORE.robots, ids=lambda robot: robot.id)
-def test_a_joint_turns_the_tool_about_the_axis_told(robot: kin.Robot) -> None:
+def test_a_joint_turns_the_tool_about_its_joint_axis(robot: kin.Robot) -> None:
     q = robot.random_q(np.random.default_rng(6))
     J = kin.jacobian(robot, q)
     for i in range(robot.n):
@@ -217,7 +217,7 @@ def q_of(tab: FakeBrowser, robot: kin.Robot) -> np.ndarray:
 
 
 def swing(tab: FakeBrowser, name: str, degrees: float) -> list[np.ndarray]:
-    """Set the slider and wait; the tool's pose in every picture on the way."""
+    """Set the slider and wait; the tool's pose in every frame of the animation."""
     poses: list[np.ndarray] = []
     tab.set(name, degrees)
     for _ in range(400):
@@ -233,7 +233,7 @@ def free_label(tab: FakeBrowser) -> str:
 
 
 @pytest.mark.parametrize("robot", [SRS, PRINTED], ids=lambda robot: robot.id)
-def test_the_tool_stays_in_every_picture_of_a_swing(tab: FakeBrowser, robot: kin.Robot) -> None:
+def test_the_tool_stays_in_every_frame_of_a_swing(tab: FakeBrowser, robot: kin.Robot) -> None:
     tab.choose(robot.name)
     T, before = home(robot), q_of(tab, robot)
     poses = swing(tab, free_label(tab), 60)
@@ -255,7 +255,7 @@ def test_the_end_of_the_range_names_the_joint(tab: FakeBrowser) -> None:
     assert "limit of joint 6" in re.findall(r"(?s)data-limits.*?</table>", tab.html)[-1]
 
 
-def test_the_ring_is_drawn_with_its_ends_and_goes_with_the_lesson(tab: FakeBrowser) -> None:
+def test_the_ring_is_drawn_with_its_ends_and_removed_with_the_lesson(tab: FakeBrowser) -> None:
     tab.choose(SRS.name)
     tab.wait(lambda: any("/feasible-" in n for n in tab.nodes))
     tab.wait(lambda: sum("/end-" in n and n.endswith("-name") for n in tab.nodes) == 2)
@@ -272,7 +272,7 @@ def test_the_ring_is_drawn_with_its_ends_and_goes_with_the_lesson(tab: FakeBrows
     assert not [n for n in tab.nodes if n.startswith("/redundancy")]
 
 
-def test_a_sweep_turns_round_at_the_limits_until_a_target_is_dragged(tab: FakeBrowser) -> None:
+def test_a_sweep_reverses_at_the_limits_until_a_target_is_dragged(tab: FakeBrowser) -> None:
     tab.choose(SRS.name)
     swing(tab, free_label(tab), 100)
     tab.set("Sweep", True)
@@ -294,7 +294,7 @@ def test_a_sweep_turns_round_at_the_limits_until_a_target_is_dragged(tab: FakeBr
     assert np.allclose(tab.tool_pose(), T, atol=1e-6)
 
 
-def test_a_trade_is_told_as_one(tab: FakeBrowser) -> None:
+def test_a_trade_is_explained_and_drawn(tab: FakeBrowser) -> None:
     tab.choose(PRINTED.name)
     assert "The axes of joints 1 and 2 coincide" in tab.html
     swing(tab, free_label(tab), 45)
@@ -320,7 +320,7 @@ def test_the_choice_between_two_redundancy_at(tab: FakeBrowser) -> None:
     assert tab.value("5 pivoting wrist") == pytest.approx(40, abs=0.01)
 
 
-def test_hostile_values_are_refused_and_the_lesson_lives(tab: FakeBrowser) -> None:
+def test_invalid_values_are_refused_and_the_lesson_keeps_working(tab: FakeBrowser) -> None:
     tab.choose(SRS.name)
     for name, value in ((free_label(tab), math.nan), (free_label(tab), math.inf)):
         tab.set(name, value)

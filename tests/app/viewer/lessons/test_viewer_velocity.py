@@ -62,7 +62,7 @@ def wrist_singular(robot_id: str, joint: int) -> tuple[kin.Robot, np.ndarray]:
     return robot, q
 
 
-# What is computed
+# Computations
 
 
 def test_ellipsoids_are_those_of_the_jacobian(robot: kin.Robot) -> None:
@@ -80,12 +80,12 @@ def test_ellipsoids_are_those_of_the_jacobian(robot: kin.Robot) -> None:
                 for k in np.flatnonzero(axes.values > 1e-9):
                     assert np.linalg.norm(rows.T @ axes.R[:, k] * semi[k]) == pytest.approx(1.0)
             else:
-                # A column is what one joint at unit speed does: it lies in the ellipsoid.
+                # A column is the twist of one joint at unit speed: it lies in the ellipsoid.
                 tips = (axes.R.T @ rows)[axes.values > 1e-9]
                 assert (np.linalg.norm(tips / semi[axes.values > 1e-9, None], axis=0) < 1.0 + 1e-9).all()
 
 
-def test_a_flat_ellipsoid_has_endless_forces() -> None:
+def test_a_flat_ellipsoid_has_unbounded_forces() -> None:
     values = axes_of(part_of(kin.jacobian(STORE.get("scara"), STORE.get("scara").q_home), "turning")).values
     assert values[1:] == pytest.approx(0.0, abs=1e-12)
     assert semi_axes(np.array([2.0, 0.5, 0.0]), "force").tolist() == [0.5, 2.0, math.inf]
@@ -108,7 +108,7 @@ def test_singular_values_give_yoshikawas_measure(robot: kin.Robot) -> None:
     ("robot_id", "joint"),
     [("irb120", 4), ("puma560", 4), ("ur5", 4), ("pioneer5", 4), ("pioneer5", 2), ("scara", 1)],
 )
-def test_no_joint_motion_has_a_part_along_a_lost_direction(robot_id: str, joint: int) -> None:
+def test_no_joint_motion_has_a_component_along_a_lost_direction(robot_id: str, joint: int) -> None:
     robot, q = wrist_singular(robot_id, joint)
     nearest = real(kin.singularities(robot, q))[0]
     assert state_of(nearest, robot.reach) == "at"
@@ -118,7 +118,7 @@ def test_no_joint_motion_has_a_part_along_a_lost_direction(robot_id: str, joint:
     assert twists[0] @ kin.jacobian(robot, q) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_far_near_and_at(robot: kin.Robot) -> None:
+def test_far_from_near_and_at_a_singularity(robot: kin.Robot) -> None:
     for q in configurations(robot, 20):
         for s in real(kin.singularities(robot, q)):
             state = state_of(s, robot.reach)
@@ -174,7 +174,7 @@ def test_a_step_moves_the_tool_exactly(six_joints: kin.Robot, axis: int, frame: 
         assert kin.branch_of(robot, made.q) == kin.branch_of(robot, robot.q_home)
 
 
-def test_five_joints_keep_point_and_approach_and_say_what_they_give_up() -> None:
+def test_five_joints_keep_point_and_approach_and_report_the_error() -> None:
     robot = STORE.get("pioneer5")
     T = kin.fk(robot, robot.q_home)
     made = step(robot, robot.q_home, "pose", 0, 0.01, "base")
@@ -190,7 +190,7 @@ def test_five_joints_keep_point_and_approach_and_say_what_they_give_up() -> None
     assert step(robot, robot.q_home, "approach", 0, 0.01, "base").notice.kind == "reached"
 
 
-def test_what_the_task_leaves_free_is_not_jogged() -> None:
+def test_directions_outside_the_task_are_not_jogged() -> None:
     robot = STORE.get("irb120")
     for task, axis, frame in (("position", 3, "base"), ("approach", 5, "tool")):
         made = step(robot, robot.q_home, task, axis, 0.02, frame)
@@ -211,7 +211,7 @@ def test_a_scara_lifts_and_swings_but_does_not_tilt() -> None:
     assert "Not moved" in made.notice.title
 
 
-def test_at_a_limit_or_out_of_reach_nothing_moves_and_the_reason_is_given() -> None:
+def test_at_a_limit_or_out_of_reach_jogging_is_refused_with_the_reason() -> None:
     robot = STORE.get("irb120")
     made = step(robot, robot.q_home, "pose", 2, 5.0, "base")
     assert made.q is None
@@ -228,7 +228,7 @@ def test_at_a_limit_or_out_of_reach_nothing_moves_and_the_reason_is_given() -> N
         assert made.notice.detail
 
 
-def test_a_jump_of_the_joints_is_refused_for_what_it_is() -> None:
+def test_a_jump_of_the_joints_is_refused_as_a_jump() -> None:
     robot = STORE.get("irb120")
     q = robot.q_home.copy()
     q[4] = math.radians(0.5)
@@ -306,7 +306,7 @@ def shown(tab: FakeBrowser, J: np.ndarray, decimals: int) -> bool:
     return len(cells) == J.size and bool(np.abs(np.array(cells) - J.ravel()).max() < 0.51 * 10.0**-decimals)
 
 
-def test_the_matrix_is_the_jacobian_live_in_either_frame(tab: FakeBrowser) -> None:
+def test_the_matrix_shows_the_current_jacobian_in_either_frame(tab: FakeBrowser) -> None:
     robot = STORE.robots[0]
     q = robot.q_home.copy()
     q[0] = math.radians(35.0)
@@ -386,7 +386,7 @@ def test_distances_to_a_singularity_follow_the_units() -> None:
         assert f">{units.distance(found.distance)}<" in views.others_html(robot, (found,), units)
 
 
-def test_a_singular_pose_is_told_with_its_kind_and_what_is_lost(tab: FakeBrowser) -> None:
+def test_a_singular_pose_is_shown_with_its_kind_and_lost_directions(tab: FakeBrowser) -> None:
     use(tab, STORE.get("irb120"))
     assert 'data-singular="far"' in tab.html
     tab.set("5 axis 5", 5.0)
@@ -404,7 +404,7 @@ def test_a_singular_pose_is_told_with_its_kind_and_what_is_lost(tab: FakeBrowser
     tab.wait(lambda: 'data-ellipsoid="moment"' in tab.html)
 
 
-def test_a_column_is_drawn_and_taken_away(tab: FakeBrowser) -> None:
+def test_a_column_is_drawn_and_removed(tab: FakeBrowser) -> None:
     arrow, ring = (next(n for n in tab.nodes if n.endswith(end)) for end in ("/column", "/turn"))
     tab.set("Column", "2")
     tab.wait(lambda: tab.visible.get(ring) is True and tab.visible.get(arrow) is True)
@@ -422,12 +422,12 @@ def test_every_arm_can_be_shown(tab: FakeBrowser) -> None:
     assert 'data-status="error"' not in tab.html
 
 
-def test_buttons_are_named_after_what_they_do() -> None:
+def test_buttons_are_named_after_their_action() -> None:
     assert [button(*b) for b in BUTTONS][:4] == ["−x", "+x", "−y", "+y"]
     assert len({button(*b) for b in BUTTONS}) == 12
 
 
-def test_a_shared_state_is_restored_and_a_hostile_one_is_ignored() -> None:
+def test_a_shared_state_is_restored_and_an_invalid_one_is_ignored() -> None:
     server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     try:
         robot = STORE.get("ur5")
@@ -452,7 +452,7 @@ def test_a_shared_state_is_restored_and_a_hostile_one_is_ignored() -> None:
         assert lesson.state() == other
         lesson.restore(first)
         assert lesson.state() == first
-        # What was on its way from fields that are gone is not read in the new units.
+        # Late events of replaced fields are not read in the new units.
         stage.units = Units(False, "cm")
         lesson.on_style()
         lesson.handle(("step", DEFAULT_UNITS), 5.0)
@@ -469,7 +469,7 @@ def test_a_shared_state_is_restored_and_a_hostile_one_is_ignored() -> None:
         server.stop()
 
 
-def test_values_are_written_at_ends_that_lie_apart_on_screen() -> None:
+def test_values_are_labelled_at_axis_ends_that_are_apart_on_screen() -> None:
     towards = np.array([1.0, 1.0, 0.5])
     rng = np.random.default_rng(5)
     for _ in range(50):

@@ -1,4 +1,4 @@
-"""The visitor's camera: aimed, orbited, kept where it rests, restored on the same screen and on another."""
+"""The visitor's camera: aimed, orbited, stored when it stops, restored on the same screen and on another."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def orbit(tab: FakeBrowser, viewpoint: np.ndarray) -> None:
 
 
 def rest(tab: FakeBrowser, count: int = 1) -> PageState:
-    """What the page is told to remember, the so manieth time."""
+    """The stored state of the page after its `count`-th update."""
     tab.wait(lambda: len(tab.kept) >= count)
     tab.settle(quiet=0.8)
     assert len(tab.kept) == count
@@ -51,7 +51,7 @@ def rest(tab: FakeBrowser, count: int = 1) -> PageState:
 
 
 @pytest.mark.parametrize("aspect", [0.3, PHONE, 0.99, 1.0, 1.6])
-def test_what_a_sheet_changes_is_undone_without_it(aspect: float) -> None:
+def test_the_view_above_a_sheet_is_undone_without_the_sheet(aspect: float) -> None:
     rng = np.random.default_rng(2)
     for _ in range(20):
         viewpoint = np.stack([rng.normal(size=3) * 3, rng.normal(size=3), camera.UP])
@@ -80,7 +80,7 @@ def test_a_phone_shows_what_a_desktop_shows_above_its_sheet() -> None:
     assert np.isfinite(camera.on_sheet(straight_down, PHONE)).all()
 
 
-def test_where_the_camera_rests_is_kept_and_restored(port: int) -> None:
+def test_the_camera_is_stored_when_it_stops_and_restored(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
         assert np.allclose(shown(tab), default(PIONEER, DESKTOP))
@@ -113,7 +113,7 @@ def test_where_the_camera_rests_is_kept_and_restored(port: int) -> None:
         assert np.allclose(shown(tab), default(UR5, DESKTOP))
 
 
-def test_a_roll_of_the_camera_is_kept_and_reset(port: int) -> None:
+def test_a_roll_of_the_camera_is_stored_and_reset(port: int) -> None:
     rolled = np.array([*ASIDE[:2], [0.0, 0.6, 0.8]])
     with FakeBrowser(port, memory=memory(PageState("pioneer5", PIONEER.q_home, camera=rolled))) as tab:
         tab.settle()
@@ -123,10 +123,10 @@ def test_a_roll_of_the_camera_is_kept_and_reset(port: int) -> None:
         assert np.allclose(shown(tab), default(PIONEER, DESKTOP))
 
 
-def test_a_view_from_before_the_camera_was_aimed_is_nobodys_choice(port: int) -> None:
+def test_a_view_before_the_camera_was_aimed_is_not_stored(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
-        tab.look(position=(3, 3, 3), look_at=(0, 0, 0))  # as a page does that has yet to draw where it was sent
+        tab.look(position=(3, 3, 3), look_at=(0, 0, 0))  # a page that has not applied its camera yet
         tab.set("1 rotating base", 20.0)
         assert rest(tab).camera is None
         tab.look()
@@ -134,7 +134,7 @@ def test_a_view_from_before_the_camera_was_aimed_is_nobodys_choice(port: int) ->
         assert rest(tab, 2).camera is not None
 
 
-def test_a_page_that_is_there_already_is_believed_at_once(port: int) -> None:
+def test_a_page_that_is_already_at_its_view_is_trusted_at_once(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
         tab.look()
@@ -144,7 +144,7 @@ def test_a_page_that_is_there_already_is_believed_at_once(port: int) -> None:
         assert rest(tab).camera is not None
 
 
-def test_a_page_that_never_tells_it_was_there_is_believed_in_the_end(port: int, monkeypatch) -> None:
+def test_a_page_that_never_confirms_its_view_is_trusted_after_a_while(port: int, monkeypatch) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
         orbit(tab, ASIDE)
@@ -163,7 +163,7 @@ def test_a_page_that_never_tells_it_was_there_is_believed_in_the_end(port: int, 
         *({"up_direction": (0, 0)}, {"position": ()}),
     ],
 )
-def test_a_camera_that_tells_nonsense_spoils_nothing(port: int, nonsense: dict[str, object]) -> None:
+def test_an_invalid_camera_is_ignored(port: int, nonsense: dict[str, object]) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
         tab.look()
@@ -200,7 +200,7 @@ def test_an_address_without_a_camera_has_the_default_view(port: int) -> None:
         assert np.allclose(shown(tab), default(UR5, PHONE, sheet=True))
 
 
-def test_the_camera_steps_back_for_what_is_drawn_and_leaves_a_chosen_view_alone() -> None:
+def test_the_camera_makes_room_for_drawings_but_keeps_a_chosen_view() -> None:
     lens = SimpleNamespace(
         image_width=956, image_height=720, position=np.ones(3), look_at=np.zeros(3), up_direction=camera.UP,
         on_update=lambda act: act,

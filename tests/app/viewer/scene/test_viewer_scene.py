@@ -91,7 +91,7 @@ def node_names(scene: viser.SceneApi, end: str) -> list[str]:
 
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=IDS)
-def test_chain_composes_to_the_forward_kinematics(robot: kin.Robot) -> None:
+def test_the_links_compose_to_the_forward_kinematics(robot: kin.Robot) -> None:
     links = chain(robot)
     for q in robot.random_q(np.random.default_rng(1), 20):
         T, frames = np.eye(4), {}
@@ -106,7 +106,7 @@ def test_chain_composes_to_the_forward_kinematics(robot: kin.Robot) -> None:
 
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=IDS)
-def test_posed_nodes_are_where_the_kinematics_says(server: viser.ViserServer, robot: kin.Robot) -> None:
+def test_posed_nodes_agree_with_the_kinematics(server: viser.ViserServer, robot: kin.Robot) -> None:
     arm = ArmScene(server.scene, robot)
     try:
         for q in (robot.q_home, *robot.random_q(np.random.default_rng(2), 3), robot.lower, robot.upper):
@@ -124,7 +124,7 @@ def test_posed_nodes_are_where_the_kinematics_says(server: viser.ViserServer, ro
     assert not [n for n in server.scene._handle_from_node_name if n.startswith("/arm")]
 
 
-def test_the_last_tiny_step_is_not_dropped(server: viser.ViserServer) -> None:
+def test_the_last_small_step_is_not_dropped(server: viser.ViserServer) -> None:
     robot = Store().get("redundant7-craig")
     arm = ArmScene(server.scene, robot)
     q = robot.q_home + 1e-7
@@ -135,7 +135,7 @@ def test_the_last_tiny_step_is_not_dropped(server: viser.ViserServer) -> None:
 
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=IDS)
-def test_bodies_are_sound_and_stay_above_the_floor(robot: kin.Robot) -> None:
+def test_bodies_are_valid_and_above_the_floor(robot: kin.Robot) -> None:
     made = body(robot)
     for part in [made.pedestal, *made.gripper, *(p for parts in made.parts for p in parts)]:
         assert np.isfinite(part.mesh.vertices).all(), part.name
@@ -151,7 +151,7 @@ def test_bodies_are_sound_and_stay_above_the_floor(robot: kin.Robot) -> None:
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=IDS)
 def test_every_part_has_a_node_of_its_own(server: viser.ViserServer, robot: kin.Robot) -> None:
-    """A second node of one name would take the place of the first: a sleeve that of the housing it is fixed to."""
+    """A second node of the same name would replace the first, for example a sleeve its housing."""
     made = body(robot)
     arm = ArmScene(server.scene, robot)
     for name in ("housing", "axis", "link", "link-bar"):
@@ -164,7 +164,7 @@ def test_every_part_has_a_node_of_its_own(server: viser.ViserServer, robot: kin.
 
 
 @pytest.mark.parametrize("robot_id", ["scara", "stanford"])
-def test_a_bar_is_in_its_sleeve_all_along_the_stroke(robot_id: str) -> None:
+def test_a_bar_stays_in_its_sleeve_over_the_whole_stroke(robot_id: str) -> None:
     """The sleeve stands at the origin of the joint's axis; the bar reaches from there to the next joint."""
     robot = Store().get(robot_id)
     made = body(robot)
@@ -187,7 +187,7 @@ def test_a_body_is_made_once_for_all_visitors() -> None:
 
 
 @pytest.mark.parametrize("robot", Store().robots, ids=[r.id for r in Store().robots])
-def test_joints_on_one_point_are_told_apart(robot: kin.Robot) -> None:
+def test_joints_at_one_point_look_different(robot: kin.Robot) -> None:
     """Housings of joints that share an origin differ in size or place, and neighbours differ in colour."""
     made = body(robot)
     boxes = []
@@ -268,7 +268,7 @@ def test_the_readout_keeps_its_shape_and_shows_no_negative_zero() -> None:
     assert "rad" in readout.html(T, Units(degrees=False))
 
 
-def test_status_speaks_words_symbol_and_colour() -> None:
+def test_the_status_is_shown_by_words_symbol_and_colour() -> None:
     for kind, (symbol, color) in status.LOOKS.items():
         text = status.html(status.Notice(kind, "Headline", "a <b>sentence</b>"))
         assert symbol in text
@@ -286,7 +286,7 @@ def test_status_speaks_words_symbol_and_colour() -> None:
         ("redundant7-craig", (2.0, 0.0, 0.0), "Out of reach by"),
     ],
 )
-def test_notices_say_what_happened(robot_id: str, shift: tuple[float, ...], title: str) -> None:
+def test_notices_describe_the_event(robot_id: str, shift: tuple[float, ...], title: str) -> None:
     robot = kin.get_robot(robot_id)
     T = kin.fk(robot, robot.q_home)
     T[:3, 3] += shift

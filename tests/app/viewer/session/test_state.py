@@ -1,4 +1,4 @@
-"""The state of a page as text: there and back, and whatever else an address may hold."""
+"""The state of a page as text: round trips, and every other content an address may have."""
 
 from __future__ import annotations
 
@@ -37,39 +37,39 @@ def packed(said: object) -> str:
 
 
 def there(**changes: object) -> PageState:
-    """What is left of a page of the PUMA with these entries changed."""
+    """The decoded state of a PUMA page with these entries changed."""
     said = {"v": 1, "robot": "puma560", "q": PUMA.q_home.tolist(), "task": "pose", **changes}
     return decode(packed(said), ROBOTS)
 
 
-def test_a_state_survives_as_text_that_any_address_may_carry():
+def test_a_state_is_restored_from_text_that_is_safe_in_an_address():
     rng = np.random.default_rng(5)
     q = PUMA.random_q(rng)
     T = kin.fk(PUMA, PUMA.random_q(rng))
     branch = kin.branch_names(PUMA)[2]
     view = ViewState(frames=True, labels=False, dark=True)
-    told = {"w": {"n": 3, "name": "π & <b>"}}
+    features = {"w": {"n": 3, "name": "π & <b>"}}
     camera = np.array([[1.5, -2.25, 0.75], [0.1, 0.2, 0.3], [0.0, 0.6, 0.8]])
-    state = PageState("puma560", q, T, "approach", branch, "dh", RADIANS_CM, view, told, (1, 4), camera)
+    state = PageState("puma560", q, T, "approach", branch, "dh", RADIANS_CM, view, features, (1, 4), camera)
     text = encode(state)
     assert set(text) <= set("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_")
     back = decode(text, ROBOTS)
     assert np.abs(back.q - q).max() < 1e-9
     assert np.abs(back.target - T).max() < 1e-8
     assert (back.robot, back.task, back.branch, back.lesson) == ("puma560", "approach", branch, "dh")
-    assert (back.units, back.view, back.features, back.locks) == (RADIANS_CM, view, told, (1, 4))
+    assert (back.units, back.view, back.features, back.locks) == (RADIANS_CM, view, features, (1, 4))
     assert np.abs(back.camera - camera).max() < 1e-9
     assert encode(back) == text
 
 
-def test_an_address_from_before_lengths_had_a_unit_is_in_millimetres():
+def test_an_address_without_a_unit_of_length_is_in_millimetres():
     assert there().units == DEFAULT_UNITS
     assert there(units="rad").units == Units(degrees=False)
     assert there(length="m").units == Units(length="m")
 
 
 @pytest.mark.parametrize("length", ["inch", "MM", "", 3, None, True, ["cm"], {"cm": 1}, "cm" * 5000])
-def test_a_unit_that_there_is_not_is_left_out(length):
+def test_an_unknown_unit_is_ignored(length):
     assert there(length=length, units="rad").units == Units(degrees=False)
 
 
@@ -100,7 +100,7 @@ def test_a_configuration_at_its_limits_comes_back_inside_them(robot):
         base64.urlsafe_b64encode(b'{"v":1,"robot":"ur5"').decode(),
     ],
 )
-def test_what_is_no_state_is_a_fresh_page(text):
+def test_an_invalid_state_gives_a_fresh_page(text):
     assert encode(decode(text, ROBOTS)) == encode(PageState())
 
 
@@ -111,7 +111,7 @@ def test_what_is_no_state_is_a_fresh_page(text):
         *([math.nan] * 6, [math.inf] * 6, [1e308] * 6, [10**400] * 6, [4.0] * 6),
     ],
 )
-def test_a_configuration_that_is_none_is_left_out_and_the_rest_stays(q):
+def test_an_invalid_configuration_is_ignored_and_the_rest_is_kept(q):
     state = there(q=q, units="rad")
     assert state.q is None
     assert (state.robot, state.units) == ("puma560", Units(degrees=False))
@@ -129,7 +129,7 @@ def test_a_configuration_that_is_none_is_left_out_and_the_rest_stays(q):
         ),
     ],
 )
-def test_a_target_that_is_no_pose_is_left_out(target):
+def test_a_target_that_is_not_a_pose_is_ignored(target):
     assert there(target=target).target is None
 
 
@@ -140,7 +140,7 @@ def test_a_target_that_is_no_pose_is_left_out(target):
         *(([True, [1]], ()), ("12", ()), (3, ()), ({"1": 1}, ()), (None, ())),
     ],
 )
-def test_only_joints_of_the_arm_come_back_locked(locks, kept):
+def test_only_joints_of_the_arm_are_restored_as_locked(locks, kept):
     assert there(locks=locks).locks == kept
 
 
@@ -153,20 +153,20 @@ def test_only_joints_of_the_arm_come_back_locked(locks, kept):
         *([2, 2, 2, 0, 0, 0, 0, 0, 0], [2, 2, 2, 0, 0, 0, 0, 0, 1e308], [2, 2, 2, 0, 0, 0, 0, 0, "1"]),
     ],
 )
-def test_a_camera_that_could_not_see_the_arm_is_left_out_and_the_rest_stays(camera):
+def test_a_camera_that_cannot_see_the_arm_is_ignored_and_the_rest_is_kept(camera):
     state = there(camera=camera)
     assert state.camera is None
     assert np.array_equal(state.q, PUMA.q_home)
 
 
-def test_a_camera_is_told_in_few_digits_and_its_upright_direction_not_at_all():
+def test_a_camera_is_stored_in_few_digits_without_a_vertical_up_direction():
     camera = np.array([[1.23456789, -2.0, 0.5], [0.0, 1e-9, 0.3], [0.0, 0.0, 1.0]])
     plain, seen = encode(PageState("ur5")), encode(PageState("ur5", camera=camera))
     assert np.array_equal(decode(seen, ROBOTS).camera, [[1.2346, -2.0, 0.5], [0.0, 0.0, 0.3], [0.0, 0.0, 1.0]])
     assert len(seen) - len(plain) < 64
 
 
-def test_names_that_nobody_knows_are_left_out():
+def test_unknown_names_are_ignored():
     state = there(task="dance", branch="elbow sideways", lesson=7, view={"dark": "yes", "axes": False, "x": True})
     assert (state.task, state.branch, state.lesson) == (None, None, None)
     assert state.view == ViewState(axes=False)
@@ -175,7 +175,7 @@ def test_names_that_nobody_knows_are_left_out():
     assert there(branch="seed").branch == "seed"
 
 
-def test_another_services_robot_is_told_and_nothing_of_it_is_used():
+def test_an_unknown_robot_is_reported_and_its_state_is_ignored():
     state = decode(
         packed({"v": 1, "robot": "somebodys", "q": [0.0] * 5, "task": "approach", "units": "rad"}), ROBOTS
     )
@@ -184,7 +184,7 @@ def test_another_services_robot_is_told_and_nothing_of_it_is_used():
     assert decode(packed({"v": 1, "robot": {"a": [1]}}), ROBOTS).robot is None
 
 
-def test_features_that_say_too_much_are_left_out_of_the_text():
+def test_features_with_too_much_state_are_left_out_of_the_text():
     text = encode(PageState("ur5", features={"talker": {"words": "x" * MAX_TEXT}}))
     assert decode(text, ROBOTS).robot == "ur5"
     assert decode(text, ROBOTS).features == {}
@@ -204,14 +204,14 @@ def test_features_that_say_too_much_are_left_out_of_the_text():
         (5, False),
     ],
 )
-def test_a_page_may_call_its_service_by_an_address_and_by_nothing_else(address, usable):
+def test_only_an_http_address_is_accepted_as_the_address_of_the_page(address, usable):
     memory = read_stored_page(json.dumps({"address": address, "state": "abc"}))
     assert memory.address == (address if usable else "")
     assert memory.state == "abc"
 
 
 @pytest.mark.parametrize("text", [None, "", "[]", "{", '{"state": 7}'])
-def test_a_page_that_answers_nonsense_remembers_nothing(text):
+def test_an_invalid_message_of_the_page_restores_nothing(text):
     assert read_stored_page(text).state == ""
 
 
@@ -254,13 +254,13 @@ def remembering(state: str, address: str = "https://arms.example/kin/") -> str:
 
 
 def kept(tab: FakeBrowser) -> PageState:
-    """What the page is told to remember once it has come to rest."""
+    """The stored state of the page once it is idle."""
     tab.wait(lambda: bool(tab.kept))
     tab.settle(quiet=0.8)
     return decode(tab.kept[-1], ROBOTS)
 
 
-def test_a_link_shows_the_same_view_and_a_lost_connection_brings_it_back(port):
+def test_a_link_and_a_reconnection_restore_the_view(port):
     q = PUMA.random_q(np.random.default_rng(8))
     far = kin.fk(PUMA, q)
     far[:3, 3] *= 3.0
@@ -298,7 +298,7 @@ def test_a_link_shows_the_same_view_and_a_lost_connection_brings_it_back(port):
         assert "very secret" not in tab.html
 
 
-def test_the_arm_is_where_the_link_says_from_its_first_picture_on(port):
+def test_the_first_frame_shows_the_arm_as_in_the_link(port):
     q = PIONEER.random_q(np.random.default_rng(3))
     with FakeBrowser(port, memory=remembering(encode(PageState("pioneer5", q)))) as tab:
         tab.settle()
@@ -307,7 +307,7 @@ def test_the_arm_is_where_the_link_says_from_its_first_picture_on(port):
         assert not [m for m in tab.log if m["type"] == "SetOrientationMessage" and "ease" in m]
 
 
-def test_nothing_is_kept_while_the_hand_moves_and_the_last_is_kept_after(port):
+def test_the_state_is_stored_after_a_drag_and_not_during_it(port):
     with FakeBrowser(port) as tab:
         tab.settle()
         T = kin.fk(PIONEER, PIONEER.q_home)
@@ -338,7 +338,7 @@ def test_nothing_is_kept_while_the_hand_moves_and_the_last_is_kept_after(port):
         remembering(packed({"v": 1, "lesson": "none such", "features": {"nobody": {"a": 1}}})),
     ],
 )
-def test_a_hostile_memory_gives_a_fresh_page(port, memory):
+def test_a_hostile_stored_state_gives_a_fresh_page(port, memory):
     with FakeBrowser(port, memory=memory) as tab:
         tab.settle()
         assert tab.value("Robot") == PIONEER.name
@@ -346,7 +346,7 @@ def test_a_hostile_memory_gives_a_fresh_page(port, memory):
         assert "Ready" in tab.html
 
 
-def test_a_feature_that_cannot_restore_takes_nothing_else_along(port, caplog):
+def test_a_feature_that_fails_to_restore_does_not_affect_the_rest(port, caplog):
     text = encode(PageState("ur5", features={"counter": {"count": 13}}))
     with FakeBrowser(port, memory=remembering(text)) as tab:
         tab.wait(lambda: "Something went wrong" in tab.html)
@@ -355,7 +355,7 @@ def test_a_feature_that_cannot_restore_takes_nothing_else_along(port, caplog):
     assert "unlucky" in caplog.text
 
 
-def test_a_robot_that_is_not_here_is_named(port):
+def test_a_missing_robot_is_named(port):
     with FakeBrowser(port, memory=remembering(packed({"v": 1, "robot": "<b>mine</b>"}))) as tab:
         tab.settle()
         assert "This service has no robot “&lt;b&gt;mine&lt;/b&gt;”." in tab.html
@@ -365,7 +365,7 @@ def options(tab: FakeBrowser) -> tuple[str, ...]:
     return tuple(tab.gui[tab.element("Locked")]["props"]["options"])
 
 
-def test_locked_joints_come_back_locked_where_they_were(port):
+def test_locked_joints_are_restored_at_their_values(port):
     q = PUMA.random_q(np.random.default_rng(4))
     state = PageState("puma560", q, locks=(1,), features={"counter": {"count": 2}})
     with FakeBrowser(port, memory=remembering(encode(state))) as tab:
@@ -386,7 +386,7 @@ def test_locked_joints_come_back_locked_where_they_were(port):
         assert decode(tab.kept[-1], ROBOTS).locks == ()
 
 
-def test_a_task_that_comes_back_has_its_rings(port):
+def test_a_restored_task_has_its_rings(port):
     cobra = STORE.get("scara")
     with FakeBrowser(port, memory=remembering(encode(PageState("scara", cobra.q_home, task="position")))) as tab:
         tab.settle()

@@ -1,4 +1,4 @@
-"""The capability folder: voxels seen while they are computed, thresholds, cuts and clicks."""
+"""The capability folder: voxels shown while they are computed, thresholds, cuts and clicks."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def the_map(robot: kin.Robot = PIONEER, directions: int = 12) -> kin.CapabilityM
 # Levels, settings, words
 
 
-def test_levels_are_equal_steps_and_hold_what_is_on_their_edge():
+def test_levels_are_equal_steps_and_include_their_edge():
     values = np.array([0.0, 1.0, 2.0, 3.0, 5.0], dtype=np.float32) / np.float32(48.0)
     assert voxels.levels(values).tolist() == [0, 5, 10, 15, voxels.LEVELS - 1]
     assert voxels.levels(np.zeros(3, np.float32)).tolist() == [0, 0, 0]
@@ -58,7 +58,7 @@ def test_levels_are_equal_steps_and_hold_what_is_on_their_edge():
         *(("least", v) for v in ("x", None, float("nan"), True)),
     ],
 )
-def test_a_wrong_wish_is_named_and_in_an_address_ignored(name, value):
+def test_a_wrong_setting_is_named_and_ignored_in_an_address(name, value):
     with pytest.raises(kin.InputError, match=name):
         MapSettings().with_value(name, value)
     other = "least" if name != "least" else "directions"
@@ -68,11 +68,11 @@ def test_a_wrong_wish_is_named_and_in_an_address_ignored(name, value):
 
 
 @pytest.mark.parametrize("state", [None, 3, "x", [1]])
-def test_what_is_no_state_restores_nothing(state):
+def test_an_invalid_state_restores_nothing(state):
     assert MapSettings().restored(state) == MapSettings()
 
 
-def test_words_tell_what_the_map_holds():
+def test_the_description_matches_the_map():
     found = the_map()
     row = int(found.share.argmax())
     text = html.unescape(views.picked(found, row, DEFAULT_UNITS))
@@ -128,7 +128,7 @@ class Visitor(FakeBrowser):
         return len(self.centres(only_visible))
 
     def is_visible(self, name: str) -> bool:
-        # Those made hidden say so by a message of their own.
+        # Nodes created hidden get a separate message.
         return self.visible.get(name, True)
 
     def centres(self, only_visible: bool = False) -> np.ndarray:
@@ -189,7 +189,7 @@ def forget_maps(maps: Maps) -> None:
 
 @pytest.fixture
 def held(service, monkeypatch):
-    """A cold cache, and blocks that are computed only as far as they are let: `held.free += 1`."""
+    """An empty cache, and blocks that wait until they are released by `held.free += 1`."""
     forget_maps(service[1])
 
     class Held:
@@ -216,7 +216,7 @@ def same_places(a: np.ndarray, b: np.ndarray) -> bool:
     return bool(np.array_equal(*key))
 
 
-def test_a_map_is_drawn_whole_in_its_colours_and_then_rests(tab):
+def test_a_map_is_drawn_completely_in_its_colours_and_then_idle(tab):
     assert tab.state == "ready"
     tab.compute()
     found = the_map()
@@ -240,7 +240,7 @@ def test_a_map_is_drawn_whole_in_its_colours_and_then_rests(tab):
     assert tab.sent("BatchedMeshesMessage") == sent
 
 
-def test_locked_joints_are_locked_in_the_map_too(tab):
+def test_the_map_respects_locked_joints(tab):
     tab.set("Locked", "1")
     tab.wait(lambda: "Joint 1 locked" in tab.html)
     tab.compute()
@@ -251,7 +251,7 @@ def test_locked_joints_are_locked_in_the_map_too(tab):
     assert "With joint 1 locked." in tab.html
 
 
-def test_voxels_are_seen_while_the_map_grows_and_stop_keeps_them(tab, held, monkeypatch):
+def test_voxels_are_shown_while_the_map_grows_and_kept_on_stop(tab, held, monkeypatch):
     monkeypatch.setattr("app.shared.maps.PUBLISHED_EVERY", 0.0)
     tab.compute()
     held.free = 1
@@ -270,7 +270,7 @@ def test_voxels_are_seen_while_the_map_grows_and_stop_keeps_them(tab, held, monk
     assert "data-shown" not in tab.html
 
 
-def test_the_threshold_hides_levels_and_sends_no_voxel(tab):
+def test_the_threshold_hides_levels_without_sending_voxels(tab):
     found = the_map()
     tab.compute()
     tab.done(len(found.index))
@@ -292,7 +292,7 @@ def test_the_threshold_hides_levels_and_sends_no_voxel(tab):
     assert 'data-legend="map-manipulability"' in tab.html
 
 
-def test_the_cut_of_the_tab_cuts_the_voxels_too(tab):
+def test_the_cut_of_the_tab_applies_to_the_voxels(tab):
     found = the_map()
     tab.compute()
     tab.done(len(found.index))
@@ -307,7 +307,7 @@ def test_the_cut_of_the_tab_cuts_the_voxels_too(tab):
     tab.wait(lambda: tab.count() == len(found.index))
 
 
-def test_a_click_tells_of_the_voxel_and_draws_its_directions(tab):
+def test_a_click_describes_the_voxel_and_draws_its_directions(tab):
     found = the_map()
     tab.compute()
     tab.done(len(found.index))
@@ -348,7 +348,7 @@ def test_another_robot_clears_the_map(tab):
     tab.done(len(the_map(PUMA).index))
 
 
-def test_two_visitors_share_one_map_and_the_last_who_leaves_stops_it(service, held):
+def test_two_visitors_share_a_map_and_the_last_to_leave_cancels_it(service, held):
     port, maps, _ = service
     with Visitor(port) as one, Visitor(port) as two:
         for visitor in (one, two):
@@ -371,7 +371,7 @@ def test_two_visitors_share_one_map_and_the_last_who_leaves_stops_it(service, he
         time.sleep(0.02)
 
 
-def test_a_failure_is_told_and_the_next_try_succeeds(tab, service, monkeypatch, caplog):
+def test_a_failure_is_reported_and_the_next_attempt_succeeds(tab, service, monkeypatch, caplog):
     forget_maps(service[1])
     with monkeypatch.context() as broken:
         broken.setattr(mapreduce, "capability_block", lambda grid, block: 1 / 0)
@@ -382,7 +382,7 @@ def test_a_failure_is_told_and_the_next_try_succeeds(tab, service, monkeypatch, 
     tab.done(len(the_map().index))
 
 
-def test_wrong_values_are_told_and_leave_the_page_alive(tab):
+def test_wrong_values_are_reported_and_the_page_keeps_working(tab):
     for label, value in (("Grid", "huge"), ("Directions", 12), ("Voxels show", None)):
         tab.set(label, value)
         tab.wait(lambda: "Invalid input" in tab.html)

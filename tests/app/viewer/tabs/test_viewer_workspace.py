@@ -1,4 +1,4 @@
-"""The workspace tab: clouds that stream, pause, cut, recolour and answer clicks, over the real viewer server."""
+"""The workspace tab: streaming, pausing, cutting, recolouring and clicking clouds, on the real viewer server."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connecti
 STORE, SUMMARIES = Store(), Summaries()
 PIONEER, PUMA = STORE.get("pioneer5"), STORE.get("puma560")
 N = 2 * SAMPLED + 1000  # three parts
-HALF = 5e-4  # m: what half precision may cost
+HALF = 5e-4  # m: error of half precision
 
 
 # Colours
 
 
 @pytest.mark.parametrize("name", colours.MAPS)
-def test_a_map_gets_brighter_all_the_way(name):
+def test_the_brightness_of_a_colour_map_increases(name):
     table = colours.table(name).astype(float)
     assert table.shape == (256, 3)
     luminance = table @ [0.2126, 0.7152, 0.0722]
@@ -52,7 +52,7 @@ def test_a_map_gets_brighter_all_the_way(name):
     assert luminance[-1] - luminance[0] > 150
 
 
-def test_values_beyond_a_scale_have_its_end_colours():
+def test_values_outside_a_scale_have_its_end_colours():
     scale = colours.Scale("height", -1.0, 3.0)
     painted = colours.paint(np.array([-9.0, -1.0, 1.0, 3.0, 9.0]), scale, "cividis")
     table = colours.table("cividis")
@@ -61,7 +61,7 @@ def test_values_beyond_a_scale_have_its_end_colours():
 
 @pytest.mark.parametrize("robot", kin.builtin_robots().values(), ids=lambda r: r.id)
 @pytest.mark.parametrize("by", [b for b in colours.BY.values() if b != "one"])
-def test_a_scale_holds_nearly_all_points(robot, by):
+def test_a_scale_covers_nearly_all_points(robot, by):
     chunk = Cloud(robot, 5000, seed=8, measures=colours.measures(by)).slice(0, 5000)
     values = colours.quantity(robot, by, chunk)
     scale = colours.scale_of(robot, by)
@@ -94,7 +94,7 @@ def _pose(x, y, tilt):
 
 
 @pytest.mark.parametrize("axis", ["x", "y", "z", "arm"])
-def test_what_is_left_of_a_cut_ends_where_the_slider_says(axis):
+def test_the_visible_part_of_a_cut_ends_at_the_slider(axis):
     points = Cloud(PIONEER, 20_000).slice(0, 20_000).points
     made = cut.cut_of([PIONEER, PUMA], axis, PIONEER.q_home)
     assert made.count <= cut.MAX_SLABS
@@ -111,7 +111,7 @@ def test_what_is_left_of_a_cut_ends_where_the_slider_says(axis):
     assert abs(made.middle / made.step - round(made.middle / made.step)) < 1e-9
 
 
-def test_the_arms_plane_holds_the_tool_and_the_axis():
+def test_the_plane_of_the_arm_contains_the_tool_and_the_axis():
     q = PIONEER.random_q(np.random.default_rng(1))
     normal = np.array(cut.cut_of([PIONEER], "arm", q).normal)
     point, axis = colours.axis_of_joint_1(PIONEER)
@@ -130,7 +130,7 @@ def test_steps_are_round(least, step):
 # Clicks
 
 
-def test_the_point_nearest_to_the_eye_that_the_ray_goes_through():
+def test_a_click_picks_the_point_on_the_ray_nearest_to_the_eye():
     points = np.array([[0, 0, 5], [0, 0.001, 2], [0, 0, -1], [0.02, 0, 3], [1, 1, 4]], dtype=np.float32)
     ray = (np.zeros(3), np.array([0.0, 0.0, 1.0]))
 
@@ -167,7 +167,7 @@ def test_the_point_nearest_to_the_eye_that_the_ray_goes_through():
         ("sizes", 1),
     ],
 )
-def test_a_wrong_wish_is_named_and_in_an_address_ignored(name, value):
+def test_a_wrong_setting_is_named_and_ignored_in_an_address(name, value):
     settings = WorkspaceSettings(n=77)
     with pytest.raises(kin.InputError, match="points" if name == "n" else name):
         settings.with_value(name, value, ("puma560",))
@@ -176,7 +176,7 @@ def test_a_wrong_wish_is_named_and_in_an_address_ignored(name, value):
     )
 
 
-def test_settings_come_back_from_their_state():
+def test_settings_are_restored_from_their_state():
     settings = WorkspaceSettings(
         5, "quasi", 9, "limits", "viridis", 0.002, "arm", 0.01, "slice", "puma560", True, True, False
     )
@@ -187,7 +187,7 @@ def test_settings_come_back_from_their_state():
 # Plot and numbers
 
 
-def test_the_cloud_in_the_drawing_is_inside_the_boundary_in_the_drawing():
+def test_the_drawn_cloud_is_inside_the_drawn_boundary():
     found = kin.section(PIONEER, resolution=32)
     frame = plot.frame_of(found)
     density = plot.Density(frame)
@@ -209,14 +209,14 @@ def test_the_cloud_in_the_drawing_is_inside_the_boundary_in_the_drawing():
     assert f'cx="{x:.1f}" cy="{y:.1f}"' in plot.tool_html(frame, 0.2, 0.05)
 
 
-def test_an_arm_whose_first_joint_slides_has_no_section():
+def test_an_arm_with_a_prismatic_first_joint_has_no_section():
     rows = (Joint("slide", kind="prismatic", limits=(0.0, 1.0)), Joint("turn", a=0.5, limits=(-1.0, 1.0)))
     slider = replace(PIONEER, rows=rows, home=(0.0, 0.0))
     found = find_section(SUMMARIES, slider)
     assert found is None
 
 
-def test_sizes_say_what_is_unknown_yet():
+def test_sizes_mark_values_that_are_not_computed_yet():
     facts = SUMMARIES.facts(PIONEER, effort=None).result()
     table = sizes.html(facts, waiting=True, units=DEFAULT_UNITS)
     assert table.count("computing…") == 2
@@ -253,7 +253,7 @@ def test_the_drawing_of_the_section_follows_the_units(length, ticks):
     assert re.search(rf"alone, radius [\d.]+ {length}</title>", drawn)
 
 
-def test_marks_closer_than_a_millimetre_are_told_apart():
+def test_tick_labels_below_a_millimetre_differ():
     texts = [text for _, text in tick_labels(0.0, 0.003, DEFAULT_UNITS.lengths.scale)]
     assert texts == ["0.0", "0.5", "1.0", "1.5", "2.0", "2.5", "3.0"]
 
@@ -340,7 +340,7 @@ def whole(robot: kin.Robot, n: int, seed: int = 0, measures=()) -> kin.Workspace
     return Cloud(robot, n, seed, measures=measures).slice(0, n)
 
 
-def test_a_cloud_arrives_whole_and_part_by_part(tab):
+def test_a_cloud_arrives_completely_in_parts(tab):
     assert tab.state == "ready"
     assert tab.clouds == []
     tab.draw(N, seed=11)
@@ -355,7 +355,7 @@ def test_a_cloud_arrives_whole_and_part_by_part(tab):
     assert tab.sent("PointCloudMessage") == sent, "and then it rests"
 
 
-def test_pause_holds_and_start_goes_on(tab):
+def test_pause_stops_the_cloud_and_start_resumes_it(tab):
     n = 24 * SAMPLED
     tab.set("Points", n)
     tab.set("Seed", 12)
@@ -379,7 +379,7 @@ def test_pause_holds_and_start_goes_on(tab):
     assert tab.state == "ready"
 
 
-def test_cancel_takes_everything_away_for_good(tab):
+def test_cancel_removes_the_cloud(tab):
     tab.set("Points", MAX_POINTS)
     tab.set("Seed", 13)
     tab.click("Start")
@@ -391,7 +391,7 @@ def test_cancel_takes_everything_away_for_good(tab):
     tab.draw(1000)
 
 
-def test_a_page_that_does_not_keep_up_is_not_flooded(tab):
+def test_a_slow_page_is_not_flooded(tab):
     tab.answers = False
     tab.set("Points", MAX_POINTS)
     tab.click("Start")
@@ -404,7 +404,7 @@ def test_a_page_that_does_not_keep_up_is_not_flooded(tab):
     tab.click("Cancel")
 
 
-def test_a_dragged_arm_and_a_growing_cloud_share_the_line(tab):
+def test_a_dragged_arm_and_a_growing_cloud_share_the_connection(tab):
     n = 8 * SAMPLED
     home = kin.fk(PIONEER, PIONEER.q_home)
     tab.grab()
@@ -479,7 +479,7 @@ def test_a_cut_hides_points_without_sending_any(tab):
     assert np.array_equal(tab.points(only_visible=True), points)
 
 
-def test_the_tab_follows_the_unit_of_length_and_keeps_what_it_shows():
+def test_the_tab_follows_the_unit_of_length_and_keeps_its_state():
     server = ViewerServer(STORE, Settings(), Clouds())
     with Visitor(server.start()) as tab:
         tab.settle(0.2)
@@ -501,7 +501,7 @@ def test_the_tab_follows_the_unit_of_length_and_keeps_what_it_shows():
         table = tab.html.count(">mm</td>")
         tab.set("Lengths", "cm")
         tab.wait(lambda: "Cut at (cm)" in tab.sliders)
-        # What was on its way from sliders that are gone.
+        # Late events of replaced sliders.
         post(("at", DEFAULT_UNITS), 0.0)
         post(("size", DEFAULT_UNITS), 20.0)
         tab.settle()
@@ -521,7 +521,7 @@ def test_the_tab_follows_the_unit_of_length_and_keeps_what_it_shows():
     server.stop()
 
 
-def test_a_cut_while_it_streams_loses_nothing(tab):
+def test_a_cut_while_streaming_loses_no_points(tab):
     n = 12 * SAMPLED
     tab.set("Points", n)
     tab.set("Seed", 16)
@@ -567,7 +567,7 @@ def test_a_click_moves_the_arm_to_the_configuration_of_the_point(tab):
     tab.wait(lambda: "No point near" in tab.html)
 
 
-def test_clicks_are_only_taken_when_they_are_wanted(tab):
+def test_clicks_are_only_handled_while_picking_is_on(tab):
     def wanted() -> bool:
         filters = [m for m in tab.log if m["type"] == "ScenePointerEnableMessage"]
         return bool(filters) and len(filters[-1]["modifiers"]) > 0
@@ -596,7 +596,7 @@ def test_a_click_respects_the_cut(tab):
     assert whole(PIONEER, N, 18).points[index, 0] < made.middle
 
 
-def test_locked_joints_are_locked_in_the_cloud_too(tab):
+def test_the_cloud_respects_locked_joints(tab):
     locked = (None, None, float(PIONEER.q_home[2]), None, float(PIONEER.q_home[4]))
     for joint in ("3", "5"):
         tab.set("Locked", joint)
@@ -621,7 +621,7 @@ def test_locked_joints_are_locked_in_the_cloud_too(tab):
     assert np.abs(tab.points() - whole(PIONEER, N, 30).points).max() < HALF
 
 
-def test_two_arms_in_one_picture_each_in_its_colour(tab):
+def test_two_arms_in_one_scene_have_different_colours(tab):
     tab.draw(N, seed=19)
     tab.set("Compare with", PUMA.name)
     tab.done(2 * N)
@@ -673,7 +673,7 @@ def test_a_second_visitor_gets_the_parts_from_the_cache(tab, service, monkeypatc
     assert len(computed) == 3
 
 
-def test_wrong_numbers_are_told_and_leave_the_page_alive(tab):
+def test_wrong_numbers_are_reported_and_the_page_keeps_working(tab):
     for label, value in (("Points", 0), ("Seed", -1), ("Sampling", "by hand"), ("Cut", "in half")):
         tab.set(label, value)
         tab.wait(lambda value=value: f"got {value!r}" in html.unescape(tab.html) and "Invalid input" in tab.html)
@@ -682,7 +682,7 @@ def test_wrong_numbers_are_told_and_leave_the_page_alive(tab):
     tab.draw(1000)
 
 
-def test_a_part_that_fails_is_told_pauses_and_can_be_tried_again(tab, monkeypatch, caplog):
+def test_a_failing_part_is_reported_pauses_the_cloud_and_can_be_retried(tab, monkeypatch, caplog):
     slice_of = Cloud.slice
 
     def failing(self, start, *args):
@@ -703,8 +703,8 @@ def test_a_part_that_fails_is_told_pauses_and_can_be_tried_again(tab, monkeypatc
     assert np.abs(tab.points() - whole(PIONEER, N, 21).points).max() < HALF
 
 
-def test_section_and_sizes_come_when_they_are_ready(tab):
-    robot = STORE.get("scara")  # the quickest
+def test_section_and_sizes_appear_when_they_are_ready(tab):
+    robot = STORE.get("scara")  # the fastest to compute
     tab.set("Robot", robot.name)
     tab.wait(lambda: robot.description in html.unescape(tab.html), 60.0)
     tab.settle()
@@ -728,7 +728,7 @@ def test_section_and_sizes_come_when_they_are_ready(tab):
     density = plot.Density(frame)
     density.add(robot, whole(robot, 4000, 24).points)
     expected = density.image_url()
-    tab.wait(lambda: expected in tab.html, 20.0)  # another cloud's points alone
+    tab.wait(lambda: expected in tab.html, 20.0)  # the points of the new cloud only
     tab.click("Cancel")
     tab.wait(lambda: "data:image/png" not in tab.html)
     tab.set("Section plot", False)
@@ -738,7 +738,7 @@ def test_section_and_sizes_come_when_they_are_ready(tab):
     tab.wait(lambda: "sizes of the workspace" not in tab.html)
 
 
-def test_nothing_is_left_running(tab):
+def test_no_thread_is_left_running(tab):
     tab.draw(5000)
     tab.settle()
     end = time.monotonic() + 5.0
