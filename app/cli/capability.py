@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.cli.terminal import Units, clean, per_joint, print_json, store_of, table
+from app.cli.terminal import Units, clean, joint_constraints, print_json, store_of, table
 from app.exports.capability import WRITERS
 from app.exports.progress import progress_bar
 from app.shared.answers.capability import CapabilityAnswer, capability_answer
@@ -22,13 +22,14 @@ def run(arguments: Namespace) -> int:
     """Print the figures of the map, and write it to a file if one is named."""
     robot = store_of(arguments).get(arguments.robot)
     save = None if arguments.output is None else _saver(Path(arguments.output))
+    constraints = joint_constraints(robot, arguments)
     voxel = arguments.voxel
     grid = capability_grid(
         robot,
         voxel=voxel if voxel is None or arguments.rad else voxel * 1e-3,
         resolution=arguments.resolution,
-        limits=per_joint(robot, arguments.limit, "--limit", 2, arguments.rad),
-        locked=per_joint(robot, arguments.lock, "--lock", 1, arguments.rad),
+        limits=constraints.limits,
+        locked=constraints.locked,
         directions=arguments.directions,
     )
     blocks = run_local(grid) if arguments.dask is None else run_dask(grid, arguments.dask)

@@ -8,9 +8,9 @@ from argparse import Namespace
 
 import numpy as np
 
-from app.cli.terminal import Units, configuration, per_joint, print_json, store_of, table
+from app.cli.terminal import Units, configuration, joint_constraints, print_json, store_of, table
 from app.shared.answers.ik import Blocked, IkAnswer, Solution, ik_answer
-from kin import IKOptions, InputError, JointConstraints, Task
+from kin import IKOptions, InputError, Task
 from kin.ik import solve
 from kin.ik.options import MASK_NAMES
 from kin.transforms import frame_from_approach, from_position_wxyz
@@ -26,13 +26,11 @@ def run(arguments: Namespace) -> int:
         T[:3, :3] = frame_from_approach(arguments.approach)
     task = _task(arguments)
     q_seed = None if arguments.seed is None else configuration(robot, arguments.seed, "--seed", arguments.rad)
-    limits = per_joint(robot, arguments.limit, "--limit", 2, arguments.rad)
-    locked = per_joint(robot, arguments.lock, "--lock", 1, arguments.rad)
     options = IKOptions(
         task=task,
         mask=None if arguments.mask is None else [name in arguments.mask for name in MASK_NAMES],
         mask_frame=arguments.mask_frame,
-        constraints=JointConstraints(limits, locked),
+        constraints=joint_constraints(robot, arguments),
         respect_limits=not arguments.ignore_limits,
         branch=arguments.branch,
         images=arguments.images,

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from app.shared.store import Store
-from kin import InputError, Robot
+from kin import InputError, JointConstraints, Robot
 from kin.transforms import Array
 
 
@@ -25,7 +25,17 @@ def store_of(arguments: Namespace) -> Store:
     return Store(Path(folder) if folder else None)
 
 
-def per_joint(robot: Robot, given: list[tuple[str, list[float]]] | None, field: str, count: int, rad: bool) -> Any:
+def joint_constraints(robot: Robot, arguments: Namespace) -> JointConstraints:
+    """The limits and locks of ``--limit`` and ``--lock``."""
+    return JointConstraints(
+        _per_joint(robot, arguments.limit, "--limit", 2, arguments.rad),
+        _per_joint(robot, arguments.lock, "--lock", 1, arguments.rad),
+    )
+
+
+def _per_joint(
+    robot: Robot, given: list[tuple[str, list[float]]] | None, field: str, count: int, rad: bool
+) -> Any:
     """``--lock 2=30`` or ``--limit 2=0:30``, joints counted from 1, as one entry per joint in radians (metres)."""
     if given is None:
         return None

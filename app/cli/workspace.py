@@ -7,15 +7,14 @@ from argparse import Namespace
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
 
-from app.cli.terminal import Units, per_joint, print_json, store_of, table
+from app.cli.terminal import Units, joint_constraints, print_json, store_of, table
 from app.exports.formats import FORMATS
 from app.exports.picture import draw
 from app.exports.save import opened, reading, save
 from app.shared.answers.workspace import workspace_answer
 from app.shared.clouds import Cloud
-from kin import InputError, Robot, sample_workspace, section, workspace_facts
+from kin import InputError, JointConstraints, Robot, WorkspaceFacts, sample_workspace, section, workspace_facts
 
 _INTERRUPTED = 130  # exit code that shells expect after Ctrl-C
 
@@ -23,19 +22,18 @@ _INTERRUPTED = 130  # exit code that shells expect after Ctrl-C
 def run(arguments: Namespace) -> int:
     """Print the sizes, or write the files that are named."""
     robot = store_of(arguments).get(arguments.robot)
-    limits = per_joint(robot, arguments.limit, "--limit", 2, arguments.rad)
-    locked = per_joint(robot, arguments.lock, "--lock", 1, arguments.rad)
+    constraints = joint_constraints(robot, arguments)
     files = (
         (arguments.output, _cloud_writer),
         (arguments.picture, _picture_writer),
         (arguments.hull, _hull_writer),
     )
     if any(target is not None for target, _ in files):
-        cloud = _cloud(robot, arguments, limits, locked)
+        cloud = _cloud(robot, arguments, constraints)
         # Every name is checked before the first file is written.
         ready = [write(cloud, target, arguments) for target, write in files if target is not None]
         return max(write() for write in ready)
-    answer = workspace_answer(workspace_facts(robot, limits=limits, locked=locked, effort=arguments.effort))
+    answer = workspace_answer(_facts(robot, constraints, arguments))
     if arguments.json:
         return print_json(answer)
     units = Units(robot, arguments.rad)
@@ -55,7 +53,12 @@ def run(arguments: Namespace) -> int:
     return 0
 
 
-def _cloud(robot: Robot, arguments: Namespace, limits: Any, locked: Any) -> Cloud:
+def _facts(robot: Robot, constraints: JointConstraints, arguments: Namespace) -> WorkspaceFacts:
+    limits, locked = constraints.limits, constraints.locked
+    return workspace_facts(robot, limits=limits, locked=locked, effort=arguments.effort)
+
+
+def _cloud(robot: Robot, arguments: Namespace, constraints: JointConstraints) -> Cloud:
     """The cloud as described by the arguments; raises `InputError` for an invalid one before any work begins."""
     cloud = Cloud(
         robot,
@@ -63,8 +66,7 @@ def _cloud(robot: Robot, arguments: Namespace, limits: Any, locked: Any) -> Clou
         arguments.seed,
         arguments.strategy,
         tuple(dict.fromkeys(arguments.measure)),
-        None if limits is None else tuple(pair and tuple(pair) for pair in limits),
-        None if locked is None else tuple(locked),
+        constraints,
     )
     # Checks its arguments when called, and samples nothing until it is read.
     sample_workspace(
@@ -72,8 +74,8 @@ def _cloud(robot: Robot, arguments: Namespace, limits: Any, locked: Any) -> Clou
         cloud.n,
         seed=cloud.seed,
         strategy=cloud.strategy,
-        limits=cloud.limits,
-        locked=cloud.locked,
+        limits=constraints.limits,
+        locked=constraints.locked,
         measure=cloud.measures,
     )
     return cloud
@@ -97,10 +99,10 @@ def _picture_writer(cloud: Cloud, target: str, arguments: Namespace) -> Callable
         raise InputError("--picture", target, "a name that ends in .svg")
 
     def act() -> str:
-        robot, limits, locked = cloud.robot, cloud.limits, cloud.locked
-        facts = workspace_facts(robot, limits=limits, locked=locked, effort=arguments.effort)
+        robot, constraints = cloud.robot, cloud.constraints
+        facts = _facts(robot, constraints, arguments)
         turns = robot.joints[0].kind == "revolute"
-        cut = section(robot, limits=limits, locked=locked) if turns else None
+        cut = section(robot, limits=constraints.limits, locked=constraints.locked) if turns else None
         with reading(cloud, _shows_progress(arguments)) as chunks, opened(target) as file:
             file.write(draw(robot, chunks, facts, cut).encode())
         return f"{cloud.n} points"

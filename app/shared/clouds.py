@@ -18,7 +18,8 @@ from functools import cached_property
 
 from app.shared.computations import ComputationCache
 from app.shared.threads import background_threads, lower_priority
-from kin import Robot, WorkspaceChunk, workspace_slice
+from kin import JointConstraints, Robot, WorkspaceChunk, workspace_slice
+from kin.ik.options import FREE
 from kin.workspace import Measure, Strategy
 
 # Points of a part: a few milliseconds of work for sampled points, half a second for points found by descent.
@@ -28,15 +29,14 @@ FIRST = 1 << 9  # of the first part of a cloud found by descent, so that somethi
 
 @dataclass(frozen=True)
 class Cloud:
-    """Description of a cloud: the arguments of `kin.sample_workspace`, hashable. Parts are numbered from 0."""
+    """Description of a cloud: what `kin.sample_workspace` takes, hashable. Parts are numbered from 0."""
 
     robot: Robot
     n: int
     seed: int = 0
     strategy: Strategy = "uniform"
     measures: tuple[Measure, ...] = ()
-    limits: tuple[tuple[float, float] | None, ...] | None = None
-    locked: tuple[float | None, ...] | None = None
+    constraints: JointConstraints = FREE
 
     @property
     def by_descent(self) -> bool:
@@ -72,8 +72,8 @@ class Cloud:
             stop,
             seed=self.seed,
             strategy=self.strategy,
-            limits=self.limits,
-            locked=self.locked,
+            limits=self.constraints.limits,
+            locked=self.constraints.locked,
             measure=self.measures or None,
             with_q=with_q,
         )

@@ -14,20 +14,20 @@ from dataclasses import dataclass
 from app.shared.computations import ComputationCache, SharedComputation, Subscription
 from app.shared.mapreduce import run_local
 from app.shared.threads import background_threads, lower_priority
-from kin import CapabilityBlock, CapabilityMap, Robot, capability_grid, capability_join
+from kin import CapabilityBlock, CapabilityMap, JointConstraints, Robot, capability_grid, capability_join
+from kin.ik.options import FREE
 
 PUBLISHED_EVERY = 0.5  # s between two partial results
 
 
 @dataclass(frozen=True)
 class MapRequest:
-    """Description of a map: the arguments of `kin.capability_grid`, hashable."""
+    """Description of a map: what `kin.capability_grid` takes, hashable."""
 
     robot: Robot
     resolution: int = 25
     directions: int = 48
-    limits: tuple[tuple[float, float] | None, ...] | None = None
-    locked: tuple[float | None, ...] | None = None
+    constraints: JointConstraints = FREE
 
 
 class Maps:
@@ -66,8 +66,8 @@ class Maps:
             request.robot,
             resolution=request.resolution,
             directions=request.directions,
-            limits=request.limits,
-            locked=request.locked,
+            limits=request.constraints.limits,
+            locked=request.constraints.locked,
         )
         computation.total = len(grid.blocks)
         blocks: list[CapabilityBlock] = []

@@ -10,10 +10,9 @@ from concurrent.futures import Future
 
 from app.shared.computations import ComputationCache
 from app.shared.threads import DaemonExecutor, background_threads, lower_priority
-from kin import Robot, Section, WorkspaceFacts, section, workspace_facts
+from kin import JointConstraints, Robot, Section, WorkspaceFacts, section, workspace_facts
+from kin.ik.options import FREE
 
-Bounds = tuple[tuple[float, float] | None, ...]
-Locks = tuple[float | None, ...]
 Plane = tuple[tuple[float, ...], tuple[float, ...]]
 
 KEPT = 64  # sizes, and as many sections
@@ -37,42 +36,44 @@ class Summaries:
     def facts(
         self,
         robot: Robot,
-        limits: Bounds | None = None,
-        locked: Locks | None = None,
+        constraints: JointConstraints = FREE,
         effort: int | None = 4,
         limited: bool = False,
     ) -> Future[WorkspaceFacts]:
         """Sizes as by `kin.workspace_facts`; do not cancel the future.
 
         Args:
-            robot, limits, locked: as there.
-            effort: as there; None: without volume and surface.
+            robot: the arm.
+            constraints: the `limits` and `locked` of the core function.
+            effort: as in the core function; None: without volume and surface.
             limited: raise `TooManyPendingError` instead of queueing behind too many computations.
         """
+
+        limits, locked = constraints.limits, constraints.locked
 
         def compute(_: object) -> WorkspaceFacts:
             if effort is None:
                 return workspace_facts(robot, limits=limits, locked=locked, volume=False)
             return workspace_facts(robot, limits=limits, locked=locked, effort=effort)
 
-        key = (robot, limits, locked, effort)
+        key = (robot, constraints, effort)
         return self._facts.get(key, compute, self._max_pending if limited else None)
 
     def section(
         self,
         robot: Robot,
         plane: Plane | None = None,
-        limits: Bounds | None = None,
-        locked: Locks | None = None,
+        constraints: JointConstraints = FREE,
         resolution: int = 96,
         limited: bool = False,
     ) -> Future[Section]:
-        """A section as by `kin.section`; do not cancel the future. `limited` as in `facts`."""
+        """A section as by `kin.section`; do not cancel the future. `constraints` and `limited` as in `facts`."""
 
         def compute(_: object) -> Section:
+            limits, locked = constraints.limits, constraints.locked
             return section(robot, plane, limits=limits, locked=locked, resolution=resolution)
 
-        key = (robot, plane, limits, locked, resolution)
+        key = (robot, plane, constraints, resolution)
         return self._sections.get(key, compute, self._max_pending if limited else None)
 
     def close(self) -> None:

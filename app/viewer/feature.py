@@ -19,7 +19,7 @@ from app.shared.store import Store
 from app.shared.summaries import Summaries
 from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import Sphere
-from kin import IKResult, Robot, Task
+from kin import IKOptions, IKResult, Robot, Task
 from kin.transforms import Array
 from kin.units import Units
 
@@ -57,8 +57,8 @@ class Stage(Protocol):
         """The target pose ``(4, 4)``; None while the target follows the tool."""
 
     @property
-    def locked(self) -> tuple[float | None, ...] | None:
-        """The value of each locked joint, None for a joint that may move; None if no joint is locked."""
+    def options(self) -> IKOptions:
+        """The options that targets are solved with: task, requested branch, and locked joints."""
 
     @property
     def branch(self) -> str | None:

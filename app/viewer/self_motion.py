@@ -7,12 +7,13 @@ them: the configuration for a value, the range reachable from the present value,
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 import kin
-from kin import IKOptions, IKResult, JointConstraints, Redundancy, Robot, Task
+from kin import IKOptions, IKResult, Redundancy, Robot
+from kin.ik import solve
 from kin.ik.problem import prepare
 from kin.transforms import Array
 
@@ -20,7 +21,6 @@ SMOOTH = 0.6  # rad; a larger step of a joint in one event is a jump to another 
 INSET = 1e-6  # rad; the end of a range is evaluated this far inside it
 AT_LIMIT = 1e-4  # rad or m
 _SEAM = 1e-9
-Locks = tuple[float | None, ...] | None
 
 
 @dataclass(frozen=True)
@@ -31,29 +31,28 @@ class End:
     joint: int
 
 
-def self_motion(robot: Robot, T: Array, task: Task, q: Array, locked: Locks, name: str, value: float) -> IKResult:
+def self_motion(robot: Robot, T: Array, options: IKOptions, q: Array, name: str, value: float) -> IKResult:
     """Solve for the target `T` ``(4, 4)`` with a redundancy parameter set.
 
-    A solution near `q` ``(n,)`` is preferred; if there is none, the solution on the branch of `q` is returned.
+    Of the options, task and constraints hold, not the branch. A solution near `q` ``(n,)`` is preferred; if there
+    is none, the solution on the branch of `q` is returned.
     """
-    target = T[:3, 3] if task == "position" else T
+    target = T[:3, 3] if options.task == "position" else T
     for branch in (None, "seed"):
-        result = kin.solve_ik(
-            robot, target, task=task, q_seed=q, locked=locked, branch=branch, redundancy={name: value},
-            max_solutions=1,
-        )  # fmt: skip
+        trial = replace(options, branch=branch, redundancy={name: value}, max_solutions=1)
+        result = solve(robot, target, trial, q)
         if result.solutions and float(np.abs(result.solutions[0].q - q).max()) < SMOOTH:
             break
     return result
 
 
-def redundancy_at(robot: Robot, T: Array, task: Task, q: Array, locked: Locks) -> tuple[Redundancy, ...]:
+def redundancy_at(robot: Robot, T: Array, options: IKOptions, q: Array) -> tuple[Redundancy, ...]:
     """The redundancy parameters of a task at `q` ``(n,)``, on its branch, without those of singular poses only."""
-    target = T[:3, 3] if task == "position" else T
+    target = T[:3, 3] if options.task == "position" else T
     seed = "seed" if kin.branch_names(robot) else None
-    options = IKOptions(task=task, constraints=JointConstraints(locked=locked), branch=seed, max_solutions=1)
+    options = replace(options, branch=seed, max_solutions=1)
     rare = {parameter.name for parameter in prepare(robot, options).redundancies if parameter.rare}
-    found = kin.ik.solve(robot, target, options, q)
+    found = solve(robot, target, options, q)
     return tuple(item for item in found.redundancy if item.name not in rare)
 
 
@@ -82,19 +81,17 @@ def range_of(item: Redundancy) -> tuple[float, float] | None:
     return low, high
 
 
-def ends(robot: Robot, T: Array, task: Task, q: Array, locked: Locks, item: Redundancy) -> tuple[End, ...]:
+def ends(robot: Robot, T: Array, options: IKOptions, q: Array, item: Redundancy) -> tuple[End, ...]:
     """The ends of all feasible ranges, each with the joint whose limit is met; ±π of a periodic one is no end."""
     found = []
-    target = T[:3, 3] if task == "position" else T
+    target = T[:3, 3] if options.task == "position" else T
     branch = "seed" if kin.branch_names(robot) else None
     for low, high in item.intervals:
         for value, inside in ((low, min(low + INSET, high)), (high, max(high - INSET, low))):
             if circular(item) and abs(abs(value) - math.pi) < _SEAM:
                 continue
-            result = kin.solve_ik(
-                robot, target, task=task, q_seed=q, locked=locked, branch=branch, redundancy={item.name: inside},
-                max_solutions=1,
-            )  # fmt: skip
+            trial = replace(options, branch=branch, redundancy={item.name: inside}, max_solutions=1)
+            result = solve(robot, target, trial, q)
             joint = -1
             if result.solutions:
                 there = result.solutions[0].q

@@ -41,7 +41,7 @@ def test_a_click_on_a_ghost_in_the_picture_morphs_the_arm(tab: Tab) -> None:
     rows = tab.page.locator("[data-posture]")
     expect(rows).to_have_count(8)
     T = kin.fk(PUMA, PUMA.q_home)
-    postures = survey(PUMA, T, "pose", PUMA.q_home)
+    postures = survey(PUMA, T, kin.IKOptions(), PUMA.q_home)
     here = kin.branch_of(PUMA, PUMA.q_home)
     expect(tab.page.locator("[data-here]")).to_have_attribute("data-posture", here)
     wanted = next(p for p in postures if p.available and p.name != here)

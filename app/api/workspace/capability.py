@@ -62,8 +62,7 @@ async def capability(
             wrong, hint="`kinboard capability` computes finer maps; the operator can raise KINBOARD_MAX_VOXELS."
         )
     robot = robot_of(request, robot_id)
-    limits, locked = query.bounds(robot)
-    wanted = MapRequest(robot, query.resolution, int(query.directions), limits, locked)
+    wanted = MapRequest(robot, query.resolution, int(query.directions), query.constraints(robot))
     maps: Maps = request.app.state.maps
     with request.app.state.streams.slot():
         deadline, reader = Deadline(compute_slots(request)), maps.subscribe(wanted)

@@ -13,10 +13,8 @@ from app.api.problems import FieldError, field_error, from_input_error, invalid,
 from app.api.schemas import LARGEST, Body
 from app.shared.clouds import Cloud
 from app.shared.settings import Settings
-from app.shared.summaries import Bounds, Locks
-from kin import InputError, Robot
+from kin import InputError, JointConstraints, Robot
 from kin.workspace import Measure, Strategy
-from kin.workspace.region import Region
 
 _FIELD_OF_CORE = {"limits": "limit", "locked": "lock"}
 _SEEDS = 1 << 64
@@ -48,14 +46,15 @@ class RegionQuery(Body):
         examples=[["3:0.2"]],
     )
 
-    def bounds(self, robot: Robot) -> tuple[Bounds | None, Locks | None]:
-        """Limits and locks as arguments of the core; raises 422 naming the invalid one."""
+    def constraints(self, robot: Robot) -> JointConstraints:
+        """Limits and locks as the core takes them; raises 422 naming the invalid one."""
         pairs, limit_at = _per_joint(robot, "limit", self.limit, 2)
         values, lock_at = _per_joint(robot, "lock", self.lock, 1)
         limits = tuple((p[0], p[1]) if p else None for p in pairs) if self.limit else None
         locked = tuple(v[0] if v else None for v in values) if self.lock else None
         try:
-            Region.of(robot, limits, locked)
+            constraints = JointConstraints(limits, locked)
+            constraints.bounds(robot)
         except InputError as error:
             # The core counts joints from 0 and does not know the order of the parameters.
             found = re.fullmatch(r"(limits|locked)\[(\d+)\]", error.field)
@@ -66,7 +65,7 @@ class RegionQuery(Body):
             given = getattr(self, name)[k]
             wrong = FieldError(field=f"{name}[{k}]", value=show(given), expected=error.expected)
             raise invalid(wrong) from None
-        return limits, locked
+        return constraints
 
 
 class CloudQuery(RegionQuery):
@@ -100,9 +99,9 @@ class CloudQuery(RegionQuery):
                 wrong,
                 hint="Request several clouds with different seeds; the operator can raise KINBOARD_MAX_POINTS.",
             )
-        limits, locked = self.bounds(robot)
+        constraints = self.constraints(robot)
         measures = tuple(dict.fromkeys(self.measure))
-        return Cloud(robot, self.n, self.seed, self.strategy, measures, limits, locked)
+        return Cloud(robot, self.n, self.seed, self.strategy, measures, constraints)
 
 
 def read_cloud_query(parameters: QueryParams) -> CloudQuery:

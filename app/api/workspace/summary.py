@@ -67,7 +67,7 @@ async def summary(request: Request, robot_id: RobotId, query: Annotated[SummaryQ
     is refused because it takes too long can be repeated: the computation goes on.
     """
     robot = robot_of(request, robot_id)
-    limits, locked = query.bounds(robot)
+    constraints = query.constraints(robot)
     plane = query.cut()
     if query.section and plane is None and robot.joints[0].kind != "revolute":
         expected = f"false: joint 1 of {robot.id} slides, so there is no section in r and z"
@@ -77,9 +77,9 @@ async def summary(request: Request, robot_id: RobotId, query: Annotated[SummaryQ
     deadline = Deadline(work)
     cut: Future[Section] | None = None
     try:
-        facts = summaries.facts(robot, limits, locked, query.effort if query.volume else None, limited=True)
+        facts = summaries.facts(robot, constraints, query.effort if query.volume else None, limited=True)
         if query.section or plane is not None:
-            cut = summaries.section(robot, plane, limits, locked, query.resolution, limited=True)
+            cut = summaries.section(robot, plane, constraints, query.resolution, limited=True)
     except TooManyPendingError as error:
         raise busy(f"{error.pending} summaries are being computed already.") from None
     sizes = await work.wait(facts, deadline)

@@ -29,7 +29,8 @@ from app.viewer.scene import gizmo
 from app.viewer.scene.arm import ArmScene
 from app.viewer.scene.gizmo_axes import gizmo_axes
 from app.viewer.scene.motion import Motion, Pace
-from kin import IKResult, Robot, Task
+from kin import IKOptions, IKResult, JointConstraints, Robot, Task
+from kin.ik import solve
 from kin.transforms import Array, from_position_wxyz
 
 # A node name is never used twice: browsers keep the poses of removed nodes.
@@ -67,7 +68,7 @@ class ArmController:
     Attributes:
         robot: the selected robot.
         task: how much of the target pose the arm must match.
-        branch: the requested branch, as `kin.solve_ik` takes it.
+        branch: the requested branch, as `kin.IKOptions` takes it.
         locks: whether each joint ``(n,)`` is locked.
         q: the configuration ``(n,)`` shown in the scene.
         target: the target pose ``(4, 4)``; None while the target follows the tool.
@@ -121,11 +122,12 @@ class ArmController:
         return hasattr(self, "_motion") and self._motion.moving
 
     @property
-    def locked(self) -> tuple[float | None, ...] | None:
-        """The value of each locked joint, None for a joint that may move; None if no joint is locked."""
-        if not any(self.locks):
-            return None
-        return tuple(x if lock else None for x, lock in zip(self.goal.tolist(), self.locks, strict=True))
+    def options(self) -> IKOptions:
+        """The options that targets are solved with: task, requested branch, and locked joints."""
+        locked = None
+        if any(self.locks):
+            locked = tuple(x if lock else None for x, lock in zip(self.goal.tolist(), self.locks, strict=True))
+        return IKOptions(task=self.task, constraints=JointConstraints(locked=locked), branch=self.branch)
 
     # Motions
 
@@ -231,9 +233,7 @@ class ArmController:
         """Solve for a target, seeded with the goal so that the arm stays on its branch."""
         target = T[:3, 3] if self.task == "position" else T
         with SOLVE_SECONDS.labels("viewer").time():
-            result = kin.solve_ik(
-                self.robot, target, task=self.task, q_seed=self.goal, locked=self.locked, branch=self.branch
-            )
+            result = solve(self.robot, target, self.options, self.goal)
         self.target = T
         if result.best is not None:
             self._head_for(result.best.q)

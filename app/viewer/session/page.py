@@ -32,7 +32,7 @@ from app.viewer.session.posture import PosturePanel
 from app.viewer.session.services import Services
 from app.viewer.session.worker import Worker
 from app.viewer.tabs import TABS
-from kin import IKResult, Robot, Task
+from kin import IKOptions, IKResult, Robot, Task
 from kin.transforms import Array
 from kin.units import DEFAULT_UNITS, Units
 
@@ -129,8 +129,8 @@ class VisitorPage(Worker):
         return self.arm.target
 
     @property
-    def locked(self) -> tuple[float | None, ...] | None:
-        return self.arm.locked
+    def options(self) -> IKOptions:
+        return self.arm.options
 
     @property
     def branch(self) -> str | None:

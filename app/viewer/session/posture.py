@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import viser
 
 import kin
@@ -10,6 +12,7 @@ from app.viewer.panel import Post
 from app.viewer.panel.posture import BranchChoice, RedundancySliders
 from app.viewer.self_motion import self_motion
 from kin import IKResult, Redundancy
+from kin.ik import solve
 from kin.transforms import Array
 
 
@@ -86,7 +89,7 @@ class PosturePanel:
     def _self_motion(self, name: str, value: float) -> IKResult:
         """Solve for the tool's present pose with a redundancy parameter set."""
         stage, q = self._stage, self._stage.goal
-        return self_motion(stage.robot, kin.fk(stage.robot, q), stage.task, q, stage.locked, name, value)
+        return self_motion(stage.robot, kin.fk(stage.robot, q), stage.options, q, name, value)
 
     def _parameters(self) -> tuple[Redundancy, ...]:
         """The redundancy parameters at the goal, on the branch of the goal."""
@@ -94,11 +97,9 @@ class PosturePanel:
         if self._result is not None and self._result[0] == self._request():
             return self._result[1]
         seed = "seed" if kin.branch_names(stage.robot) else None
-        return kin.solve_ik(
-            stage.robot, kin.fk(stage.robot, q), task=stage.task, q_seed=q, locked=stage.locked, branch=seed,
-            max_solutions=1,
-        ).redundancy  # fmt: skip
+        options = replace(stage.options, branch=seed, max_solutions=1)
+        return solve(stage.robot, kin.fk(stage.robot, q), options, q).redundancy
 
     def _request(self) -> tuple[object, ...]:
         stage = self._stage
-        return stage.robot.id, stage.task, stage.goal.tobytes(), stage.locked
+        return stage.robot.id, stage.task, stage.goal.tobytes(), stage.options.constraints

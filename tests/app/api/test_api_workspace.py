@@ -88,8 +88,7 @@ def test_a_cloud_is_the_file_of_its_format(client, app, name):
         3,
         "quasi",
         ("limits", "manipulability"),
-        ((0.0, 0.5), (0.1, 1.0), None, None, None),
-        (None, None, 0.2, None, None),
+        kin.JointConstraints(((0.0, 0.5), (0.1, 1.0), None, None, None), (None, None, 0.2, None, None)),
     )
     assert answer.content == b"".join(encode(name, app.state.clouds, cloud, True))
     kind = FORMATS[name]

@@ -67,7 +67,9 @@ def test_the_rows_are_the_cloud_and_progress_reaches_its_end(port, monkeypatch):
     columns = ["x", "y", "z", "limits", "q1", "q2", "q3", "q4", "q5"]
     assert start == {"type": "start", "total": 200_000, "columns": columns}
     limits, locked = ((0.0, 0.5), None, None, None, None), (None, None, 0.2, None, None)
-    chunk = Cloud(PIONEER, 200_000, 5, "quasi", ("limits",), limits, locked).slice(0, 200_000, True)
+    chunk = Cloud(PIONEER, 200_000, 5, "quasi", ("limits",), kin.JointConstraints(limits, locked)).slice(
+        0, 200_000, True
+    )
     expected = np.column_stack([chunk.points, chunk.measures["limits"], chunk.q]).astype(np.float32)
     rows = np.frombuffer(b"".join(m for m in messages if isinstance(m, bytes)), "<f4").reshape(-1, len(columns))
     assert np.array_equal(rows, expected)

@@ -470,7 +470,7 @@ def test_a_cloud_is_written_by_the_name_of_its_file(capsys, tmp_path, clouds, na
     assert (code, err) == (0, "")
     assert out.startswith(f"{file}: 3000 points, ")
     limits, locked = ((0.0, math.radians(90)), *[None] * 4), (None, None, math.radians(20), None, None)
-    cloud = Cloud(PIONEER, 3000, 5, "quasi", ("limits",), limits, locked)
+    cloud = Cloud(PIONEER, 3000, 5, "quasi", ("limits",), kin.JointConstraints(limits, locked))
     assert file.read_bytes() == b"".join(encode(name, clouds, cloud, True))
     assert list(tmp_path.iterdir()) == [file]
     bare = tmp_path / "cloud"

@@ -25,8 +25,7 @@ LIMITED = Cloud(
     7,
     "quasi",
     ("limits", "manipulability"),
-    ((0.0, 1.0), None, None, None, None),
-    (None, None, 0.2, None, None),
+    kin.JointConstraints(((0.0, 1.0), None, None, None, None), (None, None, 0.2, None, None)),
 )
 PLAIN = Cloud(ARM, N)
 each_format = pytest.mark.parametrize("name", FORMATS)

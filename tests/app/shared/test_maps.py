@@ -65,7 +65,7 @@ def same(found, robot, **wanted):
 def test_a_map_is_that_of_the_core_with_limits_and_locks(maps):
     limits = (None, (0.0, 1.0), None, None, None)
     locked = (0.3, None, None, None, None)
-    reader = maps.subscribe(MapRequest(ARM, 8, 12, limits, locked))
+    reader = maps.subscribe(MapRequest(ARM, 8, 12, kin.JointConstraints(limits, locked)))
     same(reader.future.result(60), ARM, resolution=8, directions=12, limits=limits, locked=locked)
     assert reader.finished
     assert reader.done == reader.total > 0

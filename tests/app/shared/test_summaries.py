@@ -22,18 +22,18 @@ def summaries():
 
 
 def test_sizes_and_sections_are_those_of_the_core(summaries):
-    facts = summaries.facts(ARM, locked=LOCKED, effort=None).result(60)
+    facts = summaries.facts(ARM, kin.JointConstraints(locked=LOCKED), effort=None).result(60)
     expected = kin.workspace_facts(ARM, locked=LOCKED, volume=False)
     assert facts.volume is None
     assert facts.reach.largest.value == expected.reach.largest.value
-    cut = summaries.section(ARM, locked=LOCKED, resolution=16).result(60)
+    cut = summaries.section(ARM, constraints=kin.JointConstraints(locked=LOCKED), resolution=16).result(60)
     assert np.array_equal(cut.curves[0], kin.section(ARM, locked=LOCKED, resolution=16).curves[0])
 
 
 def test_equal_requests_share_one_result_and_others_do_not(summaries):
     facts = summaries.facts(ARM, effort=None).result(60)
     assert summaries.facts(kin.get_robot("pioneer5"), effort=None).result(0) is facts
-    assert summaries.facts(ARM, locked=LOCKED, effort=None).result(60) is not facts
+    assert summaries.facts(ARM, kin.JointConstraints(locked=LOCKED), effort=None).result(60) is not facts
     cut = summaries.section(ARM, resolution=16).result(60)
     assert summaries.section(ARM, resolution=16).result(0) is cut
     assert summaries.section(ARM, resolution=17).result(60) is not cut

@@ -261,11 +261,14 @@ class Postures(Feature):
 
     def _survey(self, now: float) -> None:
         stage, T = self.stage, self._target
-        key: tuple[object, ...] = (T.tobytes(), stage.goal.tobytes(), stage.task, stage.locked, stage.units)
+        options = stage.options
+        key: tuple[object, ...] = (
+            T.tobytes(), stage.goal.tobytes(), options.task, options.constraints, stage.units,
+        )  # fmt: skip
         if key == self._key:
             return
         self._key, self._surveyed = key, now
-        self._postures = survey(stage.robot, T, stage.task, stage.goal, stage.locked, stage.units)
+        self._postures = survey(stage.robot, T, options, stage.goal, stage.units)
         self._show()
 
     def _show(self) -> None:
@@ -300,9 +303,7 @@ class Postures(Feature):
         stage = self.stage
         if self._search is None:
             assert self._result is not None
-            request = Request(
-                stage.robot, self._target, stage.task, stage.goal, stage.locked, stage.branch, self._result
-            )
+            request = Request(stage.robot, self._target, stage.options, stage.goal, self._result)
             self._search = remedies.remedies(request, stage.units)
         try:
             remedy = next(self._search)

@@ -7,7 +7,7 @@ generator whose every step solves at most once. The worker takes a step whenever
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -15,12 +15,13 @@ import numpy as np
 import kin
 from app.viewer.panel.status import LOOKS, notice
 from app.viewer.views.templates import render
-from kin import IKResult, Robot, Task
+from kin import IKOptions, IKResult, Robot, Task
+from kin.ik import solve
+from kin.ik.options import Locks
 from kin.transforms import Array, rotation_angle
 from kin.units import DEFAULT_UNITS, Units
 
 Kind = Literal["branch", "unlock", "relax", "turn", "move"]
-Locks = tuple[float | None, ...] | None
 WEAKER_TASKS: dict[Task, tuple[Task, ...]] = {
     "pose": ("approach", "position"),
     "approach": ("position",),
@@ -58,26 +59,20 @@ class Request:
 
     Attributes:
         T: target pose ``(4, 4)``.
-        q: configuration ``(n,)`` from which it was solved.
-        locked, branch: as `kin.solve_ik` takes them.
-        result: what `kin.solve_ik` returned.
+        options, q: what it was solved with: options, and the configuration ``(n,)`` that was the seed.
+        result: what `kin.ik.solve` returned.
     """
 
     robot: Robot
     T: Array
-    task: Task
+    options: IKOptions
     q: Array
-    locked: Locks
-    branch: str | None
     result: IKResult
 
-    def is_solved_with(self, task: Task, locked: Locks, branch: str | None) -> bool:
+    def is_solved_with(self, options: IKOptions) -> bool:
         """Whether the target can be reached with these options instead."""
-        target = self.T[:3, 3] if task == "position" else self.T
-        found = kin.solve_ik(
-            self.robot, target, task=task, q_seed=self.q, locked=locked, branch=branch, max_solutions=1
-        )
-        return found.status == "solved"
+        target = self.T[:3, 3] if options.task == "position" else self.T
+        return solve(self.robot, target, replace(options, max_solutions=1), self.q).status == "solved"
 
 
 def remedies(request: Request, units: Units = DEFAULT_UNITS) -> Iterator[Remedy | None]:
@@ -88,13 +83,14 @@ def remedies(request: Request, units: Units = DEFAULT_UNITS) -> Iterator[Remedy 
     """
     if request.result.status == "solved":
         return
-    task, locked, branch = request.task, request.locked, request.branch
-    if branch is not None:
-        yield Remedy("branch", "Allow any posture") if request.is_solved_with(task, locked, None) else None
+    options = request.options
+    if options.branch is not None:
+        works = request.is_solved_with(replace(options, branch=None))
+        yield Remedy("branch", "Allow any posture") if works else None
     yield from _unlocking(request)
     # A point out of reach is out of reach in every task.
-    for weaker in WEAKER_TASKS[task] if request.result.distance == 0.0 else ():
-        if request.is_solved_with(weaker, locked, branch):
+    for weaker in WEAKER_TASKS[options.task] if request.result.distance == 0.0 else ():
+        if request.is_solved_with(replace(options, task=weaker)):
             yield Remedy("relax", RELAX_LABELS[weaker], task=weaker)
             break
         yield None
@@ -103,19 +99,23 @@ def remedies(request: Request, units: Units = DEFAULT_UNITS) -> Iterator[Remedy 
 
 def _unlocking(request: Request) -> Iterator[Remedy | None]:
     """Unlocking one joint; if no single one helps, all of them."""
-    locked = request.locked or ()
+    locked = request.options.constraints.locked or ()
     joints = [i for i, value in enumerate(locked) if value is not None]
     helped = False
     for joint in joints:
         rest = tuple(None if i == joint else value for i, value in enumerate(locked))
-        if request.is_solved_with(request.task, rest, request.branch):
+        if request.is_solved_with(_constrained(request.options, rest)):
             helped = True
             yield Remedy("unlock", f"Unlock joint {joint + 1}", joint=joint)
         else:
             yield None
     if len(joints) > 1 and not helped:
-        works = request.is_solved_with(request.task, None, request.branch)
+        works = request.is_solved_with(_constrained(request.options, None))
         yield Remedy("unlock", "Unlock all joints") if works else None
+
+
+def _constrained(options: IKOptions, locked: Locks | None) -> IKOptions:
+    return replace(options, constraints=replace(options.constraints, locked=locked))
 
 
 def _other_targets(request: Request, units: Units) -> Iterator[Remedy]:
@@ -128,7 +128,7 @@ def _other_targets(request: Request, units: Units) -> Iterator[Remedy]:
         yield Remedy("turn", label, f"Turns the target to the nearest possible {what}", np.array(turned.q))
     closest = result.closest
     if closest is not None and (turned is None or not np.allclose(closest.q, turned.q, atol=1e-6)):
-        what = "point" if request.task == "position" else "pose"
+        what = "point" if request.options.task == "position" else "pose"
         hint = f"Moves the target to the nearest reachable {what}: {_distance(request, closest.q, units)} away"
         yield Remedy("move", f"Nearest reachable {what}", hint, np.array(closest.q))
 
@@ -136,7 +136,7 @@ def _other_targets(request: Request, units: Units) -> Iterator[Remedy]:
 def _distance(request: Request, q: Array, units: Units) -> str:
     there = kin.fk(request.robot, q)
     distance = units.distance(float(np.linalg.norm(there[:3, 3] - request.T[:3, 3])))
-    if request.task == "position":
+    if request.options.task == "position":
         return distance
     return f"{distance}, {units.angle(rotation_angle(there[:3, :3], request.T[:3, :3]))}"
 

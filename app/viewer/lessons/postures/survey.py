@@ -7,7 +7,7 @@ limit, which is reported with the joint and the excess, or have no real solution
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
 
@@ -17,7 +17,8 @@ import kin
 from app.viewer.panel.posture import parts, short
 from app.viewer.scene.meshes import JOINT_COLORS, Color
 from app.viewer.views.templates import render
-from kin import IKOptions, IKSolution, JointConstraints, LimitViolation, Robot, Task
+from kin import IKOptions, IKSolution, LimitViolation, Robot
+from kin.ik import solve
 from kin.ik.branches import is_closed, solve_branches, violations_of
 from kin.ik.candidates import OVERRUN
 from kin.ik.problem import IKProblem
@@ -66,19 +67,15 @@ class Posture:
 
 
 def survey(
-    robot: Robot,
-    T: Array,
-    task: Task,
-    q: Array,
-    locked: tuple[float | None, ...] | None = None,
-    units: Units = DEFAULT_UNITS,
+    robot: Robot, T: Array, options: IKOptions, q: Array, units: Units = DEFAULT_UNITS
 ) -> tuple[Posture, ...]:
     """All branches for the target `T` ``(4, 4)``, with the seed `q` ``(n,)``, in the order of `kin.branch_names`.
 
-    An arm whose branches have no names has one posture: the closest one found, if any.
+    Of the options, task and constraints hold, not the branch. An arm whose branches have no names has one posture:
+    the closest one found, if any.
     """
-    target = T[:3, 3] if task == "position" else T
-    result = kin.solve_ik(robot, target, task=task, q_seed=q, locked=locked)
+    options = replace(options, branch=None)
+    result = solve(robot, T[:3, 3] if options.task == "position" else T, options, q)
     solutions: dict[str, IKSolution] = {}
     for found in result.solutions:
         solutions.setdefault(found.branch, found)
@@ -88,7 +85,7 @@ def survey(
         return (
             Posture(CLOSEST, "absent", "none found") if one is None else _available(robot, CLOSEST, one, units),
         )
-    rest = {} if len(solutions) == len(names) else _unavailable(robot, T, task, q, locked, units)
+    rest = {} if len(solutions) == len(names) else _unavailable(robot, T, options, q, units)
     return tuple(
         _available(robot, name, solutions[name], units)
         if name in solutions
@@ -109,13 +106,12 @@ def _available(robot: Robot, name: str, solution: IKSolution, units: Units) -> P
     return Posture(name, state, words, q, margin, joint, value, share)
 
 
-def _unavailable(
-    robot: Robot, T: Array, task: Task, q: Array, locked: tuple[float | None, ...] | None, units: Units
-) -> dict[str, Posture]:
+def _unavailable(robot: Robot, T: Array, options: IKOptions, q: Array, units: Units) -> dict[str, Posture]:
     """The branches that the closed form rules out, and why; empty if it does not cover the task."""
     # An arm of five joints matches point and approach of a pose; its branches are those of that task.
-    kept: Task = "approach" if task == "pose" and robot.n < 6 else task
-    problem = IKProblem.of(robot, T, IKOptions(task=kept, constraints=JointConstraints(locked=locked)), q)
+    if options.task == "pose" and robot.n < 6:
+        options = replace(options, task="approach")
+    problem = IKProblem.of(robot, T, options, q)
     branches = solve_branches(problem, problem.T, problem.code)
     if branches is None:
         return {}

@@ -240,7 +240,7 @@ class RedundancyLesson(Feature):
         """Move the arm to a value of the parameter, unless a joint would jump."""
         stage = self.stage
         assert self._sent is not None
-        result = self_motion(stage.robot, self._T_held, stage.task, self._sent, stage.locked, item.name, value)
+        result = self_motion(stage.robot, self._T_held, stage.options, self._sent, item.name, value)
         best = result.solutions[0] if result.solutions else None
         if best is None or float(np.abs(best.q - self._sent).max()) > SMOOTH:
             self._up, self._target = not self._up, None
@@ -259,10 +259,11 @@ class RedundancyLesson(Feature):
         stage, robot = self.stage, self.stage.robot
         self._read_at = now
         goal = stage.goal
-        key: tuple[object, ...] = (goal.tobytes(), stage.q.tobytes(), stage.task, stage.locked, stage.units)
+        constraints = stage.options.constraints
+        key: tuple[object, ...] = (goal.tobytes(), stage.q.tobytes(), stage.task, constraints, stage.units)
         if key != self._read_key:
             self._read_key, self._changed = key, now
-            self._parameters = redundancy_at(robot, self._T_held, stage.task, goal, stage.locked)
+            self._parameters = redundancy_at(robot, self._T_held, stage.options, goal)
             if not any(item.name == self._name for item in self._parameters):
                 self._name = self._parameters[0].name if self._parameters else ""
             self._show_controls()
@@ -270,7 +271,7 @@ class RedundancyLesson(Feature):
         item = self._item
         # The ranges of an arm angle depend on the target and the branch; they are constant during a self-motion.
         ends_key: tuple[object, ...] = (
-            self._T_held.tobytes(), stage.task, stage.locked, stage.units,
+            self._T_held.tobytes(), stage.task, constraints, stage.units,
             None if item is None else (item.name, np.round(item.intervals, 6).tobytes()),
         )  # fmt: skip
         if ends_key == self._ends_key:
@@ -279,7 +280,7 @@ class RedundancyLesson(Feature):
             self._wake(QUIET - (now - self._changed))
             return
         self._ends_key = ends_key
-        self._ends = () if item is None else ends(robot, self._T_held, stage.task, goal, stage.locked, item)
+        self._ends = () if item is None else ends(robot, self._T_held, stage.options, goal, item)
         update_html(self._limits, "" if item is None else views.limits_html(robot, self._ends, stage.units))
         self._drawing.show_ring(goal, item, self._ends)
 

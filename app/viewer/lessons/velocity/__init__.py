@@ -238,12 +238,11 @@ class VelocityLesson(Feature):
     def _jog(self, axis: int, sign: int) -> None:
         stage = self.stage
         amount = sign * (self._step if axis < 3 else self._turn)
-        request = (stage.robot, stage.goal.tobytes(), stage.task, axis, amount, self._frame, stage.locked)
+        options = stage.options
+        request = (stage.robot, stage.goal.tobytes(), options, axis, amount, self._frame)
         if request == self._refused:
             return  # a button held at a limit: the same request would be solved ten times a second
-        made: Step = step(
-            stage.robot, stage.goal, stage.task, axis, amount, self._frame, stage.locked, stage.units
-        )
+        made: Step = step(stage.robot, stage.goal, options, axis, amount, self._frame, stage.units)
         if made.q is None:
             self._refused = request
             stage.notify(made.notice)

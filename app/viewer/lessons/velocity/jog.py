@@ -1,14 +1,13 @@
 """Jogging: the tool moves by one step along or about an axis, and the joints follow on their branch.
 
 A step is made exactly or not at all. It is not made either if a joint would have to jump, as it does for a short
-step
-near a singularity: the motion between the two configurations would swing the tool away.
+step near a singularity: the motion between the two configurations would swing the tool away.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -16,12 +15,12 @@ import numpy as np
 import kin
 from app.viewer.panel.joints import label
 from app.viewer.panel.status import Notice, notice
-from kin import IKResult, IKSolution, Robot, Task
+from kin import IKOptions, IKResult, IKSolution, Robot, Task
+from kin.ik import solve
 from kin.transforms import Array, rotation_from_wxyz, vector_angle
 from kin.units import DEFAULT_UNITS, Units
 
 Frame = Literal["base", "tool"]
-Locked = tuple[float | None, ...] | None
 NAMES = ("x", "y", "z", "rx", "ry", "rz")
 BUTTONS = tuple((axis, sign) for axis in range(6) for sign in (-1, 1))
 
@@ -59,27 +58,26 @@ def moved(T_base_tool: Array, axis: int, amount: float, frame: Frame) -> Array:
 def step(
     robot: Robot,
     q: Array,
-    task: Task,
+    options: IKOptions,
     axis: int,
     amount: float,
     frame: Frame,
-    locked: Locked = None,
     units: Units = DEFAULT_UNITS,
 ) -> Step:
-    """One step of `amount` (m or rad) from q ``(n,)``; `locked` as `kin.solve_ik` takes it.
+    """One step of `amount` (m or rad) from q ``(n,)``; of the options, task and constraints hold, not the branch.
 
     An arm with fewer than six joints cannot keep the roll, one with fewer than five the orientation; the step is
     then made nevertheless, and the message reports the error.
     """
     T = kin.fk(robot, q)
     goal = moved(T, axis, amount, frame)
-    if axis > 2 and (why := _not_in_task(task, T, goal)):
+    if axis > 2 and (why := _not_in_task(options.task, T, goal)):
         return Step(None, Notice("hand", "Not moved", why))
-    target = goal[:3, 3] if task == "position" else goal
+    target = goal[:3, 3] if options.task == "position" else goal
     # The arm may pass through a singularity to another branch, as long as the joints move smoothly.
     refused: list[Step] = []
     for branch in ("seed", None) if kin.branch_names(robot) else (None,):
-        result = kin.solve_ik(robot, target, task=task, q_seed=q, branch=branch, locked=locked, max_solutions=1)
+        result = solve(robot, target, replace(options, branch=branch, max_solutions=1), q)
         found = _to_step(robot, q, T, axis, amount, frame, result, units)
         if found.q is not None:
             return found

@@ -25,6 +25,7 @@ from app.viewer.tabs.workspace.cut import Cut
 from app.viewer.tabs.workspace.send_window import SendWindow
 from app.viewer.tabs.workspace.settings import WorkspaceSettings
 from kin import Robot
+from kin.ik.options import FREE
 
 REPORT = 0.2  # s between two reports of progress
 REST = 0.25  # s between two ticks while waiting for something that wakes the worker by itself
@@ -72,7 +73,7 @@ class CloudView:
         """Sample a new cloud, or continue a paused one if only its look was changed; whether it is a new one."""
         cloud = Cloud(
             self._stage.robot, self.settings.n, self.settings.seed, self.settings.strategy,
-            locked=self._stage.locked,
+            constraints=self._stage.options.constraints,
         )  # fmt: skip
         if self.nodes and not self._running and self.unfinished and self._is_shown(cloud):
             self._run(True)
@@ -81,7 +82,7 @@ class CloudView:
         self._set_clock(True)
         self.nodes = [self._add(cloud, 0)]
         if self.other is not None:
-            self.nodes.append(self._add(replace(cloud, robot=self.other, locked=None), 1))
+            self.nodes.append(self._add(replace(cloud, robot=self.other, constraints=FREE), 1))
         self.report()
         return True
 
@@ -204,8 +205,8 @@ class CloudView:
             if self.busy and not self._running:
                 state = "recolouring"
         speed = drawn / elapsed if elapsed > 0.0 else 0.0
-        locked = self.nodes[0].cloud.locked if self.nodes else self._stage.locked
-        line = views.progress(state, drawn, total or self.settings.n, speed, locked)
+        constraints = self.nodes[0].cloud.constraints if self.nodes else self._stage.options.constraints
+        line = views.progress(state, drawn, total or self.settings.n, speed, constraints.locked)
         percent = round(100.0 * drawn / total, 1) if total else 0.0
         update_html(self._controls.line, line)
         if self._controls.bar.value != percent:
@@ -246,7 +247,7 @@ class CloudView:
             own = self.nodes[0].cloud
             if self.nodes[0].parts == own.parts and not self._running:
                 self._set_clock(True)
-            self.nodes.append(self._add(replace(own, robot=other, measures=(), locked=None), 1))
+            self.nodes.append(self._add(replace(own, robot=other, measures=(), constraints=FREE), 1))
 
     def show_legend(self) -> None:
         """Update the legend. It is empty without points, because it needs sampled data."""

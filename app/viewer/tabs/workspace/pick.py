@@ -111,7 +111,11 @@ class PointPicker:
             q = None
             if best is not None:
                 q = kin.configuration_at(
-                    cloud.robot, best.index, seed=cloud.seed, strategy=cloud.strategy, locked=cloud.locked
+                    cloud.robot,
+                    best.index,
+                    seed=cloud.seed,
+                    strategy=cloud.strategy,
+                    locked=cloud.constraints.locked,
                 )
             self._post("picked", (number, cloud, best, q, size))
 
@@ -140,7 +144,7 @@ class PointPicker:
         """Show the picked point in the present units."""
         if self._picked is not None:
             cloud, index, q, point = self._picked
-            content = views.picked(cloud.robot, cloud.locked, index, q, point, self._stage.units)
+            content = views.picked(cloud.robot, cloud.constraints.locked, index, q, point, self._stage.units)
             update_html(self._controls.picked, content)
 
     def clear(self) -> None:

@@ -10,12 +10,12 @@ from markupsafe import Markup
 import kin
 from app.viewer.views.templates import render
 from kin import Robot
+from kin.ik.options import Locks
 from kin.transforms import Array
 from kin.units import Units
 from kin.workspace.clouds.measures import measured
 from kin.workspace.region import Region
 
-Locks = tuple[float | None, ...] | None
 State = Literal["ready", "preparing", "running", "paused", "recolouring", "done"]
 SYMBOLS: dict[State, str] = {
     "ready": "○",
@@ -43,13 +43,13 @@ def rate(points_per_second: float) -> str:
     return f"{points_per_second:.3g} "
 
 
-def locks(locked: Locks) -> str:
+def locks(locked: Locks | None) -> str:
     """The joints locked in a cloud or a map, in words; empty if none."""
     joints = [str(i + 1) for i, value in enumerate(locked or ()) if value is not None]
     return f"joint{'s' if len(joints) > 1 else ''} {', '.join(joints)} locked" if joints else ""
 
 
-def progress(state: State, drawn: int, total: int, speed: float, locked: Locks = None) -> str:
+def progress(state: State, drawn: int, total: int, speed: float, locked: Locks | None = None) -> str:
     """The line below the progress bar, and a second line if joints are locked."""
     return render(
         "workspace/progress",
@@ -62,7 +62,7 @@ def progress(state: State, drawn: int, total: int, speed: float, locked: Locks =
     )
 
 
-def picked(robot: Robot, locked: Locks, index: int, q: Array, point: Array, units: Units) -> str:
+def picked(robot: Robot, locked: Locks | None, index: int, q: Array, point: Array, units: Units) -> str:
     """The numbers of the clicked point of a cloud with these joints locked."""
     manipulability = float(kin.manipulability(robot, q))
     margin = float(measured(Region.of(robot, None, locked), "limits", np.asarray(q)[None])[0])

@@ -42,7 +42,7 @@ def home(robot: kin.Robot) -> np.ndarray:
 def test_the_list_agrees_with_the_core_for_every_branch(robot: kin.Robot) -> None:
     T = home(robot)
     task: kin.Task = "approach" if robot.n < 6 else "pose"
-    found = survey(robot, T, task, robot.q_home)
+    found = survey(robot, T, kin.IKOptions(task=task), robot.q_home)
     assert tuple(p.name for p in found) == kin.branch_names(robot)
     blocked = 0
     for posture in found:
@@ -69,12 +69,14 @@ def test_the_list_agrees_with_the_core_for_every_branch(robot: kin.Robot) -> Non
 
 
 def test_the_excess_over_a_limit_follows_the_units() -> None:
-    found = survey(PIONEER, home(PIONEER), "approach", PIONEER.q_home)
+    found = survey(PIONEER, home(PIONEER), kin.IKOptions(task="approach"), PIONEER.q_home)
     worst = next(p for p in found if p.state == "blocked")
     assert worst.q is not None
     over = np.maximum(worst.q - PIONEER.upper, PIONEER.lower - worst.q).max()
     assert f"by {math.degrees(over):.1f}°" in worst.words
-    radians = survey(PIONEER, home(PIONEER), "approach", PIONEER.q_home, units=Units(degrees=False))
+    radians = survey(
+        PIONEER, home(PIONEER), kin.IKOptions(task="approach"), PIONEER.q_home, units=Units(degrees=False)
+    )
     assert f"by {over:.3f} rad" in next(p for p in radians if p.name == worst.name).words
 
 
@@ -86,7 +88,7 @@ def test_the_distance_to_a_missed_target_follows_the_units(length: str) -> None:
     why = remedies.html(result, None, units)
     assert f"Out of reach by {units.distance(result.distance)}" in why
     assert "mm" not in why
-    found = remedies.remedies(Request(PUMA, T, "position", PUMA.q_home, None, None, result), units)
+    found = remedies.remedies(Request(PUMA, T, kin.IKOptions(task="position"), PUMA.q_home, result), units)
     (move,) = [fix for fix in found if fix is not None and fix.kind == "move"]
     assert re.search(rf" \d+\.\d+ {length} away$", move.hint)
 
@@ -95,14 +97,14 @@ def test_a_blocking_lock_is_reported_as_a_lock() -> None:
     T = home(PUMA)
     other = next(s for s in kin.solve_ik(PUMA, T).solutions if abs(s.q[0] - PUMA.q_home[0]) > 0.5)
     locked = (float(PUMA.q_home[0]), *(None,) * 5)
-    found = survey(PUMA, T, "pose", PUMA.q_home, locked)
+    found = survey(PUMA, T, kin.IKOptions(constraints=kin.JointConstraints(locked=locked)), PUMA.q_home)
     assert "joint 1 is locked" in next(p for p in found if p.name == other.branch).words
 
 
 def test_a_compromise_names_its_error() -> None:
     T = home(PIONEER)
     T[:3, :3] = T[:3, :3] @ np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
-    found = survey(PIONEER, T, "pose", PIONEER.q_home)
+    found = survey(PIONEER, T, kin.IKOptions(), PIONEER.q_home)
     assert any(p.state == "compromise" and p.words == "roll off by 90.0°" for p in found)
 
 
@@ -113,11 +115,11 @@ def test_the_margin_is_the_distance_to_the_nearest_limit() -> None:
 
 
 def test_an_arm_without_named_branches_lists_the_nearest_posture() -> None:
-    (only,) = survey(PANDA, home(PANDA), "pose", PANDA.q_home)
+    (only,) = survey(PANDA, home(PANDA), kin.IKOptions(), PANDA.q_home)
     assert only.available
     far = home(PANDA)
     far[:3, 3] *= 5
-    assert [p.state for p in survey(PANDA, far, "pose", PANDA.q_home)] == ["absent"]
+    assert [p.state for p in survey(PANDA, far, kin.IKOptions(), PANDA.q_home)] == ["absent"]
 
 
 def test_the_row_of_the_list_is_escaped_and_marked() -> None:
@@ -150,12 +152,9 @@ def remedies_for(
 ) -> list[Remedy]:
     target = T[:3, 3] if task == "position" else T
     q = robot.q_home
-    result = kin.solve_ik(robot, target, task=task, q_seed=q, locked=locked, branch=branch)
-    return [
-        remedy
-        for remedy in remedies.remedies(Request(robot, T, task, q, locked, branch, result))
-        if remedy is not None
-    ]
+    options = kin.IKOptions(task=task, constraints=kin.JointConstraints(locked=locked), branch=branch)
+    result = kin.ik.solve(robot, target, options, q)
+    return [remedy for remedy in remedies.remedies(Request(robot, T, options, q, result)) if remedy is not None]
 
 
 def test_a_reached_target_has_no_remedies() -> None:
@@ -191,7 +190,7 @@ def test_a_blocking_lock_and_a_blocking_branch_are_named() -> None:
     locked = (float(PUMA.q_home[0]), *(None,) * 5)
     kinds = [(fix.kind, fix.joint) for fix in remedies_for(PUMA, T, locked=locked)]
     assert kinds[0] == ("unlock", 0)
-    blocked = next(p for p in survey(PUMA, home(PUMA), "pose", PUMA.q_home) if p.state == "blocked")
+    blocked = next(p for p in survey(PUMA, home(PUMA), kin.IKOptions(), PUMA.q_home) if p.state == "blocked")
     assert remedies_for(PUMA, home(PUMA), branch=blocked.name)[0].kind == "branch"
 
 
@@ -269,13 +268,13 @@ def test_the_list_marks_the_branch_the_arm_is_on(tab: FakeBrowser) -> None:
     tab.choose(PUMA.name)
     assert tuple(rows(tab)) == kin.branch_names(PUMA)
     assert here(tab) == kin.branch_of(PUMA, PUMA.q_home)
-    expected = {p.name: p.state for p in survey(PUMA, home(PUMA), "pose", PUMA.q_home)}
+    expected = {p.name: p.state for p in survey(PUMA, home(PUMA), kin.IKOptions(), PUMA.q_home)}
     assert rows(tab) == expected
 
 
 def test_a_click_on_a_ghost_morphs_the_arm_into_it(tab: FakeBrowser) -> None:
     tab.choose(PUMA.name)
-    postures = survey(PUMA, home(PUMA), "pose", PUMA.q_home)
+    postures = survey(PUMA, home(PUMA), kin.IKOptions(), PUMA.q_home)
     index = next(i for i, p in enumerate(postures) if p.available and p.name != here(tab))
     wanted = postures[index]
     tab.click(ghosts(tab)[str(index + 1)])
@@ -330,7 +329,7 @@ def test_the_list_follows_the_target_and_is_not_sent_again_unchanged(tab: FakeBr
     tab.release()
     tab.settle(0.6)
     q = q_of(tab, PUMA)
-    assert rows(tab) == {p.name: p.state for p in survey(PUMA, tab.tool_pose(), "pose", q)}
+    assert rows(tab) == {p.name: p.state for p in survey(PUMA, tab.tool_pose(), kin.IKOptions(), q)}
     tab.log.clear()
     tab.settle(0.5)
     assert not tab.log

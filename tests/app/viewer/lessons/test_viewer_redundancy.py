@@ -39,22 +39,22 @@ def test_redundancy_parameters_are_those_that_can_be_requested() -> None:
     straight = np.array([0.3, -0.9, 1.1, 0.4, 0.0, 0.2])
     T = kin.fk(UR5, straight)
     assert kin.solve_ik(UR5, T, q_seed=straight, branch="seed").redundancy, "free at the singularity only"
-    assert self_motion.redundancy_at(UR5, T, "pose", straight, None) == ()
-    free = self_motion.redundancy_at(PIONEER, home(PIONEER), "position", PIONEER.q_home, None)
+    assert self_motion.redundancy_at(UR5, T, kin.IKOptions(), straight) == ()
+    free = self_motion.redundancy_at(PIONEER, home(PIONEER), kin.IKOptions(task="position"), PIONEER.q_home)
     assert [item.name for item in free] == ["theta4", "theta5"]
 
 
 @pytest.mark.parametrize("robot", [SRS, IIWA, PRINTED], ids=lambda robot: robot.id)
 def test_each_end_of_a_range_is_a_limit_of_the_named_joint(robot: kin.Robot) -> None:
     T, q = home(robot), robot.q_home
-    (item,) = self_motion.redundancy_at(robot, T, "pose", q, None)
-    found = self_motion.ends(robot, T, "pose", q, None, item)
+    (item,) = self_motion.redundancy_at(robot, T, kin.IKOptions(), q)
+    found = self_motion.ends(robot, T, kin.IKOptions(), q, item)
     assert len(found) == 2 * len(item.intervals)
     for end in found:
         inside = math.copysign(1e-6, item.value - end.value)
         if not any(low <= end.value + inside <= high for low, high in item.intervals):
             inside = -inside
-        result = self_motion.self_motion(robot, T, "pose", q, None, item.name, end.value + inside)
+        result = self_motion.self_motion(robot, T, kin.IKOptions(), q, item.name, end.value + inside)
         there = result.solutions[0].q
         room = min(there[end.joint] - robot.lower[end.joint], robot.upper[end.joint] - there[end.joint])
         assert abs(room) < 1e-4
@@ -83,7 +83,7 @@ def test_the_elbow_is_on_its_circle_at_the_arm_angle(robot: kin.Robot) -> None:
     for q in robot.random_q(rng, 10):
         circle = elbow_circle(robot, q)
         assert circle is not None
-        (free,) = self_motion.redundancy_at(robot, kin.fk(robot, q), "pose", q, None)
+        (free,) = self_motion.redundancy_at(robot, kin.fk(robot, q), kin.IKOptions(), q)
         points = kin.link_frames(robot, q)[:, :3, 3]
         assert np.linalg.norm(points - circle.at(free.value), axis=1).min() < 1e-9
         for point in (circle.shoulder, circle.wrist):
@@ -114,7 +114,7 @@ def test_coaxial_joints_may_have_opposite_directions(joint: int) -> None:
     robot = with_joint_turned_round(PRINTED, joint)
     assert coaxial(robot)
     q = robot.q_home + 0.3
-    (free,) = self_motion.redundancy_at(robot, kin.fk(robot, q), "pose", q, None)
+    (free,) = self_motion.redundancy_at(robot, kin.fk(robot, q), kin.IKOptions(), q)
     (low, high) = free.intervals[0]
     rays = []
     for value in (low + 1e-3, 0.5 * (low + high), high - 1e-3):
@@ -189,7 +189,7 @@ def test_residuals_are_measured_by_the_task_and_never_rounded_to_nothing() -> No
 
 def test_the_redundancy_is_explained_for_every_arm_and_task() -> None:
     def idea(robot: kin.Robot, task: kin.Task) -> str:
-        free = self_motion.redundancy_at(robot, home(robot), task, robot.q_home, None)
+        free = self_motion.redundancy_at(robot, home(robot), kin.IKOptions(task=task), robot.q_home)
         elbow = elbow_circle(robot, robot.q_home) is not None
         return views.idea(robot, task, free, coaxial(robot), elbow)
 
@@ -248,7 +248,7 @@ def test_the_tool_stays_in_every_frame_of_a_swing(tab: FakeBrowser, robot: kin.R
 
 def test_the_end_of_the_range_names_the_joint(tab: FakeBrowser) -> None:
     tab.choose(SRS.name)
-    (free,) = self_motion.redundancy_at(SRS, home(SRS), "pose", SRS.q_home, None)
+    (free,) = self_motion.redundancy_at(SRS, home(SRS), kin.IKOptions(), SRS.q_home)
     swing(tab, free_label(tab), 170)
     assert tab.value(free_label(tab)) == pytest.approx(math.degrees(free.intervals[0][1]), abs=0.1)
     assert "Joint 6 is at its limit" in tab.html
@@ -260,7 +260,7 @@ def test_the_ring_is_drawn_with_its_ends_and_removed_with_the_lesson(tab: FakeBr
     tab.wait(lambda: any("/feasible-" in n for n in tab.nodes))
     tab.wait(lambda: sum("/end-" in n and n.endswith("-name") for n in tab.nodes) == 2)
     circle = elbow_circle(SRS, SRS.q_home)
-    (free,) = self_motion.redundancy_at(SRS, home(SRS), "pose", SRS.q_home, None)
+    (free,) = self_motion.redundancy_at(SRS, home(SRS), kin.IKOptions(), SRS.q_home)
     assert circle is not None
     label_at = [tab.local(n)[:3, 3] for n in tab.nodes if "/end-" in n and n.endswith("-name")]
     expected = [circle.at(value) - circle.center for value in free.intervals[0]]

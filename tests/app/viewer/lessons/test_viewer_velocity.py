@@ -159,7 +159,7 @@ def test_a_step_moves_the_tool_exactly(six_joints: kin.Robot, axis: int, frame: 
     robot = six_joints
     amount = 0.004 if axis < 3 else math.radians(1.5)
     T = kin.fk(robot, robot.q_home)
-    made = step(robot, robot.q_home, "pose", axis, amount, frame)
+    made = step(robot, robot.q_home, kin.IKOptions(), axis, amount, frame)
     assert made.q is not None, made.notice
     after = kin.fk(robot, made.q)
     wanted = moved(T, axis, amount, frame)
@@ -177,26 +177,26 @@ def test_a_step_moves_the_tool_exactly(six_joints: kin.Robot, axis: int, frame: 
 def test_five_joints_keep_point_and_approach_and_report_the_error() -> None:
     robot = STORE.get("pioneer5")
     T = kin.fk(robot, robot.q_home)
-    made = step(robot, robot.q_home, "pose", 0, 0.01, "base")
+    made = step(robot, robot.q_home, kin.IKOptions(), 0, 0.01, "base")
     assert made.q is not None
     after = kin.fk(robot, made.q)
     assert after[:3, 3] - T[:3, 3] == pytest.approx([0.01, 0.0, 0.0], abs=1e-8)
     assert vector_angle(after[:3, 2], T[:3, 2]) < 1e-8
     assert made.notice.kind == "compromise"
     assert "roll is off by" in made.notice.detail
-    roll = step(robot, robot.q_home, "pose", 5, 0.02, "tool")
+    roll = step(robot, robot.q_home, kin.IKOptions(), 5, 0.02, "tool")
     assert roll.q is None
     assert "5 joints cannot" in roll.notice.detail
-    assert step(robot, robot.q_home, "approach", 0, 0.01, "base").notice.kind == "reached"
+    assert step(robot, robot.q_home, kin.IKOptions(task="approach"), 0, 0.01, "base").notice.kind == "reached"
 
 
 def test_directions_outside_the_task_are_not_jogged() -> None:
     robot = STORE.get("irb120")
     for task, axis, frame in (("position", 3, "base"), ("approach", 5, "tool")):
-        made = step(robot, robot.q_home, task, axis, 0.02, frame)
+        made = step(robot, robot.q_home, kin.IKOptions(task=task), axis, 0.02, frame)
         assert made.q is None
         assert "leaves" in made.notice.detail
-    made = step(robot, robot.q_home, "position", 1, 0.01, "base")
+    made = step(robot, robot.q_home, kin.IKOptions(task="position"), 1, 0.01, "base")
     assert made.q is not None
     assert made.notice.kind == "reached"
 
@@ -204,16 +204,16 @@ def test_directions_outside_the_task_are_not_jogged() -> None:
 def test_a_scara_lifts_and_swings_but_does_not_tilt() -> None:
     robot = STORE.get("scara")
     for axis, amount in ((0, -0.005), (2, -0.005), (5, 0.02)):
-        made = step(robot, robot.q_home, "pose", axis, amount, "base")
+        made = step(robot, robot.q_home, kin.IKOptions(), axis, amount, "base")
         assert made.q is not None, (axis, made.notice)
-    made = step(robot, robot.q_home, "pose", 3, 0.02, "base")
+    made = step(robot, robot.q_home, kin.IKOptions(), 3, 0.02, "base")
     assert made.q is None
     assert "Not moved" in made.notice.title
 
 
 def test_at_a_limit_or_out_of_reach_jogging_is_refused_with_the_reason() -> None:
     robot = STORE.get("irb120")
-    made = step(robot, robot.q_home, "pose", 2, 5.0, "base")
+    made = step(robot, robot.q_home, kin.IKOptions(), 2, 5.0, "base")
     assert made.q is None
     assert made.notice.title.startswith("Not moved: out of reach")
     scara = STORE.get("scara")
@@ -222,7 +222,7 @@ def test_at_a_limit_or_out_of_reach_jogging_is_refused_with_the_reason() -> None
     for end, sign in ((scara.lower[slide], -1.0), (scara.upper[slide], 1.0)):
         q[slide] = end
         down = kin.jacobian(scara, q)[2, slide] * sign
-        made = step(scara, q, "pose", 2, 0.02 * math.copysign(1.0, down), "base")
+        made = step(scara, q, kin.IKOptions(), 2, 0.02 * math.copysign(1.0, down), "base")
         assert made.q is None
         assert "Not moved: outside the limits" in made.notice.title
         assert made.notice.detail
@@ -232,7 +232,7 @@ def test_a_jump_of_the_joints_is_refused_as_a_jump() -> None:
     robot = STORE.get("irb120")
     q = robot.q_home.copy()
     q[4] = math.radians(0.5)
-    sideways = [step(robot, q, "pose", axis, math.radians(2.0), "tool") for axis in (3, 4)]
+    sideways = [step(robot, q, kin.IKOptions(), axis, math.radians(2.0), "tool") for axis in (3, 4)]
     refused = [made for made in sideways if made.q is None]
     assert refused
     assert "a joint would have to jump" in refused[0].notice.title
@@ -242,11 +242,15 @@ def test_a_jump_of_the_joints_is_refused_as_a_jump() -> None:
 def test_a_locked_joint_stays_where_it_is() -> None:
     robot = STORE.get("iiwa14")
     locked = tuple(float(v) if i == 2 else None for i, v in enumerate(robot.q_home))
-    made = step(robot, robot.q_home, "pose", 0, 0.005, "base", locked)
+    made = step(
+        robot, robot.q_home, kin.IKOptions(constraints=kin.JointConstraints(locked=locked)), 0, 0.005, "base"
+    )
     assert made.q is not None
     assert made.q[2] == robot.q_home[2]
     all_locked = tuple(robot.q_home.tolist())
-    made = step(robot, robot.q_home, "pose", 0, 0.005, "base", all_locked)
+    made = step(
+        robot, robot.q_home, kin.IKOptions(constraints=kin.JointConstraints(locked=all_locked)), 0, 0.005, "base"
+    )
     assert made.q is None
     assert made.notice.title.startswith("Not moved")
 

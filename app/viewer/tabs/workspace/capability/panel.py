@@ -54,7 +54,7 @@ class Capability:
         self._reader: Subscription[CapabilityMap] | None = None
         self._state: views.State = "ready"
         self._blocks = (0, 0)
-        self._locked = stage.locked  # joints locked in the map
+        self._locked = stage.options.constraints.locked  # joints locked in the map
         self._found: CapabilityMap | None = None
         self._voxels: Voxels | None = None
         self._drawn = 0.0
@@ -121,9 +121,9 @@ class Capability:
         self.clear()
         settings, stage = self._settings, self._stage
         self._reader = stage.maps.subscribe(
-            MapRequest(stage.robot, settings.resolution, settings.directions, locked=stage.locked)
+            MapRequest(stage.robot, settings.resolution, settings.directions, stage.options.constraints)
         )
-        self._locked = stage.locked
+        self._locked = stage.options.constraints.locked
         self._state = "waiting"
         self._report()
 

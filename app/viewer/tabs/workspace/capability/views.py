@@ -10,9 +10,10 @@ from markupsafe import Markup
 from app.viewer.tabs.workspace import colours
 from app.viewer.tabs.workspace.capability.settings import By
 from app.viewer.tabs.workspace.capability.voxels import LEVELS, first_level, largest, levels, values_of
-from app.viewer.tabs.workspace.views import GAP, Locks, grouped, locks
+from app.viewer.tabs.workspace.views import GAP, grouped, locks
 from app.viewer.views.templates import render
 from kin import CapabilityMap
+from kin.ik.options import Locks
 from kin.units import Units
 from kin.workspace.capability.evaluation import ROLLS, STARTS, Method
 
@@ -62,7 +63,7 @@ def legend(found: CapabilityMap, by: By, name: str, least: float) -> str:
     )
 
 
-def facts(found: CapabilityMap, locked: Locks, complete: bool, units: Units) -> str:
+def facts(found: CapabilityMap, locked: Locks | None, complete: bool, units: Units) -> str:
     """Size and shares, which joints were locked, and how certain a missing direction is."""
     count, share = len(found.index), found.share
     best = float(found.manipulability.max(initial=0.0))
