@@ -189,19 +189,7 @@ RULES: dict[Rule, Sources] = {
     import_circles: CODE,
 }
 
-KNOWN: dict[Rule, set[str]] = {
-    banned_words: {
-        "tests/kin/ik/test_ik_options.py: wish",
-        "tests/kin/solvers/test_families.py: told",
-        "tests/kin/solvers/test_numeric.py: told",
-        "tests/kin/solvers/test_point5.py: told",
-        "tests/kin/solvers/test_point5.py: wish",
-        "tests/kin/solvers/test_reversed.py: told",
-        "tests/kin/test_axes.py: told",
-        "tests/kin/test_singularity.py: told",
-        "tests/kin/test_singularity.py: wish",
-    },
-}
+KNOWN: dict[Rule, set[str]] = {}
 
 
 @pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.__name__)

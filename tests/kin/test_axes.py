@@ -47,7 +47,7 @@ SQUARE = math.pi / 2
         ("ur5", (), ((1, 3),)),
     ],
 )
-def test_the_built_in_arms_are_what_their_books_say(robot_id, spherical, parallel):
+def test_the_built_in_arms_agree_with_their_books(robot_id, spherical, parallel):
     robot = kin.get_robot(robot_id)
     assert axes.spherical_groups(robot) == spherical
     assert axes.parallel_groups(robot) == parallel
@@ -116,7 +116,7 @@ def test_fixed_rows_base_and_tool_change_nothing():
         ((0.1, 0.02, 1.0), ""),
     ],
 )
-def test_what_was_meant_but_rounded_is_told(row, almost):
+def test_almost_special_axes_are_reported(row, almost):
     (pair, _) = axes.pairs(arm(row, (0.2, 0.3, SQUARE), (0.1, 0.2, 0.4)))
     assert pair.almost == almost
     assert (pair.parallel, pair.perpendicular, pair.intersect) == (False, False, False)

@@ -6,8 +6,8 @@ A drag is a row of targets, each answer seeding the next, as in the viewer. Two 
 - a target that a descent from the seed reaches is reached (no freeze);
 - a step, as the 2-norm of the joints' steps, is no longer than twice what that descent shows to be enough, plus
   0.1 rad (no flip). The descent is a witness written here from `fk` and `jacobian` alone, free to use any branch
-  and any redundancy. Where a joint must whirl, the witness whirls, too. Twice, as the shortest way is not the only
-  wish: an elbow that stays where it is is worth some.
+  and any redundancy. Where a joint must turn fast, the witness shows it, too.
+  Twice, as the shortest way is not the only criterion: keeping the elbow in place has some weight.
 
 Where the targets come from a joint path that crosses the singularity, a small step exists at every target, and an
 arm that cannot drift off the path must stay within a small multiple of the path's own step.
@@ -113,11 +113,11 @@ def anywhere(robot, rng):
     return rng.uniform(-math.pi, math.pi, robot.n)
 
 
-# Where they are
+# Singular sets
 
 
 @pytest.mark.parametrize(("robot_id", "kind", "words"), SINGULAR, ids=ids(SINGULAR))
-def test_on_a_singular_set_the_arm_loses_a_motion_and_is_told_so_first(robot_id, kind, words):
+def test_on_a_singular_set_the_arm_loses_a_motion_and_that_set_comes_first(robot_id, kind, words):
     robot = kin.get_robot(robot_id)
     rng = np.random.default_rng(1)
     for _ in range(200):
@@ -132,7 +132,7 @@ def test_on_a_singular_set_the_arm_loses_a_motion_and_is_told_so_first(robot_id,
 
 @pytest.mark.parametrize(("robot_id", "kind", "words"), SINGULAR, ids=ids(SINGULAR))
 @pytest.mark.parametrize("off", [1e-6, 1e-3, 0.1])
-def test_distance_is_the_angle_or_the_length_that_is_missing(robot_id, kind, words, off):
+def test_the_distance_is_the_remaining_angle_or_length(robot_id, kind, words, off):
     robot = kin.get_robot(robot_id)
     rng = np.random.default_rng(2)
     for _ in range(50):
@@ -162,7 +162,7 @@ FLOOR = {"pioneer5": (0.03, 1), "redundant7": (0.009, 2), "redundant7-craig": (0
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 @given(data=st.data())
 def test_elsewhere_the_arm_loses_nothing(robot_id, data):
-    """The smallest singular value vanishes with the distances told, hence nowhere else."""
+    """The smallest singular value vanishes with the reported distances, hence nowhere else."""
     robot = kin.get_robot(robot_id)
     near = st.tuples(st.integers(-2, 2), st.floats(-1.0, 1.0), st.integers(0, 6))
     joint = st.one_of(
@@ -207,7 +207,7 @@ def test_over_the_shoulder_the_arm_angle_loses_its_reference_and_the_arm_no_moti
 
 
 def test_only_a_long_forearm_brings_the_wrist_back_to_a_doubled_axis():
-    """d3 > d5 as printed: never. With a longer forearm: θ3 square and the wrist centre on axis 1."""
+    """d3 > d5 as printed: never. With a longer forearm: θ3 = ±90° and the wrist centre on axis 1."""
     robot = kin.get_robot("redundant7")
     assert {s.kind for s in singularities(robot, robot.q_home)} == {"elbow", "shoulder", "wrist"}
     long = replace(robot, rows=tuple(replace(r, d=0.4) if r.d == 0.31 else r for r in robot.rows))
@@ -269,7 +269,7 @@ def test_manipulability_of_the_srs_arm():
         assert kin.manipulability(robot, q) == pytest.approx(wanted, rel=1e-9, abs=1e-14)
 
 
-# What is told
+# Reports
 
 
 @pytest.mark.parametrize("robot_id", kin.builtin_robots())
@@ -337,8 +337,8 @@ def only(robot, q):
     return found[0]
 
 
-def test_six_joints_without_a_closed_form_are_told_by_the_whole_jacobian():
-    # A leaning second axis: no closed form here knows the arm.
+def test_six_joints_without_a_closed_form_are_judged_by_the_whole_jacobian():
+    # A leaning second axis: no closed form fits the arm.
     robot = arm(
         (0.3, 0, 60), (0, 0.4, 0), (0, 0, 90), (0.3, 0, -90), (0, 0, 90), (0.1, 0, 0), home=[0, 0, 0, 0, 0, 0]
     )
@@ -350,7 +350,7 @@ def test_six_joints_without_a_closed_form_are_told_by_the_whole_jacobian():
         assert only(robot, q).distance <= 1e-12
 
 
-def test_five_joints_without_a_closed_form_are_told_by_point_and_approach():
+def test_five_joints_without_a_closed_form_are_judged_by_point_and_approach():
     # Base, three parallel axes, roll: the roll changes nothing about point and approach, so rank 4 is usual.
     robot = arm((0.1, 0, 90), (0, 0.3, 0), (0, 0.3, 0), (0, 0.05, 90), (0.2, 0, 0), home=[0, 0, 0, 0, 0])
     assert closed_form_of(robot) is None
@@ -362,7 +362,7 @@ def test_five_joints_without_a_closed_form_are_told_by_point_and_approach():
     assert only(robot, q).distance <= 1e-12
 
 
-def test_few_joints_are_told_by_the_point():
+def test_few_joints_are_judged_by_the_point():
     robot = arm((0.3, 0, 90), (0, 0.4, 0), (0, 0.3, 0), home=[0, 0, 0])
     q = np.array([0.1, 0.2, 0.9])
     J = kin.jacobian(robot, q)[:3]
@@ -372,7 +372,7 @@ def test_few_joints_are_told_by_the_point():
     assert "3 × 3" in long(only(robot, q))
 
 
-def test_a_flat_arm_is_not_blamed_for_staying_in_its_plane():
+def test_a_planar_arm_is_regular_although_it_stays_in_its_plane():
     robot = arm((0, 0.4, 0), (0, 0.3, 0), (0, 0.2, 0), (0, 0.1, 0), home=[0, 0, 0, 0])
     assert only(robot, [0.1, 0.7, -0.4, 0.3]).distance > 0.05
     assert only(robot, [0.1, 0.0, 0.0, 0.0]).distance <= 1e-12

@@ -66,17 +66,17 @@ def test_a_filter_leaves_exactly_its_branches(robot_id, task):
     for q in robot.random_q(np.random.default_rng(2), 25 if task != "position" else 6):
         target = kin.fk(robot, q)
         every = solve_ik(robot, target, task=task, q_seed=q)
-        for wish in ("elbow up", "elbow down", "wrist flip", "seed", kin.branch_of(robot, q)):
-            words = kin.branch_of(robot, q) if wish == "seed" else wish
+        for requested in ("elbow up", "elbow down", "wrist flip", "seed", kin.branch_of(robot, q)):
+            words = kin.branch_of(robot, q) if requested == "seed" else requested
             names = [n for n in kin.branch_names(robot) if all(w in n.split(" · ") for w in words.split(" · "))]
-            result = solve_ik(robot, target, task=task, q_seed=q, branch=wish)
+            result = solve_ik(robot, target, task=task, q_seed=q, branch=requested)
             assert {s.branch for s in result.solutions} <= set(names)
             if (
                 task != "position"
             ):  # with two redundancy parameters, the choice on a branch depends on the other branches
                 wanted = [s for s in every.solutions if s.branch in names]
                 assert [s.q.tolist() for s in result.solutions] == [s.q.tolist() for s in wanted]
-            if wish in ("seed", kin.branch_of(robot, q)):
+            if requested in ("seed", kin.branch_of(robot, q)):
                 assert result.status is Status.SOLVED
             if not result.solutions and result.closest is not None:
                 assert result.closest.branch in names
@@ -277,16 +277,16 @@ def test_two_redundancy_parameters_can_both_be_requested(robot_id):
     for q in robot.random_q(np.random.default_rng(9), 20):
         target = kin.fk(robot, q)
         first = solve_ik(robot, target, task="approach", q_seed=q)
-        wish = {
+        requested = {
             r.name: 0.5 * sum(first.solutions[0].redundancy[k].intervals[0])
             for k, r in enumerate(first.redundancy)
         }
         result = solve_ik(
-            robot, target, task="approach", q_seed=q, redundancy=wish, branch=first.solutions[0].branch
+            robot, target, task="approach", q_seed=q, redundancy=requested, branch=first.solutions[0].branch
         )
         assert result.status is Status.SOLVED
         (s,) = result.solutions
-        assert [r.value for r in s.redundancy] == pytest.approx(list(wish.values()), abs=1e-9)
+        assert [r.value for r in s.redundancy] == pytest.approx(list(requested.values()), abs=1e-9)
         assert meets(kin.fk(robot, s.q), target, "approach")
 
 

@@ -295,7 +295,7 @@ def test_a_batch_has_the_bits_of_its_targets_one_by_one_and_all_their_branches(f
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_the_kernels_tell_of_a_target_that_is_no_numbers(family):
+def test_the_kernels_report_a_target_that_is_not_finite(family):
     robot = members(family, 1, seed=3)[0]
     form = closed_form_of(robot)
     T = kin.fk(robot, robot.q_home)
@@ -437,7 +437,7 @@ def narrow(robot, widths):
 
 
 def check_arcs(robot, q, joint, task="pose"):
-    """Inside the ranges told for the free joint the limits can be kept, and nowhere else."""
+    """The limits can be kept exactly inside the reported ranges of the redundant joint."""
     T = kin.fk(robot, q)
     result = solve_ik(robot, T, q_seed=q)
     (free,) = result.redundancy
@@ -448,10 +448,10 @@ def check_arcs(robot, q, joint, task="pose"):
         rows = there(branches(robot, T, q, value))
         assert np.abs(kin.fk(robot, rows) - T).max() < 1e-9 if len(rows) else True
         possible = bool(len(rows)) and bool(robot.in_limits(rows, 1e-9).any())
-        told = any(low - 1e-6 <= value <= high + 1e-6 for low, high in free.intervals)
+        in_range = any(low - 1e-6 <= value <= high + 1e-6 for low, high in free.intervals)
         near_end = any(min(abs(value - low), abs(value - high)) < 1e-5 for low, high in free.intervals)
-        assert possible == told or near_end, (value, free.intervals)
-        inside += told
+        assert possible == in_range or near_end, (value, free.intervals)
+        inside += in_range
     return inside, len(values)
 
 
@@ -486,7 +486,7 @@ def test_with_axis_6_parallel_to_the_three_the_ranges_of_theta_6_are_exact():
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_the_distances_told_are_the_factors_of_the_determinant(family):
+def test_the_reported_distances_are_the_factors_of_the_determinant(family):
     rng = np.random.default_rng(10)
     for robot in members(family, 15, seed=10):
         if family != closed_form_of(robot).name:
@@ -529,7 +529,7 @@ def test_answers_inside_random_limits(family, task):
         assert robot.in_limits(result.solutions[0].q, 1e-9)
 
 
-def test_a_scara_takes_upright_poses_and_tells_of_others_what_is_kept():
+def test_a_scara_meets_upright_poses_and_reports_the_error_of_others():
     robot = scara()
     q = np.array([0.4, -0.9, 0.11, 0.7])
     T = kin.fk(robot, q)
@@ -561,10 +561,10 @@ def test_the_free_angle_of_a_scara_has_exact_ranges(task):
         assert apart(result.solutions[0].q, q) < 1e-6
         (free,) = result.redundancy
         for value in np.linspace(-3, 3, 25):
-            told = any(low - 1e-6 <= value <= high + 1e-6 for low, high in free.intervals)
+            in_range = any(low - 1e-6 <= value <= high + 1e-6 for low, high in free.intervals)
             asked = solve_ik(robot, T, task=task, redundancy=float(value))
-            assert (asked.status == Status.SOLVED) == told
-            some += told
+            assert (asked.status == Status.SOLVED) == in_range
+            some += in_range
     assert 10 < some < 140
 
 

@@ -104,7 +104,7 @@ def test_gradient_and_second_derivatives_are_those_of_the_error(code):
 @pytest.mark.parametrize("robot_id", ROBOTS)
 @pytest.mark.parametrize("task", ["pose", "approach", "position"])
 def test_a_descent_ends_where_no_small_step_helps(robot_id, task):
-    """Inside its limits a joint's derivative is zero; at a stop it points outwards (Karush, Kuhn and Tucker)."""
+    """Inside its limits a joint's derivative is zero; at a limit it points outwards (Karush, Kuhn and Tucker)."""
     robot = kin.get_robot(robot_id)
     rng = np.random.default_rng(2)
     ended = 0
@@ -169,13 +169,13 @@ def test_every_mask(frame):
         angle = rotation_angle(np.eye(3), turned)
         axis = np.array([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]])
         phi = axis * (0.5 * angle / math.sin(angle) if angle > 1e-9 else 0.5)
-        told = np.concatenate([R.T @ away, R.T @ phi] if frame == "tool" else [away, phi])
-        assert np.abs(told[list(mask)]).max() <= 1e-8, (mask, told)
+        error = np.concatenate([R.T @ away, R.T @ phi] if frame == "tool" else [away, phi])
+        assert np.abs(error[list(mask)]).max() <= 1e-8, (mask, error)
         assert robot.in_limits(found.q)
 
 
 def test_limits_are_kept_to_the_bit_and_locked_joints_stay():
-    """Solved or not, no joint is beyond its stop by even a rounding error."""
+    """Solved or not, no joint is outside its limits by even a rounding error."""
     rng = np.random.default_rng(8)
     stopped = 0
     for _ in range(40):
@@ -217,7 +217,7 @@ def test_the_seed_comes_first():
             assert found.q == pytest.approx(q, abs=1e-9)
 
 
-def test_out_of_reach_the_budget_is_used_up_and_the_best_minimum_told():
+def test_out_of_reach_the_budget_is_used_up_and_the_best_minimum_returned():
     robot = kin.get_robot("redundant7-craig")
     target = np.eye(4)
     target[:3, 3] = (2.0, 0.0, 0.30)

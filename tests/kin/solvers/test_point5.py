@@ -150,7 +150,7 @@ def test_the_ranges_of_theta5_are_exact():
 
 
 def test_the_ranges_of_theta4_are_exact():
-    """A dense grid over both finds no θ4 outside the ranges, and every θ4 told has a θ5 that the ranges give."""
+    """A dense grid over both finds no θ4 outside the ranges, and every θ4 inside has a θ5 that the ranges give."""
     rng = np.random.default_rng(9)
     checked = 0
     for _ in range(12):
@@ -177,8 +177,8 @@ def test_given_values_are_kept():
     rng = np.random.default_rng(11)
     for q in ROBOT.random_q(rng, 60):
         point = kin.fk(ROBOT, q)[:3, 3]
-        wish = {"theta4": float(q[3]), "theta5": float(q[4])}
-        result = solve_ik(ROBOT, point, task="position", q_seed=q, redundancy=wish)
+        requested = {"theta4": float(q[3]), "theta5": float(q[4])}
+        result = solve_ik(ROBOT, point, task="position", q_seed=q, redundancy=requested)
         assert result.status is Status.SOLVED
         assert any(np.abs(s.q - q).max() < 1e-6 for s in result.solutions)
         assert all(s.q[3] == q[3] and s.q[4] == q[4] for s in result.solutions)
@@ -244,7 +244,7 @@ def test_a_mounted_arm_is_of_the_family_too():
             assert robot.in_limits(s.q)
 
 
-def test_beyond_reach_is_told_in_metres():
+def test_the_distance_beyond_reach_is_in_metres():
     straight = 0.160 + 0.140 + 0.120
     found = ask((0.070 + straight + 0.25, 0.0, 0.130), ROBOT.lower, ROBOT.upper)
     assert np.isnan(found.q).all()
@@ -318,7 +318,7 @@ def test_what_breaks_the_limits_least_is_one_joint_here():
     assert np.abs(kin.fk(ROBOT, rows)[:, :3, 3] - point).max() < 1e-9
 
 
-def test_equal_questions_get_equal_answers():
+def test_equal_problems_have_equal_solutions():
     rng = np.random.default_rng(23)
     for q in ROBOT.random_q(rng, 20):
         point = kin.fk(ROBOT, q)[:3, 3]

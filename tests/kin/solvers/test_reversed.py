@@ -136,7 +136,7 @@ def poses(robot, count, seed=0, inside=True):
 
 
 @pytest.mark.parametrize("name", ARMS)
-def test_whatever_counts_otherwise_the_arm_keeps_its_family_and_tasks(name):
+def test_reversed_joints_do_not_change_the_family_or_tasks(name):
     base, n = closed_form_of(ARMS[name]), ARMS[name].n
     for count in (0, 1, 2, n - 1, n):
         for joints in itertools.combinations(range(n), count):
@@ -277,7 +277,7 @@ def margin(robot, q):
 
 
 @cases
-def test_thin_branches(name, joints):
+def test_batch_branches(name, joints):
     robot = turned(ARMS[name], joints)
     pair = Pair(robot)
     five = robot.n == 5
@@ -303,7 +303,7 @@ def apart(a, b):
     return np.nan_to_num(np.abs((a - b + PI) % (2 * PI) - PI))
 
 
-def test_thin_angles_are_told_in_the_half_open_turn():
+def test_batch_angles_are_in_the_half_open_turn():
     robot = turned(ARMS["iiwa14"], (2,))
     q = np.array([0.0, 0.5, PI, -0.7, 0.2, 0.4, 0.1])
     rows = kin.ik_branches(robot, kin.fk(robot, q), 0.0)
