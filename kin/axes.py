@@ -261,8 +261,8 @@ def links_of(robot: Robot, twists: tuple[int, ...]) -> Links:
 def links_by_rows(robot: Robot, quarters: tuple[int, ...]) -> Links | None:
     """The robot as `Links` with the numbers of its table, and the twists `quarters` (in quarter turns).
 
-    None if it has prismatic joints or a fixed offset between two joints, or if a twist is another one. Other than
-    with `links_of` nothing is computed that stands in the table, all signs are +1.0, theta_1 and d_1 are those of
+    None if it has prismatic joints or a fixed offset between two joints, or if a twist differs. Unlike
+    `links_of`, it copies the values of the table unchanged: all signs are +1.0, theta_1 and d_1 are those of
     the table, and so are the last link's, which are not in `tool`.
 
     ``Tx(a) Rx(90°) = Rz(π) Tx(−a) Rx(−90°) Rz(π)``: a twist of the wrong sign is exchanged for half turns of its

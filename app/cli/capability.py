@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.cli.terminal import Units, clean, joint_constraints, print_json, store_of, table
+from app.cli.terminal import Notation, clean, joint_constraints, print_json, store_of, table
 from app.exports.capability import WRITERS
 from app.exports.progress import progress_bar
 from app.shared.answers.capability import CapabilityAnswer, capability_answer
@@ -41,7 +41,7 @@ def run(arguments: Namespace) -> int:
     if arguments.json:
         return print_json(answer)
     print(f"{robot.name} ({robot.id})\n")
-    for line in _summary(answer, found, Units(robot, arguments.rad)):
+    for line in _summary(answer, found, Notation(robot, arguments.rad)):
         print(line)
     return 0
 
@@ -52,7 +52,7 @@ def _counted(blocks: Iterator[CapabilityBlock], advance: Callable[[int], object]
         advance(1)
 
 
-def _summary(answer: CapabilityAnswer, found: CapabilityMap, units: Units) -> list[str]:
+def _summary(answer: CapabilityAnswer, found: CapabilityMap, units: Notation) -> list[str]:
     """The figures as lines of text, and a table of voxels by share of directions."""
     length, a = units.of_length, "×".join(map(str, answer["shape"]))
 

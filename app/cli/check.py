@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from typing_extensions import TypedDict
 
-from app.cli.terminal import Units, print_json, table
+from app.cli.terminal import Notation, print_json, table
 from app.shared.answers.robots import RobotAnswer, robot_answer
 from kin import Robot, builtin_robots, jacobian, load_robot
 from kin.axes import Pair, generic_q, pairs, parallel_groups, size, spherical_groups
@@ -66,7 +66,7 @@ def run(arguments: Namespace) -> int:
     answer = check(robot, robot.id in builtin_robots() and path.resolve().parent != BUILTIN.resolve())
     if arguments.json:
         return print_json(answer)
-    units = Units(robot, arguments.rad)
+    units = Notation(robot, arguments.rad)
     print(f"{robot.name} ({robot.id})\n{robot.description or 'No description.'}\nsource: {robot.source}\n")
     rows = [
         [str(i + 1), joint.name, joint.kind, units.joint(i, low), units.joint(i, high), units.joint(i, home)]
@@ -80,7 +80,7 @@ def run(arguments: Namespace) -> int:
     return 0
 
 
-def _about(answer: CheckAnswer, units: Units) -> list[str]:
+def _about(answer: CheckAnswer, units: Notation) -> list[str]:
     """Lines about joint axes, solver and warnings."""
     robot = answer["robot"]
     lines = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from app.cli.terminal import Units, clean, configuration, print_json, store_of, table
+from app.cli.terminal import Notation, clean, configuration, print_json, store_of, table
 from app.shared.answers.fk import fk_answers
 
 
@@ -15,7 +15,7 @@ def run(arguments: Namespace) -> int:
     answer = fk_answers(robot, q[None], arguments.frames)[0]
     if arguments.json:
         return print_json(answer)
-    units = Units(robot, arguments.rad)
+    units = Notation(robot, arguments.rad)
     rows = [
         [
             joint.name,

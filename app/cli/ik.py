@@ -8,13 +8,13 @@ from argparse import Namespace
 
 import numpy as np
 
-from app.cli.terminal import Units, configuration, joint_constraints, print_json, store_of, table
+from app.cli.terminal import Notation, configuration, joint_constraints, print_json, store_of, table
 from app.shared.answers.ik import Blocked, IkAnswer, Solution, ik_answer
 from kin import IKOptions, InputError, Task
 from kin.ik import solve
 from kin.ik.options import MASK_NAMES
 from kin.transforms import frame_from_approach, from_position_wxyz
-from kin.units import Units as ReaderUnits
+from kin.units import Units
 
 
 def run(arguments: Namespace) -> int:
@@ -44,14 +44,14 @@ def run(arguments: Namespace) -> int:
     if arguments.json:
         print_json(answer)
     else:
-        print(result.explain(ReaderUnits(not arguments.rad, "m" if arguments.rad else "mm")).text + "\n")
-        _print(answer, Units(robot, arguments.rad))
+        print(result.explain(Units(not arguments.rad, "m" if arguments.rad else "mm")).text + "\n")
+        _print(answer, Notation(robot, arguments.rad))
         if not arguments.rad and np.abs(T[:3, 3]).max() < 5e-3:
             print("note: --position is in millimetres; --rad makes it metres", file=sys.stderr)
     return 0 if answer["status"] == "solved" else 1
 
 
-def _print(answer: IkAnswer, units: Units) -> None:
+def _print(answer: IkAnswer, units: Notation) -> None:
     """Print the solutions, the redundancy parameters, and the postures outside the limits."""
     listed = [(str(k + 1), solution) for k, solution in enumerate(answer["solutions"])]
     if not listed and answer["closest"]:
@@ -67,7 +67,7 @@ def _print(answer: IkAnswer, units: Units) -> None:
         print("\n" + table(["posture", "outside the limits"], _needs(units, answer["blocked"])))
 
 
-def _solutions(units: Units, listed: list[tuple[str, Solution]]) -> str:
+def _solutions(units: Notation, listed: list[tuple[str, Solution]]) -> str:
     """The table of solutions."""
     count = len(listed[0][1]["q"])
     head = ["", *(f"q{i + 1}" for i in range(count)), "point error", "rotation error", "posture"]
@@ -101,7 +101,7 @@ def _task(arguments: Namespace) -> Task:
     return task
 
 
-def _needs(units: Units, blocked: list[Blocked]) -> list[list[str]]:
+def _needs(units: Notation, blocked: list[Blocked]) -> list[list[str]]:
     """The joint values of each posture that are outside the limits."""
     return [
         [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from app.cli.terminal import Units, clean, print_json, store_of, table
+from app.cli.terminal import Notation, clean, print_json, store_of, table
 from app.shared.answers.robots import RobotAnswer, robot_answer
 
 
@@ -17,7 +17,7 @@ def run(arguments: Namespace) -> int:
         if arguments.json:
             return print_json(answer)
         print(f"{robot.name} ({robot.id})\n{robot.description}\n{robot.source}\n")
-        print(_dh_table(answer, Units(robot, arguments.rad)))
+        print(_dh_table(answer, Notation(robot, arguments.rad)))
         return 0
     answers = [robot_answer(robot) for robot in store.robots]
     if arguments.json:
@@ -29,7 +29,7 @@ def run(arguments: Namespace) -> int:
     return 0
 
 
-def _dh_table(answer: RobotAnswer, units: Units) -> str:
+def _dh_table(answer: RobotAnswer, units: Notation) -> str:
     limits = {joint["name"]: (joint["index"], joint["limits"]) for joint in answer["joints"]}
     rows = []
     for row in answer["rows"]:

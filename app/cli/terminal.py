@@ -61,7 +61,7 @@ def configuration(robot: Robot, values: list[float], field: str, rad: bool) -> A
     return robot.check_q(np.array(values) * (1.0 if rad else scale), field)
 
 
-class Units:
+class Notation:
     """Values as text: degrees and millimetres, or radians and metres."""
 
     def __init__(self, robot: Robot, rad: bool) -> None:

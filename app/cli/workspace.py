@@ -8,7 +8,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from app.cli.terminal import Units, joint_constraints, print_json, store_of, table
+from app.cli.terminal import Notation, joint_constraints, print_json, store_of, table
 from app.exports.formats import FORMATS
 from app.exports.picture import draw
 from app.exports.save import opened, reading, save
@@ -36,7 +36,7 @@ def run(arguments: Namespace) -> int:
     answer = workspace_answer(_facts(robot, constraints, arguments))
     if arguments.json:
         return print_json(answer)
-    units = Units(robot, arguments.rad)
+    units = Notation(robot, arguments.rad)
     spans = [
         *(("x", answer["x"]), ("y", answer["y"]), ("z", answer["z"])),
         *(("from the axis of joint 1", answer["radius"]), ("from the shoulder", answer["reach"])),

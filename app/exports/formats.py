@@ -193,8 +193,8 @@ def _text(table: Table, row: str, source: Source) -> Bytes:
 def _npz(table: Table, source: Source) -> Bytes:
     """One array after the other, although a cloud computes them together.
 
-    What is not due yet is held back while it is little. Otherwise the cloud, the same every time, is computed anew
-    for each array.
+    Later arrays are buffered if they are small. Otherwise the cloud, which is the same every time, is computed
+    again for each array.
     """
     arrays: list[tuple[str, str, tuple[int, ...]]] = [("points", "<f4", (table.n, 3))]
     arrays += [(name, "<f4", (table.n,)) for name in table.measures]
@@ -268,10 +268,10 @@ class _Sink:
 class Format:
     """A file format.
 
-        Attributes:
-    name: its identifier in requests, and the extension of its files.
-            media_type: the HTTP media type.
-            meaning: a description for users.
+    Attributes:
+        name: its identifier in requests, and the extension of its files.
+        media_type: the HTTP media type.
+        meaning: a description for users.
             encode: yields the bytes of the file.
             size: the number of bytes, None if it is only known at the end.
             passes: how often it iterates over the cloud.

@@ -1,7 +1,7 @@
 """Measuring candidates: one compiled pass over the raw rows of a solver.
 
 Each row is brought to its best whole-turn image, its residuals are measured by forward kinematics, and rows are
-accepted, sorted and freed of duplicates. Solvers do nothing of this.
+accepted, sorted and deduplicated. Solvers do none of this.
 """
 
 from __future__ import annotations

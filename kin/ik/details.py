@@ -92,7 +92,8 @@ class OutsideLimits(NamedTuple):
         branch: the posture that is closest to the limits.
         violations: its joint values outside the limits.
         branches: how many postures are outside the limits, this one included.
-        requested: the redundancy parameters whose values were requested, with the values that would do.
+        requested: the redundancy parameters whose values were requested, with the values that satisfy
+            the limits.
         elsewhere: how many solutions there are on branches that were not requested.
     """
 

@@ -30,7 +30,7 @@ STARTS = 24
 BUDGET = 400
 _EXACT = 1e-10
 _LEVER, _LEAST_LEVER, _MOST_LEVER = 0.3, 0.03, 1.0
-# The closest configuration is the best of so many descents, or of fewer once the best was met so often.
+# At most _MOST_STARTS descents; the search stops once _MEETINGS of them end at the best minimum.
 _MOST_STARTS = 64
 _MEETINGS = 12
 # The length in metres that weighs as much as a radian, and how many of the best descents continue from there. At
@@ -177,9 +177,9 @@ def nearest_to_point(problem: IKProblem, known: IKSolution | None) -> tuple[IKSo
 
 
 def _valleys(errors: Array, alike: float) -> list[int]:
-    """Indices of the errors ``(k,)`` by size, of each run of alike ones the first two only.
+    """Indices of the errors ``(k,)`` by size; of a run of equal errors only the first two.
 
-    Descents that end equally high are mostly in one valley, and one of them would do.
+    Descents with equal errors mostly ended in the same minimum, so following one of them is enough.
     """
     order = np.argsort(errors, kind="stable").tolist()
     return [i for k, i in enumerate(order) if k < 2 or errors[i] > errors[order[k - 2]] + alike]

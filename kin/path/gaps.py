@@ -68,8 +68,10 @@ def _closest(waypoint: Waypoint, start: Array) -> Array:
 
 
 def _as_close(waypoint: Waypoint, q: Array) -> Array:
-    """Of the configurations ``(m, n)`` and the waypoint's own answer those about as close to the target as the
-    best."""
+    """Those of the configurations ``(m, n)`` that are nearly as close to the target as the best one.
+
+    The waypoint's own answer counts as one of them.
+    """
     problem = waypoint.requested
     best = waypoint.gap.best if waypoint.gap is not None else None
     if best is not None:

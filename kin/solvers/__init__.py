@@ -1,7 +1,7 @@
 """The registry of closed-form solvers: one module and one row per family of arms, in order of preference.
 
 Which family an arm belongs to is read off its joint axes, never off its name. Neither the convention of its table
-nor the sense in which its joints count keeps it out (:mod:`kin.solvers.reversed`). The contract that every family
+nor the positive direction of its joints matters (:mod:`kin.solvers.reversed`). The contract that every family
 keeps stands in :mod:`kin.solvers.contract`.
 """
 
@@ -30,7 +30,7 @@ FAMILIES: tuple[Callable[[Robot], ClosedForm | None], ...] = (
 def closed_form_of(robot: Robot) -> ClosedForm | None:
     """The closed form of the first family that fits the robot's axes, None if there is none.
 
-    Where none fits the robot as its joints count, or one that then has no approach directions, some joints are
+    Where none fits the robot with its joints as given, or only one without approach directions, some joints are
     read as reversed.
     """
     found = _first_match(robot)
@@ -49,7 +49,7 @@ def closed_form_of(robot: Robot) -> ClosedForm | None:
 
 
 def _first_match(robot: Robot) -> ClosedForm | None:
-    """The closed form of the first family that fits the robot as its joints count."""
+    """The closed form of the first family that fits the robot with its joints as given."""
     return next((form for match in FAMILIES if (form := match(robot)) is not None), None)
 
 

@@ -1,4 +1,4 @@
-"""The batch kernels' way through many targets: in blocks, by loops that turn into vector instructions.
+"""Batches of targets: computed in blocks, by loops that the compiler vectorises.
 
 A block of `BLOCK` targets is laid out entry by entry in one array S ``(rows, BLOCK)``. What a family computes of a
 target is then a loop along the rows of S, without jumps and calls, several targets to an instruction:
@@ -9,7 +9,8 @@ target is then a loop along the rows of S, without jumps and calls, several targ
 3. *store*: the rows of the answer, gathered from S.
 4. *careful*: a marked target once more, by the kernel that limits and ranges are computed with, too.
 
-One target is a block of one, the same operations in the same order: so a batch gives the bits of one.
+One target is a block of one, the same operations in the same order: so results of a batch and of single
+targets are bit-identical.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The contract of a closed-form solver: the types through which a family of arms is used.
 
-A *family* is a set of arms whose joint axes lie to each other in the same way, so that one set of formulas gives
+A *family* is a set of arms whose joint axes have the same geometric arrangement, so that one set of formulas gives
 all their configurations. It is one module (or folder) with one function ``match(robot) -> ClosedForm | None`` and
 one row in :data:`kin.solvers.FAMILIES`. A `ClosedForm` owns the geometry that it read off the robot's axes.
 
@@ -115,7 +115,8 @@ class BatchKernels:
     """Compiled functions that write all branches of one target or of many, without limits, order or checks.
 
     A row that is NaN stands for a branch that does not exist; where two have merged, both rows hold the same
-    joints. Angles are in (−π, π], but for a joint whose value was requested. `many` gives the bits of `one`.
+    joints. Angles are in (−π, π], except for a joint whose value was requested. `many` and
+    `one` give bit-identical results.
 
     Attributes:
         params: the arm as the kernels read it, a C-contiguous float64 array ``(k,)`` that they do not write to.

@@ -7,9 +7,9 @@ the chain, only adds to the height z. So the order of the joints (RRPR, RRRP, PR
 - tan²(θ2/2) = ((a+b)² − |c|²)/(|c|² − (a−b)²), elbow right or left; θ1 = atan2(cy, cx) − atan2(b s2, a + b c2);
 - θ3 = ψ − θ1 − θ2, and the slide makes up the height.
 
-Two branches. Of the orientations only those turned about the axes can be had: for any other ψ is the nearest in
-angle and the tool's point is kept; without a slide the height must fit. Whether such an answer will do is
-judged by its residual, outside. When only a point or an approach direction is asked for, ψ is free, and the
+Two branches. Only rotations about the axes are reachable: for any other orientation, ψ is the nearest angle and
+the tool's point is kept; without a slide the height must fit. The caller decides from the residual whether to
+accept the result. When the task is only a point or an approach direction, ψ is the redundancy parameter, and the
 values that reach and limits allow are exact arcs. Singular: s2 = 0 only.
 """
 

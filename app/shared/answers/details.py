@@ -115,7 +115,7 @@ class IkDetails(TypedDict, total=False):
     branches: int
     """Cause "joint limits": how many postures are outside the limits."""
     requested: list[RedundancyAnswer]
-    """Cause "joint limits": the requested redundancy parameters, with the values that would do."""
+    """Cause "joint limits": the requested redundancy parameters, with the values that satisfy the limits."""
     elsewhere: int
     """Causes "joint limits" and "branch": how many solutions there are on branches that were not requested."""
     outside_limits: int

@@ -96,7 +96,7 @@ def _shoulder(
         R, rho = math.hypot(wrist[1], wrist[2]), math.hypot(params[A4], params[D5])
         a2, a3 = params[A2], params[A3]
         return max(abs(R - rho) - a2 - a3, abs(a2 - a3) - R - rho), found
-    # Where two shoulders merge θ1 is known but roughly, and what misses by a hair may be mended.
+    # Where two shoulders merge θ1 is known only approximately; a small change of it may close the rest.
     lever = abs(y) + abs(params[A4]) + abs(params[D5])
     slack = _REACH + lever * min(_HAIR, _ROUNDING / max(abs(x), _ROUNDING))
     gap = math.inf
@@ -132,7 +132,7 @@ def _arm(
     px, py = u - flip * (a4 * cA - d5 * sA), v - flip * (a4 * sA + d5 * cA)
     miss, bend, _, k1, k2 = two_links(px, py, a2, a3)
     if miss > _REACH and miss * sine < _ROUNDING:
-        # Near s5 = 0 A is known but roughly: a hair more or less of it may be what brings axis 4 within reach.
+        # Near s5 = 0 A is known only approximately: a tiny change may bring axis 4 within reach.
         A = _within((u, v, a4, d5, a2, a3), A, _REACH / sine)
         c, s = math.cos(A), math.sin(A)
         B = atan2(c * m02 + s * m12, m22)

@@ -137,7 +137,7 @@ def _elbow(params: Array, x: float, h: float, root: float) -> tuple[float, float
     """The elbow for W at (x, h) from axis 2: (miss, bend, cos bend, k1, k2, x), see `two_links`.
 
     A slide runs past axis 2 at the distance f, and W is at ±bend along it. Where two shoulders merge (root → 0), x
-    is known but roughly: a hair more or less may be what the elbow needs, and the x returned is moved by it.
+    is known only approximately: a tiny change may let the elbow close, and the returned x includes it.
     """
     a2, f, beside = params[A2], params[F], params[BESIDE]
     if params[SLIDES] != 0.0:

@@ -2,8 +2,7 @@
 
 The configuration of sample i depends on the arm, the limits and locks, the strategy, the seed and i alone, never
 on the chunk, the thread or earlier samples. So threads may compute any slices in any order, a longer cloud
-continues a
-shorter one, and configurations need not be stored: that of a point is recomputed from the point's index.
+continues a shorter one, and configurations need not be stored: the point's index gives them again.
 """
 
 from __future__ import annotations

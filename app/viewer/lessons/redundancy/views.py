@@ -39,8 +39,7 @@ def idea(robot: Robot, task: Task, parameters: tuple[Redundancy, ...], trades: b
     if not parameters and count <= 0:
         return (
             f"No redundancy: {counts}. Choose a task of smaller dimension (Move, Target must match), or an arm "
-            "with "
-            "seven joints."
+            "with seven joints."
         )
     if not parameters:
         return (

@@ -26,13 +26,11 @@ NONE = "none"
 FINE = 3  # decimals of a millimetre
 STRATEGY_HINT = (
     "Joints at random: each joint anywhere between its limits. Joints spread evenly: the same with fewer "
-    "clusters. Even "
-    "in space: the same density everywhere. Envelope only: the boundary. The last two take longer."
+    "clusters. Even in space: the same density everywhere. Envelope only: the boundary. The last two take longer."
 )
 CLOUD_HINT = (
     "Start: sample points, or continue after a pause; locked joints keep their values. Pause: stop for now. "
-    "Cancel: "
-    "stop and remove the points."
+    "Cancel: stop and remove the points."
 )
 CUT_HINT = "Along the arm: the vertical plane of the arm's present pose. The cut moves in steps."
 
