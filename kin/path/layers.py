@@ -51,7 +51,10 @@ def _by_answer(requested: IKProblem) -> Waypoint:
 def _sampled_waypoint(requested: IKProblem, grid: float) -> Waypoint:
     waypoint = Waypoint(requested, requested, sampled(requested, False, grid))
     if not len(waypoint.layer) and requested.robot.n < 6 and requested.code == POSE:
-        problem = replace(requested, code=APPROACH, task="approach")
+        assert requested.closed_form is not None  # as for every sampled waypoint
+        redundancies = requested.closed_form.redundancies(APPROACH)
+        values = (math.nan,) * len(redundancies)
+        problem = replace(requested, code=APPROACH, task="approach", redundancies=redundancies, values=values)
         waypoint = Waypoint(requested, problem, sampled(problem, True, grid))
     return waypoint if len(waypoint.layer) else _by_answer(requested)
 

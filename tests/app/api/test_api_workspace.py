@@ -160,7 +160,8 @@ def test_an_unknown_robot_is_a_404(client):
 def test_a_reader_that_disconnects_cancels_the_cloud(live, slices):
     app, client = live
     with client.stream("GET", f"{WORKSPACE}?n=100000000&format=bin") as answer:
-        assert next(answer.iter_bytes()).startswith(b"KINCLOUD")
+        parts = answer.iter_bytes()  # held: a dropped one may hang up
+        assert next(parts).startswith(b"KINCLOUD")
         assert app.state.streams.open == 1
     wait_for(lambda: app.state.streams.open == 0)
     wait_for(lambda: app.state.clouds._executor._work_queue.empty())

@@ -698,3 +698,13 @@ def test_misuse_names_the_field(arguments, field):
     with pytest.raises(InputError) as caught:
         solve_path(kin.get_robot("pioneer5"), targets, **arguments)
     assert caught.value.field == field
+
+
+def test_a_scara_reports_a_waypoint_out_of_reach_as_a_gap():
+    """The relaxed waypoint asks for an approach direction, which leaves the tool angle free: a pose does not."""
+    scara = kin.get_robot("scara")
+    T = kin.fk(scara, scara.q_home)
+    far = T.copy()
+    far[:3, 3] *= 5.0
+    result = solve_path(scara, [T, far, T], task="pose")
+    assert [gap.index for gap in result.gaps] == [1]
