@@ -62,9 +62,8 @@ class Pace:
 
     A frame costs half a millisecond of processor time or more on its way from the solution to the visitor. Thirty
     visitors dragging at sixty frames a second would saturate a core and delay everybody. So visitors share a
-    limited
-    rate: a few get smooth easing, more get fewer frames, and beyond that each solution is shown at once. The
-    numbers in the panel cost as much again and have a rate of their own.
+    limited rate: a few get smooth easing, more get fewer frames, and beyond that each solution is shown at once.
+    The numbers in the panel cost as much again and have a rate of their own.
     """
 
     def __init__(self, frames_per_second: float = 600.0, readings_per_second: float = 100.0) -> None:
