@@ -104,24 +104,43 @@ def _axes(normal: Array) -> tuple[Array, Array]:
 
 def _cut(found: CellMap, origin: Array, u: Array, v: Array, least: float, resolution: int) -> Section:
     """The section in the plane through `origin`, where s is not below `least`."""
-    corners = np.concatenate([found.corners[found.occupied], found.corners[found.occupied] + found.edge]) - origin
-    s, t = corners @ u, corners @ v
-    low, high = np.array([max(s.min(), least), t.min()]), np.array([s.max(), t.max()])
-    step = float((high - low).max()) / resolution
+    window = _window(found, found.occupied, origin, u, v, least)
+    step = float((window[1] - window[0]).max()) / resolution
     if not step > 0.0:
         return Section(origin, u, v, (), (), 0.0, 0.0)
-    # The first nodes of an (r, z) section are on the axis itself, so that r is not cut off at a square.
-    first = low - step
-    shape = np.ceil((high - low) / step).astype(int) + 3
-    s, t = first[0] + step * np.arange(shape[0]), first[1] + step * np.arange(shape[1])
-    places = np.stack(np.meshgrid(s, t, indexing="ij"), axis=-1)
+    places = _grid(window, step)
     q, distance = _test_nodes(found, origin, u, v, places, least)
     inside = distance <= _EXACT * found.size
+    if inside[-1].any() or inside[0].any() or inside[:, -1].any() or inside[:, 0].any():
+        # Curves would not close at the rim: the workspace extends beyond the points that made the map. Beyond the
+        # whole map, no node is found to be inside.
+        places = _grid(_window(found, np.ones_like(found.occupied), origin, u, v, least), step)
+        q, distance = _test_nodes(found, origin, u, v, places, least)
+        inside = distance <= _EXACT * found.size
     curves = tuple(_on_boundary(found, origin, u, v, places, inside, q, loop, least) for loop in loops(inside))
     area = sum(_area(curve) for curve in curves)
     for curve in curves:
         curve.flags.writeable = False
     return Section(origin, u, v, curves, (), area, step)
+
+
+def _window(found: CellMap, cubes: Flags, origin: Array, u: Array, v: Array, least: float) -> tuple[Array, Array]:
+    """Least and largest coordinates (s, t) of some cubes ``(m,)`` of the map, s not below `least`."""
+    corners = np.concatenate([found.corners[cubes], found.corners[cubes] + found.edge]) - origin
+    s, t = corners @ u, corners @ v
+    return np.array([max(s.min(), least), t.min()]), np.array([s.max(), t.max()])
+
+
+def _grid(window: tuple[Array, Array], step: float) -> Array:
+    """Nodes ``(a, b, 2)`` that cover a window, with a step to spare all around.
+
+    The second nodes of an (r, z) section are on the axis itself, so that r is not cut off at a square.
+    """
+    low, high = window
+    first = low - step
+    shape = np.ceil((high - low) / step).astype(int) + 3
+    s, t = first[0] + step * np.arange(shape[0]), first[1] + step * np.arange(shape[1])
+    return np.stack(np.meshgrid(s, t, indexing="ij"), axis=-1)
 
 
 def _test_nodes(
