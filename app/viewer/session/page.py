@@ -11,20 +11,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import replace
 
 import viser
 
 import kin
 from app.viewer.feature import Feature
 from app.viewer.lessons import LESSONS
-from app.viewer.panel import assign
 from app.viewer.panel.joints import JointSliders, lock_notice
 from app.viewer.panel.layout import Panel
 from app.viewer.panel.status import Notice, StatusLine
-from app.viewer.panel.target import TASKS
 from app.viewer.panel.view import ViewState, configure_theme
 from app.viewer.scene.camera import Sphere, VisitorCamera
+from app.viewer.session.actions import BY_HAND, Actions
 from app.viewer.session.controller import ArmController
 from app.viewer.session.lessons import LessonChoice
 from app.viewer.session.persistence import Persistence
@@ -37,15 +35,15 @@ from kin.transforms import Array
 from kin.units import DEFAULT_UNITS, Units
 
 WELCOME = Notice("hand", "Ready", "Drag the coloured arrows at the gripper, or move a joint slider.")
-BY_HAND = Notice("hand", "Joints moved by hand", "The target follows the tool.")
 
 
 class VisitorPage(Worker):
     """The page of one visitor.
 
     The methods that `Worker` calls thread-safe may be called by any thread; everything else belongs to the worker.
-    The page is the :class:`~app.viewer.feature.Stage` of its features, the listener of its arm's controller, and
-    the :class:`~app.viewer.session.persistence.SavedPage` of its persistence.
+    The page is the :class:`~app.viewer.feature.Stage` of its features, the listener of its arm's controller, the
+    :class:`~app.viewer.session.persistence.SavedPage` of its persistence, and the
+    :class:`~app.viewer.session.actions.ActedPage` of the visitor's actions.
 
     Args:
         token: whether programs must send an access token.
@@ -81,30 +79,10 @@ class VisitorPage(Worker):
         # Created by the worker when it builds the page.
         self.camera: VisitorCamera
         self.posture: PosturePanel
-        self._panel: Panel
-        self._status: StatusLine
-        self._sliders: JointSliders
-        # Events by the first part of their key. A handler takes the other parts, and the value.
-        self._handlers: dict[str, Callable[..., None]] = {
-            "gizmo": self.arm.pull,
-            "joint": self._on_slider,
-            "redundancy": self._on_redundancy,
-            "lock": self._on_lock,
-            "branch": self._on_branch_choice,
-            "feature": self._on_feature,
-            "lesson": lambda title: self.lessons.choose(title) if self.lessons is not None else None,
-            "robot": self._on_robot_choice,
-            "task": self._on_task,
-            "radians": lambda radians: self._use_units(replace(self.units, degrees=not radians)),
-            "lengths": lambda name: self._use_units(self._panel.units.with_length(self.units, name)),
-            "home": lambda _: self._move_by_hand(self.arm.move_home),
-            "random": lambda _: self._move_by_hand(self.arm.move_to_random),
-            "recall": lambda _: self._move_by_hand(self.arm.recall_target),
-            "copy-as": lambda name: self._panel.share.choose(name),
-            "view": self._on_view,
-            "camera": lambda _: self.camera.aim(self.arm.scene.body),
-            "looked": lambda _: None,  # the viewpoint is read when the camera rests
-        }
+        self.panel: Panel
+        self.status: StatusLine
+        self.sliders: JointSliders
+        self._actions = Actions(self)
 
     # Stage: what features may use
 
@@ -142,23 +120,23 @@ class VisitorPage(Worker):
 
     def move_to(self, q: Array, notice: Notice | None = None, at_once: bool = False) -> None:
         self.arm.move_to(q, ease=not at_once)
-        self._status.show(notice or BY_HAND)
+        self.status.show(notice or BY_HAND)
 
     def set_target(self, T_base_tool: Array) -> None:
         self.arm.set_target(T_base_tool)
 
     def set_task(self, task: Task) -> None:
-        self._panel.target.show(task)
+        self.panel.target.show(task)
         self.arm.set_task(task)
 
     def unlock(self, joint: int | None = None) -> None:
-        self._change_lock(joint, False)
+        self.change_lock(joint, False)
 
     def allow_any_branch(self) -> None:
         self.arm.allow_any_branch()
 
     def notify(self, notice: Notice) -> None:
-        self._status.show(notice)
+        self.status.show(notice)
 
     def fit_view(self, spheres: Sequence[Sphere]) -> None:
         self.camera.fit(spheres)
@@ -173,7 +151,7 @@ class VisitorPage(Worker):
 
     def set_locks(self, locks: Sequence[bool]) -> None:
         """Lock exactly these joints ``(n,)``."""
-        self._sliders.show_locks(locks)
+        self.sliders.show_locks(locks)
         self.arm.set_locks(locks)
 
     def set_branch(self, branch: str) -> None:
@@ -181,23 +159,62 @@ class VisitorPage(Worker):
         self.arm.branch = branch
         self.posture.choose(branch)
 
+    # ActedPage: what actions may use besides
+
+    def change_robot(self, robot: Robot, q: Array | None = None) -> None:
+        """Replace the robot, at its home configuration or at `q` ``(n,)``, in a fitting view."""
+        self.sliders.remove()
+        self.posture.remove()
+        self._use_robot(robot, q)
+        self.for_features(lambda feature: feature.on_robot())
+
+    def change_lock(self, joint: int | None, lock: bool) -> None:
+        """Lock or unlock one joint, or all of them, at the value it is heading for."""
+        joints = range(self.robot.n) if joint is None else (joint,)
+        locks = [lock if i in joints else before for i, before in enumerate(self.arm.locks)]
+        self.status.show(lock_notice(locks))
+        self.set_locks(locks)
+
+    def use_units(self, units: Units) -> None:
+        """Show all numbers in these units."""
+        self.units = units
+        self.status.use(units)
+        self.sliders.remove()
+        self.sliders = self._make_sliders()
+        self.posture.show()
+        self._readout_due = True
+        self.for_features(lambda feature: feature.on_style())
+
+    def apply_view(self) -> None:
+        """Show the scene as `view` says."""
+        scene = self.arm.scene
+        scene.show_frames(self.view.frames)
+        scene.show_labels(self.view.labels)
+        scene.show_axes(self.view.axes)
+        scene.use_dark(self.view.dark)
+
+    def for_features(self, action: Callable[[Feature], None]) -> None:
+        """Call every feature; an error of one does not stop the others."""
+        for feature in self.features:
+            self._guard(lambda feature=feature: action(feature))  # type: ignore[misc]
+
     # Reports of the arm's controller
 
     def on_pose(self, T_base_tool: Array) -> None:
         self._readout_due = True
-        self._for_features(lambda feature: feature.on_pose(T_base_tool))
+        self.for_features(lambda feature: feature.on_pose(T_base_tool))
 
     def on_goal(self, dragged: int | None) -> None:
         self._sliders_due, self._dragged = True, dragged
 
     def on_result(self, result: IKResult) -> None:
         self.posture.use_result(result)
-        self._status.show_result(result, self.units)
-        self._for_features(lambda feature: feature.on_result(result))
+        self.status.show_result(result, self.units)
+        self.for_features(lambda feature: feature.on_result(result))
 
     def on_request(self) -> None:
         self.posture.show()
-        self._for_features(lambda feature: feature.on_request())
+        self.for_features(lambda feature: feature.on_request())
 
     def on_branch(self, branch: str | None) -> None:
         self.posture.choose(branch)
@@ -216,18 +233,18 @@ class VisitorPage(Worker):
         return min(times, default=None)
 
     def _report(self, notice: Notice) -> None:
-        self._status.show(notice)
+        self.status.show(notice)
         self.client.flush()
 
     def _leave(self) -> None:
         self.arm.leave()
-        self._for_features(lambda feature: feature.on_leave())
+        self.for_features(lambda feature: feature.on_leave())
 
     def _step(self, batch: list[tuple[Hashable, object]]) -> None:
         with self.client.atomic():
             for key, value in batch:
                 # Guarded one by one, so that one bad value does not discard the others.
-                self._guard(lambda key=key, value=value: self._handle(key, value))  # type: ignore[misc]
+                self._guard(lambda key=key, value=value: self._actions.handle(key, value))  # type: ignore[misc]
             self.arm.draw(fresh=bool(batch))
             now = time.perf_counter()
             for feature in self.features:
@@ -241,12 +258,6 @@ class VisitorPage(Worker):
         elif not (self.arm.moving or self.arm.dragging) and self._persistence.rested(now):
             self._guard(self._persistence.save)
 
-    def _handle(self, key: Hashable, value: object) -> None:
-        name, *arguments = key if isinstance(key, tuple) else (key,)
-        if name not in self._handlers:
-            raise KeyError(key)
-        self._handlers[name](*arguments, value)
-
     def _update_numbers(self) -> None:
         """Update the numbers in the panel: after the scene, because that takes longer than posing the joints."""
         if not (self._readout_due or self._sliders_due):
@@ -255,95 +266,11 @@ class VisitorPage(Worker):
         with self.client.atomic():
             if self._readout_due:
                 self._readout_due = False
-                self._panel.readout.show(kin.fk(self.robot, self.q), self.units)
+                self.panel.readout.show(kin.fk(self.robot, self.q), self.units)
             if self._sliders_due:
                 self._sliders_due = False
-                self._sliders.show(self.goal, self._dragged)
+                self.sliders.show(self.goal, self._dragged)
                 self.posture.show()
-
-    def _for_features(self, action: Callable[[Feature], None]) -> None:
-        """Call every feature; an error of one does not stop the others."""
-        for feature in self.features:
-            self._guard(lambda feature=feature: action(feature))  # type: ignore[misc]
-
-    # Events of the panel
-
-    def _move_by_hand(self, motion: Callable[[], None]) -> None:
-        motion()
-        self._status.show(BY_HAND)
-
-    def _on_slider(self, robot_id: str, index: int, units: Units, value: object) -> None:
-        # An event of sliders that have been replaced since is ignored.
-        if (robot_id, units) == (self.robot.id, self.units):
-            self.arm.move_joint(index, self._sliders.read(index, value))
-            self._status.show(BY_HAND)
-
-    def _on_redundancy(self, robot_id: str, name: str, units: Units, value: object) -> None:
-        """Move through the self-motion while the tool is held."""
-        if (robot_id, units) != (self.robot.id, self.units):
-            return
-        q, result = self.posture.move(name, value)
-        self._status.show_result(result, self.units)
-        if q is not None:
-            self.arm.slide_along(q)
-
-    def _on_lock(self, robot_id: str, joint: int | None, lock: object) -> None:
-        if robot_id == self.robot.id:
-            self._change_lock(joint, bool(lock))
-
-    def _change_lock(self, joint: int | None, lock: bool) -> None:
-        """Lock or unlock one joint, or all of them, at the value it is heading for."""
-        joints = range(self.robot.n) if joint is None else (joint,)
-        locks = [lock if i in joints else before for i, before in enumerate(self.arm.locks)]
-        self._status.show(lock_notice(locks))
-        self.set_locks(locks)
-
-    def _on_branch_choice(self, robot_id: str, value: object) -> None:
-        """Move to the same pose on another branch, and stay on that branch."""
-        if robot_id == self.robot.id:
-            self.arm.switch_branch(self.posture.read(value))
-            self._for_features(lambda feature: feature.on_request())
-
-    def _on_feature(self, name: str, key: Hashable, value: object) -> None:
-        for feature in self.features:
-            if feature.key == name:
-                feature.handle(key, value)
-
-    def _on_robot_choice(self, value: object) -> None:
-        name = str(value)
-        robot = next((r for r in self.store.robots if r.name == name), None)
-        if robot is None:
-            assign(self._panel.robot, self.robot.name)
-            robot = self.store.get(name)  # raises with the list of valid ones
-        if robot == self.robot:
-            return
-        self._sliders.remove()
-        self.posture.remove()
-        self._use_robot(robot)
-        self._status.show(Notice("hand", robot.name, robot.description))
-        self._for_features(lambda feature: feature.on_robot())
-
-    def _on_task(self, value: object) -> None:
-        if value not in TASKS:
-            self._panel.target.show(self.task)
-            raise kin.InputError("task", value, "one of " + ", ".join(TASKS))
-        self.arm.set_task(TASKS[str(value)])
-
-    def _use_units(self, units: Units) -> None:
-        self.units = units
-        self._status.use(units)
-        self._sliders.remove()
-        self._sliders = self._make_sliders()
-        self.posture.show()
-        self._readout_due = True
-        self._for_features(lambda feature: feature.on_style())
-
-    def _on_view(self, name: str, value: object) -> None:
-        setattr(self.view, name, bool(value))
-        if name == "dark":
-            configure_theme(self.client.gui, self.view.dark)
-            self._for_features(lambda feature: feature.on_style())
-        self._apply_view()
 
     # Building
 
@@ -359,41 +286,34 @@ class VisitorPage(Worker):
             if not self.camera.sheet:
                 gui.main_panel.dock_right()
             titles = [tab.title for tab in TABS]
-            self._panel = Panel(
+            self.panel = Panel(
                 gui, self.store.robots, robot, self.units, self.view, self._welcome, bool(LESSONS), titles,
                 self.post,
             )  # fmt: skip
-            self._status = self._panel.status
-            self.posture = PosturePanel(self, self._panel.posture, self.post)
+            self.status = self.panel.status
+            self.posture = PosturePanel(self, self.panel.posture, self.post)
             self._use_robot(robot, saved.q)
-            if self._panel.learn is not None:
-                self.lessons = LessonChoice(gui, self._panel.learn, self, self.post)
-            for tab, container in zip(TABS, self._panel.tabs, strict=True):
+            if self.panel.learn is not None:
+                self.lessons = LessonChoice(gui, self.panel.learn, self, self.post)
+            for tab, container in zip(TABS, self.panel.tabs, strict=True):
                 with container:
                     self._tabs.append(tab(self))
             self._persistence.restore(saved)
             self.arm.draw(fresh=False)
-            self._persistence.begin(self._panel.share)
+            self._persistence.begin(self.panel.share)
         self.client.flush()
 
     def _use_robot(self, robot: Robot, q: Array | None = None) -> None:
         """Show another robot, at its home configuration or at `q` ``(n,)``, in a fitting view."""
         self.arm.use(robot, q, self.view.dark)
         self._readout_due = True
-        self._panel.target.show(self.task)
-        self._sliders = self._make_sliders()
+        self.panel.target.show(self.task)
+        self.sliders = self._make_sliders()
         self.posture.use_robot()
-        self._apply_view()
+        self.apply_view()
         self.camera.aim(self.arm.scene.body)
 
     def _make_sliders(self) -> JointSliders:
         return JointSliders(
-            self.client.gui, self._panel.joints, self.robot, self.goal, self.arm.locks, self.units, self.post
+            self.client.gui, self.panel.joints, self.robot, self.goal, self.arm.locks, self.units, self.post
         )
-
-    def _apply_view(self) -> None:
-        scene = self.arm.scene
-        scene.show_frames(self.view.frames)
-        scene.show_labels(self.view.labels)
-        scene.show_axes(self.view.axes)
-        scene.use_dark(self.view.dark)
