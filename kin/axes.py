@@ -1,20 +1,21 @@
 """The joint axes of a robot as lines in space: the one place where a robot's table is read as geometry.
 
-An axis is a line: the line a revolute joint turns about, or the direction a prismatic joint slides along (a
-direction only: a slide may be drawn anywhere). A table of DH rows has many spellings: two conventions, twists of
-either sign, fixed rows, joints that count in either sense. The lines have one.
+An axis is a line: the line a revolute joint turns about, or the direction a prismatic joint slides along (which
+has no particular place). The same arm can be written as many tables of DH rows: in two conventions, with twists of
+either sign, with fixed rows, with joints that count in either sense. Its axes are always the same lines.
 
-**Relations.** Two numbers describe how two lines lie: the angle between them and the shortest distance between
-them. Lines are *parallel* at angle 0, *perpendicular* at 90°, they *intersect* at distance 0, and both at once
-makes them *one line*. Between two consecutive joints lies one rigid link, so these relations belong to the arm,
-not to a configuration. Three consecutive axes through one point form a *spherical group*, a wrist or a shoulder:
-turning about them leaves the point where it is, which splits position from orientation (Pieper, The kinematics of
-manipulators under computer control, Stanford 1968). Three parallel axes do the same for motion in a plane.
+**Relations.** Two numbers describe the relation of two lines: the angle and the shortest distance between them.
+Lines are *parallel* at angle 0, *perpendicular* at 90°, and *intersect* at distance 0; parallel lines that
+intersect are *one line*. Two consecutive joints are connected by one rigid link, so these relations belong to the
+arm, not to a configuration. Three consecutive axes through one point form a *spherical group*, a wrist or a
+shoulder: rotation about them leaves the point in place, which separates position from orientation (Pieper, The
+kinematics of manipulators under computer control, Stanford 1968). Three parallel axes do the same for motion in a
+plane.
 
-**Links.** `links_of` joins each line to the next by their common normal, and so writes every arm down in one and
-the same way, between what is left of base and tool. Whether an arm belongs to a family with a closed form is then
-a matter of which twists are 0° or 90° and which lengths vanish. `links_by_rows` gives the same form with the exact
-numbers of the table, for tables that are spelled like it.
+**Links.** `links_of` connects each line to the next by their common normal, which describes every arm in the same
+form, between a base and a tool transform. Which twists are 0° or 90° and which lengths vanish then decides whether
+an arm belongs to a family with a closed form. `links_by_rows` gives the same form with the exact numbers of the
+table, for tables that are already written in it.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 _GOLDEN = 0.6180339887498949
-# Within this of a special place (radians, shares of the arm's size) an axis was meant to be there: a table typed
-# with three or four digits.
+# An axis this close (radians, shares of the arm's size) to a special position was meant to be there: the table was
+# typed with three or four digits.
 NEARLY = 2e-3
 
 
@@ -42,9 +43,9 @@ class Axis:
 
     Attributes:
         joint: index of the moving joint.
-        slides: whether the joint is prismatic; `point` then means nothing.
+        slides: whether the joint is prismatic; `point` is then arbitrary.
         point: a point of the axis ``(3,)``, metres.
-        direction: unit vector ``(3,)`` in the sense in which the joint counts.
+        direction: unit vector ``(3,)`` in the positive direction of the joint.
     """
 
     joint: int
@@ -55,15 +56,15 @@ class Axis:
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """How two consecutive axes lie.
+    """The relation of two consecutive axes.
 
     Attributes:
         joint: index of the first of the two joints.
         angle: between the lines, 0 to π/2 radians.
-        distance: shortest distance between the lines in metres, NaN where one is a slide.
+        distance: shortest distance between the lines in metres, NaN if one joint is prismatic.
         parallel, perpendicular, intersect: within the tolerances; one line is parallel and intersecting.
-        almost: "parallel", "perpendicular" or "intersecting" if it misses that by so little that it must have
-            been meant, "" otherwise.
+        almost: "parallel", "perpendicular" or "intersecting" if the axes miss that by so little that it must have
+            been intended, "" otherwise.
     """
 
     joint: int
@@ -86,7 +87,7 @@ class Lines(NamedTuple):
     Attributes:
         z: directions ``(n, 3)``, unit vectors.
         points: a point of each ``(n, 3)``, metres.
-        sign: ``(n,)`` −1.0 where the joint counts against the direction given here.
+        sign: ``(n,)`` −1.0 where the positive direction of the joint is opposite to z.
         T_base_tool: ``(4, 4)``.
     """
 
@@ -97,10 +98,10 @@ class Lines(NamedTuple):
 
 
 def lines_of(robot: Robot, as_counted: bool = False) -> Lines:
-    """The joint axes of a robot, whatever the spelling of its table.
+    """The joint axes of a robot, in whichever way its table is written.
 
-    An axis that is antiparallel to the one before is turned round, and so is the first if it points down in the
-    robot's base: these joints have sign −1. Not so with `as_counted`.
+    The direction of an axis that is antiparallel to the previous one is reversed, and so is that of the first axis
+    if it points down in the robot's base: these joints have sign −1. With `as_counted` no direction is reversed.
     """
     T = robot.T_world_base.copy()
     z, points, sign = np.empty((robot.n, 3)), np.empty((robot.n, 3)), np.ones(robot.n)
@@ -122,13 +123,13 @@ def lines_of(robot: Robot, as_counted: bool = False) -> Lines:
 
 
 def joint_axes(robot: Robot) -> tuple[Axis, ...]:
-    """Every joint's axis, in the sense in which the joint counts."""
+    """Every joint's axis, in the positive direction of the joint."""
     lines, turns = lines_of(robot, as_counted=True), robot.revolute.tolist()
     return tuple(Axis(i, not turns[i], lines.points[i], lines.z[i]) for i in range(robot.n))
 
 
 def generic_q(robot: Robot) -> Array:
-    """A configuration ``(n,)`` inside the limits, special in no way: golden-section shares of each range."""
+    """A configuration ``(n,)`` inside the limits in general position: golden-section shares of each range."""
     lower = np.where(np.isfinite(robot.lower), robot.lower, -math.pi)
     upper = np.where(np.isfinite(robot.upper), robot.upper, math.pi)
     share = np.modf(_GOLDEN * np.arange(1.0, robot.n + 1.0))[0]
@@ -136,13 +137,13 @@ def generic_q(robot: Robot) -> Array:
 
 
 def size(robot: Robot) -> float:
-    """The arm's size in metres, that lengths are compared with: all offsets end to end, slides apart."""
+    """The arm's size in metres, to compare lengths with: the sum of all offsets, without prismatic travel."""
     total = sum(math.hypot(row.a, row.d) for row in robot.rows)
     return float(total + np.linalg.norm(robot.T_last_tool[:3, 3])) or 1.0
 
 
 def pairs(robot: Robot) -> tuple[Pair, ...]:
-    """How each axis lies to the next one: n − 1 pairs."""
+    """The relation of each axis to the next one: n − 1 pairs."""
     return tuple(_pair(a, b, size(robot)) for a, b in pairwise(joint_axes(robot)))
 
 
@@ -150,11 +151,11 @@ def _pair(a: Axis, b: Axis, scale: float) -> Pair:
     normal = np.cross(a.direction, b.direction)
     sine, cosine = float(np.linalg.norm(normal)), abs(float(a.direction @ b.direction))
     angle = math.atan2(sine, cosine)
-    parallel, square = sine < TOLERANCES.geometry, cosine < TOLERANCES.geometry
+    parallel, perpendicular = sine < TOLERANCES.geometry, cosine < TOLERANCES.geometry
     between = b.point - a.point
     if a.slides or b.slides:
         distance = math.nan
-    elif sine < NEARLY:  # the common normal of almost parallel lines is lost in rounding: measure across them
+    elif sine < NEARLY:  # rounding spoils the common normal of almost parallel lines: measure across them
         distance = float(np.linalg.norm(between - (between @ a.direction) * a.direction))
     else:
         distance = abs(float(between @ normal)) / sine
@@ -162,17 +163,17 @@ def _pair(a: Axis, b: Axis, scale: float) -> Pair:
     almost = ""
     if not parallel and sine < NEARLY:
         almost = "parallel"
-    elif not square and cosine < NEARLY:
+    elif not perpendicular and cosine < NEARLY:
         almost = "perpendicular"
     elif not meet and not parallel and distance < NEARLY * scale:
         almost = "intersecting"
-    return Pair(a.joint, angle, distance, parallel, square, meet, almost)
+    return Pair(a.joint, angle, distance, parallel, perpendicular, meet, almost)
 
 
 def spherical_groups(robot: Robot) -> tuple[int, ...]:
-    """First joint of each three consecutive axes that meet in one point, neighbours not being one line.
+    """First joint of each three consecutive axes that meet in one point, where no two neighbours are one line.
 
-    A shoulder, an elbow and a wrist may share joints: four axes through one point are two groups.
+    Groups may share joints: four axes through one point are two groups.
     """
     axes, found = joint_axes(robot), []
     near = TOLERANCES.geometry * size(robot)
@@ -186,7 +187,7 @@ def spherical_groups(robot: Robot) -> tuple[int, ...]:
 
 
 def _meeting(a: Axis, b: Axis) -> Array:
-    """Where two lines that intersect do so ``(3,)``: the point of b nearest to a."""
+    """The intersection of two lines ``(3,)``: the point of b nearest to a."""
     between = b.point - a.point
     cosine = float(a.direction @ b.direction)
     along = (cosine * (between @ a.direction) - between @ b.direction) / (1.0 - cosine * cosine)
@@ -194,7 +195,7 @@ def _meeting(a: Axis, b: Axis) -> Array:
 
 
 def parallel_groups(robot: Robot) -> tuple[tuple[int, int], ...]:
-    """(first, last) joint of each longest run of consecutive parallel axes, slides included."""
+    """(first, last) joint of each longest run of consecutive parallel axes, prismatic joints included."""
     found: list[tuple[int, int]] = []
     for pair in pairs(robot):
         if not pair.parallel:
@@ -207,10 +208,10 @@ def parallel_groups(robot: Robot) -> tuple[tuple[int, int], ...]:
 
 
 class Links(NamedTuple):
-    """A serial arm as ``base · L1 L2 … Ln · tool``, read off its axes as lines.
+    """A serial arm as ``base · L1 L2 … Ln · tool``, derived from its axes as lines.
 
-    ``Li = Rz(theta_i) Tz(d_i) Tx(a_i) Rx(alpha_i)``; joint i adds ``sign_i q_i`` to theta_i if it turns, to d_i if
-    it slides. The last link has neither d nor a nor twist, these are in `tool`; theta_1 = d_1 = 0.
+    ``Li = Rz(theta_i) Tz(d_i) Tx(a_i) Rx(alpha_i)``; joint i adds ``sign_i q_i`` to theta_i if it is revolute, to
+    d_i if it is prismatic. The d, a and alpha of the last link are 0, `tool` contains them; theta_1 = d_1 = 0.
     """
 
     base: Array
@@ -225,8 +226,8 @@ class Links(NamedTuple):
 def links_of(robot: Robot, twists: tuple[int, ...]) -> Links:
     """The robot as `Links`, each twist with the sign in `twists` (one per joint but the last) or zero.
 
-    Common normals make the frames: so neither the convention nor fixed rows show in the result, and of parallel
-    axes all offsets along them are in the last one's d.
+    The frames lie on the common normals. The result does not depend on the convention or on fixed rows, and all
+    offsets along parallel axes are in the d of the last one.
     """
     z, points, sign, end = lines_of(robot)
     theta, d, a, alpha = (np.zeros(robot.n) for _ in range(4))
@@ -265,8 +266,8 @@ def links_by_rows(robot: Robot, quarters: tuple[int, ...]) -> Links | None:
     `links_of`, it copies the values of the table unchanged: all signs are +1.0, theta_1 and d_1 are those of
     the table, and so are the last link's, which are not in `tool`.
 
-    ``Tx(a) Rx(90°) = Rz(π) Tx(−a) Rx(−90°) Rz(π)``: a twist of the wrong sign is exchanged for half turns of its
-    two neighbours.
+    ``Tx(a) Rx(90°) = Rz(π) Tx(−a) Rx(−90°) Rz(π)``: a twist of the wrong sign is replaced by half turns of its two
+    neighbours.
     """
     links = _links_of_table(robot) if robot.revolute.all() else None
     if links is None:

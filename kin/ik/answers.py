@@ -10,8 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from kin.fk import fk
-from kin.ik import failures, preferences
-from kin.ik import nearest as search
+from kin.ik import failures, nearest, preferences
 from kin.ik.assembly import by_key, make_result, solutions_of
 from kin.ik.branches import Branches, Flags, is_closed, measure, solution, solve_branches
 from kin.ik.candidates import DISTANCE, OVERRUN
@@ -32,7 +31,7 @@ def answer(problem: IKProblem) -> IKResult:
         return _solved(problem, branches, branches.good)
     closed, good = branches.closed, branches.good
     if not branches.order and not problem.requested:  # a descent would change a requested value
-        good = search.polish(problem, branches.q, branches.stats)
+        good = nearest.polish(problem, branches.q, branches.stats)
         closed |= good
     allowed = np.array([problem.allows(i) for i in range(len(closed))])
     if (good & allowed).any():
@@ -73,10 +72,10 @@ def _numeric(problem: IKProblem) -> IKResult:
     """
     prefer = problem.options.prefer
     if problem.branches is None and prefer == "nearest":
-        pool = search.solve_numerically(problem).q[None]
+        pool = nearest.solve_numerically(problem).q[None]
     else:
-        starts = search.starting_points(problem, count=4 * search.STARTS)
-        pool = search.descend_each(problem, problem.code, starts, 1.0)[0]
+        starts = nearest.starting_points(problem, count=4 * nearest.STARTS)
+        pool = nearest.descend_each(problem, problem.code, starts, 1.0)[0]
     q, stats = _usable(problem, *measure(problem, pool))
     if not len(q):
         return failures.out_of_reach(problem, None)
@@ -96,7 +95,7 @@ def _numeric(problem: IKProblem) -> IKResult:
             best.setdefault(branch, i)
     if not best:
         details = NotOnBranch(len({problem.branch_of(row) for row in q}), 0)
-        closest = search.closest(problem, None)
+        closest = nearest.closest(problem, None)
         return make_result(problem, Status.UNREACHABLE, "branch", details, closest=closest)
     solutions = tuple(solution(problem, q[i], stats[i], branch) for branch, i in best.items())
     if problem.options.images == "all":

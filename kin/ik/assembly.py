@@ -1,4 +1,4 @@
-"""From measured rows to results: order, solutions with their redundancy, and the result with what is singular."""
+"""From measured rows to results: order, solutions with their redundancy parameters, singularities."""
 
 from __future__ import annotations
 

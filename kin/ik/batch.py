@@ -17,7 +17,7 @@ from kin.errors import InputError
 from kin.kernels import fk as fk_kernels
 from kin.robot import Robot
 from kin.solvers import closed_form_of
-from kin.solvers.contract import BatchKernels
+from kin.solvers.contract import Many, One
 from kin.transforms import Array, finite_array
 
 _FLOAT = np.dtype(np.float64)
@@ -27,9 +27,11 @@ _empty, _isinf, _ndarray = np.empty, math.isinf, np.ndarray
 
 
 class _Prepared(NamedTuple):
-    """What a call needs to know of an arm: its kernels without argument checks, and their constant arguments."""
+    """What a call needs of an arm: its kernels without argument checks, and their constant arguments."""
 
-    kernels: BatchKernels
+    one: One
+    many: Many
+    params: Array
     near: Array
     shape: tuple[int, int]
 
@@ -62,8 +64,7 @@ def ik_branches(robot: Robot, target: ArrayLike, redundancy: ArrayLike = math.na
         T = target
         if T.shape == _POSE and type(redundancy) is float and not _isinf(redundancy):
             out = _empty(prepared.shape)
-            kernels = prepared.kernels
-            if kernels.one(kernels.params, T, redundancy, prepared.near, out):
+            if prepared.one(prepared.params, T, redundancy, prepared.near, out):
                 return out
     else:
         T = finite_array("target", target, _POSE)
@@ -72,7 +73,7 @@ def ik_branches(robot: Robot, target: ArrayLike, redundancy: ArrayLike = math.na
     value = _redundancy(redundancy, T.shape[:-2])
     out = np.empty((*T.shape[:-2], *prepared.shape))
     targets, rows = T.reshape(-1, 4, 4), out.reshape(-1, *prepared.shape)
-    prepared.kernels.many(prepared.kernels.params, targets, value, prepared.near, rows)
+    prepared.many(prepared.params, targets, value, prepared.near, rows)
     return out
 
 
@@ -80,7 +81,8 @@ def _prepare(robot: Robot) -> _Prepared:
     match = closed_form_of(robot)
     if match is None:
         raise InputError("robot", robot.id, "an arm with a closed form")
-    prepared = _Prepared(match.kernels.unchecked(), robot.q_home.copy(), (len(match.branches), robot.n))
+    kernels, shape = match.kernels.unchecked(), (len(match.branches), robot.n)
+    prepared = _Prepared(kernels.one, kernels.many, kernels.params, robot.q_home.copy(), shape)
     robot.__dict__[_CACHE] = prepared
     return prepared
 

@@ -1,7 +1,7 @@
 """Measuring candidates: one compiled pass over the raw rows of a solver.
 
-Each row is brought to its best whole-turn image, its residuals are measured by forward kinematics, and rows are
-accepted, sorted and deduplicated. Solvers do none of this.
+Each row is moved to its best whole-turn image and measured by forward kinematics. The rows that meet the task are
+then sorted, without duplicates. Solvers do none of this.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from kin.kernels.compile import MODEL, direct, jit, record, row_of
 from kin.kernels.fk import fk_into
 from kin.solvers.common import TURN, nearest_image, wrap
 from kin.solvers.contract import APPROACH, MASK, POSE
-from kin.solvers.pose import relative_pose
+from kin.solvers.numeric.error import relative_pose
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 

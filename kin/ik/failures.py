@@ -1,7 +1,7 @@
-"""Answers without a solution: why there is none, and what comes closest.
+"""Results without an exact solution: the cause, and the closest configuration.
 
-Each function is one cause. Descents come first in all of them: where branches merge, a descent may meet a target
-that every row of the closed form misses by rounding error, and then the problem is solved after all.
+One function per cause. Each first searches the closest configuration by descents: where branches merge, a descent
+may meet a target that every row of the closed form misses by rounding error, and then the problem is solved.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import TypeGuard
 import numpy as np
 
 from kin.fk import fk, link_frames
-from kin.ik import nearest as search
+from kin.ik import nearest
 from kin.ik.assembly import by_key, make_result, solutions_of
 from kin.ik.branches import Branches, Flags, is_closed, measure, redundancy_of, violations_of
 from kin.ik.candidates import DISTANCE, OVERRUN, ROLL
@@ -31,12 +31,13 @@ from kin.ik.details import (
 from kin.ik.problem import IKProblem
 from kin.ik.results import BlockedBranch, Cause, IKResult, IKSolution, Status
 from kin.solvers.contract import APPROACH, MASK, POSITION
+from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 
 def outside_limits(problem: IKProblem, branches: Branches, rows: Flags, good: Flags) -> IKResult:
     """The postures in `rows` exist, but all of them are outside the limits; `good` are solutions elsewhere."""
-    closest = search.closest(problem, branches.q)
+    closest = nearest.closest(problem, branches.q)
     if _is_solution(closest, problem):
         return _found_by_descent(problem, closest)
     order = by_key(branches.q, rows, branches.stats[:, OVERRUN])
@@ -57,14 +58,14 @@ def outside_limits(problem: IKProblem, branches: Branches, rows: Flags, good: Fl
         details,
         closest=closest,
         blocked=blocked,
-        distance=search.nearest_to_point(problem, closest)[1],
+        distance=nearest.nearest_to_point(problem, closest)[1],
         redundancy=redundancy,
     )
 
 
 def not_on_branch(problem: IKProblem, branches: Branches, closed: Flags, good: Flags) -> IKResult:
     """The requested branch does not exist at this target; others do."""
-    closest = search.closest(problem, branches.q)
+    closest = nearest.closest(problem, branches.q)
     if _is_solution(closest, problem):
         return _found_by_descent(problem, closest)
     fits, exist = (len(by_key(branches.q, rows, branches.stats[:, DISTANCE])) for rows in (good, closed))
@@ -82,7 +83,7 @@ def compromise(problem: IKProblem, branches: Branches, allowed: Flags) -> IKResu
     possible = allowed & is_closed(approach_stats)
     rows = possible & (stats[:, OVERRUN] == 0.0) if problem.respect else possible
     solutions, _ = solutions_of(problem, branches, by_key(branches.q, rows, np.abs(stats[:, ROLL])), rows, "roll")
-    oriented = search.nearest_orientation(problem, branches.q if rows.any() else None)
+    oriented = nearest.nearest_orientation(problem, branches.q if rows.any() else None)
     if oriented is not None and (problem.branches is None or problem.allows(problem.branch_of(oriented.q))):
         solutions += (oriented,)
     if not solutions:
@@ -94,14 +95,14 @@ def compromise(problem: IKProblem, branches: Branches, allowed: Flags) -> IKResu
     details: Details = RollError(joints, first.rotation_error)
     if first.compromise != "roll":
         details = RotationError(joints, first.rotation_error, blocked[0].violations[0] if blocked else None)
-    closest = search.closest(problem, branches.q)
+    closest = nearest.closest(problem, branches.q)
     return make_result(
         problem,
         Status.APPROXIMATE,
         "roll" if first.compromise == "roll" else "rotation",
         details,
         solutions=solutions,
-        closest=min((*solutions, *filter(None, (closest,))), key=search.mismatch),
+        closest=min((*solutions, *filter(None, (closest,))), key=nearest.mismatch),
         blocked=blocked,
     )
 
@@ -109,20 +110,20 @@ def compromise(problem: IKProblem, branches: Branches, allowed: Flags) -> IKResu
 def out_of_reach(problem: IKProblem, branches: Branches | None) -> IKResult:
     """No configuration: either the point is out of reach, or the orientation is not possible there."""
     candidates = None if branches is None else branches.q
-    closest = search.closest(problem, candidates)
+    closest = nearest.closest(problem, candidates)
     if _is_solution(closest, problem):
         return _found_by_descent(problem, closest)
-    nearest, distance = search.nearest_to_point(problem, closest)
+    at_point, distance = nearest.nearest_to_point(problem, closest)
     position, rotation = (None, None) if closest is None else (closest.position_error, closest.rotation_error)
     if problem.code == MASK:
         details: Details = MaskNotMet(position, rotation)
         return make_result(problem, Status.UNREACHABLE, "outside", details, closest=closest, distance=distance)
     if problem.code == POSITION and problem.branches is None:
-        closest = nearest
+        closest = at_point
     if distance > 0.0 or problem.code == POSITION:
-        cause, details = side_of(problem, nearest.q), OutOfReach(distance)
+        cause, details = side_of(problem, at_point.q), OutOfReach(distance)
         return make_result(problem, Status.UNREACHABLE, cause, details, closest=closest, distance=distance)
-    oriented = search.nearest_orientation(problem, candidates)
+    oriented = nearest.nearest_orientation(problem, candidates)
     fits = branches is None or branches.obstacle is None or not branches.gap > 0.0
     details = OrientationNotMet(
         obstacle=None if fits or branches is None else branches.obstacle,
@@ -139,9 +140,9 @@ def out_of_reach(problem: IKProblem, branches: Branches | None) -> IKResult:
 def side_of(problem: IKProblem, q: Array) -> Cause:
     """On which side of the workspace the target's point is; q ``(n,)`` is the configuration nearest to it.
 
-    Distances are those from the shoulder, the point of the first joint axis at the height of the second joint. In
-    a hole of the workspace the way out tells which one it is: straight away from the axis, or away from the
-    shoulder.
+    Distances are measured from the shoulder, the point of the first joint axis at the height of the second joint.
+    For a target in a hole, the direction to the nearest point tells which hole it is: straight away from the axis,
+    or away from the shoulder.
     """
     robot = problem.robot
     first = link_frames(robot, q)[0]
@@ -151,29 +152,29 @@ def side_of(problem: IKProblem, q: Array) -> Cause:
     reached = fk(robot, q)[:3, 3] - shoulder
     target = problem.T[:3, 3] - shoulder
     far, near = float(np.linalg.norm(target)), float(np.linalg.norm(reached))
-    if far > near + 1e-6:
+    if far > near + TOLERANCES.same_distance:
         return "too far"
     out = reached - target
     radial = out - axis * float(axis @ out)
-    away = float(out @ target) / far if far > 1e-9 else math.inf
+    away = float(out @ target) / far if far > TOLERANCES.geometry else math.inf
     off_axis = [float(np.linalg.norm(v - axis * float(axis @ v))) for v in (target, reached)]
     if (
         robot.joints[0].kind == "revolute"
-        and off_axis[1] > off_axis[0] + 1e-6
-        and np.linalg.norm(radial) > away - 1e-9
+        and off_axis[1] > off_axis[0] + TOLERANCES.same_distance
+        and np.linalg.norm(radial) > away - TOLERANCES.geometry
     ):
         return "around the axis"
-    return "too near" if far < near - 1e-6 else "outside"
+    return "too near" if far < near - TOLERANCES.same_distance else "outside"
 
 
 def _blocked(problem: IKProblem, q: Array, order: list[int]) -> tuple[BlockedBranch, ...]:
-    """Rows of q ``(k, n)`` that only the limits forbid."""
+    """Rows of q ``(k, n)`` that exist outside the limits."""
     return tuple(BlockedBranch(problem.branch_name(i), q[i].copy(), violations_of(problem, q[i])) for i in order)
 
 
 def _is_solution(closest: IKSolution | None, problem: IKProblem) -> TypeGuard[IKSolution]:
-    """Whether a descent met the task after all; it would have changed values that were requested."""
-    return closest is not None and not problem.requested and search.is_exact(problem, closest)
+    """Whether a descent met the task. Not if redundancy values were requested: a descent changes them."""
+    return closest is not None and not problem.requested and nearest.is_exact(problem, closest)
 
 
 def _found_by_descent(problem: IKProblem, found: IKSolution) -> IKResult:

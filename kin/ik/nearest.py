@@ -1,9 +1,9 @@
-"""The nearest to a target: the closest configuration, the nearest point, the nearest orientation.
+"""Searches by descent for targets without an exact solution: closest configuration, nearest point and orientation.
 
 A descent ends in a local minimum, so each search starts from many configurations: the seed, the branches of the
-closed form (inside the limits or not), and points spread evenly over the limits. Of equal minima the one whose
-start comes first is taken, and the seed comes first: while a target is dragged out of reach the arm does not jump.
-A search ends once several descents have ended at the best minimum so far.
+closed form (inside the limits or not), and points spread evenly over the limits. Of equal minima, the one with the
+earliest start is taken, and the seed is the first start: the arm does not jump while a target is dragged out of
+reach. A search ends when several descents have ended at the best minimum so far.
 """
 
 from __future__ import annotations
@@ -25,22 +25,19 @@ from kin.transforms import Array
 
 ORIENTATION_WEIGHT = 0.1
 STARTS = 24
-# Of `solve_numerically`: the most starts, the error E in metres that counts as exact, and the length in metres
-# that weighs as much as a radian: a share of the arm's reach, with bounds.
+# Settings of `solve_numerically`: the largest number of starts, the error E in metres that counts as exact, and
+# the metres per radian of its error: a share of the arm's reach, between two bounds.
 BUDGET = 400
 _EXACT = 1e-10
 _LEVER, _LEAST_LEVER, _MOST_LEVER = 0.3, 0.03, 1.0
-# At most _MOST_STARTS descents; the search stops once _MEETINGS of them end at the best minimum.
+# At most _MOST_STARTS descents; the search stops when _MEETINGS of them have ended at the best minimum.
 _MOST_STARTS = 64
 _MEETINGS = 12
-# The length in metres that weighs as much as a radian, and how many of the best descents continue from there. At
-# _HELD descents also start where the point is met: the point stays nearly met, and the problem is not yet as stiff
-# as with smaller weights.
-_HELD = 1e-2
-_WEIGHTS = ((0.1, 24), (_HELD, 12), (1e-3, 12), (1e-4, 6))
-_HAIR = 1e-6
-# Minima that differ by less, in metres and radians, count as one.
-_ALIKE, _ALIKE_ANGLE = 1e-9, 1e-6
+# Stages of `nearest_orientation`: the metres per radian, and how many of the best descents continue. From
+# _POINT_KEPT on, descents also start from configurations that meet the point: at this weight they stay close to
+# the point, and the problem is better conditioned than at smaller weights.
+_POINT_KEPT = 1e-2
+_STAGES = ((0.1, 24), (_POINT_KEPT, 12), (1e-3, 12), (1e-4, 6))
 
 
 class Found(NamedTuple):
@@ -58,10 +55,10 @@ class Found(NamedTuple):
 
 
 def solve_numerically(problem: IKProblem, budget: int = BUDGET) -> Found:
-    """The first configuration that meets the task: a descent from the seed, then others from all over the limits.
+    """The first configuration that meets the task: by a descent from the seed, then from points over the limits.
 
-    Needs no closed form. If none of `budget` starts (at least 1) leads to E ≤ 1e-10 m, the best minimum reached.
-    The same problem always gets the same answer.
+    Needs no closed form. If none of `budget` starts (at least 1) leads to E ≤ 1e-10 m, the result is the best
+    minimum reached. The search is deterministic.
     """
     out = problem.seed.copy()
     weight = min(max(_LEVER * problem.robot.reach, _LEAST_LEVER), _MOST_LEVER)
@@ -76,16 +73,19 @@ def descend(
 ) -> tuple[Array, float]:
     """Best configuration ``(n,)`` over descents from the starts ``(k, n)``, and its error E in metres.
 
-    Over no more starts than it takes to end at E ≤ `enough`, or at the best minimum `_MEETINGS` times.
+    Stops early at E ≤ `enough`, or when `_MEETINGS` descents have ended at the best minimum.
     """
     q, errors = _descend(problem, code, starts, weight, enough, _MEETINGS)
     best = 0
     for i, error in enumerate(errors.tolist()):
-        # A later start must be better by more than rounding: of equal minima the one nearest to the seed stays, so
-        # that the arm does not jump about while a target is dragged out of reach.
-        if error < errors[best] * (1.0 - 1e-6) - 1e-12:
+        if _is_better(error, errors[best]):
             best = i
     return q[best], float(errors[best])
+
+
+def _is_better(error: float, best: float) -> bool:
+    """Whether an error is smaller than the best one so far by more than rounding."""
+    return error < best * (1.0 - TOLERANCES.better_minimum_share) - TOLERANCES.better_minimum
 
 
 def descend_each(problem: IKProblem, code: int, starts: Array, weight: float) -> tuple[Array, Array]:
@@ -96,7 +96,7 @@ def descend_each(problem: IKProblem, code: int, starts: Array, weight: float) ->
 def _descend(
     problem: IKProblem, code: int, starts: Array, weight: float, enough: float, meetings: int
 ) -> tuple[Array, Array]:
-    """Where the descents end ``(m, n)``, and their errors ``(m,)``; m < k if the search was over before."""
+    """Where the descents end ``(m, n)``, and their errors ``(m,)``; m < k if the search stopped early."""
     q, errors = np.array(starts, order="C"), np.empty(len(starts))
     goal = (problem.T, code, problem.mask, weight)
     bounds = (problem.low, problem.high, problem.turns)
@@ -105,7 +105,7 @@ def _descend(
 
 
 def starting_points(problem: IKProblem, candidates: Array | None = None, count: int = STARTS) -> Array:
-    """Where descents begin ``(k, n)``: the seed, the known branches ``(b, n)``, then `count` spread points."""
+    """Starts of descents ``(k, n)``: the seed, known branches ``(b, n)``, then `count` points over the limits."""
     rows = [problem.seed[None]]
     if candidates is not None:
         rows.append(candidates[~np.isnan(candidates[:, 0])])
@@ -114,16 +114,16 @@ def starting_points(problem: IKProblem, candidates: Array | None = None, count: 
 
 
 def polish(problem: IKProblem, q: Array, stats: Array) -> Flags:
-    """Descend from the rows ``(k, n)`` that miss by a hair, in place; which of them then are good ``(k,)``.
+    """Refine the rows ``(k, n)`` that are near misses by descents, in place; which of them are now good ``(k,)``.
 
-    Where two branches merge, a rounding error of 1e-16 in the target is 1e-8 in an angle: enough to push another
-    joint past its stop or the roll past the closure tolerance.
+    Where two branches merge, a rounding error of 1e-16 in the target is 1e-8 in an angle: enough to move another
+    joint past its limit, or the roll past the closure tolerance.
     """
     good = np.zeros(len(q), dtype=bool)
     miss = stats[:, POSITION_ERROR] + stats[:, ROTATION_ERROR]
     if problem.respect:
         miss = miss + stats[:, OVERRUN]
-    for i in np.flatnonzero(miss < _HAIR).tolist():
+    for i in np.flatnonzero(miss < TOLERANCES.near_miss).tolist():
         near, _ = descend(problem, problem.code, q[i : i + 1], 1.0)
         row, row_stats = measure(problem, near[None])
         error = max(row_stats[0, POSITION_ERROR], row_stats[0, ROTATION_ERROR])
@@ -133,7 +133,10 @@ def polish(problem: IKProblem, q: Array, stats: Array) -> Flags:
 
 
 def closest(problem: IKProblem, candidates: Array | None) -> IKSolution | None:
-    """The configuration inside the limits with the least E, ℓ = 0.1 m per radian; None if a branch has none."""
+    """The configuration inside the limits with the smallest E, at 0.1 m per radian.
+
+    None if no descent ends on a requested branch.
+    """
     starts = starting_points(problem, candidates, _MOST_STARTS)
     if problem.branches is None:
         q, _ = descend(problem, problem.code, starts, ORIENTATION_WEIGHT)
@@ -141,7 +144,7 @@ def closest(problem: IKProblem, candidates: Array | None) -> IKSolution | None:
         ends, errors = descend_each(problem, problem.code, starts, ORIENTATION_WEIGHT)
         best = math.inf
         for end, error in zip(ends, errors.tolist(), strict=True):
-            if error < best * (1.0 - 1e-6) - 1e-12 and problem.allows(problem.branch_of(end)):
+            if _is_better(error, best) and problem.allows(problem.branch_of(end)):
                 q, best = end, error
         if not math.isfinite(best):
             return None
@@ -155,7 +158,7 @@ def mismatch(found: IKSolution) -> float:
 
 
 def is_exact(problem: IKProblem, found: IKSolution) -> bool:
-    """Whether the closest configuration in fact meets the task."""
+    """Whether the closest configuration meets the task exactly."""
     return (
         found.position_error <= TOLERANCES.closure_position
         and found.rotation_error <= TOLERANCES.closure_rotation
@@ -164,46 +167,48 @@ def is_exact(problem: IKProblem, found: IKSolution) -> bool:
 
 
 def nearest_to_point(problem: IKProblem, known: IKSolution | None) -> tuple[IKSolution, float]:
-    """The configuration nearest to the target's point alone, and the metres that are missing there.
+    """The configuration nearest to the target's point alone, and its distance from it in metres.
 
-    Of a mask, the coordinates of the point that it keeps.
+    For a mask, only the coordinates of the point that it keeps count.
     """
     if known is not None and (known.position_error <= TOLERANCES.closure_position or problem.code == MASK):
         return known, known.position_error if problem.code == MASK else 0.0
     starts = starting_points(problem, None if known is None else known.q[None], _MOST_STARTS)
     q, distance = descend(problem, POSITION, starts, 1.0, enough=1e-11)
     found, stats = measure(problem, q[None])
-    return solution(problem, found[0], stats[0], compromise="closest"), 0.0 if distance <= 1e-7 else distance
+    closest_point = solution(problem, found[0], stats[0], compromise="closest")
+    return closest_point, 0.0 if distance <= TOLERANCES.point_met else distance
 
 
-def _valleys(errors: Array, alike: float) -> list[int]:
-    """Indices of the errors ``(k,)`` by size; of a run of equal errors only the first two.
+def _different_minima(errors: Array, same: float) -> list[int]:
+    """Indices of the errors ``(k,)``, sorted by error; of a run of equal errors only the first two.
 
-    Descents with equal errors mostly ended in the same minimum, so following one of them is enough.
+    Descents with equal errors have mostly ended in the same minimum, so it is enough to continue one or two.
     """
     order = np.argsort(errors, kind="stable").tolist()
-    return [i for k, i in enumerate(order) if k < 2 or errors[i] > errors[order[k - 2]] + alike]
+    return [i for k, i in enumerate(order) if k < 2 or errors[i] > errors[order[k - 2]] + same]
 
 
 def nearest_orientation(problem: IKProblem, candidates: Array | None) -> IKSolution | None:
-    """The configuration with the exact point and the least rotation error, None if the point is out of reach.
+    """The configuration with the exact point and the smallest rotation error, None if the point is out of reach.
 
-    A radian weighs less and less against a metre: descents from everywhere, later from where the point is met too,
-    find the valleys; the best of them are followed to where a radian weighs a tenth of a millimetre. The closed
-    form for the orientation found there then makes the point exact.
+    A penalty method: from stage to stage a radian weighs less against a metre, down to a tenth of a millimetre,
+    and the best minima of each stage are the starts of the next. The closed form for the orientation found there
+    then makes the point exact.
     """
     q = starting_points(problem, candidates)
     met, errors = descend_each(problem, POSITION, q, 1.0)
-    if errors.min() > 1e-7 and np.count_nonzero(errors <= errors.min() + _ALIKE) >= _MEETINGS:
-        return None  # as `nearest_to_point` would find
-    met = met[errors <= 1e-7]
-    for weight, keep in _WEIGHTS:
-        if weight == _HELD:
+    least = errors.min()
+    if least > TOLERANCES.point_met and np.sum(errors <= least + TOLERANCES.same_minimum) >= _MEETINGS:
+        return None  # the point is out of reach, as `nearest_to_point` would find
+    met = met[errors <= TOLERANCES.point_met]
+    for weight, keep in _STAGES:
+        if weight == _POINT_KEPT:
             q = np.concatenate([q, met])
         q, errors = descend_each(problem, problem.code, q, weight)
-        q = q[_valleys(errors, _ALIKE_ANGLE * weight)[:keep]]
+        q = q[_different_minima(errors, TOLERANCES.same_minimum_angle * weight)[:keep]]
     q, errors = descend_each(problem, POSITION, q, 1.0)
-    q = np.concatenate([q[errors <= 1e-7], met])
+    q = np.concatenate([q[errors <= TOLERANCES.point_met], met])
     if not len(q):
         return None
     q = q[int(np.argmin(measure(problem, q)[1][:, ROTATION_ERROR].round(9)))]
@@ -216,9 +221,9 @@ def nearest_orientation(problem: IKProblem, candidates: Array | None) -> IKSolut
         if problem.respect:
             miss[known.stats[:, OVERRUN] > 0.0] = math.inf
         best = int(np.argmin(miss))
-        if miss[best] < 0.05:
+        if miss[best] < TOLERANCES.same_branch:
             return solution(problem, known.q[best], known.stats[best], best, compromise="rotation")
-    # At a stop of the wrist the polished direction may leave the limits by a hair: polish the point alone.
+    # At a limit of the wrist the exact orientation may be just outside the limits: refine the point alone.
     q, error = descend(problem, POSITION, q[None], 1.0)
     if error > TOLERANCES.closure_position:
         return None

@@ -1,9 +1,9 @@
 """Preferences: which values redundancy parameters get.
 
 The solvers choose the value nearest to the seed. The other preferences search each branch for the best value:
-samples over its exact feasible ranges, then a finer and finer grid around the best sample. Values outside those
-ranges are never tried, so the choice is always feasible. Two redundancy parameters are searched one after the
-other.
+samples over its exact feasible ranges, then ever finer grids around the best sample. Values outside those
+ranges are never tried, so the choice is always feasible. Several redundancy parameters are searched one after
+another.
 """
 
 from __future__ import annotations
@@ -126,15 +126,15 @@ def _try_all(
 
 
 def _improve_row(problem: IKProblem, branches: Branches, score: Array, row: int, k: int) -> None:
-    """The best value of parameter `k` on one branch, the other parameters held."""
-    held = [
+    """The best value of parameter `k` on one branch, with the other parameters fixed."""
+    fixed = [
         float(branches.q[row, parameter.joint] if parameter.joint >= 0 else branches.values[row, i])
         for i, parameter in enumerate(branches.redundancies)
     ]
     arcs = branches.arcs[k]
     if len(branches.redundancies) > 1:
         # The present ranges may belong to other values of the other parameters.
-        arcs = _solve(problem, branches, row, [v if i != k else math.nan for i, v in enumerate(held)]).arcs[k]
+        arcs = _solve(problem, branches, row, [v if i != k else math.nan for i, v in enumerate(fixed)]).arcs[k]
     arcs = arcs[arcs[:, 0] == row][:, 1:]
     total = float((arcs[:, 1] - arcs[:, 0]).sum())
     for low, high in arcs.tolist():
@@ -142,17 +142,17 @@ def _improve_row(problem: IKProblem, branches: Branches, score: Array, row: int,
         step = (high - low) / max(count - 1, 1)
         values = np.linspace(low, high, count)
         for _ in range(_ZOOMS if high > low else 1):
-            reached = [_try(problem, branches, score, row, k, held, value) for value in values.tolist()]
+            reached = [_try(problem, branches, score, row, k, fixed, value) for value in values.tolist()]
             best = float(values[int(np.argmax(reached))])
             values = np.clip(best + step * np.linspace(-0.8, 0.8, 7), low, high)
             step *= 0.27
 
 
 def _try(
-    problem: IKProblem, branches: Branches, score: Array, row: int, k: int, held: list[float], value: float
+    problem: IKProblem, branches: Branches, score: Array, row: int, k: int, fixed: list[float], value: float
 ) -> float:
     """The score of one value; a better one replaces the row."""
-    tried = _solve(problem, branches, row, [value if i == k else h for i, h in enumerate(held)])
+    tried = _solve(problem, branches, row, [value if i == k else v for i, v in enumerate(fixed)])
     q, stats = centred(problem, tried.q[row : row + 1])
     if not is_closed(stats)[0] or (problem.respect and stats[0, OVERRUN] > 0.0):
         return -math.inf

@@ -1,7 +1,7 @@
 """An IK problem: a target, a seed, and options that have been checked against an arm.
 
-Everything that follows reads an `IKProblem` and checks nothing again. What depends on arm and options alone is
-prepared once and cached (`prepare`); a further target costs a copy of that (`IKProblem.of`). Locked joints are
+An `IKProblem` is valid, so its readers check nothing. What depends on arm and options alone is computed once and
+cached (`prepare`); each target takes a copy of that (`IKProblem.of`). Locked joints are
 limits of zero width; narrowed limits replace the robot's own.
 """
 
@@ -83,7 +83,7 @@ class IKProblem:
         """
         prepared = prepare(robot, options)
         seed = prepared.seed if q_seed is None else _seed(robot, q_seed)
-        # As `replace` does it, in a tenth of the time: every target passes through here.
+        # The same as `replace`, in a tenth of the time: this runs for every target.
         problem = object.__new__(cls)
         problem.__dict__.update(prepared.__dict__, T=pose_of(target, prepared.code), seed=seed)
         if prepared.branches is not None and SEED in (options.branch or ()):
@@ -213,8 +213,7 @@ def _requested_values(
 
 
 def _requested_branches(robot: Robot, options: IKOptions, closed_form: ClosedForm | None) -> frozenset[int] | None:
-    """The rows of the branches that are requested by whole names or parts of names; that of the seed comes
-    later."""
+    """The rows of the branches that are requested by names or parts of names; `IKProblem.of` adds the seed's."""
     requested = options.branch
     if requested is None:
         return None

@@ -64,26 +64,16 @@ def all_finite_pose(T: Array) -> bool:
     return bad == 0
 
 
-@jit
-def _turn_z(T: Array, s: float, c: float, d: float) -> None:
-    """T ← T · Rz(θ) Tz(d), on the first three rows."""
+@inlined
+def _screw(T: Array, axis: int, s: float, c: float, distance: float) -> None:
+    """T ← T · a rotation about the axis (0 for x, 2 for z) and a translation along it, on the first three rows."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
     for r in range(3):
-        x = T[r, 0]
-        y = T[r, 1]
-        T[r, 0] = c * x + s * y
-        T[r, 1] = c * y - s * x
-        T[r, 3] += d * T[r, 2]
-
-
-@jit
-def _turn_x(T: Array, a: float, ca: float, sa: float) -> None:
-    """T ← T · Tx(a) Rx(α), on the first three rows."""
-    for r in range(3):
-        y = T[r, 1]
-        z = T[r, 2]
-        T[r, 1] = ca * y + sa * z
-        T[r, 2] = ca * z - sa * y
-        T[r, 3] += a * T[r, 0]
+        x = T[r, i]
+        y = T[r, j]
+        T[r, i] = c * x + s * y
+        T[r, j] = c * y - s * x
+        T[r, 3] += distance * T[r, axis]
 
 
 @jit
@@ -152,7 +142,7 @@ def load_base(model: Array, T: Array) -> int:
     _load(T, model, 3)
     if model[2] == 0.0:
         return 0
-    _turn_x(T, model[HEADER + 2], model[HEADER + 3], model[HEADER + 4])
+    _screw(T, 0, model[HEADER + 4], model[HEADER + 3], model[HEADER + 2])
     return 1
 
 
@@ -341,11 +331,11 @@ def _apply_row(T: Array, model: Array, i: int, q: Array) -> None:
     s, c, d = z_part(model, i, q)
     a, ca, sa = x_part(model, i)
     if model[2] == 0.0:
-        _turn_z(T, s, c, d)
-        _turn_x(T, a, ca, sa)
+        _screw(T, 2, s, c, d)
+        _screw(T, 0, sa, ca, a)
     else:
-        _turn_x(T, a, ca, sa)
-        _turn_z(T, s, c, d)
+        _screw(T, 0, sa, ca, a)
+        _screw(T, 2, s, c, d)
 
 
 @jit

@@ -24,7 +24,7 @@ from kin.ik.branches import Flags, is_closed, measure, violations_of
 from kin.ik.candidates import POSITION_ERROR, ROTATION_ERROR
 from kin.ik.details import LimitViolation
 from kin.ik.problem import IKProblem
-from kin.path.configurations import LARGE, branches_near, continued, descended, nearest
+from kin.path.configurations import LARGE, branches_near, continued, descended, nearest_solution
 from kin.path.details import BranchEnds, JumpCause, JumpDetails, LimitInTheWay, NearSingularity, Place, TooFarApart
 from kin.path.results import PathJump
 from kin.path.search import DeadEnd
@@ -113,11 +113,11 @@ def _reason(at: _Break) -> Reason:
     settings, problem = at.settings, at.problem
     reach = settings.max_step * abs(at.after - at.before)
     unlimited = _without_limits(problem, np.array(problem.locked))
-    there = nearest(settings, unlimited, at.relaxed, at.q)
+    there = nearest_solution(settings, unlimited, at.relaxed, at.q)
     if any(problem.locked) and at.distance(there) > reach:
         unlimited = _without_limits(problem, np.zeros(len(at.q), dtype=np.bool_))
-        there = nearest(settings, unlimited, at.relaxed, at.q)
-    within = nearest(settings, problem, at.relaxed, at.q)
+        there = nearest_solution(settings, unlimited, at.relaxed, at.q)
+    within = nearest_solution(settings, problem, at.relaxed, at.q)
     violations = () if there is None else violations_of(problem, there)
     least = at.distance(there)
     if violations and (least <= reach or at.distance(within) > _DETOUR * least):
@@ -148,7 +148,7 @@ def _broken(at: _Break, problem: IKProblem) -> Reason | None:
     T_start, closest = fk(robot, here), _nearest_singularity(robot, here)
     for part in np.linspace(0.0, 1.0, _SUBSTEPS + 1)[1:].tolist():
         step = replace(problem, T=_interpolated(T_start, problem.T, part))
-        found = nearest(at.settings, step, at.relaxed, here)
+        found = nearest_solution(at.settings, step, at.relaxed, here)
         if found is None or at.settings.largest_move(here, found) > LARGE:
             distance, singularity = _nearest_singularity(robot, here)
             if _exists(step, here):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kin.ik import nearest as search
+from kin.ik import nearest
 from kin.ik.branches import Branches, Flags, is_closed, measure, solve_branches
 from kin.ik.candidates import OVERRUN, POSITION_ERROR, ROLL, ROTATION_ERROR, select
 from kin.ik.problem import IKProblem
@@ -19,7 +19,6 @@ from kin.transforms import Array
 
 POOL = 24  # starts of descents, and the most of their ends that are kept
 LARGE = 0.125  # a larger motion between neighbouring waypoints makes a search for a nearer solution worthwhile
-_HAIR = 1e-6
 
 
 def branches_near(problem: IKProblem, seed: Array, values: tuple[float, ...] | None = None) -> Branches:
@@ -43,11 +42,11 @@ def meeting(problem: IKProblem, relaxed: bool, q: Array, near: Array) -> Array:
     q, stats = measure(problem, q[~np.isnan(q[:, 0])], near)
     good = _meets(stats)
     miss = stats[:, POSITION_ERROR] + stats[:, ROTATION_ERROR] + stats[:, OVERRUN]
-    hair = np.flatnonzero(~good & (miss < _HAIR))[:8]
-    if len(hair):
-        missed, figures = q[hair], stats[hair]
-        good[hair] = search.polish(problem.near(near), missed, figures)
-        q[hair], stats[hair] = missed, figures
+    close = np.flatnonzero(~good & (miss < TOLERANCES.near_miss))[:8]
+    if len(close):
+        missed, figures = q[close], stats[close]
+        good[close] = nearest.polish(problem.near(near), missed, figures)
+        q[close], stats[close] = missed, figures
     if relaxed and good.any():
         roll = np.abs(stats[:, ROLL])
         good &= alike(roll, float(roll[good].min()))
@@ -68,7 +67,7 @@ def descended(problem: IKProblem, starts: Array) -> Array:
     problem.stop()
     if not len(starts):
         return starts
-    q, _ = search.descend_each(problem, problem.code, starts, 1.0)
+    q, _ = nearest.descend_each(problem, problem.code, starts, 1.0)
     q, stats = measure(problem.without_turns(), q)
     q = q[_meets(stats)]
     if problem.branches is not None:
@@ -78,7 +77,7 @@ def descended(problem: IKProblem, starts: Array) -> Array:
 
 def pool(problem: IKProblem) -> Array:
     """Configurations ``(m, n)`` that meet the problem, from descents that start all over the limits."""
-    return descended(problem, search.starting_points(problem, count=POOL))
+    return descended(problem, nearest.starting_points(problem, count=POOL))
 
 
 def distinct(q: Array, near: Array) -> Array:
@@ -102,7 +101,7 @@ def with_images(problem: IKProblem, q: Array) -> Array:
     return np.ascontiguousarray(q)
 
 
-def nearest(settings: PathSettings, problem: IKProblem, relaxed: bool, q: Array) -> Array | None:
+def nearest_solution(settings: PathSettings, problem: IKProblem, relaxed: bool, q: Array) -> Array | None:
     """The configuration nearest to q ``(n,)`` that meets the problem."""
     found = np.empty((0, len(q)))
     if has_closed_form(problem):
@@ -124,7 +123,7 @@ def continued(
         span = sequence.spans[max(s, s + direction)]
         s += direction
         waypoint = sequence.waypoints[s]
-        found = nearest(sequence.settings, waypoint.problem, waypoint.relaxed, q)
+        found = nearest_solution(sequence.settings, waypoint.problem, waypoint.relaxed, q)
         if found is None or sequence.settings.largest_move(found, q) > allowed * span:
             break
         q = found

@@ -24,6 +24,7 @@ from kin.path.configurations import branches_near, descended, distinct, meeting,
 from kin.path.waypoints import Waypoint, is_sampled
 from kin.solvers.common import wrap
 from kin.solvers.contract import APPROACH, POSE, SolverInput
+from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 _MOST_NODES = 4000  # configurations in a layer
@@ -88,7 +89,7 @@ def _marks(problem: IKProblem, arcs: Array, step: float) -> list[float]:
     marks: list[float] = []
     for branch, low, high in arcs.tolist():
         if problem.allows(int(branch)):
-            inset = min(1e-7, 0.5 * (high - low))
+            inset = min(TOLERANCES.interval_inset, 0.5 * (high - low))
             marks += [low + inset, 0.5 * (low + high), high - inset]
             marks += [i * step for i in range(math.ceil(low / step), math.floor(high / step) + 1)]
     marks = sorted(wrap(v) for v in marks)

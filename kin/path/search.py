@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.path.configurations import continued, nearest, pool, with_images
+from kin.path.configurations import continued, nearest_solution, pool, with_images
 from kin.path.layers import sampled
 from kin.path.smoothing import smoothed
 from kin.path.viterbi import Trellis, shortest
@@ -123,7 +123,7 @@ def _strided(sequence: LayerSequence, q: Array) -> list[Array]:
     out = []
     for i, waypoint in enumerate(sequence.waypoints):
         between = np.array([np.interp(i, anchors, x) for x in knots.T])
-        found = nearest(settings, waypoint.problem, waypoint.relaxed, between)
+        found = nearest_solution(settings, waypoint.problem, waypoint.relaxed, between)
         if found is None:
             return []
         out.append(found)

@@ -18,7 +18,7 @@ from kin.path.configurations import branches_near, descended, meeting
 from kin.path.viterbi import shortest
 from kin.path.waypoints import LayerSequence, Waypoint, has_closed_form
 from kin.solvers.contract import APPROACH, MASK, POSE, POSITION
-from kin.solvers.pose import relative_pose
+from kin.solvers.numeric.error import relative_pose
 from kin.transforms import Array
 
 # Rounds, relative improvement that is not worth another one, largest pull on a jump; stiffness off the tangent and

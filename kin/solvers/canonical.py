@@ -1,7 +1,9 @@
-"""The canonical form of a seven-joint arm, as the kernels of its closed form read it.
+"""Targets, seeds and limits in the canonical frames and angles of a closed form.
 
-Canonical angles are θ = q + offset, and the canonical target is ``base⁻¹ · T · tool⁻¹``: in these the formulas of
-a family have no constants but the lengths of upper arm and forearm. An arm is one float64 array:
+Canonical angles are θ = sign q + offset, and the canonical target is ``base⁻¹ · T · tool⁻¹``. In these, the
+formulas of a family have no constants but the lengths of its links.
+
+The kernels of a seven-joint arm read it from one float64 array, and all its signs are +1:
 
 ======================  =================================
 ``arm[BASE:TOOL]``      first three rows of base⁻¹
@@ -14,19 +16,81 @@ a family have no constants but the lengths of upper arm and forearm. An arm is o
 
 from __future__ import annotations
 
+import math
+from typing import NamedTuple
+
 import numpy as np
 
+from kin.axes import inverse, screw_z
 from kin.kernels.compile import jit
-from kin.solvers.common import HIGH, LOW, NEAR
-from kin.solvers.pose import canonical
+from kin.solvers.common import HIGH, LOW, NEAR, UNBOUNDED
+from kin.solvers.contract import SolverInput
 from kin.transforms import Array
 
 BASE, TOOL, OFFSET, UPPER_ARM, FOREARM = 0, 12, 24, 31, 32
 
 
-def parameters(inverse_base: Array, inverse_tool: Array, offset: Array, d3: float, d5: float) -> Array:
-    """The parameter array ``(33,)`` of an arm."""
-    return np.array([*inverse_base[:3].ravel(), *inverse_tool[:3].ravel(), *offset, d3, d5])
+class Geometry7(NamedTuple):
+    """A seven-joint arm in canonical form.
+
+    Attributes:
+        inverse_base, inverse_tool: base⁻¹ and tool⁻¹ ``(4, 4)``.
+        offset: ``(7,)`` joint offsets, radians.
+        d3, d5: lengths of upper arm and forearm, metres.
+        tool_on_axis: whether an approach direction can be solved: the last joint or the roll is then free.
+    """
+
+    inverse_base: Array
+    inverse_tool: Array
+    offset: Array
+    d3: float
+    d5: float
+    tool_on_axis: bool
+
+    @property
+    def params(self) -> Array:
+        """The array ``(33,)`` that the kernels read."""
+        poses = [*self.inverse_base[:3].ravel(), *self.inverse_tool[:3].ravel()]
+        return np.array([*poses, *self.offset, self.d3, self.d5])
+
+
+def pose_params(base: Array, tool: Array) -> list[float]:
+    """What `canonical` reads ``(24,)``: the first three rows of base⁻¹ and of tool⁻¹."""
+    return [*inverse(base)[:3].ravel().tolist(), *inverse(tool)[:3].ravel().tolist()]
+
+
+@jit
+def canonical(
+    params: Array, T: Array
+) -> tuple[float, float, float, float, float, float, float, float, float, float, float, float]:
+    """base⁻¹ · T · tool⁻¹ as twelve numbers, row after row; params[0:24] as from `pose_params`."""
+    p = params
+    a0 = p[0] * T[0, 0] + p[1] * T[1, 0] + p[2] * T[2, 0]
+    a1 = p[0] * T[0, 1] + p[1] * T[1, 1] + p[2] * T[2, 1]
+    a2 = p[0] * T[0, 2] + p[1] * T[1, 2] + p[2] * T[2, 2]
+    a3 = p[0] * T[0, 3] + p[1] * T[1, 3] + p[2] * T[2, 3] + p[3]
+    b0 = p[4] * T[0, 0] + p[5] * T[1, 0] + p[6] * T[2, 0]
+    b1 = p[4] * T[0, 1] + p[5] * T[1, 1] + p[6] * T[2, 1]
+    b2 = p[4] * T[0, 2] + p[5] * T[1, 2] + p[6] * T[2, 2]
+    b3 = p[4] * T[0, 3] + p[5] * T[1, 3] + p[6] * T[2, 3] + p[7]
+    c0 = p[8] * T[0, 0] + p[9] * T[1, 0] + p[10] * T[2, 0]
+    c1 = p[8] * T[0, 1] + p[9] * T[1, 1] + p[10] * T[2, 1]
+    c2 = p[8] * T[0, 2] + p[9] * T[1, 2] + p[10] * T[2, 2]
+    c3 = p[8] * T[0, 3] + p[9] * T[1, 3] + p[10] * T[2, 3] + p[11]
+    return (
+        a0 * p[12] + a1 * p[16] + a2 * p[20],
+        a0 * p[13] + a1 * p[17] + a2 * p[21],
+        a0 * p[14] + a1 * p[18] + a2 * p[22],
+        a0 * p[15] + a1 * p[19] + a2 * p[23] + a3,
+        b0 * p[12] + b1 * p[16] + b2 * p[20],
+        b0 * p[13] + b1 * p[17] + b2 * p[21],
+        b0 * p[14] + b1 * p[18] + b2 * p[22],
+        b0 * p[15] + b1 * p[19] + b2 * p[23] + b3,
+        c0 * p[12] + c1 * p[16] + c2 * p[20],
+        c0 * p[13] + c1 * p[17] + c2 * p[21],
+        c0 * p[14] + c1 * p[18] + c2 * p[22],
+        c0 * p[15] + c1 * p[19] + c2 * p[23] + c3,
+    )
 
 
 @jit
@@ -38,6 +102,15 @@ def canonical_pose(arm: Array, T: Array, M: Array) -> None:
 
 
 @jit
+def signed_box(near: Array, lower: Array, upper: Array, sign: Array, offset: Array, box: Array) -> None:
+    """box ``(3, ≥ n)``, rows NEAR, LOW, HIGH ← seed and limits ``(n,)`` as angles ``sign q + offset``."""
+    for i in range(sign.shape[0]):
+        box[NEAR, i] = sign[i] * near[i] + offset[i]
+        a, b = sign[i] * lower[i] + offset[i], sign[i] * upper[i] + offset[i]
+        box[LOW, i], box[HIGH, i] = min(a, b), max(a, b)
+
+
+@jit
 def canonical_box(offsets: Array, seed: Array, lower: Array, upper: Array, box: Array) -> None:
     """Rows NEAR, LOW, HIGH of box ``(≥ 3, n)`` ← seed and joint limits ``(n,)`` as canonical angles."""
     for i in range(offsets.shape[0]):
@@ -46,3 +119,25 @@ def canonical_box(offsets: Array, seed: Array, lower: Array, upper: Array, box: 
             lower[i] + offsets[i],
             upper[i] + offsets[i],
         )
+
+
+def without_last(problem: SolverInput) -> tuple[Array, Array, Array]:
+    """Target pose and limits for an approach direction along the last axis: (T, lower, upper).
+
+    The last joint only rolls the tool. T has the seed tool's roll, and the limits of that joint never bind;
+    `free_last` sets its value.
+    """
+    lower, upper = problem.lower.copy(), problem.upper.copy()
+    lower[-1], upper[-1] = -UNBOUNDED, UNBOUNDED
+    return problem.T @ screw_z(problem.seed_roll, 0.0), lower, upper
+
+
+def free_last(problem: SolverInput, out: Array) -> Array:
+    """Set the value of a last joint that only rolls the tool, in place; returns its arcs ``(k, 3)``.
+
+    The value is the last of the requested ones, or else the seed's, moved inside the limits.
+    """
+    there = ~np.isnan(out[:, -1])
+    low, high, requested = problem.lower[-1], problem.upper[-1], problem.values[-1]
+    out[there, -1] = min(max(problem.seed[-1], low), high) if math.isnan(requested) else requested
+    return np.array([(i, low, high) for i in np.flatnonzero(there)], dtype=np.float64).reshape(-1, 3)

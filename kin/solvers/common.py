@@ -32,6 +32,7 @@ NEAR, LOW, HIGH = range(3)  # rows of a box: seed and joint limits
 _SINGULAR = TOLERANCES.singular
 _LIMIT = TOLERANCES.limit
 _MERGE = TOLERANCES.merge
+_INSET = TOLERANCES.interval_inset
 
 
 @jit
@@ -138,7 +139,7 @@ def zyz(M: Array, sign: float, near: Array, low: Array, high: Array, first: int,
 def add_roots(a: float, b: float, c: float, breaks: Array, count: int) -> int:
     """Append the roots of ``a cos ψ + b sin ψ + c = 0`` in (−π, π]; returns the new count.
 
-    A root that is missed by rounding error only (|c| a hair above the amplitude) is kept as the touching point.
+    A root that is missed by rounding error only (|c| just above the amplitude) is kept as the touching point.
     """
     amplitude = math.sqrt(a * a + b * b)
     if amplitude < 1e-15 or abs(c) > amplitude * (1.0 + 1e-9):
@@ -195,8 +196,8 @@ def zyz_breaks(
 
 @jit
 def circular_clamp(value: float, low: float, high: float) -> float:
-    """The angle of the arc [low, high] (low ≤ high, any turn) nearest to `value`, a hair inside its ends."""
-    inset = min(1e-7, 0.5 * (high - low))
+    """The angle of the arc [low, high] (low ≤ high, any turn) nearest to `value`, slightly inside its ends."""
+    inset = min(_INSET, 0.5 * (high - low))
     middle = 0.5 * (low + high)
     v = middle + wrap(value - middle)
     return min(max(v, low + inset), high - inset)

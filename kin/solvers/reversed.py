@@ -1,15 +1,16 @@
-"""Arms with reversed joints: the arm is read with some joints reversed, and the signs of their values are changed.
+"""Arms with reversed joints: the closed form of the same arm with some joints counted in the other direction.
 
-The sense in which a joint counts is a choice of the table's author: with joint 3 turned round and θ3 → −θ3 it is
-the same arm. A family has made its own choice. Where an arm fits none as it is, its axes as lines
+The positive direction of a joint is a choice of the table's author: with the axis of joint 3 reversed and θ3 → −θ3
+it is the same arm. Each family assumes certain directions. If an arm fits no family as it is, its axes as lines
 (:mod:`kin.axes`) show which joints have to be reversed:
 
-- Parallel neighbours count in the same sense.
-- From one link to the next the way along an axis between two others goes forward, so that d3, d4, d5 > 0.
-- The tool looks along the last axis, not against it.
+- Neighbouring parallel axes have the same direction.
+- The offset along an axis between two others is positive: d3, d4, d5 > 0.
+- The tool points along the last axis, not against it.
 
-What is still open is read with as few reversed joints as possible. The closed form then solves that arm, and every
-number that belongs to a reversed joint changes its sign: values, limits (which change places), intervals.
+Where several choices remain, the one with the fewest reversed joints is tried first. The closed form then solves
+that arm, and every number that belongs to a reversed joint changes its sign: values, limits (which are swapped),
+intervals.
 """
 
 from __future__ import annotations
@@ -29,14 +30,14 @@ from kin.solvers.singular import JointValue, Singularity
 from kin.transforms import Array
 
 Joints = tuple[int, ...]
-_MOST = 16  # readings of one arm: what has a closed form has four at most
+_MOST = 16  # readings of one arm; an arm with a closed form has at most four
 _HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])  # Rx(π)
 
 
 def readings(robot: Robot) -> Iterator[tuple[Joints, Robot]]:
-    """The arm as a plain standard table, with the joints (indices) that are reversed in it.
+    """The arm as a table in the standard convention, with the joints (indices) that are reversed in it.
 
-    The fewest joints come first, and possibly none. The tables have neither limits nor home.
+    Readings with the fewest reversed joints come first, possibly with none. The tables have no limits and no home.
     """
     if robot.n < 2:
         return
@@ -47,7 +48,7 @@ def readings(robot: Robot) -> Iterator[tuple[Joints, Robot]]:
 
 
 def _choices(robot: Robot, links: Links) -> list[list[Joints]]:
-    """For each run of parallel axes the joints that may be reversed, in one or two ways."""
+    """For each run of parallel axes, the one or two sets of joints that may be reversed."""
     starts = [i for i in range(robot.n) if i == 0 or links.alpha[i - 1] != 0.0]
     found = []
     for first, end in zip(starts, [*starts[1:], robot.n], strict=True):
@@ -59,7 +60,7 @@ def _choices(robot: Robot, links: Links) -> list[list[Joints]]:
             found.append([along if forward > 0.0 else against])
             continue
         least = min(len(along), len(against))
-        upright = first > 0 or links.base[2, 2] >= 0.0  # of equals axis 1 rather points up
+        upright = first > 0 or links.base[2, 2] >= 0.0  # on a tie, axis 1 points up
         ways = (along, against) if upright else (against, along)
         found.append([joints for joints in ways if len(joints) == least])
         if end == robot.n and is_zero(abs(links.tool[2, 2]) - 1.0):
@@ -69,13 +70,13 @@ def _choices(robot: Robot, links: Links) -> list[list[Joints]]:
 
 
 def _table(robot: Robot, links: Links, joints: Joints) -> Robot:
-    """The arm of these links, in which all joints count as in the robot, but for `joints`.
+    """The arm of these links, with the joint directions of the robot except for the reversed `joints`.
 
-    ``Rz(θ) Tz(d) = Rx(π) Rz(−θ) Tz(−d) Rx(π)``, and half turns about x join the twists before and after.
+    ``Rz(θ) Tz(d) = Rx(π) Rz(−θ) Tz(−d) Rx(π)``; the half turns about x are added to the twists before and after.
     """
     turned = [(i in joints) != (sign < 0.0) for i, sign in enumerate(links.sign.tolist())]
-    # Lines do not show from where the first and the last angle are counted. Here that is the x axis of the robot's
-    # own base, and where the tool looks along the frame's y axis if it does not look along the last joint's.
+    # Lines do not determine the zero of the first and the last angle. The first is counted from the x axis of the
+    # robot's base. The last is 0 where the tool points along the frame's y axis, if it is not along the last axis.
     x, y = (links.base[:3, :2].T @ robot.T_world_base[:3, 0]).tolist()
     start = math.atan2(y, x)
     x, y = links.tool[:2, 2].tolist()
@@ -114,13 +115,13 @@ def _nested(T: Array) -> tuple[tuple[float, ...], ...]:
 
 
 class ReversedJoints(ClosedForm):
-    """The closed form of an arm that was read with some joints reversed.
+    """The closed form of an arm of which some joints are reversed.
 
-    From outside it is the family's closed form, with the arm's own joint values: everything that belongs to a
-    reversed joint changes its sign.
+    It behaves as the family's closed form, in the arm's own joint values: every number that belongs to a reversed
+    joint changes its sign.
 
     Attributes:
-        form: the closed form of the arm as it was read, which is the same in space.
+        form: the closed form of the arm with these joints reversed.
         joints: indices of the reversed joints.
     """
 
@@ -136,11 +137,11 @@ class ReversedJoints(ClosedForm):
         self.kernels = _reversed_kernels(form.kernels, self._signs, joints, requested)
 
     def handles(self, task: int) -> bool:
-        """As the family does."""
+        """The tasks of the family."""
         return self.form.handles(task)
 
     def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
-        """As the family has them; one that is a joint's value is the arm's own joint's."""
+        """Those of the family; a parameter that is a joint value is that of the arm's own joint."""
         return self.form.redundancies(task)
 
     def _signs_of(self, task: int) -> list[float]:
@@ -162,7 +163,7 @@ class ReversedJoints(ClosedForm):
         return self.form.branch_of(q * self._signs)
 
     def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
-        """As the family has them, met at the arm's own joint values."""
+        """Those of the family, with the arm's own joint values."""
         signs = self._signs.tolist()
         return tuple(
             replace(s, met_at=tuple(JointValue(i, signs[i] * value) for i, value in s.met_at))
@@ -178,7 +179,7 @@ class _ReversedKernels(BatchKernels):
     form: BatchKernels
 
     def unchecked(self) -> BatchKernels:
-        """The same around the family's unchecked kernels."""
+        """The same with the family's unchecked kernels."""
         return self.rebuild(self.form.unchecked())
 
 
@@ -208,7 +209,7 @@ def _reversed_kernels(form: BatchKernels, signs: Array, joints: Joints, requeste
 
 
 def _opposite(arcs: Array) -> Array:
-    """Rows (branch, low, high) of values that change their sign."""
+    """Rows (branch, low, high) with the sign of the values changed."""
     out = arcs.copy()
     out[:, 1], out[:, 2] = -arcs[:, 2], -arcs[:, 1]
     return out

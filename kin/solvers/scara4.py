@@ -25,6 +25,7 @@ from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.simd import widest, wrapped
 from kin.robot import Robot
 from kin.solvers.blocks import OWN, Arc, double, each, elbow_of, in_base, one, rows_of, single
+from kin.solvers.canonical import pose_params, signed_box
 from kin.solvers.common import HIGH, LOW, NEAR, UNBOUNDED, clear, copy_row, split_sum, wrap
 from kin.solvers.contract import (
     APPROACH,
@@ -38,7 +39,6 @@ from kin.solvers.contract import (
     SolverInput,
 )
 from kin.solvers.planar import planar_free, two_links
-from kin.solvers.pose import pose_params, signed_box
 from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array

@@ -20,7 +20,7 @@ from kin.axes import is_perpendicular, is_zero, links_of, screw_x, screw_z
 from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.simd import widest
 from kin.robot import Robot
-from kin.solvers.blocks import Arc, Entries, canonical_of, each, one, rows_of
+from kin.solvers.blocks import Arc, Entries, each, one
 from kin.solvers.contract import BatchKernels, Obstacle
 from kin.solvers.singular import JointValue, Singularity, off_line, those_within
 from kin.solvers.wrist6.batch import (
@@ -28,17 +28,17 @@ from kin.solvers.wrist6.batch import (
     FRONT,
     PAIRS,
     ROWS,
+    Lengths,
     Twist,
     all_but_third,
     arm_pairs,
+    both_sides,
     careful,
-    shape_of,
-    shoulder,
     store,
     turned,
 )
 from kin.solvers.wrist6.closed_form import Wrist6
-from kin.solvers.wrist6.geometry import BASE, OFFSET, SIGN, TOOL, Geometry, has_spherical_wrist, pack
+from kin.solvers.wrist6.geometry import OFFSET, SIGN, Geometry, has_spherical_wrist, pack
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -88,11 +88,10 @@ _ALONG, _ROWS = ROWS - 1, ROWS + 2
 
 @inlined
 def _side(
-    M: Entries, X: float, scale: float, lengths: tuple[float, float, float], twist: Twist, S: Array, back: int,
-    b: int,
+    M: Entries, X: float, scale: float, lengths: Lengths, twist: Twist, S: Array, back: int, b: int
 ) -> bool:  # fmt: skip
     """All pairs of the shoulder with W at X, scale = 1/r²; whether one needs the careful kernel."""
-    a1, f, beside = lengths
+    a1, _, f, beside = lengths
     s1, c1, R = turned(M, X, beside, scale)
     x, h, apart = X - a1, -M[11], abs(f)
     square = x * x + h * h
@@ -109,20 +108,8 @@ def _side(
 
 @inlined
 def _pairs(params: Array, near: Array, count: int, S: Array) -> int:
-    """The pairs of `count` targets; S[-1] ← 1.0 for those that need the careful kernel, and how many these are."""
-    base, tool = rows_of(params, BASE), rows_of(params, TOOL)
-    a1, _, f, beside, twist = shape_of(params)
-    lengths = (a1, f, beside)
-    found = 0
-    for b in range(count):
-        M = canonical_of(base, tool, S, b)
-        X, scale, close = shoulder(M[3], M[7], beside)
-        close0 = _side(M, X, scale, lengths, twist, S, 0, b)
-        close1 = _side(M, -X, scale, lengths, twist, S, 1, b)
-        marked = close | close0 | close1
-        S[-1, b] = 1.0 if marked else 0.0
-        found += 1 if marked else 0
-    return found
+    """The pairs of `count` targets, as `both_sides` writes them."""
+    return both_sides(_side, params, count, S)
 
 
 @joined

@@ -26,6 +26,6 @@ and of the roll), `batch` (vectorised loops over many targets), `closed_form` (r
 solver contract, singularities).
 """
 
-from kin.solvers.collinear7.closed_form import NAME, Collinear7, Geometry, match
+from kin.solvers.collinear7.closed_form import NAME, Collinear7, match
 
-__all__ = ["NAME", "Collinear7", "Geometry", "match"]
+__all__ = ["NAME", "Collinear7", "match"]

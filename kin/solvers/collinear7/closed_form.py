@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from kin.axes import inverse, is_zero, links_by_rows, screw_z
 from kin.robot import Robot
-from kin.solvers.canonical import parameters
+from kin.solvers.canonical import Geometry7
 from kin.solvers.collinear7.batch import branches_many, branches_one
 from kin.solvers.collinear7.branches import solve
 from kin.solvers.contract import (
@@ -38,17 +37,6 @@ _THETA1 = RedundancyParameter("theta1", "θ1", joint=0)
 _ROLL = RedundancyParameter("roll", "roll about the approach axis", circular=True)
 
 
-class Geometry(NamedTuple):
-    """The arm in canonical form: joint values are q = θ − offset."""
-
-    inverse_base: Array
-    inverse_tool: Array
-    offset: Array
-    d3: float
-    d5: float
-    tool_on_axis: bool
-
-
 def match(robot: Robot) -> Collinear7 | None:
     """The closed form if axes 1 and 2 are one line, 3 is perpendicular to it and 5-6-7 meet in a point."""
     links = links_by_rows(robot, (0, -1, -1, 1, -1, 1)) if robot.n == 7 else None
@@ -61,8 +49,8 @@ def match(robot: Robot) -> Collinear7 | None:
     base = links.base @ screw_z(0.0, float(links.d[0] + links.d[1]))
     inverse_tool = inverse(tool)
     # The wrist centre in the tool frame: it must stay when the tool rolls about its approach axis.
-    on_axis = is_zero(inverse_tool[0, 3], inverse_tool[1, 3])
-    return Collinear7(Geometry(inverse(base), inverse_tool, links.theta, d3, d5, on_axis))
+    on_axis = is_zero(*inverse_tool[:2, 3])
+    return Collinear7(Geometry7(inverse(base), inverse_tool, links.theta, d3, d5, on_axis))
 
 
 class Collinear7(ClosedForm):
@@ -71,11 +59,10 @@ class Collinear7(ClosedForm):
     name, title, branches = NAME, TITLE, BRANCHES
     reason = "axes 1 and 2 are one line, axis 3 is perpendicular to it, and axes 5, 6, 7 meet in one point"
 
-    def __init__(self, geometry: Geometry) -> None:
+    def __init__(self, geometry: Geometry7) -> None:
         g = self.geometry = geometry
         self.lengths = (g.d3, g.d5)
-        params = parameters(g.inverse_base, g.inverse_tool, g.offset, g.d3, g.d5)
-        self.kernels = BatchKernels(params, branches_one, branches_many)
+        self.kernels = BatchKernels(g.params, branches_one, branches_many)
 
     def handles(self, task: int) -> bool:
         """Poses, and an approach direction when it passes through the wrist centre."""

@@ -7,11 +7,43 @@ import math
 from kin.kernels.compile import jit
 from kin.kernels.jacobian import jacobian_into
 from kin.solvers.contract import APPROACH, MASK, POSE, POSITION
-from kin.solvers.pose import relative_pose
 from kin.transforms import Array
 
 Goal = tuple[Array, int, Array, float]  # target pose, task, mask, metres per radian
 Chain = tuple[Array, Array, Array]  # Jacobian (6, n), pose (4, 4), joint axes (n, 7), see `jacobian_into`
+
+
+@jit
+def relative_pose(T: Array, target: Array, in_tool: bool, e: Array) -> None:
+    """e ← (Δp, φ) ``(6,)``: where T is, seen from the target, in the target's frame or in the base frame.
+
+    φ is the rotation vector of Rₜᵀ R (target's frame) or R Rₜᵀ (base frame), |φ| ≤ π.
+    """
+    for i in range(3):
+        if in_tool:
+            e[i] = 0.0
+            for r in range(3):
+                e[i] += target[r, i] * (T[r, 3] - target[r, 3])
+        else:
+            e[i] = T[i, 3] - target[i, 3]
+    # Twice the vector part of R Rₜᵀ, in the base frame; Rₜᵀ carries it over into the target's frame.
+    x = y = z = trace = 0.0
+    for c in range(3):
+        x += T[2, c] * target[1, c] - T[1, c] * target[2, c]
+        y += T[0, c] * target[2, c] - T[2, c] * target[0, c]
+        z += T[1, c] * target[0, c] - T[0, c] * target[1, c]
+        trace += T[0, c] * target[0, c] + T[1, c] * target[1, c] + T[2, c] * target[2, c]
+    sine = math.sqrt(x * x + y * y + z * z)
+    angle = math.atan2(sine, trace - 1.0)
+    k = angle / sine if sine > 1e-14 else 0.5
+    if sine <= 1e-14 and trace < 0.0:
+        # Exactly opposite: any axis is as good, the target's own x axis is turned about.
+        x, y, z, k = target[0, 0], target[1, 0], target[2, 0], math.pi
+    for i in range(3):
+        if in_tool:
+            e[3 + i] = k * (target[0, i] * x + target[1, i] * y + target[2, i] * z)
+        else:
+            e[3 + i] = k * (x if i == 0 else (y if i == 1 else z))
 
 
 @jit

@@ -13,10 +13,10 @@ import numpy as np
 from kin.kernels.compile import jit
 from kin.kernels.simd import atan2
 from kin.solvers.blocks import Entries
+from kin.solvers.canonical import canonical, signed_box
 from kin.solvers.common import HIGH, LOW, NEAR, UNBOUNDED, clear, copy_row, wrap
 from kin.solvers.parallel6.geometry import A1, A2, A3, A4, BESIDE, COS_TWIST, D5, OFFSET, SIGN, SIN_TWIST
 from kin.solvers.planar import planar_angles, planar_free, two_links
-from kin.solvers.pose import canonical, signed_box
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -24,7 +24,8 @@ _REACH = TOLERANCES.closure_position * 0.1
 _SINGULAR = TOLERANCES.singular
 _MERGE = TOLERANCES.merge
 _STEPS = 180  # that half a turn of θ1 is searched in, where it is free
-_ROUNDING, _HAIR = 1e-14, 3e-7  # metres in a target's coordinates; the root of that
+# Rounding error of a target's coordinates, metres, and of a double root of them, which is the square root of it.
+_ROUNDING, _ROUNDING_OF_DOUBLE_ROOT = 1e-14, 3e-7
 _FREE = 6  # column of out: 1.0 where θ6 is free
 _ORDER = (1, 2, 3, 5, 0, 4)  # joints of the columns of a box
 
@@ -98,7 +99,7 @@ def _shoulder(
         return max(abs(R - rho) - a2 - a3, abs(a2 - a3) - R - rho), found
     # Where two shoulders merge θ1 is known only approximately; a small change of it may close the rest.
     lever = abs(y) + abs(params[A4]) + abs(params[D5])
-    slack = _REACH + lever * min(_HAIR, _ROUNDING / max(abs(x), _ROUNDING))
+    slack = _REACH + lever * min(_ROUNDING_OF_DOUBLE_ROOT, _ROUNDING / max(abs(x), _ROUNDING))
     gap = math.inf
     for flip in range(2):
         miss = _arm(params, wrist, (m00, m01, m02, m10, m11, m12, m22), 4 * right + flip, slack, box, out)
@@ -241,13 +242,13 @@ def _facing(params: Array, M: Entries, box: Array) -> float:
 
 
 @jit
-def _within(arm: tuple[float, float, float, float, float, float], A: float, hair: float) -> float:
-    """The direction nearest to A that brings axis 4 within reach, A itself if that is more than a hair away."""
+def _within(arm: tuple[float, float, float, float, float, float], A: float, margin: float) -> float:
+    """The direction nearest to A that brings axis 4 within reach, A itself if that is `margin` away or more."""
     box, angles, arcs = np.empty((3, 4)), np.empty(4), np.empty((16, 3))
     for i in range(4):
         box[NEAR, i], box[LOW, i], box[HIGH, i] = -UNBOUNDED, -UNBOUNDED, UNBOUNDED
-    psi, _ = planar_free(arm, (1.0, 0.0, 0.0), (A, hair < 0.0), 0, box, arcs, 0, angles)
-    return float(psi if abs(wrap(psi - A)) < hair else A)
+    psi, _ = planar_free(arm, (1.0, 0.0, 0.0), (A, margin < 0.0), 0, box, arcs, 0, angles)
+    return float(psi if abs(wrap(psi - A)) < margin else A)
 
 
 @jit

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kin.robot import Robot
-from kin.solvers.common import UNBOUNDED
+from kin.solvers.canonical import free_last, without_last
 from kin.solvers.contract import (
     APPROACH,
     POSE,
@@ -22,7 +22,6 @@ from kin.solvers.contract import (
 from kin.solvers.parallel6.batch import branches_many, branches_one
 from kin.solvers.parallel6.branches import solve
 from kin.solvers.parallel6.geometry import Geometry, geometry_of
-from kin.solvers.pose import free_last, rolled
 from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -71,10 +70,7 @@ class Parallel6(ClosedForm):
         """All branches; with an approach direction only, joint 6 stays or takes the value requested."""
         g, free_roll = self.geometry, problem.task == APPROACH
         out, arcs = np.empty((8, 7)), np.empty((128, 3))
-        T, lower, upper = problem.T, problem.lower, problem.upper
-        if free_roll:
-            T, lower, upper = rolled(T, problem.seed_roll), lower.copy(), upper.copy()
-            lower[5], upper[5] = -UNBOUNDED, UNBOUNDED
+        T, lower, upper = without_last(problem) if free_roll else (problem.T, problem.lower, problem.upper)
         value = math.nan if free_roll else problem.values[0]
         gap, count = solve(g.params, T, value, problem.seed, lower, upper, arcs, out)
         q, free = out[:, :6], out[:, 6:]

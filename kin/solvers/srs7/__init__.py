@@ -32,6 +32,6 @@ Modules: `geometry` (triangle, rotations, arm angle), `redundancy` (feasible int
 `closed_form` (recognition of the family, the solver contract, singularities).
 """
 
-from kin.solvers.srs7.closed_form import NAME, Geometry, Srs7, match
+from kin.solvers.srs7.closed_form import NAME, Srs7, match
 
-__all__ = ["NAME", "Geometry", "Srs7", "match"]
+__all__ = ["NAME", "Srs7", "match"]

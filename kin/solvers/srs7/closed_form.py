@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from kin.axes import inverse, is_zero, links_by_rows, screw_z
 from kin.robot import Robot
-from kin.solvers.canonical import parameters
+from kin.solvers.canonical import Geometry7
 from kin.solvers.contract import (
     APPROACH,
     POSE,
@@ -39,17 +38,6 @@ _PSI = RedundancyParameter("psi", "arm angle ψ", circular=True)
 _THETA7 = RedundancyParameter("theta7", "θ7", joint=6)
 
 
-class Geometry(NamedTuple):
-    """The arm in canonical form: joint values are q = θ − offset."""
-
-    inverse_base: Array
-    inverse_tool: Array
-    offset: Array
-    d3: float
-    d5: float
-    tool_on_axis: bool
-
-
 def match(robot: Robot) -> Srs7 | None:
     """The closed form if axes 1, 2, 3 meet, axes 5, 6, 7 meet, and neighbouring axes are perpendicular."""
     links = links_by_rows(robot, (-1, 1, -1, 1, -1, 1)) if robot.n == 7 else None
@@ -61,7 +49,7 @@ def match(robot: Robot) -> Srs7 | None:
     tool = screw_z(0.0, float(links.d[6])) @ links.tool
     on_axis = is_zero(tool[0, 3], tool[1, 3]) and abs(tool[2, 2] - 1.0) < TOLERANCES.geometry
     base = links.base @ screw_z(0.0, float(links.d[0]))
-    return Srs7(Geometry(inverse(base), inverse(tool), links.theta, d3, d5, bool(on_axis)))
+    return Srs7(Geometry7(inverse(base), inverse(tool), links.theta, d3, d5, bool(on_axis)))
 
 
 class Srs7(ClosedForm):
@@ -73,11 +61,10 @@ class Srs7(ClosedForm):
         "with the elbow's axis perpendicular to both links"
     )
 
-    def __init__(self, geometry: Geometry) -> None:
+    def __init__(self, geometry: Geometry7) -> None:
         g = self.geometry = geometry
         self.lengths = (g.d3, g.d5)
-        params = parameters(g.inverse_base, g.inverse_tool, g.offset, g.d3, g.d5)
-        self.kernels = BatchKernels(params, branches_one, branches_many)
+        self.kernels = BatchKernels(g.params, branches_one, branches_many)
 
     def handles(self, task: int) -> bool:
         """Poses, and an approach direction when it is the last joint's own axis (then that joint is free)."""

@@ -7,6 +7,7 @@ Rows of S are θ1 (front, back), θ3 (front, back), and of the four arms (front 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.simd import widest
@@ -39,6 +40,8 @@ FRONT, BEND, _UPPER, _ROLL, _TILT, _SPIN, _END = (OWN + i for i in (0, 2, 4, 8, 
 PAIRS, ROWS = _END - OWN, _END + _END - OWN + 1
 _CLOSE = 1e-4  # of the distance L: how far apart two shoulders are that the careful kernel computes
 Twist = tuple[float, float, float, float]
+Lengths = tuple[float, float, float, float]
+Side = Callable[[Entries, float, float, Lengths, Twist, Array, int, int], bool]
 
 
 @inlined
@@ -102,8 +105,7 @@ def arm_pairs(
 
 @inlined
 def _side(
-    M: Entries, X: float, scale: float, lengths: tuple[float, float, float, float], twist: Twist, S: Array,
-    back: int, b: int,
+    M: Entries, X: float, scale: float, lengths: Lengths, twist: Twist, S: Array, back: int, b: int
 ) -> bool:  # fmt: skip
     """All pairs of the shoulder with W at X, scale = 1/r²; whether one needs the careful kernel."""
     a1, a2, f, beside = lengths
@@ -119,9 +121,12 @@ def _side(
     return close0 | close1 | close2
 
 
-@inlined
-def _pairs(params: Array, near: Array, count: int, S: Array) -> int:
-    """The pairs of `count` targets; S[-1] ← 1.0 for those that need the careful kernel, and how many these are."""
+@joined
+def both_sides(side: Side, params: Array, count: int, S: Array) -> int:
+    """The pairs of `count` targets with W before axis 1 and behind it, each written by `side`.
+
+    S[-1] ← 1.0 for the targets that need the careful kernel; returns their number.
+    """
     base, tool = rows_of(params, BASE), rows_of(params, TOOL)
     a1, a2, f, beside, twist = shape_of(params)
     lengths = (a1, a2, f, beside)
@@ -129,12 +134,18 @@ def _pairs(params: Array, near: Array, count: int, S: Array) -> int:
     for b in range(count):
         M = canonical_of(base, tool, S, b)
         X, scale, close = shoulder(M[3], M[7], beside)
-        close0 = _side(M, X, scale, lengths, twist, S, 0, b)
-        close1 = _side(M, -X, scale, lengths, twist, S, 1, b)
+        close0 = side(M, X, scale, lengths, twist, S, 0, b)
+        close1 = side(M, -X, scale, lengths, twist, S, 1, b)
         marked = close | close0 | close1
         S[-1, b] = 1.0 if marked else 0.0
         found += 1 if marked else 0
     return found
+
+
+@inlined
+def _pairs(params: Array, near: Array, count: int, S: Array) -> int:
+    """The pairs of `count` targets, as `both_sides` writes them."""
+    return both_sides(_side, params, count, S)
 
 
 @joined

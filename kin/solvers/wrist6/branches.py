@@ -9,6 +9,7 @@ import numpy as np
 from kin.kernels.compile import jit
 from kin.kernels.simd import atan2
 from kin.solvers.blocks import Entries
+from kin.solvers.canonical import canonical, signed_box
 from kin.solvers.common import (
     HIGH,
     LOW,
@@ -25,7 +26,6 @@ from kin.solvers.common import (
     zyz_breaks,
 )
 from kin.solvers.planar import two_links
-from kin.solvers.pose import canonical, signed_box
 from kin.solvers.wrist6.geometry import (
     A1,
     A2,
@@ -45,7 +45,8 @@ from kin.transforms import Array
 _REACH = TOLERANCES.closure_position * 0.1
 _SINGULAR = TOLERANCES.singular
 _MERGE = TOLERANCES.merge
-_ROUNDING, _HAIR = 1e-14, 3e-7  # metres in a target's coordinates; the root of that
+# Rounding error of a target's coordinates, metres, and of a double root of them, which is the square root of it.
+_ROUNDING, _ROUNDING_OF_DOUBLE_ROOT = 1e-14, 3e-7
 
 Arm = tuple[float, float, float]  # canonical θ1, θ2, θ3
 Rotation = tuple[float, float, float, float, float, float, float, float, float]  # column after column
@@ -150,7 +151,7 @@ def _elbow(params: Array, x: float, h: float, root: float) -> tuple[float, float
     if miss > _REACH and beside != 0.0:
         edge = a2 + f if x * x + h * h > a2 * a2 + f * f else a2 - f
         nearest = math.copysign(math.sqrt(max(edge * edge - h * h, 0.0)), x)
-        if abs(nearest - x) < abs(beside) * min(_HAIR, _ROUNDING / max(root, _ROUNDING)):
+        if abs(nearest - x) < abs(beside) * min(_ROUNDING_OF_DOUBLE_ROOT, _ROUNDING / max(root, _ROUNDING)):
             x = nearest
             miss, bend, c3, k1, k2 = two_links(x, h, a2, f)
     return miss, bend, c3, k1, k2, x

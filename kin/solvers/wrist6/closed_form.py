@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kin.robot import Robot
-from kin.solvers.common import UNBOUNDED
+from kin.solvers.canonical import free_last, without_last
 from kin.solvers.contract import (
     APPROACH,
     POSE,
@@ -19,7 +19,6 @@ from kin.solvers.contract import (
     RedundancyParameter,
     SolverInput,
 )
-from kin.solvers.pose import free_last, rolled
 from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
 from kin.solvers.wrist6.batch import branches_many, branches_one
 from kin.solvers.wrist6.branches import solve
@@ -74,10 +73,7 @@ class Wrist6(ClosedForm):
         """All branches; with an approach direction only, joint 6 stays or takes the value requested."""
         g, free_roll = self.geometry, problem.task == APPROACH
         out, arcs = np.empty((8, 6)), np.empty((128, 3))
-        T, lower, upper = problem.T, problem.lower, problem.upper
-        if free_roll:
-            T, lower, upper = rolled(T, problem.seed_roll), lower.copy(), upper.copy()
-            lower[5], upper[5] = -UNBOUNDED, UNBOUNDED
+        T, lower, upper = without_last(problem) if free_roll else (problem.T, problem.lower, problem.upper)
         value = problem.values[0] if self._reaches_axis_1 else math.nan
         gap, count = solve(g.params, T, value, problem.seed, lower, upper, arcs, out)
         values, ranges = np.full((8, len(self.redundancies(problem.task))), math.nan), []

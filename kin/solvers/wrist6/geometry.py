@@ -9,8 +9,8 @@ import numpy as np
 
 from kin.axes import Links, is_perpendicular, is_zero, links_of
 from kin.robot import Robot
+from kin.solvers.canonical import pose_params
 from kin.solvers.common import UNBOUNDED
-from kin.solvers.pose import pose_params
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 

@@ -17,6 +17,7 @@ JOINT, PC, PT, PR, P0, M, S = range(7)
 BRANCH, START, END, SHEET = range(4)
 REACH = TOLERANCES.closure_position * 0.1
 SLACK = TOLERANCES.limit
-AMBIGUOUS = 1e-6  # rad or m; closer than this a sign is a matter of rounding
+INSET = TOLERANCES.interval_inset
+AMBIGUOUS = 1e-6  # rad or m; a quantity smaller than this may have either sign, because of rounding
 # Zero as a count. Not a literal: numba compiles a callee again for every literal it is called with.
 ZERO = cast(int, np.int64(0))

@@ -8,6 +8,7 @@ from bisect import bisect_right
 import numpy as np
 
 from kin.solvers.common import TURN
+from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 SAME = 1e-11  # rad; values closer than this are one
@@ -55,7 +56,7 @@ def nearest(rows: list[Row], branch: int, preferred: float) -> float:
     values = []
     for name, low, high in rows:
         if name == branch:
-            inset = min(1e-7, 0.5 * (high - low))
+            inset = min(TOLERANCES.interval_inset, 0.5 * (high - low))
             values.append(min(max(preferred, low + inset), high - inset))
     return min(values, key=lambda value: abs(value - preferred), default=math.nan)
 

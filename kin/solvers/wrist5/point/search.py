@@ -13,7 +13,7 @@ import numpy as np
 from kin.kernels.compile import jit
 from kin.solvers.common import HIGH, LOW, NEAR, nearest_image
 from kin.solvers.wrist5.point.configuration import branch_at, fits, keep_best
-from kin.solvers.wrist5.point.constants import AMBIGUOUS, BRANCH, END, JOINT, RAD, SHEET, START, ZERO, M
+from kin.solvers.wrist5.point.constants import AMBIGUOUS, BRANCH, END, INSET, JOINT, RAD, SHEET, START, ZERO, M
 from kin.solvers.wrist5.point.intervals import SAME, Row, merge, nearest
 from kin.solvers.wrist5.point.newton import move_near
 from kin.solvers.wrist5.point.planes import planes_of
@@ -50,9 +50,9 @@ def _probe(k: Array, turns: Array, planes: Array, box: Array, limits: Array, see
         mask = 0
         for j in range(theta5_intervals(k, turns[i], planes, box, rows)):
             mask |= 1 << int(rows[j, BRANCH])
-            # Of each interval the point nearest to the seed, slightly inside, and the middle.
+            # Two values of each interval: its middle, and the one nearest to the seed, slightly inside.
             middle, half = 0.5 * (rows[j, START] + rows[j, END]), 0.5 * (rows[j, END] - rows[j, START])
-            half -= min(half, 1e-7)
+            half -= min(half, INSET)
             for t5 in (middle, min(max(box[NEAR, 4], middle - half), middle + half)):
                 if fits(k, turns[i], t5, int(rows[j, SHEET]), box, q):
                     keep_best(k, q, box[NEAR], limits, best)
