@@ -1,4 +1,4 @@
-"""How axes lie: known arms, random chains built to order, and the same answer at every configuration and scale."""
+"""Relations of joint axes: known arms, and random chains with known relations, at any scale."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def arm(*rows, convention="standard", scale=1.0):
 
 
 def facts(robot):
-    """What is said of every pair, without figures."""
+    """The relations of every pair, without numbers."""
     return [(p.parallel, p.perpendicular, p.intersect, p.almost) for p in axes.pairs(robot)]
 
 
@@ -47,18 +47,20 @@ SQUARE = math.pi / 2
         ("ur5", (), ((1, 3),)),
     ],
 )
-def test_the_built_in_arms_agree_with_their_books(robot_id, spherical, parallel):
+def test_groups_of_the_built_in_arms(robot_id, spherical, parallel):
     robot = kin.get_robot(robot_id)
     assert axes.spherical_groups(robot) == spherical
     assert axes.parallel_groups(robot) == parallel
 
 
-def test_distances_are_those_of_the_drawing():
+def test_distances_between_axes_of_known_arms():
     distances = [p.distance for p in axes.pairs(kin.get_robot("puma560"))]
     assert distances == pytest.approx([0.0, 0.4318, 0.0203, 0.0, 0.0], abs=1e-12)
     distances = [p.distance for p in axes.pairs(kin.get_robot("panda"))]
     assert distances == pytest.approx([0.0, 0.0, 0.0825, 0.0825, 0.0, 0.088], abs=1e-12)
-    assert math.isnan(axes.pairs(kin.get_robot("scara"))[1].distance)  # a slide is nowhere in particular
+    assert math.isnan(
+        axes.pairs(kin.get_robot("scara"))[1].distance
+    )  # the axis of a prismatic joint has no particular place
 
 
 twist = st.one_of(st.sampled_from([0.0, SQUARE, -SQUARE, math.pi]), st.floats(0.1, 1.4))
@@ -70,7 +72,7 @@ length = st.one_of(st.just(0.0), st.floats(0.05, 0.5))
     convention=st.sampled_from(["standard", "modified"]),
     scale=st.sampled_from([1e-3, 1.0, 50.0]),
 )
-def test_pairs_are_what_the_rows_were_built_as(rows, convention, scale):
+def test_pairs_have_the_angle_and_distance_of_the_rows(rows, convention, scale):
     """a and α between two joints are the distance and angle of their axes, at any scale."""
     robot = arm(*rows, convention=convention, scale=scale)
     between = rows[:-1] if convention == "standard" else rows[1:]
@@ -85,8 +87,8 @@ def test_pairs_are_what_the_rows_were_built_as(rows, convention, scale):
 
 
 @given(angles=st.tuples(st.floats(0.3, 2.8), st.floats(0.3, 2.8)), d=st.floats(0.01, 1))
-def test_three_axes_meet_or_do_not(angles, d):
-    """a = 0 lets neighbours meet; the offset of the middle joint decides whether all three do."""
+def test_three_axes_form_a_spherical_group_only_if_all_meet(angles, d):
+    """With a = 0 neighbours intersect; the offset of the middle joint decides whether all three meet."""
     first, second = angles
     ends = (0.2, 0.3, 0.7), (0.4, 0.1, 0.2)
     wrist = arm(ends[0], (0.1, 0.0, first), (0.0, 0.0, second), (d, 0.2, 1.0), ends[1])
@@ -97,7 +99,7 @@ def test_three_axes_meet_or_do_not(angles, d):
     assert axes.spherical_groups(sliding) == ()
 
 
-def test_fixed_rows_base_and_tool_change_nothing():
+def test_base_and_tool_do_not_change_the_relations():
     plain = kin.get_robot("puma560")
     turned = ((0.0, -1.0, 0.0, 1.0), (1.0, 0.0, 0.0, 2.0), (0.0, 0.0, 1.0, 3.0), (0.0, 0.0, 0.0, 1.0))
     moved = replace(plain, base=turned, tool=turned)
@@ -116,13 +118,13 @@ def test_fixed_rows_base_and_tool_change_nothing():
         ((0.1, 0.02, 1.0), ""),
     ],
 )
-def test_almost_special_axes_are_reported(row, almost):
+def test_axes_that_almost_align_are_reported(row, almost):
     (pair, _) = axes.pairs(arm(row, (0.2, 0.3, SQUARE), (0.1, 0.2, 0.4)))
     assert pair.almost == almost
     assert (pair.parallel, pair.perpendicular, pair.intersect) == (False, False, False)
 
 
-def test_generic_configurations_are_inside_the_limits_and_not_special():
+def test_generic_configurations_are_inside_the_limits_and_regular():
     for robot in kin.builtin_robots().values():
         q = axes.generic_q(robot)
         assert robot.in_limits(q)
@@ -131,13 +133,13 @@ def test_generic_configurations_are_inside_the_limits_and_not_special():
 
 @pytest.mark.parametrize("robot_id", kin.builtin_robots())
 @pytest.mark.parametrize("by_rows", [False, True])
-def test_links_are_the_same_arm_in_space(robot_id, by_rows):
-    """base · L1 … Ln · tool is forward kinematics, and each joint adds to its link with its sign."""
+def test_links_reproduce_forward_kinematics(robot_id, by_rows):
+    """Forward kinematics is base · L1 … Ln · tool, and each joint adds to its link with its sign."""
     robot = kin.get_robot(robot_id)
     if by_rows:
         quarters = tuple(1 - int(pair.parallel) for pair in axes.pairs(robot))
         links = axes.links_by_rows(robot, quarters)
-        assert (links is None) == (robot_id in ("scara", "stanford"))  # these slide
+        assert (links is None) == (robot_id in ("scara", "stanford"))  # with prismatic joints
         if links is None:
             return
         assert np.abs(links.alpha[:-1] - np.array(quarters) * SQUARE).max() < 1e-9

@@ -1,4 +1,4 @@
-"""Robot files: their meaning, and the errors of wrong ones."""
+"""Robot files: what they mean, and the errors for invalid ones."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def test_a_byte_order_mark_is_accepted(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["x = " + "9" * 5000, "x = " + "[" * 100_000], ids=["digits", "brackets"])
-def test_endless_toml_is_refused(text):
+def test_endless_toml_is_rejected(text):
     with pytest.raises(RobotFileError, match="valid TOML") as caught:
         kin.parse_robot(text, "arm.toml")
     assert len(str(caught.value)) < 300
@@ -143,7 +143,7 @@ def test_the_number_of_rows_is_limited():
         assert caught.value.field in ("rows", "file")
 
 
-def test_two_files_with_one_id(tmp_path):
+def test_two_files_with_the_same_id(tmp_path):
     for name in ("a.toml", "b.toml"):
         (tmp_path / name).write_text(GOOD, encoding="utf-8")
     with pytest.raises(RobotFileError, match="no other file"):
@@ -175,7 +175,7 @@ def test_robots_are_values():
         assert not array.flags.writeable
 
 
-def test_random_configurations_stay_inside():
+def test_random_configurations_are_inside_the_limits():
     robot = kin.get_robot("pioneer5")
     q = robot.random_q(np.random.default_rng(0), (10, 100))
     assert q.shape == (10, 100, 5)

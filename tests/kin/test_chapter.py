@@ -1,4 +1,4 @@
-"""Printed equations of the chapter: which are right, which are wrong, and by how much."""
+"""Printed equations of the chapter: which are correct, which are wrong, and by how much."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ def defect(T):
 
 
 def maximum(robot, size):
-    """Largest `size(q)` inside the limits: the best of many random poses, each walked uphill by shrinking steps.
+    """Largest `size(q)` inside the limits: a hill climb with shrinking steps from many random configurations.
 
-    Going uphill one joint at a time is not enough: for (19) it stops at 2.3746, short of the maximum.
+    Moving one joint at a time is not enough: for (19) it stops at 2.3746, below the maximum.
     """
     rng = np.random.default_rng(0)
     q = robot.random_q(rng, 10_000)
@@ -75,7 +75,7 @@ def test_corrected_equals_the_dh_product(equation):
 
 @pytest.mark.parametrize("equation", EVALUABLE, ids=label)
 def test_verdict_and_size_of_the_error(equation):
-    """Right ones hold to rounding error; wrong ones approach their maximum and never exceed it."""
+    """Correct ones hold up to rounding error; wrong ones approach their maximum and never exceed it."""
     robot = kin.get_robot(equation.robot_id)
     row = difference(equation, robot.random_q(np.random.default_rng(equation.number), 20_000))
     worst = float(np.abs(row.difference).max())
@@ -98,7 +98,7 @@ def test_largest_difference_has_the_listed_place_and_size(equation):
 
 @pytest.mark.parametrize("equation", [e for e in EVALUABLE if e.verdict == "wrong"], ids=label)
 def test_a_search_inside_the_limits_finds_that_difference_and_no_larger_one(equation):
-    """The search does not use `largest_at`, so the figure is the maximum over all poses."""
+    """The search does not use `largest_at`, so it confirms the figure independently."""
     robot = kin.get_robot(equation.robot_id)
 
     def size(q):
@@ -124,7 +124,7 @@ def test_the_largest_turn_has_the_listed_place_and_size_and_is_the_largest(equat
         return chapter.turned(kin.fk(robot, q), equation.index, printed)
 
     assert turn(robot.random_q(np.random.default_rng(1), 100_000)).max() <= equation.turn + 1e-9
-    assert maximum(robot, turn) == pytest.approx(equation.turn, abs=1e-4)  # the peak at 180° is a sharp one
+    assert maximum(robot, turn) == pytest.approx(equation.turn, abs=1e-4)  # the maximum at 180° is a sharp peak
 
 
 def test_a_turn_is_the_angle_between_the_axis_and_the_printed_vector():
@@ -137,7 +137,7 @@ def test_a_turn_is_the_angle_between_the_axis_and_the_printed_vector():
 
 @pytest.mark.parametrize(("robot_id", "largest"), [("pioneer5", 1.2346318), ("redundant7", 3.0562825)])
 def test_printed_matrix_is_not_a_rotation(robot_id, largest):
-    """The misprints show without a reference: RᵀR differs from I, by this much inside the limits."""
+    """The misprints are visible without a reference: RᵀR differs from I, by this much inside the limits."""
     robot = kin.get_robot(robot_id)
     assert maximum(robot, lambda q: defect(chapter.matrix(robot_id, q))) == pytest.approx(largest, abs=1e-6)
     q = robot.random_q(np.random.default_rng(0), 1000)
@@ -162,7 +162,7 @@ def test_only_the_notation_is_read(text):
         chapter.parse(text)
 
 
-def test_misuse_is_refused():
+def test_invalid_input_is_rejected():
     with pytest.raises(kin.InputError, match="form"):
         chapter.matrix("pioneer5", np.zeros(5), "garbled")
     with pytest.raises(kin.InputError, match="robot"):

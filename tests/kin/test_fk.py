@@ -1,4 +1,4 @@
-"""Forward kinematics, Jacobian and manipulability: golden data, batch shapes, a plain reference implementation."""
+"""Forward kinematics, Jacobian and manipulability: golden data, batch shapes, a reference implementation."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def move(x=0.0, z=0.0):
 
 
 def product(robot, q):
-    """The DH product as plain as possible: every frame, then the tool."""
+    """The DH product in its simplest form: every frame, then the tool."""
     values = iter(q)
     T = np.array(robot.base)
     frames = []
@@ -59,7 +59,7 @@ angles = st.floats(-math.pi, math.pi)
 
 @st.composite
 def robots(draw):
-    """Any arm: both conventions, all kinds of rows, a moved base and a tool."""
+    """Any arm: both conventions, all kinds of rows, with a base and a tool transform."""
     rows = draw(
         st.lists(
             st.tuples(angles, lengths, lengths, angles, st.sampled_from(["revolute", "prismatic", "fixed"])),
@@ -98,7 +98,7 @@ def test_golden_poses_and_frames(robot_id, golden):
 
 
 @given(robot=robots(), data=st.data())
-def test_any_arm_equals_the_plain_product(robot, data):
+def test_any_arm_equals_the_product_of_its_matrices(robot, data):
     q = np.array(data.draw(st.lists(st.floats(-3, 3), min_size=robot.n, max_size=robot.n)))
     frames, T = product(robot, q)
     assert kin.fk(robot, q) == pytest.approx(T, abs=1e-12)
@@ -153,7 +153,7 @@ def test_poses_are_rigid(robot_id):
 
 
 @given(robot=robots(), data=st.data())
-def test_a_batch_gives_the_same_bits_as_single_calls(robot, data):
+def test_a_batch_is_bit_identical_to_single_calls(robot, data):
     """Sizes on both sides of a block boundary; angles beyond the range of the polynomials."""
     q = robot.random_q(np.random.default_rng(data.draw(st.integers(0, 99))), data.draw(st.integers(1, 140)))
     q[:: data.draw(st.integers(1, 70))] *= data.draw(st.sampled_from([1.0, 1e5, 1e9]))
@@ -177,7 +177,7 @@ def test_angles_of_many_turns_are_as_accurate(robot_id, angle):
 @pytest.mark.parametrize("value", [math.nan, math.inf])
 @pytest.mark.parametrize("index", [(0, 0), (70, 4), (129, 2)])
 @pytest.mark.parametrize("function", [kin.fk, kin.fk_positions, kin.jacobian])
-def test_one_bad_value_in_a_batch_is_found(function, index, value):
+def test_one_value_that_is_not_finite_in_a_batch_is_found(function, index, value):
     q = np.zeros((130, 5))
     q[index] = value
     with pytest.raises(InputError) as caught:
@@ -221,7 +221,7 @@ def test_arrays_of_any_type_and_layout_are_accepted():
         ([[0] * 5, [0] * 4], "q"),
     ],
 )
-def test_misuse_names_the_field(function, q, field):
+def test_invalid_input_names_the_field(function, q, field):
     with pytest.raises(InputError) as caught:
         function(kin.get_robot("pioneer5"), q)
     assert caught.value.field == field
@@ -230,7 +230,7 @@ def test_misuse_names_the_field(function, q, field):
 
 
 @pytest.mark.parametrize("value", ["world", None, [], 0])
-def test_misuse_of_a_choice_names_what_is_valid(value):
+def test_an_invalid_choice_names_the_valid_ones(value):
     robot = kin.get_robot("pioneer5")
     with pytest.raises(InputError, match=r"frame: .*tool"):
         kin.jacobian(robot, robot.q_home, frame=value)

@@ -65,7 +65,7 @@ rows = st.lists(
 
 @given(rows=rows, unlimited=st.booleans())
 def test_any_chain_has_a_home(rows, unlimited):
-    """Including arms whose joints move no point or have no limits."""
+    """Also arms whose joints move no point or have no limits."""
     limits = None if unlimited else (-2.0, 1.0)
     joints = tuple(Joint(f"{i}", 0.0, d, a, alpha, kind, limits) for i, (d, a, alpha, kind) in enumerate(rows))
     robot = Robot("x", "x", "x", "standard", joints, (0.0,) * len(joints))

@@ -51,7 +51,6 @@ def test_the_jacobian_is_the_derivative_of_the_golden_poses(robot_id):
 
 @pytest.mark.parametrize("robot_id", ROBOTS)
 def test_home_is_away_from_limits_singularities_and_the_floor(robot_id):
-    """Away from limits and singularities, and above the floor."""
     robot = kin.get_robot(robot_id)
     margin = np.minimum(robot.q_home - robot.lower, robot.upper - robot.q_home) / (robot.upper - robot.lower)
     assert margin.min() > 0.05

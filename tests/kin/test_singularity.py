@@ -1,16 +1,15 @@
-"""Singularities: where they are, that they are nowhere else, and that an arm dragged through one neither stops
-nor flips.
+"""Singularities: all of them are found, and a drag through one neither stops nor flips the arm.
 
-A drag is a row of targets, each answer seeding the next, as in the viewer. Two laws judge it:
+A drag is a sequence of targets, each solved with the previous solution as seed, as in the viewer. Two rules apply:
 
-- a target that a descent from the seed reaches is reached (no freeze);
-- a step, as the 2-norm of the joints' steps, is no longer than twice what that descent shows to be enough, plus
-  0.1 rad (no flip). The descent is a witness written here from `fk` and `jacobian` alone, free to use any branch
-  and any redundancy. Where a joint must turn fast, the witness shows it, too.
-  Twice, as the shortest way is not the only criterion: keeping the elbow in place has some weight.
+- A target that a reference descent from the seed reaches is solved (no freeze).
+- A step (2-norm of the joint steps) is at most twice that of the reference descent, plus 0.1 rad (no flip). The
+  descent is written here from `fk` and `jacobian` alone and may use any branch and any redundancy. Where a joint
+  must turn fast, the reference does so too. The factor is two because the shortest step is not the only criterion:
+  keeping the elbow in place has some weight.
 
 Where the targets come from a joint path that crosses the singularity, a small step exists at every target, and an
-arm that cannot drift off the path must stay within a small multiple of the path's own step.
+arm without redundancy must stay within a small multiple of the path's own step.
 """
 
 from __future__ import annotations
@@ -33,15 +32,15 @@ from kin.transforms import vector_angle
 
 TASK = {"pioneer5": "approach"}
 SQUARE = math.pi / 2
-BESIDE = (0.0, 1e-9, 1e-6, 1e-3)
+OFFSETS = (0.0, 1e-9, 1e-6, 1e-3)
 LINES = 2
 
 
-# The singular sets, each as joint values of the built-in arms (their zeros are the canonical ones, or π off)
+# The singular sets as joint values of the built-in arms, whose zeros are the canonical ones or π off them.
 
 
-def put(*pairs):
-    """A curve on which joints have given values, up to half turns."""
+def at_values(*pairs):
+    """A curve on which joints have given values, up to sign and half turns."""
 
     def curve(rng, q, inside):
         for joint, value in pairs:
@@ -67,8 +66,8 @@ def pioneer_shoulder(rng, q, inside):
         q[2] = rng.uniform(0.0, 2.0)
 
 
-def craig_axis(rng, q, inside):
-    """W over the shoulder: s3 = 0 and c2 d5 s4 + s2 (d3 + d5 c4) = 0."""
+def wrist_on_axis_1(rng, q, inside):
+    """Wrist centre on axis 1: s3 = 0 and c2 d5 s4 + s2 (d3 + d5 c4) = 0."""
     q[2] = 0.0
     q[1] = -math.atan2(0.31 * math.sin(q[3]), 0.35 + 0.31 * math.cos(q[3]))
     return q
@@ -77,23 +76,23 @@ def craig_axis(rng, q, inside):
 SINGULAR = {
     ("pioneer5", "elbow", ""): pioneer_elbow_inside,
     ("pioneer5", "shoulder", ""): pioneer_shoulder,
-    ("pioneer5", "wrist", ""): put((4, 0.0)),
-    ("redundant7", "elbow", ""): put((3, 0.0)),
-    ("redundant7", "shoulder", ""): put((2, SQUARE)),
-    ("redundant7", "wrist", ""): put((5, 0.0)),
-    ("redundant7-craig", "elbow", ""): put((3, 0.0)),
-    ("redundant7-craig", "shoulder", ""): put((1, 0.0), (2, SQUARE)),
-    ("redundant7-craig", "wrist", "axes 4 and 6"): put((5, 0.0), (4, SQUARE)),
-    ("redundant7-craig", "wrist", "joints 1 and 3"): put((1, 0.0), (5, 0.0)),
+    ("pioneer5", "wrist", ""): at_values((4, 0.0)),
+    ("redundant7", "elbow", ""): at_values((3, 0.0)),
+    ("redundant7", "shoulder", ""): at_values((2, SQUARE)),
+    ("redundant7", "wrist", ""): at_values((5, 0.0)),
+    ("redundant7-craig", "elbow", ""): at_values((3, 0.0)),
+    ("redundant7-craig", "shoulder", ""): at_values((1, 0.0), (2, SQUARE)),
+    ("redundant7-craig", "wrist", "axes 4 and 6"): at_values((5, 0.0), (4, SQUARE)),
+    ("redundant7-craig", "wrist", "joints 1 and 3"): at_values((1, 0.0), (5, 0.0)),
 }
-# Where the arm is sound, but the closed form has something to take care of.
-DELICATE = {
-    ("redundant7-craig", "algorithmic", ""): craig_axis,
-    ("redundant7-craig", "θ2 = 0 alone", ""): put((1, 0.0)),
-    ("redundant7-craig", "θ6 = 0 alone", ""): put((5, 0.0)),
+# Where the arm is regular, but the closed form needs care.
+REGULAR = {
+    ("redundant7-craig", "algorithmic", ""): wrist_on_axis_1,
+    ("redundant7-craig", "θ2 = 0 alone", ""): at_values((1, 0.0)),
+    ("redundant7-craig", "θ6 = 0 alone", ""): at_values((5, 0.0)),
 }
 # The Pioneer arm's wrist cannot be straight inside its limits.
-DRAGGED = {key: curve for key, curve in (SINGULAR | DELICATE).items() if key[:2] != ("pioneer5", "wrist")}
+DRAGGED = {key: curve for key, curve in (SINGULAR | REGULAR).items() if key[:2] != ("pioneer5", "wrist")}
 
 
 def ids(curves):
@@ -109,7 +108,7 @@ def least_sigma(robot, q):
     return np.linalg.svd(J, compute_uv=False)[min(robot.n, 6) - 1]
 
 
-def anywhere(robot, rng):
+def random_configuration(robot, rng):
     return rng.uniform(-math.pi, math.pi, robot.n)
 
 
@@ -117,11 +116,11 @@ def anywhere(robot, rng):
 
 
 @pytest.mark.parametrize(("robot_id", "kind", "words"), SINGULAR, ids=ids(SINGULAR))
-def test_on_a_singular_set_the_arm_loses_a_motion_and_that_set_comes_first(robot_id, kind, words):
+def test_on_a_singular_set_the_jacobian_loses_rank_and_that_set_is_listed_first(robot_id, kind, words):
     robot = kin.get_robot(robot_id)
     rng = np.random.default_rng(1)
     for _ in range(200):
-        q = SINGULAR[robot_id, kind, words](rng, anywhere(robot, rng), False)
+        q = SINGULAR[robot_id, kind, words](rng, random_configuration(robot, rng), False)
         first = singularities(robot, q)[0]
         assert least_sigma(robot, q) <= 1e-12
         assert first.kind == kind
@@ -132,14 +131,14 @@ def test_on_a_singular_set_the_arm_loses_a_motion_and_that_set_comes_first(robot
 
 @pytest.mark.parametrize(("robot_id", "kind", "words"), SINGULAR, ids=ids(SINGULAR))
 @pytest.mark.parametrize("off", [1e-6, 1e-3, 0.1])
-def test_the_distance_is_the_remaining_angle_or_length(robot_id, kind, words, off):
+def test_the_distance_to_a_singular_set_is_an_angle_or_a_length(robot_id, kind, words, off):
     robot = kin.get_robot(robot_id)
     rng = np.random.default_rng(2)
     for _ in range(50):
-        before = anywhere(robot, rng)
+        before = random_configuration(robot, rng)
         q = SINGULAR[robot_id, kind, words](rng, before.copy(), False)
         metres = (robot_id, kind) == ("pioneer5", "shoulder")
-        # Away from the set at right angles: along the joints that were set, or (Pioneer, shoulder) joint 2.
+        # Perpendicular to the set: along the joints that were set, or (Pioneer, shoulder) joint 2.
         push = (np.arange(robot.n) == 1) if metres else (q != before) * rng.normal(size=robot.n)
         away = q + off * push / np.linalg.norm(push)
         found = next(s for s in singularities(robot, away) if s.kind == kind and words in long(s))
@@ -154,15 +153,15 @@ def wrist_centre(robot, q):
     return T[:3, 3] - T[:3, 2] * {"pioneer5": 0.12}.get(robot.id, 0.42)
 
 
-# σ ≥ c · Π distance: c is a third of the least ratio met among 10⁵ configurations crowded round the singular sets.
-# Near a straight elbow of a 7-joint arm σ falls with the square, as s4² does in the determinant.
+# σ ≥ c · Π distance: c is a third of the smallest ratio among 10⁵ configurations close to the singular sets.
+# Near a straight elbow of a 7-joint arm σ falls with the square of the distance, as s4² in the determinant.
 FLOOR = {"pioneer5": (0.03, 1), "redundant7": (0.009, 2), "redundant7-craig": (0.002, 2)}
 
 
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 @given(data=st.data())
-def test_elsewhere_the_arm_loses_nothing(robot_id, data):
-    """The smallest singular value vanishes with the reported distances, hence nowhere else."""
+def test_there_are_no_other_singularities(robot_id, data):
+    """The smallest singular value has a lower bound that vanishes only with the reported distances."""
     robot = kin.get_robot(robot_id)
     near = st.tuples(st.integers(-2, 2), st.floats(-1.0, 1.0), st.integers(0, 6))
     joint = st.one_of(
@@ -189,12 +188,12 @@ def test_random_configurations_away_from_all_sets_are_regular(robot_id):
     assert tried > 200
 
 
-def test_over_the_shoulder_the_arm_angle_loses_its_reference_and_the_arm_no_motion():
+def test_with_the_wrist_centre_on_axis_1_only_the_arm_angle_is_undefined():
     robot = kin.get_robot("redundant7-craig")
     rng = np.random.default_rng(4)
     for _ in range(100):
-        q = anywhere(robot, rng)
-        on_axis = craig_axis(rng, q.copy(), True)
+        q = random_configuration(robot, rng)
+        on_axis = wrist_on_axis_1(rng, q.copy(), True)
         for at in (q, on_axis, on_axis + 1e-3 * np.eye(7)[1]):
             found = next(s for s in singularities(robot, at) if s.kind == "algorithmic")
             radius = np.hypot(*wrist_centre(robot, at)[:2])
@@ -206,8 +205,8 @@ def test_over_the_shoulder_the_arm_angle_loses_its_reference_and_the_arm_no_moti
             assert least_sigma(robot, on_axis) > 1e-6
 
 
-def test_only_a_long_forearm_brings_the_wrist_back_to_a_doubled_axis():
-    """d3 > d5 as printed: never. With a longer forearm: θ3 = ±90° and the wrist centre on axis 1."""
+def test_the_wrist_centre_reaches_axis_1_only_with_a_long_forearm():
+    """Never with d3 > d5, as in the chapter; with a longer forearm at θ3 = ±90°."""
     robot = kin.get_robot("redundant7")
     assert {s.kind for s in singularities(robot, robot.q_home)} == {"elbow", "shoulder", "wrist"}
     long = replace(robot, rows=tuple(replace(r, d=0.4) if r.d == 0.31 else r for r in robot.rows))
@@ -218,7 +217,7 @@ def test_only_a_long_forearm_brings_the_wrist_back_to_a_doubled_axis():
     assert found["algorithmic"].distance <= 1e-12
     assert found["shoulder"].distance <= 1e-12
     assert least_sigma(long, q) <= 1e-12
-    # Listed after what costs a motion.
+    # Listed after the singularity where the arm loses a motion.
     assert [s.kind for s in singularities(long, q)][:2] == ["shoulder", "algorithmic"]
 
 
@@ -237,7 +236,7 @@ def test_determinant_of_the_five_joint_arm():
         assert np.linalg.det(J) == pytest.approx(wanted, abs=1e-15)
 
 
-def test_determinant_of_the_arm_with_a_doubled_axis():
+def test_determinant_of_the_arm_with_two_joints_on_one_axis():
     """det J without joint 2 = d3 d5² s4² c3 s6."""
     robot = kin.get_robot("redundant7")
     d3, d5 = 0.35, 0.31
@@ -249,7 +248,7 @@ def test_determinant_of_the_arm_with_a_doubled_axis():
 
 
 def test_manipulability_of_the_srs_arm():
-    """√det(J Jᵀ) = d3 d5 |s4| |m| with m, up to a factor, the motion that keeps the tool still."""
+    """√det(J Jᵀ) = d3 d5 |s4| |m| where m is, up to a factor, the self-motion of the arm."""
     robot = kin.get_robot("redundant7-craig")
     d3, d5 = 0.35, 0.31
     for q in np.random.default_rng(7).uniform(-math.pi, math.pi, (200, 7)):
@@ -273,14 +272,14 @@ def test_manipulability_of_the_srs_arm():
 
 
 @pytest.mark.parametrize("robot_id", kin.builtin_robots())
-def test_nearest_comes_first_a_length_counting_as_its_angle_at_the_arms_reach(robot_id):
+def test_singularities_are_sorted_by_distance_with_lengths_relative_to_the_reach(robot_id):
     robot = kin.get_robot(robot_id)
     for q in robot.random_q(np.random.default_rng(8), 200):
         order = [s.distance / (robot.reach if s.unit == "m" else 1.0) for s in singularities(robot, q)]
         assert order == sorted(order)
 
 
-def test_meaning_names_the_joint_values_of_the_singular_posture():
+def test_the_sentence_gives_the_joint_values_of_the_singular_posture():
     robot = kin.get_robot("redundant7")
     q = robot.q_home.copy()
     for angle, word in (
@@ -292,7 +291,7 @@ def test_meaning_names_the_joint_values_of_the_singular_posture():
         elbow = next(s for s in singularities(robot, q) if s.kind == "elbow")
         assert long(elbow).startswith(f"elbow {word}")
         assert elbow.distance == pytest.approx(min(abs(angle - k * math.pi) for k in range(-2, 3)))
-    # A table with another zero: the clause speaks of the joint's own values.
+    # With another zero in the table, the sentence gives the joint's own value.
     rows = tuple(replace(r, theta=-0.5) if r.name == "joint 4" else r for r in robot.rows)
     q[3] = 0.5
     elbow = singularities(replace(robot, rows=rows), q)[0]
@@ -302,7 +301,7 @@ def test_meaning_names_the_joint_values_of_the_singular_posture():
 
 @pytest.mark.parametrize("robot_id", kin.builtin_robots())
 @pytest.mark.parametrize("q", [[0.0], [0.0] * 8, [[0.0] * 7] * 2, [[0.0] * 5], [math.nan] * 7, "home"])
-def test_misuse_is_refused(robot_id, q):
+def test_invalid_configurations_are_rejected(robot_id, q):
     with pytest.raises(InputError, match="q"):
         singularities(kin.get_robot(robot_id), q)
 
@@ -330,7 +329,7 @@ def arm(*rows, home):
     return kin.parse_robot(ARM.format(rows=text, home=list(home)))
 
 
-def only(robot, q):
+def only_singularity(robot, q):
     found = singularities(robot, q)
     assert len(found) == 1
     assert (found[0].kind, found[0].unit) == ("jacobian", "SI")
@@ -338,62 +337,62 @@ def only(robot, q):
 
 
 def test_six_joints_without_a_closed_form_are_judged_by_the_whole_jacobian():
-    # A leaning second axis: no closed form fits the arm.
+    # Axis 2 is oblique to axis 1: no closed form matches the arm.
     robot = arm(
         (0.3, 0, 60), (0, 0.4, 0), (0, 0, 90), (0.3, 0, -90), (0, 0, 90), (0.1, 0, 0), home=[0, 0, 0, 0, 0, 0]
     )
     for q in np.random.default_rng(9).uniform(-3, 3, (20, 6)):
-        found = only(robot, q)
+        found = only_singularity(robot, q)
         assert found.distance == pytest.approx(np.linalg.svd(kin.jacobian(robot, q), compute_uv=False)[-1])
         assert found.shape == (6, 6)
         q[4] = 0.0
-        assert only(robot, q).distance <= 1e-12
+        assert only_singularity(robot, q).distance <= 1e-12
 
 
 def test_five_joints_without_a_closed_form_are_judged_by_point_and_approach():
-    # Base, three parallel axes, roll: the roll changes nothing about point and approach, so rank 4 is usual.
+    # Base, three parallel axes, roll: the roll changes neither point nor approach direction, so the rank is 4.
     robot = arm((0.1, 0, 90), (0, 0.3, 0), (0, 0.3, 0), (0, 0.05, 90), (0.2, 0, 0), home=[0, 0, 0, 0, 0])
     assert closed_form_of(robot) is None
     q = np.array([0.3, 0.4, 0.5, 0.6, 0.7])
-    found = only(robot, q)
+    found = only_singularity(robot, q)
     assert found.shape == (5, 5)
     assert found.distance > 0.01
     q[2] = 0.0
-    assert only(robot, q).distance <= 1e-12
+    assert only_singularity(robot, q).distance <= 1e-12
 
 
 def test_few_joints_are_judged_by_the_point():
     robot = arm((0.3, 0, 90), (0, 0.4, 0), (0, 0.3, 0), home=[0, 0, 0])
     q = np.array([0.1, 0.2, 0.9])
     J = kin.jacobian(robot, q)[:3]
-    assert only(robot, q).distance == pytest.approx(np.linalg.svd(J, compute_uv=False)[-1])
+    assert only_singularity(robot, q).distance == pytest.approx(np.linalg.svd(J, compute_uv=False)[-1])
     q[2] = 0.0
-    assert only(robot, q).distance <= 1e-12
-    assert "3 × 3" in long(only(robot, q))
+    assert only_singularity(robot, q).distance <= 1e-12
+    assert "3 × 3" in long(only_singularity(robot, q))
 
 
 def test_a_planar_arm_is_regular_although_it_stays_in_its_plane():
     robot = arm((0, 0.4, 0), (0, 0.3, 0), (0, 0.2, 0), (0, 0.1, 0), home=[0, 0, 0, 0])
-    assert only(robot, [0.1, 0.7, -0.4, 0.3]).distance > 0.05
-    assert only(robot, [0.1, 0.0, 0.0, 0.0]).distance <= 1e-12
+    assert only_singularity(robot, [0.1, 0.7, -0.4, 0.3]).distance > 0.05
+    assert only_singularity(robot, [0.1, 0.0, 0.0, 0.0]).distance <= 1e-12
 
 
-def test_sliding_joints_are_counted_in_metres():
+def test_prismatic_joints_count_in_metres():
     robot = arm(("slide", 0, 90), ("slide", 0, 90), ("slide", 0, 0), home=[0, 0, 0])
-    found = only(robot, [0.1, 0.2, 0.3])
+    found = only_singularity(robot, [0.1, 0.2, 0.3])
     J = kin.jacobian(robot, [0.1, 0.2, 0.3])[:3]
     assert found.distance == pytest.approx(np.linalg.svd(J, compute_uv=False)[np.linalg.matrix_rank(J) - 1])
 
 
 def test_an_arm_that_moves_no_point_is_always_singular():
-    assert only(arm((0.3, 0, 0), home=[0]), [0.4]).distance == 0.0
+    assert only_singularity(arm((0.3, 0, 0), home=[0]), [0.4]).distance == 0.0
 
 
 # Drags
 
 
 def residual(robot, T, q, task):
-    """The twist that is missing, and the Jacobian of the task."""
+    """The remaining twist to the target, and the Jacobian of the task."""
     now, J = kin.fk(robot, q), kin.jacobian(robot, q)
     if task == "approach":
         a = now[:3, 2]
@@ -404,8 +403,8 @@ def residual(robot, T, q, task):
     return np.concatenate([T[:3, 3] - now[:3, 3], turn]), J
 
 
-def enough(robot, T, seed):
-    """The witness: the way (2-norm) to a solution inside the limits near the seed, ∞ if none is found."""
+def reference_step(robot, T, seed):
+    """The reference descent: step (2-norm) to a solution inside the limits near the seed, ∞ if none is found."""
     task = TASK.get(robot.id, "pose")
     best = math.inf
     for damping in (1e-2, 1e-4, 1e-7):
@@ -429,31 +428,31 @@ def reached(robot, T, q):
 
 
 def drag(robot, targets, q):
-    """The configurations that a drag from q takes through the targets, as far as they can be reached.
+    """The configurations of a drag from q through the targets, as far as they can be reached.
 
-    Every step is judged by the witness.
+    Every step is compared with the reference descent.
     """
     task = TASK.get(robot.id, "pose")
     taken = []
     for T in targets:
         result = solve_ik(robot, T, task=task, q_seed=q)
-        story = {"seed": q.tolist(), "T": T.tolist(), "answer": result.best.q.tolist(), "status": result.status}
+        facts = {"seed": q.tolist(), "T": T.tolist(), "answer": result.best.q.tolist(), "status": result.status}
         if result.status is not Status.SOLVED:
-            assert enough(robot, T, q) == math.inf, f"frozen: {story}"
+            assert reference_step(robot, T, q) == math.inf, f"frozen: {facts}"
             break
         assert reached(robot, T, result.best.q)
         step = float(np.linalg.norm(result.best.q - q))
         if step > 0.1:
-            assert step <= 2.0 * enough(robot, T, q) + 0.1, f"flipped by {step:.3f} rad: {story}"
+            assert step <= 2.0 * reference_step(robot, T, q) + 0.1, f"flipped by {step:.3f} rad: {facts}"
         q = result.best.q
         taken.append(q)
     return taken
 
 
-def paths(robot, key, count, beside, seed):
-    """Joint paths ``(21, n)`` inside the limits with steps of 0.01 rad that cross a curve in their middle.
+def paths(robot, key, count, off, seed):
+    """Joint paths ``(21, n)`` inside the limits, in steps of 0.01 rad, that cross a curve in the middle.
 
-    Other singularities and, for the 7-joint arms, the stops are kept away, so that only one thing is tried.
+    They keep away from other singularities and, for the 7-joint arms, from the limits, to test one effect alone.
     """
     rng = np.random.default_rng(seed)
     curve = DRAGGED[key]
@@ -467,25 +466,24 @@ def paths(robot, key, count, beside, seed):
         if robot.n == 7 and min(s.distance for s in others) < 0.3:
             continue
         v = rng.uniform(-1, 1, robot.n)
-        path = middle + beside * moved * rng.normal(size=robot.n)
+        path = middle + off * moved * rng.normal(size=robot.n)
         path = path + 0.01 * np.arange(-10, 11)[:, None] * v / np.abs(v).max()
         if key == ("pioneer5", "elbow", ""):
-            path[:, 2] = np.abs(path[:, 2])  # the straight elbow is its stop: the path turns round there
+            path[:, 2] = np.abs(path[:, 2])  # the straight elbow is at its limit: the path turns back there
         if ((path >= robot.lower + margin) & (path <= robot.upper - margin)).all():
             made += 1
             yield path
 
 
-@pytest.mark.parametrize("beside", BESIDE)
+@pytest.mark.parametrize("off", OFFSETS)
 @pytest.mark.parametrize("key", DRAGGED, ids=ids(DRAGGED))
-def test_targets_of_a_joint_path_through_a_singularity_are_followed(key, beside):
-    """Every target is reached. Without a redundancy to drift along, five times the path's own step is enough:
+def test_a_drag_follows_a_joint_path_through_a_singularity(key, off):
+    """Every target is reached, without redundancy in steps of at most five times the path's own.
 
-    at the singular pose a joint that has lost its meaning waits, and then has the next step to make as well, while
-    others answer to where it waited.
+    At the singular pose an undetermined joint stays, and has two steps to make afterwards; others compensate.
     """
     robot = kin.get_robot(key[0])
-    for path in paths(robot, key, LINES, beside, seed=10):
+    for path in paths(robot, key, LINES, off, seed=10):
         targets = kin.fk(robot, path)
         for T, known in zip(targets[1:], path[1:], strict=True):
             assert reached(robot, T, known)
@@ -496,14 +494,14 @@ def test_targets_of_a_joint_path_through_a_singularity_are_followed(key, beside)
 
 
 @pytest.mark.parametrize("key", DRAGGED, ids=ids(DRAGGED))
-def test_no_target_of_a_joint_path_is_missed(key):
+def test_every_target_of_a_joint_path_is_solved(key):
     robot = kin.get_robot(key[0])
     task = TASK.get(robot.id, "pose")
     for path in paths(robot, key, LINES, 0.0, seed=11):
         for before, q in itertools.pairwise(path):
             result = solve_ik(robot, kin.fk(robot, q), task=task, q_seed=before)
             assert result.status is Status.SOLVED
-            # The seed is on the path, so a step of 0.01 rad exists; twice that for the joint that waited.
+            # The seed is on the path, so a step of 0.01 rad exists. At the singular pose a joint may stay behind.
             assert np.abs(result.best.q - before).max() <= 0.05
 
 
@@ -519,13 +517,13 @@ def line(T, velocity, spin, length):
     return moved
 
 
-@pytest.mark.parametrize("beside", BESIDE)
+@pytest.mark.parametrize("off", OFFSETS)
 @pytest.mark.parametrize("key", DRAGGED, ids=ids(DRAGGED))
-def test_a_straight_drag_through_or_beside_a_singular_pose_neither_freezes_nor_flips(key, beside):
-    """Straight lines of 3 mm a step through the singular pose in the middle or `beside` metres away from it.
+def test_a_straight_drag_through_or_near_a_singular_pose_neither_freezes_nor_flips(key, off):
+    """Straight lines in steps of 3 mm through the singular pose, or past it at `off` metres.
 
-    The tool turns steadily on the way. Every second line sets out the way the joints can go, the others anyhow.
-    Each is followed as far as it is within reach.
+    The tool turns steadily. Every second line starts in a direction that the joints allow, the others in a random
+    one. Each is followed as far as it is within reach.
     """
     robot = kin.get_robot(key[0])
     rng = np.random.default_rng(12)
@@ -535,11 +533,11 @@ def test_a_straight_drag_through_or_beside_a_singular_pose_neither_freezes_nor_f
         twist = kin.jacobian(robot, path[10]) @ (path[10] - path[9]) if number % 2 else rng.normal(size=6)
         velocity, spin = np.split(twist / np.linalg.norm(twist[:3]), 2)
         aside = np.cross(velocity, rng.normal(size=3))
-        T[:3, 3] += beside * aside / np.linalg.norm(aside)
+        T[:3, 3] += off * aside / np.linalg.norm(aside)
         targets = [line(T, velocity, spin, 0.003 * k) for k in range(-10, 11)]
-        # From the middle backwards as far as reach goes, then forwards through the middle.
+        # From the middle backwards to the edge of reach, then forwards through the middle.
         back = drag(robot, targets[9::-1], path[10])
-        if not back:  # the middle is at the end of reach: the other way, then
+        if not back:  # the middle is at the edge of reach: take the other direction
             targets.reverse()
             back = drag(robot, targets[9::-1], path[10])
         on = drag(robot, targets[10 - len(back) :], back[-1] if back else path[10])

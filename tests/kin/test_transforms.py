@@ -84,7 +84,7 @@ def test_a_rounded_target_is_made_orthonormal():
         (lambda T: "up", "target"),
     ],
 )
-def test_an_invalid_pose_is_refused(change, field):
+def test_an_invalid_pose_is_rejected(change, field):
     with pytest.raises(InputError) as caught:
         as_transform(change(from_position_wxyz([0.1, 0.2, 0.3], [1, 0, 0, 0])))
     assert caught.value.field.startswith(field)
@@ -101,7 +101,7 @@ def test_an_invalid_pose_is_refused(change, field):
         (lambda: frame_from_approach([[0, 0, 1]]), "approach"),
     ],
 )
-def test_misuse_names_the_field(call, field):
+def test_invalid_input_names_the_field(call, field):
     with pytest.raises(InputError) as caught:
         call()
     assert caught.value.field == field

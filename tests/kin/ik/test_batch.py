@@ -1,4 +1,4 @@
-"""The thin call and the arithmetic under it: one against many, against the rich kernels, against the library."""
+"""`ik_branches` and its arithmetic, compared with single calls, with the solvers and with the C library."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CLOSED = tuple(robot.id for robot in kin.builtin_robots().values() if closed_for
 
 
 def moved(robot):
-    """The same arm on a base of its own: no entry of it is zero."""
+    """The same arm with a base transform in which no entry is zero."""
     c, s = math.cos(0.7), math.sin(0.7)
     tilt = np.array([[1, 0, 0, 0.1], [0, c, -s, -0.2], [0, s, c, 0.3], [0, 0, 0, 1]])
     turn = np.array([[c, -s, 0, 0.4], [s, c, 0, 0.5], [0, 0, 1, 0.6], [0, 0, 0, 1]])
@@ -41,7 +41,7 @@ def targets(robot, count, seed=1):
 
 
 def singular_targets(robot, count=64):
-    """Poses at which joints other than the first are at zero of their closed form, or at a right angle."""
+    """Poses at which some joints, not the first, are at canonical angle 0 or at a right angle."""
     rng = np.random.default_rng(2)
     q = robot.random_q(rng, count)
     offset = closed_form_of(robot).geometry.offset
@@ -50,14 +50,14 @@ def singular_targets(robot, count=64):
     return kin.fk(robot, np.where(special, rng.integers(-1, 2, q.shape) * (math.pi / 2) - offset, q))
 
 
-def rich(robot, T, value):
-    """The branches of the rich kernels, without limits."""
+def solver_branches(robot, T, value):
+    """The branches by the solver, without limits."""
     form = closed_form_of(robot)
     far = np.full(robot.n, 1e6)
     return form.solve(SolverInput(T, POSE, (value,), False, robot.q_home.copy(), -far, far)).q
 
 
-def turned(a, b):
+def angle_difference(a, b):
     """Differences of angles ``(...)``, NaN where both are NaN."""
     assert np.array_equal(np.isnan(a), np.isnan(b))
     return np.abs(np.mod(a - b + math.pi, 2 * math.pi) - math.pi)
@@ -70,12 +70,12 @@ def closure(robot, T, q):
     return np.abs(kin.fk(robot, q[there]) - wanted)[..., 2 if robot.n == 5 else 0 :].max()
 
 
-# Against each other
+# Single targets, batches and solvers compared
 
 
 @arms
 @pytest.mark.parametrize("value", [math.nan, 0.3, -4.0])
-def test_a_batch_gives_the_bits_of_one(robot, value):
+def test_a_batch_is_bit_identical_to_single_targets(robot, value):
     T = np.concatenate([targets(robot, 130), singular_targets(robot, 20)])
     many = kin.ik_branches(robot, T, value)
     assert many.shape == (150, 8, robot.n)
@@ -84,7 +84,7 @@ def test_a_batch_gives_the_bits_of_one(robot, value):
 
 
 @arms
-def test_every_target_may_have_its_own_value(robot):
+def test_each_target_may_have_its_own_value(robot):
     T = targets(robot, 70)
     values = np.linspace(-3, 3, 70)
     values[::7] = math.nan
@@ -102,35 +102,38 @@ def test_every_target_may_have_its_own_value(robot):
 def test_the_solver_gives_the_same_branches_as_its_batch_kernels(robot):
     T = targets(robot, 300)
     thin = kin.ik_branches(robot, T, 0.3)
-    difference = turned(thin, np.array([rich(robot, pose, 0.3) for pose in T]))
+    difference = angle_difference(thin, np.array([solver_branches(robot, pose, 0.3) for pose in T]))
     assert np.nanmedian(difference) <= 1e-15
     assert np.nanquantile(difference, 0.99) <= 1e-12
-    assert np.nanmax(difference) <= 1e-9  # a rounding error, seen beside a singularity
+    assert np.nanmax(difference) <= 1e-9  # rounding error, amplified near a singularity
     assert closure(robot, T, thin) <= 5e-15
 
 
 @arms
 @pytest.mark.parametrize("value", [math.nan, 0.3])
-def test_singular_targets_are_met(robot, value):
+def test_singular_targets_are_solved(robot, value):
     T = singular_targets(robot)
     thin = kin.ik_branches(robot, T, value)
     assert not np.isnan(thin).all(axis=(1, 2)).any()
     assert closure(robot, T, thin) <= 1e-9
     if not math.isnan(value):
         for pose, branches in zip(T, thin, strict=True):
-            for one, other in zip(branches, rich(robot, pose, value), strict=True):
-                # Where an angle is free, or all but free, the poses must agree, not the joints.
+            for one, other in zip(branches, solver_branches(robot, pose, value), strict=True):
+                # Where an angle is free, or nearly so, the poses must agree, not the joints.
                 assert np.isnan(one).any() == np.isnan(other).any()
 
 
 @arms
 def test_the_home_configuration_is_among_its_own_branches(robot):
     branches = kin.ik_branches(robot, kin.fk(robot, robot.home))
-    assert np.nanmin(turned(branches, np.where(np.isnan(branches), math.nan, robot.q_home)).max(axis=1)) <= 1e-7
+    assert (
+        np.nanmin(angle_difference(branches, np.where(np.isnan(branches), math.nan, robot.q_home)).max(axis=1))
+        <= 1e-7
+    )
 
 
 @arms
-def test_every_configuration_is_among_the_branches_at_its_own_value(robot):
+def test_every_configuration_is_among_the_branches_at_its_redundancy_value(robot):
     q = robot.random_q(np.random.default_rng(3), 300)
     if closed_form_of(robot).name == "srs7":
         values = [
@@ -155,7 +158,7 @@ def test_out_of_reach_there_is_no_branch(robot):
     assert np.isnan(kin.ik_branches(robot, T[0])).all()
 
 
-def test_one_side_alone_may_be_out_of_reach():
+def test_branches_may_be_out_of_reach_on_one_side_only():
     robot = kin.get_robot("pioneer5")
     branches = kin.ik_branches(robot, targets(robot, 200))
     missing = np.isnan(branches)
@@ -166,7 +169,7 @@ def test_one_side_alone_may_be_out_of_reach():
 
 
 @pytest.mark.parametrize("robot_id", CLOSED)
-def test_every_family_answers_one_and_many_alike(robot_id):
+def test_every_family_gives_equal_results_for_batches_and_single_targets(robot_id):
     robot = kin.get_robot(robot_id)
     T = targets(robot, 100)
     many = kin.ik_branches(robot, T)
@@ -177,7 +180,7 @@ def test_every_family_answers_one_and_many_alike(robot_id):
         assert np.array_equal(kin.ik_branches(robot, pose), branches, equal_nan=True)
 
 
-# Shapes, kinds of arrays, misuse
+# Shapes, kinds of arrays, invalid input
 
 
 @pytest.mark.parametrize("robot_id", ROBOTS)
@@ -189,7 +192,7 @@ def test_batch_axes_come_first(robot_id, shape):
     assert kin.ik_branches(robot, T, np.zeros(shape)).shape == (*shape, 8, robot.n)
 
 
-def test_all_kinds_of_arrays_are_taken():
+def test_all_kinds_of_arrays_are_accepted():
     robot = kin.get_robot("redundant7-craig")
     T = np.eye(4)
     T[:3, 3] = 0.25, 0.125, 0.5
@@ -209,7 +212,7 @@ def test_all_kinds_of_arrays_are_taken():
         assert np.array_equal(kin.ik_branches(robot, form, 0.5), np.stack([wanted] * 3))
 
 
-def spoilt(value, *index):
+def with_value(value, *index):
     T = np.stack([np.eye(4)] * 3)
     T[index] = value
     return T
@@ -224,29 +227,29 @@ def spoilt(value, *index):
         (np.zeros(16), "target"),
         ("home", "target"),
         (None, "target"),
-        (spoilt(math.nan, 0, 0, 0)[0], "target[0][0]"),
-        (spoilt(math.inf, 0, 1, 3)[0], "target[1][3]"),
-        (spoilt(math.nan, 0, 3, 1)[0], "target[3][1]"),
-        (spoilt(math.nan, 2, 0, 1), "target[2][0][1]"),
-        (spoilt(-math.inf, 1, 3, 3), "target[1][3][3]"),
-        (spoilt(math.nan, 2, 0, 1).tolist(), "target[2][0][1]"),
+        (with_value(math.nan, 0, 0, 0)[0], "target[0][0]"),
+        (with_value(math.inf, 0, 1, 3)[0], "target[1][3]"),
+        (with_value(math.nan, 0, 3, 1)[0], "target[3][1]"),
+        (with_value(math.nan, 2, 0, 1), "target[2][0][1]"),
+        (with_value(-math.inf, 1, 3, 3), "target[1][3][3]"),
+        (with_value(math.nan, 2, 0, 1).tolist(), "target[2][0][1]"),
     ],
 )
-def test_misuse_of_a_target_names_the_field(robot_id, target, field):
+def test_an_invalid_target_is_named(robot_id, target, field):
     with pytest.raises(InputError) as caught:
         kin.ik_branches(kin.get_robot(robot_id), target)
     assert caught.value.field == field
 
 
 @pytest.mark.parametrize("value", ["psi", None, 1j, [0.0, 1.0], np.zeros((3, 1)), math.inf, [0.0, -math.inf, 0.0]])
-def test_misuse_of_a_redundancy_names_the_field(value):
+def test_an_invalid_redundancy_of_a_batch_is_named(value):
     robot = kin.get_robot("redundant7-craig")
     with pytest.raises(InputError, match="redundancy"):
         kin.ik_branches(robot, targets(robot, 3), value)
 
 
 @pytest.mark.parametrize("value", ["psi", None, 1j, [0.0], np.zeros((1, 1)), math.inf, -math.inf])
-def test_misuse_of_one_redundancy_names_the_field(value):
+def test_an_invalid_redundancy_of_one_target_is_named(value):
     robot = kin.get_robot("redundant7-craig")
     with pytest.raises(InputError, match="redundancy"):
         kin.ik_branches(robot, kin.fk(robot, robot.home), value)
@@ -260,14 +263,14 @@ def test_an_arm_in_use_can_be_copied(copy):
     assert np.array_equal(kin.ik_branches(copy(robot), T), wanted, equal_nan=True)
 
 
-def test_an_arm_without_closed_form_is_refused():
+def test_an_arm_without_a_closed_form_is_rejected():
     slide = Robot("slide", "slide", "", "standard", (Joint("1", kind="prismatic", limits=(0.0, 1.0)),), (0.5,))
     with pytest.raises(InputError, match="robot"):
         kin.ik_branches(slide, np.eye(4))
 
 
 @pytest.mark.parametrize("robot_id", CLOSED)
-def test_many_threads_get_the_serial_answers(robot_id):
+def test_threads_get_the_same_results_as_serial_calls(robot_id):
     robot = kin.get_robot(robot_id)
     batches = [targets(robot, 300, seed) for seed in range(24)]
 
@@ -280,7 +283,7 @@ def test_many_threads_get_the_serial_answers(robot_id):
             assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(one, other, strict=True))
 
 
-# The arithmetic
+# Arithmetic
 
 
 @njit(error_model="numpy")
@@ -296,12 +299,12 @@ def many_atan2(y, x, out):
 
 
 def ulps(found, wanted):
-    """Largest error in units of the last place of the library's value."""
+    """Largest error in units of the last place (ulp) of the reference value."""
     return (np.abs(found - wanted) / np.spacing(np.abs(wanted))).max()
 
 
 @pytest.mark.parametrize("scale", [1e-300, 1e-8, 1.0, 10.0, 1e3, simd.WIDE])
-def test_sine_and_cosine_are_the_librarys_to_the_last_places(scale):
+def test_sine_and_cosine_match_the_c_library(scale):
     x = np.random.default_rng(6).uniform(-scale, scale, 400_000)
     s, c = np.empty_like(x), np.empty_like(x)
     many_sin_cos(x, s, c)
@@ -319,7 +322,7 @@ def test_sine_and_cosine_near_multiples_of_a_right_angle():
         assert ulps(c, np.cos(x)) <= 3.0
 
 
-def test_arc_tangent_is_the_librarys_to_the_last_places():
+def test_arc_tangent_matches_the_c_library():
     rng = np.random.default_rng(7)
     for spread in (0.0, 0.1, 3.0, 30.0):
         x, y = rng.normal(size=(2, 400_000)) * 10 ** rng.uniform(-spread, spread, (2, 400_000))

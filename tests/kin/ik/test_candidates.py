@@ -1,4 +1,4 @@
-"""The compiled passes between a solver's raw rows and an answer, each against a plain-Python twin."""
+"""The kernels between a solver's raw rows and a result, each compared with a version in plain Python."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def joined(arcs, rows, together, circular):
 
 @settings(max_examples=200, deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 2), angle, st.floats(0, 7)), max_size=8), st.booleans())
-def test_ranges_hold_exactly_what_their_arcs_hold(arcs, circular):
+def test_ranges_contain_exactly_the_values_of_their_arcs(arcs, circular):
     arcs = [(b, low, low + width) for b, low, width in arcs]
     together = np.array([True, False, True])
     _, found = joined(arcs, [2, 0], together, circular)
@@ -62,7 +62,7 @@ def test_an_unbounded_range_is_reported():
     assert joined([(0, 1.0, 9.0)], [0], np.array([True]), True)[1] == [[(-math.pi, math.pi)]] * 2
 
 
-def test_rows_are_taken_by_rising_key_and_once():
+def test_rows_are_selected_by_rising_key_without_duplicates():
     q = np.array([[3.0, 0.0], [1.0, 0.0], [1.0, 1e-9], [2.0, 0.0], [0.0, 0.0]])
     kept, count = select(q, np.array([3.0, 1.5, 1.0, 2.0, math.inf]))
     assert kept[:count].tolist() == [2, 3, 0]
@@ -72,7 +72,7 @@ def test_rows_are_taken_by_rising_key_and_once():
 
 @pytest.mark.parametrize("respect", [True, False])
 @pytest.mark.parametrize("kernel", [lambda: measure_and_sort, unchecked], ids=["dispatched", "unchecked"])
-def test_rows_are_measured_and_sorted_in_one_call_as_step_by_step(respect, kernel):
+def test_measuring_and_sorting_in_one_call_equals_separate_steps(respect, kernel):
     arm = get_robot("puma560")
     rng = np.random.default_rng(3)
     q = rng.uniform(1.4 * arm.lower, 1.4 * arm.upper, (8, arm.n))
@@ -97,7 +97,7 @@ def test_rows_are_measured_and_sorted_in_one_call_as_step_by_step(respect, kerne
     assert count == len({0, 2} & set(np.flatnonzero(good).tolist()))
 
 
-def test_what_meets_the_task_and_the_limits():
+def test_accepted_rows_meet_the_task_and_the_limits():
     nan = math.nan
     stats = np.array(
         [[0, 0, 1, 0, 0], [0, 0, 1, 0.1, 0], [1e-8, 0, 1, 0, 0], [0, 1e-8, 1, 0, 0], [nan, nan, nan, nan, nan]],
@@ -117,7 +117,7 @@ def test_what_meets_the_task_and_the_limits():
     st.integers(0, 15),
     st.sampled_from([1.0, -1.0, math.nan, math.inf, 3.0]),
 )
-def test_the_compiled_check_of_a_target_agrees_with_the_one_that_explains(wxyz, noise, entry, factor):
+def test_the_compiled_check_of_a_target_agrees_with_the_one_in_python(wxyz, noise, entry, factor):
     if np.linalg.norm(wxyz) < 1e-3:
         wxyz = [1, 0, 0, 0]
     T = np.eye(4)

@@ -1,4 +1,4 @@
-"""Inverse kinematics: golden branches, round trips, limits, order, refusals with reasons, misuse."""
+"""Inverse kinematics: golden branches, round trips, limits, order, unreachable targets, invalid input."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ SEVEN = ("redundant7", "redundant7-craig")
 ROUND_TRIPS = 5_000
 
 
-def turned(T, degrees, axis="z"):
-    """T with its tool turned about one of its own axes."""
+def rotated(T, degrees, axis="z"):
+    """T rotated about one of its own axes."""
     c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
     i, j = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
     R = np.eye(4)
@@ -30,12 +30,12 @@ def turned(T, degrees, axis="z"):
 
 
 def angle_gap(a, b):
-    """Largest joint difference, whole turns apart."""
+    """Largest joint difference modulo whole turns."""
     return np.abs((a - b + np.pi) % (2 * np.pi) - np.pi).max(axis=-1)
 
 
 def assert_exact(robot, target, result, task="pose"):
-    """Every solution meets the task, by an FK of our own, inside the limits and in rising distance."""
+    """Check with an independent FK that all solutions meet the task, inside the limits, in order of distance."""
     assert result.solutions
     for s in result.solutions:
         T = kin.fk(robot, s.q)
@@ -54,7 +54,7 @@ def assert_exact(robot, target, result, task="pose"):
 
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 def test_all_golden_branches_and_no_others(robot_id, golden):
-    """The 50-digit branch sets, complete, for the same value of the redundancy parameter."""
+    """The complete 50-digit branch sets, for the same value of the redundancy parameter."""
     robot = kin.get_robot(robot_id)
     five = robot.n == 5
     for case in golden(robot_id)["ik"]:
@@ -82,7 +82,7 @@ def test_the_batch_call_gives_the_same_branches(robot_id, golden):
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 @pytest.mark.parametrize("task", ["pose", "approach"])
 def test_every_round_trip_is_solved(robot_id, task):
-    """20 000 random in-limit configurations: each is reached again from an unrelated seed."""
+    """20 000 random configurations inside the limits: the pose of each is solved from an unrelated seed."""
     robot = kin.get_robot(robot_id)
     rng = np.random.default_rng(2026)
     q, seeds = robot.random_q(rng, ROUND_TRIPS), robot.random_q(rng, ROUND_TRIPS)
@@ -120,8 +120,8 @@ def test_round_trip_of_points(robot_id):
 
 
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
-def test_golden_edge_postures_are_reached(robot_id, golden):
-    """Zeros, limit corners and singular postures inside the limits: a solution, never NaN."""
+def test_golden_edge_postures_are_solved(robot_id, golden):
+    """Zeros, corners of the limits and singular postures inside the limits have a solution without NaN."""
     robot = kin.get_robot(robot_id)
     tried = 0
     for case in golden(robot_id)["edge"]:
@@ -137,7 +137,7 @@ def test_golden_edge_postures_are_reached(robot_id, golden):
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 @pytest.mark.parametrize("share", [0.1, 0.4])
 def test_every_round_trip_inside_narrowed_limits_is_solved(robot_id, share):
-    """Limits cut at random to a part of their range: the feasible arcs are found, however small."""
+    """With random limits of a part of the range, feasible arcs are found, however small."""
     from dataclasses import replace
 
     whole = kin.get_robot(robot_id)
@@ -173,7 +173,7 @@ def test_solutions_are_exact_ordered_and_deterministic(robot_id, fractions):
 
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 def test_the_seed_itself_is_found_first(robot_id):
-    """For the pose it is in, the arm stays where it is."""
+    """For its present pose, the arm stays where it is."""
     robot = kin.get_robot(robot_id)
     for q in robot.random_q(np.random.default_rng(3), 200):
         best = solve_ik(robot, kin.fk(robot, q), q_seed=q).best
@@ -182,7 +182,7 @@ def test_the_seed_itself_is_found_first(robot_id):
 
 @pytest.mark.parametrize("robot_id", SEVEN)
 def test_whole_turns_follow_the_seed(robot_id):
-    """Joint 7 turns ±270°: 200° and −160° are one posture, and the seed says which is meant."""
+    """Joint 7 has ±270°: 200° and −160° are the same posture, and the seed decides between them."""
     robot = kin.get_robot(robot_id)
     for last in (200.0, -160.0):
         q = np.radians([10, 20, 30, 40, 50, 60, last])
@@ -190,7 +190,7 @@ def test_whole_turns_follow_the_seed(robot_id):
         assert np.degrees(best.q[6]) == pytest.approx(last, abs=1e-6)
 
 
-def test_solutions_outside_the_limits_are_refused_and_the_joint_is_named():
+def test_solutions_outside_the_limits_are_rejected_and_the_joint_is_named():
     robot = kin.get_robot("pioneer5")
     q = np.radians([90, 40, 60, 30, 60])
     result = solve_ik(robot, kin.fk(robot, q), task="approach")
@@ -208,7 +208,7 @@ def test_solutions_outside_the_limits_are_refused_and_the_joint_is_named():
     assert not any(s.in_limits for s in free.solutions)
 
 
-def test_redundant_limits_name_a_joint_too():
+def test_the_joint_outside_its_limits_is_named_for_a_redundant_arm():
     robot = kin.get_robot("redundant7-craig")
     q = np.radians([0, 30, 0, 118, 0, 40, 0])
     result = solve_ik(robot, kin.fk(robot, q))
@@ -220,8 +220,8 @@ def test_redundant_limits_name_a_joint_too():
 
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 @pytest.mark.parametrize("task", ["pose", "approach", "position"])
-def test_too_far_says_how_far(robot_id, task):
-    """A point far out along x: the distance is the distance to the workspace's rim, section 7 of the facts."""
+def test_the_distance_of_a_point_too_far_is_reported(robot_id, task):
+    """For a point far out along x, it is the distance to the edge of the workspace."""
     robot = kin.get_robot(robot_id)
     rim = {"pioneer5": 0.485911099, "redundant7": 1.08, "redundant7-craig": 1.08}[robot_id]
     height = {"pioneer5": 0.098874, "redundant7": 0.30, "redundant7-craig": 0.30}[robot_id]
@@ -238,7 +238,7 @@ def test_too_far_says_how_far(robot_id, task):
 
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 def test_dragging_out_of_reach_does_not_make_the_arm_jump(robot_id):
-    """Of all equally close postures the one next to the present one is taken, step after step."""
+    """Of equally close postures, the one nearest to the present one is chosen in every step."""
     robot = kin.get_robot(robot_id)
     target = kin.fk(robot, robot.home)
     direction = target[:3, 3] / np.linalg.norm(target[:3, 3])
@@ -264,7 +264,7 @@ def test_a_point_too_close_is_reported():
 
 
 def test_an_impossible_orientation_is_reported():
-    """At the rim of the workspace the tool can only point outwards."""
+    """At the edge of the workspace the tool can only point outwards."""
     robot = kin.get_robot("redundant7-craig")
     T = np.eye(4)
     T[:3, 3] = (1.0, 0.0, 0.30)
@@ -280,13 +280,13 @@ def test_an_impossible_orientation_is_reported():
 
 
 @pytest.mark.parametrize(("roll", "mean"), [(1, 0.29), (5, 1.54), (20, 5.50)])
-def test_five_joints_give_two_compromises_for_a_pose_off_their_manifold(roll, mean):
-    """A pose turned about the approach axis: keep the direction (error = roll) or spread it (a third)."""
+def test_five_joints_give_two_compromises_for_a_pose_they_cannot_meet(roll, mean):
+    """For a pose rolled about the approach axis: keep the direction (error = roll), or a third of that error."""
     robot = kin.get_robot("pioneer5")
     rng = np.random.default_rng(5)
     lefts = []
     for q in robot.random_q(rng, 60):
-        target = turned(kin.fk(robot, q), roll)
+        target = rotated(kin.fk(robot, q), roll)
         result = solve_ik(robot, target, q_seed=q)
         assert result.status is Status.APPROXIMATE
         assert result.reason.startswith(f"Reached with roll error {roll:.1f}°")
@@ -299,21 +299,21 @@ def test_five_joints_give_two_compromises_for_a_pose_off_their_manifold(roll, me
             assert robot.in_limits(s.q)
         assert spread.rotation_error <= kept.rotation_error + 1e-9
         lefts.append(math.degrees(spread.rotation_error))
-    # The quoted averages are over all configurations; 60 of them, some at a limit, scatter around them.
+    # The expected averages are over all configurations; those of 60, some at a limit, scatter around them.
     assert 0.6 * mean < np.mean(lefts) < 1.6 * mean
 
 
-def test_an_approach_outside_the_limits_still_keeps_the_point():
+def test_with_the_approach_direction_outside_the_limits_the_point_is_kept():
     """The nearest orientation with the exact point, when the approach direction itself is outside the limits."""
     robot = kin.get_robot("pioneer5")
     q = np.radians([90, 40, 60, 30, 44])
     refused = 0
     for axis, degrees in (("x", 6), ("x", -6), ("y", 6), ("y", -6)):
-        tilted = turned(kin.fk(robot, q), degrees, axis)
+        tilted = rotated(kin.fk(robot, q), degrees, axis)
         if solve_ik(robot, tilted, task="approach").status is not Status.LIMITS:
             continue
         refused += 1
-        result = solve_ik(robot, turned(tilted, 8), q_seed=q)
+        result = solve_ik(robot, rotated(tilted, 8), q_seed=q)
         assert result.status is Status.APPROXIMATE
         assert result.best.position_error <= 1e-9
         assert result.best.compromise == "rotation"
@@ -324,8 +324,8 @@ def test_an_approach_outside_the_limits_still_keeps_the_point():
 
 
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
-def test_closest_beats_a_dense_search(robot_id):
-    """No random configuration, descended or not, is closer than `closest` in the stated metric."""
+def test_no_configuration_of_a_dense_search_is_closer(robot_id):
+    """No random configuration, before or after a descent, is closer than `closest` in the documented metric."""
     robot = kin.get_robot(robot_id)
     rng = np.random.default_rng(17)
     cloud = kin.fk(robot, robot.random_q(rng, 60_000))
@@ -358,7 +358,7 @@ def test_redundancy_is_reported_and_can_be_requested():
 
 @pytest.mark.parametrize("robot_id", SEVEN)
 def test_intervals_are_exactly_the_values_that_work(robot_id):
-    """Inside the reported intervals a requested value is solved; a little outside it is refused."""
+    """Inside the reported intervals a requested value is solved; slightly outside it is not."""
     robot = kin.get_robot(robot_id)
     checked = 0
     for q in robot.random_q(np.random.default_rng(23), 40):
@@ -402,14 +402,14 @@ def test_max_solutions_keeps_the_nearest():
         ({"redundancy": 0.5}, "redundancy"),
     ],
 )
-def test_misuse_names_the_field(arguments, field):
+def test_invalid_input_names_the_field(arguments, field):
     target = arguments.pop("target", np.eye(4))
     with pytest.raises(InputError) as caught:
         solve_ik(kin.get_robot("pioneer5"), target, **arguments)
     assert caught.value.field.startswith(field)
 
 
-def test_many_threads_get_the_serial_answers():
+def test_threads_get_the_same_results_as_serial_calls():
     robots = [kin.get_robot(i) for i in CHAPTER_ARMS]
     rng = np.random.default_rng(9)
     jobs = [(r, kin.fk(r, q)) for r in robots for q in r.random_q(rng, 100)]
@@ -419,8 +419,8 @@ def test_many_threads_get_the_serial_answers():
     assert threaded == serial
 
 
-def test_a_mounted_arm_with_other_lengths_and_twist_signs_is_still_closed_form():
-    """The family is read off the axes: a moved base, another tool and flipped twists change nothing."""
+def test_an_arm_with_base_other_lengths_and_twist_signs_has_the_closed_form():
+    """The axes determine the family: base, tool and the signs of twists do not matter."""
     text = """
     id = "other"
     name = "other"

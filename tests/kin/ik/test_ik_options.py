@@ -23,7 +23,7 @@ TASKS = ("pose", "approach", "position")
 
 
 def rotation_vector(R):
-    """Log of a rotation, written apart from the code under test."""
+    """Logarithm of a rotation, independent of the code under test."""
     angle = rotation_angle(np.eye(3), R)
     if angle < 1e-12:
         return np.zeros(3)
@@ -43,8 +43,8 @@ def meets(T, target, task):
 
 
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
-def test_names_belong_to_postures_whatever_the_target(robot_id):
-    """The name of every solution is that of its configuration, for all tasks."""
+def test_the_branch_of_every_solution_is_that_of_its_configuration(robot_id):
+    """For all tasks."""
     robot = kin.get_robot(robot_id)
     assert len(set(kin.branch_names(robot))) == 8
     rng = np.random.default_rng(1)
@@ -52,7 +52,7 @@ def test_names_belong_to_postures_whatever_the_target(robot_id):
     for q in robot.random_q(rng, 150):
         for task in TASKS:
             for s in solve_ik(robot, kin.fk(robot, q), task=task, respect_limits=False, q_seed=q).solutions:
-                # On the border of two branches, where the arm is singular, either name is right.
+                # On the border of two branches, where the arm is singular, either name is valid.
                 border = any(x.distance < 1e-6 for x in kin.singularities(robot, s.q))
                 assert border or s.branch == kin.branch_of(robot, s.q)
                 seen.add(s.branch)
@@ -61,7 +61,7 @@ def test_names_belong_to_postures_whatever_the_target(robot_id):
 
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 @pytest.mark.parametrize("task", TASKS)
-def test_a_filter_leaves_exactly_its_branches(robot_id, task):
+def test_only_the_requested_branches_are_returned(robot_id, task):
     robot = kin.get_robot(robot_id)
     for q in robot.random_q(np.random.default_rng(2), 25 if task != "position" else 6):
         target = kin.fk(robot, q)
@@ -83,7 +83,7 @@ def test_a_filter_leaves_exactly_its_branches(robot_id, task):
                 assert result.cause in ("branch", "joint limits", "outside")
 
 
-def test_several_branch_names_are_a_union():
+def test_several_branch_names_select_all_of_them():
     robot = kin.get_robot("redundant7-craig")
     target = kin.fk(robot, robot.home)
     one, two = ("shoulder front · elbow up · wrist flip", "shoulder back, wrist no-flip")
@@ -114,8 +114,8 @@ def test_a_missing_branch_is_distinguished_from_one_outside_the_limits():
 @pytest.mark.parametrize("task", TASKS)
 @settings(max_examples=40, deadline=None)
 @given(data=st.data())
-def test_narrowed_and_locked_joints_are_kept(robot_id, task, data):
-    """A configuration made inside any narrowed limits is reached again, and nothing leaves them."""
+def test_narrowed_limits_and_locks_hold(robot_id, task, data):
+    """The pose of a configuration inside narrowed limits is solved, and all solutions are inside them."""
     robot = kin.get_robot(robot_id)
     unit = st.floats(0, 1)
     width = robot.upper - robot.lower
@@ -135,7 +135,7 @@ def test_narrowed_and_locked_joints_are_kept(robot_id, task, data):
         assert meets(kin.fk(robot, s.q), target, task)
 
 
-def test_a_locked_joint_is_named_as_locked():
+def test_a_violation_says_that_the_joint_is_locked():
     robot = kin.get_robot("pioneer5")
     target = kin.fk(robot, robot.home)
     result = solve_ik(robot, target, task="approach", locked=[1.0, None, None, None, None])
@@ -148,7 +148,7 @@ def test_a_locked_joint_is_named_as_locked():
 
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 def test_all_golden_images_inside_the_limits(robot_id, golden):
-    """Every whole-turn image, and no other: against the 50-digit sets."""
+    """Exactly the whole-turn images of the 50-digit sets."""
     robot = kin.get_robot(robot_id)
     checked = 0
     for case in golden(robot_id)["ik"]:
@@ -192,8 +192,8 @@ MASKS = [m for m in itertools.product((False, True), repeat=6) if any(m)]
 
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 @pytest.mark.parametrize("frame", ["tool", "base"])
-def test_every_mask_is_met_in_its_frame(robot_id, frame):
-    """All 63 masks: the masked coordinates are zero, by a logarithm of our own."""
+def test_every_mask_is_solved_in_its_frame(robot_id, frame):
+    """All 63 masks: the kept coordinates are zero, by an independent logarithm."""
     robot = kin.get_robot(robot_id)
     rng = np.random.default_rng(6)
     for mask in MASKS:
@@ -214,7 +214,7 @@ def test_every_mask_is_met_in_its_frame(robot_id, frame):
             assert robot.in_limits(s.q)
 
 
-def test_masks_that_are_tasks_are_answered_as_these():
+def test_masks_equivalent_to_a_task_give_its_result():
     robot = kin.get_robot("redundant7-craig")
     target = kin.fk(robot, robot.home)
     for mask, frame, task in (
@@ -228,7 +228,7 @@ def test_masks_that_are_tasks_are_answered_as_these():
     assert solve_ik(robot, target, mask=(True,) * 5 + (False,), mask_frame="base").task == "mask"
 
 
-def test_a_mask_that_cannot_be_met_reports_by_how_much():
+def test_a_mask_that_cannot_be_met_reports_its_error():
     robot = kin.get_robot("redundant7-craig")
     T = np.eye(4)
     T[2, 3] = 3.0
@@ -245,7 +245,7 @@ def test_a_mask_that_cannot_be_met_reports_by_how_much():
 @pytest.mark.parametrize("robot_id", SEVEN)
 @pytest.mark.parametrize("task", ["pose", "approach"])
 @pytest.mark.parametrize("prefer", ["limits", "manipulability"])
-def test_the_preferred_value_beats_a_sweep(robot_id, task, prefer):
+def test_no_value_of_a_sweep_is_better_than_the_preferred_one(robot_id, task, prefer):
     """No value of a fine sweep over the redundancy parameter, on any branch, is better than the one chosen."""
     robot = kin.get_robot(robot_id)
 
@@ -266,7 +266,7 @@ def test_the_preferred_value_beats_a_sweep(robot_id, task, prefer):
             for v in np.linspace(low, high, 40)
             for s in solve_ik(robot, target, task=task, q_seed=q, redundancy={free.name: float(v)}).solutions
         ]
-        # Of two parameters the sweep moves only one, and the search is along one at a time.
+        # With two parameters the sweep varies only one, and the search optimises one after the other.
         assert max(swept) <= values[0] + (1e-3 if len(result.redundancy) == 1 else 1e-2) * abs(values[0]) + 1e-9
         assert meets(kin.fk(robot, result.solutions[0].q), target, task)
 
@@ -290,8 +290,8 @@ def test_two_redundancy_parameters_can_both_be_requested(robot_id):
         assert meets(kin.fk(robot, s.q), target, "approach")
 
 
-def test_a_requested_joint_value_is_not_moved_by_a_whole_turn():
-    """θ1 = −200° is requested and kept, although 160° would be nearer to the seed."""
+def test_a_requested_joint_value_is_not_changed_by_a_whole_turn():
+    """θ1 = −200° is kept, although 160° would be nearer to the seed."""
     robot = kin.get_robot("redundant7")
     q = np.radians([-200, 30, 20, 40, 50, 60, 70])
     result = solve_ik(robot, kin.fk(robot, q), redundancy={"theta1": float(q[0])})
@@ -301,7 +301,7 @@ def test_a_requested_joint_value_is_not_moved_by_a_whole_turn():
 
 @pytest.mark.parametrize("robot_id", SEVEN)
 def test_the_ranges_of_a_branch_are_exact(robot_id):
-    """On one branch, just inside each end a value is solved, just outside it is not, narrowed limits included."""
+    """A value just inside each end is solved on the branch, one just outside is not; also with narrowed limits."""
     robot = kin.get_robot(robot_id)
     rng = np.random.default_rng(10)
     ends = 0
@@ -347,7 +347,7 @@ def test_a_requested_value_outside_the_limits_names_the_joint_and_the_possible_v
 
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 def test_every_blocked_branch_reports_its_violations(robot_id):
-    """The values are those of the branch, the limits are those it exceeds; the closest branch is first."""
+    """With the values of the branch and the limits that they exceed; the closest branch is first."""
     robot = kin.get_robot(robot_id)
     rng = np.random.default_rng(12)
     blocked = 0
@@ -374,7 +374,7 @@ def test_every_blocked_branch_reports_its_violations(robot_id):
 
 
 def test_the_hole_around_the_first_axis_is_named():
-    """A planar two-link arm on a turning base that cannot fold back leaves a hole around axis 1."""
+    """A two-link arm on a rotating base that cannot fold back leaves a hole around axis 1."""
     robot = kin.parse_robot(
         """
         id = "hole"
@@ -397,7 +397,7 @@ def test_the_hole_around_the_first_axis_is_named():
 
 
 @pytest.mark.parametrize(("degrees", "said"), [(0.0, True), (1.0, False)])
-def test_a_singular_answer_says_which_kind(degrees, said):
+def test_a_singular_solution_names_the_kind_of_singularity(degrees, said):
     robot = kin.get_robot("redundant7-craig")
     q = np.radians([10, 40, 20, 60, 30, degrees, 15])
     q[4] = math.pi / 2 if said else q[4]
@@ -412,8 +412,8 @@ def test_a_singular_answer_says_which_kind(degrees, said):
 
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 @pytest.mark.parametrize("task", ["pose", "approach"])
-def test_closest_beats_a_dense_search(robot_id, task):
-    """No configuration of a dense cloud, nor what descends from its best ones, is closer than `closest`."""
+def test_no_configuration_of_a_dense_search_is_closer(robot_id, task):
+    """No configuration of a dense sample, nor a descent from the best of them, is closer than `closest`."""
     robot = kin.get_robot(robot_id)
     rng = np.random.default_rng(17)
     cloud_q = robot.random_q(rng, 30_000)
@@ -430,7 +430,7 @@ def test_closest_beats_a_dense_search(robot_id, task):
         metric = _metric(cloud, target, task)
         mine = math.hypot(result.closest.position_error, 0.1 * result.closest.rotation_error)
         assert mine <= metric.min() + 1e-9
-        # What the best of the cloud comes to by a random search of our own.
+        # The best of the sample, improved by an independent random search.
         q, best = cloud_q[np.argmin(metric)].copy(), metric.min()
         for step in np.geomspace(0.3, 1e-3, 60):
             tries = np.clip(q + step * rng.normal(size=(60, robot.n)), robot.lower, robot.upper)
@@ -442,7 +442,7 @@ def test_closest_beats_a_dense_search(robot_id, task):
 
 
 def _metric(T, target, task):
-    """The stated metric of tool poses ``(k, 4, 4)``."""
+    """The documented metric of tool poses ``(k, 4, 4)``."""
     cosine = 0.5 * (np.einsum("kij,ij->k", T[:, :3, :3], target[:3, :3]) - 1)
     if task == "approach":
         cosine = T[:, :3, 2] @ target[:3, 2]
@@ -450,8 +450,8 @@ def _metric(T, target, task):
 
 
 @pytest.mark.parametrize("robot_id", SEVEN)
-def test_nearest_orientation_beats_a_dense_search(robot_id):
-    """Of thousands of configurations that meet the point, none is nearer in orientation than the one offered."""
+def test_no_orientation_of_a_dense_search_is_nearer(robot_id):
+    """None of thousands of configurations that meet the point is nearer in orientation than the reported one."""
     robot = kin.get_robot(robot_id)
     rng = np.random.default_rng(19)
     tried = 0
@@ -477,7 +477,7 @@ def test_nearest_orientation_beats_a_dense_search(robot_id):
     assert tried == 4
 
 
-# Misuse
+# Invalid options
 
 
 @pytest.mark.parametrize(
@@ -515,7 +515,7 @@ def test_nearest_orientation_beats_a_dense_search(robot_id):
         ({"max_solutions": 1.5}, "max_solutions", "whole number"),
     ],
 )
-def test_misuse_names_the_field_and_what_is_valid(arguments, field, said):
+def test_an_invalid_option_names_the_field_and_what_is_valid(arguments, field, said):
     robot = kin.get_robot("redundant7-craig")
     with pytest.raises(InputError) as caught:
         solve_ik(robot, kin.fk(robot, robot.home), **arguments)
@@ -523,7 +523,7 @@ def test_misuse_names_the_field_and_what_is_valid(arguments, field, said):
     assert said in str(caught.value)
 
 
-# solver=
+# Choice of solver
 
 
 def test_the_closed_form_can_be_switched_off():
@@ -541,7 +541,7 @@ def test_the_closed_form_can_be_switched_off():
         solve_ik(robot, target, solver="magic")
 
 
-def test_the_choice_of_solver_is_explained():
+def test_the_result_explains_the_choice_of_solver():
     arm = kin.get_robot("redundant7-craig")
     target = kin.fk(arm, arm.q_home)
     assert "axes 1, 2, 3 meet in one point" in solve_ik(arm, target).solver_reason
@@ -550,7 +550,7 @@ def test_the_choice_of_solver_is_explained():
 
 
 def test_results_survive_pickling():
-    """They cross process boundaries."""
+    """Processes exchange them."""
     arm = kin.get_robot("redundant7-craig")
     result = solve_ik(arm, kin.fk(arm, arm.q_home))
     again = pickle.loads(pickle.dumps(result))
@@ -566,7 +566,7 @@ def test_results_survive_pickling():
 
 
 def test_options_are_values():
-    """Equal options are one key, whether made of lists, arrays or tuples; a bool is no number."""
+    """Options made of lists, arrays or tuples are equal keys; a bool is not a number."""
     lists = IKOptions(
         mask=[True] * 3 + [False] * 3,
         constraints=JointConstraints(limits=[None, [0, 1]], locked=np.array([0.5, 0.25])),
@@ -590,7 +590,7 @@ def test_options_are_values():
         IKOptions(max_solutions=True)
 
 
-def test_keywords_and_options_give_the_same_answer():
+def test_keywords_and_options_give_the_same_result():
     arm = kin.get_robot("redundant7-craig")
     rng = np.random.default_rng(8)
     q, seed = arm.random_q(rng), arm.random_q(rng)

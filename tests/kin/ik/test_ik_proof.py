@@ -1,7 +1,7 @@
-"""Proof by numbers: completeness against a numeric search, and round trips by the million.
+"""Completeness compared with a numeric search, and a million round trips.
 
-The slow ones run with ``sh scripts/test.sh -m slow -s`` and print their figures; `KINBOARD_TEST_POSES` sets how
-many poses each takes (a million by default).
+``sh scripts/test.sh -m slow -s`` runs the slow tests, which print their figures; `KINBOARD_TEST_POSES` is the
+number of poses of each (a million by default).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ TASKS = ("pose", "approach", "position")
 
 
 def newton(robot, target, q, task):
-    """Damped Gauss–Newton on the pose error, written apart from the code under test: ``(n,)`` or None."""
+    """Damped Gauss–Newton on the pose error, independent of the code under test: ``(n,)`` or None."""
     for _ in range(60):
         T = kin.fk(robot, q)
         e = np.zeros(6)
@@ -46,8 +46,8 @@ def newton(robot, target, q, task):
 
 
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
-def test_a_numeric_search_from_many_starts_finds_no_branch_we_miss(robot_id):
-    """Every configuration Newton's method ends in is one of ours, at the value it has of what is free."""
+def test_a_numeric_search_from_many_starts_finds_no_further_branch(robot_id):
+    """Each result of Newton's method is one of the branches at its value of the redundancy parameter."""
     robot = kin.get_robot(robot_id)
     rng = np.random.default_rng(31)
     task = "approach" if robot.n == 5 else "pose"
@@ -59,7 +59,7 @@ def test_a_numeric_search_from_many_starts_finds_no_branch_we_miss(robot_id):
             if q is None or any(s.distance < 0.02 for s in kin.singularities(robot, q) if s.kind != "algorithmic"):
                 continue
             found += 1
-            # What is free stays at the seed's value, which is that of Newton's answer.
+            # Redundancy parameters stay at the seed's values, which are those of Newton's result.
             result = solve_ik(robot, target, task=task, q_seed=q, respect_limits=False)
             gaps = [np.abs((s.q - q + np.pi) % (2 * np.pi) - np.pi).max() for s in result.solutions]
             assert min(gaps) < 1e-6, (q.tolist(), gaps)
@@ -105,10 +105,10 @@ def _round_trips(
 @pytest.mark.parametrize("task", TASKS)
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 def test_a_million_round_trips(robot_id, task, narrowed):
-    """0 unsolved, FK closure ≤ 1e-9, typically 1e-14."""
+    """All are solved, with FK errors ≤ 1e-9, typically 1e-14."""
     workers = os.cpu_count() or 1
     share = [POSES // workers + (k < POSES % workers) for k in range(workers)]
-    # A fresh interpreter each: forking a process that has threads is not safe.
+    # A new interpreter for each: forking a process that has threads is not safe.
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         jobs = [pool.submit(_round_trips, robot_id, task, 1000 + k, n, narrowed) for k, n in enumerate(share)]
         parts = [job.result() for job in jobs]

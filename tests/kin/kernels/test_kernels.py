@@ -1,4 +1,4 @@
-"""What is kept of compiled code, and when it is thrown away."""
+"""The disk cache of compiled kernels, and when its entries become invalid."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from pathlib import Path
 import kin
 
 
-def test_kernels_are_compiled_anew_when_a_kernel_they_call_has_changed(tmp_path):
-    """numba itself looks at the file of the kernel alone."""
+def test_kernels_are_compiled_again_when_a_kernel_they_call_has_changed(tmp_path):
+    """The cache of numba alone depends on the kernel's own file only."""
     package = tmp_path / "kin"
     shutil.copytree(Path(kin.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
     program = (

@@ -1,4 +1,4 @@
-"""Paths: continuous where that is possible, the fewest jumps where it is not, and why."""
+"""Paths: continuous where possible, otherwise with the fewest jumps, and the causes of jumps."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ SRS = "redundant7-craig"
 PRINTED = "redundant7"
 
 
-def turned(T, degrees, axis="z"):
-    """T with its tool turned about one of its own axes."""
+def rotated(T, degrees, axis="z"):
+    """T rotated about one of its own axes."""
     c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
     i, j = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
     R = np.eye(4)
@@ -71,7 +71,7 @@ def largest(q):
 
 
 def assert_exact(robot, targets, result, task="pose", rows=slice(None)):
-    """Every waypoint in `rows` is met by an FK of our own; the whole path is inside the limits."""
+    """Check with an independent FK that the waypoints in `rows` are met and the path is inside the limits."""
     assert result.q.shape == (len(targets), robot.n)
     assert robot.in_limits(result.q).all()
     assert not result.q.flags.writeable
@@ -87,12 +87,12 @@ def assert_exact(robot, targets, result, task="pose", rows=slice(None)):
     assert result.rotation_error[rows].max() <= 1e-9
 
 
-# -- what can be followed is followed -----------------------------------------------------------------------------
+# -- continuous paths ---------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("robot_id", ROBOTS)
-def test_smooth_motions_are_followed_without_a_jump(robot_id):
-    """Poses of random joint motions: continuous, exact, and hardly more motion than the one they came from."""
+def test_poses_of_smooth_motions_have_no_jump(robot_id):
+    """Poses of random joint motions: the path is exact and hardly longer than the original motion."""
     robot = kin.get_robot(robot_id)
     rng = np.random.default_rng(41)
     ratios = []
@@ -113,7 +113,7 @@ def test_smooth_motions_are_followed_without_a_jump(robot_id):
 
 @pytest.mark.parametrize("robot_id", ROBOTS)
 @pytest.mark.parametrize("task", ["approach", "position"])
-def test_redundant_tasks_are_followed_too(robot_id, task):
+def test_redundant_tasks_have_no_jump(robot_id, task):
     robot = kin.get_robot(robot_id)
     rng = np.random.default_rng(5)
     for _ in range(3):
@@ -126,8 +126,8 @@ def test_redundant_tasks_are_followed_too(robot_id, task):
         assert squares(result.q) < 1.1 * squares(path)
 
 
-def test_a_mask_is_followed():
-    """Only the height and the level of the tool; the other coordinates may have any value."""
+def test_masked_waypoints_have_no_jump():
+    """The mask keeps height and inclination of the tool; the other coordinates may have any value."""
     robot = kin.get_robot(SRS)
     path = wave(robot, np.random.default_rng(8), 20)
     targets = kin.fk(robot, path)
@@ -140,8 +140,8 @@ def test_a_mask_is_followed():
 
 
 @pytest.mark.parametrize("robot_id", [PRINTED, SRS])
-def test_the_redundancy_parameter_does_not_chatter(robot_id):
-    """The tool goes along a slow arc: second differences of the joints are far below a grid of samples."""
+def test_the_redundancy_parameter_changes_smoothly(robot_id):
+    """On a slow arc, second differences of the joints are far below the steps of the sampling grid."""
     robot = kin.get_robot(robot_id)
     path = np.radians([10, 40, 20, 60, 30, 50, 10]) + np.sin(np.linspace(0, 2, 61))[:, None] * np.radians(
         [60, -20, 30, 25, -40, 20, 70]
@@ -154,7 +154,7 @@ def test_the_redundancy_parameter_does_not_chatter(robot_id):
 
 @pytest.mark.parametrize("robot_id", ROBOTS)
 def test_closed_circles(robot_id):
-    """A circle of the tool point with the tool's direction held."""
+    """The tool point moves on a circle with constant orientation."""
     robot = kin.get_robot(robot_id)
     home = np.radians([90, 60, 60, 30, 30]) if robot.n == 5 else np.radians([20, 40, 10, 70, 30, 40, 20])
     T = kin.fk(robot, home)
@@ -180,8 +180,8 @@ def test_a_single_waypoint_is_the_solution_nearest_to_the_start():
         assert solve_path(robot, [kin.fk(robot, q)]).gaps == ()
 
 
-def test_polished_configurations_stay_on_their_turn():
-    """A row that misses by 1e-8, with θ7 at 200°: it is corrected there, not at −160°, which home is nearer to."""
+def test_refined_configurations_stay_on_their_turn():
+    """A row with an error of 1e-8 and θ7 = 200° is corrected there, not at −160°, which is nearer to home."""
     robot = kin.get_robot(SRS)
     near = np.radians([10, 40, 20, 60, 30, 50, 200])
     problem = problem_of(robot, kin.fk(robot, near))
@@ -193,25 +193,25 @@ def test_polished_configurations_stay_on_their_turn():
 
 
 def roll_path(start_degrees, sweep, count):
-    """A 7-joint arm whose tool turns about its own z axis, axis 7, and nothing else."""
+    """A 7-joint arm, and poses that only turn the tool about its z axis, which is axis 7."""
     robot = kin.get_robot(SRS)
     q = np.radians([0, 30, 0, 60, 0, 45, start_degrees])
-    return robot, [turned(kin.fk(robot, q), d) for d in np.linspace(0, sweep, count)]
+    return robot, [rotated(kin.fk(robot, q), d) for d in np.linspace(0, sweep, count)]
 
 
-def test_a_long_turn_is_started_on_the_right_turn():
-    """θ7 is 110° or −250° at the start. Only from −250° there are 500° to go."""
+def test_a_long_rotation_starts_at_the_image_with_enough_range():
+    """θ7 is 110° or −250° at the start. Only from −250° can it turn by 500°."""
     robot, targets = roll_path(110.0, 500.0, 26)
     for q_start in (None, np.radians([0, 30, 0, 60, 0, 45, 110])):
         result = solve_path(robot, targets, q_start=q_start)
         assert_exact(robot, targets, result)
         assert result.continuous
-        # The arm may swing its elbow meanwhile; without it θ7 would go from −250° to 250°.
+        # The elbow may move meanwhile; otherwise θ7 would go from −250° to 250°.
         assert math.degrees(result.q[0, 6]) == pytest.approx(-250.0, abs=30.0)
         assert math.degrees(result.q[-1, 6]) == pytest.approx(250.0, abs=30.0)
 
 
-def test_a_turn_that_is_too_long_unwinds_once_and_names_joint_7():
+def test_a_rotation_beyond_the_range_of_joint_7_has_one_jump_that_names_it():
     """700° do not fit into 540°: one jump, at the latest where θ7 reaches its limit."""
     robot, targets = roll_path(0.0, 700.0, 29)
     result = solve_path(robot, targets)
@@ -235,8 +235,8 @@ def test_turning_backwards_names_the_other_limit():
     assert "joint 7 reaches its limit of -270.0°" in jump.reason
 
 
-def test_every_further_turn_costs_one_more_jump():
-    """The arm angle is locked away, so θ7 turns alone: from 0° to 270°, then from −90° on again and again."""
+def test_every_further_turn_needs_one_more_jump():
+    """With the arm angle fixed, θ7 turns alone: from 0° to 270°, then repeatedly from −90°."""
     robot, targets = roll_path(0.0, 1100.0, 45)
     result = solve_path(robot, targets, locked=[None, None, 0.0, None, 0.0, None, None], branch="seed")
     assert_exact(robot, targets, result)
@@ -255,7 +255,7 @@ def test_joints_without_limits_turn_forever():
 
 
 def test_a_joint_of_many_turns_starts_where_the_whole_path_fits():
-    """±560° and 1000° to go: the start must be between −560° and −440°, though home is at 0°."""
+    """With limits of ±560°, a rotation by 1000° must start between −560° and −440°, although home is at 0°."""
     robot, targets = roll_path(-120.0, 1000.0, 41)
     others = ((-270, 270), (-110, 110), (-180, 180), (-110, 110), (-180, 180), (-90, 90))
     wide = limited(robot, *others, (-560, 560))
@@ -282,7 +282,7 @@ def test_a_joint_of_many_turns_starts_where_the_whole_path_fits():
     ],
 )
 def test_singularities_are_crossed_without_a_flip(robot_id, joint, base):
-    """A joint passes through 0°, where an angle is lost; one waypoint is exactly there."""
+    """A joint passes through 0°, where another is undetermined; one waypoint is exactly there."""
     robot = kin.get_robot(robot_id)
     path = np.radians(np.array(base, dtype=float)) + np.linspace(-1, 1, 31)[:, None] * np.radians([5] * 7)
     path[:, joint] = np.radians(np.linspace(-15, 15, 31))
@@ -295,7 +295,7 @@ def test_singularities_are_crossed_without_a_flip(robot_id, joint, base):
     assert squares(result.q) < 2.5 * squares(path)
 
 
-def test_an_angle_changes_smoothly_where_a_singular_stretch_leaves_it_open():
+def test_an_angle_changes_smoothly_along_a_singular_stretch():
     """θ6 = 0 for 20 waypoints, where only θ5 + θ7 is determined; before and after, θ5 differs by 100°."""
     robot = kin.get_robot(PRINTED)
     turn = np.concatenate([np.zeros(10), np.linspace(0, 100, 20), np.full(10, 100)])
@@ -309,8 +309,8 @@ def test_an_angle_changes_smoothly_where_a_singular_stretch_leaves_it_open():
     assert largest(result.q) < 2.0 * largest(path)
 
 
-def test_the_wrist_centre_passes_over_the_first_axis():
-    """The 5-joint arm reaches over its own shoulder: θ1 is undetermined at one waypoint, and keeps its value."""
+def test_the_wrist_centre_passes_through_the_first_axis():
+    """θ1 of the 5-joint arm is undetermined at one waypoint, and keeps its value."""
     robot = kin.get_robot("pioneer5")
     a1, a2, d4, t2 = 0.07, 0.16, 0.14, math.radians(75)
     over = math.acos(-(a1 + a2 * math.cos(t2)) / d4) - t2
@@ -324,8 +324,8 @@ def test_the_wrist_centre_passes_over_the_first_axis():
     assert np.abs(result.q - path).max() < 1e-6
 
 
-def test_a_pass_too_close_to_a_singularity_is_reported():
-    """Past the wrist singularity at 1°: joints 5 and 7 must turn by nearly 180° within a step or two."""
+def test_a_jump_next_to_a_singularity_is_reported():
+    """At 1° from the wrist singularity, joints 5 and 7 must turn by nearly 180° within one or two steps."""
     robot = kin.get_robot(PRINTED)
     sides = np.radians(np.linspace(-20, 20, 21))
     turn = np.arctan2(math.radians(1.0), sides)
@@ -343,7 +343,7 @@ def test_a_pass_too_close_to_a_singularity_is_reported():
         assert {4, 6} <= set(jump.joints)
 
 
-def test_poses_too_far_apart_are_reported_as_such():
+def test_a_jump_between_distant_poses_has_the_cause_spacing():
     robot = kin.get_robot("pioneer5")
     targets = [kin.fk(robot, np.radians([a, 40, 60, 30, 30])) for a in (10, 50, 90, 100, 110)]
     result = solve_path(robot, targets)
@@ -364,10 +364,10 @@ def test_poses_too_far_apart_are_reported_as_such():
 
 
 def test_only_masked_coordinates_count_as_tool_motion():
-    """Three waypoints far apart, of which only the height counts: 50 mm up, and no motion at all."""
+    """Of three distant waypoints only the height counts: 50 mm up, then no motion."""
     robot = kin.get_robot("pioneer5")
     T = kin.fk(robot, robot.home)
-    targets = [T, moved(T, -0.4, 0.3, 0.05), turned(moved(T, 0.5, 0.0, 0.05), 90.0, "x")]
+    targets = [T, moved(T, -0.4, 0.3, 0.05), rotated(moved(T, 0.5, 0.0, 0.05), 90.0, "x")]
     height = (False, False, True, False, False, False)
     result = solve_path(robot, targets, mask=height, mask_frame="base", q_start=robot.home, max_step=0.02)
     (jump,) = result.jumps
@@ -376,9 +376,9 @@ def test_only_masked_coordinates_count_as_tool_motion():
 
 
 def test_the_end_of_a_branch_is_reported():
-    """The wrist centre comes in along a ray, from where only the front of the shoulder reaches, to near axis 2.
+    """The wrist centre moves along a ray towards axis 2, from a point that only the front of the shoulder reaches.
 
-    There the front would need a forearm as long as the upper arm; only the back reaches.
+    Close to axis 2 the front would need a forearm as long as the upper arm; only the back reaches.
     """
     robot = limited(kin.get_robot("pioneer5"), *[(-200, 200)] * 5)
     T = np.array([[1.0, 0, 0, 0], [0, -1.0, 0, 0], [0, 0, -1.0, 0.13 - 0.12], [0, 0, 0, 1.0]])
@@ -399,8 +399,8 @@ def test_the_end_of_a_branch_is_reported():
 
 
 @pytest.mark.parametrize("robot_id", ROBOTS)
-def test_out_of_reach_and_back(robot_id):
-    """The unreachable stretch is reported, the rest is exact, and the arm neither flips nor strays."""
+def test_an_unreachable_stretch_is_a_gap(robot_id):
+    """The rest is exact, and the arm neither flips nor drifts in the gap."""
     robot = kin.get_robot(robot_id)
     home = np.array(robot.home)
     T = kin.fk(robot, home)
@@ -436,7 +436,7 @@ def test_an_impossible_orientation_is_a_gap():
     assert_exact(robot, targets, result, rows=rest)
 
 
-def test_a_path_out_of_reach_is_all_gaps():
+def test_a_path_out_of_reach_is_one_gap():
     robot = kin.get_robot("pioneer5")
     targets = [(0.1 * i, 3.0, 0.0) for i in range(5)]
     result = solve_path(robot, targets, task="position")
@@ -450,7 +450,7 @@ def test_five_joints_keep_point_and_direction_and_report_the_roll(roll):
     robot = kin.get_robot("pioneer5")
     path = wave(robot, np.random.default_rng(6), 25)
     targets = kin.fk(robot, path)
-    targets = np.array([turned(T, roll) if 5 <= i < 15 else T for i, T in enumerate(targets)])
+    targets = np.array([rotated(T, roll) if 5 <= i < 15 else T for i, T in enumerate(targets)])
     result = solve_path(robot, targets)
     assert_exact(robot, targets, result, "approach", rows=[i for i in range(25) if not 5 <= i < 15])
     assert result.continuous
@@ -467,7 +467,7 @@ def test_a_direction_outside_the_limits_keeps_the_point():
     robot = kin.get_robot("pioneer5")
     path = np.radians([[90, 40, 60, 30, t] for t in np.linspace(30, 60, 16)])
     wide = limited(robot, (0, 180), (0, 150), (0, 150), (0, 85), (15, 80))
-    targets = [turned(T, 5.0) for T in kin.fk(wide, path)]
+    targets = [rotated(T, 5.0) for T in kin.fk(wide, path)]
     result = solve_path(robot, targets)
     assert [gap.index for gap in result.gaps] == list(range(16))
     assert {gap.status for gap in result.gaps} == {Status.APPROXIMATE}
@@ -502,8 +502,8 @@ def test_narrowed_limits_hold_everywhere(robot_id):
 
 
 @pytest.mark.parametrize("robot_id", [PRINTED, SRS])
-def test_locked_joints_stay(robot_id):
-    """With joint 3 held the arms are not redundant: the motion they came from is the only one."""
+def test_locked_joints_do_not_move(robot_id):
+    """With joint 3 locked the arms are not redundant: the original motion is the only solution."""
     robot = kin.get_robot(robot_id)
     locked = [0.3 if robot_id == PRINTED else None, None, 0.4 if robot_id == SRS else None, None, None, None, None]
     joint = next(i for i, value in enumerate(locked) if value is not None)
@@ -526,8 +526,8 @@ def test_a_lock_in_the_way_is_reported():
     assert "joint 4 (rotating wrist) at 22.5° (locked at 20.0°)" in result.gaps[0].reason
 
 
-def test_a_lock_that_forces_a_jump_is_reported():
-    """θ1 is the redundancy parameter: held at its first value, the branch ends."""
+def test_a_lock_that_causes_a_jump_is_reported():
+    """θ1 is the redundancy parameter: with θ1 locked at its first value, the branch ends."""
     robot = kin.get_robot(PRINTED)
     path = wave(robot, np.random.default_rng(7), 16)
     locked = [path[0, 0], *[None] * 6]
@@ -551,11 +551,11 @@ def test_the_path_stays_on_the_requested_branches(branch):
         assert all(part in kin.branch_of(robot, q) for part in branch.split(" · "))
 
 
-# -- the least of all paths ---------------------------------------------------------------------------------------
+# -- optimality ---------------------------------------------------------------------------------------------------
 
 
 def exhaustive(layers, start, pull, max_step):
-    """Fewest jumps, then least squares, over every combination."""
+    """The fewest jumps, then the least sum of squares, over all combinations."""
     best = (math.inf, math.inf)
     for rows in itertools.product(*layers):
         q = np.array(rows)
@@ -568,7 +568,7 @@ def exhaustive(layers, start, pull, max_step):
 @pytest.mark.parametrize("case", ["wide5", "locked7"])
 @pytest.mark.parametrize("started", [False, True])
 def test_no_other_choice_of_solutions_is_better(case, started):
-    """Three unrelated targets: every combination of every solution and whole-turn image, one by one."""
+    """For three unrelated targets, compared with all combinations of solutions and whole-turn images."""
     rng = np.random.default_rng(31)
     if case == "wide5":
         wide = ((-170, 170), (-190, 190), (-200, 200), (-170, 170), (-120, 120))
@@ -594,7 +594,7 @@ def test_no_other_choice_of_solutions_is_better(case, started):
 
 
 def test_the_redundancy_parameter_is_the_best_of_a_fine_grid():
-    """Two poses of the S-R-S arm: no pair of arm angles on a one-degree grid has less motion."""
+    """For two poses of the S-R-S arm, no pair of arm angles on a one-degree grid needs less motion."""
     robot = kin.get_robot(SRS)
     start = np.radians([10, 40, 20, 60, 30, 50, 10])
     targets = kin.fk(robot, start + np.radians([[0] * 7, [15, 10, -10, 5, 20, -10, 10]]))
@@ -609,7 +609,7 @@ def test_the_redundancy_parameter_is_the_best_of_a_fine_grid():
     assert squares(result.q) <= pairs.min() * (1 + 1e-3)
 
 
-# -- the rest -----------------------------------------------------------------------------------------------------
+# -- further properties -------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("robot_id", ROBOTS)
@@ -621,7 +621,7 @@ def test_the_same_problem_has_the_same_path(robot_id):
     assert first.reason == second.reason
 
 
-def test_an_arm_without_a_closed_form_follows_too():
+def test_an_arm_without_a_closed_form():
     text = """
     id = "odd"
     name = "odd"
@@ -693,7 +693,7 @@ def test_an_arm_without_a_closed_form_follows_too():
         ({"limits": [((0.1, 0.2), 0.3)] + [None] * 4}, "limits[0]"),
     ],
 )
-def test_misuse_names_the_field(arguments, field):
+def test_invalid_input_names_the_field(arguments, field):
     targets = arguments.pop("targets", [np.eye(4)])
     with pytest.raises(InputError) as caught:
         solve_path(kin.get_robot("pioneer5"), targets, **arguments)
@@ -701,7 +701,7 @@ def test_misuse_names_the_field(arguments, field):
 
 
 def test_a_scara_reports_a_waypoint_out_of_reach_as_a_gap():
-    """The relaxed waypoint asks for an approach direction, which leaves the tool angle free: a pose does not."""
+    """The relaxed waypoint requires an approach direction, which leaves the tool angle free; a pose does not."""
     scara = kin.get_robot("scara")
     T = kin.fk(scara, scara.q_home)
     far = T.copy()

@@ -1,4 +1,4 @@
-"""A solver made up for a test: the planar arm of three parallel revolute axes, with all of the contract.
+"""An example solver for a test: the planar arm with three parallel revolute axes, with the whole contract.
 
 The tool's angle about the axes gives the third axis, the triangle of the axes gives the elbow: two branches.
 """

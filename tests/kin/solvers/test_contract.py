@@ -1,4 +1,4 @@
-"""Every family keeps every promise of `kin.solvers.contract`, as does an arm that is read with reversed joints.
+"""Every family fulfils `kin.solvers.contract`, and so does an arm with reversed joints.
 
 At the end a family made up for the test shows that a solver is one module and one row of the registry.
 """
@@ -27,7 +27,7 @@ PI = math.pi
 FAR = 1e6
 BUILT_IN = tuple(kin.builtin_robots().values())
 SOLVED = tuple(robot for robot in BUILT_IN if closed_form_of(robot) is not None)
-# Joints that no closed form counts that way.
+# Joints whose direction no closed form accepts.
 REVERSED = tuple(
     reversed_at(kin.get_robot(name), joints)
     for name, joints in (("pioneer5", (1, 3)), ("redundant7", (0, 2)), ("iiwa14", (2, 4)))
@@ -65,7 +65,7 @@ def exists(rows):
 
 
 def apart(a, b):
-    """Largest joint difference, whole turns aside."""
+    """Largest joint difference modulo whole turns."""
     return np.abs((a - b + PI) % (2 * PI) - PI).max(axis=-1)
 
 
@@ -87,12 +87,12 @@ def test_every_row_of_the_registry_has_a_built_in_arm_and_matches_no_arm_of_anot
     assert len(set(names)) == len(FAMILIES)
 
 
-def test_the_reversed_arms_are_read_with_reversed_joints():
+def test_the_closed_form_of_the_reversed_arms_has_reversed_joints():
     assert all(isinstance(closed_form_of(robot), ReversedJoints) for robot in REVERSED)
 
 
 @arms
-def test_names_are_words_and_branches_are_unique(robot):
+def test_family_and_branch_names_are_valid_and_unique(robot):
     form = closed_form_of(robot)
     assert form.name
     assert form.title
@@ -103,7 +103,7 @@ def test_names_are_words_and_branches_are_unique(robot):
 
 
 @arms
-def test_tasks_and_redundancy_parameters_belong_together(robot):
+def test_tasks_and_redundancy_parameters_are_consistent(robot):
     form = closed_form_of(robot)
     assert form.handles(POSE)
     assert not form.handles(MASK)
@@ -121,7 +121,7 @@ def test_tasks_and_redundancy_parameters_belong_together(robot):
 
 @arms
 @pytest.mark.parametrize("respect", [False, True])
-def test_solve_returns_one_row_per_branch_and_leaves_its_input_alone(robot, respect):
+def test_solve_returns_one_row_per_branch_and_does_not_change_its_input(robot, respect):
     form = closed_form_of(robot)
     for task in filter(form.handles, TASKS):
         count = len(form.redundancies(task))
@@ -145,9 +145,9 @@ def test_solve_returns_one_row_per_branch_and_leaves_its_input_alone(robot, resp
 
 
 @arms
-def test_an_obstacle_has_words_and_a_gap(robot):
+def test_an_obstacle_has_a_sentence_and_a_gap(robot):
     form = closed_form_of(robot)
-    # A slide without limits reaches anything but the axis that it runs past.
+    # Without limits, a sliding arm reaches every point that is far enough from the axis that it passes.
     poses = unreachable(targets(robot, 1)[1][0]), robot.T_world_base.copy()
     found = next(x for T in poses if (x := form.solve(problem(robot, T))).obstacle)
     assert obstacle.clause_of(found.obstacle)
@@ -194,7 +194,7 @@ def test_a_requested_value_is_kept(robot):
 
 @arms
 @pytest.mark.parametrize("checked", [True, False])
-def test_a_batch_gives_the_bits_of_one(robot, checked):
+def test_a_batch_is_bit_identical_to_single_targets(robot, checked):
     form = closed_form_of(robot)
     kernels = form.kernels if checked else form.kernels.unchecked()
     params, near = kernels.params.copy(), robot.q_home.copy()
@@ -230,7 +230,7 @@ def test_params_are_a_flat_array_that_kernels_can_read(robot):
 
 
 @arms
-def test_the_batch_holds_the_branches_that_solve_finds(robot):
+def test_the_batch_contains_the_branches_that_solve_finds(robot):
     form = closed_form_of(robot)
     parameters = form.redundancies(POSE)
     free = bool(parameters) and not parameters[0].rare
@@ -285,7 +285,7 @@ def test_distances_are_zero_on_the_singular_set_and_only_there(robot):
 
 
 @arms
-def test_within_leaves_out_what_is_farther(robot):
+def test_within_omits_singularities_farther_away(robot):
     form = closed_form_of(robot)
     for q in np.random.default_rng(4).uniform(-3.0, 3.0, (40, robot.n)):
         everything = form.singularities(q)
@@ -293,7 +293,7 @@ def test_within_leaves_out_what_is_farther(robot):
             assert form.singularities(q, limit) == tuple(s for s in everything if s.distance <= limit)
 
 
-def test_every_code_has_words():
+def test_every_code_has_a_sentence():
     assert set(singularity.CONDITIONS) == set(get_args(Condition))
     assert set(singularity.LOSSES) == set(get_args(Lost))
     assert set(obstacle.CLAUSES) == set(get_args(ObstacleCode))
@@ -304,7 +304,7 @@ def test_every_code_has_words():
 
 @pytest.fixture
 def planar_arm(monkeypatch):
-    """A planar arm, and a registry in which `planar3` takes the row of the family that has it otherwise."""
+    """A planar arm, and a registry with `planar3` in place of the family that matches the arm otherwise."""
     rows = tuple(
         Joint(f"joint {i + 1}", theta, 0.0, a, 0.0, limits=(-PI, PI))
         for i, (theta, a) in enumerate([(0.3, 0.5), (-0.2, 0.4), (0.1, 0.2)])
@@ -331,8 +331,8 @@ def test_a_new_solver_needs_its_module_and_one_row(planar_arm):
     assert np.isnan(kin.ik_branches(planar_arm, unreachable(T))).all()
 
 
-def test_a_new_solver_tells_singularities_and_obstacles(planar_arm):
-    q = np.array([0.4, 0.5 + 0.02, 0.1])  # θ2 = 0.5 is where the two links are in line
+def test_a_new_solver_reports_singularities_and_obstacles(planar_arm):
+    q = np.array([0.4, 0.5 + 0.02, 0.1])  # at θ2 = 0.5 the two links are in line
     found = kin.singularities(planar_arm, q)
     assert [s.kind for s in found] == ["elbow"]
     form = closed_form_of(planar_arm)

@@ -1,8 +1,8 @@
-"""The families of arms that are known by their axes: any member, in either convention, in any spelling.
+"""Families of arms that are matched by their axes, with random members.
 
-Members are drawn at random: lengths, offsets and their signs, twists of either sign, axes that point backwards,
-base and tool. What is asked of them are laws: each configuration is among the branches of its own pose, every
-branch closes, no branch is missed.
+Lengths, offsets, signs of twists, axis directions, convention, base and tool are random. The tests check
+properties: each configuration is among the branches of its own pose, every branch meets the pose, and no branch is
+missed.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ FAMILIES = {"wrist6": wrist6, "parallel6": parallel6, "slide6": slide6, "scara4"
 
 
 def arm(rows, kinds=None, convention="standard", base=None, tool=None, limits=(-PI, PI)):
-    """An arm of standard rows (theta, d, a, alpha), spelt in either convention; kinds are "r" or "p"."""
+    """An arm of standard rows (theta, d, a, alpha), written in either convention; kinds are "r" or "p"."""
     kinds = kinds or "r" * len(rows)
     joints = []
     before = (0.0, 0.0)
@@ -41,8 +41,8 @@ def arm(rows, kinds=None, convention="standard", base=None, tool=None, limits=(-
     return Robot("arm", "arm", "test", convention, tuple(joints), (0.0,) * len(rows), **extra)
 
 
-class Member(Draw):
-    """Random members of the families."""
+class MemberDraw(Draw):
+    """Draws random members of the families."""
 
     def offset(self):
         return self.length() if self.rng.random() < 0.6 else 0.0
@@ -118,24 +118,24 @@ class Member(Draw):
 
 
 def members(family, count, seed=7):
-    draw = Member(seed)
+    draw = MemberDraw(seed)
     return [getattr(draw, family)() for _ in range(count)]
 
 
 def branches(robot, T, near, value=math.nan):
-    """All branches ``(b, n)`` by the fast path."""
+    """All branches ``(b, n)`` by the batch kernel."""
     form = closed_form_of(robot)
     out = np.empty((len(form.branches), robot.n))
     form.kernels.one(form.kernels.params, np.array(T), value, np.array(near), out)
     return out
 
 
-def there(rows):
+def existing(rows):
     return rows[~np.isnan(rows[:, 0])]
 
 
 def apart(a, b):
-    """Largest joint difference, whole turns aside."""
+    """Largest joint difference modulo whole turns."""
     return np.abs((a - b + PI) % (2 * PI) - PI).max(axis=-1)
 
 
@@ -207,18 +207,18 @@ NAMED = [
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_every_configuration_is_among_the_branches_of_its_pose_and_all_of_them_close(family):
+def test_every_configuration_is_among_the_branches_of_its_pose_and_all_meet_it(family):
     rng = np.random.default_rng(1)
     for robot in members(family, 60):
         match = closed_form_of(robot)
         assert match is not None, robot
         if family != match.name:
-            continue  # a member of both
+            continue  # a member of two families
         for q in rng.uniform(-3, 3, (6, robot.n)):
             T = kin.fk(robot, q)
             rows = branches(robot, T, q)
             assert apart(rows[match.branch_of(q)], q) < 1e-6
-            assert np.abs(kin.fk(robot, there(rows)) - T).max() < 1e-9
+            assert np.abs(kin.fk(robot, existing(rows)) - T).max() < 1e-9
             for i in np.flatnonzero(~np.isnan(rows[:, 0])):
                 assert match.branch_of(rows[i]) == i
 
@@ -235,12 +235,12 @@ def test_named_arms_are_recognised_and_have_all_their_branches(robot, family):
         assert result.status == Status.SOLVED
         assert result.solver == family
         assert apart(result.solutions[0].q, q) < 1e-6
-        counts.append(len(there(branches(robot, kin.fk(robot, q), q))))
+        counts.append(len(existing(branches(robot, kin.fk(robot, q), q))))
     assert max(counts) == len(match.branches)
 
 
 def mixture(robot, rng):
-    """Targets ``(150, 4, 4)`` in no order: met at random, singular or nearly, moved and maybe out of reach."""
+    """Targets ``(150, 4, 4)`` in random order: regular, singular or nearly, and moved, possibly out of reach."""
     form, q_of = canonical(robot)
     g = form.geometry
     q = rng.uniform(-3, 3, (150, robot.n))
@@ -266,14 +266,14 @@ def mixture(robot, rng):
 
 
 def careful(robot, T):
-    """The branches of one target by the kernel that limits and ranges are computed with, without limits."""
+    """The branches of one target by the kernel that also handles limits and ranges, without limits."""
     form = closed_form_of(robot)
     far = np.full(robot.n, 1e6)
     return form.solve(SolverInput(T, POSE, (math.nan,), False, robot.q_home.copy(), -far, far)).q
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_a_batch_has_the_bits_of_its_targets_one_by_one_and_all_their_branches(family):
+def test_a_batch_is_bit_identical_to_single_targets_and_misses_no_branch(family):
     rng = np.random.default_rng(3)
     counts = set()
     for robot in members(family, 20, seed=3):
@@ -283,7 +283,7 @@ def test_a_batch_has_the_bits_of_its_targets_one_by_one_and_all_their_branches(f
             np.testing.assert_array_equal(kin.ik_branches(robot, pose), alone)
             wanted = careful(robot, pose)
             np.testing.assert_array_equal(np.isnan(alone), np.isnan(wanted))
-            assert apart(there(alone), there(wanted)).max(initial=0.0) < 1e-6
+            assert apart(existing(alone), existing(wanted)).max(initial=0.0) < 1e-6
             assert merged(alone, 1e-12) >= merged(wanted)
         exists = ~np.isnan(rows[..., 0])
         assert np.array_equal(np.isnan(rows).any(axis=2), ~exists)
@@ -307,7 +307,7 @@ def test_the_kernels_report_a_target_that_is_not_finite(family):
 
 
 def newton(robot, target, q):
-    """Damped Gauss–Newton on the pose error, written apart from the code under test: ``(n,)`` or None."""
+    """Damped Gauss–Newton on the pose error, independent of the code under test: ``(n,)`` or None."""
     for _ in range(60):
         T = kin.fk(robot, q)
         e = np.zeros(6)
@@ -325,7 +325,7 @@ def newton(robot, target, q):
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_a_numeric_search_from_many_starts_finds_no_branch_we_miss(family):
+def test_a_numeric_search_from_many_starts_finds_no_further_branch(family):
     rng = np.random.default_rng(4)
     found = 0
     for robot in members(family, 6, seed=4):
@@ -340,14 +340,16 @@ def test_a_numeric_search_from_many_starts_finds_no_branch_we_miss(family):
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_an_axis_a_little_off_is_another_arm(family):
-    """Twists that the family asks for, one after the other, a milliradian off."""
-    asked = {"wrist6": (0, 1, 3, 4), "parallel6": (1, 2, 3, 4), "slide6": (0, 1, 3, 4), "scara4": (0, 1)}[family]
+def test_an_axis_slightly_off_does_not_match(family):
+    """The twists that the family requires, one after another, with an error of a milliradian."""
+    required = {"wrist6": (0, 1, 3, 4), "parallel6": (1, 2, 3, 4), "slide6": (0, 1, 3, 4), "scara4": (0, 1)}[
+        family
+    ]
     checked = 0
     for robot in members(family, 12, seed=5):
         if robot.convention != "standard" or family != closed_form_of(robot).name:
             continue
-        for row in asked:
+        for row in required:
             rows = list(robot.rows)
             rows[row] = replace(rows[row], alpha=rows[row].alpha + 1e-3)
             assert FAMILIES[family].match(replace(robot, rows=tuple(rows))) is None
@@ -355,7 +357,7 @@ def test_an_axis_a_little_off_is_another_arm(family):
     assert checked >= 8
 
 
-def test_axes_that_pass_each_other_by_are_another_arm():
+def test_axes_that_do_not_quite_intersect_do_not_match():
     for make, row in ((puma560, 4), (ur5, 4)):
         rows = list(make().rows)
         rows[row] = replace(rows[row], a=1e-4)
@@ -377,7 +379,7 @@ def canonical(robot):
 
 
 def reach_zero(g, t):
-    """θ2 for which the wrist centre is over axis 1, or None."""
+    """θ2 for which the wrist centre is on axis 1, or None."""
     if g.a2 == 0.0:
         arm_vector = t[2] - 1j * g.f
     elif hasattr(g, "f"):
@@ -391,8 +393,8 @@ def reach_zero(g, t):
 
 
 @pytest.mark.parametrize("family", ["wrist6", "parallel6", "slide6"])
-def test_singular_targets_have_answers_that_close(family):
-    """Elbow, shoulder and wrist singular, one by one and together, exactly and nearly; inside the limits."""
+def test_singular_targets_are_solved(family):
+    """Elbow, shoulder and wrist singular, alone and together, exactly and nearly; inside the limits."""
     rng = np.random.default_rng(6)
     seen = set()
     for robot in members(family, 40, seed=6):
@@ -420,8 +422,8 @@ def test_singular_targets_have_answers_that_close(family):
                 assert np.abs(kin.fk(robot, s.q) - T).max() < 1e-8
             if mode in (1, 2, 4):
                 rows = branches(robot, T, rng.uniform(-3, 3, 6))
-                assert len(there(rows))
-                assert np.abs(kin.fk(robot, there(rows)) - T).max() < 1e-9
+                assert len(existing(rows))
+                assert np.abs(kin.fk(robot, existing(rows)) - T).max() < 1e-9
                 seen.add(mode)
     assert seen == {1, 2, 4}
 
@@ -437,7 +439,7 @@ def narrow(robot, widths):
 
 
 def check_arcs(robot, q, joint, task="pose"):
-    """The limits can be kept exactly inside the reported ranges of the redundant joint."""
+    """Check that solutions inside the limits exist exactly inside the reported ranges of the redundant joint."""
     T = kin.fk(robot, q)
     result = solve_ik(robot, T, q_seed=q)
     (free,) = result.redundancy
@@ -445,7 +447,7 @@ def check_arcs(robot, q, joint, task="pose"):
     inside = 0
     values = np.linspace(-PI + 0.01, PI - 0.01, 61)
     for value in values:
-        rows = there(branches(robot, T, q, value))
+        rows = existing(branches(robot, T, q, value))
         assert np.abs(kin.fk(robot, rows) - T).max() < 1e-9 if len(rows) else True
         possible = bool(len(rows)) and bool(robot.in_limits(rows, 1e-9).any())
         in_range = any(low - 1e-6 <= value <= high + 1e-6 for low, high in free.intervals)
@@ -501,7 +503,7 @@ def test_the_reported_distances_are_the_factors_of_the_determinant(family):
             factors = math.prod(math.sin(s.distance) if s.unit == "rad" else s.distance for s in found)
             ratios.append(volume / factors)
         if family == "scara4":
-            # The tool's lever makes no factor of the reduced Jacobian; only the zeros agree.
+            # With a tool off the axis, the determinant is no product of these factors; only the zeros agree.
             q[g.order[1]] = -g.sign[1] * g.offset[1]
             J = kin.jacobian(robot, q)
             assert np.linalg.svd(J, compute_uv=False)[robot.n - 1] < 1e-12
@@ -512,8 +514,8 @@ def test_the_reported_distances_are_the_factors_of_the_determinant(family):
 
 @pytest.mark.parametrize("family", FAMILIES)
 @pytest.mark.parametrize("task", ["pose", "approach"])
-def test_answers_inside_random_limits(family, task):
-    """Each joint between random stops: what is in them is found again, from another seed too."""
+def test_poses_inside_random_limits_are_solved(family, task):
+    """Every joint has random limits; the pose of a configuration inside them is solved from the home pose."""
     rng = np.random.default_rng(11)
     for robot in members(family, 15, seed=11):
         rows = tuple(
@@ -547,7 +549,7 @@ def test_a_scara_meets_upright_poses_and_reports_the_error_of_others():
 
 @pytest.mark.parametrize("task", ["approach", "position"])
 def test_the_free_angle_of_a_scara_has_exact_ranges(task):
-    """A tool off the last axis, so that reach and all three limits bind."""
+    """With a tool off the last axis, reach and all three limits restrict the angle."""
     lever = ((1.0, 0.0, 0.0, 0.15), (0.0, 1.0, 0.0, 0.05), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
     robot = replace(scara(), tool=lever)
     robot = replace(robot, rows=tuple(replace(r, limits=(-1.0, 1.4)) if r.name == "4" else r for r in robot.rows))
@@ -562,13 +564,13 @@ def test_the_free_angle_of_a_scara_has_exact_ranges(task):
         (free,) = result.redundancy
         for value in np.linspace(-3, 3, 25):
             in_range = any(low - 1e-6 <= value <= high + 1e-6 for low, high in free.intervals)
-            asked = solve_ik(robot, T, task=task, redundancy=float(value))
-            assert (asked.status == Status.SOLVED) == in_range
+            requested = solve_ik(robot, T, task=task, redundancy=float(value))
+            assert (requested.status == Status.SOLVED) == in_range
             some += in_range
     assert 10 < some < 140
 
 
-def test_a_planar_arm_takes_poses_in_its_plane_only():
+def test_a_planar_arm_solves_poses_in_its_plane_only():
     robot = arm([(0.0, 0.0, 0.3, 0.0), (0.0, 0.0, 0.25, 0.0), (0.0, 0.0, 0.1, 0.0)])
     q = np.array([0.3, 0.8, -0.4])
     T = kin.fk(robot, q)
@@ -579,8 +581,8 @@ def test_a_planar_arm_takes_poses_in_its_plane_only():
     assert solve_ik(robot, T).status == Status.UNREACHABLE
 
 
-def test_a_roll_that_is_free_stays_with_the_seed():
-    """The approach direction of a tool on axis 6: joint 6 keeps its value, beside the wrist singularity too."""
+def test_a_free_roll_stays_at_the_seed():
+    """For an approach direction along axis 6, joint 6 keeps its value, also at the wrist singularity."""
     for robot in (puma560(), ur5()):
         for flat in (False, True):
             q = np.array([0.3, -0.7, 0.9, 0.4, 0.0 if flat else 0.6, 0.2])
@@ -589,12 +591,12 @@ def test_a_roll_that_is_free_stays_with_the_seed():
             assert result.status == Status.SOLVED
             assert result.solver in FAMILIES
             assert result.solutions[0].q[5] == pytest.approx(seed[5])
-            asked = solve_ik(robot, kin.fk(robot, q), task="approach", redundancy={"theta6": -1.0})
-            assert asked.solutions[0].q[5] == pytest.approx(-1.0)
+            requested = solve_ik(robot, kin.fk(robot, q), task="approach", redundancy={"theta6": -1.0})
+            assert requested.solutions[0].q[5] == pytest.approx(-1.0)
 
 
-def test_only_arms_that_can_be_on_axis_1_have_a_free_theta_1():
-    beside, over = puma560(), kr6()
-    for robot, names in ((beside, []), (over, ["theta1"])):
+def test_theta_1_is_redundant_only_if_the_wrist_centre_can_be_on_axis_1():
+    offset, centred = puma560(), kr6()
+    for robot, names in ((offset, []), (centred, ["theta1"])):
         form = closed_form_of(robot)
         assert [f.name for f in form.redundancies(0)] == names

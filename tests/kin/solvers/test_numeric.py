@@ -1,7 +1,7 @@
-"""The numeric solver: any chain, any mask, limits kept to the bit, always the same answer; and proof by numbers.
+"""The numeric solver: any chain, any mask, exact limits, reproducible results, and success rates.
 
-The slow ones run with ``sh scripts/test.sh -m slow -s`` and print their figures; `KINBOARD_TEST_POSES` sets how
-many poses each takes (10 000 by default).
+``sh scripts/test.sh -m slow -s`` runs the slow tests, which print their figures; `KINBOARD_TEST_POSES` is the
+number of poses of each (10 000 by default).
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ TURN = 2 * math.pi
 
 
 def chain(rng, n, convention="standard", prismatic=0.25):
-    """A random arm: any twists and offsets, narrow and wide limits, some joints without any."""
+    """A random arm: any twists and offsets, narrow and wide limits, some joints without limits."""
     rows = []
     for i in range(n):
         theta, alpha = rng.uniform(-math.pi, math.pi, 2)
         d, a = rng.uniform(-0.3, 0.3, 2)
-        if rng.random() < 0.4:  # what real arms have: right angles, and axes that meet
+        if rng.random() < 0.4:  # as in real arms: right angles and intersecting axes
             alpha = rng.choice([0.0, 0.5, -0.5, 1.0]) * math.pi
             a = rng.choice([0.0, a])
         kind = "prismatic" if rng.random() < prismatic else "revolute"
@@ -56,7 +56,7 @@ def errors(robot, target, q, task="pose"):
     return float(np.linalg.norm(T[:3, 3] - target[:3, 3])), angle.get(task, 0.0)
 
 
-def somewhere(rng):
+def random_target(rng):
     """A pose within 1.5 m, mostly out of reach."""
     T = np.eye(4)
     T[:3, :3] = rotation_from_wxyz(rng.normal(size=4))
@@ -68,14 +68,14 @@ def task_of(robot):
     return "approach" if robot.n == 5 else "pose"
 
 
-def cost_of(problem, code, weight, q, bent=True):
+def cost_of(problem, code, weight, q, second_order=True):
     """E²/2, the gradient ``(n,)`` and the Hessian ``(n, n)`` that the descent uses."""
     n = problem.robot.n
     J, T, axes, e = np.empty((6, n)), np.empty((4, 4)), np.empty((n, 7)), np.empty(6)
     goal = (problem.T, code, problem.mask, weight)
     cost = look(problem.robot.model, q, goal, (J, T, axes), e)
     H, g = np.zeros((n, n)), np.empty(n)
-    quadratic_model(goal, bent, J, T, e, np.empty(6), H, g)
+    quadratic_model(goal, second_order, J, T, e, np.empty(6), H, g)
     return cost, -g, np.tril(H) + np.tril(H, -1).T
 
 
@@ -83,7 +83,7 @@ def cost_of(problem, code, weight, q, bent=True):
 
 
 @pytest.mark.parametrize("code", [POSE, APPROACH, POSITION, MASK])
-def test_gradient_and_second_derivatives_are_those_of_the_error(code):
+def test_gradient_and_second_derivatives_match_finite_differences(code):
     rng = np.random.default_rng(1)
     h = 1e-6
     for convention in ("standard", "modified"):
@@ -92,7 +92,7 @@ def test_gradient_and_second_derivatives_are_those_of_the_error(code):
         for frame in ("tool", "base"):
             problem = problem_of(robot, kin.fk(robot, robot.random_q(rng)), mask=mask, mask_frame=frame)
             q = robot.random_q(rng)
-            cost, gradient, hessian = cost_of(problem, code, 0.3, q, bent=code != MASK)
+            cost, gradient, hessian = cost_of(problem, code, 0.3, q, second_order=code != MASK)
             assert cost > 1e-3
             for i, step in enumerate(h * np.eye(robot.n)):
                 (after, up, _), (before, down, _) = (cost_of(problem, code, 0.3, q + s) for s in (step, -step))
@@ -103,13 +103,13 @@ def test_gradient_and_second_derivatives_are_those_of_the_error(code):
 
 @pytest.mark.parametrize("robot_id", ROBOTS)
 @pytest.mark.parametrize("task", ["pose", "approach", "position"])
-def test_a_descent_ends_where_no_small_step_helps(robot_id, task):
+def test_a_descent_ends_at_a_local_minimum(robot_id, task):
     """Inside its limits a joint's derivative is zero; at a limit it points outwards (Karush, Kuhn and Tucker)."""
     robot = kin.get_robot(robot_id)
     rng = np.random.default_rng(2)
     ended = 0
     for _ in range(12):
-        problem = problem_of(robot, somewhere(rng), task=task)
+        problem = problem_of(robot, random_target(rng), task=task)
         starts = robot.random_q(rng, 4)
         ends, found = nearest.descend_each(problem, problem.code, starts, 0.1)
         for q, error in zip(ends, found, strict=True):
@@ -119,11 +119,11 @@ def test_a_descent_ends_where_no_small_step_helps(robot_id, task):
             pushed = np.where(q == robot.lower, np.minimum(gradient, 0.0), gradient)
             pushed = np.where(q == robot.upper, np.maximum(gradient, 0.0), pushed)
             ended += np.abs(pushed).max() < 1e-6 * max(1.0, error)
-    assert ended >= 47  # of 48: at an edge of the orientations the derivative is not continuous
+    assert ended >= 47  # of 48: the rotation error has no continuous derivative at 180°
 
 
-def test_a_joint_of_a_turn_or_more_has_no_stop_and_a_narrow_gap_is_leapt():
-    """Beyond the stop lies the image a turn away: one descent goes there."""
+def test_a_descent_continues_beyond_a_limit_at_the_image_a_whole_turn_away():
+    """With a range of a turn or more, and across a narrow gap between the limits."""
     for half, seed, goal in ((200, 195, 215), (180, 175, 190), (170, 165, 195), (170, -165, -200)):
         rows = [Joint(str(i), a=0.3, limits=(-math.radians(half), math.radians(half))) for i in range(3)]
         robot = Robot("planar", "planar", "made up", "standard", tuple(rows), (0.0, 0.0, 0.0))
@@ -140,8 +140,8 @@ def test_a_joint_of_a_turn_or_more_has_no_stop_and_a_narrow_gap_is_leapt():
 
 @pytest.mark.parametrize("convention", ["standard", "modified"])
 @pytest.mark.parametrize("n", range(3, 10))
-def test_random_chains_reach_what_they_can_reach(n, convention):
-    """Poses made by forward kinematics inside the limits, arms of too few joints for any pose included."""
+def test_random_chains_solve_poses_inside_their_limits(n, convention):
+    """Poses come from forward kinematics, so that arms with fewer than six joints can reach them too."""
     rng = np.random.default_rng(100 * n + (convention == "modified"))
     for _ in range(12):
         robot = chain(rng, n, convention)
@@ -156,7 +156,7 @@ def test_random_chains_reach_what_they_can_reach(n, convention):
 
 @pytest.mark.parametrize("frame", ["tool", "base"])
 def test_every_mask(frame):
-    """All 63 masks: the kept coordinates are met, on a random chain each."""
+    """All 63 masks, each on a random chain: the kept coordinates have no error."""
     rng = np.random.default_rng(7)
     for mask in itertools.islice(itertools.product((False, True), repeat=6), 1, None):
         robot = chain(rng, 6)
@@ -174,24 +174,24 @@ def test_every_mask(frame):
         assert robot.in_limits(found.q)
 
 
-def test_limits_are_kept_to_the_bit_and_locked_joints_stay():
-    """Solved or not, no joint is outside its limits by even a rounding error."""
+def test_limits_and_locks_hold_exactly():
+    """Solved or not, no joint is outside its limits, not even by a rounding error."""
     rng = np.random.default_rng(8)
-    stopped = 0
+    at_limits = 0
     for _ in range(40):
         robot = chain(rng, 7)
         locks = [None] * 7
         locks[2] = float(np.clip(0.1, robot.lower[2], robot.upper[2]))
-        found = nearest.solve_numerically(problem_of(robot, somewhere(rng), locked=locks, task="position"), 20)
+        found = nearest.solve_numerically(problem_of(robot, random_target(rng), locked=locks, task="position"), 20)
         assert (robot.lower <= found.q).all()
         assert (found.q <= robot.upper).all()
         assert found.q[2] == locks[2]
-        stopped += bool(((found.q == robot.lower) | (found.q == robot.upper)).any())
-    assert stopped >= 10
+        at_limits += bool(((found.q == robot.lower) | (found.q == robot.upper)).any())
+    assert at_limits >= 10
 
 
 def test_narrowed_limits():
-    """Limits cut to a quarter at random: reachable poses are still reached, and inside them."""
+    """Random limits a quarter as wide: poses inside them are still solved, inside them."""
     rng = np.random.default_rng(9)
     for robot in kin.builtin_robots().values():
         width = robot.upper - robot.lower
@@ -207,7 +207,7 @@ def test_narrowed_limits():
 
 
 def test_the_seed_comes_first():
-    """An arm that is there already stays, and one near by needs one descent."""
+    """If the seed meets the target it is the result, after one descent."""
     rng = np.random.default_rng(10)
     for robot in kin.builtin_robots().values():
         for q in robot.random_q(rng, 20):
@@ -217,7 +217,7 @@ def test_the_seed_comes_first():
             assert found.q == pytest.approx(q, abs=1e-9)
 
 
-def test_out_of_reach_the_budget_is_used_up_and_the_best_minimum_returned():
+def test_out_of_reach_all_starts_are_used_and_the_best_minimum_is_returned():
     robot = kin.get_robot("redundant7-craig")
     target = np.eye(4)
     target[:3, 3] = (2.0, 0.0, 0.30)
@@ -230,11 +230,11 @@ def test_out_of_reach_the_budget_is_used_up_and_the_best_minimum_returned():
     assert found.error == pytest.approx(2.0 - 1.08, abs=1e-9)
 
 
-def test_a_larger_budget_never_ends_worse():
+def test_a_larger_budget_never_gives_a_larger_error():
     rng = np.random.default_rng(12)
     robot = kin.get_robot("redundant7")
     for _ in range(10):
-        problem = problem_of(robot, somewhere(rng))
+        problem = problem_of(robot, random_target(rng))
         ends = [nearest.solve_numerically(problem, budget).error for budget in (1, 4, 16, 64)]
         assert all(later <= sooner + 1e-9 for sooner, later in itertools.pairwise(ends))
 
@@ -255,7 +255,7 @@ def test_the_same_problem_has_the_same_solution_in_any_thread():
 
 
 def test_restarts_are_the_points_of_spread():
-    """The kernel draws its starts itself; they are those of `spread`, so that an answer can be traced."""
+    """The kernel generates its own starts; they are those of `spread`, so that a result can be reproduced."""
     robot = kin.get_robot("redundant7-craig")
     rng = np.random.default_rng(14)
     later = 0
@@ -274,14 +274,14 @@ def test_restarts_are_the_points_of_spread():
 
 
 @pytest.mark.parametrize("robot_id", ROBOTS)
-def test_closest_is_as_close_as_four_hundred_descents_get(robot_id):
-    """Descents stop once the best minimum has been met often; hardly ever is there a lower one."""
+def test_closest_is_as_close_as_the_best_of_four_hundred_descents(robot_id):
+    """The search stops early when descents keep ending at the best minimum; that rarely misses a lower one."""
     robot = kin.get_robot(robot_id)
     rng = np.random.default_rng(15)
     missed = 0
     for task in ("pose", "approach", "position"):
         for _ in range(8):
-            problem = problem_of(robot, somewhere(rng), task=task)
+            problem = problem_of(robot, random_target(rng), task=task)
             mine = nearest.mismatch(nearest.closest(problem, None))
             starts = nearest.starting_points(problem, count=400)
             _, ends = nearest.descend_each(problem, problem.code, starts, nearest.ORIENTATION_WEIGHT)
@@ -289,11 +289,11 @@ def test_closest_is_as_close_as_four_hundred_descents_get(robot_id):
     assert missed <= 1
 
 
-# -- proof by numbers ---------------------------------------------------------------------------------------------
+# -- success rates ------------------------------------------------------------------------------------------------
 
 
-def prove(robot, count, seed):
-    """(the poses not met, starts ``(count,)``, CPU seconds ``(count,)``) of random poses inside the limits."""
+def solve_random_poses(robot, count, seed):
+    """(poses not solved, starts ``(count,)``, CPU seconds ``(count,)``) of random poses inside the limits."""
     rng = np.random.default_rng(seed)
     q, seeds = robot.random_q(rng, count), robot.random_q(rng, count)
     targets = kin.fk(robot, q)
@@ -312,20 +312,20 @@ def prove(robot, count, seed):
 
 
 @pytest.mark.parametrize("robot_id", ROBOTS)
-def test_poses_inside_the_limits_are_met_without_the_closed_form(robot_id):
-    missed, starts, _ = prove(kin.get_robot(robot_id), FEW, 16)
+def test_poses_inside_the_limits_are_solved_without_the_closed_form(robot_id):
+    missed, starts, _ = solve_random_poses(kin.get_robot(robot_id), FEW, 16)
     assert missed == []
     assert np.median(starts) <= 2
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("robot_id", ROBOTS)
-def test_ten_thousand_poses_are_met_without_the_closed_form(robot_id):
+def test_ten_thousand_poses_are_solved_without_the_closed_form(robot_id):
     """At least 99.9 % of random poses inside the limits, from unrelated seeds; the others are listed."""
-    missed, starts, seconds = prove(kin.get_robot(robot_id), POSES, 17)
+    missed, starts, seconds = solve_random_poses(kin.get_robot(robot_id), POSES, 17)
     median, late = np.percentile(1e6 * seconds, (50, 99))
     print(
-        f"\n{robot_id} {task_of(kin.get_robot(robot_id))}: {POSES - len(missed)} of {POSES} met, starts mean "
+        f"\n{robot_id} {task_of(kin.get_robot(robot_id))}: {POSES - len(missed)} of {POSES} solved, starts mean "
         f"{starts.mean():.2f} max {starts.max():.0f}, median {median:.0f} µs, 99 % within {late:.0f} µs"
     )
     for q, seed, error in missed:

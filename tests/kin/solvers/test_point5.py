@@ -1,4 +1,4 @@
-"""The Pioneer family asked for a point only: exact ranges of θ4 and θ5, nothing missed, no limit broken."""
+"""The Pioneer family with a position task: exact ranges of θ4 and θ5, no solution missed, no limit violated."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def pose_at(point):
     return T
 
 
-def ask(point, low, high, seed=None, values=(math.nan, math.nan), respect=True):
+def solve_point(point, low, high, seed=None, values=(math.nan, math.nan), respect=True):
     seed = ROBOT.q_home.copy() if seed is None else seed
     return point5.solve(
         GEOMETRY, SolverInput(pose_at(point), POSITION, values, respect, seed, low.copy(), high.copy())
@@ -33,16 +33,16 @@ def ask(point, low, high, seed=None, values=(math.nan, math.nan), respect=True):
 
 
 def postures(point, q4, q5):
-    """All (θ1, θ2, θ3) ``(k, 5)`` for given θ4, θ5, straight from the geometry and apart from the code under test.
+    """All configurations ``(k, 5)`` with given θ4, θ5, from the geometry and independent of the code under test.
 
-    The tool stands m off the arm's plane; in the plane it is a two-link arm with links a2 and (d4 + d6 c5, tx).
+    The tool is m off the arm's plane; in the plane the arm has two links, a2 and (d4 + d6 c5, tx).
     """
     a1, a2, d4, d6, d1 = 0.070, 0.160, 0.140, 0.120, 0.130
     x, y, h = point[0], point[1], d1 - point[2]
     m = d6 * math.sin(q4) * math.sin(q5)
     tx, tz = -d6 * math.cos(q4) * math.sin(q5), d4 + d6 * math.cos(q5)
     found = []
-    # At an edge of reach a double root may be missed by rounding.
+    # At an edge of reach, rounding may lose a double root.
     square = x * x + y * y - m * m
     if square < -1e-14:
         return np.empty((0, 5))
@@ -61,10 +61,10 @@ def postures(point, q4, q5):
 
 
 def fits(point, q4, q5, low, high, slack=SLACK):
-    """Whether some posture at (θ4, θ5) is inside the limits, whole turns apart."""
+    """Whether some posture at (θ4, θ5) is inside the limits, up to whole turns."""
     for q in postures(point, q4, q5):
-        turned = q + 2 * math.pi * np.round((0.5 * (low + high) - q) / (2 * math.pi))
-        if ((turned >= low - slack) & (turned <= high + slack)).all():
+        image = q + 2 * math.pi * np.round((0.5 * (low + high) - q) / (2 * math.pi))
+        if ((image >= low - slack) & (image <= high + slack)).all():
             return True
     return False
 
@@ -79,7 +79,7 @@ def random_limits(rng, share):
     return low, low + share * width
 
 
-def test_the_reference_of_these_tests_meets_the_point():
+def test_the_reference_implementation_meets_the_point():
     rng = np.random.default_rng(0)
     for q in ROBOT.random_q(rng, 200):
         point = kin.fk(ROBOT, q)[:3, 3]
@@ -89,23 +89,23 @@ def test_the_reference_of_these_tests_meets_the_point():
 
 
 @pytest.mark.parametrize("share", [0.1, 0.25, 0.4, 1.0])
-def test_a_point_made_inside_narrowed_limits_is_always_met(share):
+def test_a_point_inside_narrowed_limits_is_always_solved(share):
     rng = np.random.default_rng(int(100 * share))
     for _ in range(150):
         low, high = random_limits(rng, share)
         q = rng.uniform(low, high)
         point = kin.fk(ROBOT, q)[:3, 3]
-        found = ask(point, low, high, ROBOT.random_q(rng))
+        found = solve_point(point, low, high, ROBOT.random_q(rng))
         rows = found.q[~np.isnan(found.q[:, 0])]
         assert len(rows)
         assert np.abs(kin.fk(ROBOT, rows)[:, :3, 3] - point).max() < 1e-9
-        turned = rows + 2 * np.pi * np.round((0.5 * (low + high) - rows) / (2 * np.pi))
-        assert ((turned >= low - SLACK) & (turned <= high + SLACK)).all(axis=1).any()
+        image = rows + 2 * np.pi * np.round((0.5 * (low + high) - rows) / (2 * np.pi))
+        assert ((image >= low - SLACK) & (image <= high + SLACK)).all(axis=1).any()
         assert inside(found.arcs[0], q[3], 1e-7)
 
 
-def test_locked_joints_are_met_too():
-    """Three locked joints leave single configurations: a hair of rounding must not lose them."""
+def test_points_are_solved_with_locked_joints():
+    """Three locked joints leave isolated configurations: rounding must not lose them."""
     rng = np.random.default_rng(5)
     for i in range(200):
         low, high = random_limits(rng, 0.4)
@@ -124,18 +124,18 @@ def test_locked_joints_are_met_too():
 
 
 def test_the_ranges_of_theta5_are_exact():
-    """At the θ4 used: every θ5 of a fine grid is inside the ranges just when some posture fits."""
+    """At the θ4 used, a θ5 of a fine grid is inside the ranges if and only if some posture fits."""
     rng = np.random.default_rng(7)
     inner = outer = 0
     for _ in range(25):
         low, high = random_limits(rng, rng.uniform(0.3, 1.0))
         point = kin.fk(ROBOT, rng.uniform(low, high))[:3, 3]
-        found = ask(point, low, high)
+        found = solve_point(point, low, high)
         for branch in np.flatnonzero(~np.isnan(found.q[:, 0])).tolist():
             q4 = float(found.values[branch, 0])
-            mine = found.arcs[1][found.arcs[1][:, 0] == branch]
+            ranges = found.arcs[1][found.arcs[1][:, 0] == branch]
             for q5 in np.linspace(low[4], high[4], 60).tolist():
-                if inside(mine, q5):
+                if inside(ranges, q5):
                     assert fits(point, q4, q5, low, high, 1e-7)
                     inner += 1
         every = found.arcs[1]
@@ -150,13 +150,13 @@ def test_the_ranges_of_theta5_are_exact():
 
 
 def test_the_ranges_of_theta4_are_exact():
-    """A dense grid over both finds no θ4 outside the ranges, and every θ4 inside has a θ5 that the ranges give."""
+    """A dense grid finds no θ4 outside the ranges, and each θ4 inside has a θ5 in the reported ranges."""
     rng = np.random.default_rng(9)
     checked = 0
     for _ in range(12):
         low, high = random_limits(rng, rng.uniform(0.3, 1.0))
         point = kin.fk(ROBOT, rng.uniform(low, high))[:3, 3]
-        found = ask(point, low, high)
+        found = solve_point(point, low, high)
         for q4 in np.linspace(low[3], high[3], 40).tolist():
             there = [
                 q5 for q5 in np.linspace(low[4], high[4], 40).tolist() if fits(point, q4, q5, low, high, -1e-7)
@@ -165,7 +165,7 @@ def test_the_ranges_of_theta4_are_exact():
                 assert inside(found.arcs[0], q4, 1e-6)
         for _, a, b in found.arcs[0].tolist():
             for q4 in np.linspace(a, b, 5)[1:-1].tolist():
-                given = ask(point, low, high, values=(q4, math.nan))
+                given = solve_point(point, low, high, values=(q4, math.nan))
                 assert any(
                     fits(point, q4, 0.5 * (u + v), low, high, 1e-7) for _, u, v in given.arcs[1].tolist()
                 ), (q4, a, b)
@@ -173,7 +173,7 @@ def test_the_ranges_of_theta4_are_exact():
     assert checked > 25
 
 
-def test_given_values_are_kept():
+def test_requested_values_are_kept():
     rng = np.random.default_rng(11)
     for q in ROBOT.random_q(rng, 60):
         point = kin.fk(ROBOT, q)[:3, 3]
@@ -184,7 +184,7 @@ def test_given_values_are_kept():
         assert all(s.q[3] == q[3] and s.q[4] == q[4] for s in result.solutions)
 
 
-def test_the_nearest_configuration_is_at_most_as_far_as_any_of_a_dense_search():
+def test_no_configuration_of_a_dense_search_is_nearer():
     rng = np.random.default_rng(13)
     for q in ROBOT.random_q(rng, 12):
         point, seed = kin.fk(ROBOT, q)[:3, 3], ROBOT.random_q(rng)
@@ -201,7 +201,7 @@ def test_the_nearest_configuration_is_at_most_as_far_as_any_of_a_dense_search():
 
 
 def test_a_drag_moves_smoothly():
-    """A line through the workspace in steps of 2 mm: no joint leaps."""
+    """A line through the workspace in steps of 2 mm: no joint jumps."""
     q = ROBOT.q_home.copy()
     point = kin.fk(ROBOT, q)[:3, 3].copy()
     steps = []
@@ -214,7 +214,7 @@ def test_a_drag_moves_smoothly():
     assert max(steps) < 0.06
 
 
-def test_a_mounted_arm_is_of_the_family_too():
+def test_an_arm_with_a_base_transform_belongs_to_the_family():
     text = """
     id = "mounted"
     name = "mounted"
@@ -246,19 +246,19 @@ def test_a_mounted_arm_is_of_the_family_too():
 
 def test_the_distance_beyond_reach_is_in_metres():
     straight = 0.160 + 0.140 + 0.120
-    found = ask((0.070 + straight + 0.25, 0.0, 0.130), ROBOT.lower, ROBOT.upper)
+    found = solve_point((0.070 + straight + 0.25, 0.0, 0.130), ROBOT.lower, ROBOT.upper)
     assert np.isnan(found.q).all()
     assert found.gap == pytest.approx(0.25, abs=1e-12)
 
 
 def whole_turns():
-    """Limits wide enough for every branch, with the arm's edge of reach inside them."""
+    """Limits wide enough for every branch, also at the edge of the arm's reach."""
     return np.full(5, -math.pi), np.full(5, math.pi)
 
 
 @pytest.mark.parametrize("wide", [False, True])
-def test_a_range_of_theta4_ends_where_it_says(wide):
-    """Each end is reached, and 1e-6 beyond it a fine scan of θ5 finds nothing on any branch that ends there."""
+def test_the_ends_of_theta4_ranges_are_exact(wide):
+    """A solution exists at each end, and 1e-6 beyond it a fine scan of θ5 finds none on that branch."""
     rng = np.random.default_rng(21)
     ends = 0
     for _ in range(6 if wide else 40):
@@ -266,51 +266,51 @@ def test_a_range_of_theta4_ends_where_it_says(wide):
         if wide:
             low[:2], high[:2] = (-1.5, -1.0), (1.5, 2.0)
         point = kin.fk(ROBOT, rng.uniform(low, high))[:3, 3]
-        rows = ask(point, low, high).arcs[0]
+        rows = solve_point(point, low, high).arcs[0]
         for branch, a, b in rows.tolist():
             for end, beyond in ((a, a - 1e-6), (b, b + 1e-6)):
                 if not low[3] < beyond < high[3] or inside(rows[rows[:, 0] == branch], beyond):
                     continue
                 ends += 1
-                met = ask(point, low, high, values=(end, math.nan))
+                met = solve_point(point, low, high, values=(end, math.nan))
                 assert any(fits(point, end, q5, low, high, 1e-6) for q5 in met.values[:, 1] if q5 == q5)
                 for q5 in np.linspace(low[4], high[4], 400).tolist():
                     for q in postures(point, beyond, q5):
-                        turned = q + 2 * math.pi * np.round((0.5 * (low + high) - q) / (2 * math.pi))
-                        if ((turned > low) & (turned < high)).all():
+                        image = q + 2 * math.pi * np.round((0.5 * (low + high) - q) / (2 * math.pi))
+                        if ((image > low) & (image < high)).all():
                             sines = np.sin(q[[2, 4]])
                             split = np.abs(sines).min() < 1e-6
                             assert split or FORM.branch_of(q) != branch
     assert ends >= 4
 
 
-def test_corners_of_the_limits_and_points_above_the_base_are_met():
-    """Stops met exactly, all at once, and joints locked there: double roots everywhere."""
-    stops = [(a, 0.5 * (a + b), b) for a, b in zip(ROBOT.lower, ROBOT.upper, strict=True)]
-    corners = np.array(np.meshgrid(*stops)).reshape(5, -1).T
+def test_corners_of_the_limits_and_points_above_the_base_are_solved():
+    """All joints exactly at limits, some of them locked there: double roots everywhere."""
+    values = [(a, 0.5 * (a + b), b) for a, b in zip(ROBOT.lower, ROBOT.upper, strict=True)]
+    corners = np.array(np.meshgrid(*values)).reshape(5, -1).T
     for i, q in enumerate(corners):
         point = kin.fk(ROBOT, q)[:3, 3]
         low, high = ROBOT.lower.copy(), ROBOT.upper.copy()
         locked = np.array([(i >> j) % 2 == 1 for j in range(5)])
         low[locked] = high[locked] = q[locked]
         assert solve_ik(ROBOT, point, task="position").status is Status.SOLVED
-        rows = ask(point, low, high).q
+        rows = solve_point(point, low, high).q
         assert ((rows >= low - SLACK) & (rows <= high + SLACK)).all(axis=1).any(), np.degrees(q)
     low, high = whole_turns()
     for q in np.radians([[0, 0, 90, 0, 90], [30, -60, 45, 180, 60], [10, 20, 30, 40, 0], [0, 0, 0, 0, 0]]):
         point = kin.fk(ROBOT, q)[:3, 3] * (0.0, 0.0, 1.0) if q[4] > 1.0 else kin.fk(ROBOT, q)[:3, 3]
-        rows = ask(point, low, high).q
+        rows = solve_point(point, low, high).q
         rows = rows[~np.isnan(rows[:, 0])]
         assert len(rows)
         assert np.abs(kin.fk(ROBOT, rows)[:, :3, 3] - point).max() < 1e-9
 
 
-def test_what_breaks_the_limits_least_is_one_joint_here():
-    """θ5 alone would have to pass its stop by 5°; the answer needs no more than that, and meets the point."""
+def test_the_smallest_limit_violation_is_found():
+    """It is at most that of the known configuration, where θ5 alone is outside its limit, by 5°."""
     q = np.radians([90, 60, 40, 40, 50])
     point = kin.fk(ROBOT, q)[:3, 3]
     low, high = ROBOT.lower, np.where(np.arange(5) == 4, ROBOT.upper, q)
-    found = ask(point, low, high)
+    found = solve_point(point, low, high)
     rows = found.q[~np.isnan(found.q[:, 0])]
     assert len(rows)
     over = np.maximum(0.0, np.maximum(low - rows, rows - high)).sum(axis=1)
@@ -322,17 +322,17 @@ def test_equal_problems_have_equal_solutions():
     rng = np.random.default_rng(23)
     for q in ROBOT.random_q(rng, 20):
         point = kin.fk(ROBOT, q)[:3, 3]
-        first, again = (ask(point, ROBOT.lower, ROBOT.upper) for _ in range(2))
+        first, again = (solve_point(point, ROBOT.lower, ROBOT.upper) for _ in range(2))
         assert np.array_equal(first.q, again.q, equal_nan=True)
         assert all(np.array_equal(a, b) for a, b in zip(first.arcs, again.arcs, strict=True))
 
 
 def test_gap_is_the_distance_a_dense_search_finds():
-    """Unlimited joints: no posture of a fine grid is nearer than the gap, and some are almost as near."""
+    """Without limits, no configuration of a dense sample is nearer than the gap, and some are almost as near."""
     rng = np.random.default_rng(25)
     q = rng.uniform(-math.pi, math.pi, (400_000, 5))
     cloud = kin.fk(ROBOT, q)[:, :3, 3]
     for point in ((0.9, 0.2, 0.3), (0.0, 0.0, 1.0), (-0.3, 0.5, -0.4)):
-        gap = ask(point, ROBOT.lower, ROBOT.upper).gap
+        gap = solve_point(point, ROBOT.lower, ROBOT.upper).gap
         nearest = float(np.linalg.norm(cloud - np.array(point), axis=1).min())
         assert gap <= nearest <= gap + 0.03

@@ -1,8 +1,8 @@
-"""Arms with joints that count the other way round: the closed form, and every answer, of the arm as it was.
+"""Arms with reversed joints have the same closed form, solutions and workspace as the original arm.
 
-Two laws carry the tests. An arm read with some joints turned round answers as the arm whose table has them so, but
-for signs and rounding. And whichever joints of a built-in arm are turned round, it keeps its
-closed form, its postures and its workspace; the branches may only change their names.
+Two properties are tested. The results for an arm with reversed joints are those for the arm that matches the
+family as it is, except for signs and rounding. And whichever joints of a built-in arm are reversed, it keeps its
+closed form, its postures and its workspace; only the names of branches may change.
 """
 
 from __future__ import annotations
@@ -14,8 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from arms import Draw, nested
-from arms import reversed_at as turned
+from arms import Draw, nested, reversed_at
 
 import kin
 from kin import Joint, Robot, Status, solve_ik
@@ -25,8 +24,8 @@ from kin.solvers.reversed import ReversedJoints, readings
 
 PI = math.pi
 ARMS = {name: kin.get_robot(name) for name in ("pioneer5", "redundant7", "redundant7-craig", "iiwa14")}
-# Which single joints no closed form is used to, by arm: 7 only in order to have approach directions.
-STRANGE = {"pioneer5": (1, 2, 3), "redundant7": (0, 1, 2, 4), "redundant7-craig": (2, 4, 6), "iiwa14": (2, 4, 6)}
+# Joints whose reversal the family does not accept as it is, by arm; joint 7 only because of approach directions.
+UNUSUAL = {"pioneer5": (1, 2, 3), "redundant7": (0, 1, 2, 4), "redundant7-craig": (2, 4, 6), "iiwa14": (2, 4, 6)}
 
 
 def signs_of(robot, joints):
@@ -43,30 +42,30 @@ CASES = [
         ("redundant7-craig", [(0, 2, 3), (1, 2, 4, 5, 6)]),
         ("iiwa14", [(0, 2, 4, 5), (0, 1, 2, 3, 4, 5, 6)]),
     )
-    for joints in [*((i,) for i in STRANGE[name]), *more]
+    for joints in [*((i,) for i in UNUSUAL[name]), *more]
 ]
 IDS = [f"{name}-{''.join(str(i + 1) for i in joints)}" for name, joints in CASES]
 cases = pytest.mark.parametrize(("name", "joints"), CASES, ids=IDS)
 
 
-class Pair:
-    """An arm that is read with joints turned round, and the one a closed form fits as it is."""
+class ArmPair:
+    """An arm with reversed joints, and the plain arm: the one that matches its family as it is."""
 
     def __init__(self, robot):
         self.robot = robot
         self.match = closed_form_of(robot)
         self.joints = getattr(self.match, "joints", ())
-        self.plain = turned(robot, self.joints)
+        self.plain = reversed_at(robot, self.joints)
         self.signs = signs_of(robot, self.joints)
         assert not isinstance(closed_form_of(self.plain), ReversedJoints)
 
     def value(self, name, x):
-        """A free value of the plain arm as the other one has it."""
+        """A redundancy value of the plain arm as that of the reversed arm."""
         match = re.fullmatch(r"theta(\d)", name)
         return -x if match and int(match[1]) - 1 in self.joints else x
 
     def both(self, target, **options):
-        """Answers of the plain arm and of the other one."""
+        """Results for the plain arm and for the reversed one."""
         there = dict(options)
         if "q_seed" in options:
             there["q_seed"] = options["q_seed"] * self.signs
@@ -84,19 +83,19 @@ class Pair:
         return solve_ik(self.plain, target, **options), solve_ik(self.robot, target, **there)
 
     def agree(self, a, b, tolerance=1e-7):
-        """Whether an answer of the other arm is that of the plain one."""
+        """Check that the result for the reversed arm is that for the plain one."""
         assert (a.status, a.cause, a.solver, len(a.solutions)) == (b.status, b.cause, b.solver, len(b.solutions))
         for x, y in zip(a.solutions, b.solutions, strict=True):
             assert (x.branch, x.compromise) == (y.branch, y.compromise)
-            if x.compromise == "rotation":  # by descents, which may end a whole turn away
+            if x.compromise == "rotation":  # found by descents, which may end a whole turn away
                 assert abs(x.rotation_error - y.rotation_error) < 1e-6
                 continue
             assert np.abs(x.q - y.q * self.signs).max() < tolerance
             assert max(y.position_error, y.rotation_error) <= 1e-9 or y.compromise
-            self._free(x.redundancy, y.redundancy, tolerance)
+            self._same_redundancy(x.redundancy, y.redundancy, tolerance)
         if a.solutions:
-            self._free(a.redundancy, b.redundancy, tolerance)
-        here, there = (sorted(r.blocked, key=lambda x: x.branch) for r in (a, b))  # often some break as little
+            self._same_redundancy(a.redundancy, b.redundancy, tolerance)
+        here, there = (sorted(r.blocked, key=lambda x: x.branch) for r in (a, b))  # violations may be equal
         for x, y in zip(here, there, strict=True):
             assert x.branch == y.branch
             assert [v.joint for v in x.violations] == [v.joint for v in y.violations]
@@ -104,7 +103,7 @@ class Pair:
                 sign = self.signs[v.joint]
                 assert abs((v.value - v.limit) - (w.value - w.limit) * sign) < 1e-6
 
-    def _free(self, a, b, tolerance):
+    def _same_redundancy(self, a, b, tolerance):
         assert [r.name for r in a] == [r.name for r in b]
         for x, y in zip(a, b, strict=True):
             assert abs(self.value(x.name, y.value) - x.value) < tolerance
@@ -113,12 +112,12 @@ class Pair:
 
 
 def wide(intervals):
-    """The intervals that are more than a point: whether a point is one, rounding decides."""
+    """The intervals longer than 1e-6: rounding decides whether a shorter one exists."""
     return np.array(sorted(pair for pair in intervals if pair[1] - pair[0] > 1e-6)).reshape(-1, 2)
 
 
 def poses(robot, count, seed=0, inside=True):
-    """Configurations and their poses; and poses that limits or reach forbid."""
+    """Configurations and their poses; unless `inside`, also poses outside the limits or out of reach."""
     rng = np.random.default_rng(seed)
     for _ in range(count):
         q = robot.random_q(rng)
@@ -132,7 +131,7 @@ def poses(robot, count, seed=0, inside=True):
             yield q, T
 
 
-# -- found --------------------------------------------------------------------------------------------------------
+# -- matching -----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ARMS)
@@ -140,7 +139,7 @@ def test_reversed_joints_do_not_change_the_family_or_tasks(name):
     base, n = closed_form_of(ARMS[name]), ARMS[name].n
     for count in (0, 1, 2, n - 1, n):
         for joints in itertools.combinations(range(n), count):
-            match = closed_form_of(turned(ARMS[name], joints))
+            match = closed_form_of(reversed_at(ARMS[name], joints))
             assert match is not None, joints
             assert match.name == base.name
             assert match.branches == base.branches
@@ -150,17 +149,19 @@ def test_reversed_joints_do_not_change_the_family_or_tasks(name):
 
 
 @pytest.mark.parametrize("name", ARMS)
-def test_a_single_joint_that_a_closed_form_is_not_used_to_is_the_one_turned_round(name):
+def test_a_single_joint_in_an_unusual_direction_is_the_one_that_is_reversed(name):
     for joint in range(ARMS[name].n):
-        match = closed_form_of(turned(ARMS[name], (joint,)))
-        strange = joint in STRANGE[name]
-        assert isinstance(match, ReversedJoints) == strange
-        assert match.reason.endswith(f"; joint {joint + 1} is reversed") == strange
-    assert closed_form_of(turned(ARMS["iiwa14"], (2, 4))).reason.endswith("; joints 3 and 5 are reversed")
-    assert closed_form_of(turned(ARMS["iiwa14"], (2, 4, 6))).reason.endswith("; joints 3, 5 and 7 are reversed")
+        match = closed_form_of(reversed_at(ARMS[name], (joint,)))
+        unusual = joint in UNUSUAL[name]
+        assert isinstance(match, ReversedJoints) == unusual
+        assert match.reason.endswith(f"; joint {joint + 1} is reversed") == unusual
+    assert closed_form_of(reversed_at(ARMS["iiwa14"], (2, 4))).reason.endswith("; joints 3 and 5 are reversed")
+    assert closed_form_of(reversed_at(ARMS["iiwa14"], (2, 4, 6))).reason.endswith(
+        "; joints 3, 5 and 7 are reversed"
+    )
 
 
-def test_arms_of_no_family_are_left_alone():
+def test_arms_that_match_as_they_are_or_not_at_all_have_no_reversed_joints():
     for name in ("panda", "ur5", "puma560", "irb120", "stanford", "scara", *ARMS):
         match = closed_form_of(kin.get_robot(name))
         assert (match is None) == (name == "panda")
@@ -174,20 +175,20 @@ def test_arms_of_no_family_are_left_alone():
 
 
 @cases
-def test_a_reading_is_the_same_arm_in_space(name, joints):
-    robot = turned(ARMS[name], joints)
+def test_a_reading_has_the_forward_kinematics_of_the_arm(name, joints):
+    robot = reversed_at(ARMS[name], joints)
     q = robot.random_q(np.random.default_rng(1), 5)
     assert np.allclose(kin.fk(robot, q), kin.fk(ARMS[name], q * signs_of(robot, joints)), atol=1e-12)
     for reversed_, read in readings(robot):
         assert np.allclose(kin.fk(read, q * signs_of(robot, reversed_)), kin.fk(robot, q), atol=1e-12)
 
 
-# -- answers ------------------------------------------------------------------------------------------------------
+# -- results ------------------------------------------------------------------------------------------------------
 
 
 @cases
-def test_answers_are_those_of_the_plain_arm(name, joints):
-    pair = Pair(turned(ARMS[name], joints))
+def test_results_are_those_of_the_plain_arm(name, joints):
+    pair = ArmPair(reversed_at(ARMS[name], joints))
     rng = np.random.default_rng(2)
     found = set()
     for q, T in poses(pair.plain, 2, inside=False):
@@ -206,9 +207,9 @@ def test_answers_are_those_of_the_plain_arm(name, joints):
 
 
 @pytest.mark.parametrize("joints", [joints for name, joints in CASES if name == "pioneer5"], ids=str)
-def test_a_point_alone(joints):
-    """Of other branches a stop may leave a single configuration, which rounding decides about."""
-    pair = Pair(turned(ARMS["pioneer5"], joints))
+def test_position_task(joints):
+    """Only the best solutions are compared: rounding decides whether a branch exists that touches a limit."""
+    pair = ArmPair(reversed_at(ARMS["pioneer5"], joints))
     for q, T in poses(pair.plain, 3, seed=4):
         for options in (
             {},
@@ -223,7 +224,7 @@ def test_a_point_alone(joints):
 
 @cases
 def test_narrowed_limits_and_locked_joints(name, joints):
-    pair = Pair(turned(ARMS[name], joints))
+    pair = ArmPair(reversed_at(ARMS[name], joints))
     plain = pair.plain
     rng = np.random.default_rng(5)
     for q, T in poses(plain, 2, seed=5):
@@ -248,8 +249,8 @@ SEVEN = [(name, joints) for name, joints in CASES if name != "pioneer5"]
 
 
 @pytest.mark.parametrize(("name", "joints"), SEVEN, ids=IDS[-len(SEVEN) :])
-def test_free_values_asked_for_and_preferred(name, joints):
-    pair = Pair(turned(ARMS[name], joints))
+def test_requested_and_preferred_redundancy_values(name, joints):
+    pair = ArmPair(reversed_at(ARMS[name], joints))
     free = "theta1" if name == "redundant7" else "psi"
     for q, T in poses(pair.plain, 1, seed=6):
         seed = q + 0.1
@@ -260,7 +261,7 @@ def test_free_values_asked_for_and_preferred(name, joints):
         for prefer, worth in (("limits", margin), ("manipulability", kin.manipulability)):
             a, b = pair.both(T, prefer=prefer, q_seed=seed)
             assert a.status is b.status is Status.SOLVED
-            # Many values may be as good as each other.
+            # Several values may be equally good.
             here, there = (
                 {s.branch: worth(r, s.q) for s in x.solutions} for r, x in ((pair.plain, a), (pair.robot, b))
             )
@@ -272,14 +273,14 @@ def test_free_values_asked_for_and_preferred(name, joints):
 
 
 def margin(robot, q):
-    """Distance to the nearest stop, as a share of half the joint's range."""
+    """Distance to the nearest limit, as a share of half the joint's range."""
     return float((np.minimum(q - robot.lower, robot.upper - q) / (0.5 * (robot.upper - robot.lower))).min())
 
 
 @cases
 def test_batch_branches(name, joints):
-    robot = turned(ARMS[name], joints)
-    pair = Pair(robot)
+    robot = reversed_at(ARMS[name], joints)
+    pair = ArmPair(robot)
     five = robot.n == 5
     q = pair.plain.random_q(np.random.default_rng(7), 40)
     T = kin.fk(pair.plain, q)
@@ -299,26 +300,26 @@ def test_batch_branches(name, joints):
 
 
 def apart(a, b):
-    """Joint differences, whole turns aside; 0 where there is nothing."""
+    """Joint differences modulo whole turns; 0 where a branch does not exist."""
     return np.nan_to_num(np.abs((a - b + PI) % (2 * PI) - PI))
 
 
 def test_batch_angles_are_in_the_half_open_turn():
-    robot = turned(ARMS["iiwa14"], (2,))
+    robot = reversed_at(ARMS["iiwa14"], (2,))
     q = np.array([0.0, 0.5, PI, -0.7, 0.2, 0.4, 0.1])
     rows = kin.ik_branches(robot, kin.fk(robot, q), 0.0)
     rows = rows[~np.isnan(rows[:, 0])]
     assert (rows > -PI).all()
     assert (np.abs(rows) <= PI).all()
-    printed = turned(ARMS["redundant7"], (0,))
+    printed = reversed_at(ARMS["redundant7"], (0,))
     q = np.array([-PI, 0.5, 0.4, 0.7, 0.2, 0.4, 0.1])
     rows = kin.ik_branches(printed, kin.fk(printed, q), -PI)
-    assert (rows[~np.isnan(rows[:, 0]), 0] == -PI).all()  # as it was asked for
+    assert (rows[~np.isnan(rows[:, 0]), 0] == -PI).all()  # as requested
 
 
-@pytest.mark.parametrize("joint", STRANGE["iiwa14"])
-def test_the_arm_angle_is_counted_from_the_same_plane_over_the_base(joint):
-    base, robot = ARMS["iiwa14"], turned(ARMS["iiwa14"], (joint,))
+@pytest.mark.parametrize("joint", UNUSUAL["iiwa14"])
+def test_the_arm_angle_has_the_same_reference_plane_above_the_base(joint):
+    base, robot = ARMS["iiwa14"], reversed_at(ARMS["iiwa14"], (joint,))
     q = np.array([0.5, 0.4, 0.0, 0.4 + math.asin(0.42 / 0.4 * math.sin(0.4)), 0.3, 0.7, 0.2])
     T = kin.fk(base, q)
     assert np.abs(T[:2, 3] - 0.126 * T[:2, 2]).max() < 1e-12  # the wrist centre is on axis 1
@@ -328,8 +329,8 @@ def test_the_arm_angle_is_counted_from_the_same_plane_over_the_base(joint):
 
 
 @cases
-def test_the_branches_of_the_arm_itself_are_there_and_named_alike(name, joints):
-    base, robot = ARMS[name], turned(ARMS[name], joints)
+def test_reversing_joints_renames_branches_one_to_one(name, joints):
+    base, robot = ARMS[name], reversed_at(ARMS[name], joints)
     signs = signs_of(base, joints)
     names = {}
     for q, _ in poses(base, 60, seed=8):
@@ -354,8 +355,8 @@ def test_the_branches_of_the_arm_itself_are_there_and_named_alike(name, joints):
 
 
 @cases
-def test_singularities_tell_the_real_joints_value(name, joints):
-    pair = Pair(turned(ARMS[name], joints))
+def test_singularities_give_values_of_the_arms_own_joints(name, joints):
+    pair = ArmPair(reversed_at(ARMS[name], joints))
     reversed_values = 0
     for q, _ in poses(pair.plain, 20, seed=10):
         expected = kin.singularities(pair.plain, q)
@@ -374,7 +375,7 @@ def test_singularities_tell_the_real_joints_value(name, joints):
 
 @cases
 def test_the_arm_is_singular_at_the_joint_values_given(name, joints):
-    robot = turned(ARMS[name], joints)
+    robot = reversed_at(ARMS[name], joints)
     for s in kin.singularities(robot, robot.q_home):
         q = robot.q_home.copy()
         for i, value in s.met_at:
@@ -388,8 +389,8 @@ def test_the_arm_is_singular_at_the_joint_values_given(name, joints):
 
 
 @pytest.mark.parametrize(("name", "joints"), [("pioneer5", (2,)), ("redundant7", (0, 2)), ("iiwa14", (2, 4, 6))])
-def test_a_path(name, joints):
-    pair = Pair(turned(ARMS[name], joints))
+def test_paths_are_those_of_the_plain_arm(name, joints):
+    pair = ArmPair(reversed_at(ARMS[name], joints))
     start, end = (q for q, _ in poses(pair.plain, 2, seed=11))
     way = [kin.fk(pair.plain, start + s * 0.3 * (end - start)) for s in np.linspace(0.0, 1.0, 8)]
     a, b = kin.solve_path(pair.plain, way), kin.solve_path(pair.robot, way)
@@ -401,22 +402,22 @@ def test_a_path(name, joints):
 @pytest.mark.parametrize(
     ("name", "joints"), [("pioneer5", (1,)), ("pioneer5", (2, 3)), ("redundant7", (0, 4)), ("iiwa14", (2, 6))]
 )
-def test_capability_maps_are_the_arms_own(name, joints):
+def test_reversing_joints_does_not_change_the_capability_map(name, joints):
     base = ARMS[name]
-    a, b = (kin.capability_map(r, resolution=5, directions=12) for r in (base, turned(base, joints)))
+    a, b = (kin.capability_map(r, resolution=5, directions=12) for r in (base, reversed_at(base, joints)))
     assert a.grid.method == b.grid.method == "closed form"
     assert np.array_equal(a.index, b.index)
     assert np.array_equal(a.approachable, b.approachable)
-    seen = a.approachable.any(axis=1)  # others are reached by a configuration that descents from home come to
+    seen = a.approachable.any(axis=1)  # elsewhere, manipulability is that of whatever a descent found
     assert seen.any()
     assert np.allclose(a.manipulability[seen], b.manipulability[seen], rtol=1e-5, atol=1e-9)
 
 
-# -- tables from elsewhere ----------------------------------------------------------------------------------------
+# -- random tables -----------------------------------------------------------------------------------------------
 
 
 class Table(Draw):
-    """Random arms of a family: lengths of either sign, twists of either sign, any base, either convention."""
+    """Random arms of a family: lengths and twists of either sign, any base, either convention."""
 
     def rows(self, lengths, twists):
         return [(self.angle(), d, a, alpha) for (d, a), alpha in zip(lengths, twists, strict=True)]
@@ -441,19 +442,19 @@ class Table(Draw):
             (self.length(), 0.0),
             (0, 0),
         ]
-        # The tool looks across the last axis, whichever way the zero of the last joint lies.
+        # The tool is perpendicular to the last axis, for any zero of the last joint.
         tool = screw_z(self.angle(), 0.0) @ screw_x(0.0, self.square()) @ screw_z(0.0, self.length())
         return self.rows(lengths, [self.square(), middle, self.square(), self.square(), 0.0]), nested(tool)
 
     def arm(self, family):
         rows, tool = getattr(self, family)()
         table, before, modified = [], (0.0, 0.0), self.rng.random() < 0.5
-        pieces = self.rng.random() < 0.4
-        turn, shift = 0.0, 0.0  # done already by a row that does not move
+        with_fixed_rows = self.rng.random() < 0.4
+        turn, shift = 0.0, 0.0  # of the preceding fixed row
         for i, (theta, d, a, alpha) in enumerate(rows):
             if modified:
                 table.append(Joint(f"j{i}", theta, d, *before, limits=(-PI, PI)))
-            elif pieces:
+            elif with_fixed_rows:
                 table.append(Joint(f"j{i}", theta - turn, d - shift - 0.1, limits=(-PI, PI)))
                 turn, shift = (0.4, 0.2) if i + 1 < len(rows) else (0.0, 0.0)
                 table.append(Joint(f"fixed {i}", 0.0, 0.1, a, alpha, "fixed"))
@@ -471,15 +472,15 @@ class Table(Draw):
 
 
 @pytest.mark.parametrize("family", ["srs7", "collinear7", "wrist5"])
-def test_tables_from_elsewhere(family):
+def test_random_tables_match_their_family(family):
     draw = Table(12)
-    as_it_is = 0
+    unreversed = 0
     for _ in range(25):
         robot = draw.arm(family)
         match = closed_form_of(robot)
         assert match is not None
         assert family == match.name
-        as_it_is += not isinstance(match, ReversedJoints)
+        unreversed += not isinstance(match, ReversedJoints)
         q = robot.random_q(draw.rng, 3)
         T = kin.fk(robot, q)
         for row in kin.ik_branches(robot, T).swapaxes(0, 1):
@@ -493,4 +494,4 @@ def test_tables_from_elsewhere(family):
             assert result.solutions[0].branch == kin.branch_of(robot, seed)
             assert all(s.branch == kin.branch_of(robot, s.q) for s in result.solutions)
             assert match.handles(1) == (family == "wrist5" or robot.T_last_tool[0, 3] == 0.0)
-    assert 0 < as_it_is < 20
+    assert 0 < unreversed < 20

@@ -53,8 +53,8 @@ def target(point, direction):
     return T
 
 
-def asked(found, rng, count, **limits):
-    """(reachable, approachable) of random voxels: pairs of the map's answer and that of `solve_ik`."""
+def compared(found, rng, count, **limits):
+    """(reachable, approachable) of random voxels: pairs of the map's value and that of `solve_ik`."""
     robot, grid = found.grid.robot, found.grid
     reachable, approachable = dense(found)
     for index in rng.permutation([*np.ndindex(grid.shape)])[:count]:
@@ -86,7 +86,7 @@ def test_directions_are_a_spherical_design(count, degree):
     assert apart.min() > 2.0 / math.sqrt(count)
 
     def error(total):
-        """How far the means of all monomials of this degree are from those over the sphere."""
+        """Largest difference between the means of all monomials of this degree and those over the sphere."""
         powers = [p for p in itertools.product(range(total + 1), repeat=3) if sum(p) == total]
         return max(abs(np.prod(directions**p, axis=1).mean() - sphere_mean(p)) for p in powers)
 
@@ -109,7 +109,7 @@ def sphere_mean(powers):
 def test_a_closed_form_map_equals_inverse_kinematics_everywhere(name):
     found = mapped(name)
     assert found.grid.method == "closed form"
-    pairs = np.array([*asked(found, np.random.default_rng(1), 25)])
+    pairs = np.array([*compared(found, np.random.default_rng(1), 25)])
     assert (pairs[:, 0] == pairs[:, 1]).all()
     assert 0 < pairs[:, 0].sum() < len(pairs)
 
@@ -118,7 +118,7 @@ def test_a_closed_form_map_equals_inverse_kinematics_everywhere(name):
 def test_other_maps_have_no_false_positives_and_few_misses(name, method):
     found = mapped(name, 5)
     assert found.grid.method == method
-    claimed, true = np.array([*asked(found, np.random.default_rng(2), 16)]).T
+    claimed, true = np.array([*compared(found, np.random.default_rng(2), 16)]).T
     assert not (claimed & ~true).any()
     assert claimed.sum() > 0.97 * true.sum() > 0
 
@@ -131,7 +131,7 @@ def test_the_redundancy_of_a_singular_target_is_resolved_inside_the_limits():
     grid = kin.capability_grid(robot, resolution=7, directions=12, limits=limits)
     grid = replace(grid, origin=(-0.02, -0.02, -0.2), voxel=0.04, shape=(1, 1, 30))
     found = kin.capability_join(grid, [kin.capability_block(grid, 0)])
-    pairs = np.array([*asked(found, np.random.default_rng(3), 8, limits=limits)])
+    pairs = np.array([*compared(found, np.random.default_rng(3), 8, limits=limits)])
     assert (pairs[:, 0] == pairs[:, 1]).all()
     assert found.approachable[:, 0].sum() > 3
 
@@ -154,7 +154,7 @@ def test_manipulability_is_evaluated_at_several_arm_angles_or_rolls(name):
             q = np.concatenate([kin.ik_branches(robot, T @ screw_z(angle, 0.0)) for angle in angles])
         else:
             q = np.concatenate([kin.ik_branches(robot, T, angle) for angle in angles])
-            q[..., 6] = np.where(np.isnan(q[..., 0]), math.nan, 0.0)  # rolling the tool changes nothing
+            q[..., 6] = np.where(np.isnan(q[..., 0]), math.nan, 0.0)  # the roll of the tool has no effect
         q = q[~np.isnan(q[..., 0])]
         ratios.append(found.manipulability[k] / kin.manipulability(robot, q[in_limits(robot, q)]).max())
     assert len(ratios) > 20
@@ -169,7 +169,7 @@ def test_manipulability_is_the_best_of_all_branches(name):
         T = np.array([target(found.centres[k], d) for d in found.grid.directions[found.approachable[k]]])
         q = kin.ik_branches(robot, T).reshape(-1, robot.n)
         q = q[~np.isnan(q[:, 0])]
-        q[:, -1:] = np.where(name == "puma560", 0.0, q[:, -1:])  # rolling the tool changes nothing
+        q[:, -1:] = np.where(name == "puma560", 0.0, q[:, -1:])  # the roll of the tool has no effect
         best = kin.manipulability(robot, q[in_limits(robot, q)]).max()
         assert found.manipulability[k] == pytest.approx(best, rel=1e-6)
 
@@ -184,7 +184,7 @@ def same(a, b):
     )
 
 
-def test_blocks_in_any_order_thread_and_copy_give_the_same_bits():
+def test_blocks_are_bit_identical_in_any_order_thread_and_copy():
     grid = kin.capability_grid(kin.get_robot("redundant7-craig"), resolution=10)
     count = len(grid.blocks)
     assert count > 1
@@ -215,7 +215,7 @@ def test_blocks_of_another_size_give_the_same_voxels(monkeypatch):
             assert same(whole, kin.capability_join(fine, blocks))
 
 
-def test_a_map_knows_the_places_of_its_voxels():
+def test_voxels_have_the_right_indices_and_centres():
     found = mapped("puma560")
     grid = found.grid
     assert max(grid.shape) == 7
@@ -226,7 +226,7 @@ def test_a_map_knows_the_places_of_its_voxels():
     assert found.share.dtype == found.manipulability.dtype == np.float32
     assert (found.share == found.approachable.mean(axis=1).astype(np.float32)).all()
     assert found.volume == pytest.approx(len(found.index) * grid.voxel**3)
-    # The voxels fill the bounding box of the workspace and no more.
+    # The voxels cover exactly the bounding box of the workspace.
     facts = kin.workspace_facts(grid.robot, volume=False)
     low = np.array([span.least.value for span in (facts.x, facts.y, facts.z)])
     high = np.array([span.largest.value for span in (facts.x, facts.y, facts.z)])
@@ -254,7 +254,7 @@ def test_limits_and_locks_are_respected():
         "locked": [None, None, 0.4, None, None, None],
     }
     found = kin.capability_map(robot, resolution=5, directions=12, **asked_for)
-    pairs = np.array([*asked(found, np.random.default_rng(5), 40, **asked_for)])
+    pairs = np.array([*compared(found, np.random.default_rng(5), 40, **asked_for)])
     # With joint 3 locked four joints are left for a task of dimension five: points are reachable, directions
     # rarely.
     assert (pairs[:, 0] == pairs[:, 1]).all()
@@ -277,7 +277,7 @@ def made(*joints):
     return Robot("made", "made", "made", "standard", joints, tuple(0.1 for _ in joints))
 
 
-def test_arms_with_too_few_joints_for_directions_have_points_only():
+def test_maps_of_arms_with_too_few_joints_for_directions_have_points_only():
     flat = made(Joint("a", a=0.3, limits=(-3.0, 3.0)), Joint("b", a=0.2, limits=(-2.0, 2.0)))
     found = kin.capability_map(flat, resolution=9, directions=12)
     assert found.grid.shape[2] == 1
@@ -292,11 +292,11 @@ def test_joints_without_limits_take_any_value():
     free = replace(robot, rows=tuple(replace(row, limits=None) for row in robot.rows))
     found = kin.capability_map(free, resolution=5, directions=12)
     assert found.share.mean() > mapped("puma560", 5).share.mean()
-    pairs = np.array([*asked(found, np.random.default_rng(6), 15)])
+    pairs = np.array([*compared(found, np.random.default_rng(6), 15)])
     assert (pairs[:, 0] == pairs[:, 1]).all()
 
 
-# Misuse
+# Invalid input
 
 
 @pytest.mark.parametrize(
@@ -314,14 +314,14 @@ def test_joints_without_limits_take_any_value():
         ({"limits": [(1.0, 0.0)] + [None] * 4}, "limits[0]"),
     ],
 )
-def test_misuse_names_the_argument(arguments, field):
+def test_invalid_input_names_the_argument(arguments, field):
     with pytest.raises(InputError) as caught:
         kin.capability_grid(kin.get_robot("pioneer5"), **arguments)
     assert caught.value.field == field
 
 
 @pytest.mark.parametrize("block", [-1, 1, 0.0, None])
-def test_a_block_is_one_of_the_grid(block):
+def test_a_block_outside_the_grid_is_rejected(block):
     grid = kin.capability_grid(kin.get_robot("pioneer5"), voxel=0.2, directions=12)
     assert len(grid.blocks) == 1
     with pytest.raises(InputError, match="block"):
