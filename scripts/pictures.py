@@ -17,21 +17,20 @@ from playwright.sync_api import sync_playwright
 
 from app.viewer.scene.arm import ArmScene
 from app.viewer.scene.camera import FOV, view
-from kin import Robot, builtin_robots, link_frames
+from app.viewer.scene.lights import light_scene
+from kin import Robot, builtin_robots
 
 FOLDER = Path(__file__).parents[1] / "static" / "robots"
 SIZE = (320, 240)
 FINER = 3  # drawn so many times larger: smooth edges
 MARGIN = 10
-TALLEST = 1.05  # height of a picture over its width
-PAD = 0.07  # of the whole, for the hand around its frame
 
 
 def draw(client: viser.ClientHandle, robot: Robot) -> Image.Image:
     """The arm, cut out and centred."""
     arm = ArmScene(client.scene, robot, root=f"/{robot.id}")
     arm.gizmo.visible = False
-    arm.show_floor(False)
+    arm.floor.show(False)
     arm.show_labels(False)
     width, height = (FINER * side for side in SIZE)
     position, look_at = view(arm.body, width / height)
@@ -46,18 +45,11 @@ def draw(client: viser.ClientHandle, robot: Robot) -> Image.Image:
     )
     arm.remove()
     picture = Image.fromarray(pixels)
-    left, top, right, bottom = picture.getbbox()
-    # A tall pedestal runs out of the picture, or the arm on it would be tiny; no joint and no tool does.
-    seen = (link_frames(robot, robot.q_home)[:, :3, 3] - position) @ np.column_stack([np.cross(x, z), z])
-    lowest = height / 2 * (1.0 - (seen[:, 0] / seen[:, 1] / np.tan(FOV / 2)).min()) + PAD * height
-    end = min(bottom, max(round(top + TALLEST * (right - left)), round(lowest)))
-    cut = end < bottom
-    picture = picture.crop((left, top, right, end))
-    room = (SIZE[0] - 2 * MARGIN, SIZE[1] - (1 if cut else 2) * MARGIN)
+    picture = picture.crop(picture.getbbox())
+    room = (SIZE[0] - 2 * MARGIN, SIZE[1] - 2 * MARGIN)
     picture = ImageOps.contain(picture, room, Image.Resampling.LANCZOS)
     canvas = Image.new("RGBA", SIZE)
-    above = SIZE[1] - picture.height if cut else (SIZE[1] - picture.height) // 2
-    canvas.paste(picture, ((SIZE[0] - picture.width) // 2, above))
+    canvas.paste(picture, ((SIZE[0] - picture.width) // 2, (SIZE[1] - picture.height) // 2))
     return canvas
 
 
@@ -65,11 +57,7 @@ def main() -> None:
     """Draw all arms."""
     FOLDER.mkdir(exist_ok=True)
     server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    server.scene.configure_environment_map(None)
-    server.scene.configure_default_lights(enabled=True, cast_shadow=False)
-    server.scene.add_light_hemisphere(
-        "/sky", sky_color=(255, 255, 255), ground_color=(176, 184, 200), intensity=1.6
-    )
+    light_scene(server.scene)
     done = threading.Event()
 
     @server.on_client_connect

@@ -16,6 +16,7 @@ from app.shared.store import Store
 from app.shared.summaries import Summaries
 from app.viewer.panel.status import Notice
 from app.viewer.panel.view import configure_theme
+from app.viewer.scene.lights import light_scene
 from app.viewer.scene.motion import Pace
 from app.viewer.session.page import WELCOME, VisitorPage
 from app.viewer.session.services import Services
@@ -66,7 +67,7 @@ class ViewerServer:
             server = viser.ViserServer(host="127.0.0.1", port=0, label="Kinboard", verbose=False)
         self._server = server
         configure_theme(server.gui, dark=False)
-        _light(server.scene)
+        light_scene(server.scene)
         server.on_client_connect(self._connect)
         server.on_client_disconnect(self._disconnect)
         return server.get_port()
@@ -131,14 +132,3 @@ class ViewerServer:
             page = self._pages.pop(client.client_id, None)
         if page is not None:
             page.end()
-
-
-def _light(scene: viser.SceneApi) -> None:
-    """Light from above and a little from below.
-
-    This replaces viser's environment map, whose preparation blocks the page for ten seconds or more on a machine
-    without a graphics card.
-    """
-    scene.configure_environment_map(None)
-    scene.configure_default_lights(enabled=True, cast_shadow=True)
-    scene.add_light_hemisphere("/sky", sky_color=(255, 255, 255), ground_color=(176, 184, 200), intensity=1.6)

@@ -7,13 +7,14 @@ without browsers.
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import viser
 
 from app.viewer.scene.chain import turn
+from app.viewer.scene.floor import Floor
 from app.viewer.scene.gizmo_axes import GizmoAxes
+from app.viewer.scene.lights import add_lamp
 from app.viewer.scene.meshes import Part, body
 from app.viewer.viser_patches import assign, keep_private
 from kin import Robot, fk, link_frames
@@ -23,9 +24,8 @@ from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
 NO_SHADOW = ("trim", "axis", "approach")
 STILL, NO_TURN = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
 SAME = 1e-9  # rad or m: smaller changes are below the precision of a browser's numbers
+GIZMO = 0.26  # length of the gizmo's arrows, in radii of the sphere around the arm
 GAP_COLOR = (213, 94, 0)
-GRID_LIGHT = {"cell_color": (214, 219, 226), "section_color": (176, 184, 196)}
-GRID_DARK = {"cell_color": (58, 64, 74), "section_color": (88, 96, 110)}
 
 
 class ArmScene:
@@ -54,10 +54,11 @@ class ArmScene:
         self._axes: list[viser.SceneNodeHandle] = []
         self._shown = [math.nan] * robot.n
         self._top: list[viser.SceneNodeHandle] = []
-        self._build_floor(dark)
+        self.floor = Floor(scene, root, self.body, robot.T_world_base[:3, 3], dark)
+        self._top += [*self.floor.nodes, add_lamp(scene, f"{root}-lamp", self.body)]
         self._build_arm()
         self.gizmo = scene.add_transform_controls(
-            f"{root}-target", scale=0.26 * self.body.radius, line_width=4.0, depth_test=False, opacity=0.95
+            f"{root}-target", scale=GIZMO * self.body.radius, line_width=4.0, depth_test=False, opacity=0.95
         )
         keep_private(self.gizmo)
         self._ghost = self._add(f"{root}-target", self.body.gripper[0], opacity=0.35, visible=False)
@@ -115,7 +116,7 @@ class ArmScene:
         self._rings = [
             self._scene.add_transform_controls(
                 f"{self.gizmo.name}/ring-{'xyz'[axis]}-{self._ring_sets}",
-                scale=0.26 * self.body.radius,
+                scale=GIZMO * self.body.radius,
                 line_width=4.0,
                 active_axes=(axis != 0, axis != 1, axis != 2),
                 disable_axes=True,
@@ -131,8 +132,11 @@ class ArmScene:
         return self._rings
 
     def show_gap(self, tool: Array, target: Array | None) -> None:
-        """Draw a line to an unreached target ``(3,)``, and a ghost gripper there; None hides both."""
-        self._gap.visible = self._ghost.visible = target is not None
+        """Draw a line to an unreached target ``(3,)``, and a ghost gripper there; None hides both.
+
+        The arrow of the approach direction is drawn then, too; otherwise it would cover the gizmo's.
+        """
+        self._gap.visible = self._ghost.visible = self._approach.visible = target is not None
         if target is not None:
             self._gap.points = np.array([[tool, target]], dtype=np.float32)
 
@@ -151,43 +155,16 @@ class ArmScene:
         for node in self._axes:
             node.visible = visible
 
-    def show_floor(self, visible: bool) -> None:
-        """Show or hide the grid."""
-        self._grid.visible = visible
-
-    def use_dark(self, dark: bool) -> None:
-        """Use the grid colours of a dark or a light page."""
-        colors = GRID_DARK if dark else GRID_LIGHT
-        self._grid.cell_color, self._grid.section_color = colors["cell_color"], colors["section_color"]
-
     def remove(self) -> None:
         """Remove everything from the scene."""
         for node in self._top:
             node.remove()
 
-    def _build_floor(self, dark: bool) -> None:
-        unit = 0.1 if self.body.radius < 0.6 else 0.25
-        width = max(2, round(7 * self.body.radius / unit / 4)) * 4 * unit
-        colors: dict[str, Any] = GRID_DARK if dark else GRID_LIGHT
-        self._grid = self._scene.add_grid(
-            f"{self._root}-floor",
-            width=width,
-            height=width,
-            cell_size=unit,
-            section_size=4 * unit,
-            position=(0.0, 0.0, self.body.floor),
-            fade_distance=9 * self.body.radius,
-            fade_strength=1.5,
-            fade_from="origin",
-            shadow_opacity=0.2,
-            **colors,
-        )
-        self._top.append(self._grid)
-
     def _build_arm(self) -> None:
         root = self._scene.add_frame(self._root, show_axes=False)
         self._top.append(root)
         self._add(self._root, self.body.pedestal)
+        self._add_frame(self._root, -1, self.robot.T_world_base)
         name = self._root
         for link, parts, q in zip(self.body.chain.links, self.body.parts, (0.0, *self.robot.home), strict=True):
             parent = name
@@ -208,7 +185,9 @@ class ArmScene:
                 self._add_frame(name, row, T)
         tool = self.body.chain.T_last_tool
         for part in self.body.gripper:
-            self._add(name, part, tool)
+            node = self._add(name, part, tool, visible=part.name != "approach")
+            if part.name == "approach":
+                self._approach = node
 
     def _add(
         self,
@@ -230,10 +209,15 @@ class ArmScene:
             wxyz=wxyz_from_rotation(T[:3, :3]),
             visible=visible,
             cast_shadow=opacity is None and part.name not in NO_SHADOW,
+            receive_shadow=False,  # round parts would shade themselves in stripes
         )
 
     def _add_frame(self, parent: str, row: int, T: Array) -> None:
+        """The frame of a DH row; row −1 is the base frame."""
+        rows = len(self.robot.rows)
         length = 4.0 * self.body.size
+        if row + 1 == rows:
+            length = min(length, 0.5 * GIZMO * self.body.radius)  # the gizmo's arrows are on top of it
         name = f"{parent}/frame-{row + 1}"
         self._frames.append(
             self._scene.add_frame(
@@ -245,10 +229,10 @@ class ArmScene:
                 visible=False,
             )
         )
-        text = f"frame {row + 1}" if row + 1 < len(self.robot.rows) else "tool"
+        text = "base" if row < 0 else "tool" if row + 1 == rows else f"frame {row + 1}"
         # At the tip of z, each further out than the last: the frames of one wrist share their origin.
-        origins = self._home_frames[:, :3, 3]
-        crowd = int((np.linalg.norm(origins[:row] - origins[row], axis=1) < 1e-6).sum())
+        origins = np.vstack([self.robot.T_world_base[None, :3, 3], self._home_frames[:, :3, 3]])
+        crowd = int((np.linalg.norm(origins[: row + 1] - origins[row + 1], axis=1) < 1e-6).sum())
         self._labels.append(
             self._scene.add_label(
                 f"{name}/label",

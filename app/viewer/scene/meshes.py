@@ -44,6 +44,8 @@ TOOL_COLOR: Color = (92, 99, 112)
 APPROACH_COLOR: Color = (214, 39, 120)
 PEDESTAL_COLOR: Color = (126, 134, 147)
 PROBES = 8000
+PEDESTAL = 0.12  # height of a pedestal, relative to the reach
+COLUMN, FOOT = 1.6, 3.4  # radii of its column and foot, relative to the thickness of a link
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +71,8 @@ class Body:
         parts: per link (base first), its meshes.
         gripper: the tool's meshes in the tool frame, z being the approach direction.
         pedestal: supports the base, in world coordinates.
-        floor: height of the floor (m), below everything the arm can reach.
+        column: radius of the pedestal's column (m) below an upright base; 0 if the base hangs or is tilted.
+        floor: height of the floor (m), below the arm at home; the arm may reach lower.
         center, radius: the sphere ``(3,)``, m that the camera should show.
         size: radius of the thickest link (m), the unit of all decoration.
     """
@@ -78,6 +81,7 @@ class Body:
     parts: tuple[tuple[Part, ...], ...]
     gripper: tuple[Part, ...]
     pedestal: Part
+    column: float
     floor: float
     center: Array
     radius: float
@@ -97,13 +101,12 @@ def body(robot: Robot) -> Body:
         crowd = crowd + 1 if link.index > 0 and np.linalg.norm(link.T_parent_axis[:3, 3]) < 1e-6 else 0
         held = grip if all(len(after.path) < 2 for after in links.links[link.index + 2 :]) else 0.0
         parts.append(_link_parts(link, size * _taper(link.index, robot.n, tip), crowd, held, links))
-    reach = _extent(robot)
-    floor = min(reach[0][2] - 2.5 * size, robot.T_world_base[2, 3] - 3 * size)
-    floor = math.floor(floor / 0.05) * 0.05
+    floor = _floor(robot, size)
     center, radius = _view_sphere(robot, floor, size)
     hand = _gripper(min(size, grip / 2), grip)
     pedestal = _pedestal(robot, size, floor)
-    return Body(links, tuple(parts), hand, pedestal, floor, center, radius, size)
+    column = COLUMN * size if _upright(robot) else 0.0
+    return Body(links, tuple(parts), hand, pedestal, column, floor, center, radius, size)
 
 
 def joint_color(index: int) -> Color:
@@ -237,17 +240,38 @@ def _gripper(size: float, grip: float) -> tuple[Part, ...]:
     )
 
 
+def _upright(robot: Robot) -> bool:
+    return bool(robot.T_world_base[2, 2] > 0.7)
+
+
+def _floor(robot: Robot, size: float) -> float:
+    """Height of the floor: a short pedestal below an upright base, and below the arm at home.
+
+    An arm that can go deeper may pass through the floor. A tilted or hanging arm stays above it.
+    """
+    lowest = float(_extent(robot)[0][2]) - 2.5 * size
+    base = float(robot.T_world_base[2, 3])
+    floor = min(lowest, base - 3 * size)
+    if _upright(robot):
+        home = float(link_frames(robot, robot.q_home)[:, 2, 3].min()) - 1.8 * size
+        floor = max(floor, min(base - max(PEDESTAL * robot.reach, 3 * size), home))
+    return math.floor(floor / 0.05) * 0.05
+
+
 def _pedestal(robot: Robot, size: float, floor: float) -> Part:
+    """A plate at the base, and a column down to the floor; that of a hanging base leads up."""
     base = robot.T_world_base
     top = float(base[2, 3])
     plate = placed(cylinder(2.3 * size, -0.9 * size, 0.0), base)
-    x, y = base[:2, 3]
     foot = np.eye(4)
-    foot[:3, 3] = x, y, 0.0
-    column = [
-        cylinder(1.45 * size, floor, top - 0.4 * size, bevel=0.02),
-        cylinder(3.6 * size, floor, floor + 0.5 * size),
-    ]
+    foot[:2, 3] = base[:2, 3]
+    if base[2, 2] < -0.7:
+        column = [cylinder(COLUMN * size, top + 0.4 * size, top + 6.0 * size, bevel=0.02)]
+    else:
+        column = [
+            cylinder(COLUMN * size, floor, top - 0.4 * size, bevel=0.02),
+            cylinder(FOOT * size, floor, floor + 0.5 * size),
+        ]
     return Part("pedestal", merged([plate, *(placed(part, foot) for part in column)]), PEDESTAL_COLOR)
 
 
@@ -259,10 +283,10 @@ def _extent(robot: Robot) -> Array:
 
 
 def _view_sphere(robot: Robot, floor: float, size: float) -> tuple[Array, float]:
-    """A sphere around the arm at home and most of its pedestal."""
+    """A sphere around the arm at home and its pedestal."""
     points = [robot.T_world_base[:3, 3], *link_frames(robot, robot.q_home)[:, :3, 3]]
-    points.append(np.array([*robot.T_world_base[:2, 3], 0.55 * floor]))
+    points.append(np.array([*robot.T_world_base[:2, 3], floor]))
     corners = np.array([np.min(points, axis=0), np.max(points, axis=0)])
     center = corners.mean(axis=0)
-    radius = max(float(np.linalg.norm(np.array(points) - center, axis=1).max()) + 3 * size, 0.5 * robot.reach)
+    radius = max(float(np.linalg.norm(np.array(points) - center, axis=1).max()) + 3 * size, 0.45 * robot.reach)
     return center, radius

@@ -182,6 +182,7 @@ class VisitorPage(Worker):
         self.sliders.remove()
         self.sliders = self._make_sliders()
         self.posture.show()
+        self.arm.scene.floor.use_units(units)
         self._readout_due = True
         self.for_features(lambda feature: feature.on_style())
 
@@ -191,7 +192,8 @@ class VisitorPage(Worker):
         scene.show_frames(self.view.frames)
         scene.show_labels(self.view.labels)
         scene.show_axes(self.view.axes)
-        scene.use_dark(self.view.dark)
+        scene.floor.use_dark(self.view.dark)
+        scene.floor.use_units(self.units)
 
     def for_features(self, action: Callable[[Feature], None]) -> None:
         """Call every feature; an error of one does not stop the others."""

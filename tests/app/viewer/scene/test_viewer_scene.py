@@ -141,12 +141,61 @@ def test_bodies_are_valid_and_above_the_floor(robot: kin.Robot) -> None:
         assert np.isfinite(part.mesh.vertices).all(), part.name
         assert part.mesh.faces.max() < len(part.mesh.vertices)
         assert part.mesh.area > 0
-    frames = kin.link_frames(robot, robot.random_q(np.random.default_rng(3), 4000))
-    assert frames[..., 2, 3].min() - made.size > made.floor
+    base = robot.T_world_base
+    upright = base[2, 2] > 0.7
+    q = robot.q_home[None] if upright else robot.random_q(np.random.default_rng(3), 4000)
+    assert kin.link_frames(robot, q)[..., 2, 3].min() - made.size > made.floor
+    assert (made.column > 0) == upright
+    lowest_home = kin.link_frames(robot, robot.q_home)[:, 2, 3].min()
+    if upright and lowest_home > base[2, 3]:
+        assert base[2, 3] - made.floor < 0.2 * robot.reach + 3 * made.size + 0.05, "the pedestal is short"
     assert made.pedestal.mesh.bounds[0, 2] == pytest.approx(made.floor)
     assert len(made.parts) == robot.n + 1
     for link in made.parts[1:]:
         assert {"housing", "axis"} <= {part.name for part in link}, "each joint shows itself and its axis"
+
+
+def test_a_hanging_arm_hangs_from_a_column() -> None:
+    down = robot_of(
+        "standard", ("1", "revolute", 0, 0.2, 0, 90), ("2", "revolute", 0, 0, 0.3, 0),
+        extra="[base]\nxyz = [0, 0, 1.5]\nrpy = [180, 0, 0]\n",
+    )  # fmt: skip
+    made = body(down)
+    assert made.column == 0.0
+    assert made.pedestal.mesh.bounds[0, 2] > 1.49, "nothing stands where the arm moves"
+    assert made.pedestal.mesh.bounds[1, 2] > 1.5
+    assert made.floor < 1.5 - 0.5
+
+
+def test_the_floor_names_its_scale_and_the_gizmo_stands_free(server: viser.ViserServer) -> None:
+    robot = Store().get("ur5")
+    arm = ArmScene(server.scene, robot)
+    get = server.scene.get_handle_by_name
+    (bar,) = node_names(server.scene, "arm-scale")
+    length = np.ptp(get(bar).points[0][:, 0])  # type: ignore[union-attr]
+    for units, text in ((DEFAULT_UNITS, "200 mm"), (Units(length="cm"), "20 cm"), (Units(length="m"), "0.2 m")):
+        arm.floor.use_units(units)
+        assert get(f"{bar}/length").text == text  # type: ignore[union-attr]
+    assert length == pytest.approx(0.2)
+    arm.floor.show(False)
+    assert not get(bar).visible  # type: ignore[union-attr]
+    arm.show_frames(True)
+    base = get("/arm/frame-0")
+    assert base is not None
+    assert base.visible
+    assert np.allclose(base.position, robot.T_world_base[:3, 3])
+    assert get("/arm/frame-0/label").text == "base"  # type: ignore[union-attr]
+    (tool,) = node_names(server.scene, "frame-6")
+    assert get(tool).axes_length < 0.6 * get(arm.gizmo.name).scale, (
+        "the gizmo's arrows reach past the tool's frame"
+    )  # type: ignore[union-attr]
+    (approach,) = node_names(server.scene, "approach")
+    T = kin.fk(robot, robot.q_home)
+    arm.show_gap(T[:3, 3], None)
+    assert not get(approach).visible, "it would cover an arrow of the gizmo"  # type: ignore[union-attr]
+    arm.show_gap(T[:3, 3], T[:3, 3] + 0.3)
+    assert get(approach).visible  # type: ignore[union-attr]
+    arm.remove()
 
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=IDS)

@@ -1,0 +1,101 @@
+"""The floor below an arm: a grid with a scale, and a soft shadow where the pedestal stands."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from app.viewer.scene.meshes import Body
+from kin.transforms import Array
+from kin.units import Units
+
+LIGHT: dict[str, Any] = {
+    "cell_color": (200, 208, 219),
+    "section_color": (158, 169, 184),
+    "plane_color": (250, 251, 253),
+}
+DARK: dict[str, Any] = {"cell_color": (62, 70, 82), "section_color": (94, 105, 121), "plane_color": (44, 50, 60)}
+INK_LIGHT, INK_DARK = (70, 80, 94), (176, 186, 200)
+WIDTH = 10.0  # of the grid, in radii of the sphere around the arm; it fades out before
+SCALES = (0.1, 0.2, 0.5, 1.0)  # lengths of the scale bar, m
+SHADOW_PIXELS = 96
+
+
+class Floor:
+    """The nodes of one arm's floor.
+
+    Args:
+        root: prefix of the nodes' names.
+        base: position ``(3,)`` of the arm's base.
+    """
+
+    def __init__(self, scene: viser.SceneApi, root: str, body: Body, base: Array, dark: bool) -> None:
+        unit = 0.1 if body.radius < 0.6 else 0.25
+        section = unit * (5 if unit == 0.1 else 4)
+        width = max(2, round(WIDTH * body.radius / section / 2)) * 2 * section
+        x, y = base[:2].tolist()
+        self.scale = min(SCALES, key=lambda length: abs(length - 0.55 * body.radius))
+        self._grid = scene.add_grid(
+            f"{root}-floor",
+            width=width,
+            height=width,
+            cell_size=unit,
+            section_size=section,
+            position=(0.0, 0.0, body.floor),
+            fade_distance=0.5 * width,
+            fade_strength=1.6,
+            fade_from="origin",
+            shadow_opacity=0.3,
+            plane_opacity=0.55,
+            **(DARK if dark else LIGHT),
+        )
+        wide = 15.0 * body.size
+        above = body.floor + 0.02 * body.size
+        self._shadow = scene.add_image(
+            f"{root}-contact", _spot(), wide, wide, position=(x, y, above), cast_shadow=False, receive_shadow=False
+        )
+        # The bar lies along x, in front of the arm in the default view.
+        at = np.array([x + 0.12 * body.radius, y + 0.52 * body.radius, above])
+        end, tick = at + np.array([self.scale, 0.0, 0.0]), np.array([0.0, 0.03 * body.radius, 0.0])
+        bar = np.array([[at, end], [at - tick, at + tick], [end - tick, end + tick]], np.float32)
+        self._bar = scene.add_line_segments(
+            f"{root}-scale", bar, INK_DARK if dark else INK_LIGHT, thickness=2.0, thickness_units="screen"
+        )
+        self._label = scene.add_label(
+            f"{root}-scale/length",
+            "",
+            position=(at + end) / 2.0 + 2.0 * tick,
+            font_screen_scale=0.9,
+            anchor="center-center",
+        )
+        self.nodes: list[viser.SceneNodeHandle] = [self._grid, self._shadow, self._bar]
+
+    def show(self, visible: bool) -> None:
+        """Show or hide the floor."""
+        for node in self.nodes:
+            node.visible = visible
+
+    def use_dark(self, dark: bool) -> None:
+        """Use the colours of a dark or a light page."""
+        colors = DARK if dark else LIGHT
+        for name, color in colors.items():
+            setattr(self._grid, name, color)
+        self._bar.colors = np.array(INK_DARK if dark else INK_LIGHT, np.uint8)
+
+    def use_units(self, units: Units) -> None:
+        """Name the length of the scale bar in these units."""
+        self._label.text = units.lengths.brief(self.scale)
+
+
+@cache
+def _spot() -> NDArray[np.uint8]:
+    """A black spot that fades out towards its edge, RGBA."""
+    axis = np.linspace(-1.0, 1.0, SHADOW_PIXELS)
+    radius = np.hypot(*np.meshgrid(axis, axis))
+    image = np.zeros((SHADOW_PIXELS, SHADOW_PIXELS, 4), np.uint8)
+    image[..., 3] = 150.0 * np.clip(1.0 - radius, 0.0, 1.0) ** 1.8
+    return image
