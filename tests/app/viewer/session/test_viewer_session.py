@@ -218,7 +218,7 @@ def test_frames_and_labels_can_be_shown(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
         frames = [n for n in tab.nodes if "/frame-" in n and not n.endswith("label")]
-        assert len(frames) == len(PIONEER.rows)
+        assert len(frames) == 1 + len(PIONEER.rows), "the base and every row"
         assert not any(tab.visible[n] for n in frames)
         tab.set("Link frames", True)
         tab.wait(lambda: all(tab.visible[n] for n in frames))
