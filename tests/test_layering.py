@@ -48,7 +48,7 @@ RULES: dict[str, set[str]] = {
         *("app.api", "app.equations", "app.exports", "app.shared"),
     },
     "app/viewer": {
-        *("viser", "trimesh", "numpy", "uvloop", "jinja2", "markupsafe", "kin"),
+        *("viser", "trimesh", "numpy", "jinja2", "markupsafe", "kin"),
         *("app.viewer", "app.equations", "app.exports", "app.shared"),
     },
     "app/service": {
@@ -56,7 +56,7 @@ RULES: dict[str, set[str]] = {
         *("app.api", "app.service", "app.shared", "app.viewer"),
     },
     "app/service/web": {
-        *("starlette", "websockets", "msgspec", "itsdangerous", "kin"),
+        *("starlette", "msgspec", "itsdangerous", "kin"),
         *("app.api.problems", "app.service.web", "app.shared"),
     },
     "app/cli": {"kin", "numpy", "pydantic", "typing_extensions", "app.cli", "app.exports", "app.shared"},

@@ -7,6 +7,7 @@ rarely needed in the first minute, such as those of workspace clouds, are compil
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import threading
 from collections.abc import Callable
@@ -55,6 +56,7 @@ class Startup:
         self._bridge = bridge
         self._on_ready = on_ready
         self._viewer: ViewerServer | None = None
+        self._loop: asyncio.AbstractEventLoop
         self._stopping = threading.Event()
         self._viewer_settled = threading.Event()
         # A daemon, so that Ctrl-C need not wait for the end of a compilation.
@@ -62,14 +64,15 @@ class Startup:
         self._rest = threading.Thread(target=self._warm_up_rest, name="kinboard-warm-up", daemon=True)
 
     def start(self) -> None:
-        """Start; returns at once."""
+        """Start; returns at once. The viewer serves its visitors in the running event loop."""
+        self._loop = asyncio.get_running_loop()
         self._thread.start()
 
     def stop(self) -> None:
         """Stop the viewer and the compilation of kernels. A kernel being compiled ends with the process."""
         self._stopping.set()
         self._viewer_settled.wait(timeout=5.0)
-        self._bridge.port = None
+        self._bridge.viewer = None
         if self._viewer is not None:
             self._viewer.stop()
         if self._rest.ident is not None:
@@ -103,7 +106,7 @@ class Startup:
             from app.viewer.server import ViewerServer
 
             viewer = ViewerServer(self._store, self._settings, self._clouds, self._maps, self._summaries)
-            self._bridge.port = viewer.start()
-            self._viewer = viewer
+            viewer.start(self._loop)
+            self._viewer = self._bridge.viewer = viewer
         finally:
             self._viewer_settled.set()

@@ -1,15 +1,15 @@
-"""The viewer: a viser server on the loopback interface, with one page per connected browser tab."""
+"""The viewer: a viser server without a port, with one page per connected browser tab."""
 
 from __future__ import annotations
 
-import contextlib
-import io
+import asyncio
 import logging
 import threading
 
 import viser
 
 from app.shared.clouds import Clouds
+from app.shared.connection import Connection, ConnectionEnded
 from app.shared.maps import Maps
 from app.shared.settings import Settings
 from app.shared.store import Store
@@ -20,7 +20,8 @@ from app.viewer.scene.lights import light_scene
 from app.viewer.scene.motion import Pace
 from app.viewer.session.page import WELCOME, VisitorPage
 from app.viewer.session.services import Services
-from app.viewer.viser_patches import cache_type_hints, set_events_in_their_loop, uvloop_event_loops
+from app.viewer.viser_patches import cache_type_hints, set_events_in_their_loop
+from app.viewer.viser_server import PortlessServer, client_page, start_viser
 
 log = logging.getLogger(__name__)
 
@@ -34,7 +35,7 @@ RESTARTED = Notice(
 
 
 class ViewerServer:
-    """Serves the 3-D page on 127.0.0.1. The public port forwards to it and checks access.
+    """Serves the 3-D page to connections that the service has accepted, and whose access it has checked.
 
     Args:
         maps, summaries: shared with REST; None: the viewer creates and closes its own.
@@ -53,24 +54,30 @@ class ViewerServer:
         self._owns_summaries = summaries is None
         self._settings = settings
         self._server: viser.ViserServer | None = None
+        self._connections: PortlessServer
         self._pages: dict[int, VisitorPage] = {}
         self._lock = threading.Lock()
 
-    def start(self) -> int:
-        """Start listening on a free port of 127.0.0.1 and return that port."""
+    def start(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Prepare for `serve` in the running event loop `loop`; call it from another thread than the loop's."""
         if self._server is not None:
             raise RuntimeError("the viewer is already running")
         cache_type_hints()
         set_events_in_their_loop()
-        # viser prints its own address, which visitors must not use
-        with contextlib.redirect_stdout(io.StringIO()), uvloop_event_loops():
-            server = viser.ViserServer(host="127.0.0.1", port=0, label="Kinboard", verbose=False)
+        server, self._connections = start_viser(loop, label="Kinboard")
         self._server = server
         configure_theme(server.gui, dark=False)
         light_scene(server.scene)
         server.on_client_connect(self._connect)
         server.on_client_disconnect(self._disconnect)
-        return server.get_port()
+
+    def page(self) -> bytes:
+        """The HTML of the page that connects."""
+        return client_page()
+
+    async def serve(self, connection: Connection) -> ConnectionEnded:
+        """Serve one visitor until the connection ends; returns why."""
+        return await self._connections.serve(connection)
 
     def stop(self) -> None:
         """End every page and the server; returns when their threads have ended."""
@@ -81,8 +88,7 @@ class ViewerServer:
             pages, self._pages = list(self._pages.values()), {}
         for page in pages:
             page.end()
-        with contextlib.redirect_stdout(io.StringIO()):
-            server.stop()
+        server.stop()
         for page in pages:
             if not page.join(STOP_TIMEOUT):
                 log.error("a visitor's worker did not end within %s s", STOP_TIMEOUT)

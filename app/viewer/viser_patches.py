@@ -1,4 +1,6 @@
-"""Faster and safer versions of some of viser's operations. All uses of viser's private names are in this module.
+"""Faster and safer versions of some of viser's operations.
+
+The private names of viser that Kinboard uses are in this module and in :mod:`app.viewer.viser_server`.
 
 Poses: viser's own setters ignore poses within 1e-5 of the last one, so an arm would end near its solution and not
 on it. That comparison (`np.allclose`) takes most of their time, and a moving arm sets one pose per joint and
@@ -18,11 +20,10 @@ viser's own.
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import functools
 import threading
 import typing
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -64,22 +65,6 @@ def keep_private(gizmo: viser.TransformControlsHandle) -> None:
 
 def _floats(values: Array | Sequence[float]) -> list[float]:
     return values.tolist() if isinstance(values, np.ndarray) else list(values)
-
-
-@contextlib.contextmanager
-def uvloop_event_loops() -> Iterator[None]:
-    """Event loops created in this context are uvloop's, if installed: viser always creates a loop of its own."""
-    try:
-        import uvloop
-    except ImportError:  # Windows
-        yield
-        return
-    before = asyncio.get_event_loop_policy()
-    asyncio.set_event_loop_policy(uvloop.EventLoopPolicy())
-    try:
-        yield
-    finally:
-        asyncio.set_event_loop_policy(before)
 
 
 class _LoopEvent(asyncio.Event):

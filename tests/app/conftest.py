@@ -25,10 +25,11 @@ def client(app):
 
 @pytest.fixture(scope="module")
 def port() -> Iterator[int]:
-    """Where a viewer listens."""
+    """Where a viewer is served."""
+    from live_server import serve_viewer
+
     from app.viewer.server import ViewerServer
 
     kin.warm_up()
-    server = ViewerServer(Store(), Settings(), Clouds())
-    yield server.start()
-    server.stop()
+    with serve_viewer(ViewerServer(Store(), Settings(), Clouds())) as port:
+        yield port

@@ -18,7 +18,7 @@ ANSWER = 1.5  # s until a message is answered on a busy machine
 
 
 class FakeBrowser:
-    """One visitor of viser's own port or of any URL, which may need more `options` to connect.
+    """One visitor of a local port or of any URL, which may need more `options` to connect.
 
     `pump` reads messages; everything shown is in `gui`, `values`, `poses` and `visible`. `memory` is the content
     of the page's storage, `kept` what the service has stored there. `camera` is where the service has moved it;
@@ -30,7 +30,7 @@ class FakeBrowser:
         where: int | str,
         width: int = 1280,
         height: int = 720,
-        path: str = "",
+        path: str = "/viewer",
         memory: str | None = None,
         **options: Any,
     ) -> None:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 import socket
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
 
 import uvicorn
 from fastapi import FastAPI
 
 from app.service.server import server_config
+from app.service.web.viewer_proxy import ViewerBridge
+from app.viewer.server import ViewerServer
 
 
 @contextmanager
@@ -29,6 +32,28 @@ def serve(app: FastAPI) -> Iterator[int]:
         thread.join(10)
         listener.close()
         assert not thread.is_alive()
+
+
+@contextmanager
+def serve_viewer(viewer: ViewerServer) -> Iterator[int]:
+    """Start a viewer and serve it under ``/viewer``; yields the port, and stops the viewer at the end."""
+    loops: list[asyncio.AbstractEventLoop] = []
+    bridge = ViewerBridge()
+
+    @asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        loops.append(asyncio.get_running_loop())
+        yield
+
+    app = FastAPI(lifespan=lifespan)
+    app.router.routes.extend(bridge.routes())
+    with serve(app) as port:
+        viewer.start(loops[0])
+        bridge.viewer = viewer
+        try:
+            yield port
+        finally:
+            viewer.stop()
 
 
 def wait_for(condition, seconds: float = 10.0) -> None:

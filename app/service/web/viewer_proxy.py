@@ -1,13 +1,13 @@
-"""The viewer on the public port: its page, and a bridge from its websocket to the internal viser server.
+"""The viewer on the public port: its page, and the websockets of its visitors.
 
-viser listens on a port of its own, reachable from this machine only. Visitors see one port: this module serves
-viser's page under ``/viewer/`` and forwards the messages of each websocket both ways, unchanged. The page connects
-to its own address without the trailing slash, so both forms are routes.
+The page and the viewer's messages come from :mod:`app.viewer`, which listens on no port: `ViewerBridge` accepts a
+websocket, and the viewer receives and sends through `VisitorConnection`, by function calls in the same event loop.
+The page connects to its own address without the trailing slash, so both forms are routes.
 
 Messages of visitors are inspected first (:mod:`app.service.web.inspection`); a visitor who sends invalid ones is
-disconnected without affecting others. A slow visitor must not fill our memory: with ``max_queue=1`` and both pumps
-waiting until the other side takes a message, the backlog stays in viser's bounded buffer, with back pressure by
-TCP. A visitor who reads nothing for a minute is disconnected.
+disconnected without affecting others. A slow visitor must not fill our memory: sending waits until the socket
+takes more, so the backlog stays in viser's bounded buffer, with back pressure by TCP. A visitor who reads nothing
+for a minute is disconnected.
 """
 
 from __future__ import annotations
@@ -16,22 +16,18 @@ import asyncio
 import contextlib
 import gzip
 import hashlib
-import http.client
 import logging
 import time
 from collections.abc import Iterable
 
-from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, RedirectResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
-from websockets.asyncio.client import ClientConnection, connect
-from websockets.exceptions import ConnectionClosed, InvalidHandshake
-from websockets.typing import Subprotocol
 
 from app.service.web.access import LOOK_ONLY
 from app.service.web.inspection import BURST, RATE, MalformedMessageError, MessageLimit, admitted
+from app.shared.connection import ConnectionEnded, Viewer
 from app.shared.metrics import DROPPED, STREAMED, VISITORS
 from app.shared.security import VIEWER_POLICY, origin_allowed
 
@@ -63,15 +59,12 @@ _UNSENDABLE = {1005: 1000, 1006: 1011, 1015: 1011}
 # A tab's memory, and what viser's controls lack. Relative, so that it holds behind any path prefix.
 _OURS = b'<link rel="stylesheet" href="../static/viewer.css"><script src="../static/viewer.js"></script>'
 
-# Close code and reason.
-_Ending = tuple[int, str]
-
 
 class ViewerBridge:
-    """Routes for ``/viewer``. `port` is that of the internal viser server, None until it listens."""
+    """Routes for ``/viewer``. `viewer` serves the visitors, None until it has started."""
 
     def __init__(self, allowed_origins: Iterable[str] = (), max_visitors: int = 200) -> None:
-        self.port: int | None = None
+        self.viewer: Viewer | None = None
         self.visitors = 0
         self._max_visitors = max_visitors
         self._allowed_origins = tuple(allowed_origins)
@@ -87,13 +80,13 @@ class ViewerBridge:
         ]
 
     async def page(self, request: Request) -> Response:
-        """viser's page with our content policy; until viser listens, 503 and a page that tries again."""
-        if self.port is None:
+        """viser's page with our content policy; until the viewer has started, 503 and a page that tries again."""
+        if self.viewer is None:
             return HTMLResponse(_WARMING_PAGE, status_code=503, headers={"retry-after": "1"})
         if self.visitors >= self._max_visitors:
             return HTMLResponse(_FULL_PAGE, status_code=503, headers={"retry-after": "10"})
         if self._page is None:
-            self._page = await run_in_threadpool(_fetch_page, self.port)
+            self._page = _Page(self.viewer.page())
         return self._page.response(request)
 
     async def websocket(self, visitor: WebSocket) -> None:
@@ -102,7 +95,7 @@ class ViewerBridge:
             logger.warning("refused a websocket from a page of %.200r", visitor.headers.get("origin"))
             await visitor.close()  # before the handshake: a 403
             return
-        if self.port is None:
+        if self.viewer is None:
             await _turn_away(visitor, "The viewer is warming up.")
             return
         if self.visitors >= self._max_visitors:
@@ -112,98 +105,70 @@ class ViewerBridge:
         self.visitors += 1
         try:
             with VISITORS.track_inprogress():
-                await self._serve(visitor, self.port)
+                await _serve(visitor, self.viewer)
         finally:
             self.visitors -= 1
 
-    async def _serve(self, visitor: WebSocket, port: int) -> None:
-        try:
-            upstream = await connect(
-                f"ws://127.0.0.1:{port}/",
-                subprotocols=[Subprotocol(name) for name in visitor.scope.get("subprotocols", ())] or None,
-                compression=None,
-                max_size=None,
-                max_queue=1,
-                ping_interval=None,
-                open_timeout=5,
-                close_timeout=1,
-                proxy=None,
-            )
-        except (OSError, TimeoutError, InvalidHandshake) as error:
-            logger.warning("the viewer's server does not answer: %s", error)
-            await _turn_away(visitor, "The viewer does not answer.")
-            return
-        async with upstream:
-            await visitor.accept(upstream.subprotocol)
-            await _carry(visitor, upstream)
 
-
-async def _carry(visitor: WebSocket, upstream: ClientConnection) -> None:
-    """Run both pumps until one side ends; then stop the other pump and close both sides with the same code."""
-    pumps = (
-        asyncio.create_task(_to_viser(visitor, upstream)),
-        asyncio.create_task(_to_visitor(upstream, visitor)),
-    )
+async def _serve(visitor: WebSocket, viewer: Viewer) -> None:
+    connection = VisitorConnection(visitor)
+    await visitor.accept(connection.subprotocol)
     try:
-        ended, _ = await asyncio.wait(pumps, return_when=asyncio.FIRST_COMPLETED)
-    finally:
-        for pump in pumps:
-            pump.cancel()
-        await asyncio.gather(*pumps, return_exceptions=True)
-    code, reason = ended.pop().result()
-    await upstream.close(code, reason)
+        end = await viewer.serve(connection)
+    except Exception:
+        logger.exception("a visitor's connection failed")
+        end = ConnectionEnded(1011, "internal error")
+    if end.code == 1007:
+        DROPPED.labels("malformed").inc()
     if visitor.client_state is WebSocketState.CONNECTED:
         # A visitor who has just left cannot receive the close frame.
         with contextlib.suppress(WebSocketDisconnect):
-            await visitor.close(code, reason)
+            await visitor.close(end.code, end.reason)
 
 
-async def _to_viser(visitor: WebSocket, upstream: ClientConnection) -> _Ending:
-    look_only = bool(visitor.scope.get(LOOK_ONLY, False))
-    limit = MessageLimit(RATE, BURST)
-    try:
+class VisitorConnection:
+    """A visitor's websocket for the viewer: messages inspected and limited in rate, sending limited in time."""
+
+    def __init__(self, visitor: WebSocket) -> None:
+        self.subprotocol: str | None = next(iter(visitor.scope.get("subprotocols", ())), None)
+        self._visitor = visitor
+        self._look_only = bool(visitor.scope.get(LOOK_ONLY, False))
+        self._limit = MessageLimit(RATE, BURST)
+        self._wait = 0.0
+        self._streamed = STREAMED.labels("viewer")
+
+    async def receive(self) -> bytes:
+        """The visitor's next message that is passed on; raises `ConnectionEnded`."""
         while True:
-            event = await visitor.receive()
-            if event["type"] == "websocket.disconnect":
-                return _sendable(event["code"]), ""
-            data = event.get("bytes")
-            if data is None:
-                return 1003, "binary messages only"
-            try:
-                passes = admitted(data, look_only)
-            except MalformedMessageError as error:
-                DROPPED.labels("malformed").inc()
-                return 1007, str(error)
-            if passes:
-                await upstream.send(data)
-            else:
-                DROPPED.labels("refused").inc()
             # Messages above the rate are not read: they wait in the buffers of the sender.
-            if (wait := limit.spend(time.monotonic())) > 0.0:
-                await asyncio.sleep(wait)
-    except ConnectionClosed:
-        return _ending_of(upstream)
+            if self._wait > 0.0:
+                await asyncio.sleep(self._wait)
+            event = await self._visitor.receive()
+            if event["type"] == "websocket.disconnect":
+                raise ConnectionEnded(_sendable(event["code"]))
+            data: bytes | None = event.get("bytes")
+            if data is None:
+                raise ConnectionEnded(1003, "binary messages only")
+            try:
+                passes = admitted(data, self._look_only)
+            except MalformedMessageError as error:
+                raise ConnectionEnded(1007, str(error)) from None
+            self._wait = self._limit.spend(time.monotonic())
+            if passes:
+                return data
+            DROPPED.labels("refused").inc()
 
-
-async def _to_visitor(upstream: ClientConnection, visitor: WebSocket) -> _Ending:
-    streamed = STREAMED.labels("viewer")
-    try:
-        while True:
-            message = await upstream.recv(decode=False)
+    async def send(self, data: bytes) -> None:
+        """Send a message of the viewer; raises `ConnectionEnded`."""
+        try:
             async with asyncio.timeout(PATIENCE):
-                await visitor.send({"type": "websocket.send", "bytes": message})
-            streamed.inc(len(message))
-    except ConnectionClosed:
-        return _ending_of(upstream)
-    except TimeoutError:
-        DROPPED.labels("slow").inc()
-        return 1008, "the connection is too slow"
-    except WebSocketDisconnect:
-        return 1001, ""
-
-
-def _ending_of(upstream: ClientConnection) -> _Ending:
-    return _sendable(upstream.close_code or 1006), upstream.close_reason or ""
+                await self._visitor.send({"type": "websocket.send", "bytes": data})
+        except TimeoutError:
+            DROPPED.labels("slow").inc()
+            raise ConnectionEnded(1008, "the connection is too slow") from None
+        except WebSocketDisconnect:
+            raise ConnectionEnded(1001) from None
+        self._streamed.inc(len(data))
 
 
 async def _turn_away(visitor: WebSocket, why: str) -> None:
@@ -243,17 +208,3 @@ class _Page:
         if "gzip" in request.headers.get("accept-encoding", ""):
             return HTMLResponse(self._gzipped, headers=self._headers | {"content-encoding": "gzip"})
         return HTMLResponse(self._html, headers=self._headers)
-
-
-def _fetch_page(port: int) -> _Page:
-    # Directly to this machine: urllib would use a proxy named in the environment.
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
-    try:
-        connection.request("GET", "/")
-        answer = connection.getresponse()
-        html = answer.read()
-    finally:
-        connection.close()
-    if answer.status != 200:
-        raise RuntimeError(f"the viewer's server answered {answer.status} for its page")
-    return _Page(html)

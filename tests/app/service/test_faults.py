@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 import viser
 from fake_browser import FakeBrowser
-from live_server import wait_for
+from live_server import serve_viewer, wait_for
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
@@ -152,9 +152,8 @@ def drained(pieces: Iterator[bytes]) -> None:
 
 @pytest.fixture(scope="module")
 def port() -> Iterator[int]:
-    server = ViewerServer(Store(), Settings(), Clouds())
-    yield server.start()
-    server.stop()
+    with serve_viewer(ViewerServer(Store(), Settings(), Clouds())) as port:
+        yield port
 
 
 def test_a_worker_that_dies_is_replaced_and_the_visitor_informed(port, monkeypatch, caplog):

@@ -1,4 +1,4 @@
-"""The bridge between a visitor's websocket and viser's, with a small stand-in for viser's server."""
+"""The bridge between a visitor's websocket and the viewer, with a small stand-in for the viewer."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import socket
 import threading
 import time
 from collections.abc import Iterator
-from http import HTTPStatus
 
 import httpx2
 import msgspec
@@ -16,11 +15,10 @@ from fastapi import FastAPI
 from live_server import serve, wait_for
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
-from websockets.sync.server import ServerConnection
-from websockets.sync.server import serve as serve_websocket
 
 from app.service.web.inspection import BURST, RATE, MessageLimit
 from app.service.web.viewer_proxy import ViewerBridge
+from app.shared.connection import Connection, ConnectionEnded
 
 PROTOCOL = "viser-v9.9.9"
 
@@ -37,66 +35,47 @@ class StandIn:
     """Echoes every message; a few messages make it misbehave."""
 
     def __init__(self) -> None:
-        self.received: list[bytes | str] = []
-        self.endings: list[int | None] = []
+        self.received: list[bytes] = []
+        self.endings: list[int] = []
         self.subprotocols: list[str | None] = []
         self.sent = 0
-        self.server = serve_websocket(
-            self.handle,
-            "127.0.0.1",
-            0,
-            compression=None,
-            max_size=None,
-            process_request=self.http,
-            select_subprotocol=lambda connection, offered: offered[0] if offered else None,
-        )
-        self.port: int = self.server.socket.getsockname()[1]
-        self.thread = threading.Thread(target=self.server.serve_forever)
-        self.thread.start()
 
-    def http(self, connection: ServerConnection, request):
-        if "Upgrade" in request.headers:
-            return None
-        return connection.respond(HTTPStatus.OK, "<html><title>Viser</title>page</html>")
+    def page(self) -> bytes:
+        return b"<html><title>Viser</title>page</html>"
 
-    def handle(self, connection: ServerConnection) -> None:
+    async def serve(self, connection: Connection) -> ConnectionEnded:
         self.subprotocols.append(connection.subprotocol)
         try:
             while True:
-                message = connection.recv()
+                message = await connection.receive()
                 self.received.append(message)
                 match msgspec.msgpack.decode(message).get("uuid"):
                     case "close":
-                        connection.close(4001, "bye")
-                    case "drop":
-                        connection.socket.shutdown(socket.SHUT_RDWR)
+                        raise ConnectionEnded(4001, "bye")
+                    case "fail":
+                        raise RuntimeError("broken")
                     case "flood":
                         for k in range(200):
-                            connection.send(k.to_bytes(4, "little") + bytes(1_000_000))
+                            await connection.send(k.to_bytes(4, "little") + bytes(1_000_000))
                             self.sent += 1
                     case "bytes":
-                        connection.send(bytes(range(256)) * 20_000)
+                        await connection.send(bytes(range(256)) * 20_000)
                     case _:
-                        connection.send(message)
-        except ConnectionClosed:
-            self.endings.append(connection.close_code)
-
-    def stop(self) -> None:
-        self.server.shutdown()
-        self.thread.join(10)
+                        await connection.send(message)
+        except ConnectionEnded as end:
+            self.endings.append(end.code)
+            return end
 
 
 @pytest.fixture
-def viser() -> Iterator[StandIn]:
-    stand_in = StandIn()
-    yield stand_in
-    stand_in.stop()
+def viser() -> StandIn:
+    return StandIn()
 
 
 @pytest.fixture
 def bridge(viser: StandIn) -> ViewerBridge:
     bridge = ViewerBridge(allowed_origins=("https://school.example",))
-    bridge.port = viser.port
+    bridge.viewer = viser
     return bridge
 
 
@@ -293,7 +272,7 @@ def test_a_visitor_who_does_not_read_is_disconnected(port, viser, monkeypatch):
 
 def test_a_visitor_beyond_the_limit_gets_a_page_that_says_so(viser):
     bridge = ViewerBridge(max_visitors=2)
-    bridge.port = viser.port
+    bridge.viewer = viser
     app = FastAPI()
     app.router.routes.extend(bridge.routes())
     with serve(app) as port:
@@ -321,17 +300,21 @@ def test_the_close_reason_of_viser_reaches_the_visitor(port):
     assert (end.value.rcvd.code, end.value.rcvd.reason) == (4001, "bye")
 
 
-def test_losing_viser_closes_the_visitors_connection(port):
+def test_a_failing_viewer_closes_only_the_visitors_connection(port, caplog):
     with visit(port) as visitor:
-        visitor.send(said("drop"))
+        visitor.send(said("fail"))
         with pytest.raises(ConnectionClosed) as end:
             visitor.recv(timeout=10)
     assert end.value.rcvd is not None
     assert end.value.rcvd.code == 1011
+    assert "RuntimeError: broken" in caplog.text
+    with visit(port) as visitor:
+        visitor.send(HELLO)
+        assert visitor.recv(timeout=10) == HELLO
 
 
 @pytest.mark.parametrize(("code", "seen"), [(1000, 1000), (1001, 1001), (4242, 4242)])
-def test_a_visitor_who_leaves_closes_the_connection_to_viser(port, viser, code, seen):
+def test_the_viewer_hears_why_a_visitor_has_left(port, viser, code, seen):
     with visit(port) as visitor:
         visitor.send(HELLO)
         visitor.recv(timeout=10)
@@ -371,19 +354,13 @@ def test_a_slow_reader_slows_viser_and_memory_stays_bounded(port, viser):
             assert int.from_bytes(message[:4], "little") == k
 
 
-def test_a_visitor_before_the_viewer_listens(port, bridge):
-    bridge.port = None
+def test_a_visitor_before_the_viewer_has_started(port, bridge):
+    bridge.viewer = None
     page = httpx2.get(f"http://127.0.0.1:{port}/viewer/", trust_env=False)
     assert page.status_code == 503
     assert "warming up" in page.text
     assert page.headers["retry-after"] == "1"
     assert turned_away(port) == (1013, "The viewer is warming up.")
-
-
-def test_a_lost_viewer_closes_with_try_again_later(port, viser, caplog):
-    viser.stop()
-    assert turned_away(port) == (1013, "The viewer does not answer.")
-    assert "does not answer" in caplog.text
 
 
 def turned_away(port: int) -> tuple[int, str]:

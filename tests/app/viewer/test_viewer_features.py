@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
+from live_server import serve_viewer
 
 import kin
 from app.shared.clouds import Clouds
@@ -89,11 +90,9 @@ def tab(monkeypatch: pytest.MonkeyPatch) -> Iterator[FakeBrowser]:
     monkeypatch.setattr(choice, "LESSONS", (Pupil,))
     Witness.calls.clear()
     Witness.threads.clear()
-    server = ViewerServer(STORE, Settings(), Clouds())
-    with FakeBrowser(server.start()) as opened:
+    with serve_viewer(ViewerServer(STORE, Settings(), Clouds())) as port, FakeBrowser(port) as opened:
         opened.settle()
         yield opened
-    server.stop()
 
 
 def wait_for_call(tab: FakeBrowser, *call: object, times: int = 1) -> None:

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
+from live_server import serve_viewer
 
 import kin
 from app.shared.clouds import Clouds
@@ -26,16 +27,15 @@ SCARA, SRS = STORE.get("scara"), STORE.get("redundant7-craig")
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[ViewerServer]:
+def server() -> ViewerServer:
     kin.warm_up()
-    made = ViewerServer(STORE, Settings(), Clouds())
-    yield made
-    made.stop()
+    return ViewerServer(STORE, Settings(), Clouds())
 
 
 @pytest.fixture(scope="module")
-def port(server: ViewerServer) -> int:
-    return server.start()
+def port(server: ViewerServer) -> Iterator[int]:
+    with serve_viewer(server) as served:
+        yield served
 
 
 def numbers(tab: FakeBrowser) -> list[float]:

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
+from live_server import serve_viewer
 
 import kin
 from app.shared.clouds import Clouds
@@ -262,8 +263,8 @@ def test_a_skeleton_is_connected_and_bends_at_right_angles(robot: kin.Robot) -> 
 @pytest.fixture(scope="module")
 def served() -> Iterator[tuple[ViewerServer, int]]:
     server = ViewerServer(Store(), Settings(), Clouds())
-    yield server, server.start()
-    server.stop()
+    with serve_viewer(server) as port:
+        yield server, port
 
 
 @pytest.fixture

@@ -11,6 +11,7 @@ from unittest.mock import MagicMock
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
+from live_server import serve_viewer
 
 import kin
 from app.equations import book, book_later, books
@@ -31,13 +32,11 @@ PUMA = kin.get_robot("puma560")
 
 @pytest.fixture
 def tab() -> Iterator[FakeBrowser]:
-    server = ViewerServer(Store(), Settings(), Clouds())
-    with FakeBrowser(server.start()) as opened:
+    with serve_viewer(ViewerServer(Store(), Settings(), Clouds())) as port, FakeBrowser(port) as opened:
         opened.settle()
         opened.set("Lesson", "Equations")
         opened.wait(lambda: "data-equation" in opened.html)
         yield opened
-    server.stop()
 
 
 def press(tab: FakeBrowser, label: str) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import viser
 from fake_browser import FakeBrowser
+from live_server import serve_viewer
 
 import kin
 from app.shared.clouds import Clouds
@@ -273,9 +274,8 @@ def test_a_tap_is_one_step_and_holding_repeats() -> None:
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[int]:
-    running = ViewerServer(STORE, Settings(), Clouds())
-    yield running.start()
-    running.stop()
+    with serve_viewer(ViewerServer(STORE, Settings(), Clouds())) as port:
+        yield port
 
 
 @pytest.fixture

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
+from live_server import serve_viewer
 
 import kin
 from app.shared.clouds import Clouds
@@ -243,9 +244,8 @@ class Counter(Feature):
 def port() -> Iterator[int]:
     kin.warm_up()
     before, page.TABS = page.TABS, (Counter,)
-    server = ViewerServer(STORE, Settings(token="very secret"), Clouds())
-    yield server.start()
-    server.stop()
+    with serve_viewer(ViewerServer(STORE, Settings(token="very secret"), Clouds())) as port:
+        yield port
     page.TABS = before
 
 

@@ -11,6 +11,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
+from live_server import serve_viewer
+from websockets.exceptions import ConnectionClosed
 
 import kin
 from app.shared.clouds import Clouds
@@ -31,9 +33,8 @@ SRS = STORE.get("redundant7-craig")
 def viewer() -> Iterator[tuple[ViewerServer, int]]:
     kin.warm_up()
     server = ViewerServer(STORE, Settings(), Clouds())
-    port = server.start()
-    yield server, port
-    server.stop()
+    with serve_viewer(server) as port:
+        yield server, port
 
 
 @pytest.fixture
@@ -295,16 +296,20 @@ def test_fifty_visits_leave_no_thread(viewer: tuple[ViewerServer, int]) -> None:
     wait_for(lambda: server.visitors == 0 and threading.active_count() <= before and not workers())
 
 
-def test_stopping_ends_sessions_and_the_port() -> None:
+def test_stopping_ends_sessions_and_connections() -> None:
     before = set(threading.enumerate())
     server = ViewerServer(STORE, Settings(), Clouds())
-    tabs = [FakeBrowser(server.start())]
-    tabs[0].wait(lambda: bool(tabs[0].sliders))
-    server.stop()
+    with serve_viewer(server) as port:
+        tab = FakeBrowser(port)
+        tab.wait(lambda: bool(tab.sliders))
+        server.stop()
+        with pytest.raises(ConnectionClosed) as closed:
+            tab.settle()
+    assert closed.value.rcvd is not None
+    assert closed.value.rcvd.code == 1001
     wait_for(lambda: not [t for t in set(threading.enumerate()) - before if not t.name.startswith("Thread-")])
     assert server.visitors == 0
     server.stop()  # a second time is harmless
-    tabs[0].close()
 
 
 def workers() -> list[str]:

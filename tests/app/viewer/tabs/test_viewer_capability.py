@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
+from live_server import serve_viewer
 
 import kin
 from app.shared import mapreduce
@@ -169,8 +170,8 @@ def service() -> Iterator[tuple[int, Maps, ViewerServer]]:
     kin.warm_up()
     clouds, maps = Clouds(), Maps(threads=2)
     server = ViewerServer(STORE, Settings(), clouds, maps)
-    yield server.start(), maps, server
-    server.stop()
+    with serve_viewer(server) as port:
+        yield port, maps, server
     clouds.close()
     maps.close()
 

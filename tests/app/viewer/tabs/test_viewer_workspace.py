@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
+from live_server import serve_viewer
 from PIL import Image
 
 import kin
@@ -324,8 +325,8 @@ class Visitor(FakeBrowser):
 def service() -> Iterator[tuple[int, Clouds]]:
     clouds = Clouds()
     server = ViewerServer(STORE, Settings(), clouds)
-    yield server.start(), clouds
-    server.stop()
+    with serve_viewer(server) as port:
+        yield port, clouds
     clouds.close()
 
 
@@ -481,7 +482,7 @@ def test_a_cut_hides_points_without_sending_any(tab):
 
 def test_the_tab_follows_the_unit_of_length_and_keeps_its_state():
     server = ViewerServer(STORE, Settings(), Clouds())
-    with Visitor(server.start()) as tab:
+    with serve_viewer(server) as port, Visitor(port) as tab:
         tab.settle(0.2)
         (session,) = server._pages.values()
         post = session._tabs[0].post
@@ -518,7 +519,6 @@ def test_the_tab_follows_the_unit_of_length_and_keeps_its_state():
         tab.set("Cut at (cm)", 10.0)
         tab.settle()
         assert tab.points(only_visible=True)[:, 2].max() < 0.1 + HALF
-    server.stop()
 
 
 def test_a_cut_while_streaming_loses_no_points(tab):
@@ -752,7 +752,7 @@ def test_an_address_restores_the_tab(service):
         tab.settle(0.2)
     clouds = service[1]
     server = ViewerServer(STORE, Settings(), clouds)
-    with Visitor(server.start()) as tab:
+    with serve_viewer(server) as port, Visitor(port) as tab:
         tab.settle(0.2)
         feature = next(iter(server._pages.values()))._tabs[0]
         with feature.stage.client.atomic():

@@ -1,0 +1,242 @@
+"""viser without a port: its message server, driven by function calls in the service's own event loop.
+
+viser would listen on a TCP port and run an event loop in a thread of its own. Every local user could connect to
+that port without a token, and each message would pass through a second websocket. Here viser's server gets the
+connections that the service has already accepted and inspected; nothing listens.
+
+`PortlessServer` replaces the part of `viser.infra.WebsockServer` that listens and accepts (its
+``_background_worker``). It relies on private names of viser; `missing_names` lists those that a version lacks, and
+`start_viser` refuses such a version. A test fails when viser changes the method that is replaced. Upstream offers
+no such entry point yet; https://github.com/viser-project/viser/issues is the place to ask for one.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import functools
+import inspect
+import io
+import itertools
+import logging
+import threading
+from collections.abc import Callable, Coroutine, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import viser
+from viser import _messages as messages
+from viser import infra
+from viser.infra import _infra
+from viser.infra._async_message_buffer import AsyncMessageBuffer
+
+from app.shared.connection import Connection, ConnectionEnded
+
+log = logging.getLogger(__name__)
+
+PROTOCOL = f"viser-v{viser.__version__}"
+STOP_TIMEOUT = 5.0  # s for all connections to end
+
+_Callbacks = Sequence[Callable[[infra.WebsockClientConnection], Coroutine[Any, Any, None] | None]]
+
+
+class PortlessServer(infra.WebsockServer):
+    """viser's message server without a port and without a thread.
+
+    Args:
+        loop: the running event loop of the service.
+        options: those of `viser.infra.WebsockServer`; host and port are not used.
+    """
+
+    def __init__(self, *, loop: asyncio.AbstractEventLoop, **options: Any) -> None:
+        super().__init__(**options)
+        self._background_event_loop = loop
+        self._loop = loop
+        self._ids = itertools.count()
+        self._open = 0  # connections
+        self._handling: set[asyncio.Task[None]] = set()
+        self._stopping: asyncio.Future[None]
+        self._all_ended: asyncio.Event
+
+    def start(self) -> None:
+        """Prepare for `serve`; call it from another thread than the loop's."""
+        asyncio.run_coroutine_threadsafe(self._prepare(), self._loop).result()
+
+    async def _prepare(self) -> None:
+        # Its events must belong to the loop's thread: see `viser_patches.set_events_in_their_loop`.
+        self._broadcast_buffer = AsyncMessageBuffer(self._loop, persistent_messages=True)
+        self._stopping = self._loop.create_future()
+        self._all_ended = asyncio.Event()
+        self._all_ended.set()
+
+    def stop(self) -> None:
+        """End all connections; returns when their pages have ended, or after `STOP_TIMEOUT`."""
+        self._broadcast_buffer.set_done()
+        if self._loop.is_running():  # otherwise there are no connections
+            with contextlib.suppress(TimeoutError):
+                asyncio.run_coroutine_threadsafe(self._end_all(), self._loop).result(STOP_TIMEOUT)
+
+    async def _end_all(self) -> None:
+        if not self._stopping.done():
+            self._stopping.set_result(None)
+        await self._all_ended.wait()
+
+    async def serve(self, connection: Connection) -> ConnectionEnded:
+        """Serve one visitor until the connection ends; returns why."""
+        if connection.subprotocol != PROTOCOL:
+            return ConnectionEnded(1002, f"the page must speak {PROTOCOL}; reload it")
+        self._open += 1
+        self._all_ended.clear()
+        try:
+            return await self._visit(connection)
+        finally:
+            self._open -= 1
+            if self._open == 0:
+                self._all_ended.set()
+
+    async def _visit(self, connection: Connection) -> ConnectionEnded:
+        number = infra.ClientId(next(self._ids))
+        buffer = AsyncMessageBuffer(self._loop, persistent_messages=False)
+        client = infra.WebsockClientConnection(number, _infra._ClientHandleState(buffer, self._loop))
+        self._client_state_from_id[number] = client._state
+        flows: list[asyncio.Task[Any]] = []
+        try:
+            await _call(self._client_connect_cb, client)
+            visitor: Any = connection  # viser only calls its `send`
+            flows = [
+                self._loop.create_task(flow)
+                for flow in (
+                    _infra._message_producer(visitor, buffer, number),
+                    _infra._message_producer(visitor, self._broadcast_buffer, number, self._backlog_done_message),
+                    self._consume(connection, client),
+                )
+            ]
+            await asyncio.wait([*flows, self._stopping], return_when=asyncio.FIRST_COMPLETED)
+            return _why(flows)
+        finally:
+            for flow in flows:
+                flow.cancel()
+            await asyncio.gather(*flows, return_exceptions=True)
+            buffer.set_done()
+            self._client_state_from_id.pop(number, None)
+            self._broadcast_buffer.generator_cursors.pop(number, None)
+            await _call(self._client_disconnect_cb, client)
+
+    async def _consume(self, connection: Connection, client: infra.WebsockClientConnection) -> None:
+        while True:
+            data = await connection.receive()
+            try:
+                message = self._message_class.deserialize(data)
+            except Exception as error:  # fields are converted without checks
+                raise ConnectionEnded(1007, f"not a message of the viewer: {error!r:.80}") from error
+            for handler in (self, client):
+                if type(message) in handler._incoming_handlers:
+                    task = self._loop.create_task(
+                        handler._handle_incoming_message(infra.ClientId(client.client_id), message)
+                    )
+                    self._handling.add(task)
+                    task.add_done_callback(self._handled)
+
+    def _handled(self, task: asyncio.Task[None]) -> None:
+        self._handling.discard(task)
+        if not task.cancelled() and (error := task.exception()) is not None:
+            log.warning("a message of a visitor could not be handled: %.200r", error)
+
+
+async def _call(callbacks: _Callbacks, client: infra.WebsockClientConnection) -> None:
+    for callback in callbacks:
+        result = callback(client)
+        if result is not None:
+            await result
+
+
+def _why(flows: Sequence[asyncio.Task[Any]]) -> ConnectionEnded:
+    """Why the first of these tasks has ended; if none has failed, the service stops."""
+    errors = [error for flow in flows if flow.done() and (error := flow.exception()) is not None]
+    for error in errors:
+        if isinstance(error, ConnectionEnded):
+            return error
+    for error in errors:
+        log.error("a visitor's connection failed", exc_info=error)
+        return ConnectionEnded(1011, "internal error")
+    return ConnectionEnded(1001, "the service stops")
+
+
+def start_viser(loop: asyncio.AbstractEventLoop, label: str) -> tuple[viser.ViserServer, PortlessServer]:
+    """viser's server, and what serves its connections in the running event loop `loop`.
+
+    Call it from another thread than the loop's.
+
+    Raises:
+        RuntimeError: the installed version of viser cannot be driven in this way.
+    """
+    if missing := missing_names():
+        raise RuntimeError(f"viser {viser.__version__} lacks {', '.join(missing)}; install viser>=1.1,<1.2")
+    # viser prints its own address, which does not exist.
+    with contextlib.redirect_stdout(io.StringIO()), _replaced(functools.partial(PortlessServer, loop=loop)):
+        server = viser.ViserServer(host="127.0.0.1", port=0, label=label, verbose=False)
+    portless = server._websock_server
+    if not isinstance(portless, PortlessServer):
+        server.stop()
+        raise RuntimeError(f"viser {viser.__version__} listens on a port; install viser>=1.1,<1.2")
+    # A visitor could ask viser for a public tunnel to this service.
+    for kind in (messages.ShareUrlRequest, messages.ShareUrlDisconnect):
+        portless.unregister_handler(kind)
+    return server, portless
+
+
+_replacing = threading.Lock()
+
+
+@contextlib.contextmanager
+def _replaced(make: Callable[..., PortlessServer]) -> Iterator[None]:
+    with _replacing:
+        original = infra.WebsockServer
+        infra.WebsockServer = make  # type: ignore[misc, assignment]
+        try:
+            yield
+        finally:
+            infra.WebsockServer = original  # type: ignore[misc]
+
+
+def missing_names() -> list[str]:
+    """What `PortlessServer` uses of viser and the installed version does not have, or not in this form."""
+    wanted: list[tuple[object, str, tuple[str, ...]]] = [
+        (_infra, "_message_producer", ("websocket", "buffer", "client_id", "backlog_done_message")),
+        (_infra, "_ClientHandleState", ("message_buffer", "event_loop")),
+        (infra, "WebsockClientConnection", ("client_id", "client_state")),
+        (infra.WebsockServer, "_background_worker", ("self", "ready_sem")),
+        (infra.WebsockServer, "_handle_incoming_message", ("self", "client_id", "message")),
+        (infra.WebsockServer, "unregister_handler", ("self", "message_cls", "callback")),
+        (messages.Message, "deserialize", ("message",)),
+        (AsyncMessageBuffer, "set_done", ("self",)),
+    ]
+    found = [
+        f"{getattr(owner, '__name__', owner)}.{name}({', '.join(parameters)})"
+        for owner, name, parameters in wanted
+        if _parameters(getattr(owner, name, None))[: len(parameters)] != parameters
+    ]
+    server = infra.WebsockServer("", 0)
+    attributes = (
+        "_backlog_done_message",
+        "_client_connect_cb",
+        "_client_disconnect_cb",
+        "_client_state_from_id",
+        "_incoming_handlers",
+        "_message_class",
+        "_server_thread",
+    )
+    found += [f"WebsockServer.{name}" for name in attributes if not hasattr(server, name)]
+    fields = AsyncMessageBuffer.__dataclass_fields__
+    found += [f"AsyncMessageBuffer.{name}" for name in ("generator_cursors", "done") if name not in fields]
+    return found
+
+
+def _parameters(function: Any) -> tuple[str, ...]:
+    return () if function is None else tuple(inspect.signature(function).parameters)
+
+
+@functools.cache
+def client_page() -> bytes:
+    """The HTML of viser's client, one file."""
+    return (Path(viser.__file__).parent / "client" / "build" / "index.html").read_bytes()
