@@ -83,10 +83,29 @@ class Parents:
         )  # fmt: skip
 
 
+def _command(
+    commands: Any,
+    name: str,
+    about: str,
+    *parents: argparse.ArgumentParser,
+    takes_robot: bool = True,
+    usage: str | None = None,
+) -> argparse.ArgumentParser:
+    """A new command; its first argument is a robot unless `takes_robot` is false."""
+    parser: argparse.ArgumentParser = commands.add_parser(name, parents=parents, help=about, usage=usage)
+    if takes_robot:
+        parser.add_argument("robot", metavar="ROBOT", help=ROBOT_HELP)
+    return parser
+
+
 def add_serve(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard serve``."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "serve", parents=[parents.robots], help="serve the dashboard and the REST interface (default)"
+    parser = _command(
+        commands,
+        "serve",
+        "serve the dashboard and the REST interface (default)",
+        parents.robots,
+        takes_robot=False,
     )
     parser.add_argument("--host", help="address to listen on (default 127.0.0.1)")
     parser.add_argument("--port", type=int, help="port to listen on (default 8000; 0 takes any free port)")
@@ -105,10 +124,9 @@ def add_serve(commands: Any, parents: Parents) -> argparse.ArgumentParser:
 
 def add_fk(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard fk``."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "fk", parents=[parents.robots, parents.output], help="forward kinematics: tool pose for joint values"
+    parser = _command(
+        commands, "fk", "forward kinematics: tool pose for joint values", parents.robots, parents.output
     )
-    parser.add_argument("robot", metavar="ROBOT", help=ROBOT_HELP)
     parser.add_argument("q", type=number, nargs="+", metavar="Q", help=f"joint values, {UNITS_NOTE}")
     parser.add_argument("--frames", action="store_true", help="also print the frame after every DH row")
     return parser
@@ -116,13 +134,15 @@ def add_fk(commands: Any, parents: Parents) -> argparse.ArgumentParser:
 
 def add_ik(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard ik``."""
-    parser: argparse.ArgumentParser = commands.add_parser(
+    parser = _command(
+        commands,
         "ik",
-        parents=[parents.robots, parents.output, parents.joints],
-        help="inverse kinematics: joint values for a tool pose",
+        "inverse kinematics: joint values for a tool pose",
+        parents.robots,
+        parents.output,
+        parents.joints,
         usage="kinboard ik ROBOT --position X Y Z [--wxyz W X Y Z | --approach X Y Z] [options]",
     )
-    parser.add_argument("robot", metavar="ROBOT", help=ROBOT_HELP)
     _add_target(parser)
     parser.add_argument(
         "--seed", type=number, nargs="+", metavar="Q",
@@ -178,8 +198,8 @@ def _add_target(parser: argparse.ArgumentParser) -> None:
 
 def add_robots(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard robots``."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "robots", parents=[parents.robots, parents.output], help="list the robots, or describe one"
+    parser = _command(
+        commands, "robots", "list the robots, or describe one", parents.robots, parents.output, takes_robot=False
     )
     parser.add_argument("robot", nargs="?", metavar="ROBOT", help="id of the robot to describe")
     return parser
@@ -187,12 +207,14 @@ def add_robots(commands: Any, parents: Parents) -> argparse.ArgumentParser:
 
 def add_workspace(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard workspace``."""
-    parser: argparse.ArgumentParser = commands.add_parser(
+    parser = _command(
+        commands,
         "workspace",
-        parents=[parents.robots, parents.output, parents.joints],
-        help="size of the set of points the tool reaches; with -o a point cloud as a file",
+        "size of the set of points the tool reaches; with -o a point cloud as a file",
+        parents.robots,
+        parents.output,
+        parents.joints,
     )
-    parser.add_argument("robot", metavar="ROBOT", help=ROBOT_HELP)
     parser.add_argument(
         "-o", "--output", metavar="FILE", help="write a point cloud in metres to this file; - is standard output"
     )
@@ -214,8 +236,9 @@ def add_workspace(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         "boundary: points on the envelope",
     )  # fmt: skip
     parser.add_argument(
-        "--measure", choices=("manipulability", "limits"), action="append", default=[],
-        help="add a column: manipulability, or the distance to the nearest joint limit (0 to 1); may be repeated",
+        "--measure", choices=("manipulability", "limit_margin", "limits"), action="append", default=[],
+        help="add a column: manipulability, or limit_margin (older name: limits), the relative distance to the "
+        "nearest joint limit (0 to 1); may be repeated",
     )  # fmt: skip
     parser.add_argument("--q", action="store_true", help="add the joint values, in radians (metres)")
     parser.add_argument(
@@ -230,8 +253,11 @@ def add_workspace(commands: Any, parents: Parents) -> argparse.ArgumentParser:
 
 def add_bench(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard bench``."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "bench", help="compare the speed with other libraries; `pip install 'kinboard[bench]'` installs them"
+    parser = _command(
+        commands,
+        "bench",
+        "compare the speed with other libraries; `pip install 'kinboard[bench]'` installs them",
+        takes_robot=False,
     )
     parser.add_argument("--quick", action="store_true", help="fewer targets and rounds: under two minutes")
     parser.add_argument("--rows", nargs="+", metavar="ROW", help="only these rows, such as fk ik-pioneer5")
@@ -246,8 +272,8 @@ def add_bench(commands: Any, parents: Parents) -> argparse.ArgumentParser:
 
 def add_check(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard check``."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "check", parents=[parents.output], help="validate a robot file and describe the arm"
+    parser = _command(
+        commands, "check", "validate a robot file and describe the arm", parents.output, takes_robot=False
     )
     parser.add_argument("file", metavar="FILE", help="robot file (*.toml)")
     return parser
@@ -255,12 +281,14 @@ def add_check(commands: Any, parents: Parents) -> argparse.ArgumentParser:
 
 def add_capability(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard capability``."""
-    parser: argparse.ArgumentParser = commands.add_parser(
+    parser = _command(
+        commands,
         "capability",
-        parents=[parents.robots, parents.output, parents.joints],
-        help="capability map: from which directions the tool reaches each place",
+        "capability map: from which directions the tool reaches each place",
+        parents.robots,
+        parents.output,
+        parents.joints,
     )
-    parser.add_argument("robot", metavar="ROBOT", help=ROBOT_HELP)
     size = parser.add_mutually_exclusive_group()
     size.add_argument("--voxel", type=number, metavar="SIDE", help="side of a voxel, millimetres (--rad: metres)")
     size.add_argument(

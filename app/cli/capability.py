@@ -28,8 +28,7 @@ def run(arguments: Namespace) -> int:
         robot,
         voxel=voxel if voxel is None or arguments.rad else voxel * 1e-3,
         resolution=arguments.resolution,
-        limits=constraints.limits,
-        locked=constraints.locked,
+        constraints=constraints,
         directions=arguments.directions,
     )
     blocks = run_local(grid) if arguments.dask is None else run_dask(grid, arguments.dask)

@@ -54,8 +54,7 @@ def run(arguments: Namespace) -> int:
 
 
 def _facts(robot: Robot, constraints: JointConstraints, arguments: Namespace) -> WorkspaceFacts:
-    limits, locked = constraints.limits, constraints.locked
-    return workspace_facts(robot, limits=limits, locked=locked, effort=arguments.effort)
+    return workspace_facts(robot, constraints=constraints, effort=arguments.effort)
 
 
 def _cloud(robot: Robot, arguments: Namespace, constraints: JointConstraints) -> Cloud:
@@ -74,8 +73,7 @@ def _cloud(robot: Robot, arguments: Namespace, constraints: JointConstraints) ->
         cloud.n,
         seed=cloud.seed,
         strategy=cloud.strategy,
-        limits=constraints.limits,
-        locked=constraints.locked,
+        constraints=constraints,
         measure=cloud.measures,
     )
     return cloud
@@ -102,7 +100,7 @@ def _picture_writer(cloud: Cloud, target: str, arguments: Namespace) -> Callable
         robot, constraints = cloud.robot, cloud.constraints
         facts = _facts(robot, constraints, arguments)
         turns = robot.joints[0].kind == "revolute"
-        cut = section(robot, limits=constraints.limits, locked=constraints.locked) if turns else None
+        cut = section(robot, constraints=constraints) if turns else None
         with reading(cloud, _shows_progress(arguments)) as chunks, opened(target) as file:
             file.write(draw(robot, chunks, facts, cut).encode())
         return f"{cloud.n} points"

@@ -72,8 +72,7 @@ class Cloud:
             stop,
             seed=self.seed,
             strategy=self.strategy,
-            limits=self.constraints.limits,
-            locked=self.constraints.locked,
+            constraints=self.constraints,
             measure=self.measures or None,
             with_q=with_q,
         )

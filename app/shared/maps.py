@@ -66,8 +66,7 @@ class Maps:
             request.robot,
             resolution=request.resolution,
             directions=request.directions,
-            limits=request.constraints.limits,
-            locked=request.constraints.locked,
+            constraints=request.constraints,
         )
         computation.total = len(grid.blocks)
         blocks: list[CapabilityBlock] = []

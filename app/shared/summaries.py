@@ -44,17 +44,15 @@ class Summaries:
 
         Args:
             robot: the arm.
-            constraints: the `limits` and `locked` of the core function.
+            constraints: as in the core function.
             effort: as in the core function; None: without volume and surface.
             limited: raise `TooManyPendingError` instead of queueing behind too many computations.
         """
 
-        limits, locked = constraints.limits, constraints.locked
-
         def compute(_: object) -> WorkspaceFacts:
             if effort is None:
-                return workspace_facts(robot, limits=limits, locked=locked, volume=False)
-            return workspace_facts(robot, limits=limits, locked=locked, effort=effort)
+                return workspace_facts(robot, constraints=constraints, volume=False)
+            return workspace_facts(robot, constraints=constraints, effort=effort)
 
         key = (robot, constraints, effort)
         return self._facts.get(key, compute, self._max_pending if limited else None)
@@ -70,8 +68,7 @@ class Summaries:
         """A section as by `kin.section`; do not cancel the future. `constraints` and `limited` as in `facts`."""
 
         def compute(_: object) -> Section:
-            limits, locked = constraints.limits, constraints.locked
-            return section(robot, plane, limits=limits, locked=locked, resolution=resolution)
+            return section(robot, plane, constraints=constraints, resolution=resolution)
 
         key = (robot, plane, constraints, resolution)
         return self._sections.get(key, compute, self._max_pending if limited else None)

@@ -80,6 +80,17 @@ class JointConstraints:
         if self.locked is not None:
             object.__setattr__(self, "locked", _lock_values(self.locked))
 
+    @classmethod
+    def of(
+        cls, limits: Limits | None, locked: Locks | None, constraints: JointConstraints | None
+    ) -> JointConstraints:
+        """The constraints of a call that takes them as two keywords or as one value; `InputError` if as both."""
+        if constraints is None:
+            return cls(limits, locked)
+        if limits is not None or locked is not None:
+            raise InputError("constraints", constraints, "none when limits or locked joints are given")
+        return constraints
+
     def __bool__(self) -> bool:
         return self.limits is not None or self.locked is not None
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kin.ik.options import Limits, Locks
+from kin.ik.options import JointConstraints, Limits, Locks
 from kin.robot import Robot
 from kin.solvers.common import TURN
 from kin.workspace.region import Region, checked_integer
@@ -18,6 +18,7 @@ def workspace_facts(
     *,
     limits: Limits | None = None,
     locked: Locks | None = None,
+    constraints: JointConstraints | None = None,
     effort: int = 4,
     volume: bool = True,
 ) -> WorkspaceFacts:
@@ -26,6 +27,7 @@ def workspace_facts(
     Args:
         robot: the arm.
         limits, locked: as in `kin.solve_ik`.
+        constraints: both as one value, instead of `limits` and `locked`.
         effort: 2 to 64: points tried per cube, or the resolution of the section in steps of 24 squares. The error
             of the volume falls with its square root, or with its square where joint 1 turns all the way.
         volume: whether to estimate volume and surface, which takes some seconds; the rest takes a tenth of one.
@@ -33,7 +35,7 @@ def workspace_facts(
     Raises:
         InputError: naming the wrong argument.
     """
-    region = Region.of(robot, limits, locked)
+    region = Region.of(robot, JointConstraints.of(limits, locked, constraints))
     tries = checked_integer("effort", effort, 2, 64, "a whole number from 2 to 64")
     point, axis, shoulder = base_axis(region)
     x, y, z = (along(region, direction) for direction in np.eye(3))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kin.errors import InputError
-from kin.ik.options import JointConstraints, Limits, Locks
+from kin.ik.options import FREE, JointConstraints
 from kin.robot import Robot
 from kin.transforms import Array
 
@@ -42,9 +42,9 @@ class Region:
     bounds: tuple[tuple[float, float], ...]
 
     @classmethod
-    def of(cls, robot: Robot, limits: Limits | None, locked: Locks | None) -> Region:
-        """The region of these options; raises `InputError` naming the wrong limit or lock."""
-        lower, upper, _ = JointConstraints(limits, locked).bounds(robot)
+    def of(cls, robot: Robot, constraints: JointConstraints = FREE) -> Region:
+        """The region that the constraints leave; raises `InputError` naming the wrong limit or lock."""
+        lower, upper, _ = constraints.bounds(robot)
         lower = np.where(np.isfinite(lower), lower, -math.pi)
         upper = np.where(np.isfinite(upper), upper, math.pi)
         return cls(robot, tuple(zip(lower.tolist(), upper.tolist(), strict=True)))

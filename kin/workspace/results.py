@@ -20,7 +20,7 @@ class WorkspaceChunk:
         points: ``(k, 3)`` float32, metres in the base frame. Single precision is the format of screens and point
             cloud files; a point is off by less than 1e-7 of the arm's size, its configuration is exact.
         q: ``(k, n)`` float64 configurations if requested, else None: `kin.configuration_at` recomputes any.
-        measures: by name, ``(k,)`` float32: ``"manipulability"`` (`kin.manipulability`), ``"limits"``: the
+        measures: by name, ``(k,)`` float32: ``"manipulability"`` (`kin.manipulability`), ``"limit_margin"``: the
             margin of the joint closest to a limit, 0 at the limit, 1 if every joint is in the middle of its range.
         start: index of the first point in the whole cloud.
         done, total: points up to the end of this slice, and of the whole cloud.

@@ -85,8 +85,9 @@ class CloudQuery(RegionQuery):
     measure: list[Measure] = Field(
         [],
         max_length=8,
-        description="A further column: manipulability, as `all` in the answer of `jacobian`, or limits, the "
-        "relative distance to the nearest joint limit, 0 at a limit and 1 in the middle; may be repeated.",
+        description="A further column: manipulability, as `all` in the answer of `jacobian`, or "
+        "limit_margin (older name: limits), the relative distance to the nearest joint limit, 0 at a limit and 1 "
+        "in the middle; may be repeated.",
     )
     q: bool = Field(False, description="Whether to include the configurations, in radians (metres).")
 

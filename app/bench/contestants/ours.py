@@ -60,7 +60,7 @@ def _cloud(task: Task) -> list[Contestant]:
     The kernel does the first three steps in one pass and saves the difference to their sum.
     """
     robot, count = task.robot, len(task.q)
-    region = Region.of(robot, None, None)
+    region = Region.of(robot)
     streams = joint_streams(0, region.movable, quasi=False)
     out, q = np.empty((count, 3), dtype=np.float32), np.empty_like(task.q)
 

@@ -141,6 +141,7 @@ def capability_grid(
     resolution: int = 25,
     limits: Limits | None = None,
     locked: Locks | None = None,
+    constraints: JointConstraints | None = None,
     directions: int = 48,
 ) -> CapabilityGrid:
     """The grid over the bounding box of the points the tool reaches.
@@ -150,16 +151,18 @@ def capability_grid(
         voxel: side of a voxel in metres; None to derive it from `resolution`.
         resolution: voxels along the longest side of the box, 1 to 256.
         limits, locked: as in `kin.solve_ik`.
+        constraints: both as one value, instead of `limits` and `locked`.
         directions: 12, 24, 48 or 96, see `kin.workspace.capability.sphere.spherical_design`.
 
     Raises:
         InputError: naming the wrong argument; also a voxel so small that there would be more than 2²⁴.
     """
     spherical_design(directions)
-    lower, upper, _ = JointConstraints(limits, locked).bounds(robot)
+    allowed = JointConstraints.of(limits, locked, constraints)
+    lower, upper, _ = allowed.bounds(robot)
     bounds = tuple(zip(lower.tolist(), upper.tolist(), strict=True))
     count = checked_integer("resolution", resolution, 1, 256, "a whole number from 1 to 256")
-    region = Region.of(robot, limits, locked)
+    region = Region.of(robot, allowed)
     box = [along(region, axis) for axis in np.eye(3)]
     low, high = (np.array([getattr(span, end).value for span in box]) for end in ("least", "largest"))
     size = high - low
@@ -227,13 +230,13 @@ def capability_map(
     resolution: int = 25,
     limits: Limits | None = None,
     locked: Locks | None = None,
+    constraints: JointConstraints | None = None,
     directions: int = 48,
 ) -> CapabilityMap:
     """The capability map of an arm, block after block; arguments and errors as of `capability_grid`.
 
     For threads, progress or several machines, compute the blocks of the grid one by one.
     """
-    grid = capability_grid(
-        robot, voxel=voxel, resolution=resolution, limits=limits, locked=locked, directions=directions
-    )
+    allowed = JointConstraints.of(limits, locked, constraints)
+    grid = capability_grid(robot, voxel=voxel, resolution=resolution, constraints=allowed, directions=directions)
     return capability_join(grid, (capability_block(grid, block) for block in range(len(grid.blocks))))

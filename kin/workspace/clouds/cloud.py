@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from kin.errors import InputError
 from kin.fk import fk_positions
-from kin.ik.options import Limits, Locks
+from kin.ik.options import JointConstraints, Limits, Locks
 from kin.robot import Robot
 from kin.transforms import Array
 from kin.workspace.clouds.measures import Measure, measure_names, measured
@@ -40,6 +40,7 @@ def sample_workspace(
     strategy: Strategy = "uniform",
     limits: Limits | None = None,
     locked: Locks | None = None,
+    constraints: JointConstraints | None = None,
     chunk: int = 65536,
     measure: Measure | Sequence[Measure] | None = None,
     with_q: bool = False,
@@ -56,8 +57,9 @@ def sample_workspace(
             microseconds per point, and a few seconds once per arm and limits; :mod:`kin.workspace.clouds.targets`
             describes their accuracy.
         limits, locked: as in `kin.solve_ik`, respected exactly. A joint without limits is sampled from ±π.
+        constraints: both as one value, instead of `limits` and `locked`.
         chunk: points per chunk; the points do not depend on it.
-        measure: ``"manipulability"``, ``"limits"``, or both.
+        measure: ``"manipulability"``, ``"limit_margin"``, or both.
         with_q: whether chunks carry their configurations.
 
     Raises:
@@ -65,7 +67,7 @@ def sample_workspace(
     """
     total = _count("n", n)
     size = _count("chunk", chunk)
-    samples = _Samples.of(robot, seed, strategy, limits, locked)
+    samples = _Samples.of(robot, seed, strategy, JointConstraints.of(limits, locked, constraints))
     names = measure_names(measure)
     return (
         samples.slice(start, min(start + size, total), total, names, with_q) for start in range(0, total, size)
@@ -82,6 +84,7 @@ def workspace_slice(
     strategy: Strategy = "uniform",
     limits: Limits | None = None,
     locked: Locks | None = None,
+    constraints: JointConstraints | None = None,
     measure: Measure | Sequence[Measure] | None = None,
     with_q: bool = False,
 ) -> WorkspaceChunk:
@@ -92,7 +95,7 @@ def workspace_slice(
     total = _count("n", n)
     first = checked_integer("start", start, 0, total - 1, f"a whole number from 0 to {total - 1}")
     last = checked_integer("stop", stop, first + 1, total, f"a whole number from {first + 1} to {total}")
-    samples = _Samples.of(robot, seed, strategy, limits, locked)
+    samples = _Samples.of(robot, seed, strategy, JointConstraints.of(limits, locked, constraints))
     return samples.slice(first, last, total, measure_names(measure), with_q)
 
 
@@ -104,13 +107,14 @@ def configuration_at(
     strategy: Strategy = "uniform",
     limits: Limits | None = None,
     locked: Locks | None = None,
+    constraints: JointConstraints | None = None,
 ) -> Array:
     """The configurations ``(..., n)`` behind points of a cloud, by their indices ``(...)``: one, or any array.
 
     Raises:
         InputError: naming the wrong argument.
     """
-    samples = _Samples.of(robot, seed, strategy, limits, locked)
+    samples = _Samples.of(robot, seed, strategy, JointConstraints.of(limits, locked, constraints))
     try:
         indices = np.asarray(index)
     except (ValueError, RecursionError):  # rows of different lengths, or a list that contains itself
@@ -134,13 +138,11 @@ class _Samples:
     strategy: Strategy
 
     @classmethod
-    def of(
-        cls, robot: Robot, seed: int, strategy: Strategy, limits: Limits | None, locked: Locks | None
-    ) -> _Samples:
+    def of(cls, robot: Robot, seed: int, strategy: Strategy, constraints: JointConstraints) -> _Samples:
         if strategy not in STRATEGIES:
             raise InputError("strategy", strategy, "one of " + ", ".join(f'"{name}"' for name in STRATEGIES))
         checked = checked_integer("seed", seed, 0, (1 << 64) - 1, "a whole number from 0 to 2⁶⁴ − 1")
-        return cls(Region.of(robot, limits, locked), checked, strategy)
+        return cls(Region.of(robot, constraints), checked, strategy)
 
     @property
     def by_target(self) -> bool:

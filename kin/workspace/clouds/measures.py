@@ -13,14 +13,15 @@ from kin.fk import manipulability
 from kin.transforms import Array
 from kin.workspace.region import Region
 
-Measure = Literal["manipulability", "limits"]
-MEASURES: tuple[Measure, ...] = get_args(Measure)
+Measure = Literal["manipulability", "limit_margin", "limits"]
+MEASURES: tuple[Measure, ...] = ("manipulability", "limit_margin")
+_ACCEPTED: tuple[Measure, ...] = get_args(Measure)  # "limits" is the older name of "limit_margin"
 
 
 def measure_names(measure: Measure | Sequence[Measure] | None) -> tuple[Measure, ...]:
-    """The requested measures, each once; raises `InputError` for an unknown one."""
+    """The requested measures by the requested names, each once; raises `InputError` for an unknown one."""
     names = (measure,) if isinstance(measure, str) else () if measure is None else measure
-    if not isinstance(names, Sequence) or any(name not in MEASURES for name in names):
+    if not isinstance(names, Sequence) or any(name not in _ACCEPTED for name in names):
         raise InputError("measure", measure, "any of " + ", ".join(f'"{name}"' for name in MEASURES))
     return tuple(dict.fromkeys(names))
 

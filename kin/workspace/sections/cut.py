@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from kin.errors import InputError
 from kin.fk import fk_positions
-from kin.ik.options import Limits, Locks
+from kin.ik.options import JointConstraints, Limits, Locks
 from kin.robot import Robot
 from kin.transforms import Array, finite_array
 from kin.workspace.region import Region, checked_integer
@@ -46,6 +46,7 @@ def section(
     *,
     limits: Limits | None = None,
     locked: Locks | None = None,
+    constraints: JointConstraints | None = None,
     resolution: int = 96,
 ) -> Section:
     """The cut of the workspace with a plane, and its boundary.
@@ -54,12 +55,13 @@ def section(
         robot: the arm.
         plane: a point (m) and a normal of it; None for the (r, z) section of an arm whose joint 1 is revolute.
         limits, locked: as in `kin.solve_ik`. An (r, z) section ignores those of joint 1.
+        constraints: both as one value, instead of `limits` and `locked`.
         resolution: squares along the longer side of the plane's window, 8 to 1000.
 
     Raises:
         InputError: naming the wrong argument.
     """
-    region = Region.of(robot, limits, locked)
+    region = Region.of(robot, JointConstraints.of(limits, locked, constraints))
     count = checked_integer("resolution", resolution, 8, 1000, "a whole number from 8 to 1000")
     if plane is None:
         if robot.joints[0].kind != "revolute":

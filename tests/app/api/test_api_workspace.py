@@ -123,7 +123,7 @@ def test_all_strategies_and_all_arms(client):
         ("seed=-1", "seed", '"-1"', "greater than or equal to 0"),
         (f"seed={2**64}", "seed", f'"{2**64}"', "less than"),
         ("strategy=even", "strategy", '"even"', "'boundary'"),
-        ("measure=limits&measure=beauty", "measure[1]", '"beauty"', "'manipulability' or 'limits'"),
+        ("measure=limits&measure=beauty", "measure[1]", '"beauty"', "'limit_margin' or 'limits'"),
         ("format=xls", "format", '"xls"', "'ply'"),
         ("q=perhaps", "q", '"perhaps"', "boolean"),
         ("sed=1", "sed", '"1"', "seed"),

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from app.exports.formats import FORMATS, encode
 from app.shared.clouds import Cloud, Clouds
 from app.shared.settings import Settings
 from kin.solvers import closed_form_of
-from kin.workspace import MEASURES, STRATEGIES
+from kin.workspace import STRATEGIES, Measure
 
 ROOT = Path(__file__).parents[3]
 PIONEER = kin.get_robot("pioneer5")
@@ -45,7 +46,8 @@ def answer(capsys, *words, code=0):
 
 
 @pytest.mark.parametrize(
-    ("option", "choices"), [("--measure", MEASURES), ("--strategy", STRATEGIES), ("--format", tuple(FORMATS))]
+    ("option", "choices"),
+    [("--measure", get_args(Measure)), ("--strategy", STRATEGIES), ("--format", tuple(FORMATS))],
 )
 def test_the_choices_of_a_cloud_are_those_of_the_core(capsys, option, choices):
     """They are written out in the parser, which starts without importing the core."""

@@ -83,7 +83,7 @@ def random_region(
     """Limits and locks: of each joint its own, a part of them, or one value."""
     limits: list[tuple[float, float] | None] = []
     locked: list[float | None] = []
-    for low, high in Region.of(robot, None, None).bounds:
+    for low, high in Region.of(robot).bounds:
         a, b = sorted(rng.uniform(low, high, 2).tolist())
         way = rng.random()
         limits.append((a, b) if way < 0.3 else None)

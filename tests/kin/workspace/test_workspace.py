@@ -112,7 +112,7 @@ def test_points_are_those_of_their_configurations(robot_id, strategy):
     assert (one == q[-1]).all()
 
 
-def test_samples_far_out_in_the_sequence_are_as_good_as_any():
+def test_samples_late_in_the_sequence_are_evenly_distributed():
     robot = kin.get_robot("redundant7")
     far = 2**52
     for strategy in ("uniform", "quasi"):
@@ -174,7 +174,7 @@ def test_every_point_is_inside_the_exact_sizes(robot_id, strategy):
 
 
 @pytest.mark.parametrize("robot_id", ALL)
-def test_points_of_every_arm_are_inside_its_exact_sizes_and_come_near_them(robot_id):
+def test_points_of_every_arm_are_inside_its_exact_sizes_and_close_to_them(robot_id):
     inside_sizes(robot_id, "quasi")
     found = facts(robot_id)
     points = cloud(kin.get_robot(robot_id), 200_000, strategy="quasi")
@@ -202,12 +202,12 @@ def inside_sizes(robot_id, strategy):
 @pytest.mark.parametrize("robot_id", ROBOTS)
 def test_boundary_samples_are_on_the_envelope(robot_id):
     robot = kin.get_robot(robot_id)
-    found = cell_map(Region.of(robot, None, None))
+    found = cell_map(Region.of(robot))
     away = np.random.default_rng(5).normal(size=(26, 3))
     away *= 0.01 * facts(robot_id).reach.largest.value / np.linalg.norm(away, axis=1, keepdims=True)
 
     def share_near(strategy):
-        """The fraction of samples within a hundredth of the reach of the outside."""
+        """The fraction of samples closer to the outside than a hundredth of the reach."""
         around = (cloud(robot, 100, strategy=strategy).astype(float)[:, None] + away).reshape(-1, 3)
         distance = found.nearest(around, 1e-6)[1]
         return (distance.reshape(100, -1) > 1e-6).any(axis=1).mean()
@@ -216,7 +216,7 @@ def test_boundary_samples_are_on_the_envelope(robot_id):
 
 
 def halfway(curve):
-    """Vertices of a closed polyline and points between them, no two farther apart than some millimetres."""
+    """Vertices of a closed polyline and points between them, at most some millimetres apart."""
     following = np.roll(curve, -1, axis=0)
     return np.concatenate([curve + k / 8 * (following - curve) for k in range(8)])
 
@@ -224,20 +224,20 @@ def halfway(curve):
 @pytest.mark.parametrize("robot_id", ROBOTS)
 def test_volume_samples_are_even_in_space(robot_id):
     robot = kin.get_robot(robot_id)
-    found = cell_map(Region.of(robot, None, None))
+    found = cell_map(Region.of(robot))
     full = (sampling_probes(found.region).distance < 1e-3 * found.size).all(axis=1)
 
     def variation(strategy):
         rows = found.rows(cloud(robot, 6000, strategy=strategy).astype(float))
         counts = np.bincount(rows[rows >= 0], minlength=len(full))[full]
-        # In excess of the variation that even samples have by chance.
+        # Above the variation that evenly distributed samples have by chance.
         return math.sqrt(max(counts.var() - counts.mean(), 0.0)) / counts.mean()
 
     assert variation("volume") < 0.25
     assert variation("uniform") > 2.0 * variation("volume")
 
 
-def test_measures_belong_to_their_points():
+def test_measures_are_those_of_their_points():
     robot = kin.get_robot("pioneer5")
     limits = [(0.5, 1.5), None, None, None, None]
     (chunk,) = kin.sample_workspace(robot, 500, measure=MEASURES, limits=limits, locked=[None] * 4 + [0.5])
@@ -246,8 +246,38 @@ def test_measures_belong_to_their_points():
     assert np.abs(chunk.measures["manipulability"] - kin.manipulability(robot, q)).max() < 1e-7
     low, high = np.maximum(robot.lower, [0.5, *robot.lower[1:]]), np.minimum(robot.upper, [1.5, *robot.upper[1:]])
     expected = (np.minimum(q - low, high - q) / (0.5 * (high - low)))[:, :4].min(axis=1)
-    assert np.abs(chunk.measures["limits"] - expected).max() < 1e-6
+    assert np.abs(chunk.measures["limit_margin"] - expected).max() < 1e-6
     assert 0.0 <= expected.min() <= expected.max() <= 1.0
+
+
+def test_the_older_name_of_the_limit_margin_is_accepted():
+    robot = kin.get_robot("pioneer5")
+    (chunk,) = kin.sample_workspace(robot, 50, measure=("limits", "limit_margin"))
+    assert [*chunk.measures] == ["limits", "limit_margin"]
+    assert np.array_equal(chunk.measures["limits"], chunk.measures["limit_margin"])
+
+
+def test_limits_and_locks_may_be_given_as_one_value():
+    robot = kin.get_robot("pioneer5")
+    limits, locked = [(0.5, 1.5), None, None, None, None], [None, None, None, 0.25, None]
+    one = kin.JointConstraints(limits, locked)
+    for function, attribute in (
+        (lambda **given: kin.configuration_at(robot, 7, **given), None),
+        (lambda **given: kin.workspace_slice(robot, 10, 2, 9, **given), "points"),
+        (lambda **given: next(kin.sample_workspace(robot, 10, **given)), "points"),
+        (lambda **given: kin.workspace_facts(robot, volume=False, **given).x.largest, "q"),
+        (lambda **given: kin.section(robot, resolution=8, **given).curves[0], None),
+        (lambda **given: kin.capability_grid(robot, resolution=3, **given), "bounds"),
+        (lambda **given: kin.capability_map(robot, resolution=2, directions=12, **given), "manipulability"),
+    ):
+        a, b, free = function(limits=limits, locked=locked), function(constraints=one), function()
+        if attribute is not None:
+            a, b, free = (getattr(found, attribute) for found in (a, b, free))
+        assert np.array_equal(a, b)
+        assert not np.array_equal(a, free)
+        with pytest.raises(InputError) as caught:
+            function(locked=locked, constraints=one)
+        assert caught.value.field == "constraints"
 
 
 @pytest.mark.parametrize(
@@ -363,14 +393,14 @@ def test_a_planar_arm_is_a_ring():
 def test_both_methods_give_the_same_volume():
     robot = kin.get_robot("redundant7")
     revolved = kin.workspace_facts(robot, effort=3)
-    volume, surface = from_probes(Region.of(robot, None, None), 2)
+    volume, surface = from_probes(Region.of(robot), 2)
     assert revolved.volume.error < 0.002 * revolved.volume.value
     assert abs(volume.value - revolved.volume.value) < 4.0 * math.hypot(volume.error, revolved.volume.error)
     assert abs(surface.value - revolved.surface.value) < 4.0 * math.hypot(surface.error, revolved.surface.error)
 
 
 def test_errors_shrink_with_effort():
-    region = Region.of(kin.get_robot("pioneer5"), None, [None, None, None, 0.0, 0.5])
+    region = Region.of(kin.get_robot("pioneer5"), kin.JointConstraints(locked=[None, None, None, 0.0, 0.5]))
     few, many = from_probes(region, 2)[0], from_probes(region, 6)[0]
     assert 0.4 * few.error < many.error < 0.8 * few.error
     assert abs(few.value - many.value) < 4.0 * math.hypot(few.error, many.error)
@@ -382,7 +412,7 @@ def test_errors_shrink_with_effort():
 def test_the_section_of_the_pioneer_arm_equals_the_reference():
     robot = kin.get_robot("pioneer5")
     found = kin.section(robot)
-    # The reference, a raster of 2 mm, includes the cells on the boundary: on average half a cell too much.
+    # The reference, a raster of 2 mm, includes the cells on the boundary, on average half a cell too many.
     rim = sum(np.linalg.norm(curve - np.roll(curve, 1, axis=0), axis=1).sum() for curve in found.curves)
     assert found.area == pytest.approx(0.1879 - 0.001 * rim, abs=0.001)
     upright = kin.section(robot, ([0.0, 0.0, 0.0], [1.0, 0.0, 0.0]))
@@ -405,7 +435,7 @@ def test_no_point_is_outside_of_the_section(robot_id):
     at = np.stack([np.hypot(p[:, 0], p[:, 1]), p[:, 2]], axis=1)
     turns = sum(windings(curve, at) for curve in found.curves)
     outside = at[turns < 0.5]
-    # Chords cut off less than a square.
+    # A chord cuts off less than a square.
     edges = np.concatenate([halfway(curve) for curve in found.curves])
     assert len(outside) < 0.02 * len(at)
     if len(outside):
@@ -413,7 +443,7 @@ def test_no_point_is_outside_of_the_section(robot_id):
 
 
 def windings(curve, at):
-    """How often a closed polyline goes round each point."""
+    """Winding number of a closed polyline around each point."""
     to = curve[None] - at[:, None]
     angle = np.arctan2(to[..., 1], to[..., 0])
     turn = np.roll(angle, -1, axis=1) - angle
@@ -423,7 +453,7 @@ def windings(curve, at):
 def test_vertices_of_a_section_are_on_the_boundary():
     robot = kin.get_robot("redundant7")
     (curve,) = kin.section(robot, resolution=48).curves
-    # The outstretched forearm traces a circle about the end of the horizontal upper arm.
+    # The straight forearm traces a circle around the end of the horizontal upper arm.
     around = np.hypot(curve[:, 0] - 0.35, curve[:, 1] - 0.30)
     far = curve[:, 0] > 0.5
     assert np.abs(around[far] - 0.73).max() < 1e-5

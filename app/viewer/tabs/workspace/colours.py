@@ -25,7 +25,7 @@ from kin.workspace import Measure
 from kin.workspace.region import Region
 from kin.workspace.search.extremes import base_axis
 
-By = Literal["radius", "height", "manipulability", "limits", "one"]
+By = Literal["radius", "height", "manipulability", "limit_margin", "one"]
 Colour = tuple[int, int, int]
 Bytes = NDArray[np.uint8]
 
@@ -41,14 +41,14 @@ BY: dict[str, By] = {
     "Radius": "radius",
     "Height": "height",
     "Manipulability": "manipulability",
-    "Limit margin": "limits",
+    "Limit margin": "limit_margin",
     "One colour": "one",
 }
 MEANING: dict[By, str] = {
     "radius": "distance from joint 1's axis",
     "height": "height above the base",
     "manipulability": "manipulability (Yoshikawa)",
-    "limits": "distance to the nearest joint limit, relative to half its range",
+    "limit_margin": "distance to the nearest joint limit, relative to half its range",
 }
 # Okabe and Ito's blue and orange, for the robot's own cloud and that of another one.
 OWN: Colour = (0, 114, 178)
@@ -67,13 +67,13 @@ class Scale:
 
 def measures(by: By) -> tuple[Measure, ...]:
     """The measures of a cloud that this colouring needs."""
-    return ("manipulability",) if by == "manipulability" else ("limits",) if by == "limits" else ()
+    return (by,) if by == "manipulability" or by == "limit_margin" else ()
 
 
 @lru_cache(maxsize=256)
 def axis_of_joint_1(robot: Robot) -> tuple[Array, Array]:
     """A point of joint 1's axis and its unit direction, ``(3,)`` each."""
-    point, axis, _ = base_axis(Region.of(robot, None, None))
+    point, axis, _ = base_axis(Region.of(robot))
     return point, axis
 
 
@@ -145,4 +145,4 @@ def value_text(by: By, value: float, units: Units) -> str:
     """A quantity as text, with its unit."""
     if by in ("radius", "height"):
         return units.lengths.text(value, 0)
-    return f"{100.0 * value:.0f} %" if by == "limits" else f"{value:.3g}"
+    return f"{100.0 * value:.0f} %" if by == "limit_margin" else f"{value:.3g}"

@@ -115,7 +115,7 @@ class PointPicker:
                     best.index,
                     seed=cloud.seed,
                     strategy=cloud.strategy,
-                    locked=cloud.constraints.locked,
+                    constraints=cloud.constraints,
                 )
             self._post("picked", (number, cloud, best, q, size))
 
@@ -144,7 +144,7 @@ class PointPicker:
         """Show the picked point in the present units."""
         if self._picked is not None:
             cloud, index, q, point = self._picked
-            content = views.picked(cloud.robot, cloud.constraints.locked, index, q, point, self._stage.units)
+            content = views.picked(cloud.robot, cloud.constraints, index, q, point, self._stage.units)
             update_html(self._controls.picked, content)
 
     def clear(self) -> None:

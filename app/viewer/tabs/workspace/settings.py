@@ -84,6 +84,8 @@ def _read(name: str, value: object, others: tuple[str, ...]) -> object:
         if not isinstance(value, bool):
             raise InputError(name, value, "true or false")
         return value
+    if name == "by" and value == "limits":  # the name in older links
+        value = "limit_margin"
     allowed: tuple[object, ...] = {
         "strategy": STRATEGIES,
         "by": tuple(BY.values()),

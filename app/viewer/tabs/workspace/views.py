@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 import kin
 from app.viewer.views.templates import render
-from kin import Robot
+from kin import JointConstraints, Robot
 from kin.ik.options import Locks
 from kin.transforms import Array
 from kin.units import Units
@@ -62,10 +62,10 @@ def progress(state: State, drawn: int, total: int, speed: float, locked: Locks |
     )
 
 
-def picked(robot: Robot, locked: Locks | None, index: int, q: Array, point: Array, units: Units) -> str:
-    """The numbers of the clicked point of a cloud with these joints locked."""
+def picked(robot: Robot, constraints: JointConstraints, index: int, q: Array, point: Array, units: Units) -> str:
+    """The numbers of the clicked point of a cloud."""
     manipulability = float(kin.manipulability(robot, q))
-    margin = float(measured(Region.of(robot, None, locked), "limits", np.asarray(q)[None])[0])
+    margin = float(measured(Region.of(robot, constraints), "limit_margin", np.asarray(q)[None])[0])
     rows = (
         ("point", grouped(index), ""),
         ("x y z", GAP.join(units.lengths.number(v) for v in point.tolist()), units.lengths.name),

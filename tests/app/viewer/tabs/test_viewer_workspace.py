@@ -179,10 +179,11 @@ def test_a_wrong_setting_is_named_and_ignored_in_an_address(name, value):
 
 def test_settings_are_restored_from_their_state():
     settings = WorkspaceSettings(
-        5, "quasi", 9, "limits", "viridis", 0.002, "arm", 0.01, "slice", "puma560", True, True, False
+        5, "quasi", 9, "limit_margin", "viridis", 0.002, "arm", 0.01, "slice", "puma560", True, True, False
     )
     assert WorkspaceSettings().restored(settings.state(), ("puma560",)) == settings
     assert WorkspaceSettings().restored({**settings.state(), "unheard": 1}, ()) == replace(settings, compare=None)
+    assert WorkspaceSettings().restored({"by": "limits"}, ()).by == "limit_margin"  # as in older links
 
 
 # Plot and numbers
@@ -235,7 +236,7 @@ def test_sizes_legend_and_picked_point_follow_the_units(length, scale, decimals)
     scales = colours.scale_of(PIONEER, "radius")
     assert f"{scale * scales.high:.{decimals}f} {length}" in colours.legend(scales, "viridis", units)
     point = np.array([0.1234, -0.2, 0.0])
-    text = views.picked(PIONEER, None, 7, PIONEER.q_home, point, units)
+    text = views.picked(PIONEER, kin.JointConstraints(), 7, PIONEER.q_home, point, units)
     assert f">{scale * 0.1234:.{decimals + 1}f} &nbsp; −{scale * 0.2:.{decimals + 1}f} " in text
     assert f">{length}<" in text
 
@@ -428,7 +429,7 @@ def test_a_dragged_arm_and_a_growing_cloud_share_the_connection(tab):
 
 
 @pytest.mark.parametrize(
-    ("label", "by"), [("Height", "height"), ("Manipulability", "manipulability"), ("Limit margin", "limits")]
+    ("label", "by"), [("Height", "height"), ("Manipulability", "manipulability"), ("Limit margin", "limit_margin")]
 )
 def test_recolouring_sends_colours_and_no_points(tab, label, by):
     tab.draw(N)
