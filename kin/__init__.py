@@ -10,7 +10,7 @@ from kin._version import __version__
 from kin.catalog import builtin_robots, get_robot, load_folder, load_robot, parse_robot
 from kin.errors import InputError, KinematicsError, RobotFileError, UnknownRobotError
 from kin.fk import fk, fk_positions, jacobian, link_frames, manipulability
-from kin.ik import IKOptions, JointConstraints, branch_names, branch_of, solve_ik
+from kin.ik import IKOptions, JointConstraints, branch_meanings, branch_names, branch_of, solve_ik
 from kin.ik.batch import ik_branches
 from kin.ik.details import LimitViolation, Redundancy
 from kin.ik.options import Task
@@ -70,6 +70,7 @@ __all__ = [
     "WorkspaceChunk",
     "WorkspaceFacts",
     "__version__",
+    "branch_meanings",
     "branch_names",
     "branch_of",
     "builtin_robots",

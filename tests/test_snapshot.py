@@ -327,10 +327,10 @@ IK: dict[str, Request] = {
     ),
     "pioneer5: point and direction, a large roll": ik("pioneer5", pose(0.045, 0.191, -0.211, 0.0, 0.9, 0.4, -0.2)),
     "pioneer5: direction beyond a stop": ik("pioneer5", along(0.045, 0.191, 0.1, 0.0, 0.0, 1.0)),
-    "pioneer5: elbow up, locked, narrowed": ik(
+    "pioneer5: elbow positive, locked, narrowed": ik(
         "pioneer5",
         point(-0.03, 0.157, -0.194),
-        branch="elbow up",
+        branch="elbow positive",
         locked=only(5, j5=0.5),
         limits=only(5, j3=[0.0, 2.0]),
     ),
@@ -369,7 +369,7 @@ IK: dict[str, Request] = {
     "redundant7-craig: two branches": ik(
         "redundant7-craig",
         At(SOMEWHERE["redundant7-craig"]),
-        branch=["shoulder front · elbow down · wrist flip", "seed"],
+        branch=["shoulder front · elbow negative · wrist flip", "seed"],
     ),
     "redundant7-craig: a joint narrowed, swinging on": ik(
         "redundant7-craig",
@@ -386,17 +386,17 @@ IK: dict[str, Request] = {
     "redundant7: sum of two joints": ik(
         "redundant7", At(SOMEWHERE["redundant7"]), redundancy={"theta1": -0.5}, max_solutions=2
     ),
-    "iiwa14: elbow up, swung": ik(
-        "iiwa14", At(SOMEWHERE["iiwa14"]), branch="elbow up", redundancy={"psi": -0.4}, max_solutions=2
+    "iiwa14: elbow positive, swung": ik(
+        "iiwa14", At(SOMEWHERE["iiwa14"]), branch="elbow positive", redundancy={"psi": -0.4}, max_solutions=2
     ),
     "iiwa14: a joint narrowed away": ik("iiwa14", At(SOMEWHERE["iiwa14"]), limits=only(7, j4=[0.2, 0.3])),
     "ur5: elbow narrowed away": ik("ur5", At(SOMEWHERE["ur5"]), limits=only(6, j3=[0.2, 0.3])),
-    "ur5: elbow up": ik("ur5", At(SOMEWHERE["ur5"]), branch="elbow up"),
-    "ur5: elbow up alone is narrowed away": ik(
-        "ur5", At(SOMEWHERE["ur5"]), branch="elbow up", limits=only(6, j3=[0.2, 0.3])
+    "ur5: elbow positive": ik("ur5", At(SOMEWHERE["ur5"]), branch="elbow positive"),
+    "ur5: elbow positive alone is narrowed away": ik(
+        "ur5", At(SOMEWHERE["ur5"]), branch="elbow positive", limits=only(6, j3=[0.2, 0.3])
     ),
     "puma560: on another branch": ik(
-        "puma560", At(SOMEWHERE["puma560"]), branch="shoulder back", limits=only(6, j1=[0.2, 0.4])
+        "puma560", At(SOMEWHERE["puma560"]), branch="shoulder front", limits=only(6, j1=[0.2, 0.4])
     ),
     "puma560: wrist through its axis": ik(
         "puma560", At((0.3, 0.8, -2.8, 0.4, 0.0, 0.5)), q_seed=[0.1, 0.7, -2.7, 0.0, 0.1, 0.3]
@@ -635,7 +635,7 @@ PROBLEMS: dict[str, Request] = {
     "lock beyond the limits": ik("pioneer5", P, locked=only(5, j2=-1.0)),
     "locks of another number": ik("pioneer5", P, locked=[0.0]),
     "unknown branch": ik("pioneer5", P, branch="sideways"),
-    "branch of parts that do not go together": ik("pioneer5", P, branch="elbow up · elbow down"),
+    "branch of parts that do not go together": ik("pioneer5", P, branch="elbow positive · elbow negative"),
     "no branches": ik("pioneer5", P, branch=[]),
     "branch of an arm without names": ik("panda", At(SOMEWHERE["panda"]), branch="elbow up"),
     "nothing free": ik("ur5", At(SOMEWHERE["ur5"]), redundancy=0.1),
@@ -741,7 +741,7 @@ CLI: dict[str, Request] = {
     "ik, not the roll": Command("ik pioneer5 --position 45 191 -211 --wxyz 0 0.9 0.4 -0.2"),
     "ik, metres typed": Command("ik pioneer5 --position 0.045 0.191 -0.211"),
     "ik, branch, limit, lock": Command(
-        "ik pioneer5 --position -30 157 -194 --branch elbow~up --limit 3=0:115 --lock 5=28 --all"
+        "ik pioneer5 --position -30 157 -194 --branch elbow~positive --limit 3=0:115 --lock 5=28 --all"
     ),
     "ik, no such branch here": Command(f"ik pioneer5 {WHERE} --branch shoulder~back"),
     "ik, seed and free value": Command(

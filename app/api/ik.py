@@ -57,10 +57,10 @@ EXAMPLES = {
         {"target": {"position": [-0.018, 0.31, -0.181]}, "q_seed": [1.2, 0.5, 0.5, 0.5, 0.5], "max_solutions": 1},
     ),
     "branch": example(
-        "Only postures with the elbow up, joint 5 locked, joint 3 narrowed; a point, as two joints are then gone",
+        "Only postures in front, joint 5 locked, joint 3 narrowed; a point, as two joints are then gone",
         {
             "target": {"position": [-0.03, 0.157, -0.194]},
-            "branch": "elbow up",
+            "branch": "shoulder front",
             "locked": [None, None, None, None, 0.5],
             "limits": [None, None, [0.0, 2.0], None, None],
         },

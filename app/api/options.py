@@ -58,8 +58,8 @@ class OptionsBody(schemas.Body):
     )
     branch: BranchNames | None = Field(
         None,
-        description="Only these branches: a name as in `branches` of the robot, parts of one such as `elbow up`, "
-        "`seed` for the branch of the seed, or a list of these.",
+        description="Only these branches: a name as in `branches` of the robot, parts of one such as "
+        "`shoulder front`, `seed` for the branch of the seed, or a list of these.",
     )
 
     def options(self, task: Task) -> IKOptions:

@@ -36,7 +36,16 @@ from kin.ik.results import IKResult
 from kin.robot import Robot
 from kin.solvers import closed_form_of
 
-__all__ = ["IKOptions", "IKProblem", "JointConstraints", "branch_names", "branch_of", "solve", "solve_ik"]
+__all__ = [
+    "IKOptions",
+    "IKProblem",
+    "JointConstraints",
+    "branch_meanings",
+    "branch_names",
+    "branch_of",
+    "solve",
+    "solve_ik",
+]
 
 
 def solve_ik(
@@ -99,6 +108,12 @@ def branch_names(robot: Robot) -> tuple[str, ...]:
     """The names of the arm's branches; none for an arm without a closed form."""
     closed_form = closed_form_of(robot)
     return () if closed_form is None else closed_form.branches
+
+
+def branch_meanings(robot: Robot) -> dict[str, str]:
+    """What each part of the branch names says about a configuration: ``{"elbow up": "the elbow is above …"}``."""
+    closed_form = closed_form_of(robot)
+    return {} if closed_form is None else dict(closed_form.meanings)
 
 
 def branch_of(robot: Robot, q: ArrayLike) -> str:

@@ -45,7 +45,7 @@ def closed_form_of(robot: Robot) -> ClosedForm | None:
     if not readable:
         return None
     joints, form = min(readable, key=_burden)
-    return ReversedJoints(form, joints, robot.n) if joints else form
+    return ReversedJoints(form, joints, robot) if joints else form
 
 
 def _first_match(robot: Robot) -> ClosedForm | None:

@@ -17,6 +17,8 @@ from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 from kin.kernels.compile import direct
+from kin.robot import Robot
+from kin.solvers.names import Names
 from kin.solvers.singular import Singularity
 from kin.transforms import Array
 
@@ -142,6 +144,7 @@ class ClosedForm(ABC):
     Attributes:
         name, title: id of the family, and the same for people.
         branches: names, one per row of its answers.
+        meanings: (part of a name, what it says), for every part of the names.
         reason: a clause that says what about the axes makes the arm one of the family.
         lengths: the signed lengths in its formulas, metres.
         kernels: its batch kernels.
@@ -150,9 +153,14 @@ class ClosedForm(ABC):
     name: str
     title: str
     branches: tuple[str, ...]
+    meanings: tuple[tuple[str, str], ...] = ()
     reason: str
     lengths: tuple[float, ...]
     kernels: BatchKernels
+
+    def names(self, robot: Robot, sense: Array) -> Names:
+        """The names of the branches on `robot`, in which joint i counts `sense[i]` times as it does here."""
+        return Names(self.branches, self.meanings)
 
     @abstractmethod
     def handles(self, task: int) -> bool:

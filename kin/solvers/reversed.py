@@ -125,14 +125,15 @@ class ReversedJoints(ClosedForm):
         joints: indices of the reversed joints.
     """
 
-    def __init__(self, form: ClosedForm, joints: Joints, n: int) -> None:
+    def __init__(self, form: ClosedForm, joints: Joints, robot: Robot) -> None:
         self.form, self.joints = form, joints
-        self.name, self.title, self.branches, self.lengths = form.name, form.title, form.branches, form.lengths
+        self.name, self.title, self.lengths = form.name, form.title, form.lengths
         *most, last = (str(i + 1) for i in joints)
         which = f"joints {', '.join(most)} and {last} are" if most else f"joint {last} is"
         self.reason = f"{form.reason}; {which} reversed"
-        self._signs = np.ones(n)
+        self._signs = np.ones(robot.n)
         self._signs[list(joints)] = -1.0
+        self.branches, self.meanings = form.names(robot, self._signs)
         requested = [r.joint for r in form.redundancies(POSE)[:1] if not r.rare]
         self.kernels = _reversed_kernels(form.kernels, self._signs, joints, requested)
 

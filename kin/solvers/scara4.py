@@ -38,6 +38,7 @@ from kin.solvers.contract import (
     RedundancyParameter,
     SolverInput,
 )
+from kin.solvers.names import Names, left_or_right, names_of, stance_of
 from kin.solvers.planar import planar_free, two_links
 from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
 from kin.tolerances import TOLERANCES
@@ -45,7 +46,6 @@ from kin.transforms import Array
 
 NAME = "scara4"
 TITLE = "closed form, all axes parallel"
-BRANCHES = ("elbow right", "elbow left")
 _PSI = RedundancyParameter("psi", "tool angle ψ", circular=True)
 _REACH = TOLERANCES.closure_position * 0.1
 _SINGULAR = TOLERANCES.singular
@@ -102,7 +102,7 @@ def match(robot: Robot) -> Scara4 | None:
     limits = [*[-UNBOUNDED] * 4, *[UNBOUNDED] * 4]
     pose = [*pose_params(base, np.eye(4))[:_TOOL], *tool[:3].ravel()]
     params = np.array([*pose, *lengths, *joints, *sign, *offset, *limits, float(upright)])
-    return Scara4(Geometry(params, order, sign, offset, abs(upper), abs(fore), upright))
+    return Scara4(Geometry(params, order, sign, offset, abs(upper), abs(fore), upright), robot)
 
 
 @jit
@@ -283,13 +283,23 @@ def branches_many(params: Array, T: Array, values: Array, near: Array, out: Arra
 class Scara4(ClosedForm):
     """The closed form of a SCARA or planar arm."""
 
-    name, title, branches = NAME, TITLE, BRANCHES
+    name, title = NAME, TITLE
 
-    def __init__(self, geometry: Geometry) -> None:
+    def __init__(self, geometry: Geometry, robot: Robot) -> None:
         g = self.geometry = geometry
         self.reason = "all axes are parallel" + ", and one joint slides" * (len(g.order) == 4)
         self.lengths = (g.a, g.b)
         self.kernels = BatchKernels(g.params, branches_one, branches_many)
+        self.branches, self.meanings = self.names(robot, np.ones(robot.n))
+
+    def names(self, robot: Robot, sense: Array) -> Names:
+        """The rows are the signs of s2: positive with the elbow on the right, where z is up."""
+        g = self.geometry
+        sense1 = float(g.sign[0] * sense[g.order[0]])
+        stance = stance_of(robot, g.params[_BASE:_TOOL].reshape(3, 4), float(g.offset[0]), sense1)
+        return names_of(
+            (left_or_right(stance, "elbow", "the elbow", "the last axis").times(-1.0),), [(1.0,), (-1.0,)]
+        )
 
     def handles(self, task: int) -> bool:
         """Points, with an orientation or an approach direction, whose remaining tilt :mod:`kin.ik` judges."""
@@ -318,7 +328,7 @@ class Scara4(ClosedForm):
         return float(g.sign[1] * q[g.order[1]] + g.offset[1])
 
     def branch_of(self, q: Array) -> int:
-        """The branch of a configuration: "right" if the elbow is on the right, seen along the arm from above."""
+        """The branch a configuration is on: the sign of s2."""
         return int(math.sin(self._elbow(q)) < 0.0)
 
     def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:

@@ -22,6 +22,7 @@ from kin.kernels.simd import widest
 from kin.robot import Robot
 from kin.solvers.blocks import Arc, Entries, each, one
 from kin.solvers.contract import BatchKernels, Obstacle
+from kin.solvers.names import Names, Part, eight, front_or_back, names_of
 from kin.solvers.singular import JointValue, Singularity, off_line, those_within
 from kin.solvers.wrist6.batch import (
     BEND,
@@ -44,12 +45,6 @@ from kin.transforms import Array
 
 NAME = "slide6"
 TITLE = "closed form, sliding arm with a spherical wrist"
-BRANCHES = tuple(
-    f"shoulder {s} · slide {e} · wrist {w}"
-    for s in ("front", "back")
-    for e in ("out", "through")
-    for w in ("no-flip", "flip")
-)
 _REACH = TOLERANCES.closure_position * 0.1
 _SINGULAR = TOLERANCES.singular
 _MERGE = TOLERANCES.merge
@@ -78,7 +73,7 @@ def match(robot: Robot) -> Slide6 | None:
     rest = screw_x(0.0, -twist)[:3, :3] @ screw_z(phase, 0.0)[:3, :3] @ R
     offset[3] += math.atan2(rest[1, 0], rest[0, 0])
     lengths = (float(a[0]), 0.0, 0.0 if is_zero(aside) else aside, 0.0 if is_zero(beside) else beside)
-    return Slide6(pack(links, offset, lengths, phase, twist, slides=True))
+    return Slide6(pack(links, offset, lengths, phase, twist, slides=True), robot)
 
 
 # The batch kernels are those of :mod:`kin.solvers.wrist6.batch`. How far W is along the slide (front, back) has
@@ -141,15 +136,27 @@ def branches_many(params: Array, T: Array, values: Array, near: Array, out: Arra
 class Slide6(Wrist6):
     """The closed form of a sliding arm: that of `Wrist6`, with another elbow."""
 
-    name, title, branches = NAME, TITLE, BRANCHES
+    name, title = NAME, TITLE
     reason = (
         "axes 4, 5 and 6 meet in one point, and joint 3 slides perpendicular to axis 2, "
         "which is perpendicular to axis 1"
     )
 
-    def __init__(self, geometry: Geometry) -> None:
-        super().__init__(geometry)
+    def __init__(self, geometry: Geometry, robot: Robot) -> None:
+        super().__init__(geometry, robot)
         self.kernels = BatchKernels(geometry.params, branches_one, branches_many)
+
+    def names(self, robot: Robot, sense: Array) -> Names:
+        """The rows are the signs of X, of S and of s5; the boom is out where the middle of its range is."""
+        sense = sense * self.geometry.sign
+        middle = sense[2] * 0.5 * (robot.lower[2] + robot.upper[2]) + self.geometry.offset[2]
+        extends = sense[2] if not math.isfinite(middle) or is_zero(middle) else math.copysign(1.0, middle)
+        slide = Part(
+            ("slide out", "the wrist centre is on the side of axis 2 that the slide extends to"),
+            ("slide through", "the wrist centre is on the side of axis 2 opposite to where the slide extends to"),
+        )
+        shoulder = front_or_back(self._stance(robot, sense))
+        return names_of((shoulder, slide.times(extends), self._wrist(sense)), eight())
 
     def _obstacle(self) -> Obstacle:
         return Obstacle("wrist centre too near to axis 1 or 2")

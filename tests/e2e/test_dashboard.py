@@ -77,8 +77,8 @@ def test_dragging_the_gizmo_moves_the_arm_and_reports_out_of_reach(tab: Tab) -> 
 def test_branches_and_the_arm_angle_move_the_arm_and_not_the_tool(tab: Tab) -> None:
     tab.show(SRS)
     home = kin.fk(SRS, SRS.q_home)[:3, 3]
-    name = next(n for n in kin.branch_names(SRS) if "back" in n and "elbow up" in n and "no-flip" in n)
-    tab.choose("Posture", "back · up · no-flip")
+    name = next(n for n in kin.branch_names(SRS) if "back" in n and "elbow positive" in n and "no-flip" in n)
+    tab.choose("Posture", "back · elbow + · no-flip")
     expect(tab.status).to_contain_text("Reached")
     expect(tab.page.locator("[data-branch]")).to_have_text(f"now: {name}")
     tab.wait_for_tool(home, within=0.06)

@@ -9,7 +9,7 @@ from typing_extensions import TypedDict
 
 from app.shared.answers.document import documented
 from app.shared.answers.fk import Matrix
-from kin import Joint, Robot, branch_names
+from kin import Joint, Robot, branch_meanings, branch_names
 
 
 @documented
@@ -62,6 +62,8 @@ class RobotAnswer(TypedDict):
     """Number of moving joints, the length of q."""
     branches: list[str]
     """Names of the arm's inverse-kinematics branches; empty for an arm without a closed form."""
+    branch_meanings: dict[str, str]
+    """What each part of these names says about a configuration."""
     convention: Literal["standard", "modified"]
     """DH convention. standard: Rz(θ) Tz(d) Tx(a) Rx(α). modified (Craig): Rx(α) Tx(a) Rz(θ) Tz(d)."""
     reach: float
@@ -95,6 +97,7 @@ def robot_answer(robot: Robot) -> RobotAnswer:
         "description": robot.description,
         "n": robot.n,
         "branches": list(branch_names(robot)),
+        "branch_meanings": branch_meanings(robot),
         "convention": robot.convention,
         "reach": robot.reach,
         "source": robot.source,

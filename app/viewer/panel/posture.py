@@ -13,29 +13,39 @@ import viser
 
 from app.viewer.panel import Post, assign, listen, update_html
 from app.viewer.views.templates import render
-from kin import InputError, Redundancy, Robot, branch_names
+from kin import InputError, Redundancy, Robot, branch_meanings, branch_names
 from kin.units import DEFAULT_UNITS, Unit, Units
 
 CLOSEST = "Closest"
 KEEP = "Keep current"
 BRANCH_HINT = (
     "The posture in which the arm reaches the target. Closest: the one with the least joint motion. "
-    "Keep current: the posture never changes while dragging. Or a particular one: {parts}."
+    "Keep current: the posture never changes while dragging. Or a particular one: {parts}. {meanings}"
 )
 SLIDER_HINT = (
     "Moves the arm while the tool stays where it is. The green bar shows the values that the joint limits allow."
 )
 
 
+_SIGNS = {"positive": "+", "negative": "\N{MINUS SIGN}"}
+
+
 def short(name: str) -> str:
-    """A branch's name without the words that all branches share: ``front · up · no-flip``."""
-    return " · ".join(part.split(" ", 1)[-1] for part in name.split(" · "))
+    """A branch's name without the words that all branches share: ``front · up · no-flip``, ``elbow +``."""
+    words = (part.split(" ", 1) for part in name.split(" · "))
+    return " · ".join(f"{noun} {_SIGNS[word]}" if word in _SIGNS else word for noun, word in words)
 
 
 def parts(robot: Robot) -> str:
     """The words that all branches share: ``shoulder · elbow · wrist``."""
     names = branch_names(robot)
     return " · ".join(part.split(" ", 1)[0] for part in names[0].split(" · ")) if names else ""
+
+
+def meanings(robot: Robot) -> str:
+    """What one word of each pair means, as sentences: the other word is its opposite."""
+    said = list(branch_meanings(robot).items())[::2]
+    return " ".join(f"{short(part).capitalize()}: {meaning}." for part, meaning in said)
 
 
 class BranchChoice:
@@ -45,7 +55,10 @@ class BranchChoice:
         self._names = {short(name): name for name in branch_names(robot)}
         options = (CLOSEST, KEEP, *self._names) if self._names else (CLOSEST,)
         self._choice = gui.add_dropdown(
-            "Posture", options, initial_value=CLOSEST, hint=BRANCH_HINT.format(parts=parts(robot))
+            "Posture",
+            options,
+            initial_value=CLOSEST,
+            hint=BRANCH_HINT.format(parts=parts(robot), meanings=meanings(robot)),
         )
         listen(self._choice, post, ("branch", robot.id))
         self._now = ""

@@ -21,18 +21,13 @@ from kin.solvers.contract import (
     RedundancyParameter,
     SolverInput,
 )
+from kin.solvers.names import Names, bent, eight, flipped, left_or_right, names_of, stance_of
 from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, off_perpendicular, those_within
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 NAME = "collinear7"
 TITLE = "closed form, joints 1 and 2 on one line"
-BRANCHES = tuple(
-    f"shoulder {s} · elbow {e} · wrist {w}"
-    for s in ("left", "right")
-    for e in ("up", "down")
-    for w in ("no-flip", "flip")
-)
 _THETA1 = RedundancyParameter("theta1", "θ1", joint=0)
 _ROLL = RedundancyParameter("roll", "roll about the approach axis", circular=True)
 
@@ -50,19 +45,31 @@ def match(robot: Robot) -> Collinear7 | None:
     inverse_tool = inverse(tool)
     # The wrist centre in the tool frame: it must stay when the tool rolls about its approach axis.
     on_axis = is_zero(*inverse_tool[:2, 3])
-    return Collinear7(Geometry7(inverse(base), inverse_tool, links.theta, d3, d5, on_axis))
+    return Collinear7(Geometry7(inverse(base), inverse_tool, links.theta, d3, d5, on_axis), robot)
 
 
 class Collinear7(ClosedForm):
     """The closed form of the arm whose joints 1 and 2 turn about one line."""
 
-    name, title, branches = NAME, TITLE, BRANCHES
+    name, title = NAME, TITLE
     reason = "axes 1 and 2 are one line, axis 3 is perpendicular to it, and axes 5, 6, 7 meet in one point"
 
-    def __init__(self, geometry: Geometry7) -> None:
+    def __init__(self, geometry: Geometry7, robot: Robot) -> None:
         g = self.geometry = geometry
         self.lengths = (g.d3, g.d5)
         self.kernels = BatchKernels(g.params, branches_one, branches_many)
+        self.branches, self.meanings = self.names(robot, np.ones(7))
+
+    def names(self, robot: Robot, sense: Array) -> Names:
+        """The rows are the side of the wrist centre that the upper arm is on, and the signs of s4 and s6."""
+        g = self.geometry
+        stance = stance_of(robot, g.inverse_base, float(g.offset[0] + g.offset[1]), float(sense[0]))
+        side = left_or_right(stance, "shoulder", "the upper arm")
+        elbow, wrist = (
+            bent(3, sense[3], g.offset[3]),
+            flipped(5, sense[5], g.offset[5], "axes 5 and 7 are in line"),
+        )
+        return names_of((side, elbow, wrist), eight())
 
     def handles(self, task: int) -> bool:
         """Poses, and an approach direction when it passes through the wrist centre."""

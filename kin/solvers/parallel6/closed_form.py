@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from kin.axes import is_zero
 from kin.robot import Robot
 from kin.solvers.canonical import free_last, without_last
 from kin.solvers.contract import (
@@ -19,21 +20,16 @@ from kin.solvers.contract import (
     RedundancyParameter,
     SolverInput,
 )
+from kin.solvers.names import Names, bent, eight, flipped, front_or_back, left_or_right, names_of, stance_of
 from kin.solvers.parallel6.batch import branches_many, branches_one
 from kin.solvers.parallel6.branches import solve
-from kin.solvers.parallel6.geometry import Geometry, geometry_of
+from kin.solvers.parallel6.geometry import BASE, COS_TWIST, TOOL, Geometry, geometry_of
 from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 NAME = "parallel6"
 TITLE = "closed form, three parallel axes and a wrist"
-BRANCHES = tuple(
-    f"shoulder {s} · elbow {e} · wrist {w}"
-    for s in ("left", "right")
-    for e in ("up", "down")
-    for w in ("no-flip", "flip")
-)
 _SPIN6 = RedundancyParameter("theta6", "θ6", joint=5, circular=True, rare=True)
 _THETA6 = RedundancyParameter("theta6", "θ6", joint=5)
 _REACH = TOLERANCES.closure_position * 0.1
@@ -42,21 +38,39 @@ _REACH = TOLERANCES.closure_position * 0.1
 def match(robot: Robot) -> Parallel6 | None:
     """The closed form if the robot has three parallel axes and a wrist."""
     geometry = geometry_of(robot)
-    return None if geometry is None else Parallel6(geometry)
+    return None if geometry is None else Parallel6(geometry, robot)
 
 
 class Parallel6(ClosedForm):
     """The closed form of an arm with three parallel axes and a wrist."""
 
-    name, title, branches = NAME, TITLE, BRANCHES
+    name, title = NAME, TITLE
     reason = (
         "axes 2, 3 and 4 are parallel, and axis 5 is perpendicular to axis 4 and meets axis 6 at a right angle"
     )
 
-    def __init__(self, geometry: Geometry) -> None:
+    def __init__(self, geometry: Geometry, robot: Robot) -> None:
         g = self.geometry = geometry
         self.lengths = (g.a1, g.a2, g.a3, g.a4, g.d5, g.beside)
         self.kernels = BatchKernels(g.params, branches_one, branches_many)
+        self.branches, self.meanings = self.names(robot, np.ones(6))
+
+    def names(self, robot: Robot, sense: Array) -> Names:
+        """The rows are the side of axis 1 that the arm's plane is on, and the signs of x s3 and of s5.
+
+        Only a vertical plane beside axis 1 is on one side of it. How high the elbow is depends on where axis 4
+        is, which need not be on the same side of axis 1 as W.
+        """
+        g, sense = self.geometry, sense * self.geometry.sign
+        stance = stance_of(robot, g.params[BASE:TOOL].reshape(3, 4), float(g.offset[0]), float(sense[0]))
+        x_of_left = -1.0 if g.beside < 0.0 else 1.0
+        if is_zero(g.beside) or not is_zero(g.params[COS_TWIST]):
+            side = front_or_back(stance).times(x_of_left)
+        else:
+            side = left_or_right(stance, "shoulder", "the plane of the arm")
+        wrist = flipped(4, sense[4], g.offset[4], "axis 6 is parallel to axes 2, 3 and 4")
+        rows = [(left, x_of_left * left * up, wrist) for left, up, wrist in eight()]
+        return names_of((side, bent(2, sense[2], g.offset[2]), wrist), rows)
 
     def handles(self, task: int) -> bool:
         """Poses, and an approach direction when it is the last joint's own axis (then that joint is free)."""
@@ -92,11 +106,7 @@ class Parallel6(ClosedForm):
         )
 
     def branch_of(self, q: Array) -> int:
-        """The branch a configuration is on.
-
-        "Left": the arm's plane is on the left of axis 1, seen along the arm. The elbow is "up" when it is above
-        the line from axis 2 to axis 4; the wrist is the sign of θ5.
-        """
+        """The branch a configuration is on: the arm's side of axis 1, and the signs of x s3 and of s5."""
         t = self.geometry.sign * q + self.geometry.offset
         side = -1.0 if self._x_of_wrist(t) < 0.0 else 1.0
         right = (side < 0.0) == (self.geometry.beside >= 0.0)

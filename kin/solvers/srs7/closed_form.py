@@ -19,6 +19,7 @@ from kin.solvers.contract import (
     RedundancyParameter,
     SolverInput,
 )
+from kin.solvers.names import Names, bent, eight, flipped, front_or_back, names_of, stance_of
 from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, off_perpendicular, those_within
 from kin.solvers.srs7.batch import branches_many, branches_one
 from kin.solvers.srs7.branches import solve
@@ -28,12 +29,6 @@ from kin.transforms import Array
 
 NAME = "srs7"
 TITLE = "closed form, S-R-S arm"
-BRANCHES = tuple(
-    f"shoulder {s} · elbow {e} · wrist {w}"
-    for s in ("front", "back")
-    for e in ("up", "down")
-    for w in ("no-flip", "flip")
-)
 _PSI = RedundancyParameter("psi", "arm angle ψ", circular=True)
 _THETA7 = RedundancyParameter("theta7", "θ7", joint=6)
 
@@ -49,22 +44,33 @@ def match(robot: Robot) -> Srs7 | None:
     tool = screw_z(0.0, float(links.d[6])) @ links.tool
     on_axis = is_zero(tool[0, 3], tool[1, 3]) and abs(tool[2, 2] - 1.0) < TOLERANCES.geometry
     base = links.base @ screw_z(0.0, float(links.d[0]))
-    return Srs7(Geometry7(inverse(base), inverse(tool), links.theta, d3, d5, bool(on_axis)))
+    return Srs7(Geometry7(inverse(base), inverse(tool), links.theta, d3, d5, bool(on_axis)), robot)
 
 
 class Srs7(ClosedForm):
     """The closed form of an S-R-S arm."""
 
-    name, title, branches = NAME, TITLE, BRANCHES
+    name, title = NAME, TITLE
     reason = (
         "axes 1, 2, 3 meet in one point and axes 5, 6, 7 in another, "
         "with the elbow's axis perpendicular to both links"
     )
 
-    def __init__(self, geometry: Geometry7) -> None:
+    def __init__(self, geometry: Geometry7, robot: Robot) -> None:
         g = self.geometry = geometry
         self.lengths = (g.d3, g.d5)
         self.kernels = BatchKernels(g.params, branches_one, branches_many)
+        self.branches, self.meanings = self.names(robot, np.ones(7))
+
+    def names(self, robot: Robot, sense: Array) -> Names:
+        """The rows are the signs of s2, s4 and s6. The height of the elbow depends on the arm angle instead."""
+        g = self.geometry
+        stance = stance_of(robot, g.inverse_base, float(g.offset[0]), float(sense[0]))
+        elbow, wrist = (
+            bent(3, sense[3], g.offset[3]),
+            flipped(5, sense[5], g.offset[5], "axes 5 and 7 are in line"),
+        )
+        return names_of((front_or_back(stance, "the elbow"), elbow, wrist), eight())
 
     def handles(self, task: int) -> bool:
         """Poses, and an approach direction when it is the last joint's own axis (then that joint is free)."""
@@ -98,7 +104,7 @@ class Srs7(ClosedForm):
         return Candidates(out[:, :7], values, tuple(all_arcs), gap, obstacle)
 
     def branch_of(self, q: Array) -> int:
-        """The branch a configuration is on: "shoulder", "elbow" and "wrist" are the signs of θ2, θ4, θ6."""
+        """The branch a configuration is on: the signs of s2, s4 and s6."""
         s = np.sin(q + self.geometry.offset)
         return 4 * int(s[1] < 0.0) + 2 * int(s[3] < 0.0) + int(s[5] < 0.0)
 

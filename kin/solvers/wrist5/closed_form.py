@@ -19,6 +19,7 @@ from kin.solvers.contract import (
     RedundancyParameter,
     SolverInput,
 )
+from kin.solvers.names import Names, bent, eight, flipped, front_or_back, names_of, stance_of, up_or_down
 from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
 from kin.solvers.wrist5 import point
 from kin.solvers.wrist5.batch import branches_many, branches_one
@@ -29,12 +30,6 @@ from kin.transforms import Array
 
 NAME = "wrist5"
 TITLE = "closed form, elbow arm with a two-axis wrist"
-BRANCHES = tuple(
-    f"shoulder {s} · elbow {e} · wrist {w}"
-    for s, elbows in (("front", ("up", "down")), ("back", ("down", "up")))
-    for e in elbows
-    for w in ("no-flip", "flip")
-)
 _THETA1 = RedundancyParameter("theta1", "θ1", joint=0, circular=True, rare=True)
 
 
@@ -61,22 +56,38 @@ def match(robot: Robot) -> Wrist5 | None:
         theta[1] += math.pi
         theta[2] -= math.pi
         a2 = -a2
-    return Wrist5(Geometry(inverse(base), theta, a1, a2, d4, float(tool[2, 3])))
+    return Wrist5(Geometry(inverse(base), theta, a1, a2, d4, float(tool[2, 3])), robot)
 
 
 class Wrist5(ClosedForm):
     """The closed form of a five-joint elbow arm with a two-axis wrist."""
 
-    name, title, branches = NAME, TITLE, BRANCHES
+    name, title = NAME, TITLE
     reason = (
         "axes 2 and 3 are parallel and perpendicular to axis 1, "
         "axes 3 and 4 meet at a right angle, and so do axes 4 and 5"
     )
 
-    def __init__(self, geometry: Geometry) -> None:
+    def __init__(self, geometry: Geometry, robot: Robot) -> None:
         g = self.geometry = geometry
         self.lengths = (g.a1, g.a2, g.d4, g.d6)
         self.kernels = BatchKernels(g.parameters(), branches_one, branches_many)
+        self.branches, self.meanings = self.names(robot, np.ones(5))
+
+    def names(self, robot: Robot, sense: Array) -> Names:
+        """The rows are the signs of the wrist centre's x, of s3 and of s5.
+
+        Which elbow is the higher one depends on the side of axis 2 that the wrist centre is on: it is the side of
+        axis 1 only if both axes meet.
+        """
+        g = self.geometry
+        stance = stance_of(robot, g.inverse_base, float(g.offset[0]), float(sense[0]))
+        parts = front_or_back(stance), bent(2, sense[2], g.offset[2])
+        rows = eight()
+        if is_zero(g.a1) and stance.vertical:
+            parts, rows = (parts[0], up_or_down(stance)), [(x, x * elbow, wrist) for x, elbow, wrist in rows]
+        wrist = flipped(4, sense[4], g.offset[4], "the tool is in line with the forearm")
+        return names_of((*parts, wrist), rows)
 
     def handles(self, task: int) -> bool:
         """A point, with or without an approach direction; :mod:`kin.ik` judges the roll that a pose gets."""
@@ -104,11 +115,7 @@ class Wrist5(ClosedForm):
         return Candidates(out[:, :5], out[:, 5:], (arcs,), max(gap, 0.0), obstacle)
 
     def branch_of(self, q: Array) -> int:
-        """The branch a configuration is on.
-
-        "Front" is the side of axis 1 the arm faces with the wrist centre before it; the elbow is "up" when it is
-        above the line from the shoulder to the wrist centre; the wrist is the sign of θ5.
-        """
+        """The branch a configuration is on: the signs of the wrist centre's x, of s3 and of s5."""
         g = self.geometry
         t = q + g.offset
         reach = g.a1 + g.a2 * math.cos(t[1]) + g.d4 * math.cos(t[1] + t[2])

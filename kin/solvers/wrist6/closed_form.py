@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from kin.axes import is_zero
 from kin.robot import Robot
 from kin.solvers.canonical import free_last, without_last
 from kin.solvers.contract import (
@@ -19,21 +20,27 @@ from kin.solvers.contract import (
     RedundancyParameter,
     SolverInput,
 )
+from kin.solvers.names import (
+    Names,
+    Part,
+    Stance,
+    bent,
+    eight,
+    flipped,
+    front_or_back,
+    names_of,
+    stance_of,
+    up_or_down,
+)
 from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
 from kin.solvers.wrist6.batch import branches_many, branches_one
 from kin.solvers.wrist6.branches import solve
-from kin.solvers.wrist6.geometry import Geometry, geometry_of
+from kin.solvers.wrist6.geometry import BASE, TOOL, Geometry, geometry_of
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 NAME = "wrist6"
 TITLE = "closed form, elbow arm with a spherical wrist"
-BRANCHES = tuple(
-    f"shoulder {s} · elbow {e} · wrist {w}"
-    for s in ("front", "back")
-    for e in ("up", "down")
-    for w in ("no-flip", "flip")
-)
 _THETA1 = RedundancyParameter("theta1", "θ1", joint=0, circular=True, rare=True)
 _THETA6 = RedundancyParameter("theta6", "θ6", joint=5)
 _REACH = TOLERANCES.closure_position * 0.1
@@ -42,19 +49,41 @@ _REACH = TOLERANCES.closure_position * 0.1
 def match(robot: Robot) -> Wrist6 | None:
     """The closed form if the robot is an elbow arm with a spherical wrist."""
     geometry = geometry_of(robot)
-    return None if geometry is None else Wrist6(geometry)
+    return None if geometry is None else Wrist6(geometry, robot)
 
 
 class Wrist6(ClosedForm):
     """The closed form of an elbow arm with a spherical wrist."""
 
-    name, title, branches = NAME, TITLE, BRANCHES
+    name, title = NAME, TITLE
     reason = "axes 4, 5 and 6 meet in one point, and axes 2 and 3 are parallel and perpendicular to axis 1"
 
-    def __init__(self, geometry: Geometry) -> None:
+    def __init__(self, geometry: Geometry, robot: Robot) -> None:
         g = self.geometry = geometry
         self.lengths = (g.a1, g.a2, g.f, g.beside)
         self.kernels = BatchKernels(g.params, branches_one, branches_many)
+        self.branches, self.meanings = self.names(robot, np.ones(6))
+
+    def names(self, robot: Robot, sense: Array) -> Names:
+        """The rows are the signs of X, of X s3 and of s5.
+
+        Which elbow is the higher one depends on the side of axis 2 that W is on: it is the side of axis 1 only if
+        both axes meet.
+        """
+        sense = sense * self.geometry.sign
+        stance = self._stance(robot, sense)
+        elbow, rows = up_or_down(stance), eight()
+        if not (is_zero(self.geometry.a1) and stance.vertical):
+            elbow = bent(2, sense[2], self.geometry.offset[2])
+            rows = [(x, x * side, wrist) for x, side, wrist in rows]
+        return names_of((front_or_back(stance), elbow, self._wrist(sense)), rows)
+
+    def _stance(self, robot: Robot, sense: Array) -> Stance:
+        g = self.geometry
+        return stance_of(robot, g.params[BASE:TOOL].reshape(3, 4), float(g.offset[0]), float(sense[0]))
+
+    def _wrist(self, sense: Array) -> Part:
+        return flipped(4, sense[4], self.geometry.offset[4], "axes 4 and 6 are in line")
 
     def handles(self, task: int) -> bool:
         """Poses, and an approach direction when it is the last joint's own axis (then that joint is free)."""
@@ -100,11 +129,7 @@ class Wrist6(ClosedForm):
         return float(g.a1 + g.a2 * math.cos(t[1]) + g.f * math.cos(t[1] + t[2]))
 
     def branch_of(self, q: Array) -> int:
-        """The branch a configuration is on.
-
-        "Front" is the side of axis 1 the arm faces with the wrist centre before it; the elbow is "up" when it is
-        above the line from the shoulder to the wrist centre; the wrist is the sign of θ5.
-        """
+        """The branch a configuration is on: the signs of X, of X s3 and of s5."""
         t = self.geometry.sign * q + self.geometry.offset
         side = -1.0 if self._x_of_wrist(t) < 0.0 else 1.0
         return 4 * int(side < 0.0) + 2 * int(side * math.sin(t[2]) < 0.0) + int(math.sin(t[4]) < 0.0)

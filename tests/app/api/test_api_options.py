@@ -25,8 +25,8 @@ def target_of(robot, q):
 @pytest.mark.parametrize(
     "options",
     [
-        {"branch": "elbow up"},
-        {"branch": ["shoulder front · elbow down · wrist flip", "seed"]},
+        {"branch": "elbow positive"},
+        {"branch": ["shoulder front · elbow negative · wrist flip", "seed"]},
         {"limits": [None, [-1.0, 1.5], None, None, [-2.0, 2.0], None, None]},
         {"locked": [None, None, None, None, None, None, 0.0]},
         {"images": "all"},
@@ -76,7 +76,9 @@ def test_a_mask_of_positions_accepts_a_point_without_orientation(client):
 
 def test_the_robot_lists_its_branches(client):
     for robot in kin.builtin_robots().values():
-        assert client.get(f"{API}/{robot.id}").json()["branches"] == list(kin.branch_names(robot))
+        answer = client.get(f"{API}/{robot.id}").json()
+        assert answer["branches"] == list(kin.branch_names(robot))
+        assert answer["branch_meanings"] == kin.branch_meanings(robot)
 
 
 @pytest.mark.parametrize("robot", [PIONEER, SRS], ids=lambda robot: robot.id)
@@ -106,7 +108,7 @@ def test_gaps_of_a_path_are_reported(client):
 @pytest.mark.parametrize(
     ("what", "body", "field", "said"),
     [
-        ("ik", {"branch": "elbow sideways"}, "branch", "elbow up"),
+        ("ik", {"branch": "elbow sideways"}, "branch", "elbow positive"),
         ("ik", {"branch": [1]}, "branch[0]", "string"),
         ("ik", {"limits": [[0, 1]]}, "limits", "7 pairs"),
         ("ik", {"limits": [[0, 1, 2]]}, "limits[0]", "at most 2"),

@@ -409,7 +409,7 @@ def test_targets_of_every_form_are_accepted_and_limits_are_respected(client):
     turned = ask(client, PIONEER, target={"position": p, "wxyz": [0.3, 0.5, -0.2, 0.7]})
     assert (turned["reachable"], turned["status"]) == (False, "approximate")
     assert turned["reason"]
-    none = ask(client, SRS, target={"position": [0.4, 0.1, 0.3]}, branch="elbow up")
+    none = ask(client, SRS, target={"position": [0.4, 0.1, 0.3]}, branch="elbow positive")
     assert none["reachable"]
 
 

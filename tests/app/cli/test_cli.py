@@ -146,7 +146,7 @@ def test_ik_with_options_asks_the_core_the_same(capsys):
 @pytest.mark.parametrize(
     ("words", "options"),
     [
-        (("--branch", "elbow up", "--branch", "seed"), {"branch": ["elbow up", "seed"]}),
+        (("--branch", "elbow positive", "--branch", "seed"), {"branch": ["elbow positive", "seed"]}),
         (("--lock", "7=-30"), {"locked": [None] * 6 + [math.radians(-30)]}),
         (("--limit", "2=0:60", "--limit", "4=-100:100"), {"limits": {1: (0, 60), 3: (-100, 100)}}),
         (("--images", "all"), {"images": "all"}),
@@ -241,7 +241,7 @@ def test_robots_lists_all_and_describes_one(capsys, client):
         (("ik", "pioneer5", "--position", 1, 2, 3, "--lock", "1=1:2"), "JOINT=VALUE"),
         (("ik", "pioneer5", "--position", 1, 2, 3, "--limit", "1=5"), "JOINT=LOWER:UPPER"),
         (("ik", "pioneer5", "--position", 1, 2, 3, "--limit", "1=5:x"), "invalid value"),
-        (("ik", "pioneer5", "--position", 1, 2, 3, "--branch", "sideways"), "elbow up"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--branch", "sideways"), "elbow positive"),
         (("ik", "pioneer5", "--position", 1, 2, 3, "--mask", "rx"), "--wxyz"),
         (("ik", "pioneer5", "--position", 1, 2, 3, "--mask", "x", "--task", "pose"), "no --task together"),
         (("robots", "puma"), "expected one of pioneer5"),

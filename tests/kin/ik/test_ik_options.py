@@ -66,7 +66,7 @@ def test_only_the_requested_branches_are_returned(robot_id, task):
     for q in robot.random_q(np.random.default_rng(2), 25 if task != "position" else 6):
         target = kin.fk(robot, q)
         every = solve_ik(robot, target, task=task, q_seed=q)
-        for requested in ("elbow up", "elbow down", "wrist flip", "seed", kin.branch_of(robot, q)):
+        for requested in ("elbow positive", "elbow negative", "wrist flip", "seed", kin.branch_of(robot, q)):
             words = kin.branch_of(robot, q) if requested == "seed" else requested
             names = [n for n in kin.branch_names(robot) if all(w in n.split(" · ") for w in words.split(" · "))]
             result = solve_ik(robot, target, task=task, q_seed=q, branch=requested)
@@ -86,7 +86,7 @@ def test_only_the_requested_branches_are_returned(robot_id, task):
 def test_several_branch_names_select_all_of_them():
     robot = kin.get_robot("redundant7-craig")
     target = kin.fk(robot, robot.home)
-    one, two = ("shoulder front · elbow up · wrist flip", "shoulder back, wrist no-flip")
+    one, two = ("shoulder front · elbow positive · wrist flip", "shoulder back, wrist no-flip")
     both = {s.branch for s in solve_ik(robot, target, branch=[one, two]).solutions}
     assert both == {one} | {s.branch for s in solve_ik(robot, target, branch=two).solutions}
     assert len(both) == 3
@@ -495,8 +495,8 @@ def test_no_orientation_of_a_dense_search_is_nearer(robot_id):
         ({"locked": [True] + [None] * 6}, "locked[0]", "finite number"),
         ({"locked": [None, 3.0] + [None] * 5}, "locked[1]", "inside the limits"),
         ({"locked": [0.0] + [None] * 6, "respect_limits": False}, "respect_limits", "true"),
-        ({"branch": "elbow sideways"}, "branch", "elbow up"),
-        ({"branch": "elbow up · elbow down"}, "branch", "go together"),
+        ({"branch": "elbow sideways"}, "branch", "elbow positive"),
+        ({"branch": "elbow positive · elbow negative"}, "branch", "go together"),
         ({"branch": []}, "branch", "at least one"),
         ({"branch": 3}, "branch", "at least one"),
         ({"branch": [3]}, "branch", "elbow up"),

@@ -64,6 +64,10 @@ class ArmPair:
         match = re.fullmatch(r"theta(\d)", name)
         return -x if match and int(match[1]) - 1 in self.joints else x
 
+    def rows(self, plain, other):
+        """How many different rows these branches of the two arms are: names may depend on the sense of a joint."""
+        return len({kin.branch_names(self.plain).index(plain), kin.branch_names(self.robot).index(other)})
+
     def both(self, target, **options):
         """Results for the plain arm and for the reversed one."""
         there = dict(options)
@@ -86,7 +90,8 @@ class ArmPair:
         """Check that the result for the reversed arm is that for the plain one."""
         assert (a.status, a.cause, a.solver, len(a.solutions)) == (b.status, b.cause, b.solver, len(b.solutions))
         for x, y in zip(a.solutions, b.solutions, strict=True):
-            assert (x.branch, x.compromise) == (y.branch, y.compromise)
+            assert self.rows(x.branch, y.branch) == 1
+            assert x.compromise == y.compromise
             if x.compromise == "rotation":  # found by descents, which may end a whole turn away
                 assert abs(x.rotation_error - y.rotation_error) < 1e-6
                 continue
@@ -95,9 +100,12 @@ class ArmPair:
             self._same_redundancy(x.redundancy, y.redundancy, tolerance)
         if a.solutions:
             self._same_redundancy(a.redundancy, b.redundancy, tolerance)
-        here, there = (sorted(r.blocked, key=lambda x: x.branch) for r in (a, b))  # violations may be equal
+        here, there = (
+            sorted(r.blocked, key=lambda x: kin.branch_names(arm).index(x.branch))  # violations may be equal
+            for r, arm in ((a, self.plain), (b, self.robot))
+        )
         for x, y in zip(here, there, strict=True):
-            assert x.branch == y.branch
+            assert self.rows(x.branch, y.branch) == 1
             assert [v.joint for v in x.violations] == [v.joint for v in y.violations]
             for v, w in zip(x.violations, y.violations, strict=True):
                 sign = self.signs[v.joint]
@@ -142,7 +150,7 @@ def test_reversed_joints_do_not_change_the_family_or_tasks(name):
             match = closed_form_of(reversed_at(ARMS[name], joints))
             assert match is not None, joints
             assert match.name == base.name
-            assert match.branches == base.branches
+            assert set(match.branches) == set(base.branches)
             for task in range(4):
                 assert match.handles(task) == base.handles(task)
             assert len(getattr(match, "joints", ())) <= count
@@ -263,12 +271,14 @@ def test_requested_and_preferred_redundancy_values(name, joints):
             assert a.status is b.status is Status.SOLVED
             # Several values may be equally good.
             here, there = (
-                {s.branch: worth(r, s.q) for s in x.solutions} for r, x in ((pair.plain, a), (pair.robot, b))
+                {kin.branch_names(r).index(s.branch): worth(r, s.q) for s in x.solutions}
+                for r, x in ((pair.plain, a), (pair.robot, b))
             )
             assert here.keys() == there.keys()
             assert all(abs(here[key] - there[key]) < 1e-3 * max(1.0, abs(here[key])) for key in here)
             assert all(
-                there[x.branch] >= worth(pair.robot, x.q) - 1e-3 for x in pair.both(T, q_seed=seed)[1].solutions
+                there[kin.branch_names(pair.robot).index(x.branch)] >= worth(pair.robot, x.q) - 1e-3
+                for x in pair.both(T, q_seed=seed)[1].solutions
             )
 
 
@@ -339,7 +349,8 @@ def test_reversing_joints_renames_branches_one_to_one(name, joints):
     assert len(set(names.values())) == len(names)
     exact = getattr(closed_form_of(robot), "joints", ()) == joints
     if exact:
-        assert all(here == there for here, there in names.items())
+        rows = [kin.branch_names(arm).index for arm in (base, robot)]
+        assert all(rows[0](here) == rows[1](there) for here, there in names.items())
     for q, T in poses(base, 3, seed=9):
         a, b = solve_ik(base, T, q_seed=q + 0.1), solve_ik(robot, T, q_seed=(q + 0.1) * signs)
         assert a.status is b.status is Status.SOLVED
@@ -348,7 +359,8 @@ def test_reversing_joints_renames_branches_one_to_one(name, joints):
         for s in b.solutions:
             assert s.branch == kin.branch_of(robot, s.q)
         if exact:
-            assert [s.branch for s in a.solutions] == [s.branch for s in b.solutions]
+            indices = [[row(s.branch) for s in r.solutions] for row, r in zip(rows, (a, b), strict=True)]
+            assert indices[0] == indices[1]
             assert all(
                 np.abs(x.q - y.q * signs).max() < 1e-6 for x, y in zip(a.solutions, b.solutions, strict=True)
             )

@@ -53,7 +53,7 @@ def test_every_branch_can_be_chosen_and_the_tool_stays(port: int) -> None:
 def test_a_chosen_branch_is_kept_while_dragging_and_left_by_hand(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.choose(SRS.name)
-        name = next(n for n in kin.branch_names(SRS) if "elbow down" in n)
+        name = next(n for n in kin.branch_names(SRS) if "elbow negative" in n)
         tab.set("Posture", short(name))
         tab.settle()
         T = kin.fk(SRS, SRS.q_home)
