@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import viser
@@ -61,11 +61,12 @@ def html(shown: Notice) -> str:
 
 
 class StatusLine:
-    """Shows one notice at a time."""
+    """Shows one notice at a time, and with it a warning about the configuration of the arm."""
 
     def __init__(self, gui: viser.GuiApi, first: Notice) -> None:
         self._result: IKResult | None = None
         self._shown = first
+        self._warning = ""
         self._html = gui.add_html(html(first))
 
     def show(self, shown: Notice) -> None:
@@ -73,7 +74,19 @@ class StatusLine:
         self._result = None
         if shown != self._shown:
             self._shown = shown
-            self._html.content = html(shown)
+            self._write()
+
+    def warn(self, warning: str) -> None:
+        """Show a sentence after every notice until the next call; an empty one ends it."""
+        if warning != self._warning:
+            self._warning = warning
+            self._write()
+
+    def _write(self) -> None:
+        shown = self._shown
+        if self._warning:
+            shown = replace(shown, detail=f"{shown.detail} \N{WARNING SIGN} {self._warning}".lstrip())
+        self._html.content = html(shown)
 
     def show_result(self, result: IKResult, units: Units) -> None:
         """Show the result for a target."""

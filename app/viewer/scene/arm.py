@@ -12,6 +12,7 @@ import numpy as np
 import viser
 
 from app.viewer.scene.chain import turn
+from app.viewer.scene.clearance import Contact
 from app.viewer.scene.floor import Floor
 from app.viewer.scene.gizmo_axes import GizmoAxes
 from app.viewer.scene.lights import add_lamp
@@ -26,6 +27,7 @@ STILL, NO_TURN = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
 SAME = 1e-9  # rad or m: smaller changes are below the precision of a browser's numbers
 GIZMO = 0.26  # length of the gizmo's arrows, in radii of the sphere around the arm
 GAP_COLOR = (213, 94, 0)
+CONTACT_COLOR = (204, 20, 60)
 
 
 class ArmScene:
@@ -70,7 +72,20 @@ class ArmScene:
             thickness_units="screen",
             visible=False,
         )
-        self._top += [self.gizmo, self._gap]
+        self._contact = scene.add_frame(f"{root}-contact", show_axes=False, visible=False)
+        scene.add_icosphere(
+            f"{root}-contact/mark",
+            2.4 * self.body.size,
+            CONTACT_COLOR,
+            subdivisions=2,
+            opacity=0.5,
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+        self._contact_label = scene.add_label(
+            f"{root}-contact/text", "", position=(0.0, 0.0, 3.6 * self.body.size), anchor="bottom-center"
+        )
+        self._top += [self.gizmo, self._gap, self._contact]
         self._rings: list[viser.TransformControlsHandle] = []
         self._ring_sets = 0
         self.show(robot.q_home)
@@ -139,6 +154,17 @@ class ArmScene:
         self._gap.visible = self._ghost.visible = self._approach.visible = target is not None
         if target is not None:
             self._gap.points = np.array([[tool, target]], dtype=np.float32)
+
+    def show_contact(self, contact: Contact | None) -> str:
+        """Mark where the arm passes through pedestal or floor; returns the sentence at the mark, or ""."""
+        self._contact.visible = contact is not None
+        if contact is None:
+            return ""
+        assign(self._contact, contact.point)
+        text = contact.text(self.robot)
+        if text != self._contact_label.text:
+            self._contact_label.text = text
+        return text
 
     def show_frames(self, visible: bool) -> None:
         """Show or hide the frame of every DH row."""

@@ -56,7 +56,7 @@ class Floor:
         wide = 15.0 * body.size
         above = body.floor + 0.02 * body.size
         self._shadow = scene.add_image(
-            f"{root}-contact", _spot(), wide, wide, position=(x, y, above), cast_shadow=False, receive_shadow=False
+            f"{root}-shadow", _spot(), wide, wide, position=(x, y, above), cast_shadow=False, receive_shadow=False
         )
         # The bar lies along x, in front of the arm in the default view.
         at = np.array([x + 0.12 * body.radius, y + 0.52 * body.radius, above])

@@ -45,7 +45,7 @@ APPROACH_COLOR: Color = (214, 39, 120)
 PEDESTAL_COLOR: Color = (126, 134, 147)
 PROBES = 8000
 PEDESTAL = 0.12  # height of a pedestal, relative to the reach
-COLUMN, FOOT = 1.6, 3.4  # radii of its column and foot, relative to the thickness of a link
+COLUMN, PLATE, FOOT = 1.6, 2.3, 3.4  # radii of its column, plate and foot, relative to the thickness of a link
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +75,7 @@ class Body:
         floor: height of the floor (m), below the arm at home; the arm may reach lower.
         center, radius: the sphere ``(3,)``, m that the camera should show.
         size: radius of the thickest link (m), the unit of all decoration.
+        radii: radius (m) of each link's tube, base first.
     """
 
     chain: Chain
@@ -86,6 +87,7 @@ class Body:
     center: Array
     radius: float
     size: float
+    radii: tuple[float, ...]
 
 
 @lru_cache(maxsize=32)
@@ -95,18 +97,19 @@ def body(robot: Robot) -> Body:
     size = _thickness(robot, links)
     grip = _grip_length(links, size, robot)
     tip = _tip(links, size)
+    radii = tuple(size * _taper(link.index, robot.n, tip) for link in links.links)
     parts = []
     crowd = 0
     for link in links.links:
         crowd = crowd + 1 if link.index > 0 and np.linalg.norm(link.T_parent_axis[:3, 3]) < 1e-6 else 0
         held = grip if all(len(after.path) < 2 for after in links.links[link.index + 2 :]) else 0.0
-        parts.append(_link_parts(link, size * _taper(link.index, robot.n, tip), crowd, held, links))
+        parts.append(_link_parts(link, radii[link.index + 1], crowd, held, links))
     floor = _floor(robot, size)
     center, radius = _view_sphere(robot, floor, size)
     hand = _gripper(min(size, grip / 2), grip)
     pedestal = _pedestal(robot, size, floor)
     column = COLUMN * size if _upright(robot) else 0.0
-    return Body(links, tuple(parts), hand, pedestal, column, floor, center, radius, size)
+    return Body(links, tuple(parts), hand, pedestal, column, floor, center, radius, size, radii)
 
 
 def joint_color(index: int) -> Color:
@@ -262,7 +265,7 @@ def _pedestal(robot: Robot, size: float, floor: float) -> Part:
     """A plate at the base, and a column down to the floor; that of a hanging base leads up."""
     base = robot.T_world_base
     top = float(base[2, 3])
-    plate = placed(cylinder(2.3 * size, -0.9 * size, 0.0), base)
+    plate = placed(cylinder(PLATE * size, -0.9 * size, 0.0), base)
     foot = np.eye(4)
     foot[:2, 3] = base[:2, 3]
     if base[2, 2] < -0.7:

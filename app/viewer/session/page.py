@@ -22,6 +22,7 @@ from app.viewer.panel.layout import Panel
 from app.viewer.panel.status import Notice, StatusLine
 from app.viewer.panel.view import ViewState, configure_theme
 from app.viewer.scene.camera import Sphere, VisitorCamera
+from app.viewer.scene.clearance import clearance
 from app.viewer.session.actions import BY_HAND, Actions
 from app.viewer.session.controller import ArmController
 from app.viewer.session.lessons import LessonChoice
@@ -268,6 +269,7 @@ class VisitorPage(Worker):
         with self.client.atomic():
             if self._readout_due:
                 self._readout_due = False
+                self.status.warn(self.arm.scene.show_contact(clearance(self.robot).at(self.q)))
                 self.panel.readout.show(kin.fk(self.robot, self.q), self.units)
             if self._sliders_due:
                 self._sliders_due = False

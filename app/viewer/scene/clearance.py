@@ -1,0 +1,172 @@
+"""Where the drawn arm passes through its pedestal or the floor.
+
+The drawn parts are covered by spheres along their centre lines, each fixed to the frame of a DH row. One test of a
+configuration takes about 20 µs: 100–250 spheres against a plane and three cylinders. Links are not tested against
+each other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.viewer.scene.chain import Link
+from app.viewer.scene.meshes import FOOT, PLATE, Body, Part, body
+from kin import Robot, link_frames
+from kin.transforms import Array
+
+Obstacle = Literal["floor", "pedestal"]
+FLOOR: Obstacle = "floor"
+PEDESTAL: Obstacle = "pedestal"
+DEPTH = 0.2  # relative to the thickness of a link: what is less deep only touches
+# A sphere that is in the pedestal in most configurations belongs to the mounting of the arm.
+SAMPLES, MOST = 400, 0.6
+
+
+@dataclass(frozen=True)
+class Contact:
+    """The deepest place where a drawn part is inside an obstacle.
+
+    Attributes:
+        link: index of the joint that moves the part; the number of joints for the gripper.
+        point: centre of the sphere that is inside ``(3,)``, m.
+    """
+
+    obstacle: Obstacle
+    link: int
+    point: Array
+
+    def text(self, robot: Robot) -> str:
+        """The contact as a sentence."""
+        part = "The gripper" if self.link == robot.n else f"Link {self.link + 1}"
+        return f"{part} passes through the {self.obstacle}."
+
+
+class Clearance:
+    """The test for one robot's drawn body. Immutable, so visitors share it."""
+
+    def __init__(self, robot: Robot, made: Body) -> None:
+        self._robot = robot
+        rows, points, radii, self._links = _spheres(robot, made)
+        self._rows, self._points, self._radii = rows, np.column_stack([points, np.ones(len(points))]), radii
+        size, (x, y, top) = made.size, robot.T_world_base[:3, 3].tolist()
+        self._slack = DEPTH * size
+        self._floor = made.floor + radii  # lowest height of each centre that is clear of the floor
+        # Radius, lower and upper end of the pedestal's cylinders: column, plate, foot.
+        self._cylinders = (
+            (made.column, made.floor, top),
+            (PLATE * size, top - 0.9 * size, top),
+            (FOOT * size, made.floor, made.floor + 0.5 * size),
+        )
+        # Spheres beyond these bounds, in relation to the top of the pedestal, are clear of it.
+        self._top = np.array([[x, y, top]])
+        self._aside, self._above = (FOOT * size + radii) ** 2, radii.copy()
+        if made.column == 0.0:
+            self._aside[:] = -1.0
+            return
+        q = robot.random_q(np.random.default_rng(11), SAMPLES)
+        every = np.arange(len(radii))
+        inside = [
+            self._in_pedestal(self._place(frames) - self._top, every) > 0.0 for frames in link_frames(robot, q)
+        ]
+        self._aside[np.mean(inside, axis=0) > MOST] = -1.0
+
+    def at(self, q: Array) -> Contact | None:
+        """The deepest contact at a configuration ``(n,)``; None if there is none."""
+        points = self._place(link_frames(self._robot, q))
+        below = self._floor - points[:, 2]
+        k = int(below.argmax())
+        deepest, obstacle = float(below[k]), FLOOR
+        local = points - self._top
+        x, y, z = local.T
+        near = np.flatnonzero((x * x + y * y < self._aside) & (z < self._above))
+        if len(near):
+            inside = self._in_pedestal(local, near)
+            i = int(inside.argmax())
+            if inside[i] > deepest:
+                deepest, obstacle, k = float(inside[i]), PEDESTAL, int(near[i])
+        if deepest <= self._slack:
+            return None
+        return Contact(obstacle, int(self._links[k]), points[k])
+
+    def _place(self, frames: Array) -> Array:
+        """Centres ``(k, 3)`` of the spheres."""
+        centres: Array = (frames[self._rows, :3] @ self._points[:, :, None])[:, :, 0]
+        return centres
+
+    def _in_pedestal(self, local: Array, chosen: NDArray[np.int64]) -> Array:
+        """How deep each chosen sphere is inside the pedestal, at most its radius; negative outside.
+
+        `local`: centres ``(k, 3)`` in relation to the top of the pedestal.
+        """
+        x, y, z = local[chosen].T
+        aside = np.hypot(x, y)
+        z = z + self._top[0, 2]
+        nearest = np.full(len(z), np.inf)
+        for radius, low, high in self._cylinders:
+            across = np.maximum(aside - radius, 0.0)
+            along = np.maximum(np.maximum(low - z, z - high), 0.0)
+            nearest = np.minimum(nearest, across * across + along * along)
+        depth: Array = self._radii[chosen] - np.sqrt(nearest)
+        return depth
+
+
+@lru_cache(maxsize=32)
+def clearance(robot: Robot) -> Clearance:
+    """The test for a robot; the same object for every visitor."""
+    return Clearance(robot, body(robot))
+
+
+def _spheres(robot: Robot, made: Body) -> tuple[NDArray[np.int64], Array, Array, NDArray[np.int64]]:
+    """DH row, centre in the frame of that row, radius, and link of the spheres that cover the moving parts."""
+    rows, points, radii, links = [], [], [], []
+
+    def add(link: Link, centres: Array, radius: float, index: int) -> None:
+        row, T_link_row = link.frames[-1]
+        local = (centres - T_link_row[:3, 3]) @ T_link_row[:3, :3]
+        rows.extend([row] * len(local))
+        points.append(local)
+        radii.extend([radius] * len(local))
+        links.extend([index] * len(local))
+
+    moving = [link for link in made.chain.links[1:] if link.frames]
+    tool = made.chain.T_last_tool
+    hand = next(part for part in made.gripper if part.name == "gripper")
+    for link in moving:
+        parts = made.parts[link.index + 1]
+        if any(part.name == "link" for part in parts):
+            radius = made.radii[link.index + 1]
+            centres = _along(link.path, radius)
+            if link is moving[-1]:  # the gripper replaces the end of the tube
+                centres = centres[np.linalg.norm(centres - tool[:3, 3], axis=1) > -hand.mesh.bounds[0, 2]]
+            add(link, centres, radius, link.index)
+        for part in parts:
+            if part.name in ("housing", "link-bar") and not part.fixed_to_parent:
+                add(link, *_core(part), link.index)
+    if moving:
+        centres, radius = _core(hand)
+        add(moving[-1], centres @ tool[:3, :3].T + tool[:3, 3], radius, robot.n)
+    return np.array(rows, int), np.vstack(points), np.array(radii), np.array(links, int)
+
+
+def _along(path: Array, radius: float) -> Array:
+    """Points on a polyline ``(k, 3)``, at most `radius` apart."""
+    pieces = [path[:1]]
+    for start, end in pairwise(path):
+        count = max(1, int(np.ceil(np.linalg.norm(end - start) / radius)))
+        pieces.append(start + (end - start) * (np.arange(1, count + 1) / count)[:, None])
+    return np.vstack(pieces)
+
+
+def _core(part: Part) -> tuple[Array, float]:
+    """Centres ``(k, 3)`` and radius of spheres that fill a part along z."""
+    low, high = part.mesh.bounds
+    radius = float(min((high - low)[:2])) / 2.0
+    middle, half = (low + high) / 2.0, max((high - low)[2] / 2.0 - radius, 0.0)
+    ends = np.array([[*middle[:2], middle[2] - half], [*middle[:2], middle[2] + half]])
+    return (_along(ends, radius) if half > 0.0 else ends[:1]), radius
