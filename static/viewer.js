@@ -42,7 +42,8 @@
   Storage.prototype.getItem = function (name) {
     if (name !== ITEM) return getItem.call(this, name);
     openTab(performance.now() + 30000);
-    return JSON.stringify({ address: location.origin + location.pathname.replace(/viewer\/?$/, ""), state });
+    const address = location.origin + location.pathname.replace(/viewer\/?$/, "");
+    return JSON.stringify({ address, state, dark: matchMedia("(prefers-color-scheme: dark)").matches });
   };
   Storage.prototype.setItem = function (name, value) {
     if (name !== ITEM) return setItem.call(this, name, value);

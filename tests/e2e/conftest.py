@@ -75,8 +75,8 @@ def desktop(browser: Browser, address: str) -> Iterator[Tab]:
 
 @pytest.fixture(scope="session")
 def phone(browser: Browser, address: str) -> Iterator[Tab]:
-    """The tab in phone size."""
-    opened = Tab(browser, address, 390, 844)
+    """The tab on a phone, with a touch screen."""
+    opened = Tab(browser, address, 390, 844, touch=True)
     yield opened
     opened.close()
 

@@ -32,8 +32,10 @@ Object.defineProperty(window, "devicePixelRatio", { get: () => 0.5 });
 class Tab:
     """One browser tab: actions on its controls, and readings of what it shows."""
 
-    def __init__(self, browser: Browser, address: str, width: int, height: int) -> None:
-        self.page: Page = browser.new_page(viewport={"width": width, "height": height})
+    def __init__(self, browser: Browser, address: str, width: int, height: int, touch: bool = False) -> None:
+        self.page: Page = browser.new_page(
+            viewport={"width": width, "height": height}, has_touch=touch, is_mobile=touch
+        )
         self.page.add_init_script(PLAIN)
         self.page.set_default_timeout(WAIT)
         expect.set_options(timeout=WAIT)
@@ -41,7 +43,10 @@ class Tab:
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.goto(address + "viewer/")
         expect(self.status).to_have_attribute("data-status", "hand")
-        self.page.locator("#webgl-software-rendering button").click()
+        notice = self.page.locator("#webgl-software-rendering button")
+        expect(notice).to_have_count(1)
+        if notice.is_visible():
+            notice.click()
 
     def close(self) -> None:
         self.page.close()
@@ -81,8 +86,7 @@ class Tab:
         """Switch to the dark or the light colour scheme."""
         self.open("View")
         scheme = "dark" if dark else "light"
-        if self.page.locator("html").get_attribute("data-mantine-color-scheme") != scheme:
-            self.check("Dark page")
+        self.choose("Page colours", scheme.capitalize())
         expect(self.page.locator("html")).to_have_attribute("data-mantine-color-scheme", scheme)
 
     def choose(self, label: str, option: str) -> None:
@@ -120,11 +124,16 @@ class Tab:
             ]
         )
 
+    def arrow(
+        self, robot: kin.Robot, T: np.ndarray, axis: int, lengths: float = 1.0
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Page coordinates of a point on an arrow of the gizmo at pose T, and of one farther by its length."""
+        arrow = 0.26 * body(robot).radius * T[:3, axis]
+        return self.pixel(robot, T[:3, 3] + 0.8 * arrow), self.pixel(robot, T[:3, 3] + (0.8 + lengths) * arrow)
+
     def drag_arrow(self, robot: kin.Robot, T: np.ndarray, axis: int, lengths: float, steps: int = 6) -> None:
         """Drag an arrow of the gizmo at pose T along its own direction, by a multiple of its length."""
-        arrow = 0.26 * body(robot).radius * T[:3, axis]
-        at = self.pixel(robot, T[:3, 3] + 0.8 * arrow)
-        to = self.pixel(robot, T[:3, 3] + (0.8 + lengths) * arrow)
+        at, to = self.arrow(robot, T, axis, lengths)
         self.page.mouse.move(*at.tolist())
         self.page.wait_for_timeout(300)  # the arrow lights up under the pointer
         self.page.mouse.down()

@@ -22,11 +22,24 @@ async () => {
     };
     if (area.scrollWidth > area.clientWidth) problems.push(`the panel is ${area.scrollWidth} px wide`);
     for (const node of area.querySelectorAll("*")) {
+      if (node.closest("[data-status]")) continue; // over the scene
       const { left, right, width } = node.getBoundingClientRect();
       if (width && shown(node) && (right > box.right + 1 || left < box.left - 1) && !scrolls(node)) {
         problems.push(`cut off, ${Math.round(left)} to ${Math.round(right)} px: ${describe(node)}`);
       }
     }
+  }
+
+  // The status is whole, in the window and beside the panel.
+  const status = document.querySelector("[data-status]");
+  if (status) {
+    const { left, top, right, bottom } = status.getBoundingClientRect();
+    if (left < 0 || top < 0 || right > innerWidth || bottom > innerHeight) problems.push("the status is cut off");
+    for (const node of [status, ...status.querySelectorAll("*")]) {
+      if (node.scrollHeight > node.clientHeight + 1 && getComputedStyle(node).overflow !== "visible") problems.push("the status is clipped");
+    }
+    const panel = area.getBoundingClientRect();
+    if (right > panel.left && left < panel.right && bottom > panel.top && top < panel.bottom) problems.push("the status covers the panel");
   }
 
   // Controls and their labels do not overlap.

@@ -171,10 +171,10 @@ def test_link_reload_and_lost_connection(shared: Tab, proxy: Proxy, browser: Bro
     page.get_by_role("tab", name="View").click()
     wait_for_url(page, "tab")
     with page.expect_event("framenavigated", timeout=WAIT):
-        shared.check("Dark page")
+        shared.choose("Page colours", "Dark")
     shared.screenshot("share-dark")
     with page.expect_event("framenavigated", timeout=WAIT):
-        shared.check("Dark page")
+        shared.choose("Page colours", "Light")
     shared.screenshot("share-light")
     page.get_by_role("button", name="Copy code").click()
     page.wait_for_function("navigator.clipboard.readText().then(text => text.startsWith('curl -s http'))")

@@ -56,8 +56,11 @@ _FULL_PAGE = _PAGE.format(
 # Codes that describe a lost connection and may not travel in a close frame (RFC 6455, 7.4.1).
 _UNSENDABLE = {1005: 1000, 1006: 1011, 1015: 1011}
 
-# A tab's memory, and what viser's controls lack. Relative, so that it holds behind any path prefix.
-_OURS = b'<link rel="stylesheet" href="../static/viewer.css"><script src="../static/viewer.js"></script>'
+# A tab's memory, and what viser's page lacks. Relative, so that it holds behind any path prefix.
+_OURS = b"".join(
+    [b'<link rel="stylesheet" href="../static/%s.css">' % name for name in (b"viewer", b"layout")]
+    + [b'<script src="../static/%s.js"></script>' % name for name in (b"viewer", b"layout", b"page")]
+)
 
 
 class ViewerBridge:
@@ -192,6 +195,8 @@ class _Page:
 
     def __init__(self, html: bytes) -> None:
         html = html.replace(b"<title>Viser</title>", b"<title>Kinboard viewer</title>", 1)
+        # A menu that opens beside a phone's screen must not widen the page.
+        html = html.replace(b"initial-scale=1", b"initial-scale=1, minimum-scale=1", 1)
         # Before viser's own script, for which it prepares the page.
         self._html = html.replace(b"<head>", b"<head>" + _OURS, 1)
         self._gzipped = gzip.compress(self._html, 6)

@@ -11,15 +11,18 @@ from app.viewer.panel.readout import PoseReadout
 from app.viewer.panel.share import SharePanel
 from app.viewer.panel.status import Notice, StatusLine
 from app.viewer.panel.target import DEFAULT_TASK, TargetChoice
-from app.viewer.panel.view import UnitChoice, ViewOptions, ViewState
+from app.viewer.panel.view import ColourChoice, UnitChoice, ViewOptions, ViewState
 from kin import Robot, fk
 from kin.units import Units
+
+PANEL_WIDTH = 344  # pixels; visitors change it at the panel's edge
 
 
 class Panel:
     """One visitor's panel. Posts ``"robot"``, ``"home"``, ``"random"``, and what its parts post.
 
     Args:
+        system_dark: whether the visitor's system is dark.
         learn: whether there is a tab for lessons.
         tabs: titles of the features' tabs.
 
@@ -36,12 +39,14 @@ class Panel:
         robot: Robot,
         units: Units,
         view: ViewState,
+        system_dark: bool,
         welcome: Notice,
         learn: bool,
         tabs: Sequence[str],
         post: Post,
     ) -> None:
         self.status = StatusLine(gui, welcome)
+        self.colours = ColourChoice(gui, system_dark, post)
         self.robot = gui.add_dropdown("Robot", tuple(r.name for r in robots), initial_value=robot.name)
         listen(self.robot, post, "robot")
         self.readout = PoseReadout(gui, fk(robot, robot.q_home), units)
@@ -56,6 +61,7 @@ class Panel:
         self.tabs = [group.add_tab(title) for title in tabs]
         with group.add_tab("View"):
             self.units = UnitChoice(gui, units, post)
+            self.colours.build(view.dark)
             ViewOptions(gui, view, post)
             with gui.add_folder("Share"):
                 self.share = SharePanel(gui, post)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import viser
 
 from app.viewer.views.templates import render
-from kin import IKResult
+from kin import IKResult, Robot
 from kin.ik.details import OrientationNotMet, OutsideLimits, RollError, RotationError, Solved
 from kin.units import Units
 
@@ -41,6 +42,11 @@ def notice(result: IKResult, units: Units) -> Notice:
     return Notice(_kind(result), explanation.title, explanation.detail)
 
 
+def introduction(robot: Robot) -> Notice:
+    """A robot's name and the first sentence of its description."""
+    return Notice("hand", robot.name, re.split(r"(?<=[.!?]) ", robot.description, maxsplit=1)[0])
+
+
 def _kind(result: IKResult) -> Kind:
     match result.details:
         case Solved():
@@ -55,7 +61,7 @@ def _kind(result: IKResult) -> Kind:
 
 
 def html(shown: Notice) -> str:
-    """The notice as a block of fixed height, so that nothing below it moves."""
+    """The notice as a card, which ``static/layout.css`` places over the scene."""
     symbol, color = LOOKS[shown.kind]
     return render("panel/status", notice=shown, symbol=symbol, color=color)
 

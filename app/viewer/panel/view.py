@@ -12,16 +12,22 @@ from kin.units import LENGTHS, Length, Units
 
 BRAND = (0, 114, 178)
 BRAND_ON_DARK = (86, 180, 233)
+SCHEMES: dict[str, bool | None] = {"Like the system": None, "Light": False, "Dark": True}
+SYSTEM_IS_DARK = "The system is dark"  # static/page.js looks for this label
 
 
 @dataclass
 class ViewState:
-    """The visitor's choices; they are kept when another robot is selected."""
+    """The visitor's choices; they are kept when another robot is selected.
+
+    Attributes:
+        dark: whether the page is dark; None: as the visitor's system is.
+    """
 
     frames: bool = False
     labels: bool = True
     axes: bool = True
-    dark: bool = False
+    dark: bool | None = None
 
 
 class UnitChoice:
@@ -53,11 +59,41 @@ class ViewOptions:
             ("frames", "Link frames", "The frame of every DH row: x red, y green, z blue"),
             ("labels", "Frame labels", "The name of each frame, at the tip of its z axis"),
             ("axes", "Joint axes", "The axis of each joint; its arrow shows the positive direction"),
-            ("dark", "Dark page", "Dark instead of light colours"),
         ):
             listen(gui.add_checkbox(text, getattr(state, name), hint=hint), post, ("view", name))
         group = gui.add_button_group("Camera", ("Reset view",))
         listen_click(group, post, {"Reset view": "camera"})
+
+
+class ColourChoice:
+    """The colours of the page. Posts ``"colours"``, and ``"system-dark"`` when the visitor's system changes.
+
+    The check box is hidden: ``static/page.js`` keeps it as the system is.
+    """
+
+    def __init__(self, gui: viser.GuiApi, system_dark: bool, post: Post) -> None:
+        self._gui, self._post = gui, post
+        listen(gui.add_checkbox(SYSTEM_IS_DARK, system_dark), post, "system-dark")
+        self._choice: viser.GuiDropdownHandle[str]
+
+    def build(self, dark: bool | None) -> None:
+        """Add the choice to the container that is open."""
+        hint = "Light or dark, or as the system is set"
+        self._choice = self._gui.add_dropdown(
+            "Page colours", tuple(SCHEMES), initial_value=_scheme(dark), hint=hint
+        )
+        listen(self._choice, self._post, "colours")
+
+    def read(self, value: object, before: bool | None) -> bool | None:
+        """A choice as `ViewState.dark`; an unknown one raises `InputError`, and `before` is shown again."""
+        if value not in SCHEMES:
+            assign(self._choice, _scheme(before))
+            raise InputError("page colours", value, "one of " + ", ".join(SCHEMES))
+        return SCHEMES[str(value)]
+
+
+def _scheme(dark: bool | None) -> str:
+    return next(name for name, value in SCHEMES.items() if value is dark)
 
 
 def configure_theme(gui: viser.GuiApi, dark: bool) -> None:

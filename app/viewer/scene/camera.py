@@ -1,8 +1,9 @@
 """The visitor's camera: a default view that fits the arm and the window, until the visitor moves the camera.
 
-A link made on one screen is opened on another. With a docked panel, a viewpoint is independent of the window's
-size. On a phone the width is the limit, and the panel is a sheet that covers the lower part of the window: a
-viewpoint chosen there is saved as the one that shows the same with a docked panel.
+A link made on one screen is opened on another. In a picture that is wider than high, a viewpoint shows the same
+whatever the size. In a narrow picture the width is the limit: a viewpoint chosen there is saved as the one that
+shows the same in a wide picture. When the picture changes its shape (a phone is turned, its sheet opened), the
+camera moves so that the picture still shows the same.
 """
 
 from __future__ import annotations
@@ -22,13 +23,12 @@ from kin.transforms import Array
 FOV = math.radians(38)
 DIRECTION = np.array([0.80, 0.92, 0.46])
 UP = np.array([0.0, 0.0, 1.0])
-NARROW = 700  # pixels
 LOOK_EVERY = 0.25  # seconds; a moving camera reports thirty times a second
 PATIENCE = 10.0  # seconds for a page to reach the viewpoint it was sent to; a lesson may move it meanwhile
 FARTHEST = 1e6  # metres; viser's own limit of zooming out is 1e4
 SAME = 1e-3  # tolerance, relative to the distance to the look-at point
 _MARGIN = 1.06  # of the sphere around the arm
-_SEEN = 0.4  # share of the window's height above a sheet
+_RESIZED = 0.01  # relative change of the picture's narrow side that moves the camera
 Sphere = tuple[Array, float]  # centre ``(3,)`` and radius, m
 
 
@@ -50,45 +50,39 @@ def round_both(one: Sphere, other: Sphere) -> Sphere:
     return one[0] + out / apart * (radius - one[1]), radius
 
 
-def view(body: Body, aspect: float, sheet: bool = False, room: Sequence[Sphere] = ()) -> tuple[Array, Array]:
-    """Camera position and look-at point ``(3,)`` that show the whole arm in a window of this aspect ratio.
+def view(body: Body, aspect: float, room: Sequence[Sphere] = ()) -> tuple[Array, Array]:
+    """Camera position and look-at point ``(3,)`` that show the whole arm in a picture of this aspect ratio.
 
-    In a portrait window the width is the limit. On a phone the panel is a `sheet` that covers the lower part of
-    the window; the arm is then placed above it. `room`: spheres that must be visible as well.
+    `room`: spheres that must be visible as well.
     """
     center, radius = body.center, body.radius
     for sphere in room:
         center, radius = round_both((center, radius), sphere)
-    margin, lift = _framed(aspect, sheet)
-    # The vertical is foreshortened.
-    upright = math.hypot(*DIRECTION[:2]) / float(np.linalg.norm(DIRECTION))
-    center = center - UP * lift * radius / upright
-    distance = margin * radius / math.sin(_half_angle(aspect))
+    distance = _MARGIN * radius / math.sin(_half_angle(aspect))
     return center + DIRECTION / np.linalg.norm(DIRECTION) * distance, center
 
 
-def on_sheet(viewpoint: Array, aspect: float) -> Array:
-    """The viewpoint that shows above a phone's sheet what `viewpoint` ``(3, 3)`` shows with a docked panel.
+def narrowed(viewpoint: Array, aspect: float) -> Array:
+    """The viewpoint that shows in a picture of this aspect ratio what `viewpoint` ``(3, 3)`` shows in a wide one.
 
     Rows of a viewpoint: camera position, look-at point, and up direction.
     """
-    farther, drop = _sheet(aspect)
-    return _moved(viewpoint, farther, -drop)
+    return _at_distance(viewpoint, _farther(aspect))
 
 
-def off_sheet(viewpoint: Array, aspect: float) -> Array:
-    """The inverse of `on_sheet`."""
-    farther, drop = _sheet(aspect)
-    return _moved(viewpoint, 1.0 / farther, drop / farther)
+def widened(viewpoint: Array, aspect: float) -> Array:
+    """The inverse of `narrowed`."""
+    return _at_distance(viewpoint, 1.0 / _farther(aspect))
 
 
 class VisitorCamera:
-    """The camera of one visitor. Posts ``"looked"`` a few times a second while the visitor moves it.
+    """The camera of one visitor.
+
+    Posts ``"looked"`` a few times a second while the visitor moves it, and ``"resized"`` when the picture has
+    another shape.
 
     Attributes:
-        sheet: whether the panel is a phone's sheet. Determined once, because a docked panel makes the canvas
-            narrower.
-        chosen: the viewpoint ``(3, 3)`` the visitor has chosen, as with a docked panel; None: the default view.
+        chosen: the viewpoint ``(3, 3)`` the visitor has chosen, as in a wide picture; None: the default view.
     """
 
     def __init__(self, client: viser.ClientHandle, post: Post) -> None:
@@ -99,7 +93,7 @@ class VisitorCamera:
         # The viewpoint the page was sent to, when, and whether it has arrived. Until then it reports the previous
         # viewpoint, which nobody has chosen.
         self._aimed, self._aimed_at, self._arrived = np.zeros((3, 3)), 0.0, False
-        self.sheet = self._camera.image_width < NARROW
+        self._framed = self._aspect  # the aspect ratio of the picture for which the camera was placed
         self.chosen: Array | None = None
         self._body: Body | None = None
         self._room: tuple[Sphere, ...] = ()
@@ -112,7 +106,8 @@ class VisitorCamera:
         self._camera.fov = FOV
         self._camera.near, self._camera.far = body.radius / 50, body.radius * 200
         self.chosen = None
-        self._go(np.stack([*view(body, self._aspect, self.sheet, self._room), UP]))
+        self._framed = self._aspect
+        self._go(np.stack([*view(body, self._framed, self._room), UP]))
 
     def fit(self, spheres: Sequence[Sphere]) -> None:
         """Make the default view show these spheres as well; a `chosen` view stays as it is."""
@@ -123,8 +118,18 @@ class VisitorCamera:
 
     def restore(self, viewpoint: Array) -> None:
         """Move to a viewpoint that was `chosen` in this or another window."""
-        self.chosen = viewpoint
-        self._go(on_sheet(viewpoint, self._aspect) if self.sheet else viewpoint)
+        self.chosen, self._framed = viewpoint, self._aspect
+        self._go(narrowed(viewpoint, self._framed))
+
+    def refit(self) -> None:
+        """Show in a picture of another shape what the last one showed."""
+        if self._body is None or not self._reshaped:
+            return
+        self.look()
+        if self.chosen is None:
+            self.aim(self._body)
+        else:
+            self.restore(self.chosen)
 
     def look(self) -> None:
         """Update `chosen`."""
@@ -132,12 +137,16 @@ class VisitorCamera:
         settled = self._arrived or time.perf_counter() - self._aimed_at > PATIENCE
         if settled and here is not None and not _same(here, self._aimed):
             self._aimed, self._arrived = here, True
-            self.chosen = off_sheet(here, self._aspect) if self.sheet else here
+            self.chosen = widened(here, self._framed)
 
     @property
     def _aspect(self) -> float:
         width, height = self._camera.image_width, self._camera.image_height
         return width / height if width > 0 and height > 0 else 1.6
+
+    @property
+    def _reshaped(self) -> bool:
+        return abs(_farther(self._aspect) / _farther(self._framed) - 1.0) > _RESIZED
 
     def _go(self, viewpoint: Array) -> None:
         self._aimed, self._aimed_at = viewpoint, time.perf_counter()
@@ -161,6 +170,8 @@ class VisitorCamera:
         self._reported = here = self._here()
         if not self._arrived and here is not None:
             self._arrived = _same(here, self._aimed)
+        if self._reshaped:
+            self._post("resized", None)
         now = time.perf_counter()
         if now - self._posted_at >= LOOK_EVERY:
             self._posted_at = now
@@ -171,32 +182,15 @@ def _half_angle(aspect: float) -> float:
     return math.atan(math.tan(FOV / 2) * min(aspect, 1.0))
 
 
-def _framed(aspect: float, sheet: bool) -> tuple[float, float]:
-    """Half the narrow side of the picture and the upward shift, in radii of the sphere around the arm."""
-    if not sheet or aspect >= 1.0:
-        return _MARGIN, 0.0
-    margin = max(_MARGIN, aspect * _MARGIN / _SEEN)
-    return margin, (1.0 - _SEEN) * margin / aspect
+def _farther(aspect: float) -> float:
+    """How many times farther than in a wide picture the camera is."""
+    return math.sin(FOV / 2) / math.sin(_half_angle(aspect))
 
 
-def _sheet(aspect: float) -> tuple[float, float]:
-    """How many times farther the camera is on a phone, and how much lower it looks, relative to its distance."""
-    if aspect >= 1.0:
-        return 1.0, 0.0
-    margin, lift = _framed(aspect, True)
-    farther = margin / _MARGIN * math.sin(FOV / 2) / math.sin(_half_angle(aspect))
-    return farther, lift / _MARGIN * math.sin(FOV / 2)
-
-
-def _moved(viewpoint: Array, farther: float, lift: float) -> Array:
-    """Scale the camera's distance by `farther`, and raise the look-at point by `lift` times that distance."""
+def _at_distance(viewpoint: Array, factor: float) -> Array:
+    """Multiply the camera's distance to the look-at point by `factor`."""
     position, look_at, up = viewpoint
-    back = position - look_at
-    upright = up * (back @ back) - back * (up @ back)
-    size = float(np.linalg.norm(upright))
-    if size > 0.0:
-        look_at = look_at + upright / size * lift * float(np.linalg.norm(back))
-    return np.stack([look_at + back * farther, look_at, up])
+    return np.stack([look_at + (position - look_at) * factor, look_at, up])
 
 
 def _same(a: Array, b: Array) -> bool:

@@ -14,9 +14,8 @@ from app.viewer.feature import Feature
 from app.viewer.panel import assign
 from app.viewer.panel.joints import JointSliders
 from app.viewer.panel.layout import Panel
-from app.viewer.panel.status import Notice, StatusLine
+from app.viewer.panel.status import Notice, StatusLine, introduction
 from app.viewer.panel.target import TASKS
-from app.viewer.panel.view import configure_theme
 from app.viewer.session.persistence import SavedPage
 from app.viewer.session.posture import PosturePanel
 from kin import Robot
@@ -33,6 +32,10 @@ class ActedPage(SavedPage, Protocol):
     sliders: JointSliders
     posture: PosturePanel
     status: StatusLine
+    system_dark: bool
+
+    def use_colours(self, dark: bool | None, system_dark: bool) -> None:
+        """Make the page dark or light; None: as the visitor's system is."""
 
     def change_robot(self, robot: Robot, q: Array | None = None) -> None:
         """Replace the robot, at its home configuration or at `q` ``(n,)``, in a fitting view."""
@@ -74,7 +77,10 @@ class Actions:
             "recall": lambda _: self._move_by_hand(arm.recall_target),
             "copy-as": lambda name: page.panel.share.choose(name),
             "view": self._on_view,
+            "colours": self._on_colours,
+            "system-dark": lambda dark: page.use_colours(page.view.dark, bool(dark)),
             "camera": lambda _: page.camera.aim(arm.scene.body),
+            "resized": lambda _: page.camera.refit(),
             "looked": lambda _: None,  # the viewpoint is read when the camera rests
         }
 
@@ -130,7 +136,7 @@ class Actions:
             robot = page.store.get(name)  # raises with the list of valid ones
         if robot != page.robot:
             page.change_robot(robot)
-            page.status.show(Notice("hand", robot.name, robot.description))
+            page.status.show(introduction(robot))
 
     def _on_task(self, value: object) -> None:
         page = self._page
@@ -139,10 +145,11 @@ class Actions:
             raise kin.InputError("task", value, "one of " + ", ".join(TASKS))
         page.arm.set_task(TASKS[str(value)])
 
+    def _on_colours(self, name: object) -> None:
+        page = self._page
+        page.use_colours(page.panel.colours.read(name, page.view.dark), page.system_dark)
+
     def _on_view(self, name: str, value: object) -> None:
         page = self._page
         setattr(page.view, name, bool(value))
-        if name == "dark":
-            configure_theme(page.client.gui, page.view.dark)
-            page.for_features(lambda feature: feature.on_style())
         page.apply_view()

@@ -18,7 +18,7 @@ import kin
 from app.viewer.feature import Feature
 from app.viewer.lessons import LESSONS
 from app.viewer.panel.joints import JointSliders, lock_notice
-from app.viewer.panel.layout import Panel
+from app.viewer.panel.layout import PANEL_WIDTH, Panel
 from app.viewer.panel.status import Notice, StatusLine
 from app.viewer.panel.view import ViewState, configure_theme
 from app.viewer.scene.camera import Sphere, VisitorCamera
@@ -66,6 +66,7 @@ class VisitorPage(Worker):
         self.summaries = services.summaries
         self.arm = ArmController(client, services.pace, self.post, self)
         self.view = ViewState()
+        self.system_dark = False
         self.lessons: LessonChoice | None = None
         self.client = client
         self._pace = services.pace
@@ -117,7 +118,7 @@ class VisitorPage(Worker):
 
     @property
     def dark(self) -> bool:
-        return self.view.dark
+        return self.system_dark if self.view.dark is None else self.view.dark
 
     def move_to(self, q: Array, notice: Notice | None = None, at_once: bool = False) -> None:
         self.arm.move_to(q, ease=not at_once)
@@ -187,13 +188,22 @@ class VisitorPage(Worker):
         self._readout_due = True
         self.for_features(lambda feature: feature.on_style())
 
+    def use_colours(self, dark: bool | None, system_dark: bool) -> None:
+        """Make the page dark or light; None: as the visitor's system is."""
+        before = self.dark
+        self.view.dark, self.system_dark = dark, system_dark
+        if self.dark != before:
+            configure_theme(self.client.gui, self.dark)
+            self.for_features(lambda feature: feature.on_style())
+            self.apply_view()
+
     def apply_view(self) -> None:
         """Show the scene as `view` says."""
         scene = self.arm.scene
         scene.show_frames(self.view.frames)
         scene.show_labels(self.view.labels)
         scene.show_axes(self.view.axes)
-        scene.floor.use_dark(self.view.dark)
+        scene.floor.use_dark(self.dark)
         scene.floor.use_units(self.units)
 
     def for_features(self, action: Callable[[Feature], None]) -> None:
@@ -281,18 +291,18 @@ class VisitorPage(Worker):
     def _build(self) -> None:
         gui = self.client.gui
         saved = self._persistence.load()
-        self.units, self.view = saved.units, saved.view
+        self.units, self.view, self.system_dark = saved.units, saved.view, self._persistence.system_dark
         robot = self.store.get(saved.robot) if saved.robot is not None else self.store.robots[0]
         with self.client.atomic():
-            if self.view.dark:
+            if self.dark:
                 configure_theme(gui, True)
             self.camera = VisitorCamera(self.client, self.post)
-            if not self.camera.sheet:
-                gui.main_panel.dock_right()
+            gui.main_panel.dock_right()
+            gui.main_panel.set_width(PANEL_WIDTH)
             titles = [tab.title for tab in TABS]
             self.panel = Panel(
-                gui, self.store.robots, robot, self.units, self.view, self._welcome, bool(LESSONS), titles,
-                self.post,
+                gui, self.store.robots, robot, self.units, self.view, self.system_dark, self._welcome,
+                bool(LESSONS), titles, self.post,
             )  # fmt: skip
             self.status = self.panel.status
             self.posture = PosturePanel(self, self.panel.posture, self.post)
@@ -309,7 +319,7 @@ class VisitorPage(Worker):
 
     def _use_robot(self, robot: Robot, q: Array | None = None) -> None:
         """Show another robot, at its home configuration or at `q` ``(n,)``, in a fitting view."""
-        self.arm.use(robot, q, self.view.dark)
+        self.arm.use(robot, q, self.dark)
         self._readout_due = True
         self.panel.target.show(self.task)
         self.sliders = self._make_sliders()

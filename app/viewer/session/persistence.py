@@ -55,6 +55,7 @@ class Persistence:
         guard: runs an action that may fail; the rest is restored in any case.
 
     Attributes:
+        system_dark: whether the visitor's system was dark when the page was opened.
         due: when the state is to be saved if nothing more happens (`time.perf_counter`'s); None: it is saved.
     """
 
@@ -63,6 +64,7 @@ class Persistence:
         self._token = token
         self._guard = guard
         self._address = LOCAL
+        self.system_dark = False
         self._saved = ""
         self._share: SharePanel
         self.due: float | None = None
@@ -76,6 +78,7 @@ class Persistence:
             log.debug("visitor %s has no stored state: %s", client.client_id, error)
             stored = StoredPage()
         self._address = stored.address or LOCAL
+        self.system_dark = stored.dark
         return decode(stored.state, self._page.store.robots)
 
     def restore(self, saved: PageState) -> None:

@@ -73,10 +73,17 @@ class PageState:
 
 @dataclass(frozen=True)
 class StoredPage:
-    """The contents of a page's storage: the service's address as the visitor sees it, and the encoded state."""
+    """The contents of a page's storage.
+
+    Attributes:
+        address: the service's address as the visitor sees it.
+        state: the encoded state.
+        dark: whether the visitor's system is dark.
+    """
 
     address: str = ""
     state: str = ""
+    dark: bool = False
 
 
 def encode(state: PageState) -> str:
@@ -156,7 +163,8 @@ def read_stored_page(text: str | None) -> StoredPage:
     data = _parse(text or "")
     address, state = data.get("address"), data.get("state")
     usable = isinstance(address, str) and len(address) < 500 and _ADDRESS.fullmatch(address)
-    return StoredPage(str(address) if usable else "", state if isinstance(state, str) else "")
+    state = state if isinstance(state, str) else ""
+    return StoredPage(str(address) if usable else "", state, data.get("dark") is True)
 
 
 _TASKS: tuple[Task, ...] = get_args(Task)

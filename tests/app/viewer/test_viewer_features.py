@@ -115,7 +115,7 @@ def test_a_tab_is_called_by_the_worker_of_the_visitor_alone(tab: FakeBrowser) ->
     wait_for_call(tab, "style", Units(degrees=False), False)
     tab.set("Lengths", "cm")
     wait_for_call(tab, "style", Units(False, "cm"), False)
-    tab.set("Dark page", True)
+    tab.set("Page colours", "Dark")
     wait_for_call(tab, "style", Units(False, "cm"), True)
     tab.set("Robot", OTHER.name)
     wait_for_call(tab, "robot", "puma560")

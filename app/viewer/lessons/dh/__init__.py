@@ -299,7 +299,7 @@ class DHLesson(Feature):
         eye = self.stage.client.camera
         robot = self.stage.robot
         aspect = eye.image_width / eye.image_height if eye.image_height > 0 else 1.6
-        position, look_at = camera.view(body(robot), aspect, sheet=aspect < 1.0)
+        position, look_at = camera.view(body(robot), aspect)
         before = (np.array(eye.position), np.array(eye.look_at))
         out = before[0] - before[1]
         far = max(float(np.linalg.norm(out)), 1.5 * float(np.linalg.norm(position - look_at)))

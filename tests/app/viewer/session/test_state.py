@@ -273,10 +273,10 @@ def test_a_link_and_a_reconnection_restore_the_view(port):
             "Point only",
             "Keep current",
         )
-        assert (tab.value("Radians"), tab.value("Link frames"), tab.value("Dark page"), tab.value("Count")) == (
+        assert (tab.value("Radians"), tab.value("Link frames"), tab.value("Page colours"), tab.value("Count")) == (
             True,
             True,
-            True,
+            "Dark",
             4,
         )
         assert np.abs(tab.gizmo_pose() - far).max() < 1e-8

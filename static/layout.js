@@ -1,0 +1,140 @@
+"use strict";
+// Runs in viser's page. It places what lies over the scene: the status card, and on a phone the panel as a sheet.
+//
+// The sheet has three heights: peek, half and full. It is dragged or tapped by its head or its grip. The scene gets
+// what the sheet leaves; a full sheet covers part of it.
+(() => {
+  const NARROW = matchMedia("(max-width: 36em)"); // the width at which viser's panel becomes a sheet
+  const STEPS = ["peek", "half", "full"];
+  const HEAD = 56; // px; height of a sheet that peeks
+  const STATUS = 72; // px; of the scene's top, kept for the status card: longer texts cover part of the scene
+  const TAP = 8; // px; a shorter drag is a tap
+  const SAVED = "kinboard-sheet";
+  const root = document.documentElement;
+
+  let step = STEPS.includes(stored()) ? stored() : "half";
+  let drag = null; // { y, height, moved, speed, at } while a pointer holds the sheet
+  let grip = null;
+
+  // A browser may forbid storage; then a reload opens the sheet half.
+  function stored() { try { return sessionStorage.getItem(SAVED); } catch { return null; } }
+  function store() { try { sessionStorage.setItem(SAVED, step); } catch { /* see above */ } }
+
+  const card = () => document.querySelector("[data-status]");
+
+  function heightOf(name) {
+    if (name === "peek") return HEAD;
+    const half = Math.round(innerHeight / 2);
+    return name === "half" ? half : Math.max(half, innerHeight - Math.max(STATUS, card()?.offsetHeight ?? 0));
+  }
+
+  function setHeight(pixels) { root.style.setProperty("--kb-sheet", `${Math.round(pixels)}px`); }
+
+  /** Write the sheet's height and the scene's edges into the styles. */
+  function place() {
+    root.toggleAttribute("data-kb-narrow", NARROW.matches);
+    root.dataset.kbSheet = step;
+    if (!drag) setHeight(heightOf(step));
+    root.style.setProperty("--kb-below", `${heightOf(step === "peek" ? "peek" : "half")}px`);
+    root.style.setProperty("--kb-above", `${STATUS}px`);
+    if (grip) {
+      grip.hidden = !NARROW.matches;
+      grip.ariaLabel = `Panel: ${step === "peek" ? "closed" : `${step} height`}. Press to change its height.`;
+      grip.ariaExpanded = String(step !== "peek");
+    }
+  }
+
+  function choose(name) {
+    step = name;
+    store();
+    place();
+  }
+
+  function tap() { choose(STEPS[(STEPS.indexOf(step) + 1) % STEPS.length]); }
+
+  /** The step whose height is nearest to where the sheet was let go, a moment later at its present speed. */
+  function settle(height) {
+    const near = (name) => Math.abs(heightOf(name) - height);
+    choose(STEPS.reduce((best, name) => (near(name) < near(best) ? name : best)));
+  }
+
+  const held = (event) => {
+    if (!(event.target instanceof Element) || !NARROW.matches) return false;
+    if (event.target.closest("#kb-grip")) return true;
+    return event.target.closest("[data-kb-head]") !== null && !event.target.closest("button, input, a");
+  };
+
+  addEventListener("pointerdown", (event) => {
+    if (drag || !event.isPrimary || event.button !== 0 || !held(event)) return;
+    drag = { id: event.pointerId, y: event.clientY, height: heightOf(step), moved: false, speed: 0, last: event };
+    root.toggleAttribute("data-kb-dragging", true);
+  }, true);
+  addEventListener("pointermove", (event) => {
+    if (event.pointerId !== drag?.id) return;
+    const time = Math.max(1, event.timeStamp - drag.last.timeStamp);
+    drag.speed = 0.5 * drag.speed + 0.5 * (drag.last.clientY - event.clientY) / time;
+    drag.last = event;
+    drag.moved ||= Math.abs(event.clientY - drag.y) > TAP;
+    if (drag.moved) setHeight(Math.min(heightOf("full"), Math.max(HEAD, drag.height + drag.y - event.clientY)));
+  }, true);
+  for (const kind of ["pointerup", "pointercancel"]) {
+    addEventListener(kind, (event) => {
+      if (event.pointerId !== drag?.id) return;
+      const { moved, height, y, speed } = drag;
+      const ahead = Math.min(Math.max(100 * speed, -100), 100); // px; a flick carries the sheet a little farther
+      drag = null;
+      root.toggleAttribute("data-kb-dragging", false);
+      if (moved) settle(height + y - event.clientY + ahead);
+      else if (kind === "pointerup") tap();
+    }, true);
+  }
+  // viser's own sheet would open and close with a click on its head.
+  addEventListener("click", (event) => {
+    if (!held(event)) return;
+    event.stopPropagation();
+    if (event.detail === 0) tap(); // the grip was pressed with a key
+  }, true);
+  addEventListener("keydown", (event) => {
+    if (event.target !== grip || !["ArrowUp", "ArrowDown"].includes(event.key)) return;
+    event.preventDefault();
+    const next = STEPS.indexOf(step) + (event.key === "ArrowUp" ? 1 : -1);
+    choose(STEPS[Math.min(Math.max(next, 0), STEPS.length - 1)]);
+  }, true);
+
+  /** Mark the parts of viser's sheet for the styles. */
+  function mark() {
+    const sheet = card()?.closest(".mantine-Paper-root");
+    if (!sheet || sheet.style.position !== "fixed" || sheet.hasAttribute("data-kb-panel")) return;
+    sheet.setAttribute("data-kb-panel", "");
+    const box = sheet.querySelector(".mantine-ScrollArea-viewport > div > div");
+    box?.firstElementChild?.setAttribute("data-kb-head", "");
+  }
+
+  /** Where the scene is in the window: the status card lies at its top. */
+  let watched = null;
+  const edges = new ResizeObserver(() => {
+    const { left, right } = watched.getBoundingClientRect();
+    root.style.setProperty("--kb-left", `${left}px`);
+    root.style.setProperty("--kb-right", `${innerWidth - right}px`);
+  });
+  function watch() {
+    const canvas = document.querySelector("canvas[data-engine]");
+    if (!canvas || canvas === watched) return;
+    edges.disconnect();
+    watched = canvas;
+    edges.observe(canvas);
+  }
+
+  addEventListener("DOMContentLoaded", () => {
+    grip = document.createElement("button");
+    grip.id = "kb-grip";
+    grip.type = "button";
+    document.body.append(grip);
+    place();
+    let waiting = 0;
+    const changes = new MutationObserver(() => { waiting ||= setTimeout(() => { waiting = 0; mark(); watch(); }, 50); });
+    changes.observe(document.body, { subtree: true, childList: true });
+  });
+  addEventListener("resize", place);
+  NARROW.addEventListener("change", place);
+})();

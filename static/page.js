@@ -1,0 +1,79 @@
+"use strict";
+// Runs in viser's page, before viser's own script: the page's colours, a picture of the scene, hints on labels.
+(() => {
+  const root = document.documentElement;
+  const DARK = matchMedia("(prefers-color-scheme: dark)");
+  const SYSTEM_IS_DARK = "The system is dark"; // label of a check box: see app/viewer/panel/view.py
+  const SCHEME = "kinboard-scheme";
+  const PATIENCE = 20000; // ms until the page is shown in any case
+
+  // A browser may forbid storage; then a reload is covered in the system's colours.
+  const recall = () => { try { return sessionStorage.getItem(SCHEME); } catch { return null; } };
+  const keep = (scheme) => { try { sessionStorage.setItem(SCHEME, scheme); } catch { /* see above */ } };
+
+  // Until the service knows the colours, viser's page is white: a cover in the right colour hides it.
+  root.dataset.kbCover = recall() ?? (DARK.matches ? "dark" : "light");
+  const uncover = () => delete root.dataset.kbCover;
+  setTimeout(uncover, PATIENCE);
+
+  /** Tell the service whether the system is dark, with the hidden check box. */
+  function tell() {
+    const label = [...document.querySelectorAll("label")].find((node) => node.textContent === SYSTEM_IS_DARK);
+    const line = label?.closest(".mantine-Flex-root")?.parentElement;
+    const box = line?.querySelector("input[type=checkbox]");
+    if (!box) return;
+    line.hidden = true;
+    if (box.checked !== DARK.matches) box.click();
+  }
+  DARK.addEventListener("change", tell);
+
+  function follow() {
+    tell();
+    const scheme = root.dataset.mantineColorScheme;
+    if (!scheme || !document.querySelector("[data-status]")) return;
+    keep(scheme);
+    if (root.dataset.kbCover) requestAnimationFrame(() => requestAnimationFrame(uncover));
+  }
+
+  /** Save what the scene shows as a PNG file. */
+  function savePicture() {
+    const scene = document.querySelector("canvas[data-engine]");
+    if (!scene) return;
+    const picture = document.createElement("canvas");
+    [picture.width, picture.height] = [scene.width, scene.height];
+    const pen = picture.getContext("2d");
+    // The scene is transparent where nothing is drawn.
+    pen.fillStyle = getComputedStyle(document.querySelector("[data-dock-root]").parentElement.parentElement).backgroundColor;
+    pen.fillRect(0, 0, picture.width, picture.height);
+    pen.drawImage(scene, 0, 0);
+    const link = document.createElement("a");
+    link.download = "kinboard.png";
+    picture.toBlob((blob) => {
+      link.href = URL.createObjectURL(blob);
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+    });
+  }
+
+  // viser shows a control's hint while the mouse is on the control; here its label shows it as well.
+  const hinted = (event) => {
+    const label = event.target instanceof Element ? event.target.closest("label[for]") : null;
+    return label?.closest(".mantine-Flex-root")?.lastElementChild?.firstElementChild;
+  };
+  for (const [heard, sent] of [["mouseover", "mouseenter"], ["mouseout", "mouseleave"]]) {
+    addEventListener(heard, (event) => hinted(event)?.dispatchEvent(new MouseEvent(sent)));
+  }
+
+  addEventListener("DOMContentLoaded", () => {
+    const button = document.createElement("button");
+    button.id = "kb-picture";
+    button.type = "button";
+    button.ariaLabel = button.title = "Save a picture of the scene";
+    button.innerHTML = '<svg viewBox="0 0 24 24" width="22" height="22" fill="none" stroke="currentColor" stroke-width="1.7" stroke-linecap="round" stroke-linejoin="round" aria-hidden="true"><path d="M4 8h3.2l1.6-2.4h6.4L16.8 8H20a1 1 0 0 1 1 1v9.5a1 1 0 0 1-1 1H4a1 1 0 0 1-1-1V9a1 1 0 0 1 1-1z"/><circle cx="12" cy="13.3" r="3.6"/></svg>';
+    button.addEventListener("click", savePicture);
+    document.body.append(button);
+    let waiting = 0;
+    const changes = new MutationObserver(() => { waiting ||= setTimeout(() => { waiting = 0; follow(); }, 30); });
+    changes.observe(root, { subtree: true, childList: true, attributes: true, attributeFilter: ["data-mantine-color-scheme"] });
+  });
+})();
