@@ -16,8 +16,9 @@ from PIL import Image, ImageOps
 from playwright.sync_api import sync_playwright
 
 from app.viewer.scene.arm import ArmScene
-from app.viewer.scene.camera import FOV, view
+from app.viewer.scene.camera import view
 from app.viewer.scene.lights import light_scene
+from app.viewer.scene.viewpoints import FOV
 from kin import Robot, builtin_robots
 
 FOLDER = Path(__file__).parents[1] / "static" / "robots"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal, get_args
 
 import viser
 
@@ -13,6 +14,8 @@ from kin.units import LENGTHS, Length, Units
 BRAND = (0, 114, 178)
 BRAND_ON_DARK = (86, 180, 233)
 SCHEMES: dict[str, bool | None] = {"Like the system": None, "Light": False, "Dark": True}
+Side = Literal["Front", "Side", "Top", "Isometric"]
+SIDES: tuple[Side, ...] = get_args(Side)
 SYSTEM_IS_DARK = "The system is dark"  # static/page.js looks for this label
 
 
@@ -52,7 +55,7 @@ class UnitChoice:
 
 
 class ViewOptions:
-    """Check boxes that post ``("view", name)`` and a button that posts ``"camera"``."""
+    """Check boxes that post ``("view", name)``; buttons: ``"camera"``, ``"fit-arm"``, ``("look-from", side)``."""
 
     def __init__(self, gui: viser.GuiApi, state: ViewState, post: Post) -> None:
         for name, text, hint in (
@@ -61,8 +64,10 @@ class ViewOptions:
             ("axes", "Joint axes", "The axis of each joint; its arrow shows the positive direction"),
         ):
             listen(gui.add_checkbox(text, getattr(state, name), hint=hint), post, ("view", name))
-        group = gui.add_button_group("Camera", ("Reset view",))
-        listen_click(group, post, {"Reset view": "camera"})
+        group = gui.add_button_group("Camera", ("Fit arm", "Reset view"))
+        listen_click(group, post, {"Fit arm": "fit-arm", "Reset view": "camera"})
+        sides = gui.add_button_group("View from", SIDES)
+        listen_click(sides, post, {side: ("look-from", side) for side in SIDES})
 
 
 class ColourChoice:

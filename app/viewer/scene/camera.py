@@ -17,17 +17,20 @@ import viser
 from numpy.typing import NDArray
 
 from app.viewer.panel import Post
+from app.viewer.panel.view import Side
 from app.viewer.scene.meshes import Body
+from app.viewer.scene.viewpoints import DIRECTIONS, FOV, GLIDE, UP, between, contains, place
 from kin.transforms import Array
 
-FOV = math.radians(38)
-DIRECTION = np.array([0.80, 0.92, 0.46])
-UP = np.array([0.0, 0.0, 1.0])
+DIRECTION = np.array([0.80, 0.92, 0.46])  # of the default view, from the arm to the camera
 LOOK_EVERY = 0.25  # seconds; a moving camera reports thirty times a second
 PATIENCE = 10.0  # seconds for a page to reach the viewpoint it was sent to; a lesson may move it meanwhile
 FARTHEST = 1e6  # metres; viser's own limit of zooming out is 1e4
 SAME = 1e-3  # tolerance, relative to the distance to the look-at point
 _MARGIN = 1.06  # of the sphere around the arm
+_AROUND = 0.12  # room around each frame of the arm, in radii of the sphere around the arm
+_NEAREST, _REMOTEST = 0.3, 14.0  # limits of zooming in and out, in these radii
+_SMALLEST = 0.01  # metres; viser's own limit of zooming in
 _RESIZED = 0.01  # relative change of the picture's narrow side that moves the camera
 Sphere = tuple[Array, float]  # centre ``(3,)`` and radius, m
 
@@ -55,11 +58,8 @@ def view(body: Body, aspect: float, room: Sequence[Sphere] = ()) -> tuple[Array,
 
     `room`: spheres that must be visible as well.
     """
-    center, radius = body.center, body.radius
-    for sphere in room:
-        center, radius = round_both((center, radius), sphere)
-    distance = _MARGIN * radius / math.sin(_half_angle(aspect))
-    return center + DIRECTION / np.linalg.norm(DIRECTION) * distance, center
+    viewpoint = _framed(_together(body, room), DIRECTION, aspect)
+    return viewpoint[0], viewpoint[1]
 
 
 def narrowed(viewpoint: Array, aspect: float) -> Array:
@@ -97,17 +97,78 @@ class VisitorCamera:
         self.chosen: Array | None = None
         self._body: Body | None = None
         self._room: tuple[Sphere, ...] = ()
+        self._points = np.zeros((0, 3))
+        self._glide: tuple[Array, float] | None = None  # start of the way to `_aimed`, and when it began
         self._camera.on_update(self._on_update)
 
-    def aim(self, body: Body) -> None:
-        """Move to the default view; for another arm, the extra spheres are dropped."""
+    def aim(self, body: Body, points: Array | None = None, glide: bool = False) -> None:
+        """Move to the default view, at once or in a glide; for another arm, the extra spheres are dropped.
+
+        The view also contains the origins of the arm's frames `points` ``(n, 3)``, by default the last ones given.
+        """
         if body is not self._body:
-            self._body, self._room = body, ()
+            self._body, self._room, self._points = body, (), np.zeros((0, 3))
+        if points is not None:
+            self._points = points
         self._camera.fov = FOV
         self._camera.near, self._camera.far = body.radius / 50, body.radius * 200
         self.chosen = None
         self._framed = self._aspect
-        self._go(np.stack([*view(body, self._framed, self._room), UP]))
+        viewpoint = np.stack([*view(body, self._framed, self._room), UP])
+        if not self._shows(viewpoint, self._points):
+            viewpoint = np.stack([*view(body, self._framed, [*self._room, self._arm(self._points)]), UP])
+        self._go(viewpoint, glide)
+        self._camera.min_orbit_distance = _SMALLEST  # never above the upper limit
+        self._camera.max_orbit_distance = max(_REMOTEST * body.radius, 1.5 * _distance(viewpoint))
+        self._camera.min_orbit_distance = _NEAREST * body.radius
+
+    def keep(self, points: Array) -> None:
+        """If the picture does not contain these origins of the arm's frames ``(n, 3)``, glide until it does."""
+        self._points = points
+        self.look()
+        here = self._viewpoint
+        if self._body is None or self._shows(here, points):
+            return
+        sphere = round_both(_together(self._body, self._room), self._arm(points))
+        viewpoint = _framed(sphere, here[0] - here[1], self._aspect, here[2])
+        if self.chosen is None:
+            self._go(viewpoint, glide=True)
+        else:
+            self._choose(widened(viewpoint, self._aspect))
+
+    def look_at_arm(self, points: Array) -> None:
+        """Glide to a view that the arm fills, in the present direction."""
+        self.look()
+        here = self._viewpoint
+        self._points = points
+        self._choose(_framed(self._arm(points), here[0] - here[1], 1.0, here[2]))
+
+    def look_from(self, side: Side, points: Array) -> None:
+        """Glide to a standard view of the arm."""
+        if self._body is None:
+            return
+        self._points = points
+        sphere = round_both((self._body.center, self._body.radius), self._arm(points))
+        self._choose(_framed(sphere, np.array(DIRECTIONS[side]), 1.0))
+
+    @property
+    def gliding(self) -> bool:
+        """Whether the camera is on its way to another viewpoint; `tick` moves it."""
+        return self._glide is not None
+
+    def tick(self, now: float) -> None:
+        """Continue a glide. `now` is `time.perf_counter`'s."""
+        if self._glide is None:
+            return
+        start, begun = self._glide
+        share = min((now - begun) / GLIDE, 1.0)
+        if share >= 1.0:
+            self._glide = None
+        self._send(self._aimed if share >= 1.0 else between(start, self._aimed, share))
+
+    def place(self, point: Array) -> Array:
+        """Where a point ``(3,)`` will be in the picture; see `viewpoints.place`."""
+        return place(self._viewpoint, self._aspect, point)
 
     def fit(self, spheres: Sequence[Sphere]) -> None:
         """Make the default view show these spheres as well; a `chosen` view stays as it is."""
@@ -118,8 +179,7 @@ class VisitorCamera:
 
     def restore(self, viewpoint: Array) -> None:
         """Move to a viewpoint that was `chosen` in this or another window."""
-        self.chosen, self._framed = viewpoint, self._aspect
-        self._go(narrowed(viewpoint, self._framed))
+        self._choose(viewpoint, glide=False)
 
     def refit(self) -> None:
         """Show in a picture of another shape what the last one showed."""
@@ -134,8 +194,7 @@ class VisitorCamera:
     def look(self) -> None:
         """Update `chosen`."""
         here = self._reported
-        settled = self._arrived or time.perf_counter() - self._aimed_at > PATIENCE
-        if settled and here is not None and not _same(here, self._aimed):
+        if self._settled and here is not None and not _same(here, self._aimed):
             self._aimed, self._arrived = here, True
             self.chosen = widened(here, self._framed)
 
@@ -148,10 +207,41 @@ class VisitorCamera:
     def _reshaped(self) -> bool:
         return abs(_farther(self._aspect) / _farther(self._framed) - 1.0) > _RESIZED
 
-    def _go(self, viewpoint: Array) -> None:
-        self._aimed, self._aimed_at = viewpoint, time.perf_counter()
+    @property
+    def _settled(self) -> bool:
+        return self._arrived or time.perf_counter() - self._aimed_at > PATIENCE
+
+    @property
+    def _viewpoint(self) -> Array:
+        """The viewpoint of the picture, or the one it is on its way to."""
+        return self._reported if self._reported is not None and self._settled else self._aimed
+
+    def _shows(self, viewpoint: Array, points: Array) -> bool:
+        margin = 0.0 if self._body is None else _AROUND * self._body.radius
+        return len(points) == 0 or contains(viewpoint, self._aspect, points, margin)
+
+    def _arm(self, points: Array) -> Sphere:
+        """A sphere around the arm whose frames have these origins."""
+        if self._body is None:
+            return round_points(points)
+        center, radius = round_points(np.vstack([points, self._body.foot]))
+        return center, radius + _AROUND * self._body.radius
+
+    def _choose(self, viewpoint: Array, glide: bool = True) -> None:
+        """Move to a viewpoint that the visitor has chosen, as in a wide picture."""
+        self.chosen, self._framed = viewpoint, self._aspect
+        self._go(narrowed(viewpoint, self._framed), glide)
+
+    def _go(self, viewpoint: Array, glide: bool = False) -> None:
+        start, now = self._viewpoint, time.perf_counter()
+        self._aimed, self._aimed_at = viewpoint, now
         # The page reports only changes.
         self._arrived = self._reported is not None and _same(self._reported, viewpoint)
+        self._glide = (start, now) if glide and not self._arrived else None
+        if self._glide is None:
+            self._send(viewpoint)
+
+    def _send(self, viewpoint: Array) -> None:
         position, look_at, up = viewpoint
         self._camera.up_direction = up
         self._camera.position = position
@@ -176,6 +266,25 @@ class VisitorCamera:
         if now - self._posted_at >= LOOK_EVERY:
             self._posted_at = now
             self._post("looked", None)
+
+
+def _together(body: Body, room: Sequence[Sphere]) -> Sphere:
+    """A sphere around the arm at home and these spheres."""
+    sphere: Sphere = (body.center, body.radius)
+    for other in room:
+        sphere = round_both(sphere, other)
+    return sphere
+
+
+def _framed(sphere: Sphere, out: Array, aspect: float, up: Array = UP) -> Array:
+    """The viewpoint in the direction `out` of a sphere that it fills the picture with."""
+    center, radius = sphere
+    distance = _MARGIN * radius / math.sin(_half_angle(aspect))
+    return np.stack([center + out / float(np.linalg.norm(out)) * distance, center, up])
+
+
+def _distance(viewpoint: Array) -> float:
+    return float(np.linalg.norm(viewpoint[0] - viewpoint[1]))
 
 
 def _half_angle(aspect: float) -> float:

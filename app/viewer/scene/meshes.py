@@ -73,6 +73,7 @@ class Body:
         pedestal: supports the base, in world coordinates.
         column: radius of the pedestal's column (m) below an upright base; 0 if the base hangs or is tilted.
         floor: height of the floor (m), below the arm at home; the arm may reach lower.
+        foot: where the pedestal stands ``(3,)``.
         center, radius: the sphere ``(3,)``, m that the camera should show.
         size: radius of the thickest link (m), the unit of all decoration.
         radii: radius (m) of each link's tube, base first.
@@ -84,6 +85,7 @@ class Body:
     pedestal: Part
     column: float
     floor: float
+    foot: Array
     center: Array
     radius: float
     size: float
@@ -109,7 +111,8 @@ def body(robot: Robot) -> Body:
     hand = _gripper(min(size, grip / 2), grip)
     pedestal = _pedestal(robot, size, floor)
     column = COLUMN * size if _upright(robot) else 0.0
-    return Body(links, tuple(parts), hand, pedestal, column, floor, center, radius, size, radii)
+    foot = np.array([*robot.T_world_base[:2, 3], floor if column else robot.T_world_base[2, 3]])
+    return Body(links, tuple(parts), hand, pedestal, column, floor, foot, center, radius, size, radii)
 
 
 def joint_color(index: int) -> Color:

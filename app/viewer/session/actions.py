@@ -72,14 +72,16 @@ class Actions:
             "task": self._on_task,
             "radians": lambda radians: page.use_units(replace(page.units, degrees=not radians)),
             "lengths": lambda name: page.use_units(page.panel.units.with_length(page.units, name)),
-            "home": lambda _: self._move_by_hand(arm.move_home),
-            "random": lambda _: self._move_by_hand(arm.move_to_random),
+            "home": lambda _: self._move_into_view(arm.move_home),
+            "random": lambda _: self._move_into_view(arm.move_to_random),
             "recall": lambda _: self._move_by_hand(arm.recall_target),
             "copy-as": lambda name: page.panel.share.choose(name),
             "view": self._on_view,
             "colours": self._on_colours,
             "system-dark": lambda dark: page.use_colours(page.view.dark, bool(dark)),
-            "camera": lambda _: page.camera.aim(arm.scene.body),
+            "camera": lambda _: page.camera.aim(arm.scene.body, self._frames(), glide=True),
+            "fit-arm": lambda _: page.camera.look_at_arm(self._frames()),
+            "look-from": lambda side, _: page.camera.look_from(side, self._frames()),
             "resized": lambda _: page.camera.refit(),
             "looked": lambda _: None,  # the viewpoint is read when the camera rests
         }
@@ -90,6 +92,16 @@ class Actions:
         if name not in self._handlers:
             raise KeyError(key)
         self._handlers[name](*arguments, value)
+
+    def _frames(self) -> Array:
+        """Origins ``(n, 3)`` of the frames of the arm where it is heading."""
+        frames: Array = kin.link_frames(self._page.robot, self._page.goal)[:, :3, 3]
+        return frames
+
+    def _move_into_view(self, motion: Callable[[], None]) -> None:
+        """Move the arm, and the camera if it would not show the whole arm."""
+        self._move_by_hand(motion)
+        self._page.camera.keep(self._frames())
 
     def _move_by_hand(self, motion: Callable[[], None]) -> None:
         motion()

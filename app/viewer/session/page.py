@@ -237,7 +237,7 @@ class VisitorPage(Worker):
     @property
     def _timeout(self) -> float | None:
         times = [feature.due for feature in self.features if feature.due is not None]
-        if self.arm.moving:
+        if self.arm.moving or (hasattr(self, "camera") and self.camera.gliding):
             times.append(self._pace.interval)
         elif self._persistence.due is not None and not self.arm.dragging:
             times.append(max(0.0, self._persistence.due - time.perf_counter()))
@@ -260,6 +260,7 @@ class VisitorPage(Worker):
                 self._guard(lambda key=key, value=value: self._actions.handle(key, value))  # type: ignore[misc]
             self.arm.draw(fresh=bool(batch))
             now = time.perf_counter()
+            self.camera.tick(now)
             for feature in self.features:
                 if feature.due is not None:
                     self._guard(lambda feature=feature: feature.tick(now))  # type: ignore[misc]
@@ -325,7 +326,7 @@ class VisitorPage(Worker):
         self.sliders = self._make_sliders()
         self.posture.use_robot()
         self.apply_view()
-        self.camera.aim(self.arm.scene.body)
+        self.camera.aim(self.arm.scene.body, kin.link_frames(robot, self.goal)[:, :3, 3])
 
     def _make_sliders(self) -> JointSliders:
         return JointSliders(

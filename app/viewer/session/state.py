@@ -22,7 +22,7 @@ from typing import Any, get_args
 import numpy as np
 
 from app.viewer.panel.view import ViewState
-from app.viewer.scene.camera import UP
+from app.viewer.scene.viewpoints import UP
 from kin import Robot, Task, branch_names
 from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
 from kin.units import DEFAULT_UNITS, LENGTHS, Units

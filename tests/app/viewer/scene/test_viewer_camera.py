@@ -5,14 +5,16 @@ from __future__ import annotations
 import json
 import math
 import time
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
 
+import kin
 from app.shared.store import Store
-from app.viewer.scene import camera
+from app.viewer.scene import camera, viewpoints
 from app.viewer.scene.meshes import body
 from app.viewer.session.state import PageState, decode, encode
 
@@ -256,3 +258,94 @@ def test_a_sphere_round_two() -> None:
     center, radius = camera.round_both(small, (np.array([-2.0, 0.0, 0.0]), 1.0))
     assert radius == pytest.approx(2.25)
     assert center == pytest.approx([-0.75, 0.0, 0.0])
+
+
+def frames(robot: kin.Robot, q: np.ndarray) -> np.ndarray:
+    return kin.link_frames(robot, q)[:, :3, 3]
+
+
+def test_random_never_takes_the_arm_out_of_the_picture(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.choose("UR5")
+        tab.look()
+        moved = 0
+        for _ in range(12):
+            before = shown(tab)
+            tab.set("Go to", "Random")
+            tab.settle(quiet=0.6)
+            q = np.radians([tab.value(label) for label in tab.sliders_in("Joints")])
+            assert viewpoints.contains(shown(tab), DESKTOP, frames(UR5, q), 0.0)
+            if not np.array_equal(shown(tab), before):
+                moved += 1
+                assert not viewpoints.contains(before, DESKTOP, frames(UR5, q), 0.3 * body(UR5).radius)
+            tab.look()
+        assert moved > 0, "twelve random postures, and the default view contained them all"
+        tab.set("Go to", "Home")
+        tab.settle(quiet=0.6)
+        assert decode(tab.kept[-1], STORE.robots).camera is None, "the visitor has not chosen a view"
+        near = shown(tab).copy()
+        near[0] = near[1] + 0.25 * (near[0] - near[1])
+        orbit(tab, near)
+        tab.settle(quiet=0.8)
+        tab.set("Go to", "Random")
+        tab.settle(quiet=0.8)
+        chosen = decode(tab.kept[-1], STORE.robots).camera
+        assert chosen is not None
+        assert np.allclose(chosen, shown(tab), atol=1e-3)
+        out = [v[0] - v[1] for v in (near, chosen)]
+        assert np.allclose(np.cross(*out), 0.0, atol=1e-2), "the direction stays"
+
+
+def test_standard_views_and_fit_arm(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.look()
+        for side, (x, y, z) in viewpoints.DIRECTIONS.items():
+            tab.set("View from", side)
+            tab.settle(quiet=0.6)
+            position, look_at, up = shown(tab)
+            out = position - look_at
+            assert np.allclose(out / np.linalg.norm(out), np.array([x, y, z]) / math.hypot(x, y, z), atol=1e-6)
+            assert np.array_equal(up, camera.UP)
+            assert viewpoints.contains(shown(tab), DESKTOP, frames(PIONEER, PIONEER.q_home), 0.0)
+            tab.look()
+        tab.set("Camera", "Fit arm")
+        tab.settle(quiet=0.6)
+        fitted = shown(tab)
+        assert viewpoints.contains(fitted, DESKTOP, frames(PIONEER, PIONEER.q_home), 0.0)
+        assert np.allclose(np.cross(fitted[0] - fitted[1], out), 0.0, atol=1e-6), "the direction stays"
+        assert np.allclose(decode(tab.kept[-1], STORE.robots).camera, fitted, atol=1e-3)
+        tab.set("Camera", "Reset view")
+        tab.settle(quiet=0.6)
+        assert np.allclose(shown(tab), default(PIONEER, DESKTOP))
+
+
+def test_a_glide_has_steps_and_zooming_has_limits(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        limits = {m["type"]: m for m in tab.log if "OrbitDistance" in m["type"]}
+        radius = body(PIONEER).radius
+        nearest = limits["SetCameraMinOrbitDistanceMessage"]["min_orbit_distance"]
+        farthest = limits["SetCameraMaxOrbitDistanceMessage"]["max_orbit_distance"]
+        distance = np.linalg.norm(shown(tab)[0] - shown(tab)[1])
+        assert radius * 0.2 < nearest < distance / 2
+        assert 2 * distance < farthest < 30 * radius
+        tab.look()
+        start, sent = shown(tab)[0], len(tab.log)
+        tab.set("View from", "Top")
+        tab.settle(quiet=0.6)
+        way = [np.array(m["position"]) for m in tab.log[sent:] if m["type"] == "SetCameraPositionMessage"]
+        assert len(way) > 3, "it glides"
+        # All steps lead towards the goal.
+        left = [np.linalg.norm(p - way[-1]) for p in [start, *way]]
+        assert all(a >= b - 1e-6 for a, b in pairwise(left))
+
+
+def test_the_default_view_contains_the_restored_arm(port: int) -> None:
+    rng = np.random.default_rng(3)
+    usual = default(UR5, DESKTOP)
+    q = next(q for q in UR5.random_q(rng, 500) if not viewpoints.contains(usual, DESKTOP, frames(UR5, q), 0.05))
+    with FakeBrowser(port, memory=memory(PageState(robot="ur5", q=q))) as tab:
+        tab.settle()
+        assert viewpoints.contains(shown(tab), DESKTOP, frames(UR5, q), 0.05)
