@@ -117,7 +117,7 @@ def check(robot: Robot, taken: bool = False) -> CheckAnswer:
         "spherical": [list(range(i, i + 3)) for i in spherical_groups(robot)],
         "motions": motions(robot),
         "solver": "numeric" if match is None else match.name,
-        "reason": "no closed form fits this arm's axes" if match is None else match.reason,
+        "reason": "none of Kinboard's closed forms fits this arm's axes" if match is None else match.reason,
         "warnings": warnings(robot, between, taken),
     }
 

@@ -61,7 +61,7 @@ def _solved(problem: IKProblem, branches: Branches, good: Flags) -> IKResult:
             redundancy = tuple(
                 r._replace(value=own.value) for r, own in zip(redundancy, solutions[0].redundancy, strict=True)
             )
-    details = Solved(len(solutions), bool(redundancy))
+    details = Solved(len(solutions), bool(redundancy), problem.chosen_branches)
     return make_result(problem, Status.SOLVED, "", details, solutions=solutions, redundancy=redundancy)
 
 
@@ -105,7 +105,7 @@ def _numeric(problem: IKProblem) -> IKResult:
         problem,
         Status.SOLVED,
         "",
-        Solved(len(solutions), False),
+        Solved(len(solutions), False, problem.chosen_branches, complete=False),
         solutions=solutions,
         solver="numeric" if closed_form is None else closed_form.name,
     )

@@ -8,7 +8,7 @@ import numpy as np
 
 from kin.ik.branches import Branches, Flags, redundancy_of
 from kin.ik.candidates import select
-from kin.ik.details import Details, Redundancy
+from kin.ik.details import Details, Redundancy, Solved
 from kin.ik.problem import IKProblem
 from kin.ik.results import BlockedBranch, Cause, IKResult, IKSolution, Status
 from kin.singularity import Singularity, singularities_at
@@ -60,6 +60,7 @@ def make_result(
         singular = singularities_at(problem.robot, best.q, TOLERANCES.at_singularity)
     if solver is None:
         solver = "numeric" if problem.closed_form is None else problem.closed_form.name
+    known = problem.closed_form is not None and problem.closed_form.handles(problem.code)
     return IKResult(
         status=status,
         cause=cause,
@@ -74,6 +75,7 @@ def make_result(
         nearest_orientation=nearest_orientation,
         redundancy=redundancy,
         singularities=singular,
+        complete=known and (details.complete if isinstance(details, Solved) else True),
     )
 
 
@@ -81,7 +83,11 @@ def _solver_reason(problem: IKProblem, used: str) -> str:
     """Why the answer comes from this solver."""
     closed_form = problem.closed_form
     if closed_form is None:
-        why = "no closed form fits this arm's axes" if problem.options.solver == "auto" else "requested"
+        why = (
+            "none of Kinboard's closed forms fits this arm's axes"
+            if problem.options.solver == "auto"
+            else "requested"
+        )
         return f"{why}: numeric descent from many starts"
     if used != closed_form.name:
         return f"the closed form ({closed_form.name}) does not cover this task or target: numeric descent"

@@ -53,10 +53,14 @@ class Solved(NamedTuple):
     Attributes:
         configurations: how many were found; `max_solutions` may return fewer.
         redundant: whether the task leaves a redundancy parameter.
+        chosen_branches: how many branches were requested, None for all.
+        complete: whether these are all; see `kin.IKResult`.
     """
 
     configurations: int
     redundant: bool
+    chosen_branches: int | None = None
+    complete: bool = True
 
 
 class RollError(NamedTuple):

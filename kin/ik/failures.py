@@ -180,4 +180,11 @@ def _is_solution(closest: IKSolution | None, problem: IKProblem) -> TypeGuard[IK
 def _found_by_descent(problem: IKProblem, found: IKSolution) -> IKResult:
     """A descent met the task where every branch of the closed form misses by rounding error."""
     found = replace(found, compromise=None)
-    return make_result(problem, Status.SOLVED, "", Solved(1, False), solutions=(found,), solver="numeric")
+    return make_result(
+        problem,
+        Status.SOLVED,
+        "",
+        Solved(1, False, problem.chosen_branches, complete=False),
+        solutions=(found,),
+        solver="numeric",
+    )

@@ -102,6 +102,11 @@ class IKProblem:
         """The redundancy parameters whose values were requested."""
         return tuple(p for p, v in zip(self.redundancies, self.values, strict=True) if not math.isnan(v))
 
+    @property
+    def chosen_branches(self) -> int | None:
+        """How many branches a solution may be on, None for all."""
+        return None if self.branches is None else len(self.branches)
+
     def allows(self, branch: int) -> bool:
         """Whether a solution may be on this branch."""
         return self.branches is None or branch in self.branches

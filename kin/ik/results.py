@@ -92,6 +92,8 @@ class IKResult:
         nearest_orientation: the configuration with the exact point and the smallest rotation error (status
             ``orientation``), None if none was found.
         blocked: every posture that is outside the limits, the closest to them first (status ``limits``).
+        complete: whether a closed form gave every posture, so that there is no further one on the requested
+            branches; False after a numeric search, which may miss some.
         solver, solver_reason: name of the method that found the answer, and why it was chosen.
         task: the task that was solved for.
         distance: metres by which the point is out of reach, 0 if the point can be reached.
@@ -112,6 +114,7 @@ class IKResult:
     nearest_orientation: IKSolution | None = None
     redundancy: tuple[Redundancy, ...] = ()
     singularities: tuple[Singularity, ...] = ()
+    complete: bool = False
 
     @property
     def best(self) -> IKSolution | None:

@@ -99,6 +99,10 @@ class IkDetails(TypedDict, total=False):
     """Cause "" (solved): how many configurations were found; `max_solutions` may return fewer."""
     redundant: bool
     """Cause "" (solved): whether the task leaves a redundancy parameter."""
+    chosen_branches: int | None
+    """Cause "" (solved): how many branches were requested; null for all."""
+    complete: bool
+    """Cause "" (solved): whether these are all configurations, as in the answer's own `complete`."""
     joints: int
     """Causes "roll" and "rotation": number of joints of the arm."""
     position_error: float | None

@@ -75,6 +75,9 @@ class IkAnswer(TypedDict):
     """Status and cause in a sentence for people, in degrees and millimetres."""
     task: Literal["pose", "approach", "position", "mask"]
     """The task that was solved for."""
+    complete: bool
+    """Whether a closed form gave every posture, so that no further one exists on the requested branches; false
+    after a numeric search, which may miss some. Values of redundancy parameters and whole turns do not count."""
     solver: str
     """Name of the method that answered."""
     solver_reason: str
@@ -106,6 +109,7 @@ def ik_answer(result: IKResult) -> IkAnswer:
         "details": details_answer(result.details),
         "reason": result.reason,
         "task": cast(Literal["pose", "approach", "position", "mask"], result.task),
+        "complete": result.complete,
         "solver": result.solver,
         "solver_reason": result.solver_reason,
         "solutions": [_solution(solution) for solution in result.solutions],

@@ -114,8 +114,9 @@ class RedundancySliders:
             self.remove()
             self._key = key
             self._make(parameters, robot, units)
-        for item in parameters:
-            slider = self._sliders[item.name]
+        for parameter in parameters:
+            slider = self._sliders[parameter.name]
+            item = on_side_of(slider.value, parameter, self._unit)
             value = self._unit.shown(item.value)
             if item.name != dragged:
                 assign(slider, min(max(value, slider.min), slider.max))
@@ -158,6 +159,13 @@ class RedundancySliders:
                 listen(slider, self._post, ("redundancy", robot.id, item.name, units))
                 self._sliders[item.name] = slider
                 self._tracks[item.name] = self._gui.add_html("")
+
+
+def on_side_of(shown: float, item: Redundancy, unit: Unit) -> Redundancy:
+    """The parameter, with half a turn, which is both 180° and −180°, on the side of a slider at `shown`."""
+    if item.name.startswith("theta") or (math.pi - abs(item.value)) * unit.scale > 0.5 * unit.step(1):
+        return item
+    return item._replace(value=math.copysign(item.value, shown))
 
 
 def feasible_html(item: Redundancy, low: float, high: float, unit: Unit, narrow: bool = False) -> str:

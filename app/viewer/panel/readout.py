@@ -25,7 +25,7 @@ def html(T_base_tool: Array, units: Units) -> str:
     """Position, roll/pitch/yaw and quaternion of a pose ``(4, 4)`` as a small table."""
     lengths, angles = units.lengths, units.angles
     position = (lengths.scale * T_base_tool[:3, 3]).tolist()
-    turned = [angles.scale * a for a in roll_pitch_yaw(T_base_tool[:3, :3])]
+    turned = [angles.scale * _half_turn_positive(a) for a in roll_pitch_yaw(T_base_tool[:3, :3])]
     quaternion = wxyz_from_rotation(T_base_tool[:3, :3]).tolist()
     rows = (
         ("x y z", _numbers(position, lengths.decimals(1)), lengths.name),
@@ -35,10 +35,15 @@ def html(T_base_tool: Array, units: Units) -> str:
     return render("panel/readout", rows=rows)
 
 
+def _half_turn_positive(angle: float) -> float:
+    """The angle, but +180° for −180° to the tenth that is shown: the same sign in all units, and no flicker."""
+    return abs(angle) if round(math.degrees(angle), 1) == -180.0 else angle
+
+
 def _numbers(values: Sequence[float], decimals: int) -> list[str]:
     texts = (f"{value:.{decimals}f}" for value in values)
-    # A value that may have either sign, ±0 or ±180°, must not flicker.
-    return [(t.lstrip("-") if float(t) in (0.0, -180.0) else t).replace("-", "−") for t in texts]
+    # A zero may have either sign and must not flicker.
+    return [(t.lstrip("-") if float(t) == 0.0 else t).replace("-", "−") for t in texts]
 
 
 class PoseReadout:

@@ -109,12 +109,8 @@ def _outcome(details: Details, cause: str, task: str, units: Units) -> tuple[str
     """Headline and body."""
     angle, length = units.angles.value, units.lengths.value
     match details:
-        case Solved(number, redundant):
-            parameter = f", {'each ' if number > 1 else ''}with a redundancy parameter," if redundant else ""
-            return (
-                "Reached",
-                f"{count(number, 'configuration', 'configurations')}{parameter} for this {_TASKS[task]}",
-            )
+        case Solved():
+            return "Reached", _solved(details, task)
         case RollError(joints, error):
             kept = f"{joints} joints keep the point and the approach direction, not the roll about it"
             return f"Reached with roll error {angle(error)}", kept
@@ -141,6 +137,18 @@ def _outcome(details: Details, cause: str, task: str, units: Units) -> tuple[str
             return f"Out of reach{by}", _SIDES[cause]
         case OrientationNotMet():
             return "The arm cannot hold this orientation at this point", _orientation(details, units)
+
+
+def _solved(details: Solved, task: str) -> str:
+    """How many configurations there are, and whether these are all."""
+    text = count(details.configurations, "configuration", "configurations")
+    if not details.complete:
+        text += " found"
+    if details.chosen_branches is not None:
+        text += " on the chosen branch" + "es" * (details.chosen_branches != 1)
+    if details.redundant:
+        text += f", {'each ' if details.configurations > 1 else ''}with a redundancy parameter,"
+    return f"{text} for this {_TASKS[task]}" + ("" if details.complete else "; others may exist")
 
 
 def _outside(details: OutsideLimits, units: Units) -> str:

@@ -626,3 +626,43 @@ def test_an_explanation_has_a_headline_and_a_detail_in_any_units():
     assert text.detail.startswith("The point is too far away.")
     assert text.text.startswith(f"{text.headline}: the point is too far away.")
     assert result.reason.startswith(f"Out of reach by {1e3 * distance:.1f} mm: ")
+
+
+# How many solutions there are, and whether these are all
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "complete", "said"),
+    [
+        ("ur5", {}, True, "Reached: 8 configurations for this pose."),
+        ("ur5", {"branch": "seed"}, True, "Reached: one configuration on the chosen branch for this pose."),
+        ("ur5", {"branch": "wrist flip"}, True, "Reached: 4 configurations on the chosen branches for this pose."),
+        ("ur5", {"solver": "numeric"}, False, "Reached: one configuration found for this pose; others may exist."),
+        ("panda", {}, False, "Reached: one configuration found for this pose; others may exist."),
+        ("puma560", {"max_solutions": 1}, True, "Reached: 3 configurations for this pose."),
+    ],
+)
+def test_an_answer_says_whether_its_solutions_are_all(name, options, complete, said):
+    robot = kin.get_robot(name)
+    result = solve_ik(robot, kin.fk(robot, robot.q_home), q_seed=robot.q_home, **options)
+    assert result.status is Status.SOLVED
+    assert (result.complete, result.details.complete) == (complete, complete)
+    assert result.reason == said
+
+
+def test_what_a_search_does_not_find_may_exist():
+    for name, complete in (("ur5", True), ("panda", False)):
+        robot = kin.get_robot(name)
+        far = kin.fk(robot, robot.q_home)
+        far[:3, 3] *= 10.0
+        assert solve_ik(robot, far).complete is complete
+
+
+def test_the_shared_neighbours_of_a_limit_are_all_named():
+    """Both postures of the SCARA are as far outside: neither is called the only one."""
+    robot = kin.get_robot("scara")
+    T = kin.fk(robot, [0.0, 0.7, 0.25, 0.0])
+    result = solve_ik(robot, T)
+    assert result.status is Status.LIMITS
+    assert "One other posture is outside the limits too." in result.reason
+    assert {len(b.violations) for b in result.blocked} == {1}

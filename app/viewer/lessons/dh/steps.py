@@ -123,7 +123,8 @@ def place(robot: Robot, q: Array, at: float, frames: Array | None = None) -> Pla
 class Symbolic:
     """A matrix as a linear combination of functions of the joint variable: one ``(4, 4)`` coefficient per name.
 
-    `names` are "1", and "cos" and "sin" of the variable, or "q", the variable itself.
+    The variable is θ or d of the table, the joint's value plus the constant of the row. `names` are "1", and "cos"
+    and "sin" of the variable, or "q", the variable itself.
     """
 
     names: tuple[str, ...]
@@ -137,12 +138,11 @@ def symbolic(robot: Robot, row: int, motions: int = MOTIONS) -> Symbolic:
     names: tuple[str, ...] = ("1",)
     parts = np.eye(4)[None]
     for factor in ORDERS[robot.convention][:motions]:
-        step = elementary(factor, float(getattr(joint, factor)))
-        parts = parts @ step
         if factor == open_:
             names, free = _open(factor)
-            # Constant and variable are about the same axis, so their order does not matter.
             parts = parts @ free
+        else:
+            parts = parts @ elementary(factor, float(getattr(joint, factor)))
     return Symbolic(names, parts)
 
 
@@ -196,6 +196,10 @@ def caption(robot: Robot, at: Place, units: Units) -> str:
     mover = ""
     if MOVED.get(joint.kind) == at.factor:
         mover = f", joint {robot.joint_rows.index(at.row) + 1}"
+        offset = float(getattr(joint, at.factor))
+        if offset:
+            own, constant = (amount(at.factor, x, units) for x in (at.value - offset, abs(offset)))
+            mover += f" at {own} {'−' if offset < 0.0 else '+'} {constant}"
     if at.value == 0.0 and not mover:
         none = "no rotation about" if turns(at.factor) else "no translation along"
         words = f"{name} = 0, {none} {line}"

@@ -44,7 +44,7 @@ ALL_GHOSTS_HINT = "Shows all postures as translucent copies of the arm; grey one
 CONE_HINT = (
     "The possible directions of the tool's arrow with its tip at the target, within the limits; locks ignored"
 )
-UNNAMED = "This arm has no closed form. Its branches have no names, and only the closest posture is searched."
+UNNAMED = "Kinboard has no closed form for this arm: postures have no names, and only the closest one is searched."
 _NUMBERS = count(1)
 
 

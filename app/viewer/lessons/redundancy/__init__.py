@@ -23,6 +23,7 @@ from app.viewer.lessons.redundancy import views
 from app.viewer.lessons.redundancy.drawing import Drawing
 from app.viewer.lessons.redundancy.ring import coaxial, elbow_circle
 from app.viewer.panel import assign, listen, update_html
+from app.viewer.panel.posture import on_side_of
 from app.viewer.panel.status import Notice
 from app.viewer.self_motion import INSET, SMOOTH, End, ends, range_of, redundancy_at, self_motion
 from kin import IKResult, InputError, Redundancy
@@ -291,6 +292,8 @@ class RedundancyLesson(Feature):
             update_html(self._bar, "")
             update_html(self._residual, "")
             return
+        if self._slider is not None:
+            item = on_side_of(self._slider.value, item, stage.units.angles)
         update_html(self._bar, views.range_html(robot, item, stage.units))
         if self._slider is not None and self._target is None:
             value = stage.units.angles.shown(item.value)

@@ -43,8 +43,8 @@ def idea(robot: Robot, task: Task, parameters: tuple[Redundancy, ...], trades: b
         )
     if not parameters:
         return (
-            f"Redundancy {count}: {counts}. There is no closed form for the feasible ranges, but targets and "
-            "postures work as usual."
+            f"Redundancy {count}: {counts}. Kinboard has no closed form for this arm, and so no feasible ranges; "
+            "targets work as usual."
         )
     if trades and parameters[0].name == "theta1":
         return TRADE

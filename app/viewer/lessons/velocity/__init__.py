@@ -304,8 +304,7 @@ class VelocityLesson(Feature):
         update_html(self._column, views.column_html(robot, J, self._chosen))
         self._show_singularities(R)
         rates = task_rates(robot, stage.q)
-        linear, angular = axes_of(J[:3]).values, axes_of(J[3:]).values
-        update_html(self._values, views.values_html(robot, rates, linear, angular))
+        update_html(self._values, views.values_html(robot, rates, J))
         if self._kind is None or self._axes is None:
             update_html(self._ellipsoid, "")
             return

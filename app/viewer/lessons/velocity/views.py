@@ -224,17 +224,18 @@ def task_words(robot: Robot) -> str:
     )
 
 
-def values_html(robot: Robot, rates: TaskRates, linear: Array, angular: Array) -> str:
-    """Singular values of the task's Jacobian as bars, and w and κ of it and of its parts ``(3,)``, ``(3,)``."""
+def values_html(robot: Robot, rates: TaskRates, J: Array) -> str:
+    """Singular values of the task's Jacobian as bars, and w and κ of it, of J ``(6, n)`` and of its two parts."""
     low, high = DECADES
     bars = []
     for value in rates.values.tolist():
         share = min(max((math.log10(max(value, 1e-300)) - low) / (high - low), 0.0), 1.0)
         color = LOOKS["at"][2] if value < 1e-3 else LOOKS["near"][2] if value < 0.05 else "kb-blue"
         bars.append({"value": fixed(value, 4), "percent": f"{100.0 * share:.1f}", "color": color})
-    parts = [("linear, m/s", linear[: robot.n]), ("angular, rad/s", angular[: robot.n])]
-    if robot.n > 4:
-        parts.insert(0, ("all" if robot.n > 5 else "task", rates.values))
+    named = (("all six", J), ("linear, m/s", J[:3]), ("angular, rad/s", J[3:]))
+    parts = [(name, np.asarray(np.linalg.svd(rows, compute_uv=False), np.float64)) for name, rows in named]
+    if robot.n == 5:
+        parts.insert(1, ("these five", rates.values))
     rows = [{"name": name, "product": _small(_product(s)), "ratio": _ratio(s)} for name, s in parts]
     return render("velocity/values", task=task_words(robot), bars=bars, rows=rows)
 

@@ -71,10 +71,7 @@ class CloudView:
 
     def start(self) -> bool:
         """Sample a new cloud, or continue a paused one if only its look was changed; whether it is a new one."""
-        cloud = Cloud(
-            self._stage.robot, self.settings.n, self.settings.seed, self.settings.strategy,
-            constraints=self._stage.options.constraints,
-        )  # fmt: skip
+        cloud = self._requested
         if self.nodes and not self._running and self.unfinished and self._is_shown(cloud):
             self._run(True)
             return False
@@ -120,6 +117,14 @@ class CloudView:
     def extents(self) -> list[Sphere]:
         """Spheres around the clouds."""
         return [nodes.extent for nodes in self.nodes if nodes.extent is not None]
+
+    @property
+    def _requested(self) -> Cloud:
+        """The cloud that settings and locks describe."""
+        return Cloud(
+            self._stage.robot, self.settings.n, self.settings.seed, self.settings.strategy,
+            constraints=self._stage.options.constraints,
+        )  # fmt: skip
 
     def _is_shown(self, cloud: Cloud) -> bool:
         """Whether this cloud is in the scene, regardless of its measures."""
@@ -206,7 +211,8 @@ class CloudView:
                 state = "recolouring"
         speed = drawn / elapsed if elapsed > 0.0 else 0.0
         constraints = self.nodes[0].cloud.constraints if self.nodes else self._stage.options.constraints
-        line = views.progress(state, drawn, total or self.settings.n, speed, constraints.locked)
+        old = bool(self.nodes) and not self._is_shown(self._requested)
+        line = views.progress(state, drawn, total or self.settings.n, speed, constraints.locked, old)
         percent = round(100.0 * drawn / total, 1) if total else 0.0
         update_html(self._controls.line, line)
         if self._controls.bar.value != percent:

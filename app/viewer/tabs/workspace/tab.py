@@ -181,6 +181,8 @@ class Workspace(Feature):
         before = self._settings
         self._use(before.with_value(name, value, self._others))
         match name:
+            case "n" | "strategy" | "seed":
+                self._clouds.report()  # a cloud of other settings says so
             case "by" | "map":
                 self._clouds.recolour()
                 self._show_slabs()

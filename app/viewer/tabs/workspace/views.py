@@ -16,7 +16,7 @@ from kin.units import Units
 from kin.workspace.clouds.measures import measured
 from kin.workspace.region import Region
 
-State = Literal["ready", "preparing", "running", "paused", "recolouring", "done"]
+State = Literal["ready", "preparing", "running", "paused", "recolouring", "done", "outdated"]
 SYMBOLS: dict[State, str] = {
     "ready": "○",
     "preparing": "◔",
@@ -24,6 +24,7 @@ SYMBOLS: dict[State, str] = {
     "paused": "❚❚",
     "recolouring": "◐",
     "done": "✓",
+    "outdated": "!",
 }
 
 
@@ -49,16 +50,24 @@ def locks(locked: Locks | None) -> str:
     return f"joint{'s' if len(joints) > 1 else ''} {', '.join(joints)} locked" if joints else ""
 
 
-def progress(state: State, drawn: int, total: int, speed: float, locked: Locks | None = None) -> str:
-    """The line below the progress bar, and a second line if joints are locked."""
+OLD = "Settings or locks have changed: Start samples a new cloud"
+
+
+def progress(
+    state: State, drawn: int, total: int, speed: float, locked: Locks | None = None, old: bool = False
+) -> str:
+    """The line below the progress bar, and a second line if joints are locked.
+
+    `old`: whether the cloud is not the one that the settings describe.
+    """
     return render(
         "workspace/progress",
-        state=state,
-        symbol=SYMBOLS[state],
+        state="outdated" if old and state == "done" else state,
+        symbol=SYMBOLS["outdated" if old and state == "done" else state],
         done=grouped(drawn),
         total=grouped(total),
         rate=f"{rate(speed)} points/s" if drawn and speed > 0.0 else "",
-        note=locks(locked),
+        note=". ".join(filter(None, (locks(locked), OLD if old else ""))),
     )
 
 
@@ -69,10 +78,10 @@ def picked(robot: Robot, constraints: JointConstraints, index: int, q: Array, po
     rows = (
         ("point", grouped(index), ""),
         ("x y z", GAP.join(units.lengths.number(v) for v in point.tolist()), units.lengths.name),
-        ("manipulability", f"{manipulability:.3g}", ""),
+        ("manipulability w", f"{manipulability:.4f}", ""),
         ("limit margin", f"{100.0 * margin:.0f}", "%"),
     )
-    return render("panel/facts", label="picked point", rows=rows, note="")
+    return render("panel/facts", label="picked point", rows=rows, note="w: all six rows of the Jacobian")
 
 
 def nothing_picked() -> str:

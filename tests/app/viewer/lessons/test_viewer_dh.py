@@ -68,7 +68,8 @@ def test_a_fraction_of_a_motion_is_that_fraction_of_its_value() -> None:
 def test_symbols_with_numbers_inserted_give_the_matrix(robot: kin.Robot) -> None:
     q = some_q(robot)
     for row in range(len(robot.rows)):
-        free = q[robot.joint_rows.index(row)] if row in robot.joint_rows else 0.0
+        moved = steps.MOVED.get(robot.rows[row].kind)
+        free = 0.0 if moved is None else steps.value(robot, row, moved, q)
         numbers = {"1": 1.0, "cos": np.cos(free), "sin": np.sin(free), "q": free}
         for motions in range(1, 5):
             found = steps.symbolic(robot, row, motions)
@@ -190,8 +191,10 @@ def test_symbols_insert_constants_and_keep_the_joint_variable() -> None:
         *("0", "−1", "0", "130"),
         *("0", "0", "0", "1"),
     ]
-    # θ3 − 90°: its cosine is a sine.
-    assert entries(PIONEER, 2)[:4] == ["sinθ3", "0", "cosθ3", "0"]
+    # θ3 is the table's: the joint's value − 90°, as the caption says.
+    assert entries(PIONEER, 2)[:4] == ["cosθ3", "0", "−sinθ3", "0"]
+    words_of_row = steps.caption(PIONEER, steps.place(PIONEER, PIONEER.q_home, 9), DEFAULT_UNITS)
+    assert words_of_row == "Row 3 of 6: turn −30.0° about z₂ (θ₃, joint 3 at 60.0° − 90.0°)."
     assert entries(SCARA, 2)[8:12] == ["0", "0", "1", "d3"]
 
 

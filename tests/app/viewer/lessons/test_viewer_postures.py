@@ -342,6 +342,7 @@ def test_a_missed_target_is_explained_and_one_click_moves_it(tab: FakeBrowser) -
     grab_to(tab, T)
     assert 'data-why="unreachable"' in tab.html
     assert "Why not?" in tab.html
+    assert "◀ the arm, off target" in tab.html
     tab.set("Nearest reachable pose", True)
     tab.settle()
     assert 'data-why=""' in tab.html

@@ -287,6 +287,14 @@ def tab(server: int) -> Iterator[FakeBrowser]:
         yield opened
 
 
+def test_one_of_the_manipulabilities_is_that_of_postures_and_clouds(robot: kin.Robot) -> None:
+    q = robot.random_q(np.random.default_rng(4))
+    text = views.values_html(robot, task_rates(robot, q), kin.jacobian(robot, q))
+    shown = re.search(r"<td>all six</td><td data-w>([\d.]+)<", text)
+    assert shown
+    assert float(shown[1]) == pytest.approx(float(kin.manipulability(robot, q)), abs=6e-5)
+
+
 def use(tab: FakeBrowser, robot: kin.Robot) -> None:
     tab.set("Robot", robot.name)
     tab.wait(lambda: len(numbers(tab, "data-j")) == 6 * robot.n and len(columns(tab)) == robot.n, 30.0)

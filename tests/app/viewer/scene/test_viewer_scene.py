@@ -348,6 +348,16 @@ def test_notices_describe_the_event(robot_id: str, shift: tuple[float, ...], tit
         assert f"{result.distance * 1000:.0f} mm" in shown.title
 
 
+def test_half_a_turn_has_the_same_sign_in_degrees_and_radians() -> None:
+    T = np.eye(4)
+    for error in (-1e-12, 1e-12):  # on either side of half a turn, by rounding only
+        T[1:3, 1:3] = [[math.cos(math.pi + error), -math.sin(math.pi + error)], [math.sin(math.pi + error), -1.0]]
+        for degrees, text in ((True, "180.0"), (False, "3.142")):
+            assert f">{text}<" in readout.html(T, Units(degrees=degrees))
+    T[0, 3] = -0.18
+    assert ">−180.0<" in readout.html(T, DEFAULT_UNITS), "a length keeps its sign"
+
+
 def test_notices_and_readout_follow_the_units() -> None:
     robot = kin.get_robot("redundant7-craig")
     T = kin.fk(robot, robot.q_home)

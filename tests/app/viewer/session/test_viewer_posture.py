@@ -12,7 +12,7 @@ from fake_browser import FakeBrowser
 import kin
 from app.shared.store import Store
 from app.viewer.panel.joints import label
-from app.viewer.panel.posture import feasible_html, short
+from app.viewer.panel.posture import feasible_html, meanings, on_side_of, short
 from kin.units import DEGREES
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -124,6 +124,22 @@ def test_the_strip_draws_and_words_the_ranges() -> None:
     assert "feasible: −180.0 … −90.0°, 0.0 … 90.0°" in strip
     nothing = feasible_html(kin.Redundancy("psi", "arm angle ψ", 0.0, ()), -180, 180, DEGREES)
     assert "no value is feasible" in nothing
+
+
+def test_half_a_turn_is_shown_where_the_slider_is() -> None:
+    free = kin.Redundancy("psi", "arm angle ψ", -math.pi + 1e-7, ((-math.pi, math.pi),))
+    assert on_side_of(180.0, free, DEGREES).value == pytest.approx(math.pi)
+    assert on_side_of(-180.0, free, DEGREES).value == pytest.approx(-math.pi)
+    assert "calc(100.00% - 1px)" in feasible_html(on_side_of(180.0, free, DEGREES), -180, 180, DEGREES)
+    for other in (free._replace(value=-3.0), free._replace(name="theta7")):
+        assert on_side_of(180.0, other, DEGREES) is other
+
+
+def test_the_choice_explains_its_words() -> None:
+    text = meanings(kin.get_robot("ur5"))
+    assert "Elbow +: θ3 is on the positive side of where the arm is straight." in text
+    assert "Left: the plane of the arm is on the left, seen from axis 1 towards the wrist centre." in text
+    assert meanings(kin.get_robot("panda")) == ""
 
 
 def test_hostile_choices_are_refused_and_the_session_lives(port: int) -> None:

@@ -268,6 +268,7 @@ def test_progress_in_words():
     assert "12.3 k points/s" in line
     assert "points/s" not in views.progress("ready", 0, 10, 0.0)
     assert ">joint 2 locked<" in views.progress("ready", 0, 10, 0.0, (None, 0.0, None))
+    assert "done" not in views.progress("done", 10, 10, 1.0, old=True)
     assert "locked" not in line
 
 
@@ -615,11 +616,24 @@ def test_the_cloud_respects_locked_joints(tab):
     tab.set("Compare with", "none")
     tab.set("Locked", UNLOCK_ALL)
     tab.wait(lambda: "No joint is locked" in tab.html)
-    assert ">joints 3, 5 locked<" in tab.html, "the cloud is the same"
+    assert f">joints 3, 5 locked. {views.OLD}<" in tab.html, "the cloud is the same"
     tab.click("Start")
     tab.wait(lambda: ">joints 3, 5 locked<" not in tab.html)
     tab.done(N)
     assert np.abs(tab.points() - whole(PIONEER, N, 30).points).max() < HALF
+
+
+def test_a_cloud_of_other_settings_or_locks_says_so(tab):
+    tab.draw(2_000)
+    tab.wait(lambda: tab.state == "done")
+    tab.set("Seed", 7)
+    tab.wait(lambda: tab.state == "outdated" and views.OLD in tab.html)
+    tab.set("Seed", 0)
+    tab.wait(lambda: tab.state == "done" and views.OLD not in tab.html)
+    tab.set("Sampling", "joints spread evenly")
+    tab.wait(lambda: tab.state == "outdated")
+    tab.click("Start")
+    tab.wait(lambda: tab.state == "done" and views.OLD not in tab.html)
 
 
 def test_two_arms_in_one_scene_have_different_colours(tab):

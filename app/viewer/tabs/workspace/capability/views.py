@@ -28,7 +28,7 @@ SYMBOLS: dict[State, str] = {
 }
 MEANING: dict[By, str] = {
     "share": "share of possible approach directions",
-    "manipulability": "best manipulability (Yoshikawa)",
+    "manipulability": "best manipulability w (all six rows)",
 }
 CERTAINTY: dict[Method, str] = {
     "closed form": "Exact: a missing direction is impossible.",
