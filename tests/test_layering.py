@@ -52,7 +52,7 @@ RULES: dict[str, set[str]] = {
         *("app.viewer", "app.equations", "app.exports", "app.shared"),
     },
     "app/service": {
-        *("kin", "fastapi", "starlette", "pydantic", "uvicorn"),
+        *("kin", "fastapi", "starlette", "pydantic", "pydantic_core", "uvicorn", "httptools", "websockets"),
         *("app.api", "app.service", "app.shared", "app.viewer"),
     },
     "app/service/web": {

@@ -1,19 +1,28 @@
 """The REST interface: ``api_routes()`` under /api/v1, and `install_problem_handlers` for error responses.
 
 Routes share objects in ``app.state``: ``settings``, the robots in ``store``, the caches ``clouds``, ``maps`` and
-``summaries``, the limit of concurrent ``streams``, and the slots for computations in ``compute``.
+``summaries``, the limit of concurrent ``streams``, the slots for computations in ``compute``, and the memory of
+request bodies in ``uploads``.
 """
 
 from starlette.routing import BaseRoute
 
 from app.api import equations, fk, ik, jacobian, path, robots
+from app.api.body import UploadMemory
 from app.api.document import complete_document
 from app.api.problems import install_problem_handlers
 from app.api.work import ComputeSlots
 from app.api.workspace import capability, download, reachable, socket, summary
 from app.api.workspace.streaming import StreamLimit
 
-__all__ = ["ComputeSlots", "StreamLimit", "api_routes", "complete_document", "install_problem_handlers"]
+__all__ = [
+    "ComputeSlots",
+    "StreamLimit",
+    "UploadMemory",
+    "api_routes",
+    "complete_document",
+    "install_problem_handlers",
+]
 
 _MODULES = (robots, fk, ik, path, jacobian, equations, download, socket, summary, reachable, capability)
 

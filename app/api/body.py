@@ -7,7 +7,9 @@ the name of their field.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine
+from collections import Counter
+from collections.abc import Callable, Coroutine, Iterator
+from contextlib import contextmanager
 from email.message import Message
 from typing import Any
 
@@ -16,13 +18,74 @@ from fastapi.routing import APIRoute
 from pydantic_core import from_json
 
 from app.api.problems import ProblemError, show
+from app.api.work import busy
+from app.shared.clients import client_of, share_of
+
+
+class UploadMemory:
+    """The bodies that one process holds. Used by the event loop only, so it needs no lock.
+
+    Args:
+        most: bytes of all bodies.
+        share: of one client.
+    """
+
+    def __init__(self, most: int, share: float) -> None:
+        self._most = most
+        self._most_of_one = share_of(most, share)
+        self._clients: Counter[str] = Counter()
+        self.held = 0
+
+    @contextmanager
+    def body(self, client: str) -> Iterator[Body]:
+        """The memory of one body for as long as the context lasts."""
+        body = Body(self, client)
+        try:
+            yield body
+        finally:
+            self.give_back(body)
+
+    def take(self, body: Body, size: int) -> None:
+        """Count further bytes of a body; raises 503 if there is no room for them. A body alone always has room."""
+        mine = self._clients[body.client] - body.size
+        full = self.held > body.size and self.held + size > self._most
+        if full or (mine and mine + body.size + size > self._most_of_one):
+            detail = "The bodies of other requests take all the memory for them."
+            raise busy(detail, "KINBOARD_UPLOAD_MEMORY", {"Connection": "close"})
+        self.held += size
+        self._clients[body.client] += size
+
+    def give_back(self, body: Body) -> None:
+        """Count a body no longer."""
+        self.held -= body.size
+        self._clients[body.client] -= body.size
+        if not self._clients[body.client]:
+            del self._clients[body.client]
+
+
+class Body:
+    """The bytes of one body so far."""
+
+    def __init__(self, memory: UploadMemory, client: str) -> None:
+        self._memory = memory
+        self.client = client
+        self.size = 0
+
+    def grow(self, size: int) -> None:
+        """Count further bytes; raises 503 if there is no room for them."""
+        self._memory.take(self, size)
+        self.size += size
 
 
 class JsonRequest(Request):
-    """A request whose body is JSON of at most ``settings.max_body`` bytes."""
+    """A request whose body is JSON of at most ``settings.max_body`` bytes, counted in `memory`."""
+
+    def __init__(self, request: Request, memory: Body) -> None:
+        super().__init__(request.scope, request.receive)
+        self._memory = memory
 
     async def body(self) -> bytes:
-        """The body; raises 413 as soon as its announced or received size exceeds the limit."""
+        """The body; raises 413 as soon as its announced or received size exceeds the limit, or 503."""
         if not hasattr(self, "_body"):
             limit = self.app.state.settings.max_body
             announced = self.headers.get("content-length", "")
@@ -34,6 +97,7 @@ class JsonRequest(Request):
                 size += len(chunk)
                 if size > limit:
                     raise _too_large(limit)
+                self._memory.grow(len(chunk))
                 chunks.append(chunk)
             self._body = b"".join(chunks)
         return self._body
@@ -76,9 +140,10 @@ class JsonRoute(APIRoute):
             return handle
 
         async def handle_json(request: Request) -> Response:
-            request = JsonRequest(request.scope, request.receive)
-            await request.require_json()
-            return await handle(request)
+            with request.app.state.uploads.body(client_of(request.scope)) as memory:
+                request = JsonRequest(request, memory)
+                await request.require_json()
+                return await handle(request)
 
         return handle_json
 

@@ -44,6 +44,9 @@ KINDS = {
     "batch-too-large": "The request contains too many items",
     "unsupported-media-type": "The body must be JSON",
     "invalid-input": "The request contains an invalid value",
+    "request-timeout": "The request did not arrive in time",
+    "head-too-large": "The head of the request is too large",
+    "wrong-host": "The request is for another host",
     "busy": "The service is busy",
     "too-slow": "The computation takes too long",
     "internal-error": "Internal error",
@@ -202,10 +205,14 @@ async def _input_error(request: Request, error: Exception) -> Response:
 
 
 async def _internal_error(request: Request, error: Exception) -> Response:
-    # The cause is for the log (the server re-raises the exception after this response), not for the client.
+    return respond(internal_error())
+
+
+def internal_error() -> ProblemError:
+    """500. The cause is for the log, not for the client."""
     detail = "The request was understood, but answering it failed."
     hint = "Please report it with the request you sent; the log of the server has the cause."
-    return respond(ProblemError(500, "internal-error", detail, hint))
+    return ProblemError(500, "internal-error", detail, hint)
 
 
 def from_input_error(error: InputError, prefix: str = "") -> FieldError:

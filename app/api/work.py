@@ -25,10 +25,11 @@ RETRY_SLOW = 30
 POLL = 0.2  # seconds between two checks whether the service is being stopped
 
 
-def busy(detail: str, setting: str = "") -> ProblemError:
+def busy(detail: str, setting: str = "", headers: dict[str, str] | None = None) -> ProblemError:
     """503, with the time to wait and the setting that an operator could raise."""
     hint = "Try again in a moment" + (f", or ask the operator to raise {setting}." if setting else ".")
-    return ProblemError(503, "busy", detail, hint, headers={"Retry-After": str(RETRY_AFTER)})
+    headers = {"Retry-After": str(RETRY_AFTER)} | (headers or {})
+    return ProblemError(503, "busy", detail, hint, headers=headers)
 
 
 def stopping() -> ProblemError:

@@ -22,11 +22,20 @@ from fastapi import FastAPI
 from starlette.concurrency import run_in_threadpool
 from starlette.middleware.cors import CORSMiddleware
 
-from app.api import ComputeSlots, StreamLimit, api_routes, complete_document, install_problem_handlers
+from app.api import (
+    ComputeSlots,
+    StreamLimit,
+    UploadMemory,
+    api_routes,
+    complete_document,
+    install_problem_handlers,
+)
 from app.service import status
 from app.service.server import Greeting, Server, is_loopback, listen, url_of
 from app.service.startup import Startup
 from app.service.web.access import Access
+from app.service.web.failures import Failures
+from app.service.web.hosts import LOCAL_NAMES, Hosts
 from app.service.web.observe import Observe, write_to_stderr
 from app.service.web.pages import page_routes, static_folder
 from app.service.web.prefix import PathPrefix
@@ -91,6 +100,7 @@ def create_app(
     state.store, state.settings, state.startup = store, settings, startup
     state.clouds, state.maps, state.summaries = clouds, maps, summaries
     state.streams, state.compute = StreamLimit(settings.max_streams), work
+    state.uploads = UploadMemory(max(settings.upload_memory, settings.max_body), settings.client_share)
     install_problem_handlers(app)
     complete_document(app, store, settings)
     app.router.routes.extend([*api_routes(), *page_routes(), *bridge.routes()])
@@ -116,6 +126,8 @@ def _add_middleware(app: FastAPI, settings: Settings) -> None:
             allow_headers=["*"],
             expose_headers=["*"],
         )
+    app.add_middleware(Failures)
+    app.add_middleware(Hosts, allowed=settings.allowed_hosts, proxies=bool(settings.trusted_proxies))
     app.add_middleware(SecurityHeaders)
     app.add_middleware(Observe, log=settings.access_log)
     app.add_middleware(PathPrefix, prefix=settings.root_path)
@@ -141,8 +153,11 @@ def run(settings: Settings, open_browser: bool = False) -> int:
         except RobotFileError as error:
             print(f"kinboard: {error}", file=sys.stderr)
             return 1
-        if settings.token is None and not settings.read_only and not is_loopback(listeners[0]):
-            print(OPEN_TO_ALL, file=sys.stderr, flush=True)
+        if settings.token is None and not settings.read_only:
+            if not is_loopback(listeners[0]):
+                print(OPEN_TO_ALL, file=sys.stderr, flush=True)
+            elif not settings.allowed_hosts:
+                settings = settings.model_copy(update={"allowed_hosts": (*LOCAL_NAMES, settings.host)})
         greeting = Greeting(url_of(settings, listeners[0].getsockname()[1]), open_browser)
         if len(listeners) == 1:
             return _serve(settings, listeners[0], None, store, greeting)
@@ -167,7 +182,7 @@ def _serve(
         write_to_stderr()
     sys.setswitchinterval(SWITCH_INTERVAL)
     # Kernels and routes live as long as the process: one collection among them would stop all visitors for 50 ms.
-    server = Server(create_app(settings, store, on_ready=gc.freeze), settings.drain, greeting)
+    server = Server(create_app(settings, store, on_ready=gc.freeze), settings, greeting)
     # uvicorn shuts down in order and then raises the signal again, which is the expected end here.
     before = signal.signal(signal.SIGTERM, lambda *_: None)
     try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import ipaddress
 import socket
 import sys
@@ -12,42 +13,55 @@ import webbrowser
 import uvicorn
 from fastapi import FastAPI
 
+from app.service.guard import Guard
+from app.service.http_protocol import GuardedConfig, HttpProtocol
 from app.service.web.inspection import MAX_MESSAGE
 from app.service.web.prefix import clean_prefix
+from app.service.websocket_protocol import WebSocketProtocol
 from app.shared.settings import Settings
 from kin import __version__
 
+if sys.platform != "win32":
+    import resource
 
-def server_config(app: FastAPI, drain: float = 5.0) -> uvicorn.Config:
-    """Configuration of uvicorn that makes the viewer's websockets fast and robust.
+PING_INTERVAL = 20.0  # seconds between two pings of a websocket
+
+
+def server_config(app: FastAPI, settings: Settings, files: int | None = None) -> GuardedConfig:
+    """Configuration of uvicorn: websockets that are fast, and bounds on what clients can make it hold.
 
     Args:
-        drain: seconds that running requests may take after SIGTERM.
+        files: how many files this process may have open; None: not limited.
     """
-    return uvicorn.Config(
+    config = GuardedConfig(
         app,
         lifespan="on",
         log_level="warning",
         access_log=False,
         server_header=False,
-        ws="websockets-sansio",
+        http=HttpProtocol,
+        ws=WebSocketProtocol,
         # Compressing a 12 MB point cloud would take half a second; viser compresses what is worth it.
         ws_per_message_deflate=False,
         ws_max_size=MAX_MESSAGE + 1024,
-        ws_ping_interval=20.0,
-        # On a slow line a large scene may take this long before a ping is answered.
-        ws_ping_timeout=120.0,
-        timeout_graceful_shutdown=max(1, round(drain)),
+        ws_ping_interval=min(PING_INTERVAL, settings.send_timeout / 3),
+        # A ping behind a large scene on a slow line has more time: see `WebSocketProtocol`.
+        ws_ping_timeout=settings.send_timeout - min(PING_INTERVAL, settings.send_timeout / 3),
+        timeout_graceful_shutdown=max(1, round(settings.drain)),
+        proxy_headers=bool(settings.trusted_proxies),
+        forwarded_allow_ips=list(settings.trusted_proxies),
     )
+    config.guard = Guard(settings, files)
+    return config
 
 
 class Server(uvicorn.Server):
     """Prints the greeting once it accepts connections; on shutdown ends requests that would be cut off."""
 
-    def __init__(self, app: FastAPI, drain: float, greeting: Greeting | None) -> None:
-        super().__init__(server_config(app, drain))
+    def __init__(self, app: FastAPI, settings: Settings, greeting: Greeting | None) -> None:
+        super().__init__(server_config(app, settings, open_files()))
         self._end_work = app.state.compute.close
-        self._drain = drain
+        self._drain = settings.drain
         self._greeting = greeting
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
@@ -99,6 +113,18 @@ def listen(settings: Settings) -> list[socket.socket]:
     port = alone.getsockname()[1]
     alone.close()
     return [bind(port, True) for _ in range(settings.workers)]
+
+
+def open_files() -> int | None:
+    """How many files this process may have open, after raising the limit as far as allowed; None: not limited."""
+    if sys.platform == "win32":
+        return None
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft != hard:
+        with contextlib.suppress(ValueError, OSError):  # more than the system can do
+            resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+            soft = hard
+    return None if soft == resource.RLIM_INFINITY else soft
 
 
 def is_loopback(listener: socket.socket) -> bool:

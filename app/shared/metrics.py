@@ -26,6 +26,10 @@ SOLVE_SECONDS = Histogram(
     "kinboard_solve_seconds", "Time of inverse kinematics for one request or drag.", ("door",), buckets=_FAST
 )
 VISITORS = Gauge("kinboard_visitors", "Open tabs of the viewer.", multiprocess_mode="livesum")
+CONNECTIONS = Gauge("kinboard_connections", "Open connections.", multiprocess_mode="livesum")
+REFUSED = Counter(
+    "kinboard_refused_connections", "Connections that were refused or ended, and requests not read.", ("why",)
+)
 DROPPED = Counter("kinboard_dropped_messages", "Messages of visitors that were not passed on to viser.", ("why",))
 STREAMED = Counter("kinboard_stream_bytes", "Bytes sent in streamed responses.", ("stream",))
 

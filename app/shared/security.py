@@ -64,7 +64,10 @@ def origin_allowed(headers: Headers, allowed_origins: Iterable[str]) -> bool:
         return True
     if origin.rstrip("/").lower() in {allowed.rstrip("/").lower() for allowed in allowed_origins}:
         return True
-    page = _host_and_port(urlsplit(origin.lower()).netloc)
+    try:
+        page = _host_and_port(urlsplit(origin.lower()).netloc)
+    except ValueError:  # no address, such as http://[::1
+        return False
     forwarded = headers.get("x-forwarded-host", "").split(",")[0].strip()
     ours = {_host_and_port(host) for host in (headers.get("host", ""), forwarded) if host}
     return bool(page) and page in ours

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pydantic import Field, SecretStr
+from pydantic import Field, SecretStr, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from app.shared.clients import Proxies
 
 
 class Settings(BaseSettings):
@@ -27,6 +29,9 @@ class Settings(BaseSettings):
         40, ge=1, le=256, description="Maximum number of voxels along one side of a capability map."
     )
     max_body: int = Field(8 * 1024 * 1024, ge=1024, description="Maximum size of a request body in bytes.")
+    upload_memory: int = Field(
+        64 * 1024 * 1024, ge=1024, description="Maximum size in bytes of all request bodies that a process holds."
+    )
     max_requests: int = Field(
         16, ge=1, le=32, description="Maximum number of requests that a process computes at a time; others wait."
     )
@@ -54,6 +59,22 @@ class Settings(BaseSettings):
     drain: float = Field(
         5.0, ge=1, le=300, description="Seconds that running requests may take after the service is asked to stop."
     )
+    max_connections: int = Field(1000, ge=1, description="Maximum number of open connections, for each worker.")
+    client_share: float = Field(
+        0.75,
+        gt=0,
+        le=1,
+        description="Share of connections, places and upload memory that one client may take, of each kind.",
+    )
+    receive_timeout: float = Field(
+        20.0,
+        ge=0.1,
+        le=3600,
+        description="Seconds within which the head of a request must arrive, and that its body may pause.",
+    )
+    send_timeout: float = Field(
+        60.0, ge=0.1, le=3600, description="Seconds after which a client that reads nothing is disconnected."
+    )
     max_visitors: int = Field(200, ge=1, description="Maximum number of open viewer tabs, for each worker.")
     access_log: bool = Field(False, description="Log each request to stderr, one JSON object per line.")
     cloud_memory: int = Field(
@@ -62,3 +83,19 @@ class Settings(BaseSettings):
     allowed_origins: tuple[str, ...] = Field(
         (), description="Further origins whose pages may open the viewer's websocket."
     )
+    allowed_hosts: tuple[str, ...] = Field(
+        (),
+        description="Host names of the service; `*`: any. IP addresses are always accepted. Unset: any, but on a "
+        "loopback address without a token only localhost.",
+    )
+    trusted_proxies: tuple[str, ...] = Field(
+        (),
+        description="Addresses and networks of the reverse proxies whose X-Forwarded-For and X-Forwarded-Proto "
+        "are believed.",
+    )
+
+    @field_validator("trusted_proxies")
+    @classmethod
+    def _are_networks(cls, values: tuple[str, ...]) -> tuple[str, ...]:
+        Proxies(values)  # raises ValueError
+        return values

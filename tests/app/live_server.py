@@ -14,14 +14,15 @@ from fastapi import FastAPI
 
 from app.service.server import server_config
 from app.service.web.viewer_proxy import ViewerBridge
+from app.shared.settings import Settings
 from app.viewer.server import ViewerServer
 
 
 @contextmanager
-def serve(app: FastAPI) -> Iterator[int]:
+def serve(app: FastAPI, settings: Settings | None = None) -> Iterator[int]:
     """Yields the port that `app` listens on, and stops the server's thread at the end."""
     listener = socket.create_server(("127.0.0.1", 0))
-    server = uvicorn.Server(server_config(app))
+    server = uvicorn.Server(server_config(app, settings or Settings()))
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
     thread.start()
     try:

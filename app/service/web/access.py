@@ -11,10 +11,13 @@ Health checks and the files of the login page are always open.
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import hashlib
 import hmac
 import html
 import re
+from collections import Counter
 from http.cookies import CookieError, SimpleCookie
 from pathlib import Path
 from urllib.parse import parse_qs, quote
@@ -26,7 +29,8 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
 from app.api.problems import ProblemError, respond
-from app.service.web.rate_limit import TokenBucket, client_of
+from app.service.web.rate_limit import TokenBucket
+from app.shared.clients import client_of
 
 COOKIE = "kinboard"
 COOKIE_AGE = 30 * 24 * 3600  # seconds until a login ends
@@ -35,6 +39,9 @@ OPEN = ("/livez", "/readyz", "/login", "/favicon.ico")
 HEALTH = OPEN[:2]
 SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
 TRIES, TRY_EVERY = 5, 10.0  # wrong tokens allowed at once per client, then one in this many seconds
+# A client above that rate may be many behind one address: the right token goes on being accepted, but each check
+# takes this many seconds, and this many are made at a time.
+CHECK_TIME, CHECKS = 1.0, 4
 MAX_FORM = 4096  # bytes
 # Where to go after the login: a path of this service, relative to its root.
 _PLACE = re.compile(r"(?!/)(?:[\w.~?=&%+-]|/(?!/))*", re.ASCII)
@@ -59,6 +66,8 @@ class Access:
         self._read_only = read_only
         self._requests = TokenBucket(rate, 10.0 * rate) if rate else None
         self._wrong_tokens = TokenBucket(1.0 / TRY_EVERY, TRIES)
+        self._checks: Counter[str] = Counter()  # slow ones in progress, by client
+        self._accepted = _encodings(token)
         self._login_page = login_page.read_text(encoding="utf-8")
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -73,7 +82,7 @@ class Access:
                 self._count(scope)
             if path == "/login" and request is not None:
                 answer = await self._login(request)
-            elif not (path in OPEN or path.startswith("/static/") or self._authenticated(scope)):
+            elif not (path in OPEN or path.startswith("/static/") or await self._authenticated(scope)):
                 self._admit_anonymous(scope, path)
         except ProblemError as error:
             answer = respond(error)
@@ -100,14 +109,14 @@ class Access:
             raise too_many("Too many requests from your address.", wait)
         self._requests.take(client)
 
-    def _authenticated(self, scope: Scope) -> bool:
+    async def _authenticated(self, scope: Scope) -> bool:
         """Whether the request has the token or a valid cookie. Raises 401 for a wrong token, 429 after several."""
         if self._token is None:
             return not self._read_only
         headers = dict(scope["headers"])
-        kind, _, given = headers.get(b"authorization", b"").decode("latin-1").partition(" ")
-        if kind.lower() == "bearer":
-            self._check(scope, given.strip())
+        kind, _, given = headers.get(b"authorization", b"").partition(b" ")
+        if kind.lower() == b"bearer":
+            await self._check(scope, given.strip())
             return True
         return self._has_valid_cookie(headers.get(b"cookie", b"").decode("latin-1"))
 
@@ -129,15 +138,26 @@ class Access:
                 raise _LoginNeededError
         raise unauthorized("This service requires an access token.")
 
-    def _check(self, scope: Scope, given: str) -> None:
-        """Raises 401 for a wrong token, 429 after too many."""
+    async def _check(self, scope: Scope, given: bytes) -> None:
+        """Raises 401 for a wrong token, 429 after too many; slow after too many, also for the right one."""
         client = client_of(scope)
         wait = self._wrong_tokens.wait(client)
         if wait > 0.0:
+            if self._checks[client] >= CHECKS:
+                raise too_many("Too many wrong tokens from your address.", wait)
+            self._checks[client] += 1
+            try:
+                await asyncio.sleep(CHECK_TIME)
+            finally:
+                self._checks[client] -= 1
+                if not self._checks[client]:
+                    del self._checks[client]
+        if any(hmac.compare_digest(given, accepted) for accepted in self._accepted):
+            return
+        if wait > 0.0:
             raise too_many("Too many wrong tokens from your address.", wait)
-        if self._token is None or not hmac.compare_digest(given.encode(), self._token.encode()):
-            self._wrong_tokens.take(client)
-            raise unauthorized("The access token is wrong.")
+        self._wrong_tokens.take(client)
+        raise unauthorized("The access token is wrong.")
 
     async def _login(self, request: Request) -> Response:
         """The login page; after the right token, a redirect to the page the visitor came for."""
@@ -150,7 +170,7 @@ class Access:
         if request.method == "POST":
             form = await _form(request)
             try:
-                self._check(request.scope, form.get("token", ""))
+                await self._check(request.scope, form.get("token", "").encode())
                 answer = RedirectResponse("./" + place, 303)
                 answer.set_cookie(
                     COOKIE, self._signer.sign(b"visitor").decode(), COOKIE_AGE,
@@ -177,6 +197,16 @@ class Access:
         except (CookieError, BadSignature):
             return False
         return True
+
+
+def _encodings(token: str | None) -> list[bytes]:
+    """The token as clients send it: most as UTF-8, some in the encoding that HTTP once had."""
+    if token is None:
+        return []
+    encodings = {token.encode()}
+    with contextlib.suppress(UnicodeEncodeError):
+        encodings.add(token.encode("latin-1"))
+    return sorted(encodings)
 
 
 class _LoginNeededError(Exception):

@@ -55,10 +55,10 @@ class MessageLimit:
         self._left = burst
         self._since: float | None = None
 
-    def spend(self, now: float) -> float:
-        """Count a message; returns the seconds to wait before the next one is read."""
+    def spend(self, now: float, cost: float = 1.0) -> float:
+        """Count a message, or a frame that costs more; returns the seconds to wait before the next."""
         since = now if self._since is None else self._since
-        self._left = min(self._burst, self._left + self._rate * (now - since)) - 1.0
+        self._left = min(self._burst, self._left + self._rate * (now - since)) - cost
         self._since = now
         return max(0.0, -self._left / self._rate)
 

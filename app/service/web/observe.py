@@ -15,12 +15,13 @@ import time
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.service.web.rate_limit import client_of
+from app.shared.clients import client_of
 from app.shared.metrics import REQUEST_SECONDS, REQUESTS
 
 logger = logging.getLogger("kinboard.access")
 
 _VALID_ID = re.compile(rb"[\w.:/+=-]{1,128}", re.ASCII)
+CLIENT_LEFT = 499  # the status counted for a client that left before it was answered, as nginx does
 _METHODS = frozenset(("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"))
 
 
@@ -41,7 +42,7 @@ class Observe:
         # Read now: a mounted folder removes its part of the path.
         path: str = scope["path"].removeprefix(scope.get("root_path", ""))
         began = time.perf_counter()
-        status, sent = 0, 0
+        status, sent, failed = 0, 0, True
 
         async def observed(message: Message) -> None:
             nonlocal status, sent
@@ -51,6 +52,8 @@ class Observe:
                 MutableHeaders(scope=message)["x-request-id"] = request_id
             elif kind == "websocket.accept":
                 status = 101
+            elif kind == "websocket.http.response.start":
+                status = message["status"]
             elif kind == "websocket.close" and not status:
                 status = 403
             elif kind == "http.response.body":
@@ -61,8 +64,10 @@ class Observe:
 
         try:
             await self.app(scope, receive, observed)
+            failed = False
         finally:
-            self._record(scope, path, status or 500, sent, time.perf_counter() - began)
+            status = status or (500 if failed else CLIENT_LEFT)
+            self._record(scope, path, status, sent, time.perf_counter() - began)
 
     def _record(self, scope: Scope, path: str, status: int, sent: int, seconds: float) -> None:
         websocket = scope["type"] == "websocket"

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import ipaddress
 import time
 from collections import OrderedDict
 from collections.abc import Callable
-
-from starlette.types import Scope
 
 
 class TokenBucket:
@@ -42,15 +39,3 @@ class TokenBucket:
         now = self._clock()
         tokens, since = self._tokens.get(client, (self._burst, now))
         return min(self._burst, tokens + self._rate * (now - since)), now
-
-
-def client_of(scope: Scope) -> str:
-    """The client of a request: its IPv4 address, or its IPv6 network, within which a host may use any address."""
-    host = str((scope.get("client") or ("unknown", 0))[0])
-    try:
-        address = ipaddress.ip_address(host)
-    except ValueError:
-        return host
-    if address.version == 4:
-        return host
-    return str(address.ipv4_mapped or ipaddress.ip_network((address, 64), strict=False))

@@ -15,7 +15,7 @@ from live_server import serve, wait_for
 from pydantic import TypeAdapter
 
 import kin
-from app.api import StreamLimit, api_routes, install_problem_handlers
+from app.api import StreamLimit, UploadMemory, api_routes, install_problem_handlers
 from app.api.work import ComputeSlots
 from app.api.workspace import reachable
 from app.api.workspace.streaming import ThreadedGenerator
@@ -42,7 +42,7 @@ def live():
     app.state.settings, app.state.store = Settings(), Store()
     app.state.compute = ComputeSlots(16, 300.0)
     app.state.clouds, app.state.streams = Clouds(max_bytes=0, threads=1), StreamLimit(2)
-    app.state.summaries = Summaries(threads=1)
+    app.state.summaries, app.state.uploads = Summaries(threads=1), UploadMemory(1 << 20, 1.0)
     install_problem_handlers(app)
     app.router.routes.extend(api_routes())
     with serve(app) as port, httpx2.Client(base_url=f"http://127.0.0.1:{port}", trust_env=False, timeout=60) as c:

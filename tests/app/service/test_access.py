@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import time
+from concurrent.futures import ThreadPoolExecutor
 
+import httpx2
 import pytest
 import viser
 from fake_browser import FakeBrowser
@@ -19,7 +21,8 @@ from websockets.typing import Subprotocol
 import app.service.web.access as access
 from app.service.main import create_app
 from app.service.web.access import COOKIE
-from app.service.web.rate_limit import TokenBucket, client_of
+from app.service.web.rate_limit import TokenBucket
+from app.shared.clients import client_of
 from app.shared.settings import Settings
 from app.viewer.panel.view import ViewState
 from app.viewer.session.state import PageState, encode
@@ -124,15 +127,50 @@ def test_any_other_header_is_refused(guarded, value):
     assert answer.status_code == 401
 
 
-def test_guessing_tokens_is_rate_limited_and_locks_no_one_else_out(guarded, application):
+@pytest.fixture
+def hurried(monkeypatch):
+    """Checks that are slow take no second."""
+    monkeypatch.setattr(access, "CHECK_TIME", 0.01)
+
+
+def test_guessing_tokens_is_rate_limited_and_locks_no_one_out(guarded, application, hurried):
     wrong = {"authorization": "Bearer guess"}
     codes = [guarded.get("/api/v1/robots", headers=wrong).status_code for _ in range(8)]
     assert codes == [401] * access.TRIES + [429] * 3
-    late = guarded.get("/api/v1/robots", headers=HEADER)
+    late = guarded.get("/api/v1/robots", headers=wrong)
     assert late.status_code == 429
     assert 1 <= int(late.headers["retry-after"]) <= access.TRY_EVERY
+    assert guarded.get("/api/v1/robots", headers=HEADER).status_code == 200
     other = TestClient(application, client=("10.9.9.9", 1))
     assert other.get("/api/v1/robots", headers=HEADER).status_code == 200
+
+
+def test_guesses_are_slow_and_only_few_are_checked_at_a_time(guarded, monkeypatch):
+    monkeypatch.setattr(access, "CHECK_TIME", 0.5)
+    wrong = {"authorization": "Bearer guess"}
+    for _ in range(access.TRIES):
+        guarded.get("/api/v1/robots", headers=wrong)
+
+    def ask(headers: dict[str, str]) -> tuple[int, float]:
+        began = time.monotonic()
+        return guarded.get("/api/v1/robots", headers=headers).status_code, time.monotonic() - began
+
+    with ThreadPoolExecutor(20) as pool:
+        answers = list(pool.map(ask, [wrong] * 20))
+    assert {status for status, _ in answers} == {429}
+    slow = [seconds for _, seconds in answers if seconds >= 0.5]
+    assert len(slow) <= access.CHECKS + 1
+    status, seconds = ask(HEADER)
+    assert status == 200
+    assert seconds >= 0.5
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
+def test_a_token_may_have_letters_beyond_ascii(encoding):
+    client = client_with(token="größe genügt")
+    given = "Bearer größe genügt".encode(encoding)
+    assert client.get("/api/v1/robots", headers={"authorization": given}).status_code == 200
+    assert client.post("/login", data={"token": "größe genügt"}).status_code == 303
 
 
 def test_a_browser_logs_in_once_and_is_redirected_to_the_requested_page(guarded):
@@ -155,12 +193,13 @@ def test_the_redirect_to_the_login_page_is_relative(guarded):
     assert guarded.get("/viewer/", headers=PAGE).headers["location"] == "../login?next=viewer/"
 
 
-def test_a_wrong_token_is_refused(guarded):
+def test_a_wrong_token_is_refused(guarded, hurried):
     answer = guarded.post("/login", data={"token": "<script>"})
     assert answer.status_code == 401
     assert "The access token is wrong." in answer.text
     assert "set-cookie" not in answer.headers
     assert [guarded.post("/login", data={"token": "no"}).status_code for _ in range(6)][-1] == 429
+    assert guarded.post("/login", data={"token": TOKEN}).status_code == 303
 
 
 @pytest.mark.parametrize(
@@ -356,3 +395,89 @@ def test_other_origins_read_answers_only_if_configured():
 def test_a_short_token_is_refused_at_start():
     with pytest.raises(ValueError, match="8"):
         Settings(token="short")  # type: ignore[arg-type]
+
+
+# Hosts
+
+
+@pytest.mark.parametrize(
+    ("host", "status"),
+    [
+        ("localhost", 200),
+        ("LOCALHOST:8000", 200),
+        ("localhost.", 200),
+        ("robots.localhost:80", 200),
+        ("127.0.0.1:8000", 200),
+        ("192.0.2.7", 200),
+        ("[::1]:8000", 200),
+        ("arm.example", 200),
+        ("evil.example", 421),
+        ("evil.example:8000", 421),
+        ("localhost.evil.example", 421),
+        ("127.0.0.1.evil.example", 421),
+        ("", 421),
+        ("[", 421),
+        ("\xff", 421),
+    ],
+)
+def test_a_request_for_another_host_is_refused(host, status):
+    client = client_with(allowed_hosts=("localhost", "arm.example"))
+    answer = client.get("/livez", headers={"host": host.encode("latin-1")})
+    assert answer.status_code == status
+    if status == 421:
+        assert answer.json()["type"] == "urn:kinboard:problem:wrong-host"
+        assert "KINBOARD_ALLOWED_HOSTS" in answer.json()["hint"]
+
+
+@pytest.mark.parametrize("allowed", [(), ("*",), ("*", "arm.example")])
+def test_without_names_or_with_an_asterisk_any_host_is_accepted(allowed):
+    assert client_with(allowed_hosts=allowed).get("/livez", headers={"host": "a.example"}).status_code == 200
+
+
+def test_a_websocket_for_another_host_is_refused():
+    client = client_with(allowed_hosts=("localhost",))
+    with pytest.raises(WebSocketDisconnect), client.websocket_connect("/viewer", headers={"host": "evil.example"}):
+        pass
+
+
+# Proxies
+
+
+def test_a_client_cannot_choose_its_address():
+    """Wrong tokens count for the address of the connection, whatever the header says."""
+    application = create_app(Settings(token=TOKEN))  # type: ignore[arg-type]
+    with serve(application) as port:
+        codes = [asked_as(port, f"10.0.0.{k}") for k in range(access.TRIES + 1)]
+    assert codes == [401] * access.TRIES + [429]
+
+
+def test_a_trusted_proxy_names_the_client():
+    settings = Settings(token=TOKEN, trusted_proxies=("127.0.0.0/8",))  # type: ignore[arg-type]
+    with serve(create_app(settings), settings) as port:
+        codes = [asked_as(port, f"10.0.0.{k}") for k in range(access.TRIES + 1)]
+        assert codes == [401] * (access.TRIES + 1)
+        again = [asked_as(port, "192.0.2.1, 10.0.0.77, 127.0.0.9") for _ in range(access.TRIES + 1)]
+        assert again[-1] == 429
+        assert asked_as(port, "192.0.2.1") == 401
+
+
+def asked_as(port: int, forwarded: str) -> int:
+    headers = {"authorization": "Bearer wrong", "x-forwarded-for": forwarded}
+    answer = httpx2.get(f"http://127.0.0.1:{port}/api/v1/robots", headers=headers, trust_env=False)
+    return answer.status_code
+
+
+def test_an_unknown_proxy_is_logged_once(caplog):
+    client = client_with()
+    for _ in range(3):
+        client.get("/livez", headers={"x-forwarded-for": "192.0.2.1"})
+    hints = [record.message for record in caplog.records if "KINBOARD_TRUSTED_PROXIES" in record.message]
+    assert len(hints) == 1
+    client_with(trusted_proxies=("10.0.0.1",)).get("/livez", headers={"x-forwarded-for": "192.0.2.1"})
+    assert caplog.text.count("KINBOARD_TRUSTED_PROXIES") == 1
+
+
+@pytest.mark.parametrize("proxies", [("proxy.example",), ("10.0.0.0/33",), ("*",)])
+def test_a_trusted_proxy_is_an_address_or_a_network(proxies):
+    with pytest.raises(ValueError, match="trusted_proxies"):
+        Settings(trusted_proxies=proxies)

@@ -138,8 +138,9 @@ def tls(certificate: Path) -> ssl.SSLContext:
 
 @pytest.fixture(scope="module")
 def service() -> Iterator[int]:
-    app = create_app(Settings(root_path="/kinboard", token=TOKEN))
-    with serve(app) as port:
+    settings = Settings(root_path="/kinboard", token=TOKEN, trusted_proxies=("127.0.0.1",))
+    app = create_app(settings)
+    with serve(app, settings) as port:
         wait_for(lambda: app.state.startup.status != "warming", seconds=600)
         assert app.state.startup.status == "ready"
         yield port

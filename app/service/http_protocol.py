@@ -1,0 +1,289 @@
+"""HTTP/1.1 as uvicorn speaks it, with bounds on what a client can make the service hold.
+
+uvicorn queues any number of pipelined requests, collects a head of any size, and waits for requests without end.
+Here a connection has at most `MAX_PIPELINE` requests waiting, heads are bounded, requests must arrive in time, and
+answers must be read. Refusals are problem documents. Answers to HTTP/1.0 are not chunked.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any, Final, cast
+
+import httptools
+import uvicorn
+from pydantic_core import to_json
+from starlette.types import Message, Receive, Scope, Send
+from uvicorn.protocols.http.flow_control import FlowControl
+from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol, RequestResponseCycle
+
+from app.api.problems import MEDIA_TYPE, ProblemError
+from app.service.guard import Guard, Outflow
+
+if TYPE_CHECKING:
+    from uvicorn._types import ASGI3Application
+
+MAX_PIPELINE: Final = 16  # requests of a connection that wait for the one being answered
+MAX_HEAD: Final = 64 * 1024  # bytes
+MAX_HEADERS: Final = 128
+MIN_RATE: Final = 1024.0  # bytes per second, on average, at which a body must arrive
+
+
+def require_shape(kind: type, *names: str) -> None:
+    """Raises `ImportError` if one of uvicorn's classes lacks an attribute that is overridden or used here."""
+    present = set(dir(kind)) | set(kind.__init__.__code__.co_names)  # type: ignore[misc]
+    if missing := sorted(set(names) - present):
+        raise ImportError(f"uvicorn {uvicorn.__version__} is not supported: {kind.__name__} has no {missing}")
+
+
+require_shape(
+    HttpToolsProtocol,
+    *("connection_made", "connection_lost", "data_received", "resume_writing", "_unset_keepalive_if_required"),
+    *("on_message_begin", "on_headers_complete", "on_message_complete", "on_response_complete"),
+    *("_start_asgi_task", "handle_websocket_upgrade", "_should_upgrade", "_unsupported_upgrade_warning"),
+    *("cycle", "flow", "headers", "parser", "pipeline", "server_state"),
+)
+require_shape(
+    RequestResponseCycle,
+    *("keep_alive", "response_started", "response_complete", "chunked_encoding", "expected_content_length"),
+)
+
+
+class GuardedConfig(uvicorn.Config):
+    """uvicorn's configuration, and the guard of its connections."""
+
+    guard: Guard
+
+
+class _Flow(FlowControl):
+    """Does not resume reading while requests wait: uvicorn would, after each answer."""
+
+    def __init__(self, protocol: HttpProtocol, transport: asyncio.Transport) -> None:
+        super().__init__(transport)
+        self._protocol = protocol
+
+    def resume_reading(self) -> None:
+        if not self._protocol.pipeline and not self._protocol.ended:
+            super().resume_reading()
+
+
+class HttpProtocol(HttpToolsProtocol):
+    """One HTTP connection."""
+
+    def __init__(self, config: GuardedConfig, *args: Any, **kwargs: Any) -> None:
+        super().__init__(config, *args, **kwargs)
+        self.guard = config.guard
+        self.ended = False  # no more requests are read from this connection
+        self._host: str | None = None  # None: not counted
+        self._outflow: Outflow
+        self._in_message = False
+        self._head_complete = False
+        self._head = 0  # bytes of an incomplete head, without those that came with its beginning
+        self._received = 0  # bytes since the message began
+        self._since = 0.0  # when we began to wait for what the client is to send
+        self._last = 0.0  # when it last sent something
+
+    # the connection
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        host = (transport.get_extra_info("peername") or ("unknown",))[0]
+        number = transport.get_extra_info("socket").fileno()
+        if reason := self.guard.refusal(host, number):
+            self.transport = transport
+            self.ended = True
+            self._write(ProblemError(503, "busy", f"No connection is free: {reason}.", "Try again in a moment."))
+            return
+        super().connection_made(transport)
+        self._host = host
+        self.flow = _Flow(self, transport)
+        self._outflow = Outflow(transport, self.guard.send_timeout)
+        self._since = self._last = self.loop.time()
+        self.guard.add(self, host)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        if self._host is not None:
+            self.guard.remove(self, self._host)
+            super().connection_lost(exc)
+
+    def resume_writing(self) -> None:
+        self._outflow.flowed = True
+        super().resume_writing()
+
+    def check(self, now: float) -> None:
+        """Close the connection if its client has not read an answer, or not sent a request, in time."""
+        if self._outflow.stuck(now):
+            self.guard.note(
+                "unread",
+                f"{self._host} read nothing of an answer for {self.guard.send_timeout:g} s "
+                "(KINBOARD_SEND_TIMEOUT); the connection is closed",
+            )
+            self.transport.abort()
+        elif not self._is_waiting():
+            self._since = self._last = now
+        elif self._is_late(now):
+            self._time_out()
+
+    def _is_waiting(self) -> bool:
+        """Whether it is the client's turn to send."""
+        if self.ended or self.pipeline or self.flow.read_paused:
+            return False
+        answered = self.cycle is None or self.cycle.response_complete
+        return answered or (self._in_message and self._head_complete)
+
+    def _is_late(self, now: float) -> bool:
+        timeout = self.guard.receive_timeout
+        if not (self._in_message and self._head_complete):
+            return now - self._since > timeout
+        return now - self._last > timeout or now - self._since > timeout + self._received / MIN_RATE
+
+    def _time_out(self) -> None:
+        if not self._in_message:  # an idle connection
+            self.transport.close()
+            return
+        part = "body" if self._head_complete else "head"
+        seconds = f"{self.guard.receive_timeout:g} s"
+        self.guard.note(
+            f"late {part}",
+            f"the {part} of a request from {self._host} did not arrive within {seconds} "
+            "(KINBOARD_RECEIVE_TIMEOUT); the connection is closed",
+        )
+        detail = f"The {part} of the request did not arrive within {seconds}."
+        self._refuse(ProblemError(408, "request-timeout", detail, "Send the request again, without pauses."))
+
+    # the parser
+
+    def data_received(self, data: bytes) -> None:
+        if self.ended:
+            return
+        self._unset_keepalive_if_required()
+        self._received += len(data)
+        self._last = self.loop.time()
+        try:
+            self.parser.feed_data(data)
+        except httptools.HttpParserUpgrade:
+            if self._should_upgrade():
+                self.handle_websocket_upgrade()
+            return
+        except httptools.HttpParserError as error:
+            self._end(error.__context__)
+            return
+        if self._in_message and not self._head_complete:
+            self._head += len(data) if self._head >= 0 else 1
+            if self._head > MAX_HEAD or len(self.headers) > MAX_HEADERS:
+                self._refuse(_head_too_large())
+
+    def on_message_begin(self) -> None:
+        if len(self.pipeline) >= MAX_PIPELINE:
+            raise _PipelineFullError
+        super().on_message_begin()
+        self._in_message, self._head_complete = True, False
+        self._head, self._received = -1, 0
+        self._since = self.loop.time()
+
+    def on_headers_complete(self) -> None:
+        if len(self.headers) > MAX_HEADERS:
+            raise _head_too_large()
+        self._head_complete = True
+        super().on_headers_complete()
+
+    def on_message_complete(self) -> None:
+        self._in_message = False
+        super().on_message_complete()
+
+    def on_response_complete(self) -> None:
+        self._since = self._last = self.loop.time()
+        super().on_response_complete()
+
+    def _end(self, error: BaseException | None) -> None:
+        """The parser has stopped."""
+        if isinstance(error, _PipelineFullError):
+            # What was read is answered, then the connection is closed: clients send the rest again.
+            self.guard.note(
+                "pipeline", f"{self._host} sent more than {MAX_PIPELINE} requests ahead; the rest is not read"
+            )
+            self.ended = True
+            self.flow.pause_reading()
+            self.cycle.keep_alive = False
+        elif isinstance(error, ProblemError):
+            self._refuse(error)
+        else:
+            self.guard.note("malformed", f"{self._host} sent something that is not HTTP; the connection is closed")
+            self._refuse(ProblemError(400, "bad-request", "This is not a valid HTTP request."))
+
+    def _refuse(self, error: ProblemError) -> None:
+        """Answer with a problem document, if no answer to an earlier request is on its way, and close."""
+        self.ended = True
+        current = self._in_message and self._head_complete
+        unanswered = self.cycle is not None and not self.cycle.response_complete
+        if self.pipeline or (unanswered and not current):
+            self.flow.pause_reading()
+            self.cycle.keep_alive = False
+            if current:  # it would never be answered
+                self.transport.close()
+        elif current and self.cycle.response_started:
+            self.transport.close()
+        else:
+            self._write(error)
+
+    def _write(self, error: ProblemError) -> None:
+        self.transport.write(raw_answer(error, self.server_state.default_headers))
+        self.transport.close()
+
+    def _unsupported_upgrade_warning(self) -> None:
+        """Nothing: a client that offers another protocol gets HTTP/1.1, as it expects."""
+
+    # the application
+
+    def handle_websocket_upgrade(self) -> None:
+        if self._host is not None:
+            self.guard.remove(self, self._host)
+            self._host = None  # the websocket counts itself
+        super().handle_websocket_upgrade()
+
+    def _start_asgi_task(self, cycle: RequestResponseCycle, app: ASGI3Application) -> None:
+        if cycle.scope["http_version"] == "1.0":
+            app = cast("ASGI3Application", _unchunked(app, cycle))
+        super()._start_asgi_task(cycle, app)
+
+
+def raw_answer(error: ProblemError, headers: Iterable[tuple[bytes, bytes]]) -> bytes:
+    """The last answer of a connection, as bytes, for requests that do not reach the application."""
+    body = to_json(error.problem)
+    lines = [STATUS_LINE[error.status_code]]
+    lines += [name + b": " + value + b"\r\n" for name, value in headers]
+    lines.append(
+        f"content-type: {MEDIA_TYPE}\r\ncontent-length: {len(body)}\r\nx-content-type-options: nosniff\r\n"
+        "cache-control: no-store\r\nconnection: close\r\n\r\n".encode()
+    )
+    return b"".join([*lines, body])
+
+
+class _PipelineFullError(Exception):
+    """A client sends requests faster than they are answered."""
+
+
+def _head_too_large() -> ProblemError:
+    detail = f"The head of the request has more than {MAX_HEAD} bytes or {MAX_HEADERS} fields."
+    return ProblemError(431, "head-too-large", detail, "Send fewer or shorter header fields.")
+
+
+def _unchunked(app: Any, cycle: RequestResponseCycle) -> Any:
+    """`app`, with an answer of unknown length that ends with the connection: HTTP/1.0 has no chunks."""
+
+    async def unchunked(scope: Scope, receive: Receive, send: Send) -> None:
+        known = True
+
+        async def send_unchunked(message: Message) -> None:
+            nonlocal known
+            if message["type"] == "http.response.start":
+                known = any(name.lower() == b"content-length" for name, _ in message.get("headers", ()))
+                if not known:
+                    cycle.chunked_encoding = False
+            elif not known:
+                cycle.expected_content_length = len(message.get("body", b""))
+            await send(message)
+
+        await app(scope, receive, send_unchunked)
+
+    return unchunked

@@ -1,0 +1,87 @@
+"""Which host a request is for, and hints about proxies.
+
+A page of another site can have its name resolve to our address (DNS rebinding). The browser then takes us for a
+part of that site and lets its scripts read our answers, but it still names that host in the request. So a service
+that anybody may use, on an address that only this machine can reach, answers only under its own names.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import logging
+from collections.abc import Iterable
+
+from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.websockets import WebSocket
+
+from app.api.problems import ProblemError, respond, shorten_text
+from app.shared.clients import client_of
+
+logger = logging.getLogger("kinboard.connections")
+
+LOCAL_NAMES = ("localhost",)
+
+
+class Hosts:
+    """ASGI middleware that refuses requests for other hosts.
+
+    Args:
+        allowed: names of this service; none, or ``*``: any name.
+        proxies: whether the operator has named trusted proxies.
+    """
+
+    def __init__(self, app: ASGIApp, allowed: Iterable[str], proxies: bool) -> None:
+        self.app = app
+        self._allowed = frozenset(name.lower().rstrip(".") for name in allowed)
+        self._any = not self._allowed or "*" in self._allowed
+        self._hinted = proxies
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] not in ("http", "websocket"):
+            await self.app(scope, receive, send)
+            return
+        if not self._hinted:
+            self._hint(scope)
+        refused = None if self._any else self._refused(scope)
+        if refused is None:
+            await self.app(scope, receive, send)
+        elif scope["type"] == "websocket":
+            await WebSocket(scope, receive, send).close(1008)  # before the handshake: a 403
+        else:
+            await respond(wrong_host(refused))(scope, receive, send)
+
+    def _refused(self, scope: Scope) -> str | None:
+        """The host that the request is for, if it is not ours."""
+        for name, value in scope["headers"]:
+            if name == b"host":
+                host: str = value.decode("latin-1")
+                if not self._is_ours(host):
+                    return host
+        return None
+
+    def _is_ours(self, host: str) -> bool:
+        name = host.lower()
+        name = name[1:].partition("]")[0] if name.startswith("[") else name.partition(":")[0].rstrip(".")
+        if name in self._allowed or name.endswith(".localhost"):
+            return True
+        try:
+            ipaddress.ip_address(name)  # no name that could resolve to us
+        except ValueError:
+            return False
+        return True
+
+    def _hint(self, scope: Scope) -> None:
+        if any(name == b"x-forwarded-for" for name, _ in scope["headers"]):
+            self._hinted = True
+            logger.warning(
+                "%s sends X-Forwarded-For, which is ignored: all its requests count as one client. "
+                "If it is your proxy, set KINBOARD_TRUSTED_PROXIES",
+                client_of(scope),
+            )
+
+
+def wrong_host(host: str) -> ProblemError:
+    """421 naming the host."""
+    detail = f"This service is not {shorten_text(host)}."
+    hint = "Use localhost or its IP address, or ask the operator to add the name to KINBOARD_ALLOWED_HOSTS."
+    return ProblemError(421, "wrong-host", detail, hint)

@@ -1,0 +1,197 @@
+"""Websockets as uvicorn speaks them, with a budget for frames and for waiting.
+
+uvicorn parses all that has arrived at once, answers each ping, and keeps every part of a message in fragments. A
+client could fill the event loop with frames that never become a message. Here every frame counts against a budget;
+when it is spent, the rest stays unread until there is more. A client that answers no ping, or takes
+nothing of what it is sent, is disconnected after ``KINBOARD_SEND_TIMEOUT``.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import struct
+import sys
+from typing import Any, Final
+
+from uvicorn._types import ASGIReceiveEvent
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.frames import CloseCode, Frame
+from websockets.http11 import Request
+
+from app.api.problems import ProblemError
+from app.service.guard import Outflow
+from app.service.http_protocol import GuardedConfig, raw_answer, require_shape
+from app.service.web.inspection import BURST, RATE, MessageLimit
+
+if sys.platform == "linux":
+    import fcntl
+    import termios
+
+CONTROL_COST: Final = 8.0  # of a frame that is no whole message, in messages
+PIECE: Final = 512  # bytes parsed before frames are counted: at most 85 frames
+MAX_FRAGMENTS: Final = 64  # of one message
+LINGER: Final = 5.0  # seconds between two looks whether a line is still slow
+
+
+require_shape(
+    WebSocketsSansIOProtocol,
+    *("connection_made", "connection_lost", "data_received", "resume_writing", "receive", "handle_connect"),
+    *("handle_text", "handle_bytes", "handle_cont", "handle_ping", "handle_pong", "handle_parser_exception"),
+    *("send_keepalive_ping", "keepalive_timeout", "conn", "queue", "frames", "transport"),
+    *("read_paused", "close_sent", "handshake_initiated", "handshake_complete", "pong_timer"),
+)
+
+
+class WebSocketProtocol(WebSocketsSansIOProtocol):
+    """One websocket connection."""
+
+    def __init__(self, config: GuardedConfig, *args: Any, **kwargs: Any) -> None:
+        super().__init__(config, *args, **kwargs)
+        self.guard = config.guard
+        self._host = "unknown"
+        self._outflow: Outflow
+        self._budget = MessageLimit(RATE, BURST)
+        self._unread = bytearray()  # received, not yet parsed
+        self._resting: asyncio.TimerHandle | None = None  # until there is budget again
+        self._resumed = False
+        self._queued = 0
+
+    # the connection
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        super().connection_made(transport)
+        self._host = self.client[0] if self.client else "unknown"
+        self._outflow = Outflow(self.transport, self.guard.send_timeout)
+        self.guard.add(self, self._host)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self.guard.remove(self, self._host)
+        self._unread.clear()
+        if self._resting is not None:
+            self._resting.cancel()
+        super().connection_lost(exc)
+
+    def resume_writing(self) -> None:
+        self._outflow.flowed = self._resumed = True
+        super().resume_writing()
+
+    def check(self, now: float) -> None:
+        """Disconnect a client that takes nothing of what it is sent."""
+        if self._outflow.stuck(now):
+            self._note_unread()
+            self.transport.abort()
+        elif self._unread:
+            self._parse_more()  # the closing handshake, after our close frame
+
+    # what the client sends
+
+    def data_received(self, data: bytes) -> None:
+        self._unread += data
+        self._parse_more()
+
+    async def receive(self) -> ASGIReceiveEvent:
+        message = await self.queue.get()
+        if self.queue.empty():
+            self._parse_more()
+        return message
+
+    def _parse_more(self) -> None:
+        """Parse what has arrived: until there is a message, or the budget is spent."""
+        while self._unread and self._is_reading():
+            piece = bytes(self._unread[:PIECE])
+            del self._unread[:PIECE]
+            super().data_received(piece)
+            if self.conn.handshake_exc is not None and not self.handshake_initiated:
+                self._reject("This is not a valid websocket handshake.")
+        if self.transport.is_closing():
+            return
+        paused = bool(self._unread) or not self._is_reading()
+        if paused != self.read_paused:
+            self.read_paused = paused
+            (self.transport.pause_reading if paused else self.transport.resume_reading)()
+
+    def _is_reading(self) -> bool:
+        """Whether another piece may be parsed now. After our close frame messages are dropped, unread."""
+        if self._resting is not None or self.transport.is_closing():
+            return False
+        return self.queue.empty() or self.close_sent
+
+    def _spend(self, cost: float) -> None:
+        wait = self._budget.spend(self.loop.time(), cost)
+        if wait > 0.0 and self._resting is None:
+            self._resting = self.loop.call_later(wait, self._rested)
+
+    def _rested(self) -> None:
+        self._resting = None
+        self._parse_more()
+
+    def handle_connect(self, event: Request) -> None:
+        offered = event.headers.get_all("Sec-WebSocket-Protocol")
+        if not event.path.isascii() or not all(value.isascii() for value in offered):
+            self.handshake_initiated = True
+            self._reject("The address and the subprotocols of a websocket are ASCII.")
+        else:
+            super().handle_connect(event)
+
+    def _reject(self, why: str) -> None:
+        """Answer 400 to a handshake."""
+        self.handshake_complete = self.close_sent = True
+        problem = ProblemError(400, "bad-request", why)
+        self.transport.write(raw_answer(problem, self.default_headers))
+        self.transport.close()
+
+    def handle_text(self, event: Frame) -> None:
+        self._spend(1.0 if event.fin else CONTROL_COST)
+        super().handle_text(event)
+
+    def handle_bytes(self, event: Frame) -> None:
+        self._spend(1.0 if event.fin else CONTROL_COST)
+        super().handle_bytes(event)
+
+    def handle_cont(self, event: Frame) -> None:
+        self._spend(CONTROL_COST)
+        super().handle_cont(event)
+        if len(self.frames) > MAX_FRAGMENTS:
+            self.conn.fail(CloseCode.MESSAGE_TOO_BIG, f"more than {MAX_FRAGMENTS} fragments")
+            self.handle_parser_exception()
+
+    def handle_ping(self) -> None:
+        self._spend(CONTROL_COST)
+        super().handle_ping()
+
+    def handle_pong(self, event: Frame) -> None:
+        self._spend(CONTROL_COST)
+        super().handle_pong(event)
+
+    # what the client reads
+
+    def send_keepalive_ping(self) -> None:
+        self._queued, self._resumed = self._unsent(), False
+        super().send_keepalive_ping()
+
+    def keepalive_timeout(self) -> None:
+        """Disconnect a client that has not answered a ping, unless the ping waits behind data that flows."""
+        unsent = self._unsent()
+        if unsent and (self._resumed or unsent < self._queued):
+            self._queued, self._resumed = unsent, False
+            self.pong_timer = self.loop.call_later(LINGER, self.keepalive_timeout)
+            return
+        self._note_unread()
+        super().keepalive_timeout()
+        if unsent:
+            self.transport.abort()
+
+    def _unsent(self) -> int:
+        """Bytes that the client has not acknowledged, as far as the system tells."""
+        waiting = self.transport.get_write_buffer_size()
+        if sys.platform != "linux":
+            return waiting
+        with contextlib.suppress(OSError):  # already closed
+            number = self.transport.get_extra_info("socket").fileno()
+            waiting += struct.unpack("i", fcntl.ioctl(number, termios.TIOCOUTQ, bytes(4)))[0]
+        return waiting
+
+    def _note_unread(self) -> None:
+        seconds = f"{self.guard.send_timeout:g} s (KINBOARD_SEND_TIMEOUT)"
+        self.guard.note("unread", f"{self._host} read nothing from a websocket for {seconds} and is disconnected")

@@ -1,0 +1,52 @@
+"""Who a client is, for limits per client: an IPv4 address, or an IPv6 network, within which a host may use any.
+
+Behind a proxy, all connections come from the proxy's address, and the header ``X-Forwarded-For`` names the client.
+Anybody can send that header, so it counts only if the connection comes from a proxy that the operator trusts.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import math
+from collections.abc import Iterable
+from functools import lru_cache
+
+from starlette.types import Scope
+
+
+@lru_cache(maxsize=4096)
+def network_of(host: str) -> str:
+    """The client at an address."""
+    try:
+        address = ipaddress.ip_address(host)
+    except ValueError:
+        return host
+    if address.version == 4:
+        return host
+    return str(address.ipv4_mapped or ipaddress.ip_network((address, 64), strict=False))
+
+
+def client_of(scope: Scope) -> str:
+    """The client of a request."""
+    return network_of(str((scope.get("client") or ("unknown", 0))[0])[:64])
+
+
+def share_of(most: int, share: float) -> int:
+    """How many of `most` places one client may take."""
+    return max(1, math.ceil(most * share))
+
+
+class Proxies:
+    """The proxies that may name the client. Addresses and networks, as in ``10.0.0.0/8``."""
+
+    def __init__(self, networks: Iterable[str]) -> None:
+        self._networks = tuple(ipaddress.ip_network(each, strict=False) for each in networks)
+
+    def __contains__(self, host: str) -> bool:
+        if not self._networks:
+            return False
+        try:
+            address = ipaddress.ip_address(host)
+        except ValueError:
+            return False
+        return any(address in network for network in self._networks)

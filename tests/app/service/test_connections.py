@@ -1,0 +1,351 @@
+"""Connections whose clients misbehave: too many, too slow, too much at once."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, suppress
+
+import pytest
+from attacks import ARM, GET, Victim, answer_to, closed, problem_in, victim
+from live_server import wait_for
+
+from app.api.body import UploadMemory
+from app.api.problems import ProblemError
+from app.service.guard import Guard
+from app.service.http_protocol import MAX_HEAD, MAX_PIPELINE
+from app.shared.settings import Settings
+
+
+@pytest.fixture(scope="module")
+def service() -> Iterator[Victim]:
+    with victim(
+        ready=True, KINBOARD_RECEIVE_TIMEOUT="1", KINBOARD_SEND_TIMEOUT="3", KINBOARD_MAX_CONNECTIONS="20"
+    ) as service:
+        yield service
+        assert "Traceback" not in service.log
+
+
+UPLOAD = f"POST {ARM}/fk HTTP/1.1\r\nHost: localhost\r\nContent-Length: 100000\r\n\r\n".encode()
+
+# -- requests --------------------------------------------------------------------------------------------------
+
+
+def test_requests_sent_ahead_are_answered_in_order(service):
+    paths = ["livez", "nothing", "livez", "static/landing.css", "livez"]
+    requests = b"".join(f"GET /{path} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode() for path in paths[:-1])
+    with service.connection() as connection:
+        connection.sendall(requests + b"GET /livez HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
+        answer = answer_to(connection)
+    assert [int(part[:3]) for part in answer.split(b"HTTP/1.1 ")[1:]] == [200, 404, 200, 200, 200]
+
+
+def test_a_pipeline_is_answered_up_to_a_bound(service):
+    with service.connection() as connection:
+        connection.sendall(GET * 2000)
+        answer = answer_to(connection)
+    assert 1 <= answer.count(b"HTTP/1.1 200 OK") <= MAX_PIPELINE + 1
+    assert b"connection: close" in answer
+    assert "requests ahead" in service.log
+
+
+def test_requests_sent_ahead_take_no_memory(service):
+    before = service.memory()
+    with service.connection() as connection:
+        connection.settimeout(0.5)
+        with pytest.raises(OSError):  # noqa: PT012 - which of them is the first not to be taken depends on the system
+            for _ in range(650):
+                connection.sendall(GET * 1000)
+            connection.sendall(GET)
+    assert service.memory() - before < 50e6
+
+
+@pytest.mark.parametrize(
+    ("sent", "status", "kind"),
+    [
+        (b"GET / HTTP/1.1\r\nHost: local", 408, "request-timeout"),
+        (UPLOAD + b"{", 408, "request-timeout"),
+        (b"GET / HTTP/1.1\r\n" + b"a: b\r\n" * 1000, 431, "head-too-large"),
+        (b"GET / HTTP/1.1\r\na: " + b"b" * 600_000, 431, "head-too-large"),
+        (b"GET /" + b"b" * 600_000, 431, "head-too-large"),
+        (b"nonsense\r\n\r\n", 400, "bad-request"),
+        (b"GET / HTTP/1.1\r\nHost: \x00\r\n\r\n", 400, "bad-request"),
+    ],
+    ids=["head", "body", "many fields", "long field", "long address", "no method", "bad field"],
+)  # fmt: skip
+def test_what_is_no_request_is_refused_in_time(service, sent, status, kind):
+    with service.connection() as connection:
+        try:
+            connection.sendall(sent)
+        except ConnectionError:
+            assert len(sent) > MAX_HEAD
+        answer = answer_to(connection)
+    if len(sent) > MAX_HEAD and not answer:
+        return  # reset by the service, which had not read everything
+    assert answer.startswith(b"HTTP/1.1 %d " % status)
+    assert problem_in(answer)["type"] == f"urn:kinboard:problem:{kind}"
+
+
+def test_a_body_that_trickles_is_cut_off(service):
+    with service.connection() as connection:
+        connection.sendall(UPLOAD)
+        began = time.monotonic()
+        with pytest.raises(OSError):  # noqa: PT012 - any send after the refusal may fail
+            for _ in range(300):
+                connection.sendall(b" ")
+                time.sleep(0.1)
+        assert time.monotonic() - began < 20
+
+
+@pytest.mark.parametrize("sent", [b"", b"\r\n", GET, GET + b"\r\n"], ids=["new", "blank", "used", "used, blank"])
+def test_idle_connections_are_closed(service, sent):
+    with service.connection() as connection:
+        connection.sendall(sent)
+        wait_for(lambda: closed(connection), 20)
+
+
+def test_a_pause_between_two_requests_is_no_offence(service):
+    with service.connection() as connection:
+        for _ in range(3):
+            connection.sendall(GET)
+            assert b"200 OK" in answer_to(connection, until_closed=False)
+            time.sleep(0.4)
+
+
+def test_http_1_0_gets_an_answer_without_chunks(service):
+    body = json.dumps({"target": [{"position": [0.0, 0.2, 0.1]}] * 40}).encode()
+    head = f"POST {ARM}/reachable HTTP/1.0\r\nContent-Type: application/json\r\nContent-Length: {len(body)}"
+    with service.connection() as connection:
+        connection.sendall(f"{head}\r\n\r\n".encode() + body)
+        head, _, body = answer_to(connection).partition(b"\r\n\r\n")
+    assert b"transfer-encoding" not in head
+    assert len(json.loads(body)["results"]) == 40
+
+
+# -- answers ---------------------------------------------------------------------------------------------------
+
+
+def test_an_answer_that_nobody_reads_ends(service):
+    request = f"GET {ARM}/workspace?n=20000000&format=bin HTTP/1.1\r\nHost: localhost\r\n\r\n"
+    with service.connection(receive=4096) as connection:
+        connection.sendall(request.encode())
+        assert connection.recv(1000).startswith(b"HTTP/1.1 200")
+        wait_for(lambda: "read nothing of an answer" in service.log, 30)
+        wait_for(lambda: closed(connection), 30)
+
+
+# -- clients that leave ----------------------------------------------------------------------------------------
+
+
+def test_an_upload_that_is_abandoned_is_no_failure_of_the_service(service):
+    counted = 'kinboard_requests_total{method="POST",route="/api/v1/robots/{robot_id}/fk",status="%s"}'
+    before = service.metric(counted % 499)
+    with service.connection() as connection:
+        connection.sendall(UPLOAD + b"{")
+    wait_for(lambda: service.metric(counted % 499) == before + 1, 10)
+    assert service.metric(counted % 500) == 0
+
+
+@pytest.mark.slow
+def test_stalled_uploads_hold_a_bounded_amount_of_memory():
+    """Thirty uploads of 7 MB that never end: before, they held 210 MB."""
+    with victim(KINBOARD_UPLOAD_MEMORY=str(40 << 20)) as service, ExitStack() as stack:
+        before = service.memory()
+        head = f"POST {ARM}/fk HTTP/1.1\r\nHost: localhost\r\nContent-Length: 8000000\r\n\r\n".encode()
+        uploads = [stack.enter_context(service.connection(f"127.0.1.{k}")) for k in range(1, 31)]
+        for upload in uploads:
+            with suppress(OSError):  # refused meanwhile
+                upload.sendall(head + bytes(7_000_000))
+        assert service.answers_after() < 10
+        assert service.memory() - before < 120e6
+        refused = [upload for upload in uploads if closed(upload)]
+        assert 20 <= len(refused) < 30
+
+
+def test_the_memory_of_uploads_is_shared_fairly():
+    memory = UploadMemory(100, 0.5)
+    with memory.body("a") as large:
+        large.grow(120)  # alone: accepted whatever its size
+        with memory.body("b") as other, pytest.raises(ProblemError) as refused:
+            other.grow(1)
+        assert refused.value.problem.type == "urn:kinboard:problem:busy"
+        assert refused.value.headers is not None
+        assert refused.value.headers["Connection"] == "close"
+    assert memory.held == 0
+    with memory.body("a") as first, memory.body("a") as second, memory.body("b") as third:
+        first.grow(40)
+        second.grow(10)
+        with pytest.raises(ProblemError):
+            second.grow(1)  # the share of one client
+        third.grow(50)
+        with pytest.raises(ProblemError):
+            first.grow(1)
+    assert memory.held == 0
+
+
+# -- websockets ------------------------------------------------------------------------------------------------
+
+
+def handshake(path: str, *fields: bytes) -> bytes:
+    lines = [f"GET {path} HTTP/1.1".encode(), b"Host: localhost", b"Upgrade: websocket", b"Connection: Upgrade"]
+    lines += [b"Sec-WebSocket-Version: 13", b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==", *fields]
+    return b"\r\n".join([*lines, b"", b""])
+
+
+def upgraded(service: Victim, path: str) -> socket.socket:
+    connection = service.connection()
+    connection.sendall(handshake(path))
+    assert answer_to(connection, until_closed=False).startswith(b"HTTP/1.1 101 ")
+    return connection
+
+
+STREAM = f"{ARM}/workspace/stream"
+LONG_STREAM = f"{STREAM}?n=50000000"
+
+
+def frame(opcode: int, data: bytes = b"", final: bool = True) -> bytes:
+    """A masked frame, with a mask that changes nothing."""
+    assert len(data) < 126
+    return bytes([final << 7 | opcode, 0x80 | len(data), 0, 0, 0, 0]) + data
+
+
+@pytest.mark.parametrize("path", ["/viewer", STREAM])
+@pytest.mark.parametrize(
+    ("field", "status"),
+    [
+        (b"Origin: http://[::1", 403),
+        (b"Origin: \xff", 403),
+        (b"Origin: http://", 403),
+        (b"Sec-WebSocket-Protocol: \xff\xfe", 400),
+        (b"Sec-WebSocket-Protocol: a, \xc3\xa9", 400),
+        (b"Sec-WebSocket-Key: short", 400),
+        (b"X-Long: " + b"x" * 20_000, 400),
+    ],
+    ids=["origin", "origin bytes", "empty origin", "protocol", "one protocol", "two keys", "long field"],
+)
+def test_a_handshake_that_cannot_be_read_is_refused(service, path, field, status):
+    with service.connection() as connection:
+        connection.sendall(handshake(path, field))
+        answer = answer_to(connection)
+    assert answer.startswith(b"HTTP/1.1 %d " % status), answer
+
+
+FLOODS = {
+    "pings": frame(9),
+    "pongs": frame(10),
+    "fragments": frame(0, final=False),
+    "long pings": frame(9, bytes(125)),
+}
+
+
+@pytest.mark.parametrize("flood", FLOODS)
+def test_a_flood_of_frames_is_not_read(service, flood):
+    """The buffers on the way fill up, and stay full. Without a budget, half a megabyte is read per second."""
+    frames = FLOODS[flood] * (65536 // len(FLOODS[flood]))
+    with upgraded(service, LONG_STREAM) as connection:
+        if flood == "fragments":
+            connection.sendall(frame(2, final=False))
+        connection.settimeout(0.5)
+        with suppress(OSError):  # blocked, or refused: too many fragments for one message
+            while True:
+                connection.send(frames)
+        more = 0
+        end = time.monotonic() + 1.5
+        while time.monotonic() < end:
+            try:
+                more += connection.send(frames)
+            except TimeoutError:
+                continue
+            except OSError:
+                break  # too many fragments for one message, or too long without reading what it is sent
+        assert more < 200_000
+        assert service.answers_after() < 10
+
+
+def test_a_message_in_too_many_fragments_is_refused(service):
+    with upgraded(service, LONG_STREAM) as connection:
+        connection.sendall(frame(2, b"x", final=False))
+        with pytest.raises(OSError):  # noqa: PT012 - any send after the refusal may fail
+            for _ in range(600):
+                connection.sendall(frame(0, b"x", final=False))
+                time.sleep(0.04)
+                if closed(connection):
+                    raise ConnectionError
+
+
+def test_a_ping_is_answered_and_a_message_in_fragments_is_read(service):
+    with upgraded(service, LONG_STREAM) as connection:
+        connection.sendall(frame(9, b"hello"))
+        received = b""
+        while b"\x8a\x05hello" not in received:
+            received += connection.recv(1 << 20)
+        connection.sendall(frame(1, b'{"can', final=False) + frame(0, b'cel"', final=False) + frame(0, b": true}"))
+        while b"cancelled" not in received:
+            received = received[-20:] + connection.recv(1 << 20)
+
+
+def test_a_client_that_does_not_read_its_websocket_is_disconnected(service):
+    before = service.metric('kinboard_refused_connections_total{why="unread"}')
+    with service.connection(receive=4096) as connection:
+        connection.sendall(handshake(LONG_STREAM))
+        assert connection.recv(12) == b"HTTP/1.1 101"
+        wait_for(lambda: service.metric('kinboard_refused_connections_total{why="unread"}') > before, 30)
+        wait_for(lambda: closed(connection), 30)
+    assert "read nothing from a websocket" in service.log
+
+
+# -- how many --------------------------------------------------------------------------------------------------
+
+
+def test_one_client_gets_its_share_of_the_connections_and_others_the_rest(service):
+    wait_for(lambda: service.metric("kinboard_connections") == 1, 30)
+    with ExitStack() as stack:
+        for _ in range(15):
+            stack.enter_context(service.connection("127.0.0.2"))
+        with service.connection("127.0.0.2") as one_more:
+            answer = answer_to(one_more)
+        assert answer.startswith(b"HTTP/1.1 503 ")
+        assert "127.0.0.2 has 15 connections" in str(problem_in(answer)["detail"])
+        assert service.answers_after() < 10
+        for _ in range(5):
+            stack.enter_context(service.connection("127.0.0.3"))
+        with service.connection("127.0.0.4") as too_many:
+            assert "20 connections" in str(problem_in(answer_to(too_many))["detail"])
+    assert "KINBOARD_CLIENT_SHARE" in service.log
+    wait_for(lambda: "KINBOARD_MAX_CONNECTIONS" in service.log)
+    wait_for(lambda: service.answers_after() < 10, 10)
+
+
+def test_connections_beyond_the_open_files_are_refused():
+    guard = Guard(Settings(), files=100)
+    assert guard.refusal("192.0.2.1", 80) is None
+
+    async def refused() -> str | None:
+        return guard.refusal("192.0.2.1", 90)
+
+    assert "100 files" in str(asyncio.run(refused()))
+
+
+@pytest.mark.slow
+def test_a_small_limit_of_open_files_is_reported_and_survived():
+    with victim(files=64) as service, ExitStack() as stack:
+        wait_for(lambda: "only 64 files" in service.log)
+        connections = [stack.enter_context(service.connection()) for _ in range(80)]
+        answers = []
+        for connection in connections:
+            connection.settimeout(0.05)
+            try:
+                answers.append(connection.recv(65536))
+            except TimeoutError:
+                answers.append(None)
+        refused = [answer for answer in answers if answer]
+        assert len(refused) > 20
+        assert all("ulimit -n" in str(problem_in(answer)["detail"]) for answer in refused)
+        assert "ulimit -n" in service.log
+        for connection in connections:
+            connection.close()
+        wait_for(lambda: service.answers_after() < 10, 10)
+        assert "Traceback" not in service.log
