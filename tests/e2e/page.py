@@ -27,6 +27,8 @@ HTMLCanvasElement.prototype.getContext = function (kind, options) {
 };
 Object.defineProperty(window, "devicePixelRatio", { get: () => 0.5 });
 """
+# As after the first minute: the hints are closed.
+NO_HINTS = 'localStorage.setItem("kinboard-hints", "drag joint learn");'
 
 
 class Tab:
@@ -36,7 +38,7 @@ class Tab:
         self.page: Page = browser.new_page(
             viewport={"width": width, "height": height}, has_touch=touch, is_mobile=touch
         )
-        self.page.add_init_script(PLAIN)
+        self.page.add_init_script(PLAIN + NO_HINTS)
         self.page.set_default_timeout(WAIT)
         expect.set_options(timeout=WAIT)
         self.errors: list[str] = []

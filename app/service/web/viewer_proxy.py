@@ -58,8 +58,8 @@ _UNSENDABLE = {1005: 1000, 1006: 1011, 1015: 1011}
 
 # A tab's memory, and what viser's page lacks. Relative, so that it holds behind any path prefix.
 _OURS = b"".join(
-    [b'<link rel="stylesheet" href="../static/%s.css">' % name for name in (b"viewer", b"layout")]
-    + [b'<script src="../static/%s.js"></script>' % name for name in (b"viewer", b"layout", b"page")]
+    [b'<link rel="stylesheet" href="../static/%s.css">' % name for name in (b"viewer", b"layout", b"hints")]
+    + [b'<script src="../static/%s.js"></script>' % name for name in (b"viewer", b"layout", b"page", b"hints")]
 )
 
 

@@ -31,6 +31,7 @@ from app.viewer.session.posture import PosturePanel
 from app.viewer.session.services import Services
 from app.viewer.session.worker import Worker
 from app.viewer.tabs import TABS
+from app.viewer.views.templates import render
 from kin import IKOptions, IKResult, Robot, Task
 from kin.transforms import Array
 from kin.units import DEFAULT_UNITS, Units
@@ -315,6 +316,9 @@ class VisitorPage(Worker):
                     self._tabs.append(tab(self))
             self._persistence.restore(saved)
             self.arm.draw(fresh=False)
+            # For static/hints.js: where the tool is in the picture.
+            x, y = self.camera.place(kin.fk(self.robot, self.goal)[:3, 3]).tolist()
+            gui.add_html(render("panel/hints", x=f"{x:.3f}", y=f"{y:.3f}"))
             self._persistence.begin(self.panel.share)
         self.client.flush()
 

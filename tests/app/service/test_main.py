@@ -179,7 +179,13 @@ def test_every_built_in_arm_has_a_thumbnail():
 def test_the_stored_state_is_loaded_before_the_script_of_viser(client):
     html = client.get("/viewer/").text
     ours = re.findall(r'(?:src|href)="\.\./(static/[a-z]+\.(?:js|css))"', html)
-    assert {"static/viewer.js", "static/layout.js", "static/page.js", "static/viewer.css"} <= set(ours)
+    assert {
+        "static/viewer.js",
+        "static/layout.js",
+        "static/page.js",
+        "static/hints.js",
+        "static/viewer.css",
+    } <= set(ours)
     for file in ours:
         assert html.index(file) < html.index("<script data-p")
         assert client.get(f"/{file}").status_code == 200

@@ -1,0 +1,102 @@
+"use strict";
+// The first minute: three short hints beside what they are about. Each goes away when it is followed or closed, and
+// does not come back in this browser. Where the tool is in the picture, the service says in [data-hints].
+(() => {
+  const STORE = "kinboard-hints";
+  const HINTS = [
+    { key: "drag", text: "Drag an arrow: the arm follows the tool.", target: tool },
+    { key: "joint", text: "Or move a joint.", target: slider },
+    { key: "learn", text: "Questions? Lessons explain what you see.", target: lessons },
+  ];
+  const NARROW = 580; // pixels; below, one hint at a time
+
+  let done = "";
+  try { done = localStorage.getItem(STORE) ?? ""; } catch { return; } // cannot be remembered: no hints
+  const open = new Map(HINTS.filter((hint) => !done.split(" ").includes(hint.key)).map((hint) => [hint.key, hint]));
+  if (!open.size) return;
+
+  const visible = (box) => box && box.width > 0 && box.top >= 0 && box.bottom <= innerHeight && box.left < innerWidth;
+  const panel = () => document.querySelector('[role="tab"]')?.closest(".mantine-ScrollArea-viewport")?.getBoundingClientRect();
+
+  function tool() {
+    const place = document.querySelector("[data-hints]")?.dataset.hints.split(" ").map(Number);
+    const area = document.querySelector("canvas[data-engine]")?.getBoundingClientRect();
+    if (!place || !area) return null;
+    const unit = Math.min(area.width, area.height) / 2;
+    return new DOMRect(area.x + area.width / 2 + place[0] * unit, area.y + area.height / 2 - place[1] * unit, 1, 1);
+  }
+
+  function slider() {
+    const thumbs = [...document.querySelectorAll('[role="slider"]')].map((node) => node.getBoundingClientRect());
+    const seen = thumbs.filter(visible);
+    return innerWidth < NARROW ? seen[0] : seen[Math.min(2, seen.length - 1)];
+  }
+
+  function lessons() {
+    const tab = [...document.querySelectorAll('[role="tab"]')].find((node) => node.textContent.trim() === "Learn");
+    return tab?.getBoundingClientRect();
+  }
+
+  function close(key) {
+    if (!open.delete(key)) return;
+    document.querySelector(`.kb-hint[data-hint="${key}"]`)?.remove();
+    try { localStorage.setItem(STORE, HINTS.filter((hint) => !open.has(hint.key)).map((hint) => hint.key).join(" ")); } catch { /* as above */ }
+    if (open.size) draw();
+    else clearInterval(timer);
+  }
+
+  function bubble(hint) {
+    const node = document.createElement("div");
+    node.className = "kb-hint";
+    node.dataset.hint = hint.key;
+    node.setAttribute("role", "note");
+    const text = document.createElement("span");
+    text.textContent = hint.text;
+    const button = document.createElement("button");
+    button.type = "button";
+    button.textContent = "×";
+    button.setAttribute("aria-label", `Close the hint: ${hint.text}`);
+    button.addEventListener("click", () => close(hint.key));
+    node.append(text, button);
+    document.body.append(node);
+    return node;
+  }
+
+  /** Beside the tool; left of a docked panel; above what it is about on a phone. */
+  function put(node, box, key) {
+    const { width, height } = node.getBoundingClientRect();
+    const side = panel();
+    const above = key !== "drag" && (innerWidth < NARROW || !side || side.left < width + 40);
+    let x = box.left - width - 18;
+    let y = box.top + box.height / 2 - height / 2;
+    if (key === "drag") [x, y] = [x - 60, y + 40];
+    else if (!above) x = side.left - width - 18;
+    if (above || (key === "drag" && x < 8)) [x, y] = [box.left + box.width / 2 - width / 2, box.top - height - (key === "drag" ? -78 : 14)];
+    node.dataset.arrow = key === "drag" ? "none" : above ? "down" : "right";
+    node.style.left = `${Math.min(Math.max(x, 8), innerWidth - width - 8)}px`;
+    node.style.top = `${Math.min(Math.max(y, 8), innerHeight - height - 8)}px`;
+    node.style.setProperty("--kb-tip", `${Math.min(Math.max(box.left + box.width / 2 - parseFloat(node.style.left), 16), width - 16)}px`);
+  }
+
+  function draw() {
+    if (document.querySelector("[data-hints]") === null) return;
+    let shown = 0;
+    for (const hint of open.values()) {
+      const box = hint.target();
+      let node = document.querySelector(`.kb-hint[data-hint="${hint.key}"]`);
+      if (!visible(box) || (innerWidth < NARROW && shown)) { node?.remove(); continue; }
+      node ??= bubble(hint);
+      put(node, box, hint.key);
+      shown += 1;
+    }
+  }
+
+  const timer = setInterval(draw, 400);
+  addEventListener("resize", draw);
+  addEventListener("pointerdown", (event) => {
+    if (!(event.target instanceof Element)) return;
+    if (event.target.matches("canvas")) close("drag");
+    else if (event.target.closest(".mantine-Slider-root")) close("joint");
+    else if (event.target.closest('[role="tab"]')?.textContent.trim() === "Learn") close("learn");
+  }, true);
+})();

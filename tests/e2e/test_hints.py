@@ -1,0 +1,44 @@
+"""The hints of the first minute: three, each closed by its button or by following it, and never again."""
+
+from __future__ import annotations
+
+import pytest
+from page import PLAIN, WAIT
+from playwright.sync_api import Browser, expect
+from test_screens import problems
+
+pytestmark = pytest.mark.browser
+
+
+def test_hints_come_once(browser: Browser, address: str) -> None:
+    page = browser.new_page(viewport={"width": 1280, "height": 720})
+    page.add_init_script(PLAIN)
+    page.set_default_timeout(WAIT)
+    page.goto(address + "viewer/")
+    hints = page.locator(".kb-hint")
+    expect(hints).to_have_count(3, timeout=WAIT)
+    page.locator("#webgl-software-rendering button").click()
+    boxes = {hint.get_attribute("data-hint"): hint.bounding_box() for hint in hints.all()}
+    area = page.locator("canvas[data-engine]").bounding_box()
+    assert area is not None
+    for name, box in boxes.items():
+        assert box is not None
+        assert box["x"] >= 0, name
+        assert box["x"] + box["width"] <= area["x"] + area["width"], f"the hint {name} covers the panel"
+    assert problems(page) == []
+
+    page.get_by_role("button", name="Close the hint: Questions?").click()
+    expect(hints).to_have_count(2)
+    thumb = page.get_by_role("slider").first.bounding_box()
+    assert thumb is not None
+    page.mouse.click(thumb["x"] + thumb["width"] / 2, thumb["y"] + thumb["height"] / 2)
+    expect(hints).to_have_count(1)
+    page.mouse.click(area["x"] + 0.7 * area["width"], area["y"] + 0.8 * area["height"])
+    expect(hints).to_have_count(0)
+
+    page.reload()
+    expect(page.locator("[data-hints]")).to_have_count(1, timeout=WAIT)
+    expect(page.get_by_role("slider").first).to_be_visible(timeout=WAIT)
+    page.wait_for_timeout(1000)  # a hint would be drawn within 0.4 s
+    assert hints.count() == 0
+    page.close()
