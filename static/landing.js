@@ -35,7 +35,7 @@ async function openViewerWhenReady() {
   viewer.title = "Interactive 3-D view of the arm, with its controls";
   viewer.allow = "fullscreen; clipboard-write";
   byId("frame").append(viewer);
-  show("ready", "This arm is yours; every visitor has their own");
+  show("ready", "This arm is yours alone");
   byId("placeholder").textContent = "Loading the viewer…";
 }
 

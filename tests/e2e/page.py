@@ -45,6 +45,10 @@ class Tab:
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.goto(address + "viewer/")
         expect(self.status).to_have_attribute("data-status", "hand")
+        self.dismiss_notice()
+
+    def dismiss_notice(self) -> None:
+        """Close viser's notice about software rendering, which a phone does not show."""
         notice = self.page.locator("#webgl-software-rendering button")
         expect(notice).to_have_count(1)
         if notice.is_visible():

@@ -10,7 +10,7 @@ import viser
 
 from app.viewer.views.templates import render
 from kin import IKResult, Robot
-from kin.ik.details import OrientationNotMet, OutsideLimits, RollError, RotationError, Solved
+from kin.ik.details import OrientationNotMet, OutOfReach, OutsideLimits, RollError, RotationError, Solved
 from kin.units import Units
 
 Kind = Literal["reached", "compromise", "limits", "orientation", "unreachable", "hand", "error"]
@@ -40,6 +40,23 @@ def notice(result: IKResult, units: Units) -> Notice:
     """The result for a target as a message."""
     explanation = result.explain(units)
     return Notice(_kind(result), explanation.title, explanation.detail)
+
+
+def key_number(result: IKResult, units: Units) -> str:
+    """What is missing to the target, in a few words; empty if it is reached."""
+    match result.details:
+        case OutOfReach(distance) if distance > 0.0:
+            return f"{units.distance(distance)} too far"
+        case RollError(_, error):
+            return f"roll {units.angle(error)} off"
+        case RotationError(_, error):
+            return f"orientation {units.angle(error)} off"
+        case OutsideLimits(_, (first, *_)):
+            limit = units.of(first.kind == "revolute").text(first.limit)
+            return f"joint {first.joint + 1}: {'locked at' if first.locked else 'limit'} {limit}"
+        case OrientationNotMet(nearest_rotation=angle) if angle is not None:
+            return f"orientation {units.angle(angle)} off"
+    return ""
 
 
 def introduction(robot: Robot) -> Notice:

@@ -19,10 +19,11 @@ from app.viewer.feature import Feature
 from app.viewer.lessons import LESSONS
 from app.viewer.panel.joints import JointSliders, lock_notice
 from app.viewer.panel.layout import PANEL_WIDTH, Panel
-from app.viewer.panel.status import Notice, StatusLine
+from app.viewer.panel.status import Notice, StatusLine, key_number
 from app.viewer.panel.view import ViewState, configure_theme
 from app.viewer.scene.camera import Sphere, VisitorCamera
 from app.viewer.scene.clearance import clearance
+from app.viewer.scene.key_number import KeyNumber
 from app.viewer.session.actions import BY_HAND, Actions
 from app.viewer.session.controller import ArmController
 from app.viewer.session.lessons import LessonChoice
@@ -85,6 +86,7 @@ class VisitorPage(Worker):
         self.panel: Panel
         self.status: StatusLine
         self.sliders: JointSliders
+        self._key_number: KeyNumber
         self._actions = Actions(self)
 
     # Stage: what features may use
@@ -224,6 +226,9 @@ class VisitorPage(Worker):
     def on_result(self, result: IKResult) -> None:
         self.posture.use_result(result)
         self.status.show_result(result, self.units)
+        if self.arm.target is not None:
+            target, radius = self.arm.target[:3, 3], self.arm.scene.body.radius
+            self._key_number.show(key_number(result, self.units), target, radius)
         self.for_features(lambda feature: feature.on_result(result))
 
     def on_request(self) -> None:
@@ -260,6 +265,8 @@ class VisitorPage(Worker):
                 # Guarded one by one, so that one bad value does not discard the others.
                 self._guard(lambda key=key, value=value: self._actions.handle(key, value))  # type: ignore[misc]
             self.arm.draw(fresh=bool(batch))
+            if self.arm.target is None:
+                self._key_number.hide()
             now = time.perf_counter()
             self.camera.tick(now)
             for feature in self.features:
@@ -299,6 +306,7 @@ class VisitorPage(Worker):
             if self.dark:
                 configure_theme(gui, True)
             self.camera = VisitorCamera(self.client, self.post)
+            self._key_number = KeyNumber(self.client.scene)
             gui.main_panel.dock_right()
             gui.main_panel.set_width(PANEL_WIDTH)
             titles = [tab.title for tab in TABS]

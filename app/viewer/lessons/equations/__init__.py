@@ -34,7 +34,10 @@ class EquationsLesson(Feature):
 
     key = "equations"
     title = "Equations"
-    about = "The chapter's equations, their corrections, and the error of each misprint."
+    about = (
+        "The equations of the arm. Two arms come from a book chapter: its equations as printed and corrected, and "
+        "the error of each misprint."
+    )
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)

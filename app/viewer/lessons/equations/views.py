@@ -41,7 +41,10 @@ def summary(book: Book) -> str:
         return "Derived from the DH table, and checked against forward kinematics."
     wrong = [f"({e.number})" for e in book.equations if e.verdict == "misprinted"]
     read = sum(e.correct is not None for e in book.equations)
-    return f"{len(wrong)} of the chapter's {read} readable equations are misprinted: {', '.join(wrong)}."
+    return (
+        f"This arm comes from a book chapter that prints its equations. {len(wrong)} of the {read} readable ones "
+        f"are misprinted: {', '.join(wrong)}."
+    )
 
 
 def equation_html(book: Book, equation: Equation) -> str:

@@ -81,6 +81,7 @@ class VelocityLesson(Feature):
         self._scales: dict[Ellipsoid, float]
         gui = stage.client.gui
         self._warning = gui.add_html("")
+        self._legend = gui.add_html("")
         self._frames = gui.add_dropdown("Frame", tuple(FRAMES), initial_value="Base", hint=FRAME_HINT)
         listen(self._frames, self.post, "frame")
         with gui.add_folder("Jacobian") as self._column_folder:
@@ -325,6 +326,7 @@ class VelocityLesson(Feature):
         self._drawing.show_lost(twists, state == "at")
         words = [views.lost_words(twist, R_base_tool, slowest=state == "near") for twist in twists]
         update_html(self._warning, views.warning_html(robot, found, stage.units, words))
+        update_html(self._legend, views.legend_html(self._kind, self._chosen, state, twists))
         update_html(self._others, views.others_html(robot, found, stage.units))
 
 

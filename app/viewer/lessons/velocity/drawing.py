@@ -70,7 +70,7 @@ class Drawing:
             scene.add_arrows(
                 f"{root}/{name}",
                 np.zeros((1, 2, 3), np.float32),
-                color,
+                arrow_color(color),
                 shaft_radius=0.011 * r,
                 head_radius=0.028 * r,
                 head_length=0.07 * r,
@@ -153,7 +153,7 @@ class Drawing:
         _set_visible(self._lost, bool(arrows))
         if arrows:
             self._lost.points = np.array(arrows, np.float32)
-            self._lost.colors = np.array(color, np.uint8)
+            self._lost.colors = np.array(arrow_color(color), np.uint8)
         for k, node in enumerate(self._lost_turns):
             shown = k < len(twists) and float(np.linalg.norm(twists[k, 3:])) > 1e-3
             _set_visible(node, shown)
@@ -164,6 +164,12 @@ class Drawing:
     def remove(self) -> None:
         """Remove everything from the scene."""
         self._root.remove()
+
+
+def arrow_color(color: tuple[int, int, int]) -> tuple[int, int, int]:
+    """The colour to send for arrows that look like a mesh of `color`: the scene applies gamma to arrows."""
+    red, green, blue = (round(255 * ((v / 255 + 0.055) / 1.055) ** 2.4) for v in color)
+    return red, green, blue
 
 
 def sides(tips: Array, towards: Array) -> Array:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from markupsafe import Markup
 
+from app.viewer.lessons.velocity.drawing import COLORS, COLUMN, LOST, SLOW
 from app.viewer.lessons.velocity.rates import Ellipsoid, State, TaskRates, condition, real, state_of
 from app.viewer.views.mathml import ident, sub, text
 from app.viewer.views.mathml import math as formula
@@ -164,7 +165,33 @@ def axis_name(direction: Array, R_base_tool: Array) -> str:
     return f"({', '.join(fixed(float(x), 2) for x in d)})"
 
 
+# Legend
+
+
+def legend_html(kind: Ellipsoid | None, chosen: int | None, state: State, twists: Array) -> str:
+    """What is drawn at the tool: mark, colour and meaning of each drawing; `twists` ``(k, 6)`` are drawn too."""
+    items = []
+    if kind is not None:
+        items.append(("ellipsoid", COLORS[kind], LEGEND[kind]))
+    if chosen is not None:
+        items.append(("arrow", COLUMN, f"column of joint {chosen + 1}: motion of the tool, and its turning"))
+    color, word = (LOST, "impossible here") if state == "at" else (SLOW, "slowest here")
+    if len(twists) and (np.linalg.norm(twists[:, :3], axis=1) > 1e-3).any():
+        items.append(("arrow", color, f"motion that is {word}"))
+    if len(twists) and (np.linalg.norm(twists[:, 3:], axis=1) > 1e-3).any():
+        items.append(("ring", color, f"rotation that is {word}"))
+    return render("velocity/legend", items=items)
+
+
 # Ellipsoid and singular values
+
+
+LEGEND: dict[Ellipsoid, str] = {
+    "velocity": "possible velocities of the tool point",
+    "turning": "possible angular velocities of the tool",
+    "force": "forces that the joints can hold",
+    "moment": "moments that the joints can hold",
+}
 
 
 WORDS: dict[Ellipsoid, tuple[str, str]] = {
