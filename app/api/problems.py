@@ -46,6 +46,7 @@ KINDS = {
     "invalid-input": "The request contains an invalid value",
     "request-timeout": "The request did not arrive in time",
     "head-too-large": "The head of the request is too large",
+    "bad-range": "The requested range is invalid",
     "wrong-host": "The request is for another host",
     "busy": "The service is busy",
     "too-slow": "The computation takes too long",

@@ -18,6 +18,8 @@ from fastapi import Depends, Request
 from starlette.concurrency import run_in_threadpool
 
 from app.api.problems import ProblemError
+from app.shared.clients import client_of
+from app.shared.places import Place, Places
 
 T = TypeVar("T")
 RETRY_AFTER = 2  # seconds
@@ -52,26 +54,26 @@ class ComputeSlots:
     Args:
         most: how many requests compute at a time.
         seconds: time limit of each, and the longest time to wait for a slot.
+        share: of one client.
     """
 
-    def __init__(self, most: int, seconds: float) -> None:
+    def __init__(self, most: int, seconds: float, share: float = 1.0) -> None:
         self.seconds = seconds
         self.closed = False
-        self._most = most
-        self._slots = asyncio.Semaphore(most)
+        self._places = Places(most, share)
 
     @asynccontextmanager
-    async def slot(self) -> AsyncIterator[Deadline]:
+    async def slot(self, request: Request) -> AsyncIterator[Deadline]:
         """A slot for as long as the context lasts, and its deadline; raises 503 if none becomes free in time."""
+        client = client_of(request.scope)
         try:
             async with asyncio.timeout(self.seconds):
-                await self._slots.acquire()
+                await self._places.wait(client)
         except TimeoutError:
-            raise busy(f"{self._most} requests are being computed, which is the maximum.") from None
-        try:
-            yield Deadline(self)
-        finally:
-            self._slots.release()
+            detail = f"{self._places.taken} requests are being computed, which is the maximum or your share of it."
+            raise busy(detail) from None
+        with Place.held(self._places, client) as place:
+            yield Deadline(self, place)
 
     def close(self) -> None:
         """End all computations that check their deadline, and all waiting."""
@@ -91,9 +93,10 @@ class ComputeSlots:
 
 
 class Deadline:
-    """The time limit of one request."""
+    """The time limit of one request, and its slot if it has one."""
 
-    def __init__(self, work: ComputeSlots) -> None:
+    def __init__(self, work: ComputeSlots, place: Place | None = None) -> None:
+        self.place = place
         self._work = work
         self._ends = time.monotonic() + work.seconds
 
@@ -119,14 +122,14 @@ def compute_slots(request: Request) -> ComputeSlots:
 
 async def computed(request: Request, answer: Callable[[Deadline], T]) -> T:
     """Result of `answer`, computed in a thread; raises 503 if there is no slot, or after the deadline."""
-    async with compute_slots(request).slot() as deadline:
+    async with compute_slots(request).slot(request) as deadline:
         return await run_in_threadpool(answer, deadline)
 
 
 async def _deadline(request: Request) -> AsyncIterator[Deadline]:
-    async with compute_slots(request).slot() as deadline:
+    async with compute_slots(request).slot(request) as deadline:
         yield deadline
 
 
-# For responses that are sent while they are computed: the slot is kept until the last byte has been sent.
+# For responses that are sent while they are computed: the slot is kept while the client reads.
 DeadlineDep = Annotated[Deadline, Depends(_deadline)]

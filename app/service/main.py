@@ -43,6 +43,7 @@ from app.service.web.viewer_proxy import ViewerBridge
 from app.service.workers import supervise
 from app.shared.clouds import Clouds
 from app.shared.maps import Maps
+from app.shared.places import Places
 from app.shared.security import SecurityHeaders
 from app.shared.settings import Settings
 from app.shared.store import Store
@@ -70,9 +71,9 @@ def create_app(
         RobotFileError: a file in the operator's folder of robots is invalid.
     """
     store = store or Store(settings.robots)
-    bridge = ViewerBridge(settings.allowed_origins, settings.max_visitors)
+    bridge = ViewerBridge(settings.allowed_origins, Places(settings.max_visitors, settings.client_share))
     clouds, maps, summaries = Clouds(settings.cloud_memory), Maps(), Summaries()
-    work = ComputeSlots(settings.max_requests, settings.time_budget)
+    work = ComputeSlots(settings.max_requests, settings.time_budget, settings.client_share)
     startup = Startup(settings, store, clouds, maps, summaries, bridge, on_ready)
 
     @asynccontextmanager
@@ -99,7 +100,7 @@ def create_app(
     state = app.state
     state.store, state.settings, state.startup = store, settings, startup
     state.clouds, state.maps, state.summaries = clouds, maps, summaries
-    state.streams, state.compute = StreamLimit(settings.max_streams), work
+    state.streams, state.compute = StreamLimit(settings.max_streams, settings.client_share), work
     state.uploads = UploadMemory(max(settings.upload_memory, settings.max_body), settings.client_share)
     install_problem_handlers(app)
     complete_document(app, store, settings)

@@ -15,6 +15,7 @@ from app.api.schemas import RobotId, refusals, reply, robot_of, settings_of
 from app.api.work import Deadline, compute_slots
 from app.api.workspace.query import RegionQuery
 from app.shared.answers.capability import CapabilityMapAnswer, capability_map_answer
+from app.shared.clients import client_of
 from app.shared.maps import MapRequest, Maps
 
 router = versioned("workspace")
@@ -64,7 +65,7 @@ async def capability(
     robot = robot_of(request, robot_id)
     wanted = MapRequest(robot, query.resolution, int(query.directions), query.constraints(robot))
     maps: Maps = request.app.state.maps
-    with request.app.state.streams.slot():
+    with request.app.state.streams.slot(client_of(request.scope)):
         deadline, reader = Deadline(compute_slots(request)), maps.subscribe(wanted)
         try:
             answer = asyncio.wrap_future(reader.future)

@@ -93,7 +93,8 @@ def reachable(
         return reply(_answers(robot, body, targets)[0])
     # Invalid options show in the first piece, while the status of the response can still be set.
     pieces = _pieces(robot, body, targets, deadline)
-    return ComputedResponse(_resumed(next(pieces), pieces), "reachable", "application/json")
+    pieces = _resumed(next(pieces), pieces)
+    return ComputedResponse(pieces, "reachable", "application/json", place=deadline.place)
 
 
 def _answers(robot: Robot, body: ReachableRequest, targets: list[tuple[Task, Array]]) -> list[ReachableAnswer]:

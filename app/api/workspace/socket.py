@@ -18,8 +18,10 @@ from app.api.problems import Problem, ProblemError, unknown_robot
 from app.api.workspace.query import read_cloud_query
 from app.api.workspace.streaming import ThreadedGenerator
 from app.exports.formats import slices, table_of
+from app.shared.clients import client_of
 from app.shared.clouds import Cloud
 from app.shared.metrics import STREAMED
+from app.shared.places import Place
 from app.shared.security import origin_allowed
 from kin import UnknownRobotError
 
@@ -49,8 +51,8 @@ async def stream(visitor: WebSocket, robot_id: str) -> None:
     try:
         query = read_cloud_query(visitor.query_params)
         cloud = query.cloud(state.store.get(robot_id), state.settings)
-        with state.streams.slot():
-            ending = await _carry(visitor, cloud, query.q)
+        with state.streams.slot(client_of(visitor.scope)) as place:
+            ending = await _carry(visitor, place, cloud, query.q)
     except UnknownRobotError as error:
         ending = await _refuse(visitor, unknown_robot(error).problem)
     except ProblemError as error:
@@ -63,9 +65,9 @@ async def stream(visitor: WebSocket, robot_id: str) -> None:
             await visitor.close(*ending)
 
 
-async def _carry(visitor: WebSocket, cloud: Cloud, with_q: bool) -> _Ending:
+async def _carry(visitor: WebSocket, place: Place, cloud: Cloud, with_q: bool) -> _Ending:
     """Send the cloud until it is complete or the client cancels."""
-    tasks = asyncio.create_task(_send(visitor, cloud, with_q)), asyncio.create_task(_listen(visitor))
+    tasks = asyncio.create_task(_send(visitor, place, cloud, with_q)), asyncio.create_task(_listen(visitor))
     try:
         ended, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
     finally:
@@ -75,15 +77,16 @@ async def _carry(visitor: WebSocket, cloud: Cloud, with_q: bool) -> _Ending:
     return ended.pop().result()
 
 
-async def _send(visitor: WebSocket, cloud: Cloud, with_q: bool) -> _Ending:
+async def _send(visitor: WebSocket, place: Place, cloud: Cloud, with_q: bool) -> _Ending:
     table = table_of(cloud, with_q)
     chunks = ThreadedGenerator(slices(visitor.app.state.clouds, cloud, with_q))
     begun = reported = time.perf_counter()
+    send_bytes = place.lent(visitor.send_bytes)
     try:
         await _send_text(visitor, type="start", total=table.n, columns=table.columns)
         while (chunk := await run_in_threadpool(chunks.take)) is not None:
             rows = table.single(chunk).tobytes()
-            await visitor.send_bytes(rows)
+            await send_bytes(rows)
             STREAMED.labels("workspace").inc(len(rows))
             now = time.perf_counter()
             if chunk.done == chunk.total or now - reported >= PROGRESS_EVERY:

@@ -13,31 +13,46 @@ from starlette.responses import StreamingResponse
 from starlette.types import Receive, Scope, Send
 
 from app.api.work import busy
+from app.shared.clients import client_of
 from app.shared.metrics import STREAMED
+from app.shared.places import Place, Places
 
 logger = logging.getLogger("kinboard.workspace")
 T = TypeVar("T")
 
 
 class StreamLimit:
-    """Limits the number of concurrent streams. Used by the event loop only, so it needs no lock."""
+    """Limits the number of concurrent streams. Used by the event loop only, so it needs no lock.
 
-    def __init__(self, most: int) -> None:
-        self._most = most
-        self.open = 0
+    A stream whose client does not read gives its place to another, so more may be open than are being sent.
+
+    Args:
+        most: how many are sent at a time.
+        share: of one client.
+    """
+
+    OPEN = 4  # streams may be open for each that is sent
+
+    def __init__(self, most: int, share: float = 1.0) -> None:
+        self._sent = Places(most, share)
+        self._open = Places(self.OPEN * most, share)
+
+    @property
+    def open(self) -> int:
+        """How many streams are open."""
+        return self._open.taken
 
     @contextmanager
-    def slot(self) -> Iterator[None]:
+    def slot(self, client: str) -> Iterator[Place]:
         """A slot for as long as the context lasts; raises 503 if there is none."""
-        if self.open >= self._most:
-            raise busy(
-                f"{self.open} clouds and maps are being sent, which is the maximum.", "KINBOARD_MAX_STREAMS"
+        if not self._open.free(client) or not self._sent.take(client):
+            detail = (
+                f"{self._sent.taken} clouds and maps are being sent, which is the maximum or your share of it."
             )
-        self.open += 1
-        try:
-            yield
-        finally:
-            self.open -= 1
+            raise busy(detail, "KINBOARD_MAX_STREAMS")
+        self._open.take(client)
+        with Place.held(self._open, client), Place.held(self._sent, client) as place:
+            yield place
 
 
 class ThreadedGenerator(Generic[T]):
@@ -65,14 +80,15 @@ class _StoppedError(Exception):
 class ComputedResponse(StreamingResponse):
     """A response whose bytes are computed piece by piece in threads while it is sent.
 
-    A slow client slows the computation down; a client that leaves ends it: the generator is always closed before
-    the request ends.
+    A slow client slows the computation down, and gives its place to others while it reads nothing; a client that
+    leaves ends it: the generator is always closed before the request ends.
 
     Args:
         pieces: the bytes to send.
         name: label of the bytes in the metrics.
         media_type, headers: of the response.
         limit: the limit of concurrent streams, if it applies.
+        place: the place of the request, if it has one.
     """
 
     def __init__(
@@ -82,17 +98,19 @@ class ComputedResponse(StreamingResponse):
         media_type: str,
         headers: dict[str, str] | None = None,
         limit: StreamLimit | None = None,
+        place: Place | None = None,
     ) -> None:
         self._pieces = ThreadedGenerator(pieces)
         self._name = name
         self._limit = limit
+        self._place = place
         super().__init__(self._in_threads(), headers=headers, media_type=media_type)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         self._slots = scope["app"].state.compute
         try:
-            with self._limit.slot() if self._limit else nullcontext():
-                await super().__call__(scope, receive, send)
+            with self._limit.slot(client_of(scope)) if self._limit else nullcontext(self._place) as place:
+                await super().__call__(scope, receive, send if place is None else place.lent(send))
         except _StoppedError:
             # The response is incomplete: the server closes the connection, which shows the client that it is.
             logger.warning("a response was cut off because the service is being stopped")

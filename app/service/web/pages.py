@@ -8,12 +8,14 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
+from starlette.datastructures import Headers
 from starlette.requests import Request
-from starlette.responses import HTMLResponse, RedirectResponse, Response
+from starlette.responses import FileResponse, HTMLResponse, RedirectResponse, Response
 from starlette.routing import BaseRoute, Mount, Route
 from starlette.staticfiles import StaticFiles
-from starlette.types import Scope
+from starlette.types import Message, Receive, Scope, Send
 
+from app.api.problems import ProblemError, respond
 from kin import __version__
 
 
@@ -59,4 +61,31 @@ class _FreshStaticFiles(StaticFiles):
     async def get_response(self, path: str, scope: Scope) -> Response:
         response = await super().get_response(path, scope)
         response.headers.setdefault("cache-control", "no-cache")
-        return response
+        return _File(response) if isinstance(response, FileResponse) else response
+
+
+class _File(Response):
+    """A file, or a problem document if a range of it is requested that does not exist."""
+
+    def __init__(self, file: FileResponse) -> None:
+        self._file = file
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        refused: dict[int, Message] = {}
+
+        async def with_problem(message: Message) -> None:
+            if message["type"] == "http.response.start" and message["status"] in (400, 416):
+                refused[message["status"]] = message
+            elif not refused:
+                await send(message)
+
+        await self._file(scope, receive, with_problem)
+        for status, message in refused.items():
+            headers = Headers(scope=message)
+            await respond(_bad_range(status, headers.get("content-range")))(scope, receive, send)
+
+
+def _bad_range(status: int, size: str | None) -> ProblemError:
+    detail = "The Range header cannot be read." if status == 400 else "The file has no such range."
+    headers = None if size is None else {"Content-Range": size}
+    return ProblemError(status, "bad-range", detail, "Ranges look like bytes=0-99.", headers=headers)

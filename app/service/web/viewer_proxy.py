@@ -7,17 +7,16 @@ The page connects to its own address without the trailing slash, so both forms a
 Messages of visitors are inspected first (:mod:`app.service.web.inspection`); a visitor who sends invalid ones is
 disconnected without affecting others. A slow visitor must not fill our memory: sending waits until the socket
 takes more, so the backlog stays in viser's bounded buffer, with back pressure by TCP. A visitor who reads nothing
-for a minute is disconnected.
+for a minute (``KINBOARD_SEND_TIMEOUT``) is disconnected by :mod:`app.service.websocket_protocol`, which limits the
+rate of messages too.
 """
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import gzip
 import hashlib
 import logging
-import time
 from collections.abc import Iterable
 
 from starlette.requests import Request
@@ -26,15 +25,15 @@ from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from app.service.web.access import LOOK_ONLY
-from app.service.web.inspection import BURST, RATE, MalformedMessageError, MessageLimit, admitted
+from app.service.web.inspection import MalformedMessageError, admitted
+from app.service.web.negotiation import accepts_gzip, is_current
+from app.shared.clients import client_of
 from app.shared.connection import ConnectionEnded, Viewer
 from app.shared.metrics import DROPPED, STREAMED, VISITORS
+from app.shared.places import Place, Places
 from app.shared.security import VIEWER_POLICY, origin_allowed
 
 logger = logging.getLogger("kinboard.bridge")
-
-# Seconds that sending one message may take: unread messages wait in our memory.
-PATIENCE = 60.0
 
 _PAGE = (
     '<!doctype html><html lang="en"><meta charset="utf-8"><meta http-equiv="refresh" content="{again}">'
@@ -66,10 +65,9 @@ _OURS = b"".join(
 class ViewerBridge:
     """Routes for ``/viewer``. `viewer` serves the visitors, None until it has started."""
 
-    def __init__(self, allowed_origins: Iterable[str] = (), max_visitors: int = 200) -> None:
+    def __init__(self, allowed_origins: Iterable[str] = (), places: Places | None = None) -> None:
         self.viewer: Viewer | None = None
-        self.visitors = 0
-        self._max_visitors = max_visitors
+        self.places = places or Places(200)
         self._allowed_origins = tuple(allowed_origins)
         self._page: _Page | None = None
 
@@ -86,7 +84,7 @@ class ViewerBridge:
         """viser's page with our content policy; until the viewer has started, 503 and a page that tries again."""
         if self.viewer is None:
             return HTMLResponse(_WARMING_PAGE, status_code=503, headers={"retry-after": "1"})
-        if self.visitors >= self._max_visitors:
+        if not self.places.free(client_of(request.scope)):
             return HTMLResponse(_FULL_PAGE, status_code=503, headers={"retry-after": "10"})
         if self._page is None:
             self._page = _Page(self.viewer.page())
@@ -101,16 +99,13 @@ class ViewerBridge:
         if self.viewer is None:
             await _turn_away(visitor, "The viewer is warming up.")
             return
-        if self.visitors >= self._max_visitors:
+        client = client_of(visitor.scope)
+        if not self.places.take(client):
             DROPPED.labels("full").inc()
             await _turn_away(visitor, "All places are taken.")
             return
-        self.visitors += 1
-        try:
-            with VISITORS.track_inprogress():
-                await _serve(visitor, self.viewer)
-        finally:
-            self.visitors -= 1
+        with Place.held(self.places, client), VISITORS.track_inprogress():
+            await _serve(visitor, self.viewer)
 
 
 async def _serve(visitor: WebSocket, viewer: Viewer) -> None:
@@ -130,22 +125,17 @@ async def _serve(visitor: WebSocket, viewer: Viewer) -> None:
 
 
 class VisitorConnection:
-    """A visitor's websocket for the viewer: messages inspected and limited in rate, sending limited in time."""
+    """A visitor's websocket for the viewer, whose messages are inspected."""
 
     def __init__(self, visitor: WebSocket) -> None:
         self.subprotocol: str | None = next(iter(visitor.scope.get("subprotocols", ())), None)
         self._visitor = visitor
         self._look_only = bool(visitor.scope.get(LOOK_ONLY, False))
-        self._limit = MessageLimit(RATE, BURST)
-        self._wait = 0.0
         self._streamed = STREAMED.labels("viewer")
 
     async def receive(self) -> bytes:
         """The visitor's next message that is passed on; raises `ConnectionEnded`."""
         while True:
-            # Messages above the rate are not read: they wait in the buffers of the sender.
-            if self._wait > 0.0:
-                await asyncio.sleep(self._wait)
             event = await self._visitor.receive()
             if event["type"] == "websocket.disconnect":
                 raise ConnectionEnded(_sendable(event["code"]))
@@ -156,7 +146,6 @@ class VisitorConnection:
                 passes = admitted(data, self._look_only)
             except MalformedMessageError as error:
                 raise ConnectionEnded(1007, str(error)) from None
-            self._wait = self._limit.spend(time.monotonic())
             if passes:
                 return data
             DROPPED.labels("refused").inc()
@@ -164,11 +153,7 @@ class VisitorConnection:
     async def send(self, data: bytes) -> None:
         """Send a message of the viewer; raises `ConnectionEnded`."""
         try:
-            async with asyncio.timeout(PATIENCE):
-                await self._visitor.send({"type": "websocket.send", "bytes": data})
-        except TimeoutError:
-            DROPPED.labels("slow").inc()
-            raise ConnectionEnded(1008, "the connection is too slow") from None
+            await self._visitor.send({"type": "websocket.send", "bytes": data})
         except WebSocketDisconnect:
             raise ConnectionEnded(1001) from None
         self._streamed.inc(len(data))
@@ -208,8 +193,8 @@ class _Page:
         }
 
     def response(self, request: Request) -> Response:
-        if request.headers.get("if-none-match") == self._headers["etag"]:
+        if is_current(request.headers.get("if-none-match", ""), self._headers["etag"]):
             return Response(status_code=304, headers=self._headers)
-        if "gzip" in request.headers.get("accept-encoding", ""):
+        if accepts_gzip(request.headers.get("accept-encoding", "")):
             return HTMLResponse(self._gzipped, headers=self._headers | {"content-encoding": "gzip"})
         return HTMLResponse(self._html, headers=self._headers)

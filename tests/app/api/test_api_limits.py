@@ -14,6 +14,7 @@ import pytest
 from fastapi.testclient import TestClient
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from starlette.requests import Request
 
 import kin
 from app.api import ik
@@ -89,11 +90,12 @@ def test_a_summary_that_took_too_long_is_cached_for_the_next_request(hurried, mo
 def test_a_request_without_a_slot_waits_and_is_then_refused():
     async def ask():
         work = ComputeSlots(1, 0.05)
-        async with work.slot():
+        request = Request({"type": "http", "client": ("192.0.2.1", 1)})
+        async with work.slot(request):
             with pytest.raises(ProblemError) as refused:
-                async with work.slot():
+                async with work.slot(request):
                     pytest.fail("the slot was taken")
-        async with work.slot() as deadline:  # free again
+        async with work.slot(request) as deadline:  # free again
             deadline.check()
         work.close()
         with pytest.raises(ProblemError):

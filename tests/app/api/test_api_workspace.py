@@ -206,9 +206,9 @@ def test_refused_and_finished_streams_free_their_slot(client, app):
 
 def test_the_gate_frees_a_slot_in_every_case():
     gate = StreamLimit(1)
-    with pytest.raises(ZeroDivisionError), gate.slot():
+    with pytest.raises(ZeroDivisionError), gate.slot("a"):
         raise ZeroDivisionError
-    with gate.slot(), pytest.raises(Exception, match="1 clouds"), gate.slot():
+    with gate.slot("a"), pytest.raises(Exception, match="1 clouds"), gate.slot("b"):
         pass
     assert gate.open == 0
 

@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
 
+import httpx2
 import pytest
 from attacks import ARM, GET, Victim, answer_to, closed, problem_in, victim
 from live_server import wait_for
@@ -135,6 +136,40 @@ def test_an_answer_that_nobody_reads_ends(service):
         assert connection.recv(1000).startswith(b"HTTP/1.1 200")
         wait_for(lambda: "read nothing of an answer" in service.log, 30)
         wait_for(lambda: closed(connection), 30)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("what", ["workspace", "stream", "reachable"])
+def test_clients_that_read_nothing_keep_no_place(what):
+    """More of them than there are places, from one address; another client, and one of theirs, is served."""
+    targets = json.dumps({"target": [{"position": [0.0, 0.2, 0.1]}] * 10_000}).encode()
+    post = f"POST {ARM}/reachable HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+    requests = {
+        "workspace": f"GET {ARM}/workspace?n=90000000&format=bin HTTP/1.1\r\nHost: localhost\r\n\r\n".encode(),
+        "stream": handshake(f"{STREAM}?n=90000000"),
+        "reachable": f"{post}Content-Length: {len(targets)}\r\n\r\n".encode() + targets,
+    }
+    with (
+        victim(
+            ready=True, KINBOARD_MAX_STREAMS="3", KINBOARD_MAX_REQUESTS="3", KINBOARD_SEND_TIMEOUT="60"
+        ) as service,
+        ExitStack() as stack,
+    ):
+        for _ in range(4):
+            stack.enter_context(service.connection(receive=4096)).sendall(requests[what])
+        time.sleep(0.5)
+        for source in ("127.0.0.2", "127.0.0.1"):
+            transport = httpx2.HTTPTransport(local_address=source)
+            with httpx2.Client(transport=transport, timeout=60, base_url=service.url) as client:
+
+                def served() -> bool:
+                    cloud = client.get(f"{ARM}/workspace?n=10")
+                    return cloud.status_code == 200
+
+                wait_for(served, 30)
+                answer = client.post(f"{ARM}/reachable", json={"target": [{"position": [0.0, 0.2, 0.1]}] * 20})
+                assert len(answer.json()["results"]) == 20
+        assert "Traceback" not in service.log
 
 
 # -- clients that leave ----------------------------------------------------------------------------------------

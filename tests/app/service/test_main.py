@@ -299,3 +299,16 @@ def test_a_public_service_without_a_token_logs_a_warning(capfd, monkeypatch, set
     monkeypatch.setattr("app.service.main.Server.run", lambda self, sockets: setattr(self, "started", True))
     assert run(Settings(port=0, **settings)) == 0
     assert ("open to everybody" in capfd.readouterr().err) is warned
+
+
+@pytest.mark.parametrize(
+    ("wanted", "status"), [("bytes=0-9", 206), ("bytes=9-5", 400), ("lines=1", 400), ("bytes=99999999-", 416)]
+)
+def test_a_range_of_a_file_that_does_not_exist_is_a_problem(client, wanted, status):
+    answer = client.get("/static/landing.css", headers={"range": wanted})
+    assert answer.status_code == status
+    if status == 206:
+        assert len(answer.content) == 10
+    else:
+        assert answer.json()["type"] == "urn:kinboard:problem:bad-range"
+    assert answer.headers.get("content-range", "").startswith("bytes */") is (status == 416)

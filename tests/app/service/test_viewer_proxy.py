@@ -17,8 +17,11 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from app.service.web.inspection import BURST, RATE, MessageLimit
+from app.service.web.negotiation import accepts_gzip, is_current
 from app.service.web.viewer_proxy import ViewerBridge
 from app.shared.connection import Connection, ConnectionEnded
+from app.shared.places import Places
+from app.shared.settings import Settings
 
 PROTOCOL = "viser-v9.9.9"
 
@@ -262,16 +265,18 @@ def test_a_budget_allows_fast_dragging_and_refills():
     assert [limit.spend(1000.0) for _ in range(5)][-1] == pytest.approx(0.1)
 
 
-def test_a_visitor_who_does_not_read_is_disconnected(port, viser, monkeypatch):
-    monkeypatch.setattr("app.service.web.viewer_proxy.PATIENCE", 0.3)
-    with visit(port, max_queue=1, close_timeout=0.1) as visitor:
+def test_a_visitor_who_does_not_read_is_disconnected(bridge, viser):
+    app = FastAPI()
+    app.router.routes.extend(bridge.routes())
+    with serve(app, Settings(send_timeout=0.5)) as port, visit(port, max_queue=1, close_timeout=0.1) as visitor:
         visitor.send(said("flood"))
         wait_for(lambda: len(viser.endings) == 1, 10)
+        wait_for(lambda: bridge.places.taken == 0, 10)
         assert viser.sent < 100, "how much the sockets on the way hold differs by tens of megabytes"
 
 
 def test_a_visitor_beyond_the_limit_gets_a_page_that_says_so(viser):
-    bridge = ViewerBridge(max_visitors=2)
+    bridge = ViewerBridge(places=Places(2))
     bridge.viewer = viser
     app = FastAPI()
     app.router.routes.extend(bridge.routes())
@@ -285,10 +290,25 @@ def test_a_visitor_beyond_the_limit_gets_a_page_that_says_so(viser):
             assert page.status_code == 503
             assert "All places in the viewer are taken" in page.text
             assert page.headers["retry-after"] == "10"
-        wait_for(lambda: bridge.visitors == 0)
+        wait_for(lambda: bridge.places.taken == 0)
         with visit(port) as three:
             three.send(HELLO)
             assert three.recv(timeout=10) == HELLO
+
+
+def test_one_client_leaves_places_to_others(viser):
+    bridge = ViewerBridge(places=Places(4, 0.5))
+    bridge.viewer = viser
+    app = FastAPI()
+    app.router.routes.extend(bridge.routes())
+    with serve(app) as port:
+        with visit(port), visit(port):
+            wait_for(lambda: bridge.places.taken == 2)
+            assert turned_away(port) == (1013, "All places are taken.")
+            with visit(port, source_address=("127.0.0.2", 0)) as other:
+                other.send(HELLO)
+                assert other.recv(timeout=10) == HELLO
+        wait_for(lambda: bridge.places.taken == 0)
 
 
 def test_the_close_reason_of_viser_reaches_the_visitor(port):
@@ -378,12 +398,55 @@ def test_the_page_of_viser_is_served_with_our_policy(port):
         plain = browser.get("/viewer/", headers={"Accept-Encoding": "identity"})
         assert plain.text == page.text
         assert "content-encoding" not in plain.headers
-        again = browser.get("/viewer/", headers={"If-None-Match": page.headers["etag"]})
-        assert (again.status_code, again.content) == (304, b"")
+        for known in (page.headers["etag"], f'"a", W/{page.headers["etag"]}', "*"):
+            again = browser.get("/viewer/", headers={"If-None-Match": known})
+            assert (again.status_code, again.content) == (304, b"")
+        other = browser.get("/viewer/", headers={"Accept-Encoding": "gzip;q=0, br", "If-None-Match": '"a"'})
+        assert (other.status_code, other.text) == (200, page.text)
+        assert "content-encoding" not in other.headers
         policy = dict(part.split(" ", 1) for part in page.headers["content-security-policy"].split("; "))
         assert policy["connect-src"].split() == ["'self'", "data:", "blob:"]
         assert policy["frame-ancestors"] == "'self'"
         assert "http" not in page.headers["content-security-policy"]
+
+
+@pytest.mark.parametrize(
+    ("header", "accepted"),
+    [
+        ("gzip", True),
+        ("br, GZIP;q=0.5", True),
+        ("*", True),
+        ("gzip ; q=1", True),
+        ("", False),
+        ("gzip;q=0", False),
+        ("gzip; q=0.000, *", False),
+        ("*;q=0", False),
+        ("identity", False),
+        ("xgzip", False),
+        ("gzip;q=x", False),
+    ],
+)
+def test_compression_is_used_if_accepted(header, accepted):
+    assert accepts_gzip(header) is accepted
+
+
+@pytest.mark.parametrize(
+    ("header", "current"),
+    [
+        ('"a"', True),
+        ('W/"a"', True),
+        ('"b", "a"', True),
+        ('"b,c" ,W/"a"', True),
+        (" * ", True),
+        ("", False),
+        ("a", False),
+        ('"b"', False),
+        ('"xa"', False),
+        ('W/"b", "c"', False),
+    ],
+)
+def test_a_version_is_found_in_a_list(header, current):
+    assert is_current(header, '"a"') is current
 
 
 def test_the_address_without_a_slash_redirects_to_the_page(port):

@@ -1,0 +1,122 @@
+"""Places that are few, such as those for computing: shared fairly among clients, and used while data flows.
+
+A client may take a share of the places; of those waiting, the client with the fewest places is next. A client that
+does not read its answer keeps no place: `Place.lent` gives it back after `STILL` seconds, and takes one again
+before anything more is computed.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import Counter, deque
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
+from typing import ParamSpec
+
+from app.shared.clients import share_of
+
+P = ParamSpec("P")
+STILL = 1.0  # seconds that sending may take before the place is given back
+
+
+class Places:
+    """A number of places. Used by the event loop only, so it needs no lock.
+
+    Args:
+        most: how many there are.
+        share: of one client.
+    """
+
+    def __init__(self, most: int, share: float = 1.0) -> None:
+        self.most = most
+        self.most_of_one = share_of(most, share)
+        self.taken = 0
+        self._taken_by: Counter[str] = Counter()
+        self._waiting: dict[str, deque[asyncio.Future[None]]] = {}
+
+    def free(self, client: str) -> bool:
+        """Whether this client can have a place now."""
+        return self.taken < self.most and self._taken_by[client] < self.most_of_one
+
+    def take(self, client: str) -> bool:
+        """Take a place if there is one."""
+        if self.free(client):
+            self._add(client, 1)
+            return True
+        return False
+
+    async def wait(self, client: str) -> None:
+        """Take a place as soon as there is one."""
+        if not self._waiting.get(client) and self.take(client):
+            return
+        place = asyncio.get_running_loop().create_future()
+        self._waiting.setdefault(client, deque()).append(place)
+        try:
+            await place
+        except asyncio.CancelledError:
+            if place.done() and not place.cancelled():
+                self.give_back(client)
+            raise
+
+    def give_back(self, client: str) -> None:
+        """End the use of a place; the next client waiting gets it."""
+        self._add(client, -1)
+        while self.taken < self.most and (following := self._next()) is not None:
+            queue = self._waiting[following]
+            place = queue.popleft()
+            if not queue:
+                del self._waiting[following]
+            if not place.done():  # else: no longer waiting
+                self._add(following, 1)
+                place.set_result(None)
+
+    def _next(self) -> str | None:
+        """Of the clients waiting the one with the fewest places, and among those the first."""
+        able = [client for client in self._waiting if self._taken_by[client] < self.most_of_one]
+        return min(able, key=self._taken_by.__getitem__, default=None)
+
+    def _add(self, client: str, count: int) -> None:
+        self.taken += count
+        self._taken_by[client] += count
+        if not self._taken_by[client]:
+            del self._taken_by[client]
+
+
+class Place:
+    """A place that a client has, or has given back for a while."""
+
+    def __init__(self, places: Places, client: str) -> None:
+        self._places = places
+        self._client = client
+        self._held = True
+
+    @classmethod
+    @contextmanager
+    def held(cls, places: Places, client: str) -> Iterator[Place]:
+        """The use of a place that the client has taken, to its end."""
+        place = cls(places, client)
+        try:
+            yield place
+        finally:
+            place.give_back()
+
+    def give_back(self) -> None:
+        """Let others have the place."""
+        if self._held:
+            self._held = False
+            self._places.give_back(self._client)
+
+    def lent(self, send: Callable[P, Awaitable[None]]) -> Callable[P, Awaitable[None]]:
+        """`send`, during which others may have the place if it takes long."""
+
+        async def lending(*args: P.args, **kwargs: P.kwargs) -> None:
+            timer = asyncio.get_running_loop().call_later(STILL, self.give_back)
+            try:
+                await send(*args, **kwargs)
+            finally:
+                timer.cancel()
+            if not self._held:
+                await self._places.wait(self._client)
+                self._held = True
+
+        return lending
