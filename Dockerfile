@@ -25,6 +25,7 @@ RUN cd /opt/kinboard/lib/python*/site-packages \
     && find viser/client -mindepth 1 -maxdepth 1 ! -name build ! -name '*.py' -exec rm -r {} + \
     && find . -name '*.so' ! -path '*.libs/*' -exec strip --strip-unneeded {} +
 COPY pyproject.toml README.md LICENSE ./
+COPY deploy/wheel deploy/wheel
 COPY static static
 COPY kin kin
 COPY app app

@@ -169,7 +169,7 @@ check() {
 check_other_cpus() {
   for cpu in Nehalem Haswell; do
     say "Start on an emulated $cpu"
-    start --volume "$emulator:/emulator:ro" "$image" /emulator -cpu "$cpu" /opt/kinboard/bin/python -m app.cli serve
+    start --volume "$emulator:/emulator:ro" "$image" /emulator -cpu "$cpu" /opt/kinboard/bin/python -m kinboard.cli serve
     wait_until_ready 300
     echo "ready after $(since "$began") s of emulation"
     nothing_was_compiled "$cpu"

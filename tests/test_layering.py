@@ -30,7 +30,7 @@ RULES: dict[str, set[str]] = {
     "kin/ik": {"numpy", "kin.kernels", "kin.solvers", "kin.ik", *MODEL - {"kin.catalog"}},
     "kin/path": {"numpy", "kin.kernels", "kin.solvers", "kin.ik", "kin.path", *MODEL - {"kin.catalog"}},
     "kin/workspace": {"numpy", "kin.kernels", "kin.solvers", "kin.ik", "kin.workspace", *MODEL - {"kin.catalog"}},
-    "app": {"app"},
+    "app": {"app", "kin"},
     "app/shared": {
         *("kin", "numpy", "app.shared", "pydantic", "pydantic_settings", "prometheus_client", "starlette"),
         *("typing_extensions", "distributed"),

@@ -31,7 +31,7 @@ from app.api import (
     install_problem_handlers,
 )
 from app.service import status
-from app.service.server import Greeting, Server, is_loopback, listen, url_of
+from app.service.server import STOP_TIMEOUT, Greeting, Server, is_loopback, listen, url_of
 from app.service.startup import Startup
 from app.service.web.access import Access
 from app.service.web.failures import Failures
@@ -43,12 +43,13 @@ from app.service.web.viewer_proxy import ViewerBridge
 from app.service.workers import supervise
 from app.shared.clouds import Clouds
 from app.shared.maps import Maps
+from app.shared.metrics import forget_process
 from app.shared.places import Places
 from app.shared.security import SecurityHeaders
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.shared.summaries import Summaries
-from app.shared.threads import pin
+from app.shared.threads import end_process, pin
 from kin import RobotFileError, __version__
 
 # Seconds that a thread may keep the interpreter while others wait. A drag passes through three threads; next to a
@@ -135,7 +136,7 @@ def _add_middleware(app: FastAPI, settings: Settings) -> None:
 
 
 def run(settings: Settings, open_browser: bool = False) -> int:
-    """Serve until Ctrl-C or SIGTERM; returns the exit code: 0, or 1 with a message if it could not start."""
+    """Serve until Ctrl-C or SIGTERM, which ends this process; returns 1 with a message if it could not start."""
     try:
         listeners = listen(settings)
     except OSError as error:
@@ -161,35 +162,49 @@ def run(settings: Settings, open_browser: bool = False) -> int:
                 settings = settings.model_copy(update={"allowed_hosts": (*LOCAL_NAMES, settings.host)})
         greeting = Greeting(url_of(settings, listeners[0].getsockname()[1]), open_browser)
         if len(listeners) == 1:
-            return _serve(settings, listeners[0], None, store, greeting)
+            return _serve(settings, listeners[0], store=store, greeting=greeting)
         os.environ["PROMETHEUS_MULTIPROC_DIR"] = stack.enter_context(
             tempfile.TemporaryDirectory(prefix="kinboard-")
         )
         greeting.show()
-        return supervise(partial(_serve, settings), listeners, settings.drain + 5.0)
+        return supervise(
+            # One reading of the robots for all processes, also for those that start later.
+            partial(_serve, settings, store=store),
+            listeners,
+            grace=settings.drain + STOP_TIMEOUT + 1.0,
+            silence=settings.worker_timeout,
+            on_end=forget_process,
+        )
 
 
 def _serve(
     settings: Settings,
     listener: socket.socket,
     number: int | None = None,
+    alive: Callable[[], None] | None = None,
     store: Store | None = None,
     greeting: Greeting | None = None,
 ) -> int:
-    """Serve on one socket in this process, which is worker `number` if there are several."""
+    """Serve on one socket until a signal ends this process; returns 1 if it could not start.
+
+    Args:
+        number, alive: the number of this worker process, and what it calls once a second, if there are several.
+    """
     if settings.pin:
         pin(number)
     if settings.access_log:
         write_to_stderr()
     sys.setswitchinterval(SWITCH_INTERVAL)
     # Kernels and routes live as long as the process: one collection among them would stop all visitors for 50 ms.
-    server = Server(create_app(settings, store, on_ready=gc.freeze), settings, greeting)
+    server = Server(create_app(settings, store, on_ready=gc.freeze), settings, greeting, alive)
     # uvicorn shuts down in order and then raises the signal again, which is the expected end here.
-    before = signal.signal(signal.SIGTERM, lambda *_: None)
+    before = signal.signal(signal.SIGTERM, server.handle_exit)
     try:
         server.run(sockets=[listener])
     except KeyboardInterrupt:
         pass
     finally:
         signal.signal(signal.SIGTERM, before)
-    return 0 if server.started else 1
+    if server.started:
+        end_process(0)  # threads may still compile or compute
+    return 1

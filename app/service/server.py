@@ -5,10 +5,13 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import ipaddress
+import logging
 import socket
 import sys
 import threading
 import webbrowser
+from collections.abc import Callable
+from types import FrameType
 
 import uvicorn
 from fastapi import FastAPI
@@ -19,11 +22,15 @@ from app.service.web.inspection import MAX_MESSAGE
 from app.service.web.prefix import clean_prefix
 from app.service.websocket_protocol import WebSocketProtocol
 from app.shared.settings import Settings
+from app.shared.threads import end_process
 from kin import __version__
 
 if sys.platform != "win32":
     import resource
 
+logger = logging.getLogger("kinboard.server")
+
+STOP_TIMEOUT = 3.0  # s for the end of the service itself, after requests have ended
 PING_INTERVAL = 20.0  # seconds between two pings of a websocket
 
 
@@ -56,18 +63,47 @@ def server_config(app: FastAPI, settings: Settings, files: int | None = None) ->
 
 
 class Server(uvicorn.Server):
-    """Prints the greeting once it accepts connections; on shutdown ends requests that would be cut off."""
+    """Prints the greeting once it accepts connections; on shutdown ends requests that would be cut off.
 
-    def __init__(self, app: FastAPI, settings: Settings, greeting: Greeting | None) -> None:
+    Args:
+        alive: called about once a second by the event loop.
+    """
+
+    def __init__(
+        self,
+        app: FastAPI,
+        settings: Settings,
+        greeting: Greeting | None = None,
+        alive: Callable[[], None] | None = None,
+    ) -> None:
         super().__init__(server_config(app, settings, open_files()))
         self._end_work = app.state.compute.close
         self._drain = settings.drain
         self._greeting = greeting
+        self._alive = alive
+        self._deadline: threading.Timer | None = None
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets=sockets)
         if self._greeting is not None:
             self._greeting.show()
+
+    async def on_tick(self, counter: int) -> bool:
+        if self._alive is not None and counter % 10 == 0:  # called ten times a second
+            self._alive()
+        return await super().on_tick(counter)
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """Stop, at most `STOP_TIMEOUT` after running requests have had their time."""
+        super().handle_exit(sig, frame)
+        if self._deadline is None:
+            self._deadline = threading.Timer(self._drain + STOP_TIMEOUT, self._give_up)
+            self._deadline.daemon = True
+            self._deadline.start()
+
+    def _give_up(self) -> None:
+        logger.error("the service did not stop within %s s of the signal and ends now", self._drain + STOP_TIMEOUT)
+        end_process(0)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         asyncio.get_running_loop().call_later(self._drain - min(1.0, 0.5 * self._drain), self._end_work)

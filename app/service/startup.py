@@ -69,14 +69,12 @@ class Startup:
         self._thread.start()
 
     def stop(self) -> None:
-        """Stop the viewer and the compilation of kernels. A kernel being compiled ends with the process."""
+        """Stop the viewer, and start no further kernel. One that is being compiled ends with the process."""
         self._stopping.set()
         self._viewer_settled.wait(timeout=5.0)
         self._bridge.viewer = None
         if self._viewer is not None:
             self._viewer.stop()
-        if self._rest.ident is not None:
-            self._rest.join(timeout=1.0)
 
     def _run(self) -> None:
         try:

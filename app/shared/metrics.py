@@ -9,7 +9,7 @@ import os
 from typing import Final
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
-from prometheus_client.multiprocess import MultiProcessCollector
+from prometheus_client.multiprocess import MultiProcessCollector, mark_process_dead
 from prometheus_client.registry import REGISTRY
 
 CONTENT_TYPE: Final = "text/plain; version=0.0.4; charset=utf-8"
@@ -32,6 +32,11 @@ REFUSED = Counter(
 )
 DROPPED = Counter("kinboard_dropped_messages", "Messages of visitors that were not passed on to viser.", ("why",))
 STREAMED = Counter("kinboard_stream_bytes", "Bytes sent in streamed responses.", ("stream",))
+
+
+def forget_process(pid: int) -> None:
+    """Drop what a process that has ended reported of its present state, such as its visitors; counters stay."""
+    mark_process_dead(pid)  # type: ignore[no-untyped-call]
 
 
 def exposition() -> bytes:

@@ -53,6 +53,12 @@ class Settings(BaseSettings):
     workers: int = Field(
         1, ge=1, le=64, description="Number of server processes; each serves REST and the viewer."
     )
+    worker_timeout: float = Field(
+        30.0,
+        ge=2,
+        le=3600,
+        description="Seconds without a sign of life after which one of several server processes is replaced.",
+    )
     pin: bool = Field(
         False, description="Keep the interpreter of each process on one processor, for faster drags."
     )

@@ -1,4 +1,4 @@
-"""Threads: which processors they run on, their priority, and an executor that never delays the end of the process.
+"""Threads: which processors they run on, their priority, and how a process ends in spite of them.
 
 Of a process's threads only one at a time runs Python. A gizmo drag passes through five of them in turn; if each
 wakes up on another processor, a drag among many visitors takes two to ten times as long as on a single one. So
@@ -9,6 +9,8 @@ visitors go first.
 
 from __future__ import annotations
 
+import atexit
+import contextlib
 import os
 import random
 import sys
@@ -16,7 +18,7 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from queue import SimpleQueue
-from typing import ParamSpec, TypeVar, cast
+from typing import NoReturn, ParamSpec, TypeVar, cast
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -54,6 +56,19 @@ def lower_priority() -> None:
     unpin()
     if sys.platform == "linux":
         os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)
+
+
+def end_process(code: int) -> NoReturn:
+    """End this process at once, whatever its threads do.
+
+    The usual end of a Python process destroys LLVM while a thread compiles a kernel, which aborts the process; and
+    it waits for the threads of executors. Functions registered with `atexit` are called, and output is flushed.
+    """
+    atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError):  # closed, or nobody reads it
+            stream.flush()
+    os._exit(code)
 
 
 def background_threads() -> int:

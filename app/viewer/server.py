@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import threading
+import time
 
 import viser
 
@@ -25,7 +26,7 @@ from app.viewer.viser_server import PortlessServer, client_page, start_viser
 
 log = logging.getLogger(__name__)
 
-STOP_TIMEOUT = 5.0  # s for a worker to end
+STOP_TIMEOUT = 2.0  # s for all workers to end
 RESTARTS = 3  # of one visitor's worker; after that, it is assumed to fail again
 RESTARTED = Notice(
     "error",
@@ -89,8 +90,9 @@ class ViewerServer:
         for page in pages:
             page.end()
         server.stop()
+        deadline = time.monotonic() + STOP_TIMEOUT
         for page in pages:
-            if not page.join(STOP_TIMEOUT):
+            if not page.join(max(0.0, deadline - time.monotonic())):
                 log.error("a visitor's worker did not end within %s s", STOP_TIMEOUT)
         if self._owns_maps:
             self._services.maps.close()

@@ -35,7 +35,7 @@ from app.shared.connection import Connection, ConnectionEnded
 log = logging.getLogger(__name__)
 
 PROTOCOL = f"viser-v{viser.__version__}"
-STOP_TIMEOUT = 5.0  # s for all connections to end
+STOP_TIMEOUT = 2.0  # s for all connections to end
 
 _Callbacks = Sequence[Callable[[infra.WebsockClientConnection], Coroutine[Any, Any, None] | None]]
 

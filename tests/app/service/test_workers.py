@@ -9,7 +9,8 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
@@ -25,10 +26,27 @@ from app.shared.settings import Settings
 ROOT = Path(__file__).parents[3]
 
 
+OWN_ARM = (ROOT / "kin" / "robots" / "ur5.toml").read_text("utf-8").replace('id = "ur5"', 'id = "own"')
+
+
 @pytest.fixture(scope="module")
-def service() -> Iterator[tuple[subprocess.Popen[str], int]]:
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The operator's robot files."""
+    folder = tmp_path_factory.mktemp("robots")
+    (folder / "own.toml").write_text(OWN_ARM, "utf-8")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def service(folder: Path) -> Iterator[tuple[subprocess.Popen[str], int]]:
+    with started(folder) as running:
+        yield running
+
+
+@contextmanager
+def started(folder: Path, **environment: str) -> Iterator[tuple[subprocess.Popen[str], int]]:
     command = [sys.executable, "-m", "app.cli", "serve", "--workers", "2", "--port", "0"]
-    env = os.environ | {"PYTHONPATH": str(ROOT)}
+    env = os.environ | {"PYTHONPATH": str(ROOT), "KINBOARD_ROBOTS": str(folder)} | environment
     with subprocess.Popen(
         command, cwd=ROOT, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
@@ -98,12 +116,40 @@ def test_counters_are_summed_over_all_processes(service):
     assert counted() == before + 40
 
 
-def test_a_process_that_dies_is_restarted_and_the_other_keeps_running(service):
+def test_a_process_that_dies_is_replaced_by_one_that_offers_the_same(service, folder):
+    """The robot files are read once: a restart in the middle of an edit must not change or end the service."""
     port = service[1]
+    tabs = [FakeBrowser(port, path="/viewer") for _ in range(8)]
     victim, other = sorted(set(pids(port)))
+    wait_for(lambda: counted_visitors(port) == 8)
+    (folder / "own.toml").unlink()
+    (folder / "broken.toml").write_text("id = ")
     os.kill(victim, signal.SIGKILL)
-    wait_for(lambda: len(now := ready(port)) == 2 and victim not in now, 60)
+    wait_for(lambda: len(now := ready(port)) == 2 and victim not in now, 120)
     assert other in pids(port)
+    assert [ask(port, "/api/v1/robots/own").status_code for _ in range(20)] == 20 * [200]
+    for tab in tabs:
+        tab.close()
+    wait_for(lambda: counted_visitors(port) == 0)
+
+
+def counted_visitors(port: int) -> float:
+    (count,) = re.findall(r"^kinboard_visitors (\S+)", ask(port, "/metrics").text, re.MULTILINE)
+    return float(count)
+
+
+@pytest.mark.slow
+def test_a_stopped_process_is_replaced(folder):
+    with started(folder, KINBOARD_WORKER_TIMEOUT="10") as (process, port):
+        victim, other = sorted(ready(port))
+        os.kill(victim, signal.SIGSTOP)
+        wait_for(lambda: not Path(f"/proc/{victim}").exists(), 60)
+        wait_for(lambda: len(ready(port)) == 2, 120)
+        assert other in pids(port)
+        process.send_signal(signal.SIGTERM)
+        _, errors = process.communicate(timeout=30)
+    assert process.returncode == 0
+    assert f"worker {victim} has not reported for 10.0 s and is killed" in errors
 
 
 def test_one_signal_stops_all_processes(service):
@@ -120,11 +166,22 @@ def test_one_signal_stops_all_processes(service):
         assert not Path(f"/proc/{pid}").exists()
 
 
-def _fails(listener: socket.socket, number: int) -> int:
+def _fails(listener: socket.socket, number: int, alive: Callable[[], None]) -> int:
     return 3
 
 
-def _ignores(code: int, listener: socket.socket, number: int) -> int:
+def _stops_once(noted: Path, listener: socket.socket, number: int, alive: Callable[[], None]) -> int:
+    """The first time it stops after its first report; the second time it ends the service."""
+    first = not noted.exists()
+    with noted.open("a") as file:
+        print(os.getpid(), file=file)
+    alive()
+    os.kill(*((os.getpid(), signal.SIGSTOP) if first else (os.getppid(), signal.SIGTERM)))
+    time.sleep(60)
+    return 0
+
+
+def _ignores(code: int, listener: socket.socket, number: int, alive: Callable[[], None]) -> int:
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     os.kill(os.getppid(), signal.SIGTERM)
     time.sleep(60)
@@ -133,12 +190,23 @@ def _ignores(code: int, listener: socket.socket, number: int) -> int:
 
 def test_a_process_that_fails_at_once_is_not_restarted_forever():
     with socket.create_server(("127.0.0.1", 0)) as one, socket.create_server(("127.0.0.1", 0)) as two:
-        assert supervise(_fails, [one, two], 1.0) == 1
+        assert supervise(_fails, [one, two], 1.0, 30.0) == 1
+
+
+def test_a_process_without_a_sign_of_life_is_replaced(tmp_path, caplog):
+    ended: list[int] = []
+    noted = tmp_path / "pids"
+    with socket.create_server(("127.0.0.1", 0)) as one:
+        assert supervise(partial(_stops_once, noted), [one], 5.0, 1.0, ended.append) == 0
+    first, second = map(int, noted.read_text().split())
+    assert ended == [first]
+    assert first != second
+    assert f"worker {first} has not reported for 1.0 s and is killed" in caplog.text
 
 
 def test_a_process_that_does_not_stop_is_killed(caplog):
     with socket.create_server(("127.0.0.1", 0)) as one:
-        assert supervise(partial(_ignores, 0), [one], 0.5) == 0
+        assert supervise(partial(_ignores, 0), [one], 0.5, 30.0) == 0
     assert "is killed" in caplog.text
 
 

@@ -1,0 +1,204 @@
+"""What is installed: one package for the service with a name that nobody else has."""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import os
+import re
+import subprocess
+import sys
+import sysconfig
+import venv
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx2
+import pytest
+
+import app
+import kin
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT / "deploy" / "wheel"))
+from renaming import renamed, write_renamed  # noqa: E402
+
+FOREIGN = 'raise ImportError("the package app of another project")\n'
+
+
+def imported(text: str) -> set[str]:
+    """The top-level names of all modules that a source imports."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            found |= {name.name.split(".")[0] for name in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            found.add(node.module.split(".")[0])
+    return found
+
+
+def test_no_module_of_the_installed_package_imports_the_name_of_the_folder(tmp_path):
+    write_renamed(ROOT / "app", tmp_path / "kinboard")
+    for file in sorted((ROOT / "app").rglob("*")):
+        if file.is_file() and "__pycache__" not in file.parts:
+            copy = tmp_path / "kinboard" / file.relative_to(ROOT / "app")
+            if file.suffix != ".py":
+                assert copy.read_bytes() == file.read_bytes()
+                continue
+            before, after = imported(file.read_text("utf-8")), imported(copy.read_text("utf-8"))
+            assert after == {"kinboard" if name == "app" else name for name in before}, file
+    assert (tmp_path / "kinboard" / "py.typed").exists()
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("from app.api import routes", "from kinboard.api import routes"),
+        ("from app import api", "from kinboard import api"),
+        ("import app.api as api, os", "import kinboard.api as api, os"),
+        ("def f():\n    'é'; from app.a import app", "def f():\n    'é'; from kinboard.a import app"),
+        ("from  app.a import (\n    app,\n)", "from  kinboard.a import (\n    app,\n)"),
+        ("from application import app\napp.run()", "from application import app\napp.run()"),
+        ("from .app import x", "from .app import x"),
+        ("title = 'app'", "title = 'app'"),
+    ],
+)
+def test_imports_are_renamed_and_nothing_else(before, after):
+    assert renamed(before) == after
+
+
+@pytest.mark.parametrize("text", ["import app.api", "import app", "importlib.import_module('app.api.fk')"])
+def test_what_cannot_be_renamed_is_refused(text):
+    with pytest.raises(ValueError, match="line 1: "):
+        renamed(text)
+
+
+def test_the_package_offers_the_public_names_of_the_core():
+    assert app.__all__ == kin.__all__
+    for name in kin.__all__:
+        assert getattr(app, name) is getattr(kin, name)
+    assert set(kin.__all__) <= set(dir(app))
+    rooms = {path.parent.name for path in (ROOT / "app").glob("*/__init__.py")}
+    assert not rooms & set(kin.__all__), "a room of the service would hide a name of the core"
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = app.nothing
+
+
+# -- a real wheel in a real environment -------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("wheel")
+    pip("wheel", "--no-deps", "--wheel-dir", str(folder), str(ROOT))
+    (built,) = folder.glob("kinboard-*.whl")
+    return built
+
+
+def installed(folder: Path, *what: str) -> Path:
+    """Make a virtual environment with a package and our dependencies; returns its folder of packages."""
+    venv.create(folder)
+    packages = Path(sysconfig.get_path("purelib", "venv", {"base": str(folder), "platbase": str(folder)}))
+    pip("--python", str(folder / "bin" / "python"), "install", "--no-deps", *what)
+    (packages / "z-dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n")  # after a checkout
+    return packages
+
+
+@pytest.fixture(scope="module")
+def environment(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An environment with the wheel and another project's package `app`."""
+    folder = tmp_path_factory.mktemp("environment")
+    packages = installed(folder, "--no-index", str(wheel))
+    (packages / "app").mkdir()
+    (packages / "app" / "__init__.py").write_text(FOREIGN)
+    return folder
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    """The folder of another project, with a package `app`, in which our command is called."""
+    (tmp_path / "app").mkdir()
+    (tmp_path / "app" / "__init__.py").write_text(FOREIGN)
+    return tmp_path
+
+
+def pip(*words: str) -> None:
+    subprocess.run([sys.executable, "-m", "pip", "-q", *words], check=True, timeout=300)
+
+
+def run(environment: Path, project: Path, *words: str) -> str:
+    done = subprocess.run(
+        [environment / "bin" / words[0], *words[1:]],
+        cwd=project,
+        env=os.environ | {"PYTHONPATH": "."},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+@pytest.mark.slow
+def test_the_wheel_has_two_packages_and_no_other_names(wheel):
+    names = {name.split("/")[0] for name in zipfile.ZipFile(wheel).namelist()}
+    assert names == {"kin", "kinboard", f"kinboard-{kin.__version__}.dist-info"}
+    inside = set(zipfile.ZipFile(wheel).namelist())
+    assert {
+        "kinboard/_static/index.html",
+        "kinboard/py.typed",
+        "kinboard/viewer/views/templates/macros.html",
+    } <= inside
+
+
+@pytest.mark.slow
+def test_the_command_works_beside_a_foreign_package_app(environment, project):
+    assert run(environment, project, "kinboard", "--version") == f"kinboard {kin.__version__}"
+    assert "mm" in run(environment, project, "kinboard", "fk", "pioneer5", "90", "30", "60", "30", "30")
+    assert run(environment, project, "python", "-m", "kinboard.cli", "--version") == f"kinboard {kin.__version__}"
+    program = "import kinboard, kin; from kinboard import *; print(kinboard.fk is kin.fk is fk, kinboard.__file__)"
+    same, where = run(environment, project, "python", "-c", program).split()
+    assert same == "True"
+    assert where.startswith(str(environment))
+
+
+@pytest.mark.slow
+def test_an_editable_installation_uses_the_checkout(tmp_path):
+    installed(tmp_path / "environment", "--editable", str(ROOT))
+    (tmp_path / "empty").mkdir()
+    environment, elsewhere = tmp_path / "environment", tmp_path / "empty"
+    assert run(environment, elsewhere, "kinboard", "--version") == f"kinboard {kin.__version__}"
+    program = "import kinboard, app, kin; print(kinboard is app, kinboard.fk is kin.fk, app.__file__)"
+    assert run(environment, elsewhere, "python", "-c", program) == f"True True {ROOT / 'app' / '__init__.py'}"
+
+
+@pytest.mark.slow
+def test_the_service_starts_beside_a_foreign_package_app(environment, project):
+    with (
+        serving(environment, project) as base,
+        httpx2.Client(base_url=base, trust_env=False, timeout=30) as visitor,
+    ):
+        assert visitor.get("/").status_code == 200
+        assert visitor.get("/static/landing.css").status_code == 200
+        assert visitor.get("/api/v1/robots").json()
+        page = visitor.get("/viewer/")
+        while page.status_code == 503:  # viser is being imported
+            page = visitor.get("/viewer/")
+        assert "Kinboard viewer" in page.text
+        assert visitor.get("/readyz").json()["status"] != "failed"
+
+
+@contextlib.contextmanager
+def serving(environment: Path, project: Path) -> Iterator[str]:
+    with subprocess.Popen(
+        [environment / "bin" / "kinboard", "serve", "--port", "0"],
+        cwd=project, env=os.environ | {"PYTHONPATH": "."}, stdout=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        try:
+            found = re.search(r"http://\S+:\d+", process.stdout.readline())
+            assert found
+            yield found[0]
+        finally:
+            process.kill()
