@@ -10,13 +10,13 @@ from pydantic import Field
 from typing_extensions import TypedDict
 
 from app.api import schemas
+from app.api.batches import Batch, one_or_all
 from app.api.body import versioned
 from app.api.schemas import (
     POST_REFUSALS,
     Configurations,
     RobotId,
     example,
-    one_or_all,
     refusals,
     reply,
     robot_of,
@@ -30,6 +30,8 @@ from kin import Robot
 from kin.transforms import Array
 
 router = versioned("robots")
+
+ENTRIES, VALUE = 13, 240  # equations of an arm, and bytes of one's values, about
 
 EXAMPLES = {
     "one": example("One configuration", {"q": [1.5708, 0.5236, 1.0472, 0.5236, 0.5236]}),
@@ -203,7 +205,8 @@ async def equation_values(
     """
     robot = robot_of(request, robot_id)
     q, single = schemas.as_configurations(robot, body.q, settings_of(request))
-    return await computed(request, partial(one_or_all, lambda some: _values(robot, q[some]), len(q), single))
+    batch = Batch("q", len(q), single, VALUE * ENTRIES)
+    return await computed(request, partial(one_or_all, lambda some: _values(robot, q[some]), batch))
 
 
 def _equation(found: Book, equation: Equation) -> EquationAnswer:

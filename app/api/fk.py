@@ -10,6 +10,7 @@ from pydantic import Field
 from typing_extensions import TypedDict
 
 from app.api import schemas
+from app.api.batches import Batch, one_or_all
 from app.api.body import versioned
 from app.api.schemas import (
     POST_REFUSALS,
@@ -17,7 +18,6 @@ from app.api.schemas import (
     RobotId,
     example,
     is_warm,
-    one_or_all,
     robot_of,
     settings_of,
 )
@@ -25,6 +25,7 @@ from app.api.work import Deadline, compute_slots, computed
 from app.shared.answers.document import documented
 from app.shared.answers.fk import FkAnswer, fk_answers
 
+POSE, FRAME = 550, 500  # bytes of a pose and of a frame, about
 FEW = 16  # configurations that are answered sooner than a thread could be asked to
 
 router = versioned("kinematics")
@@ -79,7 +80,8 @@ async def forward_kinematics(
     """
     robot = robot_of(request, robot_id)
     q, single = schemas.as_configurations(robot, body.q, settings_of(request))
-    answer = partial(one_or_all, lambda some: fk_answers(robot, q[some], body.frames), len(q), single)
+    batch = Batch("q", len(q), single, POSE + FRAME * len(robot.rows) * body.frames, "frames false")
+    answer = partial(one_or_all, lambda some: fk_answers(robot, q[some], body.frames), batch)
     if is_warm(request) and len(q) <= FEW:
         return answer(Deadline(compute_slots(request)))
     return await computed(request, answer)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import partial
 from typing import Annotated, Literal
@@ -11,8 +12,9 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag
 from typing_extensions import TypedDict
 
 from app.api import schemas
+from app.api.batches import Batch, one_or_all
 from app.api.body import versioned
-from app.api.options import OptionsBody, single_or_list
+from app.api.options import OptionsBody, Target, single_or_list
 from app.api.problems import FieldError, invalid
 from app.api.schemas import (
     POST_REFUSALS,
@@ -21,21 +23,23 @@ from app.api.schemas import (
     RobotId,
     example,
     integral,
-    one_or_all,
     robot_of,
     settings_of,
 )
-from app.api.targets import Target
 from app.api.work import Deadline, computed
 from app.shared.answers.document import documented
 from app.shared.answers.ik import IkAnswer, ik_answer
 from app.shared.metrics import SOLVE_SECONDS
 from app.shared.settings import Settings
 from kin import IKOptions, Robot, Task
-from kin.ik import solve
+from kin.ik import branch_names, solve
 from kin.transforms import Array
 
 router = versioned("kinematics")
+
+# Bytes of an answer without solutions, of a solution, of one joint's value and of a redundancy parameter, about.
+ANSWER, SOLUTION, JOINT, PARAMETER = 2500, 190, 25, 250
+NUMERIC = 8  # solutions that the numeric solver finds, about
 
 
 FreeValues = Annotated[
@@ -167,7 +171,26 @@ def _solve(robot: Robot, body: IkRequest, settings: Settings, deadline: Deadline
         return [answer(task, T, seed) for (task, T), seed in zip(targets[some], seeds[some], strict=True)]
 
     with SOLVE_SECONDS.labels("rest").time():
-        return one_or_all(answers, len(targets), single, deadline)
+        size = _size(robot, body, options[targets[0][0]])
+        batch = Batch("target", len(targets), single, size, _advice(body))
+        return one_or_all(answers, batch, deadline)
+
+
+def _size(robot: Robot, body: IkRequest, options: IKOptions) -> int:
+    """Estimated bytes of the answer to one target, from the number of branches and their whole-turn images."""
+    solutions = len(branch_names(robot)) or NUMERIC
+    if body.images == "all":
+        lower, upper, _ = options.constraints.bounds(robot)
+        turns = (upper - lower)[robot.revolute] / math.tau
+        solutions *= math.prod(max(1, math.ceil(turn - 1e-9)) for turn in turns if math.isfinite(turn))
+    if body.max_solutions is not None:
+        solutions = min(solutions, body.max_solutions)
+    return ANSWER + solutions * (SOLUTION + JOINT * robot.n + PARAMETER * max(0, robot.n - 6))
+
+
+def _advice(body: IkRequest) -> str:
+    """What would make the answers smaller."""
+    return 'images "nearest" or max_solutions' if body.images == "all" else "max_solutions"
 
 
 def _seeds(robot: Robot, body: IkRequest, count: int, settings: Settings) -> list[Array | None]:

@@ -10,13 +10,16 @@ from pydantic import Field
 from typing_extensions import TypedDict
 
 from app.api import schemas
+from app.api.batches import Batch, one_or_all
 from app.api.body import versioned
-from app.api.schemas import POST_REFUSALS, Configurations, RobotId, example, one_or_all, robot_of, settings_of
+from app.api.schemas import POST_REFUSALS, Configurations, RobotId, example, robot_of, settings_of
 from app.api.work import computed
 from app.shared.answers.document import documented
 from app.shared.answers.jacobian import JacobianAnswer, jacobian_answers
 
 router = versioned("kinematics")
+
+ENTRY, REST = 22, 300  # bytes of an entry, and of the rest of an answer, about
 
 EXAMPLES = {
     "one": example("One configuration", {"q": [1.5708, 0.5236, 1.0472, 0.5236, 0.5236]}),
@@ -60,5 +63,7 @@ async def geometric_jacobian(
     """
     robot = robot_of(request, robot_id)
     q, single = schemas.as_configurations(robot, body.q, settings_of(request))
-    answers = partial(one_or_all, lambda some: jacobian_answers(robot, q[some], body.frame), len(q), single)
-    return await computed(request, answers)
+    batch = Batch("q", len(q), single, REST + ENTRY * 6 * robot.n)
+    return await computed(
+        request, partial(one_or_all, lambda some: jacobian_answers(robot, q[some], body.frame), batch)
+    )

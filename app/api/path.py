@@ -10,10 +10,9 @@ from pydantic import Field
 
 from app.api import schemas
 from app.api.body import versioned
-from app.api.options import OptionsBody
+from app.api.options import OptionsBody, Target
 from app.api.problems import FieldError, invalid
 from app.api.schemas import POST_REFUSALS, Configuration, RobotId, example, reply, robot_of, settings_of
-from app.api.targets import Target
 from app.api.work import Deadline, computed
 from app.shared.answers.path import PathAnswer, path_answer
 from app.shared.settings import Settings

@@ -42,6 +42,7 @@ KINDS = {
     "too-many-requests": "Too many requests",
     "body-too-large": "The request body is too large",
     "batch-too-large": "The request contains too many items",
+    "answer-too-large": "The answer would be too large",
     "unsupported-media-type": "The body must be JSON",
     "invalid-input": "The request contains an invalid value",
     "request-timeout": "The request did not arrive in time",
@@ -53,6 +54,10 @@ KINDS = {
     "internal-error": "Internal error",
     "http-error": "The request was rejected",
 }
+
+
+class ClientLeftError(Exception):
+    """The client has left, so nobody waits for the answer."""
 
 
 class FieldError(BaseModel):
@@ -133,6 +138,7 @@ def install_problem_handlers(app: FastAPI) -> None:
     app.add_exception_handler(RequestValidationError, _validation_error)
     app.add_exception_handler(UnknownRobotError, _unknown_robot)
     app.add_exception_handler(InputError, _input_error)
+    app.add_exception_handler(ClientLeftError, _client_left)
     app.add_exception_handler(Exception, _internal_error)
 
 
@@ -203,6 +209,10 @@ async def _unknown_robot(request: Request, error: Exception) -> Response:
 async def _input_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, InputError)
     return respond(invalid(from_input_error(error)))
+
+
+async def _client_left(request: Request, error: Exception) -> Response:
+    return Response(status_code=499)  # for the log: nobody receives it
 
 
 async def _internal_error(request: Request, error: Exception) -> Response:

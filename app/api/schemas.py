@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from typing import Annotated, Any
 
 import numpy as np
@@ -11,14 +10,12 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_val
 from pydantic_core import to_json
 
 from app.api.problems import FieldError, Problem, ProblemError, invalid, show
-from app.api.work import Deadline
 from app.shared.settings import Settings
 from app.shared.store import Store
 from kin import InputError, Robot
 from kin.transforms import Array
 
 LARGEST = 1e6
-CHUNK = 256  # answers in memory at a time
 
 # A number beyond a million metres or radians is a mistake, and its square may not even be a number.
 Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False, strict=True)]
@@ -102,7 +99,7 @@ def robot_of(request: Request, robot_id: str) -> Robot:
 _REFUSALS: dict[int, str] = {
     400: "The body is not valid JSON.",
     404: "There is no such robot; the document lists the valid ids.",
-    413: "The body, or the batch in it, is larger than this service allows.",
+    413: "The body, the batch in it, or its answer is larger than this service allows.",
     415: "The Content-Type of the body is not JSON.",
     422: "A value is invalid; the document names the field, the value and what is valid.",
     500: "Internal error.",
@@ -125,30 +122,7 @@ def example(summary: str, value: dict[str, Any]) -> dict[str, Any]:
 
 def reply(content: object) -> Response:
     """`content` as JSON, serialised by compiled code without validation."""
-    return Response(_json(content), media_type="application/json")
-
-
-def _json(content: object) -> bytes:
-    return to_json(content, inf_nan_mode="null")
-
-
-def one_or_all(
-    answers: Callable[[slice], Sequence[object]], count: int, single: bool, deadline: Deadline
-) -> Response:
-    """The answer itself to a single item, ``{"results": [...]}`` in the same order to a list.
-
-    `answers` computes those of a range of items. A range is serialised before the next is computed: garbage
-    collection of a hundred thousand live lists would take longer than the computation. Raises 503 after the
-    deadline.
-    """
-    if single:
-        return reply(answers(slice(0, 1))[0])
-    ranges = (slice(start, start + CHUNK) for start in range(0, count, CHUNK))
-    parts = []
-    for each in ranges:
-        deadline.check()
-        parts.append(_json(list(answers(each)))[1:-1])
-    return Response(b'{"results":[' + b",".join(parts) + b"]}", media_type="application/json")
+    return Response(to_json(content, inf_nan_mode="null"), media_type="application/json")
 
 
 def check_batch(field: str, count: int, settings: Settings, most: int | None = None) -> None:

@@ -1,30 +1,33 @@
-"""Limits of computation: how many requests compute at a time, and for how long.
+"""Limits of computation: how many requests compute at a time, for how long, and only while the client is there.
 
 Requests that compute run in threads, of which there are few. So each needs a slot, and waits for a free one
 without occupying a thread. Its time starts when it has a slot. A thread cannot be ended from outside: the
-computation calls `Deadline.check` between targets, and ends when that raises.
+computation calls `Deadline.check` between targets, and ends when that raises. It also raises once the client has
+left, which is watched for after a moment: most answers are there before.
 """
 
 from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterator
 from concurrent.futures import Future
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, contextmanager
 from typing import Annotated, TypeVar
 
 from fastapi import Depends, Request
 from starlette.concurrency import run_in_threadpool
 
-from app.api.problems import ProblemError
+from app.api.problems import ClientLeftError, ProblemError
 from app.shared.clients import client_of
+from app.shared.memory.answers import AnswerMemory
 from app.shared.places import Place, Places
 
 T = TypeVar("T")
 RETRY_AFTER = 2  # seconds
 RETRY_SLOW = 30
 POLL = 0.2  # seconds between two checks whether the service is being stopped
+WATCH_AFTER = 0.2  # seconds of a request from which on its connection is watched
 
 
 def busy(detail: str, setting: str = "", headers: dict[str, str] | None = None) -> ProblemError:
@@ -39,13 +42,16 @@ def stopping() -> ProblemError:
     return busy("The service is being stopped.")
 
 
-def too_slow(
-    seconds: float, advice: str = "Request less at a time, or try again when the service is less busy"
-) -> ProblemError:
+ADVICE = "Request less at a time, or try again when the service is less busy"
+
+
+class TooSlowError(ProblemError):
     """503 for a request that has used up its time."""
-    detail = f"The request was not finished after {seconds:g} s, the time limit of one request."
-    hint = f"{advice}; the operator can raise KINBOARD_TIME_BUDGET."
-    return ProblemError(503, "too-slow", detail, hint, headers={"Retry-After": str(RETRY_SLOW)})
+
+    def __init__(self, seconds: float, advice: str) -> None:
+        detail = f"The request was not finished after {seconds:g} s, the time limit of one request."
+        hint = f"{advice}; the operator can raise KINBOARD_TIME_BUDGET."
+        super().__init__(503, "too-slow", detail, hint, headers={"Retry-After": str(RETRY_SLOW)})
 
 
 class ComputeSlots:
@@ -55,10 +61,12 @@ class ComputeSlots:
         most: how many requests compute at a time.
         seconds: time limit of each, and the longest time to wait for a slot.
         share: of one client.
+        memory: room for their answers; by default without limits.
     """
 
-    def __init__(self, most: int, seconds: float, share: float = 1.0) -> None:
+    def __init__(self, most: int, seconds: float, share: float = 1.0, memory: AnswerMemory | None = None) -> None:
         self.seconds = seconds
+        self.memory = memory or AnswerMemory(1 << 62, 1 << 62)
         self.closed = False
         self._places = Places(most, share)
 
@@ -66,51 +74,106 @@ class ComputeSlots:
     async def slot(self, request: Request) -> AsyncIterator[Deadline]:
         """A slot for as long as the context lasts, and its deadline; raises 503 if none becomes free in time."""
         client = client_of(request.scope)
+        with self.watched(request) as deadline:
+            await self._acquire(client, deadline)
+            with Place.held(self._places, client) as place:
+                deadline.start(place)
+                yield deadline
+
+    @contextmanager
+    def watched(self, request: Request) -> Iterator[Deadline]:
+        """A deadline without a slot; within the context it also ends when the client leaves."""
+        deadline = Deadline(self)
+        watching: list[asyncio.Task[None]] = []
+        loop = asyncio.get_running_loop()
+        timer = loop.call_later(
+            WATCH_AFTER, lambda: watching.append(loop.create_task(_until_left(request, deadline)))
+        )
         try:
-            async with asyncio.timeout(self.seconds):
-                await self._places.wait(client)
-        except TimeoutError:
-            detail = f"{self._places.taken} requests are being computed, which is the maximum or your share of it."
-            raise busy(detail) from None
-        with Place.held(self._places, client) as place:
-            yield Deadline(self, place)
+            yield deadline
+        finally:
+            timer.cancel()
+            for task in watching:
+                task.cancel()
 
     def close(self) -> None:
         """End all computations that check their deadline, and all waiting."""
         self.closed = True
 
-    async def wait(self, answer: Future[T], deadline: Deadline) -> T:
-        """The result of another thread; raises 503 if that takes too long. The computation goes on."""
+    async def wait(self, answer: Future[T], deadline: Deadline, advice: str = ADVICE) -> T:
+        """The result of another thread; raises 503 with an advice if that takes too long."""
         # Waited for instead of awaited: a client that leaves must not cancel it for the others.
         wrapped = asyncio.wrap_future(answer)
-        while not self.closed and (left := deadline.left) > 0.0:
-            await asyncio.wait((wrapped,), timeout=min(left, POLL))
-            if wrapped.done():
-                return wrapped.result()
-        if self.closed:
-            raise stopping()
-        raise too_slow(self.seconds, "The computation goes on: repeat the request later, or request less")
+        wrapped.add_done_callback(lambda done: done.cancelled() or done.exception())  # nobody may ask for it
+        while not wrapped.done():
+            deadline.check(advice)
+            await asyncio.wait((wrapped,), timeout=max(0.0, min(deadline.left, POLL)))
+        return wrapped.result()
+
+    async def _acquire(self, client: str, deadline: Deadline) -> None:
+        if self._places.take(client):
+            return
+        try:
+            async with asyncio.timeout(self.seconds) as waiting:
+                deadline.on_left = lambda: waiting.reschedule(0.0)
+                await self._places.wait(client)
+        except TimeoutError:
+            deadline.check_client()
+            detail = f"{self._places.taken} requests are being computed, which is the maximum or your share of it."
+            raise busy(detail) from None
+        finally:
+            deadline.on_left = None
 
 
 class Deadline:
-    """The time limit of one request, and its slot if it has one."""
+    """The time limit of one request, and its slot if it has one. Any thread may call `check`."""
 
-    def __init__(self, work: ComputeSlots, place: Place | None = None) -> None:
-        self.place = place
+    def __init__(self, work: ComputeSlots) -> None:
+        self.place: Place | None = None
+        self.on_left: Callable[[], None] | None = None  # called by the event loop when the client leaves
         self._work = work
-        self._ends = time.monotonic() + work.seconds
+        self._left = False
+        self.start()
+
+    def start(self, place: Place | None = None) -> None:
+        """The time of the request begins now."""
+        self.place = place
+        self._ends = time.monotonic() + self._work.seconds
+
+    @property
+    def memory(self) -> AnswerMemory:
+        """Room for the answer."""
+        return self._work.memory
 
     @property
     def left(self) -> float:
         """Seconds until the deadline."""
         return self._ends - time.monotonic()
 
-    def check(self) -> None:
-        """Raises 503 after the deadline, or when the service is being stopped. Any thread may call it."""
+    def check(self, advice: str = ADVICE) -> None:
+        """Raises `ClientLeftError` once the client has left, 503 after the deadline or when the service stops."""
+        self.check_client()
         if self._work.closed:
             raise stopping()
         if self.left < 0.0:
-            raise too_slow(self._work.seconds)
+            raise TooSlowError(self._work.seconds, advice)
+
+    def check_client(self) -> None:
+        """Raises `ClientLeftError` once the client has left."""
+        if self._left:
+            raise ClientLeftError
+
+    def client_left(self) -> None:
+        """The client has left: the next `check` raises."""
+        self._left = True
+        if self.on_left is not None:
+            self.on_left()
+
+
+async def _until_left(request: Request, deadline: Deadline) -> None:
+    while (await request.receive())["type"] != "http.disconnect":
+        pass
+    deadline.client_left()
 
 
 def compute_slots(request: Request) -> ComputeSlots:

@@ -43,6 +43,7 @@ from app.service.web.viewer_proxy import ViewerBridge
 from app.service.workers import supervise
 from app.shared.clouds import Clouds
 from app.shared.maps import Maps
+from app.shared.memory.answers import AnswerMemory
 from app.shared.metrics import forget_process
 from app.shared.places import Places
 from app.shared.security import SecurityHeaders
@@ -73,8 +74,10 @@ def create_app(
     """
     store = store or Store(settings.robots)
     bridge = ViewerBridge(settings.allowed_origins, Places(settings.max_visitors, settings.client_share))
-    clouds, maps, summaries = Clouds(settings.cloud_memory), Maps(), Summaries()
-    work = ComputeSlots(settings.max_requests, settings.time_budget, settings.client_share)
+    clouds, summaries = Clouds(settings.cloud_memory), Summaries()
+    maps = Maps(settings.map_memory, seconds=settings.map_time)
+    memory = AnswerMemory(settings.max_answer, settings.answer_memory)
+    work = ComputeSlots(settings.max_requests, settings.time_budget, settings.client_share, memory)
     startup = Startup(settings, store, clouds, maps, summaries, bridge, on_ready)
 
     @asynccontextmanager

@@ -2,9 +2,9 @@
 
 A result is identified by its key, which holds everything the result depends on; what is dropped is computed again.
 There are two ways to ask. `ComputationCache.get` returns a future: the computation runs to its end, whether or not
-anybody still waits, and the next caller finds the result. `ComputationCache.subscribe` is for long computations
-that are watched: a :class:`Subscription` shows progress and partial results, and when the last subscriber leaves,
-the computation is cancelled. Errors reach every caller and are not cached. Every method may be called by any
+anybody still waits, and the next caller finds the result. `ComputationCache.subscribe` is for long computations:
+a :class:`Subscription` shows progress and partial results, and when the last subscriber leaves, the computation is
+cancelled. Errors reach every caller and are not cached. Every method may be called by any
 thread.
 """
 
@@ -156,16 +156,22 @@ class ComputationCache(Generic[T]):
             computation._kept_running = True
         return computation.future
 
-    def subscribe(self, key: Hashable, compute: Callable[[SharedComputation[T]], T]) -> Subscription[T]:
+    def subscribe(
+        self, key: Hashable, compute: Callable[[SharedComputation[T]], T], max_pending: int | None = None
+    ) -> Subscription[T]:
         """Watch the computation for `key`, which is started if need be.
 
         Args:
             key: everything the result depends on.
             compute: computes it in a thread of the executor: reports progress and partial results in the
                 attributes of its argument, and calls its `check` often.
+            max_pending: do not start a new computation if this many are pending.
+
+        Raises:
+            TooManyPendingError: as many as `max_pending` are.
         """
         with self._lock:
-            computation = self._find_or_start(key, compute)
+            computation = self._find_or_start(key, compute, max_pending)
             computation._subscribers += 1
         return Subscription(computation, lambda: self._leave(computation))
 

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from app.shared.security import Rights
+
 
 class ConnectionEnded(Exception):  # noqa: N818 - not an error
     """A connection has ended, or must end, with this close code (RFC 6455, 7.4) and reason."""
@@ -21,6 +23,7 @@ class Connection(Protocol):
     """One visitor's connection. Messages of the visitor have been inspected."""
 
     subprotocol: str | None
+    rights: Rights
 
     async def receive(self) -> bytes:
         """The visitor's next message; raises `ConnectionEnded`."""

@@ -30,6 +30,18 @@ class MapRequest:
     constraints: JointConstraints = FREE
 
 
+class MapTimeError(Exception):
+    """A map took longer than maps may.
+
+    Attributes:
+        seconds: that a map may take.
+    """
+
+    def __init__(self, seconds: float) -> None:
+        super().__init__(f"the map was not finished after {seconds:g} s")
+        self.seconds = seconds
+
+
 class Maps:
     """Threads that compute maps, and a cache of the maps. Any thread may use it.
 
@@ -37,9 +49,17 @@ class Maps:
         max_bytes: the most that is kept; the map used longest ago is dropped first.
         threads: how many compute one map; by default as many as there are processors but one.
         at_once: how many maps are computed at a time.
+        seconds: how long one map may be computed; then its future raises `MapTimeError`.
     """
 
-    def __init__(self, max_bytes: int = 64 << 20, threads: int | None = None, at_once: int = 2) -> None:
+    def __init__(
+        self,
+        max_bytes: int = 64 << 20,
+        threads: int | None = None,
+        at_once: int = 2,
+        seconds: float = 600.0,
+    ) -> None:
+        self._seconds = seconds
         self._threads = threads or background_threads()
         self._executor = ThreadPoolExecutor(at_once, thread_name_prefix="map", initializer=lower_priority)
         self._maps: ComputationCache[CapabilityMap] = ComputationCache(self._executor, max_bytes, _size)
@@ -71,6 +91,7 @@ class Maps:
         computation.total = len(grid.blocks)
         blocks: list[CapabilityBlock] = []
         published = 0.0
+        ends = time.perf_counter() + self._seconds
         running = run_local(grid, self._threads, lower_priority)
         try:
             for block in running:
@@ -78,6 +99,9 @@ class Maps:
                 blocks.append(block)
                 computation.done = len(blocks)
                 now = time.perf_counter()
+                if now > ends and len(blocks) < len(grid.blocks):
+                    computation.latest = capability_join(grid, blocks)
+                    raise MapTimeError(self._seconds)
                 if now - published >= PUBLISHED_EVERY:
                     published, computation.latest = now, capability_join(grid, blocks)
         finally:

@@ -1,4 +1,9 @@
-"""Content security policies, and the check of a websocket's origin.
+"""What a client may cause, content security policies, and the check of a websocket's origin.
+
+`Rights` decides for every door, REST, the viewer's messages and what a link restores. Who has the access token, or
+everybody if there is none and the service is not read-only, may do everything. A read-only visitor may look: read
+pages and robots, and see the arm of a link from all sides. Nothing is moved, solved, sampled or mapped for a
+visitor who may only look.
 
 The query of the viewer's address can name another server (``?websocket=ws://elsewhere``), which could then run
 scripts in our origin: ``connect-src 'self'`` prevents that. Browsers do not apply the same-origin rule to
@@ -8,11 +13,53 @@ page is from.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
+from enum import Enum
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
+
+# What a camera reports, and what the page remembers, when viser asks for it: a link says what to look at.
+CAMERA = "ViewerCameraMessage"
+MEMORY = "LocalStorageGetItemResponseMessage"
+
+_COMPUTING = re.compile(r"/(workspace|capability)\b")
+_LOOKING_LESSONS = frozenset({"dh", "equations", "velocity"})  # the others solve the pose
+
+
+class Rights(Enum):
+    """The rights of one client."""
+
+    FULL = "full"
+    LOOK = "look"
+
+    def allow_request(self, method: str, path: str) -> bool:
+        """Whether a request without a websocket is answered; `path` below the prefix of the service."""
+        if self is Rights.FULL:
+            return True
+        return method in SAFE_METHODS and path != "/metrics" and _COMPUTING.search(path) is None
+
+    def allow_websocket(self, path: str) -> bool:
+        """Whether a websocket is accepted: that of the viewer, or a cloud."""
+        return self is Rights.FULL or path.rstrip("/") == "/viewer"
+
+    def allow_message(self, kind: object) -> bool:
+        """Whether a message of the viewer's page, which is known and well-formed, is passed on."""
+        return self is Rights.FULL or kind in (CAMERA, MEMORY)
+
+    @property
+    def compute(self) -> bool:
+        """Whether a link may start work: inverse kinematics, clouds, sections, sizes, maps."""
+        return self is Rights.FULL
+
+    def allow_lesson(self, key: str) -> bool:
+        """Whether a link may open a lesson."""
+        return self is Rights.FULL or key in _LOOKING_LESSONS
+
 
 # Swagger UI sets inline styles and data: images; scripts come from our own files only.
 PAGE_POLICY = (

@@ -32,6 +32,14 @@ class Settings(BaseSettings):
     upload_memory: int = Field(
         64 * 1024 * 1024, ge=1024, description="Maximum size in bytes of all request bodies that a process holds."
     )
+    max_answer: int = Field(
+        128 * 1024 * 1024, ge=1 << 16, description="Maximum size of the answer to one request in bytes."
+    )
+    answer_memory: int = Field(
+        256 * 1024 * 1024,
+        ge=1 << 16,
+        description="Maximum size in bytes of all answers that a process holds until they are read.",
+    )
     max_requests: int = Field(
         16, ge=1, le=32, description="Maximum number of requests that a process computes at a time; others wait."
     )
@@ -40,6 +48,12 @@ class Settings(BaseSettings):
         ge=0.1,
         le=3600,
         description="Seconds that a request may compute, and seconds that it may wait before.",
+    )
+    map_memory: int = Field(
+        64 * 1024 * 1024, ge=0, description="Maximum size in bytes of the cache of capability maps."
+    )
+    map_time: float = Field(
+        600.0, ge=1, le=86400, description="Seconds that one capability map of the viewer may be computed."
     )
     token: SecretStr | None = Field(None, min_length=8, description="Access token. Unset: no authentication.")
     read_only: bool = Field(False, description="Visitors without the access token may look but not move anything.")

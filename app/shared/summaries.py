@@ -1,14 +1,12 @@
 """Sizes and sections of workspaces, computed once for REST and for all visitors of the viewer.
 
-A volume takes seconds, the other sizes a tenth of one. Computations run to their end even if their caller gives
-up, so a caller who comes again later finds the result. A section takes some 100 kB.
+A volume takes seconds, the other sizes a tenth of one. A computation ends when the last caller leaves its
+subscription. A section takes some 100 kB.
 """
 
 from __future__ import annotations
 
-from concurrent.futures import Future
-
-from app.shared.computations import ComputationCache
+from app.shared.computations import ComputationCache, SharedComputation, Subscription
 from app.shared.threads import DaemonExecutor, background_threads, lower_priority
 from kin import JointConstraints, Robot, Section, WorkspaceFacts, section, workspace_facts
 from kin.ik.options import FREE
@@ -39,8 +37,8 @@ class Summaries:
         constraints: JointConstraints = FREE,
         effort: int | None = 4,
         limited: bool = False,
-    ) -> Future[WorkspaceFacts]:
-        """Sizes as by `kin.workspace_facts`; do not cancel the future.
+    ) -> Subscription[WorkspaceFacts]:
+        """Sizes as by `kin.workspace_facts`.
 
         Args:
             robot: the arm.
@@ -49,13 +47,13 @@ class Summaries:
             limited: raise `TooManyPendingError` instead of queueing behind too many computations.
         """
 
-        def compute(_: object) -> WorkspaceFacts:
-            if effort is None:
-                return workspace_facts(robot, constraints=constraints, volume=False)
-            return workspace_facts(robot, constraints=constraints, effort=effort)
+        def compute(computation: SharedComputation[WorkspaceFacts]) -> WorkspaceFacts:
+            volume, stop = effort is not None, computation.check
+            tries = effort if effort is not None else 4
+            return workspace_facts(robot, constraints=constraints, effort=tries, volume=volume, stop=stop)
 
         key = (robot, constraints, effort)
-        return self._facts.get(key, compute, self._max_pending if limited else None)
+        return self._facts.subscribe(key, compute, self._max_pending if limited else None)
 
     def section(
         self,
@@ -64,14 +62,14 @@ class Summaries:
         constraints: JointConstraints = FREE,
         resolution: int = 96,
         limited: bool = False,
-    ) -> Future[Section]:
-        """A section as by `kin.section`; do not cancel the future. `constraints` and `limited` as in `facts`."""
+    ) -> Subscription[Section]:
+        """A section as by `kin.section`. `constraints` and `limited` as in `facts`."""
 
-        def compute(_: object) -> Section:
-            return section(robot, plane, constraints=constraints, resolution=resolution)
+        def compute(computation: SharedComputation[Section]) -> Section:
+            return section(robot, plane, constraints=constraints, resolution=resolution, stop=computation.check)
 
         key = (robot, plane, constraints, resolution)
-        return self._sections.get(key, compute, self._max_pending if limited else None)
+        return self._sections.subscribe(key, compute, self._max_pending if limited else None)
 
     def close(self) -> None:
         """Start nothing more; returns at once."""

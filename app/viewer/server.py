@@ -12,6 +12,7 @@ import viser
 from app.shared.clouds import Clouds
 from app.shared.connection import Connection, ConnectionEnded
 from app.shared.maps import Maps
+from app.shared.security import Rights
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.shared.summaries import Summaries
@@ -114,6 +115,7 @@ class ViewerServer:
             self._settings.token is not None,
             welcome,
             lambda: self._restart(client, restarts),
+            self._connections.rights.get(client.client_id, Rights.LOOK),  # if absent, the visitor has left
         )
         with self._lock:
             self._pages[client.client_id] = page

@@ -31,6 +31,7 @@ from viser.infra import _infra
 from viser.infra._async_message_buffer import AsyncMessageBuffer
 
 from app.shared.connection import Connection, ConnectionEnded
+from app.shared.security import Rights
 
 log = logging.getLogger(__name__)
 
@@ -53,6 +54,7 @@ class PortlessServer(infra.WebsockServer):
         self._background_event_loop = loop
         self._loop = loop
         self._ids = itertools.count()
+        self.rights: dict[int, Rights] = {}  # of connected visitors, by client id
         self._open = 0  # connections
         self._handling: set[asyncio.Task[None]] = set()
         self._stopping: asyncio.Future[None]
@@ -99,6 +101,7 @@ class PortlessServer(infra.WebsockServer):
         buffer = AsyncMessageBuffer(self._loop, persistent_messages=False)
         client = infra.WebsockClientConnection(number, _infra._ClientHandleState(buffer, self._loop))
         self._client_state_from_id[number] = client._state
+        self.rights[number] = connection.rights
         flows: list[asyncio.Task[Any]] = []
         try:
             await _call(self._client_connect_cb, client)
@@ -119,6 +122,7 @@ class PortlessServer(infra.WebsockServer):
             await asyncio.gather(*flows, return_exceptions=True)
             buffer.set_done()
             self._client_state_from_id.pop(number, None)
+            self.rights.pop(number, None)
             self._broadcast_buffer.generator_cursors.pop(number, None)
             await _call(self._client_disconnect_cb, client)
 

@@ -8,9 +8,11 @@ the map (:mod:`kin.workspace.search.probes`).
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
+from kin.ik.problem import never_cancel
 from kin.transforms import Array
 from kin.workspace.region import Region
 from kin.workspace.results import Estimate, Section
@@ -21,9 +23,9 @@ from kin.workspace.sections.cut import profile
 _SQUARES = 24  # along the longer side of the section, per unit of effort
 
 
-def from_probes(region: Region, tries: int) -> tuple[Estimate, Estimate]:
+def from_probes(region: Region, tries: int, stop: Callable[[], None] = never_cancel) -> tuple[Estimate, Estimate]:
     """Volume (m³) and surface area (m²) from `tries` random points in each cell of the map."""
-    probes = probe_cells(region, tries, SEEDS)
+    probes = probe_cells(region, tries, SEEDS, stop)
     size = probes.map.size
     if (probes.map.edge == 0.0).any():
         flat = "the workspace is flat"
@@ -52,9 +54,11 @@ def _stratified(values: Array, cube: float) -> tuple[float, float]:
     return total, cube * math.sqrt(float(values.var(axis=1, ddof=1).sum()) / values.shape[1])
 
 
-def from_section(region: Region, effort: int) -> tuple[Estimate, Estimate]:
+def from_section(
+    region: Region, effort: int, stop: Callable[[], None] = never_cancel
+) -> tuple[Estimate, Estimate]:
     """Volume (m³) and surface area (m²) from (r, z) sections at a resolution and half of it."""
-    coarse, fine = (profile(region, _SQUARES * effort // part) for part in (2, 1))
+    coarse, fine = (profile(region, _SQUARES * effort // part, stop) for part in (2, 1))
     method = f"(r, z) section with squares of {fine.step:.3g} m, and of twice that, revolved"
     pairs = zip(_revolved(coarse), _revolved(fine), strict=True)
     volume, surface = (Estimate(b, abs(b - a), method) for a, b in pairs)

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-import asyncio
 from typing import Annotated, Literal
 
 from fastapi import Query, Request, Response
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
+from app.api.batches import Batch, held_json
 from app.api.body import versioned
 from app.api.problems import FieldError, invalid
-from app.api.schemas import RobotId, refusals, reply, robot_of, settings_of
-from app.api.work import Deadline, compute_slots
+from app.api.schemas import RobotId, refusals, robot_of, settings_of
+from app.api.work import ADVICE, TooSlowError, compute_slots
 from app.api.workspace.query import RegionQuery
 from app.shared.answers.capability import CapabilityMapAnswer, capability_map_answer
 from app.shared.clients import client_of
-from app.shared.maps import MapRequest, Maps
+from app.shared.maps import MapRequest, Maps, MapTimeError
 
 router = versioned("workspace")
 
-POLL = 0.5  # s between two checks whether the client is still connected
+VOXEL = 110  # bytes of a voxel in the answer, without its directions, about
 
 
 class CapabilityQuery(RegionQuery):
@@ -42,7 +42,7 @@ class CapabilityQuery(RegionQuery):
     "/robots/{robot_id}/capability",
     summary="Capability map",
     response_model=CapabilityMapAnswer,
-    responses=refusals(404, 422, 500, 503),
+    responses=refusals(404, 413, 422, 500, 503),
 )
 async def capability(
     request: Request,
@@ -65,17 +65,17 @@ async def capability(
     robot = robot_of(request, robot_id)
     wanted = MapRequest(robot, query.resolution, int(query.directions), query.constraints(robot))
     maps: Maps = request.app.state.maps
-    with request.app.state.streams.slot(client_of(request.scope)):
-        deadline, reader = Deadline(compute_slots(request)), maps.subscribe(wanted)
+    work, client = compute_slots(request), client_of(request.scope)
+    voxel = VOXEL + wanted.directions * query.approachable
+    answer = Batch("resolution", 1, True, voxel * query.resolution**3)
+    reservation = answer.reserve(work.memory)
+    slot = request.app.state.streams.slot(client)
+    with slot, work.watched(request) as deadline, maps.subscribe(wanted) as reader:
         try:
-            answer = asyncio.wrap_future(reader.future)
-            while not answer.done():
-                deadline.check()
-                await asyncio.wait([answer], timeout=POLL)
-                if await request.is_disconnected():
-                    return Response(status_code=499)  # the client has left
-            found = answer.result()
-            # Lists of some ten thousand voxels would block the event loop.
-            return await run_in_threadpool(lambda: reply(capability_map_answer(found, query.approachable)))
-        finally:
-            reader.leave()
+            found = await work.wait(reader.future, deadline)
+        except MapTimeError as error:  # somebody has waited for it longer than one request may
+            raise TooSlowError(error.seconds, ADVICE) from None
+        # Lists of some ten thousand voxels would block the event loop.
+        return await run_in_threadpool(
+            lambda: held_json(capability_map_answer(found, query.approachable), answer, reservation, work.memory)
+        )

@@ -13,10 +13,9 @@ from pydantic_core import to_json
 from typing_extensions import TypedDict
 
 from app.api.body import versioned
-from app.api.options import OptionsBody, single_or_list
+from app.api.options import OptionsBody, Target, single_or_list
 from app.api.problems import Problem, ProblemError
 from app.api.schemas import POST_REFUSALS, RobotId, example, reply, robot_of, settings_of
-from app.api.targets import Target
 from app.api.work import Deadline, DeadlineDep
 from app.api.workspace.streaming import ComputedResponse
 from app.shared.answers.document import documented

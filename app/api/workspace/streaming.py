@@ -12,6 +12,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.responses import StreamingResponse
 from starlette.types import Receive, Scope, Send
 
+from app.api.problems import ClientLeftError
 from app.api.work import busy
 from app.shared.clients import client_of
 from app.shared.metrics import STREAMED
@@ -120,9 +121,15 @@ class ComputedResponse(StreamingResponse):
             self._pieces.close()
 
     async def _in_threads(self) -> AsyncIterator[bytes]:
-        while (piece := await run_in_threadpool(self._pieces.take)) is not None:
+        while (piece := await self._next()) is not None:
             if self._slots.closed and self._limit:
                 raise _StoppedError
             if piece:
                 STREAMED.labels(self._name).inc(len(piece))
                 yield piece
+
+    async def _next(self) -> bytes | None:
+        try:
+            return await run_in_threadpool(self._pieces.take)
+        except ClientLeftError:
+            return None

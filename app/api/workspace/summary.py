@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import math
-from concurrent.futures import Future
 from typing import Annotated
 
 from fastapi import Query, Request, Response
@@ -12,12 +13,13 @@ from pydantic import Field
 from app.api.body import versioned
 from app.api.problems import FieldError, invalid, show
 from app.api.schemas import RobotId, refusals, reply, robot_of
-from app.api.work import Deadline, busy, compute_slots
+from app.api.work import TooSlowError, busy, compute_slots
 from app.api.workspace.query import NUMBER, RegionQuery, number
 from app.shared.answers.workspace import WorkspaceAnswer, workspace_answer
 from app.shared.computations import TooManyPendingError
 from app.shared.summaries import Plane, Summaries
-from kin import Section
+
+GOES_ON = "The computation goes on: repeat the request later, or request less"
 
 router = versioned("workspace")
 
@@ -64,7 +66,7 @@ async def summary(request: Request, robot_id: RobotId, query: Annotated[SummaryQ
 
     `section` adds the section with a half-plane through the axis of joint 1: closed curves and the arcs of their
     boundary; `plane` the section with any plane instead. Answers are cached for a while and shared. A request that
-    is refused because it takes too long can be repeated: the computation goes on.
+    is refused because it takes too long can be repeated: the computation goes on for as long again.
     """
     robot = robot_of(request, robot_id)
     constraints = query.constraints(robot)
@@ -74,16 +76,23 @@ async def summary(request: Request, robot_id: RobotId, query: Annotated[SummaryQ
         raise invalid(FieldError(field="section", value="true", expected=expected))
     summaries: Summaries = request.app.state.summaries
     work = compute_slots(request)
-    deadline = Deadline(work)
-    cut: Future[Section] | None = None
-    try:
-        facts = summaries.facts(robot, constraints, query.effort if query.volume else None, limited=True)
-        if query.section or plane is not None:
-            cut = summaries.section(robot, plane, constraints, query.resolution, limited=True)
-    except TooManyPendingError as error:
-        raise busy(f"{error.pending} summaries are being computed already.") from None
-    sizes = await work.wait(facts, deadline)
-    found = None
-    if cut is not None:
-        found = await work.wait(cut, deadline)
-    return reply(workspace_answer(sizes, found))
+    with work.watched(request) as deadline, contextlib.ExitStack() as subscriptions:
+        cut = None
+        try:
+            facts = summaries.facts(robot, constraints, query.effort if query.volume else None, limited=True)
+            subscriptions.enter_context(facts)
+            if query.section or plane is not None:
+                cut = summaries.section(robot, plane, constraints, query.resolution, limited=True)
+                subscriptions.enter_context(cut)
+        except TooManyPendingError as error:
+            raise busy(f"{error.pending} summaries are being computed already.") from None
+        try:
+            sizes = await work.wait(facts.future, deadline, GOES_ON)
+            section = None
+            if cut is not None:
+                section = await work.wait(cut.future, deadline, GOES_ON)
+        except TooSlowError:
+            # The client may come back for it.
+            asyncio.get_running_loop().call_later(work.seconds, subscriptions.pop_all().close)
+            raise
+    return reply(workspace_answer(sizes, section))

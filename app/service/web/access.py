@@ -31,13 +31,13 @@ from starlette.websockets import WebSocket
 from app.api.problems import ProblemError, respond
 from app.service.web.rate_limit import TokenBucket
 from app.shared.clients import client_of
+from app.shared.security import SAFE_METHODS, Rights
 
 COOKIE = "kinboard"
 COOKIE_AGE = 30 * 24 * 3600  # seconds until a login ends
-LOOK_ONLY = "kinboard.look_only"  # set in the scope of a visitor who may not move anything
+_RIGHTS = "kinboard.rights"  # in the scope of a client that has not all of them
 OPEN = ("/livez", "/readyz", "/login", "/favicon.ico")
 HEALTH = OPEN[:2]
-SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
 TRIES, TRY_EVERY = 5, 10.0  # wrong tokens allowed at once per client, then one in this many seconds
 # A client above that rate may be many behind one address: the right token goes on being accepted, but each check
 # takes this many seconds, and this many are made at a time.
@@ -123,10 +123,9 @@ class Access:
     def _admit_anonymous(self, scope: Scope, path: str) -> None:
         """Admit a request without the token as read-only; else raise `_LoginNeededError`, 401 or 403."""
         if self._read_only:
+            scope[_RIGHTS] = rights = Rights.LOOK
             websocket = scope["type"] == "websocket"
-            looks = path.startswith("/viewer") if websocket else scope["method"] in SAFE_METHODS
-            if looks and not re.search(r"/(workspace|capability)\b", path):
-                scope[LOOK_ONLY] = True
+            if rights.allow_websocket(path) if websocket else rights.allow_request(scope["method"], path):
                 return
             hint = (
                 "Send the operator's token: Authorization: Bearer …" if self._token else "It accepts no changes."
@@ -207,6 +206,13 @@ def _encodings(token: str | None) -> list[bytes]:
     with contextlib.suppress(UnicodeEncodeError):
         encodings.add(token.encode("latin-1"))
     return sorted(encodings)
+
+
+def rights_of(scope: Scope) -> Rights:
+    """What the client of an admitted request may cause."""
+    rights = scope.get(_RIGHTS, Rights.FULL)
+    assert isinstance(rights, Rights)
+    return rights
 
 
 class _LoginNeededError(Exception):

@@ -11,15 +11,14 @@ from typing import Any
 
 import msgspec
 
+from app.shared.security import CAMERA, MEMORY, Rights
+
 # A message of the page is some hundred bytes long; a name typed into a field, or a stored state, may be longer.
 MAX_MESSAGE = 64 * 1024
 MAX_DEPTH = 6
 # Messages a second, and at once: a control sends at most 20 times a second, the camera with every frame.
 RATE, BURST = 240.0, 480.0
 
-CAMERA = "ViewerCameraMessage"
-# What the page remembers, when viser asks for it: who may only look can still be sent a link to what to look at.
-MEMORY = "LocalStorageGetItemResponseMessage"
 ALLOWED = frozenset(
     {
         CAMERA,
@@ -63,11 +62,11 @@ class MessageLimit:
         return max(0.0, -self._left / self._rate)
 
 
-def admitted(message: bytes, look_only: bool) -> bool:
+def admitted(message: bytes, rights: Rights) -> bool:
     """Whether a message is passed on to viser; others are dropped.
 
     Args:
-        look_only: whether this visitor may look, not touch: then only camera and memory go on.
+        rights: of the visitor.
 
     Raises:
         MalformedMessageError: it cannot be read; the connection is not worth keeping.
@@ -86,7 +85,7 @@ def admitted(message: bytes, look_only: bool) -> bool:
             return False
     if not all(_shallow(value, MAX_DEPTH) for value in fields.values()):
         raise MalformedMessageError("nested too deeply")
-    return kind in (CAMERA, MEMORY) if look_only else isinstance(kind, str) and kind in ALLOWED
+    return isinstance(kind, str) and kind in ALLOWED and rights.allow_message(kind)
 
 
 def _shallow(value: object, depth: int) -> bool:

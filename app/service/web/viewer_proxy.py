@@ -24,7 +24,7 @@ from starlette.responses import HTMLResponse, RedirectResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
-from app.service.web.access import LOOK_ONLY
+from app.service.web.access import rights_of
 from app.service.web.inspection import MalformedMessageError, admitted
 from app.service.web.negotiation import accepts_gzip, is_current
 from app.shared.clients import client_of
@@ -130,7 +130,7 @@ class VisitorConnection:
     def __init__(self, visitor: WebSocket) -> None:
         self.subprotocol: str | None = next(iter(visitor.scope.get("subprotocols", ())), None)
         self._visitor = visitor
-        self._look_only = bool(visitor.scope.get(LOOK_ONLY, False))
+        self.rights = rights_of(visitor.scope)
         self._streamed = STREAMED.labels("viewer")
 
     async def receive(self) -> bytes:
@@ -143,7 +143,7 @@ class VisitorConnection:
             if data is None:
                 raise ConnectionEnded(1003, "binary messages only")
             try:
-                passes = admitted(data, self._look_only)
+                passes = admitted(data, self.rights)
             except MalformedMessageError as error:
                 raise ConnectionEnded(1007, str(error)) from None
             if passes:

@@ -15,6 +15,7 @@ from collections.abc import Callable, Hashable, Sequence
 import viser
 
 import kin
+from app.shared.security import Rights
 from app.viewer.feature import Feature
 from app.viewer.lessons import LESSONS
 from app.viewer.panel.joints import JointSliders, lock_notice
@@ -51,6 +52,7 @@ class VisitorPage(Worker):
     Args:
         token: whether programs must send an access token.
         failed: called last by a worker that cannot continue.
+        rights: what the visitor may cause.
     """
 
     def __init__(
@@ -60,6 +62,7 @@ class VisitorPage(Worker):
         token: bool = False,
         welcome: Notice = WELCOME,
         failed: Callable[[], None] | None = None,
+        rights: Rights = Rights.FULL,
     ) -> None:
         super().__init__(client.client_id, failed)
         self.store = services.store
@@ -73,7 +76,7 @@ class VisitorPage(Worker):
         self.client = client
         self._pace = services.pace
         self._welcome = welcome
-        self._persistence = Persistence(self, token, self._guard)
+        self._persistence = Persistence(self, token, self._guard, rights)
         self.units = DEFAULT_UNITS
         self._tabs: list[Feature] = []
         # Which numbers in the panel are out of date, and when they were updated last.

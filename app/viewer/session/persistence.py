@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Protocol
 
 import kin
 from app.exports.snippets import LOCAL, Moment
+from app.shared.security import Rights
 from app.viewer.feature import Feature, Stage
 from app.viewer.panel.share import SharePanel
 from app.viewer.panel.status import Notice
@@ -53,16 +55,20 @@ class Persistence:
     Args:
         token: whether programs must send an access token.
         guard: runs an action that may fail; the rest is restored in any case.
+        rights: what the visitor may cause: some may be shown a stored state only as far as nothing is computed.
 
     Attributes:
         system_dark: whether the visitor's system was dark when the page was opened.
         due: when the state is to be saved if nothing more happens (`time.perf_counter`'s); None: it is saved.
     """
 
-    def __init__(self, page: SavedPage, token: bool, guard: Callable[[Callable[[], None]], None]) -> None:
+    def __init__(
+        self, page: SavedPage, token: bool, guard: Callable[[Callable[[], None]], None], rights: Rights
+    ) -> None:
         self._page = page
         self._token = token
         self._guard = guard
+        self._rights = rights
         self._address = LOCAL
         self.system_dark = False
         self._saved = ""
@@ -79,7 +85,11 @@ class Persistence:
             stored = StoredPage()
         self._address = stored.address or LOCAL
         self.system_dark = stored.dark
-        return decode(stored.state, self._page.store.robots)
+        saved = decode(stored.state, self._page.store.robots)
+        if self._rights.compute:
+            return saved
+        lesson = saved.lesson if saved.lesson is not None and self._rights.allow_lesson(saved.lesson) else None
+        return replace(saved, target=None, lesson=lesson, features={})
 
     def restore(self, saved: PageState) -> None:
         """Apply the rest of a state to a page that shows its robot; what cannot be applied is reported."""

@@ -14,13 +14,15 @@ than a cube from every point of the spread configurations is not found at all.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kin.ik.problem import never_cancel
 from kin.transforms import Array
 from kin.workspace.region import Region
 from kin.workspace.sampling.kernels import configurations_of, sample_points
@@ -33,6 +35,7 @@ SEEDS = 8  # configurations kept per cube
 _SHARED = 2  # configurations a cube passes on to each neighbour
 _FLAT = 1e-9  # fraction of the longest side: the workspace is flat along a shorter one
 _BLOCK = 1 << 16
+_POINTS = 1 << 11  # whose nearest configurations are searched between two calls of `stop`
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +49,7 @@ class CellMap:
         corners: ``(m, 3)`` least corner of each cube.
         seeds: ``(m, SEEDS, n)`` configurations to start from.
         occupied: ``(m,)`` whether a spread configuration reached the cube, not only a neighbour of it.
+        stop: called now and then by long searches; raises to cancel them.
     """
 
     region: Region
@@ -55,11 +59,16 @@ class CellMap:
     corners: Array
     seeds: Array
     occupied: NDArray[np.bool_]
+    stop: Callable[[], None] = never_cancel
 
     @property
     def size(self) -> float:
         """Side of a cube, m."""
         return float(self.edge.max())
+
+    def stopped_by(self, stop: Callable[[], None]) -> CellMap:
+        """The same map, whose searches call `stop`."""
+        return replace(self, stop=stop)
 
     def cells(self, rows: Rows | slice = slice(None)) -> Cells:
         """Some cubes of the map, all by default, as compiled functions take them."""
@@ -86,7 +95,13 @@ class CellMap:
         rows = self.rows(p)
         q = np.full((len(p), self.region.robot.n), math.nan) if guess is None else guess.copy()
         distance = np.full(len(p), math.inf)
-        nearest_each(self.region.arm, np.ascontiguousarray(p), rows, self.seeds, tolerance, alike, q, distance)
+        p = np.ascontiguousarray(p)
+        for start in range(0, len(p), _POINTS):
+            self.stop()
+            some = slice(start, start + _POINTS)
+            nearest_each(
+                self.region.arm, p[some], rows[some], self.seeds, tolerance, alike, q[some], distance[some]
+            )
         q[rows < 0] = math.nan
         return q, distance
 

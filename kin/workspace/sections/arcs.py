@@ -18,7 +18,7 @@ from kin.fk import fk_positions, jacobian
 from kin.transforms import Array
 from kin.workspace.region import Region
 from kin.workspace.results import Section, SectionArc
-from kin.workspace.search.cells import CellMap, cell_map
+from kin.workspace.search.cells import CellMap
 from kin.workspace.search.descent import minimise_each, quadratic
 
 _OUTSIDE = 0.25  # of a square's side
@@ -30,11 +30,11 @@ _ROUND = 1e-9  # m
 _SWEEP = 0.25  # rad
 
 
-def arcs_of(region: Region, found: Section) -> tuple[SectionArc, ...]:
-    """The arcs of an (r, z) section of a region whose joint 1 turns freely."""
+def arcs_of(cells: CellMap, found: Section) -> tuple[SectionArc, ...]:
+    """The arcs of an (r, z) section of a region whose joint 1 turns freely, with the map of that region."""
     arcs: list[SectionArc] = []
     for curve in found.curves:
-        arcs += _arcs_of_curve(cell_map(region), found, curve)
+        arcs += _arcs_of_curve(cells, found, curve)
     return tuple(arcs)
 
 

@@ -13,7 +13,7 @@ of joint 1: the cut of a half-plane through the axis with the body that a joint 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 from kin.errors import InputError
 from kin.fk import fk_positions
 from kin.ik.options import JointConstraints, Limits, Locks
+from kin.ik.problem import never_cancel
 from kin.robot import Robot
 from kin.transforms import Array, finite_array
 from kin.workspace.region import Region, checked_integer
@@ -48,6 +49,7 @@ def section(
     locked: Locks | None = None,
     constraints: JointConstraints | None = None,
     resolution: int = 96,
+    stop: Callable[[], None] = never_cancel,
 ) -> Section:
     """The cut of the workspace with a plane, and its boundary.
 
@@ -57,6 +59,7 @@ def section(
         limits, locked: as in `kin.solve_ik`. An (r, z) section ignores those of joint 1.
         constraints: both as one value, instead of `limits` and `locked`.
         resolution: squares along the longer side of the plane's window, 8 to 1000.
+        stop: called now and then; raises to cancel the computation.
 
     Raises:
         InputError: naming the wrong argument.
@@ -66,7 +69,7 @@ def section(
     if plane is None:
         if robot.joints[0].kind != "revolute":
             raise InputError("plane", None, f"a point and a normal: joint 1 of {robot.id} slides")
-        return profile(region, count)
+        return profile(region, count, stop)
     if not isinstance(plane, Sequence) or len(plane) != 2:
         raise InputError("plane", plane, "a point and a normal, three numbers each")
     origin, normal = finite_array("plane[0]", plane[0], (3,)), finite_array("plane[1]", plane[1], (3,))
@@ -74,7 +77,7 @@ def section(
     if origin.ndim != 1 or normal.ndim != 1 or not length > 0.0:
         raise InputError("plane", plane, "a point and a normal, three numbers each, the normal not zero")
     u, v = _axes(normal / length)
-    return _cut(cell_map(region), origin, u, v, -math.inf, count)
+    return _cut(cell_map(region).stopped_by(stop), origin, u, v, -math.inf, count)
 
 
 def _turning_freely(region: Region) -> Region:
@@ -82,13 +85,13 @@ def _turning_freely(region: Region) -> Region:
     return replace(region, bounds=((-math.pi, math.pi), *region.bounds[1:]))
 
 
-def profile(region: Region, resolution: int) -> Section:
-    """The section in (r, z)."""
+def profile(region: Region, resolution: int, stop: Callable[[], None] = never_cancel) -> Section:
+    """The section in (r, z); `stop` as of `section`."""
     point, axis, _ = base_axis(region)
     u, _ = _axes(axis)
-    turning = _turning_freely(region)
-    found = _cut(cell_map(turning), point - axis * (point @ axis), u, axis, 0.0, resolution)
-    return replace(found, arcs=arcs_of(turning, found))
+    cells = cell_map(_turning_freely(region)).stopped_by(stop)
+    found = _cut(cells, point - axis * (point @ axis), u, axis, 0.0, resolution)
+    return replace(found, arcs=arcs_of(cells, found))
 
 
 def _axes(normal: Array) -> tuple[Array, Array]:

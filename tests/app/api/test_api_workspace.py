@@ -27,7 +27,6 @@ from app.shared.clouds import Cloud, Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.shared.summaries import Summaries
-from app.viewer.tabs.workspace.section.panel import find_section
 
 PIONEER = kin.get_robot("pioneer5")
 SRS = kin.get_robot("redundant7-craig")
@@ -318,8 +317,8 @@ def test_a_repeated_summary_is_served_from_the_cache(client, monkeypatch):
 
 
 def test_rest_uses_what_the_viewer_has_computed(app, client, monkeypatch):
-    app.state.summaries.facts(SRS, effort=None).result()  # as the workspace tab requests them
-    assert find_section(app.state.summaries, SRS) is not None
+    for requested in (app.state.summaries.facts(SRS, effort=None), app.state.summaries.section(SRS)):
+        requested.future.result(60)  # as the workspace tab requests them
     for name in ("workspace_facts", "section"):
         monkeypatch.setattr(f"app.shared.summaries.{name}", lambda *_, **__: pytest.fail("computed again"))
     answer = client.get(f"{API}/{SRS.id}/workspace/summary?volume=false&section=true")
@@ -341,26 +340,6 @@ def test_an_arm_with_a_prismatic_first_joint_has_no_section(client, tmp_path):
     address = f"{API}/rail/workspace/summary?volume=false&plane=0:0:0.5:1:0:0"
     level = TestClient(create_app(Settings(robots=tmp_path))).get(address)
     assert level.status_code == 200
-
-
-def test_a_visitor_who_disconnects_does_not_cancel_the_summary_for_others(live, monkeypatch):
-    _, client = live
-    go = threading.Event()
-    facts = kin.workspace_facts
-
-    def slow(*args, **options):
-        go.wait(10)
-        return facts(*args, **options)
-
-    monkeypatch.setattr("app.shared.summaries.workspace_facts", slow)
-    address = f"{WORKSPACE}/summary?volume=false"
-    with pytest.raises(httpx2.TimeoutException):
-        client.get(address, timeout=0.3)
-    with ThreadPoolExecutor(1) as other:
-        answer = other.submit(client.get, address)
-        time.sleep(0.1)
-        go.set()
-        assert answer.result(10).status_code == 200
 
 
 # -- reachable ---------------------------------------------------------------------------------------------------

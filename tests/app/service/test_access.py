@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -19,11 +20,15 @@ from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
 import app.service.web.access as access
+import kin
 from app.service.main import create_app
 from app.service.web.access import COOKIE
+from app.service.web.inspection import ALLOWED
 from app.service.web.rate_limit import TokenBucket
 from app.shared.clients import client_of
+from app.shared.security import Rights
 from app.shared.settings import Settings
+from app.viewer.lessons import LESSONS
 from app.viewer.panel.view import ViewState
 from app.viewer.session.state import PageState, encode
 
@@ -31,6 +36,7 @@ TOKEN = "correct horse battery"
 HEADER = {"authorization": f"Bearer {TOKEN}"}
 PAGE = {"accept": "text/html"}
 VISER = Subprotocol(f"viser-v{viser.__version__}")
+PIONEER = kin.get_robot("pioneer5")
 ARM = "/api/v1/robots/pioneer5"
 FK = f"{ARM}/fk"
 Q = {"q": [0, 0, 0, 0, 0]}
@@ -298,6 +304,7 @@ def test_a_logged_in_browser_gets_a_viewer():
 
 def test_read_only_serves_reads_and_refuses_computations():
     client = client_with(read_only=True)
+    assert client.get("/metrics").status_code == 403
     assert client.get("/", headers=PAGE).status_code == 200
     assert client.get("/api/v1/robots").status_code == 200
     for answer in (client.post(FK, json=Q), client.get(f"{ARM}/workspace"), client.get(f"{ARM}/capability")):
@@ -329,6 +336,67 @@ def test_a_read_only_visitor_sees_the_arm_of_a_link_and_cannot_move_it():
             tab.send("GuiUpdateMessage", uuid=tab.element("Radians"), updates={"value": True})
             tab.settle()
             assert (tab.tool_pose() == before).all()
+
+
+@pytest.mark.parametrize("everything", [False, True])
+def test_a_link_makes_the_service_compute_for_those_who_may(everything, monkeypatch):
+    """The same link: a visitor with all rights gets a cloud, sizes, a map and a target; a read-only one none."""
+    work = []
+    for name, place in (
+        ("cloud", "app.shared.clouds.workspace_slice"),
+        ("map", "app.shared.maps.capability_grid"),
+        ("sizes", "app.shared.summaries.workspace_facts"),
+        ("target", "app.viewer.session.controller.solve"),
+    ):
+        monkeypatch.setattr(place, counted(name, place, work))
+    target = kin.fk(PIONEER, PIONEER.q_home)
+    target[2, 3] += 0.02
+    workspace = {"n": 1000, "sizes": True, "drawn": True, "capability": {"resolution": 15, "drawn": True}}
+    state = PageState("pioneer5", q=PIONEER.q_home, target=target, features={"workspace": workspace})
+    memory = json.dumps({"state": encode(state)})
+    application = create_app(Settings(read_only=not everything))
+    with serve(application) as port:
+        wait_for(lambda: application.state.startup.status == "ready", 300)
+        with FakeBrowser(port, path="/viewer", memory=memory) as tab:
+            tab.settle()
+            if everything:
+                wait_for(lambda: set(work) == {"cloud", "map", "sizes", "target"}, 60)
+            else:
+                time.sleep(1.0)
+                assert not work
+                assert tab.tool_pose()[:3, 3] == pytest.approx(kin.fk(PIONEER, PIONEER.q_home)[:3, 3], abs=1e-4)
+
+
+def counted(name, place, work):
+    """The function at a place, which also notes that it was called."""
+    module, _, attribute = place.rpartition(".")
+    function = getattr(importlib.import_module(module), attribute)
+
+    def call(*arguments, **options):
+        work.append(name)
+        return function(*arguments, **options)
+
+    return call
+
+
+def test_the_rights_of_a_visitor_who_may_only_look():
+    look, full = Rights.LOOK, Rights.FULL
+    for method, path in (
+        ("POST", "/api/v1/robots/pioneer5/fk"),
+        ("GET", "/api/v1/robots/pioneer5/workspace/summary"),
+        ("HEAD", "/api/v1/robots/pioneer5/capability"),
+        ("GET", "/metrics"),
+    ):
+        assert full.allow_request(method, path)
+        assert not look.allow_request(method, path)
+    assert look.allow_request("GET", "/viewer/")
+    assert look.allow_websocket("/viewer")
+    assert look.allow_websocket("/viewer/")
+    assert not look.allow_websocket("/viewer-elsewhere")
+    assert not look.allow_websocket("/api/v1/robots/pioneer5/workspace/stream")
+    known = {kind for kind in ALLOWED if look.allow_message(kind)}
+    assert known == {"ViewerCameraMessage", "LocalStorageGetItemResponseMessage"}
+    assert [lesson.key for lesson in LESSONS if not look.allow_lesson(lesson.key)] == ["postures", "redundancy"]
 
 
 # Rate limits

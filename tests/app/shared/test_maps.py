@@ -11,7 +11,7 @@ from live_server import wait_for
 
 import kin
 from app.shared import mapreduce
-from app.shared.maps import MapRequest, Maps
+from app.shared.maps import MapRequest, Maps, MapTimeError
 from kin import InputError
 
 ARM = kin.get_robot("pioneer5")
@@ -95,6 +95,17 @@ def test_a_map_can_be_seen_while_it_grows(maps, slowly, monkeypatch):
     whole = reader.future.result(60)
     assert len(part.index) < len(whole.index)
     assert {tuple(i) for i in part.index.tolist()} <= {tuple(i) for i in whole.index.tolist()}
+
+
+def test_a_map_that_takes_too_long_ends_and_shows_what_was_computed(slowly):
+    hurried = Maps(threads=1, seconds=0.0)
+    reader = hurried.subscribe(SEVERAL)
+    slowly.let(10**6)
+    with pytest.raises(MapTimeError, match="not finished after 0 s"):
+        reader.future.result(60)
+    assert len(reader.latest.index) > 0
+    reader.leave()
+    hurried.close()
 
 
 def test_only_the_last_reader_who_leaves_cancels_the_map(maps, slowly):

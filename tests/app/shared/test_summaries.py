@@ -22,27 +22,27 @@ def summaries():
 
 
 def test_sizes_and_sections_are_those_of_the_core(summaries):
-    facts = summaries.facts(ARM, kin.JointConstraints(locked=LOCKED), effort=None).result(60)
+    facts = summaries.facts(ARM, kin.JointConstraints(locked=LOCKED), effort=None).future.result(60)
     expected = kin.workspace_facts(ARM, locked=LOCKED, volume=False)
     assert facts.volume is None
     assert facts.reach.largest.value == expected.reach.largest.value
-    cut = summaries.section(ARM, constraints=kin.JointConstraints(locked=LOCKED), resolution=16).result(60)
+    cut = summaries.section(ARM, constraints=kin.JointConstraints(locked=LOCKED), resolution=16).future.result(60)
     assert np.array_equal(cut.curves[0], kin.section(ARM, locked=LOCKED, resolution=16).curves[0])
 
 
 def test_equal_requests_share_one_result_and_others_do_not(summaries):
-    facts = summaries.facts(ARM, effort=None).result(60)
-    assert summaries.facts(kin.get_robot("pioneer5"), effort=None).result(0) is facts
-    assert summaries.facts(ARM, kin.JointConstraints(locked=LOCKED), effort=None).result(60) is not facts
-    cut = summaries.section(ARM, resolution=16).result(60)
-    assert summaries.section(ARM, resolution=16).result(0) is cut
-    assert summaries.section(ARM, resolution=17).result(60) is not cut
+    facts = summaries.facts(ARM, effort=None).future.result(60)
+    assert summaries.facts(kin.get_robot("pioneer5"), effort=None).future.result(0) is facts
+    assert summaries.facts(ARM, kin.JointConstraints(locked=LOCKED), effort=None).future.result(60) is not facts
+    cut = summaries.section(ARM, resolution=16).future.result(60)
+    assert summaries.section(ARM, resolution=16).future.result(0) is cut
+    assert summaries.section(ARM, resolution=17).future.result(60) is not cut
 
 
 def test_invalid_requests_raise_each_time(summaries):
     for _ in range(2):
         with pytest.raises(InputError, match="effort"):
-            summaries.facts(ARM, effort=1).result(60)
+            summaries.facts(ARM, effort=1).future.result(60)
 
 
 def test_only_callers_who_ask_for_the_limit_are_refused():
@@ -51,5 +51,5 @@ def test_only_callers_who_ask_for_the_limit_are_refused():
         full.facts(ARM, effort=None, limited=True)
     with pytest.raises(TooManyPendingError):
         full.section(ARM, limited=True)
-    assert full.facts(ARM, effort=None).result(60).volume is None
+    assert full.facts(ARM, effort=None).future.result(60).volume is None
     full.close()

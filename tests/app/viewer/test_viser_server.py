@@ -19,6 +19,7 @@ from viser import infra
 from viser.infra import _infra
 
 from app.shared.connection import ConnectionEnded
+from app.shared.security import Rights
 from app.viewer.viser_server import PROTOCOL, PortlessServer, missing_names, start_viser
 
 # The text of the method that `PortlessServer` replaces. If viser changes it, read what has changed, and whether
@@ -42,6 +43,7 @@ class Visit:
 
     def __init__(self, *messages: dict[str, Any], subprotocol: str | None = PROTOCOL, stays: bool = False) -> None:
         self.subprotocol = subprotocol
+        self.rights = Rights.FULL
         self.sent = 0
         self._messages = list(messages)
         self._stays = stays

@@ -6,6 +6,7 @@ import math
 
 from markupsafe import Markup
 
+from app.shared.computations import Subscription
 from app.viewer.feature import Stage
 from app.viewer.panel import Post, update_html
 from app.viewer.tabs.workspace.background import run_in_background
@@ -27,22 +28,32 @@ class Sizes:
         self._post = post
         self._visible = False
         self._found: tuple[WorkspaceFacts, bool] | None = None  # sizes, and whether they are complete
+        self._computations: tuple[Subscription[WorkspaceFacts], ...] = ()
 
     def show(self, visible: bool) -> None:
         """Compute and show the sizes of the selected robot, or hide them."""
+        self.leave()
         self._visible, self._found = visible, None
         wait = render("panel/note", text="Computing…") if visible else ""
         update_html(self._controls.sizes, wait)
         if not visible:
             return
         robot, summaries = self._stage.robot, self._stage.summaries
+        # Volume and surface take longer than the rest.
+        rest, whole = summaries.facts(robot, effort=None), summaries.facts(robot)
+        self._computations = rest, whole
 
         def work() -> None:
-            # Volume and surface take longer than the rest.
-            self._post("facts", (robot, summaries.facts(robot, effort=None).result(), False))
-            self._post("facts", (robot, summaries.facts(robot).result(), True))
+            self._post("facts", (robot, rest.future.result(), False))
+            self._post("facts", (robot, whole.future.result(), True))
 
         run_in_background(work, "sizes", self._post)
+
+    def leave(self) -> None:
+        """Do not wait for the sizes any more."""
+        for computation in self._computations:
+            computation.leave()
+        self._computations = ()
 
     def take(self, robot: Robot, found: WorkspaceFacts, complete: bool) -> None:
         """Take computed sizes, unless they are of a robot that is no longer selected."""

@@ -162,10 +162,14 @@ class Workspace(Feature):
 
     def on_leave(self) -> None:
         self._capability.leave()
+        self._sizes.leave()
+        if self._section is not None:
+            self._section.leave()
 
     def remove(self) -> None:
         self._clear()
         self._capability.clear()
+        self._sizes.leave()
         self._show_section(False)
 
     def _post_capability(self, key: Hashable, value: object = None) -> None:

@@ -28,7 +28,7 @@ from app.viewer.panel.joints import UNLOCK_ALL
 from app.viewer.server import ViewerServer
 from app.viewer.tabs.workspace import colours, cut, pick, send_window, sizes, views
 from app.viewer.tabs.workspace.section import plot
-from app.viewer.tabs.workspace.section.panel import find_section
+from app.viewer.tabs.workspace.section.panel import subscribe_section
 from app.viewer.tabs.workspace.settings import MAX_POINTS, WorkspaceSettings, default_size
 from kin.robot import Joint
 from kin.units import DEFAULT_UNITS, Units
@@ -214,12 +214,11 @@ def test_the_drawn_cloud_is_inside_the_drawn_boundary():
 def test_an_arm_with_a_prismatic_first_joint_has_no_section():
     rows = (Joint("slide", kind="prismatic", limits=(0.0, 1.0)), Joint("turn", a=0.5, limits=(-1.0, 1.0)))
     slider = replace(PIONEER, rows=rows, home=(0.0, 0.0))
-    found = find_section(SUMMARIES, slider)
-    assert found is None
+    assert subscribe_section(SUMMARIES, slider) is None
 
 
 def test_sizes_mark_values_that_are_not_computed_yet():
-    facts = SUMMARIES.facts(PIONEER, effort=None).result()
+    facts = SUMMARIES.facts(PIONEER, effort=None).future.result()
     table = sizes.html(facts, waiting=True, units=DEFAULT_UNITS)
     assert table.count("computing…") == 2
     assert f"{1000 * facts.reach.largest.value:.1f}" in table
@@ -229,7 +228,7 @@ def test_sizes_mark_values_that_are_not_computed_yet():
 
 @pytest.mark.parametrize(("length", "scale", "decimals"), [("mm", 1000, 0), ("cm", 100, 1), ("m", 1, 3)])
 def test_sizes_legend_and_picked_point_follow_the_units(length, scale, decimals):
-    units, facts = Units(length=length), SUMMARIES.facts(PIONEER, effort=None).result()
+    units, facts = Units(length=length), SUMMARIES.facts(PIONEER, effort=None).future.result()
     table = sizes.html(facts, True, units)
     assert f">{scale * facts.reach.largest.value:.{decimals + 1}f}<" in table
     assert table.count(f">{length}<") == 7 - table.count(">none<")

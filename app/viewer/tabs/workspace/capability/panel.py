@@ -15,7 +15,7 @@ import viser
 from numpy.typing import NDArray
 
 from app.shared.computations import Subscription
-from app.shared.maps import MapRequest
+from app.shared.maps import MapRequest, MapTimeError
 from app.viewer.feature import Stage
 from app.viewer.panel import Post, assign, listen, listen_click, update_html
 from app.viewer.scene.camera import Sphere
@@ -178,6 +178,10 @@ class Capability:
         """Take the complete map, or the error."""
         self.leave()
         error = reader.future.exception()
+        if isinstance(error, MapTimeError):
+            self._found, self._stale = reader.latest, True
+            self._state = "out of time"
+            return
         if error is not None:
             self._state = "failed"
             self._report()

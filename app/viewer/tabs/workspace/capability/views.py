@@ -17,12 +17,13 @@ from kin.ik.options import Locks
 from kin.units import Units
 from kin.workspace.capability.evaluation import ROLLS, STARTS, Method
 
-State = Literal["ready", "waiting", "computing", "stopped", "done", "failed"]
+State = Literal["ready", "waiting", "computing", "stopped", "out of time", "done", "failed"]
 SYMBOLS: dict[State, str] = {
     "ready": "○",
     "waiting": "◔",
     "computing": "▶",
     "stopped": "■",
+    "out of time": "■",
     "done": "✓",
     "failed": "✕",
 }

@@ -10,6 +10,7 @@ import viser
 
 from app.exports.svg import Plot, joint_colour
 from app.shared.clouds import Cloud
+from app.shared.computations import Subscription
 from app.shared.summaries import Summaries
 from app.viewer.feature import Stage
 from app.viewer.panel import Post, update_html
@@ -33,9 +34,9 @@ class Plotted:
     image: str
 
 
-def find_section(summaries: Summaries, robot: Robot) -> Section | None:
-    """The (r, z) section of a robot; None if joint 1 is prismatic. Waits for a shared computation."""
-    return summaries.section(robot).result() if robot.joints[0].kind == "revolute" else None
+def subscribe_section(summaries: Summaries, robot: Robot) -> Subscription[Section] | None:
+    """The shared computation of the (r, z) section of a robot; None if joint 1 is prismatic."""
+    return summaries.section(robot) if robot.joints[0].kind == "revolute" else None
 
 
 class SectionPanel:
@@ -46,7 +47,7 @@ class SectionPanel:
     """
 
     def __init__(self, stage: Stage, root: str, post: Post) -> None:
-        client, robot, summaries = stage.client, stage.robot, stage.summaries
+        client, robot = stage.client, stage.robot
         self.robot = robot
         self._scene = client.scene
         self._clouds = stage.clouds
@@ -69,7 +70,17 @@ class SectionPanel:
         self._panel.dock_left()
         self._panel.set_width(WIDTH)
         self._panel.expand()  # on a phone it would be collapsed at the end of the sheet
-        run_in_background(lambda: post("section-found", (robot, find_section(summaries, robot))), "section", post)
+        found = self._computation = subscribe_section(stage.summaries, robot)
+
+        def work() -> None:
+            post("section-found", (robot, None if found is None else found.future.result()))
+
+        run_in_background(work, "section", post)
+
+    def leave(self) -> None:
+        """Do not wait for the section any more."""
+        if self._computation is not None:
+            self._computation.leave()
 
     def take(self, robot: Robot, found: Section | None, tool: Array) -> None:
         """Show a computed section; the tool is at `tool` ``(3,)``."""
@@ -147,6 +158,7 @@ class SectionPanel:
 
     def remove(self) -> None:
         """Close the panel and remove the outline."""
+        self.leave()
         self._panel.remove()
         if self._outline is not None:
             self._outline.remove()

@@ -1,0 +1,156 @@
+"""Answers to one item or to a list of items: computed in pieces, bounded in size, sent in pieces.
+
+How large the answer will be is estimated before anything is computed. The computed pieces are held as bytes, and
+each is dropped as soon as it has been sent. A client that does not read holds memory, but no slot.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from fastapi import Response
+from pydantic_core import to_json
+from starlette.types import Receive, Scope, Send
+
+from app.api.problems import FieldError, ProblemError
+from app.api.work import Deadline, busy
+from app.shared.memory.answers import SMALL, AnswerMemory, AnswerTooLargeError, MemoryFullError, Reservation
+
+MEDIA_TYPE = "application/json"
+MOST_AT_ONCE = 256  # items between two checks of the deadline
+PIECE = 1 << 20  # bytes that are computed at a time, about; as Python objects they take ten times as many
+SENT = 1 << 18  # bytes that are sent at a time
+
+
+@dataclass(frozen=True)
+class Batch:
+    """The items of a request.
+
+    Attributes:
+        field: where they are in the request.
+        count: how many there are.
+        single: whether it is one item, not a list.
+        size: estimated bytes of the answer to one item.
+        advice: what makes answers smaller, if anything does.
+    """
+
+    field: str
+    count: int
+    single: bool
+    size: int
+    advice: str = ""
+
+    @property
+    def at_once(self) -> int:
+        """How many items are answered at a time."""
+        return max(1, min(MOST_AT_ONCE, PIECE // self.size))
+
+    def reserve(self, memory: AnswerMemory) -> Reservation:
+        """Room for the answers; raises 413 naming the field, or 503 if there is none at the moment."""
+        with _refused(self.field, self._given, self._expected(memory.most_of_one)):
+            return memory.reserve(self.count * self.size)
+
+    def resize(self, reservation: Reservation, size: int, memory: AnswerMemory) -> None:
+        """The answers take `size` bytes; raises as `reserve`."""
+        with _refused(self.field, self._given, self._expected(memory.most_of_one)):
+            reservation.resize(size)
+
+    @property
+    def _given(self) -> str:
+        return "one item" if self.single else f"a list of {self.count}"
+
+    def _expected(self, most: int) -> str:
+        fewer = f"at most {max(1, most // self.size)} items" if not self.single else ""
+        return " or ".join(filter(None, (fewer, self.advice))) or "a request with a smaller answer"
+
+
+@contextmanager
+def _refused(field: str, given: str, expected: str) -> Iterator[None]:
+    """Turns the errors of the memory into problems."""
+    try:
+        yield
+    except AnswerTooLargeError as error:
+        size, most = (f"{size / 1e6:.1f} MB" for size in (error.size, error.most))
+        detail = f"The answer would take about {size}; one answer may take {most}."
+        hint = "Split the request into several, or ask the operator to raise KINBOARD_MAX_ANSWER."
+        wrong = FieldError(field=field, value=given, expected=expected)
+        raise ProblemError(413, "answer-too-large", detail, hint, [wrong]) from None
+    except MemoryFullError:
+        raise busy(
+            "Other answers that have not been read yet take all memory.", "KINBOARD_ANSWER_MEMORY"
+        ) from None
+
+
+def one_or_all(answers: Callable[[slice], Sequence[object]], batch: Batch, deadline: Deadline) -> Response:
+    """The answer itself to a single item, ``{"results": [...]}`` in the same order to a list.
+
+    `answers` computes those of a range of items. A range is serialised before the next is computed: garbage
+    collection of a hundred thousand live lists would take longer than the computation. Raises 503 after the
+    deadline, 413 if the answer is too large.
+    """
+    if batch.single and batch.size <= SMALL:
+        return Response(to_json(answers(slice(0, 1))[0], inf_nan_mode="null"), media_type=MEDIA_TYPE)
+    memory = deadline.memory
+    reservation = batch.reserve(memory)
+    if batch.single:
+        content = to_json(answers(slice(0, 1))[0], inf_nan_mode="null")
+        batch.resize(reservation, len(content), memory)
+        return held_response([content], reservation)
+    pieces = []
+    size = 0
+    for start in range(0, batch.count, batch.at_once):
+        deadline.check()
+        piece = to_json(list(answers(slice(start, start + batch.at_once))), inf_nan_mode="null")
+        pieces += [b"," if start else b'{"results":[', piece[1:-1]]
+        size += len(piece)
+        if size > batch.count * batch.size:  # estimated too low
+            batch.resize(reservation, size, memory)
+    batch.resize(reservation, size, memory)
+    return held_response([*pieces, b"]}"], reservation)
+
+
+def held_json(content: object, batch: Batch, reservation: Reservation, memory: AnswerMemory) -> Response:
+    """One answer that may be large, as JSON; raises 413 naming the field if it is larger than allowed."""
+    body = to_json(content, inf_nan_mode="null")
+    batch.resize(reservation, len(body), memory)
+    return held_response([body], reservation)
+
+
+def held_response(pieces: list[bytes], reservation: Reservation) -> Response:
+    """A JSON response of these pieces."""
+    if sum(map(len, pieces)) <= SENT:
+        reservation.release()
+        return Response(b"".join(pieces), media_type=MEDIA_TYPE)
+    return HeldResponse(pieces, reservation)
+
+
+class HeldResponse(Response):
+    """A computed response that is sent in pieces; what has been sent is dropped."""
+
+    def __init__(self, pieces: Iterable[bytes], reservation: Reservation) -> None:
+        super().__init__(media_type=MEDIA_TYPE)
+        self._pieces = deque(pieces)
+        self._reservation = reservation
+        self.headers["content-length"] = str(sum(map(len, self._pieces)))
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
+        try:
+            for piece in self._in_order():
+                await send({"type": "http.response.body", "body": piece, "more_body": True})
+            await send({"type": "http.response.body", "body": b"", "more_body": False})
+        finally:
+            self._pieces.clear()
+            self._reservation.release()
+
+    def _in_order(self) -> Iterator[bytes]:
+        left = sum(map(len, self._pieces))
+        while self._pieces:
+            piece = self._pieces.popleft()
+            for start in range(0, len(piece), SENT):
+                yield piece[start : start + SENT]
+            left -= len(piece)
+            self._reservation.resize(left)
