@@ -1,14 +1,17 @@
 "use strict";
 // Runs in viser's page, before viser's own script. It stores the page's state per tab: the state that the server sends
 // is kept in the URL and in sessionStorage, and returned to the server after a reload or a lost connection. The server
-// uses viser's access to localStorage for this. All tabs of a browser share localStorage, so our one item is
-// redirected.
+// uses viser's access to localStorage for this. All tabs of a browser share localStorage, so our items are redirected.
+// Each state has an entry in the browser's history: Back returns to the one before.
 (() => {
   const ITEM = "viser-user:kinboard";
+  const REPLACE = `${ITEM}-replace`; // the same state from another viewpoint
+  const RETURN = `${ITEM}-return`; // a state that has an entry
   const STATE = "kinboard-state";
   const TAB = "kinboard-tab";
   const { getItem, setItem } = Storage.prototype;
   const replaceState = history.replaceState.bind(history);
+  const embedded = window !== window.top; // whose history belongs to the outer page
 
   // A browser may forbid storage; then only the URL keeps the state.
   const recall = (name) => { try { return getItem.call(sessionStorage, name); } catch { return null; } };
@@ -25,31 +28,65 @@
   query.delete("websocket");
   query.delete("playbackPath");
   const page = location.pathname + (query.size ? `?${query}` : "");
+  let at = history.state?.kinboard ?? 0; // the present entry
+  const loaded = at;
+  const trail = []; // the state of each entry, as far as known
+  trail[at] = state;
   // viser derives the websocket's address from the page's, where a fragment is an error: `show` restores it.
-  replaceState(null, "", page);
+  replaceState({ kinboard: at }, "", page);
 
-  function show() {
+  function address() {
     const parts = [];
     if (state) parts.push(`s=${state}`);
     if (tab) parts.push(`tab=${encodeURIComponent(tab)}`);
-    replaceState(null, "", parts.length ? `${page}#${parts.join("&")}` : page);
+    return parts.length ? `${page}#${parts.join("&")}` : page;
   }
+  const show = () => { trail[at] = state; replaceState({ kinboard: at }, "", address()); };
+
+  function add() {
+    if (embedded) { show(); return; }
+    history.pushState({ kinboard: ++at }, "", address());
+    trail.length = at;
+    trail[at] = state;
+  }
+
+  // The server may write the state with which this page was loaded in other words.
+  const start = () => JSON.parse(document.querySelector("[data-answers]")?.dataset.answers ?? "{}").start ?? "";
+  let expected = false; // whether the next move in the history is our own
+  function goBack() {
+    const near = [...trail.keys()].filter((i) => trail[i] === state || (i === loaded && state === start()));
+    const to = near.sort((a, b) => Math.abs(a - at) - Math.abs(b - at))[0];
+    if (to === undefined || embedded) add();
+    else if (to === at) show();
+    else { expected = true; history.go(to - at); }
+  }
+
+  addEventListener("popstate", (event) => {
+    if (event.state?.kinboard === undefined) return;
+    at = event.state.kinboard;
+    state = new URLSearchParams(location.hash.slice(1)).get("s") ?? "";
+    keep(STATE, state);
+    show(); // the tab may be another one now
+    if (!expected) dispatchEvent(new CustomEvent("kinboard-travel", { detail: at === loaded ? start() || state : state }));
+    expected = false;
+  });
 
   // viser would write the websocket's address into the page's URL, and a shared link would contain it.
   history.replaceState = show;
-  addEventListener("hashchange", () => location.reload());
+  addEventListener("hashchange", () => { if (history.state?.kinboard === undefined) location.reload(); });
 
   Storage.prototype.getItem = function (name) {
     if (name !== ITEM) return getItem.call(this, name);
     openTab(performance.now() + 30000);
+    dispatchEvent(new Event("kinboard-connect"));
     const address = location.origin + location.pathname.replace(/viewer\/?$/, "");
     return JSON.stringify({ address, state, dark: matchMedia("(prefers-color-scheme: dark)").matches });
   };
   Storage.prototype.setItem = function (name, value) {
-    if (name !== ITEM) return setItem.call(this, name, value);
+    if (![ITEM, REPLACE, RETURN].includes(name)) return setItem.call(this, name, value);
     state = value;
     keep(STATE, state);
-    show();
+    ({ [ITEM]: add, [REPLACE]: show, [RETURN]: goBack })[name]();
   };
 
   const tabs = () => [...document.querySelectorAll('[role="tab"]')];

@@ -58,6 +58,11 @@ def assign(
         state.api._queue_scene_message(messages.SetOrientationMessage(state.name, (w, x, y, z)))
 
 
+def uuid_of(handle: Any) -> str:
+    """The id of a control: of its message, and of its element in the page."""
+    return str(handle._impl.uuid)
+
+
 def keep_private(gizmo: viser.TransformControlsHandle) -> None:
     """Stop viser from copying a gizmo's motion to other visitors: a visitor's own scene has no others."""
     gizmo._impl_aux.sync_cb = None

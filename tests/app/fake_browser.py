@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import html
+import json
 import time
 from collections.abc import Callable
 from typing import Any
@@ -12,6 +14,7 @@ import viser
 import zstandard
 from websockets.sync.client import connect
 
+from app.viewer.panel.script import LABEL
 from kin.transforms import from_position_wxyz, wxyz_from_rotation
 
 ANSWER = 1.5  # s until a message is answered on a busy machine
@@ -35,6 +38,7 @@ class FakeBrowser:
         **options: Any,
     ) -> None:
         self.memory = memory
+        self._said: list[list[Any]] = []
         self.kept: list[str] = []
         self._socket = connect(
             where if isinstance(where, str) else f"ws://127.0.0.1:{where}{path}",
@@ -125,6 +129,22 @@ class FakeBrowser:
         uuid = self.element(label)
         self.values[uuid] = value
         self.send("GuiUpdateMessage", uuid=uuid, updates={"value": value})
+
+    def say(self, name: str, argument: Any = None) -> int:
+        """Send a message as the page's own script does; returns its number."""
+        number = self._said[-1][0] + 1 if self._said else 1
+        self._said = [*self._said[-19:], [number, name, argument]]
+        self.set(LABEL, json.dumps(self._said))
+        return int(number)
+
+    @property
+    def script(self) -> dict[str, Any]:
+        """What the page's own script knows: next steps of the history, the last reply."""
+        shown = next(
+            m["props"]["content"] for m in self.gui.values() if "data-answers" in m["props"].get("content", "")
+        )
+        answers: dict[str, Any] = json.loads(html.unescape(shown.split('data-answers="', 1)[1].split('"', 1)[0]))
+        return answers
 
     def choose(self, robot: str) -> None:
         """Choose another robot by its name, and wait until it is shown."""

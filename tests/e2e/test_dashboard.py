@@ -33,8 +33,8 @@ def test_sliders_by_keyboard_mouse_and_number(tab: Tab) -> None:
     thumb.focus()
     for _ in range(5):
         tab.page.keyboard.press("ArrowRight")
-    expect(tab.row("1 rotating base").locator("input:visible").last).to_have_value("37.3")
-    tab.wait_for_tool(kin.fk(PIONEER, home_with(PIONEER, 0, 37.3))[:3, 3], within=0.06)
+    expect(tab.row("1 rotating base").locator("input:visible").last).to_have_value("42.25")
+    tab.wait_for_tool(kin.fk(PIONEER, home_with(PIONEER, 0, 42.25))[:3, 3], within=0.06)
 
     handle = thumb.bounding_box()
     assert handle is not None

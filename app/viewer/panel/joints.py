@@ -13,6 +13,8 @@ import numpy as np
 import viser
 
 from app.viewer.panel import Post, assign, listen
+from app.viewer.panel.entry import read_value
+from app.viewer.panel.fields import field, fields_html, shown
 from app.viewer.panel.status import Notice
 from kin import InputError, Robot
 from kin.transforms import Array
@@ -75,18 +77,31 @@ class JointSliders:
                 unit = self._unit(i)
                 low, high = joint.limits or (-math.pi, math.pi)
                 bounds = (unit.shown(low, DIGITS), unit.shown(high, DIGITS))
+                limits = f"{bounds[0]:g} … {bounds[1]:g}{unit.suffix}".replace("-", "−")
                 slider = gui.add_slider(
                     label(robot, i),
                     min=bounds[0],
                     max=bounds[1],
                     step=unit.step(DIGITS),
-                    initial_value=min(max(unit.shown(float(q[i]), DIGITS), bounds[0]), bounds[1]),
-                    hint=f"{joint.name}: {bounds[0]:g} … {bounds[1]:g}{unit.suffix}",
+                    initial_value=min(max(shown(float(q[i]), unit, DIGITS), bounds[0]), bounds[1]),
+                    hint=f"{joint.name}: {limits}. Arrow keys: {unit.step(0):g}{unit.suffix}.",
                 )
                 listen(slider, post, ("joint", robot.id, i, units))
                 self._sliders.append(slider)
             self._locks = gui.add_button_group("Locked", lock_buttons(locked), hint=LOCK_HINT)
+            self._fields = dict(field(slider, self._unit(i)) for i, slider in enumerate(self._sliders))
+            self._html = gui.add_html(fields_html(self._fields))
         self._listen_locks(post)
+
+    def index_of(self, uuid: object) -> int | None:
+        """The joint whose slider has this id; None if there is none."""
+        return next((i for i, key in enumerate(self._fields) if key == uuid), None)
+
+    def read_text(self, index: int, text: str) -> float:
+        """A typed value in radians or metres; raises `EntryError` unless it is within the limits."""
+        unit, is_angle = self._unit(index), self.robot.joints[index].kind == "revolute"
+        limits = self.robot.joints[index].limits or (-math.pi, math.pi)
+        return read_value(text, f"Joint {index + 1}", unit, is_angle, limits)
 
     def read(self, index: int, value: object) -> float:
         """A slider's value in radians or metres, within the limits; raises `InputError` for anything else."""
@@ -102,8 +117,7 @@ class JointSliders:
         """
         for i, slider in enumerate(self._sliders):
             if i != dragged or not slider.min <= slider.value <= slider.max:
-                value = self._unit(i).shown(float(q[i]), DIGITS)
-                assign(slider, min(max(value, slider.min), slider.max))
+                assign(slider, min(max(shown(float(q[i]), self._unit(i), DIGITS), slider.min), slider.max))
 
     def show_locks(self, locked: Sequence[bool]) -> None:
         """Show which joints are locked ``(n,)``."""
@@ -118,16 +132,17 @@ class JointSliders:
         async def _(event: Any) -> None:
             if event.client is None:
                 return
-            shown = str(event.target.value)
-            number = shown.removeprefix(LOCKED)
-            if shown == UNLOCK_ALL:
+            text = str(event.target.value)
+            number = text.removeprefix(LOCKED)
+            if text == UNLOCK_ALL:
                 post(("lock", self.robot.id, None), False)
             elif number.isdecimal() and 1 <= int(number) <= self.robot.n:
                 # Post the requested state, not a toggle: two quick clicks arrive as one.
-                post(("lock", self.robot.id, int(number) - 1), shown == number)
+                post(("lock", self.robot.id, int(number) - 1), text == number)
 
     def remove(self) -> None:
         """Remove the sliders from the panel."""
         self._locks.remove()
+        self._html.remove()
         for slider in self._sliders:
             slider.remove()

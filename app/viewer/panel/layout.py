@@ -8,10 +8,12 @@ import viser
 
 from app.viewer.panel import Post, listen, listen_click
 from app.viewer.panel.readout import PoseReadout
+from app.viewer.panel.script import PageScript
 from app.viewer.panel.share import SharePanel
 from app.viewer.panel.status import Notice, StatusLine
 from app.viewer.panel.target import DEFAULT_TASK, TargetChoice
 from app.viewer.panel.view import ColourChoice, UnitChoice, ViewOptions, ViewState
+from app.viewer.views.templates import render
 from kin import Robot, fk
 from kin.units import Units
 
@@ -27,6 +29,7 @@ class Panel:
         tabs: titles of the features' tabs.
 
     Attributes:
+        script: the connection to the page's own script.
         joints, posture: folders that are filled for each robot.
         learn: the tab for lessons.
         tabs: the features' tabs.
@@ -47,6 +50,8 @@ class Panel:
     ) -> None:
         self.status = StatusLine(gui, welcome)
         self.colours = ColourChoice(gui, system_dark, post)
+        self.script = PageScript(gui, post)
+        gui.add_html(render("panel/head"))
         self.robot = gui.add_dropdown("Robot", tuple(r.name for r in robots), initial_value=robot.name)
         listen(self.robot, post, "robot")
         self.readout = PoseReadout(gui, fk(robot, robot.q_home), units)
@@ -62,6 +67,6 @@ class Panel:
         with group.add_tab("View"):
             self.units = UnitChoice(gui, units, post)
             self.colours.build(view.dark)
-            ViewOptions(gui, view, post)
+            self.view = ViewOptions(gui, view, post)
             with gui.add_folder("Share"):
                 self.share = SharePanel(gui, post)

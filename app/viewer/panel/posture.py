@@ -12,6 +12,8 @@ from collections.abc import Sequence
 import viser
 
 from app.viewer.panel import Post, assign, listen, update_html
+from app.viewer.panel.entry import read_value
+from app.viewer.panel.fields import field, fields_html
 from app.viewer.views.templates import render
 from kin import InputError, Redundancy, Robot, branch_meanings, branch_names
 from kin.units import DEFAULT_UNITS, Unit, Units
@@ -103,6 +105,8 @@ class RedundancySliders:
         self._key: tuple[object, ...] = ()
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
         self._tracks: dict[str, viser.GuiHtmlHandle] = {}
+        self._html: viser.GuiHtmlHandle | None = None
+        self._uuids: dict[str, str] = {}
         self._unit = DEFAULT_UNITS.angles
 
     def show(
@@ -123,6 +127,16 @@ class RedundancySliders:
             track = feasible_html(item, float(slider.min), float(slider.max), self._unit)
             update_html(self._tracks[item.name], track)
 
+    def name_of(self, uuid: object) -> str | None:
+        """The parameter whose slider has this id; None if there is none."""
+        return next((name for key, name in self._uuids.items() if key == uuid), None)
+
+    def read_text(self, name: str, text: str) -> float:
+        """A typed value in screen units; raises `EntryError` unless the slider has it."""
+        slider = self._sliders[name]
+        limits = (self._unit.read(float(slider.min)), self._unit.read(float(slider.max)))
+        return self._unit.scale * read_value(text, slider.label, self._unit, True, limits)
+
     def read(self, name: str, value: object) -> float:
         """A slider's value in radians; raises `InputError` for anything but a finite number."""
         if name not in self._sliders:
@@ -137,7 +151,9 @@ class RedundancySliders:
             slider.remove()
         for track in self._tracks.values():
             track.remove()
-        self._sliders, self._tracks, self._key = {}, {}, ()
+        if self._html is not None:
+            self._html.remove()
+        self._sliders, self._tracks, self._html, self._uuids, self._key = {}, {}, None, {}, ()
 
     def _make(self, parameters: Sequence[Redundancy], robot: Robot, units: Units) -> None:
         self._unit = unit = units.angles
@@ -159,6 +175,9 @@ class RedundancySliders:
                 listen(slider, self._post, ("redundancy", robot.id, item.name, units))
                 self._sliders[item.name] = slider
                 self._tracks[item.name] = self._gui.add_html("")
+            fields = dict(field(slider, unit) for slider in self._sliders.values())
+            self._html = self._gui.add_html(fields_html(fields))
+            self._uuids = dict(zip(fields, self._sliders, strict=True))
 
 
 def on_side_of(shown: float, item: Redundancy, unit: Unit) -> Redundancy:

@@ -11,6 +11,8 @@ from app.viewer.views.templates import render
 from kin.transforms import Array, wxyz_from_rotation
 from kin.units import Units
 
+ANGLES = "R = Rz(yaw)·Ry(pitch)·Rx(roll)"
+
 
 def roll_pitch_yaw(R: Array) -> tuple[float, float, float]:
     """Angles in radians with ``R = Rz(yaw) Ry(pitch) Rx(roll)``; roll is 0 where pitch is ±90°."""
@@ -28,9 +30,15 @@ def html(T_base_tool: Array, units: Units) -> str:
     turned = [angles.scale * _half_turn_positive(a) for a in roll_pitch_yaw(T_base_tool[:3, :3])]
     quaternion = wxyz_from_rotation(T_base_tool[:3, :3]).tolist()
     rows = (
-        ("x y z", _numbers(position, lengths.decimals(1)), lengths.name),
-        ("roll pitch yaw", _numbers(turned, angles.decimals(1)), angles.name),
-        ("w x y z", _numbers(quaternion, 3), ""),
+        (
+            "position",
+            "x y z",
+            "Tool point in the base frame",
+            _numbers(position, lengths.decimals(1)),
+            lengths.name,
+        ),
+        ("angles", "roll pitch yaw", ANGLES, _numbers(turned, angles.decimals(1)), angles.name),
+        ("quaternion", "w x y z", "Quaternion, scalar first", _numbers(quaternion, 3), ""),
     )
     return render("panel/readout", rows=rows)
 
@@ -47,10 +55,11 @@ def _numbers(values: Sequence[float], decimals: int) -> list[str]:
 
 
 class PoseReadout:
-    """Shows the tool's pose."""
+    """Shows the tool's pose, and below it the form for a typed target, which ``static/input.js`` opens."""
 
     def __init__(self, gui: viser.GuiApi, T_base_tool: Array, units: Units) -> None:
         self._html = gui.add_html(html(T_base_tool, units))
+        gui.add_html(render("panel/typed_target"))
 
     def show(self, T_base_tool: Array, units: Units) -> None:
         """Replace the numbers."""

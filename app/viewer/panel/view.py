@@ -18,6 +18,12 @@ Side = Literal["Front", "Side", "Top", "Isometric"]
 SIDES: tuple[Side, ...] = get_args(Side)
 SYSTEM_IS_DARK = "The system is dark"  # static/page.js looks for this label
 
+AXES = ("Tool axes", "Base axes")
+AXES_HINT = (
+    "The directions of the coloured arrows and rings, and of the keys that move the target: those of the tool, or "
+    "those of the base. The key G switches. Hold Shift while dragging to move in steps."
+)
+
 
 @dataclass
 class ViewState:
@@ -25,25 +31,34 @@ class ViewState:
 
     Attributes:
         dark: whether the page is dark; None: as the visitor's system is.
+        base_axes: whether the gizmo is aligned with the base instead of the tool.
     """
 
     frames: bool = False
     labels: bool = True
     axes: bool = True
     dark: bool | None = None
+    base_axes: bool = False
 
 
 class UnitChoice:
     """Posts ``"radians"`` and ``"lengths"``."""
 
     def __init__(self, gui: viser.GuiApi, units: Units, post: Post) -> None:
-        radians = gui.add_checkbox("Radians", not units.degrees, hint="Angles in radians instead of degrees")
-        listen(radians, post, "radians")
+        hint = "Angles in radians instead of degrees"
+        self._radians = gui.add_checkbox("Radians", not units.degrees, hint=hint)
+        listen(self._radians, post, "radians")
         self._length: Length = units.length
         self._lengths = gui.add_dropdown(
             "Lengths", LENGTHS, initial_value=units.length, hint="Unit of all lengths"
         )
         listen(self._lengths, post, "lengths")
+
+    def show(self, units: Units) -> None:
+        """Show these units."""
+        self._length = units.length
+        assign(self._radians, not units.degrees)
+        assign(self._lengths, units.length)
 
     def with_length(self, units: Units, value: object) -> Units:
         """The units with the chosen unit of length; raises `InputError` for an unknown one."""
@@ -55,19 +70,30 @@ class UnitChoice:
 
 
 class ViewOptions:
-    """Check boxes that post ``("view", name)``; buttons: ``"camera"``, ``"fit-arm"``, ``("look-from", side)``."""
+    """Posts ``("view", name)`` (check boxes), ``"axes"``, ``"camera"``, ``"fit-arm"``, ``("look-from", side)``."""
 
     def __init__(self, gui: viser.GuiApi, state: ViewState, post: Post) -> None:
+        self._boxes: dict[str, viser.GuiCheckboxHandle] = {}
         for name, text, hint in (
             ("frames", "Link frames", "The frame of every DH row: x red, y green, z blue"),
             ("labels", "Frame labels", "The name of each frame, at the tip of its z axis"),
             ("axes", "Joint axes", "The axis of each joint; its arrow shows the positive direction"),
         ):
-            listen(gui.add_checkbox(text, getattr(state, name), hint=hint), post, ("view", name))
+            self._boxes[name] = gui.add_checkbox(text, getattr(state, name), hint=hint)
+            listen(self._boxes[name], post, ("view", name))
+        initial = AXES[state.base_axes]
+        self._axes = gui.add_dropdown("Arrows along", AXES, initial_value=initial, hint=AXES_HINT)
+        listen(self._axes, post, "axes")
         group = gui.add_button_group("Camera", ("Fit arm", "Reset view"))
         listen_click(group, post, {"Fit arm": "fit-arm", "Reset view": "camera"})
         sides = gui.add_button_group("View from", SIDES)
         listen_click(sides, post, {side: ("look-from", side) for side in SIDES})
+
+    def show(self, state: ViewState) -> None:
+        """Show these choices."""
+        for name, box in self._boxes.items():
+            assign(box, getattr(state, name))
+        assign(self._axes, AXES[state.base_axes])
 
 
 class ColourChoice:
@@ -88,6 +114,10 @@ class ColourChoice:
             "Page colours", tuple(SCHEMES), initial_value=_scheme(dark), hint=hint
         )
         listen(self._choice, self._post, "colours")
+
+    def show(self, dark: bool | None) -> None:
+        """Show this choice."""
+        assign(self._choice, _scheme(dark))
 
     def read(self, value: object, before: bool | None) -> bool | None:
         """A choice as `ViewState.dark`; an unknown one raises `InputError`, and `before` is shown again."""

@@ -7,6 +7,7 @@ without browsers.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import viser
@@ -42,6 +43,7 @@ class ArmScene:
     Attributes:
         gizmo: the transform controls; the visitor drags them, `place_gizmo` moves them. If some rotations are not
             available, the gizmo has only arrows, and each available ring is a child node (`set_gizmo_axes`).
+        gizmo_in_base: whether `place_gizmo` aligns the gizmo with the base instead of the tool.
     """
 
     def __init__(self, scene: viser.SceneApi, robot: Robot, dark: bool = False, root: str = "/arm") -> None:
@@ -88,6 +90,8 @@ class ArmScene:
         self._top += [self.gizmo, self._gap, self._contact]
         self._rings: list[viser.TransformControlsHandle] = []
         self._ring_sets = 0
+        self.gizmo_in_base = False
+        self._R_gizmo_target = np.eye(3)
         self.show(robot.q_home)
         self.place_gizmo(fk(robot, robot.q_home))
 
@@ -107,9 +111,25 @@ class ArmScene:
 
     def place_gizmo(self, T_base_tool: Array) -> None:
         """Move the gizmo. Never call this while the visitor holds it."""
-        assign(self.gizmo, T_base_tool[:3, 3], wxyz_from_rotation(T_base_tool[:3, :3]))
+        wxyz = wxyz_from_rotation(T_base_tool[:3, :3])
+        if self.gizmo_in_base:
+            self._R_gizmo_target = T_base_tool[:3, :3].copy()
+            assign(self.gizmo, T_base_tool[:3, 3], NO_TURN)
+            assign(self._ghost, wxyz=wxyz)
+        else:
+            self._R_gizmo_target = np.eye(3)
+            assign(self.gizmo, T_base_tool[:3, 3], wxyz)
+            assign(self._ghost, wxyz=NO_TURN)
         for ring in self._rings:
             assign(ring, STILL, NO_TURN)
+
+    def pulled(self, position: Sequence[float], wxyz: Sequence[float], ring: bool) -> Array:
+        """The target ``(4, 4)`` for a pose of the gizmo or, in the gizmo's frame, of one of its rings."""
+        T = from_position_wxyz(position, wxyz)
+        if ring:  # rings are children of the gizmo, which stays still until the ring is released
+            T = self.gizmo_pose @ T
+        T[:3, :3] = T[:3, :3] @ self._R_gizmo_target
+        return T
 
     @property
     def gizmo_pose(self) -> Array:

@@ -1,12 +1,20 @@
-"""Events of the gizmo, as they are posted."""
+"""Events of the gizmo, as they are posted, and motions of the target in fixed steps."""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
+import numpy as np
 import viser
 
 from app.viewer.panel import Post
+from kin.transforms import Array, rotation_angle, rotation_from_wxyz, wxyz_from_rotation
+
+# Steps of the target: of a drag with Shift, and of one press of a key (with Shift: a tenth and a fifth).
+STEP, TURN = 0.01, math.radians(5.0)  # m, rad
+FINE_STEP, FINE_TURN = 0.001, math.radians(1.0)
+_SMALLEST = 1e-9
 
 
 class Pull(NamedTuple):
@@ -25,10 +33,40 @@ class Pull(NamedTuple):
 
 
 def listen(handle: viser.TransformControlsHandle, ring: bool, post: Post) -> None:
-    """Post ``"gizmo"`` with a `Pull` whenever the visitor drags it."""
+    """Post a `Pull`: ``"grab"`` when the visitor grabs the gizmo, ``"gizmo"`` when it is dragged or released."""
 
     @handle.on_update
     async def _(event: viser.TransformControlsEvent) -> None:
         if event.client is not None:
             gizmo = event.target
-            post("gizmo", Pull(event.phase, gizmo.position.tolist(), gizmo.wxyz.tolist(), ring))
+            key = "grab" if event.phase == "start" else "gizmo"  # the next event must not replace the start
+            post(key, Pull(event.phase, gizmo.position.tolist(), gizmo.wxyz.tolist(), ring))
+
+
+def snapped(T: Array, start: Array, R_gizmo: Array) -> Array:
+    """The pose ``(4, 4)`` nearest to `T` that is whole steps away from `start` along the gizmo's axes."""
+    out = T.copy()
+    moved = R_gizmo.T @ (T[:3, 3] - start[:3, 3])
+    out[:3, 3] = start[:3, 3] + R_gizmo @ (np.round(moved / STEP) * STEP)
+    angle = rotation_angle(T[:3, :3], start[:3, :3])
+    if angle > _SMALLEST:
+        axis = wxyz_from_rotation(T[:3, :3] @ start[:3, :3].T)[1:]
+        out[:3, :3] = rotation_about(axis, round(angle / TURN) * TURN) @ start[:3, :3]
+    return out
+
+
+def nudged(T: Array, axis: int, turn: bool, amount: float, in_base: bool) -> Array:
+    """`T` ``(4, 4)`` moved along (m), or turned about (rad), one axis of its own or of the base."""
+    out = T.copy()
+    direction = np.eye(3)[axis] if in_base else T[:3, axis]
+    if turn:
+        out[:3, :3] = rotation_about(direction, amount) @ T[:3, :3]
+    else:
+        out[:3, 3] += amount * direction
+    return out
+
+
+def rotation_about(axis: Array, angle: float) -> Array:
+    """The rotation ``(3, 3)`` about an axis ``(3,)`` of any length."""
+    xyz = math.sin(angle / 2) * axis / np.linalg.norm(axis)
+    return rotation_from_wxyz(np.array([math.cos(angle / 2), *xyz]))

@@ -5,33 +5,74 @@ Only the visitor's worker calls these methods, one event at a time.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+import math
+import time
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 from typing import Protocol
 
 import kin
 from app.viewer.feature import Feature
 from app.viewer.panel import assign
-from app.viewer.panel.joints import JointSliders
-from app.viewer.panel.layout import Panel
-from app.viewer.panel.status import Notice, StatusLine, introduction
-from app.viewer.panel.target import TASKS
-from app.viewer.session.persistence import SavedPage
-from app.viewer.session.posture import PosturePanel
-from kin import Robot
+from app.viewer.panel.status import Notice, introduction
+from app.viewer.panel.target import DEFAULT_TASK, TASKS
+from app.viewer.panel.view import ViewState
+from app.viewer.scene.gizmo import Pull
+from app.viewer.session.history import HOLD, PAUSE, History, Step, same, without_results
+from app.viewer.session.persistence import link_notice
+from app.viewer.session.state import PageState, decode
+from app.viewer.session.typed import BY_HAND, TypedInput, TypedPage
+from kin import Robot, Task
 from kin.transforms import Array
 from kin.units import Units
 
-BY_HAND = Notice("hand", "Joints moved by hand", "The target follows the tool.")
+# Events that change nothing that undo restores.
+NO_STEP = frozenset(
+    {
+        "camera",
+        "fit-arm",
+        "look-from",
+        "looked",
+        "resized",
+        "system-dark",
+        "grab",
+        "copy-as",
+        "undo",
+        "redo",
+        "travel",
+        "pause",
+        "snap",
+    }
+)
+# Controls that send many values on the way to the one the visitor means: how long (s) a step may pause.
+GRADUAL = {"gizmo": math.inf, "joint": HOLD, "redundancy": HOLD, "feature": PAUSE, "nudge": PAUSE}
+MESSAGES = ("undo", "redo", "travel", "pause", "snap", "nudge", "axes", "field", "target")
+ANSWERED = frozenset({"field", "target"})  # messages with a reply
+LABELS = {
+    "gizmo": "Drag of the target",
+    "redundancy": "Redundancy",
+    "lock": "Lock",
+    "branch": "Posture",
+    "lesson": "Lesson",
+    "robot": "Robot",
+    "task": "Target must match",
+    "radians": "Unit of angles",
+    "lengths": "Unit of lengths",
+    "home": "Home",
+    "random": "Random",
+    "recall": "Move target to tool",
+    "view": "View",
+    "colours": "Page colours",
+    "axes": "Arrows along",
+    "nudge": "Target moved by keys",
+    "field": "Typed value",
+    "target": "Typed target",
+}
 
 
-class ActedPage(SavedPage, Protocol):
-    """What actions may use of a page, in addition to what is saved of it."""
+class ActedPage(TypedPage, Protocol):
+    """What actions may use of a page, in addition to what is saved of it and to its panel."""
 
-    panel: Panel
-    sliders: JointSliders
-    posture: PosturePanel
-    status: StatusLine
     system_dark: bool
 
     def use_colours(self, dark: bool | None, system_dark: bool) -> None:
@@ -43,8 +84,11 @@ class ActedPage(SavedPage, Protocol):
     def use_units(self, units: Units) -> None:
         """Show all numbers in these units."""
 
-    def apply_view(self) -> None:
-        """Show the scene as `view` says."""
+    def use_view(self, view: ViewState) -> None:
+        """Show the page and the scene as `view` says."""
+
+    def snapshot(self) -> PageState:
+        """The present state."""
 
     def change_lock(self, joint: int | None, lock: bool) -> None:
         """Lock or unlock one joint, or all of them, at the value it is heading for."""
@@ -58,9 +102,16 @@ class Actions:
 
     def __init__(self, page: ActedPage) -> None:
         self._page = page
+        self._history = History()
+        self._gesture: tuple[object, ...] | None = None  # the control of the last step, while it may go on
+        self._changed_at = 0.0
+        self._returned = False
+        self._left: dict[str, PageState] = {}  # the state in which each robot was left
+        self._typed = TypedInput(page)
         arm = page.arm
         # Events by the first part of their key. A handler takes the other parts, and the value.
         self._handlers: dict[str, Callable[..., None]] = {
+            "grab": self._on_grab,
             "gizmo": arm.pull,
             "joint": self._on_slider,
             "redundancy": self._on_redundancy,
@@ -84,14 +135,126 @@ class Actions:
             "look-from": lambda side, _: page.camera.look_from(side, self._frames()),
             "resized": lambda _: page.camera.refit(),
             "looked": lambda _: None,  # the viewpoint is read when the camera rests
+            "axes": self._typed.use_axes,
+            # Messages of the page's own script
+            "undo": self._undo,
+            "redo": self._redo,
+            "travel": self._travel,
+            "pause": self._on_pause,
+            "snap": self._typed.snap,
+            "nudge": self._typed.nudge,
+            "field": self._typed.set_field,
+            "target": self._typed.set_target,
         }
 
     def handle(self, key: Hashable, value: object) -> None:
         """Process one event; raises `kin.InputError` for a value that none of our controls sends."""
         name, *arguments = key if isinstance(key, tuple) else (key,)
+        if name == "message":
+            name, number = arguments
+            if name not in MESSAGES:
+                raise kin.InputError("message", name, "one of " + ", ".join(MESSAGES))
+            arguments = [number] if name in ANSWERED else []
         if name not in self._handlers:
             raise KeyError(key)
-        self._handlers[name](*arguments, value)
+        action = self._handlers[name]
+        if name in NO_STEP:
+            action(*arguments, value)
+            return
+        gesture = (name, *(a for a in arguments if not isinstance(a, Units)))
+        now = time.perf_counter()
+        if self._continues(gesture, now):
+            action(*arguments, value)
+            return
+        before = self._page.snapshot()
+        try:
+            action(*arguments, value)
+        finally:
+            if not same(before, self._page.snapshot()):
+                self._history.record(_label(gesture, self._page.features), before)
+                self._gesture, self._changed_at = gesture, now
+                self._show_history()
+
+    def take_returned(self) -> bool:
+        """Whether the visitor returned to an earlier state since the last call."""
+        returned, self._returned = self._returned, False
+        return returned
+
+    def _continues(self, gesture: tuple[object, ...], now: float) -> bool:
+        """Whether an event belongs to the same step as the one before."""
+        if gesture != self._gesture or now - self._changed_at > GRADUAL.get(str(gesture[0]), 0.0):
+            return False
+        self._changed_at = now
+        return True
+
+    # History
+
+    def _undo(self, _: object) -> None:
+        self._take("Undone", "Redo: Ctrl+Shift+Z.", self._history.undo(self._page.snapshot()))
+
+    def _redo(self, _: object) -> None:
+        self._take("Redone", "Undo: Ctrl+Z.", self._history.redo(self._page.snapshot()))
+
+    def _take(self, verb: str, detail: str, step: Step | None) -> None:
+        if step is None:
+            self._page.status.show(Notice("hand", f"Nothing can be {verb.lower()}"))
+        else:
+            self._page.status.show(Notice("hand", f"{verb}: {step.label}", detail))
+            self._return_to(step.state)
+        self._show_history()
+
+    def _travel(self, text: object) -> None:
+        """Go to the state of an entry in the browser's history."""
+        page = self._page
+        state = decode(text, page.store.robots) if isinstance(text, str) else PageState(unreadable=True)
+        if (notice := link_notice(state)) is not None:
+            page.status.show(notice)
+            return
+        page.status.show(Notice("hand", "Back to this point of the browser's history"))
+        self._return_to(self._history.travel(state, page.snapshot()))
+        self._show_history()
+
+    def _return_to(self, state: PageState) -> None:
+        page = self._page
+        self._gesture, self._returned = None, True
+        robot = page.store.robots[0] if state.robot is None else page.store.get(state.robot)
+        if state.units != page.units:
+            page.panel.units.show(state.units)
+            page.use_units(state.units)
+        if state.view != page.view:
+            page.use_view(replace(state.view))
+        if robot != page.robot:
+            assign(page.panel.robot, robot.name)
+            page.change_robot(robot, state.q)
+            if state.camera is not None:
+                page.camera.restore(state.camera)
+        self._restore_arm(state)
+        lesson = None if page.lessons is None or page.lessons.shown is None else page.lessons.shown.key
+        if page.lessons is not None and state.lesson != lesson:
+            page.lessons.open(state.lesson)
+        for feature in page.features:
+            wanted = without_results(state.features.get(feature.key, {}))
+            if wanted and wanted != without_results(feature.state()):
+                feature.restore(wanted)
+        page.for_features(lambda feature: feature.on_request())
+
+    def _restore_arm(self, state: PageState) -> None:
+        page, arm = self._page, self._page.arm
+        task: Task = state.task or DEFAULT_TASK
+        locks = [i in state.locks for i in range(page.robot.n)]
+        page.panel.target.show(task)
+        page.sliders.show_locks(locks)
+        q = page.robot.q_home if state.q is None else state.q
+        arm.restore(q, state.target, task, state.branch, locks)
+
+    def _show_history(self) -> None:
+        self._page.panel.script.show_history(*self._history.labels)
+
+    def _on_pause(self, _: object) -> None:
+        """The visitor has released a control: what follows is another step."""
+        self._gesture = None
+
+    # Controls of the panel
 
     def _frames(self) -> Array:
         """Origins ``(n, 3)`` of the frames of the arm where it is heading."""
@@ -107,6 +270,10 @@ class Actions:
         motion()
         self._page.status.show(BY_HAND)
 
+    def _on_grab(self, pull: Pull) -> None:
+        self._gesture = None
+        self._page.arm.pull(pull)
+
     def _on_slider(self, robot_id: str, index: int, units: Units, value: object) -> None:
         page = self._page
         # An event of sliders that have been replaced since is ignored.
@@ -119,10 +286,7 @@ class Actions:
         page = self._page
         if (robot_id, units) != (page.robot.id, page.units):
             return
-        q, result = page.posture.move(name, value)
-        page.status.show_result(result, page.units)
-        if q is not None:
-            page.arm.slide_along(q)
+        self._typed.slide(name, value, held=True)
 
     def _on_lock(self, robot_id: str, joint: int | None, lock: object) -> None:
         if robot_id == self._page.robot.id:
@@ -146,9 +310,14 @@ class Actions:
         if robot is None:
             assign(page.panel.robot, page.robot.name)
             robot = page.store.get(name)  # raises with the list of valid ones
-        if robot != page.robot:
-            page.change_robot(robot)
-            page.status.show(introduction(robot))
+        if robot == page.robot:
+            return
+        self._left[page.robot.id] = page.snapshot()
+        left = self._left.get(robot.id)
+        page.change_robot(robot, None if left is None else left.q)
+        page.status.show(introduction(robot))
+        if left is not None:
+            self._restore_arm(left)
 
     def _on_task(self, value: object) -> None:
         page = self._page
@@ -162,6 +331,16 @@ class Actions:
         page.use_colours(page.panel.colours.read(name, page.view.dark), page.system_dark)
 
     def _on_view(self, name: str, value: object) -> None:
-        page = self._page
-        setattr(page.view, name, bool(value))
-        page.apply_view()
+        view = replace(self._page.view)
+        setattr(view, name, bool(value))
+        self._page.use_view(view)
+
+
+def _label(gesture: tuple[object, ...], features: Sequence[Feature]) -> str:
+    """What changed, for people."""
+    match gesture:
+        case ("joint", _, int(index)):
+            return f"Joint {index + 1}"
+        case ("feature", key, *_):
+            return next((feature.title for feature in features if feature.key == key), "Lesson")
+    return LABELS[str(gesture[0])]

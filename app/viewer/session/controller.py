@@ -31,7 +31,7 @@ from app.viewer.scene.gizmo_axes import gizmo_axes
 from app.viewer.scene.motion import Motion, Pace
 from kin import IKOptions, IKResult, JointConstraints, Robot, Task
 from kin.ik import solve
-from kin.transforms import Array, from_position_wxyz
+from kin.transforms import Array, rotation_from_wxyz
 
 # A node name is never used twice: browsers keep the poses of removed nodes.
 _ARMS = itertools.count(1)
@@ -73,6 +73,7 @@ class ArmController:
         q: the configuration ``(n,)`` shown in the scene.
         target: the target pose ``(4, 4)``; None while the target follows the tool.
         dragging: whether the visitor holds the gizmo.
+        snap: whether the gizmo is dragged in fixed steps.
         scene: the arm's nodes.
     """
 
@@ -93,8 +94,11 @@ class ArmController:
         self.locks: list[bool] = []
         self.target: Array | None = None
         self.dragging = False
+        self.snap = False
+        self._in_base = False
+        self._drag_start: tuple[Array, Array] = np.eye(4), np.eye(3)  # target pose, gizmo orientation
 
-    def use(self, robot: Robot, q: Array | None, dark: bool) -> None:
+    def use(self, robot: Robot, q: Array | None, dark: bool, base_axes: bool) -> None:
         """Show another robot, at its home configuration or at `q` ``(n,)``."""
         if hasattr(self, "scene"):
             self.scene.remove()
@@ -108,6 +112,7 @@ class ArmController:
         self._motion = Motion(robot.q_home if q is None else q, weights)
         self.q = self._motion.goal
         self.scene = ArmScene(self._client.scene, robot, dark, f"/arm-{next(_ARMS)}")
+        self._in_base = self.scene.gizmo_in_base = base_axes
         gizmo.listen(self.scene.gizmo, ring=False, post=self._post)
         self._set_gizmo_axes()
 
@@ -115,6 +120,11 @@ class ArmController:
     def goal(self) -> Array:
         """The configuration ``(n,)`` the arm is moving to, or has reached."""
         return self._motion.goal
+
+    @property
+    def open_target(self) -> Array | None:
+        """The target ``(4, 4)`` that the tool will not have on arrival; None if there is none."""
+        return None if self._reached and not self.dragging else self.target
 
     @property
     def moving(self) -> bool:
@@ -145,11 +155,11 @@ class ArmController:
         """Move to a random configuration within the limits."""
         self.move_to(self.robot.random_q(self._rng))
 
-    def move_joint(self, index: int, value: float) -> None:
-        """Set one joint (rad or m), whose slider the visitor holds."""
+    def move_joint(self, index: int, value: float, held: bool = True) -> None:
+        """Set one joint (rad or m); `held`: with its slider, which is not moved then."""
         q = self.goal.copy()
         q[index] = value
-        self.move_to(q, dragged=index)
+        self.move_to(q, dragged=index if held else None)
 
     def slide_along(self, q: Array) -> None:
         """Move to a configuration ``(n,)`` of a self-motion: the branch stays, the target follows the tool."""
@@ -171,6 +181,18 @@ class ArmController:
             self.branch = None
             self._listener.on_branch(None)
 
+    def restore(
+        self, q: Array, target: Array | None, task: Task, branch: str | None, locks: Sequence[bool]
+    ) -> None:
+        """Return to an earlier state of this robot: configuration ``(n,)``, open target, and requests."""
+        self.task, self.branch, self.locks, self.target = task, branch, list(locks), None
+        self._set_gizmo_axes()
+        self._listener.on_branch(branch)
+        self._head_for(q)
+        if target is not None:
+            self.restore_target(target, q, ease=True)
+        self._listener.on_request()
+
     # Targets
 
     def set_target(self, T: Array) -> None:
@@ -178,27 +200,43 @@ class ArmController:
         self.scene.place_gizmo(T)
         self._solve(T)
 
-    def restore_target(self, T: Array, q: Array | None) -> None:
+    def nudge(self, axis: int, turn: bool, amount: float) -> None:
+        """Move the target along (m), or turn it about (rad), one axis of the gizmo."""
+        T = kin.fk(self.robot, self.goal) if self.target is None else self.target
+        self.set_target(gizmo.nudged(T, axis, turn, amount, self._in_base))
+
+    def use_base_axes(self, in_base: bool) -> None:
+        """Align the gizmo with the base, or with the tool."""
+        self._in_base = self.scene.gizmo_in_base = in_base
+        self._set_gizmo_axes()
+        if not self.dragging:
+            self.scene.place_gizmo(kin.fk(self.robot, self.q) if self.target is None else self.target)
+
+    def restore_target(self, T: Array, q: Array | None, ease: bool = False) -> None:
         """Set a saved target, and keep its saved configuration ``(n,)`` unless the new answer is closer to it."""
         self.set_target(T)
         if q is None or self._reached:
             return
         saved, solved = (np.linalg.norm(kin.fk(self.robot, x)[:3, 3] - T[:3, 3]) for x in (q, self.goal))
         if saved <= solved + 1e-6:
-            self._head_for(q, ease=False)
+            self._head_for(q, ease)
 
     def pull(self, pull: gizmo.Pull) -> None:
         """Process one event of the gizmo, or of a ring attached to it."""
         phase, position, wxyz, ring = pull
         self.dragging = phase != "end"
+        target = self.scene.pulled(position, wxyz, ring)
         if phase == "start":
+            self._drag_start = (
+                target,
+                self.scene.gizmo_pose[:3, :3] if ring else rotation_from_wxyz(np.array(wxyz)),
+            )
             return
-        target = from_position_wxyz(position, wxyz)
-        if ring:  # rings are children of the gizmo, which stays still until the ring is released
-            target = self.scene.gizmo_pose @ target
+        if self.snap:
+            target = gizmo.snapped(target, *self._drag_start)
         if self.target is None or not np.array_equal(target, self.target):
             self._solve(target)
-        if ring and not self.dragging:
+        if not self.dragging and (ring or self.snap or self._in_base):
             self.scene.place_gizmo(target)
 
     def set_task(self, task: Task) -> None:
@@ -273,5 +311,5 @@ class ArmController:
 
     def _set_gizmo_axes(self) -> None:
         """Give the gizmo the arrows and rings that the arm can follow in this task."""
-        for ring in self.scene.set_gizmo_axes(gizmo_axes(self.robot, self.task)):
+        for ring in self.scene.set_gizmo_axes(gizmo_axes(self.robot, self.task, self._in_base)):
             gizmo.listen(ring, ring=True, post=self._post)

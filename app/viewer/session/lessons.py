@@ -46,11 +46,11 @@ class LessonChoice:
         with self._box:
             self.shown = chosen(self._stage)
 
-    def open(self, key: str) -> None:
-        """Open the lesson with this key, if there is one."""
+    def open(self, key: str | None) -> None:
+        """Open the lesson with this key, if there is one; None: close the open one."""
         lesson = next((lesson for lesson in LESSONS if lesson.key == key), None)
-        if lesson is not None:
-            self.choose(lesson.title)
+        if key is None or lesson is not None:
+            self.choose(NONE if lesson is None else lesson.title)
 
     def remove(self) -> None:
         """Remove the open lesson, or the overview if none is open."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Hashable, Sequence
+from dataclasses import replace
 
 import viser
 
@@ -25,12 +26,14 @@ from app.viewer.panel.view import ViewState, configure_theme
 from app.viewer.scene.camera import Sphere, VisitorCamera
 from app.viewer.scene.clearance import clearance
 from app.viewer.scene.key_number import KeyNumber
-from app.viewer.session.actions import BY_HAND, Actions
+from app.viewer.session.actions import Actions
 from app.viewer.session.controller import ArmController
 from app.viewer.session.lessons import LessonChoice
 from app.viewer.session.persistence import Persistence
 from app.viewer.session.posture import PosturePanel
 from app.viewer.session.services import Services
+from app.viewer.session.state import PageState
+from app.viewer.session.typed import BY_HAND
 from app.viewer.session.worker import Worker
 from app.viewer.tabs import TABS
 from app.viewer.views.templates import render
@@ -201,10 +204,24 @@ class VisitorPage(Worker):
         if self.dark != before:
             configure_theme(self.client.gui, self.dark)
             self.for_features(lambda feature: feature.on_style())
-            self.apply_view()
+            self._apply_view()
 
-    def apply_view(self) -> None:
-        """Show the scene as `view` says."""
+    def use_view(self, view: ViewState) -> None:
+        """Show the page and the scene as `view` says."""
+        before, self.view = self.view, replace(view, dark=self.view.dark)
+        self.panel.view.show(view)
+        if view.base_axes != before.base_axes:
+            self.arm.use_base_axes(view.base_axes)
+        if view.dark != before.dark:
+            self.panel.colours.show(view.dark)
+            self.use_colours(view.dark, self.system_dark)
+        self._apply_view()
+
+    def snapshot(self) -> PageState:
+        """The present state."""
+        return self._persistence.snapshot()
+
+    def _apply_view(self) -> None:
         scene = self.arm.scene
         scene.show_frames(self.view.frames)
         scene.show_labels(self.view.labels)
@@ -281,7 +298,7 @@ class VisitorPage(Worker):
         if batch:
             self._persistence.postpone(now)
         elif not (self.arm.moving or self.arm.dragging) and self._persistence.rested(now):
-            self._guard(self._persistence.save)
+            self._guard(lambda: self._persistence.save(self._actions.take_returned()))
 
     def _update_numbers(self) -> None:
         """Update the numbers in the panel: after the scene, because that takes longer than posing the joints."""
@@ -330,17 +347,17 @@ class VisitorPage(Worker):
             # For static/hints.js: where the tool is in the picture.
             x, y = self.camera.place(kin.fk(self.robot, self.goal)[:3, 3]).tolist()
             gui.add_html(render("panel/hints", x=f"{x:.3f}", y=f"{y:.3f}"))
-            self._persistence.begin(self.panel.share)
+            self.panel.script.show_start(self._persistence.begin(self.panel.share))
         self.client.flush()
 
     def _use_robot(self, robot: Robot, q: Array | None = None) -> None:
         """Show another robot, at its home configuration or at `q` ``(n,)``, in a fitting view."""
-        self.arm.use(robot, q, self.dark)
+        self.arm.use(robot, q, self.dark, self.view.base_axes)
         self._readout_due = True
         self.panel.target.show(self.task)
         self.sliders = self._make_sliders()
         self.posture.use_robot()
-        self.apply_view()
+        self._apply_view()
         self.camera.aim(self.arm.scene.body, kin.link_frames(robot, self.goal)[:, :3, 3])
 
     def _make_sliders(self) -> JointSliders:

@@ -21,8 +21,18 @@ from app.viewer.panel.status import Notice
 from app.viewer.panel.view import ViewState
 from app.viewer.scene.camera import VisitorCamera
 from app.viewer.session.controller import ArmController
+from app.viewer.session.history import same
 from app.viewer.session.lessons import LessonChoice
-from app.viewer.session.state import KEY, PageState, StoredPage, decode, encode, read_stored_page
+from app.viewer.session.state import (
+    KEY,
+    KEY_REPLACE,
+    KEY_RETURN,
+    PageState,
+    StoredPage,
+    decode,
+    encode,
+    read_stored_page,
+)
 
 log = logging.getLogger(__name__)
 
@@ -72,6 +82,7 @@ class Persistence:
         self._address = LOCAL
         self.system_dark = False
         self._saved = ""
+        self._state = PageState()
         self._share: SharePanel
         self.due: float | None = None
 
@@ -111,15 +122,17 @@ class Persistence:
                 self._guard(lambda feature=feature, state=state: feature.restore(state))  # type: ignore[misc]
         if camera is not None:  # after the lessons, which may move it too
             self._guard(lambda: page.camera.restore(camera))
-        if saved.missing:
-            detail = f"This service has no robot “{saved.missing}”."
-            page.notify(Notice("error", "The link needs another robot", detail))
+        notice = link_notice(saved)
+        if notice is not None:
+            page.notify(notice)
 
-    def begin(self, share: SharePanel) -> None:
-        """Take the present state as saved; from now on `share` offers the saved state."""
+    def begin(self, share: SharePanel) -> str:
+        """Take the present state as saved, and return it; from now on `share` offers the saved state."""
         self._share = share
-        self._saved = encode(self._snapshot())
+        self._state = self.snapshot()
+        self._saved = encode(self._state)
         self._update_share()
+        return self._saved
 
     def postpone(self, now: float) -> None:
         """The visitor did something: wait for the next rest."""
@@ -132,29 +145,36 @@ class Persistence:
         self.due = None
         return True
 
-    def save(self) -> None:
-        """Store the present state in the browser, unless it is stored already."""
+    def save(self, returned: bool = False) -> None:
+        """Store the present state in the browser, unless it is stored already.
+
+        Args:
+            returned: whether the visitor returned to an earlier state.
+        """
         self._page.camera.look()
-        text = encode(self._snapshot())
+        state = self.snapshot()
+        text = encode(state)
         if text != self._saved:
-            self._saved = text
-            self._page.client.local_storage.set_item(KEY, text)
+            key = KEY_RETURN if returned else KEY_REPLACE if same(state, self._state) else KEY
+            self._saved, self._state = text, state
+            self._page.client.local_storage.set_item(key, text)
             self._update_share()
             self._page.client.flush()
 
-    def _snapshot(self) -> PageState:
+    def snapshot(self) -> PageState:
+        """The present state."""
         page = self._page
         lesson = page.lessons.shown if page.lessons is not None else None
         states = {feature.key: feature.state() for feature in page.features}
         return PageState(
             robot=page.robot.id,
             q=page.goal,
-            target=page.target,
+            target=page.arm.open_target,
             task=page.task,
             branch=page.branch,
             lesson=None if lesson is None else lesson.key,
             units=page.units,
-            view=page.view,
+            view=replace(page.view),
             features={key: state for key, state in states.items() if state},
             locks=tuple(i for i, lock in enumerate(page.arm.locks) if lock),
             camera=page.camera.chosen,
@@ -165,3 +185,16 @@ class Persistence:
         target = kin.fk(page.robot, page.goal) if page.target is None else page.target
         moment = Moment(page.robot, page.goal, target, page.task, self._address, self._token)
         self._share.show(f"{self._address}viewer/#s={self._saved}", moment)
+
+
+def link_notice(saved: PageState) -> Notice | None:
+    """What could not be read in a link; None: everything was."""
+    if saved.unreadable:
+        detail = "It is incomplete, or another version made it. The page starts from the beginning."
+        return Notice("error", "The link cannot be read", detail)
+    if saved.missing:
+        return Notice("error", "The link needs another robot", f"This service has no robot “{saved.missing}”.")
+    if saved.ignored:
+        detail = f"Ignored, because it does not fit this robot: {', '.join(saved.ignored)}."
+        return Notice("error", "Part of the link cannot be used", detail)
+    return None

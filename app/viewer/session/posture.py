@@ -66,8 +66,21 @@ class PosturePanel:
         """Select a branch, given as `kin.solve_ik` takes it."""
         self._choice.choose(branch)
 
-    def move(self, name: str, value: object) -> tuple[Array | None, IKResult]:
-        """Set a redundancy parameter while the tool is held.
+    def name_of(self, uuid: object) -> str | None:
+        """The redundancy parameter whose slider has this id; None if there is none."""
+        return self._sliders.name_of(uuid)
+
+    def read_text(self, name: str, text: str) -> float:
+        """A typed value of a redundancy parameter, in screen units; raises `EntryError` for an invalid one."""
+        return self._sliders.read_text(name, text)
+
+    def move(self, name: str, value: object, held: bool = True) -> tuple[Array | None, IKResult]:
+        """Set a redundancy parameter while the tool stays.
+
+        Args:
+            name: of the parameter.
+            value: in screen units.
+            held: whether the visitor holds its slider, which is not moved then.
 
         Returns:
             The configuration ``(n,)`` to move to, None if there is none, and the result to report. Outside the
@@ -83,7 +96,7 @@ class PosturePanel:
             result = self._self_motion(name, min(feasible, key=lambda v: abs(v - requested)))
         if not result.solutions:
             return None, reported
-        self._dragged = name
+        self._dragged = name if held else None
         return result.solutions[0].q, reported
 
     def _self_motion(self, name: str, value: float) -> IKResult:

@@ -28,7 +28,9 @@ from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
 from kin.units import DEFAULT_UNITS, LENGTHS, Units
 
 VERSION = 1
-KEY = "kinboard"  # of the item in the page's storage
+# Of the item in the page's storage. For a state under `KEY`, the page adds an entry to the browser's history;
+# under the others, it replaces the present entry (another viewpoint) or returns to the entry with this state.
+KEY, KEY_REPLACE, KEY_RETURN = "kinboard", "kinboard-replace", "kinboard-return"
 MAX_TEXT = 16_000  # characters; the bridge refuses messages of 64 KiB
 FARTHEST = 1000.0  # m: the largest coordinate of a target or a camera
 # Nine digits are a nanometre: a shared configuration is practically exact, in half the text.
@@ -55,6 +57,8 @@ class PageState:
         locks: indices of the locked joints; each is locked at its value in `q`.
         camera: viewpoint ``(3, 3)`` as `VisitorCamera.chosen`; None: the default view.
         missing: the requested robot's id, if this service does not have that robot.
+        unreadable: whether there was a text that is not a state.
+        ignored: names of entries that were invalid.
     """
 
     robot: str | None = None
@@ -69,6 +73,8 @@ class PageState:
     locks: tuple[int, ...] = ()
     camera: Array | None = None
     missing: str = ""
+    unreadable: bool = False
+    ignored: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -131,7 +137,7 @@ def decode(text: str, robots: Sequence[Robot]) -> PageState:
     """
     data = _unpack(text)
     if data.get("v") != VERSION:
-        return PageState()
+        return PageState(unreadable=bool(text))
     requested = data.get("robot", robots[0].id)
     robot = next((r for r in robots if r.id == requested), None)
     lesson = data.get("lesson")
@@ -146,16 +152,18 @@ def decode(text: str, robots: Sequence[Robot]) -> PageState:
         return PageState(missing=requested[:80] if isinstance(requested, str) else "", **common)
     task, branch = data.get("task"), data.get("branch")
     valid = ("seed", *branch_names(robot)) if branch_names(robot) else ()
-    return PageState(
-        robot=robot.id,
-        q=_configuration(data.get("q"), robot),
-        target=_pose(data.get("target")),
-        task=task if task in _TASKS else None,
-        branch=branch if branch in valid else None,
-        locks=_joints(data.get("locks"), robot),
-        camera=_viewpoint(data.get("camera"), robot),
-        **common,
+    entries: dict[str, Any] = {
+        "q": _configuration(data.get("q"), robot),
+        "target": _pose(data.get("target")),
+        "task": task if task in _TASKS else None,
+        "branch": branch if branch in valid else None,
+        "camera": _viewpoint(data.get("camera"), robot),
+    }
+    ignored = tuple(
+        _NAMES[name] for name, value in entries.items() if value is None and data.get(name) is not None
     )
+    locks = _joints(data.get("locks"), robot)
+    return PageState(robot=robot.id, locks=locks, ignored=ignored, **entries, **common)
 
 
 def read_stored_page(text: str | None) -> StoredPage:
@@ -168,6 +176,7 @@ def read_stored_page(text: str | None) -> StoredPage:
 
 
 _TASKS: tuple[Task, ...] = get_args(Task)
+_NAMES = {"q": "joint values", "target": "target", "task": "task", "branch": "posture", "camera": "viewpoint"}
 
 
 def _pack(data: dict[str, Any]) -> str:

@@ -1,0 +1,207 @@
+"""Reads what visitors type: joint values and target poses. Wrong input is named, with what would be valid.
+
+Numbers are in the units on screen unless a unit follows them. The entries of a matrix are in metres, as in code.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Literal
+
+import numpy as np
+
+from app.viewer.panel.readout import ANGLES
+from kin import InputError, KinematicsError
+from kin.transforms import Array, as_transform, rotation_from_wxyz
+from kin.units import Unit, Units
+
+PoseKind = Literal["position", "angles", "quaternion", "pose"]
+LONGEST = 2000  # characters
+FARTHEST = 1000.0  # m, of a coordinate
+LIMIT_DIGITS = 2  # decimals of a degree or a millimetre in which limits are shown
+# A quaternion typed with three decimals is normalised; one that is further off was mistyped.
+_NORM_SLACK = 0.01
+# Matrices copied from a screen have few decimals.
+_MATRIX_SLACK = 2e-3
+
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_ANGLES = {"°": math.pi / 180, "deg": math.pi / 180, "rad": 1.0}
+_LENGTHS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+
+
+class EntryError(ValueError):
+    """A typed text has no valid value: a headline, and a sentence that says what is valid."""
+
+    def __init__(self, title: str, detail: str) -> None:
+        self.title = title
+        self.detail = detail
+        super().__init__(f"{title}: {detail}")
+
+
+def read_value(text: str, name: str, unit: Unit, is_angle: bool, limits: tuple[float, float]) -> float:
+    """A typed joint value in radians or metres.
+
+    Args:
+        name: of the joint, as on screen.
+        unit: of numbers without a unit.
+        limits: lower and upper limit (rad or m).
+
+    Raises:
+        EntryError: not a number, or outside the limits.
+    """
+    low, high = (unit.shown(limit, LIMIT_DIGITS) for limit in limits)
+    title = f"{name} was not changed"
+    valid = f"Valid: {_brief(low)} … {_brief(high)}{unit.suffix}."
+    cleaned = _clean(text)
+    match = re.fullmatch(rf"({_NUMBER.pattern})\s*(\D*)", cleaned.replace(",", "."))
+    if not cleaned:
+        raise EntryError(title, f"The field was empty. {valid}")
+    if match is None:
+        raise EntryError(title, f"“{_cut(text)}” is not a number. {valid}")
+    number, suffix = float(match[1]), match[2].strip()
+    scales = _ANGLES if is_angle else _LENGTHS
+    if suffix and suffix not in scales:
+        raise EntryError(title, f"“{_cut(suffix)}” is not a unit of this joint. Valid: {', '.join(scales)}.")
+    value = number * scales[suffix] if suffix else unit.read(number)
+    shown = value * unit.scale
+    slack = 1e-9 * max(1.0, abs(low), abs(high))
+    if not low - slack <= shown <= high + slack:
+        raise EntryError(title, f"“{_cut(text)}” is outside the limits of this joint. {valid}")
+    # The shown limit may be rounded outwards.
+    return min(max(value, limits[0]), limits[1])
+
+
+def read_pose(kind: PoseKind, text: str, units: Units, T: Array) -> tuple[Array, bool]:
+    """A typed target.
+
+    Args:
+        kind: what was typed: ``"position"`` x y z, ``"angles"`` roll pitch yaw, ``"quaternion"`` w x y z, or
+            a whole ``"pose"``: 3 numbers (a point), 6 (with roll pitch yaw), 7 (with a quaternion), 12 or 16 (a
+            matrix).
+        T: the present target pose ``(4, 4)``; what was not typed is taken from it.
+
+    Returns:
+        The target pose ``(4, 4)``, and whether it gives an orientation: a whole pose of 3 numbers does not.
+
+    Raises:
+        EntryError: with what is wrong.
+    """
+    numbers = _numbers(text)
+    pose = T.copy()
+    if kind == "pose":
+        return _whole_pose(numbers, units, pose)
+    if kind == "position":
+        _expect(numbers, 3, f"x y z in {units.lengths.name}")
+        pose[:3, 3] = _position(numbers, units)
+    elif kind == "angles":
+        _expect(numbers, 3, f"roll pitch yaw in {units.angles.name}, with {ANGLES}")
+        pose[:3, :3] = rotation_from_angles(*(units.angles.read(v) for v in numbers))
+    else:
+        _expect(numbers, 4, "a quaternion w x y z, scalar first")
+        pose[:3, :3] = _rotation(numbers)
+    return pose, True
+
+
+def rotation_from_angles(roll: float, pitch: float, yaw: float) -> Array:
+    """The rotation ``(3, 3)`` ``Rz(yaw) Ry(pitch) Rx(roll)`` of angles in radians."""
+    (cr, cp, cy), (sr, sp, sy) = ([f(a) for a in (roll, pitch, yaw)] for f in (math.cos, math.sin))
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def _whole_pose(numbers: list[float], units: Units, pose: Array) -> tuple[Array, bool]:
+    match len(numbers):
+        case 3:
+            pose[:3, 3] = _position(numbers, units)
+            return pose, False
+        case 6:
+            pose[:3, 3] = _position(numbers[:3], units)
+            pose[:3, :3] = rotation_from_angles(*(units.angles.read(v) for v in numbers[3:]))
+        case 7:
+            pose[:3, 3] = _position(numbers[:3], units)
+            pose[:3, :3] = _rotation(numbers[3:])
+        case 12 | 16:
+            pose = _matrix(numbers)
+        case count:
+            detail = (
+                f"Found {count}. Valid: 3 numbers (x y z, point only), 6 (x y z roll pitch yaw), "
+                "7 (x y z and a quaternion w x y z), 12 or 16 (a 3×4 or 4×4 matrix in metres)."
+            )
+            raise EntryError("The target needs another count of numbers", detail)
+    return pose, True
+
+
+def _numbers(text: str) -> list[float]:
+    """All numbers in a text; brackets, commas, semicolons and line breaks separate them."""
+    words = re.split(r"[\s,;|\[\](){}]+", _clean(text))
+    found = []
+    for word in filter(None, words):
+        if _NUMBER.fullmatch(word) is None:
+            if word in ("array", "np.array"):
+                continue
+            raise EntryError("The target was not changed", f"“{_cut(word)}” is not a number.")
+        found.append(float(word))
+    if not np.isfinite(found).all():
+        raise EntryError("The target was not changed", "A number is too large.")
+    return found
+
+
+def _expect(numbers: list[float], count: int, meaning: str) -> None:
+    if len(numbers) != count:
+        raise EntryError(f"{count} numbers are needed here", f"Found {len(numbers)}. Valid: {meaning}.")
+
+
+def _position(numbers: list[float], units: Units) -> Array:
+    position = np.array([units.lengths.read(v) for v in numbers])
+    _check_distance(position)
+    return position
+
+
+def _check_distance(position: Array) -> None:
+    if np.abs(position).max() > FARTHEST:
+        raise EntryError("The target is too far away", f"Coordinates are valid up to {FARTHEST:g} m.")
+
+
+def _rotation(wxyz: list[float]) -> Array:
+    norm = math.hypot(*wxyz)
+    if abs(norm - 1.0) > _NORM_SLACK:
+        raise EntryError("Not a unit quaternion", f"The norm of w x y z is {norm:.4g}; valid is 1.")
+    return rotation_from_wxyz(np.array(wxyz))
+
+
+def _matrix(numbers: list[float]) -> Array:
+    T = np.array([*numbers, 0.0, 0.0, 0.0, 1.0][:16]).reshape(4, 4)
+    R = T[:3, :3]
+    off = float(np.abs(R.T @ R - np.eye(3)).max())
+    if off > _MATRIX_SLACK:
+        detail = f"Its columns must be orthonormal; RᵀR differs from the identity by {off:.2g}."
+        raise EntryError("The first three columns are not a rotation", detail)
+    U, _, Vt = np.linalg.svd(R)
+    T[:3, :3] = U @ Vt
+    try:
+        T = as_transform(T, "matrix")
+    except (InputError, KinematicsError) as error:
+        raise EntryError("Not the matrix of a pose", str(error)) from None
+    _check_distance(T[:3, 3])
+    return T
+
+
+def _clean(text: str) -> str:
+    if len(text) > LONGEST:
+        raise EntryError("The text is too long", f"Valid: up to {LONGEST} characters.")
+    return text.strip().replace("−", "-").replace("\u00a0", " ")
+
+
+def _cut(text: str) -> str:
+    text = " ".join(text.split())
+    return text if len(text) <= 24 else text[:23] + "…"
+
+
+def _brief(value: float) -> str:
+    return f"{value:.10g}".replace("-", "−")

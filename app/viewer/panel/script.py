@@ -1,0 +1,80 @@
+"""The connection to the page's own script, ``static/input.js``.
+
+viser reports changes of its own controls only. Keys, typed fields, the buttons of our own HTML and the browser's
+*Back* button are handled by our script, which writes messages into a hidden text field of viser's. Each message
+has a number, and the field always holds the last few: viser sends at most one change of a control per 50 ms and
+drops older ones. The answers are in a hidden HTML element, as JSON.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any, NamedTuple
+
+import viser
+
+from app.viewer.panel import Post, update_html
+from app.viewer.views.templates import render
+
+LABEL = "Messages of the page"  # of the hidden text field
+AT_ONCE = 32  # messages in the field; more are ignored
+MAX_NUMBER = 2**53
+
+
+class Reply(NamedTuple):
+    """The answer to a message: its number, and what is wrong with it (empty: nothing)."""
+
+    number: int
+    error: str
+
+
+class PageScript:
+    """Posts ``("message", name, number)`` with the argument of each message.
+
+    Buttons of our own HTML post their ``data-send`` as a message without an argument.
+    """
+
+    def __init__(self, gui: viser.GuiApi, post: Post) -> None:
+        self._last = 0
+        self._answers: dict[str, object] = {"undo": "", "redo": "", "start": "", "reply": [0, ""]}
+        self._shown = gui.add_html(self._html())
+        field = gui.add_text(LABEL, "")
+
+        @field.on_update
+        async def _(event: Any) -> None:
+            if event.client is None:
+                return
+            for number, name, argument in self.read(event.target.value):
+                post(("message", name, number), argument)
+
+    def read(self, text: str) -> list[tuple[int, str, object]]:
+        """The messages in `text` that have not been read yet, as number, name and argument, in order."""
+        try:
+            items = json.loads(text)
+        except (ValueError, RecursionError):
+            return []
+        found = []
+        for item in items[-AT_ONCE:] if isinstance(items, list) else []:
+            match item:
+                case [int(number), str(name), argument] if self._last < number < MAX_NUMBER:
+                    self._last = number
+                    found.append((number, name, argument))
+        return found
+
+    def show_history(self, undo: str, redo: str) -> None:
+        """Show what would be undone and redone next; empty: nothing."""
+        self._answers |= {"undo": undo, "redo": redo}
+        update_html(self._shown, self._html())
+
+    def show_start(self, state: str) -> None:
+        """Tell the page the state with which it starts."""
+        self._answers["start"] = state
+        update_html(self._shown, self._html())
+
+    def reply(self, reply: Reply) -> None:
+        """Answer a message that the script waits for."""
+        self._answers["reply"] = list(reply)
+        update_html(self._shown, self._html())
+
+    def _html(self) -> str:
+        return render("panel/answers", answers=json.dumps(self._answers))

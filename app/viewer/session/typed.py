@@ -1,0 +1,109 @@
+"""Typed values, typed targets, and keys that move the target: messages of the page's own script."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import kin
+from app.viewer.panel.entry import EntryError, PoseKind, read_pose
+from app.viewer.panel.joints import JointSliders
+from app.viewer.panel.layout import Panel
+from app.viewer.panel.script import Reply
+from app.viewer.panel.status import Notice, StatusLine
+from app.viewer.panel.view import AXES
+from app.viewer.scene.gizmo import FINE_STEP, FINE_TURN, STEP, TURN
+from app.viewer.session.persistence import SavedPage
+from app.viewer.session.posture import PosturePanel
+
+BY_HAND = Notice("hand", "Joints moved by hand", "The target follows the tool.")
+
+
+class TypedPage(SavedPage, Protocol):
+    """What typed input may use of a page, in addition to what is saved of it."""
+
+    panel: Panel
+    sliders: JointSliders
+    posture: PosturePanel
+    status: StatusLine
+
+
+class TypedInput:
+    """Handles what was typed. Invalid text changes nothing; the status line and the page name it."""
+
+    def __init__(self, page: TypedPage) -> None:
+        self._page = page
+
+    def set_field(self, number: int, value: object) -> None:
+        """A value typed beside a slider."""
+        page = self._page
+        match value:
+            case [uuid, str(text)]:
+                joint, name = page.sliders.index_of(uuid), page.posture.name_of(uuid)
+            case _:
+                raise kin.InputError("field", value, "an id and a text")
+        if joint is not None:
+            self._answer(number, lambda: self._set_joint(joint, text))
+        elif name is not None:
+            self._answer(number, lambda: self.slide(name, page.posture.read_text(name, text), held=False))
+
+    def _set_joint(self, joint: int, text: str) -> None:
+        self._page.arm.move_joint(joint, self._page.sliders.read_text(joint, text), held=False)
+        self._page.status.show(BY_HAND)
+
+    def set_target(self, number: int, value: object) -> None:
+        """A typed target."""
+        match value:
+            case [("position" | "angles" | "quaternion" | "pose") as kind, str(text)]:
+                self._answer(number, lambda: self._set_target(kind, text))
+            case _:
+                raise kin.InputError("target", value, "what was typed, and a text")
+
+    def _set_target(self, kind: PoseKind, text: str) -> None:
+        page, arm = self._page, self._page.arm
+        present = kin.fk(page.robot, arm.goal) if arm.target is None else arm.target
+        T, oriented = read_pose(kind, text, page.units, present)
+        arm.target = None  # a changed task must not solve for the target of before
+        if not oriented and page.task != "position":
+            page.set_task("position")
+        elif oriented and kind != "position" and page.task == "position":
+            page.set_task("pose")
+        arm.set_target(T)
+
+    def _answer(self, number: int, action: Callable[[], None]) -> None:
+        """Act on a typed text, and tell the page whether it was valid."""
+        try:
+            action()
+        except EntryError as error:
+            self._page.status.show(Notice("error", error.title, error.detail))
+            self._page.panel.script.reply(Reply(number, f"{error.title}. {error.detail}"))
+        else:
+            self._page.panel.script.reply(Reply(number, ""))
+
+    def nudge(self, value: object) -> None:
+        """Move the target by one step along, or about, an axis of the gizmo."""
+        match value:
+            case [(0 | 1 | 2) as axis, bool(turn), (-1 | 1) as sign, bool(fine)]:
+                step, angle = (FINE_STEP, FINE_TURN) if fine else (STEP, TURN)
+                self._page.arm.nudge(axis, turn, sign * (angle if turn else step))
+            case _:
+                raise kin.InputError("nudge", value, "an axis, whether to turn, a sign, whether it is a fine step")
+
+    def use_axes(self, value: object) -> None:
+        """Align the gizmo with the base or the tool; without a value, with the other one."""
+        page = self._page
+        page.view.base_axes = not page.view.base_axes if value is None else value == AXES[True]
+        page.panel.view.show(page.view)
+        page.arm.use_base_axes(page.view.base_axes)
+
+    def snap(self, value: object) -> None:
+        """Drag the gizmo in steps, or freely."""
+        self._page.arm.snap = value is True
+
+    def slide(self, name: str, value: object, held: bool) -> None:
+        """Set a redundancy parameter, in screen units, while the tool stays; `held`: with its slider."""
+        page = self._page
+        q, result = page.posture.move(name, value, held)
+        page.status.show_result(result, page.units)
+        if q is not None:
+            page.arm.slide_along(q)

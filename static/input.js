@@ -1,0 +1,272 @@
+"use strict";
+// Runs in viser's page, before viser's own script: keys, typed values, and buttons of our own HTML. It sends messages to
+// the server, which decides what they mean; app/viewer/panel/script.py describes how.
+(() => {
+  const KEPT = 20; // messages in the field at once
+  const LONGEST = 40000; // characters in the field
+  const HOLD = 600; // ms without a key until the next press counts as another step of the history
+  const DECIMALS = 1e9;
+  // Letters that move the target: axis and direction. The same places on QWERTY, QWERTZ and AZERTY keyboards.
+  const MOVES = { KeyL: [0, 1], KeyJ: [0, -1], KeyI: [1, 1], KeyK: [1, -1], KeyO: [2, 1], KeyU: [2, -1] };
+  const CONTROLS = 'input, textarea, select, button, a, summary, [contenteditable], [role="slider"], [role="tab"], [role="option"]';
+  const setValue = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
+
+  /** Type into one of viser's fields, as if the visitor did. */
+  function type(input, text) {
+    setValue.call(input, text);
+    input.dispatchEvent(new Event("input", { bubbles: true }));
+  }
+
+  // Messages
+
+  let number = Date.now();
+  let messages = [];
+  const waiting = new Map(); // number of a message → what to do with its reply
+  // A new connection has a new page on the server, which must not act on old messages.
+  addEventListener("kinboard-connect", () => { messages = []; waiting.clear(); });
+
+  function send(name, argument = null, done = null) {
+    const field = document.querySelector("[data-answers]")?.parentElement.nextElementSibling?.querySelector("input");
+    if (!field) return;
+    messages = [...messages.slice(1 - KEPT), [++number, name, argument]];
+    while (messages.length > 1 && JSON.stringify(messages).length > LONGEST) messages.shift();
+    if (done) waiting.set(number, done);
+    type(field, JSON.stringify(messages));
+  }
+
+  let answered = "";
+  function readAnswers() {
+    const text = document.querySelector("[data-answers]")?.dataset.answers ?? "";
+    if (text === answered || !text) return;
+    answered = text;
+    const { undo, redo, reply: [to, error] } = JSON.parse(text);
+    for (const [name, label] of [["undo", undo], ["redo", redo]]) {
+      const button = document.querySelector(`[data-send="${name}"]`);
+      if (!button) { answered = ""; continue; }
+      button.ariaDisabled = String(!label);
+      button.title = label ? `${name[0].toUpperCase() + name.slice(1)}: ${label} (${button.dataset.keys})` : `Nothing to ${name}`;
+    }
+    for (const [sent, done] of waiting) {
+      if (sent > to) continue;
+      waiting.delete(sent);
+      done(sent === to ? error : "");
+    }
+  }
+
+  // Number fields beside sliders
+
+  const fields = new Map(); // id of a slider → { unit, step, fine, page }
+  const thumb = (id) => document.getElementById(id)?.querySelector('[role="slider"]');
+  const valueOf = (node, name = "now") => Number(node.getAttribute(`aria-value${name}`));
+
+  function readFields() {
+    for (const node of document.querySelectorAll("[data-fields]")) {
+      if (node.read === node.dataset.fields) continue;
+      node.read = node.dataset.fields;
+      for (const [id, field] of Object.entries(JSON.parse(node.read))) fields.set(id, field);
+    }
+    for (const [id, field] of fields) {
+      const line = document.getElementById(id)?.parentElement;
+      if (line && !line.querySelector(".kb-field") && thumb(id)) addField(id, field, line);
+    }
+  }
+
+  function addField(id, field, line) {
+    const box = document.createElement("span");
+    box.className = "kb-field";
+    const input = document.createElement("input");
+    Object.assign(input, { type: "text", inputMode: "decimal", autocomplete: "off", spellcheck: false });
+    const unit = document.createElement("span");
+    unit.className = "kb-field-unit";
+    unit.textContent = field.unit;
+    box.append(input, unit);
+    line.append(box);
+    line.dataset.kbLine = "";
+    const label = line.closest(":has(label)")?.querySelector("label")?.textContent.trim() ?? "";
+    input.setAttribute("aria-label", `${label} (${field.unit})`);
+
+    const slider = thumb(id);
+    let edited = false;
+    const show = () => { if (!edited) input.value = String(valueOf(slider)); };
+    const ask = () => {
+      if (!edited) return;
+      edited = false;
+      send("field", [id, input.value], (error) => {
+        input.ariaInvalid = error ? "true" : null;
+        input.title = error;
+        if (error) show(); else setTimeout(show, HOLD);
+      });
+    };
+    new MutationObserver(() => { show(); if (!edited) input.ariaInvalid = null; }).observe(slider, { attributes: true, attributeFilter: ["aria-valuenow"] });
+    input.addEventListener("focus", () => input.select());
+    input.addEventListener("input", () => { edited = true; input.ariaInvalid = null; });
+    input.addEventListener("blur", ask);
+    input.addEventListener("keydown", (event) => {
+      const undone = edited;
+      if (event.key === "Enter") { ask(); input.select(); }
+      else if (event.key === "Escape") { edited = false; show(); input.select(); }
+      else if (["ArrowUp", "ArrowDown", "PageUp", "PageDown"].includes(event.key)) { ask(); step(id, event); }
+      else if (!historyKey(event) || undone) return;
+      event.preventDefault();
+    });
+    show();
+  }
+
+  // Keys on sliders
+
+  let last = { id: "", value: 0, at: 0 };
+  let release = 0;
+
+  function step(id, event) {
+    const field = fields.get(id);
+    const slider = thumb(id);
+    const [least, most] = [valueOf(slider, "min"), valueOf(slider, "max")];
+    const now = performance.now();
+    const from = last.id === id && now - last.at < 300 ? last.value : valueOf(slider);
+    const small = event.shiftKey ? field.fine : field.step;
+    const to = {
+      ArrowRight: from + small, ArrowUp: from + small, ArrowLeft: from - small, ArrowDown: from - small,
+      PageUp: from + field.page, PageDown: from - field.page, Home: least, End: most,
+    }[event.key];
+    if (to === undefined) return false;
+    const value = Math.round(Math.min(Math.max(to, least), most) * DECIMALS) / DECIMALS;
+    last = { id, value, at: now };
+    const input = document.getElementById(id).nextElementSibling?.querySelector("input");
+    if (input) type(input, String(value));
+    clearTimeout(release);
+    release = setTimeout(send, HOLD, "pause");
+    return true;
+  }
+
+  function sliderKey(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey || !event.target.matches?.('[role="slider"]')) return false;
+    const id = [...fields.keys()].find((id) => document.getElementById(id)?.contains(event.target));
+    return id !== undefined && step(id, event);
+  }
+
+  // A drag is one step of the history. viser drops a control's change if another one follows within 50 ms: wait longer.
+  addEventListener("pointerup", (event) => {
+    if (event.target.closest?.(".mantine-Slider-root") || document.querySelector("[data-dragging]")) setTimeout(send, 150, "pause");
+  }, true);
+
+  // History
+
+  function historyKey(event) {
+    if (!(event.ctrlKey || event.metaKey) || event.altKey) return false;
+    const key = event.key.toLowerCase();
+    if (key !== "z" && (key !== "y" || event.shiftKey)) return false;
+    send(key === "y" || event.shiftKey ? "redo" : "undo");
+    return true;
+  }
+  addEventListener("kinboard-travel", (event) => send("travel", event.detail));
+
+  // The typed target
+
+  const form = () => document.querySelector("[data-typed]");
+  const numbersOf = (row) => [...row.querySelectorAll(".kb-number")].map((node) => node.textContent.replace("−", "-"));
+
+  function openForm(kind) {
+    const box = form();
+    if (!box) return;
+    box.hidden = false;
+    box.dataset.typed = kind;
+    for (const node of box.querySelectorAll("[data-for]")) node.hidden = node.dataset.for !== kind;
+    const rows = kind === "pose" ? ["position", "angles"] : [kind];
+    const input = box.querySelector("textarea");
+    input.value = rows.map((name) => numbersOf(document.querySelector(`tr[data-type="${name}"]`)).join("  ")).join("\n");
+    input.setAttribute("aria-label", box.querySelector(`b[data-for="${kind}"]`).textContent);
+    showError("");
+    mark(true);
+    input.focus();
+    input.select();
+    box.scrollIntoView({ block: "nearest" });
+  }
+
+  function closeForm() {
+    form().hidden = true;
+    mark(false);
+    document.querySelector("button[data-type]")?.focus();
+  }
+
+  function mark(open) {
+    const button = document.querySelector("button[data-type]");
+    if (button) button.ariaExpanded = String(open);
+  }
+
+  function showError(error) {
+    const box = form();
+    box.querySelector("[data-typed-error]").textContent = error;
+    box.querySelector("textarea").ariaInvalid = error ? "true" : null;
+  }
+
+  function sendForm() {
+    const box = form();
+    send("target", [box.dataset.typed, box.querySelector("textarea").value], (error) => {
+      if (error) showError(error);
+      else closeForm();
+    });
+  }
+
+  addEventListener("click", (event) => {
+    const target = event.target instanceof Element ? event.target : document.body;
+    const button = target.closest("[data-send]");
+    if (button && button.ariaDisabled !== "true") send(button.dataset.send);
+    if (target.closest("[data-typed-send]")) sendForm();
+    if (target.closest("[data-typed-close]")) closeForm();
+    const opener = target.closest("[data-type]");
+    if (!opener || !getSelection().isCollapsed) return;
+    if (opener.ariaExpanded === "true") closeForm();
+    else openForm(opener.dataset.type);
+  });
+
+  // Keys of the page
+
+  /** A key pressed while no control has the focus. */
+  function sceneKey(event) {
+    if (event.ctrlKey || event.metaKey || event.target.closest?.(CONTROLS)) return false;
+    const move = MOVES[event.code];
+    if (move) send("nudge", [move[0], event.altKey, move[1], event.shiftKey]);
+    else if (event.altKey || event.shiftKey || event.repeat) return false;
+    else if (event.code === "KeyG") send("axes");
+    else if (event.code === "KeyT") openForm("pose");
+    else return false;
+    return true;
+  }
+
+  function formKey(event) {
+    if (!event.target.closest?.("[data-typed]")) return false;
+    if (event.key === "Escape") closeForm();
+    else if (event.key === "Enter" && !event.shiftKey && event.target.matches("textarea")) sendForm();
+    else return false;
+    return true;
+  }
+
+  // Before viser's own listeners.
+  addEventListener("keydown", (event) => {
+    const typing = event.target.matches?.("input, textarea");
+    if (!(sliderKey(event) || formKey(event) || (!typing && historyKey(event)) || sceneKey(event))) return;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+  }, true);
+
+  // With Shift, the gizmo moves in steps.
+  let pulling = false;
+  let snaps = false;
+  function snap(wanted) {
+    if (wanted === snaps) return;
+    snaps = wanted;
+    send("snap", snaps);
+  }
+  addEventListener("pointerdown", (event) => {
+    pulling = event.target instanceof HTMLCanvasElement;
+    if (pulling) snap(event.shiftKey);
+  }, true);
+  addEventListener("pointerup", () => { pulling = false; }, true);
+  for (const kind of ["keydown", "keyup"]) {
+    addEventListener(kind, (event) => { if (pulling && event.key === "Shift") snap(kind === "keydown"); }, true);
+  }
+
+  addEventListener("DOMContentLoaded", () => {
+    new MutationObserver(() => { readAnswers(); readFields(); }).observe(document.body, { subtree: true, childList: true });
+  });
+})();
