@@ -27,12 +27,18 @@
   }
   DARK.addEventListener("change", tell);
 
+  /** Whether the page has its own colours; they are kept for the cover of a reload. */
+  function coloured() {
+    const scheme = root.dataset.mantineColorScheme;
+    if (!scheme || !document.querySelector("[data-status]")) return false;
+    keep(scheme);
+    return true;
+  }
+  addEventListener("pagehide", coloured);
+
   function follow() {
     tell();
-    const scheme = root.dataset.mantineColorScheme;
-    if (!scheme || !document.querySelector("[data-status]")) return;
-    keep(scheme);
-    if (root.dataset.kbCover) requestAnimationFrame(() => requestAnimationFrame(uncover));
+    if (coloured() && root.dataset.kbCover) requestAnimationFrame(() => requestAnimationFrame(uncover));
   }
 
   /** Save what the scene shows as a PNG file. */

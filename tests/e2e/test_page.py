@@ -210,6 +210,7 @@ def test_a_finger_drags_a_slider(phone: Tab) -> None:
     start = np.array([handle["x"] + handle["width"] / 2, handle["y"] + handle["height"] / 2 + 14])
     touch(phone, start, start + np.array([60.0, 0.0]))
     expect(phone.status).to_contain_text("Joints moved by hand")
+    expect(phone.page.locator(".mantine-Tooltip-tooltip:visible")).to_have_count(0)
     degrees = phone.number("1 rotating base")
     assert degrees > 110
     q = PIONEER.q_home.copy()
