@@ -13,6 +13,8 @@ from app.shared.settings import Settings
 
 FLAGS = ("host", "port", "root_path", "robots", "read_only", "workers", "pin")  # they override the environment
 
+SECRET = ("token",)  # logs keep what is printed
+
 
 def run(arguments: Namespace) -> int:
     """Serve until Ctrl-C; 2 for an invalid setting."""
@@ -24,7 +26,8 @@ def run(arguments: Namespace) -> int:
             name = str(item["loc"][0]) if item["loc"] else "settings"
             variable = f"KINBOARD_{name.upper()}"
             where = f"--{name.replace('_', '-')} or {variable}" if name in FLAGS else variable
-            print(f"kinboard: {where}: got {item['input']!r}: {item['msg']}", file=sys.stderr)
+            got = "a value that is not shown" if name in SECRET else repr(item["input"])
+            print(f"kinboard: {where}: got {got}: {item['msg']}", file=sys.stderr)
         return 2
     with no_collections():
         import app.service.main as service

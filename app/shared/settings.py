@@ -2,12 +2,29 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Annotated
 
-from pydantic import Field, SecretStr, field_validator
-from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic import BeforeValidator, Field, SecretStr, field_validator
+from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from app.shared.clients import Proxies
+
+
+def _listed(value: object) -> object:
+    """``a, b`` and ``["a", "b"]`` in an environment variable are the same list."""
+    if not isinstance(value, str):
+        return value
+    if not value.strip().startswith("["):
+        return tuple(part.strip() for part in value.split(",") if part.strip())
+    try:
+        return json.loads(value)
+    except json.JSONDecodeError as error:
+        raise ValueError(f"not a list in JSON ({error.msg}); write values with commas between them") from None
+
+
+Names = Annotated[tuple[str, ...], NoDecode, BeforeValidator(_listed)]
 
 
 class Settings(BaseSettings):
@@ -63,7 +80,7 @@ class Settings(BaseSettings):
         allow_inf_nan=False,
         description="Maximum rate of requests per second of one client; 0: no limit.",
     )
-    cors_origins: tuple[str, ...] = Field((), description="Origins whose pages may read REST answers.")
+    cors_origins: Names = Field((), description="Origins whose pages may read REST answers.")
     workers: int = Field(
         1, ge=1, le=64, description="Number of server processes; each serves REST and the viewer."
     )
@@ -100,15 +117,13 @@ class Settings(BaseSettings):
     cloud_memory: int = Field(
         512 * 1024 * 1024, ge=0, description="Maximum size in bytes of the cache of workspace clouds."
     )
-    allowed_origins: tuple[str, ...] = Field(
-        (), description="Further origins whose pages may open the viewer's websocket."
-    )
-    allowed_hosts: tuple[str, ...] = Field(
+    allowed_origins: Names = Field((), description="Further origins whose pages may open the viewer's websocket.")
+    allowed_hosts: Names = Field(
         (),
         description="Host names of the service; `*`: any. IP addresses are always accepted. Unset: any, but on a "
         "loopback address without a token only localhost.",
     )
-    trusted_proxies: tuple[str, ...] = Field(
+    trusted_proxies: Names = Field(
         (),
         description="Addresses and networks of the reverse proxies whose X-Forwarded-For and X-Forwarded-Proto "
         "are believed.",

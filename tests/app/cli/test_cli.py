@@ -265,6 +265,41 @@ def test_a_bad_environment_variable_is_named(capsys, monkeypatch):
     assert "KINBOARD_MAX_BATCH: got '-1'" in err
 
 
+def test_a_token_that_is_too_short_is_not_printed(capsys, monkeypatch):
+    monkeypatch.setenv("KINBOARD_TOKEN", "hunter2")
+    code, out, err = run(capsys, "serve")
+    assert code == 2
+    assert "KINBOARD_TOKEN" in err
+    assert "at least 8" in err
+    assert "hunter2" not in out + err
+
+
+@pytest.mark.parametrize("name", ["CORS_ORIGINS", "ALLOWED_ORIGINS", "ALLOWED_HOSTS"])
+@pytest.mark.parametrize(
+    ("value", "names"),
+    [
+        ("http://x", ("http://x",)),
+        ("http://x, https://y:1 ,", ("http://x", "https://y:1")),
+        ('["http://x", "https://y"]', ("http://x", "https://y")),
+        ("", ()),
+        ("[]", ()),
+    ],
+)
+def test_a_list_is_written_with_commas_or_in_json(served, monkeypatch, name, value, names):
+    monkeypatch.setenv(f"KINBOARD_{name}", value)
+    assert parser.main(["serve"]) == 0
+    assert getattr(served[0][0], name.lower()) == names
+
+
+@pytest.mark.parametrize("value", ["[http://x]", '["http://x"', "[1, 2]", "[[]]"])
+def test_a_list_that_cannot_be_read_is_named(capsys, monkeypatch, value):
+    monkeypatch.setenv("KINBOARD_CORS_ORIGINS", value)
+    code, _, err = run(capsys, "serve")
+    assert code == 2
+    assert "kinboard: KINBOARD_CORS_ORIGINS: got " in err
+    assert "Traceback" not in err
+
+
 @pytest.fixture
 def served(monkeypatch):
     """What the command line would have served, instead of serving it."""
