@@ -3,12 +3,18 @@
 #   docker run --rm -p 127.0.0.1:8000:8000 kinboard
 # scripts/image.sh builds it without Docker and checks what docs/running.md says about it.
 
-FROM python:3.13-slim-trixie AS build
+# A tag may name other bytes tomorrow. To fix them, add the digest that `docker buildx imagetools inspect` prints:
+#   --build-arg BASE=docker.io/library/python:3.13-slim-trixie@sha256:…
+ARG BASE=docker.io/library/python:3.13-slim-trixie
+# Checked against the wheel, and the image's label.
+ARG VERSION=0.2.0
+
+FROM ${BASE} AS build
 ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1 PIP_ROOT_USER_ACTION=ignore
 # An index of your own: --build-arg PIP_INDEX_URL=…, or a mounted file and its place. Neither gets into the image.
 ARG PIP_INDEX_URL
 ARG PIP_CONFIG_FILE
-RUN apt-get update -qq && apt-get install -y -qq --no-install-recommends binutils
+RUN apt-get update -qq && apt-get install -y -qq --no-install-recommends binutils=2.44-3
 WORKDIR /src
 # The environment has no pip of its own: the image never installs anything later.
 RUN python -m venv --without-pip /opt/kinboard && python -m venv --system-site-packages /opt/tools
@@ -29,12 +35,14 @@ COPY deploy/wheel deploy/wheel
 COPY static static
 COPY kin kin
 COPY app app
+ARG VERSION
 RUN /opt/tools/bin/python -m hatchling build -t wheel \
+    && { [ -e "dist/kinboard-$VERSION-py3-none-any.whl" ] || { echo "built $(ls dist), not $VERSION" >&2; exit 1; }; } \
     && pip --python /opt/kinboard/bin/python install --no-compile --no-deps --no-index dist/*.whl
 COPY deploy/image /opt/kinboard/image
 
 
-FROM python:3.13-slim-trixie
+FROM ${BASE}
 COPY --from=build /opt/kinboard /opt/kinboard
 # Machine code cached on one CPU model is ignored on any other, and compiling takes about a minute. So kernels are
 # compiled here for a fixed level that every 64-bit x86 machine of the last decade has, emulators included; the
@@ -62,11 +70,13 @@ EXPOSE 8000
 HEALTHCHECK --interval=15s --timeout=5s --start-period=30s --retries=3 \
     CMD ["python", "-ISc", "import http.client as h, os, sys; c = h.HTTPConnection('127.0.0.1', int(os.environ['KINBOARD_PORT']), timeout=4); c.request('GET', '/readyz'); sys.exit(c.getresponse().status != 200)"]
 CMD ["kinboard", "serve"]
+ARG BASE
+ARG VERSION
 ARG REVISION=unknown
 LABEL org.opencontainers.image.title="Kinboard" \
       org.opencontainers.image.description="An interactive robot-arm kinematics dashboard for the browser." \
-      org.opencontainers.image.version="0.2.0" \
+      org.opencontainers.image.version=$VERSION \
       org.opencontainers.image.revision=$REVISION \
       org.opencontainers.image.licenses="MIT" \
       org.opencontainers.image.vendor="The Kinboard authors" \
-      org.opencontainers.image.base.name="docker.io/library/python:3.13-slim-trixie"
+      org.opencontainers.image.base.name=$BASE

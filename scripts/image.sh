@@ -13,10 +13,11 @@ root=$(cd "$(dirname "$0")/.." && pwd)
 
 [ "$(id -u)" = 0 ] || fail "building without Docker needs root: sudo sh scripts/image.sh"
 work=${KINBOARD_IMAGE_WORK:-/var/tmp/kinboard-image}
-python_version=$(sed -n 's/^FROM python:\([0-9.]*\)-slim.*/\1/p' "$root/Dockerfile" | head -n 1)
-release=$(sed -n 's/^FROM python:[0-9.]*-slim-\([a-z]*\).*/\1/p' "$root/Dockerfile" | head -n 1)
-base=docker.io/library/python:$python_version-slim-$release
+base=$(sed -n 's/^ARG BASE=//p' "$root/Dockerfile")
+python_version=$(echo "$base" | sed -n 's/.*python:\([0-9.]*\)-slim.*/\1/p')
+release=$(echo "$base" | sed -n 's/.*-slim-\([a-z]*\).*/\1/p')
 image=localhost/kinboard:latest
+version=$(sed -n 's/^__version__ = "\(.*\)"/\1/p' "$root/kin/_version.py")
 container=kinboard-check
 emulator=/usr/bin/qemu-x86_64-static
 mkdir -p "$work"
@@ -78,7 +79,7 @@ build() {
   began=$(now)
   buildah bud --isolation chroot --network host --pull-never --layers \
     --volume "$work/mnt:/mnt:ro" --build-arg PIP_CONFIG_FILE=/mnt/pip.conf \
-    --format docker --build-arg "REVISION=$(git -C "$root" rev-parse HEAD 2>/dev/null || echo unknown)" \
+    --format docker --build-arg "VERSION=$version" --build-arg "REVISION=$(git -C "$root" rev-parse HEAD 2>/dev/null || echo unknown)" \
     --tag "$image" "$root" >"$work/build.log" 2>&1 || { tail -n 40 "$work/build.log"; fail "see $work/build.log"; }
   echo "built in $(since "$began") s"
 }
@@ -91,6 +92,18 @@ weigh() {
   echo "$(bytes "$image") MB, of which the base $(bytes "$base") MB; to download $(du -sm "$work/oci" | cut -f 1) MiB"
   rm -rf "$work/oci"
   podman history --format '{{.Size}}  {{.CreatedBy}}' "$image" | cut -c 1-100 | grep -v '^0 B'
+}
+
+# What is in the image and what it was built from: $work/kinboard.cdx.json and $work/kinboard.provenance.json.
+attest() {
+  say "SBOM and provenance"
+  podman run --rm --entrypoint python "$image" -c 'import importlib.metadata as m
+for d in m.distributions(): print(d.name, d.version)' >"$work/python.txt"
+  podman run --rm --entrypoint dpkg-query "$image" -W -f '${Package} ${Version}\n' >"$work/debian.txt"
+  "$root/.venv/bin/python" "$root/scripts/attest.py" --python "$work/python.txt" --debian "$work/debian.txt" \
+    --release "$release" --version "$version" --base "$base@$(podman image inspect --format '{{.Digest}}' "$base")" \
+    --revision "$(git -C "$root" rev-parse HEAD 2>/dev/null || echo unknown)" \
+    --digest "$(podman image inspect --format '{{.Digest}}' "$image")" --to "$work" || fail "see above"
 }
 
 # Stricter than compose.yaml: not even /tmp can be written to. podman's own defaults for ulimits may be more than this
@@ -184,6 +197,7 @@ trap stop_container EXIT
 make_base
 build
 weigh
+attest
 check
 [ "$(uname -m)" != x86_64 ] || check_other_cpus
 say "Everything is as docs/running.md says"

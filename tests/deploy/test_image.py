@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -84,9 +85,39 @@ def test_python_finds_the_locator_where_the_image_puts_it() -> None:
     assert f"python {folder}/prepare.py" in DOCKERFILE
 
 
-def test_both_stages_have_the_same_base() -> None:
-    (base,) = set(re.findall(r"^FROM (\S+)", DOCKERFILE, re.MULTILINE))
-    assert f'image.base.name="docker.io/library/{base}"' in DOCKERFILE
+def test_both_stages_have_the_same_base_and_the_label_names_it() -> None:
+    assert set(re.findall(r"^FROM (\S+)", DOCKERFILE, re.MULTILINE)) == {"${BASE}"}
+    assert "image.base.name=$BASE" in DOCKERFILE
+
+
+def test_packages_of_the_distribution_are_pinned() -> None:
+    (packages,) = re.findall(r"apt-get install (.+)", DOCKERFILE)
+    named = [word for word in packages.split() if not word.startswith("-")]
+    assert named
+    assert all(re.fullmatch(r"[a-z0-9.+-]+=\S+", word) for word in named)
+
+
+def test_what_an_image_contains_and_was_built_from_is_written_down(tmp_path: Path) -> None:
+    (tmp_path / "python.txt").write_text("kinboard 0.2.0\nTyping_Extensions 4.15.0\n")
+    (tmp_path / "debian.txt").write_text("libc6 2.41-12\nlibstdc++6 14.2.0-19\n")
+    digest, base = f"sha256:{'a' * 64}", f"docker.io/library/python:3.13-slim-trixie@sha256:{'b' * 64}"
+    words = ("--python", tmp_path / "python.txt", "--debian", tmp_path / "debian.txt", "--release", "trixie")
+    words += ("--version", "0.2.0", "--base", base, "--revision", "c" * 40, "--digest", digest, "--to", tmp_path)
+    subprocess.run([sys.executable, ROOT / "scripts" / "attest.py", *words], check=True, capture_output=True)
+    bill = json.loads((tmp_path / "kinboard.cdx.json").read_text())
+    assert (bill["bomFormat"], bill["specVersion"]) == ("CycloneDX", "1.6")
+    assert [part["purl"] for part in bill["components"]] == [
+        "pkg:deb/debian/libc6@2.41-12?distro=trixie",
+        "pkg:deb/debian/libstdc%2B%2B6@14.2.0-19?distro=trixie",
+        "pkg:pypi/kinboard@0.2.0",
+        "pkg:pypi/typing-extensions@4.15.0",
+    ]
+    origin = json.loads((tmp_path / "kinboard.provenance.json").read_text())
+    assert origin["predicateType"] == "https://slsa.dev/provenance/v1"
+    assert origin["subject"] == [{"name": "kinboard", "digest": {"sha256": "a" * 64}}]
+    (base_found, source) = origin["predicate"]["buildDefinition"]["resolvedDependencies"]
+    assert base_found["digest"] == {"sha256": "b" * 64}
+    assert source["digest"] == {"gitCommit": "c" * 40}
 
 
 def test_the_health_check_asks_the_port_and_tells_by_its_exit_code() -> None:

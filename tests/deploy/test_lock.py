@@ -15,7 +15,7 @@ from packaging.utils import canonicalize_name
 ROOT = Path(__file__).parents[2]
 DOCKERFILE = (ROOT / "Dockerfile").read_text(encoding="utf-8")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-PYTHON = re.search(r"^FROM python:(\d+\.\d+)-slim", DOCKERFILE, re.MULTILINE).group(1)
+PYTHON = re.search(r"^ARG BASE=\S*python:(\d+\.\d+)-slim", DOCKERFILE, re.MULTILINE).group(1)
 WANTED = {
     "requirements.lock": PROJECT["project"]["dependencies"],
     "requirements-build.lock": PROJECT["build-system"]["requires"],
