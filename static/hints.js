@@ -4,7 +4,7 @@
 (() => {
   const STORE = "kinboard-hints";
   const HINTS = [
-    { key: "drag", text: "Drag an arrow: the arm follows the tool.", target: tool },
+    { key: "drag", text: "Drag an arrow to move the tool.", target: tool },
     { key: "joint", text: "Or move a joint.", target: slider },
     { key: "learn", text: "Questions? Lessons explain what you see.", target: lessons },
   ];
@@ -23,7 +23,9 @@
     const area = document.querySelector("canvas[data-engine]")?.getBoundingClientRect();
     if (!place || !area) return null;
     const unit = Math.min(area.width, area.height) / 2;
-    return new DOMRect(area.x + area.width / 2 + place[0] * unit, area.y + area.height / 2 - place[1] * unit, 1, 1);
+    const arrows = 0.28 * unit; // their length in the default view
+    const [x, y] = [area.x + area.width / 2 + place[0] * unit, area.y + area.height / 2 - place[1] * unit];
+    return new DOMRect(x - arrows, y - arrows, 2 * arrows, 2 * arrows);
   }
 
   function slider() {
@@ -67,11 +69,13 @@
     const { width, height } = node.getBoundingClientRect();
     const side = panel();
     const above = key !== "drag" && (innerWidth < NARROW || !side || side.left < width + 40);
-    let x = box.left - width - 18;
+    let x = (key === "drag" ? box.left : side?.left ?? 0) - width - (key === "drag" ? 6 : 18);
     let y = box.top + box.height / 2 - height / 2;
-    if (key === "drag") [x, y] = [x - 60, y + 40];
-    else if (!above) x = side.left - width - 18;
-    if (above || (key === "drag" && x < 8)) [x, y] = [box.left + box.width / 2 - width / 2, box.top - height - (key === "drag" ? -78 : 14)];
+    if (above || x < 8) {
+      const below = key === "drag" && box.bottom + height + 8 < document.querySelector("canvas[data-engine]").getBoundingClientRect().bottom;
+      x = box.left + box.width / 2 - width / 2;
+      y = below ? box.bottom + 4 : box.top - height - (key === "drag" ? 4 : 14);
+    }
     node.dataset.arrow = key === "drag" ? "none" : above ? "down" : "right";
     node.style.left = `${Math.min(Math.max(x, 8), innerWidth - width - 8)}px`;
     node.style.top = `${Math.min(Math.max(y, 8), innerHeight - height - 8)}px`;

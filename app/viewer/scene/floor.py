@@ -59,7 +59,7 @@ class Floor:
             f"{root}-shadow", _spot(), wide, wide, position=(x, y, above), cast_shadow=False, receive_shadow=False
         )
         # The bar lies along x, in front of the arm in the default view.
-        at = np.array([x + 0.12 * body.radius, y + 0.52 * body.radius, above])
+        at = np.array([x + 0.1 * body.radius, y + 0.42 * body.radius, above])
         end, tick = at + np.array([self.scale, 0.0, 0.0]), np.array([0.0, 0.03 * body.radius, 0.0])
         bar = np.array([[at, end], [at - tick, at + tick], [end - tick, end + tick]], np.float32)
         self._bar = scene.add_line_segments(
