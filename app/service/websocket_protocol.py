@@ -38,6 +38,7 @@ require_shape(
     WebSocketsSansIOProtocol,
     *("connection_made", "connection_lost", "data_received", "resume_writing", "receive", "handle_connect"),
     *("handle_text", "handle_bytes", "handle_cont", "handle_ping", "handle_pong", "handle_parser_exception"),
+    *("send_receive_event_to_app", "curr_msg_data_type"),
     *("send_keepalive_ping", "keepalive_timeout", "conn", "queue", "frames", "transport"),
     *("read_paused", "close_sent", "handshake_initiated", "handshake_complete", "pong_timer"),
 )
@@ -156,6 +157,13 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
             self.conn.fail(CloseCode.MESSAGE_TOO_BIG, f"more than {MAX_FRAGMENTS} fragments")
             self.handle_parser_exception()
 
+    def send_receive_event_to_app(self) -> None:
+        if self.curr_msg_data_type == "text" and not _is_utf8(b"".join(self.frames)):
+            self.conn.fail(CloseCode.INVALID_DATA, "a text message that is not UTF-8")
+            self.handle_parser_exception()
+        else:
+            super().send_receive_event_to_app()
+
     def handle_ping(self) -> None:
         self._spend(CONTROL_COST)
         super().handle_ping()
@@ -195,3 +203,11 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
     def _note_unread(self) -> None:
         seconds = f"{self.guard.send_timeout:g} s (KINBOARD_SEND_TIMEOUT)"
         self.guard.note("unread", f"{self._host} read nothing from a websocket for {seconds} and is disconnected")
+
+
+def _is_utf8(data: bytes) -> bool:
+    try:
+        data.decode()
+    except UnicodeDecodeError:
+        return False
+    return True

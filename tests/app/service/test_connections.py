@@ -11,6 +11,7 @@ from contextlib import ExitStack, suppress
 
 import httpx2
 import pytest
+import viser
 from attacks import ARM, GET, Victim, answer_to, closed, problem_in, victim
 from live_server import wait_for
 
@@ -232,7 +233,7 @@ def handshake(path: str, *fields: bytes) -> bytes:
 
 def upgraded(service: Victim, path: str) -> socket.socket:
     connection = service.connection()
-    connection.sendall(handshake(path))
+    connection.sendall(handshake(path, f"Sec-WebSocket-Protocol: viser-v{viser.__version__}".encode()))
     assert answer_to(connection, until_closed=False).startswith(b"HTTP/1.1 101 ")
     return connection
 
@@ -276,11 +277,11 @@ FLOODS = {
 }
 
 
-@pytest.mark.parametrize("flood", FLOODS)
-def test_a_flood_of_frames_is_not_read(service, flood):
+@pytest.mark.parametrize(("flood", "path"), [*((flood, LONG_STREAM) for flood in FLOODS), ("pings", "/viewer")])
+def test_a_flood_of_frames_is_not_read(service, flood, path):
     """The buffers on the way fill up, and stay full. Without a budget, half a megabyte is read per second."""
     frames = FLOODS[flood] * (65536 // len(FLOODS[flood]))
-    with upgraded(service, LONG_STREAM) as connection:
+    with upgraded(service, path) as connection:
         if flood == "fragments":
             connection.sendall(frame(2, final=False))
         connection.settimeout(0.5)
@@ -298,6 +299,34 @@ def test_a_flood_of_frames_is_not_read(service, flood):
                 break  # too many fragments for one message, or too long without reading what it is sent
         assert more < 200_000
         assert service.answers_after() < 10
+
+
+@pytest.mark.parametrize("path", ["/viewer", LONG_STREAM])
+@pytest.mark.parametrize(
+    ("sent", "code"),
+    [
+        (frame(1, b"\xff\xfe"), 1007),
+        (frame(1, b"\xff", final=False) + frame(0, b"x"), 1007),
+        (frame(3, b"x"), 1002),
+        (frame(0, b"x"), 1002),
+        (bytes([0x82, 0xFF]) + b"\x7f" * 8 + bytes(4), 1009),
+    ],
+    ids=["not UTF-8", "not UTF-8 in parts", "unknown", "out of order", "huge"],
+)
+def test_a_malformed_message_ends_the_connection(service, path, sent, code):
+    """And nothing else: the log has no traceback at the end of these tests."""
+    with upgraded(service, path) as connection:
+        connection.sendall(sent)
+        received = b""
+        while (code).to_bytes(2, "big") not in received[-200:]:
+            chunk = connection.recv(1 << 20)
+            assert chunk, "closed without a reason"
+            received = received[-200:] + chunk
+
+
+def test_a_client_that_answers_no_ping_is_disconnected(service):
+    with upgraded(service, "/viewer") as connection:
+        wait_for(lambda: closed(connection, 0.1), 30)
 
 
 def test_a_message_in_too_many_fragments_is_refused(service):
