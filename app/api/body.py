@@ -8,8 +8,7 @@ the name of their field.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Coroutine, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Coroutine
 from email.message import Message
 from typing import Any
 
@@ -36,14 +35,9 @@ class UploadMemory:
         self._clients: Counter[str] = Counter()
         self.held = 0
 
-    @contextmanager
-    def body(self, client: str) -> Iterator[Body]:
-        """The memory of one body for as long as the context lasts."""
-        body = Body(self, client)
-        try:
-            yield body
-        finally:
-            self.give_back(body)
+    def body(self, client: str) -> Body:
+        """The memory of one body, for as long as the context that it is lasts."""
+        return Body(self, client)
 
     def take(self, body: Body, size: int) -> None:
         """Count further bytes of a body; raises 503 if there is no room for them. A body alone always has room."""
@@ -70,6 +64,12 @@ class Body:
         self._memory = memory
         self.client = client
         self.size = 0
+
+    def __enter__(self) -> Body:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._memory.give_back(self)
 
     def grow(self, size: int) -> None:
         """Count further bytes; raises 503 if there is no room for them."""

@@ -76,7 +76,7 @@ class ComputeSlots:
         client = client_of(request.scope)
         with self.watched(request) as deadline:
             await self._acquire(client, deadline)
-            with Place.held(self._places, client) as place:
+            with Place(self._places, client) as place:
                 deadline.start(place)
                 yield deadline
 

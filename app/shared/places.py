@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter, deque
-from collections.abc import Awaitable, Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Awaitable, Callable
 from typing import ParamSpec
 
 from app.shared.clients import share_of
@@ -83,22 +82,18 @@ class Places:
 
 
 class Place:
-    """A place that a client has, or has given back for a while."""
+    """A place that a client has taken, until the end of the context that it is; meanwhile it may be lent."""
 
     def __init__(self, places: Places, client: str) -> None:
         self._places = places
         self._client = client
         self._held = True
 
-    @classmethod
-    @contextmanager
-    def held(cls, places: Places, client: str) -> Iterator[Place]:
-        """The use of a place that the client has taken, to its end."""
-        place = cls(places, client)
-        try:
-            yield place
-        finally:
-            place.give_back()
+    def __enter__(self) -> Place:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.give_back()
 
     def give_back(self) -> None:
         """Let others have the place."""

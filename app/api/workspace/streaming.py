@@ -52,7 +52,7 @@ class StreamLimit:
             )
             raise busy(detail, "KINBOARD_MAX_STREAMS")
         self._open.take(client)
-        with Place.held(self._open, client), Place.held(self._sent, client) as place:
+        with Place(self._open, client), Place(self._sent, client) as place:
             yield place
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 
 from starlette.requests import ClientDisconnect
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from app.api.problems import internal_error, respond
 
@@ -13,7 +13,7 @@ logger = logging.getLogger("kinboard.errors")
 
 
 class Failures:
-    """ASGI middleware within those that add headers: the framework's own handler answers outside of them."""
+    """ASGI middleware within `Observe` and others that add headers: the framework's handler is outside of them."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
@@ -22,21 +22,14 @@ class Failures:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        started = False
-
-        async def noted(message: Message) -> None:
-            nonlocal started
-            started = True
-            await send(message)
-
         try:
-            await self.app(scope, receive, noted)
+            await self.app(scope, receive, send)
         except ClientDisconnect:
             return  # during an upload: nobody is there to be answered
         except Exception:
             logger.exception(
                 "request %s failed: %s %s", scope["kinboard.request_id"], scope["method"], scope["path"]
             )
-            if started:
+            if scope["kinboard.started"]:
                 raise  # the server cuts the answer off, so that the client sees that it is incomplete
             await respond(internal_error())(scope, receive, send)

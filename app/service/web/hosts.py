@@ -10,6 +10,7 @@ from __future__ import annotations
 import ipaddress
 import logging
 from collections.abc import Iterable
+from functools import lru_cache
 
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
@@ -35,14 +36,19 @@ class Hosts:
         self._allowed = frozenset(name.lower().rstrip(".") for name in allowed)
         self._any = not self._allowed or "*" in self._allowed
         self._hinted = proxies
+        self._is_ours = lru_cache(maxsize=1024)(self._is_ours_uncached)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] not in ("http", "websocket"):
             await self.app(scope, receive, send)
             return
-        if not self._hinted:
-            self._hint(scope)
-        refused = None if self._any else self._refused(scope)
+        refused = None
+        if not (self._any and self._hinted):
+            for name, value in scope["headers"]:
+                if name == b"host" and not self._any and not self._is_ours(value):
+                    refused = value.decode("latin-1")
+                elif name == b"x-forwarded-for" and not self._hinted:
+                    self._hint(scope)
         if refused is None:
             await self.app(scope, receive, send)
         elif scope["type"] == "websocket":
@@ -50,17 +56,8 @@ class Hosts:
         else:
             await respond(wrong_host(refused))(scope, receive, send)
 
-    def _refused(self, scope: Scope) -> str | None:
-        """The host that the request is for, if it is not ours."""
-        for name, value in scope["headers"]:
-            if name == b"host":
-                host: str = value.decode("latin-1")
-                if not self._is_ours(host):
-                    return host
-        return None
-
-    def _is_ours(self, host: str) -> bool:
-        name = host.lower()
+    def _is_ours_uncached(self, host: bytes) -> bool:
+        name = host.decode("latin-1").lower()
         name = name[1:].partition("]")[0] if name.startswith("[") else name.partition(":")[0].rstrip(".")
         if name in self._allowed or name.endswith(".localhost"):
             return True
@@ -71,13 +68,12 @@ class Hosts:
         return True
 
     def _hint(self, scope: Scope) -> None:
-        if any(name == b"x-forwarded-for" for name, _ in scope["headers"]):
-            self._hinted = True
-            logger.warning(
-                "%s sends X-Forwarded-For, which is ignored: all its requests count as one client. "
-                "If it is your proxy, set KINBOARD_TRUSTED_PROXIES",
-                client_of(scope),
-            )
+        self._hinted = True
+        logger.warning(
+            "%s sends X-Forwarded-For, which is ignored: all its requests count as one client. "
+            "If it is your proxy, set KINBOARD_TRUSTED_PROXIES",
+            client_of(scope),
+        )
 
 
 def wrong_host(host: str) -> ProblemError:

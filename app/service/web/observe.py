@@ -39,6 +39,7 @@ class Observe:
         given = next((value for name, value in scope["headers"] if name == b"x-request-id"), b"")
         request_id = given.decode() if _VALID_ID.fullmatch(given) else secrets.token_hex(8)
         scope["kinboard.request_id"] = request_id
+        scope["kinboard.started"] = False  # whether an answer has begun
         # Read now: a mounted folder removes its part of the path.
         path: str = scope["path"].removeprefix(scope.get("root_path", ""))
         began = time.perf_counter()
@@ -49,6 +50,7 @@ class Observe:
             kind = message["type"]
             if kind == "http.response.start":
                 status = message["status"]
+                scope["kinboard.started"] = True
                 MutableHeaders(scope=message)["x-request-id"] = request_id
             elif kind == "websocket.accept":
                 status = 101

@@ -105,7 +105,7 @@ class ViewerBridge:
             DROPPED.labels("full").inc()
             await _turn_away(visitor, "All places are taken.")
             return
-        with Place.held(self.places, client), VISITORS.track_inprogress():
+        with Place(self.places, client), VISITORS.track_inprogress():
             await _serve(visitor, self.viewer)
 
 

@@ -106,7 +106,7 @@ def test_a_place_is_given_back_while_sending_takes_long(monkeypatch, cancelled):
 
         async def answer() -> None:
             await places.wait("a")
-            with Place.held(places, "a") as place:
+            with Place(places, "a") as place:
                 await place.lent(send)()
                 assert places.taken == 1
 
