@@ -68,6 +68,7 @@ class ComputeSlots:
         self.seconds = seconds
         self.memory = memory or AnswerMemory(1 << 62, 1 << 62)
         self.closed = False
+        self.waiting = 0  # requests that wait for a slot
         self._places = Places(most, share)
 
     @asynccontextmanager
@@ -96,6 +97,11 @@ class ComputeSlots:
             for task in watching:
                 task.cancel()
 
+    @property
+    def used(self) -> int:
+        """How many requests compute."""
+        return self._places.taken
+
     def close(self) -> None:
         """End all computations that check their deadline, and all waiting."""
         self.closed = True
@@ -113,6 +119,7 @@ class ComputeSlots:
     async def _acquire(self, client: str, deadline: Deadline) -> None:
         if self._places.take(client):
             return
+        self.waiting += 1
         try:
             async with asyncio.timeout(self.seconds) as waiting:
                 deadline.on_left = lambda: waiting.reschedule(0.0)
@@ -122,6 +129,7 @@ class ComputeSlots:
             detail = f"{self._places.taken} requests are being computed, which is the maximum or your share of it."
             raise busy(detail) from None
         finally:
+            self.waiting -= 1
             deadline.on_left = None
 
 

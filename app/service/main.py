@@ -31,6 +31,7 @@ from app.api import (
     install_problem_handlers,
 )
 from app.service import status
+from app.service.gauges import update_gauges
 from app.service.server import STOP_TIMEOUT, Greeting, Server, is_loopback, listen, url_of
 from app.service.startup import Startup
 from app.service.web.access import Access
@@ -44,6 +45,7 @@ from app.service.workers import supervise
 from app.shared.clouds import Clouds
 from app.shared.maps import Maps
 from app.shared.memory.answers import AnswerMemory
+from app.shared.memory.process import MemoryKeeper
 from app.shared.metrics import forget_process
 from app.shared.places import Places
 from app.shared.security import SecurityHeaders
@@ -80,10 +82,16 @@ def create_app(
     work = ComputeSlots(settings.max_requests, settings.time_budget, settings.client_share, memory)
     startup = Startup(settings, store, clouds, maps, summaries, bridge, on_ready)
 
+    def idle() -> bool:
+        return not (bridge.places.taken or work.used or state.streams.open or summaries.pending or maps.pending)
+
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         startup.start()
+        keeper = MemoryKeeper(idle, state.update_gauges)
+        keeper.start()
         yield
+        keeper.stop()
         work.close()  # computations still running have had their time to finish
         await run_in_threadpool(startup.stop)
         for cache in (clouds, maps, summaries):
@@ -106,6 +114,7 @@ def create_app(
     state.clouds, state.maps, state.summaries = clouds, maps, summaries
     state.streams, state.compute = StreamLimit(settings.max_streams, settings.client_share), work
     state.uploads = UploadMemory(max(settings.upload_memory, settings.max_body), settings.client_share)
+    state.update_gauges = partial(update_gauges, state, bridge)
     install_problem_handlers(app)
     complete_document(app, store, settings)
     app.router.routes.extend([*api_routes(), *page_routes(), *bridge.routes()])

@@ -29,7 +29,8 @@ class Readiness(BaseModel):
 
 
 @router.get("/metrics", summary="Metrics, for Prometheus", response_class=PlainTextResponse)
-async def metrics() -> Response:
+async def metrics(request: Request) -> Response:
+    request.app.state.update_gauges()
     return Response(exposition(), media_type=CONTENT_TYPE)
 
 

@@ -92,6 +92,11 @@ class Clouds:
         self._parts: ComputationCache[WorkspaceChunk] = ComputationCache(self._executor, max_bytes, _size)
 
     @property
+    def pending(self) -> int:
+        """How many computations wait or run."""
+        return self._parts.pending
+
+    @property
     def bytes(self) -> int:
         """How much is kept now."""
         return self._parts.size

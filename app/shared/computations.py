@@ -130,6 +130,11 @@ class ComputationCache(Generic[T]):
         """Sum of the sizes of all results kept."""
         return self._size
 
+    @property
+    def pending(self) -> int:
+        """How many computations wait or run."""
+        return len(self._computations) - len(self._sizes)
+
     def __len__(self) -> int:
         """How many results are kept or being computed."""
         return len(self._computations)
@@ -186,9 +191,8 @@ class ComputationCache(Generic[T]):
     ) -> SharedComputation[T]:
         computation = self._computations.get(key)
         if computation is None:
-            pending = len(self._computations) - len(self._sizes)
-            if max_pending is not None and pending >= max_pending:
-                raise TooManyPendingError(pending)
+            if max_pending is not None and self.pending >= max_pending:
+                raise TooManyPendingError(self.pending)
             computation = SharedComputation(key)
             self._executor.submit(self._run, computation, compute)
             self._computations[key] = computation

@@ -72,6 +72,11 @@ class Maps:
         return self._maps.subscribe(request, lambda computation: self._compute(request, computation))
 
     @property
+    def pending(self) -> int:
+        """How many computations wait or run."""
+        return self._maps.pending
+
+    @property
     def bytes(self) -> int:
         """How much is kept now, finished maps only."""
         return self._maps.size

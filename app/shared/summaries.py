@@ -71,6 +71,11 @@ class Summaries:
         key = (robot, plane, constraints, resolution)
         return self._sections.subscribe(key, compute, self._max_pending if limited else None)
 
+    @property
+    def pending(self) -> int:
+        """How many computations wait or run."""
+        return self._facts.pending + self._sections.pending
+
     def close(self) -> None:
         """Start nothing more; returns at once."""
         self._facts.close()

@@ -79,6 +79,22 @@ def test_the_metrics_page_is_what_prometheus_reads(client):
     assert answer.headers["content-type"].startswith("text/plain; version=0.0.4")
     for name in ("kinboard_requests_total", "kinboard_visitors ", "kinboard_solve_seconds"):
         assert name in answer.text
+    for kind in ("requests", "streams", "viewer"):
+        assert f'kinboard_places{{kind="{kind}"}} 0.0' in answer.text
+    for kind in ("requests", "summaries", "maps", "clouds"):
+        assert f'kinboard_pending{{kind="{kind}"}} 0.0' in answer.text
+    for kind in ("answers", "clouds", "maps"):
+        assert f'kinboard_held_bytes{{kind="{kind}"}} ' in answer.text
+    assert counted("kinboard_resident_bytes") > 50e6
+
+
+def test_the_times_of_requests_up_to_their_limit_fall_into_different_buckets(client):
+    client.get("/livez")
+    edges = [
+        float(edge)
+        for edge in re.findall(r'request_seconds_bucket{le="([0-9.e+-]+)"', client.get("/metrics").text)
+    ]
+    assert sum(Settings().time_budget <= edge <= 2 * Settings().time_budget for edge in edges) >= 2
 
 
 def test_with_a_token_the_metrics_are_not_for_everybody():
