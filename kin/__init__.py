@@ -18,6 +18,7 @@ from kin.ik.results import BlockedBranch, IKResult, IKSolution, Status
 from kin.path import PathGap, PathJump, PathResult, solve_path
 from kin.robot import Joint, Robot
 from kin.singularity import Singularity, singularities
+from kin.transforms import from_position_wxyz, rotation_from_wxyz, wxyz_from_rotation
 from kin.warmup import warm_up, warm_up_rest
 from kin.workspace import (
     CapabilityBlock,
@@ -81,6 +82,7 @@ __all__ = [
     "configuration_at",
     "fk",
     "fk_positions",
+    "from_position_wxyz",
     "get_robot",
     "ik_branches",
     "jacobian",
@@ -89,6 +91,7 @@ __all__ = [
     "load_robot",
     "manipulability",
     "parse_robot",
+    "rotation_from_wxyz",
     "sample_workspace",
     "section",
     "singularities",
@@ -98,4 +101,5 @@ __all__ = [
     "warm_up_rest",
     "workspace_facts",
     "workspace_slice",
+    "wxyz_from_rotation",
 ]

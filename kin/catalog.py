@@ -40,13 +40,11 @@ from typing import Any
 
 from kin.errors import RobotFileError, UnknownRobotError
 from kin.home import default_home
-from kin.robot import IDENTITY, Joint, Matrix, Robot, exact_cos_sin
+from kin.robot import CONVENTIONS, IDENTITY, KIND_CODES, LENGTHS, Joint, Matrix, Robot, exact_cos_sin
 
 BUILTIN = Path(__file__).parent / "robots"
 FIRST = ("pioneer5", "redundant7", "redundant7-craig")  # the chapter's arms come first in every list
-LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 ANGLES = {"deg": math.pi / 180, "rad": 1.0}
-KINDS = ("revolute", "prismatic", "fixed")
 MAX_ROWS = 32
 _TOP = {"id", "name", "source", "description", "convention", "units", "rows", "home", "base", "tool"}
 _ROW = {"name", "kind", "theta", "d", "a", "alpha", "limits"}
@@ -125,7 +123,7 @@ class _Reader:
         length = self.choice(units, "length", tuple(LENGTHS), "units.")
         self.length = LENGTHS[length]
         self.angle = ANGLES[self.choice(units, "angle", tuple(ANGLES), "units.")]
-        convention = self.choice(data, "convention", ("standard", "modified"))
+        convention = self.choice(data, "convention", CONVENTIONS)
         raw_rows = data.get("rows")
         if not isinstance(raw_rows, list) or not 1 <= len(raw_rows) <= MAX_ROWS:
             raise self.refuse("rows", raw_rows, f"1 to {MAX_ROWS} [[rows]] tables, one per DH row")
@@ -156,7 +154,7 @@ class _Reader:
         if not isinstance(data, dict):
             raise self.refuse(f"rows[{index}]", data, "a table with theta, d, a, alpha")
         self.only_known_fields(where, data, _ROW)
-        kind = self.choice(data, "kind", KINDS, where, default="revolute")
+        kind = self.choice(data, "kind", tuple(KIND_CODES), where, default="revolute")
         scale = self.length if kind == "prismatic" else self.angle
         limits: tuple[float, float] | None = None
         if "limits" in data:

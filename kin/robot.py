@@ -15,18 +15,22 @@ A revolute joint adds its value to θ, a prismatic one to d; a ``fixed`` row is 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from collections.abc import Iterable
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import Literal
+from numbers import Real
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kin.errors import InputError
-from kin.transforms import Array, finite_array
+from kin.transforms import Array, as_transform, finite_array
 
 Convention = Literal["standard", "modified"]
 Kind = Literal["revolute", "prismatic", "fixed"]
+CONVENTIONS: tuple[Convention, ...] = get_args(Convention)
+LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 KIND_CODES: dict[Kind, float] = {"fixed": 0.0, "revolute": 1.0, "prismatic": 2.0}
 
 Matrix = tuple[tuple[float, ...], ...]
@@ -35,7 +39,11 @@ IDENTITY: Matrix = tuple(tuple(float(i == j) for j in range(4)) for i in range(4
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """One DH row. `limits` is (lower, upper) in radians or metres, None for a fixed row."""
+    """One DH row. `limits` is (lower, upper) in radians or metres, None for a fixed row.
+
+    Raises:
+        InputError: a kind that does not exist, a number that is not finite, limits that are not lower and upper.
+    """
 
     name: str
     theta: float = 0.0
@@ -44,6 +52,26 @@ class Joint:
     alpha: float = 0.0
     kind: Kind = "revolute"
     limits: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        """Check the row; numbers of any type become floats."""
+        if self.kind not in KIND_CODES:
+            raise InputError(f"kind of {self.name}", self.kind, _one_of(*KIND_CODES))
+        for key in ("theta", "d", "a", "alpha"):
+            object.__setattr__(self, key, _number(f"{key} of {self.name}", getattr(self, key)))
+        if self.limits is None:
+            return
+        where = f"limits of {self.name}"
+        if self.kind == "fixed":
+            raise InputError(where, self.limits, "None, because the row is fixed")
+        try:
+            lower, upper = self.limits
+        except (TypeError, ValueError):
+            raise InputError(where, self.limits, "two numbers (lower, upper)") from None
+        lower, upper = _number(where, lower), _number(where, upper)
+        if lower > upper:
+            raise InputError(where, self.limits, "the lower limit first")
+        object.__setattr__(self, "limits", (lower, upper))
 
 
 @dataclass(frozen=True)
@@ -56,6 +84,10 @@ class Robot:
         home: one value per moving joint, inside the limits.
         base, tool: constant transforms before the first and after the last row, as nested tuples.
         units: the length unit of the robot file ("mm", "cm" or "m"), used when the table is displayed.
+
+    Raises:
+        InputError: an unknown convention or unit, no moving joint, a home of another length, or a base or tool
+            that is no rigid transform.
     """
 
     id: str
@@ -68,6 +100,37 @@ class Robot:
     units: str = "m"
     base: Matrix = field(default=IDENTITY, repr=False)
     tool: Matrix = field(default=IDENTITY, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check the fields; lists become tuples, and arrays become nested tuples."""
+        if self.convention not in CONVENTIONS:
+            raise InputError("convention", self.convention, _one_of(*CONVENTIONS) + " (Craig's)")
+        if self.units not in LENGTHS:
+            raise InputError("units", self.units, _one_of(*LENGTHS))
+        rows = tuple(self.rows) if isinstance(self.rows, Iterable) else ()
+        if not any(isinstance(row, Joint) and row.kind != "fixed" for row in rows):
+            raise InputError("rows", self.rows, "Joint rows, at least one of them revolute or prismatic")
+        for i, row in enumerate(rows):
+            if not isinstance(row, Joint):
+                raise InputError(f"rows[{i}]", row, "a Joint")
+        object.__setattr__(self, "rows", rows)
+        home = self.check_q(self.home, "home")
+        if home.ndim != 1:
+            raise InputError("home", f"shape {home.shape}", f"one configuration of {self.n} values")
+        object.__setattr__(self, "home", tuple(home.tolist()))
+        for key in ("base", "tool"):
+            T = getattr(self, key)
+            if T is not IDENTITY:
+                as_transform(T, key)
+                object.__setattr__(self, key, tuple(tuple(map(float, row)) for row in T))
+
+    def with_base(self, T_world_base: ArrayLike) -> Robot:
+        """The same arm with another transform ``(4, 4)`` before its first row."""
+        return replace(self, base=as_transform(T_world_base, "T_world_base"))  # type: ignore[arg-type]
+
+    def with_tool(self, T_last_tool: ArrayLike) -> Robot:
+        """The same arm with another transform ``(4, 4)`` after its last row."""
+        return replace(self, tool=as_transform(T_last_tool, "T_last_tool"))  # type: ignore[arg-type]
 
     @cached_property
     def _hash(self) -> int:
@@ -181,6 +244,17 @@ class Robot:
         lower = np.where(np.isfinite(self.lower), self.lower, -math.pi)
         upper = np.where(np.isfinite(self.upper), self.upper, math.pi)
         return rng.uniform(lower, upper, (*shape, self.n))
+
+
+def _number(field: str, value: object) -> float:
+    """A finite number as a float; raises `InputError` naming the field."""
+    if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
+        raise InputError(field, value, "a finite number")
+    return float(value)
+
+
+def _one_of(*choices: str) -> str:
+    return "one of " + ", ".join(f'"{choice}"' for choice in choices)
 
 
 def exact_cos_sin(angle: float) -> tuple[float, float]:

@@ -19,7 +19,7 @@ from kin.fk import fk, jacobian
 from kin.robot import Robot
 from kin.solvers import closed_form_of
 from kin.solvers.numeric import spread
-from kin.solvers.singular import Singularity
+from kin.solvers.singular import Singularity, by_jacobian
 from kin.transforms import Array
 
 __all__ = ["Singularity", "singularities"]
@@ -81,7 +81,4 @@ def usual_rank(robot: Robot) -> int:
 def _by_jacobian(robot: Robot, q: Array) -> Singularity:
     """The last singular value that is not zero everywhere."""
     J = task_jacobian(robot, q)
-    rank = usual_rank(robot)
-    least = float(np.linalg.svd(J, compute_uv=False)[rank - 1]) if rank else 0.0
-    shape = (J.shape[0], J.shape[1])
-    return Singularity("jacobian", "smallest singular value", "slowest direction", least, "SI", shape=shape)
+    return by_jacobian(J, usual_rank(robot))

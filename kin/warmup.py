@@ -21,7 +21,7 @@ from kin.fk import fk, fk_positions, jacobian, link_frames, manipulability
 from kin.ik import solve_ik
 from kin.path import solve_path
 from kin.robot import Robot
-from kin.solvers import closed_form_of
+from kin.solvers import closed_form_of, general6
 from kin.workspace import (
     MEASURES,
     STRATEGIES,
@@ -97,6 +97,8 @@ def _rest() -> Iterator[Callable[[], object]]:
     for act in (_move, _call_all):
         for robot in robots:
             yield partial(act, robot)
+    # No built-in arm needs the general solver, which can also solve an arm of a family.
+    yield partial(general6.match, next(robot for robot in robots if robot.n == 6 and robot.revolute.all()))
     robot = robots[0]
     # Two moving joints call the same kernels and take the least time.
     locked = [None, None, *robot.q_home[2:].tolist()]

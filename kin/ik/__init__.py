@@ -105,9 +105,9 @@ def solve(
 
 
 def branch_names(robot: Robot) -> tuple[str, ...]:
-    """The names of the arm's branches; none for an arm without a closed form."""
+    """The names of the arm's branches; none for an arm whose branches have no names."""
     closed_form = closed_form_of(robot)
-    return () if closed_form is None else closed_form.branches
+    return closed_form.branches if closed_form is not None and closed_form.named else ()
 
 
 def branch_meanings(robot: Robot) -> dict[str, str]:
@@ -122,8 +122,8 @@ def branch_of(robot: Robot, q: ArrayLike) -> str:
     Raises `InputError` for an arm whose branches have no names.
     """
     closed_form = closed_form_of(robot)
-    if closed_form is None:
-        raise InputError("robot", robot.id, "an arm with a closed form")
+    if closed_form is None or not closed_form.named:
+        raise InputError("robot", robot.id, "an arm whose branches have names")
     values = robot.check_q(q)
     if values.ndim != 1:
         raise InputError("q", f"shape {values.shape}", f"one configuration of {robot.n} values")

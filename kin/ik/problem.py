@@ -222,7 +222,7 @@ def _requested_branches(robot: Robot, options: IKOptions, closed_form: ClosedFor
     requested = options.branch
     if requested is None:
         return None
-    if closed_form is None:
+    if closed_form is None or not closed_form.named:
         shown = requested[0] if len(requested) == 1 else list(requested)
         raise InputError("branch", shown, f"none: the branches of {robot.id} have no names")
     names = closed_form.branches

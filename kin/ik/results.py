@@ -41,7 +41,7 @@ class Status(StrEnum):
     UNREACHABLE = "unreachable"
 
 
-@dataclass(slots=True, eq=False)
+@dataclass(slots=True, eq=False, repr=False)
 class IKSolution:
     """One configuration, with errors measured by forward kinematics.
 
@@ -69,6 +69,12 @@ class IKSolution:
     redundancy: tuple[Redundancy, ...] = ()
     compromise: str | None = None
 
+    def __repr__(self) -> str:
+        """Joint values with six digits, the branch, and what a compromise gives up."""
+        q = ", ".join(f"{value:.6g}" for value in self.q.tolist())
+        compromise = "" if self.compromise is None else f", compromise={self.compromise!r}"
+        return f"IKSolution([{q}], {self.branch!r}{compromise})"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BlockedBranch:
@@ -79,7 +85,7 @@ class BlockedBranch:
     violations: tuple[LimitViolation, ...]
 
 
-@dataclass(slots=True, eq=False)
+@dataclass(slots=True, eq=False, repr=False)
 class IKResult:
     """The answer to one target.
 
@@ -115,6 +121,12 @@ class IKResult:
     redundancy: tuple[Redundancy, ...] = ()
     singularities: tuple[Singularity, ...] = ()
     complete: bool = False
+
+    def __repr__(self) -> str:
+        """Status, number of solutions, solver and reason: arrays and ranges are in the attributes."""
+        count = len(self.solutions)
+        solutions = f"{count} solution{'s' * (count != 1)}"
+        return f"IKResult({self.status.value}, {solutions}, {self.solver}: {self.reason!r})"
 
     @property
     def best(self) -> IKSolution | None:

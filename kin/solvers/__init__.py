@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import lru_cache
 
 from kin.robot import Robot
-from kin.solvers import collinear7, parallel6, scara4, slide6, srs7, wrist5, wrist6
+from kin.solvers import collinear7, general6, parallel6, scara4, slide6, srs7, wrist5, wrist6
 from kin.solvers.contract import APPROACH, ClosedForm
 from kin.solvers.reversed import ReversedJoints, readings
 
@@ -24,6 +24,8 @@ FAMILIES: tuple[Callable[[Robot], ClosedForm | None], ...] = (
     slide6.match,
     scara4.match,
 )
+# For arms that fit no family, whatever joints are reversed.
+GENERAL: tuple[Callable[[Robot], ClosedForm | None], ...] = (general6.match,)
 
 
 @lru_cache(maxsize=256)
@@ -31,26 +33,26 @@ def closed_form_of(robot: Robot) -> ClosedForm | None:
     """The closed form of the first family that fits the robot's axes, None if there is none.
 
     Where none fits the robot with its joints as given, or only one without approach directions, some joints are
-    read as reversed.
+    read as reversed. Where none fits then either, a general solver takes the arm.
     """
-    found = _first_match(robot)
+    found = _first_match(robot, FAMILIES)
     if found is not None and found.handles(APPROACH):
         return found
     readable: list[tuple[tuple[int, ...], ClosedForm]] = [] if found is None else [((), found)]
     for joints, table in readings(robot):
         # Only a last axis turned towards the tool adds approach directions to a family that has none.
-        form = _first_match(table) if found is None or robot.n - 1 in joints else None
+        form = _first_match(table, FAMILIES) if found is None or robot.n - 1 in joints else None
         if form is not None:
             readable.append((joints, form))
     if not readable:
-        return None
+        return _first_match(robot, GENERAL)
     joints, form = min(readable, key=_burden)
     return ReversedJoints(form, joints, robot) if joints else form
 
 
-def _first_match(robot: Robot) -> ClosedForm | None:
-    """The closed form of the first family that fits the robot with its joints as given."""
-    return next((form for match in FAMILIES if (form := match(robot)) is not None), None)
+def _first_match(robot: Robot, families: tuple[Callable[[Robot], ClosedForm | None], ...]) -> ClosedForm | None:
+    """The closed form of the first of these families that fits the robot with its joints as given."""
+    return next((form for match in families if (form := match(robot)) is not None), None)
 
 
 def _burden(reading: tuple[tuple[int, ...], ClosedForm]) -> tuple[bool, int, int]:

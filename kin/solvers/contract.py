@@ -102,7 +102,7 @@ class Candidates:
         arcs: per redundancy parameter ``(k, 3)`` rows (branch, low, high): its values that the limits allow, the
             other parameters held.
         gap: metres by which the geometry does not close when no branch exists.
-        obstacle: what does not fit then.
+        obstacle: what does not fit then; None if the solver cannot tell.
     """
 
     q: Array
@@ -148,6 +148,7 @@ class ClosedForm(ABC):
         reason: a clause that says what about the axes makes the arm one of the family.
         lengths: the signed lengths in its formulas, metres.
         kernels: its batch kernels.
+        named: whether a branch keeps its name from pose to pose, so that it can be requested and followed.
     """
 
     name: str
@@ -157,6 +158,7 @@ class ClosedForm(ABC):
     reason: str
     lengths: tuple[float, ...]
     kernels: BatchKernels
+    named: bool = True
 
     def names(self, robot: Robot, sense: Array) -> Names:
         """The names of the branches on `robot`, in which joint i counts `sense[i]` times as it does here."""

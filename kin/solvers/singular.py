@@ -12,6 +12,10 @@ import math
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
+import numpy as np
+
+from kin.transforms import Array
+
 Kind = Literal["elbow", "shoulder", "wrist", "algorithmic", "jacobian"]
 Unit = Literal["rad", "m", "SI"]
 Condition = Literal[
@@ -86,6 +90,13 @@ class Singularity:
 def those_within(limit: float, *singularities: Singularity) -> tuple[Singularity, ...]:
     """The singularities whose distance is at most `limit`, in the order given."""
     return tuple([s for s in singularities if s.distance <= limit])
+
+
+def by_jacobian(J: Array, rank: int) -> Singularity:
+    """The one entry of an arm whose singular sets have no simple form: singular value number `rank` of J."""
+    least = float(np.linalg.svd(J, compute_uv=False)[rank - 1]) if rank else 0.0
+    shape = (J.shape[0], J.shape[1])
+    return Singularity("jacobian", "smallest singular value", "slowest direction", least, "SI", shape=shape)
 
 
 def off_line(t: float) -> float:

@@ -149,7 +149,8 @@ class Slide6(Wrist6):
     def names(self, robot: Robot, sense: Array) -> Names:
         """The rows are the signs of X, of S and of s5; the boom is out where the middle of its range is."""
         sense = sense * self.geometry.sign
-        middle = sense[2] * 0.5 * (robot.lower[2] + robot.upper[2]) + self.geometry.offset[2]
+        lower, upper = float(robot.lower[2]), float(robot.upper[2])  # −∞ + ∞ is NaN without a warning
+        middle = sense[2] * 0.5 * (lower + upper) + self.geometry.offset[2]
         extends = sense[2] if not math.isfinite(middle) or is_zero(middle) else math.copysign(1.0, middle)
         slide = Part(
             ("slide out", "the wrist centre is on the side of axis 2 that the slide extends to"),

@@ -66,3 +66,72 @@ def test_descriptions_have_two_sentences(robot_id):
     assert len(robot.source) > 20
     assert all(joint.limits for joint in robot.joints)
     assert math.isfinite(robot.reach)
+
+
+# -- tables in Python ---------------------------------------------------------------------------------------------
+
+
+def table(**fields):
+    """A valid arm of one joint, but for `fields`."""
+    valid = {"convention": "standard", "rows": (kin.Joint("j"),), "home": (0.0,)}
+    return kin.Robot("one", "one", "test", **{**valid, **fields})
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: kin.Joint("j", kind="screw"), "kind of j: got 'screw', expected one of \"fixed\""),
+        (lambda: kin.Joint("j", d=math.nan), "d of j: got nan, expected a finite number"),
+        (lambda: kin.Joint("j", alpha="90"), "alpha of j: got '90'"),
+        (lambda: kin.Joint("j", limits=(1, -1)), "limits of j: got (1, -1), expected the lower limit first"),
+        (lambda: kin.Joint("j", limits=(0, math.inf)), "limits of j: got inf"),
+        (lambda: kin.Joint("j", limits=3), "limits of j: got 3, expected two numbers"),
+        (lambda: kin.Joint("j", kind="fixed", limits=(0, 1)), "because the row is fixed"),
+        (lambda: table(convention="craig"), "convention: got 'craig', expected one of"),
+        (lambda: table(units="inch"), "units: got 'inch'"),
+        (lambda: table(rows=()), "rows: got ()"),
+        (lambda: table(rows=(kin.Joint("j"), (0, 0, 0, 0))), "rows[1]: got (0, 0, 0, 0), expected a Joint"),
+        (lambda: table(home=(0, 0)), "home: got"),
+        (lambda: table(home=(math.nan,)), "home[0]: got nan"),
+        (lambda: table(tool=np.ones((4, 4))), "tool[3]"),
+        (lambda: table(base=((1, 2),)), "base: got"),
+    ],
+)
+def test_a_table_that_cannot_be_meant_is_refused_by_field(make, message):
+    with pytest.raises(kin.InputError) as error:
+        make()
+    assert message in str(error.value)
+
+
+def test_lists_and_integers_are_taken_as_they_are_meant():
+    joint = kin.Joint("j", theta=1, limits=[-2, 2])
+    assert (joint.theta, joint.limits) == (1.0, (-2.0, 2.0))
+    robot = table(rows=[joint], home=[0], tool=np.eye(4))
+    assert robot == table(rows=(joint,), tool=np.eye(4).tolist())
+    assert hash(robot) == hash(table(rows=(joint,)))
+
+
+def test_another_base_and_tool():
+    T = kin.from_position_wxyz([0.1, -0.2, 0.3], [0.5, 0.5, -0.5, 0.5])
+    robot = kin.get_robot("ur5")
+    q = robot.q_home
+    assert np.allclose(kin.fk(robot.with_tool(T), q), kin.fk(robot, q) @ T, atol=1e-12)
+    assert np.allclose(kin.fk(robot.with_base(T), q), T @ kin.fk(robot, q), atol=1e-12)
+    assert robot.with_tool(np.eye(4)) == robot
+    with pytest.raises(kin.InputError, match="T_last_tool"):
+        robot.with_tool(2.0 * np.eye(4))
+
+
+def test_quaternions_are_public():
+    T = kin.from_position_wxyz([0, 0, 0], [0.6, 0.0, 0.8, 0.0])
+    assert kin.wxyz_from_rotation(T[:3, :3]) == pytest.approx([0.6, 0.0, 0.8, 0.0])
+    assert kin.rotation_from_wxyz(np.array([0.6, 0.0, 0.8, 0.0])) == pytest.approx(T[:3, :3])
+
+
+def test_results_print_as_one_line():
+    robot = kin.get_robot("puma560")
+    result = kin.solve_ik(robot, kin.fk(robot, robot.q_home), q_seed=robot.q_home)
+    assert repr(result).startswith(f"IKResult(solved, {len(result.solutions)} solutions, wrist6: 'Reached")
+    assert repr(result.solutions[0]).startswith("IKSolution([")
+    assert result.solutions[0].branch in repr(result.solutions[0])
+    assert "\n" not in repr(result)

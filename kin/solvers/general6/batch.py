@@ -1,0 +1,180 @@
+"""All real solutions of one arm, for one target or many, as plain arrays."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kin.kernels.compile import jit
+from kin.solvers.common import TURN, clear, wrap
+from kin.solvers.general6.cuts import (
+    AFTER,
+    BEFORE,
+    LOOP,
+    OFFSET,
+    PLACE,
+    SHIFT,
+    SIGN,
+    SIZE,
+    SIZE_OF_ARM,
+    TURN_D,
+    TURN_E,
+)
+from kin.solvers.general6.elimination import QUANTITIES, UNKNOWN, condense, eliminate
+from kin.solvers.general6.recovery import angles_of, monomials, null_vectors, others, polish
+from kin.solvers.general6.roots import ROOTS, coefficients, power_at, zeros
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+SOLUTIONS = 16
+_MERGE = TOLERANCES.merge
+# Rows are sorted by a function without seams on the torus of joint angles, equal for no two of them in general.
+_WEIGHTS = np.array([1.0, 0.7548776662, 0.5698402910, 0.4301597090, 0.3247179572, 0.2451223338])
+_PROBES = np.array([(math.cos(x), math.sin(x)) for x in (0.2, 1.9, 3.3, 4.4, 5.7)])
+
+
+@jit
+def loop_of(params: Array, T: Array, F: Array) -> None:
+    """F ``(6, 3, 4)`` ← the fixed transforms of the loop closed by the target T ``(4, 4)``, in arm sizes."""
+    p = params
+    for i in range(6):
+        for r in range(3):
+            for k in range(4):
+                F[i, r, k] = p[LOOP + 12 * i + 4 * r + k]
+    X, Y = np.empty((3, 4)), np.empty((3, 4))
+    for r in range(3):
+        shift = 0.0
+        for k in range(3):
+            X[r, k] = T[k, r]
+            shift -= T[k, r] * T[k, 3]
+        X[r, 3] = shift / p[SIZE_OF_ARM]
+    _times(p[BEFORE : BEFORE + 12].reshape(3, 4), X, Y)
+    _times(Y, p[AFTER : AFTER + 12].reshape(3, 4), F[int(p[PLACE])])
+
+
+@jit
+def _times(X: Array, Y: Array, out: Array) -> None:
+    """out ← X Y, transforms of which the first three rows are given ``(3, 4)``."""
+    for r in range(3):
+        for k in range(4):
+            total = X[r, 3] if k == 3 else 0.0
+            for m in range(3):
+                total += X[r, m] * Y[m, k]
+            out[r, k] = total
+
+
+@jit
+def solve_cut(params: Array, T: Array, out: Array, count: int) -> int:
+    """Add the solutions found with one cut to the first `count` rows of out ``(16, 6)``; returns their number."""
+    F, E = np.empty((6, 3, 4)), np.empty((3, 6, 9))
+    B, Q, diagonal = np.empty((QUANTITIES, 9)), np.empty((QUANTITIES, 9)), np.empty(UNKNOWN)
+    A, W, vectors = np.empty((2, 6, 9)), np.empty((6, 6)), np.empty((2, 6))
+    found, t = np.empty(ROOTS), np.empty(6)
+    shift = int(params[SHIFT])
+    loop_of(params, T, F)
+    eliminate(F, B, Q, diagonal, E)
+    for k in range(zeros(E, found)):
+        before = count
+        for least in range(1, 3):
+            # A root whose null vector leads to a known solution has a neighbour: it takes two to span both.
+            if count > before:
+                break
+            condense(E, math.cos(found[k]), math.sin(found[k]), A, W)
+            for m in range(monomials(vectors, null_vectors(W, vectors, least))):
+                t[2] = found[k]
+                t[3], t[4] = angles_of(vectors[m])
+                others(F, B, Q, diagonal, t)
+                if not polish(F, t) or count == SOLUTIONS:
+                    continue
+                t[3] += TURN_D
+                t[4] += TURN_E
+                for i in range(6):
+                    j = (i + shift) % 6
+                    out[count, j] = wrap(params[SIGN + j] * (t[i] - params[OFFSET + j]))
+                if _is_new(out, count):
+                    count += 1
+    return count
+
+
+@jit
+def _is_new(out: Array, count: int) -> bool:
+    """Whether row `count` of out differs from all before it."""
+    for k in range(count):
+        apart = 0.0
+        for i in range(6):
+            gap = abs(out[k, i] - out[count, i])
+            apart = max(apart, min(gap, TURN - gap))
+        if apart < _MERGE:
+            return False
+    return True
+
+
+@jit
+def _sort(out: Array, count: int) -> None:
+    """Sort the first `count` rows of out by `_WEIGHTS`."""
+    key = np.empty(count)
+    for k in range(count):
+        key[k] = 0.0
+        for i in range(6):
+            key[k] += _WEIGHTS[i] * math.cos(out[k, i] - i)
+    for k in range(1, count):
+        j = k
+        while j > 0 and key[j - 1] > key[j]:
+            key[j - 1], key[j] = key[j], key[j - 1]
+            for i in range(6):
+                out[j - 1, i], out[j, i] = out[j, i], out[j - 1, i]
+            j -= 1
+
+
+@jit
+def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
+    """out ``(16, 6)`` ← all solutions of the target T ``(4, 4)``, then NaN; False if T is not finite.
+
+    Solutions come in pairs, but for double ones: with an odd number, or none, the next cut is tried too.
+    """
+    clear(out)
+    for r in range(4):
+        for k in range(4):
+            if not math.isfinite(T[r, k]):
+                return False
+    count = 0
+    for cut in range(params.shape[0] // SIZE):
+        count = solve_cut(params[cut * SIZE : (cut + 1) * SIZE], T, out, count)
+        if count > 0 and count % 2 == 0:
+            break
+    if count < SOLUTIONS:  # the row after the last may hold a duplicate
+        for i in range(6):
+            out[count, i] = math.nan
+    _sort(out, count)
+    return True
+
+
+@jit
+def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
+    """out ``(N, 16, 6)`` ← all solutions of each of the targets T ``(N, 4, 4)``."""
+    for k in range(T.shape[0]):
+        branches_one(params, T[k], 0.0, near, out[k])
+
+
+@jit
+def misfit_of_degree(params: Array, T: Array) -> float:
+    """How far det Z is from a trigonometric polynomial of degree eight, relative to its largest coefficient.
+
+    It is one where the cut is valid. In a degenerate cut the determinant vanishes identically, up to rounding.
+    """
+    F, E = np.empty((6, 3, 4)), np.empty((3, 6, 9))
+    B, Q, diagonal = np.empty((QUANTITIES, 9)), np.empty((QUANTITIES, 9)), np.empty(UNKNOWN)
+    re, im = np.empty(ROOTS + 1), np.empty(ROOTS + 1)
+    A, W = np.empty((2, 6, 9), dtype=np.complex128), np.empty((6, 6), dtype=np.complex128)
+    loop_of(params, T, F)
+    eliminate(F, B, Q, diagonal, E)
+    scale = coefficients(E, re, im)
+    worst = 0.0
+    for k in range(_PROBES.shape[0]):
+        z = complex(_PROBES[k, 0], _PROBES[k, 1])
+        predicted = 0.0 + 0.0j
+        for n in range(ROOTS, -1, -1):
+            predicted = predicted * z + complex(re[n], im[n])
+        worst = max(worst, abs(power_at(E, z, A, W) / scale - predicted))
+    return worst

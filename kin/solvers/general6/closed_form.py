@@ -1,0 +1,118 @@
+"""The general solver of six revolute joints: matching, the choice of cuts, solutions, singularities."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kin.axes import is_zero, links_of
+from kin.fk import fk, jacobian
+from kin.robot import Robot
+from kin.solvers.canonical import free_last, without_last
+from kin.solvers.common import TURN
+from kin.solvers.contract import (
+    APPROACH,
+    POSE,
+    BatchKernels,
+    Candidates,
+    ClosedForm,
+    RedundancyParameter,
+    SolverInput,
+)
+from kin.solvers.general6.batch import SOLUTIONS, branches_many, branches_one, misfit_of_degree
+from kin.solvers.general6.cuts import SIZE, cut_at
+from kin.solvers.singular import Singularity, by_jacobian, those_within
+from kin.transforms import Array
+
+NAME = "general6"
+TITLE = "elimination, any six revolute joints"
+BRANCHES = tuple(f"solution {i + 1}" for i in range(SOLUTIONS))
+_THETA6 = RedundancyParameter("theta6", "θ6", joint=5)
+_VALID = 1e-9  # largest misfit of degree of a valid cut
+_POSES = 24  # random poses that decide among valid cuts
+_CUTS = 3  # the most that are kept
+
+
+def match(robot: Robot) -> General6 | None:
+    """The general solver, if the robot has six revolute joints and its loop can be cut somewhere."""
+    if robot.n != 6 or not robot.revolute.all():
+        return None
+    links = links_of(robot, (1,) * 5)
+    params = _best_cuts(robot, [cut_at(links, shift) for shift in range(6)])
+    if not len(params):
+        return None
+    on_axis = is_zero(links.tool[0, 3], links.tool[1, 3], abs(links.tool[2, 2]) - 1.0)
+    return General6(robot, params, on_axis)
+
+
+def _best_cuts(robot: Robot, cuts: list[Array]) -> Array:
+    """The best valid cuts, one after the other: those that find most configurations of random poses.
+
+    Of a cut that is valid for one pose and degenerate for another, the median decides.
+    """
+    q = np.random.default_rng(6).uniform(-math.pi, math.pi, (_POSES, 6))
+    T = fk(robot, q)
+    ranked: list[tuple[int, int, int, Array]] = []
+    out = np.empty((_POSES, SOLUTIONS, 6))
+    for cut in cuts:
+        if np.median([misfit_of_degree(cut, pose) for pose in T[:5]]) > _VALID:
+            continue
+        branches_many(cut, T, np.array([math.nan]), q[0], out)
+        there = ~np.isnan(out[:, :, 0])
+        apart = np.abs((out - q[:, None] + math.pi) % TURN - math.pi).max(axis=2)
+        apart[~there] = math.inf
+        missed = int((apart.min(axis=1) > 1e-6).sum())
+        if missed < _POSES // 4:
+            ranked.append((missed, -int(there.sum()), len(ranked), cut))
+    ranked.sort(key=lambda entry: entry[:3])
+    return np.concatenate([entry[3] for entry in ranked[:_CUTS]] or [np.empty(0)])
+
+
+class General6(ClosedForm):
+    """All solutions of an arm with six revolute joints that has no closed form of its own.
+
+    Rows are numbered, not named: there may be up to sixteen, the arm may pass from one to another without meeting
+    a singularity, and their number changes from pose to pose.
+    """
+
+    name, title, branches = NAME, TITLE, BRANCHES
+    reason = "six revolute joints whose axes fit no closed form: all real solutions by elimination"
+    lengths = ()
+    named = False
+
+    def __init__(self, robot: Robot, params: Array, tool_on_axis: bool) -> None:
+        self.robot = robot
+        self.tool_on_axis = tool_on_axis
+        self.cuts = len(params) // SIZE
+        self.kernels = BatchKernels(params, branches_one, branches_many)
+
+    def handles(self, task: int) -> bool:
+        """Poses, and an approach direction when it is the last joint's own axis (then that joint is free)."""
+        return task == POSE or (task == APPROACH and self.tool_on_axis)
+
+    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
+        """None for a pose, joint 6 for an approach direction."""
+        return (_THETA6,) * (task == APPROACH)
+
+    def solve(self, problem: SolverInput) -> Candidates:
+        """All solutions; with an approach direction only, joint 6 stays or takes the value requested."""
+        out, free_roll = np.empty((SOLUTIONS, 6)), problem.task == APPROACH
+        T = without_last(problem)[0] if free_roll else problem.T
+        branches_one(self.kernels.params, T, math.nan, problem.seed, out)
+        values, ranges = np.full((SOLUTIONS, int(free_roll)), math.nan), []
+        if free_roll:
+            ranges.append(free_last(problem, out))
+            values[:, -1] = out[:, 5]
+        return Candidates(out, values, tuple(ranges))
+
+    def branch_of(self, q: Array) -> int:
+        """The row of q ``(6,)`` among all solutions of its pose."""
+        out = np.empty((SOLUTIONS, 6))
+        branches_one(self.kernels.params, fk(self.robot, q), math.nan, q, out)
+        apart = np.abs((out - q + math.pi) % TURN - math.pi).max(axis=1)
+        return 0 if np.isnan(apart).all() else int(np.nanargmin(apart))
+
+    def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
+        """The smallest singular value of the Jacobian: where it vanishes has no simple form."""
+        return those_within(within, by_jacobian(jacobian(self.robot, q), rank=6))
