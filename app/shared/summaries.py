@@ -62,13 +62,15 @@ class Summaries:
         constraints: JointConstraints = FREE,
         resolution: int = 96,
         limited: bool = False,
+        signed: bool = False,
     ) -> Subscription[Section]:
         """A section as by `kin.section`. `constraints` and `limited` as in `facts`."""
 
         def compute(computation: SharedComputation[Section]) -> Section:
-            return section(robot, plane, constraints=constraints, resolution=resolution, stop=computation.check)
+            stop = computation.check
+            return section(robot, plane, constraints=constraints, resolution=resolution, signed=signed, stop=stop)
 
-        key = (robot, plane, constraints, resolution)
+        key = (robot, plane, constraints, resolution, signed)
         return self._sections.subscribe(key, compute, self._max_pending if limited else None)
 
     @property

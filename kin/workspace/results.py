@@ -118,6 +118,7 @@ class Section:
         arcs: parts traced by one joint alone, exact curves.
         area: m², of the polygons.
         step: side of the grid's squares; features smaller than it can be missed.
+        signed: whether s is negative behind joint 1's axis; u is then the direction that joint 1 faces at 0.
     """
 
     origin: Array
@@ -127,3 +128,4 @@ class Section:
     arcs: tuple[SectionArc, ...]
     area: float
     step: float
+    signed: bool = False

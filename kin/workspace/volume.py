@@ -58,7 +58,7 @@ def from_section(
     region: Region, effort: int, stop: Callable[[], None] = never_cancel
 ) -> tuple[Estimate, Estimate]:
     """Volume (m³) and surface area (m²) from (r, z) sections at a resolution and half of it."""
-    coarse, fine = (profile(region, _SQUARES * effort // part, stop) for part in (2, 1))
+    coarse, fine = (profile(region, _SQUARES * effort // part, stop=stop) for part in (2, 1))
     method = f"(r, z) section with squares of {fine.step:.3g} m, and of twice that, revolved"
     pairs = zip(_revolved(coarse), _revolved(fine), strict=True)
     volume, surface = (Estimate(b, abs(b - a), method) for a, b in pairs)

@@ -70,7 +70,8 @@ def _envelope(found: CellMap, section: Section, curve: Array) -> Array:
                 q[k], distance[k] = near[0], d[0]
         # To the last digit, to distinguish joints that stand still from joints that move.
         minimise_each(found.region.arm, quadratic(_EYE, p[k]), q[k : k + 1], d)
-    q[(curve[:, 0] < _ROUND) | (places[:, 0] < _ROUND)] = math.nan
+    r = np.abs(curve[:, 0]) if section.signed else np.minimum(curve[:, 0], places[:, 0])
+    q[r < _ROUND] = math.nan
     return q
 
 
@@ -116,7 +117,12 @@ def _traced(region: Region, section: Section, q: Array, joint: int, values: Arra
     height = p @ section.v
     across = p - height[:, None] * section.v
     if folded:
-        return np.stack([np.linalg.norm(across, axis=1), height], axis=1)
+        r = np.linalg.norm(across, axis=1)
+        if section.signed:
+            turned = configurations[:, 0]
+            left = np.cross(section.v, section.u)
+            r *= np.sign(across @ section.u * np.cos(turned) + across @ left * np.sin(turned))
+        return np.stack([r, height], axis=1)
     ahead = across[len(values) // 2]
     ahead = ahead / max(float(np.linalg.norm(ahead)), 1e-300)
     return np.stack([across @ ahead, height, across @ np.cross(section.v, ahead)], axis=1)

@@ -19,6 +19,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kin.axes import is_zero, joint_axes
 from kin.errors import InputError
 from kin.fk import fk_positions
 from kin.ik.options import JointConstraints, Limits, Locks
@@ -49,6 +50,7 @@ def section(
     locked: Locks | None = None,
     constraints: JointConstraints | None = None,
     resolution: int = 96,
+    signed: bool = False,
     stop: Callable[[], None] = never_cancel,
 ) -> Section:
     """The cut of the workspace with a plane, and its boundary.
@@ -59,6 +61,8 @@ def section(
         limits, locked: as in `kin.solve_ik`. An (r, z) section ignores those of joint 1.
         constraints: both as one value, instead of `limits` and `locked`.
         resolution: squares along the longer side of the plane's window, 8 to 1000.
+        signed: give r of an (r, z) section a sign: negative where the tool is behind joint 1's axis, that is more
+            than 90° from the direction in which joint 1 faces (`faced`).
         stop: called now and then; raises to cancel the computation.
 
     Raises:
@@ -69,7 +73,7 @@ def section(
     if plane is None:
         if robot.joints[0].kind != "revolute":
             raise InputError("plane", None, f"a point and a normal: joint 1 of {robot.id} slides")
-        return profile(region, count, stop)
+        return profile(region, count, signed, stop)
     if not isinstance(plane, Sequence) or len(plane) != 2:
         raise InputError("plane", plane, "a point and a normal, three numbers each")
     origin, normal = finite_array("plane[0]", plane[0], (3,)), finite_array("plane[1]", plane[1], (3,))
@@ -80,17 +84,38 @@ def section(
     return _cut(cell_map(region).stopped_by(stop), origin, u, v, -math.inf, count)
 
 
-def _turning_freely(region: Region) -> Region:
-    """The same region with joint 1 turning all the way."""
-    return replace(region, bounds=((-math.pi, math.pi), *region.bounds[1:]))
+def _turning(region: Region, most: float) -> Region:
+    """The same region with joint 1 turning from −most to most."""
+    return replace(region, bounds=((-most, most), *region.bounds[1:]))
 
 
-def profile(region: Region, resolution: int, stop: Callable[[], None] = never_cancel) -> Section:
-    """The section in (r, z); `stop` as of `section`."""
+def faced(robot: Robot, axis: Array) -> Array:
+    """The direction ``(3,)`` in which joint 1 faces at 0, perpendicular to its `axis` ``(3,)``.
+
+    It is perpendicular to the second axis, too, unless both are parallel, and on the side of the base's x axis (y,
+    where x is perpendicular to it). It turns with joint 1.
+    """
+    x, y = robot.T_world_base[:3, 0], robot.T_world_base[:3, 1]
+    ahead = np.cross(axis, joint_axes(robot)[1].direction) if robot.n > 1 else np.zeros(3)
+    if is_zero(*ahead):
+        ahead = next(across for e in (x, y) if not is_zero(*(across := e - axis * (axis @ e))))
+    side = next((s for s in (float(ahead @ x), float(ahead @ y)) if not is_zero(s)), 1.0)
+    return np.asarray(math.copysign(1.0 / float(np.linalg.norm(ahead)), side) * ahead)
+
+
+def profile(
+    region: Region, resolution: int, signed: bool = False, stop: Callable[[], None] = never_cancel
+) -> Section:
+    """The section in (r, z); `signed` and `stop` as of `section`.
+
+    A point at the distance r in the half-plane that joint 1 faces at 0 is reached from there with |θ1| ≤ 90° if
+    the tool is in front of the axis. In the opposite half-plane the same values reach what is behind.
+    """
     point, axis, _ = base_axis(region)
-    u, _ = _axes(axis)
-    cells = cell_map(_turning_freely(region)).stopped_by(stop)
-    found = _cut(cells, point - axis * (point @ axis), u, axis, 0.0, resolution)
+    u = faced(region.robot, axis) if signed else _axes(axis)[0]
+    cells = cell_map(_turning(region, 0.5 * math.pi if signed else math.pi)).stopped_by(stop)
+    least = -math.inf if signed else 0.0
+    found = replace(_cut(cells, point - axis * (point @ axis), u, axis, least, resolution), signed=signed)
     return replace(found, arcs=arcs_of(cells, found))
 
 

@@ -157,7 +157,10 @@ class Controls:
         self.picked = self._gui.add_html("")
         hint = "Another robot's cloud in the same scene, each in one colour"
         self._add_dropdown("compare", "Compare with", None, hint)
-        hint = "The section in (r, z), its boundary, and the tool in it; locked joints are ignored"
+        hint = (
+            "The section in (r, z), its boundary, and the tool in it; locked joints are ignored. "
+            "The outline in the scene faces as joint 1 does."
+        )
         self._add_checkbox("section", "Section plot", settings.section, hint)
         hint = "Bounding box, reach, holes, volume and surface; locked joints are ignored"
         self._add_checkbox("sizes", "Sizes", settings.sizes, hint)

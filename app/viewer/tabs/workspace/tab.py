@@ -73,6 +73,7 @@ class Workspace(Feature):
             "picked": lambda found: self._picker.take(*cast(tuple[Any, ...], found)),
             "facts": lambda found: self._sizes.take(*cast(tuple[Any, ...], found)),
             "section-found": self._take_section,
+            "outline-found": self._take_outline,
             "plotted": lambda made: self._section.show_cloud(made) if self._section is not None else None,
             "capability": self._capability.handle,
             "preset": self._use_preset,
@@ -292,6 +293,11 @@ class Workspace(Feature):
         if self._section is not None:
             robot, section = cast(tuple[Robot, Section | None], found)
             self._section.take(robot, section, self._tool)
+
+    def _take_outline(self, found: object) -> None:
+        if self._section is not None:
+            robot, outline = cast(tuple[Robot, Section | None], found)
+            self._section.take_outline(robot, outline, self._tool)
 
     def _update_section(self, now: float) -> None:
         """Move the tool's dot, and count new points into the plot."""

@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -28,7 +29,7 @@ from app.viewer.panel.joints import UNLOCK_ALL
 from app.viewer.server import ViewerServer
 from app.viewer.tabs.workspace import colours, cut, pick, send_window, sizes, views
 from app.viewer.tabs.workspace.section import plot
-from app.viewer.tabs.workspace.section.panel import subscribe_section
+from app.viewer.tabs.workspace.section.panel import SectionPanel, subscribe_section
 from app.viewer.tabs.workspace.settings import MAX_POINTS, WorkspaceSettings, default_size
 from kin.robot import Joint
 from kin.units import DEFAULT_UNITS, Units
@@ -561,7 +562,7 @@ def test_a_click_moves_the_arm_to_the_configuration_of_the_point(tab):
     shown = [tab.value(label) for label in tab.sliders_in("Joints")]
     assert np.abs(np.array(shown) - np.degrees(q)).max() < 0.006
     assert "picked point" in tab.html
-    mark = [m for m in tab.nodes.values() if m["type"] == "IcosphereMessage"]
+    mark = [m for m in tab.nodes.values() if m["type"] == "IcosphereMessage" and "contact" not in m["name"]]
     assert len(mark) == 1
     assert np.allclose(tab.poses[mark[0]["name"]]["position"], kin.fk(PIONEER, q)[:3, 3])
     tab.send("ScenePointerMessage", **ray_to(np.array([9.0, 9.0, 9.0]), np.array([2.0, 2.0, 0.6])))
@@ -720,7 +721,7 @@ def test_a_failing_part_is_reported_pauses_the_cloud_and_can_be_retried(tab, mon
 def test_section_and_sizes_appear_when_they_are_ready(tab):
     robot = STORE.get("scara")  # the fastest to compute
     tab.set("Robot", robot.name)
-    tab.wait(lambda: robot.description in html.unescape(tab.html), 60.0)
+    tab.wait(lambda: robot.description.partition(". ")[0] in html.unescape(tab.html), 60.0)
     tab.settle()
     tab.draw(5000)
     tab.set("Sizes", True)
@@ -736,8 +737,16 @@ def test_section_and_sizes_appear_when_they_are_ready(tab):
     r, z = colours.radius_and_height(robot, tab.tool_pose()[None, :3, 3])
     x, y = frame.at(np.stack([r, z], axis=1))[0]
     assert f'cx="{x:.1f}" cy="{y:.1f}"' in tab.html
-    outline = [m["name"] for m in tab.nodes.values() if m["name"].startswith("/workspace") and "Line" in m["type"]]
-    assert len(outline) == 1 + len(kin.section(robot).arcs)
+    signed = kin.section(robot, signed=True)
+    outline: list[str] = []
+
+    def drawn():
+        outline[:] = [
+            m["name"] for m in tab.nodes.values() if m["name"].startswith("/workspace") and "Line" in m["type"]
+        ]
+        return len(outline) == len(signed.curves) + len(signed.arcs)
+
+    tab.wait(drawn, 60.0)
     tab.draw(4000, seed=24)
     density = plot.Density(frame)
     density.add(robot, whole(robot, 4000, 24).points)
@@ -750,6 +759,24 @@ def test_section_and_sizes_appear_when_they_are_ready(tab):
     assert not any(name in tab.nodes for name in outline)
     tab.set("Sizes", False)
     tab.wait(lambda: "sizes of the workspace" not in tab.html)
+
+
+def test_the_outline_faces_as_joint_1_does_and_contains_the_tool():
+    section = kin.section(PIONEER, resolution=8, signed=True)
+    panel = SectionPanel.__new__(SectionPanel)
+    panel._signed, panel._left = section, np.cross(section.v, section.u)
+    panel._outline, panel._angle = SimpleNamespace(wxyz=None), math.nan
+    sides = set()
+    for q in PIONEER.random_q(np.random.default_rng(5), 40):
+        panel._stage = SimpleNamespace(q=q)
+        tool = kin.fk(PIONEER, q)[:3, 3]
+        panel.turn(tool)
+        front = kin.transforms.rotation_from_wxyz(panel._outline.wxyz) @ section.u
+        across = (tool - section.origin) * (1.0, 1.0, 0.0)
+        assert np.linalg.norm(np.cross(front, across)) < 1e-9, "the tool is in the plane"
+        assert front @ (math.cos(q[0]), math.sin(q[0]), 0.0) >= 0.0
+        sides.add(front @ across > 0.0)
+    assert sides == {True, False}
 
 
 def test_no_thread_is_left_running(tab):

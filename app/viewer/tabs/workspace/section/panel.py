@@ -34,13 +34,16 @@ class Plotted:
     image: str
 
 
-def subscribe_section(summaries: Summaries, robot: Robot) -> Subscription[Section] | None:
-    """The shared computation of the (r, z) section of a robot; None if joint 1 is prismatic."""
-    return summaries.section(robot) if robot.joints[0].kind == "revolute" else None
+def subscribe_section(summaries: Summaries, robot: Robot, signed: bool = False) -> Subscription[Section] | None:
+    """The shared computation of the (r, z) section of a robot; None if joint 1 is prismatic.
+
+    `signed`: with r negative behind joint 1's axis, for the scene.
+    """
+    return summaries.section(robot, signed=signed) if robot.joints[0].kind == "revolute" else None
 
 
 class SectionPanel:
-    """A panel to the left of the scene. Posts ``"section-found"`` and ``"plotted"`` to itself.
+    """A panel to the left of the scene. Posts ``"section-found"``, ``"outline-found"``, ``"plotted"`` to itself.
 
     Args:
         root: prefix of node names, never used before in this scene.
@@ -50,10 +53,12 @@ class SectionPanel:
         client, robot = stage.client, stage.robot
         self.robot = robot
         self._scene = client.scene
+        self._stage = stage
         self._clouds = stage.clouds
         self._root = root
         self._post = post
         self._section: Section | None = None
+        self._signed: Section | None = None  # what the outline shows
         self._frame: Plot | None = None
         # The cloud's counts; while a thread adds to them, only that thread uses them. Another cloud gets new ones.
         self._density: plot.Density | None = None
@@ -70,17 +75,26 @@ class SectionPanel:
         self._panel.dock_left()
         self._panel.set_width(WIDTH)
         self._panel.expand()  # on a phone it would be collapsed at the end of the sheet
-        found = self._computation = subscribe_section(stage.summaries, robot)
+        self._computations = [
+            self._subscribe("section-found", signed=False),
+            self._subscribe("outline-found", signed=True),
+        ]
+
+    def _subscribe(self, key: str, signed: bool) -> Subscription[Section] | None:
+        """Start a computation that posts the robot and the section."""
+        found, robot, post = subscribe_section(self._stage.summaries, self.robot, signed), self.robot, self._post
 
         def work() -> None:
-            post("section-found", (robot, None if found is None else found.future.result()))
+            post(key, (robot, None if found is None else found.future.result()))
 
-        run_in_background(work, "section", post)
+        run_in_background(work, key, post)
+        return found
 
     def leave(self) -> None:
-        """Do not wait for the section any more."""
-        if self._computation is not None:
-            self._computation.leave()
+        """Do not wait for the sections any more."""
+        for computation in self._computations:
+            if computation is not None:
+                computation.leave()
 
     def take(self, robot: Robot, found: Section | None, tool: Array) -> None:
         """Show a computed section; the tool is at `tool` ``(3,)``."""
@@ -91,10 +105,16 @@ class SectionPanel:
             self._html.content = render("workspace/section_note", text=text)
             return
         self._section, self._frame = found, plot.frame_of(found)
-        self._left = np.cross(found.v, found.u)
         self._draw()
-        self._draw_outline(found)
         self.tool_at(tool)
+
+    def take_outline(self, robot: Robot, found: Section | None, tool: Array) -> None:
+        """Draw a computed boundary in the scene; the tool is at `tool` ``(3,)``."""
+        if robot != self.robot or self._outline is not None or found is None:
+            return
+        self._signed, self._left = found, np.cross(found.v, found.u)
+        self._draw_outline(found)
+        self.turn(tool)
 
     def tool_at(self, tool: Array) -> None:
         """Move the dot to the tool ``(3,)``, and turn the outline into its plane."""
@@ -105,13 +125,16 @@ class SectionPanel:
         self.turn(tool)
 
     def turn(self, tool: Array) -> None:
-        """Turn the outline into the plane of joint 1's axis and the tool ``(3,)``."""
-        section = self._section
+        """Turn the outline into the plane of joint 1's axis and the tool ``(3,)``, facing as joint 1 does."""
+        section = self._signed
         if section is None or self._outline is None:
             return
         across = tool - section.origin
         x, y = float(across @ section.u), float(across @ self._left)
-        angle = math.atan2(y, x) if math.hypot(x, y) > 1e-6 else 0.0
+        faces = float(self._stage.q[0])
+        angle = math.atan2(y, x) if math.hypot(x, y) > 1e-6 else faces
+        if math.cos(angle - faces) < 0.0:
+            angle -= math.copysign(math.pi, angle)
         if angle != self._angle:
             self._angle = angle
             half = 0.5 * angle
@@ -163,7 +186,7 @@ class SectionPanel:
         if self._outline is not None:
             self._outline.remove()
             self._outline = None
-        self._section = self._frame = self._density = None
+        self._section = self._signed = self._frame = self._density = None
 
     def _draw(self) -> None:
         if self._section is not None and self._frame is not None:
