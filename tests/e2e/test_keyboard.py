@@ -1,16 +1,22 @@
-"""Keyboard only: every control can be reached, shows its focus, and works."""
+"""Keyboard: every control can be reached, shows its focus, and works; typed values and targets; undo and Back."""
 
 from __future__ import annotations
 
+import math
+import time
+
+import numpy as np
 import pytest
-from page import Tab
+from page import WAIT, Tab
 from playwright.sync_api import expect
 
 import kin
+from app.viewer.session.state import decode
 
 pytestmark = pytest.mark.browser
 
 PIONEER, PUMA = kin.get_robot("pioneer5"), kin.get_robot("puma560")
+ELBOW = "2 rotating elbow"
 # viser takes the small arrows of a number field out of the tab order; the arrow keys do the same there.
 NOT_REACHED = """() => {
   const area = document.querySelector("[data-status]").closest(".mantine-ScrollArea-viewport");
@@ -84,3 +90,89 @@ def test_a_lesson(tab: Tab) -> None:
     # The same as a click on the ghost.
     page.get_by_role("group", name="Go").get_by_role("button", name="2", exact=True).press("Space")
     expect(here).not_to_have_attribute("data-posture", str(before))
+
+
+def with_elbow(degrees: float) -> np.ndarray:
+    q = PIONEER.q_home.copy()
+    q[1] = np.radians(degrees)
+    point: np.ndarray = kin.fk(PIONEER, q)[:3, 3]
+    return point
+
+
+def stored(tab: Tab, degrees: float) -> None:
+    """Wait until the URL has the state with the elbow at this angle."""
+    end = time.monotonic() + WAIT / 1000
+    while True:
+        text = tab.page.evaluate("new URLSearchParams(location.hash.slice(1)).get('s') ?? ''")
+        q = decode(text, (PIONEER,)).q
+        if q is not None and abs(math.degrees(q[1]) - degrees) < 1e-6:
+            return
+        assert time.monotonic() < end, f"the URL has {q}, expected {degrees}° of joint 2"
+        tab.page.wait_for_timeout(50)
+
+
+def test_a_field_names_what_is_valid_and_keeps_its_digits(tab: Tab) -> None:
+    field = tab.row(ELBOW).locator("input:visible").last
+    for text in ("abc", "NaN", "   ", "200", "1e999"):
+        field.fill(text)
+        field.press("Enter")
+        expect(field).to_have_attribute("aria-invalid", "true")
+        expect(field).to_have_value("30")
+        expect(tab.status).to_contain_text("Valid: 0 … 150°")
+    tab.type_number(ELBOW, "45.678")
+    tab.wait_for_tool(with_elbow(45.678), within=0.06)
+    expect(field).to_have_value("45.678")
+    expect(field).not_to_have_attribute("aria-invalid", "true")
+    assert tab.row(ELBOW).locator(".kb-field-unit").inner_text() == "°"
+
+
+def test_slider_keys_undo_and_the_browsers_back(tab: Tab) -> None:
+    page = tab.page
+    field = tab.row(ELBOW).locator("input:visible").last
+    slider = page.get_by_role("slider", name=ELBOW)
+    undo = page.get_by_role("button", name="Undo")
+    for key, degrees in (("ArrowUp", 31), ("Shift+ArrowUp", 31.1), ("PageDown", 21.1), ("End", 150), ("Home", 0)):
+        slider.press(key)
+        expect(field).to_have_value(f"{degrees:g}")
+    stored(tab, 0)
+    tab.type_number(ELBOW, "60")
+    expect(undo).to_have_attribute("title", "Undo: Typed value (Ctrl+Z)")
+    stored(tab, 60)
+    page.keyboard.press("Control+z")
+    expect(field).to_have_value("0")
+    tab.wait_for_tool(with_elbow(0), within=0.06)
+    page.keyboard.press("Control+Shift+Z")
+    expect(field).to_have_value("60")
+    stored(tab, 60)
+    page.go_back()
+    expect(field).to_have_value("0")
+    stored(tab, 0)
+    page.go_forward()
+    expect(field).to_have_value("60")
+    tab.wait_for_tool(with_elbow(60), within=0.06)
+
+
+def test_a_target_is_typed_and_moved_by_keys(tab: Tab) -> None:
+    page = tab.page
+    page.get_by_role("button", name="Type a target").click()
+    text = page.locator("[data-typed] textarea")
+    expect(text).to_be_focused()
+    text.fill("1 2")
+    text.press("Enter")
+    expect(page.locator("[data-typed-error]")).to_contain_text("Found 2")
+    expect(text).to_have_value("1 2")
+    text.fill("100 120 -150")
+    text.press("Enter")
+    expect(text).to_be_hidden()
+    tab.wait_for_tool(np.array([0.1, 0.12, -0.15]), within=0.06)
+    expect(tab.row("Target must match").locator("input:visible").first).to_have_value("Point only")
+    page.evaluate("document.activeElement.blur()")
+    page.keyboard.press("g")
+    page.keyboard.press("Shift+L")
+    tab.wait_for_tool(np.array([0.101, 0.12, -0.15]), within=0.06)
+    page.keyboard.press("g")
+    page.locator("tr[data-type=position]").click()
+    expect(text).to_have_value("101.0  120.0  -150.0")
+    text.press("Escape")
+    expect(text).to_be_hidden()
+    tab.choose("Target must match", "Full pose")
