@@ -4,8 +4,8 @@ numba compiles a kernel on first use and caches the machine code on disk. Its ca
 own file only, although the machine code contains the kernels it calls: after an upgrade a cached kernel could
 contain functions of the previous version. The cache here uses the text of all modules with kernels as its key.
 
-The cache is optional: if it cannot be read, kernels are compiled again; if it cannot be written, they are compiled
-in every process.
+Damaged files are recognised by a checksum. The cache is optional: if it cannot be read, kernels are compiled
+again; if it cannot be written, they are compiled in every process.
 
 With NUMBA_DISABLE_JIT=1 kernels are plain Python functions, which is faster for a command that computes one pose.
 """
@@ -14,13 +14,15 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import pickle
 import warnings
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from numba import config, njit, types
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 MODEL = "model"
 PLAIN = bool(vars(config)["DISABLE_JIT"])
@@ -41,6 +43,36 @@ def _fingerprint() -> str:
 _FINGERPRINT = _fingerprint()
 
 
+class DamagedFileError(Exception):
+    """A file of the cache is not as it was written."""
+
+
+class _CheckedFile(IndexDataCacheFile):
+    """numba's files of one kernel, with a checksum at the end: damaged machine code would end the process."""
+
+    def _dump(self, obj: Any) -> bytes:
+        data: bytes = super()._dump(obj)
+        return data + zlib.crc32(data).to_bytes(4, "little")  # unpickling ignores what follows
+
+    def _load_index(self) -> Any:
+        with contextlib.suppress(FileNotFoundError), Path(self._index_path).open("rb") as file:
+            version, data = pickle.load(file), file.read()
+            # Files of another version are not used, and may have no checksum.
+            if version == self._version and not _intact(data) and pickle.loads(data)[0] == self._source_stamp:
+                raise DamagedFileError(self._index_path)
+        return super()._load_index()
+
+    def _load_data(self, name: str) -> Any:
+        path = self._data_path(name)
+        if not _intact(Path(path).read_bytes()):
+            raise DamagedFileError(path)
+        return super()._load_data(name)
+
+
+def _intact(data: bytes) -> bool:
+    return zlib.crc32(data[:-4]).to_bytes(4, "little") == data[-4:]
+
+
 class _Cache(FunctionCache):
     """numba's cache of one kernel, keyed by our fingerprint; disk errors become warnings.
 
@@ -49,7 +81,9 @@ class _Cache(FunctionCache):
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
-        self._cache_file._source_stamp = _FINGERPRINT
+        file = self._cache_file
+        base = file._index_name.removesuffix(".nbi")
+        self._cache_file = _CheckedFile(file._cache_path, base, _FINGERPRINT)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The cached machine code, or None if the kernel has to be compiled."""

@@ -348,6 +348,31 @@ def test_truncated_machine_code_is_discarded(tmp_path, ending, left):
     assert twice(tmp_path) == {"result": 3.0, "hits": 1, "warnings": []}
 
 
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+def test_damaged_machine_code_is_discarded(tmp_path, ending):
+    """A few flipped bits, which unpickling does not notice: the code would be wrong, or end the process."""
+    assert twice(tmp_path)["hits"] == 0
+    (file,) = (tmp_path / "__pycache__").glob(f"*.{ending}")
+    content = bytearray(file.read_bytes())
+    content[-40] ^= 0x10
+    file.write_bytes(content)
+    found = twice(tmp_path)
+    assert (found["result"], found["hits"]) == (3.0, 0)
+    (message,) = found["warnings"]
+    assert "cannot be read" in message
+    assert twice(tmp_path) == {"result": 3.0, "hits": 1, "warnings": []}
+
+
+def test_machine_code_of_another_version_is_replaced_without_a_word(tmp_path):
+    assert twice(tmp_path)["hits"] == 0
+    earlier = """
+        import kin.kernels.compile as compile
+        compile._FINGERPRINT = "another"
+    """
+    found = twice(tmp_path, textwrap.dedent(earlier).replace("\n", "\n        "))
+    assert found == {"result": 3.0, "hits": 0, "warnings": []}
+
+
 def test_kernels_work_without_a_writable_cache_and_warn_once(tmp_path):
     refused = """
         import numba.core.caching as caching
