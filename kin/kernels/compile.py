@@ -2,7 +2,8 @@
 
 numba compiles a kernel on first use and caches the machine code on disk. Its cache key is the text of the kernel's
 own file only, although the machine code contains the kernels it calls: after an upgrade a cached kernel could
-contain functions of the previous version. The cache here uses the text of all modules with kernels as its key.
+contain functions of the previous version. The cache here uses the text of that file and of all modules of the core
+that it imports, directly or not, as its key: a change recompiles what depends on it and nothing else.
 
 Damaged files are recognised by a checksum. The cache is optional: if it cannot be read, kernels are compiled
 again; if it cannot be written, they are compiled in every process.
@@ -15,9 +16,11 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import pickle
+import re
 import warnings
 import zlib
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -30,17 +33,32 @@ _unliteral: Any = types.unliteral
 _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
 
 
-def _fingerprint() -> str:
-    """Hash of the text of every module of the core that contains kernels."""
-    digest = hashlib.blake2b(digest_size=16)
-    for file in sorted(Path(__file__).parents[1].rglob("*.py")):
-        text = file.read_bytes()
-        if any(mark in text for mark in (b"@jit", b"@inlined", b"@joined")):
-            digest.update(text)
-    return digest.hexdigest()
+_ROOT = Path(__file__).parents[2]
+_IMPORT = re.compile(r"^from (kin[\w.]*) import (?:\(([^)]*)\)|([^(\n]*))", re.MULTILINE)
 
 
-_FINGERPRINT = _fingerprint()
+@cache
+def fingerprint(file: Path) -> str:
+    """Hash of the text of a Python file and of all modules of the core that it imports, directly or not."""
+    found, waiting = {file}, [file]
+    while waiting:
+        new = _read(waiting.pop())[1] - found
+        found |= new
+        waiting += new
+    return hashlib.blake2b(b"".join(sorted(_read(each)[0] for each in found)), digest_size=16).hexdigest()
+
+
+@cache
+def _read(file: Path) -> tuple[bytes, frozenset[Path]]:
+    """Hash of the text of a file, and the files of the core that it imports at its top level."""
+    text = file.read_text(encoding="utf-8")
+    imports = set()
+    for module, several, one in _IMPORT.findall(text):
+        place = _ROOT.joinpath(*module.split("."))
+        names = [name.split()[0] for name in (several or one).split(",") if name.split()]
+        inside = [place / f"{name}.py" for name in names] + [place / name / "__init__.py" for name in names]
+        imports |= {each for each in (place.with_suffix(".py"), place / "__init__.py", *inside) if each.is_file()}
+    return hashlib.blake2b(text.encode(), digest_size=16).digest(), frozenset(imports)
 
 
 class DamagedFileError(Exception):
@@ -74,7 +92,7 @@ def _intact(data: bytes) -> bool:
 
 
 class _Cache(FunctionCache):
-    """numba's cache of one kernel, keyed by our fingerprint; disk errors become warnings.
+    """numba's cache of one kernel, keyed by `fingerprint`; disk errors become warnings.
 
     It uses private attributes of numba; tests check that they still work.
     """
@@ -83,7 +101,7 @@ class _Cache(FunctionCache):
         super().__init__(function)
         file = self._cache_file
         base = file._index_name.removesuffix(".nbi")
-        self._cache_file = _CheckedFile(file._cache_path, base, _FINGERPRINT)
+        self._cache_file = _CheckedFile(file._cache_path, base, fingerprint(Path(function.__code__.co_filename)))
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The cached machine code, or None if the kernel has to be compiled."""

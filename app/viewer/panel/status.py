@@ -42,11 +42,14 @@ def notice(result: IKResult, units: Units) -> Notice:
     return Notice(_kind(result), explanation.title, explanation.detail)
 
 
+_OUT_OF_REACH = {"too far": "too far", "too near": "too close"}
+
+
 def key_number(result: IKResult, units: Units) -> str:
     """What is missing to the target, in a few words; empty if it is reached."""
     match result.details:
         case OutOfReach(distance) if distance > 0.0:
-            return f"{units.distance(distance)} too far"
+            return f"{units.distance(distance)} {_OUT_OF_REACH.get(result.cause, 'out of reach')}"
         case RollError(_, error):
             return f"roll {units.angle(error)} off"
         case RotationError(_, error):

@@ -293,8 +293,7 @@ class ArmController:
             self.q = q
             self._listener.on_pose(T)
         if self.target is not None and arrived and self._reached and not self.dragging:
-            # A task that leaves some motion open is complete: from here on, the target is where the tool really
-            # is.
+            # A task that leaves some motion open is complete: the target now is where the tool really is.
             self.target = None
         if self.target is None:
             if not self.dragging:

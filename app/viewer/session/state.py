@@ -131,9 +131,8 @@ def encode(state: PageState) -> str:
 def decode(text: str, robots: Sequence[Robot]) -> PageState:
     """The state in a text, as far as it is valid for these robots; never raises.
 
-    Without a valid robot, everything that depends on a robot is ignored. The states of lessons and features are
-    not
-    validated here: `Feature.restore` does that.
+    Without a valid robot, everything that depends on a robot is ignored. The states of lessons and features
+    are not validated here: `Feature.restore` does that.
     """
     data = _unpack(text)
     if data.get("v") != VERSION:

@@ -3,12 +3,13 @@
 The loop of six joints and the target is reduced to one polynomial of degree sixteen in one joint's angle (Raghavan
 and Roth 1993, :mod:`kin.solvers.general6.elimination`). It is never written down: its values are determinants,
 seventeen of them give it, and all its roots are found at once (:mod:`kin.solvers.general6.roots`). Each real root
-gives the other joints by linear algebra, and Newton's method on the loop makes them exact
+gives the other joints by linear algebra, and least squares on the whole loop makes them exact
 (:mod:`kin.solvers.general6.recovery`).
 
-The loop may be cut at any of its six joints. Special axes make some of the cuts degenerate, which the determinant
-shows by itself: it then is no polynomial of degree eight. The best cuts are chosen once for an arm. Real solutions
-come in pairs, so an odd number means that one was missed, and another cut is asked.
+The loop may be cut at any of its six joints. Special axes make some of the cuts degenerate: the determinant then
+is zero for every angle, and its computed values are rounding errors, which no polynomial of this degree fits. The
+best cuts are chosen once for an arm. Real solutions come in pairs, so an odd number means that one was missed, and
+another cut is tried.
 """
 
 from kin.solvers.general6.closed_form import General6 as General6

@@ -23,13 +23,13 @@ from kin.solvers.general6.cuts import (
 )
 from kin.solvers.general6.elimination import QUANTITIES, UNKNOWN, condense, eliminate
 from kin.solvers.general6.recovery import angles_of, monomials, null_vectors, others, polish
-from kin.solvers.general6.roots import ROOTS, coefficients, power_at, zeros
+from kin.solvers.general6.roots import ROOTS, coefficients, polynomial_at, zeros
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 SOLUTIONS = 16
 _MERGE = TOLERANCES.merge
-# Rows are sorted by a function without seams on the torus of joint angles, equal for no two of them in general.
+# Rows are sorted by a weighted sum of cosines, which does not jump where an angle passes ±180°.
 _WEIGHTS = np.array([1.0, 0.7548776662, 0.5698402910, 0.4301597090, 0.3247179572, 0.2451223338])
 _PROBES = np.array([(math.cos(x), math.sin(x)) for x in (0.2, 1.9, 3.3, 4.4, 5.7)])
 
@@ -77,7 +77,7 @@ def solve_cut(params: Array, T: Array, out: Array, count: int) -> int:
     for k in range(zeros(E, found)):
         before = count
         for least in range(1, 3):
-            # A root whose null vector leads to a known solution has a neighbour: it takes two to span both.
+            # A root that leads to a known solution has a close neighbour: two null vectors span both solutions.
             if count > before:
                 break
             condense(E, math.cos(found[k]), math.sin(found[k]), A, W)
@@ -131,7 +131,8 @@ def _sort(out: Array, count: int) -> None:
 def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
     """out ``(16, 6)`` ← all solutions of the target T ``(4, 4)``, then NaN; False if T is not finite.
 
-    Solutions come in pairs, but for double ones: with an odd number, or none, the next cut is tried too.
+    Solutions come in pairs, but for double ones: with an odd number, or none, the next cut is tried too. `value`
+    and `near` are not used: a pose leaves nothing free.
     """
     clear(out)
     for r in range(4):
@@ -154,7 +155,7 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
 def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
     """out ``(N, 16, 6)`` ← all solutions of each of the targets T ``(N, 4, 4)``."""
     for k in range(T.shape[0]):
-        branches_one(params, T[k], 0.0, near, out[k])
+        branches_one(params, T[k], values[0], near, out[k])
 
 
 @jit
@@ -176,5 +177,5 @@ def misfit_of_degree(params: Array, T: Array) -> float:
         predicted = 0.0 + 0.0j
         for n in range(ROOTS, -1, -1):
             predicted = predicted * z + complex(re[n], im[n])
-        worst = max(worst, abs(power_at(E, z, A, W) / scale - predicted))
+        worst = max(worst, abs(polynomial_at(E, z, A, W) / scale - predicted))
     return worst

@@ -21,7 +21,7 @@ from kin.solvers.contract import (
     SolverInput,
 )
 from kin.solvers.general6.batch import SOLUTIONS, branches_many, branches_one, misfit_of_degree
-from kin.solvers.general6.cuts import SIZE, cut_at
+from kin.solvers.general6.cuts import cut_at
 from kin.solvers.singular import Singularity, by_jacobian, those_within
 from kin.transforms import Array
 
@@ -31,6 +31,7 @@ BRANCHES = tuple(f"solution {i + 1}" for i in range(SOLUTIONS))
 _THETA6 = RedundancyParameter("theta6", "θ6", joint=5)
 _VALID = 1e-9  # largest misfit of degree of a valid cut
 _POSES = 24  # random poses that decide among valid cuts
+_PROBES = 5  # of these poses, those on which the degree is checked
 _CUTS = 3  # the most that are kept
 
 
@@ -47,16 +48,16 @@ def match(robot: Robot) -> General6 | None:
 
 
 def _best_cuts(robot: Robot, cuts: list[Array]) -> Array:
-    """The best valid cuts, one after the other: those that find most configurations of random poses.
+    """The parameters of the best valid cuts, concatenated: those that find most configurations of random poses.
 
-    Of a cut that is valid for one pose and degenerate for another, the median decides.
+    A cut counts as valid if it is for most of a few poses; one that misses a quarter of the poses is not used.
     """
     q = np.random.default_rng(6).uniform(-math.pi, math.pi, (_POSES, 6))
     T = fk(robot, q)
     ranked: list[tuple[int, int, int, Array]] = []
     out = np.empty((_POSES, SOLUTIONS, 6))
     for cut in cuts:
-        if np.median([misfit_of_degree(cut, pose) for pose in T[:5]]) > _VALID:
+        if np.median([misfit_of_degree(cut, pose) for pose in T[:_PROBES]]) > _VALID:
             continue
         branches_many(cut, T, np.array([math.nan]), q[0], out)
         there = ~np.isnan(out[:, :, 0])
@@ -84,7 +85,6 @@ class General6(ClosedForm):
     def __init__(self, robot: Robot, params: Array, tool_on_axis: bool) -> None:
         self.robot = robot
         self.tool_on_axis = tool_on_axis
-        self.cuts = len(params) // SIZE
         self.kernels = BatchKernels(params, branches_one, branches_many)
 
     def handles(self, task: int) -> bool:

@@ -1,4 +1,4 @@
-"""The six cuts of an arm's loop as arrays that the kernels read, and the choice among them."""
+"""The six cuts of an arm's loop as arrays that the kernels read."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from kin.transforms import Array
 SHIFT, PLACE, SIZE_OF_ARM = range(3)
 SIGN, OFFSET, LOOP = 3, 9, 15
 BEFORE, AFTER, SIZE = LOOP + 72, LOOP + 84, LOOP + 96
-# d and e are counted from here, so that tables with zeros and right angles do not meet infinite half tangents.
+# Offsets of d and e: without them, the zeros and right angles of tables would meet infinite half tangents.
 TURN_D, TURN_E = 0.7391, 1.1713
 
 

@@ -1,7 +1,7 @@
 """From a loop of six joints to one angle: Raghavan and Roth's elimination.
 
-With E6 closed by the target, the arm is the loop ``Rz(a) F1 Rz(b) F2 … Rz(f) F6 = I``, which may be cut at any
-joint. Written as
+With the target moved into the last transform, the arm is the loop ``Rz(a) F1 Rz(b) F2 … Rz(f) F6 = I``, which may
+be cut at any joint. Written as
 
     Rz(c) F3 Rz(d) F4 Rz(e) F5 = F2⁻¹ Rz(−b) F1⁻¹ Rz(−a) F6⁻¹ Rz(−f)
 
@@ -25,9 +25,9 @@ from kin.transforms import Array
 
 Numbers = Array | NDArray[np.complex128]
 
-# Rows of the fourteen quantities: four vectors, of which Rz(c) turns x and y, and two scalars.
-VECTORS, SCALARS = 4, 12
-QUANTITIES, UNKNOWN = 14, 8
+# The fourteen quantities are four vectors, of which Rz(c) turns x and y, and from row 12 two scalars. The
+# right-hand side has eight monomials of a and b besides the constant one.
+SCALARS, QUANTITIES, UNKNOWN = 12, 14, 8
 _THIRD = 2.0 * math.pi / 3.0
 COS3 = np.array([math.cos(k * _THIRD) for k in range(3)])
 SIN3 = np.array([math.sin(k * _THIRD) for k in range(3)])
@@ -195,7 +195,7 @@ def eliminate(F: Array, B: Array, Q: Array, diagonal: Array, E: Array) -> None:
 
 @jit
 def condense(E: Array, c: complex, s: complex, A: Numbers, W: Numbers) -> complex:
-    """W ``(6, 6)`` ← Z(c) less its first and last three columns; returns the product of their pivots.
+    """W ``(6, 6)`` ← what is left of Z(c) once its first and last three columns are eliminated; product of pivots.
 
     A ``(2, 6, 9)`` is scratch. The determinant of Z is the result times that of W, up to a constant sign.
     """

@@ -1,4 +1,7 @@
-"""From one angle to the whole configuration: null vector, back substitution, and Newton's method on the loop."""
+"""From one angle to the whole configuration: null vector, back substitution, and least squares.
+
+A vector of monomials here is (x_d, x_d²) × (1, x_e, x_e²), with x_d and x_e the tangents of half of d and e.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,7 @@ _THERE = 1e-11  # radians, shares of the arm's size: the loop is closed
 def null_vectors(W: Array, out: Array, least: int) -> int:
     """out ``(2, 6)`` ← one or two null vectors of W ``(6, 6)``, which is overwritten; returns how many.
 
-    At least `least`: the second is then that of the smallest pivots.
+    `least` = 2 returns two in any case: the second belongs to the second smallest pivot.
     """
     order = np.arange(6)
     largest = 0.0
@@ -211,7 +214,7 @@ def polish(F: Array, t: Array) -> bool:
                 H[i, j] = total
         better = math.inf
         for _ in range(8):
-            if _cholesky(H, g, damping * cost + 1e-16, step):
+            if _damped_step(H, g, damping * cost + 1e-16, step):
                 for i in range(6):
                     trial[i] = t[i] + step[i]
                 close(F, trial, T, axes)
@@ -235,8 +238,8 @@ def polish(F: Array, t: Array) -> bool:
 
 
 @jit
-def _cholesky(H: Array, g: Array, damping: float, x: Array) -> bool:
-    """x ``(6,)`` ← (H + damping I)⁻¹ g of the lower triangle H ``(6, 6)``; False if that is not positive."""
+def _damped_step(H: Array, g: Array, damping: float, x: Array) -> bool:
+    """x ``(6,)`` ← (H + damping I)⁻¹ g for a lower triangle H ``(6, 6)``; False if not positive definite."""
     L = np.empty((6, 6))
     for i in range(6):
         right = g[i]

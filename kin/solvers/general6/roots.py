@@ -27,6 +27,7 @@ SAMPLES = np.array(
 )
 _ANGLES = 2.0 * np.pi * np.outer(np.arange(DEGREE + 1), np.arange(TERMS)) / TERMS
 _COSINES, _SINES = np.cos(_ANGLES) / TERMS, np.sin(_ANGLES) / TERMS
+# Starts beside the circle and in no symmetry, since roots mirrored in the circle would never meet on it.
 _START = np.exp(1j * (0.4 + 2.0 * np.pi * np.arange(ROOTS) / ROOTS)) * 1.07
 _START_X, _START_Y = _START.real.copy(), _START.imag.copy()
 _STEPS = 40
@@ -34,14 +35,17 @@ _SETTLED = 1e-24  # square of a step
 _NOISE = 4e-15  # of the largest coefficient
 _SURE = 1e-7  # radius of uncertainty below which a root needs no correction
 _NEARBY = 0.4  # |log |z||: roots that are corrected
-ON_CIRCLE = 0.03  # |log |z||: roots that are tried as real angles
+_ON_CIRCLE = 0.03  # |log |z||: roots that are tried as real angles
 _CORRECTIONS = 40
 _STRIDE = 0.1  # of one correction at most
 
 
 @jit
 def coefficients(E: Array, re: Array, im: Array) -> float:
-    """re, im ``(17,)`` ← the polynomial z⁸ det Z, lowest power first, divided by its largest modulus; that one."""
+    """re, im ``(17,)`` ← the polynomial z⁸ det Z, lowest power first, divided by its largest modulus.
+
+    Returns that modulus.
+    """
     A, W, f = np.empty((2, 6, 9)), np.empty((6, 6)), np.empty(TERMS)
     for k in range(TERMS):
         f[k] = times_determinant(condense(E, SAMPLES[k, 0], SAMPLES[k, 1], A, W), W)
@@ -105,10 +109,10 @@ def aberth(re: Array, im: Array, zx: Array, zy: Array, slope: Array) -> None:
 
 
 @jit
-def _near_circle(z: complex, log: float) -> bool:
-    """Whether |log |z|| is below `log`; not if z is not finite."""
+def _near_circle(z: complex, bound: float) -> bool:
+    """Whether |log |z|| is below `bound`; not if z is not finite."""
     square = z.real * z.real + z.imag * z.imag
-    return math.exp(-2.0 * log) < square < math.exp(2.0 * log)
+    return math.exp(-2.0 * bound) < square < math.exp(2.0 * bound)
 
 
 @jit
@@ -129,7 +133,7 @@ def _correct(E: Array, z: Numbers, slope: Array) -> None:
             square = far.real * far.real + far.imag * far.imag
             if not 0.0 < square < math.inf:
                 continue
-            step = power_at(E, z[i], A, W) * far.conjugate() / square
+            step = polynomial_at(E, z[i], A, W) * far.conjugate() / square
             size = abs(step)
             if not size < _STRIDE:
                 step *= _STRIDE / size
@@ -140,7 +144,7 @@ def _correct(E: Array, z: Numbers, slope: Array) -> None:
 
 
 @jit
-def power_at(E: Array, z: complex, A: Numbers, W: Numbers) -> complex:
+def polynomial_at(E: Array, z: complex, A: Numbers, W: Numbers) -> complex:
     """z⁸ det Z; A ``(2, 6, 9)`` and W ``(6, 6)`` complex are scratch."""
     back = 1.0 / z
     cosine, sine = 0.5 * (z + back), -0.5j * (z - back)
@@ -159,7 +163,7 @@ def _leading(E: Array, z: Numbers) -> complex:
             far *= x - z[j]
         if best < abs(far) < math.inf:
             best, product, at = abs(far), far, x
-    return power_at(E, at, A, W) / product
+    return polynomial_at(E, at, A, W) / product
 
 
 @jit
@@ -174,7 +178,7 @@ def zeros(E: Array, out: Array) -> int:
     _correct(E, z, slope)
     count = 0
     for i in range(ROOTS):
-        if _near_circle(z[i], ON_CIRCLE):
+        if _near_circle(z[i], _ON_CIRCLE):
             out[count] = math.atan2(z[i].imag, z[i].real)
             count += 1
     return count

@@ -367,7 +367,7 @@ def test_machine_code_of_another_version_is_replaced_without_a_word(tmp_path):
     assert twice(tmp_path)["hits"] == 0
     earlier = """
         import kin.kernels.compile as compile
-        compile._FINGERPRINT = "another"
+        compile.fingerprint = lambda file: "another"
     """
     found = twice(tmp_path, textwrap.dedent(earlier).replace("\n", "\n        "))
     assert found == {"result": 3.0, "hits": 0, "warnings": []}
