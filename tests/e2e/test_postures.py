@@ -19,9 +19,8 @@ PUMA, SRS, PRINTED, PIONEER = (
 
 
 def learn(tab: Tab, robot: kin.Robot, lesson: str) -> None:
-    tab.choose("Robot", robot.name)
-    tab.page.get_by_role("tab", name="Learn").click()
-    tab.choose("Lesson", lesson)
+    tab.show(robot)  # at home: a robot keeps its pose while others are shown
+    tab.choose_lesson(lesson)
 
 
 def press(tab: Tab, at: np.ndarray) -> None:

@@ -232,7 +232,8 @@ def test_an_arm_with_a_base_transform_belongs_to_the_family():
     ]
     """
     robot = kin.parse_robot(text)
-    assert kin.branch_names(robot) == kin.branch_names(ROBOT)
+    # The rows are the same; which of them is in front depends on where the arm faces at θ1 = 0.
+    assert set(kin.branch_names(robot)) == set(kin.branch_names(ROBOT))
     rng = np.random.default_rng(15)
     for q, seed in zip(robot.random_q(rng, 60), robot.random_q(rng, 60), strict=True):
         point = kin.fk(robot, q)[:3, 3]

@@ -34,10 +34,7 @@ class EquationsLesson(Feature):
 
     key = "equations"
     title = "Equations"
-    about = (
-        "The equations of the arm. Two arms come from a book chapter: its equations as printed and corrected, and "
-        "the error of each misprint."
-    )
+    about = "The equations of the arm; of the arms from the book chapter also the misprints."
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)

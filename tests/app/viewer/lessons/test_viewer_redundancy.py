@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fake_browser import FakeBrowser
+from fake_browser import ANSWER, FakeBrowser
 
 import kin
 from app.shared.store import Store
@@ -220,9 +220,7 @@ def swing(tab: FakeBrowser, name: str, degrees: float) -> list[np.ndarray]:
     """Set the slider and wait; the tool's pose in every frame of the animation."""
     poses: list[np.ndarray] = []
     tab.set(name, degrees)
-    for _ in range(400):
-        if not tab._read(0.35):
-            break
+    while tab._read(0.5 if poses else ANSWER):
         poses.append(tab.tool_pose())
     return poses
 
@@ -282,7 +280,7 @@ def test_a_sweep_reverses_at_the_limits_until_a_target_is_dragged(tab: FakeBrows
         values.append(tab.value(free_label(tab)))
         return max(values) > 111 and values[-1] < 100
 
-    tab.wait(seen)
+    tab.wait(seen, timeout=40.0)
     assert max(values) <= 111.8
     T = home(SRS)
     T[:3, 3] += (-0.02, 0.0, 0.0)
