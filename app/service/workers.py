@@ -103,17 +103,17 @@ def _run(serve: Serve, listener: socket.socket, number: int, reports: Any) -> No
 
 def _watch(workers: list[Worker], silence: float, stopping: threading.Event, on_end: Callable[[int], None]) -> int:
     while not stopping.is_set():
-        wait([worker.process.sentinel for worker in workers], timeout=STEP)
+        ended = wait([worker.process.sentinel for worker in workers], timeout=STEP)
         for worker in workers:
             process = worker.process
             if stopping.is_set():
                 break
-            if process.is_alive():
-                if worker.silent() < (silence if worker.reported else max(silence, START_TIMEOUT)):
-                    continue
+            if process.sentinel not in ended and process.is_alive():
+                if ended or worker.silent() < (silence if worker.reported else max(silence, START_TIMEOUT)):
+                    continue  # where `wait` has returned early, no step has passed
                 logger.error("worker %s has not reported for %s s and is killed", process.pid, silence)
                 process.kill()
-                process.join()
+            process.join()  # its exit code comes a moment after its sentinel
             if (process.exitcode or 0) > 0:
                 return 1
             logger.error("worker %s ended with code %s and is restarted", process.pid, process.exitcode)

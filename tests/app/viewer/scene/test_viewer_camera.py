@@ -290,10 +290,14 @@ def test_random_never_takes_the_arm_out_of_the_picture(port: int) -> None:
         tab.settle(quiet=0.8)
         tab.set("Go to", "Random")
         tab.settle(quiet=0.8)
-        chosen = decode(tab.kept[-1], STORE.robots).camera
-        assert chosen is not None
-        assert np.allclose(chosen, shown(tab), atol=1e-3)
-        out = [v[0] - v[1] for v in (near, chosen)]
+        tab.look()  # as a page reports where its camera is
+
+        def stored() -> bool:
+            chosen = decode(tab.kept[-1], STORE.robots).camera
+            return chosen is not None and np.allclose(chosen, shown(tab), atol=1e-3)
+
+        tab.wait(stored, timeout=20.0)  # the state is stored once the camera rests
+        out = [v[0] - v[1] for v in (near, shown(tab))]
         assert np.allclose(np.cross(*out), 0.0, atol=1e-2), "the direction stays"
 
 
