@@ -132,6 +132,19 @@ def test_a_stop_under_load_is_in_time(tmp_path):
             stopped(process, 10.0)
 
 
+def started_and_stopped(code: str) -> str:
+    """Run a program that starts a service, and stop it once it serves: what it has written to stderr."""
+    with subprocess.Popen(
+        [sys.executable, "-c", code], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        try:
+            assert process.stdout is not None
+            assert process.stdout.readline()
+            return stopped(process, 20.0)
+        finally:
+            process.kill()
+
+
 def test_a_service_that_cannot_stop_ends_all_the_same():
     """A thread of an executor, for which Python would wait."""
     code = (
@@ -139,15 +152,7 @@ def test_a_service_that_cannot_stop_ends_all_the_same():
         "from app.shared.settings import Settings; "
         "pool = f.ThreadPoolExecutor(1); pool.submit(time.sleep, 300); run(Settings(port=0))"
     )
-    with subprocess.Popen(
-        [sys.executable, "-c", code], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        try:
-            assert process.stdout is not None
-            assert process.stdout.readline()
-            assert stopped(process, 20.0) == ""
-        finally:
-            process.kill()
+    assert started_and_stopped(code) == ""
 
 
 def test_a_shutdown_that_hangs_is_cut_off_after_the_time_limit():
@@ -156,15 +161,7 @@ def test_a_shutdown_that_hangs_is_cut_off_after_the_time_limit():
         "server.STOP_TIMEOUT = 0.5; startup.Startup.stop = lambda self: time.sleep(300); "
         "main.run(Settings(port=0, drain=1))"
     )
-    with subprocess.Popen(
-        [sys.executable, "-c", code], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        try:
-            assert process.stdout is not None
-            assert process.stdout.readline()
-            assert "did not stop within 1.5 s of the signal" in stopped(process, 20.0)
-        finally:
-            process.kill()
+    assert "did not stop within 1.5 s of the signal" in started_and_stopped(code)
 
 
 def test_a_stop_abandons_long_computations_in_time():
