@@ -18,7 +18,7 @@ from kin.units import Unit, Units
 
 PoseKind = Literal["position", "angles", "quaternion", "pose"]
 LONGEST = 2000  # characters
-FARTHEST = 1000.0  # m, of a coordinate
+FARTHEST = 1000.0  # m: the largest coordinate of a target or a camera
 LIMIT_DIGITS = 2  # decimals of a degree or a millimetre in which limits are shown
 # A quaternion typed with three decimals is normalised; one that is further off was mistyped.
 _NORM_SLACK = 0.01

@@ -21,6 +21,7 @@ from typing import Any, get_args
 
 import numpy as np
 
+from app.viewer.panel.entry import FARTHEST
 from app.viewer.panel.view import ViewState
 from app.viewer.scene.viewpoints import UP
 from kin import Robot, Task, branch_names
@@ -32,7 +33,6 @@ VERSION = 1
 # under the others, it replaces the present entry (another viewpoint) or returns to the entry with this state.
 KEY, KEY_REPLACE, KEY_RETURN = "kinboard", "kinboard-replace", "kinboard-return"
 MAX_TEXT = 16_000  # characters; the bridge refuses messages of 64 KiB
-FARTHEST = 1000.0  # m: the largest coordinate of a target or a camera
 # Nine digits are a nanometre: a shared configuration is practically exact, in half the text.
 DIGITS = 9
 CAMERA_DIGITS = 4  # of metres; finer differences are invisible
