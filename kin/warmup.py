@@ -48,9 +48,13 @@ def warm_up() -> None:
             _call_all(robot)
 
 
-def warm_up_rest(stop: Callable[[], bool] = lambda: False) -> None:
-    """Load or compile all remaining kernels; `stop` is checked before each step, which may take many seconds."""
-    for step in _rest():
+def warm_up_rest(stop: Callable[[], bool] = lambda: False, *, backwards: bool = False) -> None:
+    """Load or compile all remaining kernels; `stop` is checked before each step, which may take many seconds.
+
+    Two processes that begin at opposite ends compile different kernels and load the others from the cache.
+    """
+    steps = list(_rest())
+    for step in reversed(steps) if backwards else steps:
         if stop():
             return
         step()
@@ -86,6 +90,7 @@ def _call_all(robot: Robot) -> None:
     far = T.copy()
     far[:3, 3] *= 10.0
     solve_ik(robot, T, task="position")
+    solve_ik(robot, T, task="position", prefer="limits")
     solve_ik(robot, far, task="pose")
     solve_ik(robot, T, mask=(True, True, False, False, False, False))
     solve_ik(robot, T, task="pose", prefer="manipulability")

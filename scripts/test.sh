@@ -26,20 +26,22 @@ if [ $# -gt 0 ]; then
   mypy
   exec pytest "$@"
 fi
-# Kernels are compiled while the code is checked, and before any test: two runs would both compile the same ones.
+# Kernels are compiled before any test, by two processes from both ends: two runs would both compile the same ones.
 python -c 'import kin; kin.warm_up(); kin.warm_up_rest()' &
 compiling=$!
+python -c 'import kin; kin.warm_up_rest(backwards=True)'
 ruff check .
 ruff format --check .
 mypy
 wait $compiling
-# The browser tests draw on one core and often wait: the other tests run beside them. What measures time runs alone.
+# The browser tests draw on one core and often wait: the other tests run beside them, and wait often too. The files of
+# app/ hold few and slow tests: first, in their own order, they leave no worker idle. What measures time runs alone.
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 pytest -m "not slow and browser" >"$log" 2>&1 &
 browsing=$!
 failed=0
-pytest -n 3 --dist loadfile -m "not slow and not browser and not bench" || failed=1
+pytest -n 4 --dist loadfile --no-loadscope-reorder -m "not slow and not browser and not bench" || failed=1
 wait $browsing || failed=1
 cat "$log"
 pytest -m "not slow and bench" || failed=1

@@ -109,7 +109,7 @@ def _try_all(
     flat = np.ascontiguousarray(values.reshape(-1))
     whose = np.repeat(owner, values.shape[1])
     out = np.empty((len(flat), len(branches.q), problem.robot.n))
-    targets = np.ascontiguousarray(np.broadcast_to(problem.T, (len(flat), 4, 4)))
+    targets = np.repeat(problem.T[None], len(flat), axis=0)  # writable: kernels are compiled for such arrays
     kernels.many(kernels.params, targets, flat, problem.seed, out)
     q, stats = centred(problem, out[np.arange(len(flat)), whose])
     fits = is_closed(stats) & ~np.isnan(flat)

@@ -31,7 +31,10 @@ for robot in kin.builtin_robots().values():
     T = kin.fk(robot, robot.home)
     kin.jacobian(robot, robot.home)
     for task in ("pose", "approach", "position"):
-        kin.solve_ik(robot, T, task=task)
+        for prefer in ("nearest", "limits", "manipulability"):
+            kin.solve_ik(robot, T, task=task, prefer=prefer)
+            if robot.n > 6:
+                kin.solve_ik(robot, T, task=task, prefer=prefer, locked=[None, None, 0.0, *[None] * (robot.n - 3)])
 arm = kin.get_robot("pioneer5")
 locked = [None, None, None, 0.3, 0.3]
 for strategy in ("uniform", "quasi", "boundary", "volume"):
@@ -53,6 +56,8 @@ def test_warm_up_rest_can_be_cancelled_between_kernels(monkeypatch):
     assert steps == [0, 1, 2]
     kin.warm_up_rest()
     assert steps[3:] == list(range(9))
+    kin.warm_up_rest(backwards=True)
+    assert steps[12:] == list(range(9))[::-1]
 
 
 def test_kernels_of_all_arms_are_compiled_before_the_service_is_ready(monkeypatch):

@@ -270,7 +270,7 @@ def test_random_never_takes_the_arm_out_of_the_picture(port: int) -> None:
         tab.choose("UR5")
         tab.look()
         moved = 0
-        for _ in range(12):
+        for _ in range(20):
             before = shown(tab)
             tab.set("Go to", "Random")
             tab.settle(quiet=0.6)
@@ -280,7 +280,9 @@ def test_random_never_takes_the_arm_out_of_the_picture(port: int) -> None:
                 moved += 1
                 assert not viewpoints.contains(before, DESKTOP, frames(UR5, q), 0.3 * body(UR5).radius)
             tab.look()
-        assert moved > 0, "twelve random postures, and the default view contained them all"
+            if moved == 2:
+                break
+        assert moved > 0, "twenty random postures, and the default view contained them all"
         tab.set("Go to", "Home")
         tab.settle(quiet=0.6)
         assert decode(tab.kept[-1], STORE.robots).camera is None, "the visitor has not chosen a view"
