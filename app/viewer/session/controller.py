@@ -27,6 +27,7 @@ from app.viewer.panel import Post
 from app.viewer.panel.target import DEFAULT_TASK
 from app.viewer.scene import gizmo
 from app.viewer.scene.arm import ArmScene
+from app.viewer.scene.clearance import clearance
 from app.viewer.scene.gizmo_axes import gizmo_axes
 from app.viewer.scene.motion import Motion, Pace
 from kin import IKOptions, IKResult, JointConstraints, Robot, Task
@@ -37,6 +38,8 @@ from kin.transforms import Array, rotation_from_wxyz
 _ARMS = itertools.count(1)
 # The motion of a prismatic joint is weighted with this many radians per metre.
 PRISMATIC_WEIGHT = 4.0
+# Random configurations that are looked at for one clear of pedestal and floor; up to 60 % of an arm's are not.
+RANDOM_DRAWS = 50
 # A target closer to the tool than this (m) gets no connecting line.
 _GAP = 5e-4
 
@@ -152,8 +155,13 @@ class ArmController:
         self.move_to(self.robot.q_home)
 
     def move_to_random(self) -> None:
-        """Move to a random configuration within the limits."""
-        self.move_to(self.robot.random_q(self._rng))
+        """Move to a random configuration within the limits that is clear of pedestal and floor, if one is found.
+
+        Locked joints stay where they are.
+        """
+        drawn = np.where(self.locks, self.goal, self.robot.random_q(self._rng, RANDOM_DRAWS))
+        clear = clearance(self.robot)
+        self.move_to(next((q for q in drawn if clear.at(q) is None), drawn[0]))
 
     def move_joint(self, index: int, value: float, held: bool = True) -> None:
         """Set one joint (rad or m); `held`: with its slider, which is not moved then."""

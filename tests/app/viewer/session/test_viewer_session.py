@@ -19,6 +19,7 @@ from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.panel.joints import label
+from app.viewer.scene.clearance import clearance
 from app.viewer.server import ViewerServer
 
 # A visitor may leave between two pictures of a motion; viser then warns about the picture nobody will see.
@@ -202,6 +203,24 @@ def test_home_random_and_units(port: int) -> None:
         tab.set("Go to", "Home")
         tab.settle()
         arrives(tab, kin.fk(PIONEER, PIONEER.q_home), 1e-9)
+
+
+def test_random_keeps_locked_joints_and_clear_of_the_pedestal(port: int) -> None:
+    """Six of ten configurations of the Pioneer are not clear."""
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.set("Locked", "3")
+        locked, poses = q_of(tab, PIONEER), set()
+        for _ in range(4):
+            before = q_of(tab, PIONEER)
+            tab.set("Go to", "Random")
+            tab.wait(lambda before=before: not np.array_equal(q_of(tab, PIONEER), before))
+            tab.settle()
+            q = q_of(tab, PIONEER)
+            assert clearance(PIONEER).at(q) is None
+            assert q[2] == locked[2]
+            poses.add(tuple(q))
+        assert len(poses) == 4
 
 
 def test_every_robot_can_be_chosen_and_left_again(port: int) -> None:
