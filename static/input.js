@@ -210,7 +210,7 @@
   addEventListener("click", (event) => {
     const target = event.target instanceof Element ? event.target : document.body;
     const button = target.closest("[data-send]");
-    if (button && button.ariaDisabled !== "true") send(button.dataset.send);
+    if (button && button.ariaDisabled !== "true") send(button.dataset.send, button.dataset.argument);
     if (target.closest("[data-typed-send]")) sendForm();
     if (target.closest("[data-typed-close]")) closeForm();
     const opener = target.closest("[data-type]");

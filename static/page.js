@@ -6,6 +6,18 @@
   const SYSTEM_IS_DARK = "The system is dark"; // label of a check box: see app/viewer/panel/view.py
   const SCHEME = "kinboard-scheme";
   const PATIENCE = 20000; // ms until the page is shown in any case
+  // Buttons in a corner of the scene: name, drawing (a cube with the face that one will see), message and argument for
+  // the server.
+  const CUBE = '<path d="M12 3l8 4.5v9L12 21l-8-4.5v-9zM4 7.5l8 4.5 8-4.5M12 12v9"/>';
+  const face = (path) => `<path d="${path}" fill="currentColor" stroke="none"/>`;
+  const TOOLS = [
+    ["Fit the picture to the arm", '<path d="M4 8V4h4M16 4h4v4M20 16v4h-4M8 20H4v-4"/><circle cx="12" cy="12" r="3.2"/>', "fit-arm", ""],
+    ["View from the front", face("M4 7.5l8 4.5v9l-8-4.5z") + CUBE, "look-from", "Front"],
+    ["View from the side", face("M20 7.5l-8 4.5v9l8-4.5z") + CUBE, "look-from", "Side"],
+    ["View from the top", face("M12 3l8 4.5-8 4.5-8-4.5z") + CUBE, "look-from", "Top"],
+    ["View from a corner", CUBE, "look-from", "Isometric"],
+    ["Save a picture of the scene", '<path d="M4 8h3.2l1.6-2.4h6.4L16.8 8H20a1 1 0 0 1 1 1v9.5a1 1 0 0 1-1 1H4a1 1 0 0 1-1-1V9a1 1 0 0 1 1-1z"/><circle cx="12" cy="13.3" r="3.6"/>'],
+  ];
 
   // A browser may forbid storage; then a reload is covered in the system's colours.
   const recall = () => { try { return sessionStorage.getItem(SCHEME); } catch { return null; } };
@@ -48,9 +60,16 @@
     const picture = document.createElement("canvas");
     [picture.width, picture.height] = [scene.width, scene.height];
     const pen = picture.getContext("2d");
-    // The scene is transparent where nothing is drawn.
-    pen.fillStyle = getComputedStyle(document.querySelector("[data-dock-root]").parentElement.parentElement).backgroundColor;
-    pen.fillRect(0, 0, picture.width, picture.height);
+    // The scene is transparent where nothing is drawn: there it shows the background of viewer.css.
+    const colours = getComputedStyle(scene);
+    const sky = pen.createRadialGradient(0, 0, 0, 0, 0, 1);
+    for (const [at, name] of [[0, "near"], [0.48, "middle"], [1, "far"]]) {
+      sky.addColorStop(at, colours.getPropertyValue(`--kb-${name}`).trim());
+    }
+    pen.setTransform(1.2 * picture.width, 0, 0, 0.95 * picture.height, 0.5 * picture.width, 0.38 * picture.height);
+    pen.fillStyle = sky;
+    pen.fillRect(-1, -1, 2, 2);
+    pen.resetTransform();
     pen.drawImage(scene, 0, 0);
     const link = document.createElement("a");
     link.download = "kinboard.png";
@@ -71,13 +90,20 @@
   }
 
   addEventListener("DOMContentLoaded", () => {
-    const button = document.createElement("button");
-    button.id = "kb-picture";
-    button.type = "button";
-    button.ariaLabel = button.title = "Save a picture of the scene";
-    button.innerHTML = '<svg viewBox="0 0 24 24" width="22" height="22" fill="none" stroke="currentColor" stroke-width="1.7" stroke-linecap="round" stroke-linejoin="round" aria-hidden="true"><path d="M4 8h3.2l1.6-2.4h6.4L16.8 8H20a1 1 0 0 1 1 1v9.5a1 1 0 0 1-1 1H4a1 1 0 0 1-1-1V9a1 1 0 0 1 1-1z"/><circle cx="12" cy="13.3" r="3.6"/></svg>';
-    button.addEventListener("click", savePicture);
-    document.body.append(button);
+    const tools = document.createElement("div");
+    tools.id = "kb-tools";
+    tools.role = "toolbar";
+    tools.ariaLabel = "Camera";
+    for (const [name, drawing, sent, argument] of TOOLS) {
+      const button = document.createElement("button");
+      button.type = "button";
+      button.ariaLabel = button.title = name;
+      button.innerHTML = `<svg viewBox="0 0 24 24" width="20" height="20" fill="none" stroke="currentColor" stroke-width="1.6" stroke-linecap="round" stroke-linejoin="round" aria-hidden="true">${drawing}</svg>`;
+      if (sent) Object.assign(button.dataset, { send: sent, argument });
+      else button.addEventListener("click", savePicture);
+      tools.append(button);
+    }
+    document.body.append(tools);
     let waiting = 0;
     const changes = new MutationObserver(() => { waiting ||= setTimeout(() => { waiting = 0; follow(); }, 30); });
     changes.observe(root, { subtree: true, childList: true, attributes: true, attributeFilter: ["data-mantine-color-scheme"] });

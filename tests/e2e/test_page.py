@@ -15,8 +15,11 @@ from playwright.sync_api import expect
 
 import kin
 from app.viewer.panel.joints import label
+from app.viewer.session.state import decode
 
 pytestmark = pytest.mark.browser
+
+ROBOTS = tuple(kin.builtin_robots().values())
 
 PUMA = kin.get_robot("puma560")
 ILLEGIBLE = """() => {
@@ -69,6 +72,24 @@ def test_a_picture_is_offered_and_the_settings_of_viser_are_not(desktop: Tab, tm
     assert file.stat().st_size > 4000, "an empty picture is smaller"
     expect(tab.page.locator(".tabler-icon-adjustments")).to_have_count(1)
     expect(tab.page.locator(".tabler-icon-adjustments")).not_to_be_visible()
+
+
+def test_the_toolbar_looks_from_the_top(desktop: Tab) -> None:
+    """The camera stands in the link, a moment after it has come to rest."""
+    page = desktop.page
+    page.get_by_role("button", name="View from the top").click()
+    page.wait_for_function("new URLSearchParams(location.hash.slice(1)).has('s')")
+    for _ in range(100):
+        text = page.evaluate("new URLSearchParams(location.hash.slice(1)).get('s')")
+        chosen = decode(text, ROBOTS).camera
+        if chosen is not None:
+            break
+        page.wait_for_timeout(100)
+    assert chosen is not None
+    above = chosen[0] - chosen[1]
+    assert above[2] > 0.99 * np.linalg.norm(above)
+    desktop.open("View")
+    page.get_by_role("button", name="Reset view").click()
 
 
 def test_labels_show_hints_but_not_over_a_menu(desktop: Tab) -> None:

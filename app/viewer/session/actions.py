@@ -16,7 +16,7 @@ from app.viewer.feature import Feature
 from app.viewer.panel import assign
 from app.viewer.panel.status import Notice, introduction
 from app.viewer.panel.target import DEFAULT_TASK, TASKS
-from app.viewer.panel.view import ViewState
+from app.viewer.panel.view import SIDES, ViewState
 from app.viewer.scene.gizmo import Pull
 from app.viewer.session.history import HOLD, PAUSE, History, Step, same, without_results
 from app.viewer.session.persistence import link_notice
@@ -46,7 +46,9 @@ NO_STEP = frozenset(
 )
 # Controls that send many values on the way to the one the visitor means: how long (s) a step may pause.
 GRADUAL = {"gizmo": math.inf, "joint": HOLD, "redundancy": HOLD, "feature": PAUSE, "nudge": PAUSE}
-MESSAGES = ("undo", "redo", "travel", "pause", "snap", "nudge", "axes", "field", "target")
+MESSAGES = (
+    "undo", "redo", "travel", "pause", "snap", "nudge", "axes", "field", "target", "fit-arm", "look-from",
+)  # fmt: skip
 ANSWERED = frozenset({"field", "target"})  # messages with a reply
 LABELS = {
     "gizmo": "Drag of the target",
@@ -132,7 +134,7 @@ class Actions:
             "system-dark": lambda dark: page.use_colours(page.view.dark, bool(dark)),
             "camera": lambda _: page.camera.aim(arm.scene.body, self._frames(), glide=True),
             "fit-arm": lambda _: page.camera.look_at_arm(self._frames()),
-            "look-from": lambda side, _: page.camera.look_from(side, self._frames()),
+            "look-from": self._look_from,
             "resized": lambda _: page.camera.refit(),
             "looked": lambda _: None,  # the viewpoint is read when the camera rests
             "axes": self._typed.use_axes,
@@ -174,6 +176,11 @@ class Actions:
                 self._history.record(_label(gesture, self._page.features), before)
                 self._gesture, self._changed_at = gesture, now
                 self._show_history()
+
+    def _look_from(self, side: object, _: object = None) -> None:
+        if side not in SIDES:
+            raise kin.InputError("look-from", side, "one of " + ", ".join(SIDES))
+        self._page.camera.look_from(side, self._frames())
 
     def take_returned(self) -> bool:
         """Whether the visitor returned to an earlier state since the last call."""

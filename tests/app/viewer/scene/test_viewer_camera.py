@@ -316,7 +316,14 @@ def test_standard_views_and_fit_arm(port: int) -> None:
             assert np.array_equal(up, camera.UP)
             assert viewpoints.contains(shown(tab), DESKTOP, frames(PIONEER, PIONEER.q_home), 0.0)
             tab.look()
-        tab.set("Camera", "Fit arm")
+        tab.say("look-from", "Front")  # the toolbar in the scene
+        tab.settle(quiet=0.6)
+        tab.look()
+        tab.say("look-from", "__class__")
+        tab.wait(lambda: "Front, Side, Top, Isometric" in tab.html)
+        out = shown(tab)[0] - shown(tab)[1]
+        assert np.allclose(out / np.linalg.norm(out), [1.0, 0.0, 0.0], atol=1e-6)
+        tab.say("fit-arm")
         tab.settle(quiet=0.6)
         fitted = shown(tab)
         assert viewpoints.contains(fitted, DESKTOP, frames(PIONEER, PIONEER.q_home), 0.0)
