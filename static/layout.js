@@ -110,6 +110,58 @@
     box?.firstElementChild?.setAttribute("data-kb-head", "");
   }
 
+  // The width of the panel on a desk: moved at its edge, by mouse or arrow keys, and kept for the next visit.
+
+  const WIDTH = "kinboard-panel-width";
+  const STRIDE = 24; // px; for one key
+  const LEAST = 200; // px; a narrower panel is folded away
+  let wished = NaN; // width of the last visit, until the panel has it
+  try { wished = Number(localStorage.getItem(WIDTH) ?? NaN); } catch { /* see above */ }
+
+  const region = () => document.querySelector("[data-dock-region]");
+
+  /** Make the panel wider, as a pointer that moves its edge would. */
+  function widen(pixels) {
+    const edge = document.querySelector("[data-dock-region-resize]");
+    if (!edge) return;
+    const start = edge.getBoundingClientRect().left;
+    const end = edge.dataset.dockRegionResize === "left" ? start + pixels : start - pixels;
+    const at = (x) => ({ bubbles: true, pointerId: 1, isPrimary: true, button: 0, clientX: x });
+    edge.firstElementChild.dispatchEvent(new PointerEvent("pointerdown", at(start)));
+    dispatchEvent(new PointerEvent("pointermove", at(end)));
+    dispatchEvent(new PointerEvent("pointerup", at(end)));
+  }
+
+  function keepWidth() {
+    const width = region()?.offsetWidth ?? 0;
+    const edge = document.querySelector("[data-dock-region-resize]");
+    if (width < LEAST || !edge) return;
+    edge.ariaValueNow = String(width);
+    if (wished >= LEAST) {
+      const change = Math.min(wished, innerWidth / 2) - width;
+      wished = NaN;
+      if (Math.abs(change) > 1) requestAnimationFrame(() => widen(change));
+      return;
+    }
+    try { localStorage.setItem(WIDTH, String(width)); } catch { /* see above */ }
+  }
+
+  /** Make the panel's edge a control for the keyboard too. */
+  function markEdge() {
+    const edge = document.querySelector("[data-dock-region-resize]:not([role])");
+    if (!edge) return;
+    Object.assign(edge, { tabIndex: 0, role: "separator", ariaOrientation: "vertical", ariaLabel: "Width of the panel" });
+    edge.addEventListener("keydown", (event) => {
+      const way = ["ArrowRight", "ArrowLeft"].indexOf(event.key);
+      if (way < 0) return;
+      event.preventDefault();
+      event.stopPropagation();
+      const outwards = edge.dataset.dockRegionResize === "left" ? 1 : -1;
+      widen((way === 0 ? outwards : -outwards) * STRIDE);
+    });
+    new ResizeObserver(keepWidth).observe(region());
+  }
+
   /** Where the scene is in the window: the status card lies at its top. */
   let watched = null;
   const edges = new ResizeObserver(() => {
@@ -132,7 +184,7 @@
     document.body.append(grip);
     place();
     let waiting = 0;
-    const changes = new MutationObserver(() => { waiting ||= setTimeout(() => { waiting = 0; mark(); watch(); }, 50); });
+    const changes = new MutationObserver(() => { waiting ||= setTimeout(() => { waiting = 0; mark(); markEdge(); watch(); }, 50); });
     changes.observe(document.body, { subtree: true, childList: true });
   });
   addEventListener("resize", place);

@@ -121,6 +121,19 @@ def test_the_panel_is_made_wider_at_its_edge(desktop: Tab) -> None:
         tab.page.mouse.move(x + way, y, steps=2)
         tab.page.mouse.up()
         tab.page.wait_for_function(f"Math.abs({width} - {before - min(way, 0)}) < 12")
+    tab.page.locator("[data-dock-region-resize=right]").focus()
+    tab.page.keyboard.press("ArrowLeft")
+    tab.page.wait_for_function(f"Math.abs({width} - {before + 24}) < 3")
+    kept = tab.page.evaluate(width)
+    tab.page.wait_for_function(f"Number(localStorage.getItem('kinboard-panel-width')) === {kept}")
+    tab.page.reload()
+    tab.page.wait_for_function(
+        f"document.querySelector('[data-dock-region=right]') && Math.abs({width} - {kept}) < 3"
+    )
+    tab.page.locator("[data-dock-region-resize=right]").press("ArrowRight")
+    tab.page.wait_for_function(f"Math.abs({width} - {before}) < 3")
+    expect(tab.status).to_have_attribute("data-status", "hand")
+    tab.dismiss_notice()
 
 
 def test_texts_are_legible_the_status_stays_and_drawings_have_a_legend(tab: Tab) -> None:
