@@ -134,7 +134,7 @@
     const input = document.getElementById(id).nextElementSibling?.querySelector("input");
     if (input) type(input, String(value));
     clearTimeout(release);
-    release = setTimeout(send, HOLD, "pause");
+    release = setTimeout(send, HOLD, "released");
     return true;
   }
 
@@ -146,7 +146,7 @@
 
   // A drag is one step of the history. viser drops a control's change if another one follows within 50 ms: wait longer.
   addEventListener("pointerup", (event) => {
-    if (event.target.closest?.(".mantine-Slider-root") || document.querySelector("[data-dragging]")) setTimeout(send, 150, "pause");
+    if (event.target.closest?.(".mantine-Slider-root") || document.querySelector("[data-dragging]")) setTimeout(send, 150, "released");
   }, true);
 
   // History

@@ -18,7 +18,7 @@ from app.viewer.panel.status import Notice, introduction
 from app.viewer.panel.target import DEFAULT_TASK, TASKS
 from app.viewer.panel.view import SIDES, ViewState
 from app.viewer.scene.gizmo import Pull
-from app.viewer.session.history import HOLD, PAUSE, History, Step, same, without_results
+from app.viewer.session.history import LONG_PAUSE, SHORT_PAUSE, History, Step, same, without_results
 from app.viewer.session.persistence import link_notice
 from app.viewer.session.state import PageState, decode
 from app.viewer.session.typed import BY_HAND, TypedInput, TypedPage
@@ -40,14 +40,16 @@ NO_STEP = frozenset(
         "undo",
         "redo",
         "travel",
-        "pause",
+        "released",
         "snap",
     }
 )
 # Controls that send many values on the way to the one the visitor means: how long (s) a step may pause.
-GRADUAL = {"gizmo": math.inf, "joint": HOLD, "redundancy": HOLD, "feature": PAUSE, "nudge": PAUSE}
+GRADUAL = {
+    "gizmo": math.inf, "joint": LONG_PAUSE, "redundancy": LONG_PAUSE, "feature": SHORT_PAUSE, "nudge": SHORT_PAUSE,
+}  # fmt: skip
 MESSAGES = (
-    "undo", "redo", "travel", "pause", "snap", "nudge", "axes", "field", "target", "fit-arm", "look-from",
+    "undo", "redo", "travel", "released", "snap", "nudge", "axes", "field", "target", "fit-arm", "look-from",
 )  # fmt: skip
 ANSWERED = frozenset({"field", "target"})  # messages with a reply
 LABELS = {
@@ -72,7 +74,7 @@ LABELS = {
 }
 
 
-class ActedPage(TypedPage, Protocol):
+class ActionsPage(TypedPage, Protocol):
     """What actions may use of a page, in addition to what is saved of it and to its panel."""
 
     system_dark: bool
@@ -102,7 +104,7 @@ class ActedPage(TypedPage, Protocol):
 class Actions:
     """Handles the events of one page."""
 
-    def __init__(self, page: ActedPage) -> None:
+    def __init__(self, page: ActionsPage) -> None:
         self._page = page
         self._history = History()
         self._gesture: tuple[object, ...] | None = None  # the control of the last step, while it may go on
@@ -125,9 +127,9 @@ class Actions:
             "task": self._on_task,
             "radians": lambda radians: page.use_units(replace(page.units, degrees=not radians)),
             "lengths": lambda name: page.use_units(page.panel.units.with_length(page.units, name)),
-            "home": lambda _: self._move_into_view(arm.move_home),
-            "random": lambda _: self._move_into_view(arm.move_to_random),
-            "recall": lambda _: self._move_by_hand(arm.recall_target),
+            "home": lambda _: self._move_into_view(arm.move_home, "Home configuration"),
+            "random": lambda _: self._move_into_view(arm.move_to_random, "Random configuration"),
+            "recall": lambda _: self._move(arm.recall_target, "The target is at the tool"),
             "copy-as": lambda name: page.panel.share.choose(name),
             "view": self._on_view,
             "colours": self._on_colours,
@@ -142,7 +144,7 @@ class Actions:
             "undo": self._undo,
             "redo": self._redo,
             "travel": self._travel,
-            "pause": self._on_pause,
+            "released": self._on_release,
             "snap": self._typed.snap,
             "nudge": self._typed.nudge,
             "field": self._typed.set_field,
@@ -257,7 +259,7 @@ class Actions:
     def _show_history(self) -> None:
         self._page.panel.script.show_history(*self._history.labels)
 
-    def _on_pause(self, _: object) -> None:
+    def _on_release(self, _: object) -> None:
         """The visitor has released a control: what follows is another step."""
         self._gesture = None
 
@@ -268,14 +270,14 @@ class Actions:
         frames: Array = kin.link_frames(self._page.robot, self._page.goal)[:, :3, 3]
         return frames
 
-    def _move_into_view(self, motion: Callable[[], None]) -> None:
+    def _move_into_view(self, motion: Callable[[], None], title: str) -> None:
         """Move the arm, and the camera if it would not show the whole arm."""
-        self._move_by_hand(motion)
+        self._move(motion, title)
         self._page.camera.keep(self._frames())
 
-    def _move_by_hand(self, motion: Callable[[], None]) -> None:
+    def _move(self, motion: Callable[[], None], title: str) -> None:
         motion()
-        self._page.status.show(BY_HAND)
+        self._page.status.show(replace(BY_HAND, title=title))
 
     def _on_grab(self, pull: Pull) -> None:
         self._gesture = None

@@ -9,7 +9,7 @@ from app.viewer.session.state import PageState, encode
 LIMIT = 100  # steps; older ones are forgotten
 # s: further changes by the same control within this time belong to the same step. The page reports when a slider
 # is released; the longer time is for a report that was lost.
-PAUSE, HOLD = 1.0, 20.0
+SHORT_PAUSE, LONG_PAUSE = 1.0, 20.0
 # The part of a feature's state that is a result and not a setting: undo neither repeats nor clears it.
 RESULT = "drawn"
 

@@ -50,7 +50,7 @@ class VisitorPage(Worker):
     The methods that `Worker` calls thread-safe may be called by any thread; everything else belongs to the worker.
     The page is the :class:`~app.viewer.feature.Stage` of its features, the listener of its arm's controller, the
     :class:`~app.viewer.session.persistence.SavedPage` of its persistence, and the
-    :class:`~app.viewer.session.actions.ActedPage` of the visitor's actions.
+    :class:`~app.viewer.session.actions.ActionsPage` of the visitor's actions.
 
     Args:
         token: whether programs must send an access token.
@@ -170,7 +170,7 @@ class VisitorPage(Worker):
         self.arm.branch = branch
         self.posture.choose(branch)
 
-    # ActedPage: what actions may use besides
+    # ActionsPage: what actions may use besides
 
     def change_robot(self, robot: Robot, q: Array | None = None) -> None:
         """Replace the robot, at its home configuration or at `q` ``(n,)``, in a fitting view."""

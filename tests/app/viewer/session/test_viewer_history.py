@@ -124,7 +124,7 @@ def test_a_slider_is_one_step_until_it_is_released(port: int) -> None:
         for value in (80, 70, 60):
             tab.set(BASE, value)
             tab.settle()
-        tab.say("pause")
+        tab.say("released")
         tab.set(BASE, 50)
         tab.settle()
         tab.say("undo")
