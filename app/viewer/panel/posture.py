@@ -34,8 +34,9 @@ _SIGNS = {"positive": "+", "negative": "\N{MINUS SIGN}"}
 
 def short(name: str) -> str:
     """A branch's name without the words that all branches share: ``front · up · no-flip``, ``elbow +``."""
-    words = (part.split(" ", 1) for part in name.split(" · "))
-    return " · ".join(f"{noun} {_SIGNS[word]}" if word in _SIGNS else word for noun, word in words)
+    words = (part.partition(" ") for part in name.split(" · "))
+    # A posture that the numeric solver found has a name of one word.
+    return " · ".join(f"{noun} {_SIGNS[word]}" if word in _SIGNS else word or noun for noun, _, word in words)
 
 
 def parts(robot: Robot) -> str:

@@ -117,6 +117,7 @@ def test_the_margin_is_the_distance_to_the_nearest_limit() -> None:
 def test_an_arm_without_named_branches_lists_the_nearest_posture() -> None:
     (only,) = survey(PANDA, home(PANDA), kin.IKOptions(), PANDA.q_home)
     assert only.available
+    assert f'data-posture="{only.name}"' in html(PANDA, (only,), only.name, frozenset(), DEFAULT_UNITS)
     far = home(PANDA)
     far[:3, 3] *= 5
     assert [p.state for p in survey(PANDA, far, kin.IKOptions(), PANDA.q_home)] == ["absent"]
