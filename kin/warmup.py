@@ -10,6 +10,7 @@ belong to solver families, not to arms, so one arm of each family is enough.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from functools import partial
 
@@ -21,7 +22,8 @@ from kin.fk import fk, fk_positions, jacobian, link_frames, manipulability
 from kin.ik import solve_ik
 from kin.path import solve_path
 from kin.robot import Robot
-from kin.solvers import closed_form_of, general6
+from kin.solvers import closed_form_of, general6, general7
+from kin.solvers.contract import POSE, SolverInput
 from kin.workspace import (
     MEASURES,
     STRATEGIES,
@@ -97,6 +99,14 @@ def _call_all(robot: Robot) -> None:
     solve_path(robot, fk(robot, pair))
 
 
+def _solve_generally(robot: Robot) -> None:
+    """The general solver of seven joints, which can also solve an arm of a family."""
+    form = general7.match(robot, general6.match)
+    if form is not None:
+        T = fk(robot, robot.q_home)
+        form.solve(SolverInput(T, POSE, (math.nan,), True, robot.q_home, robot.lower, robot.upper))
+
+
 def _rest() -> Iterator[Callable[[], object]]:
     robots = one_of_each_family()
     for act in (_move, _call_all):
@@ -104,6 +114,7 @@ def _rest() -> Iterator[Callable[[], object]]:
             yield partial(act, robot)
     # No built-in arm needs the general solver, which can also solve an arm of a family.
     yield partial(general6.match, next(robot for robot in robots if robot.n == 6 and robot.revolute.all()))
+    yield partial(_solve_generally, next(robot for robot in robots if robot.n == 7))
     robot = robots[0]
     # Two moving joints call the same kernels and take the least time.
     locked = [None, None, *robot.q_home[2:].tolist()]

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from kin import Joint, Robot
 from kin.ik import IKOptions, IKProblem, JointConstraints
 
 HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])  # Rx(π)
@@ -68,3 +69,65 @@ class Draw:
 def problem_of(robot, target, q_seed=None, limits=None, locked=None, **options):
     """The checked problem of `kin.solve_ik` with these keywords."""
     return IKProblem.of(robot, target, IKOptions(constraints=JointConstraints(limits, locked), **options), q_seed)
+
+
+def seven(name, limits, *rows):
+    """Seven revolute joints from rows (θ, d, a, α) of a standard table; None stands for one turn of each."""
+    spans = [(-math.pi, math.pi)] * 7 if limits is None else limits
+    joints = tuple(
+        Joint(f"joint {i + 1}", *row, limits=span) for i, (row, span) in enumerate(zip(rows, spans, strict=True))
+    )
+    return Robot(name, name, "test", "standard", joints, (0.1, 0.2, -0.3, 0.4, 0.5, 0.6, 0.1))
+
+
+# Arms with seven joints that are not built in, with the lengths and limits that the makers publish. Continuous
+# joints have one turn.
+_TURN, _WIDE = (-math.pi, math.pi), (-2.0 * math.pi, 2.0 * math.pi)
+GEN3 = seven(
+    "gen3",
+    (_TURN, (-2.41, 2.41), _TURN, (-2.66, 2.66), _TURN, (-2.23, 2.23), _TURN),
+    (0, -0.2848, 0, math.pi / 2),
+    (math.pi, -0.0118, 0, math.pi / 2),
+    (math.pi, -0.4208, 0, math.pi / 2),
+    (math.pi, -0.0128, 0, math.pi / 2),
+    (math.pi, -0.3143, 0, math.pi / 2),
+    (math.pi, 0, 0, math.pi / 2),
+    (math.pi, -0.1674, 0, math.pi),
+)
+XARM7 = seven(
+    "xarm7",
+    (_WIDE, (-2.059, 2.0944), _WIDE, (-0.19198, 3.927), _WIDE, (-1.69297, math.pi), _WIDE),
+    (0, 0.267, 0, -math.pi / 2),
+    (0, 0, 0, math.pi / 2),
+    (0, 0.293, 0.0525, math.pi / 2),
+    (0, 0, 0.0775, math.pi / 2),
+    (0, 0.3425, 0, math.pi / 2),
+    (0, 0, 0.076, -math.pi / 2),
+    (0, 0.097, 0, 0),
+)
+SAWYER = seven(
+    "sawyer",
+    (
+        (-3.0503, 3.0503),
+        (-3.8095, 2.2736),
+        (-3.0426, 3.0426),
+        (-3.0439, 3.0439),
+        (-2.9761, 2.9761),
+        (-2.9761, 2.9761),
+        (-4.7124, 4.7124),
+    ),
+    (0, 0.317, 0.081, -math.pi / 2),
+    (math.pi / 2, 0.1925, 0, math.pi / 2),
+    (0, 0.4, 0, -math.pi / 2),
+    (0, -0.1685, 0, math.pi / 2),
+    (0, 0.4, 0, -math.pi / 2),
+    (0, 0.1363, 0, math.pi / 2),
+    (0, 0.13375, 0, 0),
+)
+
+
+def eight_joints(robot):
+    """An arm with one revolute joint more than a robot with seven: no closed form covers it."""
+    more = Joint("joint 8", 0.0, 0.1, 0.05, math.pi / 2, limits=(-2.0, 2.0))
+    home = (*robot.home, 0.3)
+    return replace(robot, id=f"{robot.id} and one more", rows=(*robot.rows, more), home=home)

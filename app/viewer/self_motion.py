@@ -35,10 +35,10 @@ def self_motion(robot: Robot, T: Array, options: IKOptions, q: Array, name: str,
     """Solve for the target `T` ``(4, 4)`` with a redundancy parameter set.
 
     Of the options, task and constraints hold, not the branch. A solution near `q` ``(n,)`` is preferred; if there
-    is none, the solution on the branch of `q` is returned.
+    is none, the solution on the branch of `q` is returned, or the closest one if branches have no names.
     """
     target = T[:3, 3] if options.task == "position" else T
-    for branch in (None, "seed"):
+    for branch in (None, "seed") if kin.branch_names(robot) else (None,):
         trial = replace(options, branch=branch, redundancy={name: value}, max_solutions=1)
         result = solve(robot, target, trial, q)
         if result.solutions and float(np.abs(result.solutions[0].q - q).max()) < SMOOTH:
@@ -53,7 +53,8 @@ def redundancy_at(robot: Robot, T: Array, options: IKOptions, q: Array) -> tuple
     options = replace(options, branch=seed, max_solutions=1)
     rare = {parameter.name for parameter in prepare(robot, options).redundancies if parameter.rare}
     found = solve(robot, target, options, q)
-    return tuple(item for item in found.redundancy if item.name not in rare)
+    own = found.solutions[0].redundancy if found.solutions else found.redundancy
+    return tuple(item for item in own if item.name not in rare)
 
 
 def circular(item: Redundancy) -> bool:

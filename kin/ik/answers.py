@@ -61,7 +61,9 @@ def _solved(problem: IKProblem, branches: Branches, good: Flags) -> IKResult:
             redundancy = tuple(
                 r._replace(value=own.value) for r, own in zip(redundancy, solutions[0].redundancy, strict=True)
             )
-    details = Solved(len(solutions), bool(redundancy), problem.chosen_branches)
+    free = {p.name for p in problem.redundancies if p.joint < 0 or not problem.locked[p.joint]}
+    redundant = any(r.name in free for r in redundancy)
+    details = Solved(len(solutions), redundant, problem.chosen_branches)
     return make_result(problem, Status.SOLVED, "", details, solutions=solutions, redundancy=redundancy)
 
 

@@ -23,6 +23,10 @@ from kin.transforms import Array
 
 _SAMPLES = 24
 _ZOOMS = 4
+# Of a parameter whose rows are not the same branches at all values: samples of its range, and how many of the best
+# ones are refined.
+_ALL_SAMPLES = 72
+_REFINED = 3
 
 
 def scores(problem: IKProblem, q: Array) -> Array:
@@ -66,7 +70,14 @@ def centred(problem: IKProblem, q: Array) -> tuple[Array, Array]:
 
 
 def improve(problem: IKProblem, branches: Branches, good: Flags) -> None:
-    """Set the redundancy parameters of every good row of `branches`, in place, to their best values."""
+    """Set the redundancy parameters of every good row of `branches`, in place, to their best values.
+
+    Where rows are not the same branches at all values, all of them get the value at which one of them is best.
+    """
+    assert problem.closed_form is not None  # whose branches these are
+    if not problem.closed_form.steady and problem.code == POSE and not problem.requested:
+        _improve_all(problem, branches, good)
+        return
     branches.q, branches.stats = centred(problem, branches.q)
     score = scores(problem, branches.q)
     rows = np.flatnonzero(good)
@@ -79,6 +90,49 @@ def improve(problem: IKProblem, branches: Branches, good: Flags) -> None:
         else:
             for row in there.tolist():
                 _improve_row(problem, branches, score, row, k)
+
+
+def _improve_all(problem: IKProblem, branches: Branches, good: Flags) -> None:
+    """All solutions at the value at which one of them is best, of all values inside the limits, in place."""
+    assert problem.closed_form is not None
+    joint = problem.redundancies[0].joint
+    low, high = float(problem.lower[joint]), float(problem.upper[joint])
+    if not math.isfinite(high - low) or not problem.respect:
+        low, high = float(problem.seed[joint]) - math.pi, float(problem.seed[joint]) + math.pi
+    values = np.unique(np.append(np.linspace(low, high, _ALL_SAMPLES), branches.values[good, 0]))
+    reached = _best_at(problem, values)
+    step = (high - low) / (_ALL_SAMPLES - 1)
+    peaks = [i for i in range(len(values)) if reached[i] == reached[max(i - 1, 0) : i + 2].max()]
+    best = float(values[int(reached.argmax())])
+    most = float(reached.max())
+    for i in sorted(peaks, key=lambda i: -reached[i])[:_REFINED]:
+        middle, width = float(values[i]), step
+        for _ in range(_ZOOMS):
+            tried = np.clip(middle + width * np.linspace(-0.8, 0.8, 7), low, high)
+            there = _best_at(problem, tried)
+            middle, width = float(tried[int(there.argmax())]), 0.27 * width
+            if there.max() > most:
+                best, most = middle, float(there.max())
+    found = solve_branches(problem, problem.T, problem.code, None, (best,))
+    if found is None or not found.good.any():
+        return
+    branches.q, branches.stats = centred(problem, found.q)
+    branches.values, branches.arcs, branches.closed = found.values, found.arcs, found.closed
+    good[:] = found.good
+
+
+def _best_at(problem: IKProblem, values: Array) -> Array:
+    """The best score of all solutions at each value ``(k,)`` of the only redundancy parameter; −∞ for none."""
+    assert problem.closed_form is not None
+    kernels, rows = problem.closed_form.kernels, len(problem.closed_form.branches)
+    out = np.empty((len(values), rows, problem.robot.n))
+    targets = np.ascontiguousarray(np.broadcast_to(problem.T, (len(values), 4, 4)))
+    kernels.many(kernels.params, targets, np.ascontiguousarray(values), problem.seed, out)
+    q, stats = centred(problem, out.reshape(-1, problem.robot.n))
+    fits = is_closed(stats)
+    if problem.respect:
+        fits &= stats[:, OVERRUN] == 0.0
+    return np.asarray(np.where(fits, scores(problem, q), -math.inf).reshape(len(values), rows).max(axis=1))
 
 
 def _improve_together(problem: IKProblem, branches: Branches, score: Array, rows: NDArray[np.intp]) -> None:

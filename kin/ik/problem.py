@@ -20,9 +20,9 @@ from kin.ik.candidates import Requirement
 from kin.ik.options import IKOptions, shape_of
 from kin.kernels.checks import straighten
 from kin.robot import Robot
-from kin.solvers import closed_form_of
 from kin.solvers.common import TURN
 from kin.solvers.contract import POSITION, ClosedForm, RedundancyParameter
+from kin.solvers.locked import form_with_locked
 from kin.transforms import Array, as_transform, finite_array
 
 FAR = 1e6  # metres; the coordinates of targets are smaller
@@ -87,7 +87,8 @@ class IKProblem:
         problem = object.__new__(cls)
         problem.__dict__.update(prepared.__dict__, T=pose_of(target, prepared.code), seed=seed)
         if prepared.branches is not None and SEED in (options.branch or ()):
-            problem.__dict__["branches"] = prepared.branches | {prepared.branch_of(seed)}
+            name = prepared.branch_name(prepared.branch_of(seed))
+            problem.__dict__["branches"] = prepared.branches | prepared.rows_named(name)
         return problem
 
     @cached_property
@@ -119,6 +120,11 @@ class IKProblem:
         """Name of a branch."""
         return "numeric" if self.closed_form is None or branch < 0 else self.closed_form.branches[branch]
 
+    def rows_named(self, name: str) -> frozenset[int]:
+        """The rows of the branches with this name."""
+        names = () if self.closed_form is None else self.closed_form.branches
+        return frozenset(i for i, each in enumerate(names) if each == name)
+
     def without_turns(self) -> IKProblem:
         """The same problem without whole-turn images: each joint value is taken as it is."""
         return replace(self, turns=np.zeros(self.robot.n))
@@ -132,8 +138,8 @@ class IKProblem:
 def prepare(robot: Robot, options: IKOptions) -> IKProblem:
     """Check the options against an arm: a problem with the identity as target and the home pose as seed."""
     lower, upper, locked = options.constraints.bounds(robot)
-    closed_form = closed_form_of(robot) if options.solver == "auto" else None
     task, code, mask = options.coordinates
+    closed_form = form_with_locked(robot, _locks(options), code) if options.solver == "auto" else None
     handled = closed_form is not None and closed_form.handles(code)
     redundancies = closed_form.redundancies(code) if closed_form is not None and handled else ()
     values = _requested_values(robot, options, redundancies)
@@ -166,6 +172,11 @@ def prepare(robot: Robot, options: IKOptions) -> IKProblem:
     )
     _ = problem.requirement  # computed here, so that all copies share it
     return problem
+
+
+def _locks(options: IKOptions) -> tuple[float | None, ...] | None:
+    locked = options.constraints.locked
+    return None if locked is None else tuple(locked)
 
 
 def pose_of(target: ArrayLike, code: int, field: str = "target") -> Array:
@@ -207,7 +218,8 @@ def _requested_values(
         requested = dict(requested)
     names = [parameter.name for parameter in redundancies if not parameter.rare]
     if not names:
-        expected = f"none: {robot.id} has no redundancy parameter to set in this task"
+        locked = " with these joints locked" if options.constraints.locked else ""
+        expected = f"none: {robot.id} has no redundancy parameter to set in this task{locked}"
         raise InputError("redundancy", requested, expected)
     if not isinstance(requested, dict):
         requested = {names[0]: requested}

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import lru_cache
 
 from kin.robot import Robot
-from kin.solvers import collinear7, general6, parallel6, scara4, slide6, srs7, wrist5, wrist6
+from kin.solvers import collinear7, general6, general7, offset7, parallel6, scara4, slide6, srs7, wrist5, wrist6
 from kin.solvers.contract import APPROACH, ClosedForm
 from kin.solvers.reversed import ReversedJoints, readings
 
@@ -25,7 +25,11 @@ FAMILIES: tuple[Callable[[Robot], ClosedForm | None], ...] = (
     scara4.match,
 )
 # For arms that fit no family, whatever joints are reversed.
-GENERAL: tuple[Callable[[Robot], ClosedForm | None], ...] = (general6.match,)
+GENERAL: tuple[Callable[[Robot], ClosedForm | None], ...] = (
+    offset7.match,
+    general6.match,
+    lambda robot: general7.match(robot, _six_joints),
+)
 
 
 @lru_cache(maxsize=256)
@@ -48,6 +52,11 @@ def closed_form_of(robot: Robot) -> ClosedForm | None:
         return _first_match(robot, GENERAL)
     joints, form = min(readable, key=_burden)
     return ReversedJoints(form, joints, robot) if joints else form
+
+
+def _six_joints(robot: Robot) -> ClosedForm | None:
+    """The closed form of an arm that is left of one with seven joints."""
+    return closed_form_of(robot)
 
 
 def _first_match(robot: Robot, families: tuple[Callable[[Robot], ClosedForm | None], ...]) -> ClosedForm | None:

@@ -23,7 +23,7 @@ import numpy as np
 
 from kin.axes import inverse, screw_z
 from kin.kernels.compile import jit
-from kin.solvers.common import HIGH, LOW, NEAR, UNBOUNDED
+from kin.solvers.common import HIGH, LOW, NEAR, TURN, UNBOUNDED
 from kin.solvers.contract import SolverInput
 from kin.transforms import Array
 
@@ -141,3 +141,25 @@ def free_last(problem: SolverInput, out: Array) -> Array:
     low, high, requested = problem.lower[-1], problem.upper[-1], problem.values[-1]
     out[there, -1] = min(max(problem.seed[-1], low), high) if math.isnan(requested) else requested
     return np.array([(i, low, high) for i in np.flatnonzero(there)], dtype=np.float64).reshape(-1, 3)
+
+
+def turn_around(low: float, high: float, wanted: float) -> tuple[float, float]:
+    """The range of a joint with these limits, at most one turn around `wanted`."""
+    if high - low < TURN:
+        return low, high
+    if high - low < UNBOUNDED:
+        start = min(max(wanted - math.pi, low), high - TURN)
+        return start, start + TURN
+    middle = TURN * round(wanted / TURN)
+    return middle - math.pi, middle + math.pi
+
+
+def at_every_turn(arcs: Array, low: float, high: float) -> Array:
+    """Intervals ``(k, 3)`` of one turn at all whole turns inside the limits of a joint."""
+    if not TURN < high - low < UNBOUNDED:
+        return arcs
+    most = math.ceil((high - low) / TURN)
+    shifts = TURN * np.arange(-most, most + 1.0)
+    rows = np.array([(b, max(x + s, low), min(y + s, high)) for s in shifts for b, x, y in arcs.tolist()])
+    rows = rows.reshape(-1, 3)
+    return rows[rows[:, 1] <= rows[:, 2]]

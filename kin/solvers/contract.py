@@ -149,6 +149,8 @@ class ClosedForm(ABC):
         lengths: the signed lengths in its formulas, metres.
         kernels: its batch kernels.
         named: whether a branch keeps its name from pose to pose, so that it can be requested and followed.
+        steady: whether a row is the same branch at every value of the first redundancy parameter.
+        exact_ranges: whether the intervals of that parameter are exact, so that those of width 0 are found too.
     """
 
     name: str
@@ -159,6 +161,8 @@ class ClosedForm(ABC):
     lengths: tuple[float, ...]
     kernels: BatchKernels
     named: bool = True
+    steady: bool = True
+    exact_ranges: bool = True
 
     def names(self, robot: Robot, sense: Array) -> Names:
         """The names of the branches on `robot`, in which joint i counts `sense[i]` times as it does here."""

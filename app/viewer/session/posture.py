@@ -111,7 +111,8 @@ class PosturePanel:
             return self._result[1]
         seed = "seed" if kin.branch_names(stage.robot) else None
         options = replace(stage.options, branch=seed, max_solutions=1)
-        return solve(stage.robot, kin.fk(stage.robot, q), options, q).redundancy
+        found = solve(stage.robot, kin.fk(stage.robot, q), options, q)
+        return found.solutions[0].redundancy if found.solutions else found.redundancy
 
     def _request(self) -> tuple[object, ...]:
         stage = self._stage

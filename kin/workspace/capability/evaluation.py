@@ -9,7 +9,8 @@ and the map's `method` names the case:
   may a positive answer be missed: at targets that fill no volume.
 - ``"sweep"``: poses have a closed form, approaches do not, as the tool is not on the last joint's axis. `ROLLS`
   rolls are tried, and `SWEEP` values of an arm's own redundancy parameter: narrower ranges are missed.
-- ``"search"``: no closed form. `STARTS` descents per direction: a few approachable directions are missed.
+- ``"search"``: no closed form, or one that takes longer than a search. `STARTS` descents per direction: a few
+  approachable directions are missed.
 
 The best manipulability is that of all branches, at `SWEEP` arm angles or rolls where these are redundant and
 matter; a finer sweep mostly finds one or two per cent more, at worst a quarter.
@@ -77,7 +78,7 @@ class Evaluator:
         self.other_home: Robot | None = None
         self.method: Method = "search"
         match = closed_form_of(robot)
-        if match is not None:
+        if match is not None and match.steady:
             self.form = match
             exact = match.handles(APPROACH)
             self.method = "closed form" if exact else "sweep"

@@ -171,13 +171,16 @@ def test_branches_may_be_out_of_reach_on_one_side_only():
 @pytest.mark.parametrize("robot_id", CLOSED)
 def test_every_family_gives_equal_results_for_batches_and_single_targets(robot_id):
     robot = kin.get_robot(robot_id)
-    T = targets(robot, 100)
-    many = kin.ik_branches(robot, T)
+    q = robot.random_q(np.random.default_rng(1), 100)
+    T = kin.fk(robot, q)
+    first, *_ = (*closed_form_of(robot).redundancies(POSE), None)
+    values = np.full(100, math.nan) if first is None or first.joint < 0 else q[:, first.joint]
+    many = kin.ik_branches(robot, T, values)
     assert many.shape == (100, len(kin.branch_names(robot)), robot.n)
     assert closure(robot, T, many) <= 1e-12
     assert not np.isnan(many).all(axis=(1, 2)).any()
-    for pose, branches in zip(T, many, strict=True):
-        assert np.array_equal(kin.ik_branches(robot, pose), branches, equal_nan=True)
+    for pose, value, branches in zip(T, values.tolist(), many, strict=True):
+        assert np.array_equal(kin.ik_branches(robot, pose, value), branches, equal_nan=True)
 
 
 # Shapes, kinds of arrays, invalid input

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from arms import nested, reversed_at
+from arms import GEN3, eight_joints, nested, reversed_at
 
 import kin
 from kin import Joint, Robot
@@ -71,10 +71,16 @@ OTHERS = (
     factory(0.15),
     factory(-0.15),
     backwards(GET("stanford")),
+    mounted(GET("panda"), "wall", WALL),
+    reversed_at(GET("panda"), (1, 3, 4)),
+    GEN3,
+    reversed_at(GEN3, (1, 2, 5)),
 )
 
 # Indices of two axes that meet in the wrist centre (a SCARA has none).
 WRISTS = {"wrist5": (3, 4), "wrist6": (3, 4), "slide6": (3, 4), "parallel6": (4, 5), "scara4": (0, 1)}
+# Arms whose elbow is joint 4.
+FOURTH = ("srs7", "collinear7", "offset7")
 
 
 class Seen:
@@ -86,7 +92,9 @@ class Seen:
         turning = robot.revolute
         self.z = np.where(turning, J[3:], J[:3]).T
         self.points = self.T[:3, 3] + np.cross(self.z, J[:3].T)
-        self.wrist = self.meeting(*WRISTS.get(self.family, (5, 6)))
+        # Of two kinds of this family, one has a spherical shoulder, the other a spherical wrist.
+        self.shoulder_is_round = self.family == "offset7" and closed_form_of(robot).given == 6
+        self.wrist = self.meeting(*((4, 5) if self.shoulder_is_round else WRISTS.get(self.family, (5, 6))))
         own = robot.T_world_base[:3, :3]
         z1 = self.z[0]
         up = next(x for x in (z1[2], z1 @ own[:, 2]) if abs(x) > 1e-6)
@@ -118,6 +126,11 @@ class Seen:
         if self.family == "collinear7":
             side = self.up @ np.cross(self.wrist - self.points[0], self.meeting(2, 3) - self.meeting(0, 2))
             return "left" if side > 0.0 else "right"
+        if self.shoulder_is_round:
+            upper_arm = self.z[2] * np.sign(robot_length(self.robot, 2))
+            return "front" if upper_arm @ self.ahead > 0.0 else "back"
+        if self.family == "offset7":
+            return "positive" if self.beside(self.wrist - self.meeting(1, 2), 1, 2) else "negative"
         arm = (self.meeting(2, 3) if self.family == "srs7" else self.wrist) - self.points[0]
         if self.family == "parallel6":
             side = self.up @ np.cross(self.ahead * np.sign(arm @ self.ahead), arm)
@@ -126,8 +139,10 @@ class Seen:
 
     def stretch(self):
         """Distance of the wrist centre (or of axis 4) from the shoulder, across axis 2."""
-        joint = 3 if self.family in ("srs7", "collinear7") else 2
+        joint = 3 if self.family in FOURTH else 2
         start = self.meeting(2, 3) if joint == 3 else self.points[1]
+        if self.family == "offset7" and not self.shoulder_is_round:
+            return np.linalg.norm(self.wrist - self.meeting(1, 2))
         if joint == 3:
             return np.linalg.norm(self.wrist - self.meeting(0, 2))
         end = self.points[3] if self.family == "parallel6" else self.wrist
@@ -143,7 +158,7 @@ class Seen:
             x, z = places @ self.ahead, places[:, 2]
             line = z[0] + (z[2] - z[0]) * (x[1] - x[0]) / (x[2] - x[0])
             return "up" if z[1] > line else "down"
-        joint = 3 if self.family in ("srs7", "collinear7") else 2
+        joint = 3 if self.family in FOURTH else 2
         # On the positive side of the straight arm a little more of the joint brings the wrist nearer.
         closer = self.bent(joint, self.q[joint] + 1e-5).stretch() < self.stretch()
         return "positive" if closer else "negative"
@@ -152,6 +167,10 @@ class Seen:
         between = self.points[1] - self.points[0]
         meet = abs(between @ np.cross(self.z[0], self.z[1])) < 1e-9 and abs(between @ self.ahead) < 1e-9
         return self.family in ("wrist5", "wrist6") and meet and self.vertical
+
+    def beside(self, place, i, j):
+        """Whether a place is on the side of the plane of two axes that their product points to."""
+        return place @ np.cross(self.z[i], self.z[j]) > 0.0
 
     def slide_word(self):
         along = (self.wrist - self.points[1]) @ self.z[2]
@@ -165,10 +184,17 @@ class Seen:
         return self.z[first] @ self.z[last]
 
     def wrist_word(self):
-        joint = 5 if self.family in ("srs7", "collinear7") else 4
+        if self.shoulder_is_round:
+            return "positive" if self.beside(self.meeting(0, 2) - self.wrist, 4, 5) else "negative"
+        joint = 5 if self.family in FOURTH else 4
         sign = np.sign(self.bent(joint, 0.0).straightness())
         away = sign * (self.bent(joint, self.q[joint] + 1e-5).straightness() - self.straightness()) < 0.0
         return "no-flip" if away else "flip"
+
+
+def robot_length(robot, joint):
+    """The offset along a joint's axis."""
+    return robot.rows[robot.joint_rows[joint]].d
 
 
 def turn(axis, angle, v):
@@ -242,5 +268,5 @@ def test_every_part_of_a_name_has_a_meaning(robot):
 
 
 def test_an_arm_without_a_closed_form_has_no_names_and_no_meanings():
-    assert kin.branch_names(GET("panda")) == ()
-    assert kin.branch_meanings(GET("panda")) == {}
+    assert kin.branch_names(eight_joints(GET("panda"))) == ()
+    assert kin.branch_meanings(eight_joints(GET("panda"))) == {}

@@ -172,7 +172,7 @@ def test_a_single_joint_in_an_unusual_direction_is_the_one_that_is_reversed(name
 def test_arms_that_match_as_they_are_or_not_at_all_have_no_reversed_joints():
     for name in ("panda", "ur5", "puma560", "irb120", "stanford", "scara", *ARMS):
         match = closed_form_of(kin.get_robot(name))
-        assert (match is None) == (name == "panda")
+        assert match is not None
         assert match is None or not isinstance(match, ReversedJoints)
     one = Robot(
         "one", "one", "test", "standard", (Joint("j", 0.0, 0.1, 0.2, 0.3, "revolute", (-1.0, 1.0)),), (0.0,)

@@ -11,6 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from arms import eight_joints
 
 import kin
 from kin import InputError
@@ -30,6 +31,8 @@ def tilted(robot_id):
 
 @lru_cache
 def arm(name):
+    if name.startswith("longer "):
+        return eight_joints(kin.get_robot(name.removeprefix("longer ")))
     return tilted(name.removeprefix("tilted ")) if name.startswith("tilted") else kin.get_robot(name)
 
 
@@ -114,7 +117,9 @@ def test_a_closed_form_map_equals_inverse_kinematics_everywhere(name):
     assert 0 < pairs[:, 0].sum() < len(pairs)
 
 
-@pytest.mark.parametrize(("name", "method"), [("tilted puma560", "sweep"), ("panda", "search")])
+@pytest.mark.parametrize(
+    ("name", "method"), [("tilted puma560", "sweep"), ("panda", "sweep"), ("longer panda", "search")]
+)
 def test_other_maps_have_no_false_positives_and_few_misses(name, method):
     found = mapped(name, 5)
     assert found.grid.method == method

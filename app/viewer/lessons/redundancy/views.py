@@ -27,6 +27,20 @@ ELBOW = (
 )
 
 
+GIVEN = (
+    "Seven joints for a task of dimension six: the arm can move while the tool stays. Choose a value of {label}, "
+    "and the other six joints follow. The bar shows the values of joint {number} that the joint limits allow in "
+    "this posture."
+)
+
+
+def _without_ranges(robot: Robot, task: Task) -> str:
+    """Why no ranges are shown for a redundant arm, and what to do."""
+    if task != "pose" and robot.n == 7:
+        return "For this task solutions are searched without ranges. Match the full pose to see the self-motion."
+    return "Solutions of this arm are searched without ranges; targets work as usual."
+
+
 def idea(robot: Robot, task: Task, parameters: tuple[Redundancy, ...], trades: bool, elbow: bool) -> str:
     """The redundancy of an arm in a task, in a sentence or two.
 
@@ -42,14 +56,13 @@ def idea(robot: Robot, task: Task, parameters: tuple[Redundancy, ...], trades: b
             "with seven joints."
         )
     if not parameters:
-        return (
-            f"Redundancy {count}: {counts}. Kinboard has no closed form for this arm, and so no feasible ranges; "
-            "targets work as usual."
-        )
+        return f"Redundancy {count}: {counts}. {_without_ranges(robot, task)}"
     if trades and parameters[0].name == "theta1":
         return TRADE
     if elbow and parameters[0].name == "psi":
         return ELBOW
+    if task == "pose" and robot.n == 7:
+        return GIVEN.format(label=parameters[0].label, number=parameters[0].name.removeprefix("theta"))
     names = " and ".join(item.label for item in parameters)
     return f"To match {MATCHED[task]}, {names} can have any value within the joint limits."
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from arms import eight_joints
 from fake_browser import FakeBrowser
 
 import kin
@@ -115,12 +116,13 @@ def test_the_margin_is_the_distance_to_the_nearest_limit() -> None:
 
 
 def test_an_arm_without_named_branches_lists_the_nearest_posture() -> None:
-    (only,) = survey(PANDA, home(PANDA), kin.IKOptions(), PANDA.q_home)
+    longer = eight_joints(PANDA)
+    (only,) = survey(longer, home(longer), kin.IKOptions(), longer.q_home)
     assert only.available
-    assert f'data-posture="{only.name}"' in html(PANDA, (only,), only.name, frozenset(), DEFAULT_UNITS)
-    far = home(PANDA)
+    assert f'data-posture="{only.name}"' in html(longer, (only,), only.name, frozenset(), DEFAULT_UNITS)
+    far = home(longer)
     far[:3, 3] *= 5
-    assert [p.state for p in survey(PANDA, far, kin.IKOptions(), PANDA.q_home)] == ["absent"]
+    assert [p.state for p in survey(longer, far, kin.IKOptions(), longer.q_home)] == ["absent"]
 
 
 def test_the_row_of_the_list_is_escaped_and_marked() -> None:

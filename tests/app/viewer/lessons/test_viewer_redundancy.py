@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from arms import eight_joints
 from fake_browser import ANSWER, FakeBrowser
 
 import kin
@@ -197,8 +198,26 @@ def test_the_redundancy_is_explained_for_every_arm_and_task() -> None:
     assert idea(PRINTED, "pose") == views.TRADE
     assert idea(SRS, "pose") == views.ELBOW
     assert "θ4 and θ5 can have any value" in idea(PIONEER, "position")
-    assert idea(PANDA, "pose").startswith("Redundancy 1: 7 joints, task dimension 6")
-    assert idea(PANDA, "position").startswith("Redundancy 4: 7 joints, task dimension 3")
+    assert idea(PANDA, "pose") == views.GIVEN.format(label="θ7", number=7)
+    assert idea(PANDA, "position").startswith("Redundancy 4: 7 joints, task dimension 3. For this task")
+    assert idea(eight_joints(PANDA), "pose").startswith("Redundancy 2: 8 joints, task dimension 6. Solutions")
+
+
+def test_the_panda_moves_through_its_whole_range_while_the_tool_stays() -> None:
+    T, q, options = home(PANDA), PANDA.q_home, kin.IKOptions()
+    (item,) = self_motion.redundancy_at(PANDA, T, options, q)
+    assert (item.name, item.label) == ("theta7", "θ7")
+    low, high = self_motion.range_of(item)
+    assert high - low > 1.0
+    for goal in (low, high):
+        q = PANDA.q_home
+        for value in np.linspace(item.value, goal, 80)[1:-1].tolist():
+            found = self_motion.self_motion(PANDA, T, options, q, "theta7", value)
+            assert np.abs(kin.fk(PANDA, found.solutions[0].q) - T).max() < 1e-9
+            assert np.abs(found.solutions[0].q - q).max() < self_motion.SMOOTH
+            q = found.solutions[0].q
+    ends = self_motion.ends(PANDA, T, options, PANDA.q_home, item)
+    assert [end.value for end in ends] == [x for interval in item.intervals for x in interval]
 
 
 # In the page

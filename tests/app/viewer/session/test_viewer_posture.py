@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 import pytest
+from arms import eight_joints
 from fake_browser import FakeBrowser
 
 import kin
@@ -139,7 +140,7 @@ def test_the_choice_explains_its_words() -> None:
     text = meanings(kin.get_robot("ur5"))
     assert "Elbow +: θ3 is on the positive side of where the arm is straight." in text
     assert "Left: the plane of the arm is on the left, seen from axis 1 towards the wrist centre." in text
-    assert meanings(kin.get_robot("panda")) == ""
+    assert meanings(eight_joints(kin.get_robot("panda"))) == ""
 
 
 def test_hostile_choices_are_refused_and_the_session_lives(port: int) -> None:

@@ -1,0 +1,204 @@
+"""The solver of any seven revolute joints: the choice of the given joint, solutions, ranges."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from kin.axes import frame_of, inverse, lines_of, perpendicular_to
+from kin.fk import jacobian
+from kin.robot import Robot
+from kin.solvers.canonical import turn_around
+from kin.solvers.common import TURN, UNBOUNDED, nearest_image
+from kin.solvers.contract import POSE, BatchKernels, Candidates, ClosedForm, RedundancyParameter, SolverInput
+from kin.solvers.general7.motion import end_of_motion
+from kin.solvers.reduced import fixed
+from kin.solvers.singular import Singularity, by_jacobian, those_within
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+NAME = "general7"
+TITLE = "all solutions, seven revolute joints of which one is given"
+_SCAN = 64  # values that are tried where none near the seed's is feasible
+
+
+def match(robot: Robot, form_of: Callable[[Robot], ClosedForm | None]) -> General7 | None:
+    """The solver with the last joint given, or the first one if only that leaves an arm with a closed form.
+
+    `form_of` gives the solver of an arm with six joints.
+    """
+    if robot.n != 7 or not robot.revolute.all():
+        return None
+    found = [(joint, form) for joint in (6, 0) if (form := form_of(fixed(robot, {joint: 0.0}))) is not None]
+    if not found:
+        return None
+    joint, form = min(found, key=lambda entry: not entry[1].named)
+    return General7(robot, joint, form)
+
+
+@dataclass(frozen=True, eq=False)
+class _FoldedKernels(BatchKernels):
+    """Batch kernels of an arm with one joint more than `form`."""
+
+    rebuild: Callable[[BatchKernels], BatchKernels]
+    form: BatchKernels
+
+    def unchecked(self) -> BatchKernels:
+        """The same with the unchecked kernels of the arm with six joints."""
+        return self.rebuild(self.form.unchecked())
+
+
+class _Fold:
+    """Moves a rotation about the first or last joint's axis into the target."""
+
+    def __init__(self, robot: Robot, joint: int) -> None:
+        lines = lines_of(robot, as_counted=True)
+        z = lines.z[joint]
+        axis = frame_of(perpendicular_to(z), z, lines.points[joint])
+        self.joint, self.last = joint, joint > 0
+        self.others = [i for i in range(robot.n) if i != joint]
+        self.axis = inverse(lines.T_base_tool) @ axis if self.last else axis
+        self.back = inverse(self.axis)
+
+    def targets(self, T: Array, values: Array) -> Array:
+        """Targets ``(N, 4, 4)`` of the arm whose joint is at 0, with the joint of the arm at values ``(N,)``."""
+        turn = np.zeros((len(values), 4, 4))
+        turn[:, 0, 0] = turn[:, 1, 1] = np.cos(values)
+        turn[:, 0, 1] = np.sin(values)
+        turn[:, 1, 0] = -turn[:, 0, 1]
+        turn[:, 2, 2] = turn[:, 3, 3] = 1.0
+        whole = self.axis @ turn @ self.back
+        return np.ascontiguousarray(T @ whole if self.last else whole @ T)
+
+    def kernels(self, form: BatchKernels) -> BatchKernels:
+        """The batch kernels of the arm from those of the six joints."""
+
+        def many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
+            value = np.where(np.isnan(values), near[self.joint], values)
+            value = np.ascontiguousarray(np.broadcast_to(value, len(T)))
+            rows = np.empty((*out.shape[:2], len(self.others)))
+            form.many(params, self.targets(T, value), np.array([math.nan]), near[self.others].copy(), rows)
+            out[..., self.others] = rows
+            out[..., self.joint] = np.where(np.isnan(rows[..., 0]), math.nan, value[:, None])
+
+        def one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
+            many(params, T[None], np.array([value]), near, out[None])
+            return bool(np.isfinite(T).all())
+
+        return _FoldedKernels(form.params, one, many, self.kernels, form)
+
+
+class General7(ClosedForm):
+    """All solutions of an arm with seven revolute joints for a given value of its last or first joint."""
+
+    name, title = NAME, TITLE
+    lengths = ()
+    named = steady = exact_ranges = False
+
+    def __init__(self, robot: Robot, joint: int, form: ClosedForm) -> None:
+        self.robot, self.given, self.form = robot, joint, form
+        self.reason = (
+            f"seven revolute joints whose axes fit no closed form; joint {joint + 1} is given ({form.name})"
+        )
+        self.branches = tuple(f"solution {i + 1}" for i in range(len(form.branches)))
+        self.kernels = _Fold(robot, joint).kernels(form.kernels)
+        self._parameter = RedundancyParameter(f"theta{joint + 1}", f"θ{joint + 1}", joint=joint)
+
+    def handles(self, task: int) -> bool:
+        """Poses."""
+        return task == POSE
+
+    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
+        """The given joint."""
+        return (self._parameter,)
+
+    def solve(self, problem: SolverInput) -> Candidates:
+        """All solutions at the seed's value of the given joint, or as requested, and the ranges around it.
+
+        Where none of them is inside the limits, the feasible value nearest to the seed's is looked for.
+        """
+        p, requested = problem, problem.values[0]
+        low, high = float(p.lower[self.given]), float(p.upper[self.given])
+        value = min(max(float(p.seed[self.given]), low), high) if math.isnan(requested) else requested
+        out = self._at(p, np.array([value]))[0]
+        if math.isnan(requested) and p.respect_limits and not self._inside(p, out).any():
+            value, out = self._nearest_value(p, value, out)
+        values = np.where(np.isnan(out[:, :1]), math.nan, value)
+        arcs = self._ranges(p, out) if p.respect_limits else np.empty((0, 3))
+        return Candidates(out, values, (arcs,))
+
+    def _at(self, problem: SolverInput, values: Array) -> Array:
+        """All solutions ``(N, rows, 7)`` at these values of the given joint."""
+        out = np.empty((len(values), len(self.branches), 7))
+        T = np.ascontiguousarray(np.broadcast_to(problem.T, (len(values), 4, 4)))
+        self.kernels.many(self.kernels.params, T, values, problem.seed, out)
+        return out
+
+    def _outside(self, problem: SolverInput, q: Array) -> Array:
+        """How far configurations ``(..., 7)`` are outside the limits, in all; ∞ for those that do not exist."""
+        half, middle = 0.5 * (problem.upper - problem.lower), 0.5 * (problem.upper + problem.lower)
+        middle = np.where(np.isfinite(middle), middle, 0.0)
+        off = np.abs((q - middle + math.pi) % TURN - math.pi) - half - TOLERANCES.limit
+        total = np.maximum(off, 0.0).sum(axis=-1)
+        return np.where(np.isnan(total), math.inf, total)
+
+    def _inside(self, problem: SolverInput, q: Array) -> Array:
+        return np.asarray(self._outside(problem, q) == 0.0)
+
+    def _nearest_value(self, problem: SolverInput, value: float, out: Array) -> tuple[float, Array]:
+        """The feasible value nearest to `value`, and the solutions there; else those least outside the limits."""
+        low, high = turn_around(float(problem.lower[self.given]), float(problem.upper[self.given]), value)
+        tried = np.linspace(low, high, _SCAN)
+        found = self._at(problem, tried)
+        miss = self._outside(problem, found).min(axis=1)
+        if not np.isfinite(miss).any():
+            return value, out
+        if miss.min() > 0.0:
+            here = float(self._outside(problem, out).min())
+            best = int(miss.argmin())
+            return (value, out) if here <= miss[best] else (float(tried[best]), found[best])
+        best = int(np.where(miss == 0.0, np.abs(tried - value), math.inf).argmin())
+        row = found[best, int(self._outside(problem, found[best]).argmin())]
+        end = self._end(problem, row, 1.0 if value > tried[best] else -1.0)
+        inset = min(TOLERANCES.interval_inset, 0.5 * abs(end - tried[best]))
+        nearest = end - math.copysign(inset, end - tried[best])
+        there = self._at(problem, np.array([nearest]))[0]
+        return (nearest, there) if self._inside(problem, there).any() else (float(tried[best]), found[best])
+
+    def _image(self, problem: SolverInput, row: Array) -> Array:
+        """A solution at its whole turns inside the limits, nearest to the seed; the given joint as it is."""
+        q = np.array([
+            nearest_image(float(x), float(near), float(low), float(high))
+            for x, near, low, high in zip(row, problem.seed, problem.lower, problem.upper, strict=True)
+        ])  # fmt: skip
+        q[self.given] = row[self.given]
+        return q
+
+    def _end(self, problem: SolverInput, row: Array, sense: float) -> float:
+        """The end of the self-motion from a solution inside the limits."""
+        lower, upper = (np.clip(x, -UNBOUNDED, UNBOUNDED) for x in (problem.lower, problem.upper))
+        q = self._image(problem, row)
+        return float(end_of_motion(self.robot.model, problem.T, self.given, sense, q, lower, upper))
+
+    def _ranges(self, problem: SolverInput, out: Array) -> Array:
+        """The range of the given joint around each solution ``(rows, 7)`` that is inside the limits."""
+        found = []
+        least, most = float(problem.lower[self.given]), float(problem.upper[self.given])
+        for i in np.flatnonzero(self._inside(problem, out)).tolist():
+            low, high = (self._end(problem, out[i], sense) for sense in (-1.0, 1.0))
+            if high - low >= TURN:
+                low, high = turn_around(least, most, float(out[i, self.given]))
+            found.append((float(i), max(low, least), min(high, most)))
+        return np.array(found).reshape(-1, 3)
+
+    def branch_of(self, q: Array) -> int:
+        """The row of q ``(7,)`` among all solutions of its pose with the same value of the given joint."""
+        others = [i for i in range(7) if i != self.given]
+        return self.form.branch_of(np.asarray(q)[others])
+
+    def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
+        """The smallest singular value of the Jacobian: where it vanishes has no simple form."""
+        return those_within(within, by_jacobian(jacobian(self.robot, q), rank=6))

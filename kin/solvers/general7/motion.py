@@ -1,0 +1,127 @@
+"""The self-motion of an arm with seven joints: the tool stays, one joint is moved, the other six follow.
+
+A step along the tangent, then Newton steps back onto the target. Where the joints would have to move fast the step
+is halved; where it vanishes, the motion turns back, and the range of the moved joint ends.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kin.kernels.compile import jit
+from kin.kernels.jacobian import jacobian_into
+from kin.solvers.numeric.error import relative_pose
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+_STEP = 0.06  # rad of the moved joint
+_MOST = 0.25  # rad of any other joint in one step
+_LEAST = 1e-10  # rad: a shorter step ends the motion
+_NEWTON = 6
+_THERE = 1e-12
+_STEPS = 2000
+_LIMIT = TOLERANCES.limit
+
+
+@jit
+def _solved(J: Array, joint: int, right: Array, x: Array) -> bool:
+    """x ``(7,)`` ← the motion of the other joints with ``J x = right`` ``(6,)``; False if there is none."""
+    A, b = np.empty((6, 6)), np.empty(6)
+    for r in range(6):
+        b[r] = right[r]
+        for k in range(6):
+            A[r, k] = J[r, k + (1 if k >= joint else 0)]
+    for k in range(6):
+        pivot = k
+        for r in range(k + 1, 6):
+            if abs(A[r, k]) > abs(A[pivot, k]):
+                pivot = r
+        if abs(A[pivot, k]) < 1e-12:
+            return False
+        if pivot != k:
+            for m in range(6):
+                A[k, m], A[pivot, m] = A[pivot, m], A[k, m]
+            b[k], b[pivot] = b[pivot], b[k]
+        for r in range(k + 1, 6):
+            factor = A[r, k] / A[k, k]
+            b[r] -= factor * b[k]
+            for m in range(k + 1, 6):
+                A[r, m] -= factor * A[k, m]
+    x[joint] = 0.0
+    for k in range(5, -1, -1):
+        total = b[k]
+        for m in range(k + 1, 6):
+            total -= A[k, m] * x[m + (1 if m >= joint else 0)]
+        x[k + (1 if k >= joint else 0)] = total / A[k, k]
+    return True
+
+
+@jit
+def _moved(model: Array, target: Array, joint: int, step: float, q: Array, out: Array) -> bool:
+    """out ``(7,)`` ← q ``(7,)``, which meets the target, with one joint moved by `step` and the tool still there.
+
+    False if another joint has to jump.
+    """
+    J, T, axes, e, x = np.empty((6, 7)), np.empty((4, 4)), np.empty((7, 7)), np.empty(6), np.empty(7)
+    jacobian_into(model, q, J, T, axes)
+    for r in range(6):
+        e[r] = -step * J[r, joint]
+    if not _solved(J, joint, e, x):
+        return False
+    for i in range(7):
+        if abs(x[i]) > _MOST:
+            return False
+        out[i] = q[i] + x[i]
+    out[joint] = q[joint] + step
+    for _ in range(_NEWTON):
+        jacobian_into(model, out, J, T, axes)
+        relative_pose(T, target, False, e)
+        miss = 0.0
+        for r in range(6):
+            miss = max(miss, abs(e[r]))
+            e[r] = -e[r]
+        if miss < _THERE:
+            break
+        if not _solved(J, joint, e, x):
+            return False
+        for i in range(7):
+            out[i] += x[i]
+    for i in range(7):
+        if not abs(out[i] - q[i]) < 2.0 * _MOST:
+            return False
+    return miss < 1e3 * _THERE
+
+
+@jit
+def _inside(q: Array, lower: Array, upper: Array) -> bool:
+    outside = 0
+    for i in range(q.shape[0]):
+        outside += 1 if q[i] < lower[i] - _LIMIT or q[i] > upper[i] + _LIMIT else 0
+    return outside == 0
+
+
+@jit
+def end_of_motion(
+    model: Array, target: Array, joint: int, sense: float, q: Array, lower: Array, upper: Array
+) -> float:
+    """The value of the moved joint up to which the self-motion from q ``(7,)`` goes on inside the limits.
+
+    sense: 1.0 upwards, −1.0 downwards; at most one turn.
+    """
+    at, there = q.copy(), np.empty(7)
+    start = float(q[joint])
+    step = _STEP
+    for _ in range(_STEPS):
+        if step < _LEAST:
+            break
+        if abs(at[joint] - start) >= 2.0 * math.pi:
+            return start + sense * 2.0 * math.pi
+        if _moved(model, target, joint, sense * step, at, there) and _inside(there, lower, upper):
+            for i in range(7):
+                at[i] = there[i]
+            step = min(1.5 * step, _STEP)
+        else:
+            step *= 0.5
+    return float(at[joint])

@@ -1,0 +1,191 @@
+"""Kernels that find the values of the given joint at which a branch exists inside the limits, and choose one.
+
+For each branch, one continuous function of the value is positive where the branch is feasible: the least of how
+far inside the arm's reach it is and of how far its joints are inside their limits. It is sampled over the joint's
+range. Its zeros are found between samples of opposite signs, and a peak or a dip between samples that could pass
+zero is searched for by golden sections.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kin.kernels.compile import jit
+from kin.solvers.common import HIGH, LOW, NEAR, wrap
+from kin.solvers.offset7.branches import all_branches
+from kin.solvers.offset7.geometry import OFFSET, SIGN
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+SAMPLES = 96  # of the whole range
+_LIMIT = TOLERANCES.limit
+_INSET = TOLERANCES.interval_inset
+_GOLDEN = 0.6180339887498949
+_PEAK_STEPS = 24
+_ZERO_STEPS = 60
+_WIDTH = 1e-12  # rad, to which the end of an interval is found
+
+
+@jit
+def slack(params: Array, T: Array, value: float, box: Array, rows: Array, room: Array, spare: Array) -> None:
+    """spare ``(8,)`` ← how far each branch is from losing its feasibility at this value of the given joint.
+
+    box ``(3, 7)``: seed and limits as chain angles. rows ``(8, 7)``, room ``(8,)`` ← as `all_branches`.
+    """
+    t = box[NEAR].copy()
+    t[0] = params[SIGN] * value + params[OFFSET]
+    all_branches(params, T, box[NEAR], t, rows, room)
+    for k in range(8):
+        spare[k] = room[k]
+        if room[k] < 0.0:
+            continue
+        for i in range(1, 7):
+            half = 0.5 * (box[HIGH, i] - box[LOW, i])
+            if half < math.pi:
+                inside = half + _LIMIT - abs(wrap(rows[k, i] - 0.5 * (box[HIGH, i] + box[LOW, i])))
+                spare[k] = min(spare[k], inside)
+
+
+@jit
+def _at(params: Array, T: Array, value: float, box: Array, work: tuple[Array, Array, Array], k: int) -> float:
+    """`slack` of branch k."""
+    rows, room, spare = work
+    slack(params, T, value, box, rows, room, spare)
+    return float(spare[k])
+
+
+@jit
+def _zero(
+    params: Array, T: Array, box: Array, work: tuple[Array, Array, Array], k: int,
+    inside: tuple[float, float], outside: tuple[float, float],
+) -> float:  # fmt: skip
+    """The feasible side of the zero between two (value, slack) of branch k, by the Illinois method."""
+    x, fx = inside
+    y, fy = outside
+    for step in range(_ZERO_STEPS):
+        if abs(y - x) < _WIDTH:
+            break
+        middle = (x * fy - y * fx) / (fy - fx) if step % 3 < 2 and fx > 0.0 else 0.5 * (x + y)
+        if not min(x, y) < middle < max(x, y):
+            middle = 0.5 * (x + y)
+        f = _at(params, T, middle, box, work, k)
+        if f >= 0.0:
+            x, fx = middle, f
+            fy *= 0.5
+        else:
+            y, fy = middle, f
+            fx *= 0.5
+    return x
+
+
+@jit
+def _peak(
+    params: Array, T: Array, box: Array, work: tuple[Array, Array, Array], k: int, low: float, high: float,
+    sense: float,
+) -> tuple[float, float]:  # fmt: skip
+    """(value, slack) where the slack of branch k times `sense` is largest in [low, high], or passes zero."""
+    x, y = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+    fx, fy = sense * _at(params, T, x, box, work, k), sense * _at(params, T, y, box, work, k)
+    for _ in range(_PEAK_STEPS):
+        if max(fx, fy) > 0.0:
+            break
+        if fx > fy:
+            high, y, fy = y, x, fx
+            x = high - _GOLDEN * (high - low)
+            fx = sense * _at(params, T, x, box, work, k)
+        else:
+            low, x, fx = x, y, fy
+            y = low + _GOLDEN * (high - low)
+            fy = sense * _at(params, T, y, box, work, k)
+    return (x, sense * fx) if fx > fy else (y, sense * fy)
+
+
+@jit
+def _ranges_of(
+    params: Array, T: Array, box: Array, k: int, marks: Array, samples: Array, arcs: Array, found: int
+) -> int:
+    """Append the feasible intervals of branch k to arcs; marks, samples ``(n,)``: values, and the slack there."""
+    work = (np.empty((8, 7)), np.empty(8), np.empty(8))
+    n = marks.shape[0]
+    start = math.nan
+    if samples[0] >= 0.0:
+        start = marks[0]
+    for i in range(n):
+        f = samples[i]
+        if 0 < i < n - 1:
+            before, after = samples[i - 1], samples[i + 1]
+            rise = max(abs(f - before), abs(after - f))
+            hump = f < 0.0 and before <= f and after < f and -f < rise
+            dip = f >= 0.0 and before >= f and after > f and f < rise and before >= 0.0
+            if hump or dip:
+                sense = 1.0 if hump else -1.0
+                x, fx = _peak(params, T, box, work, k, marks[i - 1], marks[i + 1], sense)
+                if hump and fx >= 0.0 and found < arcs.shape[0]:
+                    arcs[found, 0] = k
+                    arcs[found, 1] = _zero(params, T, box, work, k, (x, fx), (marks[i - 1], before))
+                    arcs[found, 2] = _zero(params, T, box, work, k, (x, fx), (marks[i + 1], after))
+                    found += 1
+                if dip and fx < 0.0 and found < arcs.shape[0]:
+                    arcs[found, 0], arcs[found, 1] = k, start
+                    arcs[found, 2] = _zero(params, T, box, work, k, (marks[i - 1], before), (x, fx))
+                    found += 1
+                    start = _zero(params, T, box, work, k, (marks[i + 1], after), (x, fx))
+        if i == n - 1:
+            break
+        after = samples[i + 1]
+        if f < 0.0 <= after:
+            start = _zero(params, T, box, work, k, (marks[i + 1], after), (marks[i], f))
+        elif f >= 0.0 > after and found < arcs.shape[0]:
+            arcs[found, 0], arcs[found, 1] = k, start
+            arcs[found, 2] = _zero(params, T, box, work, k, (marks[i], f), (marks[i + 1], after))
+            found += 1
+            start = math.nan
+    if not math.isnan(start) and found < arcs.shape[0]:
+        arcs[found, 0], arcs[found, 1], arcs[found, 2] = k, start, marks[n - 1]
+        found += 1
+    return found
+
+
+@jit
+def feasible(
+    params: Array, T: Array, box: Array, span: tuple[float, float], wanted: float, arcs: Array, chosen: Array
+) -> int:
+    """arcs ``(m, 3)`` ← rows (branch, low, high): the feasible values of the given joint; returns their number.
+
+    span: where the joint may be. chosen ``(8,)`` ← the feasible value nearest to the wanted one; where there is
+    none, the sample at which the branch is least outside the limits; NaN where it does not exist.
+    """
+    low, high = span
+    n = max(2, math.ceil(SAMPLES * (high - low) / (2.0 * math.pi))) + 1 if high > low else 1
+    marks, samples, there = np.empty(n), np.empty((8, n)), np.empty((8, n))
+    rows, room, spare = np.empty((8, 7)), np.empty(8), np.empty(8)
+    for i in range(n):
+        marks[i] = low + (high - low) * i / (n - 1) if n > 1 else low
+        slack(params, T, marks[i], box, rows, room, spare)
+        for k in range(8):
+            samples[k, i], there[k, i] = spare[k], room[k]
+    found = 0
+    for k in range(8):
+        first = found
+        found = _ranges_of(params, T, box, k, marks, samples[k], arcs, found)
+        chosen[k] = _nearest(arcs, first, found, wanted)
+        if first == found:
+            best = -math.inf
+            for i in range(n):
+                if there[k, i] >= 0.0 and samples[k, i] > best:
+                    best, chosen[k] = samples[k, i], marks[i]
+    return found
+
+
+@jit
+def _nearest(arcs: Array, first: int, found: int, wanted: float) -> float:
+    """The value of the intervals first…found−1 nearest to the wanted one, slightly inside their ends."""
+    best = math.nan
+    for i in range(first, found):
+        inset = min(_INSET, 0.5 * (arcs[i, 2] - arcs[i, 1]))
+        x = min(max(wanted, arcs[i, 1] + inset), arcs[i, 2] - inset)
+        if math.isnan(best) or abs(x - wanted) < abs(best - wanted):
+            best = x
+    return best

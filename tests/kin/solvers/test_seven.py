@@ -1,0 +1,301 @@
+"""Arms with seven revolute joints of which one is given: Panda, Gen3, xArm7 (offset7), Sawyer (general7); and any
+arm with seven joints of which one is locked."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from arms import GEN3, SAWYER, XARM7, Draw, eight_joints, nested, problem_of, reversed_at
+
+import kin
+from kin import InputError, Robot, Status
+from kin.ik import preferences
+from kin.solvers import closed_form_of, general7, offset7
+from kin.solvers.contract import POSE, SolverInput
+from kin.solvers.general7.motion import end_of_motion
+
+PI = math.pi
+PANDA = kin.get_robot("panda")
+NAMED = (PANDA, GEN3, XARM7)
+ALL = (*NAMED, SAWYER)
+robots = pytest.mark.parametrize("robot", ALL, ids=lambda robot: robot.id)
+named = pytest.mark.parametrize("robot", NAMED, ids=lambda robot: robot.id)
+# An arm with six joints of a family, on a turntable.
+ON_A_TURNTABLE = replace(
+    kin.get_robot("ur5"),
+    id="turntable",
+    rows=(kin.Joint("turntable", 0.0, 0.3, 0.5, PI / 3, limits=(-2.0, 2.0)), *kin.get_robot("ur5").rows),
+    home=(0.0, *kin.get_robot("ur5").home),
+)
+
+
+def apart(a, b):
+    """Largest joint difference, whole turns aside."""
+    return np.abs((a - b + PI) % (2 * PI) - PI).max(axis=-1)
+
+
+def recall(robot: Robot, count: int, seed: int = 0) -> tuple[int, int, float]:
+    """(random poses that miss their own configuration, poses with an odd number of solutions, µs per pose).
+
+    Each is solved at its own value of the given joint; every solution is checked by forward kinematics.
+    """
+    given = closed_form_of(robot).given
+    missed = odd = 0
+    seconds = 0.0
+    rng = np.random.default_rng(seed)
+    for _ in range(0, count, 1000):
+        q = rng.uniform(-PI, PI, (min(count, 1000), 7))
+        T = kin.fk(robot, q)
+        start = time.perf_counter()
+        found = kin.ik_branches(robot, T, q[:, given])
+        seconds += time.perf_counter() - start
+        there = ~np.isnan(found[..., 0])
+        missed += int((np.where(there, apart(found, q[:, None]), math.inf).min(axis=1) > 1e-6).sum())
+        odd += int((there.sum(axis=1) % 2).sum())
+        assert np.abs(kin.fk(robot, found[there]) - np.repeat(T, there.sum(axis=1), axis=0)).max() < 1e-9
+    return missed, odd, 1e6 * seconds / count
+
+
+@robots
+def test_every_pose_finds_the_configuration_it_came_from(robot):
+    assert closed_form_of(robot).name == ("general7" if robot is SAWYER else "offset7")
+    assert recall(robot, 400)[:2] == (0, 0)
+
+
+@pytest.mark.slow
+@robots
+def test_of_a_hundred_thousand_poses_hardly_any_is_missed(robot):
+    missed, odd, each = recall(robot, 100_000, seed=1)
+    print(f"{robot.id}: missed {missed}, odd {odd} of 100 000, {each:.1f} µs each")
+    assert missed <= 10
+
+
+def test_the_given_joint_is_the_one_that_leaves_a_closed_form():
+    givens = {robot.id: closed_form_of(robot).given for robot in ALL}
+    assert givens == {"panda": 6, "gen3": 0, "xarm7": 6, "sawyer": 6}
+    form = closed_form_of(ON_A_TURNTABLE)
+    assert (form.name, form.given, form.form.name) == ("general7", 0, "parallel6")
+    assert recall(ON_A_TURNTABLE, 200)[0] == 0
+
+
+def test_random_arms_with_a_spherical_end_are_solved():
+    for seed in range(8):
+        draw = Draw(seed)
+        rows = [(draw.angle(), draw.length(), draw.length(), draw.rng.uniform(-3, 3)) for _ in range(4)]
+        rows[1] = (*rows[1][:2], 0.0, draw.rng.uniform(0.3, 2.8))
+        rows += [(0.0, draw.length(), 0.0, draw.square()), (0.3, 0.0, 0.0, draw.square()), (0.1, 0.2, 0.1, 0.4)]
+        joints = tuple(kin.Joint(f"{i}", *row, limits=(-PI, PI)) for i, row in enumerate(rows))
+        robot = Robot("made up", "", "", "standard", joints, (0.1,) * 7, base=draw.pose(), tool=draw.pose())
+        assert isinstance(closed_form_of(robot), offset7.Offset7), seed
+        assert recall(robot, 100)[:2] == (0, 0), seed
+
+
+def test_the_spelling_of_a_table_does_not_matter():
+    base = np.array([[0, -1, 0, 0.3], [1, 0, 0, -2], [0, 0, 1, 1], [0, 0, 0, 1.0]])
+    q = np.random.default_rng(4).uniform(-PI, PI, (40, 7))
+
+    def counts(robot, q):
+        rows = kin.ik_branches(robot, kin.fk(robot, q), q[:, closed_form_of(robot).given])
+        return (~np.isnan(rows)).sum(axis=(1, 2)).tolist()
+
+    for robot in ALL:
+        moved = replace(robot, id="base and tool", base=nested(base), tool=nested(robot.T_last_tool @ base))
+        assert counts(moved, q) == counts(robot, q)
+        turned = reversed_at(robot, (0, 3, 6))
+        assert counts(turned, q * np.array([-1, 1, 1, -1, 1, 1, -1])) == counts(robot, q)
+
+
+# -- ranges -------------------------------------------------------------------------------------------------------
+
+
+def candidates(robot, T, seed, value=math.nan, respect=True):
+    return closed_form_of(robot).solve(SolverInput(T, POSE, (value,), respect, seed, robot.lower, robot.upper))
+
+
+@robots
+def test_inside_a_range_the_joints_keep_their_limits_and_beyond_its_ends_they_do_not(robot):
+    form = closed_form_of(robot)
+    rng = np.random.default_rng(2)
+    tested = ends = 0
+    for _ in range(6):
+        q = robot.random_q(rng)
+        T = kin.fk(robot, q)
+        for s in kin.solve_ik(robot, T, q_seed=q).solutions:
+            for low, high in s.redundancy[0].intervals:
+                if not low <= s.redundancy[0].value <= high:
+                    continue
+                for value in np.linspace(low, high, 7)[1:-1].tolist():
+                    found = kin.solve_ik(robot, T, q_seed=q, redundancy=value)
+                    assert found.status is Status.SOLVED
+                    assert {x.q[form.given] for x in found.solutions} == {value}
+                    tested += 1
+                if robot.lower[form.given] + 1e-6 < low and form.named:
+                    beyond = kin.solve_ik(robot, T, redundancy=low - 1e-6, branch=s.branch)
+                    assert beyond.status is not Status.SOLVED
+                    ends += 1
+    assert tested > 20
+    assert ends > 3 or not form.named
+
+
+@named
+def test_ranges_agree_with_a_dense_sampling(robot):
+    form = closed_form_of(robot)
+    rng = np.random.default_rng(3)
+    low, high = max(robot.lower[form.given], -PI), min(robot.upper[form.given], PI)
+    values = np.linspace(low, high, 4001)
+    for _ in range(4):
+        q = robot.random_q(rng)
+        T = kin.fk(robot, q)
+        arcs = candidates(robot, T, q).arcs[0]
+        rows = kin.ik_branches(robot, np.broadcast_to(T, (len(values), 4, 4)), values)
+        low_q, high_q = robot.lower, robot.upper
+        shifted = low_q + (rows - low_q) % (2 * PI)
+        inside = (shifted <= high_q + 1e-9).all(axis=2)
+        for k in range(8):
+            own = arcs[arcs[:, 0] == k][:, 1:]
+            listed = ((values[:, None] >= own[:, 0] - 1e-9) & (values[:, None] <= own[:, 1] + 1e-9)).any(axis=1)
+            # A sample within a step of an end may fall on either side.
+            near = (np.abs(values[:, None] - own.reshape(1, -1)) < 1e-3).any(axis=1)
+            assert (listed == inside[:, k])[~near].all()
+
+
+def test_a_self_motion_ends_at_a_limit_or_where_it_turns_back():
+    rng = np.random.default_rng(5)
+    ended = set()
+    for _ in range(6):
+        q = SAWYER.random_q(rng)
+        T = kin.fk(SAWYER, q)
+        for sense in (-1.0, 1.0):
+            end = end_of_motion(SAWYER.model, T, 6, sense, q, SAWYER.lower, SAWYER.upper)
+            assert sense * (end - q[6]) >= 0.0
+            rows = kin.ik_branches(SAWYER, T, end - sense * 1e-7)
+            there = rows[~np.isnan(rows[:, 0])]
+            room = np.minimum(there - SAWYER.lower, SAWYER.upper - there)
+            sigma = [np.linalg.svd(np.delete(kin.jacobian(SAWYER, x), 6, axis=1))[1][-1] for x in there]
+            ended.add("limit" if np.abs(room).min() < 1e-4 else "fold")
+            assert np.abs(room).min() < 1e-4 or min(sigma) < 1e-2
+    assert ended == {"limit", "fold"}
+
+
+# -- answers ------------------------------------------------------------------------------------------------------
+
+
+@robots
+def test_an_answer_has_every_configuration_at_the_value_of_the_seed(robot):
+    form = closed_form_of(robot)
+    rng = np.random.default_rng(6)
+    for _ in range(5):
+        q = robot.random_q(rng)
+        result = kin.solve_ik(robot, kin.fk(robot, q), q_seed=q)
+        assert (result.status, result.solver, result.complete) == (Status.SOLVED, form.name, True)
+        assert np.abs(result.solutions[0].q - q).max() < 1e-8
+        (parameter,) = result.redundancy
+        assert parameter.name == f"theta{form.given + 1}"
+        assert any(low <= parameter.value <= high for low, high in parameter.intervals)
+
+
+@robots
+def test_a_pose_is_found_whatever_the_seed(robot):
+    rng = np.random.default_rng(7)
+    for _ in range(8):
+        q, seed = robot.random_q(rng, 2)
+        result = kin.solve_ik(robot, kin.fk(robot, q), q_seed=seed)
+        assert result.status is Status.SOLVED
+        assert np.abs(kin.fk(robot, result.solutions[0].q) - kin.fk(robot, q)).max() < 1e-9
+
+
+@robots
+def test_a_pose_beyond_a_limit_says_so(robot):
+    q = np.array([0.2, -0.6, 0.3, -1.9, 0.2, 1.7, 0.9])
+    T = kin.fk(robot, q)
+    limits = [None] * 7
+    limits[3] = [1.0, 1.05] if robot.upper[3] > 1.05 else [-0.2, -0.15]
+    result = kin.solve_ik(robot, T, limits=limits)
+    assert (result.status, result.cause) == (Status.LIMITS, "joint limits")
+    assert result.blocked
+    assert all(4 in {v.joint + 1 for v in posture.violations} for posture in result.blocked)
+
+
+@pytest.mark.parametrize("prefer", ["limits", "manipulability"])
+@pytest.mark.parametrize("robot", [PANDA, SAWYER], ids=lambda robot: robot.id)
+def test_a_preference_is_met_by_the_best_of_the_whole_family(robot, prefer):
+    rng = np.random.default_rng(5)
+    form = closed_form_of(robot)
+    values = np.linspace(robot.lower[form.given], robot.upper[form.given], 400)
+    for _ in range(2):
+        T = kin.fk(robot, robot.random_q(rng))
+        problem = problem_of(robot, T, prefer=prefer)
+        result = kin.solve_ik(robot, T, prefer=prefer)
+        rows = kin.ik_branches(robot, np.broadcast_to(T, (len(values), 4, 4)), values).reshape(-1, 7)
+        q, stats = preferences.centred(problem, rows)
+        best = preferences.scores(problem, q[(stats[:, 3] == 0.0) & ~np.isnan(q[:, 0])]).max()
+        assert preferences.scores(problem, result.solutions[0].q[None])[0] >= 0.99 * best
+
+
+def test_only_named_branches_can_be_requested():
+    q = np.array([0.2, -0.6, 0.3, -2.1, 0.2, 1.7, 0.9])
+    result = kin.solve_ik(PANDA, kin.fk(PANDA, q), q_seed=q, branch="seed")
+    assert {s.branch for s in result.solutions} == {kin.branch_of(PANDA, q)}
+    assert kin.branch_names(SAWYER) == ()
+    with pytest.raises(InputError, match="have no names"):
+        kin.solve_ik(SAWYER, kin.fk(SAWYER, q), branch="elbow up")
+
+
+def test_arms_of_another_kind_are_left_alone():
+    slide = replace(PANDA, rows=(replace(PANDA.rows[0], kind="prismatic"), *PANDA.rows[1:]))
+    for robot in (slide, eight_joints(PANDA), kin.get_robot("ur5")):
+        assert offset7.match(robot) is None
+        assert general7.match(robot, closed_form_of) is None
+
+
+# -- a locked joint -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("robot", [*map(kin.get_robot, ("iiwa14", "redundant7-craig")), PANDA, SAWYER], ids=repr)
+@pytest.mark.parametrize("joint", [0, 1, 2, 4, 5, 6])
+def test_an_arm_with_a_locked_joint_has_all_postures_and_no_free_parameter(robot, joint):
+    rng = np.random.default_rng(joint)
+    named_first = []
+    for _ in range(4):
+        q = robot.random_q(rng)
+        locked = [None] * 7
+        locked[joint] = float(q[joint])
+        T = kin.fk(robot, q)
+        result = kin.solve_ik(robot, T, locked=locked)
+        assert result.status is Status.SOLVED
+        assert result.complete
+        assert not result.details.redundant
+        assert all(s.q[joint] == pytest.approx(q[joint], abs=1e-9) for s in result.solutions)
+        assert min(apart(s.q, q) for s in result.solutions) < 1e-6
+        again = kin.solve_ik(robot, T, locked=locked, q_seed=q)
+        assert len(again.solutions) == len(result.solutions)
+        named_first += [s.branch == kin.branch_of(robot, s.q) for s in result.solutions if kin.branch_names(robot)]
+    assert all(named_first)
+
+
+def test_the_branches_of_a_locked_arm_can_be_requested():
+    robot = kin.get_robot("iiwa14")
+    rng = np.random.default_rng(3)
+    several = 0
+    for _ in range(10):
+        q = robot.random_q(rng)
+        locked = [None, None, float(q[2]), *[None] * 4]
+        result = kin.solve_ik(robot, kin.fk(robot, q), q_seed=q, locked=locked, branch="seed")
+        assert {s.branch for s in result.solutions} == {kin.branch_of(robot, q)}
+        several += len(result.solutions) > 1
+    assert several > 1
+    with pytest.raises(InputError, match="with these joints locked"):
+        kin.solve_ik(robot, kin.fk(robot, q), locked=locked, redundancy=0.3)
+
+
+def test_a_lock_that_does_not_remove_the_redundancy_keeps_it():
+    robot = kin.get_robot("iiwa14")
+    q = robot.random_q(np.random.default_rng(4))
+    locked = [None, None, None, float(q[3]), None, None, None]
+    result = kin.solve_ik(robot, kin.fk(robot, q), locked=locked)
+    assert result.status is Status.SOLVED
+    assert [r.name for r in result.redundancy] == ["psi"]
