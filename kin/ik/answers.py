@@ -80,7 +80,7 @@ def _numeric(problem: IKProblem) -> IKResult:
         pool = nearest.descend_each(problem, problem.code, starts, 1.0)[0]
     q, stats = _usable(problem, *measure(problem, pool))
     if not len(q):
-        return failures.out_of_reach(problem, None)
+        return failures.not_found(problem)
     related = [_same_pose(problem, row) for row in q]
     q = np.concatenate([q, *related])
     if prefer == "nearest":

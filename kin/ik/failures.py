@@ -15,7 +15,7 @@ import numpy as np
 from kin.fk import fk, link_frames
 from kin.ik import nearest
 from kin.ik.assembly import by_key, make_result, solutions_of
-from kin.ik.branches import Branches, Flags, is_closed, measure, redundancy_of, violations_of
+from kin.ik.branches import Branches, Flags, is_closed, measure, redundancy_of, solution, violations_of
 from kin.ik.candidates import DISTANCE, OVERRUN, ROLL
 from kin.ik.details import (
     Details,
@@ -30,9 +30,64 @@ from kin.ik.details import (
 )
 from kin.ik.problem import IKProblem
 from kin.ik.results import BlockedBranch, Cause, IKResult, IKSolution, Status
-from kin.solvers.contract import APPROACH, MASK, POSITION
+from kin.solvers.contract import APPROACH, MASK, POSE, POSITION
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
+
+
+def not_found(problem: IKProblem) -> IKResult:
+    """No descent met the task. An arm without a closed form gets the same statuses as one with a closed form."""
+    if problem.closed_form is None and problem.respect:
+        blocked = _beyond_limits(problem, problem.code)
+        if blocked:
+            return _outside_by_descent(problem, blocked)
+    if problem.closed_form is None and problem.robot.n < 6 and problem.code == POSE:
+        return _compromise_by_descent(problem)
+    return out_of_reach(problem, None)
+
+
+def _beyond_limits(problem: IKProblem, code: int) -> tuple[BlockedBranch, ...]:
+    """Configurations outside the limits that meet a task, the closest to the limits first."""
+    found = nearest.beyond_limits(problem, code)
+    if not len(found):
+        return ()
+    q, stats = measure(problem, found, code=code)
+    return _blocked(problem, q, by_key(q, is_closed(stats) & (stats[:, OVERRUN] > 0.0), stats[:, OVERRUN]))
+
+
+def _outside_by_descent(problem: IKProblem, blocked: tuple[BlockedBranch, ...]) -> IKResult:
+    """The task is met outside the limits only, as far as descents can tell."""
+    closest = nearest.closest(problem, None)
+    if _is_solution(closest, problem):
+        return _found_by_descent(problem, closest)
+    first = blocked[0]
+    return make_result(
+        problem,
+        Status.LIMITS,
+        "joint limits",
+        OutsideLimits(first.branch, first.violations, len(blocked), (), 0),
+        closest=closest,
+        blocked=blocked,
+        distance=nearest.nearest_to_point(problem, closest)[1],
+    )
+
+
+def _compromise_by_descent(problem: IKProblem) -> IKResult:
+    """As `compromise`, for an arm without a closed form."""
+    starts = nearest.starting_points(problem, count=4 * nearest.STARTS)
+    q, stats = measure(problem, nearest.descend_each(problem, APPROACH, starts, 1.0)[0])
+    rows = is_closed(measure(problem, q, code=APPROACH)[1])
+    if problem.respect:
+        rows &= stats[:, OVERRUN] == 0.0
+    order = by_key(q, rows, np.abs(stats[:, ROLL]))
+    solutions = tuple(solution(problem, q[i], stats[i], compromise="roll") for i in order)
+    oriented = nearest.nearest_orientation(problem, q[rows] if rows.any() else None)
+    if oriented is not None:
+        solutions += (oriented,)
+    if not solutions:
+        return out_of_reach(problem, None)
+    blocked = () if rows.any() or not problem.respect else _beyond_limits(problem, APPROACH)
+    return _compromised(problem, solutions, blocked, None)
 
 
 def outside_limits(problem: IKProblem, branches: Branches, rows: Flags, good: Flags) -> IKResult:
@@ -91,11 +146,18 @@ def compromise(problem: IKProblem, branches: Branches, allowed: Flags) -> IKResu
     blocked: tuple[BlockedBranch, ...] = ()
     if not rows.any() and possible.any():
         blocked = _blocked(problem, approach_q, by_key(approach_q, possible, approach_stats[:, OVERRUN]))
+    return _compromised(problem, solutions, blocked, branches.q)
+
+
+def _compromised(
+    problem: IKProblem, solutions: tuple[IKSolution, ...], blocked: tuple[BlockedBranch, ...], known: Array | None
+) -> IKResult:
+    """The result with these compromises, the best first; `known` ``(k, n)`` are further starts of descents."""
     first, joints = solutions[0], problem.robot.n
     details: Details = RollError(joints, first.rotation_error)
     if first.compromise != "roll":
         details = RotationError(joints, first.rotation_error, blocked[0].violations[0] if blocked else None)
-    closest = nearest.closest(problem, branches.q)
+    closest = nearest.closest(problem, known)
     return make_result(
         problem,
         Status.APPROXIMATE,
@@ -169,7 +231,8 @@ def side_of(problem: IKProblem, q: Array) -> Cause:
 
 def _blocked(problem: IKProblem, q: Array, order: list[int]) -> tuple[BlockedBranch, ...]:
     """Rows of q ``(k, n)`` that exist outside the limits."""
-    return tuple(BlockedBranch(problem.branch_name(i), q[i].copy(), violations_of(problem, q[i])) for i in order)
+    name = problem.branch_name if problem.closed_form is not None else lambda row: problem.branch_name(-1)
+    return tuple(BlockedBranch(name(i), q[i].copy(), violations_of(problem, q[i])) for i in order)
 
 
 def _is_solution(closest: IKSolution | None, problem: IKProblem) -> TypeGuard[IKSolution]:

@@ -9,6 +9,7 @@ reach. A search ends when several descents have ended at the best minimum so far
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ from kin.ik.branches import Flags, measure, solution, solve_branches
 from kin.ik.candidates import OVERRUN, POSITION_ERROR, ROTATION_ERROR
 from kin.ik.problem import IKProblem
 from kin.ik.results import IKSolution
+from kin.solvers.common import TURN
 from kin.solvers.contract import APPROACH, MASK, POSE, POSITION
 from kin.solvers.numeric import each_of, solve, spread
 from kin.tolerances import TOLERANCES
@@ -33,6 +35,8 @@ _LEVER, _LEAST_LEVER, _MOST_LEVER = 0.3, 0.03, 1.0
 # At most _MOST_STARTS descents; the search stops when _MEETINGS of them have ended at the best minimum.
 _MOST_STARTS = 64
 _MEETINGS = 12
+# Starts of a search without limits.
+_WIDE_BUDGET = 60
 # Stages of `nearest_orientation`: the metres per radian, and how many of the best descents continue. From
 # _POINT_KEPT on, descents also start from configurations that meet the point: at this weight they stay close to
 # the point, and the problem is better conditioned than at smaller weights.
@@ -111,6 +115,24 @@ def starting_points(problem: IKProblem, candidates: Array | None = None, count: 
         rows.append(candidates[~np.isnan(candidates[:, 0])])
     rows.append(spread(problem.low, problem.high, count))
     return np.concatenate(rows)
+
+
+def beyond_limits(problem: IKProblem, code: int) -> Array:
+    """Configurations ``(k, n)`` that meet a task outside the limits, from descents without limits; (0, n) if none.
+
+    The first search ends early where no configuration exists at all.
+    """
+    revolute = problem.robot.revolute
+    away = problem.robot.reach + float(np.linalg.norm(problem.T[:3, 3] - problem.robot.T_world_base[:3, 3]))
+    low = np.where(revolute, -TURN, problem.lower - away)
+    high = np.where(revolute, TURN, problem.upper + away)
+    wide = replace(problem, low=low, high=high, code=code, respect=False)
+    found = solve_numerically(wide, _WIDE_BUDGET)
+    if found.error > _EXACT:
+        return np.empty((0, problem.robot.n))
+    starts = np.concatenate([found.q[None], starting_points(wide, count=STARTS)])
+    q, errors = descend_each(wide, code, starts, 1.0)
+    return np.concatenate([found.q[None], q[errors <= TOLERANCES.closure_position]])
 
 
 def polish(problem: IKProblem, q: Array, stats: Array) -> Flags:

@@ -156,7 +156,8 @@ def _outside(details: OutsideLimits, units: Units) -> str:
     which = "the posture closest to the limits" if details.branches > 1 else "the posture"
     given = ", ".join(f"{r.label} = {units.angles.value(r.value)}" for r in details.requested)
     needs = listed([need(violation, units) for violation in details.violations])
-    text = f"{f'with {given} ' if given else ''}{which} ({details.branch}) needs {needs}"
+    name = f" ({details.branch})" if details.branch != "numeric" else ""
+    text = f"{f'with {given} ' if given else ''}{which}{name} needs {needs}"
     if details.branches > 1:
         others = count(details.branches - 1, "other posture is", "other postures are")
         text += f". {others[0].upper()}{others[1:]} outside the limits too"

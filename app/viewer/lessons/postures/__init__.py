@@ -44,7 +44,7 @@ ALL_GHOSTS_HINT = "Shows all postures as translucent copies of the arm; grey one
 CONE_HINT = (
     "The possible directions of the tool's arrow with its tip at the target, within the limits; locks ignored"
 )
-UNNAMED = "Kinboard has no closed form for this arm: postures have no names, and only the closest one is searched."
+UNNAMED = "The postures of this arm have no names: the list shows only the closest one."
 _NUMBERS = count(1)
 
 
