@@ -10,15 +10,19 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Coroutine
 from email.message import Message
+from functools import partial
 from typing import Any
 
 from fastapi import APIRouter, Request, Response
+from fastapi.exceptions import RequestValidationError
 from fastapi.routing import APIRoute
 from pydantic_core import from_json
 
 from app.api.problems import ProblemError, show
-from app.api.work import busy
+from app.api.work import busy, compute_slots
 from app.shared.clients import client_of, share_of
+
+LARGE = 16 * 1024  # bytes of a body that takes the event loop longer than a drag
 
 
 class UploadMemory:
@@ -105,12 +109,24 @@ class JsonRequest(Request):
     async def json(self) -> Any:
         """The parsed body; raises 400 naming the position of the syntax error."""
         if not hasattr(self, "_json"):
-            try:
-                self._json = from_json(await self.body())
-            except ValueError as error:
-                hint = "Check quotes, commas and brackets there; JSON keys need double quotes."
-                raise ProblemError(400, "malformed-json", f"The body is not valid JSON: {error}.", hint) from None
+            self._json = _parsed(await self.body())
         return self._json
+
+    async def validate(self, read: Callable[..., tuple[Any, list[Any]]]) -> None:
+        """Parse and validate a large body in a thread, in turn: meanwhile the event loop serves others.
+
+        FastAPI passes on the validated body as it is. Raises 400 or the errors of the schema.
+        """
+        if len(await self.body()) < LARGE:
+            return
+
+        def validated() -> Any:
+            value, errors = read(_parsed(self._body))
+            if errors:
+                raise RequestValidationError(errors)
+            return value
+
+        self._json = await compute_slots(self).read(self, validated)
 
     async def require_json(self) -> None:
         """Raises 415 if the Content-Type of the body is not JSON."""
@@ -136,13 +152,15 @@ class JsonRoute(APIRoute):
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """FastAPI's handler, with a `JsonRequest`."""
         handle = super().get_route_handler()
-        if self.body_field is None:
+        field = self.body_field
+        if field is None:
             return handle
 
         async def handle_json(request: Request) -> Response:
             with request.app.state.uploads.body(client_of(request.scope)) as memory:
                 request = JsonRequest(request, memory)
                 await request.require_json()
+                await request.validate(partial(field.validate, loc=("body",)))
                 return await handle(request)
 
         return handle_json
@@ -154,6 +172,14 @@ def versioned(tag: str) -> APIRouter:
     The application adds their routes one by one: nested routers are searched several times per request.
     """
     return APIRouter(prefix="/api/v1", tags=[tag], route_class=JsonRoute)
+
+
+def _parsed(body: bytes) -> Any:
+    try:
+        return from_json(body)
+    except ValueError as error:
+        hint = "Check quotes, commas and brackets there; JSON keys need double quotes."
+        raise ProblemError(400, "malformed-json", f"The body is not valid JSON: {error}.", hint) from None
 
 
 def _too_large(limit: int) -> ProblemError:

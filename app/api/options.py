@@ -16,6 +16,7 @@ from app.api import schemas
 from app.api.problems import FieldError, from_input_error, invalid
 from app.api.schemas import Number, Vector3, Vector4, numbers
 from app.shared.settings import Settings
+from app.shared.threads.turns import offer
 from kin import IKOptions, InputError, JointConstraints, Task
 from kin.transforms import Array, as_transform, frame_from_approach, from_position_wxyz
 
@@ -53,6 +54,7 @@ class Target(schemas.Body):
         Raises:
             ProblemError: 422 naming `field` and what is missing, contradicts, or is no rotation.
         """
+        offer()
         if task is None:
             task = "approach" if self.approach is not None else "position" if self._is_point() else "pose"
         given = ", ".join(name for name in type(self).model_fields if getattr(self, name) is not None) or "nothing"

@@ -12,6 +12,7 @@ from pydantic_core import to_json
 from app.api.problems import FieldError, Problem, ProblemError, invalid, show
 from app.shared.settings import Settings
 from app.shared.store import Store
+from app.shared.threads.turns import offer
 from kin import InputError, Robot
 from kin.transforms import Array
 
@@ -57,6 +58,7 @@ class Body(BaseModel):
     @classmethod
     def forbid_unknown(cls, data: Any) -> Any:
         """Rejects a field that the schema does not have, listing those it has."""
+        offer()
         if isinstance(data, dict):
             for name, value in data.items():
                 if name not in cls.model_fields:

@@ -22,6 +22,7 @@ from app.api.problems import ClientLeftError, ProblemError
 from app.shared.clients import client_of
 from app.shared.memory.answers import AnswerMemory
 from app.shared.places import Place, Places
+from app.shared.threads.turns import MOST, Turn, Turns, offer
 
 T = TypeVar("T")
 RETRY_AFTER = 2  # seconds
@@ -69,17 +70,32 @@ class ComputeSlots:
         self.memory = memory or AnswerMemory(1 << 62, 1 << 62)
         self.closed = False
         self.waiting = 0  # requests that wait for a slot
+        self.turns = Turns()
         self._places = Places(most, share)
+        self._reading = Places(MOST)  # of threads that validate large bodies
 
     @asynccontextmanager
     async def slot(self, request: Request) -> AsyncIterator[Deadline]:
         """A slot for as long as the context lasts, and its deadline; raises 503 if none becomes free in time."""
         client = client_of(request.scope)
         with self.watched(request) as deadline:
-            await self._acquire(client, deadline)
+            await self._acquire(self._places, client, deadline)
             with Place(self._places, client) as place:
                 deadline.start(place)
                 yield deadline
+
+    async def read(self, request: Request, validated: Callable[[], T]) -> T:
+        """What a thread makes of a large body; raises 503 if it cannot begin in time."""
+        client = client_of(request.scope)
+
+        def in_turn() -> T:
+            with deadline.turn:
+                return validated()
+
+        with self.watched(request) as deadline:
+            await self._acquire(self._reading, client, deadline)
+            with Place(self._reading, client):
+                return await run_in_threadpool(in_turn)
 
     @contextmanager
     def watched(self, request: Request) -> Iterator[Deadline]:
@@ -116,17 +132,17 @@ class ComputeSlots:
             await asyncio.wait((wrapped,), timeout=max(0.0, min(deadline.left, POLL)))
         return wrapped.result()
 
-    async def _acquire(self, client: str, deadline: Deadline) -> None:
-        if self._places.take(client):
+    async def _acquire(self, places: Places, client: str, deadline: Deadline) -> None:
+        if places.take(client):
             return
         self.waiting += 1
         try:
             async with asyncio.timeout(self.seconds) as waiting:
                 deadline.on_left = lambda: waiting.reschedule(0.0)
-                await self._places.wait(client)
+                await places.wait(client)
         except TimeoutError:
             deadline.check_client()
-            detail = f"{self._places.taken} requests are being computed, which is the maximum or your share of it."
+            detail = f"{places.taken} requests are being computed, which is the maximum or your share of it."
             raise busy(detail) from None
         finally:
             self.waiting -= 1
@@ -139,6 +155,7 @@ class Deadline:
     def __init__(self, work: ComputeSlots) -> None:
         self.place: Place | None = None
         self.on_left: Callable[[], None] | None = None  # called by the event loop when the client leaves
+        self.turn = Turn(work.turns)  # which its thread takes to compute
         self._work = work
         self._left = False
         self.start()
@@ -159,7 +176,11 @@ class Deadline:
         return self._ends - time.monotonic()
 
     def check(self, advice: str = ADVICE) -> None:
-        """Raises `ClientLeftError` once the client has left, 503 after the deadline or when the service stops."""
+        """Raises `ClientLeftError` once the client has left, 503 after the deadline or when the service stops.
+
+        Other threads may take their turn meanwhile.
+        """
+        offer()
         self.check_client()
         if self._work.closed:
             raise stopping()
@@ -193,8 +214,13 @@ def compute_slots(request: Request) -> ComputeSlots:
 
 async def computed(request: Request, answer: Callable[[Deadline], T]) -> T:
     """Result of `answer`, computed in a thread; raises 503 if there is no slot, or after the deadline."""
+
+    def in_turn() -> T:
+        with deadline.turn:
+            return answer(deadline)
+
     async with compute_slots(request).slot(request) as deadline:
-        return await run_in_threadpool(answer, deadline)
+        return await run_in_threadpool(in_turn)
 
 
 async def _deadline(request: Request) -> AsyncIterator[Deadline]:

@@ -8,7 +8,8 @@ answers must be read. Refusals are problem documents. Answers to HTTP/1.0 are no
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterable
+import selectors
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, Final, cast
 
 import httptools
@@ -20,6 +21,7 @@ from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
 
 from app.api.problems import MEDIA_TYPE, ProblemError
 from app.service.guard import Guard, Outflow
+from app.shared.threads.turns import visitors
 
 if TYPE_CHECKING:
     from uvicorn._types import ASGI3Application
@@ -54,6 +56,34 @@ class GuardedConfig(uvicorn.Config):
     """uvicorn's configuration, and the guard of its connections."""
 
     guard: Guard
+
+    def get_loop_factory(self) -> Callable[[], asyncio.AbstractEventLoop] | None:
+        """asyncio's event loop, for which computations wait; another one if uvicorn finds one installed."""
+        factory = super().get_loop_factory()
+        return _courteous_loop if factory is asyncio.SelectorEventLoop else factory
+
+
+class _Selector(selectors.DefaultSelector):
+    """Counts its event loop among those for whom computations wait, except while the loop sleeps."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        visitors.enter()
+
+    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
+        visitors.leave()
+        try:
+            return super().select(timeout)
+        finally:
+            visitors.enter()
+
+    def close(self) -> None:
+        super().close()
+        visitors.leave()
+
+
+def _courteous_loop() -> asyncio.AbstractEventLoop:
+    return asyncio.SelectorEventLoop(_Selector())
 
 
 class _Flow(FlowControl):

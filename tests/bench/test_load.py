@@ -6,7 +6,7 @@ import asyncio
 from math import cos, isnan, sin
 
 import pytest
-from load import cloud, drag, rest, soak, storm
+from load import attackers, cloud, drag, rest, siege, soak, storm
 from load.raw import Socket
 from load.service import Usage, serve
 from load.visitor import STEP, SWING, Visitor
@@ -85,7 +85,7 @@ def test_the_steps_of_a_point_are_reported_next_to_numpy_and_the_floors():
 def test_a_message_of_numbers_that_looks_like_text_is_heard_too():
     async def heard():
         found = []
-        socket = Socket("/", "", found.append)
+        socket = Socket(b"", found.append)
         socket._upgraded = True
         for opcode, data in ((2, b"{\x01\x02\x03"), (1, b'{"type": "progress"}'), (2, b"plain")):
             socket.data_received(bytes([0x80 | opcode, len(data)]) + data)
@@ -97,6 +97,22 @@ def test_a_message_of_numbers_that_looks_like_text_is_heard_too():
 def test_visitors_leave_nothing_behind(service):
     before, after = asyncio.run(soak.soak(service, 3, 2, 0.5))
     assert soak.left_behind(before, after, 6) == []
+
+
+def test_a_siege_counts_what_visitors_and_attackers_met(service, monkeypatch):
+    monkeypatch.setattr(siege, "VISITORS", 2)
+    under = siege.Siege(service)
+    asyncio.run(under.run(1, 2.0, 0.1, 0.5))
+    assert [phase.name for phase in under.phases] == ["quiet", "attacked", "quiet"]
+    assert all(phase.drags and phase.requests and phase.peak for phase in under.phases)
+    assert [row["attack"] for row in under.attacks] == [attack.name for attack in attackers.ATTACKS]
+    sent = {row["attack"] for row in under.attacks if row["MB sent"] > 0}
+    assert {"requests sent ahead", "clouds, not read", "frames, viewer", "malformed messages"} <= sent
+    statuses = asyncio.run(siege.answers(service))
+    assert statuses["200"] > 0
+    report = siege.report(under, statuses | {"500": 1}, 0, 0, 1)
+    assert "1 answers 5xx" in report["left behind"]
+    assert not any("lost" in wrong for wrong in report["left behind"])
 
 
 @pytest.mark.parametrize(

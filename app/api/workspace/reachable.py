@@ -87,9 +87,10 @@ def reachable(
     and the computation ends when the client leaves.
     """
     robot = robot_of(request, robot_id)
-    targets, single = body.resolve_all(body.target, settings_of(request))
-    if single:
-        return reply(_answers(robot, body, targets)[0])
+    with deadline.turn:
+        targets, single = body.resolve_all(body.target, settings_of(request))
+        if single:
+            return reply(_answers(robot, body, targets)[0])
     # Invalid options show in the first piece, while the status of the response can still be set.
     pieces = _pieces(robot, body, targets, deadline)
     pieces = _resumed(next(pieces), pieces)
@@ -113,8 +114,9 @@ def _pieces(
                 raise
             yield b'],"problem":' + to_json(error.problem) + b"}"
             return
-        answers = _answers(robot, body, targets[start : start + AT_ONCE])
-        yield (b"," if start else b'{"results":[') + to_json(answers, inf_nan_mode="null")[1:-1]
+        with deadline.turn:
+            piece = to_json(_answers(robot, body, targets[start : start + AT_ONCE]), inf_nan_mode="null")[1:-1]
+        yield (b"," if start else b'{"results":[') + piece
     yield b"]}"
 
 

@@ -11,6 +11,7 @@ import threading
 from collections.abc import Callable, Hashable
 
 import kin
+from app.shared.threads.turns import visitors
 from app.viewer.panel.status import Notice
 from app.viewer.session.inbox import Inbox
 
@@ -77,7 +78,8 @@ class Worker:
         try:
             self._build()
             while (batch := self._inbox.take(self._timeout)) is not None:
-                self._guard(lambda batch=batch: self._step(batch))  # type: ignore[misc]
+                with visitors:
+                    self._guard(lambda batch=batch: self._step(batch))  # type: ignore[misc]
         except BaseException:
             gone = self._inbox.closed
             self._inbox.close()

@@ -2,10 +2,12 @@
 
 import asyncio
 import json
+from contextlib import suppress
 
 import pytest
 from fastapi.testclient import TestClient
 
+from app.api import body as body_module
 from app.api.problems import KINDS, Problem
 from app.service.main import create_app
 from app.shared.settings import Settings
@@ -32,6 +34,40 @@ def problem(response, status, kind):
 
 def send(client, what, text, content_type="application/json"):
     return client.post(f"{ARM}/{what}", content=text, headers={"content-type": content_type})
+
+
+# -- large bodies -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "status", "kind"),
+    [
+        (json.dumps({"q": [Q] * 1000, "qq": 1}), 422, "invalid-input"),
+        (json.dumps({"q": [[*Q[:4], "x"]] + [Q] * 1000}), 422, "invalid-input"),
+        (json.dumps({"q": [Q] * 1000})[:-1], 400, "malformed-json"),
+        (json.dumps([Q] * 1000), 422, "invalid-input"),
+    ],
+)
+def test_a_large_body_is_refused_as_a_small_one_is(client, monkeypatch, text, status, kind):
+    assert len(text) > body_module.LARGE
+    large = problem(send(client, "fk", text), status, kind)
+    monkeypatch.setattr(body_module, "LARGE", 1 << 30)
+    assert problem(send(client, "fk", text), status, kind) == large
+
+
+@pytest.mark.parametrize(("count", "by_the_loop"), [(1, True), (1000, False)])
+def test_a_large_body_is_read_by_a_thread(client, monkeypatch, count, by_the_loop):
+    readers = []
+    parse = body_module.from_json
+
+    def parsed(data):
+        with suppress(RuntimeError):
+            readers.append(asyncio.get_running_loop())
+        return parse(data)
+
+    monkeypatch.setattr(body_module, "from_json", parsed)
+    assert client.post(f"{ARM}/fk", json={"q": [Q] * count}).status_code == 200
+    assert bool(readers) == by_the_loop
 
 
 # -- addresses -------------------------------------------------------------------------------------------------

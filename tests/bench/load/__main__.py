@@ -18,11 +18,12 @@ MODES = {
     "storm": "200 visitors at once",
     "cloud": "points a second: kernel and its steps, generator, REST, viewer",
     "soak": "visitors who come, drag, draw and go, over and over",
+    "siege": "all attacks at once beside visitors who drag, in turn with quiet minutes",
 }
 
 
 def main() -> int:
-    """0, or 1 if the soak found something left behind."""
+    """0, or 1 if the soak found something left behind, or the siege something wrong."""
     parser = argparse.ArgumentParser(prog="python tests/bench/load", description=__doc__)
     parser.add_argument("mode", choices=(*MODES, "all"), help="; ".join(f"{k}: {v}" for k, v in MODES.items()))
     parser.add_argument("--quick", action="store_true", help="seconds instead of minutes, to try it")
@@ -30,6 +31,7 @@ def main() -> int:
     parser.add_argument(
         "--only", nargs="+", help="numbers of visitors, of points, of rounds; of rest its cases, such as fk"
     )
+    parser.add_argument("--minutes", type=int, help="how long the siege lasts")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write everything measured to this file")
     arguments = parser.parse_args()
     found = {"machine": machine(), "workers": arguments.workers}
@@ -37,7 +39,7 @@ def main() -> int:
     if arguments.only and arguments.mode == "all":
         parser.error("--only goes with one mode")
     for mode in MODES if arguments.mode == "all" else [arguments.mode]:
-        only = arguments.only
+        only = [arguments.minutes] if mode == "siege" and arguments.minutes else arguments.only
         if only and mode != "rest":
             only = [int(value) for value in only]
         found[mode] = importlib.import_module(f"load.{mode}").run(arguments.quick, arguments.workers, only)

@@ -83,12 +83,38 @@ class Http(asyncio.Protocol):
             self._answer.set_exception(ConnectionError("the service hung up"))
 
 
-def request(method: str, path: str, body: bytes | None = None) -> bytes:
+def request(method: str, path: str, body: bytes | None = None, token: str = "") -> bytes:
     """A request as bytes, JSON if it has a body."""
-    head = f"{method} {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n"
+    head = f"{method} {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n{_bearer(token)}"
     if body is None:
         return f"{head}\r\n".encode()
     return f"{head}Content-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n".encode() + body
+
+
+def handshake(path: str, subprotocol: str = "", token: str = "") -> bytes:
+    """The request that opens a websocket."""
+    key = base64.b64encode(os.urandom(16)).decode()
+    offer = f"Sec-WebSocket-Protocol: {subprotocol}\r\n" if subprotocol else ""
+    return (
+        f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        f"Sec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\n{offer}{_bearer(token)}\r\n"
+    ).encode()
+
+
+def frame(opcode: int, data: bytes = b"", final: bool = True) -> bytes:
+    """A frame of a websocket, masked with zeros."""
+    first, length = final << 7 | opcode, len(data)
+    if length < 126:
+        head = struct.pack(">BB", first, 0x80 | length)
+    elif length < 1 << 16:
+        head = struct.pack(">BBH", first, 0x80 | 126, length)
+    else:
+        head = struct.pack(">BBQ", first, 0x80 | 127, length)
+    return head + bytes(4) + data
+
+
+def _bearer(token: str) -> str:
+    return f"Authorization: Bearer {token}\r\n" if token else ""
 
 
 class Socket(asyncio.Protocol):
@@ -97,13 +123,8 @@ class Socket(asyncio.Protocol):
     Frames are masked with zeros, which costs nothing and is as good as any mask where nobody stands between.
     """
 
-    def __init__(self, path: str, subprotocol: str, heard: Callable[[bytes], None]) -> None:
-        key = base64.b64encode(os.urandom(16)).decode()
-        offer = f"Sec-WebSocket-Protocol: {subprotocol}\r\n" if subprotocol else ""
-        self._hello = (
-            f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-            f"Sec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\n{offer}\r\n"
-        ).encode()
+    def __init__(self, hello: bytes, heard: Callable[[bytes], None]) -> None:
+        self._hello = hello
         self._heard = heard
         self._buffer = bytearray()
         self._transport: asyncio.Transport
@@ -112,22 +133,29 @@ class Socket(asyncio.Protocol):
         self.closed: asyncio.Future[int] = asyncio.get_running_loop().create_future()
 
     @classmethod
-    async def open(cls, port: int, path: str, subprotocol: str, heard: Callable[[bytes], None]) -> Socket:
+    async def open(
+        cls, port: int, path: str, subprotocol: str, heard: Callable[[bytes], None], token: str = "",
+        source: str = "127.0.0.1",
+    ) -> Socket:  # fmt: skip
         """A websocket that has shaken hands; raises `ConnectionError` if it was refused."""
         _, protocol = await asyncio.get_running_loop().create_connection(
-            lambda: cls(path, subprotocol, heard), "127.0.0.1", port
+            lambda: cls(handshake(path, subprotocol, token), heard), "127.0.0.1", port, local_addr=(source, 0)
         )
         await protocol.opened
         return protocol
 
     def send(self, data: bytes) -> None:
         """A binary message."""
-        self._frame(2, data)
+        self._transport.write(frame(2, data))
+
+    def stop_reading(self) -> None:
+        """Read nothing more of what the service sends."""
+        self._transport.pause_reading()
 
     def close(self) -> None:
         """Say goodbye, as a browser does whose tab is closed."""
         if not self._transport.is_closing():
-            self._frame(8, struct.pack(">H", 1001))
+            self._transport.write(frame(8, struct.pack(">H", 1001)))
             self._transport.close()
 
     # asyncio.Protocol
@@ -159,16 +187,6 @@ class Socket(asyncio.Protocol):
                 waiting.set_exception(ConnectionError("the service hung up"))
                 waiting.exception()  # nobody has to ask
 
-    def _frame(self, opcode: int, data: bytes) -> None:
-        length = len(data)
-        if length < 126:
-            head = struct.pack(">BB", 0x80 | opcode, 0x80 | length)
-        elif length < 1 << 16:
-            head = struct.pack(">BBH", 0x80 | opcode, 0x80 | 126, length)
-        else:
-            head = struct.pack(">BBQ", 0x80 | opcode, 0x80 | 127, length)
-        self._transport.write(head + bytes(4) + data)
-
     def _take_frames(self) -> None:
         buffer, at = self._buffer, 0
         while len(buffer) - at >= 2:
@@ -186,7 +204,7 @@ class Socket(asyncio.Protocol):
             if opcode == 2:
                 self._heard(data)
             elif opcode == 9:
-                self._frame(10, data)
+                self._transport.write(frame(10, data))
             elif opcode == 8:
                 if not self.closed.done():
                     self.closed.set_result(int.from_bytes(data[:2], "big"))

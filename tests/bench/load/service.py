@@ -53,6 +53,10 @@ class Service:
             sum(u.files for u in found),
         )
 
+    def resident(self) -> int:
+        """Resident bytes of all processes: cheaper to find out than `usage`."""
+        return sum(process.memory_info().rss for process in _family(self.pid))
+
     def seconds(self) -> float:
         """Processor time spent so far: cheaper to find out than `usage`."""
         return sum(_seconds(process) for process in _family(self.pid))

@@ -16,7 +16,7 @@ import zstandard
 
 from load.raw import Socket
 
-_SUBPROTOCOL = f"viser-v{viser.__version__}"
+SUBPROTOCOL = f"viser-v{viser.__version__}"
 _BASE_JOINT = re.compile(r"/arm-\d+/\d+")
 _unpack = zstandard.ZstdDecompressor().decompress
 _decode = msgspec.msgpack.Decoder().decode
@@ -34,7 +34,9 @@ class Visitor:
     drawn for the last one. Pictures of the easing towards an earlier target do not count.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, token: str = "", source: str = "127.0.0.1") -> None:
+        self._token = token
+        self._source = source
         self._socket: Socket
         self.began = time.perf_counter()
         self.complete = self.last = math.nan  # when the gizmo was there, and the last message
@@ -57,7 +59,7 @@ class Visitor:
         """Connect and wait until the arm is there."""
         self.began = time.perf_counter()
         async with asyncio.timeout(timeout):
-            self._socket = await Socket.open(port, "/viewer", _SUBPROTOCOL, self._heard)
+            self._socket = await Socket.open(port, "/viewer", SUBPROTOCOL, self._heard, self._token, self._source)
             self.send(
                 "ViewerCameraMessage", wxyz=(1, 0, 0, 0), position=(3, 3, 3), fov=1.3, near=0.01, far=1000,
                 image_height=720, image_width=1280, look_at=(0, 0, 0), up_direction=(0, 0, 1),
@@ -69,6 +71,10 @@ class Visitor:
         end = time.perf_counter() + timeout
         while (left := self.last + seconds - time.perf_counter()) > 0.0 and time.perf_counter() < end:
             await asyncio.sleep(left)
+
+    def stop_reading(self) -> None:
+        """Read nothing more of what the service sends."""
+        self._socket.stop_reading()
 
     def close(self) -> None:
         """Close the tab."""
@@ -85,12 +91,12 @@ class Visitor:
     # Drags
 
     def grab(self) -> None:
-        """Take the gizmo, which stands where the page has put it."""
-        pose = self._poses[self.gizmo["name"]]
-        self._position = [float(x) for x in pose["position"]]
-        self._wxyz = [float(x) for x in pose["wxyz"]]
-        self._home = [float(x) for x in self._poses[self._joint]["wxyz"]]
-        self._target, self._sense = 0.0, 1.0
+        """Take the gizmo, which stands where the page has put it, or where it was released."""
+        if self._home is None:
+            pose = self._poses[self.gizmo["name"]]
+            self._position = [float(x) for x in pose["position"]]
+            self._wxyz = [float(x) for x in pose["wxyz"]]
+            self._home = [float(x) for x in self._poses[self._joint]["wxyz"]]
         self.send("TransformControlsDragStartMessage", name=self.gizmo["name"], owner=self.gizmo["owner"])
 
     def drag(self) -> bool:
@@ -115,6 +121,11 @@ class Visitor:
     def release(self) -> None:
         """Let the gizmo go."""
         self.send("TransformControlsDragEndMessage", name=self.gizmo["name"], owner=self.gizmo["owner"])
+
+    @property
+    def lost(self) -> bool:
+        """Whether the service has ended the connection."""
+        return self._socket.closed.done()
 
     @property
     def unanswered(self) -> int:

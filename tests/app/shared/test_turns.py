@@ -1,0 +1,154 @@
+"""Turns of threads that compute, and who goes first."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+
+import pytest
+from live_server import wait_for
+
+from app.service.http_protocol import GuardedConfig
+from app.shared.threads import turns
+from app.shared.threads.turns import Turn, Turns, offer, visitors
+
+
+@pytest.fixture(autouse=True)
+def nobody_else() -> Iterator[None]:
+    """No server of another test may be running, or computations would wait for it."""
+    assert visitors.active == 0
+    yield
+    assert visitors.active == 0
+
+
+class Computing(threading.Thread):
+    """A request that computes step by step until it is stopped."""
+
+    def __init__(self, turn: Turn, log: list[str], name: str) -> None:
+        super().__init__(name=name)
+        self._turn, self._log, self._ends = turn, log, threading.Event()
+        self.steps = 0
+        self.start()
+
+    def run(self) -> None:
+        with self._turn:
+            self._log.append(self.name)
+            while not self._ends.wait(0.001):
+                self.steps += 1
+                offer()
+
+    def end(self) -> None:
+        self._ends.set()
+        self.join(30)
+        assert not self.is_alive()
+
+
+def test_one_runs_at_a_time_and_all_get_on(monkeypatch):
+    monkeypatch.setattr(turns, "STUCK", 60.0)
+    all_turns, at_once, most = Turns(1), [0], [0]
+
+    def compute() -> None:
+        with Turn(all_turns):
+            for _ in range(30):
+                at_once[0] += 1
+                most[0] = max(most[0], at_once[0])
+                time.sleep(0.001)
+                at_once[0] -= 1
+                offer()
+
+    threads = [threading.Thread(target=compute) for _ in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(30)
+    assert most == [1]
+    assert all_turns._free == 1
+
+
+def test_long_requests_take_turns_and_a_short_one_is_next(monkeypatch):
+    monkeypatch.setattr(turns, "STUCK", 60.0)
+    all_turns, log = Turns(1), []
+    long = [Computing(Turn(all_turns), log, f"long {k}") for k in range(3)]
+    wait_for(lambda: all(each.steps > 50 for each in long), 30)
+    short = Computing(Turn(all_turns), log, "short")
+    wait_for(lambda: short.steps > 0, 30)
+    for each in (*long, short):
+        each.end()
+    assert log[-1] == "short"
+
+
+def test_the_thread_that_has_run_least_is_next():
+    all_turns, order = Turns(1), []
+    all_turns.take(0.0)
+
+    def wait(used: float) -> None:
+        all_turns.take(used)
+        order.append(used)
+        all_turns.give()
+
+    threads = [threading.Thread(target=wait, args=(used,)) for used in (3.0, 1.0, 2.0)]
+    for thread in threads:
+        thread.start()
+    wait_for(lambda: len(all_turns._waiting) == 3)
+    all_turns.give()
+    for thread in threads:
+        thread.join(30)
+    assert order == [1.0, 2.0, 3.0]
+
+
+def test_a_thread_that_offers_nothing_does_not_stop_the_others(monkeypatch):
+    """It may be in a kernel, which runs without the interpreter. There are twice as many turns at most."""
+    monkeypatch.setattr(turns, "STUCK", 0.02)
+    all_turns, log = Turns(1), []
+    all_turns.take(0.0)
+    others = [Computing(Turn(all_turns), log, str(k)) for k in range(3)]
+    wait_for(lambda: all(each.steps > 20 for each in others), 30)
+    assert all_turns._extra == 1
+    all_turns.give()
+    for each in others:
+        each.end()
+    assert (all_turns._free, all_turns._extra) == (1, 0)
+
+
+def test_computations_wait_for_visitors_but_not_for_ever(monkeypatch):
+    monkeypatch.setattr(turns, "PATIENCE", 60.0)
+    computing = Computing(Turn(Turns(1)), [], "computing")
+    wait_for(lambda: computing.steps > 5)
+    with visitors:
+        wait_for(lambda: stays(lambda: computing.steps))
+    before = computing.steps
+    wait_for(lambda: computing.steps > before)
+    monkeypatch.setattr(turns, "PATIENCE", 0.001)
+    with visitors:
+        before = computing.steps
+        wait_for(lambda: computing.steps > before + 5)
+    computing.end()
+
+
+def stays(value) -> bool:
+    before = value()
+    time.sleep(0.2)
+    return bool(value() == before)
+
+
+def test_computations_wait_for_a_busy_event_loop():
+    factory = GuardedConfig(lambda: None, loop="asyncio").get_loop_factory()
+    assert factory is not None
+    loop = factory()
+    seen = []
+    loop.call_soon(lambda: seen.append(visitors.active))
+    timer = threading.Timer(0.2, lambda: (seen.append(visitors.active), loop.call_soon_threadsafe(loop.stop)))
+    timer.start()
+    loop.run_forever()
+    timer.join()
+    loop.close()
+    assert seen == [1, 0]
+
+
+def test_outside_of_a_turn_an_offer_is_nothing():
+    with visitors:
+        began = time.monotonic()
+        for _ in range(1000):
+            offer()
+        assert time.monotonic() - began < 5

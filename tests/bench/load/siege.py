@@ -1,0 +1,234 @@
+"""All attacks at once beside visitors who drag: attacked and quiet minutes take turns."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import multiprocessing
+import re
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+from app.shared.settings import Settings
+from load.attackers import attack
+from load.drag import HZ, hand
+from load.figures import percentile, table
+from load.raw import Http, request
+from load.service import Service, serve
+from load.visitor import Visitor
+
+TOKEN = "the-token-of-this-siege"
+VISITORS = 10
+# Seconds: an attack lasts longer than KINBOARD_SEND_TIMEOUT, so that clients that do not read meet it.
+ATTACKED, SETTLING, QUIET = 110.0, 10.0, 60.0
+RATIO = 3.0  # of the 95th percentile of drags, attacked to quiet
+LONGEST = 30.0  # seconds until a visitor's connection counts as lost
+PROGRAM = 0.3e9  # bytes of program, kernels and robots, as docs/limits.md states them
+_TARGET = json.dumps({"target": {"position": [0.045, 0.191, -0.211]}}).encode()
+_COUNTED = re.compile(r'^kinboard_requests_total\{.*status="(\d+)"\} (\S+)$', re.MULTILINE)
+
+
+@dataclass
+class Phase:
+    """What the well-behaved clients met in one phase.
+
+    Attributes:
+        name: attacked or quiet.
+        drags: seconds until the picture answered each event.
+        late: the longest time in seconds that an event was sent after it was due.
+        lost, unanswered: connections of visitors that ended; events that nothing answered.
+        requests, refused: of a program that asks for inverse kinematics; those without an answer with 200.
+        peak: bytes of memory at most.
+    """
+
+    name: str
+    drags: list[float] = field(default_factory=list)
+    late: float = 0.0
+    lost: int = 0
+    unanswered: int = 0
+    requests: list[float] = field(default_factory=list)
+    refused: int = 0
+    peak: int = 0
+
+    def row(self, number: int | str) -> dict[str, Any]:
+        """One line of the table."""
+        return {
+            "phase": f"{number} {self.name}",
+            "drags": len(self.drags),
+            "p50 ms": 1e3 * percentile(self.drags, 50),
+            "p95 ms": 1e3 * percentile(self.drags, 95),
+            "max ms": 1e3 * percentile(self.drags, 100),
+            "lost": self.lost,
+            "unanswered": self.unanswered,
+            "client late ms": 1e3 * self.late,
+            "ik p50 ms": 1e3 * percentile(self.requests, 50),
+            "ik p95 ms": 1e3 * percentile(self.requests, 95),
+            "ik refused": self.refused,
+            "peak MB": self.peak / 1e6,
+        }
+
+
+def limit(settings: Settings) -> float:
+    """Bytes that a process may hold, besides visitors and computations: the sum in docs/limits.md."""
+    caches = settings.cloud_memory + settings.map_memory
+    return PROGRAM + caches + settings.answer_memory + settings.upload_memory
+
+
+class Siege:
+    """A service, its visitors, and what was measured."""
+
+    def __init__(self, service: Service) -> None:
+        self.service = service
+        self.phases: list[Phase] = []
+        self.attacks: list[dict[str, Any]] = []
+        self._visitors: list[Visitor] = []
+
+    async def run(self, rounds: int, attacked: float, settling: float, quiet: float) -> None:
+        """Quiet at first, then so many rounds of an attack and a quiet time."""
+        self._visitors = [Visitor(TOKEN) for _ in range(VISITORS)]
+        for visitor in self._visitors:
+            await visitor.connect(self.service.port)
+        for visitor in self._visitors:
+            await visitor.quiet()
+        await self._phase("quiet", quiet)
+        for _ in range(rounds):
+            await self._attacked(attacked)
+            await asyncio.sleep(settling)
+            await self._phase("quiet", quiet)
+        for visitor in self._visitors:
+            visitor.close()
+
+    async def _attacked(self, seconds: float) -> None:
+        here, there = multiprocessing.Pipe(duplex=False)
+        context = multiprocessing.get_context("spawn")
+        process = context.Process(target=attack, args=(self.service.port, TOKEN, seconds, there), daemon=True)
+        process.start()
+        try:
+            await self._phase("attacked", seconds)
+            end = time.monotonic() + LONGEST
+            while not here.poll() and time.monotonic() < end:
+                await asyncio.sleep(0.1)
+            self._add_attacks(here.recv()[1])
+        finally:
+            process.kill()
+            process.join()
+
+    def _add_attacks(self, found: list[dict[str, Any]]) -> None:
+        if not self.attacks:
+            self.attacks = found
+            return
+        for row, more in zip(self.attacks, found, strict=True):
+            row.update({name: row[name] + value for name, value in more.items() if not isinstance(value, str)})
+
+    async def _phase(self, name: str, seconds: float) -> None:
+        phase = Phase(name)
+        self.phases.append(phase)
+        others = [asyncio.create_task(self._watch(phase)), asyncio.create_task(self._ask(phase))]
+        begin = time.perf_counter() + 0.1
+        await asyncio.gather(*(self._drag(phase, k, begin, seconds) for k in range(VISITORS)))
+        for task in others:
+            task.cancel()
+        await asyncio.gather(*others, return_exceptions=True)
+        print(table("", [phase.row(len(self.phases))]), flush=True)
+
+    async def _drag(self, phase: Phase, k: int, begin: float, seconds: float) -> None:
+        visitor = self._visitors[k]
+        visitor.latencies = phase.drags
+        late = await hand(visitor, begin + k / (VISITORS * HZ), seconds, HZ)
+        phase.late = max(phase.late, late)
+        phase.unanswered += visitor.unanswered
+        if visitor.lost or visitor.unanswered:
+            phase.lost += visitor.lost
+            visitor.close()
+            self._visitors[k] = Visitor(TOKEN)
+            await self._visitors[k].connect(self.service.port)
+            await self._visitors[k].quiet()
+
+    async def _watch(self, phase: Phase) -> None:
+        while True:
+            phase.peak = max(phase.peak, self.service.resident())
+            await asyncio.sleep(0.25)
+
+    async def _ask(self, phase: Phase) -> None:
+        """A program with the token: one request after the other, two a second."""
+        while True:
+            connection = await Http.open(self.service.port)
+            try:
+                while True:
+                    began = time.perf_counter()
+                    status = await connection.ask(request("POST", "/api/v1/robots/pioneer5/ik", _TARGET, TOKEN))
+                    phase.requests.append(time.perf_counter() - began)
+                    phase.refused += status != 200
+                    await asyncio.sleep(0.5)
+            except ConnectionError:
+                phase.refused += 1
+                await asyncio.sleep(0.5)
+            finally:
+                connection.close()
+
+
+async def answers(service: Service) -> dict[str, int]:
+    """How many answers of each status the service has counted."""
+    connection = await Http.open(service.port)
+    await connection.ask(request("GET", "/metrics", token=TOKEN))
+    connection.close()
+    found: dict[str, int] = {}
+    for status, count in _COUNTED.findall(connection.body.decode()):
+        found[status] = found.get(status, 0) + round(float(count))
+    return dict(sorted(found.items()))
+
+
+def run(quick: bool, workers: int, only: list[int] | None = None) -> dict[str, Any]:
+    """The tables on stdout, and what is in them; `only`: how many minutes."""
+    minutes = only[0] if only else 3 if quick else 30
+    length = ATTACKED + SETTLING + QUIET
+    rounds = max(1, round((60.0 * minutes - QUIET) / length))
+    with serve(workers, token=TOKEN, read_only="1") as service:
+        siege = Siege(service)
+        before = service.resident()
+        asyncio.run(siege.run(rounds, ATTACKED, SETTLING, QUIET))
+        statuses = asyncio.run(answers(service))
+        time.sleep(20.0)  # memory is given back when the service is idle
+        return report(siege, statuses, before, service.resident(), workers)
+
+
+def report(siege: Siege, statuses: dict[str, int], before: int, after: int, workers: int) -> dict[str, Any]:
+    """The tables on stdout, and what is in them.
+
+    Args:
+        statuses: how many answers of each the service has counted.
+        before, after: bytes of its memory, with nobody there.
+    """
+    print("\n" + table("attacks", siege.attacks))
+    sums = {name: Phase(name) for name in ("quiet", "attacked")}
+    for phase in siege.phases:
+        whole = sums[phase.name]
+        whole.drags += phase.drags
+        whole.requests += phase.requests
+        whole.lost, whole.unanswered = whole.lost + phase.lost, whole.unanswered + phase.unanswered
+        whole.refused += phase.refused
+        whole.late, whole.peak = max(whole.late, phase.late), max(whole.peak, phase.peak)
+    rows = [phase.row("all") for phase in sums.values()]
+    print("\n" + table(f"siege: {VISITORS} visitors, {workers} worker(s)", rows))
+    ratio = rows[1]["p95 ms"] / rows[0]["p95 ms"]
+    most = max(whole.peak for whole in sums.values())
+    bound = workers * limit(Settings())
+    failures = sum(count for status, count in statuses.items() if status.startswith("5") and status != "503")
+    print(f"p95 attacked / quiet {ratio:.2f}; answers: {', '.join(f'{n} × {s}' for s, n in statuses.items())}")
+    sizes = [f"{size / 1e6:.0f} MB" for size in (before, most, after, bound)]
+    print("memory: {} before, at most {}, {} after; sum of the limits {}".format(*sizes))
+    failed = {
+        f"p95 × {ratio:.1f}": ratio > RATIO,
+        f"{sum(w.lost for w in sums.values())} visitors lost": any(w.lost for w in sums.values()),
+        f"{failures} answers 5xx": failures,
+        f"{(most - bound) / 1e6:.0f} MB more than the limits": most > bound,
+    }
+    wrong = [name for name, is_wrong in failed.items() if is_wrong]
+    print(f"not as it should be: {', '.join(wrong) or 'nothing'}")
+    return {
+        "phases": [phase.row(k + 1) for k, phase in enumerate(siege.phases)],
+        "all": rows, "attacks": siege.attacks,
+        "answers": statuses, "memory": {"before": before, "most": most, "after": after, "limits": bound},
+        "left behind": wrong,
+    }  # fmt: skip
