@@ -11,9 +11,18 @@ import numpy as np
 from kin.axes import frame_of, inverse, lines_of, perpendicular_to
 from kin.fk import jacobian
 from kin.robot import Robot
+from kin.solvers import rolled
 from kin.solvers.canonical import turn_around
 from kin.solvers.common import TURN, UNBOUNDED, nearest_image
-from kin.solvers.contract import POSE, BatchKernels, Candidates, ClosedForm, RedundancyParameter, SolverInput
+from kin.solvers.contract import (
+    APPROACH,
+    POSE,
+    BatchKernels,
+    Candidates,
+    ClosedForm,
+    RedundancyParameter,
+    SolverInput,
+)
 from kin.solvers.general7.motion import end_of_motion
 from kin.solvers.reduced import fixed
 from kin.solvers.singular import Singularity, by_jacobian, those_within
@@ -105,21 +114,24 @@ class General7(ClosedForm):
         )
         self.branches = tuple(f"solution {i + 1}" for i in range(len(form.branches)))
         self.kernels = _Fold(robot, joint).kernels(form.kernels)
+        self._roll = rolled.roll_sense(robot)
         self._parameter = RedundancyParameter(f"theta{joint + 1}", f"θ{joint + 1}", joint=joint)
 
     def handles(self, task: int) -> bool:
-        """Poses."""
-        return task == POSE
+        """Poses, and an approach direction along the last joint's axis."""
+        return task == POSE or (task == APPROACH and self._roll != 0.0)
 
     def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
-        """The given joint."""
-        return (self._parameter,)
+        """The given joint; for an approach direction the roll or the last joint as well."""
+        return rolled.parameters(self._parameter) if task == APPROACH else (self._parameter,)
 
     def solve(self, problem: SolverInput) -> Candidates:
         """All solutions at the seed's value of the given joint, or as requested, and the ranges around it.
 
         Where none of them is inside the limits, the feasible value nearest to the seed's is looked for.
         """
+        if problem.task == APPROACH:
+            return rolled.solve_approach(self, problem, self._roll)
         p, requested = problem, problem.values[0]
         low, high = float(p.lower[self.given]), float(p.upper[self.given])
         value = min(max(float(p.seed[self.given]), low), high) if math.isnan(requested) else requested

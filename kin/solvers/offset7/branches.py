@@ -118,9 +118,9 @@ def forearm(params: Array, t4: float) -> tuple[float, float, float]:
 
 
 @jit
-def all_branches(params: Array, T: Array, near: Array, t: Array, rows: Array, room: Array) -> None:
+def all_branches(params: Array, T: Array, near: Array, t: Array, only: int, rows: Array, room: Array) -> None:
     """All branches with the first chain angle in t ``(7,)``, as chain angles; `near` ``(7,)`` decides what is
-    free.
+    free. With `only` ≥ 0 the row of that branch alone is written.
 
     rows ``(8, 7)`` ← angles, NaN where the branch does not exist; room ``(8,)`` ← how far inside the arm's reach
     the branch is, as a share: negative where it does not exist, 0 where two branches merge.
@@ -139,6 +139,8 @@ def all_branches(params: Array, T: Array, near: Array, t: Array, rows: Array, ro
     if bent < 0.0:
         return
     for elbow in range(2):
+        if only >= 0 and only >> 2 != elbow:
+            continue
         t[3] = roots[elbow]
         y0, y1, y2 = forearm(p, t[3])
         level = two_roots(p[SIN2] * y1, p[SIN2] * y0, wz - p[COS2] * y2, _REACH, sides)
@@ -147,9 +149,13 @@ def all_branches(params: Array, T: Array, near: Array, t: Array, rows: Array, ro
         if level < 0.0:
             continue
         for side in range(2):
+            if only >= 0 and (only >> 1) & 1 != side:
+                continue
             t[2] = near[2] if math.isnan(sides[side]) else sides[side]
             _finish(p, M, (wx, wy), (y0, y1, y2), t, R)
             for wrist in range(2):
+                if only >= 0 and only & 1 != wrist:
+                    continue
                 zyz(R, 1.0 - 2.0 * wrist, near, low, high, 4, t)
                 row = 4 * elbow + 2 * side + wrist
                 for i in range(7):
@@ -240,7 +246,7 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
     for i in range(7):
         t[i] = close[i]
     t[0] = params[SIGN] * value + params[OFFSET]
-    all_branches(params, T, close, t, rows, room)
+    all_branches(params, T, close, t, -1, rows, room)
     joints_of(params, rows, value, out)
     return True
 

@@ -9,8 +9,10 @@ import numpy as np
 from kin.axes import inverse
 from kin.fk import jacobian
 from kin.robot import Robot
+from kin.solvers import rolled
 from kin.solvers.canonical import at_every_turn, signed_box, turn_around
 from kin.solvers.contract import (
+    APPROACH,
     POSE,
     BatchKernels,
     Candidates,
@@ -58,6 +60,7 @@ class Offset7(ClosedForm):
         self.lengths = ()
         self.kernels = BatchKernels(g.params, branches_one, branches_many)
         self.branches, self.meanings = self.names(robot, np.ones(7))
+        self._roll = rolled.roll_sense(robot)
         self._parameter = RedundancyParameter(f"theta{self.given + 1}", f"θ{self.given + 1}", joint=self.given)
 
     def names(self, robot: Robot, sense: Array) -> Names:
@@ -75,15 +78,17 @@ class Offset7(ClosedForm):
         return names_of((lean, elbow, middle), [(wrist, bend, side) for bend, side, wrist in eight()])
 
     def handles(self, task: int) -> bool:
-        """Poses."""
-        return task == POSE
+        """Poses, and an approach direction along the last joint's axis."""
+        return task == POSE or (task == APPROACH and self._roll != 0.0)
 
     def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
-        """The given joint."""
-        return (self._parameter,)
+        """The given joint; for an approach direction the roll or the last joint as well."""
+        return rolled.parameters(self._parameter) if task == APPROACH else (self._parameter,)
 
     def solve(self, problem: SolverInput) -> Candidates:
         """All branches, each at the feasible value of the given joint nearest to the seed's, or as requested."""
+        if problem.task == APPROACH:
+            return rolled.solve_approach(self, problem, self._roll)
         p, params, i = problem, self.kernels.params, self.given
         requested, wanted = p.values[0], float(p.seed[i])
         box, arcs, chosen = np.empty((3, 7)), np.empty((_INTERVALS, 3)), np.empty(8)

@@ -29,15 +29,19 @@ _WIDTH = 1e-12  # rad, to which the end of an interval is found
 
 
 @jit
-def slack(params: Array, T: Array, value: float, box: Array, rows: Array, room: Array, spare: Array) -> None:
+def slack(
+    params: Array, T: Array, value: float, box: Array, only: int, rows: Array, room: Array, spare: Array
+) -> None:
     """spare ``(8,)`` ← how far each branch is from losing its feasibility at this value of the given joint.
 
-    box ``(3, 7)``: seed and limits as chain angles. rows ``(8, 7)``, room ``(8,)`` ← as `all_branches`.
+    box ``(3, 7)``: seed and limits as chain angles. `only`, rows ``(8, 7)``, room ``(8,)`` ← as `all_branches`.
     """
     t = box[NEAR].copy()
     t[0] = params[SIGN] * value + params[OFFSET]
-    all_branches(params, T, box[NEAR], t, rows, room)
+    all_branches(params, T, box[NEAR], t, only, rows, room)
     for k in range(8):
+        if only >= 0 and k != only:
+            continue
         spare[k] = room[k]
         if room[k] < 0.0:
             continue
@@ -52,7 +56,7 @@ def slack(params: Array, T: Array, value: float, box: Array, rows: Array, room: 
 def _at(params: Array, T: Array, value: float, box: Array, work: tuple[Array, Array, Array], k: int) -> float:
     """`slack` of branch k."""
     rows, room, spare = work
-    slack(params, T, value, box, rows, room, spare)
+    slack(params, T, value, box, k, rows, room, spare)
     return float(spare[k])
 
 
@@ -163,7 +167,7 @@ def feasible(
     rows, room, spare = np.empty((8, 7)), np.empty(8), np.empty(8)
     for i in range(n):
         marks[i] = low + (high - low) * i / (n - 1) if n > 1 else low
-        slack(params, T, marks[i], box, rows, room, spare)
+        slack(params, T, marks[i], box, -1, rows, room, spare)
         for k in range(8):
             samples[k, i], there[k, i] = spare[k], room[k]
     found = 0

@@ -7,8 +7,9 @@ and the map's `method` names the case:
   arm angle): negative answers are exact. A batch of branches decides almost all; configurations that exist but
   break a limit are passed to the solver one by one. Only where an arm is singular at one roll and not at others
   may a positive answer be missed: at targets that fill no volume.
-- ``"sweep"``: poses have a closed form, approaches do not, as the tool is not on the last joint's axis. `ROLLS`
-  rolls are tried, and `SWEEP` values of an arm's own redundancy parameter: narrower ranges are missed.
+- ``"sweep"``: poses have a closed form. Approaches have none, as the tool is not on the last joint's axis, or
+  their ranges are not exact. `ROLLS` rolls are tried, and `SWEEP` values of an arm's own redundancy parameter:
+  narrower ranges are missed.
 - ``"search"``: no closed form, or one that takes longer than a search. `STARTS` descents per direction: a few
   approachable directions are missed.
 
@@ -80,7 +81,7 @@ class Evaluator:
         match = closed_form_of(robot)
         if match is not None and match.steady:
             self.form = match
-            exact = match.handles(APPROACH)
+            exact = match.handles(APPROACH) and match.exact_ranges
             self.method = "closed form" if exact else "sweep"
             self.redundancies = match.redundancies(APPROACH) if exact else ()
             if not exact:

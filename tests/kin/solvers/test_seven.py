@@ -252,6 +252,41 @@ def test_arms_of_another_kind_are_left_alone():
         assert general7.match(robot, closed_form_of) is None
 
 
+@robots
+def test_an_approach_direction_leaves_two_parameters(robot):
+    first = "theta1" if robot is GEN3 else "roll"
+    rng = np.random.default_rng(8)
+    inside = 0
+    for _ in range(6):
+        q = robot.random_q(rng)
+        T = kin.fk(robot, q)
+        result = kin.solve_ik(robot, T, task="approach", q_seed=q)
+        assert (result.status, result.complete) == (Status.SOLVED, True)
+        assert [r.name for r in result.redundancy] == [first, "theta7"]
+        assert np.abs(result.solutions[0].q - q).max() < 1e-6
+        for s in result.solutions:
+            assert np.abs(kin.fk(robot, s.q)[:3, 2:] - T[:3, 2:]).max() < 1e-9
+            low, high = next(x for x in s.redundancy[0].intervals if x[0] <= s.redundancy[0].value <= x[1])
+            for value in np.linspace(low, high, 5)[1:-1].tolist():
+                wanted = {first: value, "theta7": float(s.q[6])}
+                found = kin.solve_ik(robot, T, task="approach", q_seed=s.q, redundancy=wanted)
+                assert found.status is Status.SOLVED
+                assert found.solutions[0].redundancy[0].value == pytest.approx(value)
+                assert found.solutions[0].q[6] == pytest.approx(s.q[6])
+                inside += 1
+    assert inside > 20
+
+
+def test_a_tool_that_points_against_the_last_axis_rolls_the_other_way():
+    robot = replace(PANDA, id="turned", tool=nested(PANDA.T_last_tool @ np.diag([1.0, -1.0, -1.0, 1.0])))
+    q = np.array([0.2, -0.6, 0.3, -1.9, 0.2, 1.7, 0.9])
+    T = kin.fk(robot, q)
+    for roll in (-0.05, 0.05):
+        found = kin.solve_ik(robot, T, task="approach", q_seed=q, redundancy={"roll": roll})
+        R = T[:3, :3].T @ kin.fk(robot, found.solutions[0].q)[:3, :3]
+        assert math.atan2(R[1, 0], R[0, 0]) == pytest.approx(roll)
+
+
 # -- a locked joint -----------------------------------------------------------------------------------------------
 
 

@@ -283,7 +283,8 @@ class RedundancyLesson(Feature):
         self._ends_key = ends_key
         self._ends = () if item is None else ends(robot, self._T_held, stage.options, goal, item)
         update_html(self._limits, "" if item is None else views.limits_html(robot, self._ends, stage.units))
-        self._drawing.show_ring(goal, item, self._ends)
+        shown = item if stage.task == "pose" or (item is not None and item.name == "psi") else None
+        self._drawing.show_ring(goal, self._T_held, shown, self._ends)
 
     def _show_numbers(self) -> None:
         stage, robot, item = self.stage, self.stage.robot, self._item

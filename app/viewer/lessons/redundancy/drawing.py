@@ -11,6 +11,7 @@ from itertools import count
 import numpy as np
 import viser
 
+from app.viewer.lessons.redundancy.path import elbow_paths, has_path
 from app.viewer.lessons.redundancy.ring import FLAT, Circle, arc_segments, elbow_circle, trade_segments
 from app.viewer.scene.meshes import JOINT_COLORS, body
 from app.viewer.self_motion import End
@@ -54,11 +55,17 @@ class Drawing:
         """Remove everything from the scene."""
         self._top.remove()
 
-    def show_ring(self, goal: Array, item: Redundancy | None, ends: tuple[End, ...]) -> None:
-        """Draw feasible and blocked arcs and their ends; they change with the target, not during a self-motion."""
+    def show_ring(self, goal: Array, T: Array, item: Redundancy | None, ends: tuple[End, ...]) -> None:
+        """Draw feasible and blocked arcs and their ends; they change with the target, not during a self-motion.
+
+        T ``(4, 4)``: where the tool is held. An arm whose elbow does not move on a circle gets its path instead.
+        """
         for node in self._ring:
             node.remove()
         self._ring = []
+        if item is not None and has_path(self._robot, item):
+            self._show_path(goal, T, item, ends)
+            return
         circle = self._circle_at(goal) if item is not None and item.name == "psi" else None
         if item is None or circle is None:
             return
@@ -78,6 +85,21 @@ class Drawing:
             name = f"{self._root}/end-{number}-{i}"
             self._ring.append(scene.add_line_segments(name, ray, LIMIT, thickness=0.4 * self._size))
             self._ring.append(scene.add_label(f"{name}-name", text, position=circle.at(end.value, RING + 0.3)))
+
+    def _show_path(self, goal: Array, T: Array, item: Redundancy, ends: tuple[End, ...]) -> None:
+        """Draw the path of the elbow, and what ends it."""
+        scene, number = self._scene, next(_NUMBERS)
+        for i, (interval, path) in enumerate(elbow_paths(self._robot, T, goal, item)):
+            if np.linalg.norm(np.diff(path, axis=0), axis=1).sum() < self._size:
+                continue
+            chords = np.stack([path[:-1], path[1:]], axis=1).astype(np.float32)
+            name = f"{self._root}/path-{number}-{i}"
+            self._ring.append(scene.add_line_segments(name, chords, FEASIBLE, thickness=0.5 * self._size))
+            for k, point in ((0, path[0]), (1, path[-1])):
+                close = [end for end in ends if abs(end.value - interval[k]) < 1e-9]
+                if len(close) == 1:
+                    text = f"limit of joint {close[0].joint + 1}" if close[0].joint >= 0 else "branch ends"
+                    self._ring.append(scene.add_label(f"{name}-{k}", text, position=point))
 
     def show_present(self, q: Array, item: Redundancy | None, trades: bool) -> None:
         """Draw the configuration ``(n,)``: the line from shoulder to wrist and the elbow, or the trade."""

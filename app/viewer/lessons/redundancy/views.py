@@ -30,7 +30,7 @@ ELBOW = (
 GIVEN = (
     "Seven joints for a task of dimension six: the arm can move while the tool stays. Choose a value of {label}, "
     "and the other six joints follow. The bar shows the values of joint {number} that the joint limits allow in "
-    "this posture."
+    "this posture; the green line is the path of the elbow."
 )
 
 

@@ -9,13 +9,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from arms import eight_joints
+from arms import GEN3, SAWYER, eight_joints
 from fake_browser import ANSWER, FakeBrowser
 
 import kin
 from app.shared.store import Store
 from app.viewer import self_motion
 from app.viewer.lessons.redundancy import views
+from app.viewer.lessons.redundancy.path import STEPS, elbow_paths, has_path
 from app.viewer.lessons.redundancy.ring import arc_segments, coaxial, elbow_circle, joint_axis, trade_segments
 from app.viewer.panel.joints import label
 from kin import Redundancy
@@ -218,6 +219,29 @@ def test_the_panda_moves_through_its_whole_range_while_the_tool_stays() -> None:
             q = found.solutions[0].q
     ends = self_motion.ends(PANDA, T, options, PANDA.q_home, item)
     assert [end.value for end in ends] == [x for interval in item.intervals for x in interval]
+
+
+@pytest.mark.parametrize("robot", [PANDA, GEN3, SAWYER], ids=lambda robot: robot.id)
+def test_the_path_of_the_elbow_is_that_of_the_self_motion(robot: kin.Robot) -> None:
+    T, q, options = home(robot), robot.q_home, kin.IKOptions()
+    (item,) = self_motion.redundancy_at(robot, T, options, q)
+    assert has_path(robot, item)
+    own = [points for (low, high), points in elbow_paths(robot, T, q, item) if low <= item.value <= high]
+    ((low, high),) = [x for x in item.intervals if x[0] <= item.value <= x[1]]
+    assert len(own) == 1
+    steps = np.linalg.norm(np.diff(own[0], axis=0), axis=1)
+    assert steps.max() < 0.25
+    for k in (1, STEPS // 2, STEPS - 2):
+        value = float(np.linspace(low + self_motion.INSET, high - self_motion.INSET, STEPS)[k])
+        found = kin.solve_ik(robot, T, q_seed=q, redundancy=value)
+        places = [joint_axis(robot, s.q, 3)[0] for s in found.solutions]
+        assert min(np.linalg.norm(own[0][k] - place) for place in places) < 1e-9
+
+
+def test_only_arms_with_a_given_joint_have_a_path() -> None:
+    for robot in (SRS, PRINTED):
+        for item in self_motion.redundancy_at(robot, home(robot), kin.IKOptions(), robot.q_home):
+            assert not has_path(robot, item)
 
 
 # In the page
