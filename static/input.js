@@ -37,12 +37,15 @@
   let answered = "";
   function readAnswers() {
     const text = document.querySelector("[data-answers]")?.dataset.answers ?? "";
-    if (text === answered || !text) return;
+    const buttons = ["undo", "redo"].map((name) => document.querySelector(`[data-send="${name}"]`));
+    // The panel, and its buttons, are built anew where a phone is turned.
+    if (!text || (text === answered && buttons.every((button) => !button || button.shows === text))) return;
     answered = text;
     const { undo, redo, reply: [to, error] } = JSON.parse(text);
     for (const [name, label] of [["undo", undo], ["redo", redo]]) {
-      const button = document.querySelector(`[data-send="${name}"]`);
+      const button = buttons[name === "undo" ? 0 : 1];
       if (!button) { answered = ""; continue; }
+      button.shows = text;
       button.ariaDisabled = String(!label);
       button.title = label ? `${name[0].toUpperCase() + name.slice(1)}: ${label} (${button.dataset.keys})` : `Nothing to ${name}`;
     }
@@ -71,11 +74,22 @@
     }
   }
 
+  /** What was refused before no longer matters. */
+  function accept() {
+    for (const input of document.querySelectorAll('.kb-field input[aria-invalid="true"]')) {
+      input.ariaInvalid = null;
+      input.title = "";
+    }
+  }
+  addEventListener("pointerdown", (event) => { if (event.target.closest?.(".mantine-Slider-root, canvas, button")) accept(); }, true);
+
   function addField(id, field, line) {
     const box = document.createElement("span");
     box.className = "kb-field";
     const input = document.createElement("input");
-    Object.assign(input, { type: "text", inputMode: "decimal", autocomplete: "off", spellcheck: false });
+    // The keys for decimals of some phones have no minus.
+    const keys = valueOf(thumb(id), "min") < 0 ? "text" : "decimal";
+    Object.assign(input, { type: "text", inputMode: keys, autocomplete: "off", spellcheck: false });
     const unit = document.createElement("span");
     unit.className = "kb-field-unit";
     unit.textContent = field.unit;
@@ -95,6 +109,7 @@
         input.ariaInvalid = error ? "true" : null;
         input.title = error;
         if (error) show(); else setTimeout(show, HOLD);
+        if (!error) accept();
       });
     };
     new MutationObserver(() => { show(); if (!edited) input.ariaInvalid = null; }).observe(slider, { attributes: true, attributeFilter: ["aria-valuenow"] });
@@ -110,6 +125,30 @@
       event.preventDefault();
     });
     show();
+  }
+
+  // Locks
+
+  const LOCKED = "\u2060"; // see app/viewer/panel/joints.py
+  function pressLocks() {
+    for (const button of document.querySelectorAll("button.mantine-Button-root")) {
+      const number = button.textContent.replace(LOCKED, "");
+      if (/^\d$/.test(number) || button.ariaPressed) button.ariaPressed = String(button.textContent.startsWith(LOCKED));
+    }
+  }
+
+  // Feasible ranges stand below a slider, as wide as its track.
+
+  function alignTracks() {
+    let track = null;
+    for (const node of document.querySelectorAll(".mantine-Slider-track, .kb-track")) {
+      if (node.matches(".mantine-Slider-track")) { track = node; continue; }
+      if (!track) continue;
+      const [bar, place] = [track.getBoundingClientRect(), node.parentElement.getBoundingClientRect()];
+      if (!bar.width || !place.width) continue;
+      const margin = `0 ${Math.round(place.right - bar.right)}px 0 ${Math.round(bar.left - place.left)}px`;
+      if (node.style.margin !== margin) node.style.margin = margin;
+    }
   }
 
   // Keys on sliders
@@ -163,7 +202,11 @@
   // The typed target
 
   const form = () => document.querySelector("[data-typed]");
-  const numbersOf = (row) => [...row.querySelectorAll(".kb-number")].map((node) => node.textContent.replace("−", "-"));
+  // The target's numbers where the tool has missed it, otherwise the tool's.
+  const numbersOf = (row) => {
+    const shown = [...row.querySelectorAll(".kb-number")].map((node) => node.textContent);
+    return (row.dataset.target?.split(" ") ?? shown).map((text) => text.replace("−", "-"));
+  };
 
   function openForm(kind) {
     const box = form();
@@ -267,6 +310,6 @@
   }
 
   addEventListener("DOMContentLoaded", () => {
-    new MutationObserver(() => { readAnswers(); readFields(); }).observe(document.body, { subtree: true, childList: true });
+    new MutationObserver(() => { readAnswers(); readFields(); pressLocks(); alignTracks(); }).observe(document.body, { subtree: true, childList: true });
   });
 })();

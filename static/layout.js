@@ -101,6 +101,25 @@
     choose(STEPS[Math.min(Math.max(next, 0), STEPS.length - 1)]);
   }, true);
 
+  // Where a phone is turned, viser builds the panel anew and opens its first tab: open the one that was open.
+  const SETTLED = 2000; // ms until the new panel stays as it is
+  let opened = "";
+  const titleOf = (tab) => tab.textContent.trim();
+  function reopen() {
+    const wanted = [...document.querySelectorAll('[role="tab"]')].find((tab) => titleOf(tab) === opened);
+    if (!wanted || wanted.ariaSelected === "true") return;
+    wanted.click();
+    wanted.dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true })); // a docked panel ignores clicks
+  }
+  NARROW.addEventListener("change", () => {
+    const timer = setInterval(reopen, 100);
+    setTimeout(clearInterval, SETTLED, timer);
+  });
+  addEventListener("click", (event) => {
+    const tab = event.target instanceof Element && event.target.closest('[role="tab"]');
+    if (tab) opened = titleOf(tab);
+  }, true);
+
   /** Mark the parts of viser's sheet for the styles. */
   function mark() {
     const sheet = card()?.closest(".mantine-Paper-root");

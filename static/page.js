@@ -15,7 +15,7 @@
     ["View from the front", face("M4 7.5l8 4.5v9l-8-4.5z") + CUBE, "look-from", "Front"],
     ["View from the side", face("M20 7.5l-8 4.5v9l8-4.5z") + CUBE, "look-from", "Side"],
     ["View from the top", face("M12 3l8 4.5-8 4.5-8-4.5z") + CUBE, "look-from", "Top"],
-    ["View from a corner", CUBE, "look-from", "Isometric"],
+    ["View from a corner", CUBE, "look-from", "Corner"],
     ["Save a picture of the scene", '<path d="M4 8h3.2l1.6-2.4h6.4L16.8 8H20a1 1 0 0 1 1 1v9.5a1 1 0 0 1-1 1H4a1 1 0 0 1-1-1V9a1 1 0 0 1 1-1z"/><circle cx="12" cy="13.3" r="3.6"/>'],
   ];
 
@@ -79,6 +79,13 @@
       setTimeout(() => URL.revokeObjectURL(link.href), 10000);
     });
   }
+
+  // viser leaves captured pointers to the handles of the scene, and browsers capture every touch: without this, a tap on
+  // a point or a posture of the scene does nothing.
+  addEventListener("pointerdown", (event) => {
+    const { target, pointerId, pointerType } = event;
+    if (pointerType === "touch" && target instanceof HTMLCanvasElement) target.releasePointerCapture(pointerId);
+  }, true);
 
   // viser shows a control's hint while the mouse is on the control; here its label shows it as well.
   const hinted = (event) => {

@@ -263,3 +263,33 @@ def test_a_finger_drags_the_gizmo(phone: Tab) -> None:
     moved = np.array(phone.tool()) / 1000 - home[:3, 3]
     assert moved @ home[:3, 2] < -0.03, "the tool went backwards along its own axis"
     assert np.linalg.norm(moved - home[:3, 2] * (moved @ home[:3, 2])) < 1e-3, "and nowhere else"
+
+
+def test_a_phone_that_is_turned_keeps_tab_and_history(phone: Tab) -> None:
+    page = phone.page
+    phone.open("Move")
+    page.get_by_role("button", name="Home").tap()
+    phone.open("Learn")
+    history = page.locator("[data-send=undo]").get_attribute("title")
+    for width, height in ((844, 390), (390, 844)):
+        page.set_viewport_size({"width": width, "height": height})
+        page.wait_for_timeout(300)
+        expect(page.get_by_role("tab", name="Learn")).to_have_attribute("aria-selected", "true")
+        assert history is not None
+        expect(page.locator("[data-send=undo]")).to_have_attribute("title", history)
+    phone.open("Move")
+
+
+def test_a_closed_sheet_leaves_the_status_and_a_tap_reaches_the_scene(phone: Tab) -> None:
+    """viser ignores captured pointers, and browsers capture every touch."""
+    page = phone.page
+    page.evaluate(
+        "addEventListener('pointerdown', (e) => { window.captured = e.target.hasPointerCapture(e.pointerId); })"
+    )
+    sheet = page.locator("#kb-grip")
+    while page.evaluate("document.documentElement.dataset.kbSheet") != "peek":
+        sheet.press("ArrowDown")
+    expect(phone.status).to_be_visible()
+    page.touchscreen.tap(60, 120)
+    page.wait_for_function("window.captured === false")
+    sheet.press("ArrowUp")

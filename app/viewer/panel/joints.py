@@ -21,11 +21,13 @@ from kin.transforms import Array
 from kin.units import Unit, Units
 
 DIGITS = 2
-LOCKED = "\N{BLACK SQUARE}"  # many fonts have no padlock
+# Marks the label of a locked joint; invisible. static/input.js presses such a button, on which viewer.css draws a
+# padlock.
+LOCKED = "\N{WORD JOINER}"
 UNLOCK_ALL = "Unlock all"
 LOCK_HINT = (
     "A locked joint keeps its value while the arm follows a target; its slider still moves it. "
-    f"Click a number to lock or unlock that joint: {LOCKED} marks a locked joint."
+    "Click a number to lock or unlock that joint."
 )
 
 
@@ -37,7 +39,7 @@ def label(robot: Robot, index: int) -> str:
 
 
 def lock_buttons(locked: Sequence[bool]) -> tuple[str, ...]:
-    """The labels of the lock buttons: one number per joint, with a symbol if it is locked."""
+    """The labels of the lock buttons: one number per joint, marked if it is locked."""
     buttons = tuple(f"{LOCKED}{i + 1}" if lock else str(i + 1) for i, lock in enumerate(locked))
     return (*buttons, UNLOCK_ALL) if any(locked) else buttons
 

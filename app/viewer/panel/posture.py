@@ -188,11 +188,8 @@ def on_side_of(shown: float, item: Redundancy, unit: Unit) -> Redundancy:
     return item._replace(value=math.copysign(item.value, shown))
 
 
-def feasible_html(item: Redundancy, low: float, high: float, unit: Unit, narrow: bool = False) -> str:
-    """The feasible ranges as bars on a track from `low` to `high` (in the shown unit), and in words.
-
-    `narrow`: the track is below a slider with a narrow label, outside a framed folder.
-    """
+def feasible_html(item: Redundancy, low: float, high: float, unit: Unit) -> str:
+    """The feasible ranges as bars on a track from `low` to `high` (in the shown unit), and in words."""
     span = high - low
 
     def percent(value: float) -> float:
@@ -205,5 +202,4 @@ def feasible_html(item: Redundancy, low: float, high: float, unit: Unit, narrow:
         bars=[(f"{percent(a):.2f}", f"{percent(b) - percent(a):.2f}") for a, b in item.intervals],
         now=f"{percent(item.value):.2f}",
         words=f"feasible: {ranges}" if ranges else "no value is feasible",
-        narrow=narrow,
     )

@@ -23,24 +23,32 @@ def roll_pitch_yaw(R: Array) -> tuple[float, float, float]:
     return math.atan2(R[2, 1], R[2, 2]), pitch, math.atan2(R[1, 0], R[0, 0])
 
 
-def html(T_base_tool: Array, units: Units) -> str:
-    """Position, roll/pitch/yaw and quaternion of a pose ``(4, 4)`` as a small table."""
+def html(T_base_tool: Array, units: Units, T_base_target: Array | None = None) -> str:
+    """Position, roll/pitch/yaw and quaternion of a pose ``(4, 4)`` as a small table.
+
+    `T_base_target`: a target that the tool has missed, from which the form for a typed target starts.
+    """
     lengths, angles = units.lengths, units.angles
-    position = (lengths.scale * T_base_tool[:3, 3]).tolist()
-    turned = [angles.scale * _half_turn_positive(a) for a in roll_pitch_yaw(T_base_tool[:3, :3])]
-    quaternion = wxyz_from_rotation(T_base_tool[:3, :3]).tolist()
-    rows = (
-        (
-            "position",
-            "x y z",
-            "Tool point in the base frame",
-            _numbers(position, lengths.decimals(1)),
-            lengths.name,
-        ),
-        ("angles", "roll pitch yaw", ANGLES, _numbers(turned, angles.decimals(1)), angles.name),
-        ("quaternion", "w x y z", "Quaternion, scalar first", _numbers(quaternion, 3), ""),
+    titles = (
+        ("position", "x y z", "Tool point in the base frame", lengths.name),
+        ("angles", "roll pitch yaw", ANGLES, angles.name),
+        ("quaternion", "w x y z", "Quaternion, scalar first", ""),
     )
+    tool = _parts(T_base_tool, units)
+    target: Sequence[Sequence[str]] = ((),) * 3 if T_base_target is None else _parts(T_base_target, units)
+    rows = [(*title, numbers, wanted) for title, numbers, wanted in zip(titles, tool, target, strict=True)]
     return render("panel/readout", rows=rows)
+
+
+def _parts(T: Array, units: Units) -> tuple[list[str], list[str], list[str]]:
+    """Position, roll-pitch-yaw and quaternion of a pose as texts."""
+    lengths, angles = units.lengths, units.angles
+    turned = [angles.scale * _half_turn_positive(a) for a in roll_pitch_yaw(T[:3, :3])]
+    return (
+        _numbers((lengths.scale * T[:3, 3]).tolist(), lengths.decimals(1)),
+        _numbers(turned, angles.decimals(1)),
+        _numbers(wxyz_from_rotation(T[:3, :3]).tolist(), 3),
+    )
 
 
 def _half_turn_positive(angle: float) -> float:
@@ -61,6 +69,6 @@ class PoseReadout:
         self._html = gui.add_html(html(T_base_tool, units))
         gui.add_html(render("panel/typed_target"))
 
-    def show(self, T_base_tool: Array, units: Units) -> None:
-        """Replace the numbers."""
-        self._html.content = html(T_base_tool, units)
+    def show(self, T_base_tool: Array, units: Units, T_base_target: Array | None = None) -> None:
+        """Replace the numbers; see `html`."""
+        self._html.content = html(T_base_tool, units, T_base_target)

@@ -14,7 +14,7 @@ from kin.units import LENGTHS, Length, Units
 BRAND = (0, 114, 178)
 BRAND_ON_DARK = (86, 180, 233)
 SCHEMES: dict[str, bool | None] = {"Like the system": None, "Light": False, "Dark": True}
-Side = Literal["Front", "Side", "Top", "Isometric"]
+Side = Literal["Front", "Side", "Top", "Corner"]
 SIDES: tuple[Side, ...] = get_args(Side)
 SYSTEM_IS_DARK = "The system is dark"  # static/page.js looks for this label
 

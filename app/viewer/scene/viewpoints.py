@@ -21,7 +21,7 @@ DIRECTIONS: dict[Side, tuple[float, float, float]] = {
     "Front": (1.0, 0.0, 0.0),
     "Side": (0.0, -1.0, 0.0),
     "Top": (0.0, -0.002, 1.0),
-    "Isometric": (1.0, 1.0, 1.0),
+    "Corner": (1.0, 1.0, 1.0),
 }
 
 

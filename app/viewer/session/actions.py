@@ -50,6 +50,7 @@ GRADUAL = {
 }  # fmt: skip
 MESSAGES = (
     "undo", "redo", "travel", "released", "snap", "nudge", "axes", "field", "target", "fit-arm", "look-from",
+    "lesson",
 )  # fmt: skip
 ANSWERED = frozenset({"field", "target"})  # messages with a reply
 LABELS = {
@@ -199,10 +200,10 @@ class Actions:
     # History
 
     def _undo(self, _: object) -> None:
-        self._take("Undone", "Redo: Ctrl+Shift+Z.", self._history.undo(self._page.snapshot()))
+        self._take("Undone", "Redo brings it back.", self._history.undo(self._page.snapshot()))
 
     def _redo(self, _: object) -> None:
-        self._take("Redone", "Undo: Ctrl+Z.", self._history.redo(self._page.snapshot()))
+        self._take("Redone", "Undo takes it back again.", self._history.redo(self._page.snapshot()))
 
     def _take(self, verb: str, detail: str, step: Step | None) -> None:
         if step is None:

@@ -309,7 +309,7 @@ class VisitorPage(Worker):
             if self._readout_due:
                 self._readout_due = False
                 self.status.warn(self.arm.scene.show_contact(clearance(self.robot).at(self.q)))
-                self.panel.readout.show(kin.fk(self.robot, self.q), self.units)
+                self.panel.readout.show(kin.fk(self.robot, self.q), self.units, self.arm.open_target)
             if self._sliders_due:
                 self._sliders_due = False
                 self.sliders.show(self.goal, self._dragged)

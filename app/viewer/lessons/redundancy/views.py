@@ -121,7 +121,7 @@ def range_html(robot: Robot, item: Redundancy, units: Units) -> str:
     """The feasible ranges as bars."""
     unit = units.angles
     low, high = bounds(robot, item)
-    return feasible_html(item, low * unit.scale, high * unit.scale, unit, narrow=True)
+    return feasible_html(item, low * unit.scale, high * unit.scale, unit)
 
 
 def bounds(robot: Robot, item: Redundancy) -> tuple[float, float]:

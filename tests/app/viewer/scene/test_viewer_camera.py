@@ -320,7 +320,7 @@ def test_standard_views_and_fit_arm(port: int) -> None:
         tab.settle(quiet=0.6)
         tab.look()
         tab.say("look-from", "__class__")
-        tab.wait(lambda: "Front, Side, Top, Isometric" in tab.html)
+        tab.wait(lambda: "Front, Side, Top, Corner" in tab.html)
         out = shown(tab)[0] - shown(tab)[1]
         assert np.allclose(out / np.linalg.norm(out), [1.0, 0.0, 0.0], atol=1e-6)
         tab.say("fit-arm")
