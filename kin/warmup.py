@@ -23,7 +23,7 @@ from kin.ik import solve_ik
 from kin.path import solve_path
 from kin.robot import Robot
 from kin.solvers import closed_form_of, general6, general7
-from kin.solvers.contract import POSE, SolverInput
+from kin.solvers.contract import POSE, ClosedForm, SolverInput
 from kin.workspace import (
     MEASURES,
     STRATEGIES,
@@ -100,11 +100,12 @@ def _call_all(robot: Robot) -> None:
 
 
 def _solve_generally(robot: Robot) -> None:
-    """The general solver of seven joints, which can also solve an arm of a family."""
-    form = general7.match(robot, general6.match)
+    """The general solvers of six and seven joints, which can also solve an arm of a family."""
+    form: ClosedForm | None = general6.match(robot) or general7.match(robot, general6.match)
     if form is not None:
+        values = (math.nan,) * len(form.redundancies(POSE))
         T = fk(robot, robot.q_home)
-        form.solve(SolverInput(T, POSE, (math.nan,), True, robot.q_home, robot.lower, robot.upper))
+        form.solve(SolverInput(T, POSE, values, True, robot.q_home.copy(), robot.lower.copy(), robot.upper.copy()))
 
 
 def _rest() -> Iterator[Callable[[], object]]:
@@ -112,9 +113,10 @@ def _rest() -> Iterator[Callable[[], object]]:
     for act in (_move, _call_all):
         for robot in robots:
             yield partial(act, robot)
-    # No built-in arm needs the general solver, which can also solve an arm of a family.
-    yield partial(general6.match, next(robot for robot in robots if robot.n == 6 and robot.revolute.all()))
-    yield partial(_solve_generally, next(robot for robot in robots if robot.n == 7))
+    # No built-in arm needs the general solvers, but for locked joints.
+    for joints in (6, 7):
+        robot = next(robot for robot in robots if robot.n == joints and robot.revolute.all())
+        yield partial(_solve_generally, robot)
     robot = robots[0]
     # Two moving joints call the same kernels and take the least time.
     locked = [None, None, *robot.q_home[2:].tolist()]
