@@ -30,6 +30,8 @@ SAME = 1e-3  # tolerance, relative to the distance to the look-at point
 _MARGIN = 1.06  # of the sphere around the arm
 _AROUND = 0.12  # room around each frame of the arm, in radii of the sphere around the arm
 _NEAREST, _REMOTEST = 0.4, 14.0  # limits of zooming in and out, in these radii
+_FARTHEST_ASIDE = 3.0  # limit of panning, in these radii
+_LOWEST = 0.03  # least height of the camera above the floor, in these radii: from below, the floor hides the arm
 _SMALLEST = 0.01  # metres; viser's own limit of zooming in
 _RESIZED = 0.01  # relative change of the picture's narrow side that moves the camera
 Sphere = tuple[Array, float]  # centre ``(3,)`` and radius, m
@@ -197,6 +199,23 @@ class VisitorCamera:
         if self._settled and here is not None and not _same(here, self._aimed):
             self._aimed, self._arrived = here, True
             self.chosen = widened(here, self._framed)
+
+    def lead_back(self) -> None:
+        """Glide back to the arm and above the floor, if the visitor has gone far aside or below."""
+        if self._body is None or not self._settled or self._glide is not None:
+            return
+        position, look_at, up = self._viewpoint
+        radius, aside = self._body.radius, look_at - self._body.center
+        near = aside * min(1.0, _FARTHEST_ASIDE * radius / max(float(np.linalg.norm(aside)), 1e-9))
+        center, out = self._body.center + near, position - look_at
+        height = max(out[2], min(self._body.floor + _LOWEST * radius - center[2], float(np.linalg.norm(out))))
+        if height == out[2] and np.array_equal(near, aside):
+            return
+        if height != out[2]:
+            level = math.hypot(out[0], out[1])
+            across = math.sqrt(max(float(out @ out) - height**2, 0.0))
+            out = np.array([*(out[:2] * (across / level) if level > 1e-9 else (across, 0.0)), height])
+        self._choose(widened(np.stack([center + out, center, up]), self._framed))
 
     @property
     def _aspect(self) -> float:

@@ -152,6 +152,7 @@ class Persistence:
             returned: whether the visitor returned to an earlier state.
         """
         self._page.camera.look()
+        self._page.camera.lead_back()
         state = self.snapshot()
         text = encode(state)
         if text != self._saved:

@@ -334,6 +334,30 @@ def test_standard_views_and_fit_arm(port: int) -> None:
         assert np.allclose(shown(tab), default(PIONEER, DESKTOP))
 
 
+def test_the_camera_returns_from_below_the_floor_and_from_far_aside(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.look()
+        made = body(PIONEER)
+        for position, look_at in (
+            (np.add(made.center, [1.0, 0.5, -2.0]), made.center),
+            (np.add(made.center, [60.0, 1.0, 1.0]), np.add(made.center, [60.0, 0.0, 0.0])),
+            (np.add(made.center, [0.0, 0.0, -1.0]), made.center),
+        ):
+            orbit(tab, np.array([position, look_at, camera.UP]))
+            tab.wait(
+                lambda look_at=look_at: not np.allclose(shown(tab)[1], look_at) or shown(tab)[0][2] > made.floor
+            )
+            tab.settle(quiet=0.8)
+            there = shown(tab)
+            assert there[0][2] > made.floor
+            assert np.linalg.norm(there[1] - made.center) < 3.01 * made.radius
+            assert np.linalg.norm(there[0] - there[1]) == pytest.approx(
+                np.linalg.norm(position - look_at), rel=1e-6
+            )
+            tab.look()
+
+
 def test_a_glide_has_steps_and_zooming_has_limits(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
