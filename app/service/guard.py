@@ -10,17 +10,16 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import Counter
-from collections.abc import Iterable
 from typing import Protocol
 
 from app.shared.clients import Proxies, network_of, share_of
 from app.shared.metrics import CONNECTIONS, REFUSED
+from app.shared.notes import Notes
 from app.shared.settings import Settings
 
 logger = logging.getLogger("kinboard.connections")
 
 SPARE_FILES = 16  # left for robot files, kernels and accepting connections to refuse them
-LOG_EVERY = 10.0  # seconds between two lines about the same thing
 TICK = 1.0  # seconds between two checks of the connections
 
 
@@ -49,7 +48,7 @@ class Guard:
         self._clients: Counter[str] = Counter()
         self._watched: set[Watched] = set()
         self._timer: asyncio.TimerHandle | None = None
-        self._notes: dict[str, _Note] = {}
+        self._notes = Notes(logger)
         if files is not None and files - SPARE_FILES < settings.max_connections:
             logger.warning(
                 "this process may have only %d files open (ulimit -n), too few for %d connections "
@@ -101,15 +100,7 @@ class Guard:
     def note(self, why: str, line: str) -> None:
         """Count a refusal and log it: the first of its kind at once, those of the next seconds as a number."""
         REFUSED.labels(why).inc()
-        note = self._notes.setdefault(why, _Note())
-        note.line = line
-        if note.quiet_until is None:
-            logger.warning("%s", line)
-            note.quiet_until = asyncio.get_running_loop().time() + LOG_EVERY
-            if self._timer is None:
-                self._schedule()
-        else:
-            note.more += 1
+        self._notes.note(why, line)
 
     def _schedule(self) -> None:
         tick = min(TICK, 0.25 * self.receive_timeout, 0.25 * self.send_timeout)
@@ -119,32 +110,10 @@ class Guard:
         now = asyncio.get_running_loop().time()
         for connection in tuple(self._watched):
             connection.check(now)
-        self._log_counts(now, self._notes.values())
-        if self._watched or any(note.quiet_until is not None for note in self._notes.values()):
+        if self._watched:
             self._schedule()
         else:
             self._timer = None
-
-    @staticmethod
-    def _log_counts(now: float, notes: Iterable[_Note]) -> None:
-        for note in notes:
-            if note.quiet_until is None or now < note.quiet_until:
-                continue
-            if note.more:
-                logger.warning("%s (%d more times in %g s)", note.line, note.more, LOG_EVERY)
-                note.quiet_until = now + LOG_EVERY
-            else:
-                note.quiet_until = None
-            note.more = 0
-
-
-class _Note:
-    """One kind of line in the log."""
-
-    def __init__(self) -> None:
-        self.line = ""
-        self.quiet_until: float | None = None
-        self.more = 0
 
 
 class Outflow:

@@ -31,6 +31,7 @@ from viser.infra import _infra
 from viser.infra._async_message_buffer import AsyncMessageBuffer
 
 from app.shared.connection import Connection, ConnectionEnded
+from app.shared.notes import Notes
 from app.shared.security import Rights
 
 log = logging.getLogger(__name__)
@@ -57,6 +58,7 @@ class PortlessServer(infra.WebsockServer):
         self.rights: dict[int, Rights] = {}  # of connected visitors, by client id
         self._open = 0  # connections
         self._handling: set[asyncio.Task[None]] = set()
+        self._notes = Notes(log)
         self._stopping: asyncio.Future[None]
         self._all_ended: asyncio.Event
 
@@ -144,7 +146,7 @@ class PortlessServer(infra.WebsockServer):
     def _handled(self, task: asyncio.Task[None]) -> None:
         self._handling.discard(task)
         if not task.cancelled() and (error := task.exception()) is not None:
-            log.warning("a message of a visitor could not be handled: %.200r", error)
+            self._notes.note("unhandled", f"a message of a visitor could not be handled: {error!r:.200}")
 
 
 async def _call(callbacks: _Callbacks, client: infra.WebsockClientConnection) -> None:

@@ -51,7 +51,7 @@ def test_a_pipeline_is_answered_up_to_a_bound(service):
         answer = answer_to(connection)
     assert 1 <= answer.count(b"HTTP/1.1 200 OK") <= MAX_PIPELINE + 1
     assert b"connection: close" in answer
-    assert "requests ahead" in service.log
+    wait_for(lambda: "requests ahead" in service.log)
 
 
 def test_requests_sent_ahead_take_no_memory(service):
@@ -137,6 +137,21 @@ def test_an_answer_that_nobody_reads_ends(service):
         assert connection.recv(1000).startswith(b"HTTP/1.1 200")
         wait_for(lambda: "read nothing of an answer" in service.log, 30)
         wait_for(lambda: closed(connection), 30)
+
+
+def test_an_answer_that_is_read_byte_by_byte_ends(service):
+    ended = 'kinboard_refused_connections_total{why="unread"}'
+    before = service.metric(ended)
+    request = f"GET {ARM}/workspace?n=20000000&format=bin HTTP/1.1\r\nHost: localhost\r\n\r\n"
+    with service.connection(receive=4096) as connection:
+        connection.sendall(request.encode())
+
+        def has_ended() -> bool:
+            with suppress(ConnectionError):
+                connection.recv(1)
+            return service.metric(ended) > before
+
+        wait_for(has_ended, 60)
 
 
 @pytest.mark.slow
@@ -358,7 +373,7 @@ def test_a_client_that_does_not_read_its_websocket_is_disconnected(service):
         assert connection.recv(12) == b"HTTP/1.1 101"
         wait_for(lambda: service.metric('kinboard_refused_connections_total{why="unread"}') > before, 30)
         wait_for(lambda: closed(connection), 30)
-    assert "read nothing from a websocket" in service.log
+    wait_for(lambda: "read nothing from a websocket" in service.log, 30)
 
 
 # -- how many --------------------------------------------------------------------------------------------------
@@ -378,7 +393,7 @@ def test_one_client_gets_its_share_of_the_connections_and_others_the_rest(servic
             stack.enter_context(service.connection("127.0.0.3"))
         with service.connection("127.0.0.4") as too_many:
             assert "20 connections" in str(problem_in(answer_to(too_many))["detail"])
-    assert "KINBOARD_CLIENT_SHARE" in service.log
+    wait_for(lambda: "KINBOARD_CLIENT_SHARE" in service.log)
     wait_for(lambda: "KINBOARD_MAX_CONNECTIONS" in service.log)
     wait_for(lambda: service.answers_after() < 10, 10)
 

@@ -305,7 +305,7 @@ async def besiege(port: int, token: str, seconds: float) -> list[dict[str, objec
         {
             "attack": name, "rounds": attacker.rounds, "ended by the service": attacker.failed,
             "MB sent": attacker.sent / 1e6,
-            "statuses read": ", ".join(f"{n} × {code}" for code, n in sorted(attacker.statuses.items())) or "–",
+            "statuses read": attacker.statuses,
         }
         for name, attacker in attackers.items()
     ]  # fmt: skip

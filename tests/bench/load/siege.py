@@ -119,7 +119,7 @@ class Siege:
             self.attacks = found
             return
         for row, more in zip(self.attacks, found, strict=True):
-            row.update({name: row[name] + value for name, value in more.items() if not isinstance(value, str)})
+            row.update({name: row[name] + value for name, value in more.items() if name != "attack"})
 
     async def _phase(self, name: str, seconds: float) -> None:
         phase = Phase(name)
@@ -200,6 +200,10 @@ def report(siege: Siege, statuses: dict[str, int], before: int, after: int, work
         statuses: how many answers of each the service has counted.
         before, after: bytes of its memory, with nobody there.
     """
+    for row in siege.attacks:
+        row["statuses read"] = (
+            ", ".join(f"{n} × {code}" for code, n in sorted(row["statuses read"].items())) or "–"
+        )
     print("\n" + table("attacks", siege.attacks))
     sums = {name: Phase(name) for name in ("quiet", "attacked")}
     for phase in siege.phases:
