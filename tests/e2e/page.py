@@ -14,6 +14,7 @@ from playwright.sync_api import Browser, Locator, Page, expect
 import kin
 from app.viewer.panel.joints import label
 from app.viewer.scene import camera
+from app.viewer.scene.arm import FOR_FINGERS, GIZMO
 from app.viewer.scene.meshes import body
 
 ARTIFACTS = Path(__file__).parents[1] / "artifacts"
@@ -38,6 +39,7 @@ class Tab:
         self.page: Page = browser.new_page(
             viewport={"width": width, "height": height}, has_touch=touch, is_mobile=touch
         )
+        self.touch = touch
         self.page.add_init_script(PLAIN + NO_HINTS)
         self.page.set_default_timeout(WAIT)
         expect.set_options(timeout=WAIT)
@@ -134,7 +136,7 @@ class Tab:
         self, robot: kin.Robot, T: np.ndarray, axis: int, lengths: float = 1.0
     ) -> tuple[np.ndarray, np.ndarray]:
         """Page coordinates of a point on an arrow of the gizmo at pose T, and of one farther by its length."""
-        arrow = 0.26 * body(robot).radius * T[:3, axis]
+        arrow = GIZMO * (FOR_FINGERS if self.touch else 1.0) * body(robot).radius * T[:3, axis]
         return self.pixel(robot, T[:3, 3] + 0.8 * arrow), self.pixel(robot, T[:3, 3] + (0.8 + lengths) * arrow)
 
     def drag_arrow(self, robot: kin.Robot, T: np.ndarray, axis: int, lengths: float, steps: int = 6) -> None:

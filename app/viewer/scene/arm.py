@@ -27,6 +27,8 @@ NO_SHADOW = ("trim", "axis", "approach")
 STILL, NO_TURN = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
 SAME = 1e-9  # rad or m: smaller changes are below the precision of a browser's numbers
 GIZMO = 0.26  # length of the gizmo's arrows, in radii of the sphere around the arm
+LINE = 4.0  # their thickness, pixels
+FOR_FINGERS = 1.6  # how much larger and thicker they are in the small picture of a phone
 GAP_COLOR = (213, 94, 0)
 CONTACT_COLOR = (204, 20, 60)
 
@@ -62,7 +64,7 @@ class ArmScene:
         self._top += [*self.floor.nodes, add_lamp(scene, f"{root}-lamp", self.body)]
         self._build_arm()
         self.gizmo = scene.add_transform_controls(
-            f"{root}-target", scale=GIZMO * self.body.radius, line_width=4.0, depth_test=False, opacity=0.95
+            f"{root}-target", scale=GIZMO * self.body.radius, line_width=LINE, depth_test=False, opacity=0.95
         )
         keep_private(self.gizmo)
         self._ghost = self._add(f"{root}-target", self.body.gripper[0], opacity=0.35, visible=False)
@@ -136,6 +138,14 @@ class ArmScene:
         """The pose ``(4, 4)`` of the gizmo itself, without its rings."""
         return from_position_wxyz(self.gizmo.position, self.gizmo.wxyz)
 
+    def size_gizmo(self, small: bool) -> None:
+        """Make the gizmo large enough for fingers in a small picture, or as large as usual."""
+        factor = FOR_FINGERS if small else 1.0
+        if self.gizmo.line_width == factor * LINE:
+            return
+        for handle in (self.gizmo, *self._rings):
+            handle.scale, handle.line_width = factor * GIZMO * self.body.radius, factor * LINE
+
     def set_gizmo_axes(self, axes: GizmoAxes) -> list[viser.TransformControlsHandle]:
         """Give the gizmo these arrows and rings; returns the rings that are separate nodes.
 
@@ -151,8 +161,8 @@ class ArmScene:
         self._rings = [
             self._scene.add_transform_controls(
                 f"{self.gizmo.name}/ring-{'xyz'[axis]}-{self._ring_sets}",
-                scale=GIZMO * self.body.radius,
-                line_width=4.0,
+                scale=self.gizmo.scale,
+                line_width=self.gizmo.line_width,
                 active_axes=(axis != 0, axis != 1, axis != 2),
                 disable_axes=True,
                 disable_sliders=True,

@@ -32,6 +32,7 @@ _AROUND = 0.12  # room around each frame of the arm, in radii of the sphere arou
 _NEAREST, _REMOTEST = 0.4, 14.0  # limits of zooming in and out, in these radii
 _FARTHEST_ASIDE = 3.0  # limit of panning, in these radii
 _LOWEST = 0.03  # least height of the camera above the floor, in these radii: from below, the floor hides the arm
+_SMALL_PICTURE = 420  # pixels
 _SMALLEST = 0.01  # metres; viser's own limit of zooming in
 _RESIZED = 0.01  # relative change of the picture's narrow side that moves the camera
 Sphere = tuple[Array, float]  # centre ``(3,)`` and radius, m
@@ -221,6 +222,11 @@ class VisitorCamera:
     def _aspect(self) -> float:
         width, height = self._camera.image_width, self._camera.image_height
         return width / height if width > 0 and height > 0 else 1.6
+
+    @property
+    def small(self) -> bool:
+        """Whether the picture is as small as on a phone."""
+        return 0 < min(self._camera.image_width, self._camera.image_height) < _SMALL_PICTURE
 
     @property
     def _reshaped(self) -> bool:

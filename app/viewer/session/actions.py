@@ -138,8 +138,8 @@ class Actions:
             "camera": lambda _: page.camera.aim(arm.scene.body, self._frames(), glide=True),
             "fit-arm": lambda _: page.camera.look_at_arm(self._frames()),
             "look-from": self._look_from,
-            "resized": lambda _: page.camera.refit(),
-            "looked": lambda _: None,  # the viewpoint is read when the camera rests
+            "resized": self._on_resize,
+            "looked": self._on_look,  # the viewpoint is read when the camera rests
             "axes": self._typed.use_axes,
             # Messages of the page's own script
             "undo": self._undo,
@@ -179,6 +179,13 @@ class Actions:
                 self._history.record(_label(gesture, self._page.features), before)
                 self._gesture, self._changed_at = gesture, now
                 self._show_history()
+
+    def _on_resize(self, _: object) -> None:
+        self._page.camera.refit()
+        self._on_look(None)
+
+    def _on_look(self, _: object) -> None:
+        self._page.arm.scene.size_gizmo(self._page.camera.small)
 
     def _look_from(self, side: object, _: object = None) -> None:
         if side not in SIDES:

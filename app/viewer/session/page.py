@@ -358,6 +358,7 @@ class VisitorPage(Worker):
         self.sliders = self._make_sliders()
         self.posture.use_robot()
         self._apply_view()
+        self.arm.scene.size_gizmo(self.camera.small)
         self.camera.aim(self.arm.scene.body, kin.link_frames(robot, self.goal)[:, :3, 3])
 
     def _make_sliders(self) -> JointSliders:

@@ -15,6 +15,7 @@ from fake_browser import FakeBrowser
 import kin
 from app.shared.store import Store
 from app.viewer.scene import camera, viewpoints
+from app.viewer.scene.arm import FOR_FINGERS
 from app.viewer.scene.meshes import body
 from app.viewer.session.state import PageState, decode, encode
 
@@ -356,6 +357,22 @@ def test_the_camera_returns_from_below_the_floor_and_from_far_aside(port: int) -
                 np.linalg.norm(position - look_at), rel=1e-6
             )
             tab.look()
+
+
+def test_the_gizmo_is_larger_in_the_picture_of_a_phone(port: int) -> None:
+    def size(tab: FakeBrowser) -> float:
+        controls = {n: m for n, m in tab.nodes.items() if m["type"] == "TransformControlsMessage"}
+        (gizmo,) = (m["props"]["scale"] for n, m in controls.items() if "/ring-" not in n)
+        return float(gizmo)
+
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.look()
+        usual = size(tab)
+        for image, factor in (((390, 350), FOR_FINGERS), ((1280, 720), 1.0), ((496, 338), FOR_FINGERS)):
+            time.sleep(camera.LOOK_EVERY)
+            tab.look(image_width=image[0], image_height=image[1])
+            tab.wait(lambda factor=factor: size(tab) == pytest.approx(factor * usual))
 
 
 def test_a_glide_has_steps_and_zooming_has_limits(port: int) -> None:
