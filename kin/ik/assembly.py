@@ -6,12 +6,16 @@ import math
 
 import numpy as np
 
+from kin.fk import jacobian
 from kin.ik.branches import Branches, Flags, redundancy_of
 from kin.ik.candidates import select
 from kin.ik.details import Details, Redundancy, Solved
+from kin.ik.options import Frame
 from kin.ik.problem import IKProblem
 from kin.ik.results import BlockedBranch, Cause, IKResult, IKSolution, Status
 from kin.singularity import Singularity, singularities_at
+from kin.solvers.contract import APPROACH, MASK, POSITION
+from kin.solvers.numeric import spread
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -37,6 +41,16 @@ def solutions_of(
         position, rotation, distance, overrun, _ = stats[i]
         solutions.append(IKSolution(q[i], names[i], position, rotation, overrun == 0.0, distance, own, compromise))
     return tuple(solutions), together
+
+
+def leaves_motion(problem: IKProblem) -> bool:
+    """Whether the task leaves the joints that may move a motion, at almost all targets."""
+    frame: Frame = "base" if problem.code == MASK and problem.mask[6] else "tool"
+    J = jacobian(problem.robot, spread(problem.low, problem.high, 16), frame)
+    rows = {APPROACH: np.arange(5), POSITION: np.arange(3), MASK: np.flatnonzero(problem.mask[:6])}
+    J = J[:, rows.get(problem.code, np.arange(6))][..., problem.low < problem.high]
+    rank = int(np.linalg.matrix_rank(J, rtol=1e-9).max())
+    return bool(rank < J.shape[-1])
 
 
 def make_result(

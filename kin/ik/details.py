@@ -55,12 +55,33 @@ class Solved(NamedTuple):
         redundant: whether the task leaves a redundancy parameter.
         chosen_branches: how many branches were requested, None for all.
         complete: whether these are all; see `kin.IKResult`.
+        infinite: whether the task leaves the joints a motion, so that there are infinitely many configurations.
+        postures: on how many branches the configurations are.
+        free: labels of the redundancy parameters that may have other values.
+        fixed: labels of those whose values were requested.
     """
 
     configurations: int
     redundant: bool
     chosen_branches: int | None = None
     complete: bool = True
+    infinite: bool = False
+    postures: int = 1
+    free: tuple[str, ...] = ()
+    fixed: tuple[str, ...] = ()
+
+
+class Restriction(NamedTuple):
+    """The locks and narrowed limits of a problem, where they are what prevents an answer.
+
+    Attributes:
+        locked, narrowed: indices of the joints that are locked, and of those whose limits are narrowed.
+        distance: metres by which the point is out of reach without them, 0 if it can be reached.
+    """
+
+    locked: tuple[int, ...]
+    narrowed: tuple[int, ...]
+    distance: float = 0.0
 
 
 class RollError(NamedTuple):
@@ -125,16 +146,24 @@ class MaskNotMet(NamedTuple):
 
     Attributes:
         position_error, rotation_error: those of the closest configuration; None if the branch has none.
+        restriction: the locks and narrowed limits without which they can be met; None if there are none.
     """
 
     position_error: float | None
     rotation_error: float | None
+    restriction: Restriction | None = None
 
 
 class OutOfReach(NamedTuple):
-    """The point cannot be reached: by how many metres."""
+    """The point cannot be reached.
+
+    Attributes:
+        distance: by how many metres.
+        restriction: the locks and narrowed limits without which the arm comes nearer; None if there are none.
+    """
 
     distance: float
+    restriction: Restriction | None = None
 
 
 class OrientationNotMet(NamedTuple):
@@ -144,6 +173,7 @@ class OrientationNotMet(NamedTuple):
         obstacle, gap: what does not fit geometrically, and by how many metres; None if nothing is known.
         nearest_rotation: rotation from the target to the nearest orientation found at this point.
         position_error, rotation_error: those of the closest configuration; None if the branch has none.
+        restriction: the locks and narrowed limits without which it is possible; None if there are none.
     """
 
     obstacle: Obstacle | None
@@ -151,6 +181,7 @@ class OrientationNotMet(NamedTuple):
     nearest_rotation: float | None
     position_error: float | None
     rotation_error: float | None
+    restriction: Restriction | None = None
 
 
 Details = (

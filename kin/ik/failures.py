@@ -15,7 +15,16 @@ import numpy as np
 from kin.fk import fk, link_frames
 from kin.ik import nearest
 from kin.ik.assembly import by_key, make_result, solutions_of
-from kin.ik.branches import Branches, Flags, is_closed, measure, redundancy_of, solution, violations_of
+from kin.ik.branches import (
+    Branches,
+    Flags,
+    is_closed,
+    measure,
+    redundancy_of,
+    solution,
+    solve_branches,
+    violations_of,
+)
 from kin.ik.candidates import DISTANCE, OVERRUN, ROLL
 from kin.ik.details import (
     Details,
@@ -24,10 +33,12 @@ from kin.ik.details import (
     OrientationNotMet,
     OutOfReach,
     OutsideLimits,
+    Restriction,
     RollError,
     RotationError,
     Solved,
 )
+from kin.ik.options import JointConstraints
 from kin.ik.problem import IKProblem
 from kin.ik.results import BlockedBranch, Cause, IKResult, IKSolution, Status
 from kin.solvers.contract import APPROACH, MASK, POSE, POSITION
@@ -178,12 +189,13 @@ def out_of_reach(problem: IKProblem, branches: Branches | None) -> IKResult:
     at_point, distance = nearest.nearest_to_point(problem, closest)
     position, rotation = (None, None) if closest is None else (closest.position_error, closest.rotation_error)
     if problem.code == MASK:
-        details: Details = MaskNotMet(position, rotation)
+        details: Details = MaskNotMet(position, rotation, _restriction(problem))
         return make_result(problem, Status.UNREACHABLE, "outside", details, closest=closest, distance=distance)
     if problem.code == POSITION and problem.branches is None:
         closest = at_point
     if distance > 0.0 or problem.code == POSITION:
-        cause, details = side_of(problem, at_point.q), OutOfReach(distance)
+        restriction, cause = _point_restriction(problem, distance) or (None, side_of(problem, at_point.q))
+        details = OutOfReach(distance, restriction)
         return make_result(problem, Status.UNREACHABLE, cause, details, closest=closest, distance=distance)
     oriented = nearest.nearest_orientation(problem, candidates)
     fits = branches is None or branches.obstacle is None or not branches.gap > 0.0
@@ -193,10 +205,50 @@ def out_of_reach(problem: IKProblem, branches: Branches | None) -> IKResult:
         nearest_rotation=None if oriented is None else oriented.rotation_error,
         position_error=position,
         rotation_error=rotation,
+        restriction=_restriction(problem),
     )
     return make_result(
         problem, Status.ORIENTATION, "orientation", details, closest=closest, nearest_orientation=oriented
     )
+
+
+def _unrestricted(problem: IKProblem) -> tuple[IKProblem, Restriction] | None:
+    """The same problem without locks and narrowed limits, and these; None if it has none."""
+    robot = problem.robot
+    narrowed = (problem.lower > robot.lower) | (problem.upper < robot.upper)
+    if not problem.respect or not narrowed.any():
+        return None
+    locked = tuple(i for i, flag in enumerate(problem.locked) if flag)
+    others = tuple(i for i in np.flatnonzero(narrowed).tolist() if i not in locked)
+    options = replace(problem.options, constraints=JointConstraints(), branch=None)
+    return IKProblem.of(robot, problem.T, options, problem.seed), Restriction(locked, others)
+
+
+def _point_restriction(problem: IKProblem, distance: float) -> tuple[Restriction, Cause] | None:
+    """What keeps the arm from coming nearer to a point that is `distance` out of reach, and the cause then."""
+    found = _unrestricted(problem)
+    if found is None:
+        return None
+    free, restriction = found
+    nearer, left = nearest.nearest_to_point(free, None)
+    if left == 0.0:
+        return restriction, "outside"
+    if left > distance - TOLERANCES.same_distance:
+        return None
+    return restriction._replace(distance=left), side_of(free, nearer.q)
+
+
+def _restriction(problem: IKProblem) -> Restriction | None:
+    """The locks and narrowed limits of a problem that has no answer, if it has one without them."""
+    found = _unrestricted(problem)
+    if found is None:
+        return None
+    free, restriction = found
+    branches = solve_branches(free, free.T, free.code)
+    if branches is not None and branches.order:
+        return restriction
+    closest = nearest.closest(free, None if branches is None else branches.q)
+    return restriction if _is_solution(closest, free) else None
 
 
 def side_of(problem: IKProblem, q: Array) -> Cause:

@@ -78,7 +78,7 @@ def _why(place: Place, details: JumpDetails, units: Units) -> str:
             return f"the motion {does} a singularity{_clause(singularity, units)}"
         case BranchEnds(branch, singularity):
             which = f" ({branch})" if branch is not None else ""
-            return f"the branch being followed{which} ends{_clause(singularity, units)}"
+            return f"the posture being followed{which} ends{_clause(singularity, units)}"
         case TooFarApart(max_step, distance, rotation):
             turns = f" and turns by {units.angles.value(rotation)}" if rotation > 0.0 else ""
             which = "they" if place.is_jump else "the waypoints"

@@ -8,7 +8,16 @@ from typing_extensions import TypedDict
 
 from app.shared.answers.document import documented
 from kin import LimitViolation, Redundancy, Singularity
-from kin.ik.details import Details, OrientationNotMet, OutsideLimits, RotationError
+from kin.ik.details import (
+    Details,
+    MaskNotMet,
+    OrientationNotMet,
+    OutOfReach,
+    OutsideLimits,
+    Restriction,
+    RotationError,
+    Solved,
+)
 from kin.ik.messages import singularity
 from kin.path import PathJump
 from kin.path.details import BranchEnds, LimitInTheWay, NearSingularity, TooFarApart
@@ -92,6 +101,18 @@ class ObstacleAnswer(TypedDict):
 
 
 @documented
+class RestrictionAnswer(TypedDict):
+    """Locks and narrowed limits that are what prevents an answer."""
+
+    locked: list[int]
+    """The locked joints, as indices into q."""
+    narrowed: list[int]
+    """The joints whose limits are narrowed, as indices into q."""
+    distance: float
+    """Metres by which the point is out of reach without them; 0 if it can be reached."""
+
+
+@documented
 class IkDetails(TypedDict, total=False):
     """The numbers behind `cause`; which fields there are depends on it. Metres and radians."""
 
@@ -103,6 +124,18 @@ class IkDetails(TypedDict, total=False):
     """Cause "" (solved): how many branches were requested; null for all."""
     complete: bool
     """Cause "" (solved): whether these are all configurations, as in the answer's own `complete`."""
+    infinite: bool
+    """Cause "" (solved): whether the task leaves the joints a motion, so that there are infinitely many
+    configurations."""
+    postures: int
+    """Cause "" (solved): on how many branches the configurations are."""
+    free: list[str]
+    """Cause "" (solved): labels of the redundancy parameters that may have other values."""
+    fixed: list[str]
+    """Cause "" (solved): labels of the redundancy parameters whose values were requested."""
+    restriction: RestrictionAnswer | None
+    """Causes "orientation" and "too far" to "outside": the locks and narrowed limits without which the arm could
+    do better; null if there are none."""
     joints: int
     """Causes "roll" and "rotation": number of joints of the arm."""
     position_error: float | None
@@ -173,12 +206,21 @@ def details_answer(details: Details) -> IkDetails:
             fields["requested"] = [redundancy_answer(r) for r in details.requested]
         case RotationError():
             fields["violation"] = None if details.violation is None else violation_answer(details.violation)
+        case Solved():
+            fields["free"], fields["fixed"] = list(details.free), list(details.fixed)
         case OrientationNotMet():
             found = details.obstacle
             if found is not None:
                 bound = found.bound if found.bound == found.bound else None  # NaN: no single length decides
                 fields["obstacle"] = {"code": found.code, "bound": bound}
+    if isinstance(details, OutOfReach | OrientationNotMet | MaskNotMet):
+        fields["restriction"] = None if details.restriction is None else _restriction_answer(details.restriction)
     return cast(IkDetails, fields)
+
+
+def _restriction_answer(found: Restriction) -> RestrictionAnswer:
+    """Locks and narrowed limits that are what prevents an answer."""
+    return {"locked": list(found.locked), "narrowed": list(found.narrowed), "distance": found.distance}
 
 
 def jump_details_answer(jump: PathJump) -> JumpDetailsAnswer:

@@ -15,13 +15,14 @@ from kin.ik.details import (
     OrientationNotMet,
     OutOfReach,
     OutsideLimits,
+    Restriction,
     RollError,
     RotationError,
     Solved,
 )
 from kin.ik.messages.obstacle import clause_of
 from kin.ik.messages.singularity import short
-from kin.ik.messages.values import count, listed, need, ranges
+from kin.ik.messages.values import are, count, listed, need, numbered, ranges
 from kin.solvers.singular import Singularity
 from kin.units import Units
 
@@ -96,12 +97,11 @@ def _title(details: Details, headline: str, units: Units) -> str:
         case RotationError(_, error):
             return f"Point reached, orientation off by {units.angle(error)}"
         case OutsideLimits(_, violations):
-            numbers = ", ".join(str(v.joint + 1) for v in violations)
-            return f"{headline}: joint{'s' if len(violations) > 1 else ''} {numbers}"
-        case OrientationNotMet():
-            return "Orientation not possible here"
-        case OutOfReach(distance) if distance > 0.0:
-            return f"Out of reach by {units.distance(distance)}"
+            return f"{headline}: {numbered([v.joint for v in violations])}"
+        case OrientationNotMet(restriction=restriction):
+            return f"Orientation not possible here{_while(restriction)}"
+        case OutOfReach(distance, restriction) if distance > 0.0:
+            return f"Out of reach by {units.distance(distance)}{_while(restriction)}"
     return headline
 
 
@@ -122,33 +122,73 @@ def _outcome(details: Details, cause: str, task: str, units: Units) -> tuple[str
         case OutsideLimits():
             return "Outside the limits", _outside(details, units)
         case NotOnBranch(elsewhere, outside):
-            why = f"{count(outside, 'other branch exists', 'other branches exist')}, outside the joint limits"
+            why = f"{count(outside, 'other posture exists', 'other postures exist')}, outside the joint limits"
             if elsewhere:
                 reach = count(elsewhere, "configuration reaches", "configurations reach")
-                why = f"{reach} this target on other branches"
-            return "No solution on the chosen branch", why
-        case MaskNotMet(position, rotation):
-            headline = "These coordinates cannot be met together"
+                why = f"{reach} this target in other postures"
+            return "No solution in the chosen posture", why
+        case MaskNotMet(position, rotation, restriction):
+            headline = f"These coordinates cannot be met together{_while(restriction)}"
             if position is None or rotation is None:
-                return f"{headline} on the chosen branch", ""
-            return headline, f"the closest configuration is off by {length(position)} and {angle(rotation)}"
-        case OutOfReach(distance):
+                return f"{headline} in the chosen posture", _possible(restriction, "they can be met")
+            off = f"the closest configuration is off by {length(position)} and {angle(rotation)}"
+            return headline, "; ".join(filter(None, (off, _possible(restriction, "they can be met"))))
+        case OutOfReach(distance, restriction):
             by = f" by {length(distance)}" if distance > 0.0 else ""
-            return f"Out of reach{by}", _SIDES[cause]
-        case OrientationNotMet():
-            return "The arm cannot hold this orientation at this point", _orientation(details, units)
+            return f"Out of reach{by}{_while(restriction)}", _out_of_reach(restriction, cause, units)
+        case OrientationNotMet(restriction=restriction):
+            headline = f"The arm cannot hold this orientation at this point{_while(restriction)}"
+            return headline, _orientation(details, units)
 
 
 def _solved(details: Solved, task: str) -> str:
     """How many configurations there are, and whether these are all."""
+    chosen = details.chosen_branches
+    inside = "" if chosen is None else f" in the chosen posture{'s' * (chosen != 1)}"
+    target = f"{inside} for this {_TASKS[task]}"
+    if details.free:
+        free = f"{listed(details.free)} {are(details.free)} free, so there are infinitely many configurations"
+        if chosen is not None:
+            return f"{free}{target}"
+        return f"{count(details.postures, 'posture', 'postures')}; {free}"
+    if details.infinite:
+        found = "one was" if details.configurations == 1 else f"{details.configurations} were"
+        return f"infinitely many configurations{target}; {found} found"
     text = count(details.configurations, "configuration", "configurations")
-    if not details.complete:
-        text += " found"
-    if details.chosen_branches is not None:
-        text += " on the chosen branch" + "es" * (details.chosen_branches != 1)
-    if details.redundant:
-        text += f", {'each ' if details.configurations > 1 else ''}with a redundancy parameter,"
-    return f"{text} for this {_TASKS[task]}" + ("" if details.complete else "; others may exist")
+    if details.fixed:
+        target += f" and the requested {listed(details.fixed)}"
+    return f"{text}{target}" if details.complete else f"{text} found{target}; others may exist"
+
+
+def _while(restriction: Restriction | None) -> str:
+    """Under which condition an answer holds: ``" while joint 1 is locked"``."""
+    if restriction is None:
+        return ""
+    parts = []
+    if restriction.locked:
+        parts.append(f"{numbered(restriction.locked)} {are(restriction.locked)} locked")
+    if restriction.narrowed:
+        parts.append(f"the limits of {numbered(restriction.narrowed)} are narrowed")
+    return f" while {listed(parts)}"
+
+
+def _possible(restriction: Restriction | None, what: str) -> str:
+    """What is possible without the locks and narrowed limits: ``"with joint 1 unlocked, they can be met"``."""
+    if restriction is None:
+        return ""
+    own = "within the arm's own limits"
+    unlocked = f"with {numbered(restriction.locked)} unlocked" if restriction.locked else own
+    return f"{unlocked}{f' and {own}' if restriction.locked and restriction.narrowed else ''}, {what}"
+
+
+def _out_of_reach(restriction: Restriction | None, cause: str, units: Units) -> str:
+    """On which side the point is, and what locks have to do with it."""
+    if restriction is None:
+        return _SIDES[cause]
+    if restriction.distance == 0.0:
+        return _possible(restriction, "the point can be reached")
+    missing = units.lengths.value(restriction.distance)
+    return f"{_SIDES[cause]}; {_possible(restriction, f'it would still be out of reach by {missing}')}"
 
 
 def _outside(details: OutsideLimits, units: Units) -> str:
@@ -166,7 +206,7 @@ def _outside(details: OutsideLimits, units: Units) -> str:
         text += f". Possible {r.label}: {ranges(r.intervals, units)}"
     if details.elsewhere:
         others = count(details.elsewhere, "configuration is", "configurations are")
-        text += f". {others[0].upper()}{others[1:]} inside the limits on branches that were not chosen"
+        text += f". {others[0].upper()}{others[1:]} inside the limits in postures that were not chosen"
     return text
 
 
@@ -181,6 +221,8 @@ def _orientation(details: OrientationNotMet, units: Units) -> str:
     if details.position_error is not None and details.rotation_error is not None:
         off = f"{length(details.position_error)} and {angle(details.rotation_error)}"
         parts.append(f"the closest pose found is off by {off}")
+    if details.restriction is not None:
+        parts.append(_possible(details.restriction, "it can"))
     return "; ".join(parts)
 
 

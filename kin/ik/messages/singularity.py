@@ -59,6 +59,11 @@ def long(found: Singularity, units: Units = DEFAULT_UNITS) -> str:
     return f"{short(found, units)}: {LOSSES[found.lost]}"
 
 
+def there(found: Singularity) -> str:
+    """What would be lost at a singularity that the arm is not at: ``"there the hand could not move along …"``."""
+    return f"there {LOSSES[found.lost].replace('cannot', 'could not')}"
+
+
 def _joint_value(at: JointValue, units: Units) -> str:
     unit = units.angles
     value = round(at.value * unit.scale, unit.decimals(DECIMALS)) + 0.0  # no minus before a zero

@@ -37,6 +37,16 @@ def count(number: int, one: str, many: str) -> str:
     return f"one {one}" if number == 1 else f"{number} {many}"
 
 
+def numbered(joints: Sequence[int]) -> str:
+    """Joints by number: ``"joint 1"``, ``"joints 1 and 3"``."""
+    return f"joint{'s' * (len(joints) > 1)} {listed([str(i + 1) for i in joints])}"
+
+
+def are(things: Sequence[object]) -> str:
+    """The verb of one thing or of several."""
+    return "is" if len(things) == 1 else "are"
+
+
 def listed(parts: Sequence[str]) -> str:
     """Parts of a list in words: ``"a"``, ``"a and b"``, ``"a, b and c"``."""
     *most, last = parts

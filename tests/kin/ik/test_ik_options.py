@@ -99,12 +99,12 @@ def test_a_missing_branch_is_distinguished_from_one_outside_the_limits():
     missing = next(name for name in kin.branch_names(robot) if name not in every)
     result = solve_ik(robot, target, task="approach", branch=missing)
     assert (result.status, result.cause) == (Status.UNREACHABLE, "branch")
-    assert "one configuration reaches this target on other branches" in result.reason
+    assert "one configuration reaches this target in other postures" in result.reason
     behind = next(name for name in every if name != kin.branch_of(robot, robot.home))
     result = solve_ik(robot, target, task="approach", branch=behind)
     assert (result.status, result.cause) == (Status.LIMITS, "joint limits")
     assert [b.branch for b in result.blocked] == [behind]
-    assert "One configuration is inside the limits on branches that were not chosen" in result.reason
+    assert "One configuration is inside the limits in postures that were not chosen" in result.reason
 
 
 # Limits and locks
@@ -141,6 +141,52 @@ def test_a_violation_says_that_the_joint_is_locked():
     result = solve_ik(robot, target, task="approach", locked=[1.0, None, None, None, None])
     assert result.status is Status.LIMITS
     assert "joint 1 (rotating base) at 90.0° (locked at 57.3°)" in result.reason
+
+
+@pytest.mark.parametrize(("name", "point"), [("puma560", [0.2, 0.5, 0.5]), ("ur5", [0.1, 0.4, 0.4])])
+@pytest.mark.parametrize("kind", ["lock", "limits"])
+def test_a_point_that_a_constraint_puts_out_of_reach_is_not_called_too_far_away(name, point, kind):
+    robot = kin.get_robot(name)
+    home = float(robot.q_home[0])
+    rest = [None] * (robot.n - 1)
+    constraint = {"locked": [home, *rest]} if kind == "lock" else {"limits": [[home - 0.1, home + 0.1], *rest]}
+    result = solve_ik(robot, point, task="position", **constraint)
+    free = solve_ik(robot, point, task="position")
+    assert np.linalg.norm(kin.fk(robot, free.solutions[0].q)[:3, 3] - point) < 1e-9
+    assert (result.status, result.cause, result.details.restriction.distance) == ("unreachable", "outside", 0.0)
+    assert "too far away" not in result.reason
+    why = "joint 1 is locked" if kind == "lock" else "the limits of joint 1 are narrowed"
+    assert f"Out of reach by {1e3 * result.distance:.1f} mm while {why}: " in result.reason
+    assert "the point can be reached." in result.reason
+    assert result.explain().title.endswith(f" mm while {why}")
+
+
+def test_a_lock_that_only_adds_to_the_distance_is_named_with_what_is_left():
+    robot = kin.get_robot("puma560")
+    result = solve_ik(robot, [2.0, 0.5, 0.5], task="position", locked=[0.0, *[None] * 5])
+    free = solve_ik(robot, [2.0, 0.5, 0.5], task="position")
+    assert 0.0 < free.distance < result.distance
+    assert free.details.restriction is None
+    assert result.details.restriction == ((0,), (), pytest.approx(free.distance, abs=1e-6))
+    assert "too far away; with joint 1 unlocked, it would still be out of reach by" in result.reason
+
+
+def test_a_lock_that_does_not_matter_is_not_blamed():
+    robot = kin.get_robot("ur5")
+    result = solve_ik(robot, [3.0, 0.0, 0.0], task="position", locked=[*[None] * 5, 0.0])
+    assert (result.cause, result.details.restriction) == ("too far", None)
+
+
+def test_an_orientation_that_locks_prevent_is_possible_without_them():
+    robot = kin.get_robot("panda")
+    T = kin.fk(robot, robot.random_q(np.random.default_rng(2)))
+    T[:3, 3] = kin.fk(robot, robot.q_home)[:3, 3]
+    locked = [*[None] * 5, *robot.q_home[5:].tolist()]
+    assert solve_ik(robot, T).status is Status.SOLVED
+    result = solve_ik(robot, T, locked=locked)
+    assert (result.status, result.details.restriction) == (Status.ORIENTATION, ((5, 6), (), 0.0))
+    assert "while joints 6 and 7 are locked" in result.reason
+    assert "with joints 6 and 7 unlocked, it can." in result.reason
 
 
 # Images
@@ -635,10 +681,10 @@ def test_an_explanation_has_a_headline_and_a_detail_in_any_units():
     ("name", "options", "complete", "said"),
     [
         ("ur5", {}, True, "Reached: 8 configurations for this pose."),
-        ("ur5", {"branch": "seed"}, True, "Reached: one configuration on the chosen branch for this pose."),
-        ("ur5", {"branch": "wrist flip"}, True, "Reached: 4 configurations on the chosen branches for this pose."),
+        ("ur5", {"branch": "seed"}, True, "Reached: one configuration in the chosen posture for this pose."),
+        ("ur5", {"branch": "wrist flip"}, True, "Reached: 4 configurations in the chosen postures for this pose."),
         ("ur5", {"solver": "numeric"}, False, "Reached: one configuration found for this pose; others may exist."),
-        ("panda", {}, True, "Reached: 2 configurations, each with a redundancy parameter, for this pose."),
+        ("panda", {}, True, "Reached: 2 postures; θ7 is free, so there are infinitely many configurations."),
         ("puma560", {"max_solutions": 1}, True, "Reached: 3 configurations for this pose."),
     ],
 )
@@ -648,6 +694,49 @@ def test_an_answer_says_whether_its_solutions_are_all(name, options, complete, s
     assert result.status is Status.SOLVED
     assert (result.complete, result.details.complete) == (complete, complete)
     assert result.reason == said
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "said"),
+    [
+        ("puma560", {"task": "position"}, "Reached: infinitely many configurations for this point; 3 were found."),
+        ("ur5", {"mask": [True] * 4 + [False, True]}, "Reached: infinitely many configurations for this set of"),
+        (
+            "pioneer5",
+            {"task": "position"},
+            "Reached: one posture; θ4 and θ5 are free, so there are infinitely many",
+        ),
+        ("scara", {"task": "position"}, "Reached: 2 postures; tool angle ψ is free, so there are infinitely many"),
+        ("redundant7", {"redundancy": 0.3}, "Reached: 4 configurations for this pose and the requested θ1."),
+        (
+            "redundant7",
+            {"branch": "seed"},
+            "Reached: θ1 is free, so there are infinitely many configurations in the",
+        ),
+        # The task leaves nothing: three joints keep a point of space, six keep five coordinates and a lock.
+        (
+            "scara",
+            {"task": "position", "locked": [None, None, None, 0.0]},
+            "Reached: 2 configurations for this point.",
+        ),
+    ],
+)
+def test_a_motion_that_a_task_leaves_is_said(name, options, said):
+    robot = kin.get_robot(name)
+    result = solve_ik(robot, kin.fk(robot, robot.q_home), q_seed=robot.q_home, **options)
+    assert result.reason.startswith(said)
+    assert result.details.infinite is ("infinitely" in said)
+
+
+@pytest.mark.parametrize("name", ["puma560", "ur5"])
+def test_a_locked_joint_takes_the_motion_that_is_left(name):
+    """Three joints for a point: with the other joints locked, the numeric search finds separate solutions."""
+    robot = kin.get_robot(name)
+    locked = [None] * 3 + robot.q_home[3:].tolist()
+    result = solve_ik(robot, kin.fk(robot, robot.q_home), task="position", locked=locked, solver="numeric")
+    assert "infinitely" not in result.reason
+    free = solve_ik(robot, kin.fk(robot, robot.q_home), task="position", solver="numeric")
+    assert "infinitely many" in free.reason
 
 
 def test_what_a_search_does_not_find_may_exist():

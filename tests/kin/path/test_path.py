@@ -391,7 +391,7 @@ def test_the_end_of_a_branch_is_reported():
     assert_exact(robot, targets, result, "approach")
     (jump,) = result.jumps
     assert jump.cause == "branch"
-    assert "the branch being followed (shoulder front · elbow " in jump.reason
+    assert "the posture being followed (shoulder front · elbow " in jump.reason
     assert jump.reason.endswith("ends, elbow folded (θ3 = 180°).") or "θ3 = -180°" in jump.reason
 
 

@@ -14,7 +14,7 @@ from app.viewer.views.mathml import ident, sub, text
 from app.viewer.views.mathml import math as formula
 from app.viewer.views.templates import render
 from kin import Robot, Singularity
-from kin.ik.messages.singularity import long, short
+from kin.ik.messages.singularity import short, there
 from kin.transforms import Array
 from kin.units import Units, fixed
 
@@ -110,8 +110,10 @@ def warning_html(robot: Robot, found: tuple[Singularity, ...], units: Units, dir
         sentences = [short(first, units), *directions]
     elif first is not None:
         amount = distance(first, units)
-        opening = f"σ_min = {amount}" if first.kind == "jacobian" else f"{first.kind}, {amount} away"
-        sentences = [opening, long(first, units), *directions[:1]]
+        if first.kind == "jacobian":
+            sentences = [f"σ_min = {amount}", short(first, units), *directions[:1]]
+        else:
+            sentences = [f"Nearest: the {first.kind} singularity, {amount} away", there(first), *directions[:1]]
     # A leading σ stays lower case.
     detail = " ".join(f"{s[:1].upper() if s[:1].isascii() else s[:1]}{s[1:].rstrip('.')}." for s in sentences)
     return render(
@@ -126,6 +128,9 @@ def others_html(robot: Robot, found: tuple[Singularity, ...], units: Units) -> s
         symbol, word, color = LOOKS[state_of(singularity, robot.reach)]
         if singularity.kind == "algorithmic":
             symbol, word, color = "·", "–", ""
+        meaning = short(singularity, units)
+        if singularity.kind != "jacobian":
+            meaning += f": {there(singularity)}"
         name = {"algorithmic": "formula only", "jacobian": "σ_min"}.get(singularity.kind, singularity.kind)
         rows.append(
             {
@@ -134,7 +139,7 @@ def others_html(robot: Robot, found: tuple[Singularity, ...], units: Units) -> s
                 "color": color,
                 "name": name,
                 "distance": distance(singularity, units),
-                "meaning": long(singularity, units),
+                "meaning": meaning,
             }
         )
     return render("velocity/singularities", rows=rows)

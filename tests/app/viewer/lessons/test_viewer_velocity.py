@@ -402,7 +402,7 @@ def test_a_singular_pose_is_shown_with_its_kind_and_lost_directions(tab: FakeBro
     use(tab, STORE.get("irb120"))
     assert 'data-singular="far"' in tab.html
     tab.set("5 axis 5", 5.0)
-    tab.wait(lambda: "Wrist, 5.0° away" in tab.html)
+    tab.wait(lambda: "Nearest: the wrist singularity, 5.0° away. There " in tab.html)
     assert 'data-singular="near"' in tab.html
     assert "Near a wrist singularity" in tab.html
     tab.set("Radians", True)
