@@ -129,6 +129,10 @@ class Feature:
         """Process a queued event; raises `kin.InputError` for a value that none of our controls sends."""
         raise KeyError(key)
 
+    def step_name(self, key: Hashable) -> str:
+        """What undo calls a change that an event of the feature made."""
+        return self.title
+
     def on_robot(self) -> None:
         """Another robot was selected. Not called for the robot that is there when the feature is constructed."""
 

@@ -16,11 +16,11 @@ from app.shared.security import Rights
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.shared.summaries import Summaries
-from app.viewer.panel.status import Notice
+from app.viewer.panel.status import READY, Notice
 from app.viewer.panel.view import configure_theme
 from app.viewer.scene.lights import light_scene
 from app.viewer.scene.motion import Pace
-from app.viewer.session.page import WELCOME, VisitorPage
+from app.viewer.session.page import VisitorPage
 from app.viewer.session.services import Services
 from app.viewer.viser_patches import cache_type_hints, set_events_in_their_loop
 from app.viewer.viser_server import PortlessServer, client_page, start_viser
@@ -106,7 +106,7 @@ class ViewerServer:
         return len(self._pages)
 
     async def _connect(self, client: viser.ClientHandle) -> None:
-        self._start_page(client, WELCOME, RESTARTS)
+        self._start_page(client, READY, RESTARTS)
 
     def _start_page(self, client: viser.ClientHandle, welcome: Notice, restarts: int) -> None:
         page = VisitorPage(

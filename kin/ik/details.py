@@ -173,7 +173,6 @@ class OrientationNotMet(NamedTuple):
         obstacle, gap: what does not fit geometrically, and by how many metres; None if nothing is known.
         nearest_rotation: rotation from the target to the nearest orientation found at this point.
         position_error, rotation_error: those of the closest configuration; None if the branch has none.
-        restriction: the locks and narrowed limits without which it is possible; None if there are none.
     """
 
     obstacle: Obstacle | None
@@ -181,7 +180,6 @@ class OrientationNotMet(NamedTuple):
     nearest_rotation: float | None
     position_error: float | None
     rotation_error: float | None
-    restriction: Restriction | None = None
 
 
 Details = (

@@ -205,7 +205,6 @@ def out_of_reach(problem: IKProblem, branches: Branches | None) -> IKResult:
         nearest_rotation=None if oriented is None else oriented.rotation_error,
         position_error=position,
         rotation_error=rotation,
-        restriction=_restriction(problem),
     )
     return make_result(
         problem, Status.ORIENTATION, "orientation", details, closest=closest, nearest_orientation=oriented

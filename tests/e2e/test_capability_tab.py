@@ -45,7 +45,7 @@ def test_a_map_is_drawn_and_a_click_shows_the_voxel(tab: Tab) -> None:
     picked.scroll_into_view_if_needed()
     tab.screenshot("capability-picked-light")
 
-    tab.type_number("Least (% best)", "48")
+    tab.type_number("Hide voxels below (% of the best)", "48")
     expect(shown).not_to_have_attribute("data-shown", str(len(found.index)))
     tab.choose("Cut", "along the arm")
     tab.choose("Voxels show", "Manipulability")

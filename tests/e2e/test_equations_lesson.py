@@ -53,12 +53,12 @@ def test_equations_are_typeset_and_marked_and_the_largest_error_is_shown(tab: Ta
     expect(off(tab)).to_contain_text("135 mm here")
     tab.wait_for_tool(kin.fk(PIONEER, np.radians(worst.worst_at))[:3, 3], within=0.06)
     tab.screenshot("equations-worst")
-    tab.choose("Equation", "(13) a_x ✕ misprinted")
+    tab.choose("Equation", "(13) x of a ✕ misprinted")
     expect(off(tab)).to_contain_text("no difference at this pose")  # θ4 is 0 here
     tab.page.get_by_role("button", name="Show the worst pose").click()
     expect(off(tab)).to_contain_text("by 35.3° here, by 35.3° at worst")
     stays_inside(tab)
-    tab.choose("Equation", "(4) p_x ✓")
+    tab.choose("Equation", "(4) x of p ✓")
     expect(off(tab)).to_contain_text("equal to the DH product")
 
 
@@ -70,7 +70,7 @@ def test_the_other_arms(tab: Tab) -> None:
         expect(tab.page.locator(f"[data-robot={robot_id}][data-equation='{first}']")).to_be_visible()
         stays_inside(tab)
         tab.screenshot(f"equations-{robot_id}")
-    tab.choose("Equation", "n_x")
+    tab.choose("Equation", "x of n")
     tab.page.get_by_text("Symbols", exact=True).click()
     expect(tab.page.locator("table[aria-label=symbols]")).to_be_visible()
     tab.screenshot("equations-derived-symbols")

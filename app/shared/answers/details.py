@@ -134,8 +134,8 @@ class IkDetails(TypedDict, total=False):
     fixed: list[str]
     """Cause "" (solved): labels of the redundancy parameters whose values were requested."""
     restriction: RestrictionAnswer | None
-    """Causes "orientation" and "too far" to "outside": the locks and narrowed limits without which the arm could
-    do better; null if there are none."""
+    """Causes "too far", "too near", "around the axis" and "outside": the locks and narrowed limits without which
+    the arm could do better; null if there are none."""
     joints: int
     """Causes "roll" and "rotation": number of joints of the arm."""
     position_error: float | None
@@ -213,7 +213,7 @@ def details_answer(details: Details) -> IkDetails:
             if found is not None:
                 bound = found.bound if found.bound == found.bound else None  # NaN: no single length decides
                 fields["obstacle"] = {"code": found.code, "bound": bound}
-    if isinstance(details, OutOfReach | OrientationNotMet | MaskNotMet):
+    if isinstance(details, OutOfReach | MaskNotMet):
         fields["restriction"] = None if details.restriction is None else _restriction_answer(details.restriction)
     return cast(IkDetails, fields)
 

@@ -74,7 +74,7 @@ class BranchChoice:
         if value == KEEP and self._names:
             return "seed"
         if value not in self._names:
-            raise InputError("branch", value, "one of " + ", ".join((CLOSEST, KEEP, *self._names)))
+            raise InputError("posture", value, "one of " + ", ".join((CLOSEST, KEEP, *self._names)))
         return self._names[str(value)]
 
     def choose(self, branch: str | None) -> None:
@@ -85,7 +85,7 @@ class BranchChoice:
         """Show the name of the arm's present branch."""
         if branch != self._now and self._names:
             self._now = branch
-            self._line.content = render("panel/branch", name=branch, text=branch)
+            self._line.content = render("panel/branch", name=branch, text=short(branch))
 
     def remove(self) -> None:
         """Remove it from the panel."""
@@ -131,6 +131,10 @@ class RedundancySliders:
     def name_of(self, uuid: object) -> str | None:
         """The parameter whose slider has this id; None if there is none."""
         return next((name for key, name in self._uuids.items() if key == uuid), None)
+
+    def label_of(self, name: str) -> str:
+        """The label of a slider."""
+        return str(self._sliders[name].label)
 
     def read_text(self, name: str, text: str) -> float:
         """A typed value in screen units; raises `EntryError` unless the slider has it."""

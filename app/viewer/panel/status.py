@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import re
+import time
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import viser
 
+from app.viewer.panel.posture import short
 from app.viewer.views.templates import render
 from kin import IKResult, Robot
 from kin.ik.details import OrientationNotMet, OutOfReach, OutsideLimits, RollError, RotationError, Solved
 from kin.units import Units
 
-Kind = Literal["reached", "compromise", "limits", "orientation", "unreachable", "hand", "error"]
+Kind = Literal["reached", "compromise", "limits", "orientation", "unreachable", "hand", "advice", "error"]
+# s: news such as "Undone: Home" are shown this long, then again what is true now.
+NEWS = 10.0
 
 # Symbol and CSS class of each kind. The symbol alone tells the kinds apart, too.
 LOOKS: dict[Kind, tuple[str, str]] = {
@@ -23,6 +27,7 @@ LOOKS: dict[Kind, tuple[str, str]] = {
     "orientation": ("∠", "kb-mauve"),
     "unreachable": ("✕", "kb-crimson"),
     "hand": ("↻", "kb-blue"),
+    "advice": ("i", "kb-amber"),
     "error": ("?", "kb-violet"),
 }
 
@@ -36,10 +41,16 @@ class Notice:
     detail: str = ""
 
 
+READY = Notice("hand", "Ready", "Drag the coloured arrows at the gripper, or move a joint slider.")
+
+
 def notice(result: IKResult, units: Units) -> Notice:
     """The result for a target as a message."""
     explanation = result.explain(units)
-    return Notice(_kind(result), explanation.title, explanation.detail)
+    detail = explanation.detail
+    if isinstance(result.details, OutsideLimits):
+        detail = detail.replace(result.details.branch, short(result.details.branch))
+    return Notice(_kind(result), explanation.title, detail)
 
 
 _OUT_OF_REACH = {"too far": "too far", "too near": "too close"}
@@ -87,17 +98,27 @@ def html(shown: Notice) -> str:
 
 
 class StatusLine:
-    """Shows one notice at a time, and with it a warning about the configuration of the arm."""
+    """Shows one notice at a time, and with it a warning about the configuration of the arm.
+
+    A notice is news until the visitor does something else; one without advice ends by itself, too.
+
+    Attributes:
+        count: how many notices were shown.
+    """
 
     def __init__(self, gui: viser.GuiApi, first: Notice) -> None:
+        self.count = 0
         self._result: IKResult | None = None
+        self._news_since: float | None = None
         self._shown = first
         self._warning = ""
         self._html = gui.add_html(html(first))
 
     def show(self, shown: Notice) -> None:
         """Replace the notice."""
+        self.count += 1
         self._result = None
+        self._news_since = time.perf_counter()
         if shown != self._shown:
             self._shown = shown
             self._write()
@@ -117,7 +138,23 @@ class StatusLine:
     def show_result(self, result: IKResult, units: Units) -> None:
         """Show the result for a target."""
         self.show(notice(result, units))
-        self._result = result
+        self._result, self._news_since = result, None
+
+    def due(self, now: float) -> float | None:
+        """Seconds until the notice is no longer news; None: it does not end by itself."""
+        if self._news_since is None or self._shown.kind not in ("hand", "reached"):
+            return None
+        return max(0.0, self._news_since + NEWS - now)
+
+    def settle(self, result: IKResult | None, units: Units) -> None:
+        """End the news: show the result for the open target, or that the arm is ready if there is none."""
+        if self._news_since is None:
+            return
+        if result is None:
+            self.show(READY)
+        else:
+            self.show_result(result, units)
+        self._news_since = None
 
     def use(self, units: Units) -> None:
         """Show a result in these units if it is still there. Other notices stay as they are."""

@@ -95,6 +95,9 @@ class ActionsPage(TypedPage, Protocol):
     def snapshot(self) -> PageState:
         """The present state."""
 
+    def settle_status(self) -> None:
+        """End the news in the status: show what is true now."""
+
     def change_lock(self, joint: int | None, lock: bool) -> None:
         """Lock or unlock one joint, or all of them, at the value it is heading for."""
 
@@ -166,6 +169,7 @@ class Actions:
         if name in NO_STEP:
             action(*arguments, value)
             return
+        shown = self._page.status.count
         gesture = (name, *(a for a in arguments if not isinstance(a, Units)))
         now = time.perf_counter()
         if self._continues(gesture, now):
@@ -174,6 +178,8 @@ class Actions:
         before = self._page.snapshot()
         try:
             action(*arguments, value)
+            if self._page.status.count == shown:  # the news were about an earlier action
+                self._page.settle_status()
         finally:
             if not same(before, self._page.snapshot()):
                 self._history.record(_label(gesture, self._page.features), before)
@@ -313,7 +319,10 @@ class Actions:
         """Move to the same pose on another branch, and stay on that branch."""
         page = self._page
         if robot_id == page.robot.id:
-            page.arm.switch_branch(page.posture.read(value))
+            branch = page.posture.read(value)
+            if not page.arm.switch_branch(branch) and branch is not None:
+                page.status.show(page.posture.not_here(branch))
+                return
             page.for_features(lambda feature: feature.on_request())
 
     def _on_feature(self, name: str, key: Hashable, value: object) -> None:
@@ -358,6 +367,6 @@ def _label(gesture: tuple[object, ...], features: Sequence[Feature]) -> str:
     match gesture:
         case ("joint", _, int(index)):
             return f"Joint {index + 1}"
-        case ("feature", key, *_):
-            return next((feature.title for feature in features if feature.key == key), "Lesson")
+        case ("feature", name, key, *_):
+            return next((feature.step_name(key) for feature in features if feature.key == name), "Lesson")
     return LABELS[str(gesture[0])]

@@ -16,6 +16,7 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -258,10 +259,20 @@ class ArmController:
         self.locks = list(locks)
         self._request_changed()
 
-    def switch_branch(self, branch: str | None) -> None:
-        """Request a branch and move to it, with the tool where its target is."""
+    def switch_branch(self, branch: str | None) -> bool:
+        """Request a branch and move to it, with the tool where its target is.
+
+        False, and nothing changes, if the tool would have to leave a target that it has.
+        """
+        T = kin.fk(self.robot, self.goal) if self.target is None else self.target
+        if self.open_target is None and branch is not None:
+            target = T[:3, 3] if self.task == "position" else T
+            if solve(self.robot, target, replace(self.options, branch=branch), self.goal).status != "solved":
+                self._listener.on_branch(self.branch)
+                return False
         self.branch = branch
-        self._solve(kin.fk(self.robot, self.goal) if self.target is None else self.target)
+        self._solve(T)
+        return True
 
     def allow_any_branch(self) -> None:
         """Drop the request for a branch, and solve again."""

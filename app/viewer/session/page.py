@@ -21,7 +21,7 @@ from app.viewer.feature import Feature
 from app.viewer.lessons import LESSONS
 from app.viewer.panel.joints import JointSliders, lock_notice
 from app.viewer.panel.layout import PANEL_WIDTH, Panel
-from app.viewer.panel.status import Notice, StatusLine, key_number
+from app.viewer.panel.status import READY, Notice, StatusLine, key_number
 from app.viewer.panel.view import ViewState, configure_theme
 from app.viewer.scene.camera import Sphere, VisitorCamera
 from app.viewer.scene.clearance import clearance
@@ -40,8 +40,6 @@ from app.viewer.views.templates import render
 from kin import IKOptions, IKResult, Robot, Task
 from kin.transforms import Array
 from kin.units import DEFAULT_UNITS, Units
-
-WELCOME = Notice("hand", "Ready", "Drag the coloured arrows at the gripper, or move a joint slider.")
 
 
 class VisitorPage(Worker):
@@ -63,7 +61,7 @@ class VisitorPage(Worker):
         client: viser.ClientHandle,
         services: Services,
         token: bool = False,
-        welcome: Notice = WELCOME,
+        welcome: Notice = READY,
         failed: Callable[[], None] | None = None,
         rights: Rights = Rights.FULL,
     ) -> None:
@@ -82,6 +80,7 @@ class VisitorPage(Worker):
         self._persistence = Persistence(self, token, self._guard, rights)
         self.units = DEFAULT_UNITS
         self._tabs: list[Feature] = []
+        self._result: IKResult | None = None  # for the last target
         # Which numbers in the panel are out of date, and when they were updated last.
         self._readout_due = self._sliders_due = False
         self._updated_at = 0.0
@@ -217,6 +216,10 @@ class VisitorPage(Worker):
             self.use_colours(view.dark, self.system_dark)
         self._apply_view()
 
+    def settle_status(self) -> None:
+        """End the news in the status: show what is true now."""
+        self.status.settle(None if self.arm.open_target is None else self._result, self.units)
+
     def snapshot(self) -> PageState:
         """The present state."""
         return self._persistence.snapshot()
@@ -244,6 +247,7 @@ class VisitorPage(Worker):
         self._sliders_due, self._dragged = True, dragged
 
     def on_result(self, result: IKResult) -> None:
+        self._result = result
         self.posture.use_result(result)
         self.status.show_result(result, self.units)
         if self.arm.target is not None:
@@ -267,6 +271,8 @@ class VisitorPage(Worker):
             times.append(self._pace.interval)
         elif self._persistence.due is not None and not self.arm.dragging:
             times.append(max(0.0, self._persistence.due - time.perf_counter()))
+        if hasattr(self, "status") and (left := self.status.due(time.perf_counter())) is not None:
+            times.append(left)
         if self._readout_due or self._sliders_due:
             times.append(max(0.0, self._updated_at + self._pace.reading - time.perf_counter()))
         return min(times, default=None)
@@ -288,6 +294,8 @@ class VisitorPage(Worker):
             if self.arm.target is None:
                 self._key_number.hide()
             now = time.perf_counter()
+            if self.status.due(now) == 0.0:
+                self.settle_status()
             self.camera.tick(now)
             for feature in self.features:
                 if feature.due is not None:

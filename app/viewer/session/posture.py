@@ -9,10 +9,13 @@ import viser
 import kin
 from app.viewer.feature import Stage
 from app.viewer.panel import Post
-from app.viewer.panel.posture import BranchChoice, RedundancySliders
+from app.viewer.panel.entry import EntryError
+from app.viewer.panel.posture import BranchChoice, RedundancySliders, short
+from app.viewer.panel.status import Notice
 from app.viewer.self_motion import self_motion
 from kin import IKResult, Redundancy
 from kin.ik import solve
+from kin.ik.messages.values import listed, need, ranges
 from kin.transforms import Array
 
 
@@ -62,6 +65,22 @@ class PosturePanel:
         """The chosen branch, as `kin.solve_ik` takes it; raises `kin.InputError` for an unknown one."""
         return self._choice.read(value)
 
+    def not_here(self, branch: str) -> Notice:
+        """Why the arm cannot take a posture with the tool where it is."""
+        stage = self._stage
+        robot, q, options = stage.robot, stage.goal, replace(stage.options, branch=branch)
+        if robot.n < 6 and options.task == "pose":  # its postures are those of point and approach direction
+            options = replace(options, task="approach")
+        T = kin.fk(robot, q)
+        result = solve(robot, T[:3, 3] if options.task == "position" else T, options, q)
+        why = "No joint values give this posture with the tool where it is."
+        if result.violations:
+            needs = listed([need(violation, stage.units) for violation in result.violations])
+            why = f"It needs {needs}."
+        elif result.status == "solved":
+            why = "With it the tool would have another roll."
+        return Notice("advice", f"Not possible here: {short(branch)}", f"{why} The arm stays where it is.")
+
     def choose(self, branch: str | None) -> None:
         """Select a branch, given as `kin.solve_ik` takes it."""
         self._choice.choose(branch)
@@ -72,7 +91,16 @@ class PosturePanel:
 
     def read_text(self, name: str, text: str) -> float:
         """A typed value of a redundancy parameter, in screen units; raises `EntryError` for an invalid one."""
-        return self._sliders.read_text(name, text)
+        shown = self._sliders.read_text(name, text)
+        units = self._stage.units
+        value = units.angles.read(shown)
+        found = next((r for r in self._parameters() if r.name == name), None)
+        slack = 0.5 * units.angles.read(units.angles.step(1))  # the ends are shown rounded
+        if found is None or any(low - slack <= value <= high + slack for low, high in found.intervals):
+            return shown
+        title = f"{self._sliders.label_of(name)} was not changed"
+        valid = f"{units.angles.text(value)} is outside the feasible range"
+        raise EntryError(title, f"{valid}. Feasible here: {ranges(found.intervals, units)}.")
 
     def move(self, name: str, value: object, held: bool = True) -> tuple[Array | None, IKResult]:
         """Set a redundancy parameter while the tool stays.

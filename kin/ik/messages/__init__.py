@@ -98,8 +98,8 @@ def _title(details: Details, headline: str, units: Units) -> str:
             return f"Point reached, orientation off by {units.angle(error)}"
         case OutsideLimits(_, violations):
             return f"{headline}: {numbered([v.joint for v in violations])}"
-        case OrientationNotMet(restriction=restriction):
-            return f"Orientation not possible here{_while(restriction)}"
+        case OrientationNotMet():
+            return "Orientation not possible here"
         case OutOfReach(distance, restriction) if distance > 0.0:
             return f"Out of reach by {units.distance(distance)}{_while(restriction)}"
     return headline
@@ -136,9 +136,8 @@ def _outcome(details: Details, cause: str, task: str, units: Units) -> tuple[str
         case OutOfReach(distance, restriction):
             by = f" by {length(distance)}" if distance > 0.0 else ""
             return f"Out of reach{by}{_while(restriction)}", _out_of_reach(restriction, cause, units)
-        case OrientationNotMet(restriction=restriction):
-            headline = f"The arm cannot hold this orientation at this point{_while(restriction)}"
-            return headline, _orientation(details, units)
+        case OrientationNotMet():
+            return "The arm cannot hold this orientation at this point", _orientation(details, units)
 
 
 def _solved(details: Solved, task: str) -> str:
@@ -221,8 +220,6 @@ def _orientation(details: OrientationNotMet, units: Units) -> str:
     if details.position_error is not None and details.rotation_error is not None:
         off = f"{length(details.position_error)} and {angle(details.rotation_error)}"
         parts.append(f"the closest pose found is off by {off}")
-    if details.restriction is not None:
-        parts.append(_possible(details.restriction, "it can"))
     return "; ".join(parts)
 
 

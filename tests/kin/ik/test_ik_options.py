@@ -177,16 +177,15 @@ def test_a_lock_that_does_not_matter_is_not_blamed():
     assert (result.cause, result.details.restriction) == ("too far", None)
 
 
-def test_an_orientation_that_locks_prevent_is_possible_without_them():
-    robot = kin.get_robot("panda")
-    T = kin.fk(robot, robot.random_q(np.random.default_rng(2)))
-    T[:3, 3] = kin.fk(robot, robot.q_home)[:3, 3]
-    locked = [*[None] * 5, *robot.q_home[5:].tolist()]
-    assert solve_ik(robot, T).status is Status.SOLVED
-    result = solve_ik(robot, T, locked=locked)
-    assert (result.status, result.details.restriction) == (Status.ORIENTATION, ((5, 6), (), 0.0))
-    assert "while joints 6 and 7 are locked" in result.reason
-    assert "with joints 6 and 7 unlocked, it can." in result.reason
+def test_coordinates_that_locks_prevent_can_be_met_without_them():
+    robot = kin.get_robot("puma560")
+    T = kin.fk(robot, robot.random_q(np.random.default_rng(0)))
+    mask = [True] * 4 + [False, True]
+    assert solve_ik(robot, T, mask=mask).status is Status.SOLVED
+    result = solve_ik(robot, T, mask=mask, locked=[*[None] * 4, *robot.q_home[4:].tolist()])
+    assert (result.status, result.details.restriction) == (Status.UNREACHABLE, ((4, 5), (), 0.0))
+    assert result.reason.startswith("These coordinates cannot be met together while joints 5 and 6 are locked: ")
+    assert "with joints 5 and 6 unlocked, they can be met." in result.reason
 
 
 # Images

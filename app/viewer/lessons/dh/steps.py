@@ -239,13 +239,25 @@ def _lines(robot: Robot, units: Units) -> str:
     if not shared:
         first = coaxial_joints(reread(robot))[0]
         link = _link(robot, first, units)
-        return f"{opening}{link} is between joints {first + 1} and {first + 2}, and all {robot.n} axes differ."
+        return f"{opening}{link} {_leads(robot, first, units)}, so no two neighbouring axes coincide."
     reasons = "; ".join(
         f"{_link(robot, k, units)} makes {_axes(robot, k)} coincide, so joints {k + 1} and {k + 2} turn "
         f"about the same axis and only {_sum(robot, k)} matters"
         for k in shared
     )
     return f"{opening}{reasons}: {robot.n} joints, {degrees_of_freedom(robot)} degrees of freedom."
+
+
+def _leads(robot: Robot, k: int, units: Units) -> str:
+    """From which axis to which the parameters between joints k and k + 1 lead, and what one row of them does."""
+    before, after = robot.joint_rows[k], robot.joint_rows[k + 1]
+    leads = f"leads from axis {k + 1} to axis {k + 2}"
+    if after - before > 1:
+        return leads
+    row = robot.rows[before if robot.convention == "standard" else after]
+    if row.alpha:
+        return f"{leads} and tilts it by {units.angles.text(row.alpha)}"
+    return f"{leads} and shifts it by {units.distance(abs(row.a))}" if row.a else leads
 
 
 def _link(robot: Robot, k: int, units: Units) -> str:

@@ -116,9 +116,12 @@ def matrices_html(robot: Robot, at: Place, symbols: bool, units: Units) -> str:
     T = m.subsup(m.ident("T"), m.short(at.row + 1), m.short(0))
     far = "" if whole else " so far"
     shown = _symbols(robot, at, unit) if symbols else _numbers(at.A, unit)
+    placed = f"All rows{far}: the moving frame"
+    if at.row == 0 and at.motion < 0:
+        placed = "No row yet: the frame is at the base"
     blocks = (
         (f"Row {at.row + 1}{far}, lengths in {unit.name}", m.math(A, m.op("="), shown, size=MATRIX)),
-        (f"All rows{far}: the moving frame", m.math(T, m.op("="), _numbers(at.T_0_now, unit), size=MATRIX)),
+        (placed, m.math(T, m.op("="), _numbers(at.T_0_now, unit), size=MATRIX)),
     )
     return render("dh/matrices", blocks=blocks)
 

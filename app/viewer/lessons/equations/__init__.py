@@ -34,7 +34,7 @@ class EquationsLesson(Feature):
 
     key = "equations"
     title = "Equations"
-    about = "The equations of the arm; of the arms from the book chapter also the misprints."
+    about = "The arm’s equations. For the book’s arms, also its misprints."
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)

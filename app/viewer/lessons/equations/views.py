@@ -24,11 +24,13 @@ LOOKS = {
 }
 SAME = 1e-9  # rounding, in metres or pure numbers
 AXES = {"n": "x", "o": "y", "a": "z"}
+COLUMNS = "The tool’s pose is [n o a p]: the directions of its x, y and z axes, and its point."
 
 
 def label(equation: Equation) -> str:
     """An equation in the dropdown: number, entry, and whether it is wrong."""
-    name = "the whole matrix" if equation.entry == "T" else equation.entry
+    # There are no Unicode subscripts for y and z, and a dropdown shows plain text.
+    name = "the whole matrix" if equation.entry == "T" else " of ".join(reversed(equation.entry.split("_")))
     if equation.number is None:
         return name
     mark, words, _ = LOOKS[equation.verdict]
@@ -38,12 +40,12 @@ def label(equation: Equation) -> str:
 def summary(book: Book) -> str:
     """The origin of this arm's equations, in one sentence."""
     if book.source == "derived":
-        return "Derived from the DH table, and checked against forward kinematics."
+        return f"Derived from the DH table, and checked against forward kinematics. {COLUMNS}"
     wrong = [f"({e.number})" for e in book.equations if e.verdict == "misprinted"]
     read = sum(e.correct is not None for e in book.equations)
     return (
         f"This arm comes from a book chapter that prints its equations. {len(wrong)} of the {read} readable ones "
-        f"are misprinted: {', '.join(wrong)}."
+        f"are misprinted: {', '.join(wrong)}. {COLUMNS}"
     )
 
 
@@ -73,7 +75,7 @@ def equation_html(book: Book, equation: Equation) -> str:
         formulas=formulas,
         note=note_html(equation.note) if equation.note else "",
         lines=[Markup(typeset.mathml(line.expression, line.name)) for line in lines],
-        legend=_legend(lines) if book.source == "derived" else "",
+        legend=_legend(lines, equation) if book.source == "derived" else "",
         separate=[Markup(typeset.mathml_name(name)) for name in separate],
     )
 
@@ -169,11 +171,15 @@ def _formula(
     return {"title": title, "parts": parts, "color": LOOKS[look][2], "word": word}
 
 
-def _legend(lines: list[Line]) -> str:
+def _legend(lines: list[Line], equation: Equation) -> str:
     """What the names of derived intermediate results mean."""
     frames = sorted({"".join(typeset.glyphs(line.name).index[:-2]) for line in lines} - {""})
     frame = " and ".join(frames)
-    return f" (x, y, z: axes of frame {frame}, p: its origin; primed: the tool in that frame)"
+    used = {name for line in lines for name in (line.name, *names(line.expression))}
+    if equation.correct is not None:
+        used |= set(names(equation.correct))
+    primed = "; primed: the tool in that frame" if any("'" in name for name in used) else ""
+    return f" (x, y, z: axes of frame {frame}, p: its origin{primed})"
 
 
 def message(text: str) -> str:

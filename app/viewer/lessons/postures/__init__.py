@@ -95,6 +95,10 @@ class Postures(Feature):
             case _:
                 raise InputError("posture", key, "a control of this lesson")
 
+    def step_name(self, key: Hashable) -> str:
+        moves = {"go": "Posture", "remedy": "Remedy"}
+        return moves.get(str(key[0]), self.title) if isinstance(key, tuple) else self.title
+
     def on_robot(self) -> None:
         self._clear()
         self._hidden.clear()

@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 import kin
+from app.viewer.panel.posture import short
 from app.viewer.panel.status import LOOKS, notice
 from app.viewer.views.templates import render
 from kin import IKOptions, IKResult, Robot, Task
@@ -153,6 +154,6 @@ def html(result: IKResult | None, branch: str | None, units: Units) -> str:
         symbol, color = LOOKS[found.kind]
         title, detail = f"Why not? {found.title}", found.detail
     if branch not in (None, "seed") and result is not None:
-        detail = f"{detail} Requested branch: {branch}."
+        detail = f"{detail} Requested posture: {short(branch)}."
     status = "" if result is None else result.status
     return render("postures/why", status=status, symbol=symbol, color=color, title=title, detail=detail.strip())

@@ -205,7 +205,7 @@ class RedundancyLesson(Feature):
         if min(abs(nearest - x) for x in images) > 1e-3:
             end = next((e for e in self._ends if abs(e.value - nearest) < 1e-3), None)
             reason = (
-                "The branch ends here"
+                "The posture ends here"
                 if end is None or end.joint < 0
                 else f"Joint {end.joint + 1} is at its limit"
             )

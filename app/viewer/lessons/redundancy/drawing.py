@@ -81,7 +81,7 @@ class Drawing:
                 self._ring.append(scene.add_line_segments(name, arcs, color, thickness=width * self._size))
         for i, end in enumerate(ends):
             ray = np.array([[circle.at(end.value, RING - 0.12), circle.at(end.value, RING + 0.18)]], np.float32)
-            text = f"limit of joint {end.joint + 1}" if end.joint >= 0 else "branch ends"
+            text = f"limit of joint {end.joint + 1}" if end.joint >= 0 else "posture ends"
             name = f"{self._root}/end-{number}-{i}"
             self._ring.append(scene.add_line_segments(name, ray, LIMIT, thickness=0.4 * self._size))
             self._ring.append(scene.add_label(f"{name}-name", text, position=circle.at(end.value, RING + 0.3)))

@@ -106,7 +106,7 @@ def limits_html(robot: Robot, ends: tuple[End, ...], units: Units) -> str:
     """Each end of a range, with the joint limit that is met there."""
     rows = []
     for end in ends:
-        reason = "the branch ends"
+        reason = "the posture ends"
         if end.joint >= 0:
             name = robot.joints[end.joint].name
             number = str(end.joint + 1)

@@ -174,6 +174,9 @@ class VelocityLesson(Feature):
             case _:
                 raise InputError("velocity", key, "a control of this lesson")
 
+    def step_name(self, key: Hashable) -> str:
+        return "Jog" if isinstance(key, tuple) and key[0] == "jog" else self.title
+
     def on_robot(self) -> None:
         self._drawing.remove()
         if self._columns is not None:

@@ -14,6 +14,7 @@ import numpy as np
 
 import kin
 from app.viewer.panel.joints import label
+from app.viewer.panel.posture import short
 from app.viewer.panel.status import Notice, notice
 from kin import IKOptions, IKResult, IKSolution, Robot, Task
 from kin.ik import solve
@@ -154,13 +155,13 @@ def _too_few(robot: Robot, axis: int, best: IKSolution, units: Units) -> str:
 
 
 def _how(robot: Robot, before: Array, after: Array) -> str:
-    """How the branch changed."""
+    """How the posture changed."""
     if not kin.branch_names(robot):
         return "with the joints moving smoothly."
     now = kin.branch_of(robot, after)
     if kin.branch_of(robot, before) != now:
-        return f"through a singularity, to the branch {now}."
-    return "on the same branch."
+        return f"through a singularity, to the posture {short(now)}."
+    return "in the same posture."
 
 
 class Press:

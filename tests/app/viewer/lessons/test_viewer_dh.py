@@ -117,7 +117,8 @@ def test_two_joints_of_the_printed_table_share_an_axis() -> None:
             "the same axis and only θ₁ + θ₂ matters: 7 joints, 6 degrees of freedom."
         )
         assert craig == (
-            "Craig’s convention: row 2 (a₁ = 0, α₁ = −90.0°) is between joints 1 and 2, and all 7 axes differ."
+            "Craig’s convention: row 2 (a₁ = 0, α₁ = −90.0°) leads from axis 1 to axis 2 and tilts it by "
+            "−90.0°, so no two neighbouring axes coincide."
         )
 
 

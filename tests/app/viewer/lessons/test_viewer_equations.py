@@ -56,7 +56,7 @@ def drawn(tab: FakeBrowser) -> list[str]:
 
 
 def test_it_begins_with_a_misprint_and_its_values_follow_the_arm(tab: FakeBrowser) -> None:
-    assert tab.value("Equation") == "(6) p_z ✕ misprinted"
+    assert tab.value("Equation") == "(6) z of p ✕ misprinted"
     assert "Equation (6):" in tab.html
     q = np.radians([20.0, 30.0, 60.0, 30.0, 30.0])
     tab.set("1 rotating base", 20)
@@ -78,13 +78,13 @@ def test_show_where_it_is_worst(tab: FakeBrowser) -> None:
 
 def test_another_equation_and_its_picture(tab: FakeBrowser) -> None:
     assert len(drawn(tab)) == 2
-    tab.set("Equation", "(4) p_x ✓")
+    tab.set("Equation", "(4) x of p ✓")
     tab.wait(lambda: "equal to the DH product" in tab.html)
     tab.wait(lambda: not drawn(tab))
     tab.set("Equation", "(3) the whole matrix ? unreadable")
     tab.wait(lambda: "unreadable</span>" in tab.html)
     assert 'aria-label="values here"' not in tab.html
-    tab.set("Equation", "(13) a_x ✕ misprinted")
+    tab.set("Equation", "(13) x of a ✕ misprinted")
     tab.wait(lambda: "tool’s z axis (a)" in tab.html)
     tab.wait(lambda: len(drawn(tab)) == 2)
     tab.set("Radians", True)
@@ -96,7 +96,7 @@ def test_another_equation_and_its_picture(tab: FakeBrowser) -> None:
 def test_another_arm_has_its_own_equations(tab: FakeBrowser) -> None:
     tab.set("Robot", PUMA.name)
     tab.wait(lambda: "derived and checked" in tab.html)
-    assert tab.value("Equation") == "p_x"
+    assert tab.value("Equation") == "x of p"
     assert not drawn(tab)
     T = kin.fk(PUMA, PUMA.q_home)
     tab.wait(lambda: values_shown(tab) == [round(1000 * T[0, 3], 1)] * 2)
@@ -108,7 +108,7 @@ def test_another_arm_has_its_own_equations(tab: FakeBrowser) -> None:
 def test_an_equation_that_there_is_not_is_refused_by_name(tab: FakeBrowser) -> None:
     tab.set("Equation", "E = m c²")
     tab.wait(lambda: "Invalid input" in tab.html)
-    tab.wait(lambda: tab.value("Equation") == "(6) p_z ✕ misprinted")
+    tab.wait(lambda: tab.value("Equation") == "(6) z of p ✕ misprinted")
 
 
 def test_a_failed_check_is_said_instead_of_shown(tab: FakeBrowser, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -130,7 +130,7 @@ def test_what_was_chosen_can_be_restored() -> None:
     stage = MagicMock(robot=PIONEER, q=PIONEER.q_home, units=DEFAULT_UNITS)
     book_later(PIONEER).result(30)
     chosen = EquationsLesson(stage)
-    chosen.handle("equation", "(13) a_x ✕ misprinted")
+    chosen.handle("equation", "(13) x of a ✕ misprinted")
     assert chosen.state() == {"equation": "13"}
     other = EquationsLesson(stage)
     for hostile in ({"equation": "nonsense"}, {"equation": ["13"]}, {"equation": None}, {}):

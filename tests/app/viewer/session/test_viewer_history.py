@@ -57,6 +57,17 @@ def test_states_are_taken_back_in_order_and_forgotten_when_there_are_too_many() 
     assert history.labels == ("another", "")
 
 
+def test_the_status_of_an_undone_step_ends_with_the_next_action(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.set(BASE, 45.0)
+        shows(tab, PIONEER, turned(45.0))
+        tab.say("undo")
+        tab.wait(lambda: "Undone: Joint 1" in tab.html)
+        tab.set("Link frames", True)
+        tab.wait(lambda: "<b>Ready</b>" in tab.html)
+        assert "Undone" not in tab.html
+
+
 def test_a_step_that_changed_nothing_is_skipped() -> None:
     history = History()
     history.record("first", state(10))

@@ -71,14 +71,55 @@ def test_a_chosen_branch_is_kept_while_dragging_and_left_by_hand(port: int) -> N
         assert tab.value("Posture") == "Closest"
 
 
-def test_a_branch_that_is_not_there_says_so(port: int) -> None:
+def test_a_posture_that_is_not_possible_here_is_explained_and_nothing_moves(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
-        tab.set("Target must match", "Point + approach")
-        name = next(n for n in kin.branch_names(PIONEER) if n.endswith("wrist flip"))
-        tab.set("Posture", short(name))
-        tab.wait(lambda: 'data-status="limits"' in tab.html or 'data-status="unreachable"' in tab.html)
-        assert name in tab.html or "chosen branch" in tab.html
+        q = q_of(tab, PIONEER)
+        for task in ("Full pose", "Point + approach"):
+            tab.set("Target must match", task)
+            for name in kin.branch_names(PIONEER):
+                if name == kin.branch_of(PIONEER, PIONEER.q_home):
+                    continue
+                tab.set("Posture", short(name))
+                tab.wait(lambda name=name: f"Not possible here: {short(name)}" in tab.html)
+                assert 'data-status="advice"' in tab.html
+                assert "kb-amber" in tab.html
+                flip = name == "shoulder front · elbow positive · wrist flip"
+                assert ("It needs joint 4 (rotating wrist) at 210.0° (limit 85.0°)" in tab.html) is flip
+                tab.settle()
+                assert tab.value("Posture") == "Closest"
+        assert np.array_equal(q_of(tab, PIONEER), q)
+
+
+def test_a_posture_is_requested_for_a_target_that_is_not_reached_anyway(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.say("target", ["position", "3000 0 500"])
+        tab.wait(lambda: 'data-status="unreachable"' in tab.html)
+        name = short(kin.branch_of(PIONEER, PIONEER.q_home))
+        tab.set("Posture", name)
+        tab.settle()
+        assert tab.value("Posture") == name
+        assert 'data-status="advice"' not in tab.html
+
+
+def test_a_value_outside_the_feasible_range_is_refused_by_name(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.choose(SRS.name)
+        (free,) = kin.solve_ik(SRS, kin.fk(SRS, SRS.q_home), q_seed=SRS.q_home, branch="seed").redundancy
+        (low, high), *_ = np.degrees(free.intervals)
+        assert high < 150.0
+        q, shown = q_of(tab, SRS), tab.value("Arm angle ψ")
+        number = tab.say("field", [tab.element("Arm angle ψ"), "150"])
+        tab.wait(lambda: tab.script["reply"][0] == number)
+        assert "Arm angle ψ was not changed. 150.0° is outside the feasible range" in tab.script["reply"][1]
+        assert f"Feasible here: {low:.1f}° … {high:.1f}°" in tab.script["reply"][1]
+        tab.settle()
+        assert tab.value("Arm angle ψ") == shown
+        assert np.array_equal(q_of(tab, SRS), q)
+        # The ends as they are shown are valid, though rounded.
+        tab.say("field", [tab.element("Arm angle ψ"), f"{high:.1f}"])
+        tab.wait(lambda: tab.value("Arm angle ψ") == pytest.approx(high, abs=0.06))
 
 
 @pytest.mark.parametrize("robot", [SRS, PRINTED], ids=lambda robot: robot.id)

@@ -277,14 +277,14 @@ def test_the_threshold_hides_levels_without_sending_voxels(tab):
     tab.done(len(found.index))
     sent = tab.sent("BatchedMeshesMessage")
     for percent in (4, 48, 96, 0):
-        tab.set("Least (% best)", percent)
+        tab.set("Hide voxels below (% of the best)", percent)
         first = percent / 100 * voxels.LEVELS
         expected = int((voxels.levels(found.share) >= round(first)).sum())
         tab.wait(lambda expected=expected: f'data-shown="{expected}"' in tab.html)
         tab.settle(0.2)
         assert tab.count(only_visible=True) == expected
     assert tab.sent("BatchedMeshesMessage") == sent
-    tab.set("Least (% best)", 48)
+    tab.set("Hide voxels below (% of the best)", 48)
     tab.set("Voxels show", "Manipulability")
     low = voxels.levels(found.manipulability) >= 12
     tab.wait(lambda: f'data-shown="{low.sum()}"' in tab.html and tab.count() == len(found.index))
@@ -403,6 +403,6 @@ def test_an_address_restores_the_map(service):
         found = the_map()
         tab.done(len(found.index))
         assert tab.value("Voxels show") == "Manipulability"
-        assert tab.value("Least (% best)") == 40
+        assert tab.value("Hide voxels below (% of the best)") == 40
         assert tab.count(only_visible=True) == (voxels.levels(found.manipulability) >= 10).sum()
         assert feature.state()["capability"] == state

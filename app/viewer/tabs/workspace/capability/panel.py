@@ -306,7 +306,7 @@ class Capability:
             self._add(
                 "least",
                 gui.add_slider(
-                    "Least (% best)",
+                    "Hide voxels below (% of the best)",
                     min=0.0,
                     max=PERCENT * (LEVELS - 1) / LEVELS,
                     step=PERCENT / LEVELS,

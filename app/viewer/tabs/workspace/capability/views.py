@@ -32,7 +32,7 @@ MEANING: dict[By, str] = {
     "manipulability": "best manipulability w (all six rows)",
 }
 CERTAINTY: dict[Method, str] = {
-    "closed form": "Exact: a missing direction is impossible.",
+    "closed form": "Exact: directions not counted cannot be reached.",
     "sweep": f"{ROLLS} rolls were tried about each direction: directions with few possible rolls may be missing.",
     "search": f"Searched with {STARTS} descents each: a few possible directions may be missing.",
 }

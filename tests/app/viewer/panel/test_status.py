@@ -1,0 +1,76 @@
+"""The status line: news end, by themselves or with the next action; what is true now stays."""
+
+from __future__ import annotations
+
+import time
+from types import SimpleNamespace
+from typing import Any
+
+import kin
+from app.viewer.lessons.postures import Postures
+from app.viewer.lessons.velocity import VelocityLesson
+from app.viewer.panel.status import NEWS, READY, Notice, StatusLine
+from kin.units import DEFAULT_UNITS
+
+UNDONE = Notice("hand", "Undone: Home")
+
+
+def line(first: Notice = READY) -> tuple[StatusLine, Any]:
+    element = SimpleNamespace(content="")
+
+    def add_html(content: str) -> Any:
+        element.content = content
+        return element
+
+    return StatusLine(SimpleNamespace(add_html=add_html), first), element  # type: ignore[arg-type]
+
+
+def test_news_end_after_some_seconds_and_the_present_state_follows() -> None:
+    status, element = line()
+    now = time.perf_counter()
+    assert status.due(now) is None
+    status.show(UNDONE)
+    due = status.due(now)
+    assert due is not None
+    assert NEWS - 1.0 < due <= NEWS + 1.0
+    assert status.due(now + NEWS + 1.0) == 0.0
+    status.settle(None, DEFAULT_UNITS)
+    assert "<b>Ready</b>" in element.content
+    assert status.due(now + 10.0 * NEWS) is None
+
+
+def test_the_result_for_an_open_target_comes_back_after_news() -> None:
+    status, element = line()
+    result = kin.solve_ik(kin.get_robot("ur5"), [3.0, 0.0, 0.0], task="position")
+    status.show(UNDONE)
+    status.settle(result, DEFAULT_UNITS)
+    assert "Out of reach by" in element.content
+    # A result is no news: neither time nor another action ends it.
+    assert status.due(time.perf_counter() + 10.0 * NEWS) is None
+    status.settle(None, DEFAULT_UNITS)
+    assert "Out of reach by" in element.content
+
+
+def test_an_error_stays_until_the_next_action() -> None:
+    status, element = line()
+    status.show(Notice("error", "Joint 1 was not changed"))
+    assert status.due(time.perf_counter() + 10.0 * NEWS) is None
+    status.settle(None, DEFAULT_UNITS)
+    assert "was not changed" not in element.content
+
+
+def test_undo_names_the_action_and_not_its_lesson() -> None:
+    velocity, postures = object.__new__(VelocityLesson), object.__new__(Postures)
+    assert velocity.step_name(("jog", 1, 2)) == "Jog"
+    assert velocity.step_name("frame") == "Velocity"
+    assert postures.step_name(("go", 1)) == "Posture"
+
+
+def test_a_sentence_has_the_short_name_of_a_posture() -> None:
+    status, element = line()
+    robot = kin.get_robot("pioneer5")
+    branch = "shoulder front · elbow positive · wrist flip"
+    result = kin.solve_ik(robot, kin.fk(robot, robot.q_home), task="approach", branch=branch)
+    status.show_result(result, DEFAULT_UNITS)
+    assert "(front · elbow + · flip) needs joint 4" in element.content
+    assert "branch" not in result.reason
