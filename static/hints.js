@@ -23,9 +23,11 @@
     const area = document.querySelector("canvas[data-engine]")?.getBoundingClientRect();
     if (!place || !area) return null;
     const unit = Math.min(area.width, area.height) / 2;
-    const arrows = 0.28 * unit; // their length in the default view
+    const arrows = place[2] * unit;
     const [x, y] = [area.x + area.width / 2 + place[0] * unit, area.y + area.height / 2 - place[1] * unit];
-    return new DOMRect(x - arrows, y - arrows, 2 * arrows, 2 * arrows);
+    if (x < area.left || x > area.right || y < area.top || y > area.bottom) return null; // out of the picture
+    const [left, top] = [Math.max(x - arrows, area.left), Math.max(y - arrows, area.top)];
+    return new DOMRect(left, top, Math.min(x + arrows, area.right) - left, Math.min(y + arrows, area.bottom) - top);
   }
 
   function slider() {

@@ -101,7 +101,7 @@
 
     const slider = thumb(id);
     let edited = false;
-    const show = () => { if (!edited) input.value = String(valueOf(slider)); };
+    const show = () => { if (!edited) input.value = String(valueOf(slider)).replace("-", "−"); };
     const ask = () => {
       if (!edited) return;
       edited = false;

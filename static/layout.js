@@ -12,6 +12,16 @@
   const SAVED = "kinboard-sheet";
   const root = document.documentElement;
 
+  // Factors of the text sizes in the tab View, as in layout.css. A large window is often a projector's.
+  const TEXT = "kinboard-text-size";
+  const SIZES = { Normal: 1, Large: 1.3, Projector: 1.7 };
+  const WIDE = matchMedia("(min-width: 1800px) and (min-height: 800px)");
+  let size = WIDE.matches ? "Large" : "Normal";
+  try {
+    const kept = localStorage.getItem(TEXT);
+    if (Object.hasOwn(SIZES, kept)) size = kept;
+  } catch { /* a browser may forbid storage */ }
+
   let step = STEPS.includes(stored()) ? stored() : "half";
   let drag = null; // { y, height, moved, speed, at } while a pointer holds the sheet
   let grip = null;
@@ -34,6 +44,7 @@
   function place() {
     root.toggleAttribute("data-kb-narrow", NARROW.matches);
     root.dataset.kbSheet = step;
+    root.dataset.kbText = NARROW.matches ? "Normal" : size;
     if (!drag) setHeight(heightOf(step));
     root.style.setProperty("--kb-below", `${heightOf(step === "peek" ? "peek" : "half")}px`);
     root.style.setProperty("--kb-above", `${STATUS}px`);
@@ -137,6 +148,8 @@
   let wished = NaN; // width of the last visit, until the panel has it
   try { wished = Number(localStorage.getItem(WIDTH) ?? NaN); } catch { /* see above */ }
 
+  let fresh = !(wished >= LEAST); // the first visit of this browser
+
   const region = () => document.querySelector("[data-dock-region]");
 
   /** Make the panel wider, as a pointer that moves its edge would. */
@@ -156,6 +169,10 @@
     const edge = document.querySelector("[data-dock-region-resize]");
     if (width < LEAST || !edge) return;
     edge.ariaValueNow = String(width);
+    if (fresh) {
+      fresh = false;
+      if (size !== "Normal" && !NARROW.matches) wished = SIZES[size] * width;
+    }
     if (wished >= LEAST) {
       const change = Math.min(wished, innerWidth / 2) - width;
       wished = NaN;
@@ -164,6 +181,30 @@
     }
     try { localStorage.setItem(WIDTH, String(width)); } catch { /* see above */ }
   }
+
+  // The size of the text. All lengths of the panel follow the page's font size, and so does its width.
+
+  function chooseSize(name) {
+    const width = region()?.offsetWidth ?? 0;
+    const factor = SIZES[name] / SIZES[size];
+    size = name;
+    try { localStorage.setItem(TEXT, size); } catch { /* see above */ }
+    place();
+    markSize();
+    if (width >= LEAST && factor !== 1) widen(Math.min(factor * width, innerWidth / 2) - width);
+  }
+
+  function markSize() {
+    for (const button of document.querySelectorAll("[data-text-size]")) {
+      const pressed = String(button.dataset.textSize === size);
+      if (button.ariaPressed !== pressed) button.ariaPressed = pressed;
+    }
+  }
+
+  addEventListener("click", (event) => {
+    const button = event.target instanceof Element ? event.target.closest("[data-text-size]") : null;
+    if (button) chooseSize(button.dataset.textSize);
+  });
 
   /** Make the panel's edge a control for the keyboard too. */
   function markEdge() {
@@ -187,6 +228,7 @@
     const { left, right } = watched.getBoundingClientRect();
     root.style.setProperty("--kb-left", `${left}px`);
     root.style.setProperty("--kb-right", `${innerWidth - right}px`);
+    root.dataset.kbDocked = NARROW.matches ? "below" : innerWidth - right > LEAST ? "right" : left > LEAST ? "left" : "";
   });
   function watch() {
     const canvas = document.querySelector("canvas[data-engine]");
@@ -196,6 +238,16 @@
     edges.observe(canvas);
   }
 
+  // A press hides the hint of a control until the pointer comes to another control.
+  const lineOf = (node) => (node instanceof Element && (node.closest(".mantine-Flex-root") ?? node.closest("button, input"))) || null;
+  let pressed = null;
+  function press(line) {
+    pressed = line;
+    root.toggleAttribute("data-kb-pressed", line !== null);
+  }
+  addEventListener("pointerdown", (event) => press(lineOf(event.target)), true);
+  addEventListener("pointerover", (event) => { if (pressed && lineOf(event.target) !== pressed && !event.buttons) press(null); }, true);
+
   addEventListener("DOMContentLoaded", () => {
     grip = document.createElement("button");
     grip.id = "kb-grip";
@@ -203,7 +255,7 @@
     document.body.append(grip);
     place();
     let waiting = 0;
-    const changes = new MutationObserver(() => { waiting ||= setTimeout(() => { waiting = 0; mark(); markEdge(); watch(); }, 50); });
+    const changes = new MutationObserver(() => { waiting ||= setTimeout(() => { waiting = 0; mark(); markEdge(); markSize(); watch(); }, 50); });
     changes.observe(document.body, { subtree: true, childList: true });
   });
   addEventListener("resize", place);

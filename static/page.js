@@ -6,16 +6,14 @@
   const SYSTEM_IS_DARK = "The system is dark"; // label of a check box: see app/viewer/panel/view.py
   const SCHEME = "kinboard-scheme";
   const PATIENCE = 20000; // ms until the page is shown in any case
-  // Buttons in a corner of the scene: name, drawing (a cube with the face that one will see), message and argument for
-  // the server.
-  const CUBE = '<path d="M12 3l8 4.5v9L12 21l-8-4.5v-9zM4 7.5l8 4.5 8-4.5M12 12v9"/>';
-  const face = (path) => `<path d="${path}" fill="currentColor" stroke="none"/>`;
+  // Buttons in a corner of the scene: name, drawing, message and argument for the server. The standard views are drawn
+  // as an arm seen from there: towards the viewer, bent to the right, from above, and a cube.
   const TOOLS = [
     ["Fit the picture to the arm", '<path d="M4 8V4h4M16 4h4v4M20 16v4h-4M8 20H4v-4"/><circle cx="12" cy="12" r="3.2"/>', "fit-arm", ""],
-    ["View from the front", face("M4 7.5l8 4.5v9l-8-4.5z") + CUBE, "look-from", "Front"],
-    ["View from the side", face("M20 7.5l-8 4.5v9l8-4.5z") + CUBE, "look-from", "Side"],
-    ["View from the top", face("M12 3l8 4.5-8 4.5-8-4.5z") + CUBE, "look-from", "Top"],
-    ["View from a corner", CUBE, "look-from", "Corner"],
+    ["View from the front", '<path d="M7 21h10M12 21v-9"/><circle cx="12" cy="8" r="4.2"/><circle cx="12" cy="8" r="1.3" fill="currentColor"/>', "look-from", "Front"],
+    ["View from the side", '<path d="M3 21h8M7 21V6l10 3.5v5M15 17v-2.5h4V17"/><circle cx="7" cy="5.5" r="1.7" fill="currentColor"/><circle cx="17" cy="9.5" r="1.7" fill="currentColor"/>', "look-from", "Side"],
+    ["View from the top", '<circle cx="7.5" cy="12" r="5"/><circle cx="7.5" cy="12" r="1.3" fill="currentColor"/><path d="M8 10.4h8.5v3.2H8M21 9h-4.5v6H21"/>', "look-from", "Top"],
+    ["View from a corner", '<path d="M12 3l8 4.5v9L12 21l-8-4.5v-9zM4 7.5l8 4.5 8-4.5M12 12v9"/>', "look-from", "Corner"],
     ["Save a picture of the scene", '<path d="M4 8h3.2l1.6-2.4h6.4L16.8 8H20a1 1 0 0 1 1 1v9.5a1 1 0 0 1-1 1H4a1 1 0 0 1-1-1V9a1 1 0 0 1 1-1z"/><circle cx="12" cy="13.3" r="3.6"/>'],
   ];
 
@@ -86,6 +84,16 @@
     const { target, pointerId, pointerType } = event;
     if (pointerType === "touch" && target instanceof HTMLCanvasElement) target.releasePointerCapture(pointerId);
   }, true);
+
+  // In another page, the wheel scrolls that page, and zooms only with Ctrl or after a press on the scene.
+  if (window !== window.top) {
+    let engaged = false;
+    addEventListener("pointerdown", (event) => { engaged = event.target instanceof HTMLCanvasElement; }, true);
+    document.documentElement.addEventListener("pointerleave", () => { engaged = false; });
+    addEventListener("wheel", (event) => {
+      if (!engaged && !event.ctrlKey && event.target instanceof HTMLCanvasElement) event.stopImmediatePropagation();
+    }, { capture: true, passive: true });
+  }
 
   // viser shows a control's hint while the mouse is on the control; here its label shows it as well.
   const hinted = (event) => {

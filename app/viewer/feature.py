@@ -96,6 +96,12 @@ class Stage(Protocol):
     def notify(self, notice: Notice) -> None:
         """Show a notice in the status line."""
 
+    def see_through(self, on: bool) -> None:
+        """Make way for drawings inside the arm: translucent links, no gizmo. Another robot undoes it."""
+
+    def show_legend(self, html: str) -> None:
+        """Say what is drawn in the scene, on whatever tab; "" removes the legend."""
+
     def fit_view(self, spheres: Sequence[Sphere]) -> None:
         """Make the default view show these spheres as well as the arm. A view chosen by the visitor stays."""
 

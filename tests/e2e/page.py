@@ -69,7 +69,7 @@ class Tab:
         return self.page.get_by_text(label, exact=True).locator("xpath=ancestor::div[.//input or .//button][1]")
 
     def number(self, label: str) -> float:
-        return float(self.row(label).locator("input:visible").last.input_value())
+        return float(self.row(label).locator("input:visible").last.input_value().replace("−", "-"))
 
     def type_number(self, label: str, text: str) -> None:
         entry = self.row(label).locator("input:visible").last

@@ -30,6 +30,18 @@ ILLEGIBLE = """() => {
     .filter(([style]) => parseFloat(style.fontSize) < 11 || !["normal", "0px"].includes(style.letterSpacing))
     .map(([style, what]) => `${style.fontSize}, ${style.letterSpacing}: ${what}`);
 }"""
+# Also without a font for mathematics: its MATH table says where subscripts are.
+SUBSCRIPTS_ON_THE_LINE = """() => {
+  const parts = [...document.querySelectorAll(".kb-jacobian msub")].map((e) => [...e.children]);
+  const boxes = parts.map((part) => part.map((e) => e.getBoundingClientRect()));
+  const high = boxes.filter(([base, index]) => index.bottom < base.bottom + 0.1 * base.height);
+  return boxes.length ? high : ["no subscripts"];
+}"""
+CELLS_THAT_OVERFLOW = """() => [...document.querySelectorAll(".kb-jacobian td[data-j] > span")].filter((e) => {
+  const text = document.createRange();
+  text.selectNodeContents(e);
+  return text.getBoundingClientRect().width > e.getBoundingClientRect().width;
+}).map((e) => e.textContent)"""
 UNDER_THE_SCROLLBAR = """() => {
   const area = document.querySelector("[data-status]").closest(".mantine-ScrollArea-viewport");
   const bar = area.parentElement.querySelector(".mantine-ScrollArea-scrollbar[data-orientation=vertical]");
@@ -98,6 +110,10 @@ def test_labels_show_hints_but_not_over_a_menu(desktop: Tab) -> None:
     hint = tab.page.get_by_role("tooltip")
     tab.page.get_by_text("Target must match", exact=True).hover()
     expect(hint).to_contain_text("position and orientation of the tool")
+    area, place = tab.page.locator("canvas[data-engine]").bounding_box(), hint.bounding_box()
+    assert area is not None
+    assert place is not None
+    assert place["x"] + place["width"] < area["x"] + area["width"], "over the scene, not over the controls"
     tab.page.mouse.move(5, 300)
     expect(hint).not_to_be_visible()
     tab.row("Target must match").locator("input:visible").first.click()
@@ -106,6 +122,22 @@ def test_labels_show_hints_but_not_over_a_menu(desktop: Tab) -> None:
     tab.page.wait_for_timeout(900)
     expect(hint).not_to_be_visible()
     tab.page.keyboard.press("Escape")
+
+
+def test_a_press_hides_the_hint(desktop: Tab) -> None:
+    tab = desktop
+    tab.open("Move")
+    hint = tab.page.get_by_role("tooltip")
+    thumb = tab.page.get_by_role("slider").first
+    thumb.hover()
+    expect(hint).to_be_visible()
+    tab.page.mouse.down()
+    expect(hint).not_to_be_visible()
+    tab.page.mouse.up()
+    tab.page.wait_for_timeout(900)  # longer than a hint waits
+    expect(hint).not_to_be_visible()
+    tab.row("Target must match").locator("input:visible").first.hover()
+    expect(hint).to_be_visible()
 
 
 def test_the_panel_is_made_wider_at_its_edge(desktop: Tab) -> None:
@@ -136,6 +168,23 @@ def test_the_panel_is_made_wider_at_its_edge(desktop: Tab) -> None:
     tab.dismiss_notice()
 
 
+def test_the_size_of_the_text_is_chosen_and_kept(desktop: Tab) -> None:
+    tab, width = desktop, "document.querySelector('[data-dock-region=right]').offsetWidth"
+    tab.open("View")
+    before, high = tab.page.evaluate(width), tab.row("Lengths").bounding_box()
+    assert high is not None
+    tab.page.get_by_role("button", name="Projector").click()
+    tab.page.wait_for_function(f"Math.abs({width} - {min(1.7 * before, 640)}) < 12")
+    higher = tab.row("Lengths").bounding_box()
+    assert higher is not None
+    assert higher["height"] == pytest.approx(1.7 * high["height"], rel=0.1)
+    assert tab.page.evaluate("localStorage.getItem('kinboard-text-size')") == "Projector"
+    assert tab.page.evaluate("document.querySelector('[data-status]').scrollWidth <= innerWidth")
+    tab.page.get_by_role("button", name="Normal", exact=True).click()
+    expect(tab.page.get_by_role("button", name="Normal", exact=True)).to_have_attribute("aria-pressed", "true")
+    tab.page.wait_for_function(f"Math.abs({width} - {before}) < 12")
+
+
 def test_texts_are_legible_the_status_stays_and_drawings_have_a_legend(tab: Tab) -> None:
     assert tab.page.evaluate(ILLEGIBLE) == []
     tab.select(PUMA)
@@ -146,6 +195,8 @@ def test_texts_are_legible_the_status_stays_and_drawings_have_a_legend(tab: Tab)
     expect(legend).to_contain_text(["possible velocities", "column of joint 2"])
 
     area = tab.page.locator(".mantine-ScrollArea-viewport:has([data-status])").first
+    assert tab.page.evaluate(SUBSCRIPTS_ON_THE_LINE) == []
+    assert tab.page.evaluate(CELLS_THAT_OVERFLOW) == []
     assert tab.hidden() > 100
     tab.page.mouse.move(1150, 600)
     assert tab.page.evaluate(UNDER_THE_SCROLLBAR) == []
@@ -155,7 +206,11 @@ def test_texts_are_legible_the_status_stays_and_drawings_have_a_legend(tab: Tab)
 
     tab.open("Move")
     tab.type_number(label(PUMA, 4), "0")
-    tab.open("Learn")
+    expect(legend.last).to_contain_text("impossible here")  # it stays as long as what it explains
+    expect(legend.last).to_be_visible()
+    tab.choose_lesson("None")
+    expect(legend).to_have_count(0)
+    tab.choose_lesson("Velocity")
     expect(tab.page.locator("[data-singular=at]")).to_be_visible()
     expect(legend.last).to_contain_text("impossible here")
     tab.screenshot("velocity-legend")

@@ -248,6 +248,17 @@ def test_the_landing_page(browser: Browser, address: str, name: str, width: int,
     if name == "light":
         viewer = page.frame_locator("#frame iframe")
         expect(viewer.locator("[data-status]")).to_have_attribute("data-status", "hand", timeout=WAIT)
+        page.evaluate("scrollTo(0, 0)")
+        card, stage = page.locator(".card").first.bounding_box(), page.locator("#frame").bounding_box()
+        assert card is not None
+        assert stage is not None
+        assert card["y"] < height - 60, "the first cards are seen"
+        page.mouse.move(stage["x"] + 200, stage["y"] + 200)
+        page.mouse.wheel(0, 150)
+        end = time.monotonic() + WAIT / 1000
+        while page.evaluate("scrollY") < 100:
+            assert time.monotonic() < end, "the wheel over the picture scrolls the page"
+            page.wait_for_timeout(50)
         page.get_by_role("link", name="UR5").click()
         expect(viewer.locator("input[value='UR5']").first).to_be_visible(timeout=WAIT)
         wait_for_tool(page, viewer, kin.fk(UR5, UR5.q_home))

@@ -16,6 +16,7 @@ from app.viewer.viser_patches import uuid_of
 from kin.units import Unit
 
 PRECISION = 9  # decimals that a field can show
+_MARKED = 3  # decimals of the limits below a slider
 _TYPED = 7  # decimals: a value with more is rounded
 _EXACT = 1e-10  # far below the last of them
 TEN = 10  # PageUp and PageDown are ten arrow keys
@@ -31,6 +32,11 @@ def shown(value: float, unit: Unit, digits: int) -> float:
         if abs(scaled - round(scaled, decimals)) < _EXACT:
             return round(scaled, decimals)
     return round(scaled, least)
+
+
+def limit_marks(low: float, high: float) -> tuple[tuple[float, str], ...]:
+    """The marks at the ends of a slider: its limits, in screen units, with a true minus sign."""
+    return tuple((end, f"{round(end, _MARKED):g}".replace("-", "−")) for end in (low, high))
 
 
 def field(slider: viser.GuiSliderHandle[float], unit: Unit) -> tuple[str, dict[str, Any]]:

@@ -14,7 +14,7 @@ import viser
 
 from app.viewer.panel import Post, assign, listen
 from app.viewer.panel.entry import read_value
-from app.viewer.panel.fields import field, fields_html, shown
+from app.viewer.panel.fields import field, fields_html, limit_marks, shown
 from app.viewer.panel.status import Notice
 from kin import InputError, Robot
 from kin.transforms import Array
@@ -85,6 +85,7 @@ class JointSliders:
                     min=bounds[0],
                     max=bounds[1],
                     step=unit.step(DIGITS),
+                    marks=limit_marks(*bounds),
                     initial_value=min(max(shown(float(q[i]), unit, DIGITS), bounds[0]), bounds[1]),
                     hint=f"{joint.name}: {limits}. Arrow keys: {unit.step(0):g}{unit.suffix}.",
                 )

@@ -33,6 +33,8 @@ class Panel:
         joints, posture: folders that are filled for each robot.
         learn: the tab for lessons.
         tabs: the features' tabs.
+        legend: what a lesson draws in the scene; below the tabs, so that it stays when another tab is opened.
+        hints: where the hints of the first minute are shown in the scene.
     """
 
     def __init__(
@@ -62,6 +64,8 @@ class Panel:
             listen_click(buttons, post, {"Home": "home", "Random": "random"})
             self.target = TargetChoice(gui, DEFAULT_TASK, post)
             self.posture = gui.add_folder("Posture and redundancy")
+        self.legend = gui.add_html("")
+        self.hints = gui.add_html("")
         self.learn = group.add_tab("Learn") if learn else None
         self.tabs = [group.add_tab(title) for title in tabs]
         with group.add_tab("View"):

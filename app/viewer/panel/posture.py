@@ -13,7 +13,7 @@ import viser
 
 from app.viewer.panel import Post, assign, listen, update_html
 from app.viewer.panel.entry import read_value
-from app.viewer.panel.fields import field, fields_html
+from app.viewer.panel.fields import field, fields_html, limit_marks
 from app.viewer.views.templates import render
 from kin import InputError, Redundancy, Robot, branch_meanings, branch_names
 from kin.units import DEFAULT_UNITS, Unit, Units
@@ -174,6 +174,7 @@ class RedundancySliders:
                     min=least,
                     max=most,
                     step=unit.step(1),
+                    marks=limit_marks(least, most),
                     initial_value=min(max(unit.shown(item.value), least), most),
                     hint=SLIDER_HINT,
                 )

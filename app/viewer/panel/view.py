@@ -8,6 +8,7 @@ from typing import Literal, get_args
 import viser
 
 from app.viewer.panel import Post, assign, listen, listen_click
+from app.viewer.views.templates import render
 from kin import InputError
 from kin.units import LENGTHS, Length, Units
 
@@ -17,6 +18,8 @@ SCHEMES: dict[str, bool | None] = {"Like the system": None, "Light": False, "Dar
 Side = Literal["Front", "Side", "Top", "Corner"]
 SIDES: tuple[Side, ...] = get_args(Side)
 SYSTEM_IS_DARK = "The system is dark"  # static/page.js looks for this label
+
+TEXT_SIZES = ("Normal", "Large", "Projector")  # static/layout.css says how large
 
 AXES = ("Tool axes", "Base axes")
 AXES_HINT = (
@@ -84,6 +87,7 @@ class ViewOptions:
         initial = AXES[state.base_axes]
         self._axes = gui.add_dropdown("Arrows along", AXES, initial_value=initial, hint=AXES_HINT)
         listen(self._axes, post, "axes")
+        gui.add_html(render("panel/text_size", names=TEXT_SIZES))
         group = gui.add_button_group("Camera", ("Fit arm", "Reset view"))
         listen_click(group, post, {"Fit arm": "fit-arm", "Reset view": "camera"})
         sides = gui.add_button_group("View from", SIDES)

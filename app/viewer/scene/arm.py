@@ -29,6 +29,8 @@ SAME = 1e-9  # rad or m: smaller changes are below the precision of a browser's 
 GIZMO = 0.26  # length of the gizmo's arrows, in radii of the sphere around the arm
 LINE = 4.0  # their thickness, pixels
 FOR_FINGERS = 1.6  # how much larger and thicker they are in the small picture of a phone
+THROUGH = 0.4  # opacity of the bodies while drawings inside them are shown
+BASE_AXES = 5.0  # length of the axes at the base, in thicknesses of the arm: beyond the pedestal's flange
 GAP_COLOR = (213, 94, 0)
 CONTACT_COLOR = (204, 20, 60)
 
@@ -57,6 +59,7 @@ class ArmScene:
         self._joints: list[viser.SceneNodeHandle] = []
         self._frames: list[viser.SceneNodeHandle] = []
         self._labels: list[viser.SceneNodeHandle] = []
+        self._bodies: list[viser.MeshHandle] = []
         self._axes: list[viser.SceneNodeHandle] = []
         self._shown = [math.nan] * robot.n
         self._top: list[viser.SceneNodeHandle] = []
@@ -196,6 +199,12 @@ class ArmScene:
             self._contact_label.text = text
         return text
 
+    def see_through(self, on: bool) -> None:
+        """Make way for drawings inside the arm: translucent links, no gizmo, no axes at the base."""
+        self.gizmo.visible = self._base.visible = not on
+        for node in self._bodies:
+            node.opacity = THROUGH if on else None
+
     def show_frames(self, visible: bool) -> None:
         """Show or hide the frame of every DH row."""
         for node in self._frames:
@@ -220,6 +229,7 @@ class ArmScene:
         root = self._scene.add_frame(self._root, show_axes=False)
         self._top.append(root)
         self._add(self._root, self.body.pedestal)
+        self._add_base_axes()
         self._add_frame(self._root, -1, self.robot.T_world_base)
         name = self._root
         for link, parts, q in zip(self.body.chain.links, self.body.parts, (0.0, *self.robot.home), strict=True):
@@ -235,6 +245,7 @@ class ArmScene:
                     if part.fixed_to_parent
                     else self._add(name, part)
                 )
+                self._bodies.append(node)
                 if part.name == "axis":
                     self._axes.append(node)
             for row, T in link.frames:
@@ -242,6 +253,7 @@ class ArmScene:
         tool = self.body.chain.T_last_tool
         for part in self.body.gripper:
             node = self._add(name, part, tool, visible=part.name != "approach")
+            self._bodies.append(node)
             if part.name == "approach":
                 self._approach = node
 
@@ -253,7 +265,7 @@ class ArmScene:
         opacity: float | None = None,
         visible: bool = True,
         name: str = "",
-    ) -> viser.SceneNodeHandle:
+    ) -> viser.MeshHandle:
         T = np.eye(4) if T is None else T
         return self._scene.add_mesh_simple(
             f"{parent}/{name or part.name}",
@@ -267,6 +279,21 @@ class ArmScene:
             cast_shadow=opacity is None and part.name not in NO_SHADOW,
             receive_shadow=False,  # round parts would shade themselves in stripes
         )
+
+    def _add_base_axes(self) -> None:
+        """The axes of the base frame, in which the read-out gives the tool's pose."""
+        T, length = self.robot.T_world_base, BASE_AXES * self.body.size
+        self._base = self._scene.add_frame(
+            f"{self._root}/base",
+            axes_length=length,
+            axes_radius=0.07 * self.body.size,
+            position=T[:3, 3],
+            wxyz=wxyz_from_rotation(T[:3, :3]),
+        )
+        for tip, letter in zip(np.eye(3), "xyz", strict=True):
+            self._scene.add_label(
+                f"{self._base.name}/{letter}", letter, position=1.15 * length * tip, anchor="center-center"
+            )
 
     def _add_frame(self, parent: str, row: int, T: Array) -> None:
         """The frame of a DH row; row −1 is the base frame."""

@@ -33,6 +33,8 @@ _NEAREST, _REMOTEST = 0.4, 14.0  # limits of zooming in and out, in these radii
 _FARTHEST_ASIDE = 3.0  # limit of panning, in these radii
 _LOWEST = 0.03  # least height of the camera above the floor, in these radii: from below, the floor hides the arm
 _SMALL_PICTURE = 420  # pixels
+_ABOVE = 0.3  # room above a target for the number that is written there, in these radii
+_OUTLOOK = 5.0  # in these radii: a target farther away is not shown
 _SMALLEST = 0.01  # metres; viser's own limit of zooming in
 _RESIZED = 0.01  # relative change of the picture's narrow side that moves the camera
 Sphere = tuple[Array, float]  # centre ``(3,)`` and radius, m
@@ -125,12 +127,22 @@ class VisitorCamera:
         self._camera.max_orbit_distance = max(_REMOTEST * body.radius, 1.5 * _distance(viewpoint))
         self._camera.min_orbit_distance = _NEAREST * body.radius
 
-    def keep(self, points: Array) -> None:
-        """If the picture does not contain these origins of the arm's frames ``(n, 3)``, glide until it does."""
+    def keep(self, points: Array, target: Array | None = None) -> None:
+        """If the picture does not contain these origins of the arm's frames ``(n, 3)``, glide until it does.
+
+        It then also contains a target ``(3,)`` or, if that is very far, the beginning of the line to it.
+        """
         self._points = points
         self.look()
         here = self._viewpoint
-        if self._body is None or self._shows(here, points):
+        if self._body is None:
+            return
+        if target is not None:
+            out = target - self._body.center
+            far = float(np.linalg.norm(out)) / (_OUTLOOK * self._body.radius)
+            seen = self._body.center + out / max(far, 1.0)
+            points = np.vstack([points, seen, seen + _ABOVE * self._body.radius * UP])
+        if self._shows(here, points):
             return
         sphere = round_both(_together(self._body, self._room), self._arm(points))
         viewpoint = _framed(sphere, here[0] - here[1], self._aspect, here[2])
@@ -169,9 +181,9 @@ class VisitorCamera:
             self._glide = None
         self._send(self._aimed if share >= 1.0 else between(start, self._aimed, share))
 
-    def place(self, point: Array) -> Array:
-        """Where a point ``(3,)`` will be in the picture; see `viewpoints.place`."""
-        return place(self._viewpoint, self._aspect, point)
+    def place(self, point: Array, length: float) -> tuple[float, float, float]:
+        """Where a point ``(3,)`` will be in the picture, and how long a length there; see `viewpoints`."""
+        return place(self._viewpoint, self._aspect, point, length)
 
     def fit(self, spheres: Sequence[Sphere]) -> None:
         """Make the default view show these spheres as well; a `chosen` view stays as it is."""

@@ -33,14 +33,15 @@ def contains(viewpoint: Array, aspect: float, points: Array, margin: float) -> b
     return bool((seen[:, 2] > margin).all() and (np.abs(seen[:, :2]) <= room).all())
 
 
-def place(viewpoint: Array, aspect: float, point: Array) -> Array:
-    """Where a point ``(3,)`` is in the picture ``(2,)``: to the right of and above the middle.
+def place(viewpoint: Array, aspect: float, point: Array, length: float) -> tuple[float, float, float]:
+    """Where a point ``(3,)`` is in the picture, to the right of and above the middle, and how long a length there.
 
-    The unit is half of the picture's narrow side, so that the place does not change with the picture's shape.
+    The unit is half of the picture's narrow side, so that the place does not change with the picture's shape. A
+    point behind the camera is far outside.
     """
-    x, y, depth = _seen(viewpoint, point[None])[0]
-    xy: Array = np.array([x, y]) / (depth * math.tan(FOV / 2.0) * min(aspect, 1.0))
-    return xy
+    x, y, depth = _seen(viewpoint, point[None])[0].tolist()
+    unit = max(depth, 1e-9) * math.tan(FOV / 2.0) * min(aspect, 1.0)
+    return x / unit, y / unit, length / unit
 
 
 def _seen(viewpoint: Array, points: Array) -> Array:

@@ -19,6 +19,7 @@ import kin
 from app.shared.security import Rights
 from app.viewer.feature import Feature
 from app.viewer.lessons import LESSONS
+from app.viewer.panel import update_html
 from app.viewer.panel.joints import JointSliders, lock_notice
 from app.viewer.panel.layout import PANEL_WIDTH, Panel
 from app.viewer.panel.status import READY, Notice, StatusLine, key_number
@@ -147,6 +148,12 @@ class VisitorPage(Worker):
 
     def notify(self, notice: Notice) -> None:
         self.status.show(notice)
+
+    def see_through(self, on: bool) -> None:
+        self.arm.scene.see_through(on)
+
+    def show_legend(self, html: str) -> None:
+        update_html(self.panel.legend, html)
 
     def fit_view(self, spheres: Sequence[Sphere]) -> None:
         self.camera.fit(spheres)
@@ -307,6 +314,13 @@ class VisitorPage(Worker):
             self._persistence.postpone(now)
         elif not (self.arm.moving or self.arm.dragging) and self._persistence.rested(now):
             self._guard(lambda: self._persistence.save(self._actions.take_returned()))
+            self._show_hints()
+
+    def _show_hints(self) -> None:
+        """Tell ``static/hints.js`` where the gizmo is in the picture, and how long its arrows are there."""
+        gizmo = self.arm.scene.gizmo
+        x, y, length = self.camera.place(gizmo.position, gizmo.scale)
+        update_html(self.panel.hints, render("panel/hints", place=f"{x:.3f} {y:.3f} {length:.3f}"))
 
     def _update_numbers(self) -> None:
         """Update the numbers in the panel: after the scene, because that takes longer than posing the joints."""
@@ -352,9 +366,7 @@ class VisitorPage(Worker):
                     self._tabs.append(tab(self))
             self._persistence.restore(saved)
             self.arm.draw(fresh=False)
-            # For static/hints.js: where the tool is in the picture.
-            x, y = self.camera.place(kin.fk(self.robot, self.goal)[:3, 3]).tolist()
-            gui.add_html(render("panel/hints", x=f"{x:.3f}", y=f"{y:.3f}"))
+            self._show_hints()
             self.panel.script.show_start(self._persistence.begin(self.panel.share))
         self.client.flush()
 

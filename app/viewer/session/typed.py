@@ -69,6 +69,7 @@ class TypedInput:
         elif oriented and kind != "position" and page.task == "position":
             page.set_task("pose")
         arm.set_target(T)
+        page.camera.keep(kin.link_frames(page.robot, arm.goal)[:, :3, 3], T[:3, 3])
 
     def _answer(self, number: int, action: Callable[[], None]) -> None:
         """Act on a typed text, and tell the page whether it was valid."""

@@ -164,6 +164,7 @@ class DHLesson(Feature):
     def remove(self) -> None:
         self._remove_drawings()
         self._restore_camera()
+        self.stage.see_through(False)
 
     # The player
 
@@ -243,6 +244,7 @@ class DHLesson(Feature):
         assign(self._slider, self._at / MOTIONS)
         self._nine.content = views.nine_steps_html(robot.convention)
         frames = link_frames(robot, robot.q_home)
+        self.stage.see_through(True)
         self._drawing = WalkDrawing(self.stage.client.scene, robot, frames, f"/dh-{next(_fresh)}")
         self._show_other(aim=True)
         self._draw()

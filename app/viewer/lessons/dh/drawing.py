@@ -8,12 +8,24 @@ drawn as a skeleton to one side.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from app.viewer.lessons.dh.steps import Factor, Place, amount, axis, coaxial_joints, reread, symbol, turns
+from app.viewer.lessons.dh.steps import (
+    Factor,
+    Place,
+    amount,
+    axis,
+    coaxial_joints,
+    coinciding,
+    frames_name,
+    reread,
+    symbol,
+    turns,
+)
 from app.viewer.lessons.dh.views import ABOUT_X, ABOUT_Z, TITLES
 from app.viewer.scene.camera import DIRECTION
 from app.viewer.scene.meshes import body, joint_color
@@ -28,6 +40,8 @@ AXES = ((204, 0, 0), (51, 153, 0), (0, 0, 204))  # x, y, z, as viser paints the 
 ARC = 32  # segments
 # In units of the arm's thickness.
 MOVING, PLACED, RADIUS, ASIDE = 8.0, 4.5, 6.0, 4.0
+ROOM = 4.0  # between two labels
+HEIGHTS = (1.2, -0.6, 1.7)  # of a frame's label, in lengths of its z axis
 
 
 def arc(axis_: int, radius: float, angle: float) -> Segments:
@@ -125,11 +139,12 @@ class WalkDrawing:
         self._root = scene.add_frame(root, show_axes=False)
         self._name = root
         self._moving = moving_frame(scene, f"{root}/moving", self._size)
-        all_frames = np.concatenate([robot.T_world_base[None], frames])
-        self._heights = [_height(all_frames, i) for i in range(len(all_frames))]
+        # One label for all frames of one origin, at the tip of the z axis of one of them.
+        self._groups = coinciding(robot)
+        self._at = label_places(self._groups, np.concatenate([robot.T_world_base[None], frames]), self._size)
         self._labels = [
-            scene.add_label(f"{root}/name-{i}", f"frame {i}", anchor="center-center", visible=False)
-            for i in range(len(all_frames))
+            scene.add_label(f"{root}/name-{group[0]}", "", anchor="center-center", visible=False)
+            for group in self._groups
         ]
         self._value = scene.add_label(
             f"{root}/value", "", anchor="center-center", visible=False, font_screen_scale=1.15
@@ -160,13 +175,18 @@ class WalkDrawing:
             self._count = len(frames)
             colors = triad_colors(len(frames))
             self._placed = self._lines("placed", points, colors, 0.26)
-            for i, label in enumerate(self._labels):
-                label.visible = i < len(frames)
+            for label, group in zip(self._labels, self._groups, strict=True):
+                placed = [number for number in group if number < len(frames)]
+                label.visible = bool(placed)
+                if placed:
+                    label.text = frames_name(placed, len(self._robot.rows))
             names = True
         if not names:
             return
-        for label, height, T in zip(self._labels, self._heights, frames, strict=False):
-            label.position = T[:3, 3] + height * PLACED * self._size * T[:3, 2]
+        for label, group, (member, height) in zip(self._labels, self._groups, self._at, strict=True):
+            if group[0] < len(frames):
+                T = frames[min(member, len(frames) - 1)]
+                label.position = T[:3, 3] + height * PLACED * self._size * T[:3, 2]
 
     def _show_quantity(self, at: Place, units: Units) -> None:
         shown = at.value * at.share
@@ -260,7 +280,9 @@ class OtherDrawing:
             )
             line.points = points
             if names:
-                label.position = points[0, 1]
+                # At the outer end: what is drawn at the arm and at the skeleton must not meet in the middle.
+                ends = points[0] @ self.offset.astype(np.float32)
+                label.position = points[0, int(ends.argmax() if reading is self.robot else ends.argmin())]
 
     def remove(self) -> None:
         """Remove everything from the scene."""
@@ -293,7 +315,22 @@ def aside(robot: Robot) -> Array:
     return 1.4 * body(robot).radius * left / np.linalg.norm(left)
 
 
-def _height(frames: Array, i: int) -> float:
-    """The distance of a frame's label, in lengths of its z axis: the frames of a wrist share their origin."""
-    crowd = int((np.linalg.norm(frames[:i, :3, 3] - frames[i, :3, 3], axis=1) < 1e-6).sum())
-    return 1.2 + 0.5 * crowd
+def label_places(groups: Sequence[Sequence[int]], frames: Array, size: float) -> list[tuple[int, float]]:
+    """Where the label of each group of `frames` ``(k, 4, 4)`` is: at the z axis of which one, at how many lengths.
+
+    It is the first place with room for a label, or else the one farthest from all labels before.
+    """
+    chosen: list[tuple[int, float]] = []
+    taken: list[Array] = []
+    for group in groups:
+        best, most = (group[0], HEIGHTS[0]), -1.0
+        for member, height in ((member, height) for height in HEIGHTS for member in group):
+            point = frames[member, :3, 3] + height * PLACED * size * frames[member, :3, 2]
+            room = min((float(np.linalg.norm(point - other)) for other in taken), default=math.inf)
+            if room > most:
+                best, most = (member, height), room
+            if room > ROOM * size:
+                break
+        chosen.append(best)
+        taken.append(frames[best[0], :3, 3] + best[1] * PLACED * size * frames[best[0], :3, 2])
+    return chosen

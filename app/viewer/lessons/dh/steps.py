@@ -7,6 +7,7 @@ the present motion as its fraction. At 4, 8, … a frame is complete: that is ``
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
@@ -206,8 +207,23 @@ def caption(robot: Robot, at: Place, units: Units) -> str:
     else:
         verb = "turn {} about {}" if turns(at.factor) else "slide {} along {}"
         words = verb.format(amount(at.factor, at.value, units), line) + f" ({name}{mover})"
-    end = f". Frame {at.row + 1} is placed." if at.placed > at.row else "."
+    end = f". {frames_name([at.row + 1], len(robot.rows)).capitalize()} is placed." if at.placed > at.row else "."
     return opening + words + end
+
+
+def frames_name(numbers: Sequence[int], rows: int) -> str:
+    """The name of the frames with these numbers, in a table of so many rows: the last one is the tool's."""
+    names = [f"{number} (tool)" if number == rows else str(number) for number in numbers]
+    return f"frame{'s' * (len(names) > 1)} {', '.join(names)}"
+
+
+def coinciding(robot: Robot) -> list[list[int]]:
+    """The numbers of all frames, grouped: frames of one group always have one origin."""
+    groups = [[0]]
+    for row, joint in enumerate(robot.rows):
+        fixed = joint.kind != "prismatic" and joint.a == 0.0 and joint.d == 0.0
+        groups[-1:] = [[*groups[-1], row + 1]] if fixed else [groups[-1], [row + 1]]
+    return groups
 
 
 def coaxial_joints(robot: Robot) -> list[int]:

@@ -23,6 +23,7 @@ from app.viewer.lessons.redundancy import views
 from app.viewer.lessons.redundancy.drawing import Drawing
 from app.viewer.lessons.redundancy.ring import coaxial, elbow_circle
 from app.viewer.panel import assign, listen, update_html
+from app.viewer.panel.fields import limit_marks
 from app.viewer.panel.posture import on_side_of
 from app.viewer.panel.status import Notice
 from app.viewer.self_motion import INSET, SMOOTH, End, ends, range_of, redundancy_at, self_motion
@@ -339,6 +340,7 @@ class RedundancyLesson(Feature):
             listen(self._sweep, self.post, "sweep")
             self._slider = gui.add_slider(
                 f"Set {item.label.split()[-1]} (tool held)", min=low, max=high, step=unit.step(1),
+                marks=limit_marks(low, high),
                 initial_value=min(max(unit.shown(item.value), low), high), hint=SLIDER_HINT,
             )  # fmt: skip
             listen(self._slider, self.post, ("value", item.name, stage.units))

@@ -81,7 +81,6 @@ class VelocityLesson(Feature):
         self._scales: dict[Ellipsoid, float]
         gui = stage.client.gui
         self._warning = gui.add_html("")
-        self._legend = gui.add_html("")
         self._frames = gui.add_dropdown("Frame", tuple(FRAMES), initial_value="Base", hint=FRAME_HINT)
         listen(self._frames, self.post, "frame")
         with gui.add_folder("Jacobian") as self._column_folder:
@@ -111,7 +110,6 @@ class VelocityLesson(Feature):
             verb = "Turns the tool about" if axis > 2 else "Moves the tool along"
             handle = gui.add_button(
                 button(axis, sign),
-                color="gray",
                 hint=f"{verb} {'xyz'[axis % 3]} by one step",
                 order=4 + number,
             )
@@ -236,6 +234,7 @@ class VelocityLesson(Feature):
 
     def remove(self) -> None:
         self._drawing.remove()
+        self.stage.show_legend("")
 
     # Jogging
 
@@ -329,7 +328,7 @@ class VelocityLesson(Feature):
         self._drawing.show_lost(twists, state == "at")
         words = [views.lost_words(twist, R_base_tool, slowest=state == "near") for twist in twists]
         update_html(self._warning, views.warning_html(robot, found, stage.units, words))
-        update_html(self._legend, views.legend_html(self._kind, self._chosen, state, twists))
+        stage.show_legend(views.legend_html(self._kind, self._chosen, state, twists))
         update_html(self._others, views.others_html(robot, found, stage.units))
 
 

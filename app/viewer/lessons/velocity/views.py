@@ -36,7 +36,7 @@ _ALIGNED = math.cos(math.radians(0.5))
 def matrix_html(robot: Robot, J: Array, frame: str, chosen: int | None) -> str:
     """The Jacobian ``(6, n)`` in one frame, with named rows and columns, and the chosen column highlighted."""
     # Columns have fixed widths, so that no number moves; seven columns must fit a panel of 300 pixels.
-    wide = robot.n >= 7
+    wide = robot.n >= 6
     names = [ident("v")] * 3 + [ident("ω")] * 3
     variables = ("θ" if revolute else "d" for revolute in robot.revolute)
     return render(

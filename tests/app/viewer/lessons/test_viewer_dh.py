@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
@@ -17,6 +18,7 @@ from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.lessons import dh
 from app.viewer.lessons.dh import drawing, steps, views
+from app.viewer.scene.meshes import body
 from app.viewer.server import ViewerServer
 from kin.units import DEFAULT_UNITS, Units
 
@@ -199,6 +201,32 @@ def test_symbols_insert_constants_and_keep_the_joint_variable() -> None:
     assert entries(SCARA, 2)[8:12] == ["0", "0", "1", "d3"]
 
 
+def test_the_last_frame_is_the_tools() -> None:
+    puma = kin.get_robot("puma560")
+    last = steps.caption(puma, steps.place(puma, puma.q_home, 28), DEFAULT_UNITS)
+    assert last == "Row 7 of 7: α₇ = 0, no rotation about x₇. Frame 7 (tool) is placed."
+    assert steps.frames_name([4, 5, 6], 7) == "frames 4, 5, 6"
+    assert steps.frames_name([7], 7) == "frame 7 (tool)"
+
+
+@pytest.mark.parametrize("robot", READINGS, ids=lambda r: f"{r.id}-{r.convention}")
+def test_frames_of_one_origin_have_one_label_and_labels_have_room(robot: kin.Robot) -> None:
+    groups = steps.coinciding(robot)
+    assert [number for group in groups for number in group] == list(range(len(robot.rows) + 1))
+    for q in robot.random_q(np.random.default_rng(3), 20):
+        frames = np.concatenate([robot.T_world_base[None], kin.link_frames(robot, q)])
+        ends = [frames[group][:, :3, 3] for group in groups]
+        assert max(float(np.ptp(origins, axis=0).max()) for origins in ends) < 1e-9, "one origin each"
+    frames = np.concatenate([robot.T_world_base[None], kin.link_frames(robot, robot.q_home)])
+    size = body(robot).size
+    places = [
+        frames[member, :3, 3] + height * drawing.PLACED * size * frames[member, :3, 2]
+        for member, height in drawing.label_places(groups, frames, size)
+    ]
+    apart = [np.linalg.norm(a - b) for a, b in itertools.combinations(places, 2)]
+    assert min(apart) > size
+
+
 def test_numbers_follow_the_units() -> None:
     at = steps.place(PIONEER, PIONEER.q_home, 4.5)
     assert "30.0" in views.table_html(PIONEER, PIONEER.q_home, at, DEFAULT_UNITS)
@@ -340,7 +368,7 @@ def test_playing_goes_to_the_end_and_stops(tab: FakeBrowser, monkeypatch: pytest
     tab.wait(lambda: "Pause" in tab.gui[tab.element("Motion")]["props"]["options"])
     tab.wait(lambda: tab.value("Row") == 6.0)
     tab.wait(lambda: shows(tab, kin.link_frames(PIONEER, PIONEER.q_home)[-1]))
-    tab.wait(lambda: "Frame 6 is placed" in tab.html)
+    tab.wait(lambda: "Frame 6 (tool) is placed" in tab.html)
     tab.settle()
     assert "Play" in tab.gui[tab.element("Motion")]["props"]["options"]
     monkeypatch.setattr(dh, "MOTION_TIME", 5.0)

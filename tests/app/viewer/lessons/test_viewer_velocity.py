@@ -430,7 +430,7 @@ def test_a_column_is_drawn_and_removed(tab: FakeBrowser) -> None:
 def test_every_arm_can_be_shown(tab: FakeBrowser) -> None:
     for robot in STORE.robots:
         use(tab, robot)
-        tab.wait(lambda robot=robot: shown(tab, kin.jacobian(robot, robot.q_home), 3 if robot.n < 7 else 2))  # type: ignore[misc]
+        tab.wait(lambda robot=robot: shown(tab, kin.jacobian(robot, robot.q_home), 3 if robot.n < 6 else 2))  # type: ignore[misc]
     assert 'data-status="error"' not in tab.html
 
 
@@ -452,6 +452,7 @@ def test_a_shared_state_is_restored_and_an_invalid_one_is_ignored() -> None:
             task="pose",
             units=DEFAULT_UNITS,
             dark=False,
+            show_legend=lambda html: None,
         )
         lesson = VelocityLesson(stage)  # type: ignore[arg-type]
         first = lesson.state()

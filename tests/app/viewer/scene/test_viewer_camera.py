@@ -252,6 +252,28 @@ def test_the_camera_makes_room_for_drawings_but_keeps_a_chosen_view() -> None:
     assert np.array_equal(lens.position, near), "another arm, another cloud"
 
 
+@pytest.mark.parametrize("target", [(0.1, 0.2, 0.0), (1.0, 0.0, 0.0), (0.0, -1.5, 0.4), (400.0, 0.0, 0.0)])
+def test_a_typed_target_and_the_arm_are_both_in_the_picture(target: tuple[float, float, float]) -> None:
+    lens = SimpleNamespace(
+        image_width=956, image_height=720, position=np.ones(3), look_at=np.zeros(3), up_direction=camera.UP,
+        on_update=lambda act: act,
+    )  # fmt: skip
+    of_visitor = camera.VisitorCamera(SimpleNamespace(camera=lens), lambda key, value: None)  # type: ignore[arg-type]
+    arm = body(PIONEER)
+    origins = frames(PIONEER, PIONEER.q_home)
+    of_visitor.aim(arm, origins)
+    before = lens.position
+    of_visitor.keep(origins, np.array(target))
+    of_visitor.tick(math.inf)
+    there = np.stack([lens.position, lens.look_at, lens.up_direction])
+    far = np.linalg.norm(np.array(target)) > 100.0
+    assert np.array_equal(lens.position, before) == (np.linalg.norm(target) < 0.3), "it moves only if it must"
+    assert viewpoints.contains(there, 956 / 720, origins, 0.0)
+    assert viewpoints.contains(there, 956 / 720, np.array([target]), 0.0) != far
+    if far:
+        assert np.linalg.norm(lens.position - arm.center) < 20.0 * arm.radius, "the arm is not lost from sight"
+
+
 def test_a_sphere_round_two() -> None:
     small, large = (np.array([1.0, 0.0, 0.0]), 0.5), (np.array([0.0, 0.0, 0.0]), 2.0)
     assert camera.round_both(small, large) is large

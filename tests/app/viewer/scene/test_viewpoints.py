@@ -60,7 +60,9 @@ def test_the_way_between_viewpoints(
 @pytest.mark.parametrize("aspect", [0.5, 1.0, 1.8])
 def test_a_place_in_the_picture_is_measured_from_its_middle(aspect: float) -> None:
     viewpoint = from_side(DIRECTIONS["Front"])
-    assert np.allclose(place(viewpoint, aspect, np.zeros(3)), 0.0)
     narrow = 4.0 * math.tan(FOV / 2) * min(aspect, 1.0)
-    assert np.allclose(place(viewpoint, aspect, np.array([0.0, narrow, 0.0])), [1.0, 0.0])
-    assert np.allclose(place(viewpoint, aspect, np.array([0.0, 0.0, narrow])), [0.0, 1.0])
+    assert np.allclose(place(viewpoint, aspect, np.zeros(3), narrow), [0.0, 0.0, 1.0])
+    assert np.allclose(place(viewpoint, aspect, np.array([0.0, narrow, 0.0]), 0.0), [1.0, 0.0, 0.0])
+    assert np.allclose(place(viewpoint, aspect, np.array([0.0, 0.0, narrow]), 0.0), [0.0, 1.0, 0.0])
+    x, y, _ = place(viewpoint, aspect, np.array([5.0, 0.1, 0.0]), 1.0)
+    assert max(abs(x), abs(y)) > 10.0, "behind the camera"
