@@ -19,7 +19,7 @@ from kin.solvers.offset7.geometry import OFFSET, SIGN
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
-SAMPLES = 96  # of the whole range
+SAMPLES = 96  # of a whole turn
 _LIMIT = TOLERANCES.limit
 _INSET = TOLERANCES.interval_inset
 _GOLDEN = 0.6180339887498949
@@ -107,10 +107,40 @@ def _peak(
 
 
 @jit
+def _at_edge(
+    params: Array, T: Array, box: Array, k: int, inside: tuple[float, float], outside: float, arcs: Array,
+    found: int,
+) -> int:  # fmt: skip
+    """Append the interval of branch k, if any, that begins where the branch begins to exist.
+
+    inside: (value, slack) where it exists outside the limits; outside: a value where it does not exist.
+    """
+    work = (np.empty((8, 7)), np.empty(8), np.empty(8))
+    x, y = inside[0], outside
+    for _ in range(_ZERO_STEPS):
+        middle = 0.5 * (x + y)
+        _at(params, T, middle, box, work, k)
+        if work[1][k] >= 0.0:
+            x = middle
+        else:
+            y = middle
+    f = _at(params, T, x, box, work, k)
+    if f < 0.0 or found == arcs.shape[0]:
+        return found
+    end = _zero(params, T, box, work, k, (x, f), inside)
+    arcs[found, 0], arcs[found, 1], arcs[found, 2] = k, min(x, end), max(x, end)
+    return found + 1
+
+
+@jit
 def _ranges_of(
-    params: Array, T: Array, box: Array, k: int, marks: Array, samples: Array, arcs: Array, found: int
+    params: Array, T: Array, box: Array, k: int, marks: Array, curves: tuple[Array, Array], arcs: Array, found: int
 ) -> int:
-    """Append the feasible intervals of branch k to arcs; marks, samples ``(n,)``: values, and the slack there."""
+    """Append the feasible intervals of branch k to arcs.
+
+    marks ``(n,)``: values; curves: the slack there ``(n,)``, and how far inside the arm's reach the branch is.
+    """
+    samples, there = curves
     work = (np.empty((8, 7)), np.empty(8), np.empty(8))
     n = marks.shape[0]
     start = math.nan
@@ -139,6 +169,10 @@ def _ranges_of(
         if i == n - 1:
             break
         after = samples[i + 1]
+        if f < 0.0 and after < 0.0 and there[i] >= 0.0 > there[i + 1]:
+            found = _at_edge(params, T, box, k, (marks[i], f), marks[i + 1], arcs, found)
+        elif f < 0.0 and after < 0.0 and there[i + 1] >= 0.0 > there[i]:
+            found = _at_edge(params, T, box, k, (marks[i + 1], after), marks[i], arcs, found)
         if f < 0.0 <= after:
             start = _zero(params, T, box, work, k, (marks[i + 1], after), (marks[i], f))
         elif f >= 0.0 > after and found < arcs.shape[0]:
@@ -153,6 +187,16 @@ def _ranges_of(
 
 
 @jit
+def _insert(marks: Array, value: float) -> None:
+    """Insert a value into the sorted marks ``(n,)``, of which the last place is free."""
+    i = marks.shape[0] - 1
+    while i > 0 and marks[i - 1] > value:
+        marks[i] = marks[i - 1]
+        i -= 1
+    marks[i] = value
+
+
+@jit
 def feasible(
     params: Array, T: Array, box: Array, span: tuple[float, float], wanted: float, arcs: Array, chosen: Array
 ) -> int:
@@ -162,18 +206,21 @@ def feasible(
     none, the sample at which the branch is least outside the limits; NaN where it does not exist.
     """
     low, high = span
-    n = max(2, math.ceil(SAMPLES * (high - low) / (2.0 * math.pi))) + 1 if high > low else 1
+    n = max(2, math.ceil(SAMPLES * (high - low) / (2.0 * math.pi))) + 2 if high > low else 1
     marks, samples, there = np.empty(n), np.empty((8, n)), np.empty((8, n))
     rows, room, spare = np.empty((8, 7)), np.empty(8), np.empty(8)
     for i in range(n):
-        marks[i] = low + (high - low) * i / (n - 1) if n > 1 else low
+        marks[i] = low + (high - low) * i / (n - 2) if i < n - 1 and n > 1 else low
+    if n > 1:
+        _insert(marks, min(max(wanted, low), high))
+    for i in range(n):
         slack(params, T, marks[i], box, -1, rows, room, spare)
         for k in range(8):
             samples[k, i], there[k, i] = spare[k], room[k]
     found = 0
     for k in range(8):
         first = found
-        found = _ranges_of(params, T, box, k, marks, samples[k], arcs, found)
+        found = _ranges_of(params, T, box, k, marks, (samples[k], there[k]), arcs, found)
         chosen[k] = _nearest(arcs, first, found, wanted)
         if first == found:
             best = -math.inf
@@ -185,9 +232,11 @@ def feasible(
 
 @jit
 def _nearest(arcs: Array, first: int, found: int, wanted: float) -> float:
-    """The value of the intervals first…found−1 nearest to the wanted one, slightly inside their ends."""
+    """The value of the intervals first…found−1 nearest to the wanted one: that one, or slightly inside an end."""
     best = math.nan
     for i in range(first, found):
+        if arcs[i, 1] <= wanted <= arcs[i, 2]:
+            return wanted
         inset = min(_INSET, 0.5 * (arcs[i, 2] - arcs[i, 1]))
         x = min(max(wanted, arcs[i, 1] + inset), arcs[i, 2] - inset)
         if math.isnan(best) or abs(x - wanted) < abs(best - wanted):

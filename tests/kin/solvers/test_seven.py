@@ -334,3 +334,10 @@ def test_a_lock_that_does_not_remove_the_redundancy_keeps_it():
     result = kin.solve_ik(robot, kin.fk(robot, q), locked=locked)
     assert result.status is Status.SOLVED
     assert [r.name for r in result.redundancy] == ["psi"]
+
+
+@named
+def test_the_configuration_of_the_seed_is_found_however_narrow_its_range(robot):
+    q = robot.random_q(np.random.default_rng(21), 300)
+    for own, T in zip(q, kin.fk(robot, q), strict=True):
+        assert kin.solve_ik(robot, T, q_seed=own).solutions[0].distance < 1e-6
