@@ -11,7 +11,7 @@ import viser
 
 from app.viewer.panel.posture import short
 from app.viewer.views.templates import render
-from kin import IKResult, Robot
+from kin import IKResult, IKSolution, Robot
 from kin.ik.details import OrientationNotMet, OutOfReach, OutsideLimits, RollError, RotationError, Solved
 from kin.units import Units
 
@@ -50,9 +50,13 @@ def notice(result: IKResult, units: Units) -> Notice:
     detail = explanation.detail
     if isinstance(result.details, OutsideLimits):
         detail = detail.replace(result.details.branch, short(result.details.branch))
+    off = _farther_off(result, units)
+    if off:
+        detail += f" The posture shown is {off} off, because it keeps the orientation as far as it can."
     return Notice(_kind(result), explanation.title, detail)
 
 
+_VISIBLE = 5e-4  # metres
 _OUT_OF_REACH = {"too far": "too far", "too near": "too close"}
 
 
@@ -60,7 +64,12 @@ def key_number(result: IKResult, units: Units) -> str:
     """What is missing to the target, in a few words; empty if it is reached."""
     match result.details:
         case OutOfReach(distance) if distance > 0.0:
-            return f"{units.distance(distance)} {_OUT_OF_REACH.get(result.cause, 'out of reach')}"
+            off = _farther_off(result, units)
+            return (
+                f"{off} off"
+                if off
+                else f"{units.distance(distance)} {_OUT_OF_REACH.get(result.cause, 'out of reach')}"
+            )
         case RollError(_, error):
             return f"roll {units.angle(error)} off"
         case RotationError(_, error):
@@ -68,9 +77,21 @@ def key_number(result: IKResult, units: Units) -> str:
         case OutsideLimits(_, (first, *_)):
             limit = units.of(first.kind == "revolute").text(first.limit)
             return f"joint {first.joint + 1}: {'locked at' if first.locked else 'limit'} {limit}"
-        case OrientationNotMet(nearest_rotation=angle) if angle is not None:
-            return f"orientation {units.angle(angle)} off"
+        case OrientationNotMet() if result.closest is not None:
+            return f"{_errors(result.closest, units)} off"
     return ""
+
+
+def _farther_off(result: IKResult, units: Units) -> str:
+    """The errors of the posture shown for a point out of reach, if the tool is farther from it than it need be."""
+    shown = result.closest
+    if not isinstance(result.details, OutOfReach) or shown is None:
+        return ""
+    return _errors(shown, units) if shown.position_error > result.details.distance + _VISIBLE else ""
+
+
+def _errors(shown: IKSolution, units: Units) -> str:
+    return f"{units.distance(shown.position_error)} and {units.angle(shown.rotation_error)}"
 
 
 def introduction(robot: Robot) -> Notice:

@@ -7,7 +7,7 @@ import pytest
 from fake_browser import FakeBrowser
 
 import kin
-from app.viewer.panel.status import key_number
+from app.viewer.panel.status import key_number, notice
 from kin.units import DEFAULT_UNITS, Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -33,6 +33,21 @@ def test_each_kind_of_miss_has_its_number() -> None:
     beyond[0] = PIONEER.lower[0] - 0.5
     found = text(PIONEER, kin.fk(PIONEER, beyond))
     assert found.startswith("joint 1: limit ") or found.endswith(" off"), found
+
+
+def test_the_number_is_the_distance_that_one_sees() -> None:
+    """A point out of reach by little, whose orientation keeps the tool much farther away."""
+    q = PIONEER.q_home.copy()
+    q[0] = np.radians(144.0)
+    T = kin.fk(PIONEER, q)
+    T[:2, 3] += 0.18 * np.array([np.cos(q[0]), np.sin(q[0])])
+    result = kin.solve_ik(PIONEER, T, q_seed=q, task="approach")
+    assert result.closest is not None
+    seen = float(np.linalg.norm(kin.fk(PIONEER, result.closest.q)[:3, 3] - T[:3, 3]))
+    assert result.distance is not None
+    assert seen > 5.0 * result.distance
+    assert key_number(result, DEFAULT_UNITS).startswith(f"{DEFAULT_UNITS.distance(seen)} and ")
+    assert f"is {DEFAULT_UNITS.distance(seen)} and" in notice(result, DEFAULT_UNITS).detail
 
 
 def test_the_number_is_beside_a_missed_target_only(port: int) -> None:
