@@ -26,6 +26,12 @@
   const uncover = () => delete root.dataset.kbCover;
   setTimeout(uncover, PATIENCE);
 
+  // Without a graphics card, clouds of many points make the page stop: static/viewer.css shows a warning then.
+  const gl = document.createElement("canvas").getContext("webgl");
+  const renderer = gl?.getParameter(gl.getExtension("WEBGL_debug_renderer_info")?.UNMASKED_RENDERER_WEBGL ?? gl.RENDERER);
+  root.toggleAttribute("data-kb-software", /swiftshader|llvmpipe|software|basic render/i.test(renderer ?? ""));
+  gl?.getExtension("WEBGL_lose_context")?.loseContext();
+
   /** Tell the service whether the system is dark, with the hidden check box. */
   function tell() {
     const label = [...document.querySelectorAll("label")].find((node) => node.textContent === SYSTEM_IS_DARK);

@@ -57,7 +57,7 @@ def cloud(tab: Tab) -> None:
     tab.select(kin.get_robot("pioneer5"))
     tab.open("Workspace")
     tab.type_number("Points", str(FEW))
-    tab.page.get_by_role("button", name="Start").click()
+    tab.page.get_by_role("button", name="Start").first.click()
     expect(tab.page.locator("[data-cloud]")).to_have_attribute("data-cloud", "done")
 
 
@@ -75,18 +75,18 @@ def capability(tab: Tab) -> None:
     tab.check("Section plot")
     tab.check("Sizes")
     tab.choose("Cut", "none")
-    tab.page.get_by_role("button", name="Cancel").click()
+    tab.page.get_by_role("button", name="Clear").first.click()
     folder = tab.page.get_by_role("button", name="Capability")
     if folder.get_attribute("aria-expanded") != "true":
         folder.press("Enter")
     tab.choose("Grid", "15 voxels long")
-    tab.page.get_by_role("button", name="Compute").click()
+    tab.page.get_by_role("button", name="Start").last.click()
     expect(tab.page.locator("[data-map]")).to_have_attribute("data-map", "done", timeout=COLD)
 
 
 def view(tab: Tab) -> None:
     if tab.page.get_by_role("button", name="Clear").count():
-        tab.page.get_by_role("button", name="Clear").click()
+        tab.page.get_by_role("button", name="Clear").last.click()
     tab.open("View")
 
 

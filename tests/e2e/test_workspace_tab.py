@@ -23,7 +23,7 @@ COLD = 120_000  # ms; a service that is ready may still be compiling the kernels
 def draw(tab: Tab, points: int) -> None:
     tab.page.get_by_role("tab", name="Workspace").click()
     tab.type_number("Points", str(points))
-    tab.page.get_by_role("button", name="Start").click()
+    tab.page.get_by_role("button", name="Start").first.click()
     expect(tab.page.locator("[data-cloud]")).to_have_attribute("data-cloud", "done")
     tab.page.wait_for_timeout(700)
 
@@ -50,7 +50,7 @@ def test_a_cloud_is_drawn_and_a_click_moves_the_arm_to_its_point(tab: Tab) -> No
     tab.page.mouse.up()
     tab.page.wait_for_timeout(500)
     assert tab.status.inner_text() == before, "orbiting the view picks no point"
-    tab.page.get_by_role("button", name="Cancel").click()
+    tab.page.get_by_role("button", name="Clear").first.click()
     tab.page.get_by_role("tab", name="View").click()
     tab.page.get_by_role("button", name="Reset view").click()
 
@@ -83,7 +83,7 @@ def test_a_cut_and_the_section_plot(tab: Tab) -> None:
     expect(tab.page.locator("[data-legend=names]")).to_contain_text("orange")
     expect(tab.page.locator("[data-cloud]")).to_have_attribute("data-cloud", "done")
     tab.screenshot("workspace-compared")
-    tab.page.get_by_role("button", name="Cancel").click()
+    tab.page.get_by_role("button", name="Clear").first.click()
     expect(tab.page.locator("[data-cloud]")).to_have_attribute("data-cloud", "ready")
     tab.check("Section plot")
     expect(tab.page.locator("[data-plot=section]")).to_have_count(0)

@@ -60,7 +60,7 @@ class CloudView:
         self._window = window
         self._new_root = new_root
         self._wake = wake
-        self._running = False
+        self._running = self._stopped = False
         self._cut: Cut | None = None
         self._slabs: NDArray[np.bool_] | None = None
         # When the clock for the speed was started last, and its time before that.
@@ -84,16 +84,27 @@ class CloudView:
         return True
 
     def pause(self) -> None:
-        """Pause, or continue."""
-        if self.nodes and self.unfinished:
-            self._run(not self._running)
+        """Stop for now."""
+        if self._running and self.unfinished:
+            self._run(False)
+
+    def resume(self) -> None:
+        """Continue after a pause."""
+        if self.nodes and not self._running and self.unfinished:
+            self._run(True)
+
+    def stop(self) -> None:
+        """End sampling; the points stay."""
+        self.pause()
+        self._stopped = bool(self.nodes)
+        self.report()
 
     def clear(self) -> None:
         """Stop and remove everything."""
         for nodes in self.nodes:
             nodes.remove()
         self.nodes = []
-        self._running = False
+        self._running = self._stopped = False
         self._elapsed = 0.0
         self.show_legend()
         self.report()
@@ -145,6 +156,7 @@ class CloudView:
         return nodes
 
     def _run(self, running: bool) -> None:
+        self._stopped = False
         self._set_clock(running)
         for nodes in self.nodes:
             nodes.resume(running)
@@ -204,7 +216,9 @@ class CloudView:
         state: views.State = "ready"
         if self.nodes:
             more = drawn < total
-            state = "running" if self._running and more else "paused" if more else "done"
+            state = "running" if self._running and more else "done"
+            if more and state == "done":
+                state = "stopped" if self._stopped else "paused"
             if state == "running" and not drawn and elapsed > REST:
                 state = "preparing"
             if self.busy and not self._running:
@@ -215,6 +229,7 @@ class CloudView:
         line = views.progress(state, drawn, total or self.settings.n, speed, constraints.locked, old)
         percent = round(100.0 * drawn / total, 1) if total else 0.0
         update_html(self._controls.line, line)
+        self._controls.show_buttons(views.buttons(state, old))
         if self._controls.bar.value != percent:
             assign(self._controls.bar, percent)
 

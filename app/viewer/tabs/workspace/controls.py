@@ -7,10 +7,12 @@ from typing import Any
 
 import viser
 
-from app.viewer.panel import Post, assign, listen, listen_click
+from app.viewer.panel import Post, assign, listen, listen_click, update_html
 from app.viewer.tabs.workspace.colours import BY, MAPS
 from app.viewer.tabs.workspace.cut import AXES, KEEP, Cut
 from app.viewer.tabs.workspace.settings import MAX_POINTS, MAX_SIZE, MIN_SIZE, WorkspaceSettings
+from app.viewer.tabs.workspace.views import grouped
+from app.viewer.views.templates import render
 from kin import InputError, Robot
 from kin.units import Units
 from kin.workspace import Strategy
@@ -21,6 +23,7 @@ STRATEGIES: dict[str, Strategy] = {
     "even in space": "volume",
     "envelope only": "boundary",
 }
+SMOOTH = 200_000  # points: a picture of them takes some tenths of a second without a graphics card
 PRESETS = {"10 k": 10_000, "100 k": 100_000, "1 M": 1_000_000, "4 M": MAX_POINTS}
 NONE = "none"
 FINE = 3  # decimals of a millimetre
@@ -29,10 +32,21 @@ STRATEGY_HINT = (
     "clusters. Even in space: the same density everywhere. Envelope only: the boundary. The last two take longer."
 )
 CLOUD_HINT = (
-    "Start: sample points, or continue after a pause; locked joints keep their values. Pause: stop for now. "
-    "Cancel: stop and remove the points."
+    "Start: sample points; locked joints keep their values. Pause: stop for now. Stop: end sampling, the points "
+    "stay. Clear: remove the points."
 )
 CUT_HINT = "Along the arm: the vertical plane of the arm's present pose. The cut moves in steps."
+
+
+def heavy(points: int) -> str:
+    """A warning of many points. ``static/page.js`` shows it where the browser draws without a graphics card."""
+    if points <= SMOOTH:
+        return ""
+    text = (
+        f"This browser draws without a graphics card: with {grouped(points)} points the page may not answer for "
+        f"seconds. Up to {grouped(SMOOTH)} are smooth."
+    )
+    return render("workspace/heavy", text=text)
 
 
 class Controls:
@@ -86,10 +100,19 @@ class Controls:
         self._add_size(settings.size)
         self.show_cut(cut, settings.at)
 
+    def show_load(self, points: int) -> None:
+        """Warn of so many points, where the page draws in software."""
+        update_html(self._heavy, heavy(points))
+
     def show(self, settings: WorkspaceSettings) -> None:
         """Set every control."""
         for name, handle in self._handles.items():
             assign(handle, self._written(name, getattr(settings, name)))
+
+    def show_buttons(self, names: tuple[str, ...]) -> None:
+        """Offer these actions on the cloud."""
+        if self._buttons.options != names:
+            self._buttons.options = names
 
     def use_robot(self, robot: Robot) -> None:
         """Offer the other robots for comparison."""
@@ -137,11 +160,13 @@ class Controls:
         presets = gui.add_button_group(" ", tuple(PRESETS), hint="Common numbers of points")
         for label, number in PRESETS.items():
             listen_click(presets, self._post, {label: ("preset", number)})
+        self._heavy = gui.add_html(heavy(settings.n))
         self._add_dropdown("strategy", "Sampling", settings.strategy, STRATEGY_HINT)
         hint = "Another seed gives other random configurations"
         self._add("seed", gui.add_number("Seed", settings.seed, min=0, step=1, hint=hint))
-        buttons = gui.add_button_group("Cloud", ("Start", "Pause", "Cancel"), hint=CLOUD_HINT)
-        listen_click(buttons, self._post, {"Start": "start", "Pause": "pause", "Cancel": "cancel"})
+        self._buttons = gui.add_button_group("Cloud", ("Start",), hint=CLOUD_HINT)
+        actions = ("start", "pause", "continue", "stop", "clear")
+        listen_click(self._buttons, self._post, {action.capitalize(): action for action in actions})
         self.bar = gui.add_progress_bar(0.0)
         self.line = gui.add_html("")
 

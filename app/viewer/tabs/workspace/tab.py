@@ -68,7 +68,9 @@ class Workspace(Feature):
             "failed": _raise,
             "start": lambda _: self._start(),
             "pause": lambda _: self._clouds.pause(),
-            "cancel": lambda _: self._clear(),
+            "continue": lambda _: self._clouds.resume(),
+            "stop": lambda _: self._clouds.stop(),
+            "clear": lambda _: self._clear(),
             "click": self._search,
             "picked": lambda found: self._picker.take(*cast(tuple[Any, ...], found)),
             "facts": lambda found: self._sizes.take(*cast(tuple[Any, ...], found)),
@@ -110,6 +112,7 @@ class Workspace(Feature):
 
     def on_request(self) -> None:
         self._clouds.report()  # shows the locked joints
+        self._capability.report()
 
     def on_style(self) -> None:
         units = self.stage.units
@@ -188,6 +191,7 @@ class Workspace(Feature):
         match name:
             case "n" | "strategy" | "seed":
                 self._clouds.report()  # a cloud of other settings says so
+                self._controls.show_load(self._settings.n)
             case "by" | "map":
                 self._clouds.recolour()
                 self._show_slabs()

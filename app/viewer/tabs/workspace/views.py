@@ -16,12 +16,13 @@ from kin.units import Units
 from kin.workspace.clouds.measures import measured
 from kin.workspace.region import Region
 
-State = Literal["ready", "preparing", "running", "paused", "recolouring", "done", "outdated"]
+State = Literal["ready", "preparing", "running", "paused", "stopped", "recolouring", "done", "outdated"]
 SYMBOLS: dict[State, str] = {
     "ready": "○",
     "preparing": "◔",
     "running": "▶",
     "paused": "❚❚",
+    "stopped": "■",
     "recolouring": "◐",
     "done": "✓",
     "outdated": "!",
@@ -48,6 +49,20 @@ def locks(locked: Locks | None) -> str:
     """The joints locked in a cloud or a map, in words; empty if none."""
     joints = [str(i + 1) for i, value in enumerate(locked or ()) if value is not None]
     return f"joint{'s' if len(joints) > 1 else ''} {', '.join(joints)} locked" if joints else ""
+
+
+def buttons(state: State, old: bool) -> tuple[str, ...]:
+    """The buttons of a cloud in this state; `old`: it is not the one that the settings describe."""
+    match state:
+        case "ready":
+            return ("Start",)
+        case "preparing" | "running":
+            return "Pause", "Stop"
+        case "paused":
+            return ("Continue", "Start", "Clear") if old else ("Continue", "Clear")
+        case "stopped":
+            return "Start", "Clear"
+    return ("Start", "Clear") if old else ("Clear",)
 
 
 OLD = "Settings or locks have changed: Start samples a new cloud"

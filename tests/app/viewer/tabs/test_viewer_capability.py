@@ -143,7 +143,7 @@ class Visitor(FakeBrowser):
     def compute(self) -> None:
         self.set("Grid", f"{LENGTH} voxels long")
         self.set("Directions", "12")
-        self.push("Compute")
+        self.push("Start")
 
     def done(self, count: int) -> None:
         self.wait(lambda: self.state == "done" and self.count() == count, 60.0)
@@ -250,6 +250,19 @@ def test_the_map_respects_locked_joints(tab):
     tab.done(len(found.index))
     assert same_places(tab.centres(), found.centres)
     assert "With joint 1 locked." in tab.html
+
+
+def test_a_map_offers_what_fits(tab):
+    def offered():
+        return tuple(tab.gui[tab.element("Map")]["props"]["options"])
+
+    assert offered() == ("Start",)
+    tab.set("Grid", f"{LENGTH} voxels long")
+    tab.push("Start")
+    tab.wait(lambda: tab.state == "done")
+    tab.wait(lambda: offered() == ("Clear",))
+    tab.set("Directions", "48")
+    tab.wait(lambda: offered() == ("Start", "Clear"))
 
 
 def test_voxels_are_shown_while_the_map_grows_and_kept_on_stop(tab, held, monkeypatch):
@@ -379,7 +392,7 @@ def test_a_failure_is_reported_and_the_next_attempt_succeeds(tab, service, monke
         tab.compute()
         tab.wait(lambda: tab.state == "failed" and "Something went wrong" in tab.html)
     assert "ZeroDivisionError" in caplog.text
-    tab.push("Compute")
+    tab.push("Start")
     tab.done(len(the_map().index))
 
 

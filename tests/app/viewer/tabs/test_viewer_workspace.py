@@ -358,12 +358,29 @@ def test_a_cloud_arrives_completely_in_parts(tab):
     assert tab.sent("PointCloudMessage") == sent, "and then it rests"
 
 
-def test_pause_stops_the_cloud_and_start_resumes_it(tab):
+def offered(tab):
+    """The buttons of the cloud."""
+    return tuple(tab.gui[tab.element("Cloud")]["props"]["options"])
+
+
+def test_many_points_are_warned_of_where_the_page_draws_in_software(tab):
+    """The page's script shows the warning; it is there for many points only."""
+    tab.set("Points", 200_000)
+    tab.settle()
+    assert "data-heavy" not in tab.html
+    tab.set("Points", MAX_POINTS)
+    tab.wait(lambda: "data-heavy" in tab.html)
+    assert "with 4\u202f000\u202f000 points the page may not answer for seconds" in tab.html
+
+
+def test_pause_stops_the_cloud_and_continue_resumes_it(tab):
     n = 24 * SAMPLED
     tab.set("Points", n)
     tab.set("Seed", 12)
+    assert offered(tab) == ("Start",)
     tab.click("Start")
     tab.wait(lambda: tab.count > 0)
+    assert offered(tab) == ("Pause", "Stop")
     tab.click("Pause")
     tab.wait(lambda: tab.state == "paused")
     tab.settle()
@@ -374,20 +391,30 @@ def test_pause_stops_the_cloud_and_start_resumes_it(tab):
     tab.settle()
     assert tab.count == held
     assert tab.state == "paused"
+    assert offered(tab) == ("Continue", "Clear")
+    tab.click("Continue")
+    tab.wait(lambda: tab.count > held)
+    tab.click("Stop")
+    tab.wait(lambda: tab.state == "stopped" or tab.count == n)
+    tab.settle()
     tab.click("Start")
     tab.done(n)
+    assert offered(tab) == ("Clear",)
+    tab.set("Seed", 13)
+    tab.wait(lambda: offered(tab) == ("Start", "Clear"))
+    tab.set("Seed", 12)
     assert np.abs(tab.points() - whole(PIONEER, n, 12).points).max() < HALF
-    tab.click("Cancel")
+    tab.click("Clear")
     tab.wait(lambda: tab.count == 0)
     assert tab.state == "ready"
 
 
-def test_cancel_removes_the_cloud(tab):
+def test_clear_removes_the_cloud(tab):
     tab.set("Points", MAX_POINTS)
     tab.set("Seed", 13)
     tab.click("Start")
     tab.wait(lambda: tab.count > 0)
-    tab.click("Cancel")
+    tab.click("Clear")
     tab.wait(lambda: tab.count == 0 and tab.state == "ready")
     tab.settle()
     assert tab.count == 0
@@ -404,7 +431,7 @@ def test_a_slow_page_is_not_flooded(tab):
         tab._read(0.05)
     assert tab.count < send_window.WINDOW + 2 * SAMPLED
     assert tab.state == "running"
-    tab.click("Cancel")
+    tab.click("Clear")
 
 
 def test_a_dragged_arm_and_a_growing_cloud_share_the_connection(tab):
@@ -581,7 +608,7 @@ def test_clicks_are_only_handled_while_picking_is_on(tab):
     tab.wait(lambda: not wanted())
     tab.set("Click on a point", True)
     tab.wait(wanted)
-    tab.click("Cancel")
+    tab.click("Clear")
     tab.wait(lambda: not wanted())
 
 
@@ -752,7 +779,7 @@ def test_section_and_sizes_appear_when_they_are_ready(tab):
     density.add(robot, whole(robot, 4000, 24).points)
     expected = density.image_url()
     tab.wait(lambda: expected in tab.html, 20.0)  # the points of the new cloud only
-    tab.click("Cancel")
+    tab.click("Clear")
     tab.wait(lambda: "data:image/png" not in tab.html)
     tab.set("Section plot", False)
     tab.wait(lambda: tab.sent("GuiPanelRemoveMessage") == 1)

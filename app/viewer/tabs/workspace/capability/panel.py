@@ -24,12 +24,17 @@ from app.viewer.tabs.workspace.capability.settings import BY, CHOICES, DIRECTION
 from app.viewer.tabs.workspace.capability.voxels import LEVELS, Look, Voxels, mark
 from app.viewer.tabs.workspace.cut import Cut
 from app.viewer.tabs.workspace.send_window import SendWindow
+from app.viewer.views.templates import render
 from kin import CapabilityMap, InputError
 
 POLL = 0.2  # s between two polls of a growing map
 REDRAW = 0.25  # s between two updates of the voxels
 COST = 4  # flow control counts a voxel as this many points
 PERCENT = 100.0
+ABOUT = (
+    "Capability: from how many directions the tool can approach each place. The map divides the workspace into "
+    "small cubes (voxels) and colours each by this share."
+)
 
 
 class Capability:
@@ -54,6 +59,7 @@ class Capability:
         self._reader: Subscription[CapabilityMap] | None = None
         self._state: views.State = "ready"
         self._blocks = (0, 0)
+        self._request: MapRequest | None = None  # the map that was started last
         self._locked = stage.options.constraints.locked  # joints locked in the map
         self._found: CapabilityMap | None = None
         self._voxels: Voxels | None = None
@@ -64,12 +70,12 @@ class Capability:
         self._marked: tuple[CapabilityMap, int] | None = None  # the map and row of the clicked voxel
         self._handles: dict[str, Any] = {}
         self._build()
-        self._report()
+        self.report()
 
     def handle(self, key: Hashable, value: object) -> None:
         """Process an event; raises `InputError` for a value that none of our controls sends."""
         match key:
-            case "compute":
+            case "start":
                 self.compute()
             case "stop":
                 self._stop("stopped")
@@ -106,7 +112,7 @@ class Capability:
                 self._found, self._stale = reader.latest, True
             if reader.finished:
                 self._finish(reader)
-            self._report()
+            self.report()
         if (
             self._stale
             and self._found is not None
@@ -119,13 +125,17 @@ class Capability:
     def compute(self) -> None:
         """Compute the map of the selected robot, and draw it while it grows."""
         self.clear()
-        settings, stage = self._settings, self._stage
-        self._reader = stage.maps.subscribe(
-            MapRequest(stage.robot, settings.resolution, settings.directions, stage.options.constraints)
-        )
+        stage, self._request = self._stage, self._requested
+        self._reader = stage.maps.subscribe(self._request)
         self._locked = stage.options.constraints.locked
         self._state = "waiting"
-        self._report()
+        self.report()
+
+    @property
+    def _requested(self) -> MapRequest:
+        """The map that settings and locks describe."""
+        settings, stage = self._settings, self._stage
+        return MapRequest(stage.robot, settings.resolution, settings.directions, stage.options.constraints)
 
     def clear(self) -> None:
         """Stop, and remove everything."""
@@ -137,7 +147,7 @@ class Capability:
         self._state, self._blocks = "ready", (0, 0)
         self._forget_pick()
         self._update()
-        self._report()
+        self.report()
 
     def leave(self) -> None:
         """Leave the shared computation."""
@@ -172,7 +182,7 @@ class Capability:
         if self._reader is not None:
             self.leave()
             self._state = state
-            self._report()
+            self.report()
 
     def _finish(self, reader: Subscription[CapabilityMap]) -> None:
         """Take the complete map, or the error."""
@@ -184,7 +194,7 @@ class Capability:
             return
         if error is not None:
             self._state = "failed"
-            self._report()
+            self.report()
             raise error
         self._found, self._stale = reader.future.result(), True
         self._state = "done"
@@ -242,6 +252,8 @@ class Capability:
             if self._voxels is not None:
                 self._voxels.show(self._settings.least)
             self._update()
+        else:
+            self.report()
 
     def _update(self) -> None:
         """Update the legend, the numbers, and those of the clicked voxel."""
@@ -254,9 +266,13 @@ class Capability:
         for element, content in ((self._legend, legend), (self._facts, facts), (self._pick, pick)):
             update_html(element, content)
 
-    def _report(self) -> None:
+    def report(self) -> None:
+        """Update buttons, progress bar and line."""
         done, total = self._blocks
         update_html(self._line, views.progress(self._state, done, total))
+        names = views.buttons(self._state, self._request != self._requested)
+        if self._buttons.options != names:
+            self._buttons.options = names
         percent = round(PERCENT * done / total, 1) if total else 0.0
         if self._bar.value != percent:
             assign(self._bar, percent)
@@ -266,6 +282,7 @@ class Capability:
     def _build(self) -> None:
         gui = self._stage.client.gui
         with gui.add_folder("Capability", expand_by_default=False):
+            gui.add_html(render("panel/note", text=ABOUT))
             self._add(
                 "resolution",
                 gui.add_dropdown(
@@ -284,12 +301,12 @@ class Capability:
                     hint="Number of evenly spread approach directions, tested at each voxel's centre",
                 ),
             )
-            buttons = gui.add_button_group(
+            self._buttons = gui.add_button_group(
                 "Map",
-                ("Compute", "Stop", "Clear"),
-                hint="Stop: keep the part computed so far. Clear: remove the map.",
+                ("Start",),
+                hint="Start: compute the map. Stop: keep the part computed so far. Clear: remove the map.",
             )
-            listen_click(buttons, self._post, {"Compute": "compute", "Stop": "stop", "Clear": "clear"})
+            listen_click(self._buttons, self._post, {"Start": "start", "Stop": "stop", "Clear": "clear"})
             self._bar = gui.add_progress_bar(0.0)
             self._line = gui.add_html("")
             self._add(

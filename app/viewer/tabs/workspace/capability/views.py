@@ -38,6 +38,18 @@ CERTAINTY: dict[Method, str] = {
 }
 
 
+def buttons(state: State, old: bool) -> tuple[str, ...]:
+    """The buttons of a map in this state; `old`: it is not the one that the settings describe."""
+    match state:
+        case "ready":
+            return ("Start",)
+        case "waiting" | "computing":
+            return ("Stop",)
+        case "done" if not old:
+            return ("Clear",)
+    return "Start", "Clear"
+
+
 def progress(state: State, done: int, total: int) -> str:
     """The line below the progress bar."""
     counts = (grouped(done), grouped(total)) if total else ("", "")
