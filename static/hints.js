@@ -74,9 +74,10 @@
     let x = (key === "drag" ? box.left : side?.left ?? 0) - width - (key === "drag" ? 6 : 18);
     let y = box.top + box.height / 2 - height / 2;
     if (above || x < 8) {
-      const below = key === "drag" && box.bottom + height + 8 < document.querySelector("canvas[data-engine]").getBoundingClientRect().bottom;
+      const scene = document.querySelector("canvas[data-engine]").getBoundingClientRect();
       x = box.left + box.width / 2 - width / 2;
-      y = below ? box.bottom + 4 : box.top - height - (key === "drag" ? 4 : 14);
+      if (key !== "drag") y = box.top - height - 14;
+      else y = box.bottom + height + 8 < scene.bottom ? box.bottom + 4 : scene.top + 6; // clear of the arm
     }
     node.dataset.arrow = key === "drag" ? "none" : above ? "down" : "right";
     node.style.left = `${Math.min(Math.max(x, 8), innerWidth - width - 8)}px`;
