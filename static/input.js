@@ -133,17 +133,23 @@
   function pressLocks() {
     for (const button of document.querySelectorAll("button.mantine-Button-root")) {
       const number = button.textContent.replace(LOCKED, "");
-      if (/^\d$/.test(number) || button.ariaPressed) button.ariaPressed = String(button.textContent.startsWith(LOCKED));
+      const pressed = /^\d$/.test(number) ? String(button.textContent.startsWith(LOCKED)) : null;
+      if (button.ariaPressed !== pressed) button.ariaPressed = pressed;
     }
   }
 
   // Feasible ranges stand below a slider, as wide as its track.
 
+  const resized = new ResizeObserver(() => requestAnimationFrame(alignTracks));
   function alignTracks() {
     let track = null;
     for (const node of document.querySelectorAll(".mantine-Slider-track, .kb-track")) {
       if (node.matches(".mantine-Slider-track")) { track = node; continue; }
       if (!track) continue;
+      if (!track.sized) {
+        track.sized = true;
+        resized.observe(track);
+      }
       const [bar, place] = [track.getBoundingClientRect(), node.parentElement.getBoundingClientRect()];
       if (!bar.width || !place.width) continue;
       const margin = `0 ${Math.round(place.right - bar.right)}px 0 ${Math.round(bar.left - place.left)}px`;
@@ -310,6 +316,6 @@
   }
 
   addEventListener("DOMContentLoaded", () => {
-    new MutationObserver(() => { readAnswers(); readFields(); pressLocks(); alignTracks(); }).observe(document.body, { subtree: true, childList: true });
+    new MutationObserver(() => { readAnswers(); readFields(); pressLocks(); alignTracks(); }).observe(document.body, { subtree: true, childList: true, characterData: true });
   });
 })();

@@ -168,7 +168,7 @@
     const width = region()?.offsetWidth ?? 0;
     const edge = document.querySelector("[data-dock-region-resize]");
     if (width < LEAST || !edge) return;
-    edge.ariaValueNow = String(width);
+    Object.assign(edge, { ariaValueMin: String(LEAST), ariaValueMax: String(innerWidth), ariaValueNow: String(width) });
     if (fresh) {
       fresh = false;
       if (size !== "Normal" && !NARROW.matches) wished = SIZES[size] * width;
@@ -209,7 +209,8 @@
   /** Make the panel's edge a control for the keyboard too. */
   function markEdge() {
     const edge = document.querySelector("[data-dock-region-resize]:not([role])");
-    if (!edge) return;
+    const box = region();
+    if (!edge || !box) return;
     Object.assign(edge, { tabIndex: 0, role: "separator", ariaOrientation: "vertical", ariaLabel: "Width of the panel" });
     edge.addEventListener("keydown", (event) => {
       const way = ["ArrowRight", "ArrowLeft"].indexOf(event.key);
@@ -219,7 +220,7 @@
       const outwards = edge.dataset.dockRegionResize === "left" ? 1 : -1;
       widen((way === 0 ? outwards : -outwards) * STRIDE);
     });
-    new ResizeObserver(keepWidth).observe(region());
+    new ResizeObserver(keepWidth).observe(box);
   }
 
   /** Where the scene is in the window: the status card lies at its top. */

@@ -113,8 +113,8 @@
   addEventListener("DOMContentLoaded", () => {
     const tools = document.createElement("div");
     tools.id = "kb-tools";
-    tools.role = "toolbar";
-    tools.ariaLabel = "Camera";
+    tools.role = "group";
+    tools.ariaLabel = "Camera and picture";
     for (const [name, drawing, sent, argument] of TOOLS) {
       const button = document.createElement("button");
       button.type = "button";

@@ -79,7 +79,7 @@ class ComputeSlots:
         """A slot for as long as the context lasts, and its deadline; raises 503 if none becomes free in time."""
         client = client_of(request.scope)
         with self.watched(request) as deadline:
-            await self._acquire(self._places, client, deadline)
+            await self._acquire(self._places, client, deadline, "computed")
             with Place(self._places, client) as place:
                 deadline.start(place)
                 yield deadline
@@ -93,7 +93,7 @@ class ComputeSlots:
                 return validated()
 
         with self.watched(request) as deadline:
-            await self._acquire(self._reading, client, deadline)
+            await self._acquire(self._reading, client, deadline, "read")
             with Place(self._reading, client):
                 return await run_in_threadpool(in_turn)
 
@@ -132,7 +132,7 @@ class ComputeSlots:
             await asyncio.wait((wrapped,), timeout=max(0.0, min(deadline.left, POLL)))
         return wrapped.result()
 
-    async def _acquire(self, places: Places, client: str, deadline: Deadline) -> None:
+    async def _acquire(self, places: Places, client: str, deadline: Deadline, act: str) -> None:
         if places.take(client):
             return
         self.waiting += 1
@@ -142,7 +142,7 @@ class ComputeSlots:
                 await places.wait(client)
         except TimeoutError:
             deadline.check_client()
-            detail = f"{places.taken} requests are being computed, which is the maximum or your share of it."
+            detail = f"{places.taken} requests are being {act}, which is the maximum or your share of it."
             raise busy(detail) from None
         finally:
             self.waiting -= 1

@@ -21,7 +21,7 @@ from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
 
 from app.api.problems import MEDIA_TYPE, ProblemError
 from app.service.guard import Guard, Outflow
-from app.shared.threads.turns import visitors
+from app.shared.threads.turns import urgent
 
 if TYPE_CHECKING:
     from uvicorn._types import ASGI3Application
@@ -68,18 +68,18 @@ class _Selector(selectors.DefaultSelector):
 
     def __init__(self) -> None:
         super().__init__()
-        visitors.enter()
+        urgent.enter()
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
-        visitors.leave()
+        urgent.leave()
         try:
             return super().select(timeout)
         finally:
-            visitors.enter()
+            urgent.enter()
 
     def close(self) -> None:
         super().close()
-        visitors.leave()
+        urgent.leave()
 
 
 def _courteous_loop() -> asyncio.AbstractEventLoop:

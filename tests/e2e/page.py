@@ -27,6 +27,9 @@ HTMLCanvasElement.prototype.getContext = function (kind, options) {
   return getContext.call(this, kind, kind.startsWith("webgl") ? { ...options, antialias: false } : options);
 };
 Object.defineProperty(window, "devicePixelRatio", { get: () => 0.5 });
+// viser draws an idle page once a second, which takes a quarter of a processor here.
+const { setInterval } = window;
+window.setInterval = (act, ms, ...rest) => setInterval(act, ms === 1000 ? 20000 : ms, ...rest);
 """
 # As after the first minute: the hints are closed.
 NO_HINTS = 'localStorage.setItem("kinboard-hints", "drag joint learn");'

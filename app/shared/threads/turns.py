@@ -1,4 +1,4 @@
-"""Turns of threads that compute: few run at a time, those that have run least first.
+"""Turns of threads that compute: few run at a time, those that have run least, or waited longest, first.
 
 Only one thread at a time runs Python. With sixteen requests that compute, the event loop and the threads of
 visitors would get a seventeenth of the interpreter: a drag would take half a second instead of some milliseconds.
@@ -17,8 +17,9 @@ import time
 from app.shared.threads import background_threads
 
 SLICE = 0.01  # seconds of a turn before it is offered to others
+AGING = 0.2  # seconds of computing that one second of waiting makes up for
 STUCK = 0.1  # seconds without an offer, after which another thread runs too: kernels run without the interpreter
-LEAST, PATIENCE = 0.0005, 0.05  # seconds between two waits for visitors, and of each at most
+LEAST, PATIENCE = 0.0005, 0.05  # seconds between two waits for what is urgent, and of each at most
 MOST = min(4, background_threads())  # turns at a time
 
 
@@ -38,7 +39,7 @@ class Turns:
         self._waiting: list[tuple[float, int, threading.Event]] = []
 
     def take(self, used: float) -> None:
-        """Wait for a turn, behind threads that have run for less than `used` seconds."""
+        """Wait for a turn, behind threads that have run for less than `used` seconds or have waited long."""
         with self._lock:
             if self._free:
                 self._free -= 1
@@ -57,18 +58,25 @@ class Turns:
             else:
                 self._free += 1
 
-    def swap(self, used: float) -> None:
-        """Let a thread that waits and has run no longer than `used` seconds have a turn, and wait for another."""
+    def swap(self, used: float, slice_: float = 0.0) -> None:
+        """Let a thread that waits and has run no longer than `used` seconds have a turn, and wait for another.
+
+        After a slice in which another thread was started, because this one offered nothing, its turn just ends.
+        """
         with self._lock:
-            if not self._waiting or self._waiting[0][0] > used:
+            replaced = self._extra > 0 and slice_ >= STUCK
+            if not replaced and (not self._waiting or self._waiting[0][0] > _rank(used)):
                 return
             mine = self._queue(used)
-            self._start_next()
+            if replaced:
+                self._extra -= 1
+            else:
+                self._start_next()
         self._wait(mine)
 
     def _queue(self, used: float) -> threading.Event:
         mine = threading.Event()
-        heapq.heappush(self._waiting, (used, next(self._order), mine))
+        heapq.heappush(self._waiting, (_rank(used), next(self._order), mine))
         return mine
 
     def _wait(self, mine: threading.Event) -> None:
@@ -87,6 +95,11 @@ class Turns:
         self._changed = time.monotonic()
 
 
+def _rank(used: float) -> float:
+    """The place of a thread that joins the queue now: newcomers overtake those who wait for a time only."""
+    return used + AGING * time.monotonic()
+
+
 class Turn:
     """What one request computes: it has a turn within the context that this is. One thread at a time uses it."""
 
@@ -94,11 +107,13 @@ class Turn:
         self._turns = turns
         self._used = 0.0
         self._since = 0.0
-        self._waited = 0.0  # when it last waited for visitors
+        self._waited = 0.0  # when it last waited for what is urgent
+        self._pause = LEAST  # until it does so again
 
     def __enter__(self) -> Turn:
         self._turns.take(self._used)
         self._since = self._waited = time.monotonic()
+        self._pause = LEAST
         _current.turn = self
         return self
 
@@ -108,20 +123,23 @@ class Turn:
         self._turns.give()
 
     def offer(self) -> None:
-        """Let visitors go first, and others run if it is their turn."""
+        """Let what is urgent go first, and others run if it is their turn."""
         now = time.monotonic()
-        if visitors.active and now - self._waited >= LEAST:
-            visitors.wait()
-            now = self._waited = time.monotonic()
+        if urgent.active and now - self._waited >= self._pause:
+            # Beside a long urgent step, computations go on with whole slices.
+            self._pause = LEAST if urgent.wait() else SLICE
+            self._waited = time.monotonic()
+            self._since += self._waited - now
+            now = self._waited
         if now - self._since < SLICE:
             return
         self._used += now - self._since
-        self._turns.swap(self._used)
+        self._turns.swap(self._used, now - self._since)
         self._since = time.monotonic()
 
 
-class Visitors:
-    """Those who go first: threads of visitors while they answer an event, within the context that this is, and the
+class Urgent:
+    """What goes first: threads of visitors while they answer an event, within the context that this is, and the
     event loop while it does not sleep.
     """
 
@@ -150,12 +168,15 @@ class Visitors:
             if not self.active:
                 self._none.set()
 
-    def wait(self) -> None:
-        """Wait until there are none, but not for long: computations go on beside many visitors."""
-        self._none.wait(PATIENCE)
+    def wait(self) -> bool:
+        """Wait until there is nothing, but not for long: computations go on beside many visitors.
+
+        Returns whether there is nothing.
+        """
+        return self._none.wait(PATIENCE)
 
 
-visitors = Visitors()
+urgent = Urgent()
 _current = threading.local()
 
 

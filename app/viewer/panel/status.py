@@ -91,7 +91,12 @@ def _farther_off(result: IKResult, units: Units) -> str:
 
 
 def _errors(shown: IKSolution, units: Units) -> str:
-    return f"{units.distance(shown.position_error)} and {units.angle(shown.rotation_error)}"
+    angle = units.angle(shown.rotation_error)
+    return (
+        f"{units.distance(shown.position_error)} and {angle}"
+        if shown.position_error > _VISIBLE
+        else f"orientation {angle}"
+    )
 
 
 def introduction(robot: Robot) -> Notice:
@@ -171,6 +176,7 @@ class StatusLine:
         """End the news: show the result for the open target, or that the arm is ready if there is none."""
         if self._news_since is None:
             return
+        self._news_since = None
         if result is None:
             self.show(READY)
         else:

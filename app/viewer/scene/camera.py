@@ -222,9 +222,11 @@ class VisitorCamera:
         near = aside * min(1.0, _FARTHEST_ASIDE * radius / max(float(np.linalg.norm(aside)), 1e-9))
         center, out = self._body.center + near, position - look_at
         height = max(out[2], min(self._body.floor + _LOWEST * radius - center[2], float(np.linalg.norm(out))))
-        if height == out[2] and np.array_equal(near, aside):
+        # The page reports rounded numbers: at a limit, they may lie a little beyond it.
+        too_low = height - out[2] > SAME * radius
+        if not too_low and float(np.linalg.norm(near - aside)) <= SAME * radius:
             return
-        if height != out[2]:
+        if too_low:
             level = math.hypot(out[0], out[1])
             across = math.sqrt(max(float(out @ out) - height**2, 0.0))
             out = np.array([*(out[:2] * (across / level) if level > 1e-9 else (across, 0.0)), height])

@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable, Hashable
 
 import kin
-from app.shared.threads.turns import visitors
+from app.shared.threads.turns import urgent
 from app.viewer.panel.status import Notice
 from app.viewer.session.inbox import Inbox
 
@@ -78,7 +78,7 @@ class Worker:
         try:
             self._build()
             while (batch := self._inbox.take(self._timeout)) is not None:
-                with visitors:
+                with urgent:
                     self._guard(lambda batch=batch: self._step(batch))  # type: ignore[misc]
         except BaseException:
             gone = self._inbox.closed

@@ -17,7 +17,8 @@ def test_each_kind_is_logged_at_once_and_then_counted(monkeypatch, caplog):
         for k in range(5):
             some.note("a", f"a {k}")
         some.note("b", "b")
-        await asyncio.sleep(0.5)
+        while some._latest:
+            await asyncio.sleep(0.01)
         some.note("a", "again")
 
     asyncio.run(noted())

@@ -98,7 +98,7 @@ class Drawing:
             for k, point in ((0, path[0]), (1, path[-1])):
                 close = [end for end in ends if abs(end.value - interval[k]) < 1e-9]
                 if len(close) == 1:
-                    text = f"limit of joint {close[0].joint + 1}" if close[0].joint >= 0 else "branch ends"
+                    text = f"limit of joint {close[0].joint + 1}" if close[0].joint >= 0 else "posture ends"
                     self._ring.append(scene.add_label(f"{name}-{k}", text, position=point))
 
     def show_present(self, q: Array, item: Redundancy | None, trades: bool) -> None:

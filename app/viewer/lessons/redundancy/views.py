@@ -36,9 +36,12 @@ GIVEN = (
 
 def _without_ranges(robot: Robot, task: Task) -> str:
     """Why no ranges are shown for a redundant arm, and what to do."""
-    if task != "pose" and robot.n == 7:
-        return "For this task solutions are searched without ranges. Match the full pose to see the self-motion."
-    return "Solutions of this arm are searched without ranges; targets work as usual."
+    advice = (
+        "Match the full pose to see the self-motion."
+        if task != "pose" and robot.n == 7
+        else "Targets work as usual."
+    )
+    return f"There is no closed form for this task, so no ranges are shown. {advice}"
 
 
 def idea(robot: Robot, task: Task, parameters: tuple[Redundancy, ...], trades: bool, elbow: bool) -> str:

@@ -43,8 +43,8 @@ def heavy(points: int) -> str:
     if points <= SMOOTH:
         return ""
     text = (
-        f"This browser draws without a graphics card: with {grouped(points)} points the page may not answer for "
-        f"seconds. Up to {grouped(SMOOTH)} are smooth."
+        f"This browser draws without a graphics card: with {grouped(points)} points the page may freeze for "
+        f"seconds. Up to {grouped(SMOOTH)} points draw smoothly."
     )
     return render("workspace/heavy", text=text)
 

@@ -374,15 +374,19 @@ def test_one_click_reduces_the_task_and_one_unlocks(tab: FakeBrowser) -> None:
     assert 'data-status="reached"' in tab.html
 
 
-def test_one_click_allows_any_branch(tab: FakeBrowser) -> None:
+def test_one_click_allows_any_posture(tab: FakeBrowser) -> None:
     tab.choose(PUMA.name)
-    blocked = next(name for name, state in rows(tab).items() if state == "blocked")
-    tab.set("Posture", short(blocked))
-    tab.settle(0.6)
-    tab.set("Allow any posture", True)
+    chosen = kin.branch_of(PUMA, PUMA.q_home)
+    rng = np.random.default_rng(7)
+    targets = (kin.fk(PUMA, PUMA.random_q(rng)) for _ in range(500))
+    T = next(T for T in targets if kin.solve_ik(PUMA, T, branch=chosen).status != "solved")
+    tab.set("Posture", short(chosen))
     tab.settle()
+    grab_to(tab, T)
+    assert not np.allclose(tab.tool_pose(), T, atol=1e-3)
+    tab.set("Allow any posture", True)
+    tab.wait(lambda: np.allclose(tab.tool_pose(), T, atol=1e-6))
     assert tab.value("Posture") == "Closest"
-    assert np.allclose(tab.tool_pose(), home(PUMA), atol=1e-6)
 
 
 def test_the_cone_is_drawn_for_five_joints_and_can_be_hidden(tab: FakeBrowser) -> None:

@@ -370,7 +370,7 @@ def test_many_points_are_warned_of_where_the_page_draws_in_software(tab):
     assert "data-heavy" not in tab.html
     tab.set("Points", MAX_POINTS)
     tab.wait(lambda: "data-heavy" in tab.html)
-    assert "with 4\u202f000\u202f000 points the page may not answer for seconds" in tab.html
+    assert "with 4\u202f000\u202f000 points the page may freeze for seconds" in tab.html
 
 
 def test_pause_stops_the_cloud_and_continue_resumes_it(tab):
