@@ -6,9 +6,9 @@ kind of answer it is. There always is one: its `status` and `cause` are codes, i
 `reason` is a sentence (:mod:`kin.ik.messages`).
 
 A closed form gives all branches. Where the task leaves a redundancy parameter (arm angle, θ1, roll), each branch
-has the feasible value nearest to the seed, from exact feasible arcs, so that a pose that can be reached inside the
-limits is found. Numeric descents (:mod:`kin.solvers.numeric`) find the closest configuration to a target that
-cannot be reached, and solve tasks and arms without a closed form.
+has the feasible value nearest to the seed, from feasible arcs (exact but for offset7 and general7), so that a pose
+that can be reached inside the limits is found. Numeric descents (:mod:`kin.solvers.numeric`) find the closest
+configuration to a target that cannot be reached, and solve tasks and arms without a closed form.
 """
 
 from __future__ import annotations

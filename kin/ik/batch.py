@@ -51,9 +51,9 @@ def ik_branches(robot: Robot, target: ArrayLike, redundancy: ArrayLike = math.na
     Args:
         robot: an arm with a closed form.
         target: one pose, or any batch of them.
-        redundancy: value of the arm's first redundancy parameter (θ1 or the arm angle ψ, radians), one for all
-            targets or one for each; NaN keeps it near the home configuration. Joint values that a singular target
-            leaves undetermined are also near that configuration.
+        redundancy: value of the arm's first redundancy parameter (a joint value such as θ1 or θ7, or the arm angle
+            ψ; radians), one for all targets or one for each; NaN keeps it near the home configuration.
+            Joint values that a singular target leaves undetermined are also near that configuration.
 
     Raises:
         InputError: an arm without a closed form; a target or redundancy that is not an array of finite numbers of

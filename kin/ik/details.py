@@ -53,7 +53,7 @@ class Solved(NamedTuple):
     Attributes:
         configurations: how many were found; `max_solutions` may return fewer.
         redundant: whether the task leaves a redundancy parameter.
-        chosen_branches: how many branches were requested, None for all.
+        chosen_branches: how many postures, branches of one name, were requested; None for all.
         complete: whether these are all; see `kin.IKResult`.
         infinite: whether the task leaves the joints a motion, so that there are infinitely many configurations.
         postures: on how many branches the configurations are.
@@ -173,6 +173,7 @@ class OrientationNotMet(NamedTuple):
         obstacle, gap: what does not fit geometrically, and by how many metres; None if nothing is known.
         nearest_rotation: rotation from the target to the nearest orientation found at this point.
         position_error, rotation_error: those of the closest configuration; None if the branch has none.
+        restriction: the locks and narrowed limits without which the pose can be met; None if there are none.
     """
 
     obstacle: Obstacle | None
@@ -180,6 +181,7 @@ class OrientationNotMet(NamedTuple):
     nearest_rotation: float | None
     position_error: float | None
     rotation_error: float | None
+    restriction: Restriction | None = None
 
 
 Details = (

@@ -14,7 +14,7 @@ import numpy as np
 
 from kin.fk import fk, link_frames
 from kin.ik import nearest
-from kin.ik.assembly import by_key, make_result, solutions_of
+from kin.ik.assembly import by_key, leaves_motion, make_result, solutions_of
 from kin.ik.branches import (
     Branches,
     Flags,
@@ -205,6 +205,7 @@ def out_of_reach(problem: IKProblem, branches: Branches | None) -> IKResult:
         nearest_rotation=None if oriented is None else oriented.rotation_error,
         position_error=position,
         rotation_error=rotation,
+        restriction=_restriction(problem),
     )
     return make_result(
         problem, Status.ORIENTATION, "orientation", details, closest=closest, nearest_orientation=oriented
@@ -219,7 +220,7 @@ def _unrestricted(problem: IKProblem) -> tuple[IKProblem, Restriction] | None:
         return None
     locked = tuple(i for i, flag in enumerate(problem.locked) if flag)
     others = tuple(i for i in np.flatnonzero(narrowed).tolist() if i not in locked)
-    options = replace(problem.options, constraints=JointConstraints(), branch=None)
+    options = replace(problem.options, constraints=JointConstraints(), branch=None, redundancy=None)
     return IKProblem.of(robot, problem.T, options, problem.seed), Restriction(locked, others)
 
 
@@ -298,7 +299,7 @@ def _found_by_descent(problem: IKProblem, found: IKSolution) -> IKResult:
         problem,
         Status.SOLVED,
         "",
-        Solved(1, False, problem.chosen_branches, complete=False),
+        Solved(1, False, problem.chosen_branches, complete=False, infinite=leaves_motion(problem)),
         solutions=(found,),
         solver="numeric",
     )

@@ -1,7 +1,7 @@
 """Preferences: which values redundancy parameters get.
 
 The solvers choose the value nearest to the seed. The other preferences search each branch for the best value:
-samples over its exact feasible ranges, then ever finer grids around the best sample. Values outside those
+samples over its feasible ranges, then ever finer grids around the best sample. Values outside those
 ranges are never tried, so the choice is always feasible. Several redundancy parameters are searched one after
 another.
 """

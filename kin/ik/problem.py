@@ -105,8 +105,8 @@ class IKProblem:
 
     @property
     def chosen_branches(self) -> int | None:
-        """How many branches a solution may be on, None for all."""
-        return None if self.branches is None else len(self.branches)
+        """How many postures, branches of one name, a solution may be on, None for all."""
+        return None if self.branches is None else len({self.branch_name(i) for i in self.branches})
 
     def allows(self, branch: int) -> bool:
         """Whether a solution may be on this branch."""

@@ -1,6 +1,6 @@
 """Layers: for each waypoint the configurations to choose from.
 
-With a closed form: its branches at samples of the redundancy parameter over the exact feasible arcs. The ends and
+With a closed form: its branches at samples of the redundancy parameter over the feasible arcs. The ends and
 middles of the arcs are among them, so that the narrowest arc has a sample, and a grid that is the same for every
 waypoint, so that a value can be kept. Each comes at all whole-turn images inside the limits.
 

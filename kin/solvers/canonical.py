@@ -150,8 +150,7 @@ def turn_around(low: float, high: float, wanted: float) -> tuple[float, float]:
     if high - low < UNBOUNDED:
         start = min(max(wanted - math.pi, low), high - TURN)
         return start, start + TURN
-    middle = TURN * round(wanted / TURN)
-    return middle - math.pi, middle + math.pi
+    return wanted - math.pi, wanted + math.pi
 
 
 def at_every_turn(arcs: Array, low: float, high: float) -> Array:

@@ -121,7 +121,7 @@ class IkDetails(TypedDict, total=False):
     redundant: bool
     """Cause "" (solved): whether the task leaves a redundancy parameter."""
     chosen_branches: int | None
-    """Cause "" (solved): how many branches were requested; null for all."""
+    """Cause "" (solved): how many postures, branches of one name, were requested; null for all."""
     complete: bool
     """Cause "" (solved): whether these are all configurations, as in the answer's own `complete`."""
     infinite: bool
@@ -134,8 +134,8 @@ class IkDetails(TypedDict, total=False):
     fixed: list[str]
     """Cause "" (solved): labels of the redundancy parameters whose values were requested."""
     restriction: RestrictionAnswer | None
-    """Causes "too far", "too near", "around the axis" and "outside": the locks and narrowed limits without which
-    the arm could do better; null if there are none."""
+    """Causes "too far", "too near", "around the axis", "outside" and "orientation": the locks and narrowed limits
+    without which the arm could do better; null if there are none."""
     joints: int
     """Causes "roll" and "rotation": number of joints of the arm."""
     position_error: float | None
@@ -213,7 +213,7 @@ def details_answer(details: Details) -> IkDetails:
             if found is not None:
                 bound = found.bound if found.bound == found.bound else None  # NaN: no single length decides
                 fields["obstacle"] = {"code": found.code, "bound": bound}
-    if isinstance(details, OutOfReach | MaskNotMet):
+    if isinstance(details, OutOfReach | MaskNotMet | OrientationNotMet):
         fields["restriction"] = None if details.restriction is None else _restriction_answer(details.restriction)
     return cast(IkDetails, fields)
 

@@ -128,16 +128,19 @@ def _outcome(details: Details, cause: str, task: str, units: Units) -> tuple[str
                 why = f"{reach} this target in other postures"
             return "No solution in the chosen posture", why
         case MaskNotMet(position, rotation, restriction):
-            headline = f"These coordinates cannot be met together{_while(restriction)}"
+            where = " in the chosen posture" if position is None or rotation is None else ""
+            headline = f"These coordinates cannot be met together{where}{_while(restriction)}"
             if position is None or rotation is None:
-                return f"{headline} in the chosen posture", _possible(restriction, "they can be met")
+                return headline, _possible(restriction, "they can be met")
             off = f"the closest configuration is off by {length(position)} and {angle(rotation)}"
             return headline, "; ".join(filter(None, (off, _possible(restriction, "they can be met"))))
         case OutOfReach(distance, restriction):
             by = f" by {length(distance)}" if distance > 0.0 else ""
             return f"Out of reach{by}{_while(restriction)}", _out_of_reach(restriction, cause, units)
         case OrientationNotMet():
-            return "The arm cannot hold this orientation at this point", _orientation(details, units)
+            held = f"The arm cannot hold this orientation at this point{_while(details.restriction)}"
+            parts = _orientation(details, units), _possible(details.restriction, "it can")
+            return held, "; ".join(filter(None, parts))
 
 
 def _solved(details: Solved, task: str) -> str:

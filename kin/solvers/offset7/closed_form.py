@@ -116,9 +116,11 @@ class Offset7(ClosedForm):
             gap, obstacle = self._obstacle(p.T, values_tried.tolist())
         return Candidates(out, values, (found,), gap, obstacle)
 
-    def _obstacle(self, T: Array, values: list[float]) -> tuple[float, Obstacle]:
+    def _obstacle(self, T: Array, values: list[float]) -> tuple[float, Obstacle | None]:
         """Why no branch exists at any of these values of the given joint: the smallest gap, and what it is."""
         code, gap, bound = min((gap_of(self.kernels.params, T, value) for value in values), key=lambda x: x[1])
+        if code == 0:  # one exists here, between the values at which `feasible` looked
+            return 0.0, None
         return gap, Obstacle(_OBSTACLES[code], bound)
 
     def branch_of(self, q: Array) -> int:

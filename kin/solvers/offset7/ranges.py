@@ -206,7 +206,7 @@ def feasible(
     none, the sample at which the branch is least outside the limits; NaN where it does not exist.
     """
     low, high = span
-    n = max(2, math.ceil(SAMPLES * (high - low) / (2.0 * math.pi))) + 2 if high > low else 1
+    n = max(8, math.ceil(SAMPLES * (high - low) / (2.0 * math.pi))) + 2 if high > low else 1
     marks, samples, there = np.empty(n), np.empty((8, n)), np.empty((8, n))
     rows, room, spare = np.empty((8, 7)), np.empty(8), np.empty(8)
     for i in range(n):

@@ -188,6 +188,24 @@ def test_coordinates_that_locks_prevent_can_be_met_without_them():
     assert "with joints 5 and 6 unlocked, they can be met." in result.reason
 
 
+def test_an_orientation_that_a_lock_prevents_can_be_held_without_it():
+    robot = kin.get_robot("panda")
+    T = kin.fk(robot, robot.random_q(np.random.default_rng(6)))
+    result = solve_ik(robot, T, locked=[*[None] * 5, float(robot.q_home[5]), None])
+    assert (result.cause, result.details.restriction) == ("orientation", ((5,), (), 0.0))
+    assert result.reason.startswith("The arm cannot hold this orientation at this point while joint 6 is locked: ")
+    assert result.reason.endswith("; with joint 6 unlocked, it can.")
+
+
+def test_a_redundancy_that_a_lock_leaves_is_given_up_with_the_lock():
+    arm = kin.get_robot("ur5")
+    rail = kin.Joint("rail", 0.0, 0.0, 0.0, math.pi / 2, kind="prismatic", limits=(0.0, 4.0))
+    robot = replace(arm, id="on a rail", rows=(rail, *arm.rows), home=(0.0, *arm.home))
+    T = kin.fk(robot, [3.0, *arm.home])
+    result = solve_ik(robot, T, task="approach", locked=[0.0, *[None] * 6], redundancy=0.2)
+    assert result.details.restriction == ((0,), (), 0.0)
+
+
 # Images
 
 

@@ -321,6 +321,7 @@ def test_the_branches_of_a_locked_arm_can_be_requested():
         locked = [None, None, float(q[2]), *[None] * 4]
         result = kin.solve_ik(robot, kin.fk(robot, q), q_seed=q, locked=locked, branch="seed")
         assert {s.branch for s in result.solutions} == {kin.branch_of(robot, q)}
+        assert result.details.chosen_branches == 1
         several += len(result.solutions) > 1
     assert several > 1
     with pytest.raises(InputError, match="with these joints locked"):
@@ -341,3 +342,30 @@ def test_the_configuration_of_the_seed_is_found_however_narrow_its_range(robot):
     q = robot.random_q(np.random.default_rng(21), 300)
     for own, T in zip(q, kin.fk(robot, q), strict=True):
         assert kin.solve_ik(robot, T, q_seed=own).solutions[0].distance < 1e-6
+
+
+def test_a_branch_between_the_samples_of_narrow_limits_is_no_obstacle():
+    rng = np.random.default_rng(0)
+    elbow = closed_form_of(PANDA).geometry
+    straight = elbow.sign[3] * (elbow.elbow - elbow.offset[3])  # almost all of the reach: short self-motions
+    for _ in range(1500):
+        q = PANDA.random_q(rng)
+        q[3] = straight + rng.uniform(-1.0, 1.0) * 10.0 ** rng.uniform(-4.0, -1.5)
+        low = float(q[6] - rng.uniform(0.0, 0.1))
+        lower, upper = PANDA.lower.copy(), PANDA.upper.copy()
+        lower[6], upper[6] = low, low + 0.1
+        found = closed_form_of(PANDA).solve(
+            SolverInput(kin.fk(PANDA, q), POSE, (math.nan,), True, PANDA.q_home, lower, upper)
+        )
+        assert (found.obstacle is not None) == (found.gap > 0.0)
+
+
+def test_the_range_of_an_unlimited_given_joint_is_a_turn_around_the_seed():
+    robot = replace(GEN3, id="unlimited", rows=(replace(GEN3.rows[0], limits=None), *GEN3.rows[1:]))
+    rng = np.random.default_rng(0)
+    for _ in range(100):
+        q = robot.random_q(rng)
+        seed = q + np.array([-0.1, *[0.0] * 6])
+        q[0], seed[0] = PI + 0.05, PI - 0.05
+        found = kin.solve_ik(robot, kin.fk(robot, q), q_seed=seed, branch="seed")
+        assert min(abs(s.q[0] - seed[0]) for s in found.solutions) <= 0.1 + 1e-9
