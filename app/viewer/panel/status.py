@@ -18,6 +18,7 @@ from kin.units import Units
 Kind = Literal["reached", "compromise", "limits", "orientation", "unreachable", "hand", "advice", "error"]
 # s: news such as "Undone: Home" are shown this long, then again what is true now.
 NEWS = 10.0
+UNSEEN = 1.0  # s: news are shown at least this long, whatever else happens
 
 # Symbol and CSS class of each kind. The symbol alone tells the kinds apart, too.
 LOOKS: dict[Kind, tuple[str, str]] = {
@@ -174,7 +175,7 @@ class StatusLine:
 
     def settle(self, result: IKResult | None, units: Units) -> None:
         """End the news: show the result for the open target, or that the arm is ready if there is none."""
-        if self._news_since is None:
+        if self._news_since is None or time.perf_counter() - self._news_since < UNSEEN:
             return
         self._news_since = None
         if result is None:

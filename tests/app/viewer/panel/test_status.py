@@ -6,13 +6,22 @@ import time
 from types import SimpleNamespace
 from typing import Any
 
+import pytest
+
 import kin
 from app.viewer.lessons.postures import Postures
 from app.viewer.lessons.velocity import VelocityLesson
+from app.viewer.panel import status as module
 from app.viewer.panel.status import NEWS, READY, Notice, StatusLine
 from kin.units import DEFAULT_UNITS
 
 UNDONE = Notice("hand", "Undone: Home")
+
+
+@pytest.fixture(autouse=True)
+def seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """News may end at once."""
+    monkeypatch.setattr(module, "UNSEEN", 0.0)
 
 
 def line(first: Notice = READY) -> tuple[StatusLine, Any]:
@@ -37,6 +46,14 @@ def test_news_end_after_some_seconds_and_the_present_state_follows() -> None:
     status.settle(None, DEFAULT_UNITS)
     assert "<b>Ready</b>" in element.content
     assert status.due(now + 10.0 * NEWS) is None
+
+
+def test_news_are_shown_for_a_moment_whatever_else_happens(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "UNSEEN", 60.0)
+    status, element = line()
+    status.show(UNDONE)
+    status.settle(None, DEFAULT_UNITS)
+    assert "Undone: Home" in element.content
 
 
 def test_the_result_for_an_open_target_comes_back_after_news() -> None:
