@@ -34,14 +34,13 @@ ruff check .
 ruff format --check .
 mypy
 wait $compiling
-# The browser tests draw on one core and often wait: the other tests run beside them, and wait often too. The files of
-# app/ hold few and slow tests: first, in their own order, they leave no worker idle. What measures time runs alone.
+# The browser tests draw on one core and often wait: the other tests run beside them. What measures time runs alone.
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 pytest -m "not slow and browser" >"$log" 2>&1 &
 browsing=$!
 failed=0
-pytest -n 4 --dist loadfile --no-loadscope-reorder -m "not slow and not browser and not bench" || failed=1
+pytest -n 3 --dist loadfile -m "not slow and not browser and not bench" || failed=1
 wait $browsing || failed=1
 cat "$log"
 pytest -m "not slow and bench" || failed=1

@@ -403,12 +403,13 @@ def test_the_rights_of_a_visitor_who_may_only_look():
 
 
 def test_too_many_requests_get_a_429_with_retry_after():
-    client = client_with(rate_limit=1.0)
-    codes = [client.get("/api/v1/robots").status_code for _ in range(12)]
-    assert codes[:10] == [200] * 10
+    client = client_with(rate_limit=0.2)  # one request in 5 s, after the first two
+    answers = [client.get("/api/v1/robots") for _ in range(12)]
+    codes = [answer.status_code for answer in answers]
+    assert codes[:2] == [200, 200]
     assert codes[-1] == 429
-    answer = client.get("/api/v1/robots")
-    assert answer.headers["retry-after"] == "1"
+    answer = answers[-1]
+    assert 1 <= int(answer.headers["retry-after"]) <= 5
     assert answer.json()["type"] == "urn:kinboard:problem:too-many-requests"
     assert client.get("/livez").status_code == 200
 

@@ -235,7 +235,12 @@ def test_large_messages_pass_both_ways(name: str, certificate: Path, tls: ssl.SS
             with (
                 running(PROXIES[name], tmp_path / name, certificate, server.socket.getsockname()[1]) as address,
                 connect(
-                    f"wss://{address}/kinboard/viewer", ssl=tls, max_size=None, compression=None, proxy=None
+                    f"wss://{address}/kinboard/viewer",
+                    ssl=tls,
+                    max_size=None,
+                    compression=None,
+                    proxy=None,
+                    open_timeout=60,
                 ) as tab,
             ):
                 message = os.urandom(LARGE)
