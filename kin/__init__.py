@@ -7,8 +7,18 @@
 """
 
 from kin._version import __version__
-from kin.catalog import builtin_robots, get_robot, load_folder, load_robot, parse_robot
 from kin.errors import InputError, KinematicsError, RobotFileError, UnknownRobotError
+from kin.files import (
+    builtin_robots,
+    get_robot,
+    load_folder,
+    load_robot,
+    parse_robot,
+    robot_from_dict,
+    robot_to_dict,
+    robot_to_toml,
+    save_robot,
+)
 from kin.fk import fk, fk_positions, jacobian, link_frames, manipulability
 from kin.ik import IKOptions, JointConstraints, branch_meanings, branch_names, branch_of, solve_ik
 from kin.ik.batch import ik_branches
@@ -91,8 +101,12 @@ __all__ = [
     "load_robot",
     "manipulability",
     "parse_robot",
+    "robot_from_dict",
+    "robot_to_dict",
+    "robot_to_toml",
     "rotation_from_wxyz",
     "sample_workspace",
+    "save_robot",
     "section",
     "singularities",
     "solve_ik",

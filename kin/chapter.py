@@ -37,8 +37,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kin.catalog import get_robot
 from kin.errors import InputError
+from kin.files import get_robot
 from kin.robot import Robot
 from kin.transforms import Array
 

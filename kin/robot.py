@@ -15,11 +15,11 @@ A revolute joint adds its value to θ, a prismatic one to d; a ``fixed`` row is 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from numbers import Real
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,14 +32,25 @@ Kind = Literal["revolute", "prismatic", "fixed"]
 CONVENTIONS: tuple[Convention, ...] = get_args(Convention)
 LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 KIND_CODES: dict[Kind, float] = {"fixed": 0.0, "revolute": 1.0, "prismatic": 2.0}
+# Where none are stated: one turn about zero, or one metre of stroke.
+DEFAULT_LIMITS: dict[str, tuple[float, float] | None] = {
+    "fixed": None,
+    "revolute": (-math.pi, math.pi),
+    "prismatic": (0.0, 1.0),
+}
 
 Matrix = tuple[tuple[float, ...], ...]
+_ROUNDING = 1e-14  # a rotation further from orthonormal than this is made orthonormal
 IDENTITY: Matrix = tuple(tuple(float(i == j) for j in range(4)) for i in range(4))
 
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """One DH row. `limits` is (lower, upper) in radians or metres, None for a fixed row.
+    """One DH row.
+
+    Attributes:
+        limits: (lower, upper) in radians or metres; None for a fixed row or an unlimited joint.
+        velocity, effort: largest speed (rad/s or m/s) and torque or force (N·m or N), None if they are not known.
 
     Raises:
         InputError: a kind that does not exist, a number that is not finite, limits that are not lower and upper.
@@ -52,6 +63,8 @@ class Joint:
     alpha: float = 0.0
     kind: Kind = "revolute"
     limits: tuple[float, float] | None = None
+    velocity: float | None = None
+    effort: float | None = None
 
     def __post_init__(self) -> None:
         """Check the row; numbers of any type become floats."""
@@ -59,6 +72,12 @@ class Joint:
             raise InputError(f"kind of {self.name}", self.kind, _one_of(*KIND_CODES))
         for key in ("theta", "d", "a", "alpha"):
             object.__setattr__(self, key, _number(f"{key} of {self.name}", getattr(self, key)))
+        for key in ("velocity", "effort"):
+            if (value := getattr(self, key)) is not None:
+                where = f"{key} of {self.name}"
+                if self.kind == "fixed" or not (limit := _number(where, value)) > 0.0:
+                    raise InputError(where, value, "a positive number, or None for a fixed row")
+                object.__setattr__(self, key, limit)
         if self.limits is None:
             return
         where = f"limits of {self.name}"
@@ -121,8 +140,42 @@ class Robot:
         for key in ("base", "tool"):
             T = getattr(self, key)
             if T is not IDENTITY:
-                as_transform(T, key)
+                clean = as_transform(T, key)
+                if np.abs(clean - np.asarray(T)).max() > _ROUNDING:
+                    T = clean
                 object.__setattr__(self, key, tuple(tuple(map(float, row)) for row in T))
+
+    @classmethod
+    def from_dh(
+        cls,
+        rows: Iterable[Joint | Mapping[str, Any] | Sequence[float]],
+        convention: Convention = "standard",
+        *,
+        robot_id: str = "arm",
+        name: str = "Arm",
+        source: str = "a table in Python",
+        home: Iterable[float] | None = None,
+        base: ArrayLike = IDENTITY,
+        tool: ArrayLike = IDENTITY,
+    ) -> Robot:
+        """An arm from a DH table in metres and radians.
+
+        Args:
+            rows: each ``(theta, d, a, alpha)`` of a revolute joint, or a dict with fields of `Joint`, or a
+                `Joint`. Without limits a revolute joint turns ±π and a prismatic one slides 0 to 1 m.
+            convention: ``"standard"`` or ``"modified"`` (Craig).
+            robot_id, name, source: as in a robot file.
+            home: one value per moving joint; by default the middle of the limits.
+            base, tool: constant transforms ``(4, 4)`` before the first and after the last row.
+
+        Raises:
+            InputError: an invalid row or field.
+        """
+        table = tuple(_row(i, row) for i, row in enumerate(rows))
+        if home is None:
+            home = [0.5 * sum(row.limits or (0.0,)) for row in table if row.kind != "fixed"]
+        transforms: dict[str, Any] = {"base": base, "tool": tool}
+        return cls(robot_id, name, source, convention, table, tuple(home), **transforms)
 
     def with_base(self, T_world_base: ArrayLike) -> Robot:
         """The same arm with another transform ``(4, 4)`` before its first row."""
@@ -244,6 +297,25 @@ class Robot:
         lower = np.where(np.isfinite(self.lower), self.lower, -math.pi)
         upper = np.where(np.isfinite(self.upper), self.upper, math.pi)
         return rng.uniform(lower, upper, (*shape, self.n))
+
+
+def _row(index: int, row: Joint | Mapping[str, Any] | Sequence[float]) -> Joint:
+    """One row of `Robot.from_dh`."""
+    if isinstance(row, Joint):
+        return row
+    if not isinstance(row, Mapping):
+        try:
+            theta, d, a, alpha = row
+        except (TypeError, ValueError):
+            raise InputError(f"rows[{index}]", row, "four numbers theta, d, a, alpha, or a dict") from None
+        row = {"theta": theta, "d": d, "a": a, "alpha": alpha}
+    known = [f.name for f in fields(Joint)]
+    for key in row:
+        if key not in known:
+            raise InputError(f"rows[{index}].{key}", row[key], "only the fields " + ", ".join(known))
+    kind = row.get("kind", "revolute")
+    defaults = {"name": f"joint {index + 1}", "limits": DEFAULT_LIMITS.get(kind)}
+    return Joint(**{**defaults, **row})
 
 
 def _number(field: str, value: object) -> float:

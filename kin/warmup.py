@@ -17,7 +17,7 @@ from functools import partial
 import numpy as np
 from numba.core.event import install_recorder
 
-from kin.catalog import builtin_robots
+from kin.files import builtin_robots
 from kin.fk import fk, fk_positions, jacobian, link_frames, manipulability
 from kin.ik import solve_ik
 from kin.path import solve_path

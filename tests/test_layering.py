@@ -14,7 +14,6 @@ ROOT = Path(__file__).parents[1]
 # library. The longest matching row counts. A name allows what is below it too.
 MODEL = {
     "kin.axes",
-    "kin.catalog",
     "kin.errors",
     "kin.fk",
     "kin.robot",
@@ -26,10 +25,11 @@ MODEL = {
 RULES: dict[str, set[str]] = {
     "kin": {"kin", "numpy", "numba"},
     "kin/kernels": {"numpy", "numba", "kin.kernels", "kin.tolerances", "kin.transforms"},
-    "kin/solvers": {"numpy", "kin.kernels", "kin.solvers", *MODEL - {"kin.catalog", "kin.singularity"}},
-    "kin/ik": {"numpy", "kin.kernels", "kin.solvers", "kin.ik", *MODEL - {"kin.catalog"}},
-    "kin/path": {"numpy", "kin.kernels", "kin.solvers", "kin.ik", "kin.path", *MODEL - {"kin.catalog"}},
-    "kin/workspace": {"numpy", "kin.kernels", "kin.solvers", "kin.ik", "kin.workspace", *MODEL - {"kin.catalog"}},
+    "kin/files": {"numpy", "kin.files", "kin.home", *MODEL},
+    "kin/solvers": {"numpy", "kin.kernels", "kin.solvers", *MODEL - {"kin.singularity"}},
+    "kin/ik": {"numpy", "kin.kernels", "kin.solvers", "kin.ik", *MODEL},
+    "kin/path": {"numpy", "kin.kernels", "kin.solvers", "kin.ik", "kin.path", *MODEL},
+    "kin/workspace": {"numpy", "kin.kernels", "kin.solvers", "kin.ik", "kin.workspace", *MODEL},
     "app": {"app", "kin"},
     "app/shared": {
         *("kin", "numpy", "app.shared", "pydantic", "pydantic_settings", "prometheus_client", "starlette"),

@@ -16,7 +16,7 @@ from arms import Draw
 
 import kin
 from kin import Joint, Robot, Status, solve_ik
-from kin.catalog import parse_robot
+from kin.files import parse_robot
 from kin.solvers import closed_form_of, parallel6, scara4, slide6, wrist6
 from kin.solvers.contract import POSE, SolverInput
 from kin.solvers.numeric import spread

@@ -1,68 +1,36 @@
-"""Robot files: TOML → `Robot`. The only module of the core that reads files.
-
-A file states its units, so a table can be copied as its source prints it::
-
-    id = "my-arm"
-    name = "My arm"
-    source = "where the numbers come from"
-    convention = "standard"            # or "modified" (Craig)
-    units = { length = "mm", angle = "deg" }
-
-    [[rows]]
-    name = "shoulder"
-    kind = "revolute"                  # or "prismatic", "fixed"
-    theta = 0
-    d = 130
-    a = 70
-    alpha = -90
-    limits = [0, 180]
-
-    [home]
-    q = [90]
-
-Only ``id``, ``name``, ``source``, ``convention``, ``units`` and ``rows`` are required; in a row, a missing number
-is zero. Without ``limits`` a revolute joint turns ±180° and a prismatic one slides 0 to 1 m. Without ``home`` the
-arm starts in the middle of its limits, or bent if that configuration is singular (:mod:`kin.home`). ``base`` and
-``tool`` are tables ``{ xyz = [x, y, z], rpy = [roll, pitch, yaw] }``.
-
-An error in a file raises `RobotFileError` with the file, the field, the value and what would be valid.
-"""
+"""Reads robot files and robot descriptions: TOML, or the same fields as a dict, → `Robot`."""
 
 from __future__ import annotations
 
 import math
 import re
 import tomllib
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from kin.errors import RobotFileError, UnknownRobotError
+from kin.errors import InputError, RobotFileError
 from kin.home import default_home
-from kin.robot import CONVENTIONS, IDENTITY, KIND_CODES, LENGTHS, Joint, Matrix, Robot, exact_cos_sin
+from kin.robot import (
+    CONVENTIONS,
+    DEFAULT_LIMITS,
+    IDENTITY,
+    KIND_CODES,
+    LENGTHS,
+    Joint,
+    Matrix,
+    Robot,
+    exact_cos_sin,
+)
+from kin.transforms import as_transform
 
-BUILTIN = Path(__file__).parent / "robots"
-FIRST = ("pioneer5", "redundant7", "redundant7-craig")  # the chapter's arms come first in every list
 ANGLES = {"deg": math.pi / 180, "rad": 1.0}
 MAX_ROWS = 32
 _TOP = {"id", "name", "source", "description", "convention", "units", "rows", "home", "base", "tool"}
-_ROW = {"name", "kind", "theta", "d", "a", "alpha", "limits"}
-
-
-@lru_cache(maxsize=1)
-def builtin_robots() -> dict[str, Robot]:
-    """The built-in robots by id: the chapter's first, then in alphabetical order."""
-    robots = load_folder(BUILTIN)
-    return {robot_id: robots[robot_id] for robot_id in dict.fromkeys((*FIRST, *robots))}
-
-
-def get_robot(robot_id: str) -> Robot:
-    """A built-in robot; raises `UnknownRobotError` listing the valid ids."""
-    robots = builtin_robots()
-    if robot_id not in robots:
-        raise UnknownRobotError(robot_id, tuple(robots))
-    return robots[robot_id]
+_ROW = {"name", "kind", "theta", "d", "a", "alpha", "limits", "velocity", "effort"}
+_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(rad|deg|°|m|cm|mm)(/s)?\s*")
+UNLIMITED = "none"
 
 
 def load_folder(folder: Path) -> dict[str, Robot]:
@@ -102,8 +70,19 @@ def parse_robot(text: str, file: str = "robot") -> Robot:
     return _Reader(file).robot(data)
 
 
+def robot_from_dict(data: dict[str, Any], source: str = "robot") -> Robot:
+    """The robot described by the fields of a robot file as plain data; `source` is the name used in messages.
+
+    Raises:
+        RobotFileError: naming the field, e.g. ``rows[2].alpha``, the value and what would be valid.
+    """
+    if not isinstance(data, dict):
+        raise RobotFileError(source, "robot", data, "a table with the fields " + ", ".join(sorted(_TOP)))
+    return _Reader(source).robot(data)
+
+
 class _Reader:
-    """Turns parsed TOML into a `Robot`; every error names the field."""
+    """Turns the fields of a file into a `Robot`; every error names the field."""
 
     def __init__(self, file: str) -> None:
         self.file = file
@@ -155,30 +134,47 @@ class _Reader:
             raise self.refuse(f"rows[{index}]", data, "a table with theta, d, a, alpha")
         self.only_known_fields(where, data, _ROW)
         kind = self.choice(data, "kind", tuple(KIND_CODES), where, default="revolute")
-        scale = self.length if kind == "prismatic" else self.angle
-        limits: tuple[float, float] | None = None
-        if "limits" in data:
-            pair = data["limits"]
-            if kind == "fixed":
-                raise self.refuse(where + "limits", pair, "no limits, because the row is fixed")
-            if not isinstance(pair, list) or len(pair) != 2:
-                raise self.refuse(where + "limits", pair, "two numbers [lower, upper]")
-            low, high = (self.number(f"{where}limits[{k}]", v) * scale for k, v in enumerate(pair))
-            if not low < high:
-                raise self.refuse(where + "limits", pair, "lower below upper")
-            limits = (low, high)
-        elif kind != "fixed":
-            # A slider needs limits: one turn about zero, or one metre of stroke.
-            limits = (-math.pi, math.pi) if kind == "revolute" else (0.0, 1.0)
+        for key in ("limits", "velocity", "effort"):
+            if kind == "fixed" and key in data:
+                raise self.refuse(where + key, data[key], f"no {key}, because the row is fixed")
+        slides = kind == "prismatic"
         return Joint(
             name=self.text(data, "name", f"joint {index + 1}", where),
-            theta=self.number(where + "theta", data.get("theta", 0)) * self.angle,
-            d=self.number(where + "d", data.get("d", 0)) * self.length,
-            a=self.number(where + "a", data.get("a", 0)) * self.length,
-            alpha=self.number(where + "alpha", data.get("alpha", 0)) * self.angle,
+            theta=self.angle_of(where + "theta", data.get("theta", 0)),
+            d=self.length_of(where + "d", data.get("d", 0)),
+            a=self.length_of(where + "a", data.get("a", 0)),
+            alpha=self.angle_of(where + "alpha", data.get("alpha", 0)),
             kind=kind,  # type: ignore[arg-type]  # checked by choice()
-            limits=limits,
+            limits=self.limits(data["limits"], where, slides) if "limits" in data else DEFAULT_LIMITS[kind],
+            velocity=self.positive(data, "velocity", where, slides),
+            effort=self.positive(data, "effort", where, None),
         )
+
+    def limits(self, pair: object, where: str, slides: bool) -> tuple[float, float] | None:
+        where += "limits"
+        if pair == UNLIMITED and not slides:
+            return None
+        if not isinstance(pair, list | tuple) or len(pair) != 2:
+            none = "" if slides else f', or "{UNLIMITED}" for a joint without limits'
+            raise self.refuse(where, pair, "two numbers [lower, upper]" + none)
+        read = self.length_of if slides else self.angle_of
+        low, high = (read(f"{where}[{k}]", v) for k, v in enumerate(pair))
+        if not low < high:
+            raise self.refuse(where, pair, "lower below upper")
+        return low, high
+
+    def positive(self, data: dict[str, Any], key: str, where: str, slides: bool | None) -> float | None:
+        """A limit of the joint's velocity (per second) or effort (N·m or N, `slides` None), if it is stated."""
+        if key not in data:
+            return None
+        given = data[key]
+        if slides is None:
+            value = self.number(where + key, given)
+        else:
+            value = (self.length_of if slides else self.angle_of)(where + key, given, "/s")
+        if not value > 0.0:
+            raise self.refuse(where + key, given, "a positive number")
+        return value
 
     def home(self, data: dict[str, Any], joints: list[Joint]) -> tuple[float, ...]:
         if "home" not in data:
@@ -190,8 +186,7 @@ class _Reader:
             raise self.refuse("home.q", q, f"{len(joints)} numbers, one per moving joint")
         values = []
         for k, (joint, raw) in enumerate(zip(joints, q, strict=True)):
-            value = self.number(f"home.q[{k}]", raw)
-            value *= self.length if joint.kind == "prismatic" else self.angle
+            value = (self.length_of if joint.kind == "prismatic" else self.angle_of)(f"home.q[{k}]", raw)
             if joint.limits and not joint.limits[0] <= value <= joint.limits[1]:
                 raise self.refuse(f"home.q[{k}]", raw, f"a value inside the limits of {joint.name}")
             values.append(value)
@@ -201,23 +196,50 @@ class _Reader:
         if key not in data:
             return IDENTITY
         table = self.table(data, key)
-        self.only_known_fields(key + ".", table, {"xyz", "rpy"})
-        x, y, z = (v * self.length for v in self.triple(table, "xyz", key + "."))
-        (cr, sr), (cp, sp), (cy, sy) = (
-            exact_cos_sin(v * self.angle) for v in self.triple(table, "rpy", key + ".")
-        )
-        return (
-            (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr, x),
-            (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr, y),
-            (-sp, cp * sr, cp * cr, z),
-            (0.0, 0.0, 0.0, 1.0),
+        self.only_known_fields(key + ".", table, {"matrix"} if "matrix" in table else {"xyz", "rpy"})
+        if "matrix" in table:
+            return self.matrix(table["matrix"], key + ".matrix")
+        xyz, rpy = (self.items(table.get(part, [0, 0, 0]), f"{key}.{part}", 3) for part in ("xyz", "rpy"))
+        return matrix_of(
+            [self.length_of(f"{key}.xyz[{i}]", v) for i, v in enumerate(xyz)],
+            [self.angle_of(f"{key}.rpy[{i}]", v) for i, v in enumerate(rpy)],
         )
 
-    def triple(self, table: dict[str, Any], key: str, where: str) -> list[float]:
-        value = table.get(key, [0, 0, 0])
-        if not isinstance(value, list) or len(value) != 3:
-            raise self.refuse(where + key, value, "three numbers")
-        return [self.number(f"{where}{key}[{i}]", v) for i, v in enumerate(value)]
+    def matrix(self, value: object, where: str) -> Matrix:
+        rows = [self.items(row, f"{where}[{i}]", 4) for i, row in enumerate(self.items(value, where, 4))]
+        T = tuple(
+            tuple(
+                (self.length_of if i < 3 and j == 3 else self.number)(f"{where}[{i}][{j}]", v)
+                for j, v in enumerate(row)
+            )
+            for i, row in enumerate(rows)
+        )
+        try:
+            as_transform(T, where)
+        except InputError as error:
+            raise self.refuse(error.field, value, error.expected) from None
+        return T
+
+    def items(self, value: object, field: str, count: int) -> list[Any]:
+        if not isinstance(value, list | tuple) or len(value) != count:
+            raise self.refuse(field, value, {3: "three numbers", 4: "four rows of four numbers"}[count])
+        return list(value)
+
+    def angle_of(self, field: str, value: object, per: str = "") -> float:
+        return self.quantity(field, value, self.angle, ANGLES | {"°": ANGLES["deg"]}, per)
+
+    def length_of(self, field: str, value: object, per: str = "") -> float:
+        return self.quantity(field, value, self.length, LENGTHS, per)
+
+    def quantity(self, field: str, value: object, scale: float, units: dict[str, float], per: str) -> float:
+        """A number in the unit of the file, or a text with a unit of its own such as ``"0.13 m"``."""
+        if isinstance(value, str):
+            found = _QUANTITY.fullmatch(value[:80])
+            if found is None or found[2] not in units or (found[3] or "") not in ("", per):
+                example = f'"1.5 {next(iter(units))}{per}"'
+                raise self.refuse(field, value, f"a finite number, or a text with its unit such as {example}")
+            value, scale = float(found[1]), units[found[2]]
+        return self.number(field, value) * scale
 
     def number(self, field: str, value: object) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < 1e6:
@@ -253,3 +275,15 @@ class _Reader:
         for key in data:
             if key not in fields:
                 raise self.refuse(where + key, data[key], "only the fields " + ", ".join(sorted(fields)))
+
+
+def matrix_of(xyz: Sequence[float], rpy: Sequence[float]) -> Matrix:
+    """The transform ``Trans(x, y, z) Rz(yaw) Ry(pitch) Rx(roll)``, metres and radians."""
+    (cr, sr), (cp, sp), (cy, sy) = map(exact_cos_sin, rpy)
+    x, y, z = xyz
+    return (
+        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr, x),
+        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr, y),
+        (-sp, cp * sr, cp * cr, z),
+        (0.0, 0.0, 0.0, 1.0),
+    )

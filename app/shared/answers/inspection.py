@@ -1,0 +1,158 @@
+"""What an arm is: how its axes lie, which solver it gets and why, and likely mistakes in its table.
+
+Warnings forbid nothing: the arm works, but perhaps not as its author intended.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import numpy as np
+from typing_extensions import TypedDict
+
+from app.shared.answers.document import documented
+from app.shared.answers.robots import RobotAnswer, robot_answer
+from kin import Robot, jacobian
+from kin.axes import Pair, generic_q, pairs, parallel_groups, size, spherical_groups
+from kin.home import candidates, margins
+from kin.solvers import closed_form_of
+
+NEAR_SINGULAR, SINGULAR = 0.1, 1e-6  # of the best margin among the candidates for a home pose
+LONG, SHORT = 100.0, 0.01  # m; a reach beyond these suggests a wrong unit
+
+
+@documented
+class PairAnswer(TypedDict):
+    """Relation of two consecutive joint axes."""
+
+    joints: list[int]
+    """Indices of the two moving joints."""
+    angle: float
+    """Angle between the axes, 0 to π/2 radians."""
+    distance: float | None
+    """Shortest distance between the axes in metres; null if one of the joints slides."""
+    relation: Literal["same line", "parallel", "perpendicular", "oblique"]
+    """Kind of the angle; "same line" for coincident axes."""
+    intersect: bool
+    """Whether the axes intersect."""
+
+
+@documented
+class InspectionAnswer(TypedDict):
+    """What an arm is: its axes, its motions, its solver, and likely mistakes in its table."""
+
+    robot: RobotAnswer
+    """The arm itself."""
+    axes: list[PairAnswer]
+    """Relation of each joint axis to the next one."""
+    parallel: list[list[int]]
+    """Maximal runs of consecutive joints with parallel axes."""
+    spherical: list[list[int]]
+    """Triples of consecutive joints whose axes meet in one point."""
+    motions: int
+    """Number of independent tool motions, at most six."""
+    redundancy: int
+    """Number of joints beyond that: the dimension of the self-motion at almost every configuration."""
+    home_margin: float
+    """Distance of the home configuration from a singularity, relative to the best of the configurations that were
+    compared with it: 0 at a singularity, 1 at best."""
+    singular_at_home: bool
+    """Whether the home configuration is singular: some tool motions that the arm has elsewhere are lost there."""
+    solver: str
+    """The closed form that answers inverse kinematics, or "numeric"."""
+    reason: str
+    """Why this solver was chosen."""
+    warnings: list[str]
+    """Likely mistakes in the table, one sentence each."""
+
+
+def inspect(robot: Robot, taken: bool = False) -> InspectionAnswer:
+    """Describe an arm; `taken`: a built-in robot has the same id."""
+    match = closed_form_of(robot)
+    between, count, margin = pairs(robot), motions(robot), home_margin(robot)
+    return {
+        "robot": robot_answer(robot),
+        "axes": [_pair(pair) for pair in between],
+        "parallel": [list(range(first, last + 1)) for first, last in parallel_groups(robot)],
+        "spherical": [list(range(i, i + 3)) for i in spherical_groups(robot)],
+        "motions": count,
+        "redundancy": robot.n - count,
+        "home_margin": margin,
+        "singular_at_home": margin < SINGULAR,
+        "solver": "numeric" if match is None else match.name,
+        "reason": "none of Kinboard's closed forms fits this arm's axes" if match is None else match.reason,
+        "warnings": [*_odd_table(robot, taken), *_odd_axes(robot, between), *_odd_motion(robot, count, margin)],
+    }
+
+
+def _pair(pair: Pair) -> PairAnswer:
+    turned: Literal["parallel", "perpendicular", "oblique"] = (
+        "parallel" if pair.parallel else "perpendicular" if pair.perpendicular else "oblique"
+    )
+    return {
+        "joints": [pair.joint, pair.joint + 1],
+        "angle": pair.angle,
+        "distance": None if math.isnan(pair.distance) else pair.distance,
+        "relation": "same line" if pair.one_line else turned,
+        "intersect": pair.intersect,
+    }
+
+
+def motions(robot: Robot) -> int:
+    """Rank of the Jacobian at a generic configuration, with lengths relative to the size of the arm."""
+    J = jacobian(robot, generic_q(robot))
+    J[:3] /= size(robot)
+    return int(np.linalg.matrix_rank(J, tol=1e-9))
+
+
+def home_margin(robot: Robot) -> float:
+    """Margin of the home configuration (see `kin.home`), relative to the best of the candidates for one."""
+    margin = margins(robot, np.vstack([robot.q_home, candidates(robot)[0]]))
+    return float(margin[0] / margin.max()) if margin.max() > 0.0 else 0.0
+
+
+def _odd_table(robot: Robot, taken: bool) -> list[str]:
+    """Likely mistakes in single numbers."""
+    found = []
+    if taken:
+        found.append(f'The id "{robot.id}" is that of a built-in robot; robot files in a folder need another id.')
+    if not SHORT <= robot.reach <= LONG:
+        found.append(f"The arm reaches {robot.reach:g} m: check units.length.")
+    for i, joint in enumerate(robot.joints):
+        if joint.kind == "revolute" and joint.limits and joint.limits[1] - joint.limits[0] > 4 * math.pi + 1e-9:
+            span = math.degrees(joint.limits[1] - joint.limits[0])
+            found.append(
+                f"Joint {i + 1} ({joint.name}) turns through {span:.0f}°, more than two turns: "
+                "each solution has several images that differ by whole turns."
+            )
+    return found
+
+
+def _odd_axes(robot: Robot, between: tuple[Pair, ...]) -> list[str]:
+    """Likely mistakes in how rows follow one another."""
+    found = []
+    for pair in between:
+        here, there = pair.joint + 1, pair.joint + 2
+        if pair.one_line:
+            found.append(f"Joints {here} and {there} turn about the same line: only their sum moves the tool.")
+        elif pair.almost:
+            found.append(
+                f"The axes of joints {here} and {there} are almost {pair.almost}: a closed form needs "
+                "exact values; give the table with more digits."
+            )
+    return found + [
+        f'The fixed row "{row.name}" changes nothing.'
+        for row in robot.rows
+        if row.kind == "fixed" and not any((row.theta, row.d, row.a, row.alpha))
+    ]
+
+
+def _odd_motion(robot: Robot, count: int, margin: float) -> list[str]:
+    """Likely mistakes that show in how the tool moves."""
+    found = []
+    if margin < NEAR_SINGULAR:
+        found.append("The home configuration is near a singularity: some tool motions there need fast joints.")
+    if robot.n > 6 and count < 6:
+        found.append(f"{robot.n} joints give the tool only {count} independent motions.")
+    return found

@@ -1,0 +1,150 @@
+"""Writes robots: `Robot` → the fields of a robot file as a dict → TOML.
+
+Reading what was written gives an equal robot, bit by bit. Not every number has a decimal that becomes exactly it
+when it is multiplied by π/180 or 0.001; such a value is written with its own unit, ``"2.8973 rad"``.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from kin.errors import InputError
+from kin.files.read import ANGLES, UNLIMITED, matrix_of
+from kin.robot import IDENTITY, LENGTHS, Joint, Matrix, Robot
+from kin.units import Length
+
+Angle = Literal["deg", "rad"]
+Value = int | float | str
+_DIGITS = (12, 15, 16, 17)  # tried in this order
+
+
+def robot_to_dict(robot: Robot, length: Length | None = None, angle: Angle = "deg") -> dict[str, Any]:
+    """The robot as the fields of a robot file; `robot_from_dict` reads them.
+
+    Args:
+        robot: the arm.
+        length: the unit of lengths; by default that of the robot. Read again, the robot has this unit.
+        angle: the unit of angles.
+    """
+    length = length or robot.units  # type: ignore[assignment]  # checked by Robot
+    for field, unit, valid in (("length", length, LENGTHS), ("angle", angle, ANGLES)):
+        if unit not in valid:
+            raise InputError(field, unit, "one of " + ", ".join(valid))
+    return _Writer(str(length), angle).robot(robot)
+
+
+def robot_to_toml(robot: Robot, length: Length | None = None, angle: Angle | None = None) -> str:
+    """The robot as the text of a robot file; see `robot_to_dict`. By default angles are in the shorter unit."""
+    if angle is None:
+        in_degrees, in_radians = (robot_to_toml(robot, length, unit) for unit in get_args(Angle))
+        return in_degrees if len(in_degrees) <= len(in_radians) else in_radians
+    data = robot_to_dict(robot, length, angle)
+    rows, home = data.pop("rows"), data.pop("home")
+    lines = [f"{key} = {_toml(value)}" for key, value in data.items()]
+    for row in rows:
+        lines += ["", "[[rows]]", *(f"{key} = {_toml(value)}" for key, value in row.items())]
+    return "\n".join([*lines, "", "[home]", f"q = {_toml(home['q'])}", ""])
+
+
+def save_robot(robot: Robot, path: Path | str) -> None:
+    """Write a robot file; an existing file is replaced."""
+    Path(path).write_text(robot_to_toml(robot), encoding="utf-8")
+
+
+class _Writer:
+    """Writes the fields in these units."""
+
+    def __init__(self, length: str, angle: str) -> None:
+        self.units = {"length": length, "angle": angle}
+
+    def robot(self, robot: Robot) -> dict[str, Any]:
+        data: dict[str, Any] = {"id": robot.id, "name": robot.name}
+        if robot.description:
+            data["description"] = robot.description
+        data |= {"source": robot.source, "convention": robot.convention, "units": self.units}
+        for key, T in (("base", robot.base), ("tool", robot.tool)):
+            if T != IDENTITY:
+                data[key] = self.transform(T)
+        data["rows"] = [self.row(row) for row in robot.rows]
+        pairs = zip(robot.joints, robot.home, strict=True)
+        data["home"] = {"q": [self.value(value, joint.kind == "prismatic") for joint, value in pairs]}
+        return data
+
+    def row(self, row: Joint) -> dict[str, Any]:
+        """Fields that are zero or the default are left out."""
+        data: dict[str, Any] = {"name": row.name}
+        if row.kind != "revolute":
+            data["kind"] = row.kind
+        for key in ("theta", "d", "a", "alpha"):
+            if value := getattr(row, key):
+                data[key] = self.value(value, key in ("d", "a"))
+        if row.kind == "fixed":
+            return data
+        slides = row.kind == "prismatic"
+        data["limits"] = UNLIMITED if row.limits is None else [self.value(v, slides) for v in row.limits]
+        if row.velocity is not None:
+            data["velocity"] = self.value(row.velocity, slides, "/s")
+        if row.effort is not None:
+            data["effort"] = _plain(row.effort)
+        return data
+
+    def transform(self, T: Matrix) -> dict[str, Any]:
+        """As xyz and rpy if they give exactly this matrix, else as the matrix."""
+        place = [row[3] for row in T[:3]]
+        xyz = [self.value(value, True) for value in place]
+        for rpy in _candidates(rpy_of(T)):
+            if matrix_of(place, rpy) == T:
+                return {"xyz": xyz, "rpy": [self.value(angle, False) for angle in rpy]}
+        rows = [[*map(_plain, row[:3]), value] for row, value in zip(T[:3], xyz, strict=True)]
+        return {"matrix": [*rows, [0, 0, 0, 1]]}
+
+    def value(self, value: float, is_length: bool, per: str = "") -> Value:
+        """A length or an angle as the number, or text with its own unit, that is read as exactly this value."""
+        scale = LENGTHS[self.units["length"]] if is_length else ANGLES[self.units["angle"]]
+        guess = value / scale
+        for digits in _DIGITS:
+            number = float(f"{guess:.{digits}g}")
+            if number * scale == value:
+                return _plain(number)
+        for number in (math.nextafter(guess, math.inf), math.nextafter(guess, -math.inf)):
+            if number * scale == value:
+                return _plain(number)
+        return f"{value!r} {'m' if is_length else 'rad'}{per}"
+
+
+def rpy_of(T: Matrix) -> tuple[float, float, float]:
+    """Roll, pitch and yaw with ``R = Rz(yaw) Ry(pitch) Rx(roll)``; yaw is 0 where pitch is ±90°."""
+    cosine = math.hypot(T[0][0], T[1][0])
+    pitch = math.atan2(-T[2][0], cosine)
+    if cosine < 1e-15:
+        return math.atan2(-T[1][2], T[1][1]), pitch, 0.0
+    return math.atan2(T[2][1], T[2][2]), pitch, math.atan2(T[1][0], T[0][0])
+
+
+def _candidates(rpy: Sequence[float]) -> Iterator[list[float]]:
+    """The angles without the rounding of the matrix they come from: round degrees, round radians, as they are."""
+    for unit in ANGLES.values():
+        yield [float(f"{angle / unit:.12g}") * unit for angle in np.round(rpy, 15)]
+    yield list(rpy)
+
+
+def _plain(value: float) -> int | float:
+    """A whole number without its decimal point."""
+    return int(value) if value == int(value) and abs(value) < 1e6 else value
+
+
+def _toml(value: Any) -> str:
+    """A number, text, list or flat table as TOML."""
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007F")
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + " }"
+    return repr(value)

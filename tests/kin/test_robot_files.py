@@ -1,0 +1,343 @@
+"""Robot files: what they mean, and the errors for invalid ones."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import FrozenInstanceError, replace
+
+import numpy as np
+import pytest
+from arms import CHAPTER_ARMS, Draw
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import kin
+from kin import InputError, Joint, Robot, RobotFileError, UnknownRobotError
+from kin.files.builtin import BUILTIN
+
+GOOD = """
+id = "bench"
+name = "Bench arm"
+source = "made up"
+convention = "standard"
+units = { length = "mm", angle = "deg" }
+base = { xyz = [0, 0, 500], rpy = [0, 0, 90] }
+tool = { xyz = [0, 0, 40] }
+
+[[rows]]
+name = "turn"
+d = 100
+a = 50
+alpha = -90
+limits = [-90, 180]
+
+[[rows]]
+name = "slide"
+kind = "prismatic"
+d = 10
+limits = [0, 250]
+
+[[rows]]
+name = "flange"
+kind = "fixed"
+theta = 90
+
+[home]
+q = [45, 125]
+"""
+
+
+def test_a_file_names_its_units():
+    robot = kin.parse_robot(GOOD)
+    assert robot.n == 2
+    assert robot.rows[0].alpha == pytest.approx(-math.pi / 2)
+    assert robot.lower == pytest.approx([-math.pi / 2, 0])
+    assert robot.upper == pytest.approx([math.pi, 0.25])
+    assert robot.home == pytest.approx((math.pi / 4, 0.125))
+    assert [row.kind for row in robot.rows] == ["revolute", "prismatic", "fixed"]
+    assert kin.fk(robot, [0, 0])[:3, 3] == pytest.approx([-0.05, 0.05, 0.6], abs=1e-12)
+
+
+def test_metres_and_radians():
+    text = GOOD.replace('length = "mm", angle = "deg"', 'length = "cm", angle = "rad"')
+    text = text.replace("[-90, 180]", "[-1.5, 3]").replace("q = [45, 125]", "q = [1, 125]")
+    robot = kin.parse_robot(text)
+    assert robot.rows[0].d == pytest.approx(1.0)
+    assert robot.rows[0].alpha == -90
+    assert robot.lower[0] == -1.5
+
+
+def test_missing_limits_and_home_get_defaults():
+    text = GOOD.replace("limits = [-90, 180]\n", "").replace("limits = [0, 250]\n", "").split("[home]")[0]
+    robot = kin.parse_robot(text)
+    assert robot.lower == pytest.approx([-math.pi, 0])
+    assert robot.upper == pytest.approx([math.pi, 1])
+    assert robot.in_limits(robot.q_home)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "field", "valid"),
+    [
+        ('id = "bench"', 'id = "Bench Arm"', "id", "lower-case"),
+        ('id = "bench"', "", "id", "text"),
+        ('name = "Bench arm"', "name = 5", "name", "text"),
+        ('source = "made up"', 'source = ""', "source", "text"),
+        ('"standard"', '"dh"', "convention", '"modified"'),
+        ('length = "mm"', 'length = "inch"', "units.length", '"cm"'),
+        ('angle = "deg"', "angle = 1", "units.angle", '"rad"'),
+        ('units = {', 'unit = {', "unit", "units"),
+        ("d = 100", 'd = "far"', "rows[0].d", "number"),
+        ("d = 100", "d = nan", "rows[0].d", "finite"),
+        ("d = 100", "d = inf", "rows[0].d", "finite"),
+        ("d = 100", "d = true", "rows[0].d", "number"),
+        ("d = 100", "dd = 100", "rows[0].dd", "alpha"),
+        ("limits = [-90, 180]", "limits = [180, -90]", "rows[0].limits", "lower below upper"),
+        ("limits = [-90, 180]", "limits = [1]", "rows[0].limits", "two numbers"),
+        ("limits = [-90, 180]", "limits = [0, 'x']", "rows[0].limits[1]", "number"),
+        ('kind = "fixed"', 'kind = "welded"', "rows[2].kind", '"prismatic"'),
+        ('kind = "fixed"\n', 'kind = "fixed"\nlimits = [0, 1]\n', "rows[2].limits", "no limits"),
+        ('name = "slide"', 'name = "turn"', "rows[].name", "different"),
+        ("q = [45, 125]", "q = [45]", "home.q", "2 numbers"),
+        ("q = [45, 125]", "q = [45, 300]", "home.q[1]", "limits of slide"),
+        ("q = [45, 125]", "p = [45, 125]", "home.p", "q"),
+        ("xyz = [0, 0, 40]", "xyz = [0, 0]", "tool.xyz", "three"),
+        ("rpy = [0, 0, 90]", "rpy = [0, 0, 'a']", "base.rpy[2]", "number"),
+        ("[[rows]]", "[[row]]", "row", "rows"),
+        ('id = "bench"', 'id = "bench', "file", "TOML"),
+    ],
+)  # fmt: skip
+def test_an_error_names_the_field_and_what_is_valid(old, new, field, valid, tmp_path):
+    assert old in GOOD
+    path = tmp_path / "arm.toml"
+    path.write_text(GOOD.replace(old, new), encoding="utf-8")
+    with pytest.raises(RobotFileError) as caught:
+        kin.load_robot(path)
+    assert caught.value.field == field
+    assert valid in caught.value.expected
+    assert str(path) in str(caught.value)
+
+
+def test_files_that_cannot_be_read(tmp_path):
+    with pytest.raises(RobotFileError, match="readable"):
+        kin.load_robot(tmp_path / "none.toml")
+    (tmp_path / "latin.toml").write_bytes('name = "Bär"'.encode("latin-1"))
+    with pytest.raises(RobotFileError, match="UTF-8"):
+        kin.load_robot(tmp_path / "latin.toml")
+
+
+def test_a_byte_order_mark_is_accepted(tmp_path):
+    (tmp_path / "arm.toml").write_text(GOOD, encoding="utf-8-sig")
+    assert kin.load_robot(tmp_path / "arm.toml") == kin.parse_robot(GOOD)
+
+
+@pytest.mark.parametrize("text", ["x = " + "9" * 5000, "x = " + "[" * 100_000], ids=["digits", "brackets"])
+def test_endless_toml_is_rejected(text):
+    with pytest.raises(RobotFileError, match="valid TOML") as caught:
+        kin.parse_robot(text, "arm.toml")
+    assert len(str(caught.value)) < 300
+
+
+def test_the_number_of_rows_is_limited():
+    head = GOOD.split("[[rows]]")[0]
+    for text in (head, head + "rows = []", head + '[[rows]]\nkind = "fixed"', head + "[[rows]]\nname='%d'\n" * 40):
+        with pytest.raises(RobotFileError) as caught:
+            kin.parse_robot(text)
+        assert caught.value.field in ("rows", "file")
+
+
+def test_two_files_with_the_same_id(tmp_path):
+    for name in ("a.toml", "b.toml"):
+        (tmp_path / name).write_text(GOOD, encoding="utf-8")
+    with pytest.raises(RobotFileError, match="no other file"):
+        kin.load_folder(tmp_path)
+
+
+def test_built_in_files_are_named_after_their_robots():
+    ids = list(kin.builtin_robots())
+    assert sorted(path.stem for path in BUILTIN.glob("*.toml")) == sorted(ids)
+    assert ids[:3] == list(CHAPTER_ARMS)  # these come first in every list
+    assert ids[3:] == sorted(ids[3:])
+    for robot in kin.builtin_robots().values():
+        assert robot.in_limits(robot.q_home)
+        assert robot.source
+        assert robot.description
+    with pytest.raises(UnknownRobotError, match="pioneer5"):
+        kin.get_robot("puma")
+
+
+def test_robots_are_values():
+    robot = kin.get_robot("pioneer5")
+    same = replace(robot)
+    assert same == robot
+    assert hash(same) == hash(robot)
+    assert replace(robot, name="other") != robot
+    with pytest.raises(FrozenInstanceError):
+        robot.name = "other"
+    for array in (robot.lower, robot.upper, robot.q_home, robot.model, robot.T_world_base, robot.revolute):
+        assert not array.flags.writeable
+
+
+def test_random_configurations_are_inside_the_limits():
+    robot = kin.get_robot("pioneer5")
+    q = robot.random_q(np.random.default_rng(0), (10, 100))
+    assert q.shape == (10, 100, 5)
+    assert robot.in_limits(q).all()
+    assert robot.in_limits(robot.clip(q + 10)).all()
+    assert not robot.in_limits(q + 10).any()
+
+
+def test_reach_bounds_every_pose_and_is_infinite_without_limits():
+    for robot in (*kin.builtin_robots().values(), kin.parse_robot(GOOD)):
+        q = robot.random_q(np.random.default_rng(1), 5000)
+        origin = robot.T_world_base[:3, 3]
+        assert np.linalg.norm(kin.fk(robot, q)[:, :3, 3] - origin, axis=-1).max() <= robot.reach
+    slide = kin.Joint("slide", kind="prismatic", limits=None)
+    assert replace(kin.parse_robot(GOOD), rows=(slide,), home=(0.0,)).reach == math.inf
+
+
+# -- plain data and writing ------------------------------------------------------------------------------------
+
+
+def read_again(robot, **units):
+    """The robot after a journey through a dict, JSON and a dict, and through TOML."""
+    by_json = kin.robot_from_dict(json.loads(json.dumps(kin.robot_to_dict(robot, **units), allow_nan=False)))
+    by_toml = kin.parse_robot(kin.robot_to_toml(robot, **units))
+    assert by_json == by_toml
+    return by_json
+
+
+@pytest.mark.parametrize("robot", kin.builtin_robots().values(), ids=lambda robot: robot.id)
+def test_writing_and_reading_gives_an_equal_robot(robot, tmp_path):
+    assert read_again(robot) == robot
+    kin.save_robot(robot, tmp_path / "arm.toml")
+    assert kin.load_robot(tmp_path / "arm.toml") == robot
+    for length in ("m", "cm", "mm"):
+        for angle in ("deg", "rad"):
+            assert read_again(robot, length=length, angle=angle) == replace(robot, units=length)
+
+
+def test_round_values_are_written_round():
+    data = kin.robot_to_dict(kin.get_robot("puma560"), length="mm")
+    assert data["rows"][0]["alpha"] == 90
+    assert isinstance(data["rows"][0]["alpha"], int)
+    assert data["rows"][1]["a"] == 431.8
+    assert data["home"]["q"] == [0, 45, -180, 0, 45, 0]
+    tilted = kin.robot_to_dict(kin.parse_robot(GOOD))
+    assert tilted["base"] == {"xyz": [0, 0, 500], "rpy": [0, 0, 90]}
+    assert tilted["tool"] == {"xyz": [0, 0, 40], "rpy": [0, 0, 0]}
+    # The shorter of degrees and radians.
+    assert 'angle = "rad"' in kin.robot_to_toml(Robot.from_dh([{"alpha": 0.7, "limits": (-2.1, 2.9)}]))
+    assert 'angle = "deg"' in kin.robot_to_toml(kin.get_robot("ur5"))
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    length=st.sampled_from(["m", "cm", "mm"]),
+    angle=st.sampled_from(["deg", "rad"]),
+)
+def test_any_robot_is_written_exactly(seed, length, angle):
+    draw = Draw(seed)
+    rng = draw.rng
+    rows = []
+    for i in range(int(rng.integers(1, 9))):
+        kind = str(rng.choice(["revolute", "prismatic", "fixed"])) if i else "revolute"
+        limits = None if kind == "fixed" else (float(rng.uniform(-3, 0)), float(rng.uniform(0.01, 3)))
+        if kind == "revolute" and rng.random() < 0.2:
+            limits = None
+        extra = {} if kind == "fixed" or rng.random() < 0.5 else {"velocity": rng.uniform(0.1, 9), "effort": 12.5}
+        numbers = (draw.angle(), draw.length() * 1e-3 ** rng.integers(0, 4), draw.length(), rng.normal())
+        rows.append(Joint(f'part {i} “{chr(i)}\\\x7f"', *numbers, kind, limits, **extra))
+    robot = Robot.from_dh(rows, str(rng.choice(["standard", "modified"])), base=draw.pose(), tool=draw.pose())
+    home = tuple(float(v) for v in robot.clip(robot.random_q(rng)))
+    robot = replace(robot, home=home, description="two\nlines")
+    assert read_again(robot, length=length, angle=angle) == replace(robot, units=length)
+
+
+def test_a_number_may_have_its_own_unit():
+    text = GOOD.replace("d = 100", 'd = "0.1 m"').replace("alpha = -90", 'alpha = "-90°"')
+    assert kin.parse_robot(text) == kin.parse_robot(GOOD)
+    text = GOOD.replace("limits = [-90, 180]", 'limits = ["-1.5 rad", 180]\nvelocity = "2 rad/s"\neffort = 87')
+    row = kin.parse_robot(text).rows[0]
+    assert (row.limits, row.velocity, row.effort) == ((-1.5, math.pi), 2.0, 87.0)
+
+
+def test_joints_without_limits():
+    robot = kin.parse_robot(GOOD.replace("limits = [-90, 180]", 'limits = "none"'))
+    assert robot.joints[0].limits is None
+    assert robot.upper[0] == math.inf
+    assert read_again(robot) == robot
+
+
+def test_base_and_tool_as_matrices():
+    matrix = [[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 500], [0, 0, 0, 1]]
+    data = {**kin.robot_to_dict(kin.parse_robot(GOOD)), "base": {"matrix": matrix}}
+    assert kin.robot_from_dict(data).T_world_base[:3, 3] == pytest.approx([1e-3, 2e-3, 0.5])
+    # A matrix typed with seven digits is made orthonormal, and stays as it is from then on.
+    s = 0.7071068
+    data["tool"] = {"matrix": [[s, -s, 0, 0], [s, s, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}
+    robot = kin.robot_from_dict(data)
+    R = robot.T_last_tool[:3, :3]
+    assert np.abs(R.T @ R - np.eye(3)).max() < 1e-15
+    assert read_again(robot) == robot
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "valid"),
+    [
+        ({"rows": [{"alpha": "π"}]}, "rows[0].alpha", "1.5 deg"),
+        ({"rows": [{"alpha": "3 mm"}]}, "rows[0].alpha", "1.5 deg"),
+        ({"rows": [{"alpha": "3 rad/s"}]}, "rows[0].alpha", "1.5 deg"),
+        ({"rows": [{"a": math.nan}]}, "rows[0].a", "finite"),
+        ({"rows": [{"a": 10**400}]}, "rows[0].a", "million"),
+        ({"rows": [{}, {"a": None}]}, "rows[1].a", "finite"),
+        ({"rows": [7]}, "rows[0]", "table"),
+        ({"rows": [{}] * 33}, "rows", "1 to 32"),
+        ({"rows": [{"kind": "prismatic", "limits": "none"}]}, "rows[0].limits", "two numbers"),
+        ({"rows": [{"limits": "free"}]}, "rows[0].limits", '"none"'),
+        ({"rows": [{"velocity": 0}]}, "rows[0].velocity", "positive"),
+        ({"rows": [{"effort": "5 m"}]}, "rows[0].effort", "finite"),
+        ({"rows": [{}, {"kind": "fixed", "effort": 1}]}, "rows[1].effort", "fixed"),
+        ({"base": {"matrix": [[1, 0], [0, 1]]}}, "base.matrix", "four rows"),
+        ({"base": {"matrix": [[1, 0, 0, 0]] * 4}}, "base.matrix[3]", "last row"),
+        ({"base": {"matrix": 1, "xyz": [0, 0, 0]}}, "base.xyz", "matrix"),
+        ({"tool": {"matrix": np.diag([2, 1, 1, 1]).tolist()}}, "tool.matrix rotation", "orthonormal"),
+    ],
+)  # fmt: skip
+def test_an_error_in_plain_data_names_the_field(change, field, valid):
+    data = {"id": "a", "name": "A", "source": "test", "convention": "standard"}
+    data |= {"units": {"length": "m", "angle": "rad"}, "rows": [{}]}
+    assert kin.robot_from_dict(data).n == 1
+    with pytest.raises(RobotFileError) as caught:
+        kin.robot_from_dict({**data, **change}, "sent")
+    assert caught.value.field == field
+    assert valid in caught.value.expected
+    assert str(caught.value).startswith("sent: ")
+
+
+def test_only_tables_and_known_units_are_data():
+    with pytest.raises(RobotFileError, match="a table with the fields"):
+        kin.robot_from_dict([1])
+    with pytest.raises(InputError, match="length"):
+        kin.robot_to_dict(kin.get_robot("ur5"), length="inch")
+    with pytest.raises(InputError, match="angle"):
+        kin.robot_to_toml(kin.get_robot("ur5"), angle="grad")
+
+
+def test_from_dh():
+    rows = [(0, 0.4, 0.025, -math.pi / 2), {"a": 0.455, "limits": (-1, 0)}, {"kind": "prismatic", "name": "rail"}]
+    robot = Robot.from_dh([*rows, Joint("flange", d=0.08, kind="fixed")], "modified")
+    assert robot.home == (0.0, -0.5, 0.5)
+    assert [row.name for row in robot.rows] == ["joint 1", "joint 2", "rail", "flange"]
+    assert robot.joints[0].limits == (-math.pi, math.pi)
+    assert Robot.from_dh([(0, 0, 1, 0)], tool=np.eye(4)).tool == kin.robot.IDENTITY
+    with pytest.raises(InputError, match=r"rows\[1\]"):
+        Robot.from_dh([(0, 0, 0, 0), (1, 2, 3)])
+    with pytest.raises(InputError, match=r"rows\[0\]\.length"):
+        Robot.from_dh([{"length": 1}])
+    with pytest.raises(InputError, match="alpha of joint 1"):
+        Robot.from_dh([(0, 0, 0, math.inf)])
+    for extra in ({"velocity": -1}, {"effort": 0}, {"kind": "fixed", "velocity": 1, "limits": None}):
+        with pytest.raises(InputError, match="positive number"):
+            Robot.from_dh([{}, extra])
