@@ -7,17 +7,23 @@
 """
 
 from kin._version import __version__
+from kin.dh import convert
 from kin.errors import InputError, KinematicsError, RobotFileError, UnknownRobotError
 from kin.files import (
+    UrdfReport,
+    UrdfRobot,
     builtin_robots,
     get_robot,
     load_folder,
     load_robot,
+    load_urdf,
     parse_robot,
+    read_urdf,
     robot_from_dict,
     robot_to_dict,
     robot_to_toml,
     save_robot,
+    to_urdf,
 )
 from kin.fk import fk, fk_positions, jacobian, link_frames, manipulability
 from kin.ik import IKOptions, JointConstraints, branch_meanings, branch_names, branch_of, solve_ik
@@ -78,6 +84,8 @@ __all__ = [
     "Status",
     "Task",
     "UnknownRobotError",
+    "UrdfReport",
+    "UrdfRobot",
     "WorkspaceChunk",
     "WorkspaceFacts",
     "__version__",
@@ -90,6 +98,7 @@ __all__ = [
     "capability_join",
     "capability_map",
     "configuration_at",
+    "convert",
     "fk",
     "fk_positions",
     "from_position_wxyz",
@@ -99,8 +108,10 @@ __all__ = [
     "link_frames",
     "load_folder",
     "load_robot",
+    "load_urdf",
     "manipulability",
     "parse_robot",
+    "read_urdf",
     "robot_from_dict",
     "robot_to_dict",
     "robot_to_toml",
@@ -111,6 +122,7 @@ __all__ = [
     "singularities",
     "solve_ik",
     "solve_path",
+    "to_urdf",
     "warm_up",
     "warm_up_rest",
     "workspace_facts",

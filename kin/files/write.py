@@ -16,7 +16,8 @@ import numpy as np
 
 from kin.errors import InputError
 from kin.files.read import ANGLES, UNLIMITED, matrix_of
-from kin.robot import IDENTITY, LENGTHS, Joint, Matrix, Robot
+from kin.robot import IDENTITY, LENGTHS, Joint, Matrix, Robot, exact_cos_sin
+from kin.transforms import Array
 from kin.units import Length
 
 Angle = Literal["deg", "rad"]
@@ -118,13 +119,16 @@ class _Writer:
         return f"{value!r} {'m' if is_length else 'rad'}{per}"
 
 
-def rpy_of(T: Matrix) -> tuple[float, float, float]:
-    """Roll, pitch and yaw with ``R = Rz(yaw) Ry(pitch) Rx(roll)``; yaw is 0 where pitch is ±90°."""
-    cosine = math.hypot(T[0][0], T[1][0])
-    pitch = math.atan2(-T[2][0], cosine)
-    if cosine < 1e-15:
-        return math.atan2(-T[1][2], T[1][1]), pitch, 0.0
-    return math.atan2(T[2][1], T[2][2]), pitch, math.atan2(T[1][0], T[0][0])
+def rpy_of(T: Matrix | Array) -> tuple[float, float, float]:
+    """Roll, pitch and yaw with ``R = Rz(yaw) Ry(pitch) Rx(roll)``.
+
+    Yaw is computed from what the roll leaves of the rotation: near a pitch of ±90° each of them alone is badly
+    defined, but their sum or difference is not.
+    """
+    pitch = math.atan2(-T[2][0], math.hypot(T[0][0], T[1][0]))
+    roll = math.atan2(T[2][1], T[2][2]) if math.hypot(T[2][1], T[2][2]) > 1e-15 else 0.0
+    c, s = exact_cos_sin(roll)
+    return roll, pitch, math.atan2(s * T[0][2] - c * T[0][1], c * T[1][1] - s * T[1][2])
 
 
 def _candidates(rpy: Sequence[float]) -> Iterator[list[float]]:

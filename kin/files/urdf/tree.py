@@ -1,0 +1,236 @@
+"""The joints and links of a URDF, and the serial chain between two links."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+from xml.etree.ElementTree import Element
+
+from kin.errors import RobotFileError
+from kin.files.urdf.xml import parse_xml
+from kin.robot import Kind
+
+MOVING = ("revolute", "continuous", "prismatic")
+TYPES = (*MOVING, "fixed", "floating", "planar")
+MOST = 12  # names in a message
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+
+
+class Tip(NamedTuple):
+    """A link at the end of a chain, with the number of moving joints that lead to it from the root."""
+
+    link: str
+    joints: int
+
+
+@dataclass(frozen=True, eq=False)
+class UrdfJoint:
+    """One joint of a URDF; its numbers are read where they are needed."""
+
+    file: str
+    element: Element
+    name: str
+    type: str
+    parent: str
+    child: str
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is not fixed."""
+        return self.type != "fixed"
+
+    @property
+    def kind(self) -> Kind:
+        """The kind of the row."""
+        return "prismatic" if self.type == "prismatic" else "revolute"
+
+    def origin(self) -> tuple[list[float], list[float]]:
+        """xyz in metres and rpy in radians of the joint's frame in its parent's."""
+        return self.triple("origin", "xyz", "0 0 0"), self.triple("origin", "rpy", "0 0 0")
+
+    def axis(self) -> list[float]:
+        """The joint axis, a unit vector in the joint's frame."""
+        given = self.triple("axis", "xyz", "1 0 0")
+        length = math.hypot(*given)
+        if length < 1e-6:
+            raise self.refuse("axis xyz", given, "a direction that is not zero")
+        return [v / length for v in given]
+
+    def limits(self) -> tuple[float, float] | None:
+        """Lower and upper limit; None if it states none, as a continuous joint does."""
+        limit = self.element.find("limit")
+        if self.type == "continuous" or limit is None or not {"lower", "upper"} & set(limit.keys()):
+            return None
+        lower, upper = (self.number("limit", key, limit.get(key, "0")) for key in ("lower", "upper"))
+        if not lower < upper:
+            raise self.refuse("limit", [lower, upper], "lower below upper; a joint that does not move is fixed")
+        return lower, upper
+
+    def positive(self, key: str) -> float | None:
+        """A limit of velocity or effort; None if it is not stated or zero, which stands for unknown."""
+        limit = self.element.find("limit")
+        given = None if limit is None else limit.get(key)
+        value = 0.0 if given is None else self.number("limit", key, given)
+        if value < 0.0:
+            raise self.refuse(f"limit {key}", value, "a positive number")
+        return value or None
+
+    def triple(self, tag: str, key: str, default: str) -> list[float]:
+        """Three numbers of an attribute."""
+        child = self.element.find(tag)
+        parts = (default if child is None else child.get(key, default)).split()
+        if len(parts) != 3:
+            raise self.refuse(f"{tag} {key}", " ".join(parts), "three numbers separated by spaces")
+        return [self.number(tag, f"{key}[{i}]", part) for i, part in enumerate(parts)]
+
+    def number(self, tag: str, key: str, text: str) -> float:
+        """A finite number of an attribute."""
+        value = float(text) if _NUMBER.fullmatch(text.strip()) else math.nan
+        if not abs(value) < 1e6:
+            hint = "; expand xacro first" if "$" in text else ""
+            raise self.refuse(f"{tag} {key}", text, "a finite number, smaller than a million" + hint)
+        return value
+
+    def refuse(self, field: str, value: object, expected: str) -> RobotFileError:
+        """The error for one of its fields."""
+        return RobotFileError(self.file, f"joint {self.name}: {field}", value, expected)
+
+
+@dataclass(frozen=True, eq=False)
+class UrdfTree:
+    """A URDF file: links that joints connect, each link with one parent at most.
+
+    Raises:
+        RobotFileError: names that occur twice or do not exist, two parents, a cycle, an unknown type of joint.
+    """
+
+    file: str
+    name: str
+    links: tuple[str, ...]
+    joints: tuple[UrdfJoint, ...]
+
+    @cached_property
+    def parents(self) -> dict[str, UrdfJoint]:
+        """For each link that has a parent, the joint to it."""
+        return {joint.child: joint for joint in self.joints}
+
+    @cached_property
+    def tips(self) -> tuple[Tip, ...]:
+        """Links without children that joints move, those with the most joints first."""
+        inner = {joint.parent for joint in self.joints}
+        found = [Tip(link, sum(j.moves for j in self.to_root(link))) for link in self.links if link not in inner]
+        return tuple(sorted((tip for tip in found if tip.joints), key=lambda tip: -tip.joints))
+
+    def to_root(self, link: str) -> list[UrdfJoint]:
+        """The joints from the root of a link's tree to the link."""
+        found: list[UrdfJoint] = []
+        while link in self.parents:
+            found.append(self.parents[link])
+            link = found[-1].parent
+            if len(found) > len(self.joints):
+                names = ", ".join(joint.name for joint in found[:MOST])
+                expected = "no cycle: each chain begins at a link without parent"
+                raise RobotFileError(self.file, "joint", names, expected)
+        return found[::-1]
+
+    def chain(self, base: str | None, tip: str | None) -> tuple[UrdfJoint, ...]:
+        """The joints from `base` (by default the root) to `tip`, which may be left out if there is only one.
+
+        Raises:
+            RobotFileError: naming the links to choose from, or a joint that is no part of a serial arm.
+        """
+        for field, link in (("base", base), ("tip", tip)):
+            if link is not None and link not in self.links:
+                names = self.names(self.links) if field == "base" else self.choices()
+                raise RobotFileError(self.file, field, link, f"one of {names}")
+        if tip is None:
+            if len(self.tips) != 1:
+                given = "no tip, and several are possible" if self.tips else "no moving joints"
+                expected = f"one of {self.choices()}" if self.tips else "a chain with revolute or prismatic joints"
+                raise RobotFileError(self.file, "tip", given, expected)
+            tip = self.tips[0].link
+        found = self.to_root(tip)
+        if base is not None:
+            above = [i for i, joint in enumerate(found) if joint.parent == base]
+            if not above:
+                names = self.names([joint.parent for joint in found])
+                raise RobotFileError(self.file, "base", base, f"a link on the way to {tip}: {names}")
+            found = found[above[0] :]
+        self._check(found, tip)
+        return tuple(found)
+
+    def _check(self, chain: list[UrdfJoint], tip: str) -> None:
+        if not any(joint.moves for joint in chain):
+            raise RobotFileError(self.file, "tip", tip, f"a link that joints move, such as {self.choices()}")
+        for joint in chain:
+            if joint.moves and joint.type not in MOVING:
+                raise joint.refuse("type", joint.type, "one of " + ", ".join((*MOVING, "fixed")))
+            if joint.element.find("mimic") is not None:
+                raise joint.refuse("mimic", "a joint that follows another", "joints that move on their own")
+
+    def choices(self) -> str:
+        """The tips, for a message."""
+        return self.names([f"{tip.link} ({tip.joints} joint{'s' * (tip.joints > 1)})" for tip in self.tips])
+
+    def names(self, all_of_them: list[str] | tuple[str, ...]) -> str:
+        """Names, for a message."""
+        more = f" and {len(all_of_them) - MOST} more" if len(all_of_them) > MOST else ""
+        return ", ".join(all_of_them[:MOST]) + more
+
+
+def read_tree(text: bytes, file: str) -> UrdfTree:
+    """The links and joints of a URDF; raises `RobotFileError`."""
+    root = parse_xml(text, file)
+    if root.tag != "robot":
+        raise RobotFileError(file, "root element", root.tag, "<robot>, the root of a URDF")
+    if any(element.tag.startswith("xacro:") for element in root.iter()):
+        expected = "plain URDF: expand it first with `xacro FILE.xacro > FILE.urdf`"
+        raise RobotFileError(file, "file", "xacro elements", expected)
+    links = tuple(_attribute(element, "name", file, "link") for element in root.findall("link"))
+    joints = tuple(_joint(element, file) for element in root.findall("joint"))
+    for field, names in (("link", links), ("joint", [joint.name for joint in joints])):
+        twice = [name for name, count in Counter(names).items() if count > 1]
+        if twice:
+            raise RobotFileError(file, field, twice[0], f"a name that no other {field} has")
+    known = set(links)
+    for joint in joints:
+        for field, link in (("parent", joint.parent), ("child", joint.child)):
+            if link not in known:
+                raise joint.refuse(field, link, "the name of a link of this file")
+    twice = [link for link, count in Counter(joint.child for joint in joints).items() if count > 1]
+    if twice:
+        both = " and ".join(joint.name for joint in joints if joint.child == twice[0])
+        expected = "one parent: a loop is no serial arm"
+        raise RobotFileError(file, f"link {twice[0]}", f"the child of {both}", expected)
+    tree = UrdfTree(file, root.get("name", ""), links, joints)
+    ends = known - {joint.parent for joint in joints}
+    reached = {joint.name for link in ends for joint in tree.to_root(link)}
+    for joint in joints:
+        if joint.name not in reached:
+            tree.to_root(joint.child)
+    return tree
+
+
+def _joint(element: Element, file: str) -> UrdfJoint:
+    name = _attribute(element, "name", file, "joint")
+    ends = []
+    for tag in ("parent", "child"):
+        child = element.find(tag)
+        if child is None:
+            raise RobotFileError(file, f"joint {name}: {tag}", "nothing", f'<{tag} link="…"/>')
+        ends.append(_attribute(child, "link", file, f"joint {name}: {tag}"))
+    kind = element.get("type", "")
+    if kind not in TYPES:
+        raise RobotFileError(file, f"joint {name}: type", kind, "one of " + ", ".join(TYPES))
+    return UrdfJoint(file, element, name, kind, *ends)
+
+
+def _attribute(element: Element, key: str, file: str, field: str) -> str:
+    value = element.get(key, "").strip()
+    if not value or len(value) > 200:
+        raise RobotFileError(file, f"{field} {key}", value, "a text of 1 to 200 characters")
+    return value

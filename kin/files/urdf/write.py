@@ -1,0 +1,76 @@
+"""`Robot` → URDF: one joint per DH row, each about the z axis of its link."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from kin.axes import screw_x, screw_z
+from kin.errors import InputError
+from kin.files.write import rpy_of
+from kin.robot import Joint, Robot
+from kin.transforms import Array
+
+_UNKNOWN = 0.0  # velocity and effort are required by URDF
+_UNFIT = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def to_urdf(robot: Robot) -> str:
+    """The arm as a URDF without bodies: links ``base``, one per row, and ``tool``.
+
+    A velocity or effort that is not known is written as 0.
+
+    Raises:
+        InputError: a slide without limits, which URDF cannot describe.
+    """
+    lines = ['<?xml version="1.0" encoding="utf-8"?>', f"<robot name={_quoted(robot.id)}>"]
+    names = _distinct([row.name for row in robot.rows])
+    links = ["base", *(f"link_{k + 1}" for k in range(len(robot.rows))), "tool"]
+    lines += [f"  <link name={_quoted(link)}/>" for link in links]
+    T = robot.T_world_base
+    for k, (row, name) in enumerate(zip(robot.rows, names, strict=True)):
+        x, z = screw_x(row.a, row.alpha), screw_z(row.theta, row.d)
+        standard = robot.convention == "standard"
+        lines += _joint(row, name, links[k], links[k + 1], T @ z if standard else T @ x @ z)
+        T = x if standard else np.eye(4)
+    end = "tool" if "tool" not in names else "tool end"
+    lines += _joint(Joint(end, kind="fixed"), end, links[-2], links[-1], T @ robot.T_last_tool)
+    return "\n".join([*lines, "</robot>", ""])
+
+
+def _joint(row: Joint, name: str, parent: str, child: str, T: Array) -> list[str]:
+    kind = "continuous" if row.kind == "revolute" and row.limits is None else row.kind
+    lines = [
+        f'  <joint name={_quoted(name)} type="{kind}">',
+        f"    <parent link={_quoted(parent)}/>",
+        f"    <child link={_quoted(child)}/>",
+        f'    <origin xyz="{_numbers(T[:3, 3])}" rpy="{_numbers(rpy_of(T))}"/>',
+    ]
+    if row.kind != "fixed":
+        lines.append('    <axis xyz="0 0 1"/>')
+        limits = ""
+        if row.limits is not None:
+            limits = f'lower="{row.limits[0]!r}" upper="{row.limits[1]!r}" '
+        elif row.kind == "prismatic":
+            raise InputError(f"limits of {row.name}", None, "limits: URDF has no slide without them")
+        effort, velocity = (_UNKNOWN if value is None else value for value in (row.effort, row.velocity))
+        lines.append(f'    <limit {limits}effort="{effort!r}" velocity="{velocity!r}"/>')
+    return [*lines, "  </joint>"]
+
+
+def _numbers(values: Sequence[float] | Array) -> str:
+    return " ".join(repr(float(value) + 0.0) for value in values)
+
+
+def _distinct(names: list[str]) -> list[str]:
+    """The names, those that occur more than once with their number."""
+    counts = Counter(names)
+    return [f"{name} {k + 1}" if counts[name] > 1 else name for k, name in enumerate(names)]
+
+
+def _quoted(text: str) -> str:
+    return quoteattr(_UNFIT.sub("_", text))

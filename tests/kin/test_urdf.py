@@ -1,0 +1,247 @@
+"""URDF files: what they mean, what is refused, and the same arm written again."""
+
+from __future__ import annotations
+
+import math
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_dh import random_robot
+
+import kin
+from kin import InputError, Joint, Robot, RobotFileError
+from kin.files.urdf.xml import MAX_BYTES
+from kin.solvers import closed_form_of
+
+EXACT = 1e-12
+FILES = Path(__file__).parents[1] / "data" / "urdf"
+
+GOOD = """<?xml version="1.0"?>
+<robot name="Bench arm 2">
+  <link name="world"/><link name="foot"/><link name="upper"/><link name="rail"/><link name="hand"/>
+  <link name="tcp"/><link name="camera"/>
+  <joint name="stand" type="fixed">
+    <parent link="world"/><child link="foot"/><origin xyz="0.1 0 0.5" rpy="0 0 1.5707963267948966"/>
+  </joint>
+  <joint name="shoulder" type="revolute">
+    <parent link="foot"/><child link="upper"/><origin xyz="0 0 0.2"/><axis xyz="0 0 -2"/>
+    <limit lower="-1" upper="2" velocity="3" effort="0"/>
+  </joint>
+  <joint name="slide" type="prismatic">
+    <parent link="upper"/><child link="rail"/><origin xyz="0.3 0 0" rpy="0.1 0.2 0.3"/><axis xyz="0 1 1"/>
+    <limit lower="0" upper="0.4" velocity="0.5" effort="80"/>
+  </joint>
+  <joint name="wrist" type="continuous">
+    <parent link="rail"/><child link="hand"/><origin xyz="0 0.05 0"/>
+  </joint>
+  <joint name="flange" type="fixed"><parent link="hand"/><child link="tcp"/><origin xyz="0 0 0.1"/></joint>
+  <joint name="mount" type="fixed"><parent link="upper"/><child link="camera"/></joint>
+  <transmission name="not a joint"><joint name="shoulder"/></transmission>
+</robot>
+"""
+
+
+def test_a_chain_becomes_a_robot():
+    robot, report = kin.read_urdf(GOOD, tip="tcp")
+    assert (robot.id, robot.name, robot.n) == ("bench-arm-2", "Bench arm 2", 3)
+    assert [row.kind for row in robot.joints] == ["revolute", "prismatic", "revolute"]
+    assert [row.limits for row in robot.joints] == [(-1.0, 2.0), (0.0, 0.4), None]
+    assert [row.velocity for row in robot.joints] == [3.0, 0.5, None]
+    assert [row.effort for row in robot.joints] == [None, 80.0, None]
+    assert (report.base, report.tip, report.joints) == ("world", "tcp", ("shoulder", "slide", "wrist"))
+    assert (report.merged, report.ignored) == (("stand", "flange"), ("mount",))
+    assert [(tip.link, tip.joints) for tip in report.tips] == [("tcp", 3), ("camera", 1)]
+    assert report.difference <= EXACT
+    # Zero positions and directions are those of the file: the shoulder turns about −z.
+    zero, turned = kin.fk(robot, [0, 0, 0]), kin.fk(robot, [0.5, 0, 0])
+    c, s = math.cos(0.5), math.sin(0.5)
+    place = np.array([0.1, 0, 0])
+    assert turned[:3, 3] - place == pytest.approx(
+        np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) @ (zero[:3, 3] - place), abs=1e-12
+    )
+    assert kin.load_urdf(GOOD, tip="tcp") == robot
+
+
+def test_base_and_tip_may_be_any_links_of_the_chain(tmp_path):
+    path = tmp_path / "bench.urdf"
+    path.write_text(GOOD, encoding="utf-8")
+    robot, report = kin.read_urdf(path, base="upper", tip="hand")
+    assert report.joints == ("slide", "wrist")
+    assert robot.source == "URDF bench.urdf, from link upper to link hand"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "field", "valid"),
+    [
+        ("<robot name", "<robots name", "file", "well-formed"),
+        ('type="continuous"', 'type="spherical"', "joint wrist: type", "continuous"),
+        ('type="continuous"', 'type="floating"', "joint wrist: type", "prismatic"),
+        ('type="continuous"', 'type="planar"', "joint wrist: type", "prismatic"),
+        ('<parent link="rail"/>', '<parent link="rail"/><mimic joint="slide"/>', "joint wrist: mimic", "move"),
+        ('<parent link="rail"/>', '', "joint wrist: parent", "parent"),
+        ('<parent link="rail"/>', '<parent/>', "joint wrist: parent link", "text"),
+        ('<parent link="rail"/>', '<parent link="nail"/>', "joint wrist: parent", "link of this file"),
+        ('<child link="camera"/>', '<child link="rail"/>', "link rail", "one parent"),
+        ('<link name="camera"/>', '<link name="rail"/>', "link", "no other link"),
+        ('name="mount"', 'name="wrist"', "joint", "no other joint"),
+        ('xyz="0 0 0.2"', 'xyz="0 0 nan"', "joint shoulder: origin xyz[2]", "finite"),
+        ('xyz="0 0 0.2"', 'xyz="0 0 1e999"', "joint shoulder: origin xyz[2]", "million"),
+        ('xyz="0 0 0.2"', 'xyz="0 0 ${h}"', "joint shoulder: origin xyz[2]", "xacro"),
+        ('xyz="0 0 0.2"', 'xyz="0 0.2"', "joint shoulder: origin xyz", "three numbers"),
+        ('rpy="0.1 0.2 0.3"', 'rpy="0.1 x 0.3"', "joint slide: origin rpy[1]", "finite"),
+        ('xyz="0 0 -2"', 'xyz="0 0 0"', "joint shoulder: axis xyz", "not zero"),
+        ('lower="-1" upper="2"', 'lower="2" upper="-1"', "joint shoulder: limit", "lower below upper"),
+        ('lower="0" upper="0.4" ', "", "joint slide: limit", "limits of the slide"),
+        ('velocity="3"', 'velocity="-3"', "joint shoulder: limit velocity", "positive"),
+        ('velocity="3"', 'velocity="inf"', "joint shoulder: limit velocity", "finite"),
+        ('<robot name="Bench arm 2">', '<robot xmlns:xacro="x" name="x"><xacro:if value="1"/>', "file", "xacro"),
+    ],
+)  # fmt: skip
+def test_an_error_names_the_joint_and_what_is_valid(old, new, field, valid):
+    assert old in GOOD
+    with pytest.raises(RobotFileError) as caught:
+        kin.load_urdf(GOOD.replace(old, new, 1), tip="tcp")
+    assert caught.value.field == field
+    assert valid in caught.value.expected
+
+
+def test_a_tip_is_offered():
+    with pytest.raises(RobotFileError, match=r"tip: got 'no tip.*one of tcp \(3 joints\), camera \(1 joint\)"):
+        kin.load_urdf(GOOD)
+    with pytest.raises(RobotFileError, match=r"tip: got 'tool'.*one of tcp"):
+        kin.load_urdf(GOOD, tip="tool")
+    with pytest.raises(RobotFileError, match=r"base: got 'rail'.*on the way to camera"):
+        kin.load_urdf(GOOD, base="rail", tip="camera")
+    with pytest.raises(RobotFileError, match=r"base: got 'ground'"):
+        kin.load_urdf(GOOD, base="ground", tip="tcp")
+    with pytest.raises(RobotFileError, match="a link that joints move"):
+        kin.load_urdf(GOOD, tip="foot")
+    only = GOOD.replace('<link name="camera"/>', "").replace(
+        '<joint name="mount" type="fixed"><parent link="upper"/><child link="camera"/></joint>', ""
+    )
+    assert kin.load_urdf(only).n == 3
+    with pytest.raises(RobotFileError, match="no moving joints"):
+        kin.load_urdf('<robot name="x"><link name="a"/></robot>')
+
+
+def test_cycles_are_refused():
+    text = "<robot name='x'><link name='a'/><link name='b'/>"
+    for name, parent, child in (("j", "a", "b"), ("k", "b", "a")):
+        text += f"<joint name='{name}' type='continuous'><parent link='{parent}'/><child link='{child}'/></joint>"
+    with pytest.raises(RobotFileError, match="no cycle"):
+        kin.load_urdf(text + "</robot>")
+    beside = (
+        "<link name='c'/><link name='d'/><joint name='l' type='continuous'><parent link='c'/><child link='d'/>"
+    )
+    with pytest.raises(RobotFileError, match="no cycle"):
+        kin.load_urdf(text + beside + "</joint></robot>", tip="d")
+
+
+BOMB = '<!DOCTYPE robot [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><robot name="&b;"/>'
+
+
+@pytest.mark.parametrize(
+    ("text", "field"),
+    [
+        (BOMB, "DOCTYPE"),
+        ('<!DOCTYPE robot SYSTEM "file:///etc/passwd"><robot/>', "DOCTYPE"),
+        ("<robot>" + "<link>" * 100 + "</link>" * 100 + "</robot>", "<link>"),
+        ("<robot>" + "<link/>" * 100_001 + "</robot>", "file"),
+        ("<robot>" + " " * MAX_BYTES + "</robot>", "file"),
+        ("<robot>", "file"),
+        ("<!-- nothing -->", "file"),
+        ("<sdf/>", "root element"),
+        ('<?xml version="1.0" encoding="klingon"?><robot/>', "file"),
+        ("<robot name='x'>\ud800</robot>", "tip"),
+    ],
+    ids=lambda value: value[:24],
+)
+def test_hostile_xml_is_refused_at_once(text, field):
+    start = time.perf_counter()
+    with pytest.raises(RobotFileError) as caught:
+        kin.load_urdf(text)
+    assert caught.value.field == field
+    assert len(str(caught.value)) < 400
+    assert time.perf_counter() - start < 5.0
+
+
+def test_files_that_cannot_be_read(tmp_path):
+    for path in (tmp_path / "none.urdf", tmp_path, "a\0b"):
+        with pytest.raises(RobotFileError, match="readable"):
+            kin.load_urdf(path)
+
+
+def test_too_many_joints_are_refused():
+    links = "".join(f"<link name='l{i}'/>" for i in range(34))
+    joints = "".join(
+        f"<joint name='j{i}' type='continuous'><parent link='l{i}'/><child link='l{i + 1}'/></joint>"
+        for i in range(33)
+    )
+    with pytest.raises(RobotFileError, match="33 moving joints"):
+        kin.load_urdf(f"<robot name='x'>{links}{joints}</robot>")
+
+
+def test_a_joint_without_limits_is_noted():
+    robot, report = kin.read_urdf(GOOD.replace('lower="-1" upper="2" ', ""), tip="tcp")
+    assert robot.joints[0].limits == (-math.pi, math.pi)
+    assert report.notes == ("Joint shoulder states no limits: it gets −180° to 180°.",)
+
+
+@pytest.mark.parametrize(
+    ("name", "tip", "family", "same_as"),
+    [
+        ("panda", "panda_link8", "offset7", "panda"),
+        ("ur5", "ee_link", "parallel6", None),
+        ("so101", "gripper_frame_link", None, None),
+    ],
+)
+def test_manufacturers_files(name, tip, family, same_as):
+    robot, report = kin.read_urdf(FILES / f"{name}.urdf", tip=tip)
+    assert report.difference <= EXACT
+    assert report.tilts == ()
+    form = closed_form_of(robot)
+    assert (form and form.name) == family
+    assert kin.parse_robot(kin.robot_to_toml(robot)) == robot
+    if same_as:  # the built-in arm, up to its own rounding
+        ours = kin.get_robot(same_as)
+        q = ours.random_q(np.random.default_rng(0), 100)
+        assert np.abs(kin.fk(ours, q) - kin.fk(robot, q)).max() < 1e-9
+
+
+@pytest.mark.parametrize("robot", kin.builtin_robots().values(), ids=lambda robot: robot.id)
+def test_a_built_in_arm_written_and_read(robot):
+    again, report = kin.read_urdf(kin.to_urdf(robot))
+    q = robot.random_q(np.random.default_rng(0), 100)
+    assert np.abs(kin.fk(robot, q) - kin.fk(again, q)).max() <= EXACT
+    assert report.difference <= EXACT
+    assert [joint.limits for joint in again.joints] == [joint.limits for joint in robot.joints]
+    assert len(again.rows) <= len(robot.rows)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_any_arm_written_and_read(seed):
+    robot = random_robot(seed)
+    again, report = kin.read_urdf(kin.to_urdf(robot))
+    q = robot.random_q(np.random.default_rng(0), 16)
+    assert np.abs(kin.fk(robot, q) - kin.fk(again, q)).max() <= EXACT
+    assert report.difference <= EXACT
+
+
+def test_names_and_limits_are_written():
+    rows = [
+        Joint('a <b> & "c" \x01', d=0.1, limits=None, velocity=2.5, effort=87.0),
+        Joint("twin", a=0.2, kind="prismatic", limits=(0, 1)),
+        Joint("twin", alpha=0.3, limits=(-1, 1)),
+    ]
+    text = kin.to_urdf(Robot.from_dh(rows))
+    robot = kin.load_urdf(text)
+    assert [joint.name for joint in robot.joints] == ['a <b> & "c" _', "twin 2", "twin 3"]
+    assert (robot.joints[0].limits, robot.joints[0].velocity, robot.joints[0].effort) == (None, 2.5, 87.0)
+    assert robot.joints[1].velocity is None
+    with pytest.raises(InputError, match="URDF has no slide without them"):
+        kin.to_urdf(Robot.from_dh([Joint("slide", kind="prismatic")]))
