@@ -11,7 +11,20 @@ from collections.abc import Callable
 from functools import lru_cache
 
 from kin.robot import Robot
-from kin.solvers import collinear7, general6, general7, offset7, parallel6, scara4, slide6, srs7, wrist5, wrist6
+from kin.solvers import (
+    collinear7,
+    general5,
+    general6,
+    general7,
+    offset7,
+    parallel5,
+    parallel6,
+    scara4,
+    slide6,
+    srs7,
+    wrist5,
+    wrist6,
+)
 from kin.solvers.contract import APPROACH, ClosedForm
 from kin.solvers.reversed import ReversedJoints, readings
 
@@ -26,8 +39,10 @@ FAMILIES: tuple[Callable[[Robot], ClosedForm | None], ...] = (
 )
 # For arms that fit no family, whatever joints are reversed.
 GENERAL: tuple[Callable[[Robot], ClosedForm | None], ...] = (
+    parallel5.match,
     offset7.match,
     general6.match,
+    lambda robot: general5.match(robot, _six_joints),
     lambda robot: general7.match(robot, _six_joints),
 )
 
@@ -55,7 +70,7 @@ def closed_form_of(robot: Robot) -> ClosedForm | None:
 
 
 def _six_joints(robot: Robot) -> ClosedForm | None:
-    """The closed form of an arm that is left of one with seven joints."""
+    """The closed form of an arm with six joints that stands for one with more or fewer."""
     return closed_form_of(robot)
 
 

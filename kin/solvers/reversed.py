@@ -173,14 +173,19 @@ class ReversedJoints(ClosedForm):
 
 
 @dataclass(frozen=True, eq=False)
-class _ReversedKernels(BatchKernels):
-    """Batch kernels that read and write the joint values of an arm with reversed joints."""
+class WrappedKernels(BatchKernels):
+    """Batch kernels that call those of another closed form.
+
+    Attributes:
+        rebuild: makes the same out of other kernels of that closed form.
+        form: its kernels.
+    """
 
     rebuild: Callable[[BatchKernels], BatchKernels]
     form: BatchKernels
 
     def unchecked(self) -> BatchKernels:
-        """The same with the family's unchecked kernels."""
+        """The same with the unchecked kernels of the other closed form."""
         return self.rebuild(self.form.unchecked())
 
 
@@ -204,7 +209,7 @@ def _reversed_kernels(form: BatchKernels, signs: Array, joints: Joints, requeste
         form.many(params, T, value_sign * values, near * signs, out)
         reverse(out)
 
-    return _ReversedKernels(
+    return WrappedKernels(
         form.params, one, many, lambda inner: _reversed_kernels(inner, signs, joints, requested), form
     )
 

@@ -32,6 +32,8 @@ Condition = Literal[
     "tool along the forearm",
     "axes 4 and 6 in line",
     "axis 6 parallel to axes 2, 3 and 4",
+    "tool on axis 1",
+    "tool nearest to axis 1",
     "smallest singular value",
 ]
 Lost = Literal[
@@ -48,6 +50,7 @@ Lost = Literal[
     "tilt about the third axis",
     "joints 5 and 7 coincide",
     "joints 1 and 3, 5 and 7 coincide",
+    "tool sideways",
     "reference of the arm angle",
     "azimuth of the forearm",
     "slowest direction",

@@ -350,14 +350,14 @@ def test_six_joints_without_a_closed_form_are_judged_by_the_whole_jacobian():
 
 
 def test_five_joints_without_a_closed_form_are_judged_by_point_and_approach():
-    # Base, three parallel axes, roll: the roll changes neither point nor approach direction, so the rank is 4.
-    robot = arm((0.1, 0, 90), (0, 0.3, 0), (0, 0.3, 0), (0, 0.05, 90), (0.2, 0, 0), home=[0, 0, 0, 0, 0])
+    # Base and four parallel axes, the tool along them: a plane that joint 1 turns, so the rank is 3.
+    robot = arm((0.1, 0, 90), (0, 0.3, 0), (0, 0.3, 0), (0, 0.2, 0), (0, 0.1, 0), home=[0, 0, 0, 0, 0])
     assert closed_form_of(robot) is None
     q = np.array([0.3, 0.4, 0.5, 0.6, 0.7])
     found = only_singularity(robot, q)
     assert found.shape == (5, 5)
     assert found.distance > 0.01
-    q[2] = 0.0
+    q[2:] = 0.0
     assert only_singularity(robot, q).distance <= 1e-12
 
 

@@ -21,6 +21,8 @@ CONDITIONS: dict[Condition, str] = {
     "tool along the forearm": "tool in line with the forearm",
     "axes 4 and 6 in line": "axes 4 and 6 in line",
     "axis 6 parallel to axes 2, 3 and 4": "axis 6 parallel to axes 2, 3 and 4",
+    "tool on axis 1": "tool on axis 1",
+    "tool nearest to axis 1": "tool as near to axis 1 as it can get",
     "smallest singular value": "smallest singular value of the {rows} × {columns} Jacobian",
 }
 LOSSES: dict[Lost, str] = {
@@ -37,6 +39,7 @@ LOSSES: dict[Lost, str] = {
     "tilt about the third axis": "the tool cannot tilt about the third axis",
     "joints 5 and 7 coincide": "joints 5 and 7 turn about one line",
     "joints 1 and 3, 5 and 7 coincide": "joints 1 and 3 turn about one line, joints 5 and 7 about another",
+    "tool sideways": "the tool cannot move sideways",
     "reference of the arm angle": "the arm angle ψ loses its reference; the arm loses no motion",
     "azimuth of the forearm": "the closed form takes θ1 + θ2 from the seed; the arm loses no motion",
     "slowest direction": "the tool's slowest direction",

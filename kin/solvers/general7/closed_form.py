@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,6 +24,7 @@ from kin.solvers.contract import (
 )
 from kin.solvers.general7.motion import end_of_motion
 from kin.solvers.reduced import fixed
+from kin.solvers.reversed import WrappedKernels
 from kin.solvers.singular import Singularity, by_jacobian, those_within
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -46,18 +46,6 @@ def match(robot: Robot, form_of: Callable[[Robot], ClosedForm | None]) -> Genera
         return None
     joint, form = min(found, key=lambda entry: not entry[1].named)
     return General7(robot, joint, form)
-
-
-@dataclass(frozen=True, eq=False)
-class _FoldedKernels(BatchKernels):
-    """Batch kernels of an arm with one joint more than `form`."""
-
-    rebuild: Callable[[BatchKernels], BatchKernels]
-    form: BatchKernels
-
-    def unchecked(self) -> BatchKernels:
-        """The same with the unchecked kernels of the arm with six joints."""
-        return self.rebuild(self.form.unchecked())
 
 
 class _Fold:
@@ -97,7 +85,7 @@ class _Fold:
             many(params, T[None], np.array([value]), near, out[None])
             return bool(np.isfinite(T).all())
 
-        return _FoldedKernels(form.params, one, many, self.kernels, form)
+        return WrappedKernels(form.params, one, many, self.kernels, form)
 
 
 class General7(ClosedForm):

@@ -1,0 +1,206 @@
+"""The solver of three to five revolute joints: the choice of virtual joints, solutions, singularities."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from kin.axes import screw_x, screw_z
+from kin.fk import fk, jacobian
+from kin.robot import Robot
+from kin.solvers.canonical import free_last, without_last
+from kin.solvers.common import TURN, UNBOUNDED
+from kin.solvers.contract import (
+    APPROACH,
+    POSE,
+    POSITION,
+    BatchKernels,
+    Candidates,
+    ClosedForm,
+    Obstacle,
+    RedundancyParameter,
+    SolverInput,
+)
+from kin.solvers.general5.completion import BALL, COMPLETIONS, ROLL, Axes, completed
+from kin.solvers.reversed import WrappedKernels
+from kin.solvers.rolled import roll_sense
+from kin.solvers.singular import Singularity, by_jacobian, those_within
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+NAME = "general5"
+TITLE = "all solutions, three to five revolute joints"
+# An orientation in no special position.
+_TURN = (screw_z(0.37, 0.0) @ screw_x(0.0, 1.19) @ screw_z(-2.23, 0.0))[:3, :3]
+_POINTS = 4  # the most configurations of three joints for a point
+_AT_ZERO = TOLERANCES.near_miss
+
+
+def match(robot: Robot, form_of: Callable[[Robot], ClosedForm | None]) -> General5 | None:
+    """The solver, if virtual joints make the arm one with a solver.
+
+    `form_of` gives the solver of an arm with six joints.
+    """
+    if robot.n not in COMPLETIONS or not robot.revolute.all():
+        return None
+    q = np.random.default_rng(5).uniform(-1.0, 1.0, (4, 6))
+    for axes in COMPLETIONS[robot.n]:
+        longer = completed(robot, axes)
+        if np.linalg.matrix_rank(jacobian(longer, q), rtol=1e-9).max() < 6:
+            continue
+        form = form_of(longer)
+        if form is not None:
+            return General5(robot, form, axes)
+    return None
+
+
+class General5(ClosedForm):
+    """All solutions of an arm with three to five revolute joints that has no closed form of its own."""
+
+    name, title = NAME, TITLE
+    lengths = ()
+    steady = False
+
+    def __init__(self, robot: Robot, form: ClosedForm, axes: Axes) -> None:
+        self.robot, self.form = robot, form
+        self._point, self._rolls = axes is BALL, axes is ROLL
+        self._last_rolls = not (self._point or self._rolls) and roll_sense(robot) != 0.0
+        virtual = "a virtual joint" if len(axes) == 1 else f"{len(axes)} virtual joints"
+        self.reason = (
+            f"{robot.n} revolute joints whose axes fit no closed form; with {virtual} at the tool: {form.name}"
+        )
+        # Names belong to all solutions of the six joints; for a point, the last part is about the virtual joints.
+        self.named = form.named and not self._last_rolls
+        self._pairs = self._point and form.named
+        if self._pairs:
+            self.branches = tuple(name.rpartition(" · ")[0] for name in form.branches[::2])
+            known = {part for name in self.branches for part in name.split(" · ")}
+            self.meanings = tuple(meaning for meaning in form.meanings if meaning[0] in known)
+        elif self.named and self._rolls:
+            self.branches, self.meanings = form.branches, form.meanings
+        else:
+            self.named = False
+            count = _POINTS if self._point else len(form.branches)
+            self.branches = tuple(f"solution {i + 1}" for i in range(count))
+        self.kernels = self._kernels(form.kernels)
+
+    def handles(self, task: int) -> bool:
+        """Poses; a direction with five joints, or if the last joint keeps it; a point with three joints."""
+        if task == APPROACH:
+            return self._point or self._rolls or self._last_rolls
+        return task == POSE or (task == POSITION and self._point)
+
+    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
+        """What a pose of the six joints leaves free, and a last joint that only rolls the tool."""
+        own = tuple(r for r in self.form.redundancies(POSE) if r.joint < self.robot.n)
+        if task == APPROACH and self._last_rolls:
+            n = self.robot.n
+            own += (RedundancyParameter(f"theta{n}", f"θ{n}", joint=n - 1),)
+        return own
+
+    def solve(self, problem: SolverInput) -> Candidates:
+        """All solutions that meet what the arm can meet of the target."""
+        p, n = problem, self.robot.n
+        free_roll = p.task == APPROACH and self._last_rolls
+        T, lower, upper = without_last(p) if free_roll else (p.T, p.lower, p.upper)
+        if self._point:
+            T = T.copy()
+            T[:3, :3] = _TURN
+        virtual = np.zeros(6 - n)
+        own = self.form.redundancies(POSE)
+        kept = [k for k, r in enumerate(own) if r.joint < n]
+        values = [math.nan] * len(own)
+        for k, value in zip(kept, p.values, strict=False):
+            values[k] = value
+        found = self.form.solve(
+            replace(
+                p,
+                T=T,
+                task=POSE,
+                values=tuple(values),
+                seed=np.append(p.seed, virtual),
+                lower=np.append(lower, virtual - UNBOUNDED),
+                upper=np.append(upper, virtual + UNBOUNDED),
+            )
+        )
+        rows = self._rows(found.q[None])[0]
+        exists = rows >= 0
+        q = np.where(exists[:, None], found.q[rows, :n], math.nan)
+        columns = np.where(exists[:, None], found.values[rows][:, kept], math.nan)
+        arcs = [_placed(found.arcs[k], rows) for k in kept]
+        if free_roll:
+            arcs.append(free_last(p, q))
+            columns = np.column_stack([columns, q[:, -1]])
+        obstacle = found.obstacle
+        if self._point:
+            obstacle = None if exists.any() else Obstacle("point")
+        return Candidates(q, columns, tuple(arcs), found.gap, obstacle)
+
+    def _rows(self, q: Array) -> Array:
+        """The solution of the six joints, q ``(N, k, 6)``, that each row ``(N, b)`` takes; −1 for none."""
+        there = ~np.isnan(q[:, :, 0])
+        numbers = np.broadcast_to(np.arange(q.shape[1]), there.shape)
+        if self._pairs:
+            first = np.where(there[:, ::2], numbers[:, ::2], numbers[:, 1::2])
+            return np.where(there[:, ::2] | there[:, 1::2], first, -1)
+        if self._point:
+            own = np.where(there[:, :, None], q[:, :, :3], math.inf)
+            with np.errstate(invalid="ignore"):
+                gap = np.abs((own[:, :, None] - own[:, None] + math.pi) % TURN - math.pi).max(axis=3)
+            again = np.tril(gap < TOLERANCES.merge, -1).any(axis=2)
+            there = there & ~again
+            order = np.argsort(~there, axis=1, kind="stable")[:, :_POINTS]
+            return np.where(np.take_along_axis(there, order, axis=1), order, -1)
+        if not self._rolls:
+            off = np.abs((q[:, :, self.robot.n :] + math.pi) % TURN - math.pi).max(axis=2)
+            there = there & (off < _AT_ZERO)
+        return np.where(there, numbers, -1)
+
+    def _kernels(self, form: BatchKernels) -> BatchKernels:
+        """The batch kernels of the arm from those of the six joints."""
+        n = self.robot.n
+
+        def many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
+            found = np.empty((len(T), len(self.form.branches), 6))
+            if self._point:
+                T = T.copy()
+                T[:, :3, :3] = _TURN
+            form.many(params, T, values, np.append(near, np.zeros(6 - n)), found)
+            rows = self._rows(found)
+            q = np.take_along_axis(found[..., :n], np.maximum(rows, 0)[..., None], axis=1)
+            out[:] = np.where(rows[..., None] >= 0, q, math.nan)
+
+        def one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
+            many(params, T[None], np.array([value]), near, out[None])
+            return bool(np.isfinite(T).all())
+
+        return WrappedKernels(form.params, one, many, self._kernels, form)
+
+    def branch_of(self, q: Array) -> int:
+        """The row of q ``(n,)`` among all solutions of its pose."""
+        if self.named:
+            row = self.form.branch_of(np.append(q, np.zeros(6 - self.robot.n)))
+            return row // 2 if self._pairs else row
+        out = np.empty((len(self.branches), self.robot.n))
+        self.kernels.one(self.kernels.params, fk(self.robot, q), math.nan, np.asarray(q), out)
+        apart = np.abs((out - q + math.pi) % TURN - math.pi).max(axis=1)
+        return 0 if np.isnan(apart).all() else int(np.nanargmin(apart))
+
+    def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
+        """The smallest singular value of the Jacobian of what the arm can control."""
+        J = jacobian(self.robot, q)
+        if self._point:
+            J = J[:3]
+        elif self._rolls:
+            J = np.vstack([J[:3], fk(self.robot, q)[:3, :2].T @ J[3:]])
+        return those_within(within, by_jacobian(J, rank=self.robot.n))
+
+
+def _placed(arcs: Array, rows: Sequence[int] | Array) -> Array:
+    """Intervals ``(k, 3)`` of solutions as intervals of the rows that take them."""
+    place = {int(i): row for row, i in enumerate(rows) if i >= 0}
+    kept = [(place[int(i)], low, high) for i, low, high in arcs.tolist() if int(i) in place]
+    return np.array(kept, dtype=np.float64).reshape(-1, 3)
