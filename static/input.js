@@ -34,6 +34,8 @@
     type(field, JSON.stringify(messages));
   }
 
+  addEventListener("kinboard-send", (event) => send(...event.detail)); // from our other scripts
+
   let answered = "";
   function readAnswers() {
     const text = document.querySelector("[data-answers]")?.dataset.answers ?? "";

@@ -14,12 +14,14 @@ from __future__ import annotations
 import json
 import math
 import shlex
+import textwrap
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pprint import pformat
 
 import numpy as np
 
-from kin import Joint, Robot, Task, builtin_robots
+from kin import Joint, Robot, Task, builtin_robots, robot_to_dict
 from kin.transforms import Array, wxyz_from_rotation
 
 DIGITS = 9
@@ -37,6 +39,7 @@ class Moment:
         task: how much of it is to be met.
         address: where this service is, with a slash at the end; no character that a shell or a string would mind.
         token: whether the service asks for one.
+        own: whether the arm is the visitor's own, which the service does not know.
     """
 
     robot: Robot
@@ -45,6 +48,7 @@ class Moment:
     task: Task = "pose"
     address: str = LOCAL
     token: bool = False
+    own: bool = False
 
 
 def curl(moment: Moment) -> str:
@@ -58,7 +62,7 @@ def curl(moment: Moment) -> str:
             f"  -d '{json.dumps(body)}'\n"
         )
 
-    return command("fk", {"q": _list(moment.q)}) + command("ik", _question(moment))
+    return _unknown(moment) + command("fk", {"q": _list(moment.q)}) + command("ik", _question(moment))
 
 
 def python_requests(moment: Moment) -> str:
@@ -68,7 +72,7 @@ def python_requests(moment: Moment) -> str:
         top = f"import os\n\n{top}\n" + 'headers = {"Authorization": "Bearer " + os.environ["KINBOARD_TOKEN"]}\n'
         header = ", headers=headers"
     body = ",\n    ".join(f'"{name}": {json.dumps(value)}' for name, value in _question(moment).items())
-    return f"""{top}
+    return f"""{_unknown(moment)}{top}
 robot = {json.dumps(_address(moment))}
 q = {_list(moment.q)}
 question = {{
@@ -88,7 +92,10 @@ for solution in answer["solutions"]:
 def python_kin(moment: Moment) -> str:
     """Python, with this package and without any service."""
     robot = moment.robot
-    if robot == builtin_robots().get(robot.id):
+    if moment.own:
+        fields = pformat(robot_to_dict(named(robot)), width=100, sort_dicts=False)
+        load = f"robot = kin.robot_from_dict({textwrap.indent(fields, ' ' * 26).lstrip()})"
+    elif robot == builtin_robots().get(robot.id):
         load = f'robot = kin.get_robot("{robot.id}")'
     else:
         load = f"# The arm's file in the service's folder of robots:\nrobot = kin.load_robot(\"{robot.id}.toml\")"
@@ -212,8 +219,25 @@ def row_transform(row: Joint, value: float, convention: str) -> Array:
     return np.asarray(twist @ turn if convention == "modified" else turn @ twist)
 
 
+def named(robot: Robot) -> Robot:
+    """An arm of a visitor's own with an id that people can read, for a file."""
+    words = "".join(c if c.isascii() and c.isalnum() else " " for c in robot.name.lower()).split()
+    return replace(robot, id="-".join(words)[:40].strip("-") or "my-arm")
+
+
+def _unknown(moment: Moment) -> str:
+    """What to do before the service knows the visitor's own arm; a comment in shells and in Python."""
+    if not moment.own:
+        return ""
+    return (
+        "# The service does not know this arm: put its file (tab Robot, Download) into the\n"
+        "# folder of kinboard serve --robots FOLDER first.\n"
+    )
+
+
 def _address(moment: Moment) -> str:
-    return f"{moment.address}api/v1/robots/{moment.robot.id}"
+    robot = named(moment.robot) if moment.own else moment.robot
+    return f"{moment.address}api/v1/robots/{robot.id}"
 
 
 def _question(moment: Moment) -> dict[str, object]:

@@ -8,7 +8,7 @@ needs no locks, and what it sends appears together with the arm's new pose.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from typing import ClassVar, Protocol
 
 import viser
@@ -17,9 +17,10 @@ from app.shared.clouds import Clouds
 from app.shared.maps import Maps
 from app.shared.store import Store
 from app.shared.summaries import Summaries
+from app.viewer.own_arm import OwnArm
 from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import Sphere
-from kin import IKOptions, IKResult, Robot, Task
+from kin import IKOptions, IKResult, InputError, Robot, Task
 from kin.transforms import Array
 from kin.units import Units
 
@@ -39,6 +40,10 @@ class Stage(Protocol):
     @property
     def robot(self) -> Robot:
         """The selected robot."""
+
+    @property
+    def own(self) -> OwnArm | None:
+        """The visitor's own arm, whether or not it is on show."""
 
     @property
     def task(self) -> Task:
@@ -81,6 +86,18 @@ class Stage(Protocol):
         The motion is eased unless `at_once`: between two configurations, easing takes the tool off its target.
         """
 
+    def show_own(self, own: OwnArm) -> None:
+        """Show an arm of the visitor's own, at its home configuration."""
+
+    def edit_arm(self, own: OwnArm) -> None:
+        """Show a changed version of the arm on show as the visitor's own.
+
+        Viewpoint and task stay, and configuration and locks if it has as many joints of the same kinds.
+        """
+
+    def change_robot(self, robot: Robot) -> None:
+        """Show a robot of the service, at its home configuration."""
+
     def set_target(self, T_base_tool: Array) -> None:
         """Make this pose ``(4, 4)`` the target, as if the gizmo had been dragged there."""
 
@@ -115,6 +132,7 @@ class Feature:
         key: short name, used in events and in the shared URL.
         title: name shown to the visitor.
         about: one-sentence description, for the list of lessons.
+        messages: the events that the page's own script may send, by the first part of their key.
         due: the worker sleeps at most this many seconds and then calls `tick`; it also does so after every other
             event. None: no ticks.
     """
@@ -122,6 +140,7 @@ class Feature:
     key: ClassVar[str]
     title: ClassVar[str]
     about: ClassVar[str] = ""
+    messages: ClassVar[frozenset[str]] = frozenset()
 
     def __init__(self, stage: Stage) -> None:
         self.stage = stage
@@ -169,3 +188,16 @@ class Feature:
 
     def remove(self) -> None:
         """Remove everything from scene and panel."""
+
+
+def message_of(features: Iterable[Feature], message: object) -> tuple[str, Hashable, object]:
+    """Feature, key and value of an event that the page's own script sends to a feature.
+
+    Raises:
+        InputError: none of these features takes such a message.
+    """
+    match message:
+        case [str(name), [str(kind), *rest], value] if all(type(part) in (int, str) for part in rest):
+            if any(feature.key == name and kind in feature.messages for feature in features):
+                return name, (kind, *rest), value
+    raise InputError("feature", message, "the name of a feature on show, a key it takes, and a value")

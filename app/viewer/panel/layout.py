@@ -6,8 +6,10 @@ from collections.abc import Sequence
 
 import viser
 
-from app.viewer.panel import Post, listen, listen_click
+from app.viewer.own_arm import OwnArm
+from app.viewer.panel import Post, listen_click
 from app.viewer.panel.readout import PoseReadout
+from app.viewer.panel.robots import RobotMenu
 from app.viewer.panel.script import PageScript
 from app.viewer.panel.share import SharePanel
 from app.viewer.panel.status import Notice, StatusLine
@@ -24,6 +26,7 @@ class Panel:
     """One visitor's panel. Posts ``"robot"``, ``"home"``, ``"random"``, and what its parts post.
 
     Args:
+        own: the visitor's own arm.
         system_dark: whether the visitor's system is dark.
         learn: whether there is a tab for lessons.
         tabs: titles of the features' tabs.
@@ -41,6 +44,7 @@ class Panel:
         self,
         gui: viser.GuiApi,
         robots: Sequence[Robot],
+        own: OwnArm | None,
         robot: Robot,
         units: Units,
         view: ViewState,
@@ -54,8 +58,7 @@ class Panel:
         self.colours = ColourChoice(gui, system_dark, post)
         self.script = PageScript(gui, post)
         gui.add_html(render("panel/head"))
-        self.robot = gui.add_dropdown("Robot", tuple(r.name for r in robots), initial_value=robot.name)
-        listen(self.robot, post, "robot")
+        self.robots = RobotMenu(gui, robots, own, robot, post)
         self.readout = PoseReadout(gui, fk(robot, robot.q_home), units)
         group = gui.add_tab_group()
         with group.add_tab("Move"):

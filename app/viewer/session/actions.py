@@ -9,20 +9,22 @@ import math
 import time
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import kin
-from app.viewer.feature import Feature
-from app.viewer.panel import assign
+from app.viewer.feature import Feature, message_of
+from app.viewer.own_arm import KEY
+from app.viewer.panel.script import Reply
 from app.viewer.panel.status import Notice, introduction
 from app.viewer.panel.target import DEFAULT_TASK, TASKS
 from app.viewer.panel.view import SIDES, ViewState
 from app.viewer.scene.gizmo import Pull
 from app.viewer.session.history import LONG_PAUSE, SHORT_PAUSE, History, Step, same, without_results
 from app.viewer.session.persistence import link_notice
+from app.viewer.session.robots import RobotPage, robot_of
 from app.viewer.session.state import PageState, decode
 from app.viewer.session.typed import BY_HAND, TypedInput, TypedPage
-from kin import Robot, Task
+from kin import Task
 from kin.transforms import Array
 from kin.units import Units
 
@@ -50,9 +52,9 @@ GRADUAL = {
 }  # fmt: skip
 MESSAGES = (
     "undo", "redo", "travel", "released", "snap", "nudge", "axes", "field", "target", "fit-arm", "look-from",
-    "lesson",
+    "lesson", "feature",
 )  # fmt: skip
-ANSWERED = frozenset({"field", "target"})  # messages with a reply
+ANSWERED = frozenset({"field", "target"})  # messages whose handlers reply
 LABELS = {
     "gizmo": "Drag of the target",
     "redundancy": "Redundancy",
@@ -75,16 +77,13 @@ LABELS = {
 }
 
 
-class ActionsPage(TypedPage, Protocol):
+class ActionsPage(TypedPage, RobotPage, Protocol):
     """What actions may use of a page, in addition to what is saved of it and to its panel."""
 
     system_dark: bool
 
     def use_colours(self, dark: bool | None, system_dark: bool) -> None:
         """Make the page dark or light; None: as the visitor's system is."""
-
-    def change_robot(self, robot: Robot, q: Array | None = None) -> None:
-        """Replace the robot, at its home configuration or at `q` ``(n,)``, in a fitting view."""
 
     def use_units(self, units: Units) -> None:
         """Show all numbers in these units."""
@@ -163,8 +162,18 @@ class Actions:
             if name not in MESSAGES:
                 raise kin.InputError("message", name, "one of " + ", ".join(MESSAGES))
             arguments = [number] if name in ANSWERED else []
+            if name == "feature":
+                try:
+                    *arguments, value = message_of(self._page.features, value)
+                    self._act(name, arguments, value)
+                finally:
+                    self._page.panel.script.reply(Reply(number, ""))
+                return
+        self._act(name, arguments, value)
+
+    def _act(self, name: str, arguments: list[Any], value: object) -> None:
         if name not in self._handlers:
-            raise KeyError(key)
+            raise KeyError(name)
         action = self._handlers[name]
         if name in NO_STEP:
             action(*arguments, value)
@@ -240,17 +249,19 @@ class Actions:
     def _return_to(self, state: PageState) -> None:
         page = self._page
         self._gesture, self._returned = None, True
-        robot = page.store.robots[0] if state.robot is None else page.store.get(state.robot)
+        changed, page.own = state.own != page.own, state.own
+        robot = robot_of(page, state.robot)
         if state.units != page.units:
             page.panel.units.show(state.units)
             page.use_units(state.units)
         if state.view != page.view:
             page.use_view(replace(state.view))
         if robot != page.robot:
-            assign(page.panel.robot, robot.name)
             page.change_robot(robot, state.q)
             if state.camera is not None:
                 page.camera.restore(state.camera)
+        elif changed:
+            page.panel.robots.show(robot, page.own)
         self._restore_arm(state)
         lesson = None if page.lessons is None or page.lessons.shown is None else page.lessons.shown.key
         if page.lessons is not None and state.lesson != lesson:
@@ -331,13 +342,12 @@ class Actions:
                 feature.handle(key, value)
 
     def _on_robot_choice(self, value: object) -> None:
-        page, name = self._page, str(value)
-        robot = next((r for r in page.store.robots if r.name == name), None)
-        if robot is None:
-            assign(page.panel.robot, page.robot.name)
-            robot = page.store.get(name)  # raises with the list of valid ones
+        page = self._page
+        robot = page.panel.robots.read(value)
         if robot == page.robot:
             return
+        # The visitor's own arm has another id after every change.
+        self._left = {name: state for name, state in self._left.items() if not name.startswith(KEY)}
         self._left[page.robot.id] = page.snapshot()
         left = self._left.get(robot.id)
         page.change_robot(robot, None if left is None else left.q)

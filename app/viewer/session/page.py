@@ -19,6 +19,7 @@ import kin
 from app.shared.security import Rights
 from app.viewer.feature import Feature
 from app.viewer.lessons import LESSONS
+from app.viewer.own_arm import OwnArm
 from app.viewer.panel import update_html
 from app.viewer.panel.joints import JointSliders, lock_notice
 from app.viewer.panel.layout import PANEL_WIDTH, Panel
@@ -32,6 +33,7 @@ from app.viewer.session.controller import ArmController
 from app.viewer.session.lessons import LessonChoice
 from app.viewer.session.persistence import Persistence
 from app.viewer.session.posture import PosturePanel
+from app.viewer.session.robots import edit, robot_of
 from app.viewer.session.services import Services
 from app.viewer.session.state import PageState
 from app.viewer.session.typed import BY_HAND
@@ -71,6 +73,7 @@ class VisitorPage(Worker):
         self.clouds = services.clouds
         self.maps = services.maps
         self.summaries = services.summaries
+        self.own: OwnArm | None = None
         self.arm = ArmController(client, services.pace, self.post, self)
         self.view = ViewState()
         self.system_dark = False
@@ -133,6 +136,13 @@ class VisitorPage(Worker):
         self.arm.move_to(q, ease=not at_once)
         self.status.show(notice or BY_HAND)
 
+    def show_own(self, own: OwnArm) -> None:
+        self.own = own
+        self.change_robot(own.robot)
+
+    def edit_arm(self, own: OwnArm) -> None:
+        edit(self, own)
+
     def set_target(self, T_base_tool: Array) -> None:
         self.arm.set_target(T_base_tool)
 
@@ -178,11 +188,12 @@ class VisitorPage(Worker):
 
     # ActionsPage: what actions may use besides
 
-    def change_robot(self, robot: Robot, q: Array | None = None) -> None:
+    def change_robot(self, robot: Robot, q: Array | None = None, glide: bool = False) -> None:
         """Replace the robot, at its home configuration or at `q` ``(n,)``, in a fitting view."""
         self.sliders.remove()
         self.posture.remove()
-        self._use_robot(robot, q)
+        self.panel.robots.show(robot, self.own)
+        self._use_robot(robot, q, glide)
         self.for_features(lambda feature: feature.on_robot())
 
     def change_lock(self, joint: int | None, lock: bool) -> None:
@@ -343,7 +354,8 @@ class VisitorPage(Worker):
         gui = self.client.gui
         saved = self._persistence.load()
         self.units, self.view, self.system_dark = saved.units, saved.view, self._persistence.system_dark
-        robot = self.store.get(saved.robot) if saved.robot is not None else self.store.robots[0]
+        self.own = saved.own
+        robot = robot_of(self, saved.robot)
         with self.client.atomic():
             if self.dark:
                 configure_theme(gui, True)
@@ -353,7 +365,7 @@ class VisitorPage(Worker):
             gui.main_panel.set_width(PANEL_WIDTH)
             titles = [tab.title for tab in TABS]
             self.panel = Panel(
-                gui, self.store.robots, robot, self.units, self.view, self.system_dark, self._welcome,
+                gui, self.store.robots, self.own, robot, self.units, self.view, self.system_dark, self._welcome,
                 bool(LESSONS), titles, self.post,
             )  # fmt: skip
             self.status = self.panel.status
@@ -370,7 +382,7 @@ class VisitorPage(Worker):
             self.panel.script.show_start(self._persistence.begin(self.panel.share))
         self.client.flush()
 
-    def _use_robot(self, robot: Robot, q: Array | None = None) -> None:
+    def _use_robot(self, robot: Robot, q: Array | None = None, glide: bool = False) -> None:
         """Show another robot, at its home configuration or at `q` ``(n,)``, in a fitting view."""
         self.arm.use(robot, q, self.dark, self.view.base_axes)
         self._readout_due = True
@@ -379,7 +391,7 @@ class VisitorPage(Worker):
         self.posture.use_robot()
         self._apply_view()
         self.arm.scene.size_gizmo(self.camera.small)
-        self.camera.aim(self.arm.scene.body, kin.link_frames(robot, self.goal)[:, :3, 3])
+        self.camera.aim(self.arm.scene.body, kin.link_frames(robot, self.goal)[:, :3, 3], glide)
 
     def _make_sliders(self) -> JointSliders:
         return JointSliders(

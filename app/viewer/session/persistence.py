@@ -169,6 +169,7 @@ class Persistence:
         states = {feature.key: feature.state() for feature in page.features}
         return PageState(
             robot=page.robot.id,
+            own=page.own,
             q=page.goal,
             target=page.arm.open_target,
             task=page.task,
@@ -184,7 +185,8 @@ class Persistence:
     def _update_share(self) -> None:
         page = self._page
         target = kin.fk(page.robot, page.goal) if page.target is None else page.target
-        moment = Moment(page.robot, page.goal, target, page.task, self._address, self._token)
+        own = page.own is not None and page.own.robot == page.robot
+        moment = Moment(page.robot, page.goal, target, page.task, self._address, self._token, own)
         self._share.show(f"{self._address}viewer/#s={self._saved}", moment)
 
 
@@ -193,6 +195,8 @@ def link_notice(saved: PageState) -> Notice | None:
     if saved.unreadable:
         detail = "It is incomplete, or another version made it. The page starts from the beginning."
         return Notice("error", "The link cannot be read", detail)
+    if saved.refused:
+        return Notice("error", "The arm of the link cannot be used", saved.refused)
     if saved.missing:
         return Notice("error", "The link needs another robot", f"This service has no robot “{saved.missing}”.")
     if saved.ignored:

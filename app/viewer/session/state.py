@@ -21,10 +21,12 @@ from typing import Any, get_args
 
 import numpy as np
 
+from app.viewer import own_arm
+from app.viewer.own_arm import OwnArm
 from app.viewer.panel.entry import FARTHEST
 from app.viewer.panel.view import ViewState
 from app.viewer.scene.viewpoints import UP
-from kin import Robot, Task, branch_names
+from kin import KinematicsError, Robot, Task, branch_names
 from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
 from kin.units import DEFAULT_UNITS, LENGTHS, Units
 
@@ -47,7 +49,7 @@ class PageState:
     """The state that a shared URL restores; None and empty: as on a fresh page.
 
     Attributes:
-        robot: id of the robot.
+        robot: id of the robot, which may be that of `own`.
         q: configuration ``(n,)`` within the limits.
         target: target pose ``(4, 4)`` that the tool does not have yet, else None.
         branch: requested branch, as `kin.solve_ik` takes it.
@@ -56,9 +58,11 @@ class PageState:
         features: `Feature.state` of each feature by its key; not validated here.
         locks: indices of the locked joints; each is locked at its value in `q`.
         camera: viewpoint ``(3, 3)`` as `VisitorCamera.chosen`; None: the default view.
+        own: the visitor's own arm, whether or not it is on show.
         missing: the requested robot's id, if this service does not have that robot.
         unreadable: whether there was a text that is not a state.
         ignored: names of entries that were invalid.
+        refused: why the visitor's own arm is invalid.
     """
 
     robot: str | None = None
@@ -72,9 +76,11 @@ class PageState:
     features: dict[str, dict[str, object]] = field(default_factory=dict)
     locks: tuple[int, ...] = ()
     camera: Array | None = None
+    own: OwnArm | None = None
     missing: str = ""
     unreadable: bool = False
     ignored: tuple[str, ...] = ()
+    refused: str = ""
 
 
 @dataclass(frozen=True)
@@ -98,8 +104,11 @@ def encode(state: PageState) -> str:
     The states of the features are left out if the text would be longer than `decode` accepts.
     """
     data: dict[str, Any] = {"v": VERSION}
+    if state.own is not None:
+        data["own"] = own_arm.pack(state.own)
     if state.robot is not None:
-        data["robot"] = state.robot
+        shown = state.own is not None and state.own.robot.id == state.robot
+        data["robot"] = own_arm.KEY if shown else state.robot
     if state.q is not None:
         data["q"] = _rounded(state.q)
     if state.target is not None:
@@ -137,8 +146,12 @@ def decode(text: str, robots: Sequence[Robot]) -> PageState:
     data = _unpack(text)
     if data.get("v") != VERSION:
         return PageState(unreadable=bool(text))
+    own, refused = _own(data.get("own"))
     requested = data.get("robot", robots[0].id)
-    robot = next((r for r in robots if r.id == requested), None)
+    if requested == own_arm.KEY:
+        robot = None if own is None else own.robot
+    else:
+        robot = next((r for r in robots if r.id == requested), None)
     lesson = data.get("lesson")
     features = data.get("features")
     common: dict[str, Any] = {
@@ -146,6 +159,8 @@ def decode(text: str, robots: Sequence[Robot]) -> PageState:
         "units": _units(data),
         "view": _view(data.get("view")),
         "features": _features(features),
+        "own": own,
+        "refused": refused,
     }
     if robot is None:
         return PageState(missing=requested[:80] if isinstance(requested, str) else "", **common)
@@ -204,6 +219,16 @@ def _parse(text: str) -> dict[str, Any]:
 def _rounded(values: Array, digits: int = DIGITS) -> list[float]:
     # Adding zero turns -0.0 into 0.0.
     return [round(value, digits) + 0.0 for value in values.tolist()]
+
+
+def _own(value: object) -> tuple[OwnArm | None, str]:
+    """The visitor's own arm, or why it is none."""
+    if value is None:
+        return None, ""
+    try:
+        return own_arm.unpack(value), ""
+    except KinematicsError as error:
+        return None, str(error)
 
 
 def _numbers(value: object, count: int) -> Array | None:

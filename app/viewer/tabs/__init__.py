@@ -6,6 +6,7 @@ Adding one is one module with a :class:`~app.viewer.feature.Feature` and one row
 from __future__ import annotations
 
 from app.viewer.feature import Feature
+from app.viewer.tabs.robot.tab import RobotTab
 from app.viewer.tabs.workspace.tab import Workspace
 
-TABS: tuple[type[Feature], ...] = (Workspace,)
+TABS: tuple[type[Feature], ...] = (RobotTab, Workspace)

@@ -138,4 +138,4 @@ def bounds(robot: Robot, item: Redundancy) -> tuple[float, float]:
 
 def frame_origins(robot: Robot, q: Array) -> Array:
     """The origins ``(k, 3)`` of all frames between the second joint and the tool: the arm's shape."""
-    return kin.link_frames(robot, q)[robot.joint_rows[1] :, :3, 3]
+    return kin.link_frames(robot, q)[robot.joint_rows[min(1, robot.n - 1)] :, :3, 3]

@@ -6,8 +6,8 @@
     measured = atom [ unit ]
     atom     = number [ "pi" ] | "pi" | "(" sum ")"
 
-A number without a unit is in the unit of the page. In a cell for an angle ``pi`` is in radians, whatever the unit of
-the page, so that ``pi/2`` is always a right angle; in a cell for a length it is the number 3.14….
+A number without a unit is in the unit of the page. In a cell for an angle ``pi`` is in radians, whatever the unit
+of the page, so that ``pi/2`` is always a right angle; in a cell for a length it is the number 3.14….
 """
 
 from __future__ import annotations

@@ -1,0 +1,152 @@
+"""The visitor's own arm: one that is not among the service's robots. It lives in the visitor's page and its link.
+
+In a link the arm is a compact form of the fields of a robot file. Links come from anybody: `unpack` checks what it
+reads as strictly as a robot file, and bounds sizes more narrowly, because the page shows every name and sends the
+whole arm with every link.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import unicodedata
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+import kin
+from kin import InputError, Robot
+
+KEY = "own"  # stands for the arm in a link, and begins its id
+MY_ARM = "My arm"
+NAME, ROW_NAME, SOURCE, DESCRIPTION = 60, 40, 200, 400  # characters
+SMALLEST, LARGEST = 1e-3, 1000.0  # m: reach of an arm that can be shown
+LONGEST = 10_000  # characters of the compact form; a link holds 12 000 in all
+_KINDS = {"revolute": "", "prismatic": "p", "fixed": "f"}
+_ROW = ("theta", "d", "a", "alpha", "limits", "kind", "name", "velocity", "effort")
+_TOP = {"n": "name", "s": "source", "i": "description", "c": "convention", "b": "base", "t": "tool"}
+
+
+@dataclass(frozen=True)
+class OwnArm:
+    """An arm of the visitor's own.
+
+    Attributes:
+        robot: the arm. Its id depends on everything else in it, so another arm never has the same.
+        start: the arm it was made from: the id of a robot, or the name of an example. Empty: none.
+    """
+
+    robot: Robot
+    start: str = ""
+
+
+def own_arm(data: Mapping[str, Any], start: str = "") -> OwnArm:
+    """An arm described by the fields of a robot file; its id is replaced.
+
+    Raises:
+        kin.KinematicsError: naming the field, the value and what would be valid.
+    """
+    fields = {**data, "id": KEY, "source": clean(data.get("source"), SOURCE) or "a visitor's table"}
+    fields["name"] = clean(data.get("name"), NAME) or MY_ARM
+    fields["description"] = clean(data.get("description", ""), DESCRIPTION)
+    rows = data.get("rows")
+    if isinstance(rows, Sequence) and not isinstance(rows, str):
+        fields["rows"] = [_named(i, row) if isinstance(row, Mapping) else row for i, row in enumerate(rows)]
+    robot = kin.robot_from_dict(fields, "your arm")
+    if not SMALLEST <= robot.reach <= LARGEST:
+        limits = f"lengths a and d (or a tool) that reach {SMALLEST * 1000:g} mm to {LARGEST:g} m"
+        raise InputError("rows", f"a reach of {robot.reach:.3g} m", limits)
+    away = float(np.abs(robot.T_world_base[:3, 3]).max())
+    if away > LARGEST:
+        raise InputError("base.xyz", f"{away:g} m", f"a base at most {LARGEST:g} m from the origin")
+    text = _text(robot)
+    if len(text) > LONGEST:
+        raise InputError("rows", f"{len(text)} characters", f"names and numbers that take at most {LONGEST}")
+    digest = hashlib.sha256(text.encode()).hexdigest()[:12]
+    return OwnArm(replace(robot, id=f"{KEY}-{digest}"), clean(start, ROW_NAME))
+
+
+def _named(index: int, row: Mapping[str, Any]) -> dict[str, Any]:
+    return {**row, "name": clean(row.get("name", ""), ROW_NAME) or f"joint {index + 1}"}
+
+
+def clean(value: object, length: int) -> Any:
+    """A name on one line, cut to `length`, without characters that are invisible or change the order of others.
+
+    What is no text is returned as it is: it is refused elsewhere.
+    """
+    if not isinstance(value, str):
+        return value
+    value = value[: 10 * length]
+    visible = "".join(" " if unicodedata.category(c) in ("Cc", "Zl", "Zp") else c for c in value)
+    kept = "".join(c for c in visible if unicodedata.category(c) not in ("Cf", "Cs", "Co", "Cn"))
+    words = " ".join(kept.split())
+    return words if len(words) <= length else words[: length - 1] + "…"
+
+
+def label(robot: Robot) -> str:
+    """The name in the menu of robots."""
+    return MY_ARM if robot.name == MY_ARM else f"{MY_ARM} ({robot.name})"
+
+
+def pack(own: OwnArm) -> dict[str, Any]:
+    """The compact form: JSON."""
+    packed: dict[str, Any] = json.loads(_text(own.robot))
+    return {**packed, "from": own.start} if own.start else packed
+
+
+def unpack(value: object) -> OwnArm:
+    """The arm of a compact form that anybody may have written.
+
+    Raises:
+        kin.KinematicsError: naming the field, the value and what would be valid.
+    """
+    if not isinstance(value, dict):
+        raise InputError("arm", value, "a table of rows")
+    data: dict[str, Any] = {name: value[key] for key, name in _TOP.items() if key in value}
+    data["convention"] = "modified" if data.get("convention") == "m" else "standard"
+    data["units"] = {"length": value.get("u", "mm"), "angle": "deg"}
+    rows = value.get("r")
+    data["rows"] = [_row(i, row) for i, row in enumerate(rows)] if isinstance(rows, list) else rows
+    if "h" in value:
+        data["home"] = {"q": value["h"]}
+    return own_arm(data, str(value.get("from", ""))[:ROW_NAME])
+
+
+def _row(index: int, row: object) -> dict[str, Any]:
+    if not isinstance(row, list) or len(row) > len(_ROW):
+        raise InputError(f"rows[{index}]", row, "a list of " + ", ".join(_ROW))
+    given = {name: item for name, item in zip(_ROW, row, strict=False) if item is not None}
+    kind = given.get("kind", "")
+    given["kind"] = next((name for name, code in _KINDS.items() if code == kind), kind)
+    if given["kind"] == "fixed":
+        given.pop("limits", None)
+    return given
+
+
+@lru_cache(maxsize=128)
+def _text(robot: Robot) -> str:
+    """The compact form as JSON, without what Reset returns to."""
+    data = kin.robot_to_dict(robot, angle="deg")
+    packed: dict[str, Any] = {key: data[name] for key, name in _TOP.items() if name in data}
+    if data["convention"] == "modified":
+        packed["c"] = "m"
+    else:
+        del packed["c"]
+    if data["units"]["length"] != "mm":
+        packed["u"] = data["units"]["length"]
+    packed["r"] = [_packed_row(row) for row in data["rows"]]
+    packed["h"] = data["home"]["q"]
+    return json.dumps(packed, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+
+
+def _packed_row(row: Mapping[str, Any]) -> list[Any]:
+    """The items of a row, without trailing ones that are missing."""
+    items = [row.get(name, 0) for name in _ROW[:4]]
+    items += [row.get("limits"), _KINDS[row.get("kind", "revolute")], row["name"], *map(row.get, _ROW[7:])]
+    while items and items[-1] is None:
+        items.pop()
+    return items

@@ -1,0 +1,43 @@
+"""The robot on show: one of the service's, or the visitor's own arm, which changes while it is on show."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from app.viewer.own_arm import OwnArm
+from app.viewer.session.persistence import SavedPage
+from kin import Robot
+from kin.transforms import Array
+
+
+class RobotPage(SavedPage, Protocol):
+    """What a change of the robot may use of a page."""
+
+    own: OwnArm | None
+
+    def change_robot(self, robot: Robot, q: Array | None = None, glide: bool = False) -> None:
+        """Replace the robot, at its home configuration or at `q` ``(n,)``, in a fitting view."""
+
+
+def robot_of(page: RobotPage, robot_id: str | None) -> Robot:
+    """The robot with this id, which may be that of the visitor's own; None: the first one of the service."""
+    if page.own is not None and page.own.robot.id == robot_id:
+        return page.own.robot
+    return page.store.robots[0] if robot_id is None else page.store.get(robot_id)
+
+
+def edit(page: RobotPage, own: OwnArm) -> None:
+    """Show a changed version of the arm on show.
+
+    Viewpoint and task stay, and configuration and locks if it has as many joints of the same kinds.
+    """
+    robot, q, task, locks, viewpoint = own.robot, page.goal, page.task, page.arm.locks, page.camera.chosen
+    alike = [joint.kind for joint in page.robot.joints] == [joint.kind for joint in robot.joints]
+    page.own = own
+    page.change_robot(robot, robot.clip(q) if alike else None, glide=True)
+    if viewpoint is not None:
+        page.camera.restore(viewpoint)
+    if task != page.task:
+        page.set_task(task)
+    if alike and any(locks):
+        page.set_locks(locks)

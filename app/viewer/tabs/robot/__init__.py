@@ -1,0 +1,1 @@
+"""The tab in which a visitor makes an arm of their own."""

@@ -1,0 +1,189 @@
+"""Changes of an arm: typed cells, rows added, removed and moved, another convention. Pure: arm in, arm out.
+
+A changed arm is described by the fields of a robot file and read by `kin.robot_from_dict`, which checks it. A
+typed value has its own unit there, so that the other numbers stay exactly as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import kin
+from app.viewer.own_arm import NAME, OwnArm, own_arm
+from app.viewer.panel.readout import roll_pitch_yaw
+from app.viewer.tabs.robot.expression import ExpressionError, cut, read
+from kin import InputError, KinematicsError, Robot, RobotFileError
+from kin.units import Units
+
+# A cell: of a row, ``(index, column)``; of a frame, ``("tool", "x")``; ``("arm", "name")``.
+Cell = tuple[int | str, str]
+ANGLES = ("theta", "alpha")
+NUMBERS = ("theta", "d", "a", "alpha", "low", "high")
+COLUMNS = (*NUMBERS, "name", "kind")
+FRAMES = ("tool", "base")
+AXES = ("x", "y", "z", "roll", "pitch", "yaw")
+KINDS = ("revolute", "prismatic", "fixed")
+NEW_LINK = 100  # mm: the length of a new row, so that it is seen
+_SHOWN = {"theta": "θ", "alpha": "α", "low": "lower limit", "high": "upper limit"}
+Fields = dict[str, Any]
+
+
+class EditError(ValueError):
+    """A change that gives no valid arm: the cell, if there is one, and what is wrong."""
+
+    def __init__(self, cell: Cell | None, message: str) -> None:
+        self.cell = cell
+        self.message = message
+        super().__init__(message)
+
+
+def name_of(cell: Cell) -> str:
+    """A cell in words, such as ``row 3, α``."""
+    where, column = cell
+    if isinstance(where, int):
+        return f"row {where + 1}, {_SHOWN.get(column, column)}"
+    return "name" if where == "arm" else f"{where}, {column}"
+
+
+def fields_of(robot: Robot, own: OwnArm | None) -> tuple[Fields, str]:
+    """The fields of the arm that a change starts from, and what it was made from."""
+    data: Fields = kin.robot_to_dict(robot)
+    if own is not None and own.robot == robot:
+        return data, own.start
+    data["name"] = f"{robot.name[: NAME - 8]} variant"
+    data["source"] = f"{robot.name}, changed in the page"
+    data.pop("description", None)
+    return data, robot.id
+
+
+def typed(robot: Robot, own: OwnArm | None, texts: Mapping[Cell, str], units: Units) -> OwnArm:
+    """The arm with these texts in its cells; numbers without a unit are in `units`.
+
+    Raises:
+        EditError: naming the first cell that is wrong.
+    """
+    data, start = fields_of(robot, own)
+    for cell, text in texts.items():
+        where, column = cell
+        try:
+            if isinstance(where, int):
+                _type_row(data, robot, where, column, text, units)
+            elif where == "arm":
+                data["name"] = text
+            else:
+                _type_frame(data, robot, where, column, text, units)
+        except ExpressionError as error:
+            raise EditError(cell, str(error)) from None
+    limits = [(i, column) for i, column in texts if isinstance(i, int) and column in ("low", "high")]
+    for i in {i for i, _ in limits}:
+        pair = data["rows"][i].get("limits")
+        if isinstance(pair, list) and None in pair:
+            if pair == [None, None]:
+                data["rows"][i]["limits"] = "none"
+            else:
+                raise EditError((i, "low" if pair[0] is None else "high"), "give both limits, or none")
+    return built(data, start, texts)
+
+
+def built(data: Fields, start: str, texts: Mapping[Cell, str] | None = None) -> OwnArm:
+    """The arm of these fields. A home that is not valid any more is replaced.
+
+    Raises:
+        EditError: with what is wrong; `texts` tells in which cell.
+    """
+    try:
+        try:
+            return own_arm(data, start)
+        except RobotFileError as error:
+            if not error.field.startswith("home"):
+                raise
+            return own_arm({key: value for key, value in data.items() if key != "home"}, start)
+    except (InputError, RobotFileError) as error:
+        cell = _cell_of(error.field, texts or {})
+        text = "" if cell is None or texts is None else f"“{cut(texts[cell])}” is not valid: "
+        raise EditError(cell, f"{text}expected {error.expected}") from None
+    except KinematicsError as error:
+        raise EditError(None, str(error)) from None
+
+
+def changed_rows(robot: Robot, own: OwnArm | None, change: Callable[[list[Fields]], None]) -> OwnArm:
+    """The arm with another list of rows; raises `EditError`."""
+    data, start = fields_of(robot, own)
+    change(data["rows"])
+    moving = [row.get("kind", "revolute") for row in data["rows"] if row.get("kind") != "fixed"]
+    if moving != [joint.kind for joint in robot.joints]:
+        data.pop("home")
+    return built(data, start)
+
+
+def add_row(rows: list[Fields], after: int, unit: str) -> None:
+    """Insert a revolute row below row `after`."""
+    taken = {row["name"] for row in rows}
+    name = next(name for k in range(1, len(rows) + 2) if (name := f"joint {k}") not in taken)
+    rows.insert(after + 1, {"name": name, "a": NEW_LINK if unit == "mm" else f"{NEW_LINK / 1000} m"})
+
+
+def move_row(rows: list[Fields], index: int, by: int) -> None:
+    """Swap a row with the one above (`by` −1) or below (+1)."""
+    rows[index], rows[index + by] = rows[index + by], rows[index]
+
+
+def reread(robot: Robot, own: OwnArm | None, convention: str) -> OwnArm:
+    """The arm that the same table describes in this convention; raises `EditError`."""
+    data, start = fields_of(robot, own)
+    return built({**data, "convention": convention}, start)
+
+
+def frame_values(robot: Robot, frame: str) -> tuple[float, ...]:
+    """x, y, z (m), roll, pitch and yaw (rad) of the arm's tool or base."""
+    T = robot.T_last_tool if frame == "tool" else robot.T_world_base
+    return (*T[:3, 3].tolist(), *roll_pitch_yaw(T[:3, :3]))
+
+
+def _type_row(data: Fields, robot: Robot, index: int, column: str, text: str, units: Units) -> None:
+    row, joint = data["rows"][index], robot.rows[index]
+    if column == "name":
+        row["name"] = text
+    elif column == "kind":
+        row["kind"] = text
+        for key in ("limits", "velocity", "effort"):
+            row.pop(key, None)
+        data.pop("home", None)
+    elif column in ("low", "high"):
+        if joint.kind == "fixed":
+            raise ExpressionError("a fixed row has no limits")
+        is_angle = joint.kind == "revolute"
+        if not isinstance(row.get("limits"), list):
+            row["limits"] = [None, None]
+        value = quantity(text, units, is_angle) if text.strip() else None
+        row["limits"][column == "high"] = value
+    else:
+        row[column] = quantity(text, units, column in ANGLES)
+
+
+def _type_frame(data: Fields, robot: Robot, frame: str, axis: str, text: str, units: Units) -> None:
+    if "xyz" not in data.get(frame, {}) or "rpy" not in data[frame]:
+        values = frame_values(robot, frame)
+        data[frame] = {"xyz": [f"{v!r} m" for v in values[:3]], "rpy": [f"{v!r} rad" for v in values[3:]]}
+    index = AXES.index(axis)
+    data[frame]["xyz" if index < 3 else "rpy"][index % 3] = quantity(text, units, index >= 3)
+
+
+def quantity(text: str, units: Units, is_angle: bool) -> str:
+    """A typed number with its unit, as robot files take it."""
+    return f"{read(text, units.of(is_angle), is_angle)!r} {'rad' if is_angle else 'm'}"
+
+
+def _cell_of(field: str, texts: Mapping[Cell, str]) -> Cell | None:
+    """The typed cell that an error of a robot file is about; None if it is about none of them."""
+    if not texts:
+        return None
+    field = field.replace("limits", "low")
+    for cell in texts:
+        where, column = cell
+        begin = f"rows[{where}]." if isinstance(where, int) else "" if where == "arm" else f"{where}."
+        wanted = begin + ("low" if column == "high" else column)
+        if field.startswith(wanted) or field == f"rows[].{column}":
+            return cell
+    return next(reversed(list(texts)))

@@ -1,0 +1,276 @@
+"""The tab *Robot*: the DH table of the arm on show with a field for every number, and what the arm is.
+
+The first change makes the arm the visitor's own. ``static/robot.js`` sends what is typed, cell by cell. A cell
+that gives no valid arm is marked, and the last valid arm stays. The part of the tab in which the visitor types is
+not sent again; the rest is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from dataclasses import replace
+
+import kin
+from app.exports.snippets import named
+from app.shared.answers.inspection import inspect
+from app.viewer.feature import Feature, Stage
+from app.viewer.own_arm import KEY, OwnArm, own_arm
+from app.viewer.panel import update_html
+from app.viewer.panel.status import Notice
+from app.viewer.tabs.robot import edits, views
+from app.viewer.tabs.robot.edits import Cell, EditError
+from app.viewer.tabs.robot.expression import cut
+from app.viewer.tabs.robot.presets import PRESETS, TITLES
+from kin import InputError, KinematicsError, Robot
+from kin.files.read import MAX_ROWS
+
+MAX_FILE = 100_000  # characters of an uploaded file
+FILE_NOTE = "The arm is in this page and in its link only. A file keeps it, and takes it to Python and REST."
+
+
+class RobotTab(Feature):
+    """The visitor's own arm: a table to change it, examples to start from, files to keep it."""
+
+    key = "robot"
+    title = "Robot"
+    messages = frozenset({"cell", "row", "start", "convention", "reset", "discard", "left", "download", "upload"})
+
+    def __init__(self, stage: Stage) -> None:
+        super().__init__(stage)
+        self._wrong: dict[Cell | None, tuple[str, str]] = {}  # what was typed, and what is wrong with it
+        self._revision = 0  # of the rows: a message about other rows is out of date
+        self._editing = ""  # the part of the tab in which the visitor types
+        self._uploaded: OwnArm | None = None
+        self._file: list[str] = []
+        gui = stage.client.gui
+        self._html = {name: gui.add_html("") for name in ("start", "table", "wrong", "about", "frames", "files")}
+        self._handlers: dict[str, Callable[[object], None]] = {
+            "start": self._start,
+            "convention": self._reread,
+            "reset": lambda _: self._reset(),
+            "discard": lambda _: self._refresh(),
+            "left": lambda _: self._leave_table(),
+            "download": lambda _: self._download(),
+            "upload": self._upload,
+        }
+        self._refresh()
+
+    def handle(self, key: Hashable, value: object) -> None:
+        match key:
+            case ("cell", int() | str() as where, str(column)):
+                self._type(where, column, value)
+            case ("row", str(action), int(index)):
+                self._change_rows(action, index)
+            case (str(name),) if name in self._handlers:
+                self._handlers[name](value)
+            case _:
+                raise InputError("robot", key, "the key of a field or a button")
+
+    def step_name(self, key: Hashable) -> str:
+        match key:
+            case ("cell", int() | str() as where, str(column)):
+                words = edits.name_of((where, column))
+                return f"{words[0].upper()}{words[1:]}"
+            case ("row", str(action), int(index)):
+                return f"Row {index + 1}: {action}"
+            case ("start" | "reset" | "upload", *_):
+                return "Another arm"
+            case ("convention",):
+                return "Convention"
+        return self.title
+
+    def on_robot(self) -> None:
+        self._refresh()
+
+    def on_style(self) -> None:
+        self._refresh()
+
+    # Drawing
+
+    def _refresh(self) -> None:
+        """Show the arm as it is, but not in the part in which the visitor types."""
+        robot, units = self.stage.robot, self.stage.units
+        if self._editing != "table":
+            self._wrong.clear()
+            self._revision += 1
+            self._show("table", views.table(robot, units, self._revision))
+        if self._editing != "frames":
+            self._show("frames", views.frames(robot, units))
+        if self._editing != "start":
+            own = self._own
+            origin = robot.id if own is None else own.start
+            self._show("start", views.start(robot, origin, own is not None, self.stage.store.robots))
+        self._show("about", views.about(inspect(robot), robot, units))
+        self._show("files", views.files(MAX_FILE, FILE_NOTE))
+        self._show_wrong()
+
+    def _show(self, name: str, html: str) -> None:
+        update_html(self._html[name], html)
+
+    def _show_wrong(self) -> None:
+        self._show("wrong", views.wrong({cell: message for cell, (_, message) in self._wrong.items()}))
+
+    def _leave_table(self) -> None:
+        """The visitor has left the fields: write every value as it is read, unless something is wrong."""
+        if not self._wrong:
+            self._refresh()
+
+    @property
+    def _own(self) -> OwnArm | None:
+        """The visitor's own arm if it is on show."""
+        own = self.stage.own
+        return own if own is not None and own.robot == self.stage.robot else None
+
+    # Changes
+
+    def _edit(self, own: OwnArm, editing: str = "") -> None:
+        if _alike(own.robot, self.stage.robot) and (self._own is not None or editing != "start"):
+            return
+        self._editing = editing
+        try:
+            self.stage.edit_arm(own)
+        finally:
+            self._editing = ""
+
+    def _type(self, where: int | str, column: str, value: object) -> None:
+        """A cell was typed into. Cells that were wrong before may be valid together with it."""
+        cell = self._cell(where, column)
+        match value:
+            case [int(revision), str(text)]:
+                if isinstance(where, int) and revision != self._revision:
+                    return  # the rows are others by now
+            case _:
+                raise InputError("cell", value, "a revision and a text")
+        editing = "start" if where == "arm" else "frames" if isinstance(where, str) else "table"
+        robot, units = self.stage.robot, self.stage.units
+        before = {key: typed for key, (typed, _) in self._wrong.items() if key is not None and key != cell}
+        self._wrong.pop(cell, None)
+        self._wrong.pop(None, None)
+        if column == "kind":
+            editing, before = "", {}
+        for texts in ({**before, cell: text}, {cell: text}):
+            try:
+                own = edits.typed(robot, self._own, texts, units)
+            except EditError as error:
+                self._wrong[cell] = text, error.message
+            else:
+                for key in texts:
+                    self._wrong.pop(key, None)
+                self._edit(own, editing)
+                break
+        self._show_wrong()
+
+    def _cell(self, where: int | str, column: str) -> Cell:
+        """A cell of the page; raises `InputError` if there is none."""
+        valid = edits.COLUMNS if isinstance(where, int) else ("name",) if where == "arm" else edits.AXES
+        rows = range(len(self.stage.robot.rows))
+        if where not in (rows if isinstance(where, int) else ("arm", *edits.FRAMES)) or column not in valid:
+            raise InputError("cell", (where, column), "a cell of the table")
+        return where, column
+
+    def _change_rows(self, action: str, index: int) -> None:
+        robot, own = self.stage.robot, self._own
+        count = len(robot.rows)
+        if not 0 <= index < count:
+            raise InputError("row", index, f"0 to {count - 1}")
+        changes: dict[str, Callable[[list[edits.Fields]], None]] = {
+            "add": lambda rows: edits.add_row(rows, index, robot.units),
+            "remove": lambda rows: rows.__delitem__(index),
+            "up": lambda rows: edits.move_row(rows, index, -1),
+            "down": lambda rows: edits.move_row(rows, index, 1),
+        }
+        if action not in changes:
+            raise InputError("row", action, "one of " + ", ".join(changes))
+        if action == "add" and count >= MAX_ROWS:
+            self._refuse("The table is full", f"An arm has at most {MAX_ROWS} rows.")
+        elif action == "remove" and count == 1:
+            self._refuse("The row stays", "An arm needs at least one row.")
+        elif 0 <= index + {"up": -1, "down": 1}.get(action, 0) < count:
+            self._try(lambda: edits.changed_rows(robot, own, changes[action]))
+
+    def _reread(self, convention: object) -> None:
+        if convention not in kin.robot.CONVENTIONS:
+            raise InputError("convention", convention, "one of " + ", ".join(kin.robot.CONVENTIONS))
+        self._try(lambda: edits.reread(self.stage.robot, self._own, str(convention)))
+
+    def _try(self, change: Callable[[], OwnArm]) -> None:
+        try:
+            own = change()
+        except EditError as error:
+            self._refuse("The arm stays as it is", error.message)
+        else:
+            self._edit(own)
+
+    def _refuse(self, title: str, detail: str) -> None:
+        self._refresh()
+        self.stage.notify(Notice("error", title, detail))
+
+    # Beginnings
+
+    def _start(self, key: object) -> None:
+        """Begin with an example, or show a robot of the service."""
+        if isinstance(key, str) and key in PRESETS:
+            self._begin(own_arm(PRESETS[key], key))
+            return
+        robot = next((r for r in self.stage.store.robots if r.id == key), None)
+        if robot is None:
+            valid = [*TITLES, *(r.id for r in self.stage.store.robots)]
+            raise InputError("start", key, "one of " + ", ".join(valid))
+        self.stage.change_robot(robot)
+        self.stage.notify(Notice("hand", robot.name, "Change its table: it becomes an arm of your own."))
+
+    def _begin(self, own: OwnArm) -> None:
+        self.stage.show_own(own)
+        self.stage.notify(Notice("hand", own.robot.name, own.robot.description))
+
+    def _reset(self) -> None:
+        own = self._own
+        if own is None:
+            return
+        if own.start:
+            self._start(own.start)
+        elif self._uploaded is not None:
+            self._begin(self._uploaded)
+        else:
+            detail = "The arm came with a link. Undo goes back one step."
+            self._refuse("There is nothing to reset to", detail)
+
+    # Files
+
+    def _download(self) -> None:
+        robot = self.stage.robot if self._own is None else named(self.stage.robot)
+        text = kin.robot_to_toml(robot)
+        self.stage.client.send_file_download(f"{robot.id}.toml", text.encode(), save_immediately=True)
+        self.stage.notify(Notice("hand", f"{robot.id}.toml is downloaded", "A robot file of this arm."))
+
+    def _upload(self, value: object) -> None:
+        """A part of a file: its name, whether it is the first, whether it is the last, and the text."""
+        match value:
+            case [str(name), bool(first), bool(last), str(part)]:
+                pass
+            case _:
+                raise InputError("upload", value, "name, first, last, text")
+        if first:
+            self._file = []
+        self._file.append(part)
+        if sum(map(len, self._file)) > MAX_FILE:
+            self._file = []
+            self._refuse("The file was not used", f"It is too large; valid are {MAX_FILE // 1000} kB.")
+        elif last:
+            text, self._file = "".join(self._file), []
+            self._use_file(cut(name), text)
+
+    def _use_file(self, name: str, text: str) -> None:
+        try:
+            self._uploaded = own = own_arm(kin.robot_to_dict(kin.parse_robot(text, name)))
+        except KinematicsError as error:
+            self._refuse("The file was not used", str(error))
+        else:
+            self._begin(own)
+
+
+def _alike(one: Robot, other: Robot) -> bool:
+    """Whether two robots have the same table, and, if both are the visitor's own, the same name."""
+    unnamed = replace(other, id=one.id, name=one.name, source=one.source, description=one.description)
+    both = other.id.startswith(KEY)
+    return one == unnamed and (not both or one.name == other.name)

@@ -1,0 +1,179 @@
+"""The HTML of the tab: the table, what is wrong, what the arm is, tool and base, files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from app.shared.answers.inspection import InspectionAnswer
+from app.viewer.tabs.robot.edits import ANGLES, AXES, FRAMES, KINDS, NUMBERS, Cell, frame_values, name_of
+from app.viewer.tabs.robot.presets import TITLES
+from app.viewer.views.templates import render
+from kin import Joint, Robot
+from kin.units import Unit, Units
+
+DECIMALS = 6  # of a degree or a millimetre, in a cell
+KIND_TITLES = {"revolute": "turns", "prismatic": "slides", "fixed": "fixed"}
+_HEADS = {
+    "kind": ("joint", "Whether the joint of this row turns (revolute), slides (prismatic) or does not move"),
+    "theta": ("θ", "Angle about z; the value of a turning joint is added"),
+    "d": ("d", "Length along z; the value of a sliding joint is added"),
+    "a": ("a", "Length along x"),
+    "alpha": ("α", "Angle about x: the twist of the link"),
+    "low": ("from", "Lower limit of the joint, in degrees or as a length"),
+    "high": ("to", "Upper limit of the joint"),
+    "name": ("name", "Name of the joint"),
+}
+_MOTIONS = {
+    0: "none: no joint moves the tool",
+    1: "one: the tool moves along one curve",
+    2: "2: the tool moves on a surface",
+    6: "6: any position and any orientation, within reach",
+}
+
+
+def text_of(value: float, unit: Unit) -> str:
+    """A value (rad or m) as short as possible."""
+    shown = f"{value * unit.scale:.{unit.decimals(DECIMALS)}f}".rstrip("0").rstrip(".")
+    return "0" if shown in ("-0", "") else shown.replace("-", "−")
+
+
+def start(robot: Robot, chosen: str, changed: bool, robots: Sequence[Robot]) -> str:
+    """What the arm was made from, its name and its convention."""
+    return render(
+        "robot/start",
+        chosen=chosen,
+        changed=changed,
+        presets=TITLES.items(),
+        robots=[(r.id, r.name) for r in robots],
+        name=robot.name,
+        convention=robot.convention,
+    )
+
+
+def table(robot: Robot, units: Units, revision: int) -> str:
+    """The DH table with a field for each number."""
+    heads = []
+    for column, (name, title) in _HEADS.items():
+        unit = units.of(column in ANGLES).name if column in NUMBERS[:4] else ""
+        heads.append({"name": name, "unit": unit, "title": title, "wide": column == "name"})
+    rows = [[_cell(i, row, column, units) for column in _HEADS] for i, row in enumerate(robot.rows)]
+    return render("robot/table", heads=heads, rows=rows, revision=revision, convention=robot.convention)
+
+
+def _cell(index: int, row: Joint, column: str, units: Units) -> dict[str, Any]:
+    cell: dict[str, Any] = {"key": f"{index} {column}", "label": name_of((index, column)), "value": "", "hint": ""}
+    cell |= {"variable": False, "options": None, "none": False, "text": column == "name"}
+    if column == "kind":
+        return {**cell, "value": row.kind, "options": [(kind, KIND_TITLES[kind]) for kind in KINDS]}
+    if column == "name":
+        return {**cell, "value": row.name}
+    if column in ("low", "high"):
+        if row.limits is None:
+            return {**cell, "none": row.kind == "fixed", "hint": "none"}
+        limit = row.limits[column == "high"]
+        return {**cell, "value": text_of(limit, units.of(row.kind == "revolute"))}
+    variable = column == {"revolute": "theta", "prismatic": "d"}.get(row.kind)
+    return {**cell, "value": text_of(getattr(row, column), units.of(column in ANGLES)), "variable": variable}
+
+
+def wrong(messages: Mapping[Cell | None, str]) -> str:
+    """What is wrong, and in which cells, for ``static/robot.js``."""
+    cells = {" ".join(map(str, cell)): message for cell, message in messages.items() if cell is not None}
+    words = [_sentence(cell, message) for cell, message in messages.items()]
+    return render("robot/wrong", cells=json.dumps(cells), messages=words)
+
+
+def _sentence(cell: Cell | None, message: str) -> str:
+    words = message if cell is None else f"{name_of(cell)}: {message}"
+    return f"{words[0].upper()}{words[1:]}."
+
+
+def about(found: InspectionAnswer, robot: Robot, units: Units) -> str:
+    """What the arm is, in plain words."""
+    facts = [
+        _fact("Joints", _joints(robot)),
+        _fact("Axes", _axes(found)),
+        _fact("Tool motions", _MOTIONS.get(found["motions"], f"{found['motions']} independent")),
+        _redundancy(found, robot),
+        _solver(found),
+        _fact("Reach", f"at most {units.distance(robot.reach)}"),
+        _home(found),
+    ]
+    near = "The home configuration is near a singularity"  # said by the row above
+    warnings = [text for text in found["warnings"] if not text.startswith(near)]
+    return render("robot/about", facts=[fact for fact in facts if fact is not None], warnings=warnings)
+
+
+def _fact(name: str, words: str, state: str = "", color: str = "kb-green") -> dict[str, str]:
+    return {"name": name, "words": words, "state": state, "color": color}
+
+
+def _joints(robot: Robot) -> str:
+    turning = int(robot.revolute.sum())
+    sliding = robot.n - turning
+    parts = [f"{count} {verb}" for count, verb in ((turning, "turning"), (sliding, "sliding")) if count]
+    return f"{robot.n}: {', '.join(parts)}" if sliding and turning else parts[0]
+
+
+def _axes(found: InspectionAnswer) -> str:
+    parts = [f"{_run(joints)} parallel" for joints in found["parallel"] if len(joints) > 1]
+    parts += [f"{_run(joints)} meet in one point" for joints in found["spherical"]]
+    turned = [pair["relation"] for pair in found["axes"]]
+    if not parts and turned:
+        same = f"each {turned[0]} to the next" if len(set(turned)) == 1 else "in no special position"
+        parts = [same if len(turned) > 1 else f"1 and 2 {turned[0]}"]
+    return "; ".join(parts) or "one axis"
+
+
+def _run(joints: Sequence[int]) -> str:
+    numbers = [str(joint + 1) for joint in joints]
+    return " and ".join([", ".join(numbers[:-1]), numbers[-1]])
+
+
+def _redundancy(found: InspectionAnswer, robot: Robot) -> dict[str, str]:
+    spare = found["redundancy"]
+    if spare:
+        words = f"{robot.n} joints − {found['motions']} motions = {spare}: the arm can move while the tool stays"
+        return _fact("Redundancy", words)
+    return _fact("Redundancy", "none: no joint to spare")
+
+
+def _solver(found: InspectionAnswer) -> dict[str, str]:
+    if found["solver"] == "numeric":
+        words = f"a search from several starts: {found['reason']}. It may miss solutions."
+        return _fact("Inverse kinematics", words, "numeric:", "kb-amber")
+    count = len(found["robot"]["branches"])
+    postures = f", up to {count} postures" if count else ""
+    return _fact("Inverse kinematics", f"{found['solver']}{postures}: {found['reason']}.", "exact:")
+
+
+def _home(found: InspectionAnswer) -> dict[str, str]:
+    if found["singular_at_home"]:
+        return _fact("Home", "the tool cannot move in some direction from there", "singular:", "kb-vermilion")
+    if found["home_margin"] < 0.1:
+        return _fact("Home", "some tool motions there need fast joints", "near a singularity:", "kb-amber")
+    return _fact("Home", "every possible motion of the tool starts freely", "not singular:")
+
+
+def frames(robot: Robot, units: Units) -> str:
+    """Fields for the tool and the base."""
+    heads = [(axis, units.of(i >= 3).name) for i, axis in enumerate(AXES)]
+    rows = []
+    for frame in FRAMES:
+        cells = [
+            {
+                "key": f"{frame} {axis}",
+                "value": text_of(value, units.of(i >= 3)),
+                "label": name_of((frame, axis)),
+            }
+            for i, (axis, value) in enumerate(zip(AXES, frame_values(robot, frame), strict=True))
+        ]
+        rows.append({"title": frame, "cells": cells})
+    return render("robot/frames", heads=heads, rows=rows)
+
+
+def files(most: int, note: str) -> str:
+    """Buttons for files of at most `most` bytes."""
+    return render("robot/files", most=f"{most // 1000} kB", bytes=most, note=note)

@@ -1,0 +1,206 @@
+"use strict";
+// Runs in viser's page: the table of the tab Robot (app/viewer/tabs/robot). It sends what is typed, cell by cell, and one
+// message at a time, so that a slow answer delays only itself. The server sends the table again when its rows change;
+// then the cell that had the focus gets it back.
+(() => {
+  const PAUSE = 40; // ms after a key until a cell is sent
+  const PATIENCE = 3000; // ms for an answer, then the next message is sent
+  const LEFT = 400; // ms without focus until the table is written again, so that a click on a button finds it
+  const PART = 12000; // characters of a file in one message
+
+  const part = (name) => document.querySelector(`[data-arm="${name}"]`);
+  const cells = () => [...document.querySelectorAll("[data-arm] input[data-cell]")];
+  const revision = () => Number(part("table")?.dataset.revision ?? 0);
+  const send = (key, value, done) => dispatchEvent(new CustomEvent("kinboard-send", { detail: ["feature", ["robot", key, value], done] }));
+
+  // Typed cells
+
+  const typed = new Map(); // cell → its key and value, not sent yet
+  let busy = 0; // the timer of the message that waits for its answer
+  let pause = 0;
+  addEventListener("kinboard-connect", () => { typed.clear(); clearTimeout(busy); busy = 0; });
+
+  function keyOf(name) {
+    const [where, column] = name.split(" ");
+    return column === undefined ? [name] : ["cell", /^\d+$/.test(where) ? Number(where) : where, column];
+  }
+
+  function push() {
+    clearTimeout(pause);
+    if (busy || !typed.size) return;
+    const [[name, value]] = typed;
+    typed.delete(name);
+    const next = () => { clearTimeout(busy); busy = 0; push(); };
+    busy = setTimeout(next, PATIENCE);
+    send(keyOf(name), value, next);
+  }
+
+  /** Send everything that was typed, before something else is sent. */
+  function flush() {
+    clearTimeout(pause);
+    for (const [name, value] of typed) send(keyOf(name), value);
+    typed.clear();
+  }
+
+  addEventListener("input", (event) => {
+    const cell = event.target.closest?.("[data-arm] input[data-cell]");
+    if (!cell) return;
+    typed.set(cell.dataset.cell, [revision(), cell.value]);
+    clearTimeout(pause);
+    pause = setTimeout(push, PAUSE);
+  });
+  addEventListener("change", (event) => {
+    const choice = event.target.closest?.("[data-arm] select[data-cell]");
+    if (!choice) return;
+    flush();
+    const key = keyOf(choice.dataset.cell);
+    send(key, key[0] === "cell" ? [revision(), choice.value] : choice.value);
+  });
+
+  // The row for the buttons below the table
+
+  let here = 0;
+  function mark() {
+    const rows = [...document.querySelectorAll("[data-arm] tr[data-row]")];
+    if (!rows.length) return;
+    here = Math.min(here, rows.length - 1);
+    rows.forEach((row, i) => row.classList.toggle("kb-here", i === here));
+    const label = document.querySelector("[data-arm-here]");
+    if (label.textContent !== `Row ${here + 1}`) label.textContent = `Row ${here + 1}`;
+    const able = { up: here > 0, down: here < rows.length - 1, remove: rows.length > 1, add: true };
+    for (const [name, yes] of Object.entries(able)) {
+      const button = part("table").querySelector(`[data-arm-do="${name}"]`);
+      if (button.ariaDisabled !== String(!yes)) button.ariaDisabled = String(!yes);
+    }
+  }
+
+  function change(action) {
+    flush();
+    send(["row", action, here], null);
+    here += { add: 1, up: -1, down: 1 }[action] ?? 0;
+    if (focus?.startsWith(/^\d/.exec(focus)?.[0] ?? " ")) focus = focus.replace(/^\d+/, here);
+  }
+
+  // Focus: kept when the server sends a part of the tab again
+
+  let focus = null; // the cell that has it
+  let caret = null;
+  let left = 0;
+  addEventListener("focusin", (event) => {
+    const row = event.target.closest?.("[data-arm] tr[data-row]");
+    if (row) { here = Number(row.dataset.row); mark(); }
+    const cell = event.target.closest?.("[data-arm] [data-cell]");
+    clearTimeout(left);
+    if (cell && cell.dataset.cell !== focus && cell.matches("input")) cell.select();
+    if (focus && !cell) left = setTimeout(leave, LEFT);
+    focus = cell?.dataset.cell ?? null;
+  });
+  addEventListener("focusout", (event) => {
+    if (!event.target.isConnected || event.relatedTarget || !event.target.closest?.("[data-arm] [data-cell]")) return;
+    left = setTimeout(leave, LEFT);
+  });
+  function leave() {
+    if (document.activeElement?.closest("[data-arm] [data-cell]")) return;
+    focus = null;
+    flush();
+    send(["left"], null);
+  }
+  document.addEventListener("selectionchange", () => {
+    const cell = document.activeElement;
+    if (cell?.matches("[data-arm] input[data-cell]")) caret = [cell.selectionStart, cell.selectionEnd];
+  });
+
+  function restore() {
+    if (!focus || document.activeElement !== document.body) return;
+    const cell = document.querySelector(`[data-arm] [data-cell="${CSS.escape(focus)}"]`);
+    if (!cell) return;
+    cell.focus({ preventScroll: true });
+    if (caret && cell.matches("input")) cell.setSelectionRange(...caret);
+  }
+
+  // What is wrong
+
+  let wrong = null;
+  function markWrong() {
+    const text = part("wrong")?.dataset.wrong ?? "{}";
+    if (text === wrong?.text && cells().every((cell) => cell.marked === text)) return;
+    const found = JSON.parse(text);
+    wrong = { text, any: Object.keys(found).length > 0 };
+    for (const cell of cells()) {
+      const message = found[cell.dataset.cell];
+      cell.marked = text;
+      cell.ariaInvalid = message ? "true" : null;
+      cell.title = message ?? "";
+    }
+  }
+
+  // Keys
+
+  function neighbour(cell, down, right) {
+    const row = cell.closest("tr");
+    const line = [...row.querySelectorAll("[data-cell]")];
+    if (right) return line[line.indexOf(cell) + right];
+    const other = down > 0 ? row.nextElementSibling : row.previousElementSibling;
+    return other?.querySelector(`[data-cell$=" ${cell.dataset.cell.split(" ")[1]}"]`);
+  }
+
+  addEventListener("keydown", (event) => {
+    const cell = event.target.closest?.("[data-arm] [data-cell]");
+    if (!cell) return;
+    const undo = (event.ctrlKey || event.metaKey) && !event.altKey && event.key.toLowerCase();
+    const inTable = cell.closest("tr[data-row]") !== null;
+    let to = null;
+    if (undo === "z" || undo === "y") {
+      flush();
+      if (wrong?.any) send(["discard"], null);
+      else dispatchEvent(new CustomEvent("kinboard-send", { detail: [undo === "y" || event.shiftKey ? "redo" : "undo"] }));
+    } else if (event.altKey && inTable && ["ArrowUp", "ArrowDown", "Enter"].includes(event.key)) {
+      const action = { ArrowUp: "up", ArrowDown: "down", Enter: "add" }[event.key];
+      if (part("table").querySelector(`[data-arm-do="${action}"]`).ariaDisabled !== "true") change(action);
+    } else if (event.key === "Escape" && wrong?.any) { flush(); send(["discard"], null); }
+    else if (!cell.matches("input") || event.ctrlKey || event.metaKey || event.altKey) return;
+    else if (event.key === "Enter") to = neighbour(cell, 0, event.shiftKey ? -1 : 1) ?? neighbour(cell, event.shiftKey ? -1 : 1, 0) ?? cell;
+    else if (event.key === "ArrowDown") to = neighbour(cell, 1, 0);
+    else if (event.key === "ArrowUp") to = neighbour(cell, -1, 0);
+    else if (event.key === "ArrowRight" && cell.selectionStart === cell.value.length) to = neighbour(cell, 0, 1);
+    else if (event.key === "ArrowLeft" && cell.selectionEnd === 0) to = neighbour(cell, 0, -1);
+    else return;
+    if (event.key.startsWith("Arrow") && !event.altKey && !to) return;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    to?.focus();
+  }, true);
+
+  // Buttons and files
+
+  addEventListener("click", (event) => {
+    const target = event.target instanceof Element ? event.target : document.body;
+    const row = target.closest("[data-arm-row]");
+    if (row) { here = Number(row.dataset.armRow); mark(); }
+    const button = target.closest("[data-arm-do]");
+    if (button && button.ariaDisabled !== "true") {
+      const action = button.dataset.armDo;
+      if (["add", "up", "down", "remove"].includes(action)) change(action);
+      else { flush(); send([action], button.dataset.argument ?? null); }
+    }
+    if (target.closest("[data-arm-upload]")) part("files").querySelector("[data-arm-file]").click();
+  });
+
+  addEventListener("change", async (event) => {
+    const input = event.target.closest?.("[data-arm-file]");
+    const file = input?.files[0];
+    if (!file) return;
+    const most = Number(input.dataset.most);
+    const text = await file.slice(0, most + 1).text();
+    input.value = "";
+    upload(file.name.slice(0, 100), text, 0);
+  });
+  function upload(name, text, from) {
+    const to = from + PART;
+    send(["upload"], [name, from === 0, to >= text.length, text.slice(from, to)], () => { if (to < text.length) upload(name, text, to); });
+  }
+
+  addEventListener("DOMContentLoaded", () => {
+    new MutationObserver(() => { if (part("table")) { restore(); mark(); markWrong(); } }).observe(document.body, { subtree: true, childList: true });
+  });
+})();

@@ -1,0 +1,134 @@
+"""Changes of an arm by typed cells and by rows."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import kin
+from app.viewer.own_arm import own_arm
+from app.viewer.tabs.robot.edits import EditError, add_row, changed_rows, frame_values, move_row, reread, typed
+from app.viewer.tabs.robot.presets import PRESETS
+from kin.transforms import from_position_wxyz
+from kin.units import Units
+
+UR5, PANDA, STANFORD = (kin.get_robot(name) for name in ("ur5", "panda", "stanford"))
+MM, RADIANS = Units(), Units(degrees=False, length="m")
+
+
+def type_in(robot, *texts, units=MM, own=None):
+    return typed(robot, own, dict(texts), units)
+
+
+def test_a_typed_number_changes_one_number_and_nothing_else():
+    own = type_in(PANDA, ((2, "a"), "12.5"))
+    assert own.robot.rows[2].a == 0.0125
+    assert own.start == "panda"
+    assert own.robot.name.endswith("variant")
+    for i, (row, before) in enumerate(zip(own.robot.rows, PANDA.rows, strict=True)):
+        for key in ("theta", "d", "alpha", "kind", "limits", "name", *(("a",) if i != 2 else ())):
+            assert getattr(row, key) == getattr(before, key)
+    assert own.robot.home == PANDA.home
+
+
+def test_a_right_angle_is_exact_in_any_unit():
+    for text, units in (("90", MM), ("pi/2", MM), ("pi/2", RADIANS), ("90°", RADIANS)):
+        assert type_in(UR5, ((1, "alpha"), text), units=units).robot.rows[1].alpha == math.pi / 2
+
+
+def test_limits_are_typed_one_by_one_or_together():
+    own = type_in(UR5, ((0, "low"), "-10"), ((0, "high"), "10"))
+    assert own.robot.rows[0].limits == (math.radians(-10), math.radians(10))
+    assert own.robot.in_limits(own.robot.q_home)
+    with pytest.raises(EditError, match="lower below upper") as caught:
+        type_in(own.robot, ((0, "low"), "20"), own=own)
+    assert caught.value.cell == (0, "low")
+    both = type_in(own.robot, ((0, "low"), "20"), ((0, "high"), "30"), own=own)
+    assert both.robot.rows[0].limits == (math.radians(20), math.radians(30))
+
+
+def test_a_joint_without_limits_has_neither():
+    free = type_in(UR5, ((0, "low"), ""), ((0, "high"), " "))
+    assert free.robot.rows[0].limits is None
+    with pytest.raises(EditError, match="give both limits, or none") as caught:
+        type_in(UR5, ((0, "low"), ""))
+    assert caught.value.cell == (0, "low")
+    with pytest.raises(EditError, match="two numbers"):
+        type_in(STANFORD, ((2, "low"), ""), ((2, "high"), ""))
+
+
+def test_another_kind_takes_its_default_limits_and_a_new_home():
+    own = type_in(UR5, ((2, "kind"), "prismatic"))
+    assert own.robot.rows[2].limits == (0.0, 1.0)
+    assert own.robot.in_limits(own.robot.q_home)
+    fixed = type_in(UR5, ((2, "kind"), "fixed"))
+    assert fixed.robot.n == 5
+    with pytest.raises(EditError):
+        type_in(fixed.robot, ((2, "low"), "1"), own=fixed)
+    with pytest.raises(EditError, match="one of"):
+        type_in(UR5, ((2, "kind"), "ball"))
+
+
+@pytest.mark.parametrize(
+    ("cell", "text", "words"),
+    [
+        ((2, "alpha"), "9o", "“9o” is not a number"),
+        ((2, "a"), "", "the cell is empty"),
+        ((2, "a"), "99999999999", "too large"),
+        ((2, "a"), "999 m + 9*1e5", "expected lengths"),
+        ((1, "name"), "joint 1", "a different name"),
+        (("tool", "x"), "1 rad", "is not a number"),
+        (("base", "z"), "1001 m", "at most 1000 m"),
+    ],
+)
+def test_a_wrong_text_is_named_by_its_cell(cell, text, words):
+    first = type_in(UR5, ((0, "name"), "joint 1"))
+    with pytest.raises(EditError) as caught:
+        typed(first.robot, first, {cell: text}, MM)
+    assert caught.value.cell == cell
+    assert words in caught.value.message
+
+
+def test_all_lengths_zero_is_no_arm():
+    own = own_arm(PRESETS["one-joint"])
+    flat = type_in(own.robot, ((0, "d"), "0"), own=own)
+    with pytest.raises(EditError, match="expected lengths a and d"):
+        type_in(flat.robot, ((0, "a"), "0"), own=flat)
+
+
+def test_a_tool_moves_the_tool_point_and_a_base_the_whole_arm():
+    own = type_in(UR5, (("tool", "z"), "120"), (("tool", "roll"), "180"))
+    T = kin.fk(UR5, UR5.q_home) @ from_position_wxyz([0, 0, 0.12], [0, 1, 0, 0])
+    assert np.abs(kin.fk(own.robot, UR5.q_home) - T).max() < 1e-15
+    based = type_in(own.robot, (("base", "x"), "0.5"), (("base", "yaw"), "pi/2"), units=RADIANS, own=own)
+    B = from_position_wxyz([0.5, 0, 0], [math.sqrt(0.5), 0, 0, math.sqrt(0.5)])
+    assert np.abs(kin.fk(based.robot, UR5.q_home) - B @ T).max() < 1e-15
+    assert frame_values(based.robot, "tool")[2:4] == (0.12, math.pi)
+    assert frame_values(based.robot, "base") == (0.5, 0.0, 0.0, 0.0, 0.0, math.pi / 2)
+
+
+def test_rows_are_added_moved_and_removed():
+    robot = UR5
+    added = changed_rows(robot, None, lambda rows: add_row(rows, 2, robot.units))
+    assert added.robot.n == 7
+    assert added.robot.rows[3].a == 0.1
+    assert len({row.name for row in added.robot.rows}) == 7
+    moved = changed_rows(added.robot, added, lambda rows: move_row(rows, 3, -1))
+    assert moved.robot.rows[2] == added.robot.rows[3]
+    removed = changed_rows(moved.robot, moved, lambda rows: rows.pop(2) and None)
+    assert removed.robot.rows == robot.rows
+    assert removed.start == "ur5"
+    with pytest.raises(EditError):
+        changed_rows(robot, None, lambda rows: rows.clear())
+
+
+def test_the_same_table_in_the_other_convention_is_another_arm():
+    own = reread(UR5, None, "modified")
+    assert own.robot.rows == UR5.rows
+    assert np.abs(kin.fk(own.robot, UR5.q_home) - kin.fk(UR5, UR5.q_home)).max() > 0.01
+
+
+def test_a_row_without_a_name_is_named_by_its_number():
+    assert type_in(UR5, ((1, "name"), " \u200b ")).robot.rows[1].name == "joint 2"

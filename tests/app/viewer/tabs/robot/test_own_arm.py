@@ -1,0 +1,183 @@
+"""The visitor's own arm as data: compact, bounded, and refused where it is no arm."""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import kin
+from app.shared.answers.inspection import inspect
+from app.viewer.own_arm import DESCRIPTION, KEY, NAME, ROW_NAME, clean, label, own_arm, pack, unpack
+from app.viewer.session.state import MAX_TEXT, PageState, decode, encode
+from app.viewer.tabs.robot.presets import PRESETS
+from kin import KinematicsError
+from kin.files.read import MAX_ROWS
+
+ROBOTS = tuple(kin.builtin_robots().values())
+
+
+def packed(said: object) -> str:
+    return base64.urlsafe_b64encode(json.dumps(said).encode()).rstrip(b"=").decode()
+
+
+@pytest.mark.parametrize("robot", ROBOTS, ids=lambda r: r.id)
+def test_every_arm_comes_back_bit_by_bit_from_its_compact_form(robot):
+    own = own_arm(kin.robot_to_dict(robot), robot.id)
+    back = unpack(json.loads(json.dumps(pack(own))))
+    assert back == own
+    assert back.robot.model.tobytes() == robot.model.tobytes()
+    assert back.robot.home == robot.home
+    assert len(json.dumps(pack(own), separators=(",", ":"))) < 1000
+
+
+def test_an_arm_has_another_id_after_every_change():
+    one = own_arm(PRESETS["planar-2r"])
+    data = {**PRESETS["planar-2r"], "name": "Another"}
+    assert one.robot.id.startswith(KEY)
+    assert own_arm(PRESETS["planar-2r"]).robot.id == one.robot.id
+    assert own_arm(data).robot.id != one.robot.id
+    assert own_arm({**PRESETS["planar-2r"], "id": "ur5"}).robot.id == one.robot.id
+
+
+@pytest.mark.parametrize("key", PRESETS)
+def test_every_example_is_an_arm_with_a_regular_home(key):
+    own = own_arm(PRESETS[key], key)
+    assert unpack(pack(own)) == own
+    assert label(own.robot) in ("My arm", f"My arm ({PRESETS[key]['name']})")
+    assert not inspect(own.robot)["singular_at_home"]
+
+
+def test_a_page_with_an_own_arm_is_restored_from_its_link():
+    own = own_arm(PRESETS["wrist-6r"], "wrist-6r")
+    q = own.robot.random_q(np.random.default_rng(1))
+    text = encode(PageState(own.robot.id, q, own=own, branch=kin.branch_names(own.robot)[0]))
+    back = decode(text, ROBOTS)
+    assert (back.robot, back.own, back.branch) == (own.robot.id, own, kin.branch_names(own.robot)[0])
+    assert np.abs(back.q - q).max() < 1e-9
+    assert encode(back) == text
+    aside = decode(encode(PageState("ur5", own=own)), ROBOTS)
+    assert (aside.robot, aside.own) == ("ur5", own)
+
+
+def test_the_largest_arm_fits_a_link():
+    row = {
+        "kind": "prismatic",
+        "theta": 0.1234567890123,
+        "d": 1.23456789012,
+        "a": 3.3333333333,
+        "alpha": 0.7777777777,
+    }
+    rows = [{**row, "name": f"{i:02}" + "é" * 60, "limits": [-0.123456789, 0.234567891]} for i in range(MAX_ROWS)]
+    data = {
+        **PRESETS["planar-2r"],
+        "rows": rows,
+        "name": "n" * 500,
+        "description": "d" * 3000,
+        "source": "s" * 3000,
+    }
+    data.pop("home")
+    own = own_arm(data)
+    assert (len(own.robot.name), len(own.robot.description)) == (NAME, DESCRIPTION)
+    assert all(len(joint.name) <= ROW_NAME for joint in own.robot.joints)
+    text = encode(PageState(own.robot.id, own.robot.q_home, own=own, features={"w": {"x": "y" * 5000}}))
+    assert len(text) <= MAX_TEXT
+    assert decode(text, ROBOTS).own == own
+
+
+GOOD = pack(own_arm(PRESETS["planar-2r"]))
+
+
+@pytest.mark.parametrize(
+    ("changes", "field"),
+    [
+        ({"r": []}, "rows"),
+        ({"r": [[0, 0, 100, 0]] * 200}, "rows"),
+        ({"r": "x" * 1000}, "rows"),
+        ({"r": None}, "rows"),
+        ({"r": [7]}, "rows[0]"),
+        ({"r": [[0] * 10]}, "rows[0]"),
+        ({"r": [{"theta": 1}]}, "rows[0]"),
+        ({"r": [[0, 0, 0, 0], [0, 0, 0, 0]], "h": [0, 0]}, "reach"),
+        ({"r": [[math.nan, 0, 100, 0]]}, "rows[0].theta"),
+        ({"r": [[0, 1e308, 100, 0]]}, "rows[0].d"),
+        ({"r": [[0, 0, 10**400, 0]]}, "rows[0].a"),
+        ({"r": [[0, 0, 100, "1 m"]]}, "rows[0].alpha"),
+        ({"r": [[0, 0, 100, True]]}, "rows[0].alpha"),
+        ({"r": [[0, 0, 100, [1]]]}, "rows[0].alpha"),
+        ({"r": [[0, 0, 100, 0, [20, 10]]]}, "rows[0].limits"),
+        ({"r": [[0, 0, 100, 0, "none", "p"]]}, "rows[0].limits"),
+        ({"r": [[0, 0, 100, 0, None, "q"]]}, "rows[0].kind"),
+        ({"r": [[0, 0, 100, 0, None, "f"]]}, "rows"),
+        ({"r": [[0, 0, 100, 0, None, "", "a"], [0, 0, 100, 0, None, "", "a"]]}, "rows[].name"),
+        ({"r": [[0, 0, 100, 0, None, "", 7]]}, "rows[0].name"),
+        ({"r": [[0, 0, 999_999, 0]] * 2, "u": "m"}, "reach"),
+        ({"h": [0]}, "home.q"),
+        ({"h": [1e5, 0]}, "home.q"),
+        ({"u": "inch"}, "units.length"),
+        ({"b": {"xyz": [5000000, 0, 0]}}, "base"),
+        ({"b": {"xyz": [900000, 0, 0]}, "u": "m"}, "base.xyz"),
+        ({"t": {"matrix": [[2, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}}, "tool.matrix"),
+        ({"t": 7}, "tool"),
+    ],
+)
+def test_what_is_no_arm_is_refused_by_field_and_the_rest_of_the_link_is_kept(changes, field):
+    said = {"v": 1, "robot": KEY, "own": {**GOOD, **changes}, "units": "rad"}
+    with pytest.raises(KinematicsError) as caught:
+        unpack(said["own"])
+    assert field in str(caught.value)
+    state = decode(packed(said), ROBOTS)
+    assert (state.robot, state.own) == (None, None)
+    assert field in state.refused
+    assert len(state.refused) < 400
+    assert not state.units.degrees
+
+
+@pytest.mark.parametrize("own", [7, "x", [], [GOOD], True, {"r": {}}, {}, {"n": 7, "r": [[0, 0, 1, 0]], "s": 3}])
+def test_a_link_with_anything_else_is_decoded(own):
+    state = decode(packed({"v": 1, "robot": KEY, "own": own}), ROBOTS)
+    assert state.own is None
+    assert state.refused
+
+
+@given(
+    st.recursive(
+        st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8),
+        lambda inner: (
+            st.lists(inner, max_size=6) | st.dictionaries(st.sampled_from("nsicbturh"), inner, max_size=9)
+        ),
+        max_leaves=20,
+    )
+)
+def test_decode_never_raises(own):
+    decode(packed({"v": 1, "robot": KEY, "own": own}), ROBOTS)
+
+
+@pytest.mark.parametrize(
+    ("name", "shown"),
+    [
+        ("  Bob's\n arm\t2 ", "Bob's arm 2"),
+        ("<script>alert(1)</script>", "<script>alert(1)</script>"),
+        ("\u202egnp.exe", "gnp.exe"),
+        ("a\u200bb\u2066c", "abc"),
+        ("ذراع", "ذراع"),
+        ("x" * 4000, "x" * (NAME - 1) + "…"),
+        ("\ud800", "My arm"),
+        ("   ", "My arm"),
+    ],
+)
+def test_a_name_is_one_line_of_visible_characters(name, shown):
+    assert own_arm({**PRESETS["planar-2r"], "name": name}).robot.name == shown
+
+
+@given(st.text(max_size=200))
+def test_a_cleaned_text_stays_as_it_is(text):
+    once = clean(text, NAME)
+    assert len(once) <= NAME
+    assert clean(once, NAME) == once
+    once.encode()

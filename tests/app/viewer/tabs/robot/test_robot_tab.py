@@ -1,0 +1,282 @@
+"""The tab *Robot* in a page: typing, rows, undo, files, and what reaches the link."""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import math
+import re
+
+import numpy as np
+import pytest
+from fake_browser import FakeBrowser
+
+import kin
+from app.shared.store import Store
+from app.viewer.lessons import LESSONS
+from app.viewer.own_arm import own_arm
+from app.viewer.session.state import PageState, decode, encode
+from app.viewer.tabs.robot.presets import PRESETS
+from app.viewer.tabs.robot.tab import MAX_FILE
+
+pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
+
+STORE = Store()
+PIONEER, UR5 = STORE.get("pioneer5"), STORE.get("ur5")
+HOSTILE = '<script>alert("x")</script>'
+
+
+def part(tab: FakeBrowser, name: str) -> str:
+    (found,) = [
+        m["props"]["content"] for m in tab.gui.values() if f'data-arm="{name}"' in m["props"].get("content", "")
+    ]
+    return str(found)
+
+
+def cell(tab: FakeBrowser, key: str) -> str:
+    """What a field shows, as the server has sent it."""
+    found = re.search(
+        rf'data-cell="{key}" value="(.*?)"', part(tab, "table") + part(tab, "frames") + part(tab, "start")
+    )
+    assert found is not None, key
+    return html.unescape(found[1]).replace("−", "-")
+
+
+def wrong(tab: FakeBrowser) -> dict[str, str]:
+    found = re.search(r'data-wrong="(.*?)"', part(tab, "wrong"))
+    assert found is not None
+    return dict(json.loads(html.unescape(found[1])))
+
+
+def revision(tab: FakeBrowser) -> int:
+    found = re.search(r'data-revision="(\d+)"', part(tab, "table"))
+    assert found is not None
+    return int(found[1])
+
+
+def say(tab: FakeBrowser, *key: object, value: object = None) -> None:
+    number = tab.say("feature", ["robot", list(key), value])
+    tab.wait(lambda: tab.script["reply"][0] >= number)  # the last of what the message has caused
+
+
+def type_in(tab: FakeBrowser, row: int | str, column: str, text: str) -> None:
+    say(tab, "cell", row, column, value=[revision(tab), text])
+
+
+def shows(tab: FakeBrowser, robot: kin.Robot, q: np.ndarray) -> None:
+    T = kin.fk(robot, q)
+    tab.wait(lambda: np.allclose(tab.tool_pose(), T, atol=1e-9))
+
+
+def saved(tab: FakeBrowser) -> PageState:
+    tab.settle(0.8)
+    return decode(tab.kept[-1], STORE.robots)
+
+
+def longer(robot: kin.Robot, row: int, a: float) -> kin.Robot:
+    """The robot with another length in a row."""
+    data = kin.robot_to_dict(robot)
+    data["rows"][row]["a"] = f"{a} m"
+    return kin.robot_from_dict(data)
+
+
+def test_a_typed_cell_changes_the_arm_and_undo_takes_it_back(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.set("1 rotating base", 50)
+        tab.settle()
+        q = PIONEER.q_home.copy()
+        q[0] = math.radians(50)
+        before, table = tab.tool_pose(), part(tab, "table")
+        type_in(tab, 1, "a", "250")
+        shows(tab, longer(PIONEER, 1, 0.25), q)
+        assert part(tab, "table") == table, "the table is not sent again while it is typed in"
+        assert tab.value("Robot") == f"My arm ({PIONEER.name} variant)"
+        assert tab.script["undo"] == "Row 2, a"
+        type_in(tab, 1, "a", "255")
+        shows(tab, longer(PIONEER, 1, 0.255), q)
+        say(tab, "left")
+        assert cell(tab, "1 a") == "255"
+        tab.say("undo")
+        tab.settle()
+        assert np.allclose(tab.tool_pose(), before, atol=1e-9)
+        assert tab.value("Robot") == PIONEER.name
+        assert cell(tab, "1 a") == "160"
+        tab.say("redo")
+        tab.settle()
+        shows(tab, longer(PIONEER, 1, 0.255), q)
+        assert tab.value("Robot") == f"My arm ({PIONEER.name} variant)"
+
+
+def test_a_wrong_cell_is_marked_and_the_last_valid_arm_stays(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        type_in(tab, 2, "alpha", "9o")
+        assert "“9o” is not a number" in wrong(tab)["2 alpha"]
+        assert "Row 3, α: “9o” is not a number" in part(tab, "wrong")
+        assert tab.value("Robot") == PIONEER.name
+        assert tab.script["undo"] == ""
+        type_in(tab, 1, "a", "250")
+        assert list(wrong(tab)) == ["2 alpha"]
+        shows(tab, longer(PIONEER, 1, 0.25), PIONEER.q_home)
+        type_in(tab, 2, "alpha", "90°")
+        assert wrong(tab) == {}
+        type_in(tab, 0, "low", "200")
+        assert list(wrong(tab)) == ["0 low"]
+        type_in(tab, 0, "high", "300")
+        assert wrong(tab) == {}, "both limits are valid together"
+        type_in(tab, 0, "d", "x")
+        say(tab, "discard")
+        assert wrong(tab) == {}
+        assert cell(tab, "0 d") == "130"
+
+
+def test_rows_examples_convention_and_reset(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        say(tab, "start", value="planar-2r")
+        two = own_arm(PRESETS["planar-2r"]).robot
+        shows(tab, two, two.q_home)
+        assert "2 and" in part(tab, "about") or "1 and 2 parallel" in part(tab, "about")
+        say(tab, "row", "add", 1)
+        assert len(re.findall("data-row=", part(tab, "table"))) == 3
+        old = revision(tab)
+        say(tab, "row", "up", 2)
+        say(tab, "cell", 1, "a", value=[old, "777"])
+        assert cell(tab, "1 a") != "777", "a message about rows as they were is dropped"
+        say(tab, "row", "remove", 0)
+        say(tab, "row", "remove", 0)
+        say(tab, "row", "remove", 0)
+        assert "The row stays" in tab.html
+        say(tab, "convention", value="modified")
+        assert "modified convention" in part(tab, "table")
+        say(tab, "reset")
+        shows(tab, two, two.q_home)
+        say(tab, "start", value="ur5")
+        assert tab.value("Robot") == UR5.name
+        type_in(tab, "tool", "z", "100")
+        assert cell(tab, "2 a") == "-392.25"
+        say(tab, "reset")
+        assert tab.value("Robot") == UR5.name
+
+
+def test_the_link_restores_the_arm(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        type_in(tab, "arm", "name", HOSTILE)
+        type_in(tab, 0, "d", "2*65 + 10")
+        state = saved(tab)
+        assert state.own is not None
+        assert state.own.robot.id == state.robot
+        assert state.own.robot.rows[0].d == pytest.approx(0.14)
+        memory = json.dumps({"state": tab.kept[-1], "address": "http://x/"})
+    with FakeBrowser(port, memory=memory) as again:
+        again.settle()
+        shows(again, state.own.robot, PIONEER.q_home)
+        assert again.value("Robot") == f"My arm ({HOSTILE})"
+        assert "<script>" not in again.html
+        assert cell(again, "arm name") == HOSTILE
+        again.choose(UR5.name)
+        again.choose(f"My arm ({HOSTILE})")
+        shows(again, state.own.robot, PIONEER.q_home)
+        again.set("Copy as", "Python, kin")
+        again.wait(lambda: "kin.robot_from_dict(" in again.html)
+        again.settle()
+
+
+def test_an_invalid_arm_in_a_link_is_named(port: int) -> None:
+    own = own_arm(PRESETS["planar-2r"])
+    text = encode(PageState(own.robot.id, own=own))
+    assert decode(text, STORE.robots).own == own
+    broken = {"v": 1, "robot": "own", "own": {"n": HOSTILE, "r": [[HOSTILE, 0, 100, 0]]}}
+    memory = json.dumps({"state": base64.urlsafe_b64encode(json.dumps(broken).encode()).decode().rstrip("=")})
+    with FakeBrowser(port, memory=memory) as tab:
+        tab.settle()
+        assert tab.value("Robot") == PIONEER.name
+        assert "The arm of the link cannot be used" in tab.html
+        assert "rows[0].theta" in tab.html
+        assert "<script>" not in tab.html
+
+
+def test_files_go_out_and_come_in(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        type_in(tab, 1, "a", "250")
+        say(tab, "download")
+        tab.wait(lambda: any(m["type"] == "FileTransferPart" for m in tab.log))
+        content = b"".join(bytes(m["content"]) for m in tab.log if m["type"] == "FileTransferPart").decode()
+        robot = kin.parse_robot(content)
+        assert robot.rows[1].a == 0.25
+        assert robot.id == "pioneer-arm-variant"
+        text = kin.robot_to_toml(UR5)
+        say(tab, "upload", value=["ur5.toml", True, False, text[:200]])
+        say(tab, "upload", value=["ur5.toml", False, True, text[200:]])
+        shows(tab, UR5, UR5.q_home)
+        type_in(tab, 0, "d", "95")
+        say(tab, "reset")
+        shows(tab, UR5, UR5.q_home)
+        say(tab, "upload", value=["bad.toml", True, True, text.replace("kind", "kand").replace("alpha", "alhpa")])
+        assert "The file was not used" in tab.html
+        assert "bad.toml: rows[0].alhpa" in html.unescape(tab.html)
+        for k in range(MAX_FILE // 20_000 + 1):
+            tab._said = tab._said[-1:]  # as the page's script does: a message to the service has a limit
+            say(tab, "upload", value=["big.toml", k == 0, False, "x" * 20_000])
+        assert "too large" in tab.html
+        shows(tab, UR5, UR5.q_home)
+
+
+UNEXPECTED: list[tuple[list[object], object]] = [
+    (["cell", 99, "a"], [1, "1"]),
+    (["cell", -1, "a"], [1, "1"]),
+    (["cell", 0, "x"], [1, "1"]),
+    (["cell", "tool", "a"], [1, "1"]),
+    (["cell", "arm", "x"], [1, "1"]),
+    (["cell", 0, "a"], "1"),
+    (["cell", 0], [1, "1"]),
+    (["row", "add", 10**9], None),
+    (["row", "burn", 0], None),
+    (["row"], None),
+    (["start"], "nobody"),
+    (["start"], {"a": 1}),
+    (["convention"], ["standard"]),
+    (["upload"], "x"),
+    (["kill"], None),
+    (["cell", 0.5, "a"], [1, "1"]),
+]
+
+
+def test_messages_that_the_page_does_not_send_change_nothing(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        for key, value in UNEXPECTED:
+            tab.set("Robot", UR5.name if tab.value("Robot") == PIONEER.name else PIONEER.name)
+            tab.wait(lambda: "Invalid input" not in tab.html)
+            say(tab, *key, value=value)
+            assert "Invalid input" in tab.html, key
+        assert tab.value("Robot") == PIONEER.name
+        assert tab.script["undo"] == "Robot"
+
+
+def test_units_of_the_page_are_those_of_the_table(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.set("Radians", True)
+        tab.set("Lengths", "m")
+        tab.wait(lambda: cell(tab, "0 d") == "0.13")
+        assert cell(tab, "0 alpha") == "-1.57079633"
+        type_in(tab, 1, "a", "0.25")
+        shows(tab, longer(PIONEER, 1, 0.25), PIONEER.q_home)
+
+
+@pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.key)
+def test_every_lesson_follows_an_arm_that_changes(port: int, lesson) -> None:
+    with FakeBrowser(port) as tab:
+        tab.set("Lesson", lesson.title)
+        tab.settle()
+        for start in PRESETS:
+            say(tab, "start", value=start)
+            say(tab, "row", "add", 0)
+            type_in(tab, 0, "alpha", "33")
+            assert "Something went wrong" not in tab.html, start
+            assert "Invalid input" not in tab.html, start
