@@ -21,6 +21,13 @@ SYSTEM_IS_DARK = "The system is dark"  # static/page.js looks for this label
 
 TEXT_SIZES = ("Normal", "Large", "Projector")  # static/layout.css says how large
 
+Look = Literal["body", "skeleton", "both"]
+LOOKS: tuple[Look, ...] = get_args(Look)
+LOOK_NAMES: dict[Look, str] = {"body": "Body", "skeleton": "Skeleton", "both": "Both"}
+LOOK_HINT = (
+    "Body: as the real arm looks. Skeleton: its joints and links, in the colours of the sliders. "
+    "Both: the skeleton in a translucent body. Arms without a drawn body are always a skeleton."
+)
 AXES = ("Tool axes", "Base axes")
 AXES_HINT = (
     "The directions of the coloured arrows and rings, and of the keys that move the target: those of the tool, or "
@@ -35,6 +42,7 @@ class ViewState:
     Attributes:
         dark: whether the page is dark; None: as the visitor's system is.
         base_axes: whether the gizmo is aligned with the base instead of the tool.
+        look: how an arm is drawn of which there is a body.
     """
 
     frames: bool = False
@@ -42,6 +50,7 @@ class ViewState:
     axes: bool = True
     dark: bool | None = None
     base_axes: bool = False
+    look: Look = "body"
 
 
 class UnitChoice:
@@ -73,14 +82,27 @@ class UnitChoice:
 
 
 class ViewOptions:
-    """Posts ``("view", name)`` (check boxes), ``"axes"``, ``"camera"``, ``"fit-arm"``, ``("look-from", side)``."""
+    """The options of the scene.
+
+    Posts ``"look"``, ``("view", name)`` (check boxes), ``"axes"``, ``"camera"``, ``"fit-arm"`` and
+    ``("look-from", side)``.
+    """
 
     def __init__(self, gui: viser.GuiApi, state: ViewState, post: Post) -> None:
+        names = tuple(LOOK_NAMES.values())
+        self._look = gui.add_dropdown(
+            "Show arm as", names, initial_value=LOOK_NAMES[state.look], hint=LOOK_HINT
+        )
+        listen(self._look, post, "look")
         self._boxes: dict[str, viser.GuiCheckboxHandle] = {}
         for name, text, hint in (
             ("frames", "Link frames", "The frame of every DH row: x red, y green, z blue"),
             ("labels", "Frame labels", "The name of each frame, at the tip of its z axis"),
-            ("axes", "Joint axes", "The axis of each joint; its arrow shows the positive direction"),
+            (
+                "axes",
+                "Joint axes",
+                "The axis of each joint of a skeleton; its arrow shows the positive turn",
+            ),
         ):
             self._boxes[name] = gui.add_checkbox(text, getattr(state, name), hint=hint)
             listen(self._boxes[name], post, ("view", name))
@@ -98,6 +120,15 @@ class ViewOptions:
         for name, box in self._boxes.items():
             assign(box, getattr(state, name))
         assign(self._axes, AXES[state.base_axes])
+        assign(self._look, LOOK_NAMES[state.look])
+
+    def read_look(self, value: object, before: Look) -> Look:
+        """A choice as `ViewState.look`; an unknown one raises `InputError`, and `before` is shown again."""
+        found = next((look for look in LOOKS if LOOK_NAMES[look] == value), None)
+        if found is None:
+            assign(self._look, LOOK_NAMES[before])
+            raise InputError("show arm as", value, "one of " + ", ".join(LOOK_NAMES.values()))
+        return found
 
 
 class ColourChoice:

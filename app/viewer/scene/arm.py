@@ -8,18 +8,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import viser
 
+from app.viewer.panel.view import Look
+from app.viewer.scene.bodies import drawing
+from app.viewer.scene.bodies.parts import Part
 from app.viewer.scene.chain import turn
-from app.viewer.scene.clearance import Contact
+from app.viewer.scene.clearance import Contact, clearance
 from app.viewer.scene.floor import Floor
 from app.viewer.scene.gizmo_axes import GizmoAxes
 from app.viewer.scene.lights import add_lamp
-from app.viewer.scene.meshes import Part, body
+from app.viewer.scene.meshes import body
+from app.viewer.scene.shapes import merged, placed
 from app.viewer.viser_patches import assign, keep_private
 from kin import Robot, fk, link_frames
+from kin.axes import inverse
 from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
 
 # Parts without shadows: these would cost as much as the shadows of the bodies, and are not visible.
@@ -54,13 +60,17 @@ class ArmScene:
         self.robot = robot
         self._root = root
         self.body = body(robot)
+        self._drawing = drawing(robot)
+        self._look: Look = "skeleton" if self._drawing is None else "body"
         self._scene = scene
         self._home_frames = link_frames(robot, robot.q_home)
         self._joints: list[viser.SceneNodeHandle] = []
         self._frames: list[viser.SceneNodeHandle] = []
         self._labels: list[viser.SceneNodeHandle] = []
         self._bodies: list[viser.MeshHandle] = []
-        self._axes: list[viser.SceneNodeHandle] = []
+        self._drawn: list[viser.MeshHandle] = []
+        self._axes: list[viser.MeshHandle] = []
+        self._through = False
         self._shown = [math.nan] * robot.n
         self._top: list[viser.SceneNodeHandle] = []
         self.floor = Floor(scene, root, self.body, robot.T_world_base[:3, 3], dark)
@@ -70,7 +80,10 @@ class ArmScene:
             f"{root}-target", scale=GIZMO * self.body.radius, line_width=LINE, depth_test=False, opacity=0.95
         )
         keep_private(self.gizmo)
-        self._ghost = self._add(f"{root}-target", self.body.gripper[0], opacity=0.35, visible=False)
+        self._ghosts = [
+            self._add(f"{root}-target", part, opacity=0.35, visible=False)
+            for part in (self.body.gripper[0], self._hand())
+        ]
         self._gap = scene.add_line_segments(
             f"{root}-gap",
             np.zeros((1, 2, 3), np.float32),
@@ -97,6 +110,7 @@ class ArmScene:
         self._ring_sets = 0
         self.gizmo_in_base = False
         self._R_gizmo_target = np.eye(3)
+        self.show_as(self._look)
         self.show(robot.q_home)
         self.place_gizmo(fk(robot, robot.q_home))
 
@@ -120,11 +134,13 @@ class ArmScene:
         if self.gizmo_in_base:
             self._R_gizmo_target = T_base_tool[:3, :3].copy()
             assign(self.gizmo, T_base_tool[:3, 3], NO_TURN)
-            assign(self._ghost, wxyz=wxyz)
+            turned = tuple(wxyz.tolist())
         else:
             self._R_gizmo_target = np.eye(3)
             assign(self.gizmo, T_base_tool[:3, 3], wxyz)
-            assign(self._ghost, wxyz=NO_TURN)
+            turned = NO_TURN
+        for ghost in self._ghosts:
+            assign(ghost, wxyz=turned)
         for ring in self._rings:
             assign(ring, STILL, NO_TURN)
 
@@ -184,9 +200,14 @@ class ArmScene:
 
         The arrow of the approach direction is drawn then, too; otherwise it would cover the gizmo's.
         """
-        self._gap.visible = self._ghost.visible = self._approach.visible = target is not None
+        self._gap.visible = self._approach.visible = target is not None
+        self._show_ghost()
         if target is not None:
             self._gap.points = np.array([[tool, target]], dtype=np.float32)
+
+    def contact_at(self, q: Array) -> Contact | None:
+        """Where the arm, as it is drawn, passes through pedestal or floor at a configuration ``(n,)``."""
+        return clearance(self.robot, self._look == "skeleton").at(q)
 
     def show_contact(self, contact: Contact | None) -> str:
         """Mark where the arm passes through pedestal or floor; returns the sentence at the mark, or ""."""
@@ -202,8 +223,21 @@ class ArmScene:
     def see_through(self, on: bool) -> None:
         """Make way for drawings inside the arm: translucent links, no gizmo, no axes at the base."""
         self.gizmo.visible = self._base.visible = not on
+        self._through = on
+        self._set_opacity()
+
+    def show_as(self, look: Look) -> None:
+        """Draw the arm as its body, its skeleton or both; an arm without a drawn body stays a skeleton."""
+        if self._drawing is None:
+            return
+        self._look = look
         for node in self._bodies:
-            node.opacity = THROUGH if on else None
+            node.visible = look != "body"
+        for node in self._drawn:
+            node.visible = look != "skeleton"
+        self._base_up.visible = look != "body"  # the arrow is inside the body's foot
+        self._show_ghost()
+        self._set_opacity()
 
     def show_frames(self, visible: bool) -> None:
         """Show or hide the frame of every DH row."""
@@ -216,14 +250,33 @@ class ArmScene:
             node.visible = visible
 
     def show_axes(self, visible: bool) -> None:
-        """Show or hide the joint axes."""
+        """Show or hide the joint axes; a body hides most of them, so only a skeleton shows any."""
         for node in self._axes:
-            node.visible = visible
+            node.visible = visible and self._look != "body"
 
     def remove(self) -> None:
         """Remove everything from the scene."""
         for node in self._top:
             node.remove()
+
+    def _show_ghost(self) -> None:
+        for ghost, look in zip(self._ghosts, ("skeleton", "body"), strict=True):
+            ghost.visible = self._gap.visible and (self._look == "skeleton") == (look == "skeleton")
+
+    def _set_opacity(self) -> None:
+        for node in (*self._bodies, *self._axes, self._approach):
+            node.opacity = THROUGH if self._through else None
+        for node in self._drawn:
+            node.opacity = THROUGH if self._through or self._look == "both" else None
+
+    def _hand(self) -> Part:
+        """What the last joint carries, in the tool frame: the ghost of an arm with a drawn body."""
+        gripper = self.body.gripper[0]
+        if self._drawing is None:
+            return replace(gripper, name="hand")
+        T_tool_link = inverse(self.body.chain.T_last_tool)
+        parts = [placed(part.mesh, T_tool_link) for part in self._drawing.parts[-1]]
+        return Part("hand", merged(parts), gripper.color)
 
     def _build_arm(self) -> None:
         root = self._scene.add_frame(self._root, show_axes=False)
@@ -245,17 +298,16 @@ class ArmScene:
                     if part.fixed_to_parent
                     else self._add(name, part)
                 )
-                self._bodies.append(node)
-                if part.name == "axis":
-                    self._axes.append(node)
+                (self._axes if part.name == "axis" else self._bodies).append(node)
+            if self._drawing is not None:
+                shell = self._drawing.parts[link.index + 1]
+                self._drawn += [self._add(name, part, name=f"{part.name}-{link.index + 1}") for part in shell]
             for row, T in link.frames:
                 self._add_frame(name, row, T)
         tool = self.body.chain.T_last_tool
-        for part in self.body.gripper:
-            node = self._add(name, part, tool, visible=part.name != "approach")
-            self._bodies.append(node)
-            if part.name == "approach":
-                self._approach = node
+        gripper, approach = self.body.gripper
+        self._bodies.append(self._add(name, gripper, tool))
+        self._approach = self._add(name, approach, tool, visible=False)
 
     def _add(
         self,
@@ -291,7 +343,7 @@ class ArmScene:
             wxyz=wxyz_from_rotation(T[:3, :3]),
         )
         for tip, letter in zip(np.eye(3), "xyz", strict=True):
-            self._scene.add_label(
+            self._base_up = self._scene.add_label(
                 f"{self._base.name}/{letter}", letter, position=1.15 * length * tip, anchor="center-center"
             )
 

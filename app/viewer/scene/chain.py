@@ -91,6 +91,25 @@ def chain(robot: Robot) -> Chain:
     return Chain(tuple(links), T)
 
 
+def link_poses(robot: Robot, q: Array) -> Array:
+    """Poses ``(k, n + 1, 4, 4)`` of all links, base first, for configurations ``(k, n)``."""
+    links = chain(robot).links
+    found = np.empty((len(q), robot.n + 1, 4, 4))
+    T = np.broadcast_to(np.eye(4), (len(q), 4, 4))
+    found[:, 0] = T
+    for i, link in enumerate(links[1:]):
+        motion = np.zeros((len(q), 4, 4))
+        motion[:, range(4), range(4)] = 1.0
+        if link.joint is not None and link.joint.kind == "prismatic":
+            motion[:, 2, 3] = q[:, i]
+        else:
+            c, s = np.cos(q[:, i]), np.sin(q[:, i])
+            motion[:, 0, 0], motion[:, 0, 1], motion[:, 1, 0], motion[:, 1, 1] = c, -s, s, c
+        T = T @ link.T_parent_axis @ motion
+        found[:, i + 1] = T
+    return found
+
+
 def _steps(row: Joint, modified: bool) -> list[Array | None]:
     """The row's elementary motions in order; None stands for the joint's own motion."""
     motion: list[Array | None] = [] if row.kind == "fixed" else [None]

@@ -9,14 +9,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.viewer.scene.bodies import Drawing, drawing
+from app.viewer.scene.bodies.parts import Part
 from app.viewer.scene.chain import Link
-from app.viewer.scene.meshes import FOOT, PLATE, Body, Part, body
+from app.viewer.scene.meshes import FOOT, PLATE, Body, body
+from app.viewer.scene.shapes import spaced
 from kin import Robot, link_frames
 from kin.transforms import Array
 
@@ -50,9 +52,9 @@ class Contact:
 class Clearance:
     """The test for one robot's drawn body. Immutable, so visitors share it."""
 
-    def __init__(self, robot: Robot, made: Body) -> None:
+    def __init__(self, robot: Robot, made: Body, drawn: Drawing | None) -> None:
         self._robot = robot
-        rows, points, radii, self._links = _spheres(robot, made)
+        rows, points, radii, self._links = _spheres(robot, made, drawn)
         self._rows, self._points, self._radii = rows, np.column_stack([points, np.ones(len(points))]), radii
         size, (x, y, top) = made.size, robot.T_world_base[:3, 3].tolist()
         self._slack = DEPTH * size
@@ -117,31 +119,41 @@ class Clearance:
 
 
 @lru_cache(maxsize=32)
-def clearance(robot: Robot) -> Clearance:
-    """The test for a robot; the same object for every visitor."""
-    return Clearance(robot, body(robot))
+def clearance(robot: Robot, skeleton: bool = False) -> Clearance:
+    """The test for a robot as it is drawn, or for its skeleton; the same object for every visitor."""
+    return Clearance(robot, body(robot), None if skeleton else drawing(robot))
 
 
-def _spheres(robot: Robot, made: Body) -> tuple[NDArray[np.int64], Array, Array, NDArray[np.int64]]:
+def _spheres(
+    robot: Robot, made: Body, drawn: Drawing | None
+) -> tuple[NDArray[np.int64], Array, Array, NDArray[np.int64]]:
     """DH row, centre in the frame of that row, radius, and link of the spheres that cover the moving parts."""
-    rows, points, radii, links = [], [], [], []
+    rows: list[int] = []
+    points: list[Array] = []
+    radii: list[float] = []
+    links: list[int] = []
 
-    def add(link: Link, centres: Array, radius: float, index: int) -> None:
+    def add(link: Link, centres: Array, radius: Array | float, index: int) -> None:
         row, T_link_row = link.frames[-1]
         local = (centres - T_link_row[:3, 3]) @ T_link_row[:3, :3]
         rows.extend([row] * len(local))
         points.append(local)
-        radii.extend([radius] * len(local))
+        radii.extend(np.broadcast_to(radius, len(local)).tolist())
         links.extend([index] * len(local))
 
     moving = [link for link in made.chain.links[1:] if link.frames]
+    if drawn is not None:
+        for link in moving:
+            cover = drawn.spheres[link.index + 1]
+            add(link, cover[:, :3], cover[:, 3], link.index)
+        return np.array(rows, int), np.vstack(points), np.array(radii), np.array(links, int)
     tool = made.chain.T_last_tool
     hand = next(part for part in made.gripper if part.name == "gripper")
     for link in moving:
         parts = made.parts[link.index + 1]
         if any(part.name == "link" for part in parts):
             radius = made.radii[link.index + 1]
-            centres = _along(link.path, radius)
+            centres = spaced(link.path, radius)
             if link is moving[-1]:  # the gripper replaces the end of the tube
                 centres = centres[np.linalg.norm(centres - tool[:3, 3], axis=1) > -hand.mesh.bounds[0, 2]]
             add(link, centres, radius, link.index)
@@ -154,19 +166,10 @@ def _spheres(robot: Robot, made: Body) -> tuple[NDArray[np.int64], Array, Array,
     return np.array(rows, int), np.vstack(points), np.array(radii), np.array(links, int)
 
 
-def _along(path: Array, radius: float) -> Array:
-    """Points on a polyline ``(k, 3)``, at most `radius` apart."""
-    pieces = [path[:1]]
-    for start, end in pairwise(path):
-        count = max(1, int(np.ceil(np.linalg.norm(end - start) / radius)))
-        pieces.append(start + (end - start) * (np.arange(1, count + 1) / count)[:, None])
-    return np.vstack(pieces)
-
-
 def _core(part: Part) -> tuple[Array, float]:
     """Centres ``(k, 3)`` and radius of spheres that fill a part along z."""
     low, high = part.mesh.bounds
     radius = float(min((high - low)[:2])) / 2.0
     middle, half = (low + high) / 2.0, max((high - low)[2] / 2.0 - radius, 0.0)
     ends = np.array([[*middle[:2], middle[2] - half], [*middle[:2], middle[2] + half]])
-    return (_along(ends, radius) if half > 0.0 else ends[:1]), radius
+    return (spaced(ends, radius) if half > 0.0 else ends[:1]), radius

@@ -20,24 +20,13 @@ from functools import lru_cache
 import numpy as np
 import trimesh
 
-from app.viewer.scene.chain import Chain, Link, chain
+from app.viewer.scene.bodies import drawing
+from app.viewer.scene.bodies.parts import Color, Part, joint_color
+from app.viewer.scene.chain import Chain, Link, chain, link_poses
 from app.viewer.scene.shapes import ball, box, cone, cylinder, merged, placed, tube
 from kin import Robot, link_frames
 from kin.transforms import Array
 
-Color = tuple[int, int, int]
-
-# Okabe and Ito's palette, which stays distinguishable with any colour vision; ordered for contrast between
-# neighbours along the arm.
-JOINT_COLORS: tuple[Color, ...] = (
-    (0, 114, 178),
-    (230, 159, 0),
-    (0, 158, 115),
-    (204, 121, 167),
-    (86, 180, 233),
-    (213, 94, 0),
-    (240, 228, 66),
-)
 LINK_COLOR: Color = (214, 218, 224)
 TRIM_COLOR: Color = (58, 64, 74)
 TOOL_COLOR: Color = (92, 99, 112)
@@ -46,20 +35,6 @@ PEDESTAL_COLOR: Color = (126, 134, 147)
 PROBES = 8000
 PEDESTAL = 0.12  # height of a pedestal, relative to the reach
 COLUMN, PLATE, FOOT = 1.6, 2.3, 3.4  # radii of its column, plate and foot, relative to the thickness of a link
-
-
-@dataclass(frozen=True, eq=False)
-class Part:
-    """One mesh of one colour, in the coordinates of its node.
-
-    `fixed_to_parent` attaches it to the previous link, in this joint's axis frame: a sleeve that a bar slides
-    through.
-    """
-
-    name: str
-    mesh: trimesh.Trimesh
-    color: Color
-    fixed_to_parent: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,11 +88,6 @@ def body(robot: Robot) -> Body:
     column = COLUMN * size if _upright(robot) else 0.0
     foot = np.array([*robot.T_world_base[:2, 3], floor if column else robot.T_world_base[2, 3]])
     return Body(links, tuple(parts), hand, pedestal, column, floor, foot, center, radius, size, radii)
-
-
-def joint_color(index: int) -> Color:
-    """The colour of a moving joint, by its index."""
-    return JOINT_COLORS[index % len(JOINT_COLORS)]
 
 
 def _thickness(robot: Robot, links: Chain) -> float:
@@ -290,9 +260,14 @@ def _extent(robot: Robot) -> Array:
 
 def _view_sphere(robot: Robot, floor: float, size: float) -> tuple[Array, float]:
     """A sphere around the arm at home and its pedestal."""
-    points = [robot.T_world_base[:3, 3], *link_frames(robot, robot.q_home)[:, :3, 3]]
-    points.append(np.array([*robot.T_world_base[:2, 3], floor]))
-    corners = np.array([np.min(points, axis=0), np.max(points, axis=0)])
-    center = corners.mean(axis=0)
-    radius = max(float(np.linalg.norm(np.array(points) - center, axis=1).max()) + 3 * size, 0.45 * robot.reach)
+    points = [robot.T_world_base[None, :3, 3], link_frames(robot, robot.q_home)[:, :3, 3]]
+    points.append(np.array([[*robot.T_world_base[:2, 3], floor]]))
+    drawn = drawing(robot)
+    if drawn is not None:
+        poses = link_poses(robot, robot.q_home[None])[0]
+        for T, spheres in zip(poses, drawn.spheres, strict=True):
+            points.append(spheres[:, :3] @ T[:3, :3].T + T[:3, 3])
+    every = np.vstack(points)
+    center = (every.min(axis=0) + every.max(axis=0)) / 2.0
+    radius = max(float(np.linalg.norm(every - center, axis=1).max()) + 3 * size, 0.45 * robot.reach)
     return center, radius

@@ -6,6 +6,7 @@ has its vertices twice.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -16,20 +17,35 @@ from kin.transforms import Array, frame_from_approach
 
 Faces = NDArray[np.int64]
 SEGMENTS = 28
+DIRECTIONS = 28  # corners of an outline
 
 
 def lathe(profile: ArrayLike) -> trimesh.Trimesh:
     """The solid of revolution about z of a profile ``(k, 2)`` of (radius, z), bottom to top, with sharp edges."""
-    points = np.asarray(profile, dtype=float)
     angles = np.linspace(0.0, 2 * np.pi, SEGMENTS, endpoint=False)
     ring = np.column_stack([np.cos(angles), np.sin(angles)])
-    vertices: list[Array] = []
-    faces: list[Faces] = []
-    for low, high in pairwise(points):
-        base = len(vertices) * SEGMENTS
-        vertices += [np.column_stack([r * ring, np.full(SEGMENTS, z)]) for r, z in (low, high)]
-        faces.append(_band(base, base + SEGMENTS))
-    return _mesh(np.vstack(vertices), np.vstack(faces))
+    return loft([np.column_stack([r * ring, np.full(SEGMENTS, z)]) for r, z in np.asarray(profile, dtype=float)])
+
+
+def loft(rings: Sequence[Array]) -> trimesh.Trimesh:
+    """The surface through closed outlines ``(k, 3)`` of as many points each, with sharp edges at the outlines."""
+    count = len(rings[0])
+    faces = [_band(2 * i * count, (2 * i + 1) * count, count) for i in range(len(rings) - 1)]
+    return _mesh(np.vstack([ring for pair in pairwise(rings) for ring in pair]), np.vstack(faces))
+
+
+def outline(discs: ArrayLike, inset: float = 0.0) -> Array:
+    """The convex hull of discs ``(k, 3)`` of (u, v, radius), made smaller by `inset`: points ``(DIRECTIONS, 2)``.
+
+    Each point is the farthest one in one of as many directions, so that points of different outlines correspond.
+    """
+    centers = np.asarray(discs, dtype=float)
+    angles = np.linspace(0.0, 2 * np.pi, DIRECTIONS, endpoint=False)
+    directions = np.column_stack([np.cos(angles), np.sin(angles)])
+    radii = centers[:, 2] - inset
+    farthest = (directions @ centers[:, :2].T + radii).argmax(axis=1)
+    points: Array = centers[farthest, :2] + radii[farthest, None] * directions
+    return points
 
 
 def cylinder(radius: float, low: float, high: float, bevel: float = 0.12) -> trimesh.Trimesh:
@@ -114,9 +130,18 @@ def placed(mesh: trimesh.Trimesh, T: Array) -> trimesh.Trimesh:
     return _mesh(mesh.vertices @ T[:3, :3].T + T[:3, 3], np.asarray(mesh.faces))
 
 
-def _band(low: int, high: int) -> Faces:
-    i = np.arange(SEGMENTS)
-    j = (i + 1) % SEGMENTS
+def spaced(path: Array, step: float) -> Array:
+    """Points on a polyline ``(k, 3)``, at most `step` apart."""
+    pieces = [path[:1]]
+    for start, end in pairwise(path):
+        count = max(1, int(np.ceil(np.linalg.norm(end - start) / step)))
+        pieces.append(start + (end - start) * (np.arange(1, count + 1) / count)[:, None])
+    return np.vstack(pieces)
+
+
+def _band(low: int, high: int, count: int = SEGMENTS) -> Faces:
+    i = np.arange(count)
+    j = (i + 1) % count
     return np.vstack(
         [np.column_stack([low + i, low + j, high + j]), np.column_stack([low + i, high + j, high + i])]
     )

@@ -69,6 +69,7 @@ LABELS = {
     "random": "Random",
     "recall": "Move target to tool",
     "view": "View",
+    "look": "Show arm as",
     "colours": "Page colours",
     "axes": "Arrows along",
     "nudge": "Target moved by keys",
@@ -135,6 +136,7 @@ class Actions:
             "recall": lambda _: self._move(arm.recall_target, "The target is at the tool"),
             "copy-as": lambda name: page.panel.share.choose(name),
             "view": self._on_view,
+            "look": self._on_drawn_as,
             "colours": self._on_colours,
             "system-dark": lambda dark: page.use_colours(page.view.dark, bool(dark)),
             "camera": lambda _: page.camera.aim(arm.scene.body, self._frames(), glide=True),
@@ -365,6 +367,10 @@ class Actions:
     def _on_colours(self, name: object) -> None:
         page = self._page
         page.use_colours(page.panel.colours.read(name, page.view.dark), page.system_dark)
+
+    def _on_drawn_as(self, name: object) -> None:
+        page = self._page
+        page.use_view(replace(page.view, look=page.panel.view.read_look(name, page.view.look)))
 
     def _on_view(self, name: str, value: object) -> None:
         view = replace(self._page.view)

@@ -28,7 +28,6 @@ from app.viewer.panel import Post
 from app.viewer.panel.target import DEFAULT_TASK
 from app.viewer.scene import gizmo
 from app.viewer.scene.arm import ArmScene
-from app.viewer.scene.clearance import clearance
 from app.viewer.scene.gizmo_axes import gizmo_axes
 from app.viewer.scene.motion import Motion, Pace
 from kin import IKOptions, IKResult, JointConstraints, Robot, Task
@@ -161,8 +160,7 @@ class ArmController:
         Locked joints stay where they are.
         """
         drawn = np.where(self.locks, self.goal, self.robot.random_q(self._rng, RANDOM_DRAWS))
-        clear = clearance(self.robot)
-        self.move_to(next((q for q in drawn if clear.at(q) is None), drawn[0]))
+        self.move_to(next((q for q in drawn if self.scene.contact_at(q) is None), drawn[0]))
 
     def move_joint(self, index: int, value: float, held: bool = True) -> None:
         """Set one joint (rad or m); `held`: with its slider, which is not moved then."""

@@ -26,7 +26,6 @@ from app.viewer.panel.layout import PANEL_WIDTH, Panel
 from app.viewer.panel.status import READY, Notice, StatusLine, key_number
 from app.viewer.panel.view import ViewState, configure_theme
 from app.viewer.scene.camera import Sphere, VisitorCamera
-from app.viewer.scene.clearance import clearance
 from app.viewer.scene.key_number import KeyNumber
 from app.viewer.session.actions import Actions
 from app.viewer.session.controller import ArmController
@@ -244,6 +243,7 @@ class VisitorPage(Worker):
 
     def _apply_view(self) -> None:
         scene = self.arm.scene
+        scene.show_as(self.view.look)
         scene.show_frames(self.view.frames)
         scene.show_labels(self.view.labels)
         scene.show_axes(self.view.axes)
@@ -341,7 +341,7 @@ class VisitorPage(Worker):
         with self.client.atomic():
             if self._readout_due:
                 self._readout_due = False
-                self.status.warn(self.arm.scene.show_contact(clearance(self.robot).at(self.q)))
+                self.status.warn(self.arm.scene.show_contact(self.arm.scene.contact_at(self.q)))
                 self.panel.readout.show(kin.fk(self.robot, self.q), self.units, self.arm.open_target)
             if self._sliders_due:
                 self._sliders_due = False

@@ -24,7 +24,7 @@ import numpy as np
 from app.viewer import own_arm
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel.entry import FARTHEST
-from app.viewer.panel.view import ViewState
+from app.viewer.panel.view import LOOKS, ViewState
 from app.viewer.scene.viewpoints import UP
 from kin import KinematicsError, Robot, Task, branch_names
 from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
@@ -288,7 +288,8 @@ def _units(data: dict[str, Any]) -> Units:
 
 def _view(value: object) -> ViewState:
     options = value if isinstance(value, dict) else {}
-    return ViewState(**{name: options[name] for name in vars(FRESH) if isinstance(options.get(name), bool)})
+    flags = {name: options[name] for name in vars(FRESH) if name != "look" and isinstance(options.get(name), bool)}
+    return ViewState(**flags, look=next((look for look in LOOKS if look == options.get("look")), FRESH.look))
 
 
 def _features(value: object) -> dict[str, dict[str, object]]:

@@ -27,8 +27,9 @@ from app.viewer.lessons.dh.steps import (
     turns,
 )
 from app.viewer.lessons.dh.views import ABOUT_X, ABOUT_Z, TITLES
+from app.viewer.scene.bodies.parts import joint_color
 from app.viewer.scene.camera import DIRECTION
-from app.viewer.scene.meshes import body, joint_color
+from app.viewer.scene.meshes import body
 from kin import Robot
 from kin.transforms import Array, wxyz_from_rotation
 from kin.units import Units

@@ -15,7 +15,7 @@ import numpy as np
 import viser
 
 from app.viewer.lessons.postures.survey import BLOCKED_COLOR, COLORS, Posture
-from app.viewer.scene.chain import chain
+from app.viewer.scene.chain import chain, link_poses
 from app.viewer.scene.meshes import body
 from kin import Robot
 from kin.transforms import Array, frame_from_approach, wxyz_from_rotation
@@ -62,25 +62,6 @@ def skeleton(robot: Robot) -> Skeleton:
                 poses.append(T)
                 scales.append((thick, thick, length))
     return Skeleton(np.array(links), np.array(poses), np.array(scales))
-
-
-def link_poses(robot: Robot, q: Array) -> Array:
-    """Poses ``(k, n + 1, 4, 4)`` of all links, base first, for configurations ``(k, n)``."""
-    links = chain(robot).links
-    found = np.empty((len(q), robot.n + 1, 4, 4))
-    T = np.broadcast_to(np.eye(4), (len(q), 4, 4))
-    found[:, 0] = T
-    for i, link in enumerate(links[1:]):
-        motion = np.zeros((len(q), 4, 4))
-        motion[:, range(4), range(4)] = 1.0
-        if link.joint is not None and link.joint.kind == "prismatic":
-            motion[:, 2, 3] = q[:, i]
-        else:
-            c, s = np.cos(q[:, i]), np.sin(q[:, i])
-            motion[:, 0, 0], motion[:, 0, 1], motion[:, 1, 0], motion[:, 1, 1] = c, -s, s, c
-        T = T @ link.T_parent_axis @ motion
-        found[:, i + 1] = T
-    return found
 
 
 def places(robot: Robot, q: Array) -> tuple[Array, Array, Array]:

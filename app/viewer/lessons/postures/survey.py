@@ -15,7 +15,7 @@ import numpy as np
 
 import kin
 from app.viewer.panel.posture import parts, short
-from app.viewer.scene.meshes import JOINT_COLORS, Color
+from app.viewer.scene.bodies.parts import JOINT_COLORS, Color
 from app.viewer.views.templates import render
 from kin import IKOptions, IKSolution, LimitViolation, Robot
 from kin.ik import solve

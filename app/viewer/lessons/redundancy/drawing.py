@@ -13,7 +13,8 @@ import viser
 
 from app.viewer.lessons.redundancy.path import elbow_paths, has_path
 from app.viewer.lessons.redundancy.ring import FLAT, Circle, arc_segments, elbow_circle, trade_segments
-from app.viewer.scene.meshes import JOINT_COLORS, body
+from app.viewer.scene.bodies.parts import JOINT_COLORS
+from app.viewer.scene.meshes import body
 from app.viewer.self_motion import End
 from kin import Redundancy, Robot
 from kin.transforms import Array

@@ -8,40 +8,43 @@ from fake_browser import FakeBrowser
 
 import kin
 from app.shared.store import Store
+from app.viewer.scene.bodies import drawing
+from app.viewer.scene.chain import link_poses
 from app.viewer.scene.clearance import clearance
 from app.viewer.scene.meshes import body
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
 ROBOTS = list(Store().robots)
-SOLID = ("link", "housing", "link-bar", "gripper")
+SOLID = ("link", "housing", "body-")
 
 
-def drawn(robot: kin.Robot, q: np.ndarray) -> list[tuple[int, np.ndarray]]:
+def drawn(robot: kin.Robot, q: np.ndarray, skeleton: bool) -> list[tuple[int, np.ndarray]]:
     """Index and vertices in the world of every solid part that moves with a joint."""
-    made = body(robot)
-    T, found = np.eye(4), []
-    for link, parts, value in zip(made.chain.links, made.parts, [0.0, *q], strict=True):
-        position, wxyz = link.pose(value)
-        T = T @ kin.transforms.from_position_wxyz(position, wxyz)
-        found += [
-            (link.index, part.mesh.vertices @ T[:3, :3].T + T[:3, 3])
-            for part in parts
-            if link.index >= 0 and part.name in SOLID and not part.fixed_to_parent
-        ]
-    tool = T @ made.chain.T_last_tool
-    gripper = next(part for part in made.gripper if part.name == "gripper")
-    found.append((robot.n, gripper.mesh.vertices @ tool[:3, :3].T + tool[:3, 3]))
+    made, shell = body(robot), drawing(robot)
+    links = made.parts if skeleton or shell is None else shell.parts
+    poses = link_poses(robot, q[None])[0]
+    found = [
+        (link.index, part.mesh.vertices @ T[:3, :3].T + T[:3, 3])
+        for link, parts, T in zip(made.chain.links, links, poses, strict=True)
+        for part in parts
+        if link.index >= 0 and part.name.startswith(SOLID) and not part.fixed_to_parent
+    ]
+    if skeleton or shell is None:
+        tool = poses[-1] @ made.chain.T_last_tool
+        gripper = next(part for part in made.gripper if part.name == "gripper")
+        found.append((robot.n, gripper.mesh.vertices @ tool[:3, :3].T + tool[:3, 3]))
     return found
 
 
+@pytest.mark.parametrize("skeleton", [False, True])
 @pytest.mark.parametrize("robot", ROBOTS, ids=[r.id for r in ROBOTS])
-def test_contacts_agree_with_the_meshes(robot: kin.Robot) -> None:
-    made, test = body(robot), clearance(robot)
+def test_contacts_agree_with_the_meshes(robot: kin.Robot, skeleton: bool) -> None:
+    made, test = body(robot), clearance(robot, skeleton)
     assert test.at(robot.q_home) is None
     for q in robot.random_q(np.random.default_rng(4), 60):
         contact = test.at(q)
-        parts = drawn(robot, q)
+        parts = drawn(robot, q, skeleton)
         depth = max(made.floor - vertices[:, 2].min() for _, vertices in parts)
         if contact is None:
             assert depth < 0.8 * made.size, "a part under the floor is found"

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import math
 import re
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -17,8 +14,10 @@ from app.shared.store import Store
 from app.viewer.panel import joints, readout, status
 from app.viewer.scene import camera
 from app.viewer.scene.arm import ArmScene
-from app.viewer.scene.chain import chain
-from app.viewer.scene.meshes import body, joint_color
+from app.viewer.scene.bodies import drawing
+from app.viewer.scene.bodies.parts import joint_color
+from app.viewer.scene.chain import chain, link_poses
+from app.viewer.scene.meshes import body
 from app.viewer.scene.shapes import tube
 from kin.transforms import from_position_wxyz
 from kin.units import DEFAULT_UNITS, Units
@@ -65,14 +64,6 @@ AWKWARD = {
 }
 ROBOTS = [*Store().robots, *AWKWARD.values()]
 IDS = [*(r.id for r in Store().robots), *AWKWARD]
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[viser.ViserServer]:
-    with contextlib.redirect_stdout(io.StringIO()):
-        made = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-        yield made
-        made.stop()
 
 
 def world(scene: viser.SceneApi, name: str) -> np.ndarray:
@@ -266,7 +257,16 @@ def test_the_default_view_holds_the_arm(robot: kin.Robot, aspect: float) -> None
     right = np.cross(forward, [0, 0, 1.0])
     right /= np.linalg.norm(right)
     up = np.cross(right, forward)
-    points = kin.link_frames(robot, robot.q_home)[:, :3, 3] - position
+    points = kin.link_frames(robot, robot.q_home)[:, :3, 3]
+    if (drawn := drawing(robot)) is not None:
+        poses = link_poses(robot, robot.q_home[None])[0]
+        shells = [
+            part.mesh.vertices @ T[:3, :3].T + T[:3, 3]
+            for parts, T in zip(drawn.parts, poses, strict=True)
+            for part in parts
+        ]
+        points = np.vstack([points, *shells])
+    points = points - position
     depth = points @ forward
     half = math.tan(camera.FOV / 2)
     assert (depth > 0).all()

@@ -48,7 +48,7 @@ def test_a_state_is_restored_from_text_that_is_safe_in_an_address():
     q = PUMA.random_q(rng)
     T = kin.fk(PUMA, PUMA.random_q(rng))
     branch = kin.branch_names(PUMA)[2]
-    view = ViewState(frames=True, labels=False, dark=True)
+    view = ViewState(frames=True, labels=False, dark=True, look="both")
     features = {"w": {"n": 3, "name": "π & <b>"}}
     camera = np.array([[1.5, -2.25, 0.75], [0.1, 0.2, 0.3], [0.0, 0.6, 0.8]])
     state = PageState("puma560", q, T, "approach", branch, "dh", RADIANS_CM, view, features, (1, 4), camera)
@@ -168,7 +168,8 @@ def test_a_camera_is_stored_in_few_digits_without_a_vertical_up_direction():
 
 
 def test_unknown_names_are_ignored():
-    state = there(task="dance", branch="elbow sideways", lesson=7, view={"dark": "yes", "axes": False, "x": True})
+    view = {"dark": "yes", "axes": False, "x": True, "look": 7}
+    state = there(task="dance", branch="elbow sideways", lesson=7, view=view)
     assert (state.task, state.branch, state.lesson) == (None, None, None)
     assert state.view == ViewState(axes=False)
     assert there(task=["pose"], branch={"a": 1}, view=[1], features=[1]).features == {}

@@ -274,6 +274,22 @@ def test_hostile_values_are_shown_as_errors_and_the_session_lives(
         assert tab.value("Robot") == PIONEER.name
 
 
+def test_an_arm_is_shown_as_body_skeleton_or_both(port: int) -> None:
+    def seen(tab: FakeBrowser, name: str) -> set[bool]:
+        return {tab.visible.get(node, True) for node in tab.nodes if node.split("/")[-1].startswith(name)}
+
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.choose("UR5")
+        for look, body, skeleton in (("Both", True, True), ("Skeleton", False, True), ("Body", True, False)):
+            tab.set("Show arm as", look)
+            wanted = {body}, {skeleton}
+            tab.wait(lambda wanted=wanted: (seen(tab, "body-"), seen(tab, "housing")) == wanted)
+        tab.set("Show arm as", "Ghost")
+        tab.wait(lambda: "one of Body, Skeleton, Both" in tab.html)
+        tab.wait(lambda: tab.value("Show arm as") == "Body")
+
+
 def test_values_beyond_a_stop_end_at_the_stop(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()

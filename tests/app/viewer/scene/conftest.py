@@ -1,0 +1,18 @@
+"""A server without browsers."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from collections.abc import Iterator
+
+import pytest
+import viser
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[viser.ViserServer]:
+    with contextlib.redirect_stdout(io.StringIO()):
+        made = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        yield made
+        made.stop()
