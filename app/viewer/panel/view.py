@@ -90,9 +90,7 @@ class ViewOptions:
 
     def __init__(self, gui: viser.GuiApi, state: ViewState, post: Post) -> None:
         names = tuple(LOOK_NAMES.values())
-        self._look = gui.add_dropdown(
-            "Show arm as", names, initial_value=LOOK_NAMES[state.look], hint=LOOK_HINT
-        )
+        self._look = gui.add_dropdown("Show arm as", names, initial_value=LOOK_NAMES[state.look], hint=LOOK_HINT)
         listen(self._look, post, "look")
         self._boxes: dict[str, viser.GuiCheckboxHandle] = {}
         for name, text, hint in (
