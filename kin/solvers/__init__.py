@@ -27,6 +27,7 @@ from kin.solvers import (
 )
 from kin.solvers.contract import APPROACH, ClosedForm
 from kin.solvers.reversed import ReversedJoints, readings
+from kin.solvers.rounded import Rounded, meant
 
 FAMILIES: tuple[Callable[[Robot], ClosedForm | None], ...] = (
     wrist5.match,
@@ -37,10 +38,12 @@ FAMILIES: tuple[Callable[[Robot], ClosedForm | None], ...] = (
     slide6.match,
     scara4.match,
 )
-# For arms that fit no family, whatever joints are reversed.
+# Families that read joints of either direction.
+UNDIRECTED: tuple[Callable[[Robot], ClosedForm | None], ...] = (parallel5.match, offset7.match)
+# Radians, shares of the arm's size.
+FAR = 2e-5
+# For arms that fit no family.
 GENERAL: tuple[Callable[[Robot], ClosedForm | None], ...] = (
-    parallel5.match,
-    offset7.match,
     general6.match,
     lambda robot: general5.match(robot, _six_joints),
     lambda robot: general7.match(robot, _six_joints),
@@ -51,20 +54,37 @@ GENERAL: tuple[Callable[[Robot], ClosedForm | None], ...] = (
 def closed_form_of(robot: Robot) -> ClosedForm | None:
     """The closed form of the first family that fits the robot's axes, None if there is none.
 
-    Where none fits the robot with its joints as given, or only one without approach directions, some joints are
-    read as reversed. Where none fits then either, a general solver takes the arm.
+    A table that is rounded gets the family that was meant. Where no family fits then either, or the table is far
+    from it, a general solver takes the arm.
     """
-    found = _first_match(robot, FAMILIES)
+    found, intended = _family(robot, robot), meant(robot)
+    if intended is None:
+        return found or _first_match(robot, GENERAL)
+    if found is None:
+        form = _family(intended.table, robot)
+        # Close to singularities some postures of a table that is far from its family would be missed.
+        general = _first_match(robot, GENERAL) if form is None or (intended.off > FAR and robot.n < 7) else None
+        return Rounded(robot, form, intended.off) if form is not None and general is None else general
+    return Rounded(robot, found, intended.off) if intended.hidden else found
+
+
+def _family(table: Robot, robot: Robot) -> ClosedForm | None:
+    """The family of a table; the branches are named as those of the robot that it stands for.
+
+    Where none fits the table with its joints as given, or only one without approach directions, some joints are
+    read as reversed.
+    """
+    found = _first_match(table, FAMILIES)
     if found is not None and found.handles(APPROACH):
         return found
     readable: list[tuple[tuple[int, ...], ClosedForm]] = [] if found is None else [((), found)]
-    for joints, table in readings(robot):
+    for joints, other in readings(table):
         # Only a last axis turned towards the tool adds approach directions to a family that has none.
-        form = _first_match(table, FAMILIES) if found is None or robot.n - 1 in joints else None
+        form = _first_match(other, FAMILIES) if found is None or robot.n - 1 in joints else None
         if form is not None:
             readable.append((joints, form))
     if not readable:
-        return _first_match(robot, GENERAL)
+        return _first_match(table, UNDIRECTED)
     joints, form = min(readable, key=_burden)
     return ReversedJoints(form, joints, robot) if joints else form
 

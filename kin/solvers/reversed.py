@@ -44,7 +44,7 @@ def readings(robot: Robot) -> Iterator[tuple[Joints, Robot]]:
     links = links_of(robot, (1,) * (robot.n - 1))
     choices = islice(product(*_choices(robot, links)), _MOST)
     for joints in sorted((tuple(i for part in choice for i in part) for choice in choices), key=len):
-        yield joints, _table(robot, links, joints)
+        yield joints, table_of(robot, links, joints)
 
 
 def _choices(robot: Robot, links: Links) -> list[list[Joints]]:
@@ -69,7 +69,7 @@ def _choices(robot: Robot, links: Links) -> list[list[Joints]]:
     return found
 
 
-def _table(robot: Robot, links: Links, joints: Joints) -> Robot:
+def table_of(robot: Robot, links: Links, joints: Joints) -> Robot:
     """The arm of these links, with the joint directions of the robot except for the reversed `joints`.
 
     ``Rz(θ) Tz(d) = Rx(π) Rz(−θ) Tz(−d) Rx(π)``; the half turns about x are added to the twists before and after.

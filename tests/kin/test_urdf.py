@@ -196,7 +196,7 @@ def test_a_joint_without_limits_is_noted():
     [
         ("panda", "panda_link8", "offset7", "panda"),
         ("ur5", "ee_link", "parallel6", None),
-        ("so101", "gripper_frame_link", None, None),
+        ("so101", "gripper_frame_link", "parallel5", None),
     ],
 )
 def test_manufacturers_files(name, tip, family, same_as):

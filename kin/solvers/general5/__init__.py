@@ -7,7 +7,7 @@ joints (:mod:`kin.solvers.general6`) apply:
   value of the virtual joint is the roll that is left. If joint 5 is this roll itself, any other axis does, see
   below.
 - **Three joints:** three axes through the tool's point. Every solution meets the point, and the orientation of the
-  target does not matter: another one, fixed and in no special position, is asked for. A point has up to four
+  target does not matter: one in no special position is asked for. A point has up to four
   solutions.
 - **Otherwise:** axes in general position. Solutions are those whose virtual joints are at 0: a pose that the arm
   cannot reach has none.

@@ -33,8 +33,11 @@ from kin.transforms import Array
 
 NAME = "general5"
 TITLE = "all solutions, three to five revolute joints"
-# An orientation in no special position.
-_TURN = (screw_z(0.37, 0.0) @ screw_x(0.0, 1.19) @ screw_z(-2.23, 0.0))[:3, :3]
+# Orientations in no special position.
+_TURNS = tuple(
+    (screw_z(a, 0.0) @ screw_x(0.0, b) @ screw_z(c, 0.0))[:3, :3]
+    for a, b, c in ((0.4, 1.2, -2.2), (1.4, 0.9, -0.2))
+)
 _POINTS = 4  # the most configurations of three joints for a point
 _AT_ZERO = TOLERANCES.near_miss
 
@@ -104,11 +107,16 @@ class General5(ClosedForm):
     def solve(self, problem: SolverInput) -> Candidates:
         """All solutions that meet what the arm can meet of the target."""
         p, n = problem, self.robot.n
+        if self._point and not self._pairs:
+            q = np.empty((len(self.branches), n))
+            self.kernels.one(self.kernels.params, p.T, math.nan, p.seed, q)
+            missing = bool(np.isnan(q).all())
+            return Candidates(q, np.empty((len(q), 0)), (), 0.0, Obstacle("point") if missing else None)
         free_roll = p.task == APPROACH and self._last_rolls
         T, lower, upper = without_last(p) if free_roll else (p.T, p.lower, p.upper)
         if self._point:
             T = T.copy()
-            T[:3, :3] = _TURN
+            T[:3, :3] = _TURNS[0]
         virtual = np.zeros(6 - n)
         own = self.form.redundancies(POSE)
         kept = [k for k, r in enumerate(own) if r.joint < n]
@@ -164,11 +172,7 @@ class General5(ClosedForm):
         n = self.robot.n
 
         def many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
-            found = np.empty((len(T), len(self.form.branches), 6))
-            if self._point:
-                T = T.copy()
-                T[:, :3, :3] = _TURN
-            form.many(params, T, values, np.append(near, np.zeros(6 - n)), found)
+            found = self._completed(form, params, T, values, np.append(near, np.zeros(6 - n)))
             rows = self._rows(found)
             q = np.take_along_axis(found[..., :n], np.maximum(rows, 0)[..., None], axis=1)
             out[:] = np.where(rows[..., None] >= 0, q, math.nan)
@@ -178,6 +182,31 @@ class General5(ClosedForm):
             return bool(np.isfinite(T).all())
 
         return WrappedKernels(form.params, one, many, self._kernels, form)
+
+    def _completed(self, form: BatchKernels, params: Array, T: Array, values: Array, near: Array) -> Array:
+        """Solutions of the six joints ``(N, k, 6)``.
+
+        Those of a point come in pairs, but for double ones: with an odd number, or none, another orientation is
+        asked for as well.
+        """
+        found = np.empty((len(T), len(self.form.branches), 6))
+        if not self._point:
+            form.many(params, T, values, near, found)
+            return found
+        T = T.copy()
+        T[:, :3, :3] = _TURNS[0]
+        form.many(params, T, values, near, found)
+        if self._pairs:
+            return found
+        count = (self._rows(found) >= 0).sum(axis=1)
+        odd = np.flatnonzero((count % 2 == 1) | (count == 0))
+        more = np.full_like(found, math.nan)
+        if len(odd):
+            T[odd, :3, :3] = _TURNS[1]
+            again = np.empty((len(odd), *found.shape[1:]))
+            form.many(params, np.ascontiguousarray(T[odd]), np.array([math.nan]), near, again)
+            more[odd] = again
+        return np.concatenate([found, more], axis=1)
 
     def branch_of(self, q: Array) -> int:
         """The row of q ``(n,)`` among all solutions of its pose."""

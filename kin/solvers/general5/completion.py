@@ -26,7 +26,7 @@ def completed(robot: Robot, axes: Axes) -> Robot:
     for k, (direction, place) in enumerate(axes):
         z = tool[:3, :3] @ np.asarray(direction) / np.linalg.norm(direction)
         point = tool[:3, 3] + robot.reach * (tool[:3, :3] @ np.asarray(place))
-        theta, d, a, alpha = _link_to(inverse(frame), z, point)
+        theta, d, a, alpha = link_to(inverse(frame), z, point)
         frame = frame @ screw_z(theta, d) @ screw_x(a, alpha)
         name = f"virtual {k + 1}"
         # In either convention the fixed row and the joint's row together are this link, then the joint.
@@ -42,7 +42,7 @@ def completed(robot: Robot, axes: Axes) -> Robot:
     )
 
 
-def _link_to(back: Array, z: Array, point: Array) -> tuple[float, float, float, float]:
+def link_to(back: Array, z: Array, point: Array) -> tuple[float, float, float, float]:
     """(θ, d, a, α) of the link from a frame, given by its inverse, to an axis: Rz(θ) Tz(d) Tx(a) Rx(α)."""
     zx, zy, zz = (back[:3, :3] @ z).tolist()
     px, py, pz = (back[:3, :3] @ point + back[:3, 3]).tolist()

@@ -186,7 +186,7 @@ def test_a_twist_typed_with_few_digits_keeps_every_posture():
     ur5 = kin.get_robot("ur5")
     rows = tuple(replace(row, alpha=round(row.alpha, 4)) for row in ur5.rows)
     typed = replace(ur5, id="typed", rows=rows)
-    assert closed_form_of(typed).name == "general6"
+    assert closed_form_of(typed).name == "parallel6"
     q = ur5.random_q(np.random.default_rng(5), 60)
     exact, found = rows_of(ur5, kin.fk(ur5, q)), rows_of(typed, kin.fk(typed, q))
     assert all(apart(rows, own).min() < 1e-6 for rows, own in zip(found, q, strict=True))

@@ -1,0 +1,12 @@
+"""Arms whose tables are rounded: the family that was meant, and every posture on the table as it is.
+
+A right angle typed as 1.5708 is not one, and the closed form of the family does not apply. Its postures are close
+to those of the arm whose axes are exactly parallel, perpendicular or intersecting where the table misses that by
+little (:mod:`kin.solvers.rounded.table`). That arm's closed form gives the postures, a descent makes each of them
+exact
+on the true table (:mod:`kin.solvers.rounded.closed_form`).
+"""
+
+from kin.solvers.rounded.closed_form import Rounded as Rounded
+from kin.solvers.rounded.table import Meant as Meant
+from kin.solvers.rounded.table import meant as meant

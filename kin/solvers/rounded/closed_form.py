@@ -1,0 +1,161 @@
+"""The closed form of a family, made exact on a table that fits the family only nearly."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kin.axes import size
+from kin.robot import Robot
+from kin.solvers.common import UNBOUNDED
+from kin.solvers.contract import (
+    APPROACH,
+    POSE,
+    POSITION,
+    BatchKernels,
+    Candidates,
+    ClosedForm,
+    RedundancyParameter,
+    SolverInput,
+)
+from kin.solvers.numeric import each_of
+from kin.solvers.reversed import WrappedKernels
+from kin.solvers.singular import Singularity
+from kin.transforms import Array
+
+Flags = NDArray[np.bool_]
+_MASK = np.array([1.0] * 6 + [0.0])
+_MOVED = 0.1  # rad, m: a descent that goes farther has left the posture
+_DIRECTIONS = np.concatenate([np.eye(3), -np.eye(3)])
+_MARGIN = 10.0  # times the rounding: how far from a target starts are looked for
+_ABOUT = 1e-9  # m, rad: what is closer needs no descent with another task
+
+
+class Rounded(ClosedForm):
+    """The closed form of the arm that was meant by a rounded table; its postures are exact on the table itself.
+
+    Ranges of redundancy parameters and distances to singularities are those of the arm that was meant.
+    """
+
+    exact_ranges = False
+
+    def __init__(self, robot: Robot, form: ClosedForm, off: float) -> None:
+        self.robot, self.form = robot, form
+        self.name, self.title, self.lengths = form.name, form.title, form.lengths
+        self.named, self.steady = form.named, form.steady
+        self.reason = (
+            f"{form.reason}, but for rounding of the table ({off:.1g} rad or of the arm's size); "
+            "every posture is made exact on the table as it is"
+        )
+        self.branches, self.meanings = form.names(robot, np.ones(robot.n))
+        self._margin = _MARGIN * off * size(robot)
+        self.kernels = self._kernels(form.kernels)
+
+    def handles(self, task: int) -> bool:
+        """The tasks of the family."""
+        return self.form.handles(task)
+
+    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
+        """Those of the family."""
+        return self.form.redundancies(task)
+
+    def solve(self, problem: SolverInput) -> Candidates:
+        """All branches, each moved onto the target on the true table; requested values are kept."""
+        p, found = problem, self.form.solve(problem)
+        q, values = found.q, found.values.copy()
+        parameters = tuple(enumerate(self.redundancies(p.task)))
+        held = [r.joint for k, r in parameters if r.joint >= 0 and not math.isnan(p.values[k])]
+        known = ~np.isnan(q[:, 0])
+        if p.task == POSE and self.robot.n == 6:
+            q = self._with_starts(self.form.kernels, p.T, p.seed, q)
+        q = self._exact(p.T, p.task, q, held, known)
+        for k, r in parameters:
+            if r.joint >= 0:
+                values[:, k] = np.where(np.isnan(values[:, k]), math.nan, q[:, r.joint])
+        return Candidates(q, values, found.arcs, found.gap, None if not np.isnan(q).all() else found.obstacle)
+
+    def _with_starts(self, form: BatchKernels, T: Array, near: Array, q: Array) -> Array:
+        """The rows ``(k, 6)``, the missing ones from targets close by: the true table may just reach this one."""
+        out, missing, rows = q.copy(), np.isnan(q[:, 0]), np.empty(q.shape)
+        for direction in _DIRECTIONS:
+            if not missing.any():
+                break
+            moved = T.copy()
+            moved[:3, 3] += self._margin * direction
+            form.one(form.params, moved, math.nan, near, rows)
+            out[missing] = rows[missing]
+            missing = np.isnan(out[:, 0])
+        return out
+
+    def _exact(self, T: Array, task: int, q: Array, held: list[int], known: Flags) -> Array:
+        """Rows ``(k, n)`` moved onto the target, with the joints in `held` where they are.
+
+        Those not `known` ``(k,)`` that do not meet the target do not exist.
+
+        Arms with few joints miss a part of most poses: then rows meet what they can, the direction or the point.
+        """
+        out = np.array(q, order="C")
+        there = np.flatnonzero(~np.isnan(out[:, 0]))
+        for code in (task,) if self.robot.n >= 6 else dict.fromkeys((task, max(task, APPROACH), POSITION)):
+            if not len(there):
+                break
+            rows, errors = self._descend(T, code, q[there], held)
+            near = np.abs(rows - q[there]).max(axis=1) < _MOVED
+            met = near & (errors < _ABOUT)
+            out[there[met]] = rows[met]
+            there = there[~met]
+        out[there[~known[there]]] = math.nan
+        return out
+
+    def _descend(self, T: Array, code: int, q: Array, held: list[int]) -> tuple[Array, Array]:
+        """Where descents from the rows end, and the errors there."""
+        rows, errors = q.copy(), np.empty(len(q))
+        lower, upper = np.full(self.robot.n, -UNBOUNDED), np.full(self.robot.n, UNBOUNDED)
+        goal = (np.ascontiguousarray(T), code, _MASK, 1.0)
+        turns = np.zeros(self.robot.n)
+        for k in range(len(q)):
+            lower[held] = upper[held] = q[k, held]
+            each_of(self.robot.model, goal, (lower, upper, turns), -1.0, 2, rows[k : k + 1], errors[k : k + 1])
+        return rows, errors
+
+    def _kernels(self, form: BatchKernels) -> BatchKernels:
+        """The batch kernels: those of the family, and a descent for each row."""
+        held = [r.joint for r in self.redundancies(POSE) if r.joint >= 0 and not r.rare]
+
+        def many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
+            form.many(params, T, values, near, out)
+            for k in range(len(T)):
+                out[k] = self._row(form, T[k], near, out[k], held)
+
+        def one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
+            if not form.one(params, T, value, near, out):
+                return False
+            out[:] = self._row(form, T, near, out, held)
+            return True
+
+        return WrappedKernels(form.params, one, many, self._kernels, form)
+
+    def _row(self, form: BatchKernels, T: Array, near: Array, q: Array, held: list[int]) -> Array:
+        """All branches of one target from those of the family ``(k, n)``."""
+        known = ~np.isnan(q[:, 0])
+        if self.robot.n == 6:
+            q = self._with_starts(form, T, near, q)
+        return self._wrapped(self._exact(T, POSE, q, held, known), held)
+
+    def _wrapped(self, q: Array, held: list[int]) -> Array:
+        """The same with angles in (−π, π], but for joints whose values may be requested."""
+        out = q.copy()
+        for i in np.flatnonzero(self.robot.revolute).tolist():
+            if i not in held:
+                out[:, i] = math.pi - (math.pi - q[:, i]) % (2.0 * math.pi)
+        return out
+
+    def branch_of(self, q: Array) -> int:
+        """The branch a configuration is on, as the family has it."""
+        return self.form.branch_of(q)
+
+    def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
+        """Those of the arm that was meant."""
+        return self.form.singularities(q, within)

@@ -1,0 +1,126 @@
+"""Rounded tables: the same postures as the exact table, exact on the table as it is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import kin
+from kin import Status
+from kin.solvers import closed_form_of
+from kin.solvers.rounded import Rounded, meant
+
+PI = math.pi
+UR5 = kin.get_robot("ur5")
+UR10 = replace(
+    UR5,
+    id="ur10",
+    rows=tuple(
+        replace(row, a=a, d=d)
+        for row, a, d in zip(
+            UR5.rows, (0, -0.612, -0.5723, 0, 0, 0), (0.1273, 0, 0, 0.163941, 0.1157, 0.0922), strict=True
+        )
+    ),
+)
+ARMS = (
+    UR5,
+    UR10,
+    *(kin.get_robot(name) for name in ("puma560", "irb120", "pioneer5", "panda", "iiwa14", "stanford")),
+)
+arms = pytest.mark.parametrize("robot", ARMS, ids=lambda robot: robot.id)
+QUARTERS = (1.570796326, 1.5707963, 1.5708)
+
+
+def rounded(robot, quarter):
+    """The same table with another number for a right angle."""
+
+    def typed(angle):
+        turns = round(angle / (PI / 2))
+        return turns * quarter if abs(angle - turns * PI / 2) < 1e-12 else angle
+
+    rows = tuple(replace(row, alpha=typed(row.alpha), theta=typed(row.theta)) for row in robot.rows)
+    return replace(robot, id=f"{robot.id}-{quarter}", rows=rows)
+
+
+def apart(robot, a, b):
+    """Largest joint difference, whole turns aside."""
+    gap = np.abs(a - b)
+    turns = np.abs((a - b + PI) % (2 * PI) - PI)
+    return np.where(robot.revolute, turns, gap).max(axis=-1)
+
+
+@arms
+@pytest.mark.parametrize("quarter", QUARTERS)
+def test_a_rounded_table_has_the_postures_of_the_exact_one(robot, quarter):
+    table = rounded(robot, quarter)
+    form = closed_form_of(table)
+    assert isinstance(form, Rounded)
+    assert "rounding" in form.reason
+    assert kin.branch_names(table) == kin.branch_names(robot)
+    for q in robot.random_q(np.random.default_rng(0), 25):
+        T = kin.fk(table, q)
+        options = {"q_seed": q, "respect_limits": False}
+        found = kin.solve_ik(table, T, **options)
+        exact = kin.solve_ik(robot, kin.fk(robot, q), **options)
+        assert found.status is Status.SOLVED
+        postures = {s.branch: s.q for s in found.solutions}
+        assert set(postures) == {s.branch for s in exact.solutions}
+        near = 2e-2 if robot.n > 6 else 1e-3
+        assert all(apart(robot, postures[s.branch], s.q) < near for s in exact.solutions)
+        assert min(apart(robot, s.q, q) for s in found.solutions) < (1e-3 if robot.n > 6 else 1e-6)
+        assert all(max(s.position_error, s.rotation_error) < 1e-9 for s in found.solutions)
+
+
+@arms
+def test_an_exact_table_is_left_alone(robot):
+    assert meant(robot) is None
+    assert not isinstance(closed_form_of(robot), Rounded)
+
+
+@pytest.mark.parametrize("quarter", QUARTERS)
+def test_both_levels_agree(quarter):
+    table = rounded(UR5, quarter)
+    T = kin.fk(table, table.random_q(np.random.default_rng(1), 10))
+    for pose, rows in zip(T, kin.ik_branches(table, T), strict=True):
+        rich = kin.solve_ik(table, pose, respect_limits=False, images="nearest")
+        assert (~np.isnan(rows[:, 0])).sum() == len(rich.solutions)
+        assert np.abs(kin.fk(table, rows[~np.isnan(rows[:, 0])]) - pose).max() < 1e-9
+
+
+def test_a_requested_value_is_kept_exactly():
+    table = rounded(kin.get_robot("panda"), 1.5708)
+    T = kin.fk(table, table.q_home)
+    result = kin.solve_ik(table, T, redundancy={"theta7": 0.5})
+    assert result.status is Status.SOLVED
+    assert all(s.q[6] == 0.5 for s in result.solutions)
+
+
+def test_a_table_far_from_its_family_has_a_general_solver():
+    assert closed_form_of(rounded(UR5, 1.5715)).name == "general6"
+    oblique = replace(UR5, rows=tuple(replace(row, alpha=row.alpha + 0.01) for row in UR5.rows))
+    assert closed_form_of(oblique).name == "general6"
+
+
+def test_short_offsets_and_turned_tools_are_rounding_too():
+    rows = list(kin.get_robot("puma560").rows)
+    rows[4] = replace(rows[4], a=3e-6, d=-2e-6)
+    table = replace(kin.get_robot("puma560"), id="puma-offset", rows=tuple(rows))
+    assert closed_form_of(table).name == "wrist6"
+    for q in table.random_q(np.random.default_rng(2), 10):
+        result = kin.solve_ik(table, kin.fk(table, q), respect_limits=False)
+        assert len(result.solutions) == 8
+        assert min(apart(table, s.q, q) for s in result.solutions) < 1e-6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("quarter", QUARTERS)
+@pytest.mark.parametrize("robot", [robot for robot in ARMS if robot.n == 6], ids=lambda robot: robot.id)
+def test_every_configuration_is_found(robot, quarter):
+    table = rounded(robot, quarter)
+    q = table.random_q(np.random.default_rng(3), 10_000)
+    T = kin.fk(table, q)
+    found = apart(table, kin.ik_branches(table, T), q[:, None])
+    assert int((~(np.nan_to_num(found, nan=9.0).min(axis=1) < 1e-5)).sum()) <= 10
