@@ -19,6 +19,7 @@ MODES = {
     "cloud": "points a second: kernel and its steps, generator, REST, viewer",
     "soak": "visitors who come, drag, draw and go, over and over",
     "siege": "all attacks at once beside visitors who drag, in turn with quiet minutes",
+    "attacks": "each attack of the siege alone beside visitors who drag",
 }
 
 
@@ -29,7 +30,7 @@ def main() -> int:
     parser.add_argument("--quick", action="store_true", help="seconds instead of minutes, to try it")
     parser.add_argument("--workers", type=int, default=1, help="processes of the service")
     parser.add_argument(
-        "--only", nargs="+", help="numbers of visitors, of points, of rounds; of rest its cases, such as fk"
+        "--only", nargs="+", help="numbers of visitors, of points, of rounds; of rest its cases, such as fk; of attacks their names, or parts"
     )
     parser.add_argument("--minutes", type=int, help="how long the siege lasts")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write everything measured to this file")
@@ -40,7 +41,7 @@ def main() -> int:
         parser.error("--only goes with one mode")
     for mode in MODES if arguments.mode == "all" else [arguments.mode]:
         only = [arguments.minutes] if mode == "siege" and arguments.minutes else arguments.only
-        if only and mode != "rest":
+        if only and mode not in ("rest", "attacks"):
             only = [int(value) for value in only]
         found[mode] = importlib.import_module(f"load.{mode}").run(arguments.quick, arguments.workers, only)
         failed |= bool(found[mode].get("left behind"))

@@ -289,12 +289,13 @@ ATTACKS = (
 )
 
 
-async def besiege(port: int, token: str, seconds: float) -> list[dict[str, object]]:
-    """All attacks at once for so long: what each has done."""
-    attackers = {attack.name: Attacker(port, token, f"127.0.1.{k + 1}") for k, attack in enumerate(ATTACKS)}
+async def besiege(port: int, token: str, seconds: float, names: list[str] | None = None) -> list[dict[str, object]]:
+    """All attacks at once, or those of these names, for so long: what each has done."""
+    chosen = [attack for attack in ATTACKS if names is None or attack.name in names]
+    attackers = {attack.name: Attacker(port, token, f"127.0.1.{k + 1}") for k, attack in enumerate(chosen)}
     tasks = [
         asyncio.create_task(_keep_on(attackers[attack.name], attack))
-        for attack in ATTACKS
+        for attack in chosen
         for _ in range(attack.clients)
     ]
     await asyncio.sleep(seconds)
@@ -324,9 +325,9 @@ async def _keep_on(attacker: Attacker, attack: Attack) -> None:
         await asyncio.sleep(attack.pause)
 
 
-def attack(port: int, token: str, seconds: float, report: Connection) -> None:
+def attack(port: int, token: str, seconds: float, report: Connection, names: list[str] | None = None) -> None:
     """A process of attackers, which ends by itself: sends what `besiege` returns."""
     os.nice(19)
     began = time.monotonic()
-    found = asyncio.run(besiege(port, token, seconds))
+    found = asyncio.run(besiege(port, token, seconds, names))
     report.send((time.monotonic() - began, found))

@@ -57,6 +57,12 @@ class Service:
         """Resident bytes of all processes: cheaper to find out than `usage`."""
         return sum(process.memory_info().rss for process in _family(self.pid))
 
+    def loop_seconds(self) -> float:
+        """Processor time that the thread of the event loop has spent; of one worker."""
+        return sum(
+            each.user_time + each.system_time for each in psutil.Process(self.pid).threads() if each.id == self.pid
+        )
+
     def seconds(self) -> float:
         """Processor time spent so far: cheaper to find out than `usage`."""
         return sum(_seconds(process) for process in _family(self.pid))

@@ -7,6 +7,8 @@ import json
 import multiprocessing
 import re
 import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -86,30 +88,45 @@ class Siege:
 
     async def run(self, rounds: int, attacked: float, settling: float, quiet: float) -> None:
         """Quiet at first, then so many rounds of an attack and a quiet time."""
+        await self.connect()
+        await self.phase("quiet", quiet)
+        for _ in range(rounds):
+            async with self.attack(attacked) as found:
+                await self.phase("attacked", attacked)
+            self._add_attacks(found)
+            await asyncio.sleep(settling)
+            await self.phase("quiet", quiet)
+        self.close()
+
+    async def connect(self) -> None:
+        """The visitors come, one after the other."""
         self._visitors = [Visitor(TOKEN) for _ in range(VISITORS)]
         for visitor in self._visitors:
             await visitor.connect(self.service.port)
         for visitor in self._visitors:
             await visitor.quiet()
-        await self._phase("quiet", quiet)
-        for _ in range(rounds):
-            await self._attacked(attacked)
-            await asyncio.sleep(settling)
-            await self._phase("quiet", quiet)
+
+    def close(self) -> None:
+        """The visitors leave."""
         for visitor in self._visitors:
             visitor.close()
 
-    async def _attacked(self, seconds: float) -> None:
+    @asynccontextmanager
+    async def attack(self, seconds: float, names: list[str] | None = None) -> AsyncIterator[list[dict[str, Any]]]:
+        """All attacks, or those of these names, for so long; what came of them is there after the context."""
         here, there = multiprocessing.Pipe(duplex=False)
         context = multiprocessing.get_context("spawn")
-        process = context.Process(target=attack, args=(self.service.port, TOKEN, seconds, there), daemon=True)
+        process = context.Process(
+            target=attack, args=(self.service.port, TOKEN, seconds, there, names), daemon=True
+        )
         process.start()
+        found: list[dict[str, Any]] = []
         try:
-            await self._phase("attacked", seconds)
+            yield found
             end = time.monotonic() + LONGEST
             while not here.poll() and time.monotonic() < end:
                 await asyncio.sleep(0.1)
-            self._add_attacks(here.recv()[1])
+            found += here.recv()[1]
         finally:
             process.kill()
             process.join()
@@ -121,7 +138,8 @@ class Siege:
         for row, more in zip(self.attacks, found, strict=True):
             row.update({name: row[name] + value for name, value in more.items() if name != "attack"})
 
-    async def _phase(self, name: str, seconds: float) -> None:
+    async def phase(self, name: str, seconds: float) -> Phase:
+        """All visitors drag for so long: what the well-behaved clients met."""
         phase = Phase(name)
         self.phases.append(phase)
         others = [asyncio.create_task(self._watch(phase)), asyncio.create_task(self._ask(phase))]
@@ -131,6 +149,7 @@ class Siege:
             task.cancel()
         await asyncio.gather(*others, return_exceptions=True)
         print(table("", [phase.row(len(self.phases))]), flush=True)
+        return phase
 
     async def _drag(self, phase: Phase, k: int, begin: float, seconds: float) -> None:
         visitor = self._visitors[k]
