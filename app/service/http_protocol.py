@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import selectors
+import socket
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, Final, cast
 
@@ -58,19 +59,26 @@ class GuardedConfig(uvicorn.Config):
     guard: Guard
 
     def get_loop_factory(self) -> Callable[[], asyncio.AbstractEventLoop] | None:
-        """asyncio's event loop, for which computations wait; another one if uvicorn finds one installed."""
+        """asyncio's event loop, for which computations wait. Others, as uvloop, do not tell when they sleep."""
         factory = super().get_loop_factory()
         return _courteous_loop if factory is asyncio.SelectorEventLoop else factory
 
 
 class _Selector(selectors.DefaultSelector):
-    """Counts its event loop among those for whom computations wait, except while the loop sleeps."""
+    """Counts its event loop among those for whom computations wait, except while the loop sleeps.
+
+    A loop with something to do does not sleep: if computations went on between two of its rounds, each round would
+    wait for the interpreter, and an event takes several rounds.
+    """
 
     def __init__(self) -> None:
         super().__init__()
         urgent.enter()
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
+        ready = super().select(0.0)
+        if ready or (timeout is not None and timeout <= 0.0):
+            return ready
         urgent.leave()
         try:
             return super().select(timeout)
@@ -126,6 +134,8 @@ class HttpProtocol(HttpToolsProtocol):
             return
         super().connection_made(transport)
         self._host = host
+        # Otherwise the body of a small answer waits for the client to acknowledge its head: 40 ms.
+        transport.get_extra_info("socket").setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.flow = _Flow(self, transport)
         self._outflow = Outflow(transport, self.guard.send_timeout)
         self._since = self._last = self.loop.time()

@@ -43,6 +43,7 @@ def server_config(app: FastAPI, settings: Settings, files: int | None = None) ->
     config = GuardedConfig(
         app,
         lifespan="on",
+        loop="asyncio",  # faster here than uvloop: see `http_protocol.GuardedConfig`
         log_level="warning",
         access_log=False,
         server_header=False,

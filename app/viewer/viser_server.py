@@ -57,7 +57,6 @@ class PortlessServer(infra.WebsockServer):
         self._ids = itertools.count()
         self.rights: dict[int, Rights] = {}  # of connected visitors, by client id
         self._open = 0  # connections
-        self._handling: set[asyncio.Task[None]] = set()
         self._notes = Notes(log)
         self._stopping: asyncio.Future[None]
         self._all_ended: asyncio.Event
@@ -137,15 +136,19 @@ class PortlessServer(infra.WebsockServer):
                 raise ConnectionEnded(1007, f"not a message of the viewer: {error!r:.80}") from error
             for handler in (self, client):
                 if type(message) in handler._incoming_handlers:
-                    task = self._loop.create_task(
-                        handler._handle_incoming_message(infra.ClientId(client.client_id), message)
-                    )
-                    self._handling.add(task)
-                    task.add_done_callback(self._handled)
+                    await self._handle(handler, infra.ClientId(client.client_id), message)
+            await asyncio.sleep(0)  # others come between the messages of a burst
 
-    def _handled(self, task: asyncio.Task[None]) -> None:
-        self._handling.discard(task)
-        if not task.cancelled() and (error := task.exception()) is not None:
+    async def _handle(
+        self, handler: infra.WebsockMessageHandler, number: infra.ClientId, message: infra.Message
+    ) -> None:
+        """At once: as a task of its own, as in viser, a drag would wait for more rounds of the event loop.
+
+        No handler waits for a later message: callbacks that may wait run in threads, or post to the inbox.
+        """
+        try:
+            await handler._handle_incoming_message(number, message)
+        except Exception as error:  # noqa: BLE001 - fields are converted without checks
             self._notes.note("unhandled", f"a message of a visitor could not be handled: {error!r:.200}")
 
 

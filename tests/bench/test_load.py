@@ -6,7 +6,7 @@ import asyncio
 from math import cos, isnan, sin
 
 import pytest
-from load import attackers, cloud, drag, rest, siege, soak, storm
+from load import attackers, attacks, cloud, drag, rest, siege, soak, storm
 from load.raw import Socket
 from load.service import Usage, serve
 from load.visitor import STEP, SWING, Visitor
@@ -112,6 +112,14 @@ def test_a_siege_counts_what_visitors_and_attackers_met(service, monkeypatch):
     report = siege.report(under, statuses | {"500": 1}, 0, 0, 1)
     assert "1 answers 5xx" in report["left behind"]
     assert not any("lost" in wrong for wrong in report["left behind"])
+
+
+def test_each_attack_is_measured_alone(service, monkeypatch):
+    monkeypatch.setattr(siege, "VISITORS", 2)
+    monkeypatch.setattr(attacks, "BEGINNING", 0.1)
+    (row,) = asyncio.run(attacks.measure(service, [["no HTTP"]], 1.0, 0.5))
+    assert row["attack"] == "no HTTP"
+    assert row["p95 ms"] > 0 < row["loop CPU %"] <= row["CPU %"]
 
 
 @pytest.mark.parametrize(

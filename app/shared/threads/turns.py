@@ -19,7 +19,7 @@ from app.shared.threads import background_threads
 SLICE = 0.01  # seconds of a turn before it is offered to others
 AGING = 0.2  # seconds of computing that one second of waiting makes up for
 STUCK = 0.1  # seconds without an offer, after which another thread runs too: kernels run without the interpreter
-LEAST, PATIENCE = 0.0005, 0.05  # seconds between two waits for what is urgent, and of each at most
+LEAST, PATIENCE = 0.0005, 0.2  # seconds between two waits for what is urgent, and of each at most
 MOST = min(4, background_threads())  # turns at a time
 
 

@@ -13,12 +13,13 @@ import httpx2
 import pytest
 import viser
 from attacks import ARM, GET, Victim, answer_to, closed, problem_in, victim
-from live_server import wait_for
+from fastapi import FastAPI
+from live_server import serve, wait_for
 
 from app.api.body import UploadMemory
 from app.api.problems import ProblemError
 from app.service.guard import Guard
-from app.service.http_protocol import MAX_HEAD, MAX_PIPELINE
+from app.service.http_protocol import MAX_HEAD, MAX_PIPELINE, HttpProtocol
 from app.shared.settings import Settings
 
 
@@ -107,6 +108,20 @@ def test_idle_connections_are_closed(service, sent):
     with service.connection() as connection:
         connection.sendall(sent)
         wait_for(lambda: closed(connection), 20)
+
+
+def test_answers_are_sent_at_once(monkeypatch):
+    """Else the body of each answer would wait until the client acknowledges its head."""
+    delayed = []
+    monkeypatch.setattr(Guard, "add", lambda _, connection, host: delayed.append(socket_of(connection)))
+    with serve(FastAPI()) as port, socket.create_connection(("127.0.0.1", port)):
+        wait_for(lambda: delayed)
+        assert delayed[0].getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+
+
+def socket_of(connection: HttpProtocol) -> socket.socket:
+    found: socket.socket = connection.transport.get_extra_info("socket")
+    return found
 
 
 def test_a_pause_between_two_requests_is_no_offence(service):

@@ -6,10 +6,13 @@ import threading
 import time
 
 import pytest
+from fastapi import FastAPI
 from live_server import wait_for
 
 from app.service import http_protocol
 from app.service.http_protocol import GuardedConfig
+from app.service.server import server_config
+from app.shared.settings import Settings
 from app.shared.threads import turns
 from app.shared.threads.turns import Turn, Turns, Urgent, offer
 
@@ -194,6 +197,29 @@ def test_computations_wait_for_a_busy_event_loop(urgent):
     timer.join()
     loop.close()
     assert seen == [1, 0]
+
+
+def test_computations_do_not_come_between_two_rounds_of_a_busy_event_loop(urgent, monkeypatch):
+    pauses = []
+    loop = http_protocol._courteous_loop()
+    monkeypatch.setattr(urgent, "leave", lambda: pauses.append(rounds))
+    rounds = 0
+
+    def one_more() -> None:
+        nonlocal rounds
+        rounds += 1
+        loop.call_soon(one_more) if rounds < 50 else loop.stop()
+
+    loop.call_soon(one_more)
+    loop.run_forever()
+    assert rounds == 50
+    assert not pauses
+    loop.close()
+
+
+def test_the_service_runs_on_the_loop_for_which_computations_wait():
+    config = server_config(FastAPI(), Settings())
+    assert config.get_loop_factory() is http_protocol._courteous_loop
 
 
 def test_outside_of_a_turn_an_offer_is_nothing(urgent):

@@ -49,7 +49,7 @@ class Visit:
         self._stays = stays
 
     async def receive(self) -> bytes:
-        await asyncio.sleep(0.02)  # viser handles each message in a task of its own
+        await asyncio.sleep(0.02)  # so that what the last message has caused is there
         if self._messages:
             return msgspec.msgpack.encode(self._messages.pop(0))
         if self._stays:

@@ -30,7 +30,9 @@ def main() -> int:
     parser.add_argument("--quick", action="store_true", help="seconds instead of minutes, to try it")
     parser.add_argument("--workers", type=int, default=1, help="processes of the service")
     parser.add_argument(
-        "--only", nargs="+", help="numbers of visitors, of points, of rounds; of rest its cases, such as fk; of attacks their names, or parts"
+        "--only",
+        nargs="+",
+        help="numbers of visitors, of points, of rounds; names of requests, of attacks",
     )
     parser.add_argument("--minutes", type=int, help="how long the siege lasts")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write everything measured to this file")

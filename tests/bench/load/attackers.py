@@ -289,7 +289,9 @@ ATTACKS = (
 )
 
 
-async def besiege(port: int, token: str, seconds: float, names: list[str] | None = None) -> list[dict[str, object]]:
+async def besiege(
+    port: int, token: str, seconds: float, names: list[str] | None = None
+) -> list[dict[str, object]]:
     """All attacks at once, or those of these names, for so long: what each has done."""
     chosen = [attack for attack in ATTACKS if names is None or attack.name in names]
     attackers = {attack.name: Attacker(port, token, f"127.0.1.{k + 1}") for k, attack in enumerate(chosen)}

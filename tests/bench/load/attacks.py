@@ -50,7 +50,9 @@ async def _phase(siege: Siege, name: str, seconds: float) -> dict[str, float]:
     }
 
 
-async def measure(service: Service, groups: list[list[str]], attacked: float, quiet: float) -> list[dict[str, Any]]:
+async def measure(
+    service: Service, groups: list[list[str]], attacked: float, quiet: float
+) -> list[dict[str, Any]]:
     """Each group of attacks at once, one group after the other."""
     siege = Siege(service)
     await siege.connect()
