@@ -3,27 +3,27 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Annotated, Literal
+from typing import Literal
 
-from fastapi import Body, Request, Response
+from fastapi import Request, Response
 from pydantic import Field
 from typing_extensions import TypedDict
 
 from app.api import schemas
+from app.api.arms.operation import operation
 from app.api.batches import Batch, one_or_all
 from app.api.body import versioned
+from app.api.problems import FieldError, invalid
 from app.api.schemas import (
     POST_REFUSALS,
     Configurations,
-    RobotId,
     example,
     refusals,
     reply,
-    robot_of,
     settings_of,
 )
-from app.api.work import computed
-from app.equations import Book, Equation, Symbol, book, typeset
+from app.api.work import compute_slots, computed
+from app.equations import Book, DerivationError, Equation, Symbol, book_later, typeset
 from app.equations.expression import Expression
 from app.shared.answers.document import documented
 from kin import Robot
@@ -31,6 +31,7 @@ from kin.transforms import Array
 
 router = versioned("robots")
 
+GOES_ON = "The derivation goes on: repeat the request later"
 ENTRIES, VALUE = 13, 240  # equations of an arm, and bytes of one's values, about
 
 EXAMPLES = {
@@ -157,20 +158,23 @@ class EquationValuesList(TypedDict):
     """One per configuration, in the same order."""
 
 
-@router.get(
-    "/robots/{robot_id}/equations",
+@operation(
+    router,
+    "equations",
+    method="GET",
+    sent="equations/formulas",
     summary="Equations of a robot",
     response_model=EquationsAnswer,
-    responses=refusals(404, 422, 500),
+    responses=refusals(404, 422, 500, 503),
 )
-def equations(request: Request, robot_id: RobotId) -> Response:
+async def equations(request: Request, robot: Robot) -> Response:
     """The tool's pose [n o a p] entry by entry, as MathML and LaTeX.
 
     For the arms of the source chapter: each of its equations as printed, and corrected where it is misprinted. For
     any other arm: a closed form derived from its DH table, checked against forward kinematics before it is shown.
     The first request for such an arm may take some seconds.
     """
-    found = book(robot_of(request, robot_id))
+    found = await _book(request, robot)
     return reply(
         EquationsAnswer(
             source=found.source,
@@ -190,23 +194,33 @@ class EquationsRequest(schemas.Body):
     )
 
 
-@router.post(
-    "/robots/{robot_id}/equations",
+@operation(
+    router,
+    "equations",
+    examples=EXAMPLES,
     summary="Values of a robot's equations",
     response_model=EquationValues | EquationValuesList,
     responses=POST_REFUSALS,
 )
-async def equation_values(
-    request: Request, robot_id: RobotId, body: Annotated[EquationsRequest, Body(openapi_examples=EXAMPLES)]
-) -> Response:
+async def equation_values(request: Request, robot: Robot, body: EquationsRequest) -> Response:
     """Values of every equation as printed and corrected (or derived), and of the product of the DH matrices.
 
     One configuration gets one answer; a list gets `{"results": [...]}` in the same order.
     """
-    robot = robot_of(request, robot_id)
+    found = await _book(request, robot)
     q, single = schemas.as_configurations(robot, body.q, settings_of(request))
     batch = Batch("q", len(q), single, VALUE * ENTRIES)
-    return await computed(request, partial(one_or_all, lambda some: _values(robot, q[some]), batch))
+    return await computed(request, partial(one_or_all, lambda some: _values(found, q[some]), batch))
+
+
+async def _book(request: Request, robot: Robot) -> Book:
+    """The equations of an arm; the request waits for them with a slot."""
+    work = compute_slots(request)
+    async with work.slot(request) as deadline:
+        try:
+            return await work.wait(book_later(robot), deadline, GOES_ON)
+        except DerivationError as error:
+            raise invalid(FieldError(field="robot", value=robot.id, expected=f"another arm: {error}")) from None
 
 
 def _equation(found: Book, equation: Equation) -> EquationAnswer:
@@ -243,9 +257,9 @@ def _symbol(symbol: Symbol) -> SymbolAnswer:
     }
 
 
-def _values(robot: Robot, q: Array) -> list[EquationValues]:
+def _values(found: Book, q: Array) -> list[EquationValues]:
     out: list[EquationValues] = [{"values": []} for _ in q]
-    for equation, values in book(robot).compare(q):
+    for equation, values in found.compare(q):
         printed = [None] * len(q) if values.printed is None else values.printed.tolist()
         numbers = (values.correct, values.dh, values.difference, values.turn)
         rows = zip(printed, *(column.tolist() for column in numbers), strict=True)

@@ -3,27 +3,27 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Annotated
 
-from fastapi import Body, Request, Response
+from fastapi import Request, Response
 from pydantic import Field
 from typing_extensions import TypedDict
 
 from app.api import schemas
+from app.api.arms.frames import FramesBody
+from app.api.arms.operation import operation
 from app.api.batches import Batch, one_or_all
 from app.api.body import versioned
 from app.api.schemas import (
     POST_REFUSALS,
     Configurations,
-    RobotId,
     example,
     is_warm,
-    robot_of,
     settings_of,
 )
 from app.api.work import Deadline, compute_slots, computed
 from app.shared.answers.document import documented
 from app.shared.answers.fk import FkAnswer, fk_answers
+from kin import Robot
 
 POSE, FRAME = 550, 500  # bytes of a pose and of a frame, about
 FEW = 16  # configurations that are answered sooner than a thread could be asked to
@@ -42,7 +42,7 @@ EXAMPLES = {
 }
 
 
-class FkRequest(schemas.Body):
+class FkRequest(FramesBody):
     """Which configurations to put the arm in."""
 
     q: Configurations = Field(
@@ -64,21 +64,20 @@ class FkAnswers(TypedDict):
     """One per configuration, in the same order."""
 
 
-@router.post(
-    "/robots/{robot_id}/fk",
+@operation(
+    router,
+    "fk",
+    examples=EXAMPLES,
     summary="Forward kinematics",
     response_model=FkAnswer | FkAnswers,
     responses=POST_REFUSALS,
 )
-async def forward_kinematics(
-    request: Request, robot_id: RobotId, body: Annotated[FkRequest, Body(openapi_examples=EXAMPLES)]
-) -> Response:
+async def forward_kinematics(request: Request, robot: Robot, body: FkRequest) -> Response:
     """Pose of the tool for joint values, as a 4×4 matrix and as position with quaternion.
 
     One configuration gets one answer; a list gets `{"results": [...]}` in the same order. Joint values outside the
     limits are answered too, with `in_limits` false.
     """
-    robot = robot_of(request, robot_id)
     q, single = schemas.as_configurations(robot, body.q, settings_of(request))
     batch = Batch("q", len(q), single, POSE + FRAME * len(robot.rows) * body.frames, "frames false")
     answer = partial(one_or_all, lambda some: fk_answers(robot, q[some], body.frames), batch)

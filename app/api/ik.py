@@ -7,11 +7,12 @@ from dataclasses import replace
 from functools import partial
 from typing import Annotated, Literal
 
-from fastapi import Body, Request, Response
+from fastapi import Request, Response
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 from typing_extensions import TypedDict
 
 from app.api import schemas
+from app.api.arms.operation import operation
 from app.api.batches import Batch, one_or_all
 from app.api.body import versioned
 from app.api.options import OptionsBody, Target, single_or_list
@@ -20,10 +21,8 @@ from app.api.schemas import (
     POST_REFUSALS,
     Configurations,
     Number,
-    RobotId,
     example,
     integral,
-    robot_of,
     settings_of,
 )
 from app.api.work import Deadline, computed
@@ -139,22 +138,22 @@ class IkAnswers(TypedDict):
     """One per target, in the same order."""
 
 
-@router.post(
-    "/robots/{robot_id}/ik",
+@operation(
+    router,
+    "ik",
+    examples=EXAMPLES,
     summary="Inverse kinematics",
     response_model=IkAnswer | IkAnswers,
     responses=POST_REFUSALS,
 )
-async def inverse_kinematics(
-    request: Request, robot_id: RobotId, body: Annotated[IkRequest, Body(openapi_examples=EXAMPLES)]
-) -> Response:
+async def inverse_kinematics(request: Request, robot: Robot, body: IkRequest) -> Response:
     """Every configuration that brings the tool to a target, nearest to the seed first, or why there is none.
 
     A target that cannot be reached is answered with 200: `status` and `cause` are codes, `details` are the numbers
     behind them, `reason` is a sentence, `closest` is the closest configuration. One target gets one answer; a list
     gets `{"results": [...]}` in the same order. Each solution's errors are measured by forward kinematics.
     """
-    return await computed(request, partial(_solve, robot_of(request, robot_id), body, settings_of(request)))
+    return await computed(request, partial(_solve, robot, body, settings_of(request)))
 
 
 def _solve(robot: Robot, body: IkRequest, settings: Settings, deadline: Deadline) -> Response:

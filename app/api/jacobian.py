@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Annotated, Literal
+from typing import Literal
 
-from fastapi import Body, Request, Response
+from fastapi import Request, Response
 from pydantic import Field
 from typing_extensions import TypedDict
 
 from app.api import schemas
+from app.api.arms.frames import FramesBody
+from app.api.arms.operation import operation
 from app.api.batches import Batch, one_or_all
 from app.api.body import versioned
-from app.api.schemas import POST_REFUSALS, Configurations, RobotId, example, robot_of, settings_of
+from app.api.schemas import POST_REFUSALS, Configurations, example, settings_of
 from app.api.work import computed
 from app.shared.answers.document import documented
 from app.shared.answers.jacobian import JacobianAnswer, jacobian_answers
+from kin import Robot
 
 router = versioned("kinematics")
 
@@ -28,7 +31,7 @@ EXAMPLES = {
 }
 
 
-class JacobianRequest(schemas.Body):
+class JacobianRequest(FramesBody):
     """Where to evaluate the Jacobian, and in which frame."""
 
     q: Configurations = Field(
@@ -48,20 +51,19 @@ class JacobianAnswers(TypedDict):
     """One per configuration, in the same order."""
 
 
-@router.post(
-    "/robots/{robot_id}/jacobian",
+@operation(
+    router,
+    "jacobian",
+    examples=EXAMPLES,
     summary="Jacobian and manipulability",
     response_model=JacobianAnswer | JacobianAnswers,
     responses=POST_REFUSALS,
 )
-async def geometric_jacobian(
-    request: Request, robot_id: RobotId, body: Annotated[JacobianRequest, Body(openapi_examples=EXAMPLES)]
-) -> Response:
+async def geometric_jacobian(request: Request, robot: Robot, body: JacobianRequest) -> Response:
     """The geometric 6×n Jacobian (linear rows first), its singular values and Yoshikawa's manipulability.
 
     One configuration gets one answer; a list gets `{"results": [...]}` in the same order.
     """
-    robot = robot_of(request, robot_id)
     q, single = schemas.as_configurations(robot, body.q, settings_of(request))
     batch = Batch("q", len(q), single, REST + ENTRY * 6 * robot.n)
     return await computed(

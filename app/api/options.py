@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import Discriminator, Field, Tag
 
 from app.api import schemas
+from app.api.arms.frames import FramesBody
 from app.api.problems import FieldError, from_input_error, invalid
 from app.api.schemas import Number, Vector3, Vector4, numbers
 from app.shared.settings import Settings
@@ -113,7 +114,7 @@ BranchNames = Annotated[
 ]
 
 
-class OptionsBody(schemas.Body):
+class OptionsBody(FramesBody):
     """Task, joint constraints, branch."""
 
     task: Task | None = Field(

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Annotated
 
-from fastapi import Body, Request, Response
+from fastapi import Request, Response
 from pydantic import Field
 
 from app.api import schemas
+from app.api.arms.operation import operation
 from app.api.body import versioned
 from app.api.options import OptionsBody, Target
 from app.api.problems import FieldError, invalid
-from app.api.schemas import POST_REFUSALS, Configuration, RobotId, example, reply, robot_of, settings_of
+from app.api.schemas import POST_REFUSALS, Configuration, example, reply, settings_of
 from app.api.work import Deadline, computed
 from app.shared.answers.path import PathAnswer, path_answer
 from app.shared.settings import Settings
@@ -67,22 +67,22 @@ class PathRequest(OptionsBody):
     )
 
 
-@router.post(
-    "/robots/{robot_id}/ik/path",
+@operation(
+    router,
+    "ik/path",
+    examples=EXAMPLES,
     summary="Inverse kinematics along a path",
     response_model=PathAnswer,
     responses=POST_REFUSALS,
 )
-async def path_inverse_kinematics(
-    request: Request, robot_id: RobotId, body: Annotated[PathRequest, Body(openapi_examples=EXAMPLES)]
-) -> Response:
+async def path_inverse_kinematics(request: Request, robot: Robot, body: PathRequest) -> Response:
     """One continuous joint path through all targets: as few jumps as possible, then as little motion as possible.
 
     Branches, whole turns and redundancy parameters are chosen for the path as a whole, so that no joint turns up
     to its limit where another start would have avoided it. Each remaining jump has its place, cause and numbers; a
     waypoint that cannot be reached is a gap, and the path holds the closest configuration there.
     """
-    return await computed(request, partial(_solve, robot_of(request, robot_id), body, settings_of(request)))
+    return await computed(request, partial(_solve, robot, body, settings_of(request)))
 
 
 def _solve(robot: Robot, body: PathRequest, settings: Settings, deadline: Deadline) -> Response:

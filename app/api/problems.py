@@ -188,12 +188,17 @@ async def _http_error(request: Request, error: Exception) -> Response:
 
 
 def _methods_at(request: Request) -> list[str]:
-    """Methods of an address: each may be a route of its own, and the route that rejects knows only one."""
-    taken: set[str] = set()
-    for route in request.app.routes:
-        if isinstance(route, Route) and route.matches(request.scope)[0] is not Match.NONE:
-            taken |= route.methods or set()
-    return sorted(taken)
+    """Methods of an address: each may be a route of its own, and the route that rejects knows only one.
+
+    An address that has a route without parameters is not taken for a robot's.
+    """
+    routes = [
+        route
+        for route in request.app.routes
+        if isinstance(route, Route) and route.matches(request.scope)[0] is not Match.NONE
+    ]
+    exact = [route for route in routes if not route.param_convertors]
+    return sorted(set[str]().union(*(route.methods or () for route in exact or routes)))
 
 
 async def _validation_error(request: Request, error: Exception) -> Response:

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
-from fastapi import Query, Request, Response
+from fastapi import Request, Response
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
+from app.api.arms.operation import operation
 from app.api.batches import Batch, held_json
 from app.api.body import versioned
 from app.api.problems import FieldError, invalid
-from app.api.schemas import RobotId, refusals, robot_of, settings_of
+from app.api.schemas import refusals, settings_of
 from app.api.work import ADVICE, TooSlowError, compute_slots
 from app.api.workspace.query import RegionQuery
 from app.shared.answers.capability import CapabilityMapAnswer, capability_map_answer
 from app.shared.clients import client_of
 from app.shared.maps import MapRequest, Maps, MapTimeError
+from kin import Robot
 
 router = versioned("workspace")
 
@@ -38,16 +40,18 @@ class CapabilityQuery(RegionQuery):
     approachable: bool = Field(False, description="Whether to list the possible directions of each voxel.")
 
 
-@router.get(
-    "/robots/{robot_id}/capability",
+@operation(
+    router,
+    "capability",
+    method="GET",
     summary="Capability map",
     response_model=CapabilityMapAnswer,
     responses=refusals(404, 413, 422, 500, 503),
 )
 async def capability(
     request: Request,
-    robot_id: RobotId,
-    query: Annotated[CapabilityQuery, Query()],
+    robot: Robot,
+    query: CapabilityQuery,
 ) -> Response:
     """For each reachable voxel of the workspace, the share of directions along which the tool can approach its
     centre inside the limits, and the largest manipulability there.
@@ -62,7 +66,6 @@ async def capability(
         raise invalid(
             wrong, hint="`kinboard capability` computes finer maps; the operator can raise KINBOARD_MAX_VOXELS."
         )
-    robot = robot_of(request, robot_id)
     wanted = MapRequest(robot, query.resolution, int(query.directions), query.constraints(robot))
     maps: Maps = request.app.state.maps
     work, client = compute_slots(request), client_of(request.scope)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from fastapi import Query, Request, Response
+from fastapi import Request, Response
 from pydantic import Field
 
+from app.api.arms.operation import operation
 from app.api.body import versioned
-from app.api.schemas import RobotId, refusals, robot_of, settings_of
+from app.api.schemas import refusals, settings_of
 from app.api.workspace.query import CloudQuery
 from app.api.workspace.streaming import ComputedResponse
 from app.exports.formats import FORMATS, encode, table_of
+from kin import Robot
 
 router = versioned("workspace")
 
@@ -34,8 +36,10 @@ class DownloadQuery(CloudQuery):
     )
 
 
-@router.get(
-    "/robots/{robot_id}/workspace",
+@operation(
+    router,
+    "workspace",
+    method="GET",
     summary="Point cloud of the workspace",
     response_class=Response,
     responses={
@@ -43,7 +47,7 @@ class DownloadQuery(CloudQuery):
         **refusals(404, 422, 500, 503),
     },
 )
-async def workspace(request: Request, robot_id: RobotId, query: Annotated[DownloadQuery, Query()]) -> Response:
+async def workspace(request: Request, robot: Robot, query: DownloadQuery) -> Response:
     """A cloud of tool points in the base frame, in metres, computed while it is sent.
 
     Equal requests get equal bytes, and a larger cloud begins with the points of a smaller one. Columns are x, y,
@@ -51,7 +55,6 @@ async def workspace(request: Request, robot_id: RobotId, query: Annotated[Downlo
     `KINCLOUD`, version (uint16), number of columns (uint16), offset of the first row (uint32), number of points
     (uint64), all little-endian, then the names of the columns, separated by commas and padded with spaces.
     """
-    robot = robot_of(request, robot_id)
     cloud = query.cloud(robot, settings_of(request))
     kind, table = FORMATS[query.format], table_of(cloud, query.q)
     headers = {

@@ -7,15 +7,16 @@ from dataclasses import replace
 from itertools import chain
 from typing import Annotated, NotRequired
 
-from fastapi import Body, Request, Response
+from fastapi import Request, Response
 from pydantic import Discriminator, Field, Tag
 from pydantic_core import to_json
 from typing_extensions import TypedDict
 
+from app.api.arms.operation import operation
 from app.api.body import versioned
 from app.api.options import OptionsBody, Target, single_or_list
 from app.api.problems import Problem, ProblemError
-from app.api.schemas import POST_REFUSALS, RobotId, example, reply, robot_of, settings_of
+from app.api.schemas import POST_REFUSALS, example, reply, settings_of
 from app.api.work import Deadline, DeadlineDep
 from app.api.workspace.streaming import ComputedResponse
 from app.shared.answers.document import documented
@@ -68,17 +69,19 @@ class ReachableAnswers(TypedDict):
     """Why results are missing: the time limit of the request was reached. Absent if all are there."""
 
 
-@router.post(
-    "/robots/{robot_id}/reachable",
+@operation(
+    router,
+    "reachable",
+    examples=EXAMPLES,
     summary="Reachability of targets",
     response_model=ReachableAnswer | ReachableAnswers,
     responses=POST_REFUSALS,
 )
 def reachable(
     request: Request,
-    robot_id: RobotId,
+    robot: Robot,
     deadline: DeadlineDep,
-    body: Annotated[ReachableRequest, Body(openapi_examples=EXAMPLES)],
+    body: ReachableRequest,
 ) -> Response:
     """Whether each target can be reached inside the limits; if not, why, by how much, and what comes closest.
 
@@ -86,7 +89,6 @@ def reachable(
     takes a tenth of a millisecond, others some milliseconds. The answer to a list is sent while it is computed,
     and the computation ends when the client leaves.
     """
-    robot = robot_of(request, robot_id)
     with deadline.turn:
         targets, single = body.resolve_all(body.target, settings_of(request))
         if single:

@@ -5,19 +5,20 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-from typing import Annotated
 
-from fastapi import Query, Request, Response
+from fastapi import Request, Response
 from pydantic import Field
 
+from app.api.arms.operation import operation
 from app.api.body import versioned
 from app.api.problems import FieldError, invalid, show
-from app.api.schemas import RobotId, refusals, reply, robot_of
+from app.api.schemas import refusals, reply
 from app.api.work import TooSlowError, busy, compute_slots
 from app.api.workspace.query import NUMBER, RegionQuery, number
 from app.shared.answers.workspace import WorkspaceAnswer, workspace_answer
 from app.shared.computations import TooManyPendingError
 from app.shared.summaries import Plane, Summaries
+from kin import Robot
 
 GOES_ON = "The computation goes on: repeat the request later, or request less"
 
@@ -55,20 +56,21 @@ class SummaryQuery(RegionQuery):
         return values[:3], values[3:]
 
 
-@router.get(
-    "/robots/{robot_id}/workspace/summary",
+@operation(
+    router,
+    "workspace/summary",
+    method="GET",
     summary="Size of the workspace",
     response_model=WorkspaceAnswer,
     responses=refusals(404, 422, 500, 503),
 )
-async def summary(request: Request, robot_id: RobotId, query: Annotated[SummaryQuery, Query()]) -> Response:
+async def summary(request: Request, robot: Robot, query: SummaryQuery) -> Response:
     """Bounding box, reach and holes, exact and with configurations; volume and surface with their errors.
 
     `section` adds the section with a half-plane through the axis of joint 1: closed curves and the arcs of their
     boundary; `plane` the section with any plane instead. Answers are cached for a while and shared. A request that
     is refused because it takes too long can be repeated: the computation goes on for as long again.
     """
-    robot = robot_of(request, robot_id)
     constraints = query.constraints(robot)
     plane = query.cut()
     if query.section and plane is None and robot.joints[0].kind != "revolute":

@@ -37,7 +37,7 @@ def test_every_operation_has_summary_description_and_documented_refusals(documen
                 assert list(response["content"]) == ["application/problem+json"]
                 schema = response["content"]["application/problem+json"]["schema"]
                 assert schema == {"$ref": "#/components/schemas/Problem"}
-    assert seen == 12
+    assert seen == 29
 
 
 def test_every_parameter_is_described_and_a_cloud_has_all_its_formats(document):
@@ -97,10 +97,13 @@ def test_every_example_request_works(client, document):
         for name, example in examples.items():
             response = client.post(path.replace("{robot_id}", "pioneer5"), json=example["value"])
             assert response.status_code == 200, f"{path} {name}: {response.text}"
+            tried += 1
+            if response.headers["content-type"] != "application/json":  # a cloud, a robot file
+                assert response.content
+                continue
             answer = response.json()
             for one in answer.get("results", [answer]):
                 if "status" in one:
                     expected = {"unreachable": "unreachable", "pose": "approximate"}.get(name, "solved")
                     assert one["status"] == expected, one["reason"]
-            tried += 1
-    assert tried >= 10
+    assert tried >= 30

@@ -235,7 +235,7 @@ def test_a_wrong_configuration(client, what, q, field, value, expected):
     ("what", "body", "field", "expected"),
     [
         ("fk", {}, "q", "a value"),
-        ("fk", {"q": Q, "frame": True}, "frame", "only the fields q, frames"),
+        ("fk", {"q": Q, "frame": True}, "frame", "only the fields base, tool, q, frames"),
         ("fk", {"q": Q, "frames": "yes"}, "frames", "a valid boolean"),
         ("jacobian", {"q": Q, "frame": "world"}, "frame", "'base' or 'tool'"),
         ("ik", {}, "target", "a value"),

@@ -1,0 +1,142 @@
+"""An arm that is sent along: the fields of a robot file as a JSON object."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import ConfigDict, Field, RootModel
+
+from app.api.problems import FieldError, ProblemError, invalid
+from kin import Robot, RobotFileError, robot_from_dict
+from kin.files.read import MAX_ROWS
+
+# What a file must state and an arm in a request need not.
+DEFAULTS = {"id": "sent", "name": "Sent arm", "source": "the request"}
+
+_TEXT = {"type": "string", "minLength": 1, "maxLength": 4000, "pattern": r"\S"}
+_NUMBER = {"type": "number", "exclusiveMinimum": -1e6, "exclusiveMaximum": 1e6}
+
+
+def _quantity(units: str, description: str) -> dict[str, Any]:
+    """A number in the unit of the file, or a text with a unit of its own."""
+    example = "1.5 rad" if "rad" in units else "0.13 m"
+    text = {"type": "string", "pattern": rf"^[0-9]{{1,5}}(\.[0-9]{{1,17}})? ({units})$", "examples": [example]}
+    return {"description": description, "anyOf": [_NUMBER, text]}
+
+
+def _items(item: dict[str, Any], count: int, description: str = "") -> dict[str, Any]:
+    schema = {"type": "array", "items": item, "minItems": count, "maxItems": count}
+    return schema | ({"description": description} if description else {})
+
+
+_ANGLE, _LENGTH = "rad|deg|°", "m|cm|mm"
+_ANY = _quantity(f"{_ANGLE}|{_LENGTH}", "A value in the units of this object, or a text with its unit.")
+_MATRIX = _items(_items(_ANY, 4), 4, "4×4 homogeneous transform, row by row; positions in the length unit.")
+_TRANSFORM: dict[str, Any] = {
+    "type": "object",
+    "additionalProperties": False,
+    "properties": {
+        "xyz": _items(_quantity(_LENGTH, "A length."), 3, "Translation in the length unit."),
+        "rpy": _items(
+            _quantity(_ANGLE, "An angle."), 3, "Roll, pitch, yaw in the angle unit: Rz(yaw) Ry(pitch) Rx(roll)."
+        ),
+        "matrix": _MATRIX,
+    },
+}
+_ROW: dict[str, Any] = {
+    "type": "object",
+    "additionalProperties": False,
+    "properties": {
+        "name": {"type": "string", "maxLength": 4000, "description": "Name of the row, different for each."},
+        "kind": {"enum": ["revolute", "prismatic", "fixed"], "description": "By default revolute."},
+        "theta": _quantity(_ANGLE, "Rotation about z, 0 by default."),
+        "d": _quantity(_LENGTH, "Translation along z, 0 by default."),
+        "a": _quantity(_LENGTH, "Translation along x, 0 by default."),
+        "alpha": _quantity(_ANGLE, "Rotation about x, 0 by default."),
+        "limits": {
+            "description": "[lower, upper]; by default ±180° or 0 to 1 m. `none`: an unlimited revolute joint.",
+            "anyOf": [_items(_ANY, 2), {"const": "none"}],
+        },
+        "velocity": {"description": "Largest speed, per second.", "anyOf": [_NUMBER, {"type": "string"}]},
+        "effort": {"description": "Largest torque or force in N·m or N.", **_NUMBER, "exclusiveMinimum": 0},
+    },
+}
+EXAMPLE: dict[str, Any] = {  # the table of pioneer5, so that the examples for it work here too
+    "convention": "standard",
+    "units": {"length": "mm", "angle": "deg"},
+    "rows": [
+        {"name": "rotating base", "d": 130, "a": 70, "alpha": -90, "limits": [0, 180]},
+        {"name": "rotating elbow", "a": 160, "limits": [0, 150]},
+        {"name": "pivoting elbow", "theta": -90, "alpha": -90, "limits": [0, 150]},
+        {"name": "rotating wrist", "d": 140, "alpha": 90, "limits": [0, 85]},
+        {"name": "pivoting wrist", "alpha": -90, "limits": [15, 45]},
+        {"name": "tool", "kind": "fixed", "d": 120},
+    ],
+    "home": {"q": [90, 30, 60, 30, 30]},
+}
+_SCHEMA: dict[str, Any] = {
+    "type": "object",
+    "description": "An arm as the fields of a robot file: a DH table with its units. `id`, `name` and `source` "
+    "are optional here.",
+    "additionalProperties": False,
+    "required": ["convention", "units", "rows"],
+    "properties": {
+        "id": {"type": "string", "pattern": "^[a-z0-9][a-z0-9-]{0,39}$", "description": "Short name."},
+        "name": {**_TEXT, "description": "Display name."},
+        "source": {**_TEXT, "description": "Source of the numbers."},
+        "description": {"type": "string", "maxLength": 4000, "description": "Short description of the arm."},
+        "convention": {
+            "enum": ["standard", "modified"],
+            "description": "standard: Rz(θ) Tz(d) Tx(a) Rx(α). modified (Craig): Rx(α) Tx(a) Rz(θ) Tz(d).",
+        },
+        "units": {
+            "type": "object",
+            "description": "The units of all numbers in this object.",
+            "additionalProperties": False,
+            "required": ["length", "angle"],
+            "properties": {
+                "length": {"enum": ["m", "cm", "mm"], "description": "Unit of lengths."},
+                "angle": {"enum": ["deg", "rad"], "description": "Unit of angles."},
+            },
+        },
+        "rows": {
+            "type": "array",
+            "minItems": 1,
+            "maxItems": MAX_ROWS,
+            "items": _ROW,
+            "description": "The DH rows from base to tool; at least one moves.",
+        },
+        "home": {
+            "type": "object",
+            "additionalProperties": False,
+            "required": ["q"],
+            "properties": {"q": {"type": "array", "items": _ANY, "description": "One value per moving joint."}},
+            "description": "The home configuration, inside the limits; chosen by the service if it is missing.",
+        },
+        "base": {**_TRANSFORM, "description": "Constant transform before the first row."},
+        "tool": {**_TRANSFORM, "description": "Constant transform after the last row."},
+    },
+}
+
+
+class RobotDescription(RootModel[dict[str, Any]]):
+    """An arm as the fields of a robot file; `robot` reads it and explains errors."""
+
+    model_config = ConfigDict(frozen=True, json_schema_extra=lambda schema: schema.update(_SCHEMA))
+
+    def robot(self) -> Robot:
+        """The arm; raises 422 naming the field."""
+        try:
+            return robot_from_dict({**DEFAULTS, **self.root}, "robot")
+        except RobotFileError as error:
+            raise invalid_file(error, "robot") from None
+
+
+def invalid_file(error: RobotFileError, prefix: str) -> ProblemError:
+    """422 for an error in a description or file that was sent."""
+    field = prefix if error.field in ("file", prefix) else f"{prefix}.{error.field}"
+    hint = "docs/robot-files.md lists the fields of a robot."
+    return invalid(FieldError(field=field, value=error.value, expected=error.expected), hint=hint)
+
+
+SENT = Field(description="The arm itself, as the fields of a robot file.")

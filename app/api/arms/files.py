@@ -1,0 +1,145 @@
+"""Arms as tables and files: what one is, the other convention, URDF in, files out."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from fastapi import Body, Request, Response
+from pydantic import Field
+
+from app.api import schemas
+from app.api.arms.description import invalid_file
+from app.api.arms.operation import operation
+from app.api.body import versioned
+from app.api.problems import from_input_error, invalid
+from app.api.schemas import POST_REFUSALS, example, refusals, reply
+from app.api.work import computed
+from app.exports.robots import FORMATS, robot_file
+from app.shared.answers.exchange import ConvertAnswer, ImportAnswer, convert_answer, import_answer
+from app.shared.answers.inspection import InspectionAnswer, inspect
+from kin import InputError, Robot, RobotFileError, UrdfRobot, read_urdf
+
+router = versioned("robots")
+
+_REFUSALS = refusals(404, 422, 500, 503)
+_IMPORT_REFUSALS = {status: text for status, text in POST_REFUSALS.items() if status != 404}
+_URDF = """<robot name="two links"><link name="base"/><link name="upper"/><link name="hand"/>
+<joint name="shoulder" type="continuous"><parent link="base"/><child link="upper"/><axis xyz="0 0 1"/></joint>
+<joint name="elbow" type="revolute"><parent link="upper"/><child link="hand"/><origin xyz="0.3 0 0"/>
+<axis xyz="0 0 1"/><limit lower="-2" upper="2" velocity="3" effort="40"/></joint></robot>"""
+IMPORT_EXAMPLES = {"one": example("Two links", {"urdf": _URDF, "tip": "hand"})}
+
+
+@operation(
+    router,
+    "inspect",
+    method="GET",
+    sent="robots/inspect",
+    summary="What an arm is",
+    response_model=InspectionAnswer,
+    responses=_REFUSALS,
+)
+async def inspect_robot(request: Request, robot: Robot) -> Response:
+    """How the joint axes lie, which solver the arm gets and why, its motions, and likely mistakes in its table."""
+    return await computed(request, lambda _: reply(inspect(robot)))
+
+
+class ConvertQuery(schemas.Body):
+    """The requested convention."""
+
+    convention: Literal["standard", "modified", "other"] = Field(
+        "other", description="The convention of the new table; other: the one that the arm does not have."
+    )
+
+
+@operation(
+    router,
+    "convert",
+    method="GET",
+    sent="robots/convert",
+    summary="The other DH convention",
+    response_model=ConvertAnswer,
+    responses=_REFUSALS,
+)
+async def convert_robot(request: Request, robot: Robot, query: ConvertQuery) -> Response:
+    """The same arm as a table in the other convention, with the base and tool transforms that this requires.
+
+    Joints, limits and poses are the same; `difference` is the proof.
+    """
+    wanted = query.convention
+    if wanted == "other":
+        wanted = "modified" if robot.convention == "standard" else "standard"
+    return await computed(request, lambda _: reply(convert_answer(robot, wanted)))
+
+
+class ImportRequest(schemas.Body):
+    """A URDF and the part of it that is the arm."""
+
+    urdf: str = Field(
+        description="The text of the URDF; xacro has to be expanded first.", min_length=1, max_length=8_000_000
+    )
+    base: str | None = Field(
+        None, description="The link the arm stands on; by default the root.", max_length=200, min_length=1
+    )
+    tip: str | None = Field(
+        None,
+        description="The link that is the tool. It may be left out if only one is possible.",
+        max_length=200,
+        min_length=1,
+    )
+
+
+@router.post("/robots/import", summary="Read a URDF", response_model=ImportAnswer, responses=_IMPORT_REFUSALS)
+async def import_robot(
+    request: Request, body: Annotated[ImportRequest, Body(openapi_examples=IMPORT_EXAMPLES)]
+) -> Response:
+    """A serial chain of revolute, continuous, prismatic and fixed joints of a URDF as a DH table, exactly.
+
+    Joint values, directions and limits are those of the URDF. The report proves it: the tool's poses are compared
+    with the product of the URDF's own transforms. If several tips are possible, the problem document lists them.
+    """
+    return await computed(request, lambda _: reply(import_answer(_read(body))))
+
+
+def _read(body: ImportRequest) -> UrdfRobot:
+    try:
+        if "<" not in body.urdf:  # it would be taken for the path of a file
+            raise RobotFileError("URDF", "file", body.urdf, "the text of a URDF")
+        return read_urdf(body.urdf, body.base, body.tip)
+    except RobotFileError as error:
+        raise invalid_file(error, "urdf") from None
+
+
+class ExportQuery(schemas.Body):
+    """The format of the file."""
+
+    format: Literal["toml", "urdf", "dh", "mdh"] = Field(
+        "toml", description="; ".join(f"{name}: {each.meaning}" for name, each in FORMATS.items()) + "."
+    )
+
+
+@operation(
+    router,
+    "export",
+    method="GET",
+    sent="robots/export",
+    summary="An arm as a file",
+    response_class=Response,
+    responses={
+        200: {
+            "description": "The file.",
+            "content": {each.media_type: {"schema": {"type": "string"}} for each in FORMATS.values()},
+        },
+        **_REFUSALS,
+    },
+)
+async def export_robot(request: Request, robot: Robot, query: ExportQuery) -> Response:
+    """The arm as a robot file in its own or another convention, or as URDF without bodies."""
+    kind = FORMATS[query.format]
+    try:
+        text = await computed(request, lambda _: robot_file(robot, query.format))
+    except InputError as error:
+        raise invalid(from_input_error(error)) from None
+    name = f"{robot.id}{kind.suffix}"
+    headers = {"content-disposition": f'attachment; filename="{name}"'}
+    return Response(text, media_type=kind.media_type, headers=headers)

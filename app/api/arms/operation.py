@@ -1,0 +1,144 @@
+"""One handler for two addresses: an arm of this service by its id, and an arm sent along.
+
+``@operation(router, "fk", …)`` makes of a handler ``(request, robot, body)`` the routes
+``POST /robots/{robot_id}/fk`` and ``POST /fk``; the body of the latter has a further field `robot`. A handler of a
+GET takes `query` instead of `body`: its second route is a POST with these parameters as fields.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from copy import copy
+from typing import Annotated, Any, get_type_hints
+
+from fastapi import APIRouter, Body, Query, Request
+from pydantic import BeforeValidator, Strict, create_model
+
+from app.api import schemas
+from app.api.arms.description import EXAMPLE, SENT, RobotDescription
+from app.api.arms.frames import FramesBody
+from app.api.schemas import POST_REFUSALS, RobotId, example, integral, robot_of
+from app.api.work import computed
+from kin import Robot
+
+Handler = Callable[..., Any]
+_STRICT: dict[Any, Any] = {
+    bool: Annotated[bool, Strict()],
+    int: Annotated[int, Strict(), BeforeValidator(integral)],
+}
+_SENT_ALONG = "The arm is sent along as `robot`, with the fields of a robot file."
+
+
+def operation(
+    router: APIRouter,
+    path: str,
+    *,
+    method: str = "POST",
+    sent: str = "",
+    examples: dict[str, Any] | None = None,
+    **route: Any,
+) -> Callable[[Handler], Handler]:
+    """Decorator: adds both routes of a handler, which is a coroutine or has a parameter `deadline`.
+
+    Args:
+        router: where they are added.
+        path: below ``/robots/{robot_id}/``, and by default of the second route.
+        method: of the first route.
+        sent: another path of the second route.
+        examples: request bodies for the arm pioneer5; the first is one of the second route as well.
+        route: further arguments of the routes; `responses` are those of the first one.
+    """
+    responses = route.pop("responses")
+
+    def add(handler: Handler) -> Handler:
+        hints = get_type_hints(handler, include_extras=True)
+        part = "query" if "query" in hints else "body"
+        model = hints.get(part)
+        others = {key: hint for key, hint in hints.items() if key not in ("request", "robot", part, "return")}
+        plain: dict[str, Any] = {"request": Request, "robot_id": RobotId, **others}
+        if model is not None:
+            plain[part] = Annotated[model, Query() if part == "query" else Body(openapi_examples=examples)]
+        url = f"/robots/{{robot_id}}/{path}"
+        router.add_api_route(url, _by_id(handler, plain), methods=[method], responses=responses, **route)
+
+        first = list((examples or {"one": example("An arm", {})}).items())[:1]
+        given: Any = {key: example(each["summary"], {"robot": EXAMPLE, **each["value"]}) for key, each in first}
+        body: Any = _with_robot(model, handler)
+        refusals = {status: text for status, text in {**POST_REFUSALS, **responses}.items() if status != 404}
+        endpoint = _of_sent(
+            handler,
+            {"request": Request, **others, "body": Annotated[body, Body(openapi_examples=given)]},
+            part if model else None,
+        )
+        more = {**route, "summary": f"{route['summary']} (arm sent along)"}
+        more["description"] = f"{inspect.getdoc(handler)}\n\n{_SENT_ALONG}"
+        router.add_api_route(f"/{sent or path}", endpoint, methods=["POST"], responses=refusals, **more)
+        return handler
+
+    return add
+
+
+def _by_id(handler: Handler, parameters: dict[str, Any]) -> Handler:
+    """The endpoint of an arm of this service."""
+
+    def prepared(given: dict[str, Any]) -> dict[str, Any]:
+        robot = robot_of(given["request"], given.pop("robot_id"))
+        return given | {"robot": _framed(robot, given.get("body"))}
+
+    async def later(**given: Any) -> Any:
+        return await handler(**prepared(given))
+
+    def at_once(**given: Any) -> Any:
+        return handler(**prepared(given))
+
+    return _endpoint(later if inspect.iscoroutinefunction(handler) else at_once, handler, "", parameters)
+
+
+def _of_sent(handler: Handler, parameters: dict[str, Any], part: str | None) -> Handler:
+    """The endpoint of an arm that is sent along; its table is read in a thread, in turn."""
+
+    def read(body: Any) -> Robot:
+        sent: RobotDescription = body.robot
+        return _framed(sent.robot(), body)
+
+    def prepared(given: dict[str, Any], robot: Robot) -> dict[str, Any]:
+        body = given.pop("body")
+        return given | {"robot": robot} | ({part: body} if part else {})
+
+    async def later(**given: Any) -> Any:
+        robot = await computed(given["request"], lambda _: read(given["body"]))
+        return await handler(**prepared(given, robot))
+
+    def at_once(**given: Any) -> Any:
+        with given["deadline"].turn:
+            robot = read(given["body"])
+        return handler(**prepared(given, robot))
+
+    return _endpoint(later if inspect.iscoroutinefunction(handler) else at_once, handler, "_sent", parameters)
+
+
+def _framed(robot: Robot, body: object) -> Robot:
+    return body.framed(robot) if isinstance(body, FramesBody) else robot
+
+
+def _endpoint(call: Handler, handler: Handler, suffix: str, parameters: dict[str, Any]) -> Handler:
+    """`call` with the name and documentation of the handler and these parameters, for FastAPI."""
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    signature = inspect.Signature([inspect.Parameter(n, keyword, annotation=a) for n, a in parameters.items()])
+    call.__name__, call.__doc__ = handler.__name__ + suffix, handler.__doc__
+    call.__signature__ = signature  # type: ignore[attr-defined]
+    return call
+
+
+def _with_robot(model: type[schemas.Body] | None, handler: Handler) -> type[schemas.Body]:
+    """The body with the field `robot`. In JSON, numbers and booleans are not texts as they are in a query."""
+    if model is None:
+        name, base, text = "".join(map(str.title, handler.__name__.split("_"))), schemas.Body, "An arm."
+    else:
+        name, base, text = model.__name__, model, f"{inspect.getdoc(model)} And the arm itself."
+    fields: dict[str, Any] = {"robot": (RobotDescription, SENT)}
+    for key, field in base.model_fields.items():
+        if field.annotation in _STRICT:
+            fields[key] = (_STRICT[field.annotation], copy(field))
+    return create_model(f"Sent{name}", __base__=base, __doc__=text, **fields)

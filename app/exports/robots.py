@@ -1,0 +1,39 @@
+"""Arms as files: robot files in either convention, and URDF."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from kin import Robot, convert, robot_to_toml, to_urdf
+
+
+@dataclass(frozen=True)
+class RobotFormat:
+    """A format of files that hold an arm.
+
+    Attributes:
+        meaning: what it is, for people.
+        suffix: end of the name of such a file.
+        media_type: of the file over HTTP.
+    """
+
+    meaning: str
+    suffix: str
+    media_type: str
+
+
+FORMATS = {
+    "toml": RobotFormat("a robot file", ".toml", "application/toml"),
+    "urdf": RobotFormat("URDF without bodies", ".urdf", "application/xml"),
+    "dh": RobotFormat("a robot file in the standard convention", "-standard.toml", "application/toml"),
+    "mdh": RobotFormat("a robot file in the modified convention", "-modified.toml", "application/toml"),
+}
+
+
+def robot_file(robot: Robot, name: str) -> str:
+    """The text of a file in one of `FORMATS`; raises `InputError` for an arm that the format cannot describe."""
+    if name == "urdf":
+        return to_urdf(robot)
+    if name == "toml":
+        return robot_to_toml(robot)
+    return robot_to_toml(convert(robot, "standard" if name == "dh" else "modified"))

@@ -1,0 +1,114 @@
+"""Answers that hold a whole arm: converted to the other convention, or read from a URDF."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from typing_extensions import TypedDict
+
+from app.shared.answers.document import documented
+from app.shared.answers.robots import RobotAnswer, robot_answer
+from kin import Robot, UrdfRobot, convert, robot_to_dict, robot_to_toml
+from kin.dh import SAMPLES, largest_difference
+from kin.robot import Convention
+
+
+@documented
+class ConvertAnswer(TypedDict):
+    """The same arm in the other convention, with the proof."""
+
+    robot: RobotAnswer
+    """The arm as a table in the requested convention."""
+    description: dict[str, Any]
+    """The same as the fields of a robot file, as other requests take it."""
+    toml: str
+    """The same as the text of a robot file."""
+    difference: float
+    """Largest difference of any entry of the tool's pose between the two tables, at random configurations."""
+    samples: int
+    """Number of these configurations."""
+
+
+@documented
+class TipAnswer(TypedDict):
+    """A link that can be the tip of an arm."""
+
+    link: str
+    """Name of the link."""
+    joints: int
+    """Number of moving joints between the root and the link."""
+
+
+@documented
+class UrdfReportAnswer(TypedDict):
+    """What became of a URDF."""
+
+    base: str
+    """The link the arm stands on."""
+    tip: str
+    """The link that is the tool."""
+    tips: list[TipAnswer]
+    """The links that could have been chosen as the tip, those with the most joints first."""
+    joints: list[str]
+    """The moving joints, in the order of q."""
+    merged: list[str]
+    """The fixed joints of the chain, which became part of its constant transforms."""
+    ignored: list[str]
+    """The joints that are no part of the chain."""
+    tilts: list[str]
+    """The fixed rows that hold the small angle between two almost parallel axes."""
+    notes: list[str]
+    """What was assumed, one sentence each."""
+    difference: float
+    """Largest difference of any entry of the tool's pose from the product of the URDF's transforms, at random
+    configurations."""
+    samples: int
+    """Number of these configurations."""
+
+
+@documented
+class ImportAnswer(TypedDict):
+    """An arm read from a URDF."""
+
+    robot: RobotAnswer
+    """The arm as a standard DH table."""
+    description: dict[str, Any]
+    """The same as the fields of a robot file, as other requests take it."""
+    toml: str
+    """The same as the text of a robot file."""
+    report: UrdfReportAnswer
+    """What became of the file, and the proof."""
+
+
+def convert_answer(robot: Robot, convention: Convention) -> ConvertAnswer:
+    """The arm as a table in this convention."""
+    other = convert(robot, convention)
+    return {
+        "robot": robot_answer(other),
+        "description": robot_to_dict(other),
+        "toml": robot_to_toml(other),
+        "difference": largest_difference(robot, other),
+        "samples": SAMPLES,
+    }
+
+
+def import_answer(found: UrdfRobot) -> ImportAnswer:
+    """The arm, and the report about its file."""
+    robot, report = found
+    return {
+        "robot": robot_answer(robot),
+        "description": robot_to_dict(robot),
+        "toml": robot_to_toml(robot),
+        "report": {
+            "base": report.base,
+            "tip": report.tip,
+            "tips": [{"link": tip.link, "joints": tip.joints} for tip in report.tips],
+            "joints": list(report.joints),
+            "merged": list(report.merged),
+            "ignored": list(report.ignored),
+            "tilts": list(report.tilts),
+            "notes": list(report.notes),
+            "difference": report.difference,
+            "samples": report.samples,
+        },
+    }

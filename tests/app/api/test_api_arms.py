@@ -1,0 +1,259 @@
+"""REST: arms that are sent along with a request, what an arm is, conversion, URDF, files."""
+
+from __future__ import annotations
+
+import gc
+import json
+import math
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pytest
+from arms import Draw
+from numba.core.dispatcher import Dispatcher
+
+import kin
+from app.api.arms.description import DEFAULTS, EXAMPLE
+
+FILES = Path(__file__).parents[2] / "data" / "urdf"
+PIONEER = kin.get_robot("pioneer5")
+Q = [1.2, 0.4, 0.9, 0.3, 0.6]
+POSE = {"position": [0.045, 0.191, -0.211], "approach": [-0.31, -0.164, -0.936]}
+TARGET = {"target": POSE}
+
+
+def post(client, path, body, status=200):
+    response = client.post(f"/api/v1/{path}", json=body)
+    assert response.status_code == status, response.text
+    kind = response.headers["content-type"]
+    return response.json() if "json" in kind and "ndjson" not in kind else response.text
+
+
+def test_the_example_is_the_pioneer_arm():
+    robot = kin.robot_from_dict({**DEFAULTS, **EXAMPLE})
+    assert (robot.rows, robot.home) == (PIONEER.rows, PIONEER.home)
+
+
+OPERATIONS = {
+    "fk": {"q": Q, "frames": True},
+    "jacobian": {"q": [Q, Q]},
+    "ik": TARGET,
+    "ik/path": {"targets": [{"position": [-0.03, 0.157, z]} for z in (-0.194, -0.2)]},
+    "reachable": {"target": [POSE, {"position": [2, 0, 0]}]},
+    "workspace": {"n": 50, "format": "csv", "q": True, "lock": ["1:0.5"]},
+    "workspace/summary": {"volume": False},
+    "capability": {"resolution": 5, "directions": "12"},
+    "robots/inspect": {},
+    "robots/convert": {},
+    "robots/export": {"format": "urdf"},
+}
+
+
+@pytest.mark.parametrize("path", OPERATIONS)
+def test_an_arm_sent_along_is_answered_as_one_of_the_service(client, path):
+    body = OPERATIONS[path]
+    sent = {"robot": {**EXAMPLE, "id": "pioneer5", "name": PIONEER.name, "source": PIONEER.source}}
+    sent["robot"]["description"] = PIONEER.description
+    name = path.removeprefix("robots/")
+    if path in ("fk", "jacobian", "ik", "ik/path", "reachable"):
+        expected = client.post(f"/api/v1/robots/pioneer5/{name}", json=body)
+    else:
+        expected = client.get(f"/api/v1/robots/pioneer5/{name}", params=body)
+    assert expected.status_code == 200, expected.text
+    answer = client.post(f"/api/v1/{path}", json={**body, **sent})
+    assert answer.status_code == 200, answer.text
+    assert answer.content == expected.content
+    assert answer.headers["content-type"] == expected.headers["content-type"]
+
+
+def test_equations_of_an_arm_sent_along(client):
+    robot = {**EXAMPLE, "rows": EXAMPLE["rows"][:2], "home": {"q": [90, 30]}}
+    found = post(client, "equations/formulas", {"robot": robot})
+    assert found["source"] == "derived"
+    values = post(client, "equations", {"robot": robot, "q": [0.5, 0.7]})["values"]
+    assert max(abs(value["difference"]) for value in values) < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "valid"),
+    [
+        ({"rows": [{"alpha": "π/2"}]}, "robot.rows[0].alpha", "finite number"),
+        ({"rows": [{}, {"kind": "helical"}]}, "robot.rows[1].kind", "prismatic"),
+        ({"rows": [{}] * 200}, "robot.rows", "1 to 32"),
+        ({"rows": [{"a": 1e9}]}, "robot.rows[0].a", "million"),
+        ({"rows": []}, "robot.rows", "1 to 32"),
+        ({"rows": [{"kind": "fixed"}]}, "robot.rows", "revolute or prismatic"),
+        ({"units": {"length": "mile", "angle": "deg"}}, "robot.units.length", "mm"),
+        ({"convention": "craig"}, "robot.convention", "modified"),
+        ({"colour": "red"}, "robot.colour", "convention"),
+        ({"home": {"q": [500, 0, 0, 0, 0]}}, "robot.home.q[0]", "inside the limits"),
+        ({"base": {"matrix": [[1]]}}, "robot.base.matrix", "four rows"),
+    ],
+)
+def test_an_error_in_a_sent_arm_names_the_field(client, change, field, valid):
+    problem = post(client, "fk", {"robot": {**EXAMPLE, **change}, "q": Q}, 422)
+    (error,) = problem["errors"]
+    assert error["field"] == field
+    assert valid in error["expected"]
+
+
+@pytest.mark.parametrize("robot", [None, 5, "ur5", [EXAMPLE]])
+def test_a_sent_arm_is_an_object(client, robot):
+    problem = post(client, "ik", {**TARGET, "robot": robot}, 422)
+    assert problem["errors"][0]["field"] == "robot"
+    assert post(client, "ik", TARGET, 422)["errors"][0]["field"] == "robot"
+
+
+def test_nan_in_a_sent_arm_is_refused(client):
+    body = json.dumps({"q": [0], "robot": {**EXAMPLE, "rows": [{"a": math.nan}]}})
+    response = client.post("/api/v1/fk", content=body, headers={"content-type": "application/json"})
+    assert response.status_code == 422
+    assert response.json()["errors"][0]["field"] == "robot.rows[0].a"
+
+
+def test_base_and_tool_frames(client):
+    tool, base = {"xyz": [0.0, 0.0, 0.1]}, {"xyz": [1.0, 2.0, 3.0], "rpy": [0.0, 0.0, math.pi / 2]}
+    plain = np.array(post(client, "robots/pioneer5/fk", {"q": Q})["pose"]["matrix"])
+    framed = post(client, "robots/pioneer5/fk", {"q": Q, "tool": tool, "base": base})["pose"]
+    T_base = np.array([[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1.0]])
+    T_tool = np.eye(4)
+    T_tool[2, 3] = 0.1
+    assert np.array(framed["matrix"]) == pytest.approx(T_base @ plain @ T_tool)
+    matrices = {"tool": {"matrix": T_tool.tolist()}, "base": {"matrix": T_base.tolist()}}
+    assert np.array(post(client, "robots/pioneer5/fk", {"q": Q, **matrices})["pose"]["matrix"]) == pytest.approx(
+        np.array(framed["matrix"])
+    )
+    target = {"matrix": framed["matrix"]}
+    for path, arm in (("robots/pioneer5/ik", {}), ("ik", {"robot": EXAMPLE})):
+        found = post(
+            client, path, {"target": target, "task": "approach", "tool": tool, "base": base, "q_seed": Q} | arm
+        )
+        assert found["status"] == "solved"
+        assert found["solutions"][0]["q"] == pytest.approx(Q, abs=1e-6)
+    wrong = {"matrix": np.diag([2.0, 1, 1, 1]).tolist()}
+    problem = post(client, "robots/pioneer5/fk", {"q": Q, "tool": wrong}, 422)
+    assert problem["errors"][0]["field"] == "tool.matrix rotation"
+    both = {"matrix": np.eye(4).tolist(), "xyz": [0.0, 0.0, 0.0]}
+    assert "one of the two" in post(client, "robots/pioneer5/ik", {**TARGET, "base": both}, 422)["detail"]
+
+
+def test_what_an_arm_is(client):
+    for robot in kin.builtin_robots().values():
+        found = client.get(f"/api/v1/robots/{robot.id}/inspect").json()
+        assert found["motions"] + found["redundancy"] == robot.n
+        assert not found["singular_at_home"]
+    straight = {**EXAMPLE, "rows": [{"a": 300}, {"a": 200}, {"a": 100}], "home": {"q": [0, 0, 0]}}
+    found = post(client, "robots/inspect", {"robot": straight})
+    assert (found["motions"], found["redundancy"]) == (3, 0)
+    assert found["parallel"] == [[0, 1, 2]]
+    assert found["singular_at_home"]
+    assert found["home_margin"] < 1e-6
+
+
+def test_conversion_with_proof(client):
+    found = client.get("/api/v1/robots/panda/convert").json()
+    assert found["robot"]["convention"] == "standard"
+    assert found["difference"] <= 1e-12
+    assert kin.robot_from_dict(found["description"]) == kin.convert(kin.get_robot("panda"), "standard")
+    again = post(client, "robots/convert", {"robot": found["description"], "convention": "modified"})
+    assert again["robot"]["rows"][3] == pytest.approx(client.get("/api/v1/robots/panda").json()["rows"][3])
+    same = post(client, "robots/convert", {"robot": found["description"], "convention": "standard"})
+    assert same["description"] == found["description"]
+
+
+def test_import_of_urdf(client):
+    text = (FILES / "panda.urdf").read_text(encoding="utf-8")
+    found = post(client, "robots/import", {"urdf": text, "tip": "panda_link8"})
+    assert found["report"]["difference"] <= 1e-12
+    assert found["report"]["tips"][0]["joints"] == 8
+    assert found["robot"]["n"] == 7
+    assert kin.parse_robot(found["toml"]) == kin.robot_from_dict(found["description"])
+    answer = post(client, "ik", {"robot": found["description"], "target": {"position": [0.4, 0.1, 0.5]}})
+    assert answer["status"] == "solved"
+    problem = post(client, "robots/import", {"urdf": text}, 422)
+    assert problem["errors"][0]["field"] == "urdf.tip"
+    assert "panda_leftfinger (8 joints)" in problem["detail"]
+    for urdf, field in (
+        ("/etc/passwd", "urdf"),
+        ("../../etc/passwd", "urdf"),
+        ("<robot", "urdf"),
+        ('<!DOCTYPE robot SYSTEM "file:///etc/passwd"><robot/>', "urdf.DOCTYPE"),
+    ):
+        problem = post(client, "robots/import", {"urdf": urdf}, 422)
+        assert problem["errors"][0]["field"] == field
+        assert "root:" not in str(problem)
+
+
+def test_export(client):
+    panda = kin.get_robot("panda")
+    for name, convention in (("toml", "modified"), ("mdh", "modified"), ("dh", "standard")):
+        response = client.get(f"/api/v1/robots/panda/export?format={name}")
+        assert response.headers["content-type"].startswith("application/toml")
+        assert response.headers["content-disposition"].endswith('.toml"')
+        assert kin.parse_robot(response.text) == kin.convert(panda, convention)
+    response = client.get("/api/v1/robots/panda/export?format=urdf")
+    assert response.headers["content-type"].startswith("application/xml")
+    assert kin.load_urdf(response.text).n == 7
+    assert client.get("/api/v1/robots/panda/export?format=dxf").status_code == 422
+
+
+# -- many arms -------------------------------------------------------------------------------------------------
+
+
+def arms(count):
+    """Descriptions of different arms: 2 to 7 joints, prismatic and fixed rows, both conventions."""
+    draw = Draw(3)
+    for k in range(count):
+        kinds = ["revolute"] * (2 + k % 6)
+        kinds[k % len(kinds)] = "prismatic" if k % 3 == 1 else "revolute"
+        if k % 4 == 2:
+            kinds.append("fixed")
+        rows = [
+            {"kind": kind, "theta": draw.angle(), "d": draw.length(), "a": draw.length(), "alpha": draw.angle()}
+            for kind in kinds
+        ]
+        units = {"length": "m", "angle": "rad"}
+        yield {"convention": "modified" if k % 2 else "standard", "units": units, "rows": rows}
+
+
+def ask(client, robot):
+    """What a visitor with an arm of their own asks."""
+    home = post(client, "robots/inspect", {"robot": robot})["robot"]["home"]
+    pose = post(client, "fk", {"robot": robot, "q": home})["pose"]
+    post(client, "jacobian", {"robot": robot, "q": home})
+    answer = post(client, "ik", {"robot": robot, "target": {"matrix": pose["matrix"]}, "q_seed": home})
+    assert answer["status"] in ("solved", "approximate")
+    post(client, "workspace", {"robot": robot, "n": 10})
+
+
+def signatures():
+    """How many signatures of kernels are compiled."""
+    return sum(len(each.signatures) for each in gc.get_objects() if isinstance(each, Dispatcher))
+
+
+def test_an_arm_sent_along_compiles_nothing(client):
+    """All kernels take any arm: what is compiled before the first one is enough."""
+    kin.warm_up()
+    kin.warm_up_rest()
+    before = signatures()
+    assert before > 10
+    for robot in arms(12):
+        ask(client, robot)
+    assert signatures() == before
+
+
+@pytest.mark.slow
+def test_arms_sent_along_do_not_fill_memory(client):
+    """A thousand different arms leave what the caches of a few hundred hold."""
+    many = list(arms(1400))
+    for robot in many[:400]:
+        ask(client, robot)
+    gc.collect()
+    tracemalloc.start()
+    for robot in many[400:]:
+        ask(client, robot)
+    gc.collect()
+    grown = tracemalloc.get_traced_memory()[0]
+    tracemalloc.stop()
+    assert grown < 30e6
