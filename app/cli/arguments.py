@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 UNITS_NOTE = "degrees and millimetres, or radians and metres with --rad"
-ROBOT_HELP = "id of the robot; `kinboard robots` lists them"
+ROBOT_HELP = "id of the robot (`kinboard robots` lists them), or a robot file (*.toml, *.urdf)"
 XYZ = ("X", "Y", "Z")
 
 
@@ -275,7 +275,35 @@ def add_check(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     parser = _command(
         commands, "check", "validate a robot file and describe the arm", parents.output, takes_robot=False
     )
-    parser.add_argument("file", metavar="FILE", help="robot file (*.toml)")
+    parser.add_argument("file", metavar="FILE", help="robot file (*.toml) or URDF (*.urdf)")
+    _add_links(parser)
+    return parser
+
+
+def add_import(commands: Any, parents: Parents) -> argparse.ArgumentParser:
+    """``kinboard import``."""
+    parser = _command(commands, "import", "read an arm from a URDF as a robot file", takes_robot=False)
+    parser.add_argument("file", metavar="FILE", help="URDF; xacro has to be expanded first")
+    _add_links(parser)
+    parser.add_argument("-o", "--output", metavar="FILE", help="write the robot file and print a report")
+    parser.add_argument("--json", action="store_true", help="print the arm and the report as JSON")
+    return parser
+
+
+def _add_links(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--base", metavar="LINK", help="link of the URDF that is the base (default: the root)")
+    parser.add_argument("--tip", metavar="LINK", help="link of the URDF that is the tool, if several are possible")
+
+
+def add_export(commands: Any, parents: Parents) -> argparse.ArgumentParser:
+    """``kinboard export``."""
+    parser = _command(commands, "export", "an arm as a robot file or URDF", parents.robots)
+    parser.add_argument(
+        "--format", choices=("toml", "urdf", "dh", "mdh"), default="toml",
+        help="toml: robot file (default); dh, mdh: the same in the standard or the modified convention; "
+        "urdf: URDF without bodies",
+    )  # fmt: skip
+    parser.add_argument("-o", "--output", metavar="FILE", help="write to this file (default: standard output)")
     return parser
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.cli.terminal import Notation, clean, joint_constraints, print_json, store_of, table
+from app.cli.terminal import Notation, clean, joint_constraints, print_json, robot_of, table
 from app.exports.capability import WRITERS
 from app.exports.progress import progress_bar
 from app.shared.answers.capability import CapabilityAnswer, capability_answer
@@ -20,7 +20,7 @@ from kin import CapabilityBlock, CapabilityMap, InputError, capability_grid, cap
 
 def run(arguments: Namespace) -> int:
     """Print the figures of the map, and write it to a file if one is named."""
-    robot = store_of(arguments).get(arguments.robot)
+    robot = robot_of(arguments)
     save = None if arguments.output is None else _saver(Path(arguments.output))
     constraints = joint_constraints(robot, arguments)
     voxel = arguments.voxel

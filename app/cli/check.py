@@ -8,16 +8,25 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
+from app.cli.files import report_lines
 from app.cli.terminal import Notation, print_json, table
 from app.shared.answers.inspection import InspectionAnswer, inspect
-from kin import builtin_robots, load_robot
+from kin import InputError, builtin_robots, load_robot, read_urdf
 from kin.files.builtin import BUILTIN
 
 
 def run(arguments: Namespace) -> int:
     """Describe the arm of a robot file."""
     path = Path(arguments.file)
-    robot = load_robot(path)
+    lines: list[str] = []
+    if path.suffix == ".urdf":
+        robot, report = read_urdf(path, arguments.base, arguments.tip)
+        lines = ["", *report_lines(report)]
+    else:
+        robot = load_robot(path)
+        for option, link in (("--base", arguments.base), ("--tip", arguments.tip)):
+            if link is not None:
+                raise InputError(option, link, "no link: only a URDF has links")
     answer = inspect(robot, robot.id in builtin_robots() and path.resolve().parent != BUILTIN.resolve())
     if arguments.json:
         return print_json(answer)
@@ -30,7 +39,7 @@ def run(arguments: Namespace) -> int:
         )
     ]
     print(table(["", "joint", "kind", "lower", "upper", "home"], rows) + "\n")
-    for line in _about(answer, units):
+    for line in [*_about(answer, units), *lines]:
         print(line)
     return 0
 

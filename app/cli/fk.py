@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from app.cli.terminal import Notation, clean, configuration, print_json, store_of, table
+from app.cli.terminal import Notation, clean, configuration, print_json, robot_of, table
 from app.shared.answers.fk import fk_answers
 
 
 def run(arguments: Namespace) -> int:
     """Print the pose of the tool."""
-    robot = store_of(arguments).get(arguments.robot)
+    robot = robot_of(arguments)
     q = configuration(robot, arguments.q, "q", arguments.rad)
     answer = fk_answers(robot, q[None], arguments.frames)[0]
     if arguments.json:

@@ -8,7 +8,7 @@ from argparse import Namespace
 
 import numpy as np
 
-from app.cli.terminal import Notation, configuration, joint_constraints, print_json, store_of, table
+from app.cli.terminal import Notation, configuration, joint_constraints, print_json, robot_of, table
 from app.shared.answers.ik import Blocked, IkAnswer, Solution, ik_answer
 from kin import IKOptions, InputError, Task
 from kin.ik import solve
@@ -19,7 +19,7 @@ from kin.units import Units
 
 def run(arguments: Namespace) -> int:
     """Print the solutions; 1 if there is no exact one."""
-    robot = store_of(arguments).get(arguments.robot)
+    robot = robot_of(arguments)
     angle, length = (1.0, 1.0) if arguments.rad else (math.pi / 180, 1e-3)
     T = from_position_wxyz([x * length for x in arguments.position], arguments.wxyz)
     if arguments.approach is not None:

@@ -27,7 +27,8 @@ EPILOG = """examples:
   kinboard ik pioneer5 --position 45 191 -211 --approach -0.31 -0.164 -0.936
   kinboard robots pioneer5 --json
   kinboard workspace pioneer5 -n 1e6 -o cloud.ply
-  kinboard check my-arm.toml"""
+  kinboard check my-arm.toml
+  kinboard import arm.urdf --tip tool0 -o my-arm.toml"""
 
 Run = Callable[[argparse.Namespace], int]
 
@@ -162,6 +163,18 @@ def _load_check() -> Run:
     return run
 
 
+def _load_import() -> Run:
+    from app.cli.files import run_import
+
+    return run_import
+
+
+def _load_export() -> Run:
+    from app.cli.files import run_export
+
+    return run_export
+
+
 def _load_capability() -> Run:
     from app.cli.capability import run
 
@@ -177,4 +190,6 @@ COMMANDS = (
     Command(declare.add_bench, _load_bench),
     Command(declare.add_check, _load_check, interpreted=True),
     Command(declare.add_capability, _load_capability),
+    Command(declare.add_import, _load_import, interpreted=True),
+    Command(declare.add_export, _load_export, interpreted=True),
 )

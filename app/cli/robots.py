@@ -4,22 +4,21 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from app.cli.terminal import Notation, clean, print_json, store_of, table
+from app.cli.terminal import Notation, clean, print_json, robot_of, store_of, table
 from app.shared.answers.robots import RobotAnswer, robot_answer
 
 
 def run(arguments: Namespace) -> int:
     """List all robots, or describe one."""
-    store = store_of(arguments)
     if arguments.robot is not None:
-        robot = store.get(arguments.robot)
+        robot = robot_of(arguments)
         answer = robot_answer(robot)
         if arguments.json:
             return print_json(answer)
         print(f"{robot.name} ({robot.id})\n{robot.description}\n{robot.source}\n")
         print(_dh_table(answer, Notation(robot, arguments.rad)))
         return 0
-    answers = [robot_answer(robot) for robot in store.robots]
+    answers = [robot_answer(robot) for robot in store_of(arguments).robots]
     if arguments.json:
         return print_json({"robots": answers})
     rows = [

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from app.shared.store import Store
-from kin import InputError, JointConstraints, Robot
+from kin import InputError, JointConstraints, Robot, load_robot, load_urdf
 from kin.transforms import Array
 
 
@@ -23,6 +23,16 @@ def store_of(arguments: Namespace) -> Store:
     """The built-in robots and those of the folder named by ``--robots`` or KINBOARD_ROBOTS."""
     folder = arguments.robots or os.environ.get("KINBOARD_ROBOTS")
     return Store(Path(folder) if folder else None)
+
+
+def robot_of(arguments: Namespace) -> Robot:
+    """The robot of the argument ``ROBOT``: an id, or the path of a file."""
+    named = arguments.robot
+    if Path(named).suffix == ".urdf":
+        return load_urdf(Path(named))
+    if Path(named).suffix == ".toml":
+        return load_robot(named)
+    return store_of(arguments).get(named)
 
 
 def joint_constraints(robot: Robot, arguments: Namespace) -> JointConstraints:
@@ -78,7 +88,9 @@ class Notation:
         return clean(value, 6) if self.rad else clean(value * 1e3, 3)
 
     def joint(self, index: int, value: float) -> str:
-        """The value of a joint."""
+        """The value of a joint; "none" for a limit that it does not have."""
+        if math.isinf(value):
+            return "none"
         return self.angle(value) if self._revolute[index] else f"{self.length(value)} {self.of_length}"
 
 

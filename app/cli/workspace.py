@@ -8,7 +8,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from app.cli.terminal import Notation, joint_constraints, print_json, store_of, table
+from app.cli.terminal import Notation, joint_constraints, print_json, robot_of, table
 from app.exports.formats import FORMATS
 from app.exports.picture import draw
 from app.exports.save import opened, reading, save
@@ -21,7 +21,7 @@ _INTERRUPTED = 130  # exit code that shells expect after Ctrl-C
 
 def run(arguments: Namespace) -> int:
     """Print the sizes, or write the files that are named."""
-    robot = store_of(arguments).get(arguments.robot)
+    robot = robot_of(arguments)
     constraints = joint_constraints(robot, arguments)
     files = (
         (arguments.output, _cloud_writer),

@@ -138,8 +138,8 @@ def _odd_axes(robot: Robot, between: tuple[Pair, ...]) -> list[str]:
             found.append(f"Joints {here} and {there} turn about the same line: only their sum moves the tool.")
         elif pair.almost:
             found.append(
-                f"The axes of joints {here} and {there} are almost {pair.almost}: a closed form needs "
-                "exact values; give the table with more digits."
+                f"The axes of joints {here} and {there} are almost {pair.almost}: if they should be so exactly, "
+                "give the table with more digits."
             )
     return found + [
         f'The fixed row "{row.name}" changes nothing.'

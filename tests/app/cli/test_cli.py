@@ -462,6 +462,70 @@ def test_check_refuses_a_bad_file_as_everywhere(capsys, tmp_path):
     assert run(capsys, "check", tmp_path / "none.toml")[0] == 2
 
 
+# -- import, export --------------------------------------------------------------------------------------------
+
+URDF = ROOT / "tests" / "data" / "urdf"
+
+
+def test_import_prints_or_writes_a_robot_file(capsys, tmp_path):
+    panda = URDF / "panda.urdf"
+    code, out, _ = run(capsys, "import", panda, "--tip", "panda_link8")
+    assert code == 0
+    robot = kin.parse_robot(out)
+    assert robot == kin.load_urdf(panda, tip="panda_link8")
+    file = tmp_path / "panda.toml"
+    code, out, _ = run(capsys, "import", panda, "--tip", "panda_link8", "--base", "panda_link0", "-o", file)
+    assert code == 0
+    assert kin.load_robot(file).rows == robot.rows
+    assert "links       panda_link0 to panda_link8" in out.splitlines()
+    got = answer(capsys, "import", panda, "--tip", "panda_link8")
+    assert got["report"]["difference"] <= 1e-12
+    assert got["robot"]["n"] == 7
+    # The file stands for the robot in other commands.
+    code, out, _ = run(capsys, "fk", file, *[0] * 7, "--json")
+    assert json.loads(out)["pose"]["position"] == pytest.approx([0.088, 0, 0.926], abs=1e-12)
+
+
+def test_import_offers_the_tips(capsys, tmp_path):
+    code, out, err = run(capsys, "import", URDF / "ur5.urdf")
+    assert (code, out) == (2, "")
+    assert "one of ee_link (6 joints), tool0 (6 joints)" in err
+    assert run(capsys, "fk", URDF / "ur5.urdf", *[0] * 6)[2] == err
+    code, _, err = run(capsys, "import", URDF / "ur5.urdf", "--tip", "tool0", "-o", tmp_path / "no" / "file.toml")
+    assert code == 2
+    assert "--output" in err
+
+
+@pytest.mark.parametrize("form", ["toml", "dh", "mdh", "urdf"])
+def test_export_in_every_format(capsys, tmp_path, form):
+    code, out, _ = run(capsys, "export", "puma560", "--format", form)
+    assert code == 0
+    robot = kin.load_urdf(out) if form == "urdf" else kin.parse_robot(out)
+    assert robot.convention == ("modified" if form == "mdh" else "standard")
+    q = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
+    assert kin.fk(robot, q) == pytest.approx(kin.fk(kin.get_robot("puma560"), q), abs=1e-12)
+    file = tmp_path / f"arm.{'urdf' if form == 'urdf' else 'toml'}"
+    assert run(capsys, "export", "puma560", "--format", form, "-o", file)[1].startswith(f"{file}: ")
+    assert file.read_text(encoding="utf-8") == out
+    assert run(capsys, "robots", file)[0] == 0
+    assert run(capsys, "check", file)[0] == 0
+
+
+def test_check_of_a_urdf(capsys, tmp_path):
+    code, out, _ = run(capsys, "check", URDF / "ur5.urdf", "--tip", "ee_link")
+    assert code == 0
+    assert "joints 2 to 4: parallel axes" in out.splitlines()
+    assert re.search("^left out .*wrist_3_link-tool0_fixed_joint", out, re.M)
+    spinning = (URDF / "ur5.urdf").read_text(encoding="utf-8").replace('"revolute"', '"continuous"')
+    (tmp_path / "free.urdf").write_text(spinning, encoding="utf-8")
+    code, out, _ = run(capsys, "check", tmp_path / "free.urdf", "--tip", "ee_link")
+    assert re.search(r"^1 +shoulder_pan_joint +revolute +none +none ", out, re.M)
+    file = ROOT / "kin" / "robots" / "ur5.toml"
+    code, _, err = run(capsys, "check", file, "--tip", "ee_link")
+    assert code == 2
+    assert "only a URDF has links" in err
+
+
 # -- workspace -------------------------------------------------------------------------------------------------
 
 
