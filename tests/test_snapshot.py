@@ -47,7 +47,7 @@ TIED = {"redundant7: beyond a stop", "stanford: in front, tool down"}
 VOLATILE = {"version", "pid", "date", "x-request-id", "content-length"}  # fields that may change at any time
 HEADERS = ("content-type", "content-disposition", "x-cloud-count", "x-cloud-columns", "allow", "retry-after")
 WIDTH = 115
-UNTIL = 20  # seconds a process of its own may take
+UNTIL = 60  # seconds a process of its own may take
 
 
 # -- the parts of the tables -----------------------------------------------------------------------------------

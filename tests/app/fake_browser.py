@@ -18,6 +18,7 @@ from app.viewer.panel.script import LABEL
 from kin.transforms import from_position_wxyz, wxyz_from_rotation
 
 ANSWER = 1.5  # s until a message is answered on a busy machine
+PATIENCE = 30.0  # s until something that must happen has happened, on a machine that does much else
 
 
 class FakeBrowser:
@@ -201,7 +202,7 @@ class FakeBrowser:
 
     # Time
 
-    def wait(self, until: Callable[[], bool], timeout: float = 10.0) -> None:
+    def wait(self, until: Callable[[], bool], timeout: float = PATIENCE) -> None:
         """Read messages until a condition holds; fails after `timeout` seconds."""
         end = time.monotonic() + timeout
         while not until():
@@ -209,7 +210,7 @@ class FakeBrowser:
             assert left > 0, f"not seen within {timeout} s; page shows: {self.html[:600]}"
             self._read(left)
 
-    def settle(self, quiet: float = 0.3, timeout: float = 10.0) -> None:
+    def settle(self, quiet: float = 0.3, timeout: float = PATIENCE) -> None:
         """Read messages until none arrives for `quiet` seconds; the first answer may take longer."""
         end = time.monotonic() + timeout
         self._owed, patience = False, ANSWER if self._owed else quiet
