@@ -32,6 +32,7 @@ from app.shared.metrics import SOLVE_SECONDS
 from app.shared.settings import Settings
 from kin import IKOptions, Robot, Task
 from kin.ik import branch_names, solve
+from kin.ik.options import LEAST_TOLERANCE, MOST_METRES, MOST_RADIANS
 from kin.transforms import Array
 
 router = versioned("kinematics")
@@ -117,6 +118,22 @@ class IkRequest(OptionsBody):
         "auto", description="numeric: descend from many starts, even where the arm has a closed form."
     )
 
+    position_tolerance: float | None = Field(
+        None,
+        ge=LEAST_TOLERANCE,
+        le=MOST_METRES,
+        strict=True,
+        description="Error of the tool's point that counts as none, in metres. By default 1e-9, or what the "
+        "digits of a `matrix` allow whose rotation had to be made orthonormal.",
+    )
+    rotation_tolerance: float | None = Field(
+        None,
+        ge=LEAST_TOLERANCE,
+        le=MOST_RADIANS,
+        strict=True,
+        description="The same for the rotation error, in radians.",
+    )
+
     def options(self, task: Task) -> IKOptions:
         """These fields as options of the core."""
         return replace(
@@ -127,6 +144,8 @@ class IkRequest(OptionsBody):
             max_solutions=self.max_solutions,
             redundancy=self.redundancy,
             solver=self.solver,
+            position_tolerance=self.position_tolerance,
+            rotation_tolerance=self.rotation_tolerance,
         )
 
 

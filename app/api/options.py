@@ -19,7 +19,9 @@ from app.api.schemas import Number, Vector3, Vector4, numbers
 from app.shared.settings import Settings
 from app.shared.threads.turns import offer
 from kin import IKOptions, InputError, JointConstraints, Task
-from kin.transforms import Array, as_transform, frame_from_approach, from_position_wxyz
+from kin.ik.problem import read_pose
+from kin.solvers.contract import POSE
+from kin.transforms import Array, frame_from_approach, from_position_wxyz
 
 AGREEMENT = 1e-6  # metres, and matrix entries
 FORMS = {
@@ -83,14 +85,16 @@ class Target(schemas.Body):
             if self.approach is not None:
                 T[:3, :3] = frame_from_approach(self.approach)
             return T
-        T = as_transform(self.matrix, f"{field}.matrix")
+        # As it was sent, so that its digits tell how closely it can be met.
+        T, error = np.array(self.matrix), read_pose(self.matrix, POSE, f"{field}.matrix", always=True)[1]
+        agreement = max(AGREEMENT, 2.0 * error)
         if self.position is not None and np.abs(T[:3, 3] - self.position).max() > AGREEMENT:
             raise _wrong(
                 f"{field}.position", str(self.position), "the position the matrix has, or only one of them"
             )
         if self.wxyz is not None:
             R = from_position_wxyz([0.0, 0.0, 0.0], self.wxyz)[:3, :3]
-            if np.abs(T[:3, :3] - R).max() > AGREEMENT:
+            if np.abs(T[:3, :3] - R).max() > agreement:
                 raise _wrong(f"{field}.wxyz", str(self.wxyz), "the rotation the matrix has, or only one of them")
         return T
 

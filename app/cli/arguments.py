@@ -165,6 +165,14 @@ def add_ik(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         "--solver", choices=("auto", "numeric"), default="auto",
         help="numeric: search from many starts, even if the arm has a closed form",
     )  # fmt: skip
+    parser.add_argument(
+        "--position-tolerance", type=number, metavar="X",
+        help="error of the point that counts as none, in millimetres (--rad: metres); default 1e-9 m",
+    )  # fmt: skip
+    parser.add_argument(
+        "--rotation-tolerance", type=number, metavar="A",
+        help="rotation error that counts as none, in degrees (--rad: radians); default 1e-9 rad",
+    )  # fmt: skip
     parser.add_argument("--all", action="store_true", help="print all solutions, not only the best")
     parser.add_argument(
         "--images", choices=("nearest", "all"), default="nearest",

@@ -38,6 +38,8 @@ def run(arguments: Namespace) -> int:
         redundancy=_redundancy(arguments, angle),
         max_solutions=None if arguments.all else 1,
         solver=arguments.solver,
+        position_tolerance=_scaled(arguments.position_tolerance, length),
+        rotation_tolerance=_scaled(arguments.rotation_tolerance, angle),
     )
     result = solve(robot, T, options, q_seed)
     answer = ik_answer(result)
@@ -49,6 +51,10 @@ def run(arguments: Namespace) -> int:
         if not arguments.rad and np.abs(T[:3, 3]).max() < 5e-3:
             print("note: --position is in millimetres; --rad makes it metres", file=sys.stderr)
     return 0 if answer["status"] == "solved" else 1
+
+
+def _scaled(value: float | None, unit: float) -> float | None:
+    return None if value is None else value * unit
 
 
 def _print(answer: IkAnswer, units: Notation) -> None:

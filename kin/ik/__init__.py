@@ -65,6 +65,8 @@ def solve_ik(
     redundancy: float | Mapping[str, float] | None = None,
     max_solutions: int | None = None,
     solver: Solver = "auto",
+    position_tolerance: float | None = None,
+    rotation_tolerance: float | None = None,
 ) -> IKResult:
     """All configurations that bring the tool to `target`, or why there are none.
 
@@ -76,13 +78,16 @@ def solve_ik(
         q_seed: ``(n,)`` configuration to stay near; the home pose by default.
         limits: n pairs (lower, upper) inside the robot's own limits, None for a joint that keeps its own.
         locked: n joint values, None for a joint that may move.
-        task, mask, mask_frame, respect_limits, branch, images, prefer, redundancy, max_solutions, solver: as in
-            `kin.IKOptions`.
+        task, mask, mask_frame, respect_limits, branch, images, prefer, redundancy, max_solutions, solver,
+            position_tolerance, rotation_tolerance: as in `kin.IKOptions`.
 
     Raises:
         InputError: a malformed target, seed or option. An unreachable target is not an error.
     """
-    plain = (task, mask_frame, respect_limits, images, prefer, max_solutions, solver)
+    plain = (
+        task, mask_frame, respect_limits, images, prefer, max_solutions, solver, position_tolerance,
+        rotation_tolerance,
+    )  # fmt: skip
     if mask is None and limits is None and locked is None and branch is None and redundancy is None:
         try:
             options = _plain_options(*plain)
@@ -138,6 +143,8 @@ def _options(
     prefer: Preference = "nearest",
     max_solutions: int | None = None,
     solver: Solver = "auto",
+    position_tolerance: float | None = None,
+    rotation_tolerance: float | None = None,
     mask: Sequence[bool] | None = None,
     constraints: JointConstraints | None = None,
     branch: str | Sequence[str] | None = None,
@@ -156,6 +163,8 @@ def _options(
         redundancy=redundancy,
         max_solutions=max_solutions,
         solver=solver,
+        position_tolerance=position_tolerance,
+        rotation_tolerance=rotation_tolerance,
     )
 
 

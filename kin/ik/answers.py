@@ -138,7 +138,7 @@ def _has_width(redundancy: Redundancy) -> bool:
 
 def _usable(problem: IKProblem, q: Array, stats: Array) -> tuple[Array, Array]:
     """The rows that meet the task inside the limits."""
-    rows = is_closed(stats)
+    rows = is_closed(problem, stats)
     if problem.respect:
         rows = rows & (stats[:, OVERRUN] == 0.0)
     return q[rows], stats[rows]

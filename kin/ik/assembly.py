@@ -89,6 +89,8 @@ def make_result(
         nearest_orientation=nearest_orientation,
         redundancy=redundancy,
         singularities=singular,
+        tolerances=(problem.requirement.position, problem.requirement.rotation),
+        target_error=problem.target_error,
         complete=known and (details.complete if isinstance(details, Solved) else True),
     )
 

@@ -45,10 +45,10 @@ class Branches:
     obstacle: Obstacle | None
 
 
-def is_closed(stats: Array) -> Flags:
+def is_closed(problem: IKProblem, stats: Array) -> Flags:
     """Which rows of statistics ``(k, 5)`` meet the task, whether or not inside the limits ``(k,)``."""
     closed, good = np.empty((2, len(stats)), dtype=bool)
-    accept(stats, False, closed, good)
+    accept(problem.requirement, stats, False, closed, good)
     return closed
 
 

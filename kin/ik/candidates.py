@@ -43,6 +43,7 @@ class Requirement(NamedTuple):
         turns: ``(n,)`` 2π for a joint with whole-turn images, else 0.0.
         task: code of the task.
         respect: whether rows outside the limits are refused.
+        position, rotation: errors that count as none, metres and radians.
     """
 
     model: Array
@@ -52,6 +53,8 @@ class Requirement(NamedTuple):
     turns: Array
     task: int
     respect: bool
+    position: float = _POSITION
+    rotation: float = _ROTATION
 
 
 class Rows(NamedTuple):
@@ -146,11 +149,12 @@ def measure_rows(
 
 
 @jit
-def accept(stats: Array, respect: bool, closed: Flags, good: Flags) -> int:
+def accept(requirement: Requirement, stats: Array, respect: bool, closed: Flags, good: Flags) -> int:
     """closed, good ``(k,)`` ← which rows meet the task, and which of them the limits allow; how many those are."""
     count = 0
     for k in range(stats.shape[0]):
-        closed[k] = stats[k, POSITION_ERROR] <= _POSITION and stats[k, ROTATION_ERROR] <= _ROTATION
+        close, turned = stats[k, POSITION_ERROR], stats[k, ROTATION_ERROR]
+        closed[k] = close <= requirement.position and turned <= requirement.rotation
         good[k] = closed[k] and (stats[k, OVERRUN] == 0.0 or not respect)
         if good[k]:
             count += 1
@@ -245,7 +249,7 @@ def measure_and_sort(requirement: Requirement, target: Array, near: Array, seed:
     One kernel, since every target passes through it and a call from Python costs as much as a row.
     """
     measure_rows(requirement, target, near, seed, rows.q, rows.stats)
-    if accept(rows.stats, requirement.respect, rows.closed, rows.good) == 0:
+    if accept(requirement, rows.stats, requirement.respect, rows.closed, rows.good) == 0:
         return 0
     key = np.empty(rows.q.shape[0])
     for k in range(rows.q.shape[0]):
@@ -259,6 +263,6 @@ def measure_and_sort(requirement: Requirement, target: Array, near: Array, seed:
 @cache
 def unchecked() -> Callable[[Requirement, Array, Array, Array, Rows], int]:
     """`measure_and_sort` without type dispatch: arrays must be C-contiguous and of the types given in `Rows`."""
-    requirement = record(Requirement, MODEL, 1, 1, 1, 1, int, bool)
+    requirement = record(Requirement, MODEL, 1, 1, 1, 1, int, bool, float, float)
     rows = record(Rows, 2, 2, row_of(bool), row_of(bool), row_of(int))
     return direct(measure_and_sort, requirement, 2, 1, 1, rows)

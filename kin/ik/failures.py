@@ -63,7 +63,9 @@ def _beyond_limits(problem: IKProblem, code: int) -> tuple[BlockedBranch, ...]:
     if not len(found):
         return ()
     q, stats = measure(problem, found, code=code)
-    return _blocked(problem, q, by_key(q, is_closed(stats) & (stats[:, OVERRUN] > 0.0), stats[:, OVERRUN]))
+    return _blocked(
+        problem, q, by_key(q, is_closed(problem, stats) & (stats[:, OVERRUN] > 0.0), stats[:, OVERRUN])
+    )
 
 
 def _outside_by_descent(problem: IKProblem, blocked: tuple[BlockedBranch, ...]) -> IKResult:
@@ -87,7 +89,7 @@ def _compromise_by_descent(problem: IKProblem) -> IKResult:
     """As `compromise`, for an arm without a closed form."""
     starts = nearest.starting_points(problem, count=4 * nearest.STARTS)
     q, stats = measure(problem, nearest.descend_each(problem, APPROACH, starts, 1.0)[0])
-    rows = is_closed(measure(problem, q, code=APPROACH)[1])
+    rows = is_closed(problem, measure(problem, q, code=APPROACH)[1])
     if problem.respect:
         rows &= stats[:, OVERRUN] == 0.0
     order = by_key(q, rows, np.abs(stats[:, ROLL]))
@@ -146,7 +148,7 @@ def compromise(problem: IKProblem, branches: Branches, allowed: Flags) -> IKResu
     """
     stats = branches.stats
     approach_q, approach_stats = measure(problem, branches.q, code=APPROACH)
-    possible = allowed & is_closed(approach_stats)
+    possible = allowed & is_closed(problem, approach_stats)
     rows = possible & (stats[:, OVERRUN] == 0.0) if problem.respect else possible
     solutions, _ = solutions_of(problem, branches, by_key(branches.q, rows, np.abs(stats[:, ROLL])), rows, "roll")
     oriented = nearest.nearest_orientation(problem, branches.q if rows.any() else None)
@@ -221,7 +223,8 @@ def _unrestricted(problem: IKProblem) -> tuple[IKProblem, Restriction] | None:
     locked = tuple(i for i, flag in enumerate(problem.locked) if flag)
     others = tuple(i for i in np.flatnonzero(narrowed).tolist() if i not in locked)
     options = replace(problem.options, constraints=JointConstraints(), branch=None, redundancy=None)
-    return IKProblem.of(robot, problem.T, options, problem.seed), Restriction(locked, others)
+    free = IKProblem.of(robot, problem.T, options, problem.seed)
+    return replace(free, target_error=problem.target_error), Restriction(locked, others)
 
 
 def _point_restriction(problem: IKProblem, distance: float) -> tuple[Restriction, Cause] | None:

@@ -26,6 +26,7 @@ from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 ORIENTATION_WEIGHT = 0.1
+_NEAR = 100.0  # tolerances: rows that miss a target by less are refined
 STARTS = 24
 # Settings of `solve_numerically`: the largest number of starts, the error E in metres that counts as exact, and
 # the metres per radian of its error: a share of the arm's reach, between two bounds.
@@ -139,17 +140,20 @@ def polish(problem: IKProblem, q: Array, stats: Array) -> Flags:
     """Refine the rows ``(k, n)`` that are near misses by descents, in place; which of them are now good ``(k,)``.
 
     Where two branches merge, a rounding error of 1e-16 in the target is 1e-8 in an angle: enough to move another
-    joint past its limit, or the roll past the closure tolerance.
+    joint past its limit, or the roll past the closure tolerance. Arms with few joints meet the point of a rounded
+    target exactly, and so its orientation too badly.
     """
+    position, rotation = problem.requirement.position, problem.requirement.rotation
+    near_miss = max(TOLERANCES.near_miss, _NEAR * (position + rotation))
     good = np.zeros(len(q), dtype=bool)
     miss = stats[:, POSITION_ERROR] + stats[:, ROTATION_ERROR]
     if problem.respect:
         miss = miss + stats[:, OVERRUN]
-    for i in np.flatnonzero(miss < TOLERANCES.near_miss).tolist():
+    for i in np.flatnonzero(miss < near_miss).tolist():
         near, _ = descend(problem, problem.code, q[i : i + 1], 1.0)
         row, row_stats = measure(problem, near[None])
-        error = max(row_stats[0, POSITION_ERROR], row_stats[0, ROTATION_ERROR])
-        if error <= TOLERANCES.closure_position and (row_stats[0, OVERRUN] == 0.0 or not problem.respect):
+        met = row_stats[0, POSITION_ERROR] <= position and row_stats[0, ROTATION_ERROR] <= rotation
+        if met and (row_stats[0, OVERRUN] == 0.0 or not problem.respect):
             q[i], stats[i], good[i] = row[0], row_stats[0], True
     return good
 
@@ -182,8 +186,8 @@ def mismatch(found: IKSolution) -> float:
 def is_exact(problem: IKProblem, found: IKSolution) -> bool:
     """Whether the closest configuration meets the task exactly."""
     return (
-        found.position_error <= TOLERANCES.closure_position
-        and found.rotation_error <= TOLERANCES.closure_rotation
+        found.position_error <= problem.requirement.position
+        and found.rotation_error <= problem.requirement.rotation
         and (found.in_limits or not problem.respect)
     )
 

@@ -32,6 +32,7 @@ Locks = Sequence[float | None]
 Values = float | Mapping[str, float] | tuple[tuple[str, float], ...]
 TASKS: tuple[Task, ...] = ("pose", "approach", "position")
 PREFERENCES: tuple[Preference, ...] = ("nearest", "limits", "manipulability")
+LEAST_TOLERANCE, MOST_METRES, MOST_RADIANS = TOLERANCES.closure_position, 0.1, 0.5
 MASK_NAMES = ("x", "y", "z", "rx", "ry", "rz")
 # Masks that are equivalent to one of the three tasks; the first and the last one in either frame.
 _EQUIVALENT: dict[tuple[bool, ...], int] = {
@@ -151,6 +152,8 @@ class IKOptions:
             of the first one. None lets `prefer` choose.
         max_solutions: at most so many solutions, the best first.
         solver: ``"numeric"`` ignores the arm's closed form.
+        position_tolerance, rotation_tolerance: errors of a solution that count as none, metres and radians. None
+            stands for 1e-9, or for the digits of a target whose rotation had to be made one.
 
     Raises:
         InputError: an option that is malformed whatever the arm.
@@ -167,6 +170,8 @@ class IKOptions:
     redundancy: Values | None = None
     max_solutions: int | None = None
     solver: Solver = "auto"
+    position_tolerance: float | None = None
+    rotation_tolerance: float | None = None
 
     def __post_init__(self) -> None:
         _check_choice("task", self.task, TASKS)
@@ -182,6 +187,8 @@ class IKOptions:
             ("branch", None if self.branch is None else _names(self.branch)),
             ("redundancy", None if self.redundancy is None else _values(self.redundancy)),
             ("max_solutions", None if self.max_solutions is None else _whole_number(self.max_solutions)),
+            ("position_tolerance", _tolerance("position_tolerance", self.position_tolerance, "m", MOST_METRES)),
+            ("rotation_tolerance", _tolerance("rotation_tolerance", self.rotation_tolerance, "rad", MOST_RADIANS)),
         ):
             object.__setattr__(self, name, value)
 
@@ -196,7 +203,8 @@ class IKOptions:
     def _hash(self) -> int:
         return hash((
             self.task, self.mask, self.mask_frame, self.constraints, self.respect_limits, self.branch, self.images,
-            self.prefer, self.redundancy, self.max_solutions, self.solver,
+            self.prefer, self.redundancy, self.max_solutions, self.solver, self.position_tolerance,
+            self.rotation_tolerance,
         ))  # fmt: skip
 
     @cached_property
@@ -294,6 +302,16 @@ def _values(redundancy: Values) -> float | tuple[tuple[str, float], ...]:
     if not isinstance(redundancy, Mapping):
         return finite_number("redundancy", redundancy, expected)
     return tuple((str(k), finite_number(f"redundancy.{k}", v, expected)) for k, v in redundancy.items())
+
+
+def _tolerance(field: str, value: float | None, unit: str, most: float) -> float | None:
+    if value is None:
+        return None
+    expected = f"a number from {LEAST_TOLERANCE:g} to {most:g} {unit}, or none"
+    number = finite_number(field, value, expected)
+    if not LEAST_TOLERANCE <= number <= most:
+        raise InputError(field, value, expected)
+    return number
 
 
 def _whole_number(value: int) -> int:

@@ -129,7 +129,7 @@ def _best_at(problem: IKProblem, values: Array) -> Array:
     targets = np.ascontiguousarray(np.broadcast_to(problem.T, (len(values), 4, 4)))
     kernels.many(kernels.params, targets, np.ascontiguousarray(values), problem.seed, out)
     q, stats = centred(problem, out.reshape(-1, problem.robot.n))
-    fits = is_closed(stats)
+    fits = is_closed(problem, stats)
     if problem.respect:
         fits &= stats[:, OVERRUN] == 0.0
     return np.asarray(np.where(fits, scores(problem, q), -math.inf).reshape(len(values), rows).max(axis=1))
@@ -166,7 +166,7 @@ def _try_all(
     targets = np.repeat(problem.T[None], len(flat), axis=0)  # writable: kernels are compiled for such arrays
     kernels.many(kernels.params, targets, flat, problem.seed, out)
     q, stats = centred(problem, out[np.arange(len(flat)), whose])
-    fits = is_closed(stats) & ~np.isnan(flat)
+    fits = is_closed(problem, stats) & ~np.isnan(flat)
     if problem.respect:
         fits &= stats[:, OVERRUN] == 0.0
     reached = np.where(fits, scores(problem, q), -math.inf)
@@ -208,7 +208,7 @@ def _try(
     """The score of one value; a better one replaces the row."""
     tried = _solve(problem, branches, row, [value if i == k else v for i, v in enumerate(fixed)])
     q, stats = centred(problem, tried.q[row : row + 1])
-    if not is_closed(stats)[0] or (problem.respect and stats[0, OVERRUN] > 0.0):
+    if not is_closed(problem, stats)[0] or (problem.respect and stats[0, OVERRUN] > 0.0):
         return -math.inf
     reached = float(scores(problem, q)[0])
     if reached > score[row]:

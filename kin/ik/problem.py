@@ -23,11 +23,16 @@ from kin.robot import Robot
 from kin.solvers.common import TURN
 from kin.solvers.contract import POSITION, ClosedForm, RedundancyParameter
 from kin.solvers.locked import form_with_locked
+from kin.tolerances import TOLERANCES
 from kin.transforms import Array, as_transform, finite_array
 
 FAR = 1e6  # metres; the coordinates of targets are smaller
 SEED = "seed"  # stands for the branch of the seed
 _FLOAT = np.dtype(np.float64)
+_LEVER = 0.1  # metres
+_SINGLE = float(np.finfo(np.float32).eps)
+_DOUBLE = 1e-9  # deviation of RᵀR from I that does not matter
+_ROUNDED = 1e-2  # the largest one of a rotation that is typed with few digits
 
 
 def never_cancel() -> None:
@@ -51,6 +56,7 @@ class IKProblem:
         redundancies: the redundancy parameters of the closed form in this task.
         values: one per redundancy parameter, NaN to let it be chosen.
         branches: the requested rows, None for all.
+        target_error: how far the target's rotation was from a rotation, if that matters; then it was made one.
         stop: called now and then by long computations; raises to cancel them.
     """
 
@@ -72,6 +78,7 @@ class IKProblem:
     redundancies: tuple[RedundancyParameter, ...]
     values: tuple[float, ...]
     branches: frozenset[int] | None
+    target_error: float = 0.0
     stop: Callable[[], None] = never_cancel
 
     @classmethod
@@ -85,7 +92,11 @@ class IKProblem:
         seed = prepared.seed if q_seed is None else _seed(robot, q_seed)
         # The same as `replace`, in a tenth of the time: this runs for every target.
         problem = object.__new__(cls)
-        problem.__dict__.update(prepared.__dict__, T=pose_of(target, prepared.code), seed=seed)
+        T, error = read_pose(target, prepared.code, always=robot.n < 6)
+        problem.__dict__.update(prepared.__dict__, T=T, seed=seed)
+        if error > 0.0:
+            problem.__dict__["target_error"] = error
+            del problem.__dict__["requirement"]  # computed again from this error
         if prepared.branches is not None and SEED in (options.branch or ()):
             name = prepared.branch_name(prepared.branch_of(seed))
             problem.__dict__["branches"] = prepared.branches | prepared.rows_named(name)
@@ -93,9 +104,24 @@ class IKProblem:
 
     @cached_property
     def requirement(self) -> Requirement:
-        """What the compiled measurement needs of this problem, but for target and seed."""
+        """What the compiled measurement needs of this problem, but for target and seed.
+
+        The point of a rounded target is as rounded as its entries are. Where it is `_LEVER` from axis 1, joint 1
+        turns the tool by a larger angle to meet it.
+        """
+        options = self.options
+        position = options.position_tolerance or max(TOLERANCES.closure_position, 2.0 * self.target_error)
+        rotation = options.rotation_tolerance or max(TOLERANCES.closure_rotation, self.target_error / _LEVER)
         return Requirement(
-            self.robot.model, self.mask, self.lower, self.upper, self.turns, self.code, self.respect
+            self.robot.model,
+            self.mask,
+            self.lower,
+            self.upper,
+            self.turns,
+            self.code,
+            self.respect,
+            position,
+            rotation,
         )
 
     @property
@@ -181,19 +207,58 @@ def _locks(options: IKOptions) -> tuple[float | None, ...] | None:
 
 def pose_of(target: ArrayLike, code: int, field: str = "target") -> Array:
     """A target as a pose ``(4, 4)``: for the task POSITION also a point ``(3,)``; `InputError` naming `field`."""
+    return read_pose(target, code, field)[0]
+
+
+def read_pose(target: ArrayLike, code: int, field: str = "target", always: bool = False) -> tuple[Array, float]:
+    """`pose_of`, and how rounded it is; 0.0 if its rotation is one within `TOLERANCES.rotation_matrix`.
+
+    With `always`, whatever is more than rounding of doubles counts: an arm with few joints meets few poses
+    exactly, and the digits of a target decide which of them are meant.
+    """
     if type(target) is np.ndarray and target.shape == (4, 4) and target.dtype is _FLOAT and target.flags.carray:
         T = np.empty((4, 4))
         if straighten(target, FAR, T):
-            return T
-        T = as_transform(target, field)  # says what is wrong
-    elif code == POSITION and shape_of(target) == (3,):
+            return T, _rounding(target) if always else 0.0
+    if code == POSITION and shape_of(target) == (3,):
         T = np.eye(4)
         T[:3, 3] = finite_array(field, target, (3,))
+        error = 0.0
     else:
-        T = as_transform(target, field)
+        T, error = _nearest_pose(target, field, always)
     if max(abs(T.item(3)), abs(T.item(7)), abs(T.item(11))) > FAR:
         raise InputError(f"{field} position", T[:3, 3].tolist(), "coordinates below 1e6 m")
-    return T
+    return T, error
+
+
+def _nearest_pose(target: ArrayLike, field: str, always: bool) -> tuple[Array, float]:
+    """A matrix that is nearly a pose ``(4, 4)`` as the nearest one, and how rounded it is."""
+    T = finite_array(field, target, (4, 4))
+    if T.ndim != 2 or np.abs(T).max() > FAR or np.abs(T[3] - (0.0, 0.0, 0.0, 1.0)).max() > _ROUNDED:
+        return as_transform(T, field), 0.0
+    R = T[:3, :3]
+    error = float(np.abs(R.T @ R - np.eye(3)).max())
+    if TOLERANCES.rotation_matrix < error <= _ROUNDED and np.linalg.det(R) > 0.0:
+        U, _, V = np.linalg.svd(R)
+        found = T.copy()
+        found[:3, :3], found[3] = U @ V, (0.0, 0.0, 0.0, 1.0)
+        return found, _rounding(T)
+    return as_transform(T, field), _rounding(T) if always else 0.0
+
+
+def _rounding(T: Array) -> float:
+    """How rounded the entries of a pose ``(4, 4)`` are: at least the largest entry of RᵀR − I.
+
+    0.0 if that vanishes up to the rounding of doubles: nothing is known of the digits of such a matrix.
+    """
+    R = T[:3, :3]
+    error = float(np.abs(R.T @ R - np.eye(3)).max())
+    if error < _DOUBLE:
+        return 0.0
+    if np.array_equal(T, T.astype(np.float32)):
+        return max(error, _SINGLE * max(1.0, float(np.abs(T[:3, 3]).max())))
+    digits = next((k for k in range(2, 9) if np.abs(T - T.round(k)).max() < 1e-14), None)
+    return error if digits is None else max(error, 10.0**-digits)
 
 
 def _seed(robot: Robot, q_seed: ArrayLike) -> Array:

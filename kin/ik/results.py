@@ -7,8 +7,9 @@ from enum import StrEnum
 from typing import Literal
 
 from kin.ik.details import Details, LimitViolation, Redundancy
-from kin.ik.messages import Explanation, explain
+from kin.ik.messages import Explanation, explain, rounded_target
 from kin.solvers.singular import Singularity
+from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 from kin.units import DEFAULT_UNITS, Units
 
@@ -100,6 +101,9 @@ class IKResult:
         blocked: every posture that is outside the limits, the closest to them first (status ``limits``).
         complete: whether a closed form gave every posture, so that there is no further one on the requested
             branches; False after a numeric search, which may miss some.
+        tolerances: errors that count as none, metres and radians; larger than 1e-9 if that was asked for, or for a
+            target of few digits.
+        target_error: how rounded the entries of the target are, if its rotation had to be made one; else 0.
         solver, solver_reason: name of the method that found the answer, and why it was chosen.
         task: the task that was solved for.
         distance: metres by which the point is out of reach, 0 if the point can be reached.
@@ -121,6 +125,8 @@ class IKResult:
     redundancy: tuple[Redundancy, ...] = ()
     singularities: tuple[Singularity, ...] = ()
     complete: bool = False
+    tolerances: tuple[float, float] = (TOLERANCES.closure_position, TOLERANCES.closure_rotation)
+    target_error: float = 0.0
 
     def __repr__(self) -> str:
         """Status, number of solutions, solver and reason: arrays and ranges are in the attributes."""
@@ -145,4 +151,8 @@ class IKResult:
 
     def explain(self, units: Units = DEFAULT_UNITS) -> Explanation:
         """The answer in words, with a headline and a detail, in any units."""
-        return explain(self.details, self.cause, self.task, self.singularities, units)
+        found = explain(self.details, self.cause, self.task, self.singularities, units)
+        if not self.target_error:
+            return found
+        mended = rounded_target(self.target_error, self.tolerances, units)
+        return found._replace(note=" ".join(filter(None, (found.note, mended))))

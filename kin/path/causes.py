@@ -167,7 +167,7 @@ def _exists(problem: IKProblem, q: Array) -> bool:
     """Whether the branch of q ``(n,)`` goes on to the problem's pose."""
     if has_closed_form(problem):
         rows = list(problem.rows_named(problem.branch_name(problem.branch_of(q))))
-        return bool(is_closed(branches_near(problem, q).stats)[rows].any())
+        return bool(is_closed(problem, branches_near(problem, q).stats)[rows].any())
     return len(descended(problem, q[None])) > 0
 
 

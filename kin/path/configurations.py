@@ -40,7 +40,7 @@ def meeting(problem: IKProblem, relaxed: bool, q: Array, near: Array) -> Array:
         count = len(problem.closed_form.branches)
         q = q[[problem.allows(i % count) for i in range(len(q))]]
     q, stats = measure(problem, q[~np.isnan(q[:, 0])], near)
-    good = _meets(stats)
+    good = _meets(problem, stats)
     miss = stats[:, POSITION_ERROR] + stats[:, ROTATION_ERROR] + stats[:, OVERRUN]
     close = np.flatnonzero(~good & (miss < TOLERANCES.near_miss))[:8]
     if len(close):
@@ -53,8 +53,8 @@ def meeting(problem: IKProblem, relaxed: bool, q: Array, near: Array) -> Array:
     return np.asarray(q[good])
 
 
-def _meets(stats: Array) -> Flags:
-    return np.asarray(is_closed(stats) & (stats[:, OVERRUN] == 0.0))
+def _meets(problem: IKProblem, stats: Array) -> Flags:
+    return np.asarray(is_closed(problem, stats) & (stats[:, OVERRUN] == 0.0))
 
 
 def alike(miss: Array, least: float) -> Flags:
@@ -69,7 +69,7 @@ def descended(problem: IKProblem, starts: Array) -> Array:
         return starts
     q, _ = nearest.descend_each(problem, problem.code, starts, 1.0)
     q, stats = measure(problem.without_turns(), q)
-    q = q[_meets(stats)]
+    q = q[_meets(problem, stats)]
     if problem.branches is not None:
         q = q[[problem.allows(problem.branch_of(row)) for row in q]]
     return distinct(q, problem.seed)[:POOL]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, cast
+from typing import Literal, NotRequired, cast
 
 from typing_extensions import TypedDict
 
@@ -19,6 +19,9 @@ from app.shared.answers.details import (
 from app.shared.answers.document import documented
 from kin import BlockedBranch, IKResult, IKSolution, Status
 from kin.ik.results import Cause
+from kin.tolerances import TOLERANCES
+
+EXACT = (TOLERANCES.closure_position, TOLERANCES.closure_rotation)
 
 
 @documented
@@ -55,6 +58,18 @@ class Blocked(TypedDict):
     """The configuration it would need, in radians (metres)."""
     violations: list[Violation]
     """Its joint values outside the limits."""
+
+
+@documented
+class Tolerances(TypedDict):
+    """Errors of a solution that count as none."""
+
+    position: float
+    """Of the tool's point, in metres."""
+    rotation: float
+    """Of the rotation, in radians."""
+    target_error: float
+    """How rounded the entries of the target are, if its rotation had to be made one; else 0."""
 
 
 @documented
@@ -99,11 +114,13 @@ class IkAnswer(TypedDict):
     """Redundancy parameters: the values of the first solution, with the ranges of all branches together."""
     singularities: list[SingularityAnswer]
     """The singularities that the first solution (or `closest`) is at."""
+    tolerances: NotRequired[Tolerances]
+    """The errors that count as none, if they are not 1e-9."""
 
 
 def ik_answer(result: IKResult) -> IkAnswer:
     """One result of `kin.solve_ik`."""
-    return {
+    answer: IkAnswer = {
         "status": result.status.value,
         "cause": result.cause,
         "details": details_answer(result.details),
@@ -123,6 +140,10 @@ def ik_answer(result: IKResult) -> IkAnswer:
         "redundancy": [redundancy_answer(each) for each in result.redundancy],
         "singularities": [singularity_answer(each) for each in result.singularities],
     }
+    position, rotation = result.tolerances
+    if result.target_error or result.tolerances != EXACT:
+        answer["tolerances"] = {"position": position, "rotation": rotation, "target_error": result.target_error}
+    return answer
 
 
 def _solution(solution: IKSolution) -> Solution:

@@ -89,6 +89,12 @@ def explain(
     return Explanation(_title(details, headline, units), headline, body, note)
 
 
+def rounded_target(error: float, tolerances: tuple[float, float], units: Units) -> str:
+    """A sentence about a target whose rotation had to be made one."""
+    position, rotation = units.lengths.value(tolerances[0]), units.angles.value(tolerances[1])
+    return f"The target is rounded (by {error:.1g}): met to within {position} and {rotation}."
+
+
 def _title(details: Details, headline: str, units: Units) -> str:
     """The headline, or a shorter one with rounded numbers."""
     match details:

@@ -86,7 +86,7 @@ def test_measuring_and_sorting_in_one_call_equals_separate_steps(respect, kernel
     twin, stats = q.copy(), np.empty((8, 5))
     measure_rows(requirement, T, seed, seed, twin, stats)
     closed, good = np.empty((2, 8), bool)
-    accept(stats, respect, closed, good)
+    accept(requirement, stats, respect, closed, good)
     kept, expected = select(twin, np.where(good, stats[:, DISTANCE], math.inf))
     assert np.array_equal(rows.q, twin, equal_nan=True)
     assert np.array_equal(rows.stats, stats, equal_nan=True)
@@ -104,10 +104,16 @@ def test_accepted_rows_meet_the_task_and_the_limits():
         dtype=float,
     )
     closed, good = np.empty((2, 5), dtype=bool)
-    assert accept(stats, True, closed, good) == 1
+    ends = np.array([-1.0]), np.array([1.0])
+    requirement = Requirement(get_robot("puma560").model, np.ones(7), *ends, np.zeros(1), POSE, True)
+    assert accept(requirement, stats, True, closed, good) == 1
     assert (closed.tolist(), good.tolist()) == ([True, True, False, False, False], [True] + [False] * 4)
-    assert accept(stats, False, closed, good) == 2
+    assert accept(requirement, stats, False, closed, good) == 2
     assert good.tolist() == closed.tolist()
+    accept(requirement._replace(position=1e-8), stats, True, closed, good)
+    assert closed.tolist() == [True, True, True, False, False]
+    accept(requirement._replace(rotation=1e-8), stats, True, closed, good)
+    assert closed.tolist() == [True, True, False, True, False]
 
 
 @settings(max_examples=300, deadline=None)

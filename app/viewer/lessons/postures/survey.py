@@ -115,7 +115,7 @@ def _unavailable(robot: Robot, T: Array, options: IKOptions, q: Array, units: Un
     branches = solve_branches(problem, problem.T, problem.code)
     if branches is None:
         return {}
-    closed = is_closed(branches.stats)
+    closed = is_closed(problem, branches.stats)
     found = {}
     for i, name in enumerate(kin.branch_names(robot)):
         if not closed[i]:
