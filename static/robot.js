@@ -6,7 +6,7 @@
   const PAUSE = 40; // ms after a key until a cell is sent
   const PATIENCE = 3000; // ms for an answer, then the next message is sent
   const LEFT = 400; // ms without focus until the table is written again, so that a click on a button finds it
-  const PART = 12000; // characters of a file in one message
+  const PART = 8000; // characters of a file in one message
 
   const part = (name) => document.querySelector(`[data-arm="${name}"]`);
   const cells = () => [...document.querySelectorAll("[data-arm] input[data-cell]")];
@@ -171,6 +171,20 @@
     to?.focus();
   }, true);
 
+  // Sideways: the button says what is there, and is gone where everything is in sight
+
+  const scroller = () => part("table")?.querySelector(".kb-arm-scroll");
+  function showMore() {
+    const box = scroller();
+    if (!box?.clientWidth) return;
+    box.classList.toggle("kb-arm-whole", box.scrollWidth <= box.clientWidth + 1);
+    const words = box.scrollLeft > 8 ? "‹ Numbers" : "Limits ›";
+    const button = part("table").querySelector("[data-arm-more]");
+    if (button.textContent !== words) button.textContent = words;
+  }
+  addEventListener("scroll", (event) => { if (event.target === scroller()) showMore(); }, true);
+  const resized = new ResizeObserver(showMore);
+
   // Buttons and files
 
   addEventListener("click", (event) => {
@@ -182,6 +196,10 @@
       const action = button.dataset.armDo;
       if (["add", "up", "down", "remove"].includes(action)) change(action);
       else { flush(); send([action], button.dataset.argument ?? null); }
+    }
+    if (target.closest("[data-arm-more]")) {
+      const box = scroller();
+      box.scrollTo({ left: box.scrollLeft > 8 ? 0 : box.scrollWidth, behavior: "smooth" });
     }
     if (target.closest("[data-arm-upload]")) part("files").querySelector("[data-arm-file]").click();
   });
@@ -201,6 +219,6 @@
   }
 
   addEventListener("DOMContentLoaded", () => {
-    new MutationObserver(() => { if (part("table")) { restore(); mark(); markWrong(); } }).observe(document.body, { subtree: true, childList: true });
+    new MutationObserver(() => { if (part("table")) { restore(); mark(); markWrong(); resized.observe(scroller()); showMore(); } }).observe(document.body, { subtree: true, childList: true });
   });
 })();

@@ -52,6 +52,14 @@ def lesson(robot: str, title: str, ready: str) -> Callable[[Tab], None]:
     return show
 
 
+def robot(tab: Tab) -> None:
+    tab.open("Robot")
+    tab.page.locator('[data-arm-do="convert"]').first.click()
+    expect(tab.page.locator(".kb-arm-converted")).to_be_visible()
+    tab.page.locator('[data-cell="1 a"]').fill("1/0")
+    expect(tab.page.locator('[data-arm="wrong"]')).to_contain_text("divides by zero")
+
+
 def cloud(tab: Tab) -> None:
     tab.choose_lesson("None")
     tab.select(kin.get_robot("pioneer5"))
@@ -98,13 +106,14 @@ SCREENS: dict[str, Callable[[Tab], None]] = {
     "learn-postures": lesson("puma560", "Postures", "[data-posture]"),
     "learn-velocity": lesson("puma560", "Velocity", "[data-singular]"),
     "learn-redundancy": lesson("redundant7-craig", "Redundancy", "[data-limits]"),
+    "robot": robot,
     "workspace-cloud": cloud,
     "workspace-section": section,
     "workspace-capability": capability,
     "view": view,
 }
 # Every screen is checked dark in desktop size and light in phone size; these the other way round as well.
-LIGHT_DESKTOP = ("move", "learn-equations", "learn-postures", "learn-velocity", "workspace-cloud")
+LIGHT_DESKTOP = ("move", "learn-equations", "learn-postures", "learn-velocity", "robot", "workspace-cloud")
 DARK_PHONE = ("learn-velocity",)
 
 

@@ -187,3 +187,10 @@ def _cell_of(field: str, texts: Mapping[Cell, str]) -> Cell | None:
         if field.startswith(wanted) or field == f"rows[].{column}":
             return cell
     return next(reversed(list(texts)))
+
+
+def converted(robot: Robot, own: OwnArm | None) -> OwnArm:
+    """The same arm as a table in the other convention; raises `EditError`."""
+    data, start = fields_of(robot, own)
+    other = kin.convert(robot, "modified" if robot.convention == "standard" else "standard")
+    return built({**kin.robot_to_dict(other), **{key: data[key] for key in ("name", "source")}}, start)

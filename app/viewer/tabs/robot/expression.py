@@ -24,6 +24,13 @@ _TOKEN = re.compile(r"\s*(?:((?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)|(
 _SIGNS = str.maketrans({"−": "-", "–": "-", "×": "*", "·": "*", "÷": "/", ",": ".", "\u00a0": " ", "º": "°"})
 _ANGLES = {"°": math.pi / 180, "deg": math.pi / 180, "rad": 1.0}
 _LENGTHS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+_EXAMPLES = {
+    "°": "-90 or pi/2",
+    "rad": "-1.57 or pi/2",
+    "mm": "350 or 2*175",
+    "cm": "35 or 70/2",
+    "m": "0.35 or 0.7/2",
+}
 _CUT = 24  # characters of a wrong text in a message
 
 
@@ -49,7 +56,7 @@ def read(text: str, unit: Unit, is_angle: bool) -> float:
     Raises:
         ExpressionError: with what is wrong.
     """
-    example = "-90 or pi/2" if unit.name == "°" else "-1.57 or pi/2" if is_angle else "350 or 2*0.35"
+    example = _EXAMPLES[unit.name]
     if not text.strip():
         raise ExpressionError(f"the cell is empty; try 0, {example}")
     if len(text) > LONGEST:

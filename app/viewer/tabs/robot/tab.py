@@ -19,13 +19,15 @@ from app.viewer.panel import update_html
 from app.viewer.panel.status import Notice
 from app.viewer.tabs.robot import edits, views
 from app.viewer.tabs.robot.edits import Cell, EditError
-from app.viewer.tabs.robot.expression import cut
+from app.viewer.tabs.robot.files import MOST, Incoming, TooLargeError, arm_of, text_of, tips_of
 from app.viewer.tabs.robot.presets import PRESETS, TITLES
 from kin import InputError, KinematicsError, Robot
 from kin.files.read import MAX_ROWS
+from kin.robot import Convention
 
-MAX_FILE = 100_000  # characters of an uploaded file
-FILE_NOTE = "The arm is in this page and in its link only. A file keeps it, and takes it to Python and REST."
+PARTS = ("start", "table", "wrong", "about", "frames", "convert", "files")
+OTHER: dict[Convention, Convention] = {"standard": "modified", "modified": "standard"}
+UNUSED = "The file was not used"
 
 
 class RobotTab(Feature):
@@ -33,7 +35,12 @@ class RobotTab(Feature):
 
     key = "robot"
     title = "Robot"
-    messages = frozenset({"cell", "row", "start", "convention", "reset", "discard", "left", "download", "upload"})
+    messages = frozenset(
+        {
+            *("cell", "row", "start", "convention", "convert", "reset", "discard", "left"),
+            *("download", "upload", "tip"),
+        }
+    )
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
@@ -41,17 +48,21 @@ class RobotTab(Feature):
         self._revision = 0  # of the rows: a message about other rows is out of date
         self._editing = ""  # the part of the tab in which the visitor types
         self._uploaded: OwnArm | None = None
-        self._file: list[str] = []
+        self._incoming = Incoming()
+        self._several: tuple[str, str] | None = None  # name and text of a URDF whose tip is to be chosen
+        self._converting = False
         gui = stage.client.gui
-        self._html = {name: gui.add_html("") for name in ("start", "table", "wrong", "about", "frames", "files")}
+        self._html = {name: gui.add_html("") for name in PARTS}
         self._handlers: dict[str, Callable[[object], None]] = {
             "start": self._start,
             "convention": self._reread,
             "reset": lambda _: self._reset(),
             "discard": lambda _: self._refresh(),
             "left": lambda _: self._leave_table(),
-            "download": lambda _: self._download(),
+            "convert": self._convert,
+            "download": self._download,
             "upload": self._upload,
+            "tip": self._choose_tip,
         }
         self._refresh()
 
@@ -101,7 +112,8 @@ class RobotTab(Feature):
             origin = robot.id if own is None else own.start
             self._show("start", views.start(robot, origin, own is not None, self.stage.store.robots))
         self._show("about", views.about(inspect(robot), robot, units))
-        self._show("files", views.files(MAX_FILE, FILE_NOTE))
+        self._show_conversion()
+        self._show_files()
         self._show_wrong()
 
     def _show(self, name: str, html: str) -> None:
@@ -109,6 +121,15 @@ class RobotTab(Feature):
 
     def _show_wrong(self) -> None:
         self._show("wrong", views.wrong({cell: message for cell, (_, message) in self._wrong.items()}))
+
+    def _show_conversion(self) -> None:
+        robot = self.stage.robot
+        other = kin.convert(robot, OTHER[robot.convention]) if self._converting else None
+        self._show("convert", views.conversion(robot, other, self.stage.units))
+
+    def _show_files(self) -> None:
+        name, text = self._several or ("", "")
+        self._show("files", views.files(MOST, name, tips_of(name, text) if text else ()))
 
     def _leave_table(self) -> None:
         """The visitor has left the fields: write every value as it is read, unless something is wrong."""
@@ -193,6 +214,15 @@ class RobotTab(Feature):
             raise InputError("convention", convention, "one of " + ", ".join(kin.robot.CONVENTIONS))
         self._try(lambda: edits.reread(self.stage.robot, self._own, str(convention)))
 
+    def _convert(self, action: object) -> None:
+        """Show the arm in the other convention, take that table, or close it."""
+        if action not in ("show", "use", "close"):
+            raise InputError("convert", action, "show, use or close")
+        self._converting = action == "show"
+        if action == "use":
+            self._try(lambda: edits.converted(self.stage.robot, self._own))
+        self._show_conversion()
+
     def _try(self, change: Callable[[], OwnArm]) -> None:
         try:
             own = change()
@@ -237,36 +267,42 @@ class RobotTab(Feature):
 
     # Files
 
-    def _download(self) -> None:
+    def _download(self, kind: object) -> None:
         robot = self.stage.robot if self._own is None else named(self.stage.robot)
-        text = kin.robot_to_toml(robot)
-        self.stage.client.send_file_download(f"{robot.id}.toml", text.encode(), save_immediately=True)
-        self.stage.notify(Notice("hand", f"{robot.id}.toml is downloaded", "A robot file of this arm."))
+        name, text = text_of(robot, kind)
+        self.stage.client.send_file_download(name, text.encode(), save_immediately=True)
+        self.stage.notify(Notice("hand", f"{name} is saved", "Your browser has put it where it puts downloads."))
 
     def _upload(self, value: object) -> None:
-        """A part of a file: its name, whether it is the first, whether it is the last, and the text."""
-        match value:
-            case [str(name), bool(first), bool(last), str(part)]:
-                pass
-            case _:
-                raise InputError("upload", value, "name, first, last, text")
-        if first:
-            self._file = []
-        self._file.append(part)
-        if sum(map(len, self._file)) > MAX_FILE:
-            self._file = []
-            self._refuse("The file was not used", f"It is too large; valid are {MAX_FILE // 1000} kB.")
-        elif last:
-            text, self._file = "".join(self._file), []
-            self._use_file(cut(name), text)
-
-    def _use_file(self, name: str, text: str) -> None:
         try:
-            self._uploaded = own = own_arm(kin.robot_to_dict(kin.parse_robot(text, name)))
+            file = self._incoming.take(value)
+        except TooLargeError:
+            self._refuse(UNUSED, f"It is too large; valid are {MOST // 1000} kB.")
+            return
+        if file is not None:
+            self._several = None
+            self._use_file(*file)
+
+    def _use_file(self, name: str, text: str, tip: str | None = None) -> None:
+        try:
+            if tip is None and tips_of(name, text):
+                self._several = name, text
+                self._show_files()
+                self.stage.notify(
+                    Notice("advice", f"{name} has several ends", "Choose the link of the tool, below.")
+                )
+                return
+            own, words = arm_of(name, text, tip)
         except KinematicsError as error:
-            self._refuse("The file was not used", str(error))
-        else:
-            self._begin(own)
+            self._refuse(UNUSED, str(error))
+            return
+        self._uploaded, self._several = own, None
+        self.stage.show_own(own)
+        self.stage.notify(Notice("hand", own.robot.name, words))
+
+    def _choose_tip(self, value: object) -> None:
+        if self._several is not None and isinstance(value, str) and value:
+            self._use_file(*self._several, tip=value)
 
 
 def _alike(one: Robot, other: Robot) -> bool:

@@ -11,6 +11,8 @@ from app.viewer.tabs.robot.edits import ANGLES, AXES, FRAMES, KINDS, NUMBERS, Ce
 from app.viewer.tabs.robot.presets import TITLES
 from app.viewer.views.templates import render
 from kin import Joint, Robot
+from kin.dh import SAMPLES, largest_difference
+from kin.files.urdf.tree import Tip
 from kin.units import Unit, Units
 
 DECIMALS = 6  # of a degree or a millimetre, in a cell
@@ -57,7 +59,7 @@ def table(robot: Robot, units: Units, revision: int) -> str:
     heads = []
     for column, (name, title) in _HEADS.items():
         unit = units.of(column in ANGLES).name if column in NUMBERS[:4] else ""
-        heads.append({"name": name, "unit": unit, "title": title, "wide": column == "name"})
+        heads.append({"name": name, "unit": unit, "title": title, "left": column in ("kind", "name")})
     rows = [[_cell(i, row, column, units) for column in _HEADS] for i, row in enumerate(robot.rows)]
     return render("robot/table", heads=heads, rows=rows, revision=revision, convention=robot.convention)
 
@@ -159,7 +161,6 @@ def _home(found: InspectionAnswer) -> dict[str, str]:
 
 def frames(robot: Robot, units: Units) -> str:
     """Fields for the tool and the base."""
-    heads = [(axis, units.of(i >= 3).name) for i, axis in enumerate(AXES)]
     rows = []
     for frame in FRAMES:
         cells = [
@@ -171,9 +172,39 @@ def frames(robot: Robot, units: Units) -> str:
             for i, (axis, value) in enumerate(zip(AXES, frame_values(robot, frame), strict=True))
         ]
         rows.append({"title": frame, "cells": cells})
-    return render("robot/frames", heads=heads, rows=rows)
+    length, angle = units.lengths.name, units.angles.name
+    return render("robot/frames", heads=AXES, rows=rows, length=length, angle=angle)
 
 
-def files(most: int, note: str) -> str:
-    """Buttons for files of at most `most` bytes."""
-    return render("robot/files", most=f"{most // 1000} kB", bytes=most, note=note)
+def files(most: int, file: str, tips: Sequence[Tip]) -> str:
+    """Buttons for files of at most `most` bytes, and the ends of a URDF to choose from."""
+    return render("robot/files", most=f"{most // 1000} kB", bytes=most, file=file, tips=tips)
+
+
+def conversion(robot: Robot, other: Robot | None, units: Units) -> str:
+    """An offer to convert, or the same arm in the other convention, `other`, beside the present numbers."""
+    convention = {"standard": "modified (Craig)", "modified": "standard"}[robot.convention]
+    if other is None:
+        return render("robot/convert", convention=convention, rows=())
+    heads = [(_HEADS[column][0], units.of(column in ANGLES).name) for column in NUMBERS[:4]]
+    rows = []
+    for row, before in zip(other.rows, robot.rows, strict=True):
+        pairs = [
+            tuple(text_of(getattr(one, c), units.of(c in ANGLES)) for one in (row, before)) for c in NUMBERS[:4]
+        ]
+        rows.append([{"value": new, "before": old, "changed": new != old} for new, old in pairs])
+    frames = [(frame.capitalize(), _frame_words(other, robot, frame, units)) for frame in FRAMES]
+    difference, samples = largest_difference(robot, other), SAMPLES
+    differ = f"differ by at most {difference:.0e} m" if difference else "are equal, digit by digit,"
+    proof = f"the tool poses of both tables {differ} in {samples} random configurations."
+    return render("robot/convert", convention=convention, heads=heads, rows=rows, frames=frames, proof=proof)
+
+
+def _frame_words(other: Robot, robot: Robot, frame: str, units: Units) -> str:
+    """The tool or the base that the other table needs."""
+    same = (other.tool == robot.tool) if frame == "tool" else (other.base == robot.base)
+    if same:
+        return "stays as it is."
+    values = [text_of(v, units.of(i >= 3)) for i, v in enumerate(frame_values(other, frame))]
+    length, angle = units.lengths.name, units.angles.suffix
+    return f"becomes x y z = {', '.join(values[:3])} {length}; roll pitch yaw = {', '.join(values[3:])}{angle}."

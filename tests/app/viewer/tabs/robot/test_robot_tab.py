@@ -17,8 +17,8 @@ from app.shared.store import Store
 from app.viewer.lessons import LESSONS
 from app.viewer.own_arm import own_arm
 from app.viewer.session.state import PageState, decode, encode
+from app.viewer.tabs.robot.files import MOST
 from app.viewer.tabs.robot.presets import PRESETS
-from app.viewer.tabs.robot.tab import MAX_FILE
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -203,7 +203,7 @@ def test_files_go_out_and_come_in(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
         type_in(tab, 1, "a", "250")
-        say(tab, "download")
+        say(tab, "download", value="toml")
         tab.wait(lambda: any(m["type"] == "FileTransferPart" for m in tab.log))
         content = b"".join(bytes(m["content"]) for m in tab.log if m["type"] == "FileTransferPart").decode()
         robot = kin.parse_robot(content)
@@ -219,7 +219,7 @@ def test_files_go_out_and_come_in(port: int) -> None:
         say(tab, "upload", value=["bad.toml", True, True, text.replace("kind", "kand").replace("alpha", "alhpa")])
         assert "The file was not used" in tab.html
         assert "bad.toml: rows[0].alhpa" in html.unescape(tab.html)
-        for k in range(MAX_FILE // 20_000 + 1):
+        for k in range(MOST // 20_000 + 1):
             tab._said = tab._said[-1:]  # as the page's script does: a message to the service has a limit
             say(tab, "upload", value=["big.toml", k == 0, False, "x" * 20_000])
         assert "too large" in tab.html
@@ -242,6 +242,8 @@ UNEXPECTED: list[tuple[list[object], object]] = [
     (["convention"], ["standard"]),
     (["upload"], "x"),
     (["kill"], None),
+    (["convert"], "away"),
+    (["download"], "exe"),
     (["cell", 0.5, "a"], [1, "1"]),
 ]
 
@@ -280,3 +282,55 @@ def test_every_lesson_follows_an_arm_that_changes(port: int, lesson) -> None:
             type_in(tab, 0, "alpha", "33")
             assert "Something went wrong" not in tab.html, start
             assert "Invalid input" not in tab.html, start
+
+
+def test_the_same_arm_in_the_other_convention(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        say(tab, "convert", value="show")
+        shown = html.unescape(part(tab, "convert"))
+        assert "in the modified (Craig) convention" in shown
+        assert "configurations" in shown
+        assert "Tool</b> stays as it is" in shown, "the last row of this arm is fixed and has no length a"
+        say(tab, "convert", value="use")
+        shows(tab, PIONEER, PIONEER.q_home)
+        assert "modified convention" in part(tab, "table")
+        assert tab.value("Robot").startswith("My arm")
+        assert "Show as standard" in part(tab, "convert")
+        tab.say("undo")
+        tab.settle()
+        assert tab.value("Robot") == PIONEER.name
+
+
+def test_a_urdf_comes_in_with_the_tip_that_is_chosen(port: int) -> None:
+    text = kin.to_urdf(UR5)
+    branch = (
+        '<link name="camera"/><joint name="mount" type="revolute"><parent link="link_2"/><child link="camera"/>'
+        '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
+    )
+    there = kin.load_urdf(text)
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        say(tab, "upload", value=["ur5.urdf", True, True, text])
+        shows(tab, there, there.q_home)
+        assert "The table and the URDF differ by at most" in tab.html
+        say(tab, "start", value="planar-2r")
+        say(tab, "upload", value=["two.urdf", True, True, text.replace("</robot>", branch)])
+        assert "tool (6 joints)" in part(tab, "files")
+        say(tab, "tip", value="tool")
+        shows(tab, there, there.q_home)
+        assert "tool (6 joints)" not in part(tab, "files")
+        bomb = '<!DOCTYPE x [<!ENTITY a "aaaaaaaa"><!ENTITY b "&a;&a;&a;">]><robot name="x">&b;</robot>'
+        for name, bad in (
+            ("bomb", bomb),
+            ("cut", text[:200]),
+            ("empty", "<robot name='x'/>"),
+            ("/etc/passwd", "x"),
+        ):
+            say(tab, "upload", value=[name, True, True, bad])
+            assert "The file was not used" in tab.html, name
+        shows(tab, there, there.q_home)
+        say(tab, "download", value="urdf")
+        tab.wait(lambda: any(m["type"] == "FileTransferPart" for m in tab.log))
+        content = b"".join(bytes(m["content"]) for m in tab.log if m["type"] == "FileTransferPart").decode()
+        assert np.abs(kin.fk(kin.load_urdf(content), UR5.q_home) - kin.fk(UR5, UR5.q_home)).max() < 1e-12
