@@ -78,22 +78,24 @@
     flush();
     send(["row", action, here], null);
     here += { add: 1, up: -1, down: 1 }[action] ?? 0;
-    if (focus?.startsWith(/^\d/.exec(focus)?.[0] ?? " ")) focus = focus.replace(/^\d+/, here);
+    focus = focus?.replace(/^(\[data-cell=")\d+/, `$1${here}`) ?? null;
   }
 
   // Focus: kept when the server sends a part of the tab again
 
-  let focus = null; // the cell that has it
+  let focus = null; // a selector of the field or button that has it
   let caret = null;
   let left = 0;
   addEventListener("focusin", (event) => {
     const row = event.target.closest?.("[data-arm] tr[data-row]");
     if (row) { here = Number(row.dataset.row); mark(); }
     const cell = event.target.closest?.("[data-arm] [data-cell]");
+    const button = event.target.closest?.("[data-arm] [data-arm-do]");
+    const name = cell ? `[data-cell="${cell.dataset.cell}"]` : button ? `[data-arm-do="${button.dataset.armDo}"]` : null;
     clearTimeout(left);
-    if (cell && cell.dataset.cell !== focus && cell.matches("input")) cell.select();
+    if (cell?.matches("input") && name !== focus) cell.select();
     if (focus && !cell) left = setTimeout(leave, LEFT);
-    focus = cell?.dataset.cell ?? null;
+    focus = name;
   });
   addEventListener("focusout", (event) => {
     if (!event.target.isConnected || event.relatedTarget || !event.target.closest?.("[data-arm] [data-cell]")) return;
@@ -101,7 +103,7 @@
   });
   function leave() {
     if (document.activeElement?.closest("[data-arm] [data-cell]")) return;
-    focus = null;
+    if (document.activeElement === document.body) focus = null;
     flush();
     send(["left"], null);
   }
@@ -112,7 +114,7 @@
 
   function restore() {
     if (!focus || document.activeElement !== document.body) return;
-    const cell = document.querySelector(`[data-arm] [data-cell="${CSS.escape(focus)}"]`);
+    const cell = document.querySelector(`[data-arm] ${focus}`);
     if (!cell) return;
     cell.focus({ preventScroll: true });
     if (caret && cell.matches("input")) cell.setSelectionRange(...caret);
