@@ -55,14 +55,15 @@ def curl(moment: Moment) -> str:
     """Two commands for a shell: forward, then inverse kinematics."""
     header = ' -H "Authorization: Bearer $KINBOARD_TOKEN"' if moment.token else ""
 
-    def command(operation: str, body: object) -> str:
+    def command(operation: str, body: dict[str, object]) -> str:
+        sent = {**body, "robot": robot_to_dict(named(moment.robot))} if moment.own else body
         return (
             f"curl -s {shlex.quote(_address(moment) + '/' + operation)}{header} \\\n"
             f"  -H 'Content-Type: application/json' \\\n"
-            f"  -d '{json.dumps(body)}'\n"
+            f"  -d {shlex.quote(json.dumps(sent))}\n"
         )
 
-    return _unknown(moment) + command("fk", {"q": _list(moment.q)}) + command("ik", _question(moment))
+    return command("fk", {"q": _list(moment.q)}) + command("ik", _question(moment))
 
 
 def python_requests(moment: Moment) -> str:
@@ -72,14 +73,17 @@ def python_requests(moment: Moment) -> str:
         top = f"import os\n\n{top}\n" + 'headers = {"Authorization": "Bearer " + os.environ["KINBOARD_TOKEN"]}\n'
         header = ", headers=headers"
     body = ",\n    ".join(f'"{name}": {json.dumps(value)}' for name, value in _question(moment).items())
-    return f"""{_unknown(moment)}{top}
+    arm, field, sent = "", "", ""
+    if moment.own:
+        arm, field, sent = f"arm = {_fields(moment.robot, 6)}\n", '"robot": arm, ', '\n    "robot": arm,'
+    return f"""{top}
 robot = {json.dumps(_address(moment))}
-q = {_list(moment.q)}
-question = {{
+{arm}q = {_list(moment.q)}
+question = {{{sent}
     {body},
 }}
 
-forward = requests.post(robot + "/fk", json={{"q": q}}{header}).json()
+forward = requests.post(robot + "/fk", json={{{field}"q": q}}{header}).json()
 print(forward["pose"]["position"], forward["pose"]["wxyz"])
 
 answer = requests.post(robot + "/ik", json=question{header}).json()
@@ -93,8 +97,7 @@ def python_kin(moment: Moment) -> str:
     """Python, with this package and without any service."""
     robot = moment.robot
     if moment.own:
-        fields = pformat(robot_to_dict(named(robot)), width=100, sort_dicts=False)
-        load = f"robot = kin.robot_from_dict({textwrap.indent(fields, ' ' * 26).lstrip()})"
+        load = f"robot = kin.robot_from_dict({_fields(robot, 28)})"
     elif robot == builtin_robots().get(robot.id):
         load = f'robot = kin.get_robot("{robot.id}")'
     else:
@@ -225,19 +228,15 @@ def named(robot: Robot) -> Robot:
     return replace(robot, id="-".join(words)[:40].strip("-") or "my-arm")
 
 
-def _unknown(moment: Moment) -> str:
-    """What to do before the service knows the visitor's own arm; a comment in shells and in Python."""
-    if not moment.own:
-        return ""
-    return (
-        "# The service does not know this arm: put its file (tab Robot, Download) into the\n"
-        "# folder of kinboard serve --robots FOLDER first.\n"
-    )
+def _fields(robot: Robot, indent: int) -> str:
+    """The fields of the arm's robot file as a dict in Python, of which all lines but the first are indented."""
+    fields = pformat(robot_to_dict(named(robot)), width=100, sort_dicts=False)
+    return textwrap.indent(fields, " " * indent).lstrip()
 
 
 def _address(moment: Moment) -> str:
-    robot = named(moment.robot) if moment.own else moment.robot
-    return f"{moment.address}api/v1/robots/{robot.id}"
+    """The address below which the operations on the arm are; the visitor's own is sent along."""
+    return f"{moment.address}api/v1" if moment.own else f"{moment.address}api/v1/robots/{moment.robot.id}"
 
 
 def _question(moment: Moment) -> dict[str, object]:

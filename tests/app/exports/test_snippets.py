@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import re
 import shlex
+import sys
+from dataclasses import replace
 from types import ModuleType, SimpleNamespace
 
 import numpy as np
@@ -209,3 +211,34 @@ def test_names_cannot_break_out_of_the_code():
     assert np.abs(toolbox_fk(robotics_toolbox(moment(arm))) - moment(arm).target).max() < 1e-8
     assert "\nimport os" not in robotics_toolbox(moment(arm))
     assert "\nsystem" not in matlab(moment(arm))
+
+
+def own() -> Moment:
+    """An arm of a visitor's own, with a name that a shell or Python would mind, which no service knows."""
+    name = 'Bob\'s "arm" $(true) `x` \\ é'
+    return moment(replace(mounted(), id="own-0123456789ab", name=name), own=True, address="http://testserver/")
+
+
+def test_an_own_arm_is_sent_along_by_curl(client):
+    here = own()
+    commands = [shlex.split(line) for line in curl(here).replace("\\\n", "").splitlines()]
+    assert [words[2] for words in commands] == ["http://testserver/api/v1/fk", "http://testserver/api/v1/ik"]
+    forward, inverse = (client.post(words[2], json=json.loads(words[-1])).json() for words in commands)
+    assert np.abs(np.array(forward["pose"]["matrix"]) - here.target).max() < 1e-8
+    assert inverse["status"] == "solved"
+
+
+def test_an_own_arm_is_sent_along_by_requests(client, capsys, monkeypatch):
+    here = own()
+    module = SimpleNamespace(post=lambda url, json, headers=None: client.post(url, json=json))
+    monkeypatch.setitem(sys.modules, "requests", module)
+    exec(python_requests(here), {})
+    assert "solved" in capsys.readouterr().out
+
+
+def test_an_own_arm_is_built_in_python(capsys):
+    here, scope = own(), {}
+    exec(python_kin(here), scope)
+    assert scope["robot"].name == here.robot.name
+    assert np.abs(kin.fk(scope["robot"], here.q) - here.target).max() < 1e-15
+    assert "solved" in capsys.readouterr().out
