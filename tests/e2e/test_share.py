@@ -1,4 +1,4 @@
-"""Links, reloads and lost connections restore the view; an own arm; the landing page, its cards and its request box."""
+"""Links, reloads and lost connections restore the view; an own arm; the landing page with its request box."""
 
 from __future__ import annotations
 
