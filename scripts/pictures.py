@@ -33,6 +33,8 @@ def draw(client: viser.ClientHandle, robot: Robot) -> Image.Image:
     arm.gizmo.visible = False
     arm.floor.show(False)
     arm.show_labels(False)
+    arm.show_axes(True)
+    arm.show_base_axes(False)
     width, height = (FINER * side for side in SIZE)
     position, look_at = view(arm.body, width / height)
     toward = look_at - position

@@ -35,10 +35,10 @@ class Shot(NamedTuple):
 
 
 PUMA = [0.35, 0.75, -2.9, 0.3, 0.7, 0.2]
-CLOUD = {"drawn": True, "n": 300_000, "strategy": "uniform", "axis": "y", "at": 0.0}
+CLOUD = {"drawn": True, "n": 200_000, "strategy": "uniform", "axis": "y", "at": 0.0}
 SHOTS = (
     Shot("dashboard", "Move", {"robot": "puma560", "q": PUMA}),
-    Shot("dh", "Learn", {"robot": "stanford", "lesson": "dh"}),
+    Shot("dh", "Learn", {"robot": "stanford", "lesson": "dh", "features": {"dh": {"at": 8.0}}}),
     Shot("equations", "Learn", {"robot": "pioneer5", "lesson": "equations"}),
     Shot("postures", "Learn", {"robot": "puma560", "q": PUMA, "lesson": "postures"}, 8.0),
     Shot("redundancy", "Learn", {"robot": "iiwa14", "lesson": "redundancy"}, 8.0),

@@ -222,7 +222,8 @@ class ArmScene:
 
     def see_through(self, on: bool) -> None:
         """Make way for drawings inside the arm: translucent links, no gizmo, no axes at the base."""
-        self.gizmo.visible = self._base.visible = not on
+        self.gizmo.visible = not on
+        self.show_base_axes(not on)
         self._through = on
         self._set_opacity()
 
@@ -238,6 +239,10 @@ class ArmScene:
         self._base_up.visible = look != "body"  # the arrow is inside the body's foot
         self._show_ghost()
         self._set_opacity()
+
+    def show_base_axes(self, visible: bool) -> None:
+        """Show or hide the axes of the base frame."""
+        self._base.visible = visible
 
     def show_frames(self, visible: bool) -> None:
         """Show or hide the frame of every DH row."""
