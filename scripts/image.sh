@@ -19,6 +19,7 @@ release=$(echo "$base" | sed -n 's/.*-slim-\([a-z]*\).*/\1/p')
 image=localhost/kinboard:latest
 version=$(sed -n 's/^__version__ = "\(.*\)"/\1/p' "$root/kin/_version.py")
 container=kinboard-check
+limits="--ulimit nofile=4096:4096 --ulimit nproc=4096:4096"
 emulator=/usr/bin/qemu-x86_64-static
 mkdir -p "$work"
 
@@ -94,24 +95,32 @@ weigh() {
   podman history --format '{{.Size}}  {{.CreatedBy}}' "$image" | cut -c 1-100 | grep -v '^0 B'
 }
 
+inside() { # $1: a program of the image, $@: its arguments
+  program=$1
+  shift
+  # podman's own defaults for ulimits may be more than this machine allows; its health checks need systemd.
+  # shellcheck disable=SC2086 # a list of words
+  podman run --rm --no-healthcheck $limits --entrypoint "$program" "$image" "$@"
+}
+
 # What is in the image and what it was built from: $work/kinboard.cdx.json and $work/kinboard.provenance.json.
 attest() {
   say "SBOM and provenance"
-  podman run --rm --entrypoint python "$image" -c 'import importlib.metadata as m
+  inside python -c 'import importlib.metadata as m
 for d in m.distributions(): print(d.name, d.version)' >"$work/python.txt"
-  podman run --rm --entrypoint dpkg-query "$image" -W -f '${Package} ${Version}\n' >"$work/debian.txt"
+  inside dpkg-query -W -f '${Package} ${Version}\n' >"$work/debian.txt"
   "$root/.venv/bin/python" "$root/scripts/attest.py" --python "$work/python.txt" --debian "$work/debian.txt" \
     --release "$release" --version "$version" --base "$base@$(podman image inspect --format '{{.Digest}}' "$base")" \
     --revision "$(git -C "$root" rev-parse HEAD 2>/dev/null || echo unknown)" \
     --digest "$(podman image inspect --format '{{.Digest}}' "$image")" --to "$work" || fail "see above"
 }
 
-# Stricter than compose.yaml: not even /tmp can be written to. podman's own defaults for ulimits may be more than this
-# machine allows, and its timer for health checks needs systemd.
+# Stricter than compose.yaml: not even /tmp can be written to.
+# shellcheck disable=SC2086 # a list of words
 run() {
   podman run --detach --replace --name "$container" --publish 127.0.0.1::8000 \
     --read-only --read-only-tmpfs=false --cap-drop all --security-opt no-new-privileges \
-    --pids-limit 256 --memory 1g --cpus 2 --ulimit nofile=4096:4096 --ulimit nproc=4096:4096 \
+    --pids-limit 256 --memory 1g --cpus 2 $limits \
     --health-interval disable "$@"
 }
 

@@ -15,19 +15,24 @@ import viser
 from attacks import ARM, GET, Victim, answer_to, closed, problem_in, victim
 from fastapi import FastAPI
 from live_server import serve, wait_for
+from websockets.exceptions import ConnectionClosed
+from websockets.frames import Close
+from websockets.sync.client import ClientConnection, connect
 
 from app.api.body import UploadMemory
 from app.api.problems import ProblemError
 from app.service.guard import Guard
 from app.service.http_protocol import MAX_HEAD, MAX_PIPELINE, HttpProtocol
+from app.service.websocket_protocol import MAX_FRAGMENTS
 from app.shared.settings import Settings
 
 
 @pytest.fixture(scope="module")
 def service() -> Iterator[Victim]:
     with victim(
-        ready=True, KINBOARD_RECEIVE_TIMEOUT="1", KINBOARD_SEND_TIMEOUT="3", KINBOARD_MAX_CONNECTIONS="20"
-    ) as service:
+        ready=True, KINBOARD_RECEIVE_TIMEOUT="1", KINBOARD_SEND_TIMEOUT="2",
+        KINBOARD_MAX_CONNECTIONS="20", KINBOARD_MAX_VISITORS="4",
+    ) as service:  # fmt: skip
         yield service
         assert "Traceback" not in service.log
 
@@ -103,11 +108,14 @@ def test_a_body_that_trickles_is_cut_off(service):
         assert time.monotonic() - began < 20
 
 
-@pytest.mark.parametrize("sent", [b"", b"\r\n", GET, GET + b"\r\n"], ids=["new", "blank", "used", "used, blank"])
-def test_idle_connections_are_closed(service, sent):
-    with service.connection() as connection:
-        connection.sendall(sent)
-        wait_for(lambda: closed(connection), 20)
+def test_idle_connections_are_closed(service):
+    """New, after a blank line, after a request, and after a request and a blank line."""
+    with ExitStack() as stack:
+        idle = [stack.enter_context(service.connection()) for _ in range(4)]
+        for connection, sent in zip(idle, [b"", b"\r\n", GET, GET + b"\r\n"], strict=True):
+            connection.sendall(sent)
+        for connection in idle:
+            wait_for(lambda connection=connection: closed(connection), 20)
 
 
 def test_answers_are_sent_at_once(monkeypatch):
@@ -307,7 +315,16 @@ FLOODS = {
 }
 
 
-@pytest.mark.parametrize(("flood", "path"), [*((flood, LONG_STREAM) for flood in FLOODS), ("pings", "/viewer")])
+@pytest.mark.parametrize(
+    ("flood", "path"),
+    [
+        ("pings", LONG_STREAM),
+        ("pings", "/viewer"),
+        ("fragments", LONG_STREAM),
+        pytest.param("pongs", LONG_STREAM, marks=pytest.mark.slow),
+        pytest.param("long pings", LONG_STREAM, marks=pytest.mark.slow),
+    ],
+)
 def test_a_flood_of_frames_is_not_read(service, flood, path):
     """The buffers on the way fill up, and stay full. Without a budget, half a megabyte is read per second."""
     frames = FLOODS[flood] * (65536 // len(FLOODS[flood]))
@@ -362,12 +379,12 @@ def test_a_client_that_answers_no_ping_is_disconnected(service):
 def test_a_message_in_too_many_fragments_is_refused(service):
     with upgraded(service, LONG_STREAM) as connection:
         connection.sendall(frame(2, b"x", final=False))
-        with pytest.raises(OSError):  # noqa: PT012 - any send after the refusal may fail
-            for _ in range(600):
-                connection.sendall(frame(0, b"x", final=False))
-                time.sleep(0.04)
-                if closed(connection):
-                    raise ConnectionError
+        connection.sendall(frame(0, b"x", final=False) * MAX_FRAGMENTS)
+        received = b""
+        while b"more than %d fragments" % MAX_FRAGMENTS not in received[-200:]:
+            chunk = connection.recv(1 << 20)
+            assert chunk, "closed without a reason"
+            received = received[-200:] + chunk
 
 
 def test_a_ping_is_answered_and_a_message_in_fragments_is_read(service):
@@ -411,6 +428,28 @@ def test_one_client_gets_its_share_of_the_connections_and_others_the_rest(servic
     wait_for(lambda: "KINBOARD_CLIENT_SHARE" in service.log)
     wait_for(lambda: "KINBOARD_MAX_CONNECTIONS" in service.log)
     wait_for(lambda: service.answers_after() < 10, 10)
+
+
+def test_one_client_gets_its_share_of_the_viewer_and_others_the_rest(service):
+    wait_for(lambda: service.metric("kinboard_visitors") == 0, 30)
+    with ExitStack() as stack:
+
+        def visit(source: str) -> ClientConnection:
+            protocol = f"viser-v{viser.__version__}"
+            line = service.connection(source)
+            url = f"ws://127.0.0.1:{service.port}/viewer"
+            # Reads everything, so that pings are answered.
+            return stack.enter_context(connect(url, sock=line, subprotocols=[protocol], max_queue=None))
+
+        for _ in range(3):
+            assert visit("127.0.0.2").recv(timeout=30)
+        with pytest.raises(ConnectionClosed) as refused:
+            visit("127.0.0.2").recv(timeout=30)
+        assert refused.value.rcvd == Close(1013, "All places are taken.")
+        assert visit("127.0.0.3").recv(timeout=30)
+        with pytest.raises(ConnectionClosed):
+            visit("127.0.0.4").recv(timeout=30)
+        assert service.metric("kinboard_visitors") == 4
 
 
 def test_connections_beyond_the_open_files_are_refused():
