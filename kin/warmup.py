@@ -71,6 +71,15 @@ def one_of_each_family() -> tuple[Robot, ...]:
     return tuple(families.values())
 
 
+def made_up_arms() -> tuple[Robot, ...]:
+    """Arms of the families that no built-in arm belongs to, which visitors may bring."""
+    quarter = 0.5 * math.pi
+    parallel = ((0, 0.1, 0, quarter), (0, 0, 0.3, 0), (0, 0, 0.2, 0), (0, 0.05, 0, quarter), (0, 0.1, 0, 0))
+    oblique = tuple((0.3 * i, 0.1 + 0.1 * i, 0.3 - 0.05 * i, 0.7 + 0.1 * i) for i in range(5))
+    tables = (parallel, oblique, oblique[:2])
+    return tuple(Robot.from_dh(rows, home=[0.3, 0.5, 0.7, 0.4, 0.6][: len(rows)]) for rows in tables)
+
+
 def _move(robot: Robot) -> None:
     """The calls behind dragging a slider or the target."""
     q = robot.q_home.copy()
@@ -111,7 +120,7 @@ def _solve_generally(robot: Robot) -> None:
 def _rest() -> Iterator[Callable[[], object]]:
     robots = one_of_each_family()
     for act in (_move, _call_all):
-        for robot in robots:
+        for robot in (*robots, *made_up_arms()):
             yield partial(act, robot)
     # No built-in arm needs the general solvers, but for locked joints.
     for joints in (6, 7):

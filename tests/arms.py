@@ -131,3 +131,17 @@ def eight_joints(robot):
     more = Joint("joint 8", 0.0, 0.1, 0.05, math.pi / 2, limits=(-2.0, 2.0))
     home = (*robot.home, 0.3)
     return replace(robot, id=f"{robot.id} and one more", rows=(*robot.rows, more), home=home)
+
+
+def random_arms(count):
+    """Different arms of 2 to 7 joints, with prismatic and fixed rows, in both conventions."""
+    draw = Draw(3)
+    for k in range(count):
+        kinds = ["revolute"] * (2 + k % 6) + ["fixed"] * (k % 4 == 2)
+        kinds[k % (2 + k % 6)] = "prismatic" if k % 3 == 1 else "revolute"
+        numbers = [(draw.angle(), draw.length(), draw.length(), draw.angle()) for _ in kinds]
+        rows = [
+            {"kind": kind, "theta": theta, "d": d, "a": a, "alpha": alpha}
+            for kind, (theta, d, a, alpha) in zip(kinds, numbers, strict=True)
+        ]
+        yield Robot.from_dh(rows, "modified" if k % 2 else "standard")

@@ -10,6 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from kin.errors import InputError, RobotFileError
 from kin.home import default_home
 from kin.robot import (
@@ -27,6 +29,7 @@ from kin.transforms import as_transform
 
 ANGLES = {"deg": math.pi / 180, "rad": 1.0}
 MAX_ROWS = 32
+MAX_REACH = 1e5  # metres; targets may have coordinates up to 1e6 m
 _TOP = {"id", "name", "source", "description", "convention", "units", "rows", "home", "base", "tool"}
 _ROW = {"name", "kind", "theta", "d", "a", "alpha", "limits", "velocity", "effort"}
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(rad|deg|°|m|cm|mm)(/s)?\s*")
@@ -126,6 +129,10 @@ class _Reader:
             base=self.transform(data, "base"),
             tool=self.transform(data, "tool"),
         )
+        if robot.reach + float(np.linalg.norm(robot.T_world_base[:3, 3])) > MAX_REACH:
+            raise self.refuse(
+                "rows", f"a reach of {robot.reach:g} m", f"at most {MAX_REACH:g} m with base and tool"
+            )
         return robot if "home" in data else replace(robot, home=default_home(robot))
 
     def row(self, index: int, data: object) -> Joint:

@@ -64,8 +64,9 @@ def centred(problem: IKProblem, q: Array) -> tuple[Array, Array]:
     """Rows ``(k, n)`` at the images that score best, with their statistics ``(k, 5)``."""
     near = None
     if problem.options.prefer == "limits":
-        middle = 0.5 * (problem.lower + problem.upper)
-        near = np.where(np.isfinite(middle), middle, problem.seed)
+        bounded = np.isfinite(problem.upper - problem.lower)
+        near = problem.seed.copy()
+        near[bounded] = 0.5 * (problem.lower[bounded] + problem.upper[bounded])
     return measure(problem, q, near)
 
 
@@ -75,7 +76,8 @@ def improve(problem: IKProblem, branches: Branches, good: Flags) -> None:
     Where rows are not the same branches at all values, all of them get the value at which one of them is best.
     """
     assert problem.closed_form is not None  # whose branches these are
-    if not problem.closed_form.steady and problem.code == POSE and not problem.requested:
+    form = problem.closed_form
+    if form.redundancies(POSE) and not form.steady and problem.code == POSE and not problem.requested:
         _improve_all(problem, branches, good)
         return
     branches.q, branches.stats = centred(problem, branches.q)

@@ -123,7 +123,7 @@ def _reason(at: _Break) -> Reason:
     if violations and (least <= reach or at.distance(within) > _DETOUR * least):
         return "limits", LimitInTheWay(_worst(violations))
     shift, turn = measure(problem, at.q[None], at.q)[1][0, [POSITION_ERROR, ROTATION_ERROR]].tolist()
-    if least > _AMPLIFIED * max(shift / problem.robot.reach, turn):
+    if least > _AMPLIFIED * max(shift / (problem.robot.reach or 1.0), turn):
         broken = _broken(at, unlimited)
         if broken is not None:
             return broken

@@ -292,6 +292,8 @@ def test_base_and_tool_as_matrices():
         ({"rows": [{"a": math.nan}]}, "rows[0].a", "finite"),
         ({"rows": [{"a": 10**400}]}, "rows[0].a", "million"),
         ({"rows": [{}, {"a": None}]}, "rows[1].a", "finite"),
+        ({"rows": [{"a": 9e4}, {"a": 9e4}]}, "rows", "100000 m"),
+        ({"rows": [{}], "base": {"xyz": [0, 0, 2e5]}}, "rows", "base and tool"),
         ({"rows": [7]}, "rows[0]", "table"),
         ({"rows": [{}] * 33}, "rows", "1 to 32"),
         ({"rows": [{"kind": "prismatic", "limits": "none"}]}, "rows[0].limits", "two numbers"),

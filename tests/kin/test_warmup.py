@@ -15,7 +15,9 @@ def test_after_warm_up_rest_no_call_compiles_a_kernel():
     """In a separate process, in which nothing else has loaded kernels."""
     program = """
 import sys
+sys.path.insert(0, "tests")
 import kin
+from arms import random_arms
 from numba.core.dispatcher import Dispatcher
 
 def compilations():
@@ -35,6 +37,12 @@ for robot in kin.builtin_robots().values():
             kin.solve_ik(robot, T, task=task, prefer=prefer)
             if robot.n > 6:
                 kin.solve_ik(robot, T, task=task, prefer=prefer, locked=[None, None, 0.0, *[None] * (robot.n - 3)])
+for robot in random_arms(24):
+    T = kin.fk(robot, robot.home)
+    for task in ("pose", "approach", "position"):
+        kin.solve_ik(robot, T, task=task)
+    kin.solve_ik(robot, T, q_seed=robot.home)
+    kin.solve_path(robot, [T, T])
 arm = kin.get_robot("pioneer5")
 locked = [None, None, None, 0.3, 0.3]
 for strategy in ("uniform", "quasi", "boundary", "volume"):

@@ -18,7 +18,7 @@ import numpy as np
 from kin.axes import frame_of, inverse, perpendicular_to
 from kin.dh import SAMPLES, table_of_chain
 from kin.errors import RobotFileError
-from kin.files.read import MAX_ROWS, matrix_of
+from kin.files.read import MAX_REACH, MAX_ROWS, matrix_of
 from kin.files.urdf.tree import Tip, UrdfJoint, UrdfTree, read_tree
 from kin.fk import fk
 from kin.home import default_home
@@ -109,6 +109,8 @@ def _import(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> UrdfRobot:
         base=table.base,
         tool=table.tool,
     )
+    if robot.reach > MAX_REACH:
+        raise RobotFileError(tree.file, "joint", f"a reach of {robot.reach:g} m", f"at most {MAX_REACH:g} m")
     robot = replace(robot, home=default_home(robot))
     used = {joint.name for joint in chain}
     report = UrdfReport(

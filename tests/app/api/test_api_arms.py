@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from arms import Draw
+from arms import random_arms
 from numba.core.dispatcher import Dispatcher
 
 import kin
@@ -202,19 +202,10 @@ def test_export(client):
 
 
 def arms(count):
-    """Descriptions of different arms: 2 to 7 joints, prismatic and fixed rows, both conventions."""
-    draw = Draw(3)
-    for k in range(count):
-        kinds = ["revolute"] * (2 + k % 6)
-        kinds[k % len(kinds)] = "prismatic" if k % 3 == 1 else "revolute"
-        if k % 4 == 2:
-            kinds.append("fixed")
-        rows = [
-            {"kind": kind, "theta": draw.angle(), "d": draw.length(), "a": draw.length(), "alpha": draw.angle()}
-            for kind in kinds
-        ]
-        units = {"length": "m", "angle": "rad"}
-        yield {"convention": "modified" if k % 2 else "standard", "units": units, "rows": rows}
+    """Descriptions of different arms, without a home."""
+    for robot in random_arms(count):
+        data = kin.robot_to_dict(robot, angle="rad")
+        yield {key: data[key] for key in ("convention", "units", "rows")}
 
 
 def ask(client, robot):
