@@ -33,12 +33,13 @@ from kin.solvers.contract import (
     SolverInput,
 )
 from kin.solvers.reduced import fixed
-from kin.solvers.singular import Singularity
+from kin.solvers.reversed import WrappedKernels
+from kin.solvers.singular import JointValue, Singularity
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 Locks = tuple[float | None, ...]
-_PER_BRANCH = 4  # rows for each branch of the whole arm
+_PER_BRANCH = 16  # rows for each branch of the whole arm: as many as six joints have postures
 _SINGLE = 1e-6  # rad; the most that rounding makes of a single value
 
 
@@ -76,10 +77,29 @@ def _several(names: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _place(q: Array, branch: int) -> int | None:
-    """A free row of q ``(k, n)`` that belongs to this branch of the whole arm, or else any free one."""
+    """A free row of q ``(k, n)`` that belongs to this branch of the whole arm; None if there is none left."""
     first = _PER_BRANCH * branch
-    rows = (*range(first, first + _PER_BRANCH), *range(len(q)))
-    return next((row for row in rows if math.isnan(q[row, 0])), None)
+    return next((row for row in range(first, first + _PER_BRANCH) if math.isnan(q[row, 0])), None)
+
+
+def _kernels(form: ClosedForm, inner: BatchKernels) -> BatchKernels:
+    """Batch kernels that call `form.solve`, with the parameters of `inner`."""
+
+    def one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
+        if not np.isfinite(T).all():
+            out[:] = math.nan
+            return False
+        values = (value,) + (math.nan,) * len(form.redundancies(POSE))
+        open_ended = np.full(len(near), UNBOUNDED)
+        asked = SolverInput(T, POSE, values[: len(form.redundancies(POSE))], False, near, -open_ended, open_ended)
+        out[:] = form.solve(asked).q
+        return True
+
+    def many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
+        for k, value in enumerate(np.broadcast_to(values, len(T)).tolist()):
+            one(params, T[k], value, near, out[k])
+
+    return WrappedKernels(inner.params, one, many, lambda _: _kernels(form, inner), inner)
 
 
 def _single_values(arcs: Array) -> list[tuple[int, float]]:
@@ -99,7 +119,7 @@ class SingleValues(ClosedForm):
         self.form, self.joint, self.value = form, joint, value
         self.name, self.title, self.reason, self.lengths = form.name, form.title, form.reason, form.lengths
         self.branches, self.meanings, self.named = _several(form.branches), form.meanings, form.named
-        self.kernels: BatchKernels = form.kernels
+        self.kernels = _kernels(self, form.kernels)
 
     def handles(self, task: int) -> bool:
         """The tasks of the closed form."""
@@ -154,7 +174,8 @@ class LockedJoints(ClosedForm):
     def __init__(self, robot: Robot, form: ClosedForm | None, inner: ClosedForm, values: dict[int, float]) -> None:
         self.form, self.inner, self.values = form, inner, values
         self.others = [i for i in range(robot.n) if i not in values]
-        self.name, self.title, self.lengths, self.kernels = inner.name, inner.title, inner.lengths, inner.kernels
+        self.name, self.title, self.lengths = inner.name, inner.title, inner.lengths
+        self.kernels = _kernels(self, inner.kernels)
         numbers = ", ".join(str(i + 1) for i in values)
         self.reason = f"joint{'s' * (len(values) > 1)} {numbers} locked: {inner.reason}"
         self.named = inner.named
@@ -214,4 +235,7 @@ class LockedJoints(ClosedForm):
 
     def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
         """Those of the six joints."""
-        return self.inner.singularities(np.asarray(q)[self.others], within)
+        return tuple(
+            replace(found, met_at=tuple(JointValue(self.others[i], value) for i, value in found.met_at))
+            for found in self.inner.singularities(np.asarray(q)[self.others], within)
+        )

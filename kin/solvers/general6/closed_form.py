@@ -20,6 +20,7 @@ from kin.solvers.contract import (
     RedundancyParameter,
     SolverInput,
 )
+from kin.solvers.general6.backwards import backwards, turned_round
 from kin.solvers.general6.batch import SOLUTIONS, branches_many, branches_one, misfit_of_degree
 from kin.solvers.general6.cuts import cut_at
 from kin.solvers.singular import Singularity, by_jacobian, those_within
@@ -33,18 +34,45 @@ _VALID = 1e-9  # largest misfit of degree of a valid cut
 _POSES = 24  # random poses that decide among valid cuts
 _PROBES = 5  # of these poses, those on which the degree is checked
 _CUTS = 3  # the most that are kept
+_RARE = 1  # of these poses, those with an odd number of solutions on an arm without special axes
 
 
 def match(robot: Robot) -> General6 | None:
-    """The general solver, if the robot has six revolute joints and its loop can be cut somewhere."""
+    """The general solver, if the robot has six revolute joints and its loop can be cut somewhere.
+
+    Where some poses of the arm have solutions that it misses, the arm from tool to base may have better cuts.
+    """
     if robot.n != 6 or not robot.revolute.all():
         return None
     links = links_of(robot, (1,) * 5)
-    params = _best_cuts(robot, [cut_at(links, shift) for shift in range(6)])
-    if not len(params):
-        return None
     on_axis = is_zero(links.tool[0, 3], links.tool[1, 3], abs(links.tool[2, 2]) - 1.0)
-    return General6(robot, params, on_axis)
+    params = _best_cuts(robot, [cut_at(links, shift) for shift in range(6)])
+    missed = _missed(robot, params)
+    kernels = BatchKernels(params, branches_one, branches_many)
+    if missed > _RARE:
+        back = backwards(robot)
+        links = links_of(back, (1,) * 5)
+        other = _best_cuts(back, [cut_at(links, shift) for shift in range(6)])
+        if _missed(back, other) < missed:
+            return General6(robot, turned_round(BatchKernels(other, branches_one, branches_many)), on_axis)
+    return General6(robot, kernels, on_axis) if len(params) else None
+
+
+def _poses(robot: Robot) -> tuple[Array, Array]:
+    """Random configurations, and their poses."""
+    q = np.random.default_rng(6).uniform(-math.pi, math.pi, (_POSES, 6))
+    return q, fk(robot, q)
+
+
+def _missed(robot: Robot, params: Array) -> int:
+    """How many of the random poses have an odd number of solutions, or none, with these cuts."""
+    if not len(params):
+        return _POSES
+    q, T = _poses(robot)
+    out = np.empty((_POSES, SOLUTIONS, 6))
+    branches_many(params, T, np.array([math.nan]), q[0], out)
+    count = (~np.isnan(out[:, :, 0])).sum(axis=1)
+    return int(((count % 2 == 1) | (count == 0)).sum())
 
 
 def _best_cuts(robot: Robot, cuts: list[Array]) -> Array:
@@ -52,8 +80,7 @@ def _best_cuts(robot: Robot, cuts: list[Array]) -> Array:
 
     A cut counts as valid if it is for most of a few poses; one that misses a quarter of the poses is not used.
     """
-    q = np.random.default_rng(6).uniform(-math.pi, math.pi, (_POSES, 6))
-    T = fk(robot, q)
+    q, T = _poses(robot)
     ranked: list[tuple[int, int, int, Array]] = []
     out = np.empty((_POSES, SOLUTIONS, 6))
     for cut in cuts:
@@ -82,10 +109,10 @@ class General6(ClosedForm):
     lengths = ()
     named = False
 
-    def __init__(self, robot: Robot, params: Array, tool_on_axis: bool) -> None:
+    def __init__(self, robot: Robot, kernels: BatchKernels, tool_on_axis: bool) -> None:
         self.robot = robot
         self.tool_on_axis = tool_on_axis
-        self.kernels = BatchKernels(params, branches_one, branches_many)
+        self.kernels = kernels
 
     def handles(self, task: int) -> bool:
         """Poses, and an approach direction when it is the last joint's own axis (then that joint is free)."""
@@ -99,7 +126,7 @@ class General6(ClosedForm):
         """All solutions; with an approach direction only, joint 6 stays or takes the value requested."""
         out, free_roll = np.empty((SOLUTIONS, 6)), problem.task == APPROACH
         T = without_last(problem)[0] if free_roll else problem.T
-        branches_one(self.kernels.params, T, math.nan, problem.seed, out)
+        self.kernels.one(self.kernels.params, T, math.nan, problem.seed, out)
         values, ranges = np.full((SOLUTIONS, int(free_roll)), math.nan), []
         if free_roll:
             ranges.append(free_last(problem, out))
@@ -109,7 +136,7 @@ class General6(ClosedForm):
     def branch_of(self, q: Array) -> int:
         """The row of q ``(6,)`` among all solutions of its pose."""
         out = np.empty((SOLUTIONS, 6))
-        branches_one(self.kernels.params, fk(self.robot, q), math.nan, q, out)
+        self.kernels.one(self.kernels.params, fk(self.robot, q), math.nan, q, out)
         apart = np.abs((out - q + math.pi) % TURN - math.pi).max(axis=1)
         return 0 if np.isnan(apart).all() else int(np.nanargmin(apart))
 

@@ -17,6 +17,8 @@ from kin.ik import preferences
 from kin.solvers import closed_form_of, general7, offset7
 from kin.solvers.contract import POSE, SolverInput
 from kin.solvers.general7.motion import end_of_motion
+from kin.solvers.locked import form_with_locked
+from kin.solvers.reduced import fixed
 
 PI = math.pi
 PANDA = kin.get_robot("panda")
@@ -335,6 +337,80 @@ def test_a_lock_that_does_not_remove_the_redundancy_keeps_it():
     result = kin.solve_ik(robot, kin.fk(robot, q), locked=locked)
     assert result.status is Status.SOLVED
     assert [r.name for r in result.redundancy] == ["psi"]
+
+
+@pytest.mark.parametrize("joint", [0, 1, 2, 4, 5, 6])
+def test_a_table_with_a_joint_fixed_has_all_postures(joint):
+    """Two axes meet where three met: from base to tool some cuts are degenerate, from tool to base others."""
+    robot = fixed(kin.get_robot("iiwa14"), {joint: 0.4})
+    q = np.random.default_rng(joint).uniform(-math.pi, math.pi, (100, 6))
+    rows = kin.ik_branches(robot, kin.fk(robot, q))
+    found = np.nan_to_num(np.abs((rows - q[:, None] + math.pi) % (2 * math.pi) - math.pi).max(axis=2), nan=9.0)
+    assert (found.min(axis=1) > 1e-6).sum() <= 1
+    assert ((~np.isnan(rows[:, :, 0])).sum(axis=1) == 8).sum() >= 98
+
+
+def on_a_rail(name):
+    """A built-in arm on a rail, and the locks that hold the rail at 0.2 m."""
+    arm = kin.get_robot(name)
+    rail = kin.Joint("rail", kind="prismatic", limits=(-1.0, 1.0))
+    robot = replace(arm, id=f"railed-{name}", rows=(rail, *arm.rows), home=(0.0, *arm.home))
+    return robot, (0.2, *[None] * 6)
+
+
+def test_singularities_of_a_locked_arm_name_its_own_joints():
+    robot, locked = on_a_rail("puma560")
+    form = form_with_locked(robot, locked)
+    found = form.singularities(np.array([0.2, *robot.q_home[1:]]))
+    assert {at.joint for s in found for at in s.met_at} == {3, 5}
+
+
+def test_the_batch_kernels_of_a_locked_arm_are_its_own():
+    robot, rail = on_a_rail("irb120")
+    iiwa, single = kin.get_robot("iiwa14"), (None, None, 0.3, *[None] * 4)
+    for arm, locked in ((robot, rail), (iiwa, single), (iiwa, (0.3, *[None] * 6)), (PANDA, (0.3, *[None] * 6))):
+        form = form_with_locked(arm, locked)
+        q = arm.random_q(np.random.default_rng(1))
+        q = np.array([x if value is None else value for x, value in zip(q, locked, strict=True)])
+        T, out = kin.fk(arm, np.stack([q, q])), np.empty((2, len(form.branches), arm.n))
+        for kernels in (form.kernels, form.kernels.unchecked()):
+            kernels.many(kernels.params, T, np.array([math.nan]), q, out)
+            assert np.array_equal(out[0], out[1], equal_nan=True)
+            rows = out[0][~np.isnan(out[0][:, 0])]
+            assert np.abs(kin.fk(arm, rows) - T[0]).max() < 1e-9
+            assert apart(rows, q).min() < 1e-6
+            T[0, 0, 3] = math.inf
+            assert not kernels.one(kernels.params, T[0], math.nan, q, out[0])
+            T[0] = T[1]
+
+
+def test_a_preference_is_kept_at_a_singular_target_of_a_locked_arm():
+    arm = kin.get_robot("irb120")
+    q = np.array([0.9, 0.0, 0.6, 0.4, 0.7, 0.2])
+
+    def beside_axis_1(joint2):
+        q[1] = joint2
+        return next(s.distance for s in kin.singularities(arm, q) if s.kind == "shoulder")
+
+    # The wrist centre on axis 1: joint 1 is free.
+    tried = np.linspace(-1.5, 1.0, 2001)
+    low, high = (tried[np.argmin([beside_axis_1(x) for x in tried])] + step for step in (-2e-3, 2e-3))
+    for _ in range(200):
+        third = (high - low) / 3.0
+        low, high = (
+            (low, high - third)
+            if beside_axis_1(low + third) < beside_axis_1(high - third)
+            else (low + third, high)
+        )
+    assert beside_axis_1(low) < 1e-12
+    robot, locked = on_a_rail("irb120")
+    whole = np.array([0.2, *q])
+    T, found = kin.fk(robot, whole), []
+    for start in (-2.0, 2.0):  # outside what the limits allow, and near its end
+        whole[1] = start
+        found.append(kin.solve_ik(robot, T, prefer="limits", q_seed=whole, locked=locked))
+        assert found[-1].redundancy[0].name == "theta2"
+    assert np.ptp([result.best.q[1] for result in found]) < 1e-3
 
 
 @named
