@@ -29,6 +29,7 @@ from app.shared.clients import client_of
 from app.shared.security import Rights
 from app.shared.settings import Settings
 from app.viewer.lessons import LESSONS
+from app.viewer.own_arm import own_arm
 from app.viewer.panel.view import ViewState
 from app.viewer.session.state import PageState, encode
 
@@ -324,13 +325,16 @@ def test_read_only_does_not_restrict_clients_with_the_token():
 
 def test_a_read_only_visitor_sees_the_arm_of_a_link_and_cannot_move_it():
     application = create_app(Settings(read_only=True))
-    memory = json.dumps({"state": encode(PageState("pioneer5", view=ViewState(frames=True)))})
+    own = own_arm({**kin.robot_to_dict(PIONEER), "name": "Bob's arm"})
+    memory = json.dumps({"state": encode(PageState(own.robot.id, own=own, view=ViewState(frames=True)))})
     with serve(application) as port:
         wait_for(lambda: application.state.startup.status == "ready", 300)
         with FakeBrowser(port, path="/viewer", memory=memory) as tab:
             tab.settle()
             assert tab.value("Link frames") is True
+            assert tab.value("Robot") == "My arm (Bob's arm)"
             before = tab.tool_pose()
+            tab.say("feature", ["robot", ["start"], "planar-2r"])
             tab.set("1 rotating base", 10.0)
             tab.drag(position=(0.1, 0.1, 0.1))
             tab.send("GuiUpdateMessage", uuid=tab.element("Radians"), updates={"value": True})

@@ -148,7 +148,7 @@ def _solver(found: InspectionAnswer) -> dict[str, str]:
         return _fact("Inverse kinematics", words, "numeric:", "kb-amber")
     count = len(found["robot"]["branches"])
     postures = f", up to {count} postures" if count else ""
-    return _fact("Inverse kinematics", f"{found['solver']}{postures}: {found['reason']}.", "exact:")
+    return _fact("Inverse kinematics", f"solver {found['solver']}{postures}: {found['reason']}.", "exact:")
 
 
 def _home(found: InspectionAnswer) -> dict[str, str]:
