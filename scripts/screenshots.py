@@ -20,6 +20,9 @@ from typing import NamedTuple
 from PIL import Image
 from playwright.sync_api import Page, expect, sync_playwright
 
+from app.viewer.own_arm import KEY, own_arm, pack
+from app.viewer.tabs.robot.presets import PRESETS
+
 FOLDER = Path(__file__).parents[1] / "docs" / "images"
 SIZE = {"width": 1280, "height": 720}
 WAIT = 60_000  # ms; software rendering is slow
@@ -43,6 +46,7 @@ SHOTS = (
     Shot("postures", "Learn", {"robot": "puma560", "q": PUMA, "lesson": "postures"}, 8.0),
     Shot("redundancy", "Learn", {"robot": "iiwa14", "lesson": "redundancy"}, 8.0),
     Shot("velocity", "Learn", {"robot": "ur5", "lesson": "velocity"}, 8.0),
+    Shot("own-arm", "Robot", {"robot": KEY, "own": pack(own_arm(PRESETS["wrist-6r"], "wrist-6r"))}),
     Shot("workspace", "Workspace", {"robot": "irb120", "features": {"workspace": CLOUD}}, 25.0),
 )
 

@@ -52,6 +52,7 @@ PRESETS: dict[str, dict[str, Any]] = {
             _row("wrist", 0, 0, 0, 90, limits=[-120, 120]),
             _row("flange", 0, 100, 0, 0),
         ],
+        [0, -10, -110, 0, -60, 0],
     ),
     "scara-4": _arm(
         "SCARA",

@@ -121,7 +121,7 @@ GOOD = pack(own_arm(PRESETS["planar-2r"]))
         ({"h": [1e5, 0]}, "home.q"),
         ({"u": "inch"}, "units.length"),
         ({"b": {"xyz": [5000000, 0, 0]}}, "base"),
-        ({"b": {"xyz": [900000, 0, 0]}, "u": "m"}, "base.xyz"),
+        ({"b": {"xyz": [50000, 0, 0]}, "u": "m"}, "base.xyz"),
         ({"t": {"matrix": [[2, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}}, "tool.matrix"),
         ({"t": 7}, "tool"),
     ],
