@@ -24,6 +24,7 @@ from kin.files import (
     robot_to_toml,
     save_robot,
     to_urdf,
+    urdf_tips,
 )
 from kin.fk import fk, fk_positions, jacobian, link_frames, manipulability
 from kin.ik import IKOptions, JointConstraints, branch_meanings, branch_names, branch_of, solve_ik
@@ -123,6 +124,7 @@ __all__ = [
     "solve_ik",
     "solve_path",
     "to_urdf",
+    "urdf_tips",
     "warm_up",
     "warm_up_rest",
     "workspace_facts",

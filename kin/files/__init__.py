@@ -34,7 +34,7 @@ An error raises `RobotFileError` with the file, the field, the value and what wo
 
 from kin.files.builtin import builtin_robots, get_robot
 from kin.files.read import load_folder, load_robot, parse_robot, robot_from_dict
-from kin.files.urdf.read import UrdfReport, UrdfRobot, load_urdf, read_urdf
+from kin.files.urdf.read import UrdfReport, UrdfRobot, load_urdf, read_urdf, urdf_tips
 from kin.files.urdf.write import to_urdf
 from kin.files.write import robot_to_dict, robot_to_toml, save_robot
 
@@ -53,4 +53,5 @@ __all__ = [
     "robot_to_toml",
     "save_robot",
     "to_urdf",
+    "urdf_tips",
 ]

@@ -55,6 +55,7 @@ def test_a_chain_becomes_a_robot():
     assert (report.base, report.tip, report.joints) == ("world", "tcp", ("shoulder", "slide", "wrist"))
     assert (report.merged, report.ignored) == (("stand", "flange"), ("mount",))
     assert [(tip.link, tip.joints) for tip in report.tips] == [("tcp", 3), ("camera", 1)]
+    assert kin.urdf_tips(GOOD) == report.tips
     assert report.difference <= EXACT
     # Zero positions and directions are those of the file: the shoulder turns about −z.
     zero, turned = kin.fk(robot, [0, 0, 0]), kin.fk(robot, [0.5, 0, 0])

@@ -78,15 +78,23 @@ def read_urdf(source: Path | str, base: str | None = None, tip: str | None = Non
     Raises:
         RobotFileError: the file is invalid, or describes no serial arm; the message names the joint or link.
     """
-    if isinstance(source, str) and "<" in source:
-        tree = read_tree(source.encode("utf-8", "replace"), file or "URDF")
-    else:
-        try:
-            content = Path(source).read_bytes()
-        except (OSError, ValueError) as error:
-            raise RobotFileError(str(source), "file", str(error), "a readable URDF file") from error
-        tree = read_tree(content, file or str(source))
+    tree = _tree(source, file)
     return _import(tree, tree.chain(base, tip))
+
+
+def urdf_tips(source: Path | str, file: str = "") -> tuple[Tip, ...]:
+    """The links of a URDF that can be the tip of an arm, those with the most joints first; see `read_urdf`."""
+    return _tree(source, file).tips
+
+
+def _tree(source: Path | str, file: str) -> UrdfTree:
+    if isinstance(source, str) and "<" in source:
+        return read_tree(source.encode("utf-8", "replace"), file or "URDF")
+    try:
+        content = Path(source).read_bytes()
+    except (OSError, ValueError) as error:
+        raise RobotFileError(str(source), "file", str(error), "a readable URDF file") from error
+    return read_tree(content, file or str(source))
 
 
 def _import(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> UrdfRobot:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import gc
+import inspect
 import json
 import math
 import tracemalloc
+from functools import _lru_cache_wrapper
 from pathlib import Path
 
 import numpy as np
@@ -234,17 +236,27 @@ def test_an_arm_sent_along_compiles_nothing(client):
     assert signatures() == before
 
 
+def test_no_cache_without_bound_keeps_arms(client):
+    """Of all caches of functions; those of results have a capacity (`ComputationCache`)."""
+    ask(client, next(arms(1)))
+    caches = [each for each in gc.get_objects() if isinstance(each, _lru_cache_wrapper)]
+    ours = [each for each in caches if each.__module__.split(".")[0] in ("kin", "app")]
+    assert len(ours) > 15
+    for each in ours:
+        if each.cache_parameters()["maxsize"] is None:
+            given = {str(p.annotation) for p in inspect.signature(each).parameters.values()}
+            assert given <= {"int", "str", "Path", "bool"}, each.__qualname__
+
+
 @pytest.mark.slow
 def test_arms_sent_along_do_not_fill_memory(client):
-    """A thousand different arms leave what the caches of a few hundred hold."""
-    many = list(arms(1400))
-    for robot in many[:400]:
-        ask(client, robot)
-    gc.collect()
+    """Further arms take the places of those that the caches hold."""
+    many, sizes = list(arms(1600)), []
     tracemalloc.start()
-    for robot in many[400:]:
+    for k, robot in enumerate(many):
         ask(client, robot)
-    gc.collect()
-    grown = tracemalloc.get_traced_memory()[0]
+        if k in (1100, 1599):
+            gc.collect()
+            sizes.append(tracemalloc.get_traced_memory()[0])
     tracemalloc.stop()
-    assert grown < 30e6
+    assert sizes[1] < sizes[0] + 5e6
