@@ -26,7 +26,7 @@ from kin.solvers.locked import form_with_locked
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array, as_transform, finite_array
 
-FAR = 1e6  # metres; the coordinates of targets are smaller
+FAR = 1e6  # metres, radians; the coordinates of targets and the values of seeds are smaller
 SEED = "seed"  # stands for the branch of the seed
 _FLOAT = np.dtype(np.float64)
 _LEVER = 0.1  # metres
@@ -264,11 +264,14 @@ def _rounding(T: Array) -> float:
 def _seed(robot: Robot, q_seed: ArrayLike) -> Array:
     if type(q_seed) is np.ndarray and q_seed.shape == robot.q_shape and q_seed.dtype == np.float64:
         seed = q_seed.copy()
-        if all(map(math.isfinite, seed.tolist())):
+        if all(abs(x) <= FAR for x in seed.tolist()):
             return seed
     seed = np.array(robot.check_q(q_seed, "q_seed"))
     if seed.ndim != 1:
         raise InputError("q_seed", f"shape {seed.shape}", f"one configuration of {robot.n} values")
+    for i in np.flatnonzero(np.abs(seed) > FAR).tolist():
+        # So many turns away, the whole-turn images of an angle have lost their digits.
+        raise InputError(f"q_seed[{i}]", float(seed[i]), "a value below 1e6")
     return seed
 
 

@@ -147,3 +147,23 @@ def test_a_wrong_path_is_refused_by_name(client):
         assert document["errors"][0]["field"] == field, document
     document = post(client, SRS, "ik/path", 413, targets=[pose] * 1001)
     assert "1001" in document["detail"]
+
+
+def test_a_matrix_of_few_digits_is_met_as_closely_as_it_says(client):
+    robot = kin.get_robot("pioneer5")
+    T = kin.fk(robot, robot.q_home + 0.2)
+    answer = post(client, robot, "ik", target={"matrix": T.round(4).tolist()})
+    assert answer["status"] == "solved"
+    assert answer["tolerances"]["target_error"] >= 1e-4
+    assert answer["solutions"][0]["position_error"] <= answer["tolerances"]["position"]
+    assert "The target is rounded" in answer["reason"]
+    exact = post(client, robot, "ik", target={"matrix": T.tolist()})
+    assert "tolerances" not in exact
+    asked = post(
+        client, robot, "ik", target={"matrix": T.tolist()}, position_tolerance=1e-3, rotation_tolerance=0.01
+    )
+    assert asked["tolerances"] == {"position": 1e-3, "rotation": 0.01, "target_error": 0.0}
+    post(client, robot, "ik", target={"matrix": T.tolist()}, position_tolerance=0.0, status=422)
+    scaled = T.copy()
+    scaled[:3, :3] *= 1.1
+    post(client, robot, "ik", target={"matrix": scaled.tolist()}, status=422)

@@ -771,3 +771,15 @@ def test_the_shared_neighbours_of_a_limit_are_all_named():
     assert result.status is Status.LIMITS
     assert "One other posture is outside the limits too." in result.reason
     assert {len(b.violations) for b in result.blocked} == {1}
+
+
+@pytest.mark.parametrize("value", [1e154, 1e12, -1e7])
+def test_a_seed_too_many_turns_away_is_refused(value):
+    robot = kin.get_robot("ur5")
+    T = kin.fk(robot, robot.q_home)
+    for seed in ([0.0, value, 0.0, 0.0, 0.0, 0.0], np.array([0.0, value, 0.0, 0.0, 0.0, 0.0])):
+        with pytest.raises(InputError, match=r"q_seed\[1\]"):
+            solve_ik(robot, T, q_seed=seed, respect_limits=False)
+    far = solve_ik(robot, T, q_seed=[9e5] * 6, respect_limits=False)
+    assert far.status is Status.SOLVED
+    assert far.best.position_error < 1e-9
