@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from kin.ik.options import JointConstraints, Limits, Locks
+from kin.errors import InputError
+from kin.ik.options import FREE, JointConstraints, Limits, Locks
 from kin.ik.problem import never_cancel
 from kin.robot import Robot
 from kin.solvers.common import TURN
@@ -38,9 +39,14 @@ def workspace_facts(
         stop: called now and then; raises to cancel the computation.
 
     Raises:
-        InputError: naming the wrong argument.
+        InputError: naming the wrong argument, or a joint that slides without limits.
     """
-    region = Region.of(robot, JointConstraints.of(limits, locked, constraints))
+    constraints = JointConstraints.of(limits, locked, constraints)
+    endless = slides_without_end(robot, constraints)
+    if endless:
+        name = robot.joints[endless[0]].name
+        raise InputError(f"limits of {name}", "none", "limits, given here or by the robot: it slides without end")
+    region = Region.of(robot, constraints)
     tries = checked_integer("effort", effort, 2, 64, "a whole number from 2 to 64")
     point, axis, shoulder = base_axis(region)
     x, y, z = (along(region, direction) for direction in np.eye(3))
@@ -58,6 +64,12 @@ def workspace_facts(
         volume=size[0],
         surface=size[1],
     )
+
+
+def slides_without_end(robot: Robot, constraints: JointConstraints = FREE) -> tuple[int, ...]:
+    """Indices of the joints that slide without limits: the workspace has no end then."""
+    lower, upper, _ = constraints.bounds(robot)
+    return tuple(np.flatnonzero(~robot.revolute & ~np.isfinite(upper - lower)).tolist())
 
 
 def _turns(region: Region) -> bool:

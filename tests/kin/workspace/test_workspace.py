@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -498,3 +499,18 @@ def test_arcs_lie_on_the_boundary_and_are_traced_by_one_joint(robot_id):
     traced = sum(np.linalg.norm(np.diff(arc.points, axis=0), axis=1).sum() for arc in found.arcs)
     rim = sum(np.linalg.norm(np.diff(curve, axis=0), axis=1).sum() for curve in found.curves)
     assert traced > 0.6 * rim
+
+
+def test_the_workspace_of_a_slide_without_limits_has_no_end():
+    arm = kin.get_robot("puma560")
+    rail = kin.Joint("rail", kind="prismatic")
+    robot = replace(arm, id="railed", rows=(rail, *arm.rows), home=(0.0, *arm.home))
+    with pytest.raises(InputError, match=r"limits of rail.*slides without end"):
+        kin.workspace_facts(robot, volume=False)
+    limits = [(-1.0, 1.0), *[None] * 6]
+    found = kin.workspace_facts(robot, limits=limits, volume=False)
+    assert found.z.largest.value - found.z.least.value > 2.0
+    locked = [0.3, *[None] * 6]
+    held = kin.workspace_facts(robot, locked=locked, volume=False).z
+    own = kin.workspace_facts(arm, volume=False).z
+    assert held.largest.value == pytest.approx(own.largest.value + 0.3, abs=1e-9)
