@@ -115,9 +115,13 @@ class Rounded(ClosedForm):
         lower, upper = np.full(self.robot.n, -UNBOUNDED), np.full(self.robot.n, UNBOUNDED)
         goal = (np.ascontiguousarray(T), code, _MASK, 1.0)
         turns = np.zeros(self.robot.n)
+        model = self.robot.model
+        if not held:
+            each_of(model, goal, (lower, upper, turns), -1.0, len(q) + 1, rows, errors)
+            return rows, errors
         for k in range(len(q)):
             lower[held] = upper[held] = q[k, held]
-            each_of(self.robot.model, goal, (lower, upper, turns), -1.0, 2, rows[k : k + 1], errors[k : k + 1])
+            each_of(model, goal, (lower, upper, turns), -1.0, 2, rows[k : k + 1], errors[k : k + 1])
         return rows, errors
 
     def _kernels(self, form: BatchKernels) -> BatchKernels:
