@@ -15,6 +15,8 @@ from hypothesis import strategies as st
 import kin
 from kin import InputError, Joint, Robot, RobotFileError, UnknownRobotError
 from kin.files.builtin import BUILTIN
+from kin.files.read import matrix_of
+from kin.files.write import rpy_of
 
 GOOD = """
 id = "bench"
@@ -343,3 +345,13 @@ def test_from_dh():
     for extra in ({"velocity": -1}, {"effort": 0}, {"kind": "fixed", "velocity": 1, "limits": None}):
         with pytest.raises(InputError, match="positive number"):
             Robot.from_dh([{}, extra])
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("away", [0.0, 1e-15, 1e-12, 1e-9, 1e-6, 1e-3, 1.0])
+def test_roll_pitch_and_yaw_near_a_pitch_of_90_degrees(sign, away):
+    """There roll and yaw are hardly defined, but the rotation they make together is."""
+    for roll in (-3.0, 0.0, 0.4, math.pi):
+        for yaw in (-2.0, 0.0, 1.0):
+            T = matrix_of((0, 0, 0), (roll, sign * (math.pi / 2 - away), yaw))
+            assert np.abs(np.array(matrix_of((0, 0, 0), rpy_of(T))) - T).max() < 2e-15
