@@ -92,7 +92,8 @@ class Stage(Protocol):
     def edit_arm(self, own: OwnArm) -> None:
         """Show a changed version of the arm on show as the visitor's own.
 
-        Viewpoint and task stay, and configuration and locks if it has as many joints of the same kinds.
+        Viewpoint, task and a target that is not reached stay; configuration and locks do if it has as many joints
+        of the same kinds.
         """
 
     def change_robot(self, robot: Robot) -> None:

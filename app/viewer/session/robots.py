@@ -29,9 +29,11 @@ def robot_of(page: RobotPage, robot_id: str | None) -> Robot:
 def edit(page: RobotPage, own: OwnArm) -> None:
     """Show a changed version of the arm on show.
 
-    Viewpoint and task stay, and configuration and locks if it has as many joints of the same kinds.
+    Viewpoint, task and a target that is not reached stay; configuration and locks do if it has as many joints of
+    the same kinds.
     """
     robot, q, task, locks, viewpoint = own.robot, page.goal, page.task, page.arm.locks, page.camera.chosen
+    target = page.arm.open_target
     alike = [joint.kind for joint in page.robot.joints] == [joint.kind for joint in robot.joints]
     page.own = own
     page.change_robot(robot, robot.clip(q) if alike else None, glide=True)
@@ -41,3 +43,5 @@ def edit(page: RobotPage, own: OwnArm) -> None:
         page.set_task(task)
     if alike and any(locks):
         page.set_locks(locks)
+    if target is not None:
+        page.arm.restore_target(target, page.goal, ease=True)
