@@ -149,5 +149,7 @@ def _same_pose(problem: IKProblem, q: Array) -> Array:
     T = fk(problem.robot, q)
     if problem.code == POSITION:
         T[:3, 3] = problem.T[:3, 3]
-    found = solve_branches(problem, T, POSE if problem.robot.n >= 6 else APPROACH, q)
+    form = problem.closed_form
+    rolls = problem.robot.n < 6 and form is not None and form.handles(APPROACH)
+    found = solve_branches(problem, T, APPROACH if rolls else POSE, q)
     return np.empty((0, problem.robot.n)) if found is None else found.q[~np.isnan(found.q[:, 0])]

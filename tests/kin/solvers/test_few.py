@@ -194,6 +194,11 @@ def test_an_approach_leaves_the_roll_free():
 def test_a_gripper_beside_the_roll_axis_leaves_neither_point_nor_direction_free():
     form = closed_form_of(OFFSETS)
     assert [form.handles(task) for task in range(4)] == [True, False, False, False]
+    counts = [
+        len(kin.solve_ik(OFFSETS, T[:3, 3], task="position", q_seed=q).solutions)
+        for q, T in zip(*configurations(OFFSETS, 10), strict=True)
+    ]
+    assert max(counts) > 1  # the other postures of the pose that is found
 
 
 def test_five_joints_and_a_direction():
