@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
 import ipaddress
 import logging
 import socket
@@ -12,6 +13,7 @@ import threading
 import webbrowser
 from collections.abc import Callable
 from types import FrameType
+from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
@@ -30,6 +32,10 @@ if sys.platform != "win32":
 
 logger = logging.getLogger("kinboard.server")
 
+QUEUE = 2048  # connections that may wait to be accepted
+# Connections accepted in one round of the event loop (asyncio takes uvicorn's backlog for it). Each holds a file
+# for two more rounds, even if it is refused, so this must be a quarter of `guard.SPARE_FILES`.
+ACCEPTED = 4
 STOP_TIMEOUT = 3.0  # s for the end of the service itself, after requests have ended
 PING_INTERVAL = 20.0  # seconds between two pings of a websocket
 
@@ -43,6 +49,7 @@ def server_config(app: FastAPI, settings: Settings, files: int | None = None) ->
     config = GuardedConfig(
         app,
         lifespan="on",
+        backlog=ACCEPTED,
         loop="asyncio",  # faster here than uvloop: see `http_protocol.GuardedConfig`
         log_level="warning",
         access_log=False,
@@ -77,7 +84,9 @@ class Server(uvicorn.Server):
         greeting: Greeting | None = None,
         alive: Callable[[], None] | None = None,
     ) -> None:
-        super().__init__(server_config(app, settings, open_files()))
+        config = server_config(app, settings, open_files())
+        super().__init__(config)
+        self._note = config.guard.note
         self._end_work = app.state.compute.close
         self._drain = settings.drain
         self._greeting = greeting
@@ -85,9 +94,20 @@ class Server(uvicorn.Server):
         self._deadline: threading.Timer | None = None
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        asyncio.get_running_loop().set_exception_handler(self._on_loop_error)
         await super().startup(sockets=sockets)
+        for listener in sockets or ():
+            listener.listen(QUEUE)  # asyncio has just made the queue as short as `ACCEPTED`
         if self._greeting is not None:
             self._greeting.show()
+
+    def _on_loop_error(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        """One line instead of a traceback where the loop accepts more connections at once than there are files."""
+        error = context.get("exception")
+        if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
+            self._note("no file", "no file is free for a new connection (ulimit -n); it waits for a second")
+        else:
+            loop.default_exception_handler(context)
 
     async def on_tick(self, counter: int) -> bool:
         if self._alive is not None and counter % 10 == 0:  # called ten times a second
@@ -139,7 +159,7 @@ def listen(settings: Settings) -> list[socket.socket]:
 
     def bind(port: object, shared: bool) -> socket.socket:
         return socket.create_server(
-            (address[0], port), family=family, backlog=2048, dualstack_ipv6=dual, reuse_port=shared
+            (address[0], port), family=family, backlog=QUEUE, dualstack_ipv6=dual, reuse_port=shared
         )
 
     alone = bind(address[1], False)
