@@ -40,6 +40,7 @@ _TURNS = tuple(
 )
 _POINTS = 4  # the most configurations of three joints for a point
 _AT_ZERO = TOLERANCES.near_miss
+_CHUNK = 256  # targets whose solutions are compared at a time
 
 
 def match(robot: Robot, form_of: Callable[[Robot], ClosedForm | None]) -> General5 | None:
@@ -172,10 +173,15 @@ class General5(ClosedForm):
         n = self.robot.n
 
         def many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
-            found = self._completed(form, params, T, values, np.append(near, np.zeros(6 - n)))
-            rows = self._rows(found)
-            q = np.take_along_axis(found[..., :n], np.maximum(rows, 0)[..., None], axis=1)
-            out[:] = np.where(rows[..., None] >= 0, q, math.nan)
+            longer = np.append(near, np.zeros(6 - n))
+            values = np.broadcast_to(values, len(T))
+            for start in range(0, len(T), _CHUNK):
+                part = slice(start, start + _CHUNK)
+                wanted = np.ascontiguousarray(values[part])
+                found = self._completed(form, params, np.ascontiguousarray(T[part]), wanted, longer)
+                rows = self._rows(found)
+                q = np.take_along_axis(found[..., :n], np.maximum(rows, 0)[..., None], axis=1)
+                out[part] = np.where(rows[..., None] >= 0, q, math.nan)
 
         def one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
             many(params, T[None], np.array([value]), near, out[None])
