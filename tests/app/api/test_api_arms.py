@@ -133,6 +133,15 @@ def test_base_and_tool_frames(client):
         )
         assert found["status"] == "solved"
         assert found["solutions"][0]["q"] == pytest.approx(Q, abs=1e-6)
+    # The frames are added to those of the arm.
+    own = {
+        **EXAMPLE,
+        "tool": {"xyz": [20, 0, 50], "rpy": [0, 90, 0]},
+        "base": {"xyz": [0, 0, 300], "rpy": [90, 0, 0]},
+    }
+    plain = np.array(post(client, "fk", {"q": Q, "robot": own})["pose"]["matrix"])
+    framed = post(client, "fk", {"q": Q, "robot": own, "tool": tool, "base": base})["pose"]
+    assert np.array(framed["matrix"]) == pytest.approx(T_base @ plain @ T_tool)
     wrong = {"matrix": np.diag([2.0, 1, 1, 1]).tolist()}
     problem = post(client, "robots/pioneer5/fk", {"q": Q, "tool": wrong}, 422)
     assert problem["errors"][0]["field"] == "tool.matrix rotation"
@@ -251,11 +260,11 @@ def test_no_cache_without_bound_keeps_arms(client):
 @pytest.mark.slow
 def test_arms_sent_along_do_not_fill_memory(client):
     """Further arms take the places of those that the caches hold."""
-    many, sizes = list(arms(1600)), []
+    many, sizes = list(arms(1250)), []
     tracemalloc.start()
     for k, robot in enumerate(many):
         ask(client, robot)
-        if k in (1100, 1599):
+        if k in (1050, 1249):
             gc.collect()
             sizes.append(tracemalloc.get_traced_memory()[0])
     tracemalloc.stop()
