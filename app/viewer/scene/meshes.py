@@ -33,6 +33,7 @@ TOOL_COLOR: Color = (92, 99, 112)
 APPROACH_COLOR: Color = (214, 39, 120)
 PEDESTAL_COLOR: Color = (126, 134, 147)
 PROBES = 8000
+MOST_AT_A_POINT = 4  # drums at one point, beyond which no further one is longer
 PEDESTAL = 0.12  # height of a pedestal, relative to the reach
 COLUMN, PLATE, FOOT = 1.6, 2.3, 3.4  # radii of its column, plate and foot, relative to the thickness of a link
 
@@ -78,7 +79,8 @@ def body(robot: Robot) -> Body:
     parts = []
     crowd = 0
     for link in links.links:
-        crowd = crowd + 1 if link.index > 0 and np.linalg.norm(link.T_parent_axis[:3, 3]) < 1e-6 else 0
+        crowded = link.index > 0 and np.linalg.norm(link.T_parent_axis[:3, 3]) < 1e-6
+        crowd = min(crowd + 1, MOST_AT_A_POINT) if crowded else 0
         held = grip if all(len(after.path) < 2 for after in links.links[link.index + 2 :]) else 0.0
         parts.append(_link_parts(link, radii[link.index + 1], crowd, held, links))
     floor = _floor(robot, size)
@@ -104,7 +106,7 @@ def _tip(links: Chain, size: float) -> float:
     path = links.links[-1].path
     if len(path) < 2:
         return 0.62
-    return min(0.62, 0.27 * float(np.linalg.norm(path[1] - path[0])) / size)
+    return max(min(0.62, 0.27 * float(np.linalg.norm(path[1] - path[0])) / size), 0.1)
 
 
 def _taper(index: int, n: int, tip: float) -> float:

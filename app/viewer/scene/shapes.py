@@ -6,6 +6,7 @@ has its vertices twice.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -17,6 +18,7 @@ from kin.transforms import Array, frame_from_approach
 
 Faces = NDArray[np.int64]
 SEGMENTS = 28
+MOST_POINTS = 100
 DIRECTIONS = 28  # corners of an outline
 
 
@@ -131,10 +133,10 @@ def placed(mesh: trimesh.Trimesh, T: Array) -> trimesh.Trimesh:
 
 
 def spaced(path: Array, step: float) -> Array:
-    """Points on a polyline ``(k, 3)``, at most `step` apart."""
+    """Points on a polyline ``(k, 3)``, at most `step` apart where that takes at most `MOST_POINTS` for a line."""
     pieces = [path[:1]]
     for start, end in pairwise(path):
-        count = max(1, int(np.ceil(np.linalg.norm(end - start) / step)))
+        count = math.ceil(min(MOST_POINTS, max(1.0, float(np.linalg.norm(end - start)) / step)))
         pieces.append(start + (end - start) * (np.arange(1, count + 1) / count)[:, None])
     return np.vstack(pieces)
 

@@ -89,3 +89,19 @@ def test_the_page_marks_a_contact_and_says_so(port: int) -> None:
         assert "passes through the floor." in tab.nodes[f"{mark}/text"]["props"]["text"]
         tab.set("2 shoulder", -90.0)
         tab.wait(lambda: not tab.visible[mark] and "passes through" not in tab.html)
+
+
+NOTHING = (0.0, 0.0, 0.0, 0.0)
+STRANGE = {
+    "32 joints at a point": [NOTHING] * 31 + [(0.0, 0.0, 0.05, 0.0)],
+    "a tiny last step": [(0.0, 0.3, 0.0, 1.0), (0.0, 1e-5, 300.0, 0.0)],
+    "a tiny and a long link": [(0.0, 2e-6, 0.0, 0.0), (0.0, 2e-6, 999.0, 0.0)],
+}
+
+
+@pytest.mark.parametrize("rows", STRANGE.values(), ids=STRANGE)
+def test_the_cover_of_any_arm_is_bounded(rows: list[tuple[float, float, float, float]]) -> None:
+    robot = kin.Robot.from_dh(rows)
+    test = clearance(robot)
+    assert len(test._radii) < 5000
+    assert np.abs(body(robot).parts[-1][0].mesh.vertices).max() < 10.0 * robot.reach
