@@ -68,7 +68,7 @@ class Joint:
 
     def __post_init__(self) -> None:
         """Check the row; numbers of any type become floats."""
-        if self.kind not in KIND_CODES:
+        if not isinstance(self.kind, str) or self.kind not in KIND_CODES:
             raise InputError(f"kind of {self.name}", self.kind, _one_of(*KIND_CODES))
         for key in ("theta", "d", "a", "alpha"):
             object.__setattr__(self, key, _number(f"{key} of {self.name}", getattr(self, key)))
@@ -124,7 +124,7 @@ class Robot:
         """Check the fields; lists become tuples, and arrays become nested tuples."""
         if self.convention not in CONVENTIONS:
             raise InputError("convention", self.convention, _one_of(*CONVENTIONS) + " (Craig's)")
-        if self.units not in LENGTHS:
+        if not isinstance(self.units, str) or self.units not in LENGTHS:
             raise InputError("units", self.units, _one_of(*LENGTHS))
         rows = tuple(self.rows) if isinstance(self.rows, Iterable) else ()
         if not any(isinstance(row, Joint) and row.kind != "fixed" for row in rows):
@@ -314,15 +314,19 @@ def _row(index: int, row: Joint | Mapping[str, Any] | Sequence[float]) -> Joint:
         if key not in known:
             raise InputError(f"rows[{index}].{key}", row[key], "only the fields " + ", ".join(known))
     kind = row.get("kind", "revolute")
-    defaults = {"name": f"joint {index + 1}", "limits": DEFAULT_LIMITS.get(kind)}
+    defaults = {"name": f"joint {index + 1}", "limits": DEFAULT_LIMITS.get(str(kind))}
     return Joint(**{**defaults, **row})
 
 
 def _number(field: str, value: object) -> float:
     """A finite number as a float; raises `InputError` naming the field."""
-    if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
+    try:
+        number = math.nan if isinstance(value, bool) or not isinstance(value, Real) else float(value)
+    except OverflowError:  # an integer beyond the largest float
+        number = math.inf
+    if not math.isfinite(number):
         raise InputError(field, value, "a finite number")
-    return float(value)
+    return number
 
 
 def _one_of(*choices: str) -> str:

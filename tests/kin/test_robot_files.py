@@ -342,6 +342,14 @@ def test_from_dh():
         Robot.from_dh([{"length": 1}])
     with pytest.raises(InputError, match="alpha of joint 1"):
         Robot.from_dh([(0, 0, 0, math.inf)])
+    with pytest.raises(InputError, match="alpha of joint 1"):
+        Robot.from_dh([(0, 0, 0, 10**400)])
+    with pytest.raises(InputError, match="kind of joint 1"):
+        Robot.from_dh([{"kind": []}])
+    with pytest.raises(InputError, match="kind of a"):
+        Joint("a", kind={})
+    with pytest.raises(InputError, match="units"):
+        replace(robot, units=[])
     for extra in ({"velocity": -1}, {"effort": 0}, {"kind": "fixed", "velocity": 1, "limits": None}):
         with pytest.raises(InputError, match="positive number"):
             Robot.from_dh([{}, extra])
