@@ -27,7 +27,7 @@ FLOOR: Obstacle = "floor"
 PEDESTAL: Obstacle = "pedestal"
 DEPTH = 0.2  # relative to the thickness of a link: what is less deep only touches
 # A sphere that is in the pedestal in most configurations belongs to the mounting of the arm.
-SAMPLES, MOST = 400, 0.6
+SAMPLES, MOST = 100, 0.6
 
 
 @dataclass(frozen=True)
