@@ -3,7 +3,7 @@
 // the server, which decides what they mean; app/viewer/panel/script.py describes how.
 (() => {
   const KEPT = 20; // messages in the field at once
-  const LONGEST = 40000; // characters in the field
+  const LONGEST = 48000; // bytes in the field; the service closes a connection that sends more than 64 KiB at once
   const HOLD = 600; // ms without a key until the next press counts as another step of the history
   const DECIMALS = 1e9;
   // Letters that move the target: axis and direction. The same places on QWERTY, QWERTZ and AZERTY keyboards.
@@ -25,11 +25,15 @@
   // A new connection has a new page on the server, which must not act on old messages.
   addEventListener("kinboard-connect", () => { messages = []; waiting.clear(); });
 
+  const bytes = (value) => new TextEncoder().encode(JSON.stringify(value)).length;
+
   function send(name, argument = null, done = null) {
     const field = document.querySelector("[data-answers]")?.parentElement.nextElementSibling?.querySelector("input");
     if (!field) return;
-    messages = [...messages.slice(1 - KEPT), [++number, name, argument]];
-    while (messages.length > 1 && JSON.stringify(messages).length > LONGEST) messages.shift();
+    const message = [++number, name, argument];
+    if (bytes([message]) > LONGEST) { done?.("This text is too long."); return; }
+    messages = [...messages.slice(1 - KEPT), message];
+    while (bytes(messages) > LONGEST) messages.shift();
     if (done) waiting.set(number, done);
     type(field, JSON.stringify(messages));
   }

@@ -6,7 +6,7 @@
   const PAUSE = 40; // ms after a key until a cell is sent
   const PATIENCE = 3000; // ms for an answer, then the next message is sent
   const LEFT = 400; // ms without focus until the table is written again, so that a click on a button finds it
-  const PART = 8000; // characters of a file in one message
+  const PART = 16000; // bytes of a file in one message
 
   const part = (name) => document.querySelector(`[data-arm="${name}"]`);
   const cells = () => [...document.querySelectorAll("[data-arm] input[data-cell]")];
@@ -84,6 +84,7 @@
   // Focus: kept when the server sends a part of the tab again
 
   let focus = null; // a selector of the field or button that has it
+  let gone = false; // the visitor has left it
   let caret = null;
   let left = 0;
   addEventListener("focusin", (event) => {
@@ -93,13 +94,17 @@
     const button = event.target.closest?.("[data-arm] [data-arm-do]");
     const name = cell ? `[data-cell="${cell.dataset.cell}"]` : button ? `[data-arm-do="${button.dataset.armDo}"]` : null;
     clearTimeout(left);
+    gone = false;
     if (cell?.matches("input") && name !== focus) cell.select();
     if (focus && !cell) left = setTimeout(leave, LEFT);
     focus = name;
   });
   addEventListener("focusout", (event) => {
-    if (!event.target.isConnected || event.relatedTarget || !event.target.closest?.("[data-arm] [data-cell]")) return;
-    left = setTimeout(leave, LEFT);
+    const target = event.target;
+    if (event.relatedTarget || !target.closest?.("[data-arm]")) return;
+    // Browsers also report an element that they are about to remove; after that it is not connected.
+    queueMicrotask(() => { if (target.isConnected && document.activeElement === document.body) gone = true; });
+    if (target.isConnected && target.closest("[data-cell]")) left = setTimeout(leave, LEFT);
   });
   function leave() {
     if (document.activeElement?.closest("[data-arm] [data-cell]")) return;
@@ -113,7 +118,7 @@
   });
 
   function restore() {
-    if (!focus || document.activeElement !== document.body) return;
+    if (!focus || gone || document.activeElement !== document.body) return;
     const cell = document.querySelector(`[data-arm] ${focus}`);
     if (!cell) return;
     cell.focus({ preventScroll: true });
@@ -140,6 +145,7 @@
 
   function neighbour(cell, down, right) {
     const row = cell.closest("tr");
+    if (!row) return undefined;
     const line = [...row.querySelectorAll("[data-cell]")];
     if (right) return line[line.indexOf(cell) + right];
     const other = down > 0 ? row.nextElementSibling : row.previousElementSibling;
@@ -161,6 +167,7 @@
       if (part("table").querySelector(`[data-arm-do="${action}"]`).ariaDisabled !== "true") change(action);
     } else if (event.key === "Escape" && wrong?.any) { flush(); send(["discard"], null); }
     else if (!cell.matches("input") || event.ctrlKey || event.metaKey || event.altKey) return;
+    else if (event.key === "Enter" && !cell.closest("tr")) cell.blur();
     else if (event.key === "Enter") to = neighbour(cell, 0, event.shiftKey ? -1 : 1) ?? neighbour(cell, event.shiftKey ? -1 : 1, 0) ?? cell;
     else if (event.key === "ArrowDown") to = neighbour(cell, 1, 0);
     else if (event.key === "ArrowUp") to = neighbour(cell, -1, 0);
@@ -215,8 +222,15 @@
     input.value = "";
     upload(file.name.slice(0, 100), text, 0);
   });
+  /** The end of the part that begins at `from`: a short enough message, and no character is cut in two. */
+  function endOfPart(text, from) {
+    let length = PART;
+    while (new TextEncoder().encode(JSON.stringify(text.slice(from, from + length))).length > PART + 2) length >>= 1;
+    const inside = text.codePointAt(from + length - 1) > 0xffff; // the second half of that character comes next
+    return from + length - inside;
+  }
   function upload(name, text, from) {
-    const to = from + PART;
+    const to = endOfPart(text, from);
     send(["upload"], [name, from === 0, to >= text.length, text.slice(from, to)], () => { if (to < text.length) upload(name, text, to); });
   }
 

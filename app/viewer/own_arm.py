@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import unicodedata
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -19,6 +19,7 @@ import numpy as np
 
 import kin
 from kin import InputError, Robot
+from kin.files.read import MAX_ROWS
 
 KEY = "own"  # stands for the arm in a link, and begins its id
 MY_ARM = "My arm"
@@ -54,7 +55,7 @@ def own_arm(data: Mapping[str, Any], start: str = "") -> OwnArm:
     fields["description"] = clean(data.get("description", ""), DESCRIPTION)
     rows = data.get("rows")
     if isinstance(rows, Sequence) and not isinstance(rows, str):
-        fields["rows"] = [_named(i, row) if isinstance(row, Mapping) else row for i, row in enumerate(rows)]
+        fields["rows"] = _named(rows)
     robot = kin.robot_from_dict(fields, "your arm")
     if not SMALLEST <= robot.reach <= LARGEST:
         limits = f"lengths a and d (or a tool) that reach {SMALLEST * 1000:g} mm to {LARGEST:g} m"
@@ -69,8 +70,29 @@ def own_arm(data: Mapping[str, Any], start: str = "") -> OwnArm:
     return OwnArm(replace(robot, id=f"{KEY}-{digest}"), clean(start, ROW_NAME))
 
 
-def _named(index: int, row: Mapping[str, Any]) -> dict[str, Any]:
-    return {**row, "name": clean(row.get("name", ""), ROW_NAME) or f"joint {index + 1}"}
+def _named(rows: Sequence[Any]) -> list[Any]:
+    """The rows with names that can be shown. Names that only this makes equal get a number."""
+    named: list[Any] = []
+    taken = {
+        row.get("name") for row in rows[:MAX_ROWS] if isinstance(row, Mapping) and isinstance(row.get("name"), str)
+    }
+    for i, row in enumerate(rows):
+        if isinstance(row, Mapping):
+            given = row.get("name", "")
+            name = clean(given, ROW_NAME) or f"joint {i + 1}"
+            if isinstance(name, str) and name != given and i < MAX_ROWS:
+                name = _unused(name, taken)
+                taken.add(name)
+            row = {**row, "name": name}
+        named.append(row)
+    return named
+
+
+def _unused(name: str, taken: Set[Any]) -> str:
+    """The name, with a number if it is taken."""
+    endings = ("", *(f"_{k}" for k in range(2, MAX_ROWS + 2)))
+    cut = (name if len(name + end) <= ROW_NAME else name[: ROW_NAME - len(end) - 1] + "…" for end in endings)
+    return next(one for start, end in zip(cut, endings, strict=True) if (one := start + end) not in taken)
 
 
 def clean(value: object, length: int) -> Any:

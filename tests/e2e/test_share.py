@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 import pytest
 from page import WAIT, Tab, save_picture
-from playwright.sync_api import Browser, FrameLocator, Page, expect
+from playwright.sync_api import Browser, FilePayload, FrameLocator, Page, expect
 
 import kin
 from app.viewer.panel.joints import LOCKED
@@ -306,9 +306,35 @@ def test_an_arm_of_ones_own_is_typed_and_kept(tab: Tab) -> None:
     tab.wait_for_tool(longer("250 mm"), within=0.06)
     page.wait_for_function("before => location.href !== before", arg=before)
 
+    name = page.locator("#kb-arm-name")
+    name.press("ArrowDown")
+    name.press("Enter")
+    expect(name).not_to_be_focused()
+
     page.reload()
     expect(cell).to_have_value("250")
     tab.wait_for_tool(longer("250 mm"), within=0.06)
     tab.dismiss_notice()
     page.go_back()
     tab.wait_for_tool(kin.fk(PIONEER, PIONEER.q_home)[:3, 3], within=0.06)
+
+
+def test_a_large_file_of_ones_own_comes_in_whole(tab: Tab) -> None:
+    page = tab.page
+    tab.open("Robot")
+    comment = "# 臂臂臂臂臂臂臂臂臂臂🤖\n" * 2400
+    text = comment + kin.robot_to_toml(UR5).replace('name = "UR5"', 'name = "工業機械臂"')
+    file = FilePayload(name="臂.toml", mimeType="application/toml", buffer=text.encode())
+    page.locator("[data-arm-file]").set_input_files(file)
+    expect(page.locator("#kb-arm-name")).to_have_value("工業機械臂")
+    tab.wait_for_tool(kin.fk(UR5, UR5.q_home)[:3, 3], within=0.06)
+
+    cell = page.locator('[data-cell="1 a"]')
+    cell.click()
+    expect(cell).to_be_focused()
+    page.mouse.click(300, 300)
+    expect(cell).not_to_be_focused()
+    page.evaluate("""document.body.append(document.createElement("i"))""")
+    page.wait_for_function(
+        "new Promise(done => requestAnimationFrame(() => done(document.activeElement === document.body)))"
+    )

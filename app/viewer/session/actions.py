@@ -13,7 +13,6 @@ from typing import Any, Protocol
 
 import kin
 from app.viewer.feature import Feature, message_of
-from app.viewer.own_arm import KEY
 from app.viewer.panel.script import Reply
 from app.viewer.panel.status import Notice, introduction
 from app.viewer.panel.target import DEFAULT_TASK, TASKS
@@ -348,8 +347,10 @@ class Actions:
         robot = page.panel.robots.read(value)
         if robot == page.robot:
             return
-        # The visitor's own arm has another id after every change.
-        self._left = {name: state for name, state in self._left.items() if not name.startswith(KEY)}
+        # The visitor's own arm has another id after every change; only the present one can be shown again.
+        own = None if page.own is None else page.own.robot.id
+        ids = {own, *(offered.id for offered in page.store.robots)}
+        self._left = {name: state for name, state in self._left.items() if name in ids}
         self._left[page.robot.id] = page.snapshot()
         left = self._left.get(robot.id)
         page.change_robot(robot, None if left is None else left.q)

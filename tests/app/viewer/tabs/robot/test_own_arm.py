@@ -175,6 +175,34 @@ def test_a_name_is_one_line_of_visible_characters(name, shown):
     assert own_arm({**PRESETS["planar-2r"], "name": name}).robot.name == shown
 
 
+def test_names_that_only_cutting_makes_equal_get_a_number():
+    long = "robot_namespace_left_manipulator_arm_link_"
+    rows = [{"a": 100, "name": f"{long}{i}"} for i in range(3)]
+    taken = f"{long[: ROW_NAME - 3]}…_2"
+    names = [
+        joint.name for joint in own_arm({**PRESETS["one-joint"], "rows": rows, "home": {"q": [0] * 3}}).robot.rows
+    ]
+    assert names == [f"{long[: ROW_NAME - 1]}…", taken, f"{long[: ROW_NAME - 3]}…_3"]
+    assert all(len(name) <= ROW_NAME for name in names)
+    rows = [{"a": 100, "name": name} for name in ("", "joint 1", "joint\t1", "joint 1_2")]
+    own = own_arm({**PRESETS["one-joint"], "rows": rows, "home": {"q": [0] * 4}})
+    assert [joint.name for joint in own.robot.rows] == ["joint 1_3", "joint 1", "joint 1_4", "joint 1_2"]
+    assert unpack(pack(own)) == own
+
+
+@given(
+    st.lists(st.text(max_size=3) | st.text("ab", min_size=39, max_size=42), min_size=1, max_size=8, unique=True)
+)
+def test_any_different_names_give_an_arm(names):
+    rows = [{"a": 100, "name": name} for name in names]
+    shown = [
+        joint.name
+        for joint in own_arm({**PRESETS["one-joint"], "rows": rows, "home": {"q": [0] * len(names)}}).robot.rows
+    ]
+    assert len(set(shown)) == len(names)
+    assert all(name == clean(name, ROW_NAME) for name in shown)
+
+
 @given(st.text(max_size=200))
 def test_a_cleaned_text_stays_as_it_is(text):
     once = clean(text, NAME)

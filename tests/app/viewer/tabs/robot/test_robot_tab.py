@@ -348,3 +348,19 @@ def test_a_target_out_of_reach_waits_for_a_longer_arm(port: int) -> None:
         type_in(tab, 0, "a", "600")
         tab.wait(lambda: 'data-status="reached"' in tab.html)
         tab.wait(lambda: np.allclose(tab.tool_pose()[:3, 3], [0.85, 0.0, 0.0], atol=1e-6))
+
+
+def test_the_own_arm_keeps_its_pose_while_another_robot_is_on_show(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        say(tab, "start", value="planar-2r")
+        tab.settle()
+        two = own_arm(PRESETS["planar-2r"]).robot
+        tab.set("1 shoulder", 77)
+        q = np.radians([77, 60])
+        shows(tab, two, q)
+        tab.settle()
+        mine = tab.value("Robot")
+        tab.choose(UR5.name)
+        tab.choose(mine)
+        shows(tab, two, q)
