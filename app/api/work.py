@@ -217,6 +217,7 @@ async def computed(request: Request, answer: Callable[[Deadline], T]) -> T:
 
     def in_turn() -> T:
         with deadline.turn:
+            deadline.check()  # the thread may have waited for its turn
             return answer(deadline)
 
     async with compute_slots(request).slot(request) as deadline:

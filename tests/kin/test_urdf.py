@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import time
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from test_dh import random_robot
 
 import kin
 from kin import InputError, Joint, Robot, RobotFileError
+from kin.files.urdf.tree import MAX_LINKS
 from kin.files.urdf.xml import MAX_BYTES
 from kin.solvers import closed_form_of
 
@@ -184,6 +186,49 @@ def test_too_many_joints_are_refused():
     )
     with pytest.raises(RobotFileError, match="33 moving joints"):
         kin.load_urdf(f"<robot name='x'>{links}{joints}</robot>")
+
+
+def comb(teeth: int) -> str:
+    """A chain with another link at each of its links."""
+    parts = ["<link name='l0'/>"]
+    for i in range(teeth):
+        for child in (f"l{i + 1}", f"t{i}"):
+            ends = f"<parent link='l{i}'/><child link='{child}'/>"
+            parts.append(f"<link name='{child}'/><joint name='to_{child}' type='continuous'>{ends}</joint>")
+    return f"<robot name='comb'>{''.join(parts)}</robot>"
+
+
+def steps_to_read(teeth: int) -> int:
+    """Lines of Python that reading a comb takes."""
+    text, steps, before = comb(teeth), 0, sys.gettrace()
+
+    def count(*_: object) -> object:
+        nonlocal steps
+        steps += 1
+        return count
+
+    sys.settrace(count)
+    try:
+        kin.read_urdf(text, tip="t3")
+    finally:
+        sys.settrace(before)
+    return steps
+
+
+def test_the_work_grows_no_faster_than_the_file():
+    steps_to_read(10)  # fills caches
+    few, many, most = map(steps_to_read, (100, 300, 500))
+    assert most - many <= 1.1 * (many - few)
+
+
+def test_the_number_of_links_is_bounded():
+    largest = comb((MAX_LINKS - 1) // 2)
+    assert len(largest) < MAX_BYTES
+    robot, report = kin.read_urdf(largest, tip="t3")
+    assert robot.n == 4
+    assert report.tips[0] == ("l2499", 2499)
+    with pytest.raises(RobotFileError, match=r"link: got '5001 links'.*at most 5000 links"):
+        kin.read_urdf(comb(MAX_LINKS // 2), tip="t3")
 
 
 def test_a_joint_without_limits_is_noted():

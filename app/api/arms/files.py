@@ -18,6 +18,7 @@ from app.exports.robots import FORMATS, robot_file
 from app.shared.answers.exchange import ConvertAnswer, ImportAnswer, convert_answer, import_answer
 from app.shared.answers.inspection import InspectionAnswer, inspect
 from kin import InputError, Robot, RobotFileError, UrdfRobot, read_urdf
+from kin.files.urdf.xml import MAX_BYTES
 
 router = versioned("robots")
 
@@ -76,7 +77,7 @@ class ImportRequest(schemas.Body):
     """A URDF and the part of it that is the arm."""
 
     urdf: str = Field(
-        description="The text of the URDF; xacro has to be expanded first.", min_length=1, max_length=8_000_000
+        description="The text of the URDF; xacro has to be expanded first.", min_length=1, max_length=MAX_BYTES
     )
     base: str | None = Field(
         None, description="The link the arm stands on; by default the root.", max_length=200, min_length=1

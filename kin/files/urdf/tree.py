@@ -17,6 +17,7 @@ from kin.robot import Kind
 MOVING = ("revolute", "continuous", "prismatic")
 TYPES = (*MOVING, "fixed", "floating", "planar")
 MOST = 12  # names in a message
+MAX_LINKS = 5000
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
@@ -119,10 +120,24 @@ class UrdfTree:
         return {joint.child: joint for joint in self.joints}
 
     @cached_property
+    def depths(self) -> dict[str, int]:
+        """For each link, the moving joints from its root to it; links of or behind a cycle are missing."""
+        children: dict[str, list[UrdfJoint]] = {}
+        for joint in self.joints:
+            children.setdefault(joint.parent, []).append(joint)
+        found = {link: 0 for link in self.links if link not in self.parents}
+        links = list(found)
+        for link in links:  # grows meanwhile
+            for joint in children.get(link, ()):
+                found[joint.child] = found[link] + joint.moves
+                links.append(joint.child)
+        return found
+
+    @cached_property
     def tips(self) -> tuple[Tip, ...]:
         """Links without children that joints move, those with the most joints first."""
         inner = {joint.parent for joint in self.joints}
-        found = [Tip(link, sum(j.moves for j in self.to_root(link))) for link in self.links if link not in inner]
+        found = [Tip(link, self.depths[link]) for link in self.links if link not in inner]
         return tuple(sorted((tip for tip in found if tip.joints), key=lambda tip: -tip.joints))
 
     def to_root(self, link: str) -> list[UrdfJoint]:
@@ -191,6 +206,8 @@ def read_tree(text: bytes, file: str) -> UrdfTree:
         expected = "plain URDF: expand it first with `xacro FILE.xacro > FILE.urdf`"
         raise RobotFileError(file, "file", "xacro elements", expected)
     links = tuple(_attribute(element, "name", file, "link") for element in root.findall("link"))
+    if len(links) > MAX_LINKS:
+        raise RobotFileError(file, "link", f"{len(links)} links", f"at most {MAX_LINKS} links")
     joints = tuple(_joint(element, file) for element in root.findall("joint"))
     for field, names in (("link", links), ("joint", [joint.name for joint in joints])):
         twice = [name for name, count in Counter(names).items() if count > 1]
@@ -207,11 +224,9 @@ def read_tree(text: bytes, file: str) -> UrdfTree:
         expected = "one parent: a loop is no serial arm"
         raise RobotFileError(file, f"link {twice[0]}", f"the child of {both}", expected)
     tree = UrdfTree(file, root.get("name", ""), links, joints)
-    ends = known - {joint.parent for joint in joints}
-    reached = {joint.name for link in ends for joint in tree.to_root(link)}
-    for joint in joints:
-        if joint.name not in reached:
-            tree.to_root(joint.child)
+    for link in links:
+        if link not in tree.depths:
+            tree.to_root(link)  # raises: there is a cycle
     return tree
 
 

@@ -7,7 +7,7 @@ from xml.parsers import expat
 
 from kin.errors import RobotFileError
 
-MAX_BYTES = 8_000_000
+MAX_BYTES = 1_000_000
 MAX_DEPTH = 64
 MAX_ELEMENTS = 100_000
 
