@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 from functools import partial
 from typing import Literal
 
@@ -22,10 +24,11 @@ from app.api.schemas import (
     reply,
     settings_of,
 )
-from app.api.work import compute_slots, computed
+from app.api.work import TooSlowError, busy, compute_slots, computed
 from app.equations import Book, DerivationError, Equation, Symbol, book_later, typeset
 from app.equations.expression import Expression
 from app.shared.answers.document import documented
+from app.shared.computations import TooManyPendingError
 from kin import Robot
 from kin.transforms import Array
 
@@ -172,7 +175,7 @@ async def equations(request: Request, robot: Robot) -> Response:
 
     For the arms of the source chapter: each of its equations as printed, and corrected where it is misprinted. For
     any other arm: a closed form derived from its DH table, checked against forward kinematics before it is shown.
-    The first request for such an arm may take some seconds.
+    The first request for such an arm may take some seconds. It has at most 16 rows.
     """
     found = await _book(request, robot)
     return reply(
@@ -217,10 +220,19 @@ async def _book(request: Request, robot: Robot) -> Book:
     """The equations of an arm; the request waits for them with a slot."""
     work = compute_slots(request)
     async with work.slot(request) as deadline:
-        try:
-            return await work.wait(book_later(robot), deadline, GOES_ON)
-        except DerivationError as error:
-            raise invalid(FieldError(field="robot", value=robot.id, expected=f"another arm: {error}")) from None
+        with contextlib.ExitStack() as subscriptions:
+            try:
+                waiting = subscriptions.enter_context(book_later(robot, limited=True))
+                return await work.wait(waiting.future, deadline, GOES_ON)
+            except TooManyPendingError as error:
+                raise busy(f"The equations of {error.pending} arms are being derived already.") from None
+            except DerivationError as error:
+                expected = f"another arm: {error}"
+                raise invalid(FieldError(field="robot", value=robot.id, expected=expected)) from None
+            except TooSlowError:
+                # The client may come back for it.
+                asyncio.get_running_loop().call_later(work.seconds, subscriptions.pop_all().close)
+                raise
 
 
 def _equation(found: Book, equation: Equation) -> EquationAnswer:

@@ -4,8 +4,28 @@ The two arms of the chapter have its printed equations; any other arm gets a clo
 REST and the viewer read them from a `Book`.
 """
 
-from app.equations.books import Book, DerivationError, Equation, Values, book, book_later, check
+from app.equations.books import (
+    Book,
+    DerivationError,
+    Equation,
+    TooManyRowsError,
+    Values,
+    book,
+    book_later,
+    check,
+)
 from app.equations.derive import Line
 from app.equations.symbols import Symbol
 
-__all__ = ["Book", "DerivationError", "Equation", "Line", "Symbol", "Values", "book", "book_later", "check"]
+__all__ = [
+    "Book",
+    "DerivationError",
+    "Equation",
+    "Line",
+    "Symbol",
+    "TooManyRowsError",
+    "Values",
+    "book",
+    "book_later",
+    "check",
+]

@@ -1,13 +1,13 @@
 """The equations of one arm, ready to be shown: the chapter's own, or derived ones that have passed their check.
 
-`book` returns them when they are ready, for REST and scripts. A visitor's worker must not wait for sympy, so it
-calls `book_later` and goes on drawing. Both share one cache and one thread.
+`book` returns them when they are ready, for scripts. A visitor's worker and the event loop must not wait for it,
+so they call `book_later`. Both share one cache and one thread.
 """
 
 from __future__ import annotations
 
 import math
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -17,7 +17,7 @@ import numpy as np
 from app.equations.derive import AXES, COLUMNS, Line, derive
 from app.equations.expression import Expression, astray, from_text, names, value
 from app.equations.symbols import Symbol, chapter_symbols
-from app.shared.computations import ComputationCache
+from app.shared.computations import ComputationCache, SharedComputation, Subscription
 from kin import Robot, chapter, fk, get_robot
 from kin.transforms import Array
 
@@ -26,10 +26,16 @@ Verdict = Literal["right", "misprinted", "unreadable", "derived"]
 CHECKED = 1000  # random configurations at which a derived form is checked
 AGREES = 1e-12  # tolerance, relative to the size of the arm; absolute for directions
 KEPT = 64  # books
+MOST_ROWS = 16  # of an arm whose equations are derived: a second, and pages that can be read
+MAX_PENDING = 8  # derivations
 
 
 class DerivationError(RuntimeError):
     """A derived closed form disagrees with forward kinematics."""
+
+
+class TooManyRowsError(DerivationError):
+    """The arm has more rows than equations are derived for."""
 
 
 @dataclass(frozen=True)
@@ -185,23 +191,36 @@ def book(robot: Robot) -> Book:
     """The equations of an arm: the chapter's if it prints any, else derived and checked, which may take a second.
 
     Raises:
-        DerivationError: the check failed; the message states the difference.
+        DerivationError: the check failed, the message states the difference; or the arm has too many rows.
     """
-    return book_later(robot).result()
+    with book_later(robot) as waiting:
+        return waiting.future.result()
 
 
-def book_later(robot: Robot) -> Future[Book]:
-    """Future of `book`, computed in a background thread, one arm after the other. Do not cancel it."""
-    return _BOOKS.get(robot, lambda _: _make(robot))
+def book_later(robot: Robot, limited: bool = False) -> Subscription[Book]:
+    """`book`, computed in a background thread, one arm after the other. A caller that waits no more must `leave`.
+
+    Args:
+        robot: the arm.
+        limited: raise `TooManyPendingError` instead of queueing behind too many derivations.
+
+    Raises:
+        TooManyRowsError: at once.
+    """
+    rows = len(robot.rows)
+    if rows > MOST_ROWS:
+        raise TooManyRowsError(f"equations are derived for at most {MOST_ROWS} rows, this arm has {rows}")
+    return _BOOKS.subscribe(robot, lambda computation: _make(robot, computation), MAX_PENDING if limited else None)
 
 
 _BOOKS: ComputationCache[Book] = ComputationCache(ThreadPoolExecutor(1, thread_name_prefix="equations"), KEPT)
 
 
-def _make(robot: Robot) -> Book:
+def _make(robot: Robot, computation: SharedComputation[Book]) -> Book:
     if robot.id in chapter.LENGTHS and robot == get_robot(robot.id):
         return _chapter_book(robot)
     derived = derive(robot)
+    computation.check()
     order = [f"{column}_{row}" for column in "pnoa" for row in AXES]
     equations = tuple(Equation(key, None, key, "derived", None, derived.entries[key]) for key in order)
     out = Book(robot, "derived", derived.symbols, derived.lines, equations)

@@ -1,7 +1,9 @@
 """REST: the equations of every arm, typeset, and their values."""
 
 import json
+import threading
 import xml.etree.ElementTree as ET
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -9,7 +11,9 @@ from pydantic import TypeAdapter
 
 import kin
 from app.api.equations import EquationsAnswer, EquationValues
-from app.equations import book
+from app.equations import book, book_later, books
+from app.equations.derive import derive
+from app.shared.computations import ComputationCache
 from kin import chapter
 
 ROBOTS = tuple(kin.builtin_robots().values())
@@ -115,3 +119,28 @@ def test_misuse_is_refused_by_name(client, q, field):
 
 def test_an_unknown_robot_is_refused(client):
     assert client.get("/api/v1/robots/nobody/equations").status_code == 404
+
+
+def test_a_full_queue_is_said(client, monkeypatch):
+    released = threading.Event()
+    monkeypatch.setattr(books, "derive", lambda robot: released.wait(30) and derive(robot))
+    monkeypatch.setattr(books, "_BOOKS", ComputationCache(ThreadPoolExecutor(1), 4))
+    monkeypatch.setattr(books, "MAX_PENDING", 1)
+    with book_later(kin.get_robot("ur5")) as first:
+        refused = client.get("/api/v1/robots/puma560/equations")
+        released.set()
+        assert first.future.result(30).source == "derived"
+    assert refused.status_code == 503
+    assert refused.json()["type"] == "urn:kinboard:problem:busy"
+    assert int(refused.headers["retry-after"]) > 0
+    assert client.get("/api/v1/robots/puma560/equations").status_code == 200
+
+
+def test_arms_with_very_many_rows_are_refused(client):
+    rows = [{"a": 100, "alpha": 90}] * 2 + [{"kind": "fixed", "a": 1}] * books.MOST_ROWS
+    robot = {"convention": "standard", "units": {"length": "mm", "angle": "deg"}, "rows": rows}
+    response = client.post("/api/v1/equations/formulas", json={"robot": robot})
+    assert response.status_code == 422
+    (error,) = response.json()["errors"]
+    assert error["field"] == "robot"
+    assert "at most 16 rows, this arm has 18" in error["expected"]

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import xml.etree.ElementTree as ET
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +16,7 @@ import numpy as np
 import pytest
 
 import kin
-from app.equations import DerivationError, book, book_later, check, typeset
+from app.equations import DerivationError, TooManyRowsError, book, book_later, check, typeset
 from app.equations import books as module
 from app.equations.derive import LONGEST, derive
 from app.equations.expression import (
@@ -31,6 +32,7 @@ from app.equations.expression import (
     terms,
     value,
 )
+from app.shared.computations import ComputationCache, TooManyPendingError
 from kin import chapter
 
 ROOT = Path(__file__).parents[3]
@@ -286,9 +288,9 @@ def test_any_arm_can_be_derived(seed, convention):
 
 def test_a_long_arm_is_cut_into_readable_pieces():
     rows = tuple(
-        kin.Joint(f"row {i}", 0.0, 0.1, 0.2, (-1) ** i * math.pi / 2, "revolute", (-3.0, 3.0)) for i in range(20)
+        kin.Joint(f"row {i}", 0.0, 0.1, 0.2, (-1) ** i * math.pi / 2, "revolute", (-3.0, 3.0)) for i in range(16)
     )
-    robot = kin.Robot("long", "long", "", "standard", rows, (0.0,) * 20)
+    robot = kin.Robot("long", "long", "", "standard", rows, (0.0,) * 16)
     found = book(robot)
     assert max(size(line.expression) for line in found.lines) <= LONGEST
     assert any("''" in line.name for line in found.lines)
@@ -304,7 +306,7 @@ def test_an_arm_is_derived_once_and_another_arm_of_the_same_name_again(monkeypat
     threads = []
     monkeypatch.setattr(module, "derive", lambda r: threads.append(threading.current_thread()) or derive(r))
     other = replace(robot, rows=(replace(robot.rows[0], d=0.3), *robot.rows[1:]))
-    assert book_later(other).result(30).source == "derived"
+    assert book(other).source == "derived"
     assert threads[0] is not threading.current_thread()
 
 
@@ -329,10 +331,44 @@ def test_a_wrong_closed_form_is_not_shown(monkeypatch, damage):
     monkeypatch.setattr(module, "derive", wrong)
     with pytest.raises(DerivationError, match="n_y of mine"):
         book(robot)
-    with pytest.raises(DerivationError):
-        book_later(robot).result(30)
+    with pytest.raises(DerivationError), book_later(robot) as waiting:
+        waiting.future.result(30)
     monkeypatch.undo()
     check(book(robot))
+
+
+def variant(d):
+    puma = kin.get_robot("puma560")
+    return replace(puma, rows=(replace(puma.rows[0], d=d), *puma.rows[1:]))
+
+
+def test_what_nobody_waits_for_is_not_derived_and_the_queue_is_bounded(monkeypatch):
+    released, derived = threading.Event(), []
+
+    def slowly(robot):
+        derived.append(robot)
+        assert released.wait(30)
+        return derive(robot)
+
+    monkeypatch.setattr(module, "derive", slowly)
+    monkeypatch.setattr(module, "_BOOKS", ComputationCache(ThreadPoolExecutor(1), 16))
+    arms = [variant(1.0 + k) for k in range(module.MAX_PENDING + 1)]
+    waiting = [book_later(arm, limited=True) for arm in arms[:-1]]
+    with pytest.raises(TooManyPendingError):
+        book_later(arms[-1], limited=True)
+    for each in waiting[1:]:
+        each.leave()
+    with book_later(arms[-1], limited=True) as last:
+        released.set()
+        assert last.future.result(30).robot == arms[-1]
+    assert derived == [arms[0], arms[-1]]
+
+
+def test_arms_with_very_many_rows_have_no_equations():
+    puma = kin.get_robot("puma560")
+    fixed = tuple(kin.Joint(f"spacer {k}", kind="fixed") for k in range(module.MOST_ROWS))
+    with pytest.raises(TooManyRowsError, match="at most 16 rows, this arm has 23"):
+        book(replace(puma, rows=(*puma.rows, *fixed)))
 
 
 def test_sympy_is_imported_for_derived_equations_only():

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Hashable
-from concurrent.futures import Future
 from itertools import count
 from typing import Any
 
 import numpy as np
 import viser
 
-from app.equations import Book, DerivationError, Equation, book_later
+from app.equations import Book, DerivationError, Equation, TooManyRowsError, book_later
+from app.shared.computations import Subscription
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons.equations import views
 from app.viewer.panel import assign, listen, update_html
@@ -24,6 +24,7 @@ from kin import InputError, fk
 from kin.transforms import Array
 
 INTERVAL = 0.05  # s between two updates of the numbers
+AFTER_EDIT = 0.5  # s without another change of the visitor's own arm, before its equations are derived
 # Vermilion and bluish green, darkened because the scene applies gamma to lines.
 PRINTED, TRUE = (170, 29, 0), (0, 87, 43)
 _fresh = count()
@@ -40,7 +41,8 @@ class EquationsLesson(Feature):
         super().__init__(stage)
         gui = stage.client.gui
         self._book: Book | None = None
-        self._future: Future[Book] | None = None
+        self._derivation: Subscription[Book] | None = None
+        self._derive_at: float | None = None  # of `time.perf_counter`
         self._requested: object = None  # id of the equation to show as soon as there is a book
         self._largest = 0.0  # largest error of the shown equation, m or rad
         self._equation: Equation | None = None
@@ -81,15 +83,36 @@ class EquationsLesson(Feature):
                 super().handle(key, value)
 
     def on_robot(self) -> None:
-        robot = self.stage.robot
+        robot, own = self.stage.robot, self.stage.own
         self._T = fk(robot, self.stage.q)
         self._book = self._equation = None
+        self._stop_deriving()
         self._empty("Deriving the equations of this arm …")
-        self._future = future = book_later(robot)
-        if future.done():
+        if own is not None and own.robot == robot:  # which the visitor may still be editing
+            self._derive_at = time.perf_counter() + AFTER_EDIT
+            self.due = AFTER_EDIT
+        else:
+            self._derive()
+
+    def _derive(self) -> None:
+        """Ask for the equations of the arm on show."""
+        self._derive_at = None
+        try:
+            self._derivation = derivation = book_later(self.stage.robot)
+        except TooManyRowsError as error:
+            self._empty(f"No equations for so many rows: {error}.")
+            return
+        if derivation.finished:
             self._take()
         else:
-            future.add_done_callback(lambda _: self.post("ready"))
+            derivation.future.add_done_callback(lambda _: self.post("ready"))
+
+    def _stop_deriving(self) -> None:
+        """Wait no more; unless somebody else waits for the same equations, they are not derived."""
+        self._derive_at = None
+        if self._derivation is not None:
+            self._derivation.leave()
+            self._derivation = None
 
     def on_pose(self, T_base_tool: Array) -> None:
         self._T = T_base_tool
@@ -99,6 +122,8 @@ class EquationsLesson(Feature):
             self.due = INTERVAL
 
     def tick(self, now: float) -> None:
+        if self._derive_at is not None and now >= self._derive_at:
+            self._derive()
         if now - self._shown_at >= INTERVAL:
             self._show_values()
 
@@ -118,17 +143,21 @@ class EquationsLesson(Feature):
             if equation.id == requested:
                 self._show(equation)
 
+    def on_leave(self) -> None:
+        self._stop_deriving()
+
     def remove(self) -> None:
+        self._stop_deriving()
         self._clear_scene()
         for handle in (self._about, self._choice, self._text, self._values, self._button, self._folder):
             handle.remove()
 
     def _take(self) -> None:
         """Take the derived book, or the reason why there is none."""
-        if self._future is None or not self._future.done() or self._book is not None:
+        if self._derivation is None or not self._derivation.finished or self._book is not None:
             return  # of a robot that is no longer selected
         try:
-            self._book = self._future.result()
+            self._book = self._derivation.future.result()
         except DerivationError as error:
             self._empty(f"No equations: {error}.")
             self.stage.notify(Notice("error", "No equations for this arm", str(error)))
@@ -195,8 +224,8 @@ class EquationsLesson(Feature):
         update_html(self._symbols, content)
 
     def _show_values(self) -> None:
-        self.due = None
-        self._shown_at = time.perf_counter()
+        self._shown_at = now = time.perf_counter()
+        self.due = None if self._derive_at is None else max(0.0, self._derive_at - now)
         equation = self._equation
         if self._book is None or equation is None:
             return

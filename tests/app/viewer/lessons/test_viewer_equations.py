@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import threading
+import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -14,12 +16,14 @@ from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
 import kin
-from app.equations import book, book_later, books
+from app.equations import book, books
+from app.equations.derive import derive
 from app.shared.clouds import Clouds
 from app.shared.computations import ComputationCache
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.lessons.equations import EquationsLesson, views
+from app.viewer.own_arm import OwnArm
 from app.viewer.server import ViewerServer
 from kin import chapter
 from kin.units import DEFAULT_UNITS, Units, fixed
@@ -128,7 +132,7 @@ def test_a_failed_check_is_said_instead_of_shown(tab: FakeBrowser, monkeypatch: 
 
 def test_what_was_chosen_can_be_restored() -> None:
     stage = MagicMock(robot=PIONEER, q=PIONEER.q_home, units=DEFAULT_UNITS)
-    book_later(PIONEER).result(30)
+    book(PIONEER)
     chosen = EquationsLesson(stage)
     chosen.handle("equation", "(13) x of a ✕ misprinted")
     assert chosen.state() == {"equation": "13"}
@@ -138,6 +142,59 @@ def test_what_was_chosen_can_be_restored() -> None:
         assert other.state() == {"equation": "6"}
     other.restore(chosen.state())
     assert other.state() == {"equation": "13"}
+
+
+def test_only_the_last_of_many_edits_is_derived(monkeypatch: pytest.MonkeyPatch) -> None:
+    derived: list[kin.Robot] = []
+
+    def counted(robot: kin.Robot) -> object:
+        derived.append(robot)
+        return derive(robot)
+
+    monkeypatch.setattr(books, "derive", counted)
+    cache = ComputationCache(ThreadPoolExecutor(1), 4)
+    monkeypatch.setattr(books, "_BOOKS", cache)
+    stage = MagicMock(robot=PIONEER, q=PIONEER.q_home, units=DEFAULT_UNITS)
+    lesson = EquationsLesson(stage)
+    for d in (0.1, 0.2, 0.3):
+        stage.robot = replace(PUMA, rows=(replace(PUMA.rows[0], d=d), *PUMA.rows[1:]))
+        stage.q = PUMA.q_home
+        stage.own = OwnArm(stage.robot)
+        lesson.on_robot()
+        lesson.tick(time.perf_counter())
+    assert lesson.due is not None
+    assert stage.robot not in cache
+    lesson.tick(time.perf_counter() + 1.0)
+    assert stage.robot in cache
+    with books.book_later(stage.robot) as waiting:
+        waiting.future.result(30)
+    assert derived == [stage.robot]
+    lesson.handle("ready", None)
+    assert lesson.state() == {"equation": "p_x"}
+
+
+def test_a_lesson_that_is_closed_or_left_waits_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    released = threading.Event()
+    monkeypatch.setattr(books, "derive", lambda robot: released.wait(30) and derive(robot))
+    cache = ComputationCache(ThreadPoolExecutor(1), 4)
+    monkeypatch.setattr(books, "_BOOKS", cache)
+    stage = MagicMock(robot=PUMA, q=PUMA.q_home, units=DEFAULT_UNITS)
+    for end in (EquationsLesson.remove, EquationsLesson.on_leave):
+        lesson = EquationsLesson(stage)
+        assert PUMA in cache
+        end(lesson)
+        assert PUMA not in cache
+    released.set()
+
+
+def test_an_arm_with_very_many_rows_has_no_equations() -> None:
+    fixed_rows = tuple(kin.Joint(f"spacer {k}", kind="fixed") for k in range(books.MOST_ROWS))
+    robot = replace(PUMA, rows=(*PUMA.rows, *fixed_rows))
+    stage = MagicMock(robot=robot, q=robot.q_home, units=DEFAULT_UNITS)
+    boxes = [MagicMock(name=str(k)) for k in range(4)]
+    stage.client.gui.add_html.side_effect = boxes
+    EquationsLesson(stage)
+    assert "at most 16 rows, this arm has 23" in boxes[0].content
 
 
 # -- as HTML ------------------------------------------------------------------------------------------------
