@@ -100,7 +100,11 @@ def test_base_and_tip_may_be_any_links_of_the_chain(tmp_path):
         ('lower="-1" upper="2"', 'lower="2" upper="-1"', "joint shoulder: limit", "lower below upper"),
         ('lower="0" upper="0.4" ', "", "joint slide: limit", "limits of the slide"),
         ('velocity="3"', 'velocity="-3"', "joint shoulder: limit velocity", "positive"),
-        ('velocity="3"', 'velocity="inf"', "joint shoulder: limit velocity", "finite"),
+        ('velocity="3"', 'velocity="nan"', "joint shoulder: limit velocity", "positive"),
+        ('velocity="3"', 'velocity="-inf"', "joint shoulder: limit velocity", "positive"),
+        ('lower="-1" upper="2"', 'lower="-inf" upper="2"', "joint shoulder: limit lower", "finite"),
+        ('lower="0" upper="0.4"', 'lower="-inf" upper="inf"', "joint slide: limit lower", "million"),
+        ('xyz="0 0 0.2"', 'xyz="1e5 0 0.2"', "joint", "with the base"),
         ('<robot name="Bench arm 2">', '<robot xmlns:xacro="x" name="x"><xacro:if value="1"/>', "file", "xacro"),
     ],
 )  # fmt: skip
@@ -144,6 +148,12 @@ def test_cycles_are_refused():
         kin.load_urdf(text + beside + "</joint></robot>", tip="d")
 
 
+TWO = """<robot name="two"><link name="a"/><link name="b"/><link name="c"/><link name="t"/>
+  <joint name="j" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 0 2"/></joint>
+  <joint name="k" type="revolute"><parent link="b"/><child link="c"/><origin xyz="1 0 0"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1"/></joint>
+  <joint name="end" type="fixed"><parent link="c"/><child link="t"/><origin xyz="1 0 0"/></joint>
+</robot>"""
 BOMB = '<!DOCTYPE robot [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><robot name="&b;"/>'
 
 
@@ -158,7 +168,9 @@ BOMB = '<!DOCTYPE robot [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><robot name="&
         ("<robot>", "file"),
         ("<!-- nothing -->", "file"),
         ("<sdf/>", "root element"),
-        ('<?xml version="1.0" encoding="klingon"?><robot/>', "file"),
+        (TWO.replace('xyz="0 0 1"', f'xyz="{"1" * 100_000}x 0 0"'), "joint k: axis xyz[0]"),
+        (TWO.replace('xyz="0 0 1"', f'xyz="{"1" * 61} 0 0"'), "joint k: axis xyz[0]"),
+        ("/etc/hostname", "file"),
         ("<robot name='x'>\ud800</robot>", "tip"),
     ],
     ids=lambda value: value[:24],
@@ -173,9 +185,66 @@ def test_hostile_xml_is_refused_at_once(text, field):
 
 
 def test_files_that_cannot_be_read(tmp_path):
-    for path in (tmp_path / "none.urdf", tmp_path, "a\0b"):
+    for path in (tmp_path / "none.urdf", tmp_path, Path("a\0b")):
         with pytest.raises(RobotFileError, match="readable"):
             kin.load_urdf(path)
+    path = tmp_path / "klingon.urdf"
+    path.write_text('<?xml version="1.0" encoding="klingon"?>' + TWO)
+    with pytest.raises(RobotFileError, match="file: got 'unknown encoding"):
+        kin.load_urdf(path)
+
+
+def test_a_text_is_never_a_path(tmp_path):
+    path = tmp_path / "two.urdf"
+    path.write_text(TWO, encoding="utf-8")
+    assert kin.load_urdf(path).n == 2
+    with pytest.raises(RobotFileError, match="the text of a URDF"):
+        kin.load_urdf(str(path))
+
+
+@pytest.mark.parametrize("encoding", ["iso-8859-1", "utf-16", "klingon"])
+def test_a_text_is_decoded_already(encoding):
+    text = f'<?xml version="1.0" encoding="{encoding}"?>' + TWO.replace('"two"', '"Bär"')
+    assert kin.load_urdf(text).name == "Bär"
+
+
+@pytest.mark.parametrize("axis", ["0 1e-8 1", "1e-8 0 -1", "1e-9 2e-9 1", "0 1e-300 1", "0 0 -1"])
+def test_axes_that_are_almost_z_are_kept(axis):
+    _, report = kin.read_urdf(TWO.replace('xyz="0 0 1"', f'xyz="{axis}"'))
+    assert report.difference < 2e-15
+    assert report.notes == ()
+
+
+def test_a_difference_beyond_rounding_is_noted(monkeypatch):
+    monkeypatch.setattr("kin.files.urdf.read._difference", lambda *_: 3e-12)
+    assert "up to 3.0e-12" in kin.read_urdf(TWO).report.notes[0]
+    far = TWO.replace('origin xyz="1 0 0"', 'origin xyz="2 0 0"')
+    assert kin.read_urdf(far).report.notes == ()  # of a reach of 4 m
+
+
+def test_huge_limits_stand_for_none():
+    limit = '<limit lower="-1e16" upper="1e16" effort="1e6" velocity="inf"/>'
+    robot, report = kin.read_urdf(TWO.replace('<limit lower="-1" upper="1"/>', limit))
+    joint = robot.joints[1]
+    assert (joint.limits, joint.velocity, joint.effort) == (None, None, None)
+    assert report.notes == (
+        "Joint k has limits of a million or more: it is read as unlimited.",
+        "Joint k has velocity inf: it is read as unknown.",
+        "Joint k has effort 1e+06: it is read as unknown.",
+    )
+
+
+def test_names_of_tilts_are_distinct():
+    text = TWO.replace('xyz="0 0 1"', 'xyz="1e-3 0 1"').replace('name="k"', 'name="j tilt"')
+    robot, report = kin.read_urdf(text)
+    assert [row.name for row in robot.rows] == ["j", "j tilt 2", "j tilt"]
+    assert report.tilts == ("j tilt 2",)
+    assert kin.parse_robot(kin.robot_to_toml(robot)) == robot
+
+
+def test_what_is_read_from_a_long_name_can_be_written():
+    robot = kin.load_urdf(TWO.replace('name="two"', f'name="{"x" * 199} y"'))
+    assert kin.parse_robot(kin.robot_to_toml(robot)) == robot
 
 
 def test_too_many_joints_are_refused():
@@ -289,5 +358,24 @@ def test_names_and_limits_are_written():
     assert [joint.name for joint in robot.joints] == ['a <b> & "c" _', "twin 2", "twin 3"]
     assert (robot.joints[0].limits, robot.joints[0].velocity, robot.joints[0].effort) == (None, 2.5, 87.0)
     assert robot.joints[1].velocity is None
+
+
+@pytest.mark.parametrize(
+    ("names", "written"),
+    [
+        (["a", "a", "a 2"], ["a 1", "a 3", "a 2", "tool"]),
+        (["tool", "tool end"], ["tool", "tool end", "tool end 2"]),
+        (["tool", "b"], ["tool", "b", "tool end"]),
+        (["a\x01", "a_", " a_"], ["a_ 1", "a_ 2", "a_ 3", "tool"]),
+        (["", " ", "x" * 300], ["joint 1", "joint 2", "x" * 180, "tool"]),
+    ],
+)
+def test_names_are_written_once(names, written):
+    text = kin.to_urdf(Robot.from_dh([Joint(name, a=0.1, limits=(-1, 1)) for name in names]))
+    _, report = kin.read_urdf(text)
+    assert [*report.joints, *report.merged] == written
+
+
+def test_a_slide_without_limits_is_not_written():
     with pytest.raises(InputError, match="URDF has no slide without them"):
         kin.to_urdf(Robot.from_dh([Joint("slide", kind="prismatic")]))

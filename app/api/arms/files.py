@@ -104,7 +104,7 @@ async def import_robot(
 
 def _read(body: ImportRequest) -> UrdfRobot:
     try:
-        if "<" not in body.urdf:  # it would be taken for the path of a file
+        if "<" not in body.urdf:  # kin says how to read a file in Python instead
             raise RobotFileError("URDF", "file", body.urdf, "the text of a URDF")
         return read_urdf(body.urdf, body.base, body.tip)
     except RobotFileError as error:

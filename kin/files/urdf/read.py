@@ -7,6 +7,7 @@ the URDF's own transforms at random configurations.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,12 +19,16 @@ import numpy as np
 from kin.axes import frame_of, inverse, perpendicular_to
 from kin.dh import SAMPLES, table_of_chain
 from kin.errors import RobotFileError
+from kin.files.numbers import LARGEST
 from kin.files.read import MAX_REACH, MAX_ROWS, matrix_of
+from kin.files.urdf.names import unused
 from kin.files.urdf.tree import Tip, UrdfJoint, UrdfTree, read_tree
 from kin.fk import fk
 from kin.home import default_home
 from kin.robot import DEFAULT_LIMITS, Joint, Robot
 from kin.transforms import Array
+
+EXACT = 1e-12  # a larger difference, per metre of reach, is noted
 
 
 @dataclass(frozen=True)
@@ -62,7 +67,7 @@ class UrdfRobot(NamedTuple):
 
 
 def load_urdf(source: Path | str, base: str | None = None, tip: str | None = None) -> Robot:
-    """The robot that a URDF describes; see `read_urdf`, which reports about it as well."""
+    """The robot that a URDF describes, by path or text; see `read_urdf`, which reports about it as well."""
     return read_urdf(source, base, tip).robot
 
 
@@ -70,7 +75,7 @@ def read_urdf(source: Path | str, base: str | None = None, tip: str | None = Non
     """The serial arm between two links of a URDF, as a standard DH table.
 
     Args:
-        source: the path of a file, or the text itself, which contains a ``<``.
+        source: a `Path` of a file, or a `str`, which is the text itself and never a path.
         base: the link the arm stands on; by default the root.
         tip: the link that is the tool; needed if several are possible.
         file: the name used in messages.
@@ -88,10 +93,12 @@ def urdf_tips(source: Path | str, file: str = "") -> tuple[Tip, ...]:
 
 
 def _tree(source: Path | str, file: str) -> UrdfTree:
-    if isinstance(source, str) and "<" in source:
-        return read_tree(source.encode("utf-8", "replace"), file or "URDF")
+    if isinstance(source, str):
+        if "<" not in source:
+            raise RobotFileError(file or "URDF", "file", source, "the text of a URDF, or the Path of a file")
+        return read_tree(source, file or "URDF")
     try:
-        content = Path(source).read_bytes()
+        content = source.read_bytes()
     except (OSError, ValueError) as error:
         raise RobotFileError(str(source), "file", str(error), "a readable URDF file") from error
     return read_tree(content, file or str(source))
@@ -104,23 +111,30 @@ def _import(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> UrdfRobot:
     notes: list[str] = []
     joints = [_joint(joint, notes) for joint in moving]
     table = table_of_chain(joints, _transforms(chain))
-    if len(table.rows) > MAX_ROWS:
-        raise RobotFileError(tree.file, "joint", f"{len(table.rows)} DH rows", f"at most {MAX_ROWS}")
+    rows = _with_distinct_tilts(table.rows)
+    if len(rows) > MAX_ROWS:
+        raise RobotFileError(tree.file, "joint", f"{len(rows)} DH rows", f"at most {MAX_ROWS}")
     name = tree.name.strip() or "robot"
     robot = Robot(
         id=re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:40].strip("-") or "robot",
-        name=name[:200],
-        source=f"URDF {Path(tree.file).name}, from link {chain[0].parent} to link {chain[-1].child}",
+        name=name[:200].strip(),
+        source=f"URDF {_file_name(tree.file)}, from link {chain[0].parent} to link {chain[-1].child}",
         convention="standard",
-        rows=table.rows,
+        rows=rows,
         home=tuple(0.5 * sum(joint.limits or (0.0,)) for joint in joints),
         base=table.base,
         tool=table.tool,
     )
-    if robot.reach > MAX_REACH:
-        raise RobotFileError(tree.file, "joint", f"a reach of {robot.reach:g} m", f"at most {MAX_REACH:g} m")
+    if robot.reach + float(np.linalg.norm(robot.T_world_base[:3, 3])) > MAX_REACH:
+        expected = f"at most {MAX_REACH:g} m with the base"
+        raise RobotFileError(tree.file, "joint", f"a reach of {robot.reach:g} m", expected)
     robot = replace(robot, home=default_home(robot))
     used = {joint.name for joint in chain}
+    difference = _difference(robot, chain)
+    if difference > EXACT * max(1.0, robot.reach):
+        notes.append(
+            f"The poses of the table differ from those of the URDF by up to {difference:.1e}, more than usual."
+        )
     report = UrdfReport(
         base=chain[0].parent,
         tip=chain[-1].child,
@@ -128,17 +142,25 @@ def _import(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> UrdfRobot:
         joints=tuple(joint.name for joint in moving),
         merged=tuple(joint.name for joint in chain if not joint.moves),
         ignored=tuple(joint.name for joint in tree.joints if joint.name not in used),
-        tilts=tuple(row.name for row in table.rows if row.kind == "fixed"),
+        tilts=tuple(row.name for row in rows if row.kind == "fixed"),
         notes=tuple(notes),
-        difference=_difference(robot, chain),
+        difference=difference,
         samples=SAMPLES,
     )
     return UrdfRobot(robot, report)
 
 
+def _file_name(file: str) -> str:
+    """Without bytes that are no text: file systems allow them."""
+    return Path(file).name.encode("utf-8", "replace").decode()
+
+
 def _joint(joint: UrdfJoint, notes: list[str]) -> Joint:
     limits = joint.limits()
-    if limits is None and joint.type != "continuous":
+    if limits == (-math.inf, math.inf):
+        limits = None
+        notes.append(f"Joint {joint.name} has limits of a million or more: it is read as unlimited.")
+    elif limits is None and joint.type != "continuous":
         if joint.kind == "prismatic":
             raise joint.refuse("limit", "no lower and upper", "the limits of the slide in metres")
         limits = DEFAULT_LIMITS["revolute"]
@@ -147,9 +169,27 @@ def _joint(joint: UrdfJoint, notes: list[str]) -> Joint:
         joint.name,
         kind=joint.kind,
         limits=limits,
-        velocity=joint.positive("velocity"),
-        effort=joint.positive("effort"),
+        velocity=_known(joint, "velocity", notes),
+        effort=_known(joint, "effort", notes),
     )
+
+
+def _known(joint: UrdfJoint, key: str, notes: list[str]) -> float | None:
+    value = joint.positive(key)
+    if value is None or value < LARGEST:
+        return value
+    notes.append(f"Joint {joint.name} has {key} {value:g}: it is read as unknown.")
+    return None
+
+
+def _with_distinct_tilts(rows: Sequence[Joint]) -> tuple[Joint, ...]:
+    """The rows of a table; the name made for a tilt may be that of a joint."""
+    taken = {row.name for row in rows if row.kind != "fixed"}
+    found = []
+    for row in rows:
+        found.append(replace(row, name=unused(row.name, taken)) if row.kind == "fixed" else row)
+        taken.add(found[-1].name)
+    return tuple(found)
 
 
 def _transforms(chain: Sequence[UrdfJoint]) -> list[Array]:
@@ -166,7 +206,7 @@ def _transforms(chain: Sequence[UrdfJoint]) -> list[Array]:
 
 def _turn_to(axis: Array) -> Array:
     """A rotation ``(4, 4)`` whose z axis is `axis`."""
-    if abs(axis[2]) == 1.0:
+    if axis[0] == axis[1] == 0.0:
         return np.diag([1.0, axis[2], axis[2], 1.0])
     return frame_of(perpendicular_to(axis), axis, np.zeros(3))
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,6 +10,7 @@ from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 from kin.errors import RobotFileError
+from kin.files.numbers import LARGEST, number_of
 from kin.files.urdf.xml import parse_xml
 from kin.robot import Kind
 
@@ -18,7 +18,6 @@ MOVING = ("revolute", "continuous", "prismatic")
 TYPES = (*MOVING, "fixed", "floating", "planar")
 MOST = 12  # names in a message
 MAX_LINKS = 5000
-_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
 class Tip(NamedTuple):
@@ -62,22 +61,32 @@ class UrdfJoint:
         return [v / length for v in given]
 
     def limits(self) -> tuple[float, float] | None:
-        """Lower and upper limit; None if it states none, as a continuous joint does."""
+        """Lower and upper limit; None if it states none, as a continuous joint does.
+
+        Both limits of a revolute joint may be huge or infinite, as some files write that there are none.
+        """
         limit = self.element.find("limit")
         if self.type == "continuous" or limit is None or not {"lower", "upper"} & set(limit.keys()):
             return None
-        lower, upper = (self.number("limit", key, limit.get(key, "0")) for key in ("lower", "upper"))
+        texts = {key: limit.get(key, "0") for key in ("lower", "upper")}
+        lower, upper = map(number_of, texts.values())
+        if self.kind == "revolute" and lower <= -LARGEST and upper >= LARGEST:
+            return -math.inf, math.inf
+        lower, upper = (self.number("limit", key, text) for key, text in texts.items())
         if not lower < upper:
             raise self.refuse("limit", [lower, upper], "lower below upper; a joint that does not move is fixed")
         return lower, upper
 
     def positive(self, key: str) -> float | None:
-        """A limit of velocity or effort; None if it is not stated or zero, which stands for unknown."""
+        """A limit of velocity or effort; None if it is not stated or zero, which stands for unknown.
+
+        It may be huge or infinite, as some files write that it is not known.
+        """
         limit = self.element.find("limit")
         given = None if limit is None else limit.get(key)
-        value = 0.0 if given is None else self.number("limit", key, given)
-        if value < 0.0:
-            raise self.refuse(f"limit {key}", value, "a positive number")
+        value = 0.0 if given is None else number_of(given)
+        if given is not None and not value >= 0.0:
+            raise self.refuse(f"limit {key}", given, "a positive number")
         return value or None
 
     def triple(self, tag: str, key: str, default: str) -> list[float]:
@@ -90,8 +99,8 @@ class UrdfJoint:
 
     def number(self, tag: str, key: str, text: str) -> float:
         """A finite number of an attribute."""
-        value = float(text) if _NUMBER.fullmatch(text.strip()) else math.nan
-        if not abs(value) < 1e6:
+        value = number_of(text)
+        if not abs(value) < LARGEST:
             hint = "; expand xacro first" if "$" in text else ""
             raise self.refuse(f"{tag} {key}", text, "a finite number, smaller than a million" + hint)
         return value
@@ -197,7 +206,7 @@ class UrdfTree:
         return ", ".join(all_of_them[:MOST]) + more
 
 
-def read_tree(text: bytes, file: str) -> UrdfTree:
+def read_tree(text: bytes | str, file: str) -> UrdfTree:
     """The links and joints of a URDF; raises `RobotFileError`."""
     root = parse_xml(text, file)
     if root.tag != "robot":

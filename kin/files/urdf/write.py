@@ -11,11 +11,13 @@ import numpy as np
 
 from kin.axes import screw_x, screw_z
 from kin.errors import InputError
+from kin.files.urdf.names import unused
 from kin.files.write import rpy_of
 from kin.robot import Joint, Robot
 from kin.transforms import Array
 
 _UNKNOWN = 0.0  # velocity and effort are required by URDF
+_LONGEST = 180  # characters of a name, without its number; the reader takes 200
 _UNFIT = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
@@ -37,7 +39,7 @@ def to_urdf(robot: Robot) -> str:
         standard = robot.convention == "standard"
         lines += _joint(row, name, links[k], links[k + 1], T @ z if standard else T @ x @ z)
         T = x if standard else np.eye(4)
-    end = "tool" if "tool" not in names else "tool end"
+    end = unused("tool" if "tool" not in names else "tool end", names)
     lines += _joint(Joint(end, kind="fixed"), end, links[-2], links[-1], T @ robot.T_last_tool)
     return "\n".join([*lines, "</robot>", ""])
 
@@ -67,9 +69,14 @@ def _numbers(values: Sequence[float] | Array) -> str:
 
 
 def _distinct(names: list[str]) -> list[str]:
-    """The names, those that occur more than once with their number."""
-    counts = Counter(names)
-    return [f"{name} {k + 1}" if counts[name] > 1 else name for k, name in enumerate(names)]
+    """The names as a URDF can hold them, those that occur more than once with the number of their row."""
+    fit = [_UNFIT.sub("_", name).strip()[:_LONGEST].strip() or "joint" for name in names]
+    counts, taken = Counter(fit), set(fit)
+    found = []
+    for k, name in enumerate(fit):
+        found.append(unused(name, taken, k + 1) if counts[name] > 1 else name)
+        taken.add(found[-1])
+    return found
 
 
 def _quoted(text: str) -> str:

@@ -12,12 +12,15 @@ MAX_DEPTH = 64
 MAX_ELEMENTS = 100_000
 
 
-def parse_xml(text: bytes, file: str) -> Element:
-    """The root element; raises `RobotFileError`."""
+def parse_xml(text: bytes | str, file: str) -> Element:
+    """The root element; raises `RobotFileError`. A `str` is decoded already, whatever encoding it declares."""
+    encoding = None
+    if isinstance(text, str):
+        text, encoding = text.encode("utf-8", "replace"), "utf-8"
     if len(text) > MAX_BYTES:
         raise RobotFileError(file, "file", f"{len(text)} bytes", f"at most {MAX_BYTES} bytes")
     builder = TreeBuilder()
-    parser = expat.ParserCreate()
+    parser = expat.ParserCreate(encoding)
     count = depth = 0
 
     def start(tag: str, attributes: dict[str, str]) -> None:

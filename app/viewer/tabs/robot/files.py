@@ -71,7 +71,7 @@ def arm_of(name: str, text: str, tip: str | None = None) -> tuple[OwnArm, str]:
 
 def tips_of(name: str, text: str) -> tuple[Tip, ...]:
     """The links of a URDF that can be the tool, if there are several; raises `kin.KinematicsError`."""
-    tips = read_tree(text.encode("utf-8", "replace"), name).tips if is_urdf(text) else ()
+    tips = read_tree(text, name).tips if is_urdf(text) else ()
     return tips if len(tips) > 1 else ()
 
 
