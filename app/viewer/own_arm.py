@@ -37,7 +37,8 @@ class OwnArm:
 
     Attributes:
         robot: the arm. Its id depends on everything else in it, so another arm never has the same.
-        start: the arm it was made from: the id of a robot, or the name of an example. Empty: none.
+        start: the arm it was made from: the id of a robot, the name of an example, or the id of the own arm that a
+            file gave. A link may hold any text. Empty: none.
     """
 
     robot: Robot
@@ -135,7 +136,8 @@ def unpack(value: object) -> OwnArm:
     data["rows"] = [_row(i, row) for i, row in enumerate(rows)] if isinstance(rows, list) else rows
     if "h" in value:
         data["home"] = {"q": value["h"]}
-    return own_arm(data, str(value.get("from", ""))[:ROW_NAME])
+    start = value.get("from", "")
+    return own_arm(data, start if isinstance(start, str) else "")
 
 
 def _row(index: int, row: object) -> dict[str, Any]:

@@ -40,9 +40,14 @@ class RobotMenu:
         return self._options[str(value)]
 
     def _named(self, own: OwnArm | None) -> dict[str, Robot]:
-        """The robots by the names in the menu."""
-        named = {robot.name: robot for robot in self._robots}
-        return named if own is None else {**named, label(own.robot): own.robot}
+        """The robots by the names in the menu. A name that is taken is followed by the robot's id."""
+        named: dict[str, Robot] = {}
+        for robot in self._robots:
+            named[f"{robot.name} ({robot.id})" if robot.name in named else robot.name] = robot
+        if own is not None:
+            name = label(own.robot)
+            named[f"{name} ({own.robot.id})" if name in named else name] = own.robot
+        return named
 
     def _name(self, robot: Robot) -> str:
         return next(name for name, offered in self._options.items() if offered.id == robot.id)

@@ -6,6 +6,8 @@
     measured = atom [ unit ]
     atom     = number [ "pi" ] | "pi" | "(" sum ")"
 
+A comma is a decimal point, except where it may separate thousands.
+
 A number without a unit is in the unit of the page. In a cell for an angle ``pi`` is in radians, whatever the unit
 of the page, so that ``pi/2`` is always a right angle; in a cell for a length it is the number 3.14….
 """
@@ -22,6 +24,8 @@ LONGEST = 60  # characters of a cell
 LARGEST = 1e6  # rad or m: as in robot files
 _TOKEN = re.compile(r"\s*(?:((?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)|([a-zA-Zπ]+|°)|([-+*/()]))")
 _SIGNS = str.maketrans({"−": "-", "–": "-", "×": "*", "·": "*", "÷": "/", ",": ".", "\u00a0": " ", "º": "°"})
+# 1,000 may be 1000 or 1.000. Not so 0,125 or 1234,567.
+_THOUSANDS = re.compile(r"(?<![\d.,])[1-9]\d{0,2}(?:,\d{3})+(?![\d,])(?:\.\d*)?", re.ASCII)
 _ANGLES = {"°": math.pi / 180, "deg": math.pi / 180, "rad": 1.0}
 _LENGTHS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 _EXAMPLES = {
@@ -61,6 +65,11 @@ def read(text: str, unit: Unit, is_angle: bool) -> float:
         raise ExpressionError(f"the cell is empty; try 0, {example}")
     if len(text) > LONGEST:
         raise ExpressionError(f"“{cut(text)}” is too long; valid are {LONGEST} characters")
+    if unclear := _THOUSANDS.search(text):
+        number = unclear[0]
+        other = f" or {number.replace(',', '.')}" if number.count(",") == 1 and "." not in number else ""
+        valid = f"{cut(number.replace(',', ''))}{other}"
+        raise ExpressionError(f"the comma in “{cut(number)}” may separate thousands or decimals; type {valid}")
     try:
         value = _Reader(text, unit, is_angle).read()
     except _SyntaxError as error:

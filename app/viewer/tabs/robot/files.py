@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import kin
 from app.viewer.own_arm import OwnArm, own_arm
 from app.viewer.tabs.robot.expression import cut
@@ -9,6 +11,14 @@ from kin import InputError, Robot
 from kin.files.urdf.tree import Tip, read_tree
 
 MOST = 300_000  # characters of a file
+
+
+class Several(NamedTuple):
+    """A URDF with several links that can be the tool."""
+
+    name: str
+    text: str
+    tips: tuple[Tip, ...]
 
 
 class TooLargeError(ValueError):
@@ -20,6 +30,7 @@ class Incoming:
 
     def __init__(self) -> None:
         self._parts: list[str] = []
+        self._length = 0
 
     def take(self, value: object) -> tuple[str, str] | None:
         """Add a part; name and text of the file if it was the last one.
@@ -29,19 +40,22 @@ class Incoming:
             kin.InputError: not a part of a file.
         """
         match value:
-            case [str(name), bool(first), bool(last), str(part)]:
+            case [str(name), bool(first), bool(last), str(part)] if part or last:
                 pass
             case _:
-                raise InputError("upload", value, "name, whether it is the first part, the last part, and text")
+                raise InputError(
+                    "upload", value, "name, whether it is the first part, the last part, and its text"
+                )
         if first:
-            self._parts = []
+            self._parts, self._length = [], 0
         self._parts.append(part)
-        if sum(map(len, self._parts)) > MOST:
-            self._parts = []
+        self._length += len(part)
+        if self._length > MOST:
+            self._parts, self._length = [], 0
             raise TooLargeError
         if not last:
             return None
-        text, self._parts = "".join(self._parts), []
+        text, self._parts, self._length = "".join(self._parts), [], 0
         return cut(name), text
 
 

@@ -7,19 +7,20 @@ not sent again; the rest is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import replace
 
 import kin
 from app.exports.snippets import named
 from app.shared.answers.inspection import inspect
 from app.viewer.feature import Feature, Stage
-from app.viewer.own_arm import KEY, OwnArm, own_arm
+from app.viewer.own_arm import KEY, OwnArm, label, own_arm
 from app.viewer.panel import update_html
 from app.viewer.panel.status import Notice
 from app.viewer.tabs.robot import edits, views
 from app.viewer.tabs.robot.edits import Cell, EditError
-from app.viewer.tabs.robot.files import MOST, Incoming, TooLargeError, arm_of, text_of, tips_of
+from app.viewer.tabs.robot.expression import LONGEST, cut
+from app.viewer.tabs.robot.files import MOST, Incoming, Several, TooLargeError, arm_of, text_of, tips_of
 from app.viewer.tabs.robot.presets import PRESETS, TITLES
 from kin import InputError, KinematicsError, Robot
 from kin.files.read import MAX_ROWS
@@ -44,12 +45,12 @@ class RobotTab(Feature):
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
-        self._wrong: dict[Cell | None, tuple[str, str]] = {}  # what was typed, and what is wrong with it
+        self._wrong: dict[Cell, tuple[str, str]] = {}  # what was typed, and what is wrong with it
         self._revision = 0  # of the rows: a message about other rows is out of date
         self._editing = ""  # the part of the tab in which the visitor types
         self._uploaded: OwnArm | None = None
         self._incoming = Incoming()
-        self._several: tuple[str, str] | None = None  # name and text of a URDF whose tip is to be chosen
+        self._several: Several | None = None  # a URDF whose tip is to be chosen
         self._converting = False
         gui = stage.client.gui
         self._html = {name: gui.add_html("") for name in PARTS}
@@ -91,6 +92,7 @@ class RobotTab(Feature):
         return self.title
 
     def on_robot(self) -> None:
+        self._several = None
         self._refresh()
 
     def on_style(self) -> None:
@@ -101,16 +103,14 @@ class RobotTab(Feature):
     def _refresh(self) -> None:
         """Show the arm as it is, but not in the part in which the visitor types."""
         robot, units = self.stage.robot, self.stage.units
+        self._wrong = {cell: why for cell, why in self._wrong.items() if _part(cell) == self._editing}
         if self._editing != "table":
-            self._wrong.clear()
             self._revision += 1
             self._show("table", views.table(robot, units, self._revision))
         if self._editing != "frames":
             self._show("frames", views.frames(robot, units))
         if self._editing != "start":
-            own = self._own
-            origin = robot.id if own is None else own.start
-            self._show("start", views.start(robot, origin, own is not None, self.stage.store.robots))
+            self._show("start", views.start(robot, self._origin, self._own is not None, self.stage.store.robots))
         self._show("about", views.about(inspect(robot), robot, units))
         self._show_conversion()
         self._show_files()
@@ -128,8 +128,8 @@ class RobotTab(Feature):
         self._show("convert", views.conversion(robot, other, self.stage.units))
 
     def _show_files(self) -> None:
-        name, text = self._several or ("", "")
-        self._show("files", views.files(MOST, name, tips_of(name, text) if text else ()))
+        waiting = self._several or Several("", "", ())
+        self._show("files", views.files(MOST, waiting.name, waiting.tips))
 
     def _leave_table(self) -> None:
         """The visitor has left the fields: write every value as it is read, unless something is wrong."""
@@ -142,31 +142,59 @@ class RobotTab(Feature):
         own = self.stage.own
         return own if own is not None and own.robot == self.stage.robot else None
 
+    @property
+    def _origin(self) -> str:
+        """What the arm on show was made from: a key of *Start from*, or `views.FILE` or `views.LINK`."""
+        own = self._own
+        start = self.stage.robot.id if own is None else own.start
+        if start in PRESETS or any(robot.id == start for robot in self.stage.store.robots):
+            return start
+        return views.FILE if self._uploaded is not None and start == self._uploaded.robot.id else views.LINK
+
     # Changes
 
     def _edit(self, own: OwnArm, editing: str = "") -> None:
-        if _alike(own.robot, self.stage.robot) and (self._own is not None or editing != "start"):
+        mine = self._own is not None
+        if _alike(own.robot, self.stage.robot, mine) and (mine or editing != "start"):
             return
+        replaced = None if mine else self.stage.own
+        before = self._wrong
         self._editing = editing
         try:
             self.stage.edit_arm(own)
         finally:
             self._editing = ""
+        lost = self._lost(before)
+        if replaced is not None:
+            detail = f"{own.robot.name} is now your own arm. Undo brings the other back. {lost}"
+            self.stage.notify(Notice("advice", f"{label(replaced.robot)} was replaced", detail.strip()))
+        elif lost:
+            self.stage.notify(Notice("advice", "A field that was not valid is as before", lost))
+
+    def _lost(self, before: Mapping[Cell, tuple[str, str]]) -> str:
+        """Which of the cells that were wrong `before` are written again as they were, for the status."""
+        gone = [
+            f"{edits.name_of(cell)} (“{cut(text)}”)"
+            for cell, (text, _) in before.items()
+            if cell not in self._wrong
+        ]
+        more = f" and {len(gone) - 3} more" if len(gone) > 3 else ""
+        return f"Not used: {', '.join(gone[:3])}{more}." if gone else ""
 
     def _type(self, where: int | str, column: str, value: object) -> None:
         """A cell was typed into. Cells that were wrong before may be valid together with it."""
         cell = self._cell(where, column)
         match value:
             case [int(revision), str(text)]:
+                text = text[: LONGEST + 1]  # still too long to be valid, and a name is shorter
                 if isinstance(where, int) and revision != self._revision:
                     return  # the rows are others by now
             case _:
                 raise InputError("cell", value, "a revision and a text")
-        editing = "start" if where == "arm" else "frames" if isinstance(where, str) else "table"
+        editing = _part(cell)
         robot, units = self.stage.robot, self.stage.units
-        before = {key: typed for key, (typed, _) in self._wrong.items() if key is not None and key != cell}
+        before = {key: typed for key, (typed, _) in self._wrong.items() if key != cell}
         self._wrong.pop(cell, None)
-        self._wrong.pop(None, None)
         if column == "kind":
             editing, before = "", {}
         for texts in ({**before, cell: text}, {cell: text}):
@@ -232,8 +260,9 @@ class RobotTab(Feature):
             self._edit(own)
 
     def _refuse(self, title: str, detail: str) -> None:
+        before = self._wrong
         self._refresh()
-        self.stage.notify(Notice("error", title, detail))
+        self.stage.notify(Notice("error", title, f"{detail} {self._lost(before)}".strip()))
 
     # Beginnings
 
@@ -254,16 +283,21 @@ class RobotTab(Feature):
         self.stage.notify(Notice("hand", own.robot.name, own.robot.description))
 
     def _reset(self) -> None:
-        own = self._own
+        own, origin = self._own, self._origin
         if own is None:
             return
-        if own.start:
-            self._start(own.start)
-        elif self._uploaded is not None:
+        if origin == views.FILE and self._uploaded is not None:
             self._begin(self._uploaded)
+        elif origin != views.LINK:
+            self._start(origin)
         else:
-            detail = "The arm came with a link. Undo goes back one step."
-            self._refuse("There is nothing to reset to", detail)
+            if own.start.startswith(f"{KEY}-"):
+                words = "The arm came from a file, which this page no longer has: open the file again."
+            elif own.start:
+                words = f"The arm was made from “{own.start}”, which this service does not have."
+            else:
+                words = "The arm came with a link."
+            self._refuse("There is nothing to reset to", f"{words} Undo goes back one step.")
 
     # Files
 
@@ -285,8 +319,8 @@ class RobotTab(Feature):
 
     def _use_file(self, name: str, text: str, tip: str | None = None) -> None:
         try:
-            if tip is None and tips_of(name, text):
-                self._several = name, text
+            if tip is None and (tips := tips_of(name, text)):
+                self._several = Several(name, text, tips)
                 self._show_files()
                 self.stage.notify(
                     Notice("advice", f"{name} has several ends", "Choose the link of the tool, below.")
@@ -296,17 +330,22 @@ class RobotTab(Feature):
         except KinematicsError as error:
             self._refuse(UNUSED, str(error))
             return
-        self._uploaded, self._several = own, None
+        self._uploaded = own = replace(own, start=own.robot.id)
         self.stage.show_own(own)
         self.stage.notify(Notice("hand", own.robot.name, words))
 
     def _choose_tip(self, value: object) -> None:
         if self._several is not None and isinstance(value, str) and value:
-            self._use_file(*self._several, tip=value)
+            self._use_file(self._several.name, self._several.text, tip=value)
 
 
-def _alike(one: Robot, other: Robot) -> bool:
-    """Whether two robots have the same table, and, if both are the visitor's own, the same name."""
+def _part(cell: Cell) -> str:
+    """The part of the tab that a cell is in."""
+    where, _ = cell
+    return "table" if isinstance(where, int) else "start" if where == "arm" else "frames"
+
+
+def _alike(one: Robot, other: Robot, named: bool) -> bool:
+    """Whether two robots have the same table and, if `named`, the same name."""
     unnamed = replace(other, id=one.id, name=one.name, source=one.source, description=one.description)
-    both = other.id.startswith(KEY)
-    return one == unnamed and (not both or one.name == other.name)
+    return one == unnamed and (not named or one.name == other.name)

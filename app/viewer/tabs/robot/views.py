@@ -15,6 +15,8 @@ from kin.dh import SAMPLES, largest_difference
 from kin.files.urdf.tree import Tip
 from kin.units import Unit, Units
 
+FILE, LINK = "your own file", "a link"  # what an arm was made from, besides examples and robots
+MOST_TIPS = 50  # links of a URDF to choose from
 DECIMALS = 6  # of a degree or a millimetre, in a cell
 KIND_TITLES = {"revolute": "turns", "prismatic": "slides", "fixed": "fixed"}
 _HEADS = {
@@ -46,6 +48,7 @@ def start(robot: Robot, chosen: str, changed: bool, robots: Sequence[Robot]) -> 
     return render(
         "robot/start",
         chosen=chosen,
+        other=chosen if chosen in (FILE, LINK) else "",
         changed=changed,
         presets=TITLES.items(),
         robots=[(r.id, r.name) for r in robots],
@@ -80,15 +83,15 @@ def _cell(index: int, row: Joint, column: str, units: Units) -> dict[str, Any]:
     return {**cell, "value": text_of(getattr(row, column), units.of(column in ANGLES)), "variable": variable}
 
 
-def wrong(messages: Mapping[Cell | None, str]) -> str:
+def wrong(messages: Mapping[Cell, str]) -> str:
     """What is wrong, and in which cells, for ``static/robot.js``."""
-    cells = {" ".join(map(str, cell)): message for cell, message in messages.items() if cell is not None}
+    cells = {" ".join(map(str, cell)): message for cell, message in messages.items()}
     words = [_sentence(cell, message) for cell, message in messages.items()]
     return render("robot/wrong", cells=json.dumps(cells), messages=words)
 
 
-def _sentence(cell: Cell | None, message: str) -> str:
-    words = message if cell is None else f"{name_of(cell)}: {message}"
+def _sentence(cell: Cell, message: str) -> str:
+    words = f"{name_of(cell)}: {message}"
     return f"{words[0].upper()}{words[1:]}."
 
 
@@ -178,7 +181,10 @@ def frames(robot: Robot, units: Units) -> str:
 
 def files(most: int, file: str, tips: Sequence[Tip]) -> str:
     """Buttons for files of at most `most` bytes, and the ends of a URDF to choose from."""
-    return render("robot/files", most=f"{most // 1000} kB", bytes=most, file=file, tips=tips)
+    more = max(0, len(tips) - MOST_TIPS)
+    return render(
+        "robot/files", most=f"{most // 1000} kB", bytes=most, file=file, tips=tips[:MOST_TIPS], more=more
+    )
 
 
 def conversion(robot: Robot, other: Robot | None, units: Units) -> str:

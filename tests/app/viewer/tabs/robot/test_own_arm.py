@@ -5,6 +5,8 @@ from __future__ import annotations
 import base64
 import json
 import math
+from dataclasses import replace
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from hypothesis import strategies as st
 import kin
 from app.shared.answers.inspection import inspect
 from app.viewer.own_arm import DESCRIPTION, KEY, NAME, ROW_NAME, clean, label, own_arm, pack, unpack
+from app.viewer.panel.robots import RobotMenu
 from app.viewer.session.state import MAX_TEXT, PageState, decode, encode
 from app.viewer.tabs.robot.presets import PRESETS
 from kin import KinematicsError
@@ -209,3 +212,15 @@ def test_a_cleaned_text_stays_as_it_is(text):
     assert len(once) <= NAME
     assert clean(once, NAME) == once
     once.encode()
+
+
+def test_the_menu_offers_every_robot_whatever_its_name():
+    robots = [
+        replace(robot, name=name) for robot, name in zip(ROBOTS, ("My arm", "My arm", "Other"), strict=False)
+    ]
+    own = own_arm(PRESETS["one-joint"])
+    menu = RobotMenu(MagicMock(), robots, own, robots[1], MagicMock())
+    options = [f"My arm{end}" for end in ("", f" ({robots[1].id})")] + ["Other", f"My arm ({own.robot.id})"]
+    for name, robot in zip(options, (*robots, own.robot), strict=True):
+        assert menu.read(name) == robot
+        menu.show(robot, own)

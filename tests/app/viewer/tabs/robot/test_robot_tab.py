@@ -15,10 +15,13 @@ from fake_browser import FakeBrowser
 import kin
 from app.shared.store import Store
 from app.viewer.lessons import LESSONS
-from app.viewer.own_arm import own_arm
+from app.viewer.own_arm import own_arm, pack
 from app.viewer.session.state import PageState, decode, encode
+from app.viewer.tabs.robot import files
 from app.viewer.tabs.robot.files import MOST
 from app.viewer.tabs.robot.presets import PRESETS
+from app.viewer.tabs.robot.views import MOST_TIPS
+from kin.files.urdf.tree import read_tree
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -364,3 +367,109 @@ def test_the_own_arm_keeps_its_pose_while_another_robot_is_on_show(port: int) ->
         tab.choose(UR5.name)
         tab.choose(mine)
         shows(tab, two, q)
+
+
+def packed(own: object) -> str:
+    text = json.dumps({"v": 1, "robot": "own", "own": own})
+    return json.dumps({"state": base64.urlsafe_b64encode(text.encode()).decode().rstrip("=")})
+
+
+@pytest.mark.parametrize(
+    ("start", "words"),
+    [
+        ("my-lab-arm", "The arm was made from “my-lab-arm”, which this service does not have."),
+        ("own-0123456789ab", "The arm came from a file, which this page no longer has: open the file again."),
+        ("", "The arm came with a link."),
+        ({"a": 1}, "The arm came with a link."),
+    ],
+)
+def test_the_origin_that_a_link_names_may_be_unknown(port: int, start: object, words: str) -> None:
+    own = pack(own_arm(PRESETS["planar-2r"]))
+    with FakeBrowser(port, memory=packed({**own, "from": start})) as tab:
+        tab.settle()
+        assert '<option value="" selected>a link</option>' in part(tab, "start")
+        say(tab, "reset")
+        assert "There is nothing to reset to" in tab.html
+        assert words in html.unescape(tab.html)
+        assert tab.value("Robot").startswith("My arm")
+
+
+def test_reset_goes_back_to_the_file_that_the_arm_came_from(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        for robot in (UR5, PIONEER):
+            say(tab, "upload", value=["arm.toml", True, True, kin.robot_to_toml(robot)])
+            assert '<option value="" selected>your own file</option>' in part(tab, "start")
+            shows(tab, robot, robot.q_home)
+            if robot is UR5:
+                type_in(tab, 0, "d", "95")
+                tab.settle()
+        tab.say("undo")
+        tab.settle()
+        assert cell(tab, "0 d") == "95"
+        assert '<option value="" selected>a link</option>' in part(tab, "start")
+        say(tab, "reset")
+        assert "open the file again" in tab.html
+        assert cell(tab, "0 d") == "95"
+        tab.say("redo")
+        tab.settle()
+        type_in(tab, 0, "d", "96")
+        say(tab, "reset")
+        shows(tab, PIONEER, PIONEER.q_home)
+        assert cell(tab, "0 d") == "130"
+
+
+def test_a_file_that_waits_for_its_tip_is_read_once(port: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    arms = "".join(
+        f'<link name="end{i}"/><joint name="j{i}" type="revolute"><parent link="base"/><child link="end{i}"/>'
+        '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+        for i in range(MOST_TIPS + 7)
+    )
+    read = []
+    monkeypatch.setattr(files, "read_tree", lambda text, name: read.append(name) or read_tree(text, name))
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        say(tab, "upload", value=["many.urdf", True, True, f'<robot name="x"><link name="base"/>{arms}</robot>'])
+        assert part(tab, "files").count("(1 joint)") == MOST_TIPS
+        assert "7 more are not shown" in part(tab, "files")
+        tab.set("Radians", True)
+        tab.set("Lengths", "m")
+        tab.wait(lambda: cell(tab, "0 d") == "0.13")
+        assert "many.urdf" in part(tab, "files")
+        assert read == ["many.urdf"]
+        tab.choose(UR5.name)
+        assert "many.urdf" not in part(tab, "files")
+
+
+def test_long_texts_and_empty_parts_are_not_kept(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        type_in(tab, 1, "a", "9" * 20_000)
+        assert "too long" in wrong(tab)["1 a"]
+        say(tab, "upload", value=["empty.toml", True, False, ""])
+        assert "Invalid input" in tab.html
+
+
+def test_the_status_says_what_a_change_has_put_back_or_replaced(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        type_in(tab, 2, "alpha", "9o")
+        type_in(tab, "tool", "x", "1o")
+        type_in(tab, "tool", "y", "5")
+        assert "Not used: row 3, α (“9o”)." in html.unescape(tab.html)
+        assert list(wrong(tab)) == ["tool x"], "what is still in its field is still marked"
+        type_in(tab, 2, "a", "1o0")
+        say(tab, "row", "add", 0)
+        assert "A field that was not valid is as before" in tab.html
+        assert wrong(tab) == {}
+        mine = tab.value("Robot")
+        tab.choose(UR5.name)
+        type_in(tab, 0, "d", "95")
+        assert f"{mine} was replaced" in tab.html
+        assert "Undo brings the other back" in tab.html
+        type_in(tab, 0, "d", "96")
+        tab.settle()
+        tab.say("undo")
+        tab.settle()
+        tab.choose(mine)
+        assert len(re.findall("data-row=", part(tab, "table"))) == len(PIONEER.rows) + 1
