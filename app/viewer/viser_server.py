@@ -20,6 +20,7 @@ import io
 import itertools
 import logging
 import threading
+import warnings
 from collections.abc import Callable, Coroutine, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -188,6 +189,8 @@ def start_viser(loop: asyncio.AbstractEventLoop, label: str) -> tuple[viser.Vise
     if not isinstance(portless, PortlessServer):
         server.stop()
         raise RuntimeError(f"viser {viser.__version__} listens on a port; install viser>=1.1,<1.2")
+    # Visitors leave while something is drawn for them or asked of their page.
+    warnings.filterwarnings("ignore", r"Queued a \w+ on a closed connection", UserWarning)
     # A visitor could ask viser for a public tunnel to this service.
     for kind in (messages.ShareUrlRequest, messages.ShareUrlDisconnect):
         portless.unregister_handler(kind)

@@ -7,6 +7,7 @@ import hashlib
 import inspect
 import logging
 import threading
+import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -116,6 +117,23 @@ def test_a_visitor_comes_and_goes(server, serve):
     assert server[0].get_clients() == {}
     assert server[1]._client_state_from_id == {}
     assert server[1]._broadcast_buffer.generator_cursors == {}
+
+
+def test_a_message_for_a_visitor_who_has_left_is_no_warning(loop):
+    started, connections = start_viser(loop, "test")
+    visitors: list[viser.ClientHandle] = []
+
+    @started.on_client_connect
+    async def _(client: viser.ClientHandle) -> None:
+        visitors.append(client)
+
+    visit = Visit(*[{"type": "ViewerCameraMessage"} | CAMERA] * 3)
+    asyncio.run_coroutine_threadsafe(connections.serve(visit), loop).result(10)
+    (client,) = visitors
+    with warnings.catch_warnings(record=True) as shown:
+        client.local_storage.set_item("key", "value")
+    started.stop()
+    assert shown == []
 
 
 def test_a_page_of_another_version_is_refused_with_a_reason(serve):
