@@ -14,13 +14,18 @@ from kin.files.read import MAX_ROWS
 DEFAULTS = {"id": "sent", "name": "Sent arm", "source": "the request"}
 
 _TEXT = {"type": "string", "minLength": 1, "maxLength": 4000, "pattern": r"\S"}
+# What the reader takes, smaller than a million even after rounding.
+_DECIMAL = (
+    r"[-+]?(([0-9]{1,6}(\.[0-9]{0,9})?|[0-9]{1,5}\.[0-9]{10,24}|\.[0-9]{1,24})([eE]-[0-9]{1,3})?"
+    r"|[0-9](\.[0-9]{0,9})?[eE]\+?0?[0-5])"
+)
 _NUMBER = {"type": "number", "exclusiveMinimum": -1e6, "exclusiveMaximum": 1e6}
 
 
 def _quantity(units: str, description: str) -> dict[str, Any]:
     """A number in the unit of the file, or a text with a unit of its own."""
-    example = "1.5 rad" if "rad" in units else "0.13 m"
-    text = {"type": "string", "pattern": rf"^[0-9]{{1,5}}(\.[0-9]{{1,17}})? ({units})$", "examples": [example]}
+    example = "-90 deg" if "rad" in units else "0.13 m"
+    text = {"type": "string", "pattern": rf"^{_DECIMAL} ?({units})$", "examples": [example]}
     return {"description": description, "anyOf": [_NUMBER, text]}
 
 

@@ -44,8 +44,9 @@ class FramesBody(schemas.Body):
 
     base: ConstantFrame | None = Field(
         None,
-        description="Pose of the arm's base in a frame of your own, such as a workpiece: all poses are in that "
-        "frame. By default they are in the base frame.",
+        description="Pose of the arm's base frame in a frame of your own, such as a workpiece: all poses are in "
+        "that frame. By default they are in the base frame. If the arm has a `base` of its own, that is the frame "
+        "in which this `base` is stated, not the one of its first row.",
     )
     tool: ConstantFrame | None = Field(
         None,

@@ -10,13 +10,16 @@ import tracemalloc
 from functools import _lru_cache_wrapper
 from pathlib import Path
 
+import jsonschema_rs
 import numpy as np
 import pytest
 from arms import random_arms
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 from numba.core.dispatcher import Dispatcher
 
 import kin
-from app.api.arms.description import DEFAULTS, EXAMPLE
+from app.api.arms.description import _SCHEMA, DEFAULTS, EXAMPLE
 
 FILES = Path(__file__).parents[2] / "data" / "urdf"
 PIONEER = kin.get_robot("pioneer5")
@@ -35,6 +38,52 @@ def post(client, path, body, status=200):
 def test_the_example_is_the_pioneer_arm():
     robot = kin.robot_from_dict({**DEFAULTS, **EXAMPLE})
     assert (robot.rows, robot.home) == (PIONEER.rows, PIONEER.home)
+
+
+@pytest.fixture(scope="module")
+def schema(app):
+    """The schema of a sent arm, as a validator of the OpenAPI document."""
+    return jsonschema_rs.validator_for(app.openapi()["components"]["schemas"]["RobotDescription"])
+
+
+@pytest.mark.parametrize("robot", kin.builtin_robots().values(), ids=lambda robot: robot.id)
+def test_what_is_written_fits_the_schema(schema, robot):
+    other = kin.convert(robot, "modified" if robot.convention == "standard" else "standard")
+    for arm in (robot, other):
+        for length in ("m", "cm", "mm"):
+            for angle in ("deg", "rad"):
+                schema.validate(kin.robot_to_dict(arm, length=length, angle=angle))
+
+
+QUANTITIES = ["-90 deg", "1e-05 rad", "+1.5 rad", "180.°", ".5rad", "0.00012345678901234567 rad", "-2.5e3 deg"]
+
+
+@pytest.mark.parametrize("text", QUANTITIES)
+def test_the_schema_takes_the_angles_that_the_reader_takes(schema, text):
+    described = {**EXAMPLE, "rows": [{"theta": text}], "home": {"q": [0]}}
+    kin.robot_from_dict({**DEFAULTS, **described})
+    schema.validate(described)
+
+
+@pytest.mark.parametrize("text", ["90", "1 m", "1e6 rad", "1000000 rad", "nan rad", "π rad"])
+def test_neither_takes_another_text_for_an_angle(schema, text):
+    described = {**EXAMPLE, "rows": [{"theta": text}], "home": {"q": [0]}}
+    with pytest.raises(kin.RobotFileError):
+        kin.robot_from_dict({**DEFAULTS, **described})
+    assert not schema.is_valid(described)
+
+
+PATTERN = _SCHEMA["properties"]["rows"]["items"]["properties"]["theta"]["anyOf"][1]["pattern"]
+
+
+@settings(max_examples=40)
+@given(st.from_regex(PATTERN, fullmatch=True))
+@example("-999999.999999999 rad")
+@example("99999.999999999999999999999999 deg")
+@example("9.999999999E5 rad")
+def test_the_reader_takes_what_the_schema_takes(text):
+    described = {**EXAMPLE, "rows": [{"theta": text}], "home": {"q": [0]}}
+    assert kin.robot_from_dict({**DEFAULTS, **described}).n == 1
 
 
 OPERATIONS = {
