@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from kin.errors import InputError, RobotFileError
+from kin.errors import InputError, KinematicsError, RobotFileError, shorten
+from kin.files.numbers import LARGEST, NUMBER
 from kin.home import default_home
 from kin.robot import (
     CONVENTIONS,
@@ -32,7 +33,9 @@ MAX_ROWS = 32
 MAX_REACH = 1e5  # metres; targets may have coordinates up to 1e6 m
 _TOP = {"id", "name", "source", "description", "convention", "units", "rows", "home", "base", "tool"}
 _ROW = {"name", "kind", "theta", "d", "a", "alpha", "limits", "velocity", "effort"}
-_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(rad|deg|°|m|cm|mm)(/s)?\s*")
+_QUANTITY = re.compile(rf"\s*({NUMBER})\s*(rad|deg|°|m|cm|mm)(/s)?\s*")
+_LONGEST = 80  # characters of a number with a unit
+_SURROGATE = re.compile("[\ud800-\udfff]")  # half a character, which no encoding can write
 UNLIMITED = "none"
 
 
@@ -70,7 +73,7 @@ def parse_robot(text: str, file: str = "robot") -> Robot:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # TOMLDecodeError is a ValueError, as is an integer too long
         raise RobotFileError(file, "file", str(error), "valid TOML") from None
-    return _Reader(file).robot(data)
+    return Reader(file).robot(data)
 
 
 def robot_from_dict(data: dict[str, Any], source: str = "robot") -> Robot:
@@ -81,10 +84,10 @@ def robot_from_dict(data: dict[str, Any], source: str = "robot") -> Robot:
     """
     if not isinstance(data, dict):
         raise RobotFileError(source, "robot", data, "a table with the fields " + ", ".join(sorted(_TOP)))
-    return _Reader(source).robot(data)
+    return Reader(source).robot(data)
 
 
-class _Reader:
+class Reader:
     """Turns the fields of a file into a `Robot`; every error names the field."""
 
     def __init__(self, file: str) -> None:
@@ -92,7 +95,8 @@ class _Reader:
         self.length = 1.0
         self.angle = 1.0
 
-    def refuse(self, field: str, value: object, expected: str) -> RobotFileError:
+    def refuse(self, field: str, value: object, expected: str) -> KinematicsError:
+        """The error for one of the fields."""
         return RobotFileError(self.file, field, value, expected)
 
     def robot(self, data: dict[str, Any]) -> Robot:
@@ -241,22 +245,25 @@ class _Reader:
     def quantity(self, field: str, value: object, scale: float, units: dict[str, float], per: str) -> float:
         """A number in the unit of the file, or a text with a unit of its own such as ``"0.13 m"``."""
         if isinstance(value, str):
-            found = _QUANTITY.fullmatch(value[:80])
+            found = _QUANTITY.fullmatch(value) if len(value) <= _LONGEST else None
             if found is None or found[2] not in units or (found[3] or "") not in ("", per):
                 example = f'"1.5 {next(iter(units))}{per}"'
                 raise self.refuse(field, value, f"a finite number, or a text with its unit such as {example}")
             value, scale = float(found[1]), units[found[2]]
-        return self.number(field, value) * scale
+        return self.number(field, value, scale, " radians" if "rad" in units else " metres")
 
-    def number(self, field: str, value: object) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < 1e6:
-            raise self.refuse(field, value, "a finite number, smaller than a million")
-        return float(value)
+    def number(self, field: str, value: object, scale: float = 1.0, unit: str = "") -> float:
+        """A number times the scale of its unit."""
+        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < LARGEST / scale:
+            raise self.refuse(field, value, "a finite number, smaller than a million" + unit)
+        return float(value) * scale
 
     def text(self, data: dict[str, Any], key: str, default: str | None = None, where: str = "") -> str:
         value = data.get(key, default)
         if not isinstance(value, str) or (default is None and not value.strip()) or len(value) > 4000:
             raise self.refuse(where + key, value, "a text of 1 to 4000 characters")
+        if _SURROGATE.search(value):
+            raise self.refuse(where + key, value, "a text without halves of characters (surrogates)")
         return value.strip()
 
     def table(self, data: dict[str, Any], key: str) -> dict[str, Any]:
@@ -278,10 +285,11 @@ class _Reader:
             raise self.refuse(where + key, value, "one of " + ", ".join(f'"{v}"' for v in valid))
         return str(value)
 
-    def only_known_fields(self, where: str, data: dict[str, Any], fields: set[str]) -> None:
+    def only_known_fields(self, where: str, data: dict[Any, Any], fields: set[str]) -> None:
         for key in data:
             if key not in fields:
-                raise self.refuse(where + key, data[key], "only the fields " + ", ".join(sorted(fields)))
+                name = key if isinstance(key, str) and key.isprintable() and len(key) <= 80 else shorten(key)
+                raise self.refuse(where + name, data[key], "only the fields " + ", ".join(sorted(fields)))
 
 
 def matrix_of(xyz: Sequence[float], rpy: Sequence[float]) -> Matrix:

@@ -1,7 +1,8 @@
 """Writes robots: `Robot` → the fields of a robot file as a dict → TOML.
 
-Reading what was written gives an equal robot, bit by bit. Not every number has a decimal that becomes exactly it
-when it is multiplied by π/180 or 0.001; such a value is written with its own unit, ``"2.8973 rad"``.
+Reading what was written gives an equal robot, bit by bit; what could not be read is not written. Not every number
+has a decimal that becomes exactly it when it is multiplied by π/180 or 0.001; such a value is written with its own
+unit, ``"2.8973 rad"``.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from kin.errors import InputError
-from kin.files.read import ANGLES, UNLIMITED, matrix_of
+from kin.files.read import ANGLES, UNLIMITED, Reader, matrix_of
 from kin.robot import IDENTITY, LENGTHS, Joint, Matrix, Robot, exact_cos_sin
 from kin.transforms import Array
 from kin.units import Length
@@ -32,12 +33,18 @@ def robot_to_dict(robot: Robot, length: Length | None = None, angle: Angle = "de
         robot: the arm.
         length: the unit of lengths; by default that of the robot. Read again, the robot has this unit.
         angle: the unit of angles.
+
+    Raises:
+        InputError: an unknown unit, or an arm that no robot file may describe, such as one with a slide without
+            limits or two rows of one name; the field is that of the file, e.g. ``rows[2].limits``.
     """
     length = length or robot.units  # type: ignore[assignment]  # checked by Robot
     for field, unit, valid in (("length", length, LENGTHS), ("angle", angle, ANGLES)):
         if unit not in valid:
             raise InputError(field, unit, "one of " + ", ".join(valid))
-    return _Writer(str(length), angle).robot(robot)
+    data = _Writer(str(length), angle).robot(robot)
+    _Proof("robot").robot(data)
+    return data
 
 
 def robot_to_toml(robot: Robot, length: Length | None = None, angle: Angle | None = None) -> str:
@@ -56,6 +63,19 @@ def robot_to_toml(robot: Robot, length: Length | None = None, angle: Angle | Non
 def save_robot(robot: Robot, path: Path | str) -> None:
     """Write a robot file; an existing file is replaced."""
     Path(path).write_text(robot_to_toml(robot), encoding="utf-8")
+
+
+class _Proof(Reader):
+    """Reads what was written, so that nothing is written that cannot be read."""
+
+    def refuse(self, field: str, value: object, expected: str) -> InputError:
+        return InputError(field, value, expected)
+
+    def text(self, data: dict[str, Any], key: str, default: str | None = None, where: str = "") -> str:
+        found = super().text(data, key, default, where)
+        if found != data.get(key, default):
+            raise self.refuse(where + key, data[key], "a text without spaces at its ends")
+        return found
 
 
 class _Writer:

@@ -219,6 +219,43 @@ def test_writing_and_reading_gives_an_equal_robot(robot, tmp_path):
             assert read_again(robot, length=length, angle=angle) == replace(robot, units=length)
 
 
+SLIDE, LINK = Joint("slide", kind="prismatic"), Joint("link", a=1.0, limits=(-1, 1))
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "valid"),
+    [
+        ({"rows": (SLIDE,)}, "rows[0].limits", "two numbers"),
+        ({"rows": (replace(LINK, limits=(0, 0)),)}, "rows[0].limits", "lower below upper"),
+        ({"rows": (LINK, LINK), "home": (0, 0)}, "rows[].name", "different"),
+        ({"rows": (replace(LINK, name=" link"),)}, "rows[0].name", "without spaces at its ends"),
+        ({"rows": (replace(LINK, name="\udc80"),)}, "rows[0].name", "surrogates"),
+        ({"rows": (replace(LINK, a=2e5),)}, "rows", "100000 m"),
+        ({"rows": (replace(LINK, effort=1e7),)}, "rows[0].effort", "million"),
+        ({"home": (2.0,)}, "home.q[0]", "limits of link"),
+        ({"id": "My Arm"}, "id", "lower-case"),
+        ({"name": "My arm "}, "name", "without spaces at its ends"),
+        ({"source": ""}, "source", "text of 1"),
+        ({"description": "\n"}, "description", "without spaces at its ends"),
+        ({"base": matrix_of((1e5, 0, 0), (0, 0, 0))}, "rows", "base"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_read_is_not_written(change, field, valid, tmp_path):
+    robot = Robot.from_dh([LINK])
+    assert read_again(robot) == robot
+    with pytest.raises(InputError) as caught:
+        kin.save_robot(replace(robot, **change), tmp_path / "arm.toml")
+    assert caught.value.field == field
+    assert valid in caught.value.expected
+    assert not (tmp_path / "arm.toml").exists()
+
+
+@pytest.mark.parametrize("length", ["m", "cm", "mm"])
+def test_long_arms_are_written_in_any_unit(length):
+    robot = Robot.from_dh([{"d": 2000.0, "a": 9e4, "limits": (-1e5, 1e5)}])
+    assert read_again(robot, length=length) == replace(robot, units=length)
+
+
 def test_round_values_are_written_round():
     data = kin.robot_to_dict(kin.get_robot("puma560"), length="mm")
     assert data["rows"][0]["alpha"] == 90
@@ -292,7 +329,16 @@ def test_base_and_tool_as_matrices():
         ({"rows": [{"alpha": "3 mm"}]}, "rows[0].alpha", "1.5 deg"),
         ({"rows": [{"alpha": "3 rad/s"}]}, "rows[0].alpha", "1.5 deg"),
         ({"rows": [{"a": math.nan}]}, "rows[0].a", "finite"),
-        ({"rows": [{"a": 10**400}]}, "rows[0].a", "million"),
+        ({"rows": [{"a": 10**400}]}, "rows[0].a", "million metres"),
+        ({"rows": [{"alpha": 1e6}]}, "rows[0].alpha", "million radians"),
+        ({"rows": [{"a": "1e9 mm"}]}, "rows[0].a", "million metres"),
+        ({"rows": [{"a": "0.13 m" + 80 * " " + "junk"}]}, "rows[0].a", "1.5 m"),
+        ({"rows": [{"a": "1" * 40_000 + " m"}]}, "rows[0].a", "1.5 m"),
+        ({1: 2}, "1", "only the fields"),
+        ({"rows": [{None: 2}]}, "rows[0].None", "only the fields"),
+        ({"\ud800": 2}, "'\\ud800'", "only the fields"),
+        ({"name": "\ud800"}, "name", "surrogates"),
+        ({"rows": [{"name": "a\udfff"}]}, "rows[0].name", "surrogates"),
         ({"rows": [{}, {"a": None}]}, "rows[1].a", "finite"),
         ({"rows": [{"a": 9e4}, {"a": 9e4}]}, "rows", "100000 m"),
         ({"rows": [{}], "base": {"xyz": [0, 0, 2e5]}}, "rows", "base and tool"),
