@@ -351,6 +351,14 @@ def is_perpendicular(angle: float) -> bool:
     return abs(abs(angle) - 0.5 * math.pi) < TOLERANCES.geometry
 
 
+def is_along(T: Array) -> bool:
+    """Whether the z axis of a frame ``(4, 4)`` is that of its parent, or opposite to it.
+
+    The sideways components decide: the cosine does not change with a small tilt.
+    """
+    return is_zero(T[0, 2], T[1, 2])
+
+
 def is_zero(*values: float) -> bool:
     """Whether all lengths vanish within the geometric tolerance."""
     return all(abs(v) < TOLERANCES.geometry for v in values)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from kin.axes import size
 from kin.fk import fk
 from kin.ik import failures, nearest, preferences
 from kin.ik.assembly import by_key, leaves_motion, make_result, solutions_of
@@ -21,6 +22,8 @@ from kin.ik.results import IKResult, Status
 from kin.solvers.contract import APPROACH, POSE, POSITION
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
+
+_SUSPICIOUS = 1e3  # times the rounding: where the formulas of a rounded table may miss postures
 
 
 def answer(problem: IKProblem) -> IKResult:
@@ -37,6 +40,9 @@ def answer(problem: IKProblem) -> IKResult:
     allowed = np.array([problem.allows(i) for i in range(len(closed))])
     if (good & allowed).any():
         return _solved(problem, branches, good & allowed)
+    missed = _missed(problem, branches, closed)
+    if missed is not None:
+        return missed
     if (closed & allowed).any():
         return failures.outside_limits(problem, branches, closed & allowed, good)
     if closed.any():
@@ -74,12 +80,36 @@ def _solved(problem: IKProblem, branches: Branches, good: Flags) -> IKResult:
         postures=postures,
         free=free,
         fixed=fixed,
+        complete=branches.complete,
     )
     return make_result(problem, Status.SOLVED, "", details, solutions=solutions, redundancy=redundancy)
 
 
+def _missed(problem: IKProblem, branches: Branches, closed: Flags) -> IKResult | None:
+    """What descents find of a rounded table where its family has nothing; None if nothing, or if it is exact.
+
+    Joints that are free in the family may move the tool by little more than the rounding, and must then move far.
+    Only where the closest configuration misses the target by little may there be one that meets it.
+    """
+    form = problem.closed_form
+    if form is None or form.off == 0.0 or problem.requested:  # a descent would change a requested value
+        return None
+    near = nearest.closest(problem, branches.q)
+    if near is not None and nearest.mismatch(near) < _SUSPICIOUS * form.off * size(problem.robot):
+        found = _by_descents(problem)
+        if found is not None and (found.status is Status.SOLVED or not closed.any()):
+            return found
+    return failures.outside_by_descent(problem) if problem.respect and not closed.any() else None
+
+
 def _numeric(problem: IKProblem) -> IKResult:
-    """A task or an arm without a closed form: descents from many starts.
+    """A task or an arm without a closed form."""
+    found = _by_descents(problem)
+    return failures.not_found(problem) if found is None else found
+
+
+def _by_descents(problem: IKProblem) -> IKResult | None:
+    """Descents from many starts; None if none meets the task.
 
     Where the arm has a closed form for whole poses, it adds the other branches of the poses found.
     """
@@ -91,7 +121,7 @@ def _numeric(problem: IKProblem) -> IKResult:
         pool = nearest.descend_each(problem, problem.code, starts, 1.0)[0]
     q, stats = _usable(problem, *measure(problem, pool))
     if not len(q):
-        return failures.not_found(problem)
+        return None
     related = [_same_pose(problem, row) for row in q]
     q = np.concatenate([q, *related])
     if prefer == "nearest":

@@ -30,7 +30,7 @@ class Branches:
         closed, good: ``(k,)``, which rows meet the task, and which of them the limits allow (if they count).
         order: the good rows, nearest to the seed first, each configuration once.
         redundancies: the redundancy parameters of `values` and `arcs`.
-        values, arcs, gap, obstacle: as in `kin.solvers.contract.Candidates`.
+        values, arcs, gap, obstacle, complete: as in `kin.solvers.contract.Candidates`.
     """
 
     q: Array
@@ -43,6 +43,7 @@ class Branches:
     arcs: list[Array]
     gap: float
     obstacle: Obstacle | None
+    complete: bool
 
 
 def is_closed(problem: IKProblem, stats: Array) -> Flags:
@@ -86,7 +87,7 @@ def solve_branches(
     count = unchecked()(problem.requirement, problem.T, seed, problem.seed, rows)
     return Branches(
         q, rows.stats, rows.closed, rows.good, rows.order[:count].tolist(), redundancies, found.values,
-        list(found.arcs), found.gap, found.obstacle,
+        list(found.arcs), found.gap, found.obstacle, found.complete,
     )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ may meet a target that every row of the closed form misses by rounding error, an
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypeGuard
 
@@ -49,9 +50,9 @@ from kin.transforms import Array
 def not_found(problem: IKProblem) -> IKResult:
     """No descent met the task. An arm without a closed form gets the same statuses as one with a closed form."""
     if problem.closed_form is None and problem.respect:
-        blocked = _beyond_limits(problem, problem.code)
-        if blocked:
-            return _outside_by_descent(problem, blocked)
+        found = outside_by_descent(problem)
+        if found is not None:
+            return found
     if problem.closed_form is None and problem.robot.n < 6 and problem.code == POSE:
         return _compromise_by_descent(problem)
     return out_of_reach(problem, None)
@@ -63,13 +64,17 @@ def _beyond_limits(problem: IKProblem, code: int) -> tuple[BlockedBranch, ...]:
     if not len(found):
         return ()
     q, stats = measure(problem, found, code=code)
-    return _blocked(
-        problem, q, by_key(q, is_closed(problem, stats) & (stats[:, OVERRUN] > 0.0), stats[:, OVERRUN])
-    )
+    branch = [problem.branch_of(row) for row in q]
+    allowed = np.array([problem.allows(i) for i in branch])
+    rows = is_closed(problem, stats) & (stats[:, OVERRUN] > 0.0) & allowed
+    return _blocked(problem, q, by_key(q, rows, stats[:, OVERRUN]), branch)
 
 
-def _outside_by_descent(problem: IKProblem, blocked: tuple[BlockedBranch, ...]) -> IKResult:
-    """The task is met outside the limits only, as far as descents can tell."""
+def outside_by_descent(problem: IKProblem) -> IKResult | None:
+    """The task is met outside the limits only, as far as descents can tell; None if they do not meet it there."""
+    blocked = _beyond_limits(problem, problem.code)
+    if not blocked:
+        return None
     closest = nearest.closest(problem, None)
     if _is_solution(closest, problem):
         return _found_by_descent(problem, closest)
@@ -109,7 +114,7 @@ def outside_limits(problem: IKProblem, branches: Branches, rows: Flags, good: Fl
     if _is_solution(closest, problem):
         return _found_by_descent(problem, closest)
     order = by_key(branches.q, rows, branches.stats[:, OVERRUN])
-    blocked = _blocked(problem, branches.q, order)
+    blocked = _blocked(problem, branches.q, order, range(len(branches.q)))
     redundancy = redundancy_of(problem, branches, order[:1], rows)[1]
     names = [parameter.name for parameter in problem.requested]
     details = OutsideLimits(
@@ -158,7 +163,8 @@ def compromise(problem: IKProblem, branches: Branches, allowed: Flags) -> IKResu
         return out_of_reach(problem, branches)
     blocked: tuple[BlockedBranch, ...] = ()
     if not rows.any() and possible.any():
-        blocked = _blocked(problem, approach_q, by_key(approach_q, possible, approach_stats[:, OVERRUN]))
+        order = by_key(approach_q, possible, approach_stats[:, OVERRUN])
+        blocked = _blocked(problem, approach_q, order, range(len(approach_q)))
     return _compromised(problem, solutions, blocked, branches.q)
 
 
@@ -284,10 +290,10 @@ def side_of(problem: IKProblem, q: Array) -> Cause:
     return "too near" if far < near - TOLERANCES.same_distance else "outside"
 
 
-def _blocked(problem: IKProblem, q: Array, order: list[int]) -> tuple[BlockedBranch, ...]:
-    """Rows of q ``(k, n)`` that exist outside the limits."""
-    name = problem.branch_name if problem.closed_form is not None else lambda row: problem.branch_name(-1)
-    return tuple(BlockedBranch(name(i), q[i].copy(), violations_of(problem, q[i])) for i in order)
+def _blocked(problem: IKProblem, q: Array, order: list[int], branch: Sequence[int]) -> tuple[BlockedBranch, ...]:
+    """Rows of q ``(k, n)`` that exist outside the limits; `branch` has the branch of each row."""
+    name = problem.branch_name
+    return tuple(BlockedBranch(name(branch[i]), q[i].copy(), violations_of(problem, q[i])) for i in order)
 
 
 def _is_solution(closest: IKSolution | None, problem: IKProblem) -> TypeGuard[IKSolution]:

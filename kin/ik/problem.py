@@ -234,7 +234,8 @@ def read_pose(target: ArrayLike, code: int, field: str = "target", always: bool 
 def _nearest_pose(target: ArrayLike, field: str, always: bool) -> tuple[Array, float]:
     """A matrix that is nearly a pose ``(4, 4)`` as the nearest one, and how rounded it is."""
     T = finite_array(field, target, (4, 4))
-    if T.ndim != 2 or np.abs(T).max() > FAR or np.abs(T[3] - (0.0, 0.0, 0.0, 1.0)).max() > _ROUNDED:
+    last = np.abs(T[3] - (0.0, 0.0, 0.0, 1.0)).max() if T.ndim == 2 else math.inf
+    if last > TOLERANCES.rotation_matrix or np.abs(T).max() > FAR:
         return as_transform(T, field), 0.0
     R = T[:3, :3]
     error = float(np.abs(R.T @ R - np.eye(3)).max())

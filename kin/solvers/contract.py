@@ -103,6 +103,7 @@ class Candidates:
             other parameters held.
         gap: metres by which the geometry does not close when no branch exists.
         obstacle: what does not fit then; None if the solver cannot tell.
+        complete: whether no configuration is missing, as far as the solver can tell.
     """
 
     q: Array
@@ -110,6 +111,7 @@ class Candidates:
     arcs: tuple[Array, ...]
     gap: float = 0.0
     obstacle: Obstacle | None = None
+    complete: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,6 +153,8 @@ class ClosedForm(ABC):
         named: whether a branch keeps its name from pose to pose, so that it can be requested and followed.
         steady: whether a row is the same branch at every value of the first redundancy parameter.
         exact_ranges: whether the intervals of that parameter are exact, so that those of width 0 are found too.
+        off: the largest angle (radians) or share of the arm's size by which the formulas are those of another arm;
+            if it is not 0.0, configurations may be missing.
     """
 
     name: str
@@ -163,6 +167,7 @@ class ClosedForm(ABC):
     named: bool = True
     steady: bool = True
     exact_ranges: bool = True
+    off: float = 0.0
 
     def names(self, robot: Robot, sense: Array) -> Names:
         """The names of the branches on `robot`, in which joint i counts `sense[i]` times as it does here."""

@@ -118,6 +118,7 @@ class SingleValues(ClosedForm):
     def __init__(self, form: ClosedForm, joint: int, value: float) -> None:
         self.form, self.joint, self.value = form, joint, value
         self.name, self.title, self.reason, self.lengths = form.name, form.title, form.reason, form.lengths
+        self.off = form.off
         self.branches, self.meanings, self.named = _several(form.branches), form.meanings, form.named
         self.kernels = _kernels(self, form.kernels)
 
@@ -142,9 +143,11 @@ class SingleValues(ClosedForm):
         rest = len(free) - 1
         q, values = np.full((len(self.branches), len(p.seed)), math.nan), np.empty((len(self.branches), rest))
         values[:] = math.nan
+        complete = first.complete
         arcs: list[list[tuple[float, float, float]]] = [[] for _ in range(rest)]
         for branch, value in _single_values(first.arcs[0]):
             found = form.solve(replace(p, values=(value, *p.values)))
+            complete &= found.complete
             row = _place(q, branch)
             if math.isnan(found.q[branch, 0]) or row is None:
                 continue
@@ -152,7 +155,7 @@ class SingleValues(ClosedForm):
             for k in range(rest):
                 arcs[k] += [(row, x, y) for i, x, y in found.arcs[k + 1].tolist() if i == branch]
         kept = tuple(np.array(each, dtype=np.float64).reshape(-1, 3) for each in arcs)
-        return Candidates(q, values, kept, first.gap, first.obstacle)
+        return Candidates(q, values, kept, first.gap, first.obstacle, complete)
 
     def branch_of(self, q: Array) -> int:
         """The first row of the branch that a configuration ``(n,)`` is on."""
@@ -174,7 +177,7 @@ class LockedJoints(ClosedForm):
     def __init__(self, robot: Robot, form: ClosedForm | None, inner: ClosedForm, values: dict[int, float]) -> None:
         self.form, self.inner, self.values = form, inner, values
         self.others = [i for i in range(robot.n) if i not in values]
-        self.name, self.title, self.lengths = inner.name, inner.title, inner.lengths
+        self.name, self.title, self.lengths, self.off = inner.name, inner.title, inner.lengths, inner.off
         self.kernels = _kernels(self, inner.kernels)
         numbers = ", ".join(str(i + 1) for i in values)
         self.reason = f"joint{'s' * (len(values) > 1)} {numbers} locked: {inner.reason}"

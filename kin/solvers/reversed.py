@@ -22,7 +22,7 @@ from itertools import islice, product
 
 import numpy as np
 
-from kin.axes import Links, is_zero, links_of, screw_z
+from kin.axes import Links, is_along, is_zero, links_of, screw_z
 from kin.robot import Joint, Robot
 from kin.solvers.common import TURN
 from kin.solvers.contract import POSE, BatchKernels, Candidates, ClosedForm, RedundancyParameter, SolverInput
@@ -63,7 +63,7 @@ def _choices(robot: Robot, links: Links) -> list[list[Joints]]:
         upright = first > 0 or links.base[2, 2] >= 0.0  # on a tie, axis 1 points up
         ways = (along, against) if upright else (against, along)
         found.append([joints for joints in ways if len(joints) == least])
-        if end == robot.n and is_zero(abs(links.tool[2, 2]) - 1.0):
+        if end == robot.n and is_along(links.tool):
             with_tool = along if links.tool[2, 2] > 0.0 else against
             found[-1] += [with_tool] * (with_tool not in found[-1])
     return found

@@ -28,7 +28,7 @@ def roll_sense(robot: Robot) -> float:
     z, T = lines.z[-1], lines.T_base_tool
     between = np.cross(T[:3, 3] - lines.points[-1], z)
     along = float(z @ T[:3, 2])
-    return math.copysign(1.0, along) if is_zero(*between, abs(along) - 1.0) else 0.0
+    return math.copysign(1.0, along) if is_zero(*between, *np.cross(z, T[:3, 2])) else 0.0
 
 
 def parameters(given: RedundancyParameter) -> tuple[RedundancyParameter, ...]:

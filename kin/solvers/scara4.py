@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.axes import frame_of, is_zero, lines_of, perpendicular_to
+from kin.axes import frame_of, is_along, is_zero, lines_of, perpendicular_to
 from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.simd import widest, wrapped
 from kin.robot import Robot
@@ -97,7 +97,7 @@ def match(robot: Robot) -> Scara4 | None:
     offset = np.array([first, second - first, -second, 0.0])
     wrist = frame_of(base[:3, 0], z[0], base[:3, 3] + base[:3, 0] * x[2] + base[:3, 1] * y[2])
     tool = np.linalg.inv(wrist) @ lines.T_base_tool
-    upright = is_zero(abs(tool[2, 2]) - 1.0)
+    upright = is_along(tool)
     lengths, joints = [abs(upper), abs(fore)], [*order, *[-1] * (4 - robot.n)]
     limits = [*[-UNBOUNDED] * 4, *[UNBOUNDED] * 4]
     pose = [*pose_params(base, np.eye(4))[:_TOOL], *tool[:3].ravel()]

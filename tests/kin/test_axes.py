@@ -163,3 +163,11 @@ def test_axes_are_the_columns_of_the_jacobian():
             moving = axis.direction if axis.slides else np.cross(axis.direction, tool - axis.point)
             assert np.allclose(column[:3], moving, rtol=0.0, atol=1e-12)
             assert np.allclose(column[3:], 0.0 if axis.slides else axis.direction, rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("tilt", [2e-9, 1e-6, 4e-5])
+def test_a_small_tilt_is_not_along(tilt):
+    assert axes.is_along(axes.screw_x(0.2, 0.0) @ axes.screw_z(0.3, 0.1))
+    assert axes.is_along(axes.screw_x(0.2, math.pi))
+    assert not axes.is_along(axes.screw_x(0.0, tilt))
+    assert not axes.is_along(axes.screw_z(1.0, 0.0) @ axes.screw_x(0.0, math.pi - tilt))

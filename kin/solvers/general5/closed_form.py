@@ -41,6 +41,7 @@ _TURNS = tuple(
 _POINTS = 4  # the most configurations of three joints for a point
 _AT_ZERO = TOLERANCES.near_miss
 _CHUNK = 256  # targets whose solutions are compared at a time
+_REGULAR = 1e-4  # smallest singular value of a completed arm, of the largest: with less, solutions would be lost
 
 
 def match(robot: Robot, form_of: Callable[[Robot], ClosedForm | None]) -> General5 | None:
@@ -53,7 +54,9 @@ def match(robot: Robot, form_of: Callable[[Robot], ClosedForm | None]) -> Genera
     q = np.random.default_rng(5).uniform(-1.0, 1.0, (4, 6))
     for axes in COMPLETIONS[robot.n]:
         longer = completed(robot, axes)
-        if np.linalg.matrix_rank(jacobian(longer, q), rtol=1e-9).max() < 6:
+        J = jacobian(longer, q)
+        J[:, :3] /= robot.reach or 1.0
+        if np.linalg.matrix_rank(J, rtol=_REGULAR).max() < 6:
             continue
         form = form_of(longer)
         if form is not None:
@@ -69,7 +72,7 @@ class General5(ClosedForm):
     steady = False
 
     def __init__(self, robot: Robot, form: ClosedForm, axes: Axes) -> None:
-        self.robot, self.form = robot, form
+        self.robot, self.form, self.off = robot, form, form.off
         self._point, self._rolls = axes is BALL, axes is ROLL
         self._last_rolls = not (self._point or self._rolls) and roll_sense(robot) != 0.0
         virtual = "a virtual joint" if len(axes) == 1 else f"{len(axes)} virtual joints"
@@ -146,7 +149,7 @@ class General5(ClosedForm):
         obstacle = found.obstacle
         if self._point:
             obstacle = None if exists.any() else Obstacle("point")
-        return Candidates(q, columns, tuple(arcs), found.gap, obstacle)
+        return Candidates(q, columns, tuple(arcs), found.gap, obstacle, found.complete)
 
     def _rows(self, q: Array) -> Array:
         """The solution of the six joints, q ``(N, k, 6)``, that each row ``(N, b)`` takes; −1 for none."""

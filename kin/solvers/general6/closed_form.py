@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from kin.axes import is_zero, links_of
+from kin.axes import is_along, is_zero, links_of
 from kin.fk import fk, jacobian
 from kin.robot import Robot
 from kin.solvers.canonical import free_last, without_last
@@ -45,7 +45,7 @@ def match(robot: Robot) -> General6 | None:
     if robot.n != 6 or not robot.revolute.all():
         return None
     links = links_of(robot, (1,) * 5)
-    on_axis = is_zero(links.tool[0, 3], links.tool[1, 3], abs(links.tool[2, 2]) - 1.0)
+    on_axis = is_zero(links.tool[0, 3], links.tool[1, 3]) and is_along(links.tool)
     params = _best_cuts(robot, [cut_at(links, shift) for shift in range(6)])
     missed = _missed(robot, params)
     kernels = BatchKernels(params, branches_one, branches_many)

@@ -96,7 +96,7 @@ class General7(ClosedForm):
     named = steady = exact_ranges = False
 
     def __init__(self, robot: Robot, joint: int, form: ClosedForm) -> None:
-        self.robot, self.given, self.form = robot, joint, form
+        self.robot, self.given, self.form, self.off = robot, joint, form, form.off
         self.reason = (
             f"seven revolute joints whose axes fit no closed form; joint {joint + 1} is given ({form.name})"
         )

@@ -20,6 +20,7 @@ from kin.transforms import Array
 ROWS = 4
 _SINGULAR = TOLERANCES.singular
 _REACH = TOLERANCES.closure_position * 0.1
+_ROUNDING = 1e-15  # of the target's coordinates
 
 
 @jit
@@ -103,7 +104,8 @@ def solve(
             planar[k, i] = box[k, i + 1]
     cx, cy, beside = M[0, 3], M[1, 3], arm[BESIDE]
     r = math.hypot(cx, cy)
-    on_axis = r < _SINGULAR and beside == 0.0
+    rounding = _ROUNDING * (abs(T[0, 3]) + abs(T[1, 3]) + abs(T[2, 3]))
+    on_axis = r < _SINGULAR + rounding and beside == 0.0
     if r < abs(beside) - _REACH:
         return abs(beside) - r, 0
     across = math.sqrt(max(r * r - beside * beside, 0.0))

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.axes import inverse, is_perpendicular, is_zero, links_of
+from kin.axes import inverse, is_along, is_perpendicular, is_zero, links_of
 from kin.robot import Robot
 from kin.solvers.common import UNBOUNDED
 from kin.tolerances import TOLERANCES
@@ -59,7 +59,7 @@ def geometry_of(robot: Robot) -> Geometry | None:
         return None
     if rolls:
         p, q, beside, along = float(a[3]), float(tool[2, 3]), float(d[3]), float(tool[2, 3])
-        on_axis = is_zero(tool[0, 3], tool[1, 3], abs(tool[2, 2]) - 1.0)
+        on_axis = is_zero(tool[0, 3], tool[1, 3]) and is_along(tool)
         turned = inverse(tool)
     else:
         p, q, beside, along = float(tool[0, 3]), float(tool[1, 3]), float(tool[2, 3]), 0.0

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.axes import is_perpendicular, is_zero, links_of
+from kin.axes import is_along, is_perpendicular, is_zero, links_of
 from kin.robot import Robot
 from kin.solvers.canonical import pose_params
 from kin.solvers.common import UNBOUNDED
@@ -60,5 +60,5 @@ def geometry_of(robot: Robot) -> Geometry | None:
     shape = [a1, a2, a3, a4, d5, beside, math.cos(alpha[0]), math.sin(alpha[0])]
     pose = pose_params(links.base, links.tool)
     params = np.array([*pose, *links.sign, *links.theta, *shape, *[-UNBOUNDED] * 6, *[UNBOUNDED] * 6])
-    on_axis = is_zero(links.tool[0, 3], links.tool[1, 3], abs(links.tool[2, 2]) - 1.0)
+    on_axis = is_zero(links.tool[0, 3], links.tool[1, 3]) and is_along(links.tool)
     return Geometry(params, links.sign, links.theta, a1, a2, a3, a4, d5, beside, on_axis)

@@ -36,7 +36,8 @@ _ABOUT = 1e-9  # m, rad: what is closer needs no descent with another task
 class Rounded(ClosedForm):
     """The closed form of the arm that was meant by a rounded table; its postures are exact on the table itself.
 
-    Ranges of redundancy parameters and distances to singularities are those of the arm that was meant.
+    Ranges of redundancy parameters and distances to singularities are those of the arm that was meant. A row whose
+    descent ends elsewhere is left out: a joint that is free in the family may have one value only on the table.
     """
 
     exact_ranges = False
@@ -44,7 +45,7 @@ class Rounded(ClosedForm):
     def __init__(self, robot: Robot, form: ClosedForm, off: float) -> None:
         self.robot, self.form = robot, form
         self.name, self.title, self.lengths = form.name, form.title, form.lengths
-        self.named, self.steady = form.named, form.steady
+        self.named, self.steady, self.off = form.named, form.steady, off
         self.reason = (
             f"{form.reason}, but for rounding of the table ({off:.1g} rad or of the arm's size); "
             "every posture is made exact on the table as it is"
@@ -70,11 +71,12 @@ class Rounded(ClosedForm):
         known = ~np.isnan(q[:, 0])
         if p.task == POSE and self.robot.n == 6:
             q = self._with_starts(self.form.kernels, p.T, p.seed, q)
-        q = self._exact(p.T, p.task, q, held, known)
+        q, met = self._exact(p.T, p.task, q, held, known)
         for k, r in parameters:
             if r.joint >= 0:
                 values[:, k] = np.where(np.isnan(values[:, k]), math.nan, q[:, r.joint])
-        return Candidates(q, values, found.arcs, found.gap, None if not np.isnan(q).all() else found.obstacle)
+        obstacle = None if not np.isnan(q).all() else found.obstacle
+        return Candidates(q, values, found.arcs, found.gap, obstacle, met)
 
     def _with_starts(self, form: BatchKernels, T: Array, near: Array, q: Array) -> Array:
         """The rows ``(k, 6)``, the missing ones from targets close by: the true table may just reach this one."""
@@ -89,10 +91,10 @@ class Rounded(ClosedForm):
             missing = np.isnan(out[:, 0])
         return out
 
-    def _exact(self, T: Array, task: int, q: Array, held: list[int], known: Flags) -> Array:
+    def _exact(self, T: Array, task: int, q: Array, held: list[int], known: Flags) -> tuple[Array, bool]:
         """Rows ``(k, n)`` moved onto the target, with the joints in `held` where they are.
 
-        Those not `known` ``(k,)`` that do not meet the target do not exist.
+        Those not `known` ``(k,)`` that do not meet the target do not exist. Also returns whether the others do.
 
         Arms with few joints miss a part of most poses: then rows meet what they can, the direction or the point.
         """
@@ -107,7 +109,7 @@ class Rounded(ClosedForm):
             out[there[met]] = rows[met]
             there = there[~met]
         out[there[~known[there]]] = math.nan
-        return out
+        return out, not known[there].any()
 
     def _descend(self, T: Array, code: int, q: Array, held: list[int]) -> tuple[Array, Array]:
         """Where descents from the rows end, and the errors there."""
@@ -146,7 +148,7 @@ class Rounded(ClosedForm):
         known = ~np.isnan(q[:, 0])
         if self.robot.n == 6:
             q = self._with_starts(form, T, near, q)
-        return self._wrapped(self._exact(T, POSE, q, held, known), held)
+        return self._wrapped(self._exact(T, POSE, q, held, known)[0], held)
 
     def _wrapped(self, q: Array, held: list[int]) -> Array:
         """The same with angles in (−π, π], but for joints whose values may be requested."""

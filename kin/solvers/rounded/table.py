@@ -83,7 +83,7 @@ def _parallel(lines: Lines) -> tuple[Lines, Array]:
 def _rotation(axis: Array, angle: float) -> Array:
     """The rotation ``(3, 3)`` about a unit vector."""
     K = np.cross(np.eye(3), axis)
-    return np.asarray(np.eye(3) - math.sin(angle) * K + (1.0 - math.cos(angle)) * (K @ K))
+    return np.asarray(np.eye(3) + math.sin(angle) * K + (1.0 - math.cos(angle)) * (K @ K))
 
 
 def _along(robot: Robot, lines: Lines) -> Robot:
@@ -108,7 +108,7 @@ def _along(robot: Robot, lines: Lines) -> Robot:
 
 
 def _snapped(links: Links, scale: float) -> tuple[Links, Array]:
-    """Links with right angles and without tiny lengths, and what was changed."""
+    """Links with right angles, also of the tool, and without tiny lengths, and what was changed."""
     a, d, alpha, tool = links.a.copy(), links.d.copy(), links.alpha.copy(), links.tool.copy()
     quarter = 0.5 * math.pi
     off = np.where(np.abs(np.abs(alpha) - quarter) < NEARLY, np.abs(alpha) - quarter, 0.0)
@@ -118,8 +118,12 @@ def _snapped(links: Links, scale: float) -> tuple[Links, Array]:
         tiny = np.abs(lengths) < _LENGTH * scale
         changed.append(lengths[tiny] / scale)
         lengths[tiny] = 0.0
-    along = math.copysign(1.0, tool[2, 2])
-    across = np.cross(tool[:3, 2], (0.0, 0.0, along))
+    x, y, z = tool[:3, 2].tolist()
+    # Nearly along the last axis, or nearly perpendicular to it.
+    wanted = (
+        np.array([x, y, 0.0]) / math.hypot(x, y) if abs(z) < 0.5 else np.array([0.0, 0.0, math.copysign(1.0, z)])
+    )
+    across = np.cross(tool[:3, 2], wanted)
     sine = float(np.linalg.norm(across))
     if 0.0 < sine < NEARLY:
         tool[:3, :3] = _rotation(across / sine, math.asin(sine)) @ tool[:3, :3]

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from kin.axes import inverse, is_zero, links_by_rows, screw_z
+from kin.axes import inverse, is_along, is_zero, links_by_rows, screw_z
 from kin.robot import Robot
 from kin.solvers.canonical import Geometry7
 from kin.solvers.contract import (
@@ -42,7 +42,7 @@ def match(robot: Robot) -> Srs7 | None:
     if min(d3, d5) < TOLERANCES.geometry:
         return None
     tool = screw_z(0.0, float(links.d[6])) @ links.tool
-    on_axis = is_zero(tool[0, 3], tool[1, 3]) and abs(tool[2, 2] - 1.0) < TOLERANCES.geometry
+    on_axis = is_zero(tool[0, 3], tool[1, 3]) and is_along(tool) and tool[2, 2] > 0.0
     base = links.base @ screw_z(0.0, float(links.d[0]))
     return Srs7(Geometry7(inverse(base), inverse(tool), links.theta, d3, d5, bool(on_axis)), robot)
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from kin.axes import inverse, is_zero, links_by_rows, screw_x, screw_z
+from kin.axes import inverse, is_along, is_zero, links_by_rows, screw_x, screw_z
 from kin.robot import Robot
 from kin.solvers.contract import (
     APPROACH,
@@ -43,10 +43,10 @@ def match(robot: Robot) -> Wrist5 | None:
     if min(abs(a2), d4) < TOLERANCES.geometry:
         return None
     tool = screw_x(0.0, math.pi / 2) @ screw_z(0.0, float(d[4])) @ links.tool
-    if abs(tool[2, 2] + 1.0) < TOLERANCES.geometry:
+    if tool[2, 2] < 0.0:
         theta[4] += math.pi
         tool = screw_x(0.0, math.pi / 2) @ screw_z(math.pi, float(d[4])) @ links.tool
-    if not is_zero(tool[0, 3], tool[1, 3], tool[2, 2] - 1.0):
+    if not (is_zero(tool[0, 3], tool[1, 3]) and is_along(tool)):
         return None
     # In the formulas θ3 = 0 is the straight elbow, a quarter turn from where the common normals align.
     theta[2] += math.pi / 2

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.axes import Links, is_perpendicular, is_zero, links_of
+from kin.axes import Links, is_along, is_perpendicular, is_zero, links_of
 from kin.robot import Robot
 from kin.solvers.canonical import pose_params
 from kin.solvers.common import UNBOUNDED
@@ -85,5 +85,5 @@ def pack(
     shape = [*lengths, math.cos(phase), math.sin(phase), math.cos(twist), math.sin(twist), float(slides)]
     pose = pose_params(links.base, links.tool)
     params = np.array([*pose, *links.sign, *offset, *shape, *[-UNBOUNDED] * 6, *[UNBOUNDED] * 6])
-    on_axis = is_zero(links.tool[0, 3], links.tool[1, 3], abs(links.tool[2, 2]) - 1.0)
+    on_axis = is_zero(links.tool[0, 3], links.tool[1, 3]) and is_along(links.tool)
     return Geometry(params, links.sign, offset, *lengths, on_axis)

@@ -92,3 +92,13 @@ def test_tolerances_are_checked():
             with pytest.raises(InputError, match=field):
                 IKOptions(**{field: value})
     assert IKOptions(position_tolerance=1e-6) != IKOptions()
+
+
+@pytest.mark.parametrize("stretch", [1.0, 1.001])
+@pytest.mark.parametrize("last", [(0, 0, 0, 1.005), (1e-5, 0, 0, 1)])
+def test_the_last_row_of_a_target_is_checked_whatever_its_rotation(stretch, last):
+    T = kin.fk(kin.get_robot("ur5"), np.zeros(6))
+    T[:3, :3] *= stretch
+    T[3] = last
+    with pytest.raises(kin.InputError, match=r"target\[3\]"):
+        kin.solve_ik(kin.get_robot("ur5"), T)

@@ -238,3 +238,22 @@ def test_reversed_joints_and_the_other_convention_change_nothing():
             assert len(a.solutions) == len(b.solutions)
             signs = np.where(np.isin(np.arange(robot.n), (1, 2)), -1.0, 1.0)
             assert min(apart(s.q * signs, q) for s in b.solutions) < 1e-6
+
+
+def test_no_posture_is_lost_where_the_last_axis_is_almost_the_approach_axis():
+    rows = (
+        (0, 0, 0, 1.6502), (-PI / 2, 0, 0, -PI / 2), (-PI / 2, 0.461753, 0, PI / 2), (0.3, 0, -0.319846, 0),
+        (0, -0.281150, -0.470773, 3.1416),
+    )  # fmt: skip
+    assert missed(arm("nearly-rolled", *rows), 300) == 0
+
+
+@pytest.mark.parametrize("robot", [RM501, SCORBOT, ELBOW5], ids=lambda robot: robot.id)
+def test_a_last_joint_that_turns_the_z_axis_a_little_is_no_roll(robot):
+    """Without limits, so that a descent may turn the last joint as far as it must."""
+    rows = (*robot.rows[:-1], replace(robot.rows[-1], alpha=3.141593))
+    table = replace(robot, id=f"{robot.id}-tilted", rows=rows)
+    for T in configurations(table, 40)[1]:
+        found = kin.solve_ik(table, T, task="approach", respect_limits=False)
+        assert found.status is Status.SOLVED
+        assert found.solutions[0].rotation_error < 1e-9

@@ -7,11 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from few import arm
 
 import kin
 from kin import Status
 from kin.solvers import closed_form_of
 from kin.solvers.rounded import Rounded, meant
+from kin.solvers.rounded.table import _rotation
 
 PI = math.pi
 UR5 = kin.get_robot("ur5")
@@ -113,6 +115,76 @@ def test_short_offsets_and_turned_tools_are_rounding_too():
         result = kin.solve_ik(table, kin.fk(table, q), respect_limits=False)
         assert len(result.solutions) == 8
         assert min(apart(table, s.q, q) for s in result.solutions) < 1e-6
+
+
+def test_the_rotation_turns_counterclockwise():
+    turned = _rotation(np.array([0.0, 0.0, 1.0]), 0.1) @ (1.0, 0.0, 0.0)
+    assert np.allclose(turned, (math.cos(0.1), math.sin(0.1), 0.0), atol=1e-15)
+
+
+@pytest.mark.parametrize("row", range(3))
+def test_one_tilt_of_several_parallel_axes_counts_once(row):
+    rows = list(UR5.rows)
+    rows[row] = replace(rows[row], alpha=rows[row].alpha + 1e-5)
+    table = replace(UR5, id=f"tilted{row}", rows=tuple(rows))
+    assert meant(table).off == pytest.approx(1e-5, rel=1e-3)
+    assert closed_form_of(table).name == "parallel6"
+
+
+def test_tilts_of_parallel_axes_in_a_row_and_of_the_tool():
+    typed = 3.1416 - PI
+    planar = arm("planar", (0, 0.1, 0.3, 3.1416), (0, 0, 0.25, 3.1416), (0, 0, 0.2, 3.1416))
+    assert meant(planar).off == pytest.approx(typed, rel=1e-3)
+    assert closed_form_of(planar).name == "scara4"
+    five = arm("five", *[(0, 0, 0.3, 3.1416)] * 5)
+    assert meant(five).off == pytest.approx(typed, rel=1e-3)
+    # The typed twists are all that is off: without them nothing is.
+    assert np.abs(kin.fk(meant(five).table, np.zeros(5)) - kin.fk(five, np.zeros(5))).max() < 10.0 * typed
+
+
+@pytest.mark.parametrize("name", ["puma560", "ur5", "scara", "pioneer5", "iiwa14", "stanford"])
+def test_an_approach_direction_is_met_with_a_tool_that_is_tilted_a_little(name):
+    robot = kin.get_robot(name)
+    c, s = math.cos(2e-5), math.sin(2e-5)
+    tilt = np.array([[1, 0, 0, 0], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1.0]])
+    tool = tuple(tuple(row) for row in (robot.T_last_tool @ tilt).tolist())
+    table = replace(robot, id=f"{name}-tilted", tool=tool)
+    for q in table.random_q(np.random.default_rng(4), 10):
+        for task in ("pose", "approach"):
+            found = kin.solve_ik(table, kin.fk(table, q), task=task)
+            assert found.status is Status.SOLVED
+            assert found.solutions[0].rotation_error < 1e-9
+
+
+# Joints that are free in the family move the tool by the rounding only, and must move far.
+PLANAR = arm("planar-typed", (0, 0.1, 0.3, 0), (0, 0, 0.25, 3.1416), (0, 0, 0.2, -1.5708))
+FIVE = arm(
+    "five-typed",
+    (0, 0.15, 0, 1.5708), (0, 0, 0.26, 0), (0, 0, 0.42, 3.1416), (0.3, 0, -0.1, 1.5708), (0, 0, 0, 3.141593),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("robot", "task"), [(PLANAR, "position"), (FIVE, "approach")])
+def test_what_can_be_reached_is_never_called_unreachable(robot, task):
+    for seed in range(2):
+        for q in robot.random_q(np.random.default_rng(seed), 50):
+            T = kin.fk(robot, q)
+            found = kin.solve_ik(robot, T, task=task)
+            assert found.status is Status.SOLVED
+            assert np.abs(kin.fk(robot, found.solutions[0].q)[:3, 3] - T[:3, 3]).max() < 1e-9
+            if found.solver == "numeric":
+                assert not found.complete
+
+
+def test_a_posture_of_a_rounded_table_outside_the_limits_is_blocked_not_unreachable():
+    q = np.array([0.4, 0.6, -0.5])
+    joints = tuple(replace(row, limits=(-2.0, 0.3)) for row in PLANAR.rows)
+    found = kin.solve_ik(
+        replace(PLANAR, id="narrow", rows=joints, home=(0.1, 0.1, 0.1)), kin.fk(PLANAR, q), task="position"
+    )
+    assert found.status is Status.LIMITS
+    assert found.blocked
+    assert all(max(posture.q) > 0.3 or min(posture.q) < -2.0 for posture in found.blocked)
 
 
 @pytest.mark.slow
