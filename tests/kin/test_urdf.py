@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_dh import random_robot
+from test_convert import random_robot
 
 import kin
 from kin import InputError, Joint, Robot, RobotFileError
