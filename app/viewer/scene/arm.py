@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import viser
@@ -80,10 +79,8 @@ class ArmScene:
             f"{root}-target", scale=GIZMO * self.body.radius, line_width=LINE, depth_test=False, opacity=0.95
         )
         keep_private(self.gizmo)
-        self._ghosts = [
-            self._add(f"{root}-target", part, opacity=0.35, visible=False)
-            for part in (self.body.gripper[0], self._hand())
-        ]
+        hands = [self.body.gripper[0], *self._drawn_hand()]
+        self._ghosts = [self._add(f"{root}-target", hand, opacity=0.35, visible=False) for hand in hands]
         self._gap = scene.add_line_segments(
             f"{root}-gap",
             np.zeros((1, 2, 3), np.float32),
@@ -265,8 +262,10 @@ class ArmScene:
             node.remove()
 
     def _show_ghost(self) -> None:
-        for ghost, look in zip(self._ghosts, ("skeleton", "body"), strict=True):
-            ghost.visible = self._gap.visible and (self._look == "skeleton") == (look == "skeleton")
+        gripper, *drawn = self._ghosts
+        gripper.visible = self._gap.visible and self._look == "skeleton"
+        for hand in drawn:
+            hand.visible = self._gap.visible and self._look != "skeleton"
 
     def _set_opacity(self) -> None:
         for node in (*self._bodies, *self._axes, self._approach):
@@ -274,14 +273,13 @@ class ArmScene:
         for node in self._drawn:
             node.opacity = THROUGH if self._through or self._look == "both" else None
 
-    def _hand(self) -> Part:
-        """What the last joint carries, in the tool frame: the ghost of an arm with a drawn body."""
-        gripper = self.body.gripper[0]
+    def _drawn_hand(self) -> list[Part]:
+        """What the last joint of a drawn body carries, in the tool frame; nothing for an arm without a body."""
         if self._drawing is None:
-            return replace(gripper, name="hand")
+            return []
         T_tool_link = inverse(self.body.chain.T_last_tool)
         parts = [placed(part.mesh, T_tool_link) for part in self._drawing.parts[-1]]
-        return Part("hand", merged(parts), gripper.color)
+        return [Part("hand", merged(parts), self.body.gripper[0].color)]
 
     def _build_arm(self) -> None:
         root = self._scene.add_frame(self._root, show_axes=False)
