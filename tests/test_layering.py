@@ -25,7 +25,7 @@ MODEL = {
 RULES: dict[str, set[str]] = {
     "kin": {"kin", "numpy", "numba"},
     "kin/kernels": {"numpy", "numba", "kin.kernels", "kin.tolerances", "kin.transforms"},
-    "kin/files": {"numpy", "kin.dh", "kin.files", "kin.home", *MODEL},
+    "kin/files": {"numpy", "kin.dh", "kin.files", *MODEL},
     "kin/solvers": {"numpy", "kin.dh", "kin.kernels", "kin.solvers", *MODEL - {"kin.singularity"}},
     "kin/ik": {"numpy", "kin.kernels", "kin.solvers", "kin.ik", *MODEL},
     "kin/path": {"numpy", "kin.kernels", "kin.solvers", "kin.ik", "kin.path", *MODEL},

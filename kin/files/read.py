@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from kin.errors import InputError, KinematicsError, RobotFileError, shorten
+from kin.files.home import default_home
 from kin.files.numbers import LARGEST, NUMBER
-from kin.home import default_home
 from kin.robot import (
     CONVENTIONS,
     DEFAULT_LIMITS,

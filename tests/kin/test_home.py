@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import kin
-from kin.home import candidates, default_home, margins
+from kin.files.home import candidates, default_home, margins
 from kin.robot import Joint, Robot
 
 HEAD = 'id = "x"\nname = "x"\nsource = "x"\nconvention = "standard"\nunits = { length = "m", angle = "deg" }\n'

@@ -15,7 +15,7 @@ from app.shared.answers.document import documented
 from app.shared.answers.robots import RobotAnswer, robot_answer
 from kin import Robot, jacobian
 from kin.axes import Pair, generic_q, pairs, parallel_groups, size, spherical_groups
-from kin.home import candidates, margins
+from kin.files.home import candidates, margins
 from kin.solvers import closed_form_of
 
 NEAR_SINGULAR, SINGULAR = 0.1, 1e-6  # of the best margin among the candidates for a home pose
@@ -107,7 +107,7 @@ def motions(robot: Robot) -> int:
 
 
 def home_margin(robot: Robot) -> float:
-    """Margin of the home configuration (see `kin.home`), relative to the best of the candidates for one."""
+    """Margin of the home configuration (see `kin.files.home`), relative to the best of the candidates for one."""
     margin = margins(robot, np.vstack([robot.q_home, candidates(robot)[0]]))
     return float(margin[0] / margin.max()) if margin.max() > 0.0 else 0.0
 

@@ -23,13 +23,13 @@ from app.viewer.own_arm import OwnArm
 from app.viewer.panel import update_html
 from app.viewer.panel.joints import JointSliders, lock_notice
 from app.viewer.panel.layout import PANEL_WIDTH, Panel
-from app.viewer.panel.status import READY, Notice, StatusLine, key_number
+from app.viewer.panel.status import READY, Notice, StatusLine
 from app.viewer.panel.view import ViewState, configure_theme
 from app.viewer.scene.camera import Sphere, VisitorCamera
-from app.viewer.scene.key_number import KeyNumber
 from app.viewer.session.actions import Actions
 from app.viewer.session.controller import ArmController
 from app.viewer.session.lessons import LessonChoice
+from app.viewer.session.numbers import Numbers
 from app.viewer.session.persistence import Persistence
 from app.viewer.session.posture import PosturePanel
 from app.viewer.session.robots import edit, robot_of
@@ -84,17 +84,13 @@ class VisitorPage(Worker):
         self.units = DEFAULT_UNITS
         self._tabs: list[Feature] = []
         self._result: IKResult | None = None  # for the last target
-        # Which numbers in the panel are out of date, and when they were updated last.
-        self._readout_due = self._sliders_due = False
-        self._updated_at = 0.0
-        self._dragged: int | None = None  # the joint whose slider the visitor holds
         # Created by the worker when it builds the page.
         self.camera: VisitorCamera
         self.posture: PosturePanel
         self.panel: Panel
         self.status: StatusLine
         self.sliders: JointSliders
-        self._key_number: KeyNumber
+        self.numbers: Numbers
         self._actions = Actions(self)
 
     # Stage: what features may use
@@ -210,7 +206,7 @@ class VisitorPage(Worker):
         self.sliders = self._make_sliders()
         self.posture.show()
         self.arm.scene.floor.use_units(units)
-        self._readout_due = True
+        self.numbers.use_pose()
         self.for_features(lambda feature: feature.on_style())
 
     def use_colours(self, dark: bool | None, system_dark: bool) -> None:
@@ -258,19 +254,17 @@ class VisitorPage(Worker):
     # Reports of the arm's controller
 
     def on_pose(self, T_base_tool: Array) -> None:
-        self._readout_due = True
+        self.numbers.use_pose()
         self.for_features(lambda feature: feature.on_pose(T_base_tool))
 
     def on_goal(self, dragged: int | None) -> None:
-        self._sliders_due, self._dragged = True, dragged
+        self.numbers.use_goal(dragged)
 
     def on_result(self, result: IKResult) -> None:
         self._result = result
         self.posture.use_result(result)
         self.status.show_result(result, self.units)
-        if self.arm.target is not None:
-            target, radius = self.arm.target[:3, 3], self.arm.scene.body.radius
-            self._key_number.show(key_number(result, self.units), target, radius)
+        self.numbers.use_result(result)
         self.for_features(lambda feature: feature.on_result(result))
 
     def on_request(self) -> None:
@@ -291,8 +285,8 @@ class VisitorPage(Worker):
             times.append(max(0.0, self._persistence.due - time.perf_counter()))
         if hasattr(self, "status") and (left := self.status.due(time.perf_counter())) is not None:
             times.append(left)
-        if self._readout_due or self._sliders_due:
-            times.append(max(0.0, self._updated_at + self._pace.reading - time.perf_counter()))
+        if hasattr(self, "numbers") and (left := self.numbers.waiting) is not None:
+            times.append(left)
         return min(times, default=None)
 
     def _report(self, notice: Notice) -> None:
@@ -310,7 +304,7 @@ class VisitorPage(Worker):
                 self._guard(lambda key=key, value=value: self._actions.handle(key, value))  # type: ignore[misc]
             self.arm.draw(fresh=bool(batch))
             if self.arm.target is None:
-                self._key_number.hide()
+                self.numbers.hide_target()
             now = time.perf_counter()
             if self.status.due(now) == 0.0:
                 self.settle_status()
@@ -319,8 +313,7 @@ class VisitorPage(Worker):
                 if feature.due is not None:
                     self._guard(lambda feature=feature: feature.tick(now))  # type: ignore[misc]
         self.client.flush()
-        if time.perf_counter() - self._updated_at >= self._pace.reading:
-            self._update_numbers()
+        self.numbers.update()
         if batch:
             self._persistence.postpone(now)
         elif not (self.arm.moving or self.arm.dragging) and self._persistence.rested(now):
@@ -332,21 +325,6 @@ class VisitorPage(Worker):
         gizmo = self.arm.scene.gizmo
         x, y, length = self.camera.place(gizmo.position, gizmo.scale)
         update_html(self.panel.hints, render("panel/hints", place=f"{x:.3f} {y:.3f} {length:.3f}"))
-
-    def _update_numbers(self) -> None:
-        """Update the numbers in the panel: after the scene, because that takes longer than posing the joints."""
-        if not (self._readout_due or self._sliders_due):
-            return
-        self._updated_at = time.perf_counter()
-        with self.client.atomic():
-            if self._readout_due:
-                self._readout_due = False
-                self.status.warn(self.arm.scene.show_contact(self.arm.scene.contact_at(self.q)))
-                self.panel.readout.show(kin.fk(self.robot, self.q), self.units, self.arm.open_target)
-            if self._sliders_due:
-                self._sliders_due = False
-                self.sliders.show(self.goal, self._dragged)
-                self.posture.show()
 
     # Building
 
@@ -360,7 +338,7 @@ class VisitorPage(Worker):
             if self.dark:
                 configure_theme(gui, True)
             self.camera = VisitorCamera(self.client, self.post)
-            self._key_number = KeyNumber(self.client.scene)
+            self.numbers = Numbers(self, self._pace.reading)
             gui.main_panel.dock_right()
             gui.main_panel.set_width(PANEL_WIDTH)
             titles = [tab.title for tab in TABS]
@@ -385,7 +363,7 @@ class VisitorPage(Worker):
     def _use_robot(self, robot: Robot, q: Array | None = None, glide: bool = False) -> None:
         """Show another robot, at its home configuration or at `q` ``(n,)``, in a fitting view."""
         self.arm.use(robot, q, self.dark, self.view.base_axes)
-        self._readout_due = True
+        self.numbers.use_pose()
         self.panel.target.show(self.task)
         self.sliders = self._make_sliders()
         self.posture.use_robot()

@@ -19,12 +19,12 @@ import numpy as np
 from kin.axes import frame_of, inverse, perpendicular_to
 from kin.dh import SAMPLES, table_of_chain
 from kin.errors import RobotFileError
+from kin.files.home import default_home
 from kin.files.numbers import LARGEST
 from kin.files.read import MAX_REACH, MAX_ROWS, matrix_of
 from kin.files.urdf.names import unused
 from kin.files.urdf.tree import Tip, UrdfJoint, UrdfTree, read_tree
 from kin.fk import fk
-from kin.home import default_home
 from kin.robot import DEFAULT_LIMITS, Joint, Robot
 from kin.transforms import Array
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.viewer.scene.motion import FRAME, LONGEST, SHORTEST, Motion, Pace
-from app.viewer.session.inbox import Inbox
+from app.viewer.session.worker.inbox import Inbox
 
 
 def test_the_newest_value_of_a_key_wins_and_order_is_that_of_the_last_touch() -> None:

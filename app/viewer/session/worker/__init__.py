@@ -13,7 +13,7 @@ from collections.abc import Callable, Hashable
 import kin
 from app.shared.threads.turns import urgent
 from app.viewer.panel.status import Notice
-from app.viewer.session.inbox import Inbox
+from app.viewer.session.worker.inbox import Inbox
 
 log = logging.getLogger(__name__)
 

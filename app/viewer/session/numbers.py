@@ -1,0 +1,92 @@
+"""The numbers that follow the arm: read-out, sliders, warning of a contact, and the number beside a missed target.
+
+They are updated after the scene, and at most once per interval, because that takes longer than posing the joints.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Protocol
+
+import viser
+
+import kin
+from app.viewer.panel.joints import JointSliders
+from app.viewer.panel.layout import Panel
+from app.viewer.panel.status import StatusLine, key_number
+from app.viewer.scene.key_number import KeyNumber
+from app.viewer.session.controller import ArmController
+from app.viewer.session.posture import PosturePanel
+from kin import IKResult
+from kin.units import Units
+
+
+class NumbersPage(Protocol):
+    """The parts of a page whose numbers these are."""
+
+    client: viser.ClientHandle
+    arm: ArmController
+    panel: Panel
+    posture: PosturePanel
+    sliders: JointSliders
+    status: StatusLine
+    units: Units
+
+
+class Numbers:
+    """The numbers of one page. Not thread-safe: the visitor's worker calls it.
+
+    Args:
+        interval: seconds between two updates.
+    """
+
+    def __init__(self, page: NumbersPage, interval: float) -> None:
+        self._page = page
+        self._interval = interval
+        self._pose_due = self._sliders_due = False
+        self._updated_at = 0.0
+        self._dragged: int | None = None  # the joint whose slider the visitor holds
+        self._beside_target = KeyNumber(page.client.scene)
+
+    def use_pose(self) -> None:
+        """The arm has another pose, or numbers have other units."""
+        self._pose_due = True
+
+    def use_goal(self, dragged: int | None) -> None:
+        """The arm is heading for another configuration; the visitor holds the slider of joint `dragged`."""
+        self._sliders_due, self._dragged = True, dragged
+
+    def use_result(self, result: IKResult) -> None:
+        """The target has been solved: write the most important number beside it."""
+        arm = self._page.arm
+        if arm.target is not None:
+            self._beside_target.show(
+                key_number(result, self._page.units), arm.target[:3, 3], arm.scene.body.radius
+            )
+
+    def hide_target(self) -> None:
+        """There is no target."""
+        self._beside_target.hide()
+
+    @property
+    def waiting(self) -> float | None:
+        """Seconds until the next update; None if no number is out of date."""
+        if not (self._pose_due or self._sliders_due):
+            return None
+        return max(0.0, self._updated_at + self._interval - time.perf_counter())
+
+    def update(self) -> None:
+        """Update the numbers that are out of date, if it is time."""
+        if self.waiting != 0.0:
+            return
+        page, arm = self._page, self._page.arm
+        self._updated_at = time.perf_counter()
+        with page.client.atomic():
+            if self._pose_due:
+                self._pose_due = False
+                page.status.warn(arm.scene.show_contact(arm.scene.contact_at(arm.q)))
+                page.panel.readout.show(kin.fk(arm.robot, arm.q), page.units, arm.open_target)
+            if self._sliders_due:
+                self._sliders_due = False
+                page.sliders.show(arm.goal, self._dragged)
+                page.posture.show()
