@@ -109,7 +109,7 @@ class JsonRequest(Request):
     async def json(self) -> Any:
         """The parsed body; raises 400 naming the position of the syntax error."""
         if not hasattr(self, "_json"):
-            self._json = _parsed(await self.body())
+            self._json = parsed(await self.body())
         return self._json
 
     async def validate(self, read: Callable[..., tuple[Any, list[Any]]]) -> None:
@@ -121,7 +121,7 @@ class JsonRequest(Request):
             return
 
         def validated() -> Any:
-            value, errors = read(_parsed(self._body))
+            value, errors = read(parsed(self._body))
             if errors:
                 raise RequestValidationError(errors)
             return value
@@ -174,7 +174,8 @@ def versioned(tag: str) -> APIRouter:
     return APIRouter(prefix="/api/v1", tags=[tag], route_class=JsonRoute)
 
 
-def _parsed(body: bytes) -> Any:
+def parsed(body: bytes) -> Any:
+    """The value of a JSON text; raises 400 naming the position of a syntax error."""
     try:
         return from_json(body)
     except ValueError as error:

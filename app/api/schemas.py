@@ -54,6 +54,11 @@ class Body(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
+    @classmethod
+    def in_json(cls) -> dict[str, Any]:
+        """Fields of a query that have another type in a JSON body, with that type."""
+        return {}
+
     @model_validator(mode="before")
     @classmethod
     def forbid_unknown(cls, data: Any) -> Any:

@@ -2,31 +2,50 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from pydantic import ConfigDict, Field, RootModel
 
 from app.api.problems import FieldError, ProblemError, invalid
 from kin import Robot, RobotFileError, robot_from_dict
-from kin.files.read import MAX_ROWS
+from kin.files.numbers import LARGEST
+from kin.files.read import ANGLES, MAX_ROWS
+from kin.robot import LENGTHS
 
 # What a file must state and an arm in a request need not.
 DEFAULTS = {"id": "sent", "name": "Sent arm", "source": "the request"}
+SCALES = {**ANGLES, **LENGTHS, "°": ANGLES["deg"]}
 
 _TEXT = {"type": "string", "minLength": 1, "maxLength": 4000, "pattern": r"\S"}
-# What the reader takes, smaller than a million even after rounding.
-_DECIMAL = (
-    r"[-+]?(([0-9]{1,6}(\.[0-9]{0,9})?|[0-9]{1,5}\.[0-9]{10,24}|\.[0-9]{1,24})([eE]-[0-9]{1,3})?"
-    r"|[0-9](\.[0-9]{0,9})?[eE]\+?0?[0-5])"
-)
-_NUMBER = {"type": "number", "exclusiveMinimum": -1e6, "exclusiveMaximum": 1e6}
+# Digits before the point of a number smaller than a million radians or metres, in each unit.
+_DIGITS = {"rad": 6, "deg": 7, "°": 7, "m": 6, "cm": 8, "mm": 9}
 
 
-def _quantity(units: str, description: str) -> dict[str, Any]:
+def _number(units: Iterable[str]) -> dict[str, Any]:
+    """A number in the unit of the file, which is one of these; the reader knows which and bounds it by that."""
+    most = max(LARGEST / SCALES[unit] for unit in units)
+    return {"type": "number", "exclusiveMinimum": -most, "exclusiveMaximum": most}
+
+
+def _decimal(digits: int) -> str:
+    """Decimals that are smaller than ten to the power of `digits`, even after rounding."""
+    return (
+        rf"[-+]?(([0-9]{{1,{digits}}}(\.[0-9]{{0,{15 - digits}}})?"
+        rf"|[0-9]{{1,{digits - 1}}}\.[0-9]{{{16 - digits},24}}|\.[0-9]{{1,24}})([eE]-[0-9]{{1,3}})?"
+        rf"|[0-9](\.[0-9]{{0,9}})?[eE]\+?0?[0-{digits - 1}])"
+    )
+
+
+def _quantity(units: Sequence[str], description: str) -> dict[str, Any]:
     """A number in the unit of the file, or a text with a unit of its own."""
     example = "-90 deg" if "rad" in units else "0.13 m"
-    text = {"type": "string", "pattern": rf"^{_DECIMAL} ?({units})$", "examples": [example]}
-    return {"description": description, "anyOf": [_NUMBER, text]}
+    alike = {
+        digits: "|".join(u for u in units if _DIGITS[u] == digits) for digits in (_DIGITS[unit] for unit in units)
+    }
+    texts = "|".join(f"{_decimal(digits)} ?({names})" for digits, names in alike.items())
+    text = {"type": "string", "pattern": f"^({texts})$", "examples": [example]}
+    return {"description": description, "anyOf": [_number(units), text]}
 
 
 def _items(item: dict[str, Any], count: int, description: str = "") -> dict[str, Any]:
@@ -34,8 +53,8 @@ def _items(item: dict[str, Any], count: int, description: str = "") -> dict[str,
     return schema | ({"description": description} if description else {})
 
 
-_ANGLE, _LENGTH = "rad|deg|°", "m|cm|mm"
-_ANY = _quantity(f"{_ANGLE}|{_LENGTH}", "A value in the units of this object, or a text with its unit.")
+_ANGLE, _LENGTH = ("rad", "deg", "°"), ("m", "cm", "mm")
+_ANY = _quantity((*_ANGLE, *_LENGTH), "A value in the units of this object, or a text with its unit.")
 _MATRIX = _items(_items(_ANY, 4), 4, "4×4 homogeneous transform, row by row; positions in the length unit.")
 _TRANSFORM: dict[str, Any] = {
     "type": "object",
@@ -62,8 +81,11 @@ _ROW: dict[str, Any] = {
             "description": "[lower, upper]; by default ±180° or 0 to 1 m. `none`: an unlimited revolute joint.",
             "anyOf": [_items(_ANY, 2), {"const": "none"}],
         },
-        "velocity": {"description": "Largest speed, per second.", "anyOf": [_NUMBER, {"type": "string"}]},
-        "effort": {"description": "Largest torque or force in N·m or N.", **_NUMBER, "exclusiveMinimum": 0},
+        "velocity": {
+            "description": "Largest speed, per second; smaller than a million radians or metres per second.",
+            "anyOf": [_number(_LENGTH), {"type": "string"}],
+        },
+        "effort": {"description": "Largest torque or force in N·m or N.", **_number(["m"]), "exclusiveMinimum": 0},
     },
 }
 EXAMPLE: dict[str, Any] = {  # the table of pioneer5, so that the examples for it work here too

@@ -13,7 +13,7 @@ from copy import copy
 from typing import Annotated, Any, get_type_hints
 
 from fastapi import APIRouter, Body, Query, Request
-from pydantic import BeforeValidator, Strict, create_model
+from pydantic import BeforeValidator, Field, Strict, create_model
 
 from app.api import schemas
 from app.api.arms.description import EXAMPLE, SENT, RobotDescription
@@ -64,7 +64,7 @@ def operation(
 
         first = list((examples or {"one": example("An arm", {})}).items())[:1]
         given: Any = {key: example(each["summary"], {"robot": EXAMPLE, **each["value"]}) for key, each in first}
-        body: Any = _with_robot(model, handler)
+        body: Any = with_robot(model, "".join(map(str.title, handler.__name__.split("_"))))
         refusals = {status: text for status, text in {**POST_REFUSALS, **responses}.items() if status != 404}
         endpoint = _of_sent(
             handler,
@@ -131,14 +131,20 @@ def _endpoint(call: Handler, handler: Handler, suffix: str, parameters: dict[str
     return call
 
 
-def _with_robot(model: type[schemas.Body] | None, handler: Handler) -> type[schemas.Body]:
-    """The body with the field `robot`. In JSON, numbers and booleans are not texts as they are in a query."""
-    if model is None:
-        name, base, text = "".join(map(str.title, handler.__name__.split("_"))), schemas.Body, "An arm."
-    else:
-        name, base, text = model.__name__, model, f"{inspect.getdoc(model)} And the arm itself."
+def with_robot(model: type[schemas.Body] | None, name: str = "") -> type[schemas.Body]:
+    """The body with the field `robot`. What is text in a query may be numbers, booleans or lists in JSON.
+
+    Args:
+        model: the body, or the query; None: the arm is all there is.
+        name: of the operation, if there is no model.
+    """
+    base = schemas.Body if model is None else model
+    text = "An arm." if model is None else f"{inspect.getdoc(model)} And the arm itself."
     fields: dict[str, Any] = {"robot": (RobotDescription, SENT)}
     for key, field in base.model_fields.items():
         if field.annotation in _STRICT:
             fields[key] = (_STRICT[field.annotation], copy(field))
-    return create_model(f"Sent{name}", __base__=base, __doc__=text, **fields)
+    for key, hint in base.in_json().items():
+        field = base.model_fields[key]
+        fields[key] = (hint, Field(field.default, description=field.description, examples=field.examples))
+    return create_model(f"Sent{name if model is None else model.__name__}", __base__=base, __doc__=text, **fields)

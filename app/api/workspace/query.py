@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Annotated, Any, get_origin
+from typing import Annotated, Any, TypeVar, get_origin
 
-from pydantic import Field, ValidationError, WithJsonSchema
+from pydantic import BeforeValidator, Field, ValidationError, WithJsonSchema
 from starlette.datastructures import QueryParams
 
 from app.api.problems import FieldError, field_error, from_input_error, invalid, show
@@ -24,7 +24,26 @@ NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 
 def _joint_values(values: int) -> Any:
     """Constraints of ``JOINT:VALUE…`` for the OpenAPI document; `_per_joint` validates and explains errors."""
-    return Field(max_length=100, json_schema_extra={"pattern": rf"^[0-9]+(:{NUMBER}){{{values}}}$"})
+    return Field(max_length=100, json_schema_extra={"pattern": _pattern(values)})
+
+
+def _pattern(values: int) -> str:
+    return rf"^[0-9]+(:{NUMBER}){{{values}}}$"
+
+
+def listed(pattern: str, count: int) -> Any:
+    """A text of numbers separated by colons that JSON may also hold as a list of `count` numbers."""
+
+    def joined(value: object) -> object:
+        if not isinstance(value, list) or not all(type(item) in (int, float) for item in value):
+            return value
+        return ":".join(str(int(item)) if float(item).is_integer() else repr(item) for item in value)
+
+    numbers = {"type": "array", "items": {"type": "number"}, "minItems": count, "maxItems": count}
+    text = {"type": "string", "maxLength": 200, "pattern": pattern}
+    return Annotated[
+        str, Field(max_length=200), BeforeValidator(joined), WithJsonSchema({"anyOf": [text, numbers]})
+    ]
 
 
 _MANY = Field(max_length=100)
@@ -32,6 +51,12 @@ _MANY = Field(max_length=100)
 
 class RegionQuery(Body):
     """Joint limits and locks."""
+
+    @classmethod
+    def in_json(cls) -> dict[str, Any]:
+        """In JSON, each entry may be a list of numbers."""
+        items = {"limit": listed(_pattern(2), 3), "lock": listed(_pattern(1), 2)}
+        return {name: Annotated[list[item], _MANY] for name, item in items.items()}  # type: ignore[valid-type]
 
     limit: Annotated[list[Annotated[str, _joint_values(2)]], _MANY] = Field(
         [],
@@ -111,10 +136,18 @@ def read_cloud_query(parameters: QueryParams) -> CloudQuery:
     given: dict[str, Any] = {
         name: parameters.getlist(name) if name in repeated else parameters[name] for name in parameters
     }
+    return validated(CloudQuery, given, "query")
+
+
+_Model = TypeVar("_Model", bound=Body)
+
+
+def validated(model: type[_Model], given: object, place: str) -> _Model:
+    """A model of values that FastAPI has not read; raises 422. `place`: ``"query"`` or ``"body"``."""
     try:
-        return CloudQuery.model_validate(given)
+        return model.model_validate(given)
     except ValidationError as error:
-        items = [{**item, "loc": ("query", *item["loc"])} for item in error.errors()]
+        items = [{**item, "loc": (place, *item["loc"])} for item in error.errors()]
         raise invalid(*map(field_error, items)) from None
     except InputError as error:
         raise invalid(from_input_error(error)) from None

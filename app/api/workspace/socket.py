@@ -1,4 +1,8 @@
-"""A cloud of tool points over a websocket: float32 rows as binary messages, progress as text messages."""
+"""A cloud of tool points over a websocket: float32 rows as binary messages, progress as text messages.
+
+For an arm of the service the query of the URL describes the cloud. An arm that is sent along is in the first
+message, with the parameters of the query as further fields.
+"""
 
 from __future__ import annotations
 
@@ -7,15 +11,18 @@ import contextlib
 import json
 import logging
 import time
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 from fastapi import WebSocket
 from starlette.concurrency import run_in_threadpool
 from starlette.websockets import WebSocketDisconnect, WebSocketState
 
-from app.api.body import versioned
-from app.api.problems import Problem, ProblemError, unknown_robot
-from app.api.workspace.query import read_cloud_query
+from app.api.arms.operation import with_robot
+from app.api.body import parsed, versioned
+from app.api.problems import FieldError, Problem, ProblemError, invalid, unknown_robot
+from app.api.work import Deadline
+from app.api.workspace.query import CloudQuery, read_cloud_query, validated
 from app.api.workspace.streaming import ThreadedGenerator
 from app.exports.formats import slices, table_of
 from app.shared.clients import client_of
@@ -23,16 +30,19 @@ from app.shared.clouds import Cloud
 from app.shared.metrics import STREAMED
 from app.shared.places import Place
 from app.shared.security import origin_allowed
-from kin import UnknownRobotError
+from kin import Robot, UnknownRobotError
 
 logger = logging.getLogger("kinboard.workspace")
 router = versioned("workspace")
 
+PATIENCE = 10.0  # seconds for the first message of a client that sends its arm along
 PROGRESS_EVERY = 0.1  # seconds between two progress messages
 
 # Close codes of RFC 6455.
 DONE, POLICY, UNSUPPORTED, FAILED, LATER = 1000, 1008, 1003, 1011, 1013
 _LONGEST = 123  # bytes of a close reason
+
+SentCloud = with_robot(CloudQuery)
 
 # Close code and reason; None if the visitor has left.
 _Ending = tuple[int, str] | None
@@ -40,7 +50,52 @@ _Ending = tuple[int, str] | None
 
 @router.websocket("/robots/{robot_id}/workspace/stream")
 async def stream(visitor: WebSocket, robot_id: str) -> None:
-    """One client's cloud, from the handshake to its end, a cancellation or a disconnect."""
+    """The cloud of an arm of the service, from the handshake to its end, a cancellation or a disconnect."""
+
+    async def described() -> tuple[CloudQuery, Robot]:
+        return read_cloud_query(visitor.query_params), visitor.app.state.store.get(robot_id)
+
+    await _serve(visitor, described)
+
+
+@router.websocket("/workspace/stream")
+async def stream_of_sent(visitor: WebSocket) -> None:
+    """The cloud of the arm in the first message, from the handshake to its end."""
+
+    async def described() -> tuple[CloudQuery, Robot]:
+        text = await _first_message(visitor)
+        state = visitor.app.state
+        with state.streams.slot(client_of(visitor.scope)):  # so that few arms are read at a time
+            return await run_in_threadpool(_read, text, Deadline(state.compute))
+
+    await _serve(visitor, described)
+
+
+async def _first_message(visitor: WebSocket) -> str:
+    """The text that describes the cloud; raises `ProblemError` if it does not come, or is none."""
+    expected = "`robot` and the parameters of the cloud, as a JSON object in a text message"
+    try:
+        async with asyncio.timeout(PATIENCE):
+            event = await visitor.receive()
+    except TimeoutError:
+        detail = f"No message arrived within {PATIENCE:g} s; the first one describes the arm."
+        raise ProblemError(408, "request-timeout", detail, f"Send {expected}.") from None
+    if event["type"] == "websocket.disconnect":
+        raise WebSocketDisconnect
+    if not isinstance(text := event.get("text"), str):
+        raise invalid(FieldError(field="body", value="a binary message", expected=expected))
+    return text
+
+
+def _read(text: str, deadline: Deadline) -> tuple[CloudQuery, Robot]:
+    """The cloud and the arm of a first message, read in turn with other computations; raises `ProblemError`."""
+    with deadline.turn:
+        body: Any = validated(SentCloud, parsed(text.encode()), "body")
+        return body, body.robot.robot()
+
+
+async def _serve(visitor: WebSocket, described: Callable[[], Awaitable[tuple[CloudQuery, Robot]]]) -> None:
+    """One client's cloud; errors are sent as problems."""
     state = visitor.app.state
     if not origin_allowed(visitor.headers, state.settings.allowed_origins):
         logger.warning("rejected a websocket from a page of %.200r", visitor.headers.get("origin"))
@@ -48,11 +103,14 @@ async def stream(visitor: WebSocket, robot_id: str) -> None:
         return
     # Browsers give a page no reason for a rejected handshake, so it is accepted and the problem sent as a message.
     await visitor.accept()
+    ending: _Ending = None
     try:
-        query = read_cloud_query(visitor.query_params)
-        cloud = query.cloud(state.store.get(robot_id), state.settings)
+        query, robot = await described()
+        cloud = query.cloud(robot, state.settings)
         with state.streams.slot(client_of(visitor.scope)) as place:
             ending = await _carry(visitor, place, cloud, query.q)
+    except WebSocketDisconnect:  # before the first message
+        return
     except UnknownRobotError as error:
         ending = await _refuse(visitor, unknown_robot(error).problem)
     except ProblemError as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
+from typing import Any
 
 from fastapi import Request, Response
 from pydantic import Field
@@ -14,7 +15,7 @@ from app.api.body import versioned
 from app.api.problems import FieldError, invalid, show
 from app.api.schemas import refusals, reply
 from app.api.work import TooSlowError, busy, compute_slots
-from app.api.workspace.query import NUMBER, RegionQuery, number
+from app.api.workspace.query import NUMBER, RegionQuery, listed, number
 from app.shared.answers.workspace import WorkspaceAnswer, workspace_answer
 from app.shared.computations import TooManyPendingError
 from app.shared.summaries import Plane, Summaries
@@ -23,6 +24,8 @@ from kin import Robot
 GOES_ON = "The computation goes on: repeat the request later, or request less"
 
 router = versioned("workspace")
+
+_PLANE = rf"^{NUMBER}(:{NUMBER}){{5}}$"
 
 
 class SummaryQuery(RegionQuery):
@@ -41,9 +44,14 @@ class SummaryQuery(RegionQuery):
         max_length=200,
         description="Section in this plane instead, `X:Y:Z:NX:NY:NZ`: a point in metres, and a normal.",
         examples=["0:0:0.1:0:0:1"],
-        json_schema_extra={"pattern": rf"^{NUMBER}(:{NUMBER}){{5}}$"},
+        json_schema_extra={"pattern": _PLANE},
     )
     resolution: int = Field(96, ge=8, le=400, description="Grid squares along the longer side of the section.")
+
+    @classmethod
+    def in_json(cls) -> dict[str, Any]:
+        """In JSON, the plane may be a list of numbers."""
+        return {**super().in_json(), "plane": listed(_PLANE, 6) | None}
 
     def cut(self) -> Plane | None:
         """Point and normal of the plane; raises 422."""

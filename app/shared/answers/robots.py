@@ -26,6 +26,10 @@ class JointAnswer(TypedDict):
     """Unit of its value: rad if revolute, m if prismatic."""
     limits: list[float] | None
     """[lower, upper] in that unit; null if it is unlimited."""
+    velocity: float | None
+    """Its largest speed, in that unit per second; null if it is not known."""
+    effort: float | None
+    """Its largest torque in N·m (revolute) or force in N (prismatic); null if it is not known."""
     home: float
     """Its value in the home configuration, in that unit."""
 
@@ -119,5 +123,7 @@ def _joint(index: int, joint: Joint, home: float) -> JointAnswer:
         "kind": "prismatic" if joint.kind == "prismatic" else "revolute",
         "unit": "m" if joint.kind == "prismatic" else "rad",
         "limits": list(joint.limits) if joint.limits is not None and bounded else None,
+        "velocity": joint.velocity,
+        "effort": joint.effort,
         "home": home,
     }

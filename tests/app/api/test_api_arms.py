@@ -86,6 +86,57 @@ def test_the_reader_takes_what_the_schema_takes(text):
     assert kin.robot_from_dict({**DEFAULTS, **described}).n == 1
 
 
+@pytest.mark.parametrize(("unit", "most"), [("m", 1e6), ("cm", 1e8), ("mm", 1e9)])
+def test_the_bound_of_a_length_is_a_million_metres_whatever_the_unit(schema, unit, most):
+    for factor, expected in ((0.999, "rows"), (1.001, "rows[0].limits[0]")):
+        row = {"kind": "prismatic", "limits": [f"-{factor * most:.0f} {unit}", 0]}
+        described = {**EXAMPLE, "rows": [row], "home": {"q": [-1]}}
+        assert schema.is_valid(described) is (factor < 1)
+        with pytest.raises(kin.RobotFileError) as refused:
+            kin.robot_from_dict({**DEFAULTS, **described})
+        assert refused.value.field == expected, "first the number itself, then a reach of a thousand kilometres"
+    for row in ({"d": 0.99 * most}, {"d": -0.99 * most}):
+        assert schema.is_valid({**EXAMPLE, "units": {"length": unit, "angle": "deg"}, "rows": [row]})
+    assert not schema.is_valid({**EXAMPLE, "rows": [{"d": 1.01e9}]})
+
+
+def test_a_joint_says_how_fast_and_how_strong_it_is(client):
+    rows = [{"a": 300, "velocity": 90, "effort": 40}, {"kind": "prismatic", "velocity": 250}, {"a": 100}]
+    arm = {**EXAMPLE, "rows": rows, "home": {"q": [0, 1, 0]}}
+    first, second, third = post(client, "robots/inspect", {"robot": arm})["robot"]["joints"]
+    assert (first["velocity"], first["effort"]) == (pytest.approx(math.pi / 2), 40.0)
+    assert (second["velocity"], second["effort"]) == (0.25, None)
+    assert (third["velocity"], third["effort"]) == (None, None)
+
+
+def test_numbers_that_are_text_in_a_query_may_be_lists_for_an_arm_sent_along(client):
+    texts = {"limit": ["1:0:1.5"], "lock": ["2:0.5"], "plane": "0:0:0.1:0:0:1"}
+    lists = {"limit": [[1, 0, 1.5]], "lock": [[2, 0.5]], "plane": [0, 0, 0.1, 0, 0, 1]}
+    rest = {"volume": False, "robot": EXAMPLE}
+    assert post(client, "workspace/summary", rest | lists) == post(client, "workspace/summary", rest | texts)
+    region = {"n": 20, "format": "csv", "robot": EXAMPLE}
+    cloud = post(client, "workspace", {**region, "limit": lists["limit"], "lock": ["2:0.5"]})
+    assert cloud == post(client, "workspace", {**region, "limit": texts["limit"], "lock": lists["lock"]})
+
+
+@pytest.mark.parametrize(
+    ("wrong", "field"),
+    [
+        ({"limit": [[9, 0, 1]]}, "limit[0]"),
+        ({"limit": [[1, 0]]}, "limit[0]"),
+        ({"lock": [[1.5, 0]]}, "lock[0]"),
+        ({"lock": [[True, 0]]}, "lock[0]"),
+        ({"lock": [1, 0.5]}, "lock[0]"),
+        ({"plane": [0, 0, 1]}, "plane"),
+        ({"plane": [0, 0, 0, 0, 0, 0]}, "plane"),
+        ({"plane": [0, 0, 0, 0, 0, None]}, "plane"),
+    ],
+)
+def test_a_wrong_list_is_refused_by_its_field(client, wrong, field):
+    problem = post(client, "workspace/summary", {"volume": False, "robot": EXAMPLE, **wrong}, 422)
+    assert problem["errors"][0]["field"] == field
+
+
 OPERATIONS = {
     "fk": {"q": Q, "frames": True},
     "jacobian": {"q": [Q, Q]},

@@ -14,7 +14,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 import kin
-from app.api import StreamLimit, api_routes
+from app.api import ComputeSlots, StreamLimit, api_routes
 from app.api.workspace import socket as socket_module
 from app.shared.clouds import Cloud, Clouds
 from app.shared.settings import Settings
@@ -31,6 +31,7 @@ def app() -> Iterator[FastAPI]:
     app.state.settings = Settings(allowed_origins=("https://school.example",))
     app.state.store = Store()
     app.state.clouds, app.state.streams = Clouds(max_bytes=0, threads=1), StreamLimit(2)
+    app.state.compute = ComputeSlots(2, 5.0)
     app.router.routes.extend(api_routes())
     yield app
     app.state.clouds.close()
@@ -205,3 +206,53 @@ def test_own_and_allowed_origins_are_accepted(port):
     for origin in (f"http://127.0.0.1:{port}", "https://school.example", None):
         with visit(port, "n=1", origin=origin) as visitor:
             assert ending(visitor)[1] == 1000
+
+
+def sent_along(port, message):
+    """What a client gets whose first message is this."""
+    with connect(f"ws://127.0.0.1:{port}/api/v1/workspace/stream", proxy=None, max_size=None) as visitor:
+        visitor.send(message if isinstance(message, bytes | str) else json.dumps(message))
+        return ending(visitor)
+
+
+def test_the_cloud_of_an_arm_sent_along_is_that_of_the_same_arm_of_the_service(port, app):
+    arm = kin.robot_to_dict(PIONEER)
+    asked = {"n": 3000, "seed": 4, "measure": ["manipulability"], "lock": [[1, 0.5]], "q": True}
+    messages, code, reason = sent_along(port, {"robot": arm, **asked})
+    with visit(port, "n=3000&seed=4&measure=manipulability&lock=1:0.5&q=true") as visitor:
+        expected, *_ = ending(visitor)
+    assert (code, reason) == (1000, "done")
+    rows, same = (b"".join(m for m in each if isinstance(m, bytes)) for each in (messages, expected))
+    assert rows == same
+    assert json.loads(messages[0])["columns"] == json.loads(expected[0])["columns"]
+    assert app.state.streams.open == 0
+
+
+@pytest.mark.parametrize(
+    ("message", "said"),
+    [
+        ("{", "The body is not valid JSON"),
+        (b"\x00", "body: got a binary message"),
+        ("[]", "body: got [], expected a JSON object"),
+        ({"n": 10}, "robot: got nothing"),
+        ({"robot": {"rows": []}}, "robot."),
+        ({"robot": kin.robot_to_dict(PIONEER), "n": "10"}, 'n: got "10"'),
+        ({"robot": kin.robot_to_dict(PIONEER), "n": 100000001}, "n: got 100000001"),
+        ({"robot": kin.robot_to_dict(PIONEER), "limit": [[9, 0, 1]]}, 'limit[0]: got "9:0:1"'),
+        ({"robot": kin.robot_to_dict(PIONEER), "format": "csv"}, 'format: got "csv"'),
+    ],
+)
+def test_a_first_message_that_is_wrong_is_refused_with_a_reason(port, app, message, said):
+    messages, code, _ = sent_along(port, message)
+    (problem,) = [json.loads(m)["problem"] for m in messages]
+    assert problem["detail"].startswith(said)
+    assert code == 1008
+    assert app.state.streams.open == 0
+
+
+def test_a_client_that_sends_nothing_is_not_waited_for(port, monkeypatch):
+    monkeypatch.setattr(socket_module, "PATIENCE", 0.05)
+    with connect(f"ws://127.0.0.1:{port}/api/v1/workspace/stream", proxy=None) as visitor:
+        messages, code, _ = ending(visitor)
+    assert json.loads(messages[0])["problem"]["type"].endswith("request-timeout")
+    assert code == 1008
