@@ -172,11 +172,13 @@ def _compromised(
     problem: IKProblem, solutions: tuple[IKSolution, ...], blocked: tuple[BlockedBranch, ...], known: Array | None
 ) -> IKResult:
     """The result with these compromises, the best first; `known` ``(k, n)`` are further starts of descents."""
+    closest = nearest.closest(problem, known)
+    if _is_solution(closest, problem):
+        return _found_by_descent(problem, closest)
     first, joints = solutions[0], problem.robot.n
     details: Details = RollError(joints, first.rotation_error)
     if first.compromise != "roll":
         details = RotationError(joints, first.rotation_error, blocked[0].violations[0] if blocked else None)
-    closest = nearest.closest(problem, known)
     return make_result(
         problem,
         Status.APPROXIMATE,

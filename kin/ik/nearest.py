@@ -22,6 +22,7 @@ from kin.ik.results import IKSolution
 from kin.solvers.common import TURN
 from kin.solvers.contract import APPROACH, MASK, POSE, POSITION
 from kin.solvers.numeric import each_of, solve, spread
+from kin.solvers.numeric.valley import follow
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -33,6 +34,9 @@ STARTS = 24
 BUDGET = 400
 _EXACT = 1e-10
 _LEVER, _LEAST_LEVER, _MOST_LEVER = 0.3, 0.03, 1.0
+# Valleys are followed from so many ends of descents, if they miss the target by less than this share of the reach.
+_VALLEYS = 24
+_BESIDE = 1e-3
 # At most _MOST_STARTS descents; the search stops when _MEETINGS of them have ended at the best minimum.
 _MOST_STARTS = 64
 _MEETINGS = 12
@@ -69,8 +73,50 @@ def solve_numerically(problem: IKProblem, budget: int = BUDGET) -> Found:
     weight = min(max(_LEVER * problem.robot.reach, _LEAST_LEVER), _MOST_LEVER)
     goal = (problem.T, problem.code, problem.mask, weight)
     bounds = (problem.low, problem.high, problem.turns)
-    error, starts = solve(problem.robot.model, goal, bounds, budget, _EXACT * min(1.0, weight), out)
+    enough = _EXACT * min(1.0, weight)
+    error, starts = solve(problem.robot.model, goal, bounds, budget, enough, out)
+    if error > enough:
+        q, errors = out[None], np.array([error])
+        if error < _beside(problem):
+            more, others = descend_each(problem, problem.code, starting_points(problem), weight)
+            q, errors = np.concatenate([q, more]), np.concatenate([errors, others])
+        followed = _followed(problem, q, errors, weight)
+        if followed is not None:
+            out, error = followed, 0.0
     return Found(out, float(error), int(starts))
+
+
+def _followed(problem: IKProblem, q: Array, errors: Array, weight: float) -> Array | None:
+    """The configuration ``(n,)`` that meets the task in the valleys where descents ended ``(k, n)``, if any does.
+
+    None if a descent met the task itself.
+    """
+    goal = (problem.T, problem.code, problem.mask, weight)
+    bounds = (problem.low, problem.high, problem.turns)
+    enough = _EXACT * min(1.0, weight)
+    order = np.argsort(errors, kind="stable").tolist()
+    if errors[order[0]] <= enough:
+        return None
+    near = [q[i] for i in order if errors[i] < _beside(problem)]
+    for row in _apart(near)[:_VALLEYS]:
+        there, error = follow(problem.robot.model, goal, bounds, enough, row)
+        if error <= enough:
+            return there
+    return None
+
+
+def _beside(problem: IKProblem) -> float:
+    """The error in metres below which a descent may have ended in a valley that leads to the target."""
+    return _BESIDE * (problem.robot.reach or 1.0)
+
+
+def _apart(rows: list[Array]) -> list[Array]:
+    """Configurations without those that differ little from one before."""
+    found: list[Array] = []
+    for row in rows:
+        if all(np.abs(row - other).max() > TOLERANCES.same_branch for other in found):
+            found.append(row)
+    return found
 
 
 def descend(
@@ -81,11 +127,17 @@ def descend(
     Stops early at E ≤ `enough`, or when `_MEETINGS` descents have ended at the best minimum.
     """
     q, errors = _descend(problem, code, starts, weight, enough, _MEETINGS)
+    best = _best(errors)
+    return q[best], float(errors[best])
+
+
+def _best(errors: Array) -> int:
+    """The first of the smallest errors ``(k,)``."""
     best = 0
     for i, error in enumerate(errors.tolist()):
         if _is_better(error, errors[best]):
             best = i
-    return q[best], float(errors[best])
+    return best
 
 
 def _is_better(error: float, best: float) -> bool:
@@ -164,16 +216,16 @@ def closest(problem: IKProblem, candidates: Array | None) -> IKSolution | None:
     None if no descent ends on a requested branch.
     """
     starts = starting_points(problem, candidates, _MOST_STARTS)
-    if problem.branches is None:
-        q, _ = descend(problem, problem.code, starts, ORIENTATION_WEIGHT)
-    else:
-        ends, errors = descend_each(problem, problem.code, starts, ORIENTATION_WEIGHT)
-        best = math.inf
-        for end, error in zip(ends, errors.tolist(), strict=True):
-            if _is_better(error, best) and problem.allows(problem.branch_of(end)):
-                q, best = end, error
-        if not math.isfinite(best):
-            return None
+    meetings = _MEETINGS if problem.branches is None else len(starts) + 1
+    ends, errors = _descend(problem, problem.code, starts, ORIENTATION_WEIGHT, 0.0, meetings)
+    allowed = np.array([problem.branches is None or problem.allows(problem.branch_of(end)) for end in ends])
+    if not allowed.any():
+        return None
+    ends, errors = ends[allowed], errors[allowed]
+    q = ends[_best(errors)]
+    followed = _followed(problem, ends, errors, ORIENTATION_WEIGHT)
+    if followed is not None and (problem.branches is None or problem.allows(problem.branch_of(followed))):
+        q = followed
     found, stats = measure(problem, q[None])
     return solution(problem, found[0], stats[0], compromise="closest")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -84,3 +85,22 @@ def random_arm(joints: int, seed: int) -> Robot:
 
 
 GENERAL = (ELBOW5, ELBOW3, SPATIAL3, random_arm(5, 1), random_arm(4, 1), random_arm(3, 1))
+
+
+def typed_arm(joints: int, seed: int) -> Robot:
+    """A random table as people type them: right angles with four to six decimals, many zeros, often planar."""
+    rng = np.random.default_rng(seed)
+    digits, planar = int(rng.integers(4, 7)), rng.random() < 0.3
+    rows = []
+    for i in range(joints):
+        twists = (0.0, PI) if planar and i < joints - 1 else (0.0, PI / 2, -PI / 2, PI)
+        alpha = rng.choice(twists) if planar or rng.random() < 0.9 else rng.uniform(-3, 3)
+        theta = rng.choice((0.0, 0.0, PI / 2, -PI / 2, rng.uniform(-3, 3)))
+        d, a = rng.choice((0.0, rng.uniform(-0.5, 0.5))), rng.choice((0.0, *rng.uniform(-0.5, 0.5, 2)))
+        rows.append((round(theta, digits), round(d, 4), round(a, 4), round(alpha, digits)))
+    robot = arm(f"typed{joints}-{seed}", *((float(t), float(d), float(a), float(x)) for t, d, a, x in rows))
+    if rng.random() < 0.5:
+        return robot
+    spans = [(-round(low, 2), round(high, 2)) for low, high in rng.uniform(0.5, 3.0, (joints, 2)).tolist()]
+    narrow = tuple(replace(row, limits=span) for row, span in zip(robot.rows, spans, strict=True))
+    return replace(robot, rows=narrow)

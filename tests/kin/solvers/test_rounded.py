@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from few import arm
+from few import arm, typed_arm
 
 import kin
 from kin import Status
@@ -174,6 +174,36 @@ def test_what_can_be_reached_is_never_called_unreachable(robot, task):
             assert np.abs(kin.fk(robot, found.solutions[0].q)[:3, 3] - T[:3, 3]).max() < 1e-9
             if found.solver == "numeric":
                 assert not found.complete
+
+
+# Tables whose free joints move the tool by the rounding, in two directions or at the joint limits as well.
+SEEDS = (2, 10, 17, 31, 43, 67, 75, 86)
+
+
+def not_solved(robot, count):
+    """The targets, as (task, configuration), of random configurations that are not answered with a solution."""
+    found = []
+    for q in robot.random_q(np.random.default_rng(11), count):
+        T = kin.fk(robot, q)
+        for task in ("pose", "approach", "position"):
+            target = T[:3, 3] if task == "position" else T
+            result = kin.solve_ik(robot, target, task=task)
+            if result.status is not Status.SOLVED:
+                found.append((task, q.tolist(), result.status))
+    return found
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_far_motion_in_weak_directions_is_found(seed):
+    """Motions that move the tool by the rounding only, and that a target may need far."""
+    assert not not_solved(typed_arm(2 + seed % 4, seed), 3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("joints", range(1, 6))
+def test_no_target_of_random_typed_arms_is_called_unreachable(joints):
+    for seed in range(200):
+        assert not not_solved(typed_arm(joints, seed), 4), seed
 
 
 def test_a_posture_of_a_rounded_table_outside_the_limits_is_blocked_not_unreachable():
