@@ -179,7 +179,7 @@ def _solve(robot: Robot, body: IkRequest, settings: Settings, deadline: Deadline
     targets, single = body.resolve_all(body.target, settings)
     seeds = _seeds(robot, body, len(targets), settings)
 
-    options = {task: body.options(task) for task, _ in targets}
+    options = {task: body.options(task) for task in {task for task, _ in targets}}
 
     def answer(task: Task, T: Array, seed: Array | None) -> IkAnswer:
         deadline.check()

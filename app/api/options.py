@@ -60,13 +60,15 @@ class Target(schemas.Body):
         offer()
         if task is None:
             task = "approach" if self.approach is not None else "position" if self._is_point() else "pose"
-        given = ", ".join(name for name in type(self).model_fields if getattr(self, name) is not None) or "nothing"
         usable = self.matrix is not None or (
             self.position is not None
             and (task == "position" or self.wxyz is not None or (task == "approach" and self.approach is not None))
         )
         if not usable:
-            raise _wrong(field, f"only {given}" if given != "nothing" else given, f"{FORMS[task]} for task {task}")
+            given = [name for name in type(self).model_fields if getattr(self, name) is not None]
+            raise _wrong(
+                field, f"only {', '.join(given)}" if given else "nothing", f"{FORMS[task]} for task {task}"
+            )
         if self.approach is not None and (self.wxyz is not None or self.matrix is not None):
             raise _wrong(f"{field}.approach", "an approach besides an orientation", "one of the two")
         try:
