@@ -7,7 +7,7 @@
 """
 
 from kin._version import __version__
-from kin.dh import convert
+from kin.dh import Screws, convert, robot_from_screws, screws
 from kin.errors import InputError, KinematicsError, RobotFileError, UnknownRobotError
 from kin.files import (
     UrdfReport,
@@ -28,7 +28,7 @@ from kin.files import (
 )
 from kin.fk import fk, fk_positions, jacobian, link_frames, manipulability
 from kin.ik import IKOptions, JointConstraints, branch_meanings, branch_names, branch_of, solve_ik
-from kin.ik.batch import ik_branches
+from kin.ik.batch import IKResults, ik_branches, solve_ik_many
 from kin.ik.details import LimitViolation, Redundancy
 from kin.ik.options import Task
 from kin.ik.results import BlockedBranch, IKResult, IKSolution, Status
@@ -67,6 +67,7 @@ __all__ = [
     "Extreme",
     "IKOptions",
     "IKResult",
+    "IKResults",
     "IKSolution",
     "InputError",
     "Joint",
@@ -79,6 +80,7 @@ __all__ = [
     "Redundancy",
     "Robot",
     "RobotFileError",
+    "Screws",
     "Section",
     "SectionArc",
     "Singularity",
@@ -114,14 +116,17 @@ __all__ = [
     "parse_robot",
     "read_urdf",
     "robot_from_dict",
+    "robot_from_screws",
     "robot_to_dict",
     "robot_to_toml",
     "rotation_from_wxyz",
     "sample_workspace",
     "save_robot",
+    "screws",
     "section",
     "singularities",
     "solve_ik",
+    "solve_ik_many",
     "solve_path",
     "to_urdf",
     "urdf_tips",

@@ -1,6 +1,7 @@
 """Forward kinematics, Jacobian and manipulability: arrays in, arrays out.
 
-Each function takes one configuration ``(n,)`` or any batch ``(..., n)`` and returns the same leading axes.
+Each function takes a robot, or the id of a built-in one, and one configuration ``(n,)`` or any batch ``(..., n)``;
+it returns the same leading axes.
 
 For a single configuration, checking the argument takes longer than the kinematics. A contiguous float64 array is
 therefore checked once and passed directly to a compiled function (:func:`kin.kernels.compile.direct`); any other
@@ -20,6 +21,7 @@ from kin.errors import InputError
 from kin.kernels import fk as fk_kernels
 from kin.kernels import jacobian as jacobian_kernels
 from kin.kernels.compile import MODEL, direct
+from kin.named import robot_of
 from kin.robot import Robot
 from kin.transforms import Array
 
@@ -54,11 +56,13 @@ class _Compiled:
 _compiled = _Compiled()
 
 
-def fk(robot: Robot, q: ArrayLike) -> Array:
+def fk(robot: Robot | str, q: ArrayLike) -> Array:
     """Pose of the tool, T_base_tool ``(..., 4, 4)``, for configurations ``(..., n)`` in radians (metres).
 
     Equation (2) of the chapter, ``T = A_1 … A_n``, for either convention.
     """
+    if not isinstance(robot, Robot):
+        robot = robot_of(robot)
     # Strides of (8,): one axis, contiguous.
     if type(q) is _ndarray and q.strides == _DENSE and q.dtype is _FLOAT:
         T = _empty(_POSE)
@@ -71,11 +75,12 @@ def fk(robot: Robot, q: ArrayLike) -> Array:
     return out
 
 
-def fk_positions(robot: Robot, q: ArrayLike) -> Array:
+def fk_positions(robot: Robot | str, q: ArrayLike) -> Array:
     """Tool points ``(..., 3)`` in metres in the base frame, for configurations ``(..., n)``.
 
     The position column of `fk`, computed several times faster.
     """
+    robot = robot_of(robot)
     q = _batch(robot, q)
     out = np.empty((*q.shape[:-1], 3))
     if not _compiled.positions_many(robot.model, q.reshape(-1, robot.n), out.reshape(-1, 3)):
@@ -83,19 +88,22 @@ def fk_positions(robot: Robot, q: ArrayLike) -> Array:
     return out
 
 
-def link_frames(robot: Robot, q: ArrayLike) -> Array:
+def link_frames(robot: Robot | str, q: ArrayLike) -> Array:
     """Frame after every DH row, ``(..., rows, 4, 4)``: ``A_1``, ``A_1 A_2``, … in the base frame."""
+    robot = robot_of(robot)
     q = _writable(robot.check_q(q))
     frames = fk_kernels.frames_many(robot.model, q.reshape(-1, robot.n))
     return frames.reshape(*q.shape[:-1], len(robot.rows), 4, 4)
 
 
-def jacobian(robot: Robot, q: ArrayLike, frame: Literal["base", "tool"] = "base") -> Array:
+def jacobian(robot: Robot | str, q: ArrayLike, frame: Literal["base", "tool"] = "base") -> Array:
     """Geometric Jacobian ``(..., 6, n)``: twist of the tool point = J q̇.
 
     Rows 0–2 are the linear velocity of the tool point (m/s per rad/s or m/s), rows 3–5 the angular velocity,
     both expressed in the base frame, or in the tool's own frame with ``frame="tool"``.
     """
+    if not isinstance(robot, Robot):
+        robot = robot_of(robot)
     if frame == "base":
         if type(q) is _ndarray and q.strides == _DENSE and q.dtype is _FLOAT:
             J = _empty((6, len(q)))
@@ -111,7 +119,7 @@ def jacobian(robot: Robot, q: ArrayLike, frame: Literal["base", "tool"] = "base"
     return J
 
 
-def manipulability(robot: Robot, q: ArrayLike, part: Part = "all") -> Array:
+def manipulability(robot: Robot | str, q: ArrayLike, part: Part = "all") -> Array:
     """Yoshikawa's manipulability ``(...)``: the product of the singular values of the Jacobian.
 
     √det(J Jᵀ) for six or more joints, √det(Jᵀ J) for fewer (Yoshikawa, Int. J. Robotics Research 4(2), 1985).
@@ -119,6 +127,7 @@ def manipulability(robot: Robot, q: ArrayLike, part: Part = "all") -> Array:
     """
     if part not in tuple(_PARTS):
         raise InputError("part", part, "one of " + ", ".join(f'"{name}"' for name in _PARTS))
+    robot = robot_of(robot)
     first, last = _PARTS[part]
     J = jacobian(robot, q)
     values = jacobian_kernels.manipulability_many(J.reshape(-1, 6, robot.n), first, last)

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from kin.errors import InputError
 from kin.fk import fk, jacobian
+from kin.named import robot_of
 from kin.robot import Robot
 from kin.solvers import closed_form_of
 from kin.solvers.numeric import spread
@@ -25,7 +26,7 @@ from kin.transforms import Array
 __all__ = ["Singularity", "singularities"]
 
 
-def singularities(robot: Robot, q: ArrayLike, within: float = math.inf) -> tuple[Singularity, ...]:
+def singularities(robot: Robot | str, q: ArrayLike, within: float = math.inf) -> tuple[Singularity, ...]:
     """The singularities of the arm and their distances from a configuration `q` ``(n,)``, the nearest first.
 
     To sort angles and lengths together, a length counts as the angle at which it is seen from the arm's reach:
@@ -38,6 +39,7 @@ def singularities(robot: Robot, q: ArrayLike, within: float = math.inf) -> tuple
     Raises:
         InputError: q is not one configuration.
     """
+    robot = robot_of(robot)
     q = robot.check_q(q)
     if q.ndim != 1:
         raise InputError("q", f"shape {q.shape}", f"one configuration of {robot.n} values")

@@ -16,6 +16,7 @@ MODEL = {
     "kin.axes",
     "kin.errors",
     "kin.fk",
+    "kin.named",
     "kin.robot",
     "kin.singularity",
     "kin.tolerances",

@@ -15,7 +15,7 @@ from app.api import schemas
 from app.api.arms.operation import operation
 from app.api.batches import Batch, one_or_all
 from app.api.body import versioned
-from app.api.options import OptionsBody, Target, single_or_list
+from app.api.options import PreciseBody, Target, single_or_list
 from app.api.problems import FieldError, invalid
 from app.api.schemas import (
     POST_REFUSALS,
@@ -32,7 +32,6 @@ from app.shared.metrics import SOLVE_SECONDS
 from app.shared.settings import Settings
 from kin import IKOptions, Robot, Task
 from kin.ik import branch_names, solve
-from kin.ik.options import LEAST_TOLERANCE, MOST_METRES, MOST_RADIANS
 from kin.transforms import Array
 
 router = versioned("kinematics")
@@ -80,7 +79,7 @@ EXAMPLES = {
 }
 
 
-class IkRequest(OptionsBody):
+class IkRequest(PreciseBody):
     """Where the tool should go, and which solutions are returned."""
 
     target: Annotated[
@@ -118,22 +117,6 @@ class IkRequest(OptionsBody):
         "auto", description="numeric: descend from many starts, even where the arm has a closed form."
     )
 
-    position_tolerance: float | None = Field(
-        None,
-        ge=LEAST_TOLERANCE,
-        le=MOST_METRES,
-        strict=True,
-        description="Error of the tool's point that counts as none, in metres. By default 1e-9, or what the "
-        "digits of a `matrix` allow whose rotation had to be made orthonormal.",
-    )
-    rotation_tolerance: float | None = Field(
-        None,
-        ge=LEAST_TOLERANCE,
-        le=MOST_RADIANS,
-        strict=True,
-        description="The same for the rotation error, in radians.",
-    )
-
     def options(self, task: Task) -> IKOptions:
         """These fields as options of the core."""
         return replace(
@@ -144,8 +127,6 @@ class IkRequest(OptionsBody):
             max_solutions=self.max_solutions,
             redundancy=self.redundancy,
             solver=self.solver,
-            position_tolerance=self.position_tolerance,
-            rotation_tolerance=self.rotation_tolerance,
         )
 
 

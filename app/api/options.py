@@ -7,6 +7,7 @@ A target is where the tool should go, in whichever form its sender has it. A pos
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -19,6 +20,7 @@ from app.api.schemas import Number, Vector3, Vector4, numbers
 from app.shared.settings import Settings
 from app.shared.threads.turns import offer
 from kin import IKOptions, InputError, JointConstraints, Task
+from kin.ik.options import LEAST_TOLERANCE, MOST_METRES, MOST_RADIANS
 from kin.ik.problem import read_pose
 from kin.solvers.contract import POSE
 from kin.transforms import Array, frame_from_approach, from_position_wxyz
@@ -184,3 +186,31 @@ class OptionsBody(FramesBody):
             return target.resolve(self.task, field)
         _, T = target.resolve("pose" if any(self.mask[3:]) else "position", field)
         return self.task or "pose", T
+
+
+class PreciseBody(OptionsBody):
+    """The same with the errors that count as none."""
+
+    position_tolerance: float | None = Field(
+        None,
+        ge=LEAST_TOLERANCE,
+        le=MOST_METRES,
+        strict=True,
+        description="Error of the tool's point that counts as none, in metres. By default 1e-9, or what the "
+        "digits of a `matrix` allow whose rotation had to be made orthonormal.",
+    )
+    rotation_tolerance: float | None = Field(
+        None,
+        ge=LEAST_TOLERANCE,
+        le=MOST_RADIANS,
+        strict=True,
+        description="The same for the rotation error, in radians.",
+    )
+
+    def options(self, task: Task) -> IKOptions:
+        """These fields as options of the core."""
+        return replace(
+            super().options(task),
+            position_tolerance=self.position_tolerance,
+            rotation_tolerance=self.rotation_tolerance,
+        )

@@ -10,7 +10,7 @@ from pydantic import Field
 from app.api import schemas
 from app.api.arms.operation import operation
 from app.api.body import versioned
-from app.api.options import OptionsBody, Target
+from app.api.options import PreciseBody, Target
 from app.api.problems import FieldError, invalid
 from app.api.schemas import POST_REFUSALS, Configuration, example, reply, settings_of
 from app.api.work import Deadline, computed
@@ -46,7 +46,7 @@ EXAMPLES = {
 }
 
 
-class PathRequest(OptionsBody):
+class PathRequest(PreciseBody):
     """Where the tool should go, one waypoint after the other."""
 
     targets: list[Target] = Field(

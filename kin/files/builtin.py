@@ -7,6 +7,7 @@ from pathlib import Path
 
 from kin.errors import UnknownRobotError
 from kin.files.read import load_folder
+from kin.named import finds_robots
 from kin.robot import Robot
 
 BUILTIN = Path(__file__).parents[1] / "robots"
@@ -20,6 +21,7 @@ def builtin_robots() -> dict[str, Robot]:
     return {robot_id: robots[robot_id] for robot_id in dict.fromkeys((*FIRST, *robots))}
 
 
+@finds_robots
 def get_robot(robot_id: str) -> Robot:
     """A built-in robot; raises `UnknownRobotError` listing the valid ids."""
     robots = builtin_robots()

@@ -17,6 +17,7 @@ import numpy as np
 
 from kin.errors import InputError
 from kin.files.read import ANGLES, UNLIMITED, Reader, matrix_of
+from kin.named import robot_of
 from kin.robot import IDENTITY, LENGTHS, Joint, Matrix, Robot, exact_cos_sin
 from kin.transforms import Array
 from kin.units import Length
@@ -26,11 +27,11 @@ Value = int | float | str
 _DIGITS = (12, 15, 16, 17)  # tried in this order
 
 
-def robot_to_dict(robot: Robot, length: Length | None = None, angle: Angle = "deg") -> dict[str, Any]:
+def robot_to_dict(robot: Robot | str, length: Length | None = None, angle: Angle = "deg") -> dict[str, Any]:
     """The robot as the fields of a robot file; `robot_from_dict` reads them.
 
     Args:
-        robot: the arm.
+        robot: the arm, or the id of a built-in one.
         length: the unit of lengths; by default that of the robot. Read again, the robot has this unit.
         angle: the unit of angles.
 
@@ -38,6 +39,7 @@ def robot_to_dict(robot: Robot, length: Length | None = None, angle: Angle = "de
         InputError: an unknown unit, or an arm that no robot file may describe, such as one with a slide without
             limits or two rows of one name; the field is that of the file, e.g. ``rows[2].limits``.
     """
+    robot = robot_of(robot)
     length = length or robot.units  # type: ignore[assignment]  # checked by Robot
     for field, unit, valid in (("length", length, LENGTHS), ("angle", angle, ANGLES)):
         if unit not in valid:
@@ -47,7 +49,7 @@ def robot_to_dict(robot: Robot, length: Length | None = None, angle: Angle = "de
     return data
 
 
-def robot_to_toml(robot: Robot, length: Length | None = None, angle: Angle | None = None) -> str:
+def robot_to_toml(robot: Robot | str, length: Length | None = None, angle: Angle | None = None) -> str:
     """The robot as the text of a robot file; see `robot_to_dict`. By default angles are in the shorter unit."""
     if angle is None:
         in_degrees, in_radians = (robot_to_toml(robot, length, unit) for unit in get_args(Angle))
@@ -60,7 +62,7 @@ def robot_to_toml(robot: Robot, length: Length | None = None, angle: Angle | Non
     return "\n".join([*lines, "", "[home]", f"q = {_toml(home['q'])}", ""])
 
 
-def save_robot(robot: Robot, path: Path | str) -> None:
+def save_robot(robot: Robot | str, path: Path | str) -> None:
     """Write a robot file; an existing file is replaced."""
     Path(path).write_text(robot_to_toml(robot), encoding="utf-8")
 

@@ -33,6 +33,7 @@ from kin.ik.options import (
 )
 from kin.ik.problem import IKProblem
 from kin.ik.results import IKResult
+from kin.named import robot_of
 from kin.robot import Robot
 from kin.solvers import closed_form_of
 
@@ -49,7 +50,7 @@ __all__ = [
 
 
 def solve_ik(
-    robot: Robot,
+    robot: Robot | str,
     target: ArrayLike,
     *,
     task: Task = "pose",
@@ -73,7 +74,7 @@ def solve_ik(
     `solve` takes the same options as one value.
 
     Args:
-        robot: the arm.
+        robot: the arm, or the id of a built-in one.
         target: T_base_tool ``(4, 4)``; for ``task="position"`` also a point ``(3,)`` in metres.
         q_seed: ``(n,)`` configuration to stay near; the home pose by default.
         limits: n pairs (lower, upper) inside the robot's own limits, None for a joint that keeps its own.
@@ -99,33 +100,34 @@ def solve_ik(
 
 
 def solve(
-    robot: Robot, target: ArrayLike, options: IKOptions | None = None, q_seed: ArrayLike | None = None
+    robot: Robot | str, target: ArrayLike, options: IKOptions | None = None, q_seed: ArrayLike | None = None
 ) -> IKResult:
     """`solve_ik` with all options in one value; None stands for the default options.
 
     Raises:
         InputError: a malformed target or seed, or an option that does not fit the arm.
     """
-    return answer(IKProblem.of(robot, target, _plain_options() if options is None else options, q_seed))
+    return answer(IKProblem.of(robot_of(robot), target, _plain_options() if options is None else options, q_seed))
 
 
-def branch_names(robot: Robot) -> tuple[str, ...]:
+def branch_names(robot: Robot | str) -> tuple[str, ...]:
     """The names of the arm's branches; none for an arm whose branches have no names."""
-    closed_form = closed_form_of(robot)
+    closed_form = closed_form_of(robot_of(robot))
     return closed_form.branches if closed_form is not None and closed_form.named else ()
 
 
-def branch_meanings(robot: Robot) -> dict[str, str]:
+def branch_meanings(robot: Robot | str) -> dict[str, str]:
     """What each part of the branch names says about a configuration: ``{"elbow up": "the elbow is above …"}``."""
-    closed_form = closed_form_of(robot)
+    closed_form = closed_form_of(robot_of(robot))
     return {} if closed_form is None else dict(closed_form.meanings)
 
 
-def branch_of(robot: Robot, q: ArrayLike) -> str:
+def branch_of(robot: Robot | str, q: ArrayLike) -> str:
     """Name of the branch of a configuration ``(n,)``; on the border of two, the one whose sine is not negative.
 
     Raises `InputError` for an arm whose branches have no names.
     """
+    robot = robot_of(robot)
     closed_form = closed_form_of(robot)
     if closed_form is None or not closed_form.named:
         raise InputError("robot", robot.id, "an arm whose branches have names")

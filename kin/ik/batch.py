@@ -1,20 +1,28 @@
-"""The batch call: all branches of a closed form as a plain array, and nothing else.
+"""Calls for many targets.
 
-:func:`kin.solve_ik` applies limits, finds ranges, sorts and words its answers. `ik_branches` returns joint values
-at the rate of a control loop, or for a million targets: no limits, no order, no verification. It calls the batch
-kernels of the arm's closed form (`kin.solvers.contract.BatchKernels`).
+`solve_ik_many` answers each target of a stack as :func:`kin.solve_ik` does: limits, ranges, order, a sentence.
+`ik_branches` returns joint values at the rate of a control loop, or for a million targets: all branches of a
+closed form as a plain array, without limits, order or verification. It calls the batch kernels of the arm's closed
+form (`kin.solvers.contract.BatchKernels`).
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any, NamedTuple, overload
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from kin.errors import InputError
+from kin.ik.answers import answer
+from kin.ik.options import IKOptions, JointConstraints
+from kin.ik.problem import IKProblem, listed, read_poses
+from kin.ik.results import IKResult, Status
 from kin.kernels import fk as fk_kernels
+from kin.named import robot_of
 from kin.robot import Robot
 from kin.solvers import closed_form_of
 from kin.solvers.contract import Many, One
@@ -24,6 +32,76 @@ _FLOAT = np.dtype(np.float64)
 _POSE = (4, 4)
 _CACHE = "_batch"
 _empty, _isinf, _ndarray = np.empty, math.isinf, np.ndarray
+
+
+class IKResults(Sequence[IKResult]):
+    """The answers to a stack of targets: a sequence of `IKResult`, with the best solutions as one array.
+
+    Attributes:
+        q: ``(k, n)`` the best solution for each target, NaN where there is no exact one; read-only.
+        solved: ``(k,)`` whether there is an exact one.
+        status: of each answer.
+    """
+
+    def __init__(self, results: Sequence[IKResult], n: int) -> None:
+        self._results = tuple(results)
+        self.status: tuple[Status, ...] = tuple(result.status for result in self._results)
+        self.solved: NDArray[np.bool_] = np.array([status is Status.SOLVED for status in self.status], dtype=bool)
+        self.q: Array = np.full((len(self._results), n), math.nan)
+        for i in np.flatnonzero(self.solved).tolist():
+            self.q[i] = self._results[i].solutions[0].q
+        self.q.flags.writeable = self.solved.flags.writeable = False
+
+    @overload
+    def __getitem__(self, index: int) -> IKResult: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[IKResult, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> IKResult | tuple[IKResult, ...]:
+        return self._results[index]
+
+    def __len__(self) -> int:
+        return len(self._results)
+
+    def __repr__(self) -> str:
+        """How many targets have each status."""
+        counts = Counter(status.value for status in self.status)
+        return f"IKResults({len(self)} targets: {', '.join(f'{n} {status}' for status, n in counts.items())})"
+
+
+def solve_ik_many(
+    robot: Robot | str,
+    targets: Sequence[ArrayLike] | Array,
+    *,
+    q_seed: ArrayLike | None = None,
+    **options: Any,
+) -> IKResults:
+    """`kin.solve_ik` for each target of a stack, each on its own; `kin.solve_path` finds one path through all.
+
+    Args:
+        robot: the arm, or the id of a built-in one.
+        targets: T_base_tool ``(k, 4, 4)``; for ``task="position"`` also points ``(k, 3)`` in metres.
+        q_seed: ``(n,)`` one seed for all targets, or ``(k, n)`` one for each; the home pose by default.
+        options: those of `kin.solve_ik`.
+
+    Raises:
+        InputError: a malformed target (named ``targets[i]``), seed or option.
+    """
+    robot = robot_of(robot)
+    constraints = JointConstraints(options.pop("limits", None), options.pop("locked", None))
+    wanted = IKOptions(constraints=constraints, **options)
+    given = listed(targets)
+    read_poses(given, wanted.coordinates.code)  # an error names the target that is malformed
+    seeds: list[Array | None] = [None] * len(given)
+    if q_seed is not None:
+        rows = robot.check_q(q_seed, "q_seed")
+        if rows.shape not in (robot.q_shape, (len(given), robot.n)):
+            expected = f"one configuration of {robot.n} values, or one for each of the {len(given)} targets"
+            raise InputError("q_seed", f"shape {rows.shape}", expected)
+        seeds = list(np.broadcast_to(rows, (len(given), robot.n)))
+    found = [answer(IKProblem.of(robot, T, wanted, seed)) for T, seed in zip(given, seeds, strict=True)]
+    return IKResults(found, robot.n)
 
 
 class _Prepared(NamedTuple):
@@ -40,7 +118,7 @@ class _Prepared(NamedTuple):
         return type(None), ()
 
 
-def ik_branches(robot: Robot, target: ArrayLike, redundancy: ArrayLike = math.nan) -> Array:
+def ik_branches(robot: Robot | str, target: ArrayLike, redundancy: ArrayLike = math.nan) -> Array:
     """All closed-form branches ``(..., branches, n)`` for poses T_base_tool ``(..., 4, 4)``, radians (metres).
 
     Row i is branch i of :func:`kin.branch_names`, NaN where it does not exist; where two have merged, both rows
@@ -49,7 +127,7 @@ def ik_branches(robot: Robot, target: ArrayLike, redundancy: ArrayLike = math.na
     meet the rotation about the tool's z axis.
 
     Args:
-        robot: an arm with a closed form.
+        robot: an arm with a closed form, or the id of a built-in one.
         target: one pose, or any batch of them.
         redundancy: value of the arm's first redundancy parameter (a joint value such as θ1 or θ7, or the arm angle
             ψ; radians), one for all targets or one for each; NaN keeps it near the home configuration.
@@ -59,6 +137,8 @@ def ik_branches(robot: Robot, target: ArrayLike, redundancy: ArrayLike = math.na
         InputError: an arm without a closed form; a target or redundancy that is not an array of finite numbers of
             that shape (a redundancy may be NaN).
     """
+    if not isinstance(robot, Robot):
+        robot = robot_of(robot)
     prepared = robot.__dict__.get(_CACHE) or _prepare(robot)
     if type(target) is _ndarray and target.dtype is _FLOAT and target.flags.c_contiguous:
         T = target

@@ -8,7 +8,7 @@ limits of zero width; narrowed limits replace the robot's own.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -205,14 +205,11 @@ def _locks(options: IKOptions) -> tuple[float | None, ...] | None:
     return None if locked is None else tuple(locked)
 
 
-def pose_of(target: ArrayLike, code: int, field: str = "target") -> Array:
-    """A target as a pose ``(4, 4)``: for the task POSITION also a point ``(3,)``; `InputError` naming `field`."""
-    return read_pose(target, code, field)[0]
-
-
 def read_pose(target: ArrayLike, code: int, field: str = "target", always: bool = False) -> tuple[Array, float]:
-    """`pose_of`, and how rounded it is; 0.0 if its rotation is one within `TOLERANCES.rotation_matrix`.
+    """A target as a pose ``(4, 4)``, and how rounded it is: 0.0 if it has a rotation, within
+    `TOLERANCES.rotation_matrix`.
 
+    For the task POSITION it may also be a point ``(3,)``. An `InputError` names `field`.
     With `always`, whatever is more than rounding of doubles counts: an arm with few joints meets few poses
     exactly, and the digits of a target decide which of them are meant.
     """
@@ -231,9 +228,27 @@ def read_pose(target: ArrayLike, code: int, field: str = "target", always: bool 
     return T, error
 
 
+def listed(targets: object) -> list[ArrayLike]:
+    """Several targets as a list; raises `InputError` for anything else, and for none."""
+    if isinstance(targets, np.ndarray):
+        targets = list(targets) if targets.ndim else None
+    if not isinstance(targets, Sequence) or isinstance(targets, str | bytes):
+        raise InputError("targets", targets, "a sequence of poses (k, 4, 4)")
+    if not targets:
+        raise InputError("targets", targets, "at least one pose")
+    return list(targets)
+
+
+def read_poses(targets: Sequence[ArrayLike], code: int, always: bool = False) -> list[tuple[Array, float]]:
+    """`read_pose` of each target; an `InputError` names ``targets[i]``."""
+    return [read_pose(target, code, f"targets[{i}]", always) for i, target in enumerate(targets)]
+
+
 def _nearest_pose(target: ArrayLike, field: str, always: bool) -> tuple[Array, float]:
     """A matrix that is nearly a pose ``(4, 4)`` as the nearest one, and how rounded it is."""
     T = finite_array(field, target, (4, 4))
+    if T.ndim > 2 and field == "target":
+        raise InputError(field, f"shape {T.shape}", "one 4×4 matrix; kin.solve_ik_many takes several")
     last = np.abs(T[3] - (0.0, 0.0, 0.0, 1.0)).max() if T.ndim == 2 else math.inf
     if last > TOLERANCES.rotation_matrix or np.abs(T).max() > FAR:
         return as_transform(T, field), 0.0

@@ -77,13 +77,17 @@ class IKSolution:
         return f"IKSolution([{q}], {self.branch!r}{compromise})"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class BlockedBranch:
     """A posture outside the joint limits: its branch, its configuration ``(n,)``, and what is outside."""
 
     branch: str
     q: Array
     violations: tuple[LimitViolation, ...]
+
+    def __repr__(self) -> str:
+        """The branch and the joints that are outside."""
+        return f"BlockedBranch({self.branch!r}, {', '.join(v.name for v in self.violations)})"
 
 
 @dataclass(slots=True, eq=False, repr=False)

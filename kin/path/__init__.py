@@ -29,7 +29,8 @@ from numpy.typing import ArrayLike
 
 from kin.errors import InputError
 from kin.ik.options import Frame, IKOptions, JointConstraints, Limits, Locks, Task, finite_number
-from kin.ik.problem import IKProblem, never_cancel, pose_of
+from kin.ik.problem import IKProblem, listed, never_cancel, read_poses
+from kin.named import robot_of
 from kin.path.details import JumpCause
 from kin.path.gaps import fill_gaps
 from kin.path.layers import layered
@@ -46,7 +47,7 @@ MAX_STEP = 0.5
 
 
 def solve_path(
-    robot: Robot,
+    robot: Robot | str,
     targets: Sequence[ArrayLike] | Array,
     *,
     task: Task = "pose",
@@ -56,6 +57,8 @@ def solve_path(
     limits: Limits | None = None,
     locked: Locks | None = None,
     branch: str | Sequence[str] | None = None,
+    position_tolerance: float | None = None,
+    rotation_tolerance: float | None = None,
     max_step: float = MAX_STEP,
     stop: Callable[[], None] = never_cancel,
 ) -> PathResult:
@@ -64,10 +67,10 @@ def solve_path(
     `kin.path.solve` takes the options as one value.
 
     Args:
-        robot: the arm.
+        robot: the arm, or the id of a built-in one.
         targets: T_base_tool ``(k, 4, 4)``, k ≥ 1; for ``task="position"`` also points ``(k, 3)`` in metres.
-        task, mask, mask_frame, limits, locked, branch: as in `kin.solve_ik`, for every waypoint; the branch
-            ``"seed"`` is that of `q_start`.
+        task, mask, mask_frame, limits, locked, branch, position_tolerance, rotation_tolerance: as in
+            `kin.solve_ik`, for every waypoint; the branch ``"seed"`` is that of `q_start`.
         q_start: ``(n,)`` where the arm is. The way from there to the first waypoint counts as motion, but never as
             a jump: the path begins at its first waypoint. Without it the path may start anywhere; of equally good
             paths, the one that starts nearest to the home pose is taken.
@@ -78,13 +81,19 @@ def solve_path(
         InputError: a malformed target (named ``targets[i]``) or option. An unreachable target is not an error.
     """
     options = IKOptions(
-        task=task, mask=mask, mask_frame=mask_frame, constraints=JointConstraints(limits, locked), branch=branch
+        task=task,
+        mask=mask,
+        mask_frame=mask_frame,
+        constraints=JointConstraints(limits, locked),
+        branch=branch,
+        position_tolerance=position_tolerance,
+        rotation_tolerance=rotation_tolerance,
     )
     return solve(robot, targets, options, q_start, max_step, stop)
 
 
 def solve(
-    robot: Robot,
+    robot: Robot | str,
     targets: Sequence[ArrayLike] | Array,
     options: IKOptions,
     q_start: ArrayLike | None = None,
@@ -96,13 +105,14 @@ def solve(
     Of the options, those that choose among the solutions of one target (`images`, `prefer`, `max_solutions`) have
     no effect: the path chooses.
     """
+    robot = robot_of(robot)
     if q_start is not None and robot.check_q(q_start, "q_start").ndim != 1:
         raise InputError("q_start", q_start, f"one configuration of {robot.n} values")
     problem = replace(IKProblem.of(robot, np.eye(4), options, q_start), stop=stop)
     step = _checked_step(max_step)
-    poses = _checked_targets(targets, problem.code)
+    poses = read_poses(listed(targets), problem.code, always=robot.n < 6)
     settings = PathSettings.of(problem, step, q_start is not None, len(poses))
-    waypoints = layered([replace(problem, T=T) for T in poses], settings.grid)
+    waypoints = layered([replace(problem, T=T, target_error=error) for T, error in poses], settings.grid)
     sequence = LayerSequence.of(settings, waypoints)
     q = np.full((len(waypoints), robot.n), math.nan)
     ends: list[DeadEnd] = []
@@ -118,14 +128,3 @@ def _checked_step(value: float) -> float:
     if number <= 0.0:
         raise InputError("max_step", value, expected)
     return number
-
-
-def _checked_targets(targets: object, code: int) -> list[Array]:
-    """Every target as a pose ``(4, 4)``."""
-    if isinstance(targets, np.ndarray):
-        targets = list(targets) if targets.ndim else None
-    if not isinstance(targets, Sequence) or isinstance(targets, str | bytes):
-        raise InputError("targets", targets, "a sequence of poses (k, 4, 4)")
-    if not targets:
-        raise InputError("targets", targets, "at least one pose")
-    return [pose_of(target, code, f"targets[{i}]") for i, target in enumerate(targets)]

@@ -36,6 +36,7 @@ def report(sequence: LayerSequence, waypoints: list[Waypoint], q: Array, ends: l
         if waypoint.gap or waypoint.relaxed
     )
     closed_form = settings.problem.closed_form
+    required = [waypoint.requested.requirement for waypoint in waypoints]
     position, rotation = stats[:, POSITION_ERROR].copy(), stats[:, ROTATION_ERROR].copy()
     for array in (q, position, rotation):
         array.flags.writeable = False
@@ -48,6 +49,8 @@ def report(sequence: LayerSequence, waypoints: list[Waypoint], q: Array, ends: l
         rotation_error=rotation,
         solver=closed_form.name if closed_form is not None and has_closed_form(settings.problem) else "numeric",
         largest_step=_largest_step(settings, q),
+        tolerances=(max(r.position for r in required), max(r.rotation for r in required)),
+        target_error=max(waypoint.requested.target_error for waypoint in waypoints),
     )
 
 

@@ -5,16 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from kin.ik.details import Details
-from kin.ik.messages import explain
+from kin.ik.messages import explain, rounded_target
 from kin.ik.results import Cause, Status
 from kin.path import messages
 from kin.path.details import JointMove, JumpCause, JumpDetails, Place
 from kin.solvers.singular import Singularity
+from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 from kin.units import DEFAULT_UNITS, Units
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class PathJump:
     """A step of the path that is not continuous.
 
@@ -38,6 +39,10 @@ class PathJump:
     place: Place
     details: JumpDetails
 
+    def __repr__(self) -> str:
+        """Where it is and why."""
+        return f"PathJump({self.index}, {self.cause}: {self.reason!r})"
+
     @property
     def reason(self) -> str:
         """The jump in a sentence, in degrees and millimetres."""
@@ -48,7 +53,7 @@ class PathJump:
         return messages.jump(self.index, self.joints, self.widest, self.place, self.details, units)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class PathGap:
     """A waypoint without an exact solution.
 
@@ -66,6 +71,10 @@ class PathGap:
     distance: float
     singularities: tuple[Singularity, ...] = ()
 
+    def __repr__(self) -> str:
+        """Where it is and why."""
+        return f"PathGap({self.index}, {self.status.value}: {self.reason!r})"
+
     @property
     def reason(self) -> str:
         """The gap in a sentence, in degrees and millimetres."""
@@ -76,7 +85,7 @@ class PathGap:
         return explain(self.details, self.cause, self.task, self.singularities, units).text
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class PathResult:
     """A joint path, one configuration per waypoint.
 
@@ -89,6 +98,8 @@ class PathResult:
         position_error, rotation_error: ``(k,)``, measured by forward kinematics, as in `kin.IKSolution`.
         solver: name of the closed form, ``"numeric"`` if the arm has none for this task.
         largest_step: the largest motion of a joint between neighbours; None for a single waypoint.
+        tolerances: errors that count as none, metres and radians; the largest of all waypoints.
+        target_error: how rounded the most rounded target is, as in `kin.IKResult`; 0 if none is.
     """
 
     q: Array
@@ -99,6 +110,14 @@ class PathResult:
     rotation_error: Array
     solver: str
     largest_step: JointMove | None
+    tolerances: tuple[float, float] = (TOLERANCES.closure_position, TOLERANCES.closure_rotation)
+    target_error: float = 0.0
+
+    def __repr__(self) -> str:
+        """Number of waypoints, jumps and gaps, solver and reason: arrays are in the attributes."""
+        counts = (len(self.q), "waypoint"), (len(self.jumps), "jump"), (len(self.gaps), "gap")
+        parts = ", ".join(f"{count} {noun}{'s' * (count != 1)}" for count, noun in counts)
+        return f"PathResult({parts}, {self.solver}: {self.reason!r})"
 
     @property
     def reason(self) -> str:
@@ -109,4 +128,7 @@ class PathResult:
         """The whole path in a sentence, in any units."""
         jumps = [(jump.index, jump.cause) for jump in self.jumps]
         gaps = [gap.index for gap in self.gaps]
-        return messages.summary(len(self.q), self.largest_step, jumps, gaps, units)
+        text = messages.summary(len(self.q), self.largest_step, jumps, gaps, units)
+        if not self.target_error:
+            return text
+        return f"{text} {rounded_target(self.target_error, self.tolerances, units, path=True)}"

@@ -9,6 +9,7 @@ import numpy as np
 from kin.errors import InputError
 from kin.ik.options import FREE, JointConstraints, Limits, Locks
 from kin.ik.problem import never_cancel
+from kin.named import robot_of
 from kin.robot import Robot
 from kin.solvers.common import TURN
 from kin.workspace.region import Region, checked_integer
@@ -18,7 +19,7 @@ from kin.workspace.volume import from_probes, from_section
 
 
 def workspace_facts(
-    robot: Robot,
+    robot: Robot | str,
     *,
     limits: Limits | None = None,
     locked: Locks | None = None,
@@ -30,7 +31,7 @@ def workspace_facts(
     """Bounding box, reach, holes, volume and surface of the points the tool reaches.
 
     Args:
-        robot: the arm.
+        robot: the arm, or the id of a built-in one.
         limits, locked: as in `kin.solve_ik`.
         constraints: both as one value, instead of `limits` and `locked`.
         effort: 2 to 64: points tried per cube, or the resolution of the section in steps of 24 squares. The error
@@ -41,7 +42,7 @@ def workspace_facts(
     Raises:
         InputError: naming the wrong argument, or a joint that slides without limits.
     """
-    constraints = JointConstraints.of(limits, locked, constraints)
+    robot, constraints = robot_of(robot), JointConstraints.of(limits, locked, constraints)
     endless = slides_without_end(robot, constraints)
     if endless:
         name = robot.joints[endless[0]].name

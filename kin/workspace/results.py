@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from kin.transforms import Array
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class WorkspaceChunk:
     """A slice of a cloud of tool points.
 
@@ -33,14 +33,24 @@ class WorkspaceChunk:
     done: int
     total: int
 
+    def __repr__(self) -> str:
+        """Which points of the cloud, and what is known of them."""
+        known = ", ".join(["points", *(["q"] if self.q is not None else []), *self.measures])
+        return f"WorkspaceChunk({self.start} to {self.done} of {self.total}: {known})"
 
-@dataclass(frozen=True, slots=True, eq=False)
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Extreme:
     """The least or largest value of a coordinate or distance (m), with its configuration ``(n,)`` and point."""
 
     value: float
     q: Array
     point: Array
+
+    def __repr__(self) -> str:
+        """The value, and the configuration with six digits."""
+        q = ", ".join(f"{value:.6g}" for value in self.q.tolist())
+        return f"Extreme({self.value:.6g} m at [{q}])"
 
 
 class Span(NamedTuple):
@@ -59,7 +69,7 @@ class Estimate:
     method: str
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class WorkspaceFacts:
     """Sizes of the set of points the tool reaches inside the limits; metres, base frame.
 
@@ -84,8 +94,16 @@ class WorkspaceFacts:
     volume: Estimate | None
     surface: Estimate | None
 
+    def __repr__(self) -> str:
+        """The sizes without their configurations."""
+        spans = [("x", self.x), ("y", self.y), ("z", self.z), ("radius", self.radius), ("reach", self.reach)]
+        parts = [f"{name} {span.least.value:.6g} to {span.largest.value:.6g} m" for name, span in spans]
+        sizes = [("volume", self.volume, "m³"), ("surface", self.surface, "m²")]
+        parts += [f"{name} {size.value:.4g} {unit}" for name, size, unit in sizes if size is not None]
+        return f"WorkspaceFacts({', '.join(parts)})"
 
-@dataclass(frozen=True, slots=True, eq=False)
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class SectionArc:
     """Part of a section's boundary that one joint traces while the others stand still, mostly at limits.
 
@@ -105,8 +123,12 @@ class SectionArc:
     centre: tuple[float, float] | None
     radius: float | None
 
+    def __repr__(self) -> str:
+        """The joint that moves, and from where to where."""
+        return f"SectionArc(joint {self.joint}, {self.start:.6g} to {self.stop:.6g}, {len(self.points)} points)"
 
-@dataclass(frozen=True, slots=True, eq=False)
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Section:
     """A cut through the workspace.
 
@@ -129,3 +151,8 @@ class Section:
     area: float
     step: float
     signed: bool = False
+
+    def __repr__(self) -> str:
+        """Numbers of curves and arcs, and the area."""
+        curves, arcs = len(self.curves), len(self.arcs)
+        return f"Section({curves} curve{'s' * (curves != 1)}, {arcs} arc{'s' * (arcs != 1)}, {self.area:.4g} m²)"

@@ -17,7 +17,7 @@ from app.shared.answers.details import (
     violation_answer,
 )
 from app.shared.answers.document import documented
-from kin import BlockedBranch, IKResult, IKSolution, Status
+from kin import BlockedBranch, IKResult, IKSolution, PathResult, Status
 from kin.ik.results import Cause
 from kin.tolerances import TOLERANCES
 
@@ -140,10 +140,18 @@ def ik_answer(result: IKResult) -> IkAnswer:
         "redundancy": [redundancy_answer(each) for each in result.redundancy],
         "singularities": [singularity_answer(each) for each in result.singularities],
     }
-    position, rotation = result.tolerances
-    if result.target_error or result.tolerances != EXACT:
-        answer["tolerances"] = {"position": position, "rotation": rotation, "target_error": result.target_error}
+    tolerances = tolerances_answer(result)
+    if tolerances is not None:
+        answer["tolerances"] = tolerances
     return answer
+
+
+def tolerances_answer(result: IKResult | PathResult) -> Tolerances | None:
+    """The tolerances of a result, None if they are the usual ones."""
+    if not result.target_error and result.tolerances == EXACT:
+        return None
+    position, rotation = result.tolerances
+    return {"position": position, "rotation": rotation, "target_error": result.target_error}
 
 
 def _solution(solution: IKSolution) -> Solution:

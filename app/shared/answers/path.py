@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal, cast
+from typing import Literal, NotRequired, cast
 
 from typing_extensions import TypedDict
 
 from app.shared.answers.details import IkDetails, JumpDetailsAnswer, details_answer, jump_details_answer
 from app.shared.answers.document import documented
 from app.shared.answers.fk import Matrix
+from app.shared.answers.ik import Tolerances, tolerances_answer
 from kin import PathResult
 from kin.ik.results import Cause
 
@@ -71,11 +72,13 @@ class PathAnswer(TypedDict):
     """Name of the method that answered."""
     reason: str
     """The whole in a sentence for people."""
+    tolerances: NotRequired[Tolerances]
+    """The errors that count as none, if they are not 1e-9; the largest ones of all waypoints."""
 
 
 def path_answer(result: PathResult) -> PathAnswer:
     """One result of `kin.solve_path`."""
-    return {
+    answer: PathAnswer = {
         "q": result.q.tolist(),
         "continuous": result.continuous,
         "jumps": [
@@ -105,3 +108,7 @@ def path_answer(result: PathResult) -> PathAnswer:
         "solver": result.solver,
         "reason": result.reason,
     }
+    tolerances = tolerances_answer(result)
+    if tolerances is not None:
+        answer["tolerances"] = tolerances
+    return answer

@@ -13,6 +13,7 @@ from kin.axes import screw_x, screw_z
 from kin.errors import InputError
 from kin.files.urdf.names import unused
 from kin.files.write import rpy_of
+from kin.named import robot_of
 from kin.robot import Joint, Robot
 from kin.transforms import Array
 
@@ -21,7 +22,7 @@ _LONGEST = 180  # characters of a name, without its number; the reader takes 200
 _UNFIT = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-def to_urdf(robot: Robot) -> str:
+def to_urdf(robot: Robot | str) -> str:
     """The arm as a URDF without bodies: links ``base``, one per row, and ``tool``.
 
     A velocity or effort that is not known is written as 0.
@@ -29,6 +30,7 @@ def to_urdf(robot: Robot) -> str:
     Raises:
         InputError: a slide without limits, which URDF cannot describe.
     """
+    robot = robot_of(robot)
     lines = ['<?xml version="1.0" encoding="utf-8"?>', f"<robot name={_quoted(robot.id)}>"]
     names = _distinct([row.name for row in robot.rows])
     links = ["base", *(f"link_{k + 1}" for k in range(len(robot.rows))), "tool"]

@@ -89,10 +89,11 @@ def explain(
     return Explanation(_title(details, headline, units), headline, body, note)
 
 
-def rounded_target(error: float, tolerances: tuple[float, float], units: Units) -> str:
-    """A sentence about a target whose rotation had to be made one."""
+def rounded_target(error: float, tolerances: tuple[float, float], units: Units, path: bool = False) -> str:
+    """A sentence about a target whose rotation had to be made one, or about the most rounded target of a path."""
     position, rotation = units.lengths.value(tolerances[0]), units.angles.value(tolerances[1])
-    return f"The target is rounded (by {error:.1g}): met to within {position} and {rotation}."
+    which = "Targets are rounded (by up to" if path else "The target is rounded (by"
+    return f"{which} {error:.1g}): met to within {position} and {rotation}."
 
 
 def _title(details: Details, headline: str, units: Units) -> str:

@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from kin.errors import InputError
 from kin.fk import manipulability
 from kin.ik.options import JointConstraints, Limits, Locks, finite_number
+from kin.named import robot_of
 from kin.robot import Robot
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -45,7 +46,7 @@ MOST = 1 << 24  # voxels of a grid
 _TARGETS = 1 << 14  # of a block, about
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class CapabilityGrid:
     """The voxels and directions of a map: plain data, equal and hashable by value, can be sent to another process.
 
@@ -64,6 +65,11 @@ class CapabilityGrid:
     voxel: float
     shape: tuple[int, int, int]
     count: int
+
+    def __repr__(self) -> str:
+        """The arm, the voxels and the number of directions."""
+        shape = " × ".join(map(str, self.shape))
+        return f"CapabilityGrid({self.robot.id!r}, {shape} voxels of {self.voxel:.4g} m, {self.count} directions)"
 
     def __getstate__(self) -> dict[str, object]:
         """The fields alone: the cached list of blocks is not sent along."""
@@ -94,7 +100,7 @@ class CapabilityGrid:
         return np.asarray(np.array(self.origin) + (index + 0.5) * self.voxel)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class CapabilityBlock:
     """The reachable voxels of one block.
 
@@ -110,8 +116,12 @@ class CapabilityBlock:
     approachable: NDArray[np.bool_]
     manipulability: NDArray[np.float32]
 
+    def __repr__(self) -> str:
+        """Its index, and how many of its voxels can be reached."""
+        return f"CapabilityBlock({self.block}, {len(self.numbers)} voxels)"
 
-@dataclass(frozen=True, slots=True, eq=False)
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class CapabilityMap:
     """The reachable voxels of a grid and their values; flat arrays, read-only.
 
@@ -133,9 +143,13 @@ class CapabilityMap:
     manipulability: NDArray[np.float32]
     volume: float
 
+    def __repr__(self) -> str:
+        """The grid, and how much of it can be reached."""
+        return f"CapabilityMap({len(self.index)} voxels, {self.volume:.4g} m³, of {self.grid!r})"
+
 
 def capability_grid(
-    robot: Robot,
+    robot: Robot | str,
     *,
     voxel: float | None = None,
     resolution: int = 25,
@@ -147,7 +161,7 @@ def capability_grid(
     """The grid over the bounding box of the points the tool reaches.
 
     Args:
-        robot: the arm.
+        robot: the arm, or the id of a built-in one.
         voxel: side of a voxel in metres; None to derive it from `resolution`.
         resolution: voxels along the longest side of the box, 1 to 256.
         limits, locked: as in `kin.solve_ik`.
@@ -158,7 +172,7 @@ def capability_grid(
         InputError: naming the wrong argument; also a voxel so small that there would be more than 2²⁴.
     """
     spherical_design(directions)
-    allowed = JointConstraints.of(limits, locked, constraints)
+    robot, allowed = robot_of(robot), JointConstraints.of(limits, locked, constraints)
     lower, upper, _ = allowed.bounds(robot)
     bounds = tuple(zip(lower.tolist(), upper.tolist(), strict=True))
     count = checked_integer("resolution", resolution, 1, 256, "a whole number from 1 to 256")
@@ -224,7 +238,7 @@ def capability_join(grid: CapabilityGrid, blocks: Iterable[CapabilityBlock]) -> 
 
 
 def capability_map(
-    robot: Robot,
+    robot: Robot | str,
     *,
     voxel: float | None = None,
     resolution: int = 25,

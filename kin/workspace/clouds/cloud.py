@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from kin.errors import InputError
 from kin.fk import fk_positions
 from kin.ik.options import JointConstraints, Limits, Locks
+from kin.named import robot_of
 from kin.robot import Robot
 from kin.transforms import Array
 from kin.workspace.clouds.measures import Measure, measure_names, measured
@@ -33,7 +34,7 @@ MOST = 1 << 53  # indices up to here are whole numbers everywhere, in JSON too
 
 
 def sample_workspace(
-    robot: Robot,
+    robot: Robot | str,
     n: int,
     *,
     seed: int = 0,
@@ -48,7 +49,7 @@ def sample_workspace(
     """A cloud of n points that the tool reaches, in chunks.
 
     Args:
-        robot: the arm.
+        robot: the arm, or the id of a built-in one.
         n: how many points, up to 2⁵³.
         seed: a whole number from 0; another seed gives another cloud.
         strategy: ``"uniform"``: each joint evenly between its limits, pseudo-random; ``"quasi"``: the same, spread
@@ -67,7 +68,7 @@ def sample_workspace(
     """
     total = _count("n", n)
     size = _count("chunk", chunk)
-    samples = _Samples.of(robot, seed, strategy, JointConstraints.of(limits, locked, constraints))
+    samples = _Samples.of(robot_of(robot), seed, strategy, JointConstraints.of(limits, locked, constraints))
     names = measure_names(measure)
     return (
         samples.slice(start, min(start + size, total), total, names, with_q) for start in range(0, total, size)
@@ -75,7 +76,7 @@ def sample_workspace(
 
 
 def workspace_slice(
-    robot: Robot,
+    robot: Robot | str,
     n: int,
     start: int,
     stop: int,
@@ -95,12 +96,12 @@ def workspace_slice(
     total = _count("n", n)
     first = checked_integer("start", start, 0, total - 1, f"a whole number from 0 to {total - 1}")
     last = checked_integer("stop", stop, first + 1, total, f"a whole number from {first + 1} to {total}")
-    samples = _Samples.of(robot, seed, strategy, JointConstraints.of(limits, locked, constraints))
+    samples = _Samples.of(robot_of(robot), seed, strategy, JointConstraints.of(limits, locked, constraints))
     return samples.slice(first, last, total, measure_names(measure), with_q)
 
 
 def configuration_at(
-    robot: Robot,
+    robot: Robot | str,
     index: ArrayLike,
     *,
     seed: int = 0,
@@ -114,6 +115,7 @@ def configuration_at(
     Raises:
         InputError: naming the wrong argument.
     """
+    robot = robot_of(robot)
     samples = _Samples.of(robot, seed, strategy, JointConstraints.of(limits, locked, constraints))
     try:
         indices = np.asarray(index)

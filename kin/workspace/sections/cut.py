@@ -24,6 +24,7 @@ from kin.errors import InputError
 from kin.fk import fk_positions
 from kin.ik.options import JointConstraints, Limits, Locks
 from kin.ik.problem import never_cancel
+from kin.named import robot_of
 from kin.robot import Robot
 from kin.transforms import Array, finite_array
 from kin.workspace.region import Region, checked_integer
@@ -43,7 +44,7 @@ ALIKE = 3
 
 
 def section(
-    robot: Robot,
+    robot: Robot | str,
     plane: tuple[ArrayLike, ArrayLike] | None = None,
     *,
     limits: Limits | None = None,
@@ -56,7 +57,7 @@ def section(
     """The cut of the workspace with a plane, and its boundary.
 
     Args:
-        robot: the arm.
+        robot: the arm, or the id of a built-in one.
         plane: a point (m) and a normal of it; None for the (r, z) section of an arm whose joint 1 is revolute.
         limits, locked: as in `kin.solve_ik`. An (r, z) section ignores those of joint 1.
         constraints: both as one value, instead of `limits` and `locked`.
@@ -68,11 +69,11 @@ def section(
     Raises:
         InputError: naming the wrong argument.
     """
-    region = Region.of(robot, JointConstraints.of(limits, locked, constraints))
+    region = Region.of(robot_of(robot), JointConstraints.of(limits, locked, constraints))
     count = checked_integer("resolution", resolution, 8, 1000, "a whole number from 8 to 1000")
     if plane is None:
-        if robot.joints[0].kind != "revolute":
-            raise InputError("plane", None, f"a point and a normal: joint 1 of {robot.id} slides")
+        if region.robot.joints[0].kind != "revolute":
+            raise InputError("plane", None, f"a point and a normal: joint 1 of {region.robot.id} slides")
         return profile(region, count, signed, stop)
     if not isinstance(plane, Sequence) or len(plane) != 2:
         raise InputError("plane", plane, "a point and a normal, three numbers each")

@@ -167,3 +167,17 @@ def test_a_matrix_of_few_digits_is_met_as_closely_as_it_says(client):
     scaled = T.copy()
     scaled[:3, :3] *= 1.1
     post(client, robot, "ik", target={"matrix": scaled.tolist()}, status=422)
+
+
+def test_a_path_of_rounded_matrices_is_met_as_closely_as_they_say(client):
+    robot = kin.get_robot("pioneer5")
+    line = kin.fk(robot, np.linspace(robot.q_home, robot.clip(robot.q_home + 0.1), 4))
+    answer = post(client, robot, "ik/path", targets=[{"matrix": T.round(4).tolist()} for T in line])
+    assert answer["gaps"] == []
+    assert answer["tolerances"]["target_error"] >= 1e-4
+    assert "Targets are rounded" in answer["reason"]
+    exact = [{"matrix": T.tolist()} for T in line]
+    assert "tolerances" not in post(client, robot, "ik/path", targets=exact)
+    asked = post(client, robot, "ik/path", targets=exact, position_tolerance=1e-3, rotation_tolerance=0.01)
+    assert asked["tolerances"] == {"position": 1e-3, "rotation": 0.01, "target_error": 0.0}
+    post(client, robot, "ik/path", targets=exact, rotation_tolerance=1.0, status=422)

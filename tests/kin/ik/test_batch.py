@@ -350,3 +350,66 @@ def test_sine_and_cosine_of_nan_are_nan():
     many_sin_cos(x, s, c)
     assert np.isnan(s).all()
     assert np.isnan(c).all()
+
+
+# -- solve_ik_many -----------------------------------------------------------------------------------------------
+
+
+def test_a_stack_of_targets_has_the_answers_of_each():
+    robot = kin.get_robot("pioneer5")
+    T = targets(robot, 6)
+    T[2, :3, 3] = 9.0
+    T[4] = T[4].round(3)
+    seeds = robot.random_q(np.random.default_rng(5), 6)
+    found = kin.solve_ik_many(robot, T, q_seed=seeds, images="all", limits=[None] * 4 + [(0.3, 0.7)])
+    assert len(found) == 6
+    assert found.q.shape == (6, 5)
+    alone = [
+        kin.solve_ik(robot, each, q_seed=seed, images="all", limits=[None] * 4 + [(0.3, 0.7)])
+        for each, seed in zip(T, seeds, strict=True)
+    ]
+    assert list(map(repr, found)) == list(map(repr, alone))
+    assert found[4].target_error > 0.0
+    for i, result in enumerate(alone):
+        assert found.status[i] is result.status
+        assert found.solved[i] == (result.status is kin.Status.SOLVED)
+        expected = result.solutions[0].q if found.solved[i] else np.full(5, math.nan)
+        assert np.array_equal(found.q[i], expected, equal_nan=True)
+    assert not found.solved[2]
+    assert found.solved.sum() >= 2
+    assert [type(part) for part in found[1:3]] == [kin.IKResult] * 2
+    assert repr(found).startswith("IKResults(6 targets: ")
+    with pytest.raises(ValueError, match="read-only"):
+        found.q[0] = 0.0
+
+
+def test_one_seed_is_the_seed_of_all_targets_and_points_are_targets_too():
+    T = targets(kin.get_robot("ur5"), 3)
+    seed = np.full(6, 0.5)
+    found = kin.solve_ik_many("ur5", list(T), q_seed=seed)
+    assert list(map(repr, found)) == [repr(kin.solve_ik("ur5", each, q_seed=seed)) for each in T]
+    points = kin.solve_ik_many("ur5", T[:, :3, 3], task="position")
+    assert points.solved.all()
+
+
+@pytest.mark.parametrize(
+    ("given", "more", "message"),
+    [
+        (np.eye(4), {}, r"targets\[0\]: got 'shape \(4,\)'"),
+        ([], {}, "targets: got .*at least one pose"),
+        ("poses", {}, "targets: .*a sequence of poses"),
+        ([np.eye(4), np.eye(3)], {}, r"targets\[1\]"),
+        ([np.eye(4)] * 2, {"q_seed": np.zeros((3, 6))}, "q_seed: .*one for each of the 2 targets"),
+        ([np.eye(4)], {"task": "place"}, "task: "),
+        ([np.eye(4)], {"task": []}, "task: "),
+        ([np.eye(4)], {"locked": [0.0]}, "locked: "),
+    ],
+)
+def test_a_malformed_stack_is_refused_by_name(given, more, message):
+    with pytest.raises(InputError, match=message):
+        kin.solve_ik_many("ur5", given, **more)
+
+
+def test_a_stack_given_to_solve_ik_is_refused_with_what_takes_it():
+    with pytest.raises(InputError, match=r"kin\.solve_ik_many takes several"):
+        kin.solve_ik("ur5", targets(kin.get_robot("ur5"), 2))

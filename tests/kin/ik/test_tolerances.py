@@ -102,3 +102,45 @@ def test_the_last_row_of_a_target_is_checked_whatever_its_rotation(stretch, last
     T[3] = last
     with pytest.raises(kin.InputError, match=r"target\[3\]"):
         kin.solve_ik(kin.get_robot("ur5"), T)
+
+
+# -- paths -------------------------------------------------------------------------------------------------------
+
+
+def straight(robot, count=9):
+    q = np.linspace(robot.q_home, robot.clip(robot.q_home + 0.2), count)
+    return kin.fk(robot, q)
+
+
+@pytest.mark.parametrize("name", ["pioneer5", "ur5", "scara"])
+@pytest.mark.parametrize("digits", [4, "float32"])
+def test_a_path_of_rounded_targets_has_no_gaps(name, digits):
+    robot = kin.get_robot(name)
+    line = straight(robot)
+    rounded = line.astype(np.float32) if digits == "float32" else line.round(digits)
+    path = kin.solve_path(robot, rounded, q_start=robot.q_home)
+    assert (path.gaps, path.jumps) == ((), ())
+    assert (path.position_error <= path.tolerances[0]).all()
+    assert (path.rotation_error <= path.tolerances[1]).all()
+    if digits == 4:
+        assert 1e-6 < path.target_error < 1e-3
+        assert "Targets are rounded" in path.reason
+    exact = kin.solve_path(robot, line, q_start=robot.q_home)
+    assert (exact.target_error, exact.tolerances) == (0.0, EXACT)
+    assert "rounded" not in exact.reason
+
+
+def test_a_path_meets_its_targets_within_the_tolerances_that_were_requested():
+    robot = kin.get_robot("pioneer5")
+    line = straight(robot)
+    c, s = np.cos(1e-4), np.sin(1e-4)
+    line[3, :3, :3] = line[3, :3, :3] @ np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    line[3, :3, 3] += 1e-5
+    strict = kin.solve_path(robot, line, q_start=robot.q_home)
+    assert [gap.index for gap in strict.gaps] == [3]
+    loose = kin.solve_path(robot, line, q_start=robot.q_home, position_tolerance=1e-3, rotation_tolerance=1e-2)
+    assert loose.gaps == ()
+    assert loose.tolerances == (1e-3, 1e-2)
+    assert loose.rotation_error[3] > 1e-9
+    with pytest.raises(InputError, match="position_tolerance"):
+        kin.solve_path(robot, line, position_tolerance=0.0)

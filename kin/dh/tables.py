@@ -23,6 +23,7 @@ import numpy as np
 from kin.axes import screw_x
 from kin.errors import InputError
 from kin.fk import fk
+from kin.named import robot_of
 from kin.robot import CONVENTIONS, IDENTITY, Convention, Joint, Matrix, Robot
 from kin.transforms import Array
 
@@ -32,7 +33,7 @@ PARALLEL = 2e-14  # radians: a tilt this small is dropped
 SAMPLES = 256
 
 
-def convert(robot: Robot, convention: Convention) -> Robot:
+def convert(robot: Robot | str, convention: Convention) -> Robot:
     """The same arm as a table in this convention: the same joints, limits and tool poses.
 
     Raises:
@@ -40,6 +41,7 @@ def convert(robot: Robot, convention: Convention) -> Robot:
     """
     if convention not in CONVENTIONS:
         raise InputError("convention", convention, "one of " + ", ".join(CONVENTIONS))
+    robot = robot_of(robot)
     if robot.convention == convention:
         return robot
     offsets = [(row.a, row.alpha) for row in robot.rows]

@@ -1,0 +1,124 @@
+"""Arms as products of exponentials, ``T(q) = exp([S₁] q₁) … exp([Sₙ] qₙ) M`` (Lynch and Park, Modern Robotics).
+
+A screw ``S = (ω, v)`` is the twist of the whole space, seen from the base frame, when its joint moves at 1 rad/s
+or 1 m/s and the others stand still at zero: ω is the direction of the axis and v the velocity of the point at the
+base's origin, ``v = p × ω`` for a point p of the axis. A prismatic joint has ω = 0, and v is its direction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kin.axes import frame_of, inverse, perpendicular_to
+from kin.dh.tables import convert, table_of_chain
+from kin.errors import InputError
+from kin.fk import fk, jacobian
+from kin.named import robot_of
+from kin.robot import DEFAULT_LIMITS, Convention, Joint, Kind, Robot
+from kin.transforms import Array, as_transform, finite_array
+
+_ROUNDED = 1e-6  # deviation from a unit vector, or pitch in metres, that is taken as rounding
+
+
+class Screws(NamedTuple):
+    """An arm as a product of exponentials.
+
+    Attributes:
+        S: ``(6, n)`` screws in the base frame, one column (ω, v) per moving joint.
+        M: ``(4, 4)`` pose of the tool where all joints of the formula are zero.
+    """
+
+    S: Array
+    M: Array
+
+
+def screws(robot: Robot | str, q: ArrayLike | None = None) -> Screws:
+    """The arm as a product of exponentials.
+
+    Args:
+        robot: the arm, or the id of a built-in one.
+        q: ``(n,)`` the configuration at which the joints of the formula are zero; by default q = 0, so that they
+            are the joints of the arm.
+
+    Raises:
+        InputError: q is not one configuration.
+    """
+    robot = robot_of(robot)
+    zero = robot.check_q(np.zeros(robot.n) if q is None else q)
+    if zero.ndim != 1:
+        raise InputError("q", f"shape {zero.shape}", f"one configuration of {robot.n} values")
+    J, M = jacobian(robot, zero), fk(robot, zero)
+    omega = np.where(robot.revolute, J[3:], 0.0)
+    return Screws(np.concatenate([omega, J[:3] + np.cross(M[:3, 3], omega, axisb=0, axisc=0)]) + 0.0, M)
+
+
+def robot_from_screws(
+    S: ArrayLike,
+    M: ArrayLike,
+    *,
+    limits: Sequence[tuple[float, float] | None] | None = None,
+    names: Sequence[str] | None = None,
+    home: Iterable[float] | None = None,
+    convention: Convention = "standard",
+    robot_id: str = "arm",
+    name: str = "Arm",
+    source: str = "screws in Python",
+) -> Robot:
+    """An arm from its screws and its tool pose at zero, with the same joint values.
+
+    Args:
+        S: ``(6, n)`` one column (ω, v) per joint, in the base frame: |ω| = 1 for a revolute joint; ω = 0 and
+            |v| = 1 for a prismatic one.
+        M: ``(4, 4)`` pose of the tool at q = 0.
+        limits: per joint (lower, upper), None for a revolute joint without limits. By default a revolute joint
+            turns ±π and a prismatic one slides 0 to 1 m.
+        names: of the joints.
+        home: one value per joint; by default the middle of the limits.
+        convention: of the DH table that the robot gets.
+        robot_id, name, source: as in a robot file.
+
+    Raises:
+        InputError: a column that is no unit screw, or one with a pitch; a malformed argument.
+    """
+    columns = finite_array("S", S, (6, None))
+    n = columns.shape[-1]
+    if columns.ndim != 2 or n == 0:
+        raise InputError("S", f"shape {columns.shape}", "one column of six numbers (ω, v) per joint")
+    tool = as_transform(M, "M")
+    given = (("limits", limits), ("names", names))
+    for field, values in given:
+        if values is not None and len(values) != n:
+            raise InputError(field, values, f"{n} values, one per joint")
+    joints, frames = [], []
+    for i, column in enumerate(columns.T):
+        kind, frame = _axis(column, f"S[:, {i}]")
+        bounds = DEFAULT_LIMITS[kind] if limits is None else limits[i]
+        joints.append(Joint(f"joint {i + 1}" if names is None else names[i], kind=kind, limits=bounds))
+        frames.append(frame)
+    chain = [np.eye(4), *frames, tool]
+    table = table_of_chain(joints, [inverse(a) @ b for a, b in pairwise(chain)])
+    robot = Robot.from_dh(
+        table.rows, robot_id=robot_id, name=name, source=source, home=home, base=table.base, tool=table.tool
+    )
+    return convert(robot, convention)
+
+
+def _axis(column: Array, field: str) -> tuple[Kind, Array]:
+    """The kind of a joint, and a frame ``(4, 4)`` in the base frame whose z axis is the joint's."""
+    omega, v = column[:3], column[3:]
+    size, speed = float(np.linalg.norm(omega)), float(np.linalg.norm(v))
+    slides = size <= _ROUNDED and abs(speed - 1.0) <= _ROUNDED
+    if not slides and abs(size - 1.0) > _ROUNDED:
+        raise InputError(field, column.tolist(), "|ω| = 1 (revolute), or ω = 0 and |v| = 1 (prismatic)")
+    if slides:
+        z = v / speed
+        return "prismatic", frame_of(perpendicular_to(z), z, np.zeros(3))
+    z = omega / size
+    if abs(float(z @ v)) > _ROUNDED * max(1.0, speed):
+        raise InputError(field, column.tolist(), "v perpendicular to ω: a joint has no pitch")
+    return "revolute", frame_of(perpendicular_to(z), z, np.cross(z, v / size))

@@ -1,0 +1,120 @@
+"""Arms as products of exponentials."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from arms import Draw
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import kin
+from kin import InputError
+from kin.axes import inverse
+
+
+def exponential(S, value):
+    """exp([S] value) by its series: independent of Rodrigues' formula and of DH rows."""
+    w, v = S[:3], S[3:]
+    A = np.zeros((4, 4))
+    A[:3, :3] = [[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]]
+    A[:3, 3] = v
+    T, term = np.eye(4), np.eye(4)
+    for k in range(1, 40):
+        term = term @ A * (value / k)
+        T = T + term
+    return T
+
+
+def product(S, M, q):
+    T = np.eye(4)
+    for column, value in zip(S.T, q, strict=True):
+        T = T @ exponential(column, value)
+    return T @ M
+
+
+@pytest.mark.parametrize("robot", kin.builtin_robots().values(), ids=lambda robot: robot.id)
+def test_the_formula_is_the_arm_and_comes_back(robot):
+    rng = np.random.default_rng(1)
+    S, M = kin.screws(robot)
+    for q in robot.random_q(rng, 4):
+        assert np.allclose(product(S, M, q), kin.fk(robot, q), atol=1e-13)
+    zero = robot.random_q(rng)
+    there = kin.screws(robot, zero)
+    assert np.allclose(product(*there, robot.q_home - zero), kin.fk(robot, robot.q_home), atol=1e-13)
+    limits = [joint.limits for joint in robot.joints]
+    for convention in ("standard", "modified"):
+        back = kin.robot_from_screws(S, M, limits=limits, home=robot.home, convention=convention)
+        assert back.convention == convention
+        assert [j.kind for j in back.joints] == [j.kind for j in robot.joints]
+        assert (back.lower.tolist(), back.home) == (robot.lower.tolist(), robot.home)
+        q = robot.random_q(rng, 100)
+        assert np.abs(kin.fk(back, q) - kin.fk(robot, q)).max() < 1e-13
+        again = kin.screws(back)
+        assert max(np.abs(again.S - S).max(), np.abs(again.M - M).max()) < 1e-13
+
+
+def random_screws(seed):
+    draw = Draw(seed)
+    columns = []
+    for _ in range(int(draw.rng.integers(1, 8))):
+        direction = draw.rng.normal(size=3)
+        direction /= np.linalg.norm(direction)
+        if draw.rng.random() < 0.25:
+            columns.append([0, 0, 0, *direction])
+        else:
+            columns.append([*direction, *np.cross(draw.rng.normal(size=3), direction)])
+    return np.array(columns).T, np.array(draw.pose())
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_any_screws_become_an_arm_with_these_screws(seed):
+    S, M = random_screws(seed)
+    arm = kin.robot_from_screws(S, M)
+    found = kin.screws(arm)
+    assert np.abs(found.S - S).max() < 1e-11
+    assert np.abs(found.M - M).max() < 1e-11
+    q = arm.random_q(np.random.default_rng(0))
+    assert np.allclose(product(S, M, q), kin.fk(arm, q), atol=1e-11)
+    assert kin.robot_from_dict(kin.robot_to_dict(arm)) == arm
+
+
+def test_a_moved_base_moves_the_screws():
+    ur5 = kin.get_robot("ur5")
+    T = np.array(Draw(3).pose())
+    S, M = kin.screws(ur5)
+    moved = kin.screws(ur5.with_base(T))
+    assert np.allclose(moved.M, T @ M)
+    for one, other in zip(S.T, moved.S.T, strict=True):
+        assert np.allclose(exponential(other, 0.4), T @ exponential(one, 0.4) @ inverse(T), atol=1e-13)
+
+
+UNIT = np.array([[0, 0, 1, 0, 0, 0], [0, 0, 0, 1, 0, 0]]).T
+
+
+@pytest.mark.parametrize(
+    ("S", "more", "field"),
+    [
+        (UNIT * [2, 1], {}, r"S\[:, 0\]"),
+        (UNIT * [1, 0], {}, r"S\[:, 1\]"),
+        (UNIT + np.outer([0, 0, 0, 0, 0, 0.1], [1, 0]), {}, "pitch"),
+        (UNIT[:5], {}, r"^S: got 'shape \(5, 2\)'"),
+        (UNIT[:, 0], {}, "^S: got"),
+        (UNIT[:, :0], {}, "^S: got"),
+        (UNIT * np.nan, {}, "finite"),
+        (UNIT, {"limits": [None]}, "^limits: "),
+        (UNIT, {"names": ["one"]}, "^names: "),
+        (UNIT, {"home": [0.0]}, "^home: "),
+        (UNIT, {"convention": "craig"}, "^convention: "),
+        (UNIT, {"M": np.diag([1.0, 1.0, -1.0, 1.0])}, "^M rotation: "),
+    ],
+)
+def test_what_is_no_product_of_exponentials_is_refused(S, more, field):
+    with pytest.raises(InputError, match=field):
+        kin.robot_from_screws(S, more.pop("M", np.eye(4)), **more)
+
+
+def test_screws_are_those_of_one_configuration():
+    with pytest.raises(InputError, match=r"^q: "):
+        kin.screws("ur5", np.zeros((2, 6)))

@@ -1,0 +1,100 @@
+"""The id of a built-in robot in place of a robot, and results that print as one line."""
+
+from __future__ import annotations
+
+import inspect
+
+import numpy as np
+import pytest
+
+import kin
+from kin import InputError, UnknownRobotError
+
+UR5 = kin.get_robot("ur5")
+T = kin.fk(UR5, UR5.q_home)
+# The arguments after the robot of every public function that takes one.
+CALLS = {
+    "branch_meanings": (),
+    "branch_names": (),
+    "branch_of": (UR5.q_home,),
+    "capability_grid": (),
+    "capability_map": (),
+    "configuration_at": (3,),
+    "convert": ("modified",),
+    "fk": (UR5.q_home,),
+    "fk_positions": (UR5.q_home,),
+    "ik_branches": (T,),
+    "jacobian": (UR5.q_home,),
+    "link_frames": (UR5.q_home,),
+    "manipulability": (UR5.q_home,),
+    "robot_to_dict": (),
+    "robot_to_toml": (),
+    "sample_workspace": (8,),
+    "save_robot": (),
+    "screws": (),
+    "section": (),
+    "singularities": (UR5.q_home,),
+    "solve_ik": (T,),
+    "solve_ik_many": (T[None],),
+    "solve_path": (T[None],),
+    "to_urdf": (),
+    "workspace_facts": (),
+    "workspace_slice": (8, 0, 8),
+}
+MORE = {
+    "capability_grid": {"resolution": 4, "directions": 12},
+    "capability_map": {"resolution": 2, "directions": 12},
+    "section": {"resolution": 8},
+    "workspace_facts": {"volume": False},
+}
+
+
+def test_the_table_names_every_function_that_takes_a_robot():
+    functions = {name: value for name, value in vars(kin).items() if inspect.isfunction(value)}
+    taking = {name for name, value in functions.items() if "robot" in inspect.signature(value).parameters}
+    assert taking & set(kin.__all__) == set(CALLS)
+
+
+def found(name, robot, tmp_path):
+    arguments = CALLS[name]
+    if name == "save_robot":
+        arguments = (tmp_path / "robot.toml",)
+    result = getattr(kin, name)(robot, *arguments, **MORE.get(name, {}))
+    if name == "save_robot":
+        return arguments[0].read_text()
+    return repr(list(result) if name == "sample_workspace" else result)
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_the_id_of_a_robot_is_as_good_as_the_robot(name, tmp_path):
+    assert found(name, "ur5", tmp_path) == found(name, UR5, tmp_path)
+    with pytest.raises(UnknownRobotError, match="ur6"):
+        found(name, "ur6", tmp_path)
+    with pytest.raises(InputError, match=r"^robot: got 5, expected a Robot"):
+        found(name, 5, tmp_path)
+
+
+def test_results_print_as_one_line():
+    line = kin.fk(UR5, UR5.q_home + 0.01 * np.arange(5)[:, None])
+    far = line.copy()
+    far[2, :3, 3] = 5.0
+    path = kin.solve_path(UR5, far, max_step=0.05)
+    narrowed = kin.solve_ik("ur5", T, limits=[(0.0, 0.1)] + [None] * 5)
+    (chunk,) = kin.sample_workspace("ur5", 8, with_q=True, measure="limit_margin")
+    facts = kin.workspace_facts("ur5", volume=False)
+    section = kin.section("ur5", resolution=8)
+    grid = kin.capability_grid("ur5", resolution=2, directions=12)
+    block = kin.capability_block(grid, 0)
+    results = [
+        *(path, *path.gaps, *path.jumps, narrowed, *narrowed.blocked, chunk, facts, facts.x.least),
+        *(section, *section.arcs, grid, block, kin.capability_join(grid, [block])),
+        *(kin.solve_ik_many("ur5", far), kin.solve_ik("ur5", T).solutions[0]),
+    ]
+    assert path.gaps
+    assert path.jumps
+    assert narrowed.blocked
+    for result in results:
+        text = repr(result)
+        assert text.startswith(type(result).__name__)
+        assert "\n" not in text
+        assert len(text) < 330, text
