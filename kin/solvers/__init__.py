@@ -17,8 +17,10 @@ from kin.solvers import (
     general6,
     general7,
     offset7,
+    pair2,
     parallel5,
     parallel6,
+    planar4,
     scara4,
     slide6,
     srs7,
@@ -39,7 +41,12 @@ FAMILIES: tuple[Callable[[Robot], ClosedForm | None], ...] = (
     scara4.match,
 )
 # Families that read joints of either direction.
-UNDIRECTED: tuple[Callable[[Robot], ClosedForm | None], ...] = (parallel5.match, offset7.match)
+UNDIRECTED: tuple[Callable[[Robot], ClosedForm | None], ...] = (
+    parallel5.match,
+    offset7.match,
+    planar4.match,
+    pair2.match,
+)
 # Radians, shares of the arm's size.
 FAR = 2e-5
 # For arms that fit no family.

@@ -106,7 +106,7 @@ def match(robot: Robot) -> Scara4 | None:
 
 
 @jit
-def _held(params: Array, T: Array, task: int) -> tuple[float, float, float, float]:
+def held(params: Array, T: Array, task: int) -> tuple[float, float, float, float]:
     """(x, y, z, ψ) of a target in the canonical base: the tool's point, and its angle about the axes.
 
     Of all Rz(ψ) it is the one with the least angle to R Rtoolᵀ (largest trace); with an approach direction
@@ -158,7 +158,7 @@ def _branches(
     that is NaN, and out has one column more for it.
     """
     clear(out)
-    x, y, z, psi = _held(params, T, task)
+    x, y, z, psi = held(params, T, task)
     a, b, p, q = params[_A], params[_B], params[_TOOL_X], params[_TOOL_Y]
     if task == POSITION or (task == APPROACH and params[_UPRIGHT] != 0.0):
         box, angles = _box(params, near, lower, upper), np.empty(4)

@@ -267,7 +267,8 @@ def test_an_arm_in_use_can_be_copied(copy):
 
 
 def test_an_arm_without_a_closed_form_is_rejected():
-    slide = Robot("slide", "slide", "", "standard", (Joint("1", kind="prismatic", limits=(0.0, 1.0)),), (0.5,))
+    rows = tuple(Joint(name, kind="prismatic", limits=(0.0, 1.0)) for name in "12")
+    slide = Robot("slides", "slides", "", "standard", rows, (0.5, 0.5))
     with pytest.raises(InputError, match="robot"):
         kin.ik_branches(slide, np.eye(4))
 

@@ -77,6 +77,10 @@ ELBOW3 = arm("elbow3-like", (0, 0.3, 0.05, PI / 2), (0, 0.1, 0.4, 0), (0, 0, 0.3
 SPATIAL3 = arm("orthogonal3", (0, 0, 0.2, PI / 2), (0, 0.3, 0.3, -PI / 2), (0, 0.1, 0.25, 0))
 
 
+# Links that turn about parallel axes, and two joints in general position.
+PLANAR2, PLANAR4 = (arm(f"planar{n}", *((0.1 * i, 0.05, 0.4 - 0.05 * i, 0) for i in range(n))) for n in (2, 4))
+
+
 def random_arm(joints: int, seed: int) -> Robot:
     """A table of random numbers."""
     rng = np.random.default_rng(seed)
@@ -84,6 +88,7 @@ def random_arm(joints: int, seed: int) -> Robot:
     return arm(f"random{joints}-{seed}", *((float(t), float(d), float(a), float(x)) for t, d, a, x in rows))
 
 
+OBLIQUE2 = random_arm(2, 1)
 GENERAL = (ELBOW5, ELBOW3, SPATIAL3, random_arm(5, 1), random_arm(4, 1), random_arm(3, 1))
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import planar3
 import pytest
 from arms import reversed_at
-from few import ELBOW3, ELBOW5, PITCH
+from few import ELBOW3, ELBOW5, PITCH, PLANAR2, PLANAR4
 
 import kin
 from kin import Joint, Robot, Status
@@ -34,7 +34,7 @@ REVERSED = tuple(
     for name, joints in (("pioneer5", (1, 3)), ("redundant7", (0, 2)), ("iiwa14", (2, 4)))
 )
 # Arms of no built-in robot's kind, named all the same.
-FEW = (*PITCH, ELBOW5, ELBOW3)
+FEW = (*PITCH, ELBOW5, ELBOW3, PLANAR2, PLANAR4)
 ARMS = SOLVED + REVERSED + FEW
 arms = pytest.mark.parametrize("robot", ARMS, ids=lambda robot: robot.id)
 TASKS = (POSE, APPROACH, POSITION)
@@ -185,7 +185,7 @@ def test_a_requested_value_is_kept(robot):
             for q, T in zip(*targets(robot, 5), strict=True):
                 # Not every roll is possible where the tool is not on the wrist's axes, nor every pitch.
                 other = 0.0 if parameter.name == "roll" else 0.3
-                if robot in PITCH:
+                if robot in (*PITCH, PLANAR4):
                     free = form.solve(problem(robot, T, task, seed=-q)).values[:, k]
                     other = float(free[~np.isnan(free)][0])
                 value = float(q[parameter.joint]) if parameter.joint >= 0 else other
@@ -266,7 +266,8 @@ def test_the_batch_contains_the_branches_that_solve_finds(robot):
 def least_sigma(robot, q):
     rolls = closed_form_of(robot).name == "parallel5"  # one of its five joints only rolls the tool
     J = task_jacobian(robot, q) if robot.n >= 5 and not rolls else kin.jacobian(robot, q)
-    return np.linalg.svd(J, compute_uv=False)[min(robot.n, 6) - 1]
+    rank = 3 if robot is PLANAR4 else min(robot.n, 6)
+    return np.linalg.svd(J, compute_uv=False)[rank - 1]
 
 
 @arms

@@ -1,0 +1,152 @@
+"""The closed form of an arm with one or two joints: tasks, branches, singularities."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kin.axes import is_zero
+from kin.fk import fk, jacobian
+from kin.robot import Robot
+from kin.solvers.canonical import free_last
+from kin.solvers.common import TURN
+from kin.solvers.contract import (
+    APPROACH,
+    POSE,
+    POSITION,
+    BatchKernels,
+    Candidates,
+    ClosedForm,
+    Obstacle,
+    RedundancyParameter,
+    SolverInput,
+)
+from kin.solvers.names import Names, bent, names_of
+from kin.solvers.pair2.geometry import Geometry, configurations, geometry_of, straight
+from kin.solvers.singular import Singularity, by_jacobian, those_within
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+NAME = "pair2"
+# Which of the tool's point (0) and directions x, y, z (1, 2, 3) a task keeps.
+KEPT = {POSE: [0, 1, 2, 3], APPROACH: [0, 3], POSITION: [0]}
+_NONE = np.empty(0)
+
+
+def match(robot: Robot) -> Pair2 | None:
+    """The closed form of an arm with one or two joints, unless both do the same."""
+    if robot.n not in (1, 2):
+        return None
+    form = Pair2(robot, geometry_of(robot))
+    return form if form.handles(POSE) else None
+
+
+class _NotCompiled(BatchKernels):
+    """Batch functions that check nothing and are not compiled."""
+
+    def unchecked(self) -> BatchKernels:
+        """The same."""
+        return self
+
+
+class Pair2(ClosedForm):
+    """The closed form of an arm with one or two joints."""
+
+    name = NAME
+
+    def __init__(self, robot: Robot, geometry: Geometry) -> None:
+        self.robot, self.geometry = robot, geometry
+        count = "one joint" if robot.n == 1 else "two joints"
+        self.title, self.reason = f"closed form, {count}", f"the arm has {count}"
+        self.lengths = ()
+        self.kernels = self._kernels()
+        self._rank = {task: self._ranks(task) for task in KEPT}
+        # Parallel axes: an elbow, which has two sides. Otherwise the values of joint 2 have no names.
+        self.named = geometry.rows == 1 or (all(geometry.turns) and is_zero(*geometry.wave[:, 0, 2]))
+        self.branches, self.meanings = self.names(robot, np.ones(robot.n))
+
+    def names(self, robot: Robot, sense: Array) -> Names:
+        """The sign of joint 2 where the axes are parallel."""
+        g = self.geometry
+        if g.rows == 1:
+            return Names(("solution 1",), (("solution 1", "the only configuration"),))
+        if not self.named:
+            return Names(("solution 1", "solution 2"), ())
+        return names_of((bent(1, sense[1], -straight(g)),), [(1.0,), (-1.0,)])
+
+    def _ranks(self, task: int) -> tuple[int, bool]:
+        """How many coordinates of a task the joints move, and whether the last joint moves none."""
+        q = np.random.default_rng(2).uniform(-1.0, 1.0, (3, self.robot.n))
+        J, R = jacobian(self.robot, q), fk(self.robot, q)[:, :3, :3]
+        J[:, :3] /= self.geometry.scale
+        if task == APPROACH:
+            J = np.concatenate([J[:, :3], np.swapaxes(R[:, :, :2], 1, 2) @ J[:, 3:]], axis=1)
+        elif task == POSITION:
+            J = J[:, :3]
+        free = bool(np.linalg.norm(J[:, :, -1], axis=1).max() < TOLERANCES.geometry)
+        return int(np.linalg.matrix_rank(J, tol=TOLERANCES.geometry).max()), free
+
+    def handles(self, task: int) -> bool:
+        """Every task, unless it leaves another joint free than the last."""
+        if task not in KEPT:
+            return False
+        rank, free = self._rank[task]
+        return rank == self.robot.n - free
+
+    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
+        """The last joint, if it moves neither point nor direction."""
+        n = self.robot.n
+        turns = self.geometry.turns[-1]
+        name, label = (f"theta{n}", f"θ{n}") if turns else (f"d{n}", f"d{n}")
+        return (RedundancyParameter(name, label, joint=n - 1),) * self._rank[task][1]
+
+    def solve(self, problem: SolverInput) -> Candidates:
+        """All configurations that meet what the arm can meet of the target."""
+        p = problem
+        found, off = configurations(self.geometry, self.geometry.seen(p.T[None]), KEPT[p.task], p.seed)
+        q = self._wrapped(found[0])
+        missing = bool(np.isnan(q).all())
+        gap, obstacle = (float(off.min()), Obstacle("point")) if missing else (0.0, None)
+        if not self._rank[p.task][1]:
+            return Candidates(q, np.empty((len(q), 0)), (), gap, obstacle)
+        q[1:] = math.nan
+        arcs = free_last(p, q)
+        return Candidates(q, q[:, -1:].copy(), (arcs,), gap, obstacle)
+
+    def _wrapped(self, q: Array) -> Array:
+        """The same with angles in (−π, π]."""
+        return np.where(self.geometry.turns, math.pi - (math.pi - q) % TURN, q)
+
+    def _kernels(self) -> BatchKernels:
+        """Batch kernels that call the vectorised formulas."""
+
+        def many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
+            out[:] = self._wrapped(configurations(self.geometry, self.geometry.seen(T), KEPT[POSE], near)[0])
+
+        def one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
+            finite = bool(np.isfinite(T).all())
+            if finite:
+                many(params, T[None], _NONE, near, out[None])
+            else:
+                out[:] = math.nan
+            return finite
+
+        return _NotCompiled(_NONE, one, many)
+
+    def branch_of(self, q: Array) -> int:
+        """The side of the elbow, or the row of q ``(n,)`` among all configurations of its pose."""
+        if self.geometry.rows == 1:
+            return 0
+        if self.named:
+            return int(math.sin(q[1] - straight(self.geometry)) < 0.0)
+        out = np.empty((2, 2))
+        self.kernels.one(_NONE, fk(self.robot, q), math.nan, np.asarray(q), out)
+        apart = np.where(self.geometry.turns, np.abs((out - q + math.pi) % TURN - math.pi), np.abs(out - q))
+        apart = np.where(np.isnan(apart), math.inf, apart).max(axis=1)
+        return int(np.argmin(apart))
+
+    def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
+        """The smallest singular value of the point's Jacobian that is not zero everywhere."""
+        J = jacobian(self.robot, q)[:3]
+        return those_within(within, by_jacobian(J, rank=self._rank[POSITION][0]))

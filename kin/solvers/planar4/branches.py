@@ -1,0 +1,76 @@
+"""Kernels: both branches of one target, and of many."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kin.kernels.compile import jit
+from kin.solvers.canonical import signed_box
+from kin.solvers.common import NEAR, UNBOUNDED, clear, wrap
+from kin.solvers.contract import POSE
+from kin.solvers.planar import planar_free
+from kin.solvers.scara4 import held
+from kin.transforms import Array
+
+# Layout of the parameter array: the first three rows of base⁻¹ and of the tool, as `held` reads them; the three
+# links; signs and offsets of the joints.
+BASE, TOOL, LINKS, SIGN, OFFSET, SIZE = 0, 12, 24, 27, 31, 35
+_TOOL_X, _TOOL_Y = TOOL + 3, TOOL + 7
+
+
+@jit
+def solve(
+    params: Array, T: Array, task: int, value: float, near: Array, lower: Array, upper: Array, arcs: Array,
+    out: Array,
+) -> tuple[float, int]:  # fmt: skip
+    """out ``(2, 5)`` ← both branches and φ: (gap in metres, number of arcs of φ).
+
+    φ is `value`, or near the seed's if that is NaN.
+    """
+    clear(out)
+    box, angles = np.empty((3, 4)), np.empty(4)
+    signed_box(near, lower, upper, params[SIGN:OFFSET], params[OFFSET:SIZE], box)
+    x, y, _, psi = held(params, T, task)
+    c, s, p, q = math.cos(psi), math.sin(psi), params[_TOOL_X], params[_TOOL_Y]
+    u, v = x - p * c + q * s, y - p * s - q * c
+    a, b, last = params[LINKS], params[LINKS + 1], params[LINKS + 2]
+    fixed = not math.isnan(value)
+    wanted = value if fixed else box[NEAR, 0] + box[NEAR, 1] + box[NEAR, 2]
+    found = 0
+    for row in range(2):
+        side = (1.0 - 2.0 * row, 1.0, psi)
+        phi, found = planar_free((u, v, last, 0.0, a, b), side, (wanted, fixed), row, box, arcs, found, angles)
+        if not math.isnan(phi):
+            for i in range(4):
+                out[row, i] = wrap(params[SIGN + i] * (angles[i] - params[OFFSET + i]))
+            out[row, 4] = phi
+    R = math.hypot(u, v)
+    return max(abs(R - last) - a - b, abs(a - b) - R - last), found
+
+
+@jit
+def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
+    """out ``(2, 4)`` ← both branches of the target T ``(4, 4)``; False if T is not finite.
+
+    φ is `value`, or near that of `near` if it is NaN.
+    """
+    clear(out)
+    for r in range(4):
+        for k in range(4):
+            if not math.isfinite(T[r, k]):
+                return False
+    lower, upper, rows = np.full(4, -UNBOUNDED), np.full(4, UNBOUNDED), np.empty((2, 5))
+    solve(params, T, POSE, value, near, lower, upper, np.empty((64, 3)), rows)
+    for k in range(2):
+        for i in range(4):
+            out[k, i] = rows[k, i]
+    return True
+
+
+@jit
+def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
+    """out ``(N, 2, 4)`` ← both branches of each of the targets T ``(N, 4, 4)``, values ``(N,)`` or ``(1,)``."""
+    for k in range(T.shape[0]):
+        branches_one(params, T[k], values[min(k, values.shape[0] - 1)], near, out[k])
