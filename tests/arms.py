@@ -145,3 +145,15 @@ def random_arms(count):
             for kind, (theta, d, a, alpha) in zip(kinds, numbers, strict=True)
         ]
         yield Robot.from_dh(rows, "modified" if k % 2 else "standard")
+
+
+def random_robot(seed):
+    """Any arm: 1 to 7 rows of any kind, either convention, with a base and a tool."""
+    draw = Draw(seed)
+    rng = draw.rng
+    rows = []
+    for i in range(int(rng.integers(1, 8))):
+        kind = str(rng.choice(["revolute", "prismatic", "fixed"], p=[0.7, 0.15, 0.15])) if i else "revolute"
+        limits = None if kind == "fixed" else (-1.5, 2.0)
+        rows.append(Joint(f"part {i}", draw.angle(), draw.length(), draw.length(), draw.angle(), kind, limits))
+    return Robot.from_dh(rows, str(rng.choice(["standard", "modified"])), base=draw.pose(), tool=draw.pose())

@@ -17,3 +17,12 @@ def number_of(text: str) -> float:
     text = text.strip()
     known = len(text) <= LONGEST and (_NUMBER.fullmatch(text) or _INFINITE.fullmatch(text))
     return float(text) if known else math.nan
+
+
+def scaled(value: float, scale: float) -> float:
+    """A number in a unit as metres or radians.
+
+    Units of length are divided by their whole number per metre: 109.15 mm is 0.10915 m, not 0.10915000000000001 m.
+    """
+    per = 1.0 / scale
+    return value / per if per.is_integer() else value * scale

@@ -14,7 +14,7 @@ import numpy as np
 
 from kin.errors import InputError, KinematicsError, RobotFileError, shorten
 from kin.files.home import default_home
-from kin.files.numbers import LARGEST, NUMBER
+from kin.files.numbers import LARGEST, NUMBER, scaled
 from kin.robot import (
     CONVENTIONS,
     DEFAULT_LIMITS,
@@ -256,7 +256,7 @@ class Reader:
         """A number times the scale of its unit."""
         if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < LARGEST / scale:
             raise self.refuse(field, value, "a finite number, smaller than a million" + unit)
-        return float(value) * scale
+        return scaled(float(value), scale)
 
     def text(self, data: dict[str, Any], key: str, default: str | None = None, where: str = "") -> str:
         value = data.get(key, default)

@@ -1,8 +1,8 @@
 """Writes robots: `Robot` → the fields of a robot file as a dict → TOML.
 
 Reading what was written gives an equal robot, bit by bit; what could not be read is not written. Not every number
-has a decimal that becomes exactly it when it is multiplied by π/180 or 0.001; such a value is written with its own
-unit, ``"2.8973 rad"``.
+has a decimal that becomes exactly it when it is multiplied by π/180; such a value is written with its own unit,
+``"2.8973 rad"``.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from kin.errors import InputError
+from kin.files.numbers import scaled
 from kin.files.read import ANGLES, UNLIMITED, Reader, matrix_of
 from kin.named import robot_of
 from kin.robot import IDENTITY, LENGTHS, Joint, Matrix, Robot, exact_cos_sin
@@ -133,10 +134,10 @@ class _Writer:
         guess = value / scale
         for digits in _DIGITS:
             number = float(f"{guess:.{digits}g}")
-            if number * scale == value:
+            if scaled(number, scale) == value:
                 return _plain(number)
         for number in (math.nextafter(guess, math.inf), math.nextafter(guess, -math.inf)):
-            if number * scale == value:
+            if scaled(number, scale) == value:
                 return _plain(number)
         return f"{value!r} {'m' if is_length else 'rad'}{per}"
 

@@ -409,3 +409,16 @@ def test_roll_pitch_and_yaw_near_a_pitch_of_90_degrees(sign, away):
         for yaw in (-2.0, 0.0, 1.0):
             T = matrix_of((0, 0, 0), (roll, sign * (math.pi / 2 - away), yaw))
             assert np.abs(np.array(matrix_of((0, 0, 0), rpy_of(T))) - T).max() < 2e-15
+
+
+@pytest.mark.parametrize(("unit", "per_metre"), [("mm", 1000), ("cm", 100)])
+def test_lengths_keep_their_digits_in_any_unit(unit, per_metre):
+    hundredths = [1, 10915, 14999, *np.random.default_rng(4).integers(1, 10**6, 300).tolist()]
+    for number in (k / 100 for k in hundredths):
+        metres = number / per_metre
+        row = {"d": number, "a": -number}
+        arm = {"id": "a", "name": "A", "source": "s", "convention": "standard", "rows": [{"name": "j", **row}]}
+        robot = kin.robot_from_dict(arm | {"units": {"length": unit, "angle": "deg"}})
+        assert (robot.rows[0].d, robot.rows[0].a) == (float(repr(metres)), -metres)
+        written = kin.robot_to_dict(kin.Robot.from_dh([(0, metres, -metres, 0)]), length=unit)
+        assert {key: written["rows"][0][key] for key in row} == row

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from arms import random_robot
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_convert import random_robot
 
 import kin
 from kin import InputError, Joint, Robot, RobotFileError
@@ -379,3 +379,8 @@ def test_names_are_written_once(names, written):
 def test_a_slide_without_limits_is_not_written():
     with pytest.raises(InputError, match="URDF has no slide without them"):
         kin.to_urdf(Robot.from_dh([Joint("slide", kind="prismatic")]))
+
+
+def test_a_joint_that_cannot_move_is_not_written():
+    with pytest.raises(InputError, match=r"limits of stuck: .*lower below upper"):
+        kin.to_urdf(Robot.from_dh([Joint("stuck", a=0.1, limits=(0.5, 0.5))]))

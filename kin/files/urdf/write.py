@@ -28,7 +28,7 @@ def to_urdf(robot: Robot | str) -> str:
     A velocity or effort that is not known is written as 0.
 
     Raises:
-        InputError: a slide without limits, which URDF cannot describe.
+        InputError: a slide without limits, which URDF cannot describe, or a joint whose limits leave no motion.
     """
     robot = robot_of(robot)
     lines = ['<?xml version="1.0" encoding="utf-8"?>', f"<robot name={_quoted(robot.id)}>"]
@@ -58,6 +58,9 @@ def _joint(row: Joint, name: str, parent: str, child: str, T: Array) -> list[str
         lines.append('    <axis xyz="0 0 1"/>')
         limits = ""
         if row.limits is not None:
+            if not row.limits[0] < row.limits[1]:
+                expected = "lower below upper: a joint that does not move is a fixed row"
+                raise InputError(f"limits of {row.name}", row.limits, expected)
             limits = f'lower="{row.limits[0]!r}" upper="{row.limits[1]!r}" '
         elif row.kind == "prismatic":
             raise InputError(f"limits of {row.name}", None, "limits: URDF has no slide without them")

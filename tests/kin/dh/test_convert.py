@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from arms import Draw, nested
+from arms import nested, random_robot
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -44,17 +44,6 @@ def test_converting_shifts_the_table_by_half_a_row():
     assert pioneer.T_last_tool == pytest.approx(screw_x(last.a, last.alpha))
     with pytest.raises(InputError, match="convention"):
         kin.convert(puma, "craig")
-
-
-def random_robot(seed):
-    draw = Draw(seed)
-    rng = draw.rng
-    rows = []
-    for i in range(int(rng.integers(1, 8))):
-        kind = str(rng.choice(["revolute", "prismatic", "fixed"], p=[0.7, 0.15, 0.15])) if i else "revolute"
-        limits = None if kind == "fixed" else (-1.5, 2.0)
-        rows.append(Joint(f"part {i}", draw.angle(), draw.length(), draw.length(), draw.angle(), kind, limits))
-    return Robot.from_dh(rows, str(rng.choice(["standard", "modified"])), base=draw.pose(), tool=draw.pose())
 
 
 @settings(max_examples=100, deadline=None)

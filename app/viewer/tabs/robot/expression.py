@@ -18,6 +18,7 @@ import math
 import re
 from typing import NamedTuple
 
+from kin.files.numbers import scaled
 from kin.units import Unit
 
 LONGEST = 60  # characters of a cell
@@ -116,7 +117,7 @@ class _Reader:
         return _SyntaxError(f"unknown: {cut(word)}" if word.isalpha() and word not in ("pi", "π") else "")
 
     def _in_si(self, value: _Value) -> _Value:
-        return value if value.measured else _Value(value.number * self._scale, True)
+        return value if value.measured else _Value(scaled(value.number, self._scale), True)
 
     def _sum(self) -> _Value:
         value = self._product()
@@ -149,7 +150,7 @@ class _Reader:
         if unit := self._next(*self._units):
             if value.measured:
                 raise _SyntaxError("a unit after a unit")
-            value = _Value(value.number * self._units[unit], True)
+            value = _Value(scaled(value.number, self._units[unit]), True)
         return value
 
     def _atom(self) -> _Value:
