@@ -48,6 +48,7 @@
     if (!drag) setHeight(heightOf(step));
     root.style.setProperty("--kb-below", `${heightOf(step === "peek" ? "peek" : "half")}px`);
     root.style.setProperty("--kb-above", `${STATUS}px`);
+    tellSize();
     if (grip) {
       grip.hidden = !NARROW.matches;
       grip.ariaLabel = `Panel: ${step === "peek" ? "closed" : `${step} height`}. Press to change its height.`;
@@ -194,6 +195,16 @@
     if (width >= LEAST && factor !== 1) widen(Math.min(factor * width, innerWidth / 2) - width);
   }
 
+  /** Labels in the scene have the size of the text too: the server draws them. A new panel has not heard of it. */
+  let told = { field: null, size: "" };
+  function tellSize() {
+    const field = document.querySelector("[data-answers]")?.parentElement.nextElementSibling?.querySelector("input");
+    const now = root.dataset.kbText;
+    if (!field || (told.field === field && told.size === now)) return;
+    told = { field, size: now };
+    dispatchEvent(new CustomEvent("kinboard-send", { detail: ["text-size", now] }));
+  }
+
   function markSize() {
     for (const button of document.querySelectorAll("[data-text-size]")) {
       const pressed = String(button.dataset.textSize === size);
@@ -256,7 +267,7 @@
     document.body.append(grip);
     place();
     let waiting = 0;
-    const changes = new MutationObserver(() => { waiting ||= setTimeout(() => { waiting = 0; mark(); markEdge(); markSize(); watch(); }, 50); });
+    const changes = new MutationObserver(() => { waiting ||= setTimeout(() => { waiting = 0; mark(); markEdge(); markSize(); tellSize(); watch(); }, 50); });
     changes.observe(document.body, { subtree: true, childList: true });
   });
   addEventListener("resize", place);

@@ -58,6 +58,11 @@ def assign(
         state.api._queue_scene_message(messages.SetOrientationMessage(state.name, (w, x, y, z)))
 
 
+def is_removed(node: viser.SceneNodeHandle) -> bool:
+    """Whether a node is no longer in the scene, so that its properties cannot be set."""
+    return bool(node._impl.removed)
+
+
 def uuid_of(handle: Any) -> str:
     """The id of a control: of its message, and of its element in the page."""
     return str(handle._impl.uuid)

@@ -7,6 +7,7 @@ from typing import Literal, get_args
 
 import viser
 
+from app.viewer.labels import TEXT_SIZES
 from app.viewer.panel import Post, assign, listen, listen_click
 from app.viewer.views.templates import render
 from kin import InputError
@@ -18,8 +19,6 @@ SCHEMES: dict[str, bool | None] = {"Like the system": None, "Light": False, "Dar
 Side = Literal["Front", "Side", "Top", "Corner"]
 SIDES: tuple[Side, ...] = get_args(Side)
 SYSTEM_IS_DARK = "The system is dark"  # static/page.js looks for this label
-
-TEXT_SIZES = ("Normal", "Large", "Projector")  # static/layout.css says how large
 
 Look = Literal["body", "skeleton", "both"]
 LOOKS: tuple[Look, ...] = get_args(Look)
@@ -107,7 +106,7 @@ class ViewOptions:
         initial = AXES[state.base_axes]
         self._axes = gui.add_dropdown("Arrows along", AXES, initial_value=initial, hint=AXES_HINT)
         listen(self._axes, post, "axes")
-        gui.add_html(render("panel/text_size", names=TEXT_SIZES))
+        gui.add_html(render("panel/text_size", names=tuple(TEXT_SIZES)))
         group = gui.add_button_group("Camera", ("Fit arm", "Reset view"))
         listen_click(group, post, {"Fit arm": "fit-arm", "Reset view": "camera"})
         sides = gui.add_button_group("View from", SIDES)

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 import viser
 
+from app.viewer.labels import add_label
 from app.viewer.panel.view import Look
 from app.viewer.scene.bodies import drawing
 from app.viewer.scene.bodies.parts import Part
@@ -19,6 +20,7 @@ from app.viewer.scene.chain import turn
 from app.viewer.scene.clearance import Contact, clearance
 from app.viewer.scene.floor import Floor
 from app.viewer.scene.gizmo_axes import GizmoAxes
+from app.viewer.scene.key_number import place_beside
 from app.viewer.scene.lights import add_lamp
 from app.viewer.scene.meshes import body
 from app.viewer.scene.shapes import merged, placed
@@ -99,9 +101,7 @@ class ArmScene:
             cast_shadow=False,
             receive_shadow=False,
         )
-        self._contact_label = scene.add_label(
-            f"{root}-contact/text", "", position=(0.0, 0.0, 3.6 * self.body.size), anchor="bottom-center"
-        )
+        self._contact_label = add_label(scene, f"{root}-contact/text", "", anchor="bottom-center")
         self._top += [self.gizmo, self._gap, self._contact]
         self._rings: list[viser.TransformControlsHandle] = []
         self._ring_sets = 0
@@ -206,12 +206,19 @@ class ArmScene:
         """Where the arm, as it is drawn, passes through pedestal or floor at a configuration ``(n,)``."""
         return clearance(self.robot, self._look == "skeleton").at(q)
 
-    def show_contact(self, contact: Contact | None) -> str:
-        """Mark where the arm passes through pedestal or floor; returns the sentence at the mark, or ""."""
+    def show_contact(self, contact: Contact | None, target: Array | None = None) -> str:
+        """Mark where the arm passes through pedestal or floor; returns the sentence at the mark, or "".
+
+        `target`: a missed target ``(3,)``, whose number the sentence must not cover.
+        """
         self._contact.visible = contact is not None
         if contact is None:
             return ""
         assign(self._contact, contact.point)
+        height, anchor = place_beside(contact.point, 3.6 * self.body.size, target, self.body.radius)
+        assign(self._contact_label, (0.0, 0.0, height))
+        if anchor != self._contact_label.anchor:
+            self._contact_label.anchor = anchor
         text = contact.text(self.robot)
         if text != self._contact_label.text:
             self._contact_label.text = text
@@ -345,10 +352,9 @@ class ArmScene:
             position=T[:3, 3],
             wxyz=wxyz_from_rotation(T[:3, :3]),
         )
-        for tip, letter in zip(np.eye(3), "xyz", strict=True):
-            self._base_up = self._scene.add_label(
-                f"{self._base.name}/{letter}", letter, position=1.15 * length * tip, anchor="center-center"
-            )
+        for tip, letter in zip(1.15 * length * np.eye(3), "xyz", strict=True):
+            name = f"{self._base.name}/{letter}"
+            self._base_up = add_label(self._scene, name, letter, position=tip, anchor="center-center")
 
     def _add_frame(self, parent: str, row: int, T: Array) -> None:
         """The frame of a DH row; row −1 is the base frame."""
@@ -372,7 +378,8 @@ class ArmScene:
         origins = np.vstack([self.robot.T_world_base[None, :3, 3], self._home_frames[:, :3, 3]])
         crowd = int((np.linalg.norm(origins[: row + 1] - origins[row + 1], axis=1) < 1e-6).sum())
         self._labels.append(
-            self._scene.add_label(
+            add_label(
+                self._scene,
                 f"{name}/label",
                 text,
                 position=(0.0, 0.0, (1.15 + 0.6 * crowd) * length),

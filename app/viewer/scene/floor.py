@@ -9,6 +9,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
+from app.viewer.labels import add_label
 from app.viewer.scene.meshes import Body
 from kin.transforms import Array
 from kin.units import Units
@@ -65,11 +66,12 @@ class Floor:
         self._bar = scene.add_line_segments(
             f"{root}-scale", bar, INK_DARK if dark else INK_LIGHT, thickness=2.0, thickness_units="screen"
         )
-        self._label = scene.add_label(
+        self._label = add_label(
+            scene,
             f"{root}-scale/length",
             "",
             position=(at + end) / 2.0 + 2.0 * tick,
-            font_screen_scale=0.9,
+            scale=0.9,
             anchor="center-center",
         )
         self.nodes: list[viser.SceneNodeHandle] = [self._grid, self._shadow, self._bar]

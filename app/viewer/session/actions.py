@@ -13,6 +13,7 @@ from typing import Any, Protocol
 
 import kin
 from app.viewer.feature import Feature, message_of
+from app.viewer.labels import size_labels, text_factor
 from app.viewer.panel.script import Reply
 from app.viewer.panel.status import Notice, introduction
 from app.viewer.panel.target import DEFAULT_TASK, TASKS
@@ -43,6 +44,7 @@ NO_STEP = frozenset(
         "travel",
         "released",
         "snap",
+        "text-size",
     }
 )
 # Controls that send many values on the way to the one the visitor means: how long (s) a step may pause.
@@ -51,7 +53,7 @@ GRADUAL = {
 }  # fmt: skip
 MESSAGES = (
     "undo", "redo", "travel", "released", "snap", "nudge", "axes", "field", "target", "fit-arm", "look-from",
-    "lesson", "feature",
+    "lesson", "feature", "text-size",
 )  # fmt: skip
 ANSWERED = frozenset({"field", "target"})  # messages whose handlers reply
 LABELS = {
@@ -144,6 +146,7 @@ class Actions:
             "resized": self._on_resize,
             "looked": self._on_look,  # the viewpoint is read when the camera rests
             "axes": self._typed.use_axes,
+            "text-size": lambda name: size_labels(page.client.scene, text_factor(name)),
             # Messages of the page's own script
             "undo": self._undo,
             "redo": self._redo,

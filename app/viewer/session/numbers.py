@@ -84,7 +84,8 @@ class Numbers:
         with page.client.atomic():
             if self._pose_due:
                 self._pose_due = False
-                page.status.warn(arm.scene.show_contact(arm.scene.contact_at(arm.q)))
+                target = None if arm.open_target is None else arm.open_target[:3, 3]
+                page.status.warn(arm.scene.show_contact(arm.scene.contact_at(arm.q), target))
                 page.panel.readout.show(kin.fk(arm.robot, arm.q), page.units, arm.open_target)
             if self._sliders_due:
                 self._sliders_due = False

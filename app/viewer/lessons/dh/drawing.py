@@ -14,6 +14,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
+from app.viewer.labels import add_label
 from app.viewer.lessons.dh.steps import (
     Factor,
     Place,
@@ -144,12 +145,10 @@ class WalkDrawing:
         self._groups = coinciding(robot)
         self._at = label_places(self._groups, np.concatenate([robot.T_world_base[None], frames]), self._size)
         self._labels = [
-            scene.add_label(f"{root}/name-{group[0]}", "", anchor="center-center", visible=False)
+            add_label(scene, f"{root}/name-{group[0]}", "", anchor="center-center", visible=False)
             for group in self._groups
         ]
-        self._value = scene.add_label(
-            f"{root}/value", "", anchor="center-center", visible=False, font_screen_scale=1.15
-        )
+        self._value = add_label(scene, f"{root}/value", "", anchor="center-center", visible=False, scale=1.15)
         self._placed: viser.LineSegmentsHandle | None = None
         self._count = -1
         self._quantity: viser.LineSegmentsHandle | None = None
@@ -252,7 +251,7 @@ class OtherDrawing:
         reach = 3.0 * self._size
         for reading, parent in zip(self._pair, (root, other), strict=True):
             base = reading.T_world_base[:3, 3] - np.array([0.0, 0.0, reach])
-            scene.add_label(f"{parent}/title", TITLES[reading.convention], position=base, anchor="top-center")
+            add_label(scene, f"{parent}/title", TITLES[reading.convention], position=base, anchor="top-center")
         joints = sorted({j for r in self._pair for k in coaxial_joints(r) for j in (k, k + 1)})
         self._lines = []
         for reading, parent in zip(self._pair, (root, other), strict=True):
@@ -264,8 +263,8 @@ class OtherDrawing:
                 line = scene.add_line_segments(
                     f"{parent}/line-{j + 1}", nothing, joint_color(j), thickness=0.3 * self._size
                 )
-                label = scene.add_label(
-                    f"{parent}/line-{j + 1}-name", text, anchor="center-left", visible=bool(text)
+                label = add_label(
+                    scene, f"{parent}/line-{j + 1}-name", text, anchor="center-left", visible=bool(text)
                 )
                 self._lines.append((reading, j, line, label))
 
@@ -300,7 +299,7 @@ def moving_frame(scene: viser.SceneApi, name: str, size: float) -> viser.FrameHa
         origin_color=(230, 159, 0),
     )
     for tip, letter in zip(np.eye(3), "xyz", strict=True):
-        scene.add_label(f"{name}/{letter}", letter, position=1.1 * MOVING * size * tip, anchor="center-center")
+        add_label(scene, f"{name}/{letter}", letter, position=1.1 * MOVING * size * tip, anchor="center-center")
     return frame
 
 

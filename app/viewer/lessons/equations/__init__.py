@@ -17,6 +17,7 @@ import viser
 from app.equations import Book, DerivationError, Equation, TooManyRowsError, book_later
 from app.shared.computations import Subscription
 from app.viewer.feature import Feature, Stage
+from app.viewer.labels import add_label
 from app.viewer.lessons.equations import views
 from app.viewer.panel import assign, listen, update_html
 from app.viewer.panel.status import Notice
@@ -247,7 +248,7 @@ class EquationsLesson(Feature):
             self._segments = scene.add_line_segments(
                 f"{root}-lines", lines.astype(np.float32), colors, thickness=4.0, thickness_units="screen"
             )
-            self._label = scene.add_label(f"{root}-label", "as printed", position=tuple(lines[0, 1].tolist()))
+            self._label = add_label(scene, f"{root}-label", "as printed", position=tuple(lines[0, 1].tolist()))
             self._nodes = [self._segments, self._label]
             return
         self._segments.points = lines.astype(np.float32)

@@ -14,6 +14,7 @@ from functools import lru_cache
 import numpy as np
 import viser
 
+from app.viewer.labels import add_label
 from app.viewer.lessons.postures.survey import BLOCKED_COLOR, COLORS, Posture
 from app.viewer.scene.chain import chain, link_poses
 from app.viewer.scene.meshes import body
@@ -109,7 +110,7 @@ class Ghosts:
             )
             _listen(node, clicked, i)
             self._nodes.append(node)
-            self._labels.append(scene.add_label(f"{root}/name/{i + 1}", str(i + 1), visible=False))
+            self._labels.append(add_label(scene, f"{root}/name/{i + 1}", str(i + 1), visible=False))
 
     def show(self, postures: tuple[Posture, ...], shown: frozenset[str]) -> None:
         """Draw the ghosts of these branches; unchanged ones are not sent again."""

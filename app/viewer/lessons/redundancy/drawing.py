@@ -11,6 +11,7 @@ from itertools import count
 import numpy as np
 import viser
 
+from app.viewer.labels import add_label
 from app.viewer.lessons.redundancy.path import elbow_paths, has_path
 from app.viewer.lessons.redundancy.ring import FLAT, Circle, arc_segments, elbow_circle, trade_segments
 from app.viewer.scene.bodies.parts import JOINT_COLORS
@@ -85,7 +86,7 @@ class Drawing:
             text = f"limit of joint {end.joint + 1}" if end.joint >= 0 else "posture ends"
             name = f"{self._root}/end-{number}-{i}"
             self._ring.append(scene.add_line_segments(name, ray, LIMIT, thickness=0.4 * self._size))
-            self._ring.append(scene.add_label(f"{name}-name", text, position=circle.at(end.value, RING + 0.3)))
+            self._ring.append(add_label(scene, f"{name}-name", text, position=circle.at(end.value, RING + 0.3)))
 
     def _show_path(self, goal: Array, T: Array, item: Redundancy, ends: tuple[End, ...]) -> None:
         """Draw the path of the elbow, and what ends it."""
@@ -100,7 +101,7 @@ class Drawing:
                 close = [end for end in ends if abs(end.value - interval[k]) < 1e-9]
                 if len(close) == 1:
                     text = f"limit of joint {close[0].joint + 1}" if close[0].joint >= 0 else "posture ends"
-                    self._ring.append(scene.add_label(f"{name}-{k}", text, position=point))
+                    self._ring.append(add_label(scene, f"{name}-{k}", text, position=point))
 
     def show_present(self, q: Array, item: Redundancy | None, trades: bool) -> None:
         """Draw the configuration ``(n,)``: the line from shoulder to wrist and the elbow, or the trade."""

@@ -12,6 +12,7 @@ import numpy as np
 import trimesh
 import viser
 
+from app.viewer.labels import add_label
 from app.viewer.lessons.velocity.rates import Ellipsoid
 from app.viewer.scene.meshes import body
 from app.viewer.scene.shapes import cone, merged, placed, tube
@@ -63,8 +64,7 @@ class Drawing:
             thickness_units="screen",
         )
         self._labels = [
-            scene.add_label(f"{root}/body/value-{k + 1}", "", font_screen_scale=0.8, anchor="center-center")
-            for k in range(3)
+            add_label(scene, f"{root}/body/value-{k + 1}", "", scale=0.8, anchor="center-center") for k in range(3)
         ]
         self._column, self._lost = (
             scene.add_arrows(

@@ -8,6 +8,7 @@ from fake_browser import FakeBrowser
 
 import kin
 from app.viewer.panel.status import key_number, notice
+from app.viewer.scene.key_number import place_beside
 from kin.units import DEFAULT_UNITS, Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -63,3 +64,36 @@ def test_the_number_is_beside_a_missed_target_only(port: int) -> None:
         assert np.linalg.norm(np.array(tab.poses[name]["position"]) - T[:3, 3]) < 0.3
         tab.set("Go to", "Home")
         tab.wait(lambda: not tab.visible[name])
+
+
+@pytest.mark.parametrize("higher", [-0.3, -0.1, -0.01, 0.0, 0.01, 0.1, 0.3])
+def test_the_words_at_a_contact_leave_room_for_the_number_above_a_missed_target(higher: float) -> None:
+    radius, size, room = 0.8, 0.06, 0.1  # of a line of text in a picture of the whole arm (m)
+    contact, target = np.array([0.0, 0.0, 0.2 + higher]), np.array([0.1, 0.0, 0.2])
+    height, anchor = place_beside(contact, size, target, radius)
+    number = target[2] + 0.16 * radius  # its lower edge
+    edge = contact[2] + height
+    assert edge <= target[2] if anchor == "top-center" else edge >= number + room
+    assert place_beside(contact, size, None, radius) == (size, "bottom-center")
+
+
+def test_labels_follow_the_size_of_the_text(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+
+        def sizes() -> dict[str, float]:
+            labels = {name: node["props"] for name, node in tab.nodes.items() if "Label" in node["type"]}
+            return {name: props["font_screen_scale"] for name, props in labels.items()}
+
+        before = sizes()
+        assert len(before) > 5
+        tab.say("text-size", "Projector")
+        tab.wait(lambda: sizes()["/key-number"] == pytest.approx(1.7))
+        assert sizes() == pytest.approx({name: 1.7 * size for name, size in before.items()})
+        tab.choose(UR5.name)
+        assert {round(size, 9) for size in sizes().values()} == {1.7, round(1.7 * 0.9, 9)}, (
+            "also those of another arm"
+        )
+        tab.say("text-size", "Tiny")
+        tab.wait(lambda: "Normal, Large, Projector" in tab.html)
+        assert sizes()["/key-number"] == pytest.approx(1.7)
