@@ -27,6 +27,7 @@ from kin.files import (
     urdf_tips,
 )
 from kin.fk import fk, fk_positions, jacobian, link_frames, manipulability
+from kin.frames import frame_pose, from_xyz_rpy
 from kin.ik import IKOptions, JointConstraints, branch_meanings, branch_names, branch_of, solve_ik
 from kin.ik.batch import IKResults, ik_branches, solve_ik_many
 from kin.ik.details import LimitViolation, Redundancy
@@ -104,7 +105,9 @@ __all__ = [
     "convert",
     "fk",
     "fk_positions",
+    "frame_pose",
     "from_position_wxyz",
+    "from_xyz_rpy",
     "get_robot",
     "ik_branches",
     "jacobian",

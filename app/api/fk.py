@@ -9,10 +9,11 @@ from pydantic import Field
 from typing_extensions import TypedDict
 
 from app.api import schemas
-from app.api.arms.frames import FramesBody
+from app.api.arms.frames import FrameName, FramesBody
 from app.api.arms.operation import operation
 from app.api.batches import Batch, one_or_all
 from app.api.body import versioned
+from app.api.problems import FieldError, invalid, show
 from app.api.schemas import (
     POST_REFUSALS,
     Configurations,
@@ -24,8 +25,10 @@ from app.api.work import Deadline, compute_slots, computed
 from app.shared.answers.document import documented
 from app.shared.answers.fk import FkAnswer, fk_answers
 from kin import Robot
+from kin.frames import BASE, TOOL, WORLD
+from kin.transforms import Array
 
-POSE, FRAME = 550, 500  # bytes of a pose and of a frame, about
+POSE, FRAME = 570, 520  # bytes of a pose and of a frame, about
 FEW = 16  # configurations that are answered sooner than a thread could be asked to
 
 router = versioned("kinematics")
@@ -34,6 +37,14 @@ EXAMPLES = {
     "one": example("One configuration", {"q": [1.5708, 0.5236, 1.0472, 0.5236, 0.5236]}),
     "frames": example(
         "With the frame of every link", {"q": [1.5708, 0.5236, 1.0472, 0.5236, 0.5236], "frames": True}
+    ),
+    "table": example(
+        "In the frame of a table",
+        {
+            "q": [1.5708, 0.5236, 1.0472, 0.5236, 0.5236],
+            "workpieces": {"table": {"xyz": [0.1, 0.2, -0.3], "rpy": [0.0, 0.0, 1.5708]}},
+            "frame": "table",
+        },
     ),
     "many": example(
         "Several configurations",
@@ -54,6 +65,18 @@ class FkRequest(FramesBody):
         strict=True,
         description="Whether to return the frame after every DH row as well, not only the tool's.",
     )
+    frame: FrameName = Field(
+        WORLD,
+        description="The frame in which poses are answered: world, base (that of the first DH row), or the name "
+        "of one of `workpieces`.",
+    )
+
+    def axes(self, robot: Robot) -> Array | None:
+        """T_world_frame ``(4, 4)`` of the requested frame; None: the world frame. Raises 422."""
+        if self.frame == TOOL:
+            expected = "one of " + ", ".join([WORLD, BASE, *self.workpieces])
+            raise invalid(FieldError(field="frame", value=show(self.frame), expected=expected))
+        return None if self.frame == WORLD else self.pose_of(robot, self.frame, "frame")
 
 
 @documented
@@ -79,8 +102,9 @@ async def forward_kinematics(request: Request, robot: Robot, body: FkRequest) ->
     limits are answered too, with `in_limits` false.
     """
     q, single = schemas.as_configurations(robot, body.q, settings_of(request))
+    axes = body.axes(robot)
     batch = Batch("q", len(q), single, POSE + FRAME * len(robot.rows) * body.frames, "frames false")
-    answer = partial(one_or_all, lambda some: fk_answers(robot, q[some], body.frames), batch)
+    answer = partial(one_or_all, lambda some: fk_answers(robot, q[some], body.frames, body.frame, axes), batch)
     if is_warm(request) and len(q) <= FEW:
         return answer(Deadline(compute_slots(request)))
     return await computed(request, answer)

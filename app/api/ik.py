@@ -68,6 +68,13 @@ EXAMPLES = {
             "limits": [None, None, [0.0, 2.0], None, None],
         },
     ),
+    "table": example(
+        "A point in the frame of a table",
+        {
+            "target": {"position": [0.05, 0.13, 0.1], "frame": "table"},
+            "workpieces": {"table": {"xyz": [0.1, 0.2, -0.3], "rpy": [0.0, 0.0, 1.5708]}},
+        },
+    ),
     "unreachable": example("Out of reach: still an answer", {"target": {"position": [2.0, 0.0, 0.0]}}),
     "many": example(
         "Several targets",
@@ -157,8 +164,10 @@ async def inverse_kinematics(request: Request, robot: Robot, body: IkRequest) ->
 
 
 def _solve(robot: Robot, body: IkRequest, settings: Settings, deadline: Deadline) -> Response:
-    targets, single = body.resolve_all(body.target, settings)
-    seeds = _seeds(robot, body, len(targets), settings)
+    count = len(body.target) if isinstance(body.target, list) else 1
+    schemas.check_batch("target", count, settings)
+    seeds = _seeds(robot, body, count, settings)
+    targets, single = body.resolve_all(robot, body.target, settings, seeds)
 
     options = {task: body.options(task) for task in {task for task, _ in targets}}
 

@@ -39,7 +39,9 @@ class JacobianRequest(FramesBody):
         "one configuration of n numbers, or a list of configurations."
     )
     frame: Literal["base", "tool"] = Field(
-        "base", description="The frame the velocities of the tool point are expressed in."
+        "base",
+        description="The directions in which the velocities of the tool point are expressed: those of the world "
+        "frame, in which poses are (base), or of the tool.",
     )
 
 

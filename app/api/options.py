@@ -7,19 +7,22 @@ A target is where the tool should go, in whichever form its sender has it. A pos
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import cycle
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag
 
 from app.api import schemas
-from app.api.arms.frames import FramesBody
+from app.api.arms.frames import FrameName, FramesBody
 from app.api.problems import FieldError, from_input_error, invalid
 from app.api.schemas import Number, Vector3, Vector4, numbers
 from app.shared.settings import Settings
 from app.shared.threads.turns import offer
-from kin import IKOptions, InputError, JointConstraints, Task
+from kin import IKOptions, InputError, JointConstraints, Robot, Task
+from kin.frames import WORLD
 from kin.ik.options import LEAST_TOLERANCE, MOST_METRES, MOST_RADIANS
 from kin.ik.problem import read_pose
 from kin.solvers.contract import POSE
@@ -34,7 +37,15 @@ FORMS = {
 
 
 class Target(schemas.Body):
-    """A target in the base frame: `matrix`, or `position` with `wxyz` or `approach`, or `position` alone."""
+    """A target: `matrix`, or `position` with `wxyz` or `approach`, or `position` alone."""
+
+    frame: FrameName | None = Field(
+        None,
+        description="The frame in which this target is: world (by default), base (that of the first DH row), tool "
+        "(where the tool is at the present configuration, `q_seed` or `q_start`), or the name of one of "
+        "`workpieces`.",
+        examples=["world"],
+    )
 
     position: Vector3 | None = Field(
         None, description="Where the tool's point should be: x, y, z in metres.", examples=[[0.03, 0.154, -0.2]]
@@ -54,7 +65,7 @@ class Target(schemas.Body):
     )
 
     def resolve(self, task: Task | None, field: str) -> tuple[Task, Array]:
-        """The task it asks for, if none is given the one its form implies, and T_base_tool ``(4, 4)``.
+        """The task it asks for, if none is given the one its form implies, and T_frame_tool ``(4, 4)``.
 
         Raises:
             ProblemError: 422 naming `field` and what is missing, contradicts, or is no rotation.
@@ -67,7 +78,8 @@ class Target(schemas.Body):
             and (task == "position" or self.wxyz is not None or (task == "approach" and self.approach is not None))
         )
         if not usable:
-            given = [name for name in type(self).model_fields if getattr(self, name) is not None]
+            fields = type(self).model_fields
+            given = [name for name in fields if name != "frame" and getattr(self, name) is not None]
             raise _wrong(
                 field, f"only {', '.join(given)}" if given else "nothing", f"{FORMS[task]} for task {task}"
             )
@@ -138,7 +150,7 @@ class OptionsBody(FramesBody):
     )
     mask_frame: Literal["tool", "base"] = Field(
         "tool",
-        description="Frame of the mask's coordinates: the target's own (tool) or the base frame.",
+        description="Directions of the mask's coordinates: of the target (tool) or of the world frame (base).",
     )
     limits: list[Pair | None] | None = Field(
         None,
@@ -166,19 +178,32 @@ class OptionsBody(FramesBody):
         )
 
     def resolve_all(
-        self, target: Target | list[Target], settings: Settings
+        self, robot: Robot, target: Target | list[Target], settings: Settings, q: Sequence[Array | None] = (None,)
     ) -> tuple[list[tuple[Task, Array]], bool]:
         """`resolve` of one target or of each in a list, and whether it was one.
 
         All are read before anything is computed: a mistake in the last one costs nothing. Raises 413 for too many.
+
+        Args:
+            robot: the arm, with the base and tool of this request.
+            q: present configurations, one per target or one for all; None: not known.
         """
         if isinstance(target, Target):
-            return [self.resolve(target, "target")], True
+            return [self.resolve(robot, target, "target", q[0])], True
         schemas.check_batch("target", len(target), settings)
-        return [self.resolve(each, f"target[{i}]") for i, each in enumerate(target)], False
+        present = cycle(q) if len(q) == 1 else q
+        places = zip(target, present, range(len(target)), strict=False)
+        return [self.resolve(robot, each, f"target[{i}]", at) for each, at, i in places], False
 
-    def resolve(self, target: Target, field: str) -> tuple[Task, Array]:
-        """The task, and the target's pose ``(4, 4)``; raises `ProblemError` naming `field`.
+    def resolve(self, robot: Robot, target: Target, field: str, q: Array | None = None) -> tuple[Task, Array]:
+        """The task, and the target's pose ``(4, 4)`` in the world frame; raises `ProblemError` naming `field`."""
+        task, T = self._in_its_frame(target, field)
+        if target.frame in (None, WORLD):
+            return task, T
+        return task, self.pose_of(robot, str(target.frame), f"{field}.frame", q) @ T
+
+    def _in_its_frame(self, target: Target, field: str) -> tuple[Task, Array]:
+        """The task, and the target's pose in its own frame.
 
         With a mask without rotations, a target may be a point alone.
         """

@@ -87,14 +87,14 @@ async def path_inverse_kinematics(request: Request, robot: Robot, body: PathRequ
 
 def _solve(robot: Robot, body: PathRequest, settings: Settings, deadline: Deadline) -> Response:
     schemas.check_batch("targets", len(body.targets), settings, settings.max_path)
-    targets = [body.resolve(target, f"targets[{i}]") for i, target in enumerate(body.targets)]
+    q_start = None
+    if body.q_start is not None:
+        q_start = schemas.as_configurations(robot, body.q_start, settings, "q_start")[0][0]
+    targets = [body.resolve(robot, each, f"targets[{i}]", q_start) for i, each in enumerate(body.targets)]
     task = targets[0][0]
     for i, (other, _) in enumerate(targets):
         if other != task:
             expected = f"a target for task {task}, as the first one, or `task` for all of them"
             raise invalid(FieldError(field=f"targets[{i}]", value=f"a target for task {other}", expected=expected))
-    q_start = None
-    if body.q_start is not None:
-        q_start = schemas.as_configurations(robot, body.q_start, settings, "q_start")[0][0]
     poses = [T for _, T in targets]
     return reply(path_answer(solve(robot, poses, body.options(task), q_start, body.max_step, deadline.check)))

@@ -43,6 +43,14 @@ def named_numbers(text: str) -> tuple[str, list[float]]:
     return name.strip(), [number(value) for value in values.split(":")]
 
 
+def workpiece(text: str) -> tuple[str, list[float]]:
+    """``NAME=X:Y:Z`` or ``NAME=X:Y:Z:ROLL:PITCH:YAW``."""
+    name, values = named_numbers(text)
+    if not name or len(values) not in (3, 6):
+        raise argparse.ArgumentTypeError(f"{text!r} is not NAME=X:Y:Z or NAME=X:Y:Z:ROLL:PITCH:YAW")
+    return name, [*values, 0.0, 0.0, 0.0][:6]
+
+
 # argparse reports "invalid <name> value".
 whole_number.__name__ = count.__name__ = "whole number"
 named_number.__name__ = named_numbers.__name__ = "value"
@@ -55,6 +63,7 @@ class Parents:
         robots: ``--robots``, the folder of further robot files.
         output: ``--json`` and the units.
         joints: ``--lock`` and ``--limit``.
+        frames: ``--workpiece``.
     """
 
     def __init__(self) -> None:
@@ -80,6 +89,12 @@ class Parents:
         self.joints.add_argument(
             "--limit", type=named_numbers, action="append", metavar="JOINT=LOWER:UPPER",
             help=f"narrow the limits of a joint (counted from 1); {UNITS_NOTE}; may be repeated",
+        )  # fmt: skip
+        self.frames = argparse.ArgumentParser(add_help=False)
+        self.frames.add_argument(
+            "--workpiece", type=workpiece, action="append", metavar="NAME=X:Y:Z[:ROLL:PITCH:YAW]", default=[],
+            help="a frame of your own, such as a table, with its pose in the world frame; --frame may name it; "
+            f"{UNITS_NOTE}; may be repeated",
         )  # fmt: skip
 
 
@@ -125,10 +140,19 @@ def add_serve(commands: Any, parents: Parents) -> argparse.ArgumentParser:
 def add_fk(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard fk``."""
     parser = _command(
-        commands, "fk", "forward kinematics: tool pose for joint values", parents.robots, parents.output
+        commands,
+        "fk",
+        "forward kinematics: tool pose for joint values",
+        parents.robots,
+        parents.output,
+        parents.frames,
     )
     parser.add_argument("q", type=number, nargs="+", metavar="Q", help=f"joint values, {UNITS_NOTE}")
     parser.add_argument("--frames", action="store_true", help="also print the frame after every DH row")
+    parser.add_argument(
+        "--frame", default="world", metavar="NAME",
+        help="print poses in this frame: world (default), base (of the first DH row), or a workpiece",
+    )  # fmt: skip
     return parser
 
 
@@ -141,6 +165,7 @@ def add_ik(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         parents.robots,
         parents.output,
         parents.joints,
+        parents.frames,
         usage="kinboard ik ROBOT --position X Y Z [--wxyz W X Y Z | --approach X Y Z] [options]",
     )
     _add_target(parser)
@@ -190,6 +215,11 @@ def _add_target(parser: argparse.ArgumentParser) -> None:
     turn = parser.add_mutually_exclusive_group()
     turn.add_argument("--wxyz", type=number, nargs=4, metavar=("W", *XYZ), help="orientation as a quaternion")
     turn.add_argument("--approach", type=number, nargs=3, metavar=XYZ, help="direction of the tool's z axis")
+    parser.add_argument(
+        "--frame", default="world", metavar="NAME",
+        help="frame in which the target is: world (default), base (of the first DH row), tool (where the tool is "
+        "at --seed), or a workpiece",
+    )  # fmt: skip
     parser.add_argument(
         "--task", choices=("pose", "approach", "position"),
         help="what the tool must match (default: everything that is given)",

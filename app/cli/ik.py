@@ -8,9 +8,10 @@ from argparse import Namespace
 
 import numpy as np
 
-from app.cli.terminal import Notation, configuration, joint_constraints, print_json, robot_of, table
+from app.cli.terminal import Notation, configuration, frame_of, joint_constraints, print_json, robot_of, table
 from app.shared.answers.ik import Blocked, IkAnswer, Solution, ik_answer
 from kin import IKOptions, InputError, Task
+from kin.frames import TOOL
 from kin.ik import solve
 from kin.ik.options import MASK_NAMES
 from kin.transforms import frame_from_approach, from_position_wxyz
@@ -26,6 +27,9 @@ def run(arguments: Namespace) -> int:
         T[:3, :3] = frame_from_approach(arguments.approach)
     task = _task(arguments)
     q_seed = None if arguments.seed is None else configuration(robot, arguments.seed, "--seed", arguments.rad)
+    if arguments.frame == TOOL and q_seed is None:
+        raise InputError("--frame", TOOL, "--seed as well, which says where the tool is")
+    T = frame_of(robot, arguments, q_seed) @ T
     options = IKOptions(
         task=task,
         mask=None if arguments.mask is None else [name in arguments.mask for name in MASK_NAMES],

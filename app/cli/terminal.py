@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from app.shared.store import Store
-from kin import InputError, JointConstraints, Robot, load_robot, load_urdf
+from kin import InputError, JointConstraints, Robot, frame_pose, from_xyz_rpy, load_robot, load_urdf
+from kin.frames import FRAMES
 from kin.transforms import Array
 
 
@@ -69,6 +70,22 @@ def configuration(robot: Robot, values: list[float], field: str, rad: bool) -> A
         raise InputError(field, f"{len(values)} values", f"{robot.n}, one for each of: {joints}")
     scale = np.where(robot.revolute, math.pi / 180, 1e-3)
     return robot.check_q(np.array(values) * (1.0 if rad else scale), field)
+
+
+def frame_of(robot: Robot, arguments: Namespace, q: Array | None = None) -> Array:
+    """T_world_frame ``(4, 4)`` of the frame of ``--frame``, with those of ``--workpiece``; raises `InputError`.
+
+    `q`: where the arm is, for the frame of the tool.
+    """
+    angle, length = (1.0, 1.0) if arguments.rad else (math.pi / 180, 1e-3)
+    workpieces: dict[str, Array] = {}
+    for name, values in arguments.workpiece:
+        if name in workpieces or name in FRAMES:
+            raise InputError("--workpiece", name, f"names other than {', '.join(FRAMES)}, each once")
+        workpieces[name] = from_xyz_rpy([v * length for v in values[:3]], [v * angle for v in values[3:]])
+    if arguments.frame not in (*FRAMES, *workpieces):
+        raise InputError("--frame", arguments.frame, "one of " + ", ".join([*FRAMES, *workpieces]))
+    return frame_pose(robot, arguments.frame, workpieces, q)
 
 
 class Notation:

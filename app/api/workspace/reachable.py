@@ -90,7 +90,7 @@ def reachable(
     and the computation ends when the client leaves.
     """
     with deadline.turn:
-        targets, single = body.resolve_all(body.target, settings_of(request))
+        targets, single = body.resolve_all(robot, body.target, settings_of(request))
         if single:
             return reply(_answers(robot, body, targets)[0])
     # Invalid options show in the first piece, while the status of the response can still be set.

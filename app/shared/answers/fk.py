@@ -6,6 +6,8 @@ from typing_extensions import TypedDict
 
 from app.shared.answers.document import documented
 from kin import Robot, fk, link_frames
+from kin.axes import inverse
+from kin.frames import WORLD
 from kin.transforms import Array, wxyz_from_rotation
 
 Matrix = list[list[float]]
@@ -16,11 +18,14 @@ class Pose(TypedDict):
     """A rigid transform, as a matrix and as a position with a quaternion."""
 
     matrix: Matrix
-    """4×4 homogeneous transform in the base frame, row by row; the last column is the position in metres."""
+    """4×4 homogeneous transform, row by row; the last column is the position in metres."""
     position: list[float]
-    """x, y, z in metres, in the base frame."""
+    """x, y, z in metres."""
     wxyz: list[float]
     """Unit quaternion w, x, y, z (scalar first, w never negative)."""
+    frame: str
+    """Name of the frame in which these numbers are: world unless another one was requested. The world frame is the
+    base frame, that of the first DH row, unless the arm or the request has a `base`."""
 
 
 @documented
@@ -30,7 +35,7 @@ class Frame(TypedDict):
     name: str
     """Name of the row of the DH table the frame follows."""
     pose: Pose
-    """Its pose in the base frame."""
+    """Its pose."""
 
 
 @documented
@@ -38,27 +43,42 @@ class FkAnswer(TypedDict):
     """Forward kinematics of one configuration."""
 
     pose: Pose
-    """Pose of the tool in the base frame."""
+    """Pose of the tool."""
     in_limits: bool
     """Whether every joint is inside its limits. The pose is computed in either case."""
     frames: list[Frame] | None
     """Frame after every DH row, base to tool, fixed rows included; null unless requested with `frames`."""
 
 
-def poses(T: Array) -> list[Pose]:
-    """Poses of transforms ``(k, 4, 4)``."""
+def poses(T: Array, frame: str) -> list[Pose]:
+    """Poses of transforms ``(k, 4, 4)``, which are in this frame."""
     columns = zip(T.tolist(), T[:, :3, 3].tolist(), wxyz_from_rotation(T[:, :3, :3]).tolist(), strict=True)
-    return [{"matrix": matrix, "position": position, "wxyz": wxyz} for matrix, position, wxyz in columns]
+    return [
+        {"matrix": matrix, "position": position, "wxyz": wxyz, "frame": frame}
+        for matrix, position, wxyz in columns
+    ]
 
 
-def fk_answers(robot: Robot, q: Array, frames: bool = False) -> list[FkAnswer]:
-    """Forward kinematics of configurations ``(k, n)`` in radians (metres)."""
-    tools = poses(fk(robot, q))
+def fk_answers(
+    robot: Robot, q: Array, frames: bool = False, frame: str = WORLD, T_world_frame: Array | None = None
+) -> list[FkAnswer]:
+    """Forward kinematics of configurations ``(k, n)`` in radians (metres).
+
+    Args:
+        frames: whether to include the frame of each row.
+        frame: name of the frame in which poses are answered.
+        T_world_frame: its pose ``(4, 4)``; None: the world frame.
+    """
+
+    def framed(T: Array) -> list[Pose]:
+        return poses(T if T_world_frame is None else inverse(T_world_frame) @ T, frame)
+
+    tools = framed(fk(robot, q))
     inside: list[bool] = robot.in_limits(q).tolist()
     if not frames:
         return [{"pose": pose, "in_limits": ok, "frames": None} for pose, ok in zip(tools, inside, strict=True)]
     names = [row.name for row in robot.rows]
-    flat = iter(poses(link_frames(robot, q).reshape(-1, 4, 4)))
+    flat = iter(framed(link_frames(robot, q).reshape(-1, 4, 4)))
     return [
         {"pose": pose, "in_limits": ok, "frames": [{"name": name, "pose": next(flat)} for name in names]}
         for pose, ok in zip(tools, inside, strict=True)

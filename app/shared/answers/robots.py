@@ -54,7 +54,10 @@ class RowAnswer(TypedDict):
 
 @documented
 class RobotAnswer(TypedDict):
-    """Everything that defines an arm: T_base_tool = base · A_1 … A_m · tool, with one A per DH row."""
+    """Everything that defines an arm: T_world_tool = base · A_1 … A_m · tool, with one A per DH row.
+
+    Poses are answered in the world frame. It is the base frame unless `base` is another transform than 1.
+    """
 
     id: str
     """Short name, used in URLs."""
@@ -84,9 +87,9 @@ class RobotAnswer(TypedDict):
     home: list[float]
     """The home configuration, one value per moving joint, in radians (metres)."""
     base: Matrix
-    """Constant 4×4 transform before the first row."""
+    """Pose of the base frame, that of the first row, in the world frame: constant, 4×4, metres."""
     tool: Matrix
-    """Constant 4×4 transform after the last row."""
+    """Pose of the tool frame, which targets are about, in the frame after the last row: constant, 4×4, metres."""
 
 
 def robot_answer(robot: Robot) -> RobotAnswer:

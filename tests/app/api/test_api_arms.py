@@ -369,3 +369,80 @@ def test_arms_sent_along_do_not_fill_memory(client):
             sizes.append(tracemalloc.get_traced_memory()[0])
     tracemalloc.stop()
     assert sizes[1] < sizes[0] + 5e6
+
+
+# Targets in named frames
+
+UR5 = kin.get_robot("ur5")
+SIX = [0.3, -1.2, 1.4, 0.2, 0.7, 0.1]
+TABLE = {"xyz": [0.3, 0.2, 0.1], "rpy": [0.1, -0.2, 0.3]}
+STAND = {"xyz": [0.0, 0.5, 0.2], "rpy": [0.0, 0.0, 1.0]}
+T_TABLE = kin.from_xyz_rpy(TABLE["xyz"], TABLE["rpy"])
+OPTIONS = [{}, {"base": STAND}, {"base": STAND, "tool": {"xyz": [0, 0, 0.1]}}]
+
+
+@pytest.mark.parametrize("options", OPTIONS, ids=["as it is", "base", "base and tool"])
+@pytest.mark.parametrize("frame", ["world", "base", "table"])
+def test_a_pose_answered_in_a_frame_is_a_target_in_it(client, frame, options):
+    asked = {"workpieces": {"table": TABLE}, **options}
+    pose = post(client, "robots/ur5/fk", {"q": SIX, "frame": frame, "frames": True, **asked})
+    assert {each["frame"] for each in (pose["pose"], *(row["pose"] for row in pose["frames"]))} == {frame}
+    answer = post(client, "robots/ur5/ik", {"target": pose["pose"], "q_seed": SIX, **asked})
+    assert answer["status"] == "solved"
+    assert answer["solutions"][0]["q"] == pytest.approx(SIX, abs=1e-9)
+    judged = post(client, "robots/ur5/reachable", {"target": [pose["pose"]], **asked})
+    assert judged["results"][0]["reachable"]
+    path = {"targets": [pose["pose"], {**pose["pose"]}], "q_start": SIX, **asked}
+    assert post(client, "robots/ur5/ik/path", path)["q"][0] == pytest.approx(SIX, abs=1e-9)
+
+
+def test_a_frame_moves_the_numbers_of_a_pose(client):
+    arm = UR5.with_base(kin.from_xyz_rpy(STAND["xyz"], STAND["rpy"]))
+    asked = {"q": SIX, "base": STAND, "workpieces": {"table": TABLE}}
+    for frame in ("world", "base", "table"):
+        expected = np.linalg.solve(kin.frame_pose(arm, frame, {"table": T_TABLE}), kin.fk(arm, np.array(SIX)))
+        answer = post(client, "robots/ur5/fk", {**asked, "frame": frame})
+        assert np.allclose(answer["pose"]["matrix"], expected, atol=1e-12)
+
+
+def test_targets_in_the_frame_of_the_tool_are_steps_from_the_present_configuration(client):
+    ahead = {"position": [0, 0, 0.03], "wxyz": [1, 0, 0, 0], "frame": "tool"}
+    expected = kin.fk(UR5, np.array(SIX)) @ kin.from_xyz_rpy([0, 0, 0.03])
+    answer = post(client, "robots/ur5/ik", {"target": ahead, "q_seed": SIX})
+    assert np.allclose(kin.fk(UR5, answer["solutions"][0]["q"]), expected, atol=1e-9)
+    other = [0.1, *SIX[1:]]
+    several = post(client, "robots/ur5/ik", {"target": [ahead, ahead], "q_seed": [SIX, other]})["results"]
+    ends = [kin.fk(UR5, each["solutions"][0]["q"]) for each in several]
+    starts = [kin.fk(UR5, np.array(q)) for q in (SIX, other)]
+    assert np.allclose(np.linalg.solve(starts, ends), kin.from_xyz_rpy([0, 0, 0.03]), atol=1e-9)
+    path = post(client, "robots/ur5/ik/path", {"targets": [ahead], "q_start": SIX})
+    assert np.allclose(kin.fk(UR5, path["q"][0]), expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", [" ", "world", "base", "tool", "x" * 41])
+def test_names_of_workpieces_are_their_own(client, name):
+    body = {"target": {"position": [0.3, 0, 0.3]}, "workpieces": {name: TABLE}}
+    assert post(client, "robots/ur5/ik", body, 422)["errors"][0]["field"].startswith("workpieces")
+
+
+TWISTED = {"a": {"xyz": [0, 0, 0], "matrix": np.eye(4).tolist()}}
+
+
+@pytest.mark.parametrize(
+    ("operation", "body", "field", "valid"),
+    [
+        ("ik", {"target": {**POSE, "frame": "desk"}}, "target.frame", "world, base, tool, table"),
+        ("ik", {"target": [POSE, {**POSE, "frame": ""}]}, "target[1].frame", ""),
+        ("ik", {"target": {**POSE, "frame": "tool"}}, "target.frame", "q_seed"),
+        ("reachable", {"target": {**POSE, "frame": "tool"}}, "target.frame", "q_seed"),
+        ("ik/path", {"targets": [POSE, {**POSE, "frame": "tool"}]}, "targets[1].frame", "q_start"),
+        ("fk", {"q": SIX, "frame": "tool"}, "frame", "one of world, base, table"),
+        ("fk", {"q": SIX, "frame": "desk"}, "frame", "world, base, tool, table"),
+        ("fk", {"q": SIX, "frame": "a", "workpieces": TWISTED}, "workpieces.a.matrix", "one of the two"),
+        ("ik", {"target": POSE, "workpieces": {str(k): {} for k in range(33)}}, "workpieces", "32"),
+    ],
+)
+def test_a_frame_that_is_none_is_refused_by_name(client, operation, body, field, valid):
+    problem = post(client, f"robots/ur5/{operation}", {"workpieces": {"table": TABLE}, **body}, 422)
+    assert problem["errors"][0]["field"] == field
+    assert valid in problem["errors"][0]["expected"]

@@ -66,6 +66,30 @@ def test_fk_reads_degrees_and_answers_as_rest_does(capsys, client):
     assert got["pose"]["matrix"] == kin.fk(PIONEER, q).tolist()
 
 
+TABLE = "table=100:200:-300:0:0:90"
+
+
+def test_poses_in_the_frame_of_a_workpiece_are_those_of_rest(capsys, client):
+    asked = {"workpieces": {"table": {"xyz": [0.1, 0.2, -0.3], "rpy": [0, 0, math.pi / 2]}}}
+    q = [math.radians(x) for x in (90, 30, 60, 30, 30)]
+    got = answer(capsys, "fk", "pioneer5", 90, 30, 60, 30, 30, "--frame", "table", "--workpiece", TABLE)
+    assert got == client.post("/api/v1/robots/pioneer5/fk", json={"q": q, "frame": "table", **asked}).json()
+    place = [1000 * x for x in got["pose"]["position"]]
+    where = ("--frame", "table", "--workpiece", TABLE)
+    found = answer(capsys, "ik", "pioneer5", "--position", *place, "--wxyz", *got["pose"]["wxyz"], *where)
+    assert np.allclose(kin.fk(PIONEER, found["solutions"][0]["q"]), kin.fk(PIONEER, q), atol=1e-9)
+    assert "in the frame table:" in run(capsys, "fk", "pioneer5", 90, 30, 60, 30, 30, *where)[1]
+
+
+def test_a_target_in_the_frame_of_the_tool_is_a_step_from_the_seed(capsys):
+    seed = (0, -90, 90, 0, 90, 0)
+    step = ("--position", 0, 0, 30, "--wxyz", 1, 0, 0, 0, "--frame", "tool", "--seed", *seed)
+    found = answer(capsys, "ik", "ur5", *step)
+    ur5 = kin.get_robot("ur5")
+    expected = kin.fk(ur5, np.radians(seed)) @ kin.from_xyz_rpy([0, 0, 0.03])
+    assert np.allclose(kin.fk(ur5, found["solutions"][0]["q"]), expected, atol=1e-9)
+
+
 def test_fk_in_radians(capsys):
     got = answer(capsys, "fk", "pioneer5", 1.5, 0.5, 1, 0.5, 0.5, "--rad")
     assert got["pose"]["matrix"] == kin.fk(PIONEER, [1.5, 0.5, 1, 0.5, 0.5]).tolist()
@@ -244,6 +268,11 @@ def test_robots_lists_all_and_describes_one(capsys, client):
         (("ik", "pioneer5", "--position", 1, 2, 3, "--branch", "sideways"), "elbow positive"),
         (("ik", "pioneer5", "--position", 1, 2, 3, "--mask", "rx"), "--wxyz"),
         (("ik", "pioneer5", "--position", 1, 2, 3, "--mask", "x", "--task", "pose"), "no --task together"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--frame", "tool"), "--seed as well"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--frame", "table"), "one of world, base, tool"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--workpiece", "table=1:2"), "NAME=X:Y:Z"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--workpiece", "base=1:2:3"), "names other than world"),
+        (("fk", "pioneer5", 1, 2, 3, 4, 5, "--frame", "tool"), "world, base or a workpiece"),
         (("robots", "puma"), "expected one of pioneer5"),
         (("robots", "--robots", "/no/such/folder"), "existing folder"),
         (("dance",), "invalid choice: 'dance'"),
