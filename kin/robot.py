@@ -32,6 +32,8 @@ Kind = Literal["revolute", "prismatic", "fixed"]
 CONVENTIONS: tuple[Convention, ...] = get_args(Convention)
 LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 KIND_CODES: dict[Kind, float] = {"fixed": 0.0, "revolute": 1.0, "prismatic": 2.0}
+# Fields of a joint that hold the largest value of a quantity.
+PEAK_FIELDS = ("velocity", "acceleration", "jerk", "effort")
 # Where none are stated: one turn about zero, or one metre of stroke.
 DEFAULT_LIMITS: dict[str, tuple[float, float] | None] = {
     "fixed": None,
@@ -50,7 +52,8 @@ class Joint:
 
     Attributes:
         limits: (lower, upper) in radians or metres; None for a fixed row or an unlimited joint.
-        velocity, effort: largest speed (rad/s or m/s) and torque or force (N·m or N), None if they are not known.
+        velocity, acceleration, jerk: largest values (rad or m, per second, s² and s³), None if they are not known.
+        effort: largest torque or force (N·m or N), None if it is not known.
 
     Raises:
         InputError: a kind that does not exist, a number that is not finite, limits that are not lower and upper.
@@ -65,6 +68,8 @@ class Joint:
     limits: tuple[float, float] | None = None
     velocity: float | None = None
     effort: float | None = None
+    acceleration: float | None = None
+    jerk: float | None = None
 
     def __post_init__(self) -> None:
         """Check the row; numbers of any type become floats."""
@@ -72,7 +77,7 @@ class Joint:
             raise InputError(f"kind of {self.name}", self.kind, _one_of(*KIND_CODES))
         for key in ("theta", "d", "a", "alpha"):
             object.__setattr__(self, key, _number(f"{key} of {self.name}", getattr(self, key)))
-        for key in ("velocity", "effort"):
+        for key in PEAK_FIELDS:
             if (value := getattr(self, key)) is not None:
                 where = f"{key} of {self.name}"
                 if self.kind == "fixed" or not (limit := _number(where, value)) > 0.0:

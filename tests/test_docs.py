@@ -133,9 +133,18 @@ def test_lists_are_read_from_the_environment_as_documented(monkeypatch):
 
 
 def test_the_robot_file_is_a_robot():
-    (text,) = blocks("toml")
-    robot = kin.parse_robot(text)
+    robot_file, *others = blocks(
+        "toml", "docs/robot-files.md", *(set(PAGES) - {"docs/robot-files.md", "docs/motion.md"})
+    )
+    assert not others
+    robot = kin.parse_robot(robot_file)
     assert kin.fk(robot, [0.0, 0.0])[:3, 3].tolist() == [0.5, 0.0, 0.0]
+
+
+def test_the_programs_can_be_driven():
+    for text in blocks("toml", "docs/motion.md"):
+        robot = kin.get_robot("panda")
+        assert kin.plan_motion(robot, kin.parse_program(text, robot)).planned
 
 
 def test_the_built_in_arms_are_named():

@@ -27,7 +27,7 @@ NAME, ROW_NAME, SOURCE, DESCRIPTION = 60, 40, 200, 400  # characters
 SMALLEST, LARGEST = 1e-3, 1000.0  # m: reach of an arm that can be shown
 LONGEST = 10_000  # characters of the compact form; a link holds 12 000 in all
 _KINDS = {"revolute": "", "prismatic": "p", "fixed": "f"}
-_ROW = ("theta", "d", "a", "alpha", "limits", "kind", "name", "velocity", "effort")
+_ROW = ("theta", "d", "a", "alpha", "limits", "kind", "name", "velocity", "effort", "acceleration", "jerk")
 _TOP = {"n": "name", "s": "source", "i": "description", "c": "convention", "b": "base", "t": "tool"}
 
 

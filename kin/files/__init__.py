@@ -22,10 +22,10 @@ A file states its units, so a table can be copied as its source prints it::
 
 Only ``id``, ``name``, ``source``, ``convention``, ``units`` and ``rows`` are required; in a row, a missing number
 is zero. Without ``limits`` a revolute joint turns ±180° and a prismatic one slides 0 to 1 m; ``limits = "none"``
-leaves a revolute joint unlimited. ``velocity`` and ``effort`` are optional. Without ``home`` the arm starts in the
-middle of its limits, or bent if that configuration is singular (:mod:`kin.files.home`). ``base`` and ``tool`` are
-tables ``{ xyz = [x, y, z], rpy = [roll, pitch, yaw] }`` or ``{ matrix = [[…], […], […], […]] }``. A number may be
-a text with a unit of its own, ``"0.13 m"``.
+leaves a revolute joint unlimited. ``velocity``, ``acceleration``, ``jerk`` and ``effort`` are optional. Without
+``home`` the arm starts in the middle of its limits, or bent if that configuration is singular
+(:mod:`kin.files.home`). ``base`` and ``tool`` are tables ``{ xyz = [x, y, z], rpy = [roll, pitch, yaw] }`` or
+``{ matrix = [[…], […], […], […]] }``. A number may be a text with a unit of its own, ``"0.13 m"``.
 
 The same fields as a dict (:func:`robot_from_dict`, :func:`robot_to_dict`) are what REST and the page exchange.
 

@@ -21,6 +21,7 @@ from kin.robot import (
     IDENTITY,
     KIND_CODES,
     LENGTHS,
+    PEAK_FIELDS,
     Joint,
     Matrix,
     Robot,
@@ -32,8 +33,10 @@ ANGLES = {"deg": math.pi / 180, "rad": 1.0}
 MAX_ROWS = 32
 MAX_REACH = 1e5  # metres; targets may have coordinates up to 1e6 m
 _TOP = {"id", "name", "source", "description", "convention", "units", "rows", "home", "base", "tool"}
-_ROW = {"name", "kind", "theta", "d", "a", "alpha", "limits", "velocity", "effort"}
-_QUANTITY = re.compile(rf"\s*({NUMBER})\s*(rad|deg|°|m|cm|mm)(/s)?\s*")
+_ROW = {"name", "kind", "theta", "d", "a", "alpha", "limits", *PEAK_FIELDS}
+_QUANTITY = re.compile(rf"\s*({NUMBER})\s*(rad|deg|°|m|cm|mm)(/s[23²³]?)?\s*")
+PER = {"velocity": "/s", "acceleration": "/s2", "jerk": "/s3"}
+_POWERS = str.maketrans("²³", "23")
 _LONGEST = 80  # characters of a number with a unit
 _SURROGATE = re.compile("[\ud800-\udfff]")  # half a character, which no encoding can write
 UNLIMITED = "none"
@@ -145,7 +148,7 @@ class Reader:
             raise self.refuse(f"rows[{index}]", data, "a table with theta, d, a, alpha")
         self.only_known_fields(where, data, _ROW)
         kind = self.choice(data, "kind", tuple(KIND_CODES), where, default="revolute")
-        for key in ("limits", "velocity", "effort"):
+        for key in ("limits", *PEAK_FIELDS):
             if kind == "fixed" and key in data:
                 raise self.refuse(where + key, data[key], f"no {key}, because the row is fixed")
         slides = kind == "prismatic"
@@ -159,6 +162,8 @@ class Reader:
             limits=self.limits(data["limits"], where, slides) if "limits" in data else DEFAULT_LIMITS[kind],
             velocity=self.positive(data, "velocity", where, slides),
             effort=self.positive(data, "effort", where, None),
+            acceleration=self.positive(data, "acceleration", where, slides),
+            jerk=self.positive(data, "jerk", where, slides),
         )
 
     def limits(self, pair: object, where: str, slides: bool) -> tuple[float, float] | None:
@@ -175,14 +180,14 @@ class Reader:
         return low, high
 
     def positive(self, data: dict[str, Any], key: str, where: str, slides: bool | None) -> float | None:
-        """A limit of the joint's velocity (per second) or effort (N·m or N, `slides` None), if it is stated."""
+        """A limit of the joint's velocity, acceleration, jerk, or effort (`slides` None), if it is stated."""
         if key not in data:
             return None
         given = data[key]
         if slides is None:
             value = self.number(where + key, given)
         else:
-            value = (self.length_of if slides else self.angle_of)(where + key, given, "/s")
+            value = (self.length_of if slides else self.angle_of)(where + key, given, PER[key])
         if not value > 0.0:
             raise self.refuse(where + key, given, "a positive number")
         return value
@@ -246,7 +251,7 @@ class Reader:
         """A number in the unit of the file, or a text with a unit of its own such as ``"0.13 m"``."""
         if isinstance(value, str):
             found = _QUANTITY.fullmatch(value) if len(value) <= _LONGEST else None
-            if found is None or found[2] not in units or (found[3] or "") not in ("", per):
+            if found is None or found[2] not in units or (found[3] or "").translate(_POWERS) not in ("", per):
                 example = f'"1.5 {next(iter(units))}{per}"'
                 raise self.refuse(field, value, f"a finite number, or a text with its unit such as {example}")
             value, scale = float(found[1]), units[found[2]]

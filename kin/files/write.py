@@ -17,7 +17,7 @@ import numpy as np
 
 from kin.errors import InputError
 from kin.files.numbers import scaled
-from kin.files.read import ANGLES, UNLIMITED, Reader, matrix_of
+from kin.files.read import ANGLES, PER, UNLIMITED, Reader, matrix_of
 from kin.named import robot_of
 from kin.robot import IDENTITY, LENGTHS, Joint, Matrix, Robot, exact_cos_sin
 from kin.transforms import Array
@@ -112,8 +112,9 @@ class _Writer:
             return data
         slides = row.kind == "prismatic"
         data["limits"] = UNLIMITED if row.limits is None else [self.value(v, slides) for v in row.limits]
-        if row.velocity is not None:
-            data["velocity"] = self.value(row.velocity, slides, "/s")
+        for key, per in PER.items():
+            if (largest := getattr(row, key)) is not None:
+                data[key] = self.value(largest, slides, per)
         if row.effort is not None:
             data["effort"] = _plain(row.effort)
         return data

@@ -85,6 +85,14 @@ _ROW: dict[str, Any] = {
             "description": "Largest speed, per second; smaller than a million radians or metres per second.",
             "anyOf": [_number(_LENGTH), {"type": "string"}],
         },
+        "acceleration": {
+            "description": "Largest acceleration, per s²; smaller than a million radians or metres per s².",
+            "anyOf": [_number(_LENGTH), {"type": "string"}],
+        },
+        "jerk": {
+            "description": "Largest jerk, per s³; smaller than a million radians or metres per s³.",
+            "anyOf": [_number(_LENGTH), {"type": "string"}],
+        },
         "effort": {"description": "Largest torque or force in N·m or N.", **_number(["m"]), "exclusiveMinimum": 0},
     },
 }

@@ -14,6 +14,7 @@ from app.viewer.own_arm import NAME, OwnArm, own_arm
 from app.viewer.panel.readout import roll_pitch_yaw
 from app.viewer.tabs.robot.expression import ExpressionError, cut, read
 from kin import InputError, KinematicsError, Robot, RobotFileError
+from kin.robot import PEAK_FIELDS
 from kin.units import Units
 
 # A cell: of a row, ``(index, column)``; of a frame, ``("tool", "x")``; ``("arm", "name")``.
@@ -147,7 +148,7 @@ def _type_row(data: Fields, robot: Robot, index: int, column: str, text: str, un
         row["name"] = text
     elif column == "kind":
         row["kind"] = text
-        for key in ("limits", "velocity", "effort"):
+        for key in ("limits", *PEAK_FIELDS):
             row.pop(key, None)
         data.pop("home", None)
     elif column in ("low", "high"):

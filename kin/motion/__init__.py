@@ -1,0 +1,81 @@
+"""Motions: a program of segments, timed so that the joints keep their limits.
+
+1. :mod:`kin.motion.program` holds the program, :mod:`kin.motion.reading` reads it from plain data.
+2. :mod:`kin.motion.limits` knows how fast each joint may move.
+3. :mod:`kin.motion.planner` turns the program into pieces (:mod:`kin.motion.pieces`): a PTP is timed
+   joint by joint (:mod:`kin.motion.scurve`).
+4. :mod:`kin.motion.results` holds the answer, :mod:`kin.motion.details` the facts behind a refusal or a note, and
+   :mod:`kin.motion.messages` words them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from kin.errors import InputError
+from kin.ik.problem import never_cancel
+from kin.motion.limits import MotionLimits, limits_of
+from kin.motion.planner import planned
+from kin.motion.program import Circ, Dwell, JointTarget, Lin, PoseTarget, Program, Ptp, Spline
+from kin.motion.reading import parse_program, program_from_dict, program_to_dict
+from kin.motion.results import Motion, MotionSample, Peak, Refusal, SegmentTimes
+from kin.named import robot_of
+from kin.robot import Robot
+
+__all__ = [
+    "Circ",
+    "Dwell",
+    "JointTarget",
+    "Lin",
+    "Motion",
+    "MotionLimits",
+    "MotionSample",
+    "Peak",
+    "PoseTarget",
+    "Program",
+    "Ptp",
+    "Refusal",
+    "SegmentTimes",
+    "Spline",
+    "limits_of",
+    "parse_program",
+    "plan_motion",
+    "program_from_dict",
+    "program_to_dict",
+]
+
+
+def plan_motion(
+    robot: Robot | str,
+    program: Program | Mapping[str, Any] | Sequence[Ptp | Lin | Circ | Spline | Dwell],
+    q_start: ArrayLike | None = None,
+    *,
+    limits: MotionLimits | None = None,
+    stop: Callable[[], None] = never_cancel,
+) -> Motion:
+    """The motion of a program, with every limit kept, or why it cannot be driven.
+
+    Args:
+        robot: the arm, or the id of a built-in one.
+        program: a `Program`, its segments, or plain data as in `program_from_dict`.
+        q_start: ``(n,)`` where the arm is; the home pose by default.
+        limits: other limits than those of `limits_of`.
+        stop: called now and then; cancels the computation by raising.
+
+    Raises:
+        InputError: a malformed program or start. A program that cannot be driven is not an error.
+    """
+    robot = robot_of(robot)
+    if isinstance(program, Mapping):
+        program = program_from_dict(program, robot)
+    elif not isinstance(program, Program):
+        if not isinstance(program, Sequence) or isinstance(program, str | bytes):
+            raise InputError("program", program, "a Program, its segments, or a dict")
+        program = Program(tuple(program))
+    q = robot.q_home if q_start is None else robot.check_q(q_start, "q_start")
+    if q.ndim != 1:
+        raise InputError("q_start", f"shape {q.shape}", f"one configuration of {robot.n} values")
+    return planned(robot, program, limits_of(robot) if limits is None else limits, q.copy(), stop)

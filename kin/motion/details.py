@@ -1,0 +1,153 @@
+"""The facts behind a refused motion, and what is worth knowing of a planned one, as codes and numbers.
+
+`kin.motion.messages` makes the sentences from them. Lengths are in metres, angles in radians.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+from kin.ik.details import Details, LimitViolation
+from kin.path.details import JointMove
+from kin.solvers.singular import Singularity
+
+Cause = Literal["start", "target", "unreachable", "limits", "singularity", "branch", "circle", "task"]
+HelpCode = Literal["ptp", "posture", "via", "start", "closer", "task"]
+
+
+class StartOutside(NamedTuple):
+    """Cause ``start``: the arm is outside its limits before it moves."""
+
+    violations: tuple[LimitViolation, ...]
+
+
+class TargetOutside(NamedTuple):
+    """Cause ``target``: the configuration asked for is outside the limits."""
+
+    violations: tuple[LimitViolation, ...]
+
+
+class NotReached(NamedTuple):
+    """Cause ``unreachable``: no configuration meets a pose, as in the `kin.IKResult` of it."""
+
+    details: Details
+    cause: str
+    task: str
+    singularities: tuple[Singularity, ...]
+
+
+class LimitMet(NamedTuple):
+    """Cause ``limits``: the posture being followed would take a joint past its limit."""
+
+    violation: LimitViolation
+
+
+class SingularityMet(NamedTuple):
+    """Cause ``singularity``: the path leads through a singularity, where a joint would have to jump.
+
+    Attributes:
+        singularity: which one; None if no condition is known.
+        move: the joint that moves most there, and how far.
+    """
+
+    singularity: Singularity | None
+    move: JointMove | None
+
+
+class BranchNeeded(NamedTuple):
+    """Cause ``branch``: the posture at the start does not lead to the end.
+
+    Attributes:
+        start: the posture being followed; None if the arm's postures have no names.
+    """
+
+    start: str | None
+
+
+class NoCircle(NamedTuple):
+    """Cause ``circle``: start, via point and target do not define an arc.
+
+    Attributes:
+        coincident: which two points are the same; None: via lies on the line but not between the others.
+    """
+
+    coincident: tuple[str, str] | None
+
+
+class NotKept(NamedTuple):
+    """Cause ``task``: the arm's joints cannot keep the path.
+
+    Attributes:
+        joints: how many the arm has.
+        position, rotation: by how much the path is missed.
+    """
+
+    joints: int
+    position: float
+    rotation: float
+
+
+RefusalDetails = (
+    StartOutside | TargetOutside | NotReached | LimitMet | SingularityMet | BranchNeeded | NoCircle | NotKept
+)
+
+
+class Help(NamedTuple):
+    """What would help.
+
+    Attributes:
+        code: ``"ptp"``: a PTP to the same target; ``"posture"``: another posture at the start; ``"via"``: a detour
+            by another point; ``"start"``: a start inside the limits; ``"closer"``: a target closer to the arm;
+            ``"task"``: keeping less than the whole pose.
+        posture: name of the posture, for ``"posture"`` and ``"ptp"``; None if it has none.
+    """
+
+    code: HelpCode
+    posture: str | None = None
+
+
+class BlendShortened(NamedTuple):
+    """The zone at the end of a segment is smaller than asked for: half of the shorter segment is the most."""
+
+    segment: int
+    asked: float
+    used: float
+
+
+class BlendLeftOut(NamedTuple):
+    """The arm stops at the end of a segment although a zone was asked for."""
+
+    segment: int
+    why: Literal["last", "kinds", "short", "dwell"]
+
+
+class Slowed(NamedTuple):
+    """A path that is slow at one place, because a joint is at its limit of velocity or acceleration there.
+
+    Attributes:
+        segment, fraction: where: the segment, and the part of it that is covered, 0 to 1.
+        joint, name: which joint limits the speed.
+        quantity: which of its limits.
+        ratio: the tool's speed there as a part of its largest speed on this path.
+        singularity: the one that is nearest there; None if none is near.
+    """
+
+    segment: int
+    fraction: float
+    joint: int
+    name: str
+    quantity: Literal["velocity", "acceleration", "jerk"]
+    ratio: float
+    singularity: Singularity | None
+
+
+class JerkCost(NamedTuple):
+    """What the limits of jerk cost on a path: its seconds with them and without."""
+
+    first: int
+    last: int
+    duration: float
+    without: float
+
+
+Note = BlendShortened | BlendLeftOut | Slowed | JerkCost

@@ -1,0 +1,281 @@
+"""Programs: targets and the segments that lead to them. Metres, radians, seconds.
+
+A program begins where the arm is. Each segment leads from the end of the one before to its target.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kin.errors import InputError
+from kin.ik.options import Task, finite_number
+from kin.transforms import Array, as_transform, from_position_wxyz, wxyz_from_rotation
+
+Orientation = Literal["geodesic", "two-axis"]
+Kind = Literal["ptp", "lin", "circ", "spline", "dwell"]
+ORIENTATIONS: tuple[Orientation, ...] = get_args(Orientation)
+TASKS: tuple[Task, ...] = ("pose", "approach", "position")
+MOST_SEGMENTS, MOST_POINTS, MOST_VALUES = 1000, 200, 32
+LONGEST_NAME, LONGEST_DWELL = 120, 3600.0
+_FAR = 1e6  # metres or radians
+
+
+@dataclass(frozen=True, slots=True)
+class JointTarget:
+    """A configuration: one value per moving joint, radians or metres."""
+
+    q: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        """Check the values; they become floats."""
+        object.__setattr__(self, "q", _numbers("q", self.q, None, "joint values, radians or metres"))
+
+
+@dataclass(frozen=True, slots=True)
+class PoseTarget:
+    """A pose of the tool.
+
+    Attributes:
+        position: the tool point in the base frame, metres.
+        wxyz: unit quaternion of the orientation; None keeps the orientation at the start of the segment.
+    """
+
+    position: tuple[float, float, float]
+    wxyz: tuple[float, float, float, float] | None = None
+
+    def __post_init__(self) -> None:
+        """Check the values; the quaternion becomes a unit quaternion."""
+        object.__setattr__(
+            self, "position", _numbers("position", self.position, 3, "three numbers x, y, z in metres")
+        )
+        if self.wxyz is not None:
+            given = _numbers("wxyz", self.wxyz, 4, "a quaternion (w, x, y, z) that is not zero")
+            size = math.hypot(*given)
+            if not size > 1e-12:
+                raise InputError("wxyz", self.wxyz, "a quaternion (w, x, y, z) that is not zero")
+            if abs(size - 1.0) > 1e-15:
+                given = tuple(value / size for value in given)
+            object.__setattr__(self, "wxyz", given)
+
+    @classmethod
+    def of(cls, T: ArrayLike) -> PoseTarget:
+        """The target for a transform T_base_tool ``(4, 4)``."""
+        pose = as_transform(T, "pose")
+        x, y, z = pose[:3, 3].tolist()
+        w, i, j, k = wxyz_from_rotation(pose[:3, :3]).tolist()
+        return cls((x, y, z), (w, i, j, k))
+
+    def pose(self, before: Array) -> Array:
+        """T_base_tool ``(4, 4)``; `before` has the orientation that is kept where none is given."""
+        T = from_position_wxyz(self.position, self.wxyz)
+        if self.wxyz is None:
+            T[:3, :3] = before[:3, :3]
+        return T
+
+
+Target = JointTarget | PoseTarget
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Move:
+    """What all segments but a dwell have.
+
+    Attributes:
+        speed, acceleration: parts of the joint limits that the segment may use, above 0 and at most 1. The
+            second scales acceleration and jerk.
+        tool_speed, tool_turn: largest speed of the tool point (m/s) and of the tool's rotation (rad/s); None: no
+            other limits than those of the joints.
+        blend: radius of the zone (m) about the target within which the path may leave this segment for the next;
+            0: the arm stops at the target. At most half of each of the two segments is used.
+        name: shown to people.
+    """
+
+    speed: float = 1.0
+    acceleration: float = 1.0
+    tool_speed: float | None = None
+    tool_turn: float | None = None
+    blend: float = 0.0
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        """Check the values; numbers become floats."""
+        for key in ("speed", "acceleration"):
+            expected = "a number above 0 and at most 1"
+            value = finite_number(key, getattr(self, key), expected)
+            if not 0.0 < value <= 1.0:
+                raise InputError(key, getattr(self, key), expected)
+            object.__setattr__(self, key, value)
+        for key in ("tool_speed", "tool_turn"):
+            if (given := getattr(self, key)) is not None:
+                unit = "m/s" if key == "tool_speed" else "rad/s"
+                value = finite_number(key, given, f"a number above 0 in {unit}")
+                if not value > 0.0:
+                    raise InputError(key, given, f"a number above 0 in {unit}")
+                object.__setattr__(self, key, value)
+        expected = "a radius in metres, 0 or more"
+        blend = finite_number("blend", self.blend, expected)
+        if not 0.0 <= blend <= _FAR:
+            raise InputError("blend", self.blend, expected)
+        object.__setattr__(self, "blend", blend)
+        _check_name(self.name)
+
+
+@dataclass(frozen=True, slots=True)
+class Ptp(Move):
+    """Point to point: all joints start and end together, as fast as they may; the tool's path follows from that.
+
+    For a pose, the configuration nearest to the start is taken.
+    """
+
+    target: Target
+
+
+@dataclass(frozen=True, slots=True)
+class Lin(Move):
+    """A straight line of the tool point.
+
+    Attributes:
+        orientation: ``"geodesic"``: rotation about one fixed axis; ``"two-axis"``: the approach direction turns in
+            its plane while the tool turns about it.
+    """
+
+    target: Target
+    orientation: Orientation = "geodesic"
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        Move.__post_init__(self)
+        _check_orientation(self.orientation)
+
+
+@dataclass(frozen=True, slots=True)
+class Circ(Move):
+    """An arc of the tool point through a via point; the orientation turns steadily from start to target.
+
+    Attributes:
+        via: a point of the arc between start and target, metres.
+    """
+
+    via: tuple[float, float, float]
+    target: Target
+    orientation: Orientation = "geodesic"
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        Move.__post_init__(self)
+        _check_orientation(self.orientation)
+        object.__setattr__(self, "via", _numbers("via", self.via, 3, "three numbers x, y, z in metres"))
+
+
+@dataclass(frozen=True, slots=True)
+class Spline(Move):
+    """A smooth curve through points: of the tool if all are poses, of the joints if all are configurations."""
+
+    points: tuple[Target, ...]
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        Move.__post_init__(self)
+        points = tuple(self.points)
+        if not 1 <= len(points) <= MOST_POINTS or len({type(point) for point in points}) > 1:
+            raise InputError("points", self.points, f"1 to {MOST_POINTS} poses, or as many configurations")
+        object.__setattr__(self, "points", points)
+
+    @property
+    def target(self) -> Target:
+        """Where it ends."""
+        return self.points[-1]
+
+
+@dataclass(frozen=True, slots=True)
+class Dwell:
+    """A pause at the place where the segment before ended."""
+
+    seconds: float
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        expected = f"seconds, 0 to {LONGEST_DWELL:g}"
+        seconds = finite_number("seconds", self.seconds, expected)
+        if not 0.0 <= seconds <= LONGEST_DWELL:
+            raise InputError("seconds", self.seconds, expected)
+        object.__setattr__(self, "seconds", seconds)
+        _check_name(self.name)
+
+
+Segment = Ptp | Lin | Circ | Spline | Dwell
+KINDS: dict[Kind, type[Segment]] = {"ptp": Ptp, "lin": Lin, "circ": Circ, "spline": Spline, "dwell": Dwell}
+_KIND_OF: dict[type[Segment], Kind] = {cls: kind for kind, cls in KINDS.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """A motion as it is asked for.
+
+    Attributes:
+        segments: in order, at least one.
+        name: shown to people.
+        task: what the tool keeps of a pose: ``"pose"``, ``"approach"`` (point and approach direction) or
+            ``"position"`` (the point). None: as much as the joints of the arm can keep.
+        jerk_limited: whether paths keep the limits of jerk too; if not, acceleration may jump.
+    """
+
+    segments: tuple[Segment, ...]
+    name: str = ""
+    task: Task | None = None
+    jerk_limited: bool = True
+
+    def __post_init__(self) -> None:
+        """Check the fields."""
+        segments = tuple(self.segments)
+        if not 1 <= len(segments) <= MOST_SEGMENTS:
+            raise InputError("segments", f"{len(segments)} segments", f"1 to {MOST_SEGMENTS} segments")
+        for i, segment in enumerate(segments):
+            if type(segment) not in _KIND_OF:
+                raise InputError(f"segments[{i}]", segment, "one of " + ", ".join(c.__name__ for c in _KIND_OF))
+        object.__setattr__(self, "segments", segments)
+        if self.task is not None and self.task not in TASKS:
+            raise InputError("task", self.task, "one of " + ", ".join(f'"{task}"' for task in TASKS))
+        if not isinstance(self.jerk_limited, bool):
+            raise InputError("jerk_limited", self.jerk_limited, "true or false")
+        _check_name(self.name)
+
+
+def kind_of(segment: Segment) -> Kind:
+    """The kind of a segment, as it is written in a file."""
+    return _KIND_OF[type(segment)]
+
+
+def field_names(cls: type[Segment] | type[Program]) -> list[str]:
+    """The fields of a segment or a program."""
+    return [field.name for field in fields(cls)]
+
+
+def _numbers(field: str, values: object, count: int | None, expected: str) -> tuple[float, ...]:
+    if isinstance(values, np.ndarray):
+        values = values.tolist()
+    if not isinstance(values, list | tuple) or (
+        len(values) != count if count else not 1 <= len(values) <= MOST_VALUES
+    ):
+        raise InputError(field, values, expected)
+    found = tuple(finite_number(f"{field}[{i}]", value, "a finite number") for i, value in enumerate(values))
+    for i, value in enumerate(found):
+        if abs(value) > _FAR:
+            raise InputError(f"{field}[{i}]", value, "a number below a million")
+    return found
+
+
+def _check_orientation(value: object) -> None:
+    if value not in ORIENTATIONS:
+        raise InputError("orientation", value, "one of " + ", ".join(f'"{each}"' for each in ORIENTATIONS))
+
+
+def _check_name(value: object) -> None:
+    if not isinstance(value, str) or len(value) > LONGEST_NAME:
+        raise InputError("name", value, f"a text of at most {LONGEST_NAME} characters")

@@ -1,0 +1,240 @@
+"""Programs as plain data: TOML text or a dict → `Program`, and back.
+
+```toml
+units = { length = "mm", angle = "deg" }   # by default metres and radians
+
+[[segments]]
+kind = "ptp"
+q = [0, -90, 90, 0, 90, 0]
+
+[[segments]]
+kind = "lin"
+position = [400, 100, 300]
+wxyz = [0, 1, 0, 0]
+blend = 20
+```
+
+A target is `q`, or `position` with or without `wxyz`, or `pose`, a 4×4 matrix. Every error names the field, as in
+``segments[1].blend``.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from typing import Any, NoReturn
+
+import numpy as np
+
+from kin.errors import InputError, shorten
+from kin.ik.options import finite_number
+from kin.motion.program import (
+    KINDS,
+    MOST_POINTS,
+    MOST_SEGMENTS,
+    Circ,
+    Dwell,
+    JointTarget,
+    Move,
+    PoseTarget,
+    Program,
+    Segment,
+    Spline,
+    Target,
+    field_names,
+    kind_of,
+)
+from kin.robot import LENGTHS, Robot
+from kin.transforms import as_transform
+
+ANGLES = {"rad": 1.0, "deg": math.pi / 180.0}
+_TARGET = ("q", "position", "wxyz", "pose")
+_TOP = (*field_names(Program), "units")
+_LENGTHS, _ANGLES = ("tool_speed", "blend"), ("tool_turn",)
+
+
+def parse_program(text: str, robot: Robot | None = None) -> Program:
+    """The program described by TOML text; see `program_from_dict`."""
+    try:
+        data = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError("program", str(error), "valid TOML") from None
+    return program_from_dict(data, robot)
+
+
+def program_from_dict(data: Mapping[str, Any], robot: Robot | None = None) -> Program:
+    """The program described by plain data.
+
+    Args:
+        data: the fields of `Program`, with each segment as a dict; ``units`` for the numbers in it.
+        robot: the arm; it tells which joint values are lengths. Without it all are angles.
+
+    Raises:
+        InputError: naming the field, the value and what would be valid.
+    """
+    if not isinstance(data, Mapping):
+        raise InputError("program", data, "a table with the fields " + ", ".join(_TOP))
+    _only(data, _TOP, "")
+    reader = _Reader(data.get("units", {}), robot)
+    segments = data.get("segments")
+    if not isinstance(segments, list | tuple) or not 1 <= len(segments) <= MOST_SEGMENTS:
+        raise InputError("segments", segments, f"1 to {MOST_SEGMENTS} segments")
+    read = tuple(reader.segment(segment, f"segments[{i}]") for i, segment in enumerate(segments))
+    return Program(read, **{key: data[key] for key in field_names(Program)[1:] if key in data})
+
+
+def program_to_dict(program: Program) -> dict[str, Any]:
+    """The program as plain data in metres and radians; `program_from_dict` reads it. Defaults are left out."""
+    data: dict[str, Any] = {}
+    if program.name:
+        data["name"] = program.name
+    if program.task is not None:
+        data["task"] = program.task
+    if not program.jerk_limited:
+        data["jerk_limited"] = False
+    return data | {"segments": [_segment_to_dict(segment) for segment in program.segments]}
+
+
+def _segment_to_dict(segment: Segment) -> dict[str, Any]:
+    data: dict[str, Any] = {"kind": kind_of(segment)}
+    if isinstance(segment, Dwell):
+        return data | {"seconds": segment.seconds} | ({"name": segment.name} if segment.name else {})
+    if isinstance(segment, Spline):
+        data["points"] = [_target_to_dict(point) for point in segment.points]
+    else:
+        data |= _target_to_dict(segment.target)
+    if isinstance(segment, Circ):
+        data["via"] = list(segment.via)
+    if getattr(segment, "orientation", "geodesic") != "geodesic":
+        data["orientation"] = "two-axis"
+    for key in field_names(Move):  # type: ignore[arg-type]
+        value = getattr(segment, key)
+        if value != getattr(_PLAIN, key):
+            data[key] = value
+    return data
+
+
+def _target_to_dict(target: Target) -> dict[str, Any]:
+    if isinstance(target, JointTarget):
+        return {"q": list(target.q)}
+    data: dict[str, Any] = {"position": list(target.position)}
+    return data if target.wxyz is None else data | {"wxyz": list(target.wxyz)}
+
+
+_PLAIN = Move()
+
+
+class _Reader:
+    """Reads numbers in the units of the file."""
+
+    def __init__(self, units: object, robot: Robot | None) -> None:
+        if not isinstance(units, Mapping):
+            raise InputError("units", units, 'a table such as { length = "mm", angle = "deg" }')
+        _only(units, ("length", "angle"), "units.")
+        self.length = _unit(units, "length", LENGTHS, "m")
+        self.angle = _unit(units, "angle", ANGLES, "rad")
+        self.robot = robot
+
+    def segment(self, data: object, where: str) -> Segment:
+        if not isinstance(data, Mapping):
+            raise InputError(where, data, "a table with kind and target")
+        kind = data.get("kind")
+        if not isinstance(kind, str) or kind not in KINDS:
+            raise InputError(f"{where}.kind", kind, "one of " + ", ".join(f'"{each}"' for each in KINDS))
+        cls: Any = KINDS[kind]
+        own = [name for name in field_names(cls) if name != "target"]
+        _only(data, ("kind", *own, *(_TARGET if kind in ("ptp", "lin", "circ") else ())), f"{where}.")
+        given = {key: self.scaled(key, data[key], where) for key in own if key in data}
+        if kind == "spline":
+            given["points"] = self.points(data.get("points"), f"{where}.points")
+        elif kind == "dwell":
+            if "seconds" not in data:
+                raise InputError(f"{where}.seconds", None, "the length of the pause in seconds")
+        else:
+            given["target"] = self.target(data, where)
+        if kind == "circ":
+            given["via"] = self.via(data.get("via"), f"{where}.via")
+        try:
+            made: Segment = cls(**given)
+        except InputError as error:
+            _rename(error, where)
+        return made
+
+    def scaled(self, key: str, value: object, where: str) -> object:
+        if value is None or key not in (*_LENGTHS, *_ANGLES):
+            return value
+        scale = self.length if key in _LENGTHS else self.angle
+        return finite_number(f"{where}.{key}", value, "a finite number") * scale
+
+    def points(self, data: object, where: str) -> tuple[Target, ...]:
+        if not isinstance(data, list | tuple) or not 1 <= len(data) <= MOST_POINTS:
+            raise InputError(where, data, f"1 to {MOST_POINTS} targets")
+        found = []
+        for i, item in enumerate(data):
+            if not isinstance(item, Mapping):
+                raise InputError(f"{where}[{i}]", item, "a table with q, position or pose")
+            _only(item, _TARGET, f"{where}[{i}].")
+            found.append(self.target(item, f"{where}[{i}]"))
+        return tuple(found)
+
+    def target(self, data: Mapping[str, Any], where: str) -> Target:
+        given = [key for key in ("q", "position", "pose") if key in data]
+        if len(given) != 1 or ("wxyz" in data and given != ["position"]):
+            keys = [key for key in _TARGET if key in data]
+            raise InputError(f"{where}.target", keys, "one of q; position with or without wxyz; pose")
+        try:
+            if given == ["q"]:
+                return self.joints(JointTarget(data["q"]))
+            if given == ["pose"]:
+                T = as_transform(data["pose"], "pose")
+                T[:3, 3] *= self.length
+                return PoseTarget.of(T)
+            read = PoseTarget(data["position"], data.get("wxyz"))
+        except InputError as error:
+            _rename(error, where)
+        return PoseTarget(_times(read.position, self.length), read.wxyz)
+
+    def joints(self, target: JointTarget) -> JointTarget:
+        if self.robot is None:
+            return JointTarget(tuple(value * self.angle for value in target.q))
+        if len(target.q) != self.robot.n:
+            raise InputError("q", list(target.q), f"{self.robot.n} joint values")
+        scale = np.where(self.robot.revolute, self.angle, self.length).tolist()
+        return JointTarget(tuple(value * each for value, each in zip(target.q, scale, strict=True)))
+
+    def via(self, data: object, where: str) -> tuple[float, float, float]:
+        if isinstance(data, Mapping):
+            _only(data, ("position",), f"{where}.")
+            data = data.get("position")
+        try:
+            return _times(PoseTarget(data).position, self.length)  # type: ignore[arg-type]  # checked there
+        except InputError as error:
+            raise InputError(where, data, error.expected) from None
+
+
+def _times(position: tuple[float, float, float], scale: float) -> tuple[float, float, float]:
+    x, y, z = position
+    return x * scale, y * scale, z * scale
+
+
+def _unit(units: Mapping[str, Any], key: str, valid: Mapping[str, float], default: str) -> float:
+    value = units.get(key, default)
+    if not isinstance(value, str) or value not in valid:
+        raise InputError(f"units.{key}", value, "one of " + ", ".join(f'"{each}"' for each in valid))
+    return valid[value]
+
+
+def _only(data: Mapping[Any, Any], known: tuple[str, ...], where: str) -> None:
+    for key in data:
+        if key not in known:
+            name = key if isinstance(key, str) and key.isprintable() and len(key) <= 80 else shorten(key)
+            raise InputError(where + name, data[key], "only the fields " + ", ".join(known))
+
+
+def _rename(error: InputError, where: str) -> NoReturn:
+    """The same error with the place in its field."""
+    renamed = InputError(f"{where}.{error.field}", None, error.expected)
+    renamed.value = error.value
+    renamed.args = (f"{renamed.field}: got {error.value}, expected {error.expected}",)
+    raise renamed from None

@@ -1,0 +1,247 @@
+"""Motion result types."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kin.fk import fk, jacobian
+from kin.motion import messages
+from kin.motion.details import Cause, Help, Note, RefusalDetails
+from kin.motion.limits import MotionLimits
+from kin.motion.pieces import Piece
+from kin.motion.program import Dwell, Kind, Program
+from kin.robot import Robot
+from kin.transforms import Array, finite_array
+from kin.units import DEFAULT_UNITS, Units
+
+Quantity = Literal["velocity", "acceleration", "jerk", "tool_speed", "tool_turn"]
+_JOINT: tuple[Quantity, ...] = ("velocity", "acceleration", "jerk")
+
+
+def _times(t: ArrayLike) -> Array:
+    """Times as a finite array of any shape."""
+    times = finite_array("t", np.asarray(t)[..., None], (1,))
+    return times.reshape(times.shape[:-1])
+
+
+@dataclass(frozen=True, slots=True)
+class SegmentTimes:
+    """When a segment is driven, in seconds from the start; blends are shared half and half."""
+
+    index: int
+    kind: Kind
+    name: str
+    start: float
+    end: float
+
+
+@dataclass(frozen=True, slots=True)
+class Peak:
+    """The largest value of a quantity.
+
+    Attributes:
+        joint, name: whose; None and ``"tool"`` for the tool.
+        quantity: of what. `tool_speed` is that of the tool point (m/s), `tool_turn` the angular velocity (rad/s).
+        peak, time: the largest size, and when it is met.
+        limit: None if there is none.
+        assumed: whether the limit is assumed, see `kin.MotionLimits`.
+    """
+
+    joint: int | None
+    name: str
+    quantity: Quantity
+    peak: float
+    time: float
+    limit: float | None
+    assumed: bool = False
+
+    @property
+    def ratio(self) -> float | None:
+        """Peak / limit."""
+        return None if self.limit is None else self.peak / self.limit
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """Why a program cannot be driven.
+
+    Attributes:
+        segment, kind, name: which segment.
+        fraction: how much of it is covered, 0 to 1; None if it is not a matter of a place.
+        distance: the same in metres of the tool's path; None likewise.
+        cause, details: code and numbers, see :mod:`kin.motion.details`.
+        helps: what would help.
+    """
+
+    segment: int
+    kind: Kind
+    name: str
+    fraction: float | None
+    distance: float | None
+    cause: Cause
+    details: RefusalDetails
+    helps: tuple[Help, ...] = ()
+
+    @property
+    def reason(self) -> str:
+        """The refusal in sentences, in degrees and millimetres."""
+        return self.explain()
+
+    def explain(self, units: Units = DEFAULT_UNITS) -> str:
+        """The refusal in sentences, in any units."""
+        return messages.refusal(self.segment, self.kind, self.name, self.fraction, self.details, self.helps, units)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionSample:
+    """A motion at times ``(...)``: arrays with the same leading axes.
+
+    Attributes:
+        t: seconds, ``(...)``.
+        q, qd, qdd, qddd: joint values and their derivatives ``(..., n)``.
+        T: tool poses ``(..., 4, 4)``.
+        twist: velocity of the tool point and angular velocity in the base frame ``(..., 6)``.
+    """
+
+    t: Array
+    q: Array
+    qd: Array
+    qdd: Array
+    qddd: Array
+    T: Array
+    twist: Array
+
+    @property
+    def tool_speed(self) -> Array:
+        """Speed of the tool point ``(...)``, m/s."""
+        return np.asarray(np.linalg.norm(self.twist[..., :3], axis=-1))
+
+    @property
+    def tool_turn(self) -> Array:
+        """Angular velocity of the tool ``(...)``, rad/s."""
+        return np.asarray(np.linalg.norm(self.twist[..., 3:], axis=-1))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Motion:
+    """The answer to a program: a motion, or why there is none.
+
+    Attributes:
+        robot, program, limits: what was asked for, and the limits that were kept.
+        q_start: ``(n,)``, where it begins.
+        refusal: why it cannot be driven; None if it can.
+        segments: when each segment is driven; empty after a refusal, as is the motion.
+        notes: what is worth knowing, see :mod:`kin.motion.details`.
+        pieces: the joints as functions of time, one after the other.
+    """
+
+    robot: Robot
+    program: Program
+    limits: MotionLimits
+    q_start: Array
+    refusal: Refusal | None
+    segments: tuple[SegmentTimes, ...]
+    notes: tuple[Note, ...] = ()
+    pieces: tuple[Piece, ...] = field(default=())
+
+    def __repr__(self) -> str:
+        """The sentence about it."""
+        return f"Motion({self.reason!r})"
+
+    @property
+    def planned(self) -> bool:
+        """Whether it can be driven."""
+        return self.refusal is None
+
+    @cached_property
+    def starts(self) -> Array:
+        """When each piece begins, and the end ``(k + 1,)``."""
+        return np.concatenate([[0.0], np.cumsum([piece.duration for piece in self.pieces])])
+
+    @property
+    def duration(self) -> float:
+        """Seconds."""
+        return float(self.starts[-1])
+
+    @property
+    def reason(self) -> str:
+        """The motion in sentences, in degrees and millimetres."""
+        return self.explain()
+
+    def explain(self, units: Units = DEFAULT_UNITS) -> str:
+        """The motion in sentences, in any units."""
+        if self.refusal is not None:
+            return self.refusal.explain(units)
+        said = [messages.note(fact, units) for fact in self.notes]
+        return " ".join([messages.summary(len(self.segments), self.duration), *said])
+
+    def derivatives(self, t: ArrayLike) -> Array:
+        """Joint values and their first three derivatives ``(4, ..., n)`` at times ``(...)``.
+
+        Before the start and after the end the arm is at rest where it begins and ends.
+        """
+        times = _times(t)
+        flat = times.ravel()
+        out = np.zeros((4, flat.size, self.robot.n))
+        out[0] = self.q_start
+        which = np.clip(np.searchsorted(self.starts, flat, side="right") - 1, 0, max(len(self.pieces) - 1, 0))
+        for k in np.unique(which).tolist() if self.pieces else []:
+            rows = which == k
+            piece = self.pieces[k]
+            local = flat[rows] - self.starts[k]
+            out[:, rows] = piece.at(np.clip(local, 0.0, piece.duration))
+            if k in (0, len(self.pieces) - 1):
+                out[1:, np.flatnonzero(rows)[(local < 0.0) | (local > piece.duration)]] = 0.0
+        return out.reshape(4, *times.shape, self.robot.n)
+
+    def sample(self, t: ArrayLike) -> MotionSample:
+        """The motion at times ``(...)``, seconds; before the start and after the end the arm is at rest."""
+        times = _times(t)
+        q, qd, qdd, qddd = self.derivatives(times)
+        twist = (jacobian(self.robot, q) @ qd[..., None])[..., 0]
+        return MotionSample(times, q, qd, qdd, qddd, fk(self.robot, q), twist)
+
+    @cached_property
+    def peaks(self) -> tuple[Peak, ...]:
+        """The largest velocity, acceleration and jerk of each joint, and those of the tool.
+
+        They are read off the motion itself by fine sampling, without what the planner knows.
+        """
+        return self._peaks(0.0, self.duration, 1.0, 1.0, (None, None))
+
+    def segment_peaks(self, index: int) -> tuple[Peak, ...]:
+        """`peaks` during one segment, against its own limits: those of the arm times its scales."""
+        times, segment = self.segments[index], self.program.segments[index]
+        if isinstance(segment, Dwell):
+            return self._peaks(times.start, times.end, 1.0, 1.0, (None, None))
+        tool = (segment.tool_speed, segment.tool_turn)
+        return self._peaks(times.start, times.end, segment.speed, segment.acceleration, tool)
+
+    def _peaks(
+        self, start: float, end: float, speed: float, acceleration: float, tool: tuple[float | None, float | None]
+    ) -> tuple[Peak, ...]:
+        times = np.concatenate([[start], *(p.grid() + s for p, s in zip(self.pieces, self.starts, strict=False))])
+        times = times[(times >= start) & (times <= end)]
+        sample = self.sample(times)
+        found = []
+        scales = (speed, acceleration, acceleration)
+        for quantity, values, scale in zip(_JOINT, (sample.qd, sample.qdd, sample.qddd), scales, strict=True):
+            sizes = np.abs(values)
+            limit = getattr(self.limits, quantity) * scale
+            for i, at in enumerate(np.argmax(sizes, axis=0).tolist()):
+                name, assumed = self.robot.joints[i].name, quantity in self.limits.assumed[i]
+                size, when = float(sizes[at, i]), float(times[at])
+                found.append(Peak(i, name, quantity, size, when, float(limit[i]), assumed))
+        parts: tuple[tuple[Quantity, Array], ...] = (
+            ("tool_speed", sample.tool_speed),
+            ("tool_turn", sample.tool_turn),
+        )
+        for (quantity, sizes), most in zip(parts, tool, strict=True):
+            at = int(np.argmax(sizes))
+            found.append(Peak(None, "tool", quantity, float(sizes[at]), float(times[at]), most))
+        return tuple(found)

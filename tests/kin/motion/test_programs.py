@@ -1,0 +1,139 @@
+"""Programs: read from plain data, written back, refused with the name of the field."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import kin
+
+number = st.floats(-5, 5)
+joints = st.builds(kin.JointTarget, st.tuples(*[number] * 6))
+poses = st.builds(
+    kin.PoseTarget,
+    st.tuples(number, number, number),
+    st.none() | st.just((1.0, 0.0, 0.0, 0.0)) | st.just((0.0, 0.6, 0.0, -0.8)),
+)
+targets = joints | poses
+part = st.floats(0.01, 1)
+common = {
+    "speed": part,
+    "acceleration": part,
+    "tool_speed": st.none() | st.floats(0.01, 2),
+    "blend": st.just(0.0) | st.floats(0, 0.2),
+    "name": st.text(max_size=10),
+}
+orientation = st.sampled_from(["geodesic", "two-axis"])
+segments = (
+    st.builds(kin.Ptp, targets, **common)
+    | st.builds(kin.Lin, targets, orientation=orientation, **common)
+    | st.builds(kin.Circ, st.tuples(number, number, number), targets, orientation=orientation, **common)
+    | st.builds(kin.Spline, st.lists(poses, min_size=1, max_size=3) | st.lists(joints, min_size=1, max_size=3))
+    | st.builds(kin.Dwell, st.floats(0, 5))
+)
+programs = st.builds(
+    kin.Program,
+    st.lists(segments, min_size=1, max_size=4),
+    task=st.sampled_from([None, "pose", "approach", "position"]),
+    jerk_limited=st.booleans(),
+)
+
+
+@given(programs)
+def test_what_is_written_is_read_again(program):
+    assert kin.program_from_dict(kin.program_to_dict(program)) == program
+
+
+def test_units_and_toml():
+    program = kin.parse_program(
+        """
+        name = "pick"
+        units = { length = "mm", angle = "deg" }
+        [[segments]]
+        kind = "ptp"
+        q = [90, 0, 100, 180]
+        [[segments]]
+        kind = "circ"
+        via = [100, 0, 0]
+        position = [200, 0, 0]
+        tool_speed = 250
+        tool_turn = 90
+        blend = 5
+        [[segments]]
+        kind = "lin"
+        pose = [[1, 0, 0, 300], [0, 1, 0, 0], [0, 0, 1, 10], [0, 0, 0, 1]]
+        """,
+        kin.get_robot("scara"),
+    )
+    ptp, circ, lin = program.segments
+    assert program.name == "pick"
+    assert ptp.target.q == pytest.approx((math.pi / 2, 0, 0.1, math.pi))
+    assert (circ.via, circ.target.position, circ.target.wxyz) == ((0.1, 0, 0), (0.2, 0, 0), None)
+    assert (circ.tool_speed, circ.tool_turn, circ.blend) == pytest.approx((0.25, math.pi / 2, 0.005))
+    assert lin.target == kin.PoseTarget((0.3, 0, 0.01), (1, 0, 0, 0))
+
+
+LIN = {"kind": "lin", "position": [0, 0, 0]}
+PTP = {"kind": "ptp", "q": [0, 0]}
+
+
+@pytest.mark.parametrize(
+    ("data", "field"),
+    [
+        ([], "program"),
+        ({}, "segments"),
+        ({"segments": []}, "segments"),
+        ({"segments": [5]}, "segments[0]"),
+        ({"segments": [{}]}, "segments[0].kind"),
+        ({"segments": [{"kind": ["ptp"]}]}, "segments[0].kind"),
+        ({"segments": [PTP, {"kind": "ptp"}]}, "segments[1].target"),
+        ({"segments": [PTP | {"position": [0, 0, 0]}]}, "segments[0].target"),
+        ({"segments": [PTP | {"wxyz": [1, 0, 0, 0]}]}, "segments[0].target"),
+        ({"segments": [{"kind": "ptp", "q": [0, "x"]}]}, "segments[0].q[1]"),
+        ({"segments": [{"kind": "ptp", "q": []}]}, "segments[0].q"),
+        ({"segments": [{"kind": "ptp", "q": [1e9]}]}, "segments[0].q[0]"),
+        ({"segments": [PTP | {"speed": 0}]}, "segments[0].speed"),
+        ({"segments": [PTP | {"speed": 1.5}]}, "segments[0].speed"),
+        ({"segments": [PTP | {"acceleration": True}]}, "segments[0].acceleration"),
+        ({"segments": [PTP | {"blend": -1}]}, "segments[0].blend"),
+        ({"segments": [PTP | {"via": [0, 0, 0]}]}, "segments[0].via"),
+        ({"segments": [PTP | {"name": 5}]}, "segments[0].name"),
+        ({"segments": [LIN | {"position": [0, 0]}]}, "segments[0].position"),
+        ({"segments": [LIN | {"position": [0, 0, math.nan]}]}, "segments[0].position[2]"),
+        ({"segments": [LIN | {"wxyz": [0, 0, 0, 0]}]}, "segments[0].wxyz"),
+        ({"segments": [LIN | {"orientation": "slerp"}]}, "segments[0].orientation"),
+        ({"segments": [LIN | {"tool_speed": 0}]}, "segments[0].tool_speed"),
+        ({"segments": [LIN | {"tool_turn": "fast"}]}, "segments[0].tool_turn"),
+        ({"segments": [{"kind": "lin", "pose": np.zeros((4, 4)).tolist()}]}, "segments[0].pose[3]"),
+        ({"segments": [{"kind": "circ", "position": [0, 0, 0]}]}, "segments[0].via"),
+        ({"segments": [{"kind": "spline", "points": []}]}, "segments[0].points"),
+        (
+            {"segments": [{"kind": "spline", "points": [{"q": [0]}, {"position": [0, 0, 0]}]}]},
+            "segments[0].points",
+        ),
+        ({"segments": [{"kind": "spline", "points": [{"speed": 1}]}]}, "segments[0].points[0].speed"),
+        ({"segments": [{"kind": "dwell"}]}, "segments[0].seconds"),
+        ({"segments": [{"kind": "dwell", "seconds": -1}]}, "segments[0].seconds"),
+        ({"segments": [PTP], "speed": 1}, "speed"),
+        ({"segments": [PTP], "task": "roll"}, "task"),
+        ({"segments": [PTP], "jerk_limited": 1}, "jerk_limited"),
+        ({"segments": [PTP], "units": "mm"}, "units"),
+        ({"segments": [PTP], "units": {"length": "inch"}}, "units.length"),
+    ],
+)
+def test_a_malformed_program_names_the_field(data, field):
+    with pytest.raises(kin.InputError) as caught:
+        kin.program_from_dict(data)
+    assert caught.value.field == field
+    assert str(caught.value).startswith(f"{field}: got ")
+
+
+def test_the_number_of_joint_values_is_checked_against_the_arm():
+    with pytest.raises(kin.InputError, match=r"segments\[0\].q: .* 6 joint values"):
+        kin.program_from_dict({"segments": [PTP]}, kin.get_robot("ur5"))
+    with pytest.raises(kin.InputError, match=r"segments\[0\].q: .* 6 joint values"):
+        kin.plan_motion(kin.get_robot("ur5"), [kin.Ptp(kin.JointTarget((0, 0)))])
+    with pytest.raises(kin.InputError, match="TOML"):
+        kin.parse_program("segments = [")

@@ -1,0 +1,163 @@
+"""Point-to-point motions: against another library, within limits, at rest at both ends."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import kin
+from kin.motion.pieces import JointMotion
+
+CASES = json.loads((Path(__file__).parents[2] / "data/motion-times.json").read_text(encoding="utf-8"))
+ARMS = tuple(kin.builtin_robots())
+positive = st.floats(1e-2, 1e3)
+
+
+def limits_of(velocity, acceleration, jerk):
+    return np.stack([velocity, acceleration, jerk], axis=1).astype(float)
+
+
+@pytest.mark.parametrize("case", CASES["joint_motions"])
+def test_the_time_is_that_of_ruckig(case):
+    limits = limits_of(case["velocity"], case["acceleration"], case["jerk"])
+    motion = JointMotion.between(np.array(case["start"]), np.array(case["end"]), limits)
+    assert motion.duration == pytest.approx(case["seconds"], rel=1e-9)
+
+
+@given(st.floats(-10, 10), st.floats(-10, 10), positive, positive, positive)
+def test_a_joint_goes_from_rest_to_rest_within_its_limits(start, end, v, a, j):
+    motion = JointMotion.between(np.array([start, 0.0]), np.array([end, 0.5]), limits_of([v, 1], [a, 2], [j, 3]))
+    ends = motion.at(np.array([0.0, motion.duration]))[..., 0]
+    size = max(abs(start), abs(end), 1.0)
+    assert ends[0] == pytest.approx([start, end], abs=1e-12 * size)
+    assert abs(ends[1]).max() <= 1e-9 * v
+    sizes = np.abs(motion.at(motion.grid())).max(axis=1)[1:, 0]
+    assert (sizes <= np.array([v, a, j]) * (1 + 1e-9)).all()
+
+
+@given(st.floats(-3, 3), positive, positive, positive)
+def test_position_velocity_and_acceleration_are_continuous(end, v, a, j):
+    motion = JointMotion.between(np.zeros(1), np.array([end]), limits_of([v], [a], [j]))
+    breaks = motion.breaks[0, 1:-1]
+    step = 1e-9 * motion.duration
+    jumps = np.abs(motion.at(breaks + step) - motion.at(np.maximum(breaks - step, 0.0)))[:3, :, 0].max(axis=1)
+    assert jumps[0] <= 2.1 * step * v + 1e-15 * abs(end)
+    assert jumps[1] <= 2.1 * step * a + 1e-12 * v
+    assert jumps[2] <= 2.1 * step * j + 1e-12 * a
+
+
+def test_start_and_end_the_same_takes_no_time():
+    robot = kin.get_robot("ur5")
+    motion = kin.plan_motion(robot, [kin.Ptp(kin.JointTarget(robot.home))])
+    assert (motion.planned, motion.duration) == (True, 0.0)
+    assert motion.sample(0.0).q.tolist() == list(robot.home)
+    assert [peak.peak for peak in motion.peaks] == [0.0] * 20
+
+
+@settings(max_examples=30)
+@given(st.sampled_from(ARMS), st.integers(0, 2**32 - 1), st.floats(0.05, 1), st.floats(0.05, 1))
+def test_random_programs_keep_every_limit_on_every_arm(arm, seed, speed, acceleration):
+    robot = kin.get_robot(arm)
+    targets = robot.random_q(np.random.default_rng(seed), 3)
+    program = [
+        kin.Ptp(kin.JointTarget(tuple(q)), speed=speed, acceleration=acceleration) for q in targets.tolist()
+    ]
+    program.insert(1, kin.Dwell(0.25))
+    motion = kin.plan_motion(robot, program)
+    assert motion.planned
+    assert all(peak.ratio <= 1 + 1e-9 for peak in motion.peaks if peak.ratio is not None)
+    for i in range(4):
+        assert all(peak.ratio <= 1 + 1e-9 for peak in motion.segment_peaks(i) if peak.ratio is not None)
+    # In each PTP some joint is at a limit all the time; without jerk it would be faster.
+    times = [motion.segments[i].end for i in (0, 2, 3)]
+    assert np.abs(motion.sample(times).q - targets).max() < 1e-12
+    assert motion.duration == motion.segments[-1].end
+    again = kin.plan_motion(robot, program)
+    grid = np.linspace(0, motion.duration, 97)
+    assert (again.derivatives(grid) == motion.derivatives(grid)).all()
+
+
+def test_a_pose_target_is_reached_in_the_nearest_posture():
+    robot = kin.get_robot("panda")
+    T = kin.fk(robot, robot.q_home)
+    T[0, 3] += 0.1
+    motion = kin.plan_motion(robot, [kin.Ptp(kin.PoseTarget.of(T))])
+    end = motion.sample(motion.duration)
+    assert np.abs(end.T - T).max() < 1e-9
+    assert np.abs(end.q - robot.q_home).max() < 0.6
+    kept = kin.plan_motion(robot, [kin.Ptp(kin.PoseTarget(tuple(T[:3, 3])))])
+    assert np.abs(kept.sample(kept.duration).T - T).max() < 1e-9
+
+
+def test_before_and_after_the_motion_the_arm_is_at_rest():
+    robot = kin.get_robot("scara")
+    q = [0.1, 0.2, 0.05, 1.0]
+    motion = kin.plan_motion(robot, [kin.Ptp(kin.JointTarget(q))])
+    sample = motion.sample([-1.0, 99.0])
+    assert sample.q.tolist() == [list(robot.home), pytest.approx(q)]
+    assert not sample.qd.any()
+    assert not sample.qdd.any()
+    assert sample.tool_speed.tolist() == [0.0, 0.0]
+    assert motion.sample(motion.duration / 2).tool_speed > 0.1
+
+
+def test_derivatives_are_those_of_the_joint_values():
+    robot = kin.get_robot("puma560")
+    motion = kin.plan_motion(robot, [kin.Ptp(kin.JointTarget((1, 0.5, -1, 0.5, -1, 2)))])
+    t, h = np.linspace(0.05, motion.duration - 0.05, 40), 1e-5
+    q, qd, qdd, _ = motion.derivatives(t)
+    before, after = motion.derivatives(t - h)[0], motion.derivatives(t + h)[0]
+    assert np.abs((after - before) / (2 * h) - qd).max() < 1e-5
+    assert np.abs((after - 2 * q + before) / h**2 - qdd).max() < 2e-2
+    poses = [motion.sample(t + s).T[:, :3, 3] for s in (-h, h)]
+    assert np.abs((poses[1] - poses[0]) / (2 * h) - motion.sample(t).twist[:, :3]).max() < 1e-4
+
+
+def test_a_target_outside_the_limits_is_refused_with_joint_and_value():
+    robot = kin.get_robot("panda")
+    q = list(robot.home)
+    q[3] = 0.5
+    motion = kin.plan_motion(robot, [kin.Dwell(1), kin.Ptp(kin.JointTarget(q), name="up")])
+    refusal = motion.refusal
+    assert (refusal.segment, refusal.cause, motion.duration, motion.segments) == (1, "target", 0.0, ())
+    assert motion.reason == (
+        "Segment 2 (PTP, up) cannot be driven: the target is outside the limits: joint 4 at 28.6° (limit -4.0°)."
+    )
+
+
+def test_a_pose_out_of_reach_and_a_start_outside_are_refused():
+    robot = kin.get_robot("ur5")
+    motion = kin.plan_motion(robot, [kin.Ptp(kin.PoseTarget((3, 0, 0)))])
+    assert motion.refusal.cause == "unreachable"
+    assert "out of reach" in motion.reason
+    assert "closer" in motion.reason
+    outside = kin.plan_motion(robot, [kin.Dwell(1)], [7, 0, 0, 0, 0, 0])
+    assert outside.refusal.cause == "start"
+    assert "joint 1 (base) at 401.1° (limit 360.0°)" in outside.reason
+
+
+def test_assumed_limits_are_marked():
+    panda, ur5 = kin.limits_of(kin.get_robot("panda")), kin.limits_of(kin.get_robot("ur5"))
+    assert panda.assumed == ((),) * 7
+    assert panda.jerk[0] == 7500
+    assert ur5.assumed == (("acceleration", "jerk"),) * 6
+    assert ur5.velocity[0] == pytest.approx(math.pi)
+    scara = kin.limits_of(kin.get_robot("scara"))
+    assert scara.velocity[2] == pytest.approx(1.1)
+    assert np.isnan(scara.effort).all()
+    own = kin.Robot.from_dh([kin.Joint("slide", kind="prismatic", limits=(0, 1)), (0, 0, 1, 0)])
+    found = kin.limits_of(own)
+    assert found.assumed == (("velocity", "acceleration", "jerk"),) * 2
+    assert found.velocity.tolist() == [1.0, math.pi]
+    peaks = kin.plan_motion(own, [kin.Ptp(kin.JointTarget((0.2, 1)))]).peaks
+    assert all(peak.assumed for peak in peaks if peak.joint is not None)
+
+
+@pytest.mark.parametrize("bad", [[1, 2], [[0] * 6] * 2, ["a"] * 6])
+def test_a_malformed_start_raises(bad):
+    with pytest.raises(kin.InputError, match="q_start"):
+        kin.plan_motion(kin.get_robot("ur5"), [kin.Dwell(1)], bad)
