@@ -91,18 +91,23 @@ def _followed(problem: IKProblem, q: Array, errors: Array, weight: float) -> Arr
 
     None if a descent met the task itself.
     """
-    goal = (problem.T, problem.code, problem.mask, weight)
-    bounds = (problem.low, problem.high, problem.turns)
     enough = _EXACT * min(1.0, weight)
     order = np.argsort(errors, kind="stable").tolist()
     if errors[order[0]] <= enough:
         return None
     near = [q[i] for i in order if errors[i] < _beside(problem)]
     for row in _apart(near)[:_VALLEYS]:
-        there, error = follow(problem.robot.model, goal, bounds, enough, row)
+        there, error = at_floor(problem, row, weight)
         if error <= enough:
             return there
     return None
+
+
+def at_floor(problem: IKProblem, q: Array, weight: float) -> tuple[Array, float]:
+    """Where the floor of the valley around q ``(n,)`` comes nearest to the target, and the error E there."""
+    goal = (problem.T, problem.code, problem.mask, weight)
+    bounds = (problem.low, problem.high, problem.turns)
+    return follow(problem.robot.model, goal, bounds, _EXACT * min(1.0, weight), q)
 
 
 def _beside(problem: IKProblem) -> float:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from kin.fk import jacobian
 from kin.ik import nearest
 from kin.ik.branches import Branches, Flags, is_closed, measure, solve_branches
 from kin.ik.candidates import OVERRUN, POSITION_ERROR, ROLL, ROTATION_ERROR, select
@@ -18,6 +19,9 @@ from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 POOL = 24  # starts of descents, and the most of their ends that are kept
+_ASIDE = (0.1, -0.1, 0.25, -0.25, 0.5, -0.5)  # rad or m, along the slowest motion
+_FOLLOWED = 4  # descents that end a little beside a target are led on along the floor of their valley
+_WAYS = 4  # motions that are followed from one configuration
 LARGE = 0.125  # a larger motion between neighbouring waypoints makes a search for a nearer solution worthwhile
 
 
@@ -67,7 +71,9 @@ def descended(problem: IKProblem, starts: Array) -> Array:
     problem.stop()
     if not len(starts):
         return starts
-    q, _ = nearest.descend_each(problem, problem.code, starts, 1.0)
+    q, errors = nearest.descend_each(problem, problem.code, starts, 1.0)
+    for i in np.flatnonzero((errors > TOLERANCES.better_minimum) & (errors < TOLERANCES.near_miss))[:_FOLLOWED]:
+        q[i] = nearest.at_floor(problem, q[i], 1.0)[0]
     q, stats = measure(problem.without_turns(), q)
     q = q[_meets(problem, stats)]
     if problem.branches is not None:
@@ -103,12 +109,37 @@ def with_images(problem: IKProblem, q: Array) -> Array:
 
 def nearest_solution(settings: PathSettings, problem: IKProblem, relaxed: bool, q: Array) -> Array | None:
     """The configuration nearest to q ``(n,)`` that meets the problem."""
+    found = near_solutions(settings, problem, relaxed, q)
+    return np.asarray(found[0]) if len(found) else None
+
+
+def near_solutions(
+    settings: PathSettings, problem: IKProblem, relaxed: bool, q: Array, ahead: Array | None = None
+) -> Array:
+    """Configurations ``(k, n)`` around q ``(n,)`` that meet the problem, the nearest first.
+
+    `ahead`: where the motion that has come to q would go on to.
+    """
     found = np.empty((0, len(q)))
     if has_closed_form(problem):
         found = meeting(problem, relaxed, branches_near(problem, q).q, q)
-    if not len(found) or settings.moves(found, q).max(axis=1).min() > LARGE:
-        found = np.concatenate([found, descended(problem, q[None])])
-    return np.asarray(found[np.argmin(settings.moves(found, q).max(axis=1))]) if len(found) else None
+    for starts in (lambda: q[None], lambda: _around(problem, q, ahead)):
+        if not len(found) or settings.moves(found, q).max(axis=1).min() > LARGE:
+            found = np.concatenate([found, descended(problem, starts())])
+    return np.asarray(found[np.argsort(settings.moves(found, q).max(axis=1), kind="stable")])
+
+
+def _around(problem: IKProblem, q: Array, ahead: Array | None) -> Array:
+    """Starts of descents ``(k, n)`` close to q ``(n,)``, inside the limits.
+
+    Near a singularity, branches are close to each other along the motion that hardly moves the tool, and a descent
+    from q alone may end on another branch than the one that a motion would follow.
+    """
+    slow = np.linalg.svd(jacobian(problem.robot, q))[2][-1 if len(q) <= 6 else 5 - len(q) :]
+    starts = [q + share * direction for direction in slow for share in _ASIDE]
+    if ahead is not None:
+        starts.append(ahead)
+    return np.clip(np.array(starts), problem.low, problem.high)
 
 
 def continued(
@@ -116,16 +147,26 @@ def continued(
 ) -> list[tuple[int, Array]]:
     """The motion from q at waypoint s of the sequence on to the nearest solution, again and again, until it jumps.
 
-    Pairs of a waypoint of the sequence and the configuration there; `direction` is 1 or −1.
+    Where other solutions are as good as near, they are followed too. Pairs of a waypoint of the sequence and a
+    configuration there; `direction` is 1 or −1.
     """
-    out = []
-    while 0 <= s + direction < len(sequence.waypoints):
-        span = sequence.spans[max(s, s + direction)]
-        s += direction
-        waypoint = sequence.waypoints[s]
-        found = nearest_solution(sequence.settings, waypoint.problem, waypoint.relaxed, q)
-        if found is None or sequence.settings.largest_move(found, q) > allowed * span:
+    settings = sequence.settings
+    out: list[tuple[int, Array]] = []
+    ways: list[tuple[int, Array, Array | None]] = [(s, q, None)]
+    for _ in range(_WAYS):
+        if not ways:
             break
-        q = found
-        out.append((s, found))
+        s, q, ahead = ways.pop()
+        while 0 <= s + direction < len(sequence.waypoints):
+            most = allowed * sequence.spans[max(s, s + direction)]
+            s += direction
+            waypoint = sequence.waypoints[s]
+            found = near_solutions(settings, waypoint.problem, waypoint.relaxed, q, ahead)
+            moves = settings.moves(found, q).max(axis=1)
+            found = distinct(found[moves <= most], q)
+            if not len(found):
+                break
+            out += [(s, other) for other in found]
+            ways += [(s, other, 2.0 * other - q) for other in found[1:]]
+            ahead, q = 2.0 * found[0] - q, found[0]
     return out
