@@ -123,10 +123,16 @@ def near_solutions(
     found = np.empty((0, len(q)))
     if has_closed_form(problem):
         found = meeting(problem, relaxed, branches_near(problem, q).q, q)
-    for starts in (lambda: q[None], lambda: _around(problem, q, ahead)):
-        if not len(found) or settings.moves(found, q).max(axis=1).min() > LARGE:
-            found = np.concatenate([found, descended(problem, starts())])
+    if _is_far(settings, found, q):
+        found = np.concatenate([found, descended(problem, q[None])])
+    if _is_far(settings, found, q) and not has_closed_form(problem):
+        found = np.concatenate([found, descended(problem, _around(problem, q, ahead))])
     return np.asarray(found[np.argsort(settings.moves(found, q).max(axis=1), kind="stable")])
+
+
+def _is_far(settings: PathSettings, found: Array, q: Array) -> bool:
+    """Whether a search for configurations nearer to q ``(n,)`` is worthwhile."""
+    return not len(found) or bool(settings.moves(found, q).max(axis=1).min() > LARGE)
 
 
 def _around(problem: IKProblem, q: Array, ahead: Array | None) -> Array:
@@ -139,7 +145,7 @@ def _around(problem: IKProblem, q: Array, ahead: Array | None) -> Array:
     starts = [q + share * direction for direction in slow for share in _ASIDE]
     if ahead is not None:
         starts.append(ahead)
-    return np.clip(np.array(starts), problem.low, problem.high)
+    return np.asarray(np.clip(starts, problem.low, problem.high))
 
 
 def continued(
