@@ -14,6 +14,7 @@ def fixed(robot: Robot, values: dict[int, float]) -> Robot:
         k = robot.joint_rows[joint]
         row = rows[k]
         turned, slid = (value, 0.0) if row.kind == "revolute" else (0.0, value)
-        rows[k] = replace(row, theta=row.theta + turned, d=row.d + slid, kind="fixed", limits=None)
+        free = replace(row, limits=None, velocity=None, acceleration=None, jerk=None, effort=None)
+        rows[k] = replace(free, theta=row.theta + turned, d=row.d + slid, kind="fixed")
     home = tuple(x for i, x in enumerate(robot.home) if i not in values)
     return replace(robot, rows=tuple(rows), home=home)

@@ -445,3 +445,12 @@ def test_the_range_of_an_unlimited_given_joint_is_a_turn_around_the_seed():
         q[0], seed[0] = PI + 0.05, PI - 0.05
         found = kin.solve_ik(robot, kin.fk(robot, q), q_seed=seed, branch="seed")
         assert min(abs(s.q[0] - seed[0]) for s in found.solutions) <= 0.1 + 1e-9
+
+
+def test_a_fixed_joint_has_no_limits_of_any_kind():
+    peaks = {"velocity": 2.0, "acceleration": 5.0, "jerk": 50.0, "effort": 50.0}
+    rows = tuple(replace(row, **peaks) if row.limits else row for row in SAWYER.rows)
+    limited = replace(SAWYER, rows=rows)
+    assert closed_form_of(limited) is not None
+    row = fixed(limited, {2: 0.3}).rows[limited.joint_rows[2]]
+    assert (row.kind, row.limits, row.velocity, row.acceleration, row.jerk, row.effort) == ("fixed", *5 * [None])
