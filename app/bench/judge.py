@@ -28,6 +28,8 @@ class Check:
         position_error, rotation_error: largest errors of the correct answers, metres and radians.
         wrong: answers per target with an error above `ACCURACY`.
         same: share of targets with the same set of branches as ours; None where sets cannot be compared.
+        recall: share of targets at which the configuration they were made from is among the correct answers; None
+            where one answer is enough.
     """
 
     success: float
@@ -36,6 +38,7 @@ class Check:
     rotation_error: float
     wrong: float
     same: float | None
+    recall: float | None = None
 
 
 def judge_poses(task: Task, poses: list[Array]) -> Check:
@@ -76,7 +79,16 @@ def right_sets(task: Task, answers: list[Array]) -> tuple[list[Array], Check]:
         kept.append(_distinct(q[good]))
     count = len(task.T)
     success = sum(len(q) > 0 for q in kept) / count
-    return kept, Check(success, sum(map(len, kept)) / count, position, rotation, wrong / count, None)
+    recall = sum(bool(_near(q, own).any()) for q, own in zip(kept, task.q, strict=True)) / count
+    return kept, Check(
+        success,
+        sum(map(len, kept)) / count,
+        position,
+        rotation,
+        wrong / count,
+        None,
+        recall if task.row.kind == "branches" else None,
+    )
 
 
 def share_of_same(ours: list[Array], theirs: list[Array]) -> float:

@@ -19,10 +19,23 @@ noise           interquartile range, relative to the time
 × solve         the same relative to kin.solve_ik
 solved          share of targets with a correct answer
 branches        correct, distinct answers per target
+recall          share of targets whose generating configuration is among the answers
 wrong           answers per target with an error above 1e-6
 worst residual  of the correct answers, by our forward kinematics
 same set        share of targets with the same set of branches as ours"""
-_HEAD = ["", "time", "noise", "× array", "× solve", "solved", "branches", "wrong", "worst residual", "same set"]
+_HEAD = [
+    "",
+    "time",
+    "noise",
+    "× array",
+    "× solve",
+    "solved",
+    "branches",
+    "recall",
+    "wrong",
+    "worst residual",
+    "same set",
+]
 _UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
 
 
@@ -111,6 +124,7 @@ def _entry_json(entry: Entry) -> dict[str, Any]:
         found |= {
             "success": check.success,
             "branches": check.branches,
+            "recall": check.recall,
             "wrong": check.wrong,
             "position_error": check.position_error,
             "rotation_error": check.rotation_error,
@@ -197,7 +211,7 @@ def _cells(entry: Entry) -> list[str]:
         *("" if value is None else f"{value:.3g}" for value in (entry.to_array, entry.to_solve)),
     ]
     if check is None:
-        return cells + [""] * 5
+        return cells + [""] * 6
     residual = f"{check.position_error:.0e} m"
     if entry.check is not None and check.rotation_error:
         residual += f", {check.rotation_error:.0e} rad"
@@ -205,6 +219,7 @@ def _cells(entry: Entry) -> list[str]:
         *cells,
         f"{check.success:.0%}",
         "" if check.branches is None else f"{check.branches:.2f}",
+        "" if check.recall is None else f"{check.recall:.0%}",
         f"{check.wrong:.2g}",
         residual if check.success else "",
         "" if check.same is None else f"{check.same:.0%}",

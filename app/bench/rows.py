@@ -10,7 +10,9 @@ import numpy as np
 
 import kin
 from app.bench.arms import Arm, arm_of
+from app.bench.robots import robots
 from kin.robot import Robot
+from kin.solvers import closed_form_of
 from kin.transforms import Array
 
 Kind = Literal["fk", "branches", "answer", "cloud"]
@@ -22,12 +24,14 @@ class Row:
 
     Attributes:
         id, title: name on the command line, and for people.
-        robot: id of the arm.
+        robot: id of the arm, see :mod:`app.bench.robots`.
         kind: ``"fk"``; ``"branches"``, all configurations, ignoring limits; ``"answer"``, at least one inside the
             limits, verified; ``"cloud"``, tool points of configurations that the contestant samples itself.
         batch: all targets in one call.
         approach: point and approach direction only; the roll about the tool axis does not matter.
         lock: for a redundant arm, the joint that solvers for six joints lock at `value`.
+        unverified: whether branches of our array-level call may miss the approach direction, so that wrong answers
+            are expected of it.
         value: value of the locked joint and of our redundancy parameter in radians; NaN if there is none.
     """
 
@@ -39,6 +43,7 @@ class Row:
     approach: bool = False
     lock: int | None = None
     value: float = math.nan
+    unverified: bool = False
 
 
 CLOUD = 16  # batches in a cloud, so that call overhead is negligible and caches are as full as in real use
@@ -66,6 +71,12 @@ ROWS: tuple[Row, ...] = (
     Row("ik-iiwa14", "all branches of an S-R-S arm at one value of its freedom", "iiwa14", "branches",
         lock=2, value=0.3),
     Row("ik-panda", "all branches at one value of joint 7", "panda", "branches", lock=6, value=0.3),
+    Row("ik-jaco", "all solutions, six joints in general position", "jaco", "branches"),
+    Row("ik-crx", "all solutions, six joints in general position", "crx", "branches"),
+    Row("ik-sawyer", "all solutions at one value of joint 7", "sawyer", "branches", lock=6, value=0.3),
+    Row("ik-scorbot", "all branches, five joints, three parallel axes", "scorbot", "branches", approach=True,
+        unverified=True),
+    Row("ik-elbow5", "all solutions, five joints in general position", "elbow5", "branches", approach=True),
     Row("solve-pioneer5", "an answer inside the limits, verified", "pioneer5", "answer", approach=True),
     Row("solve-redundant7", "an answer inside the limits, verified", "redundant7", "answer"),
     Row("solve-redundant7-craig", "an answer inside the limits, verified", "redundant7-craig", "answer"),
@@ -93,9 +104,9 @@ class Task:
 
 
 def prepare(row: Row, size: int, seed: int) -> Task | None:
-    """The row's task with `size` targets; None if the arm is not built in or has no closed form the row needs."""
-    robot = kin.builtin_robots().get(row.robot)
-    if robot is None or (row.kind == "branches" and not kin.branch_names(robot)):
+    """The row's task with `size` targets; None if there is no such arm or it has no closed form the row needs."""
+    robot = robots().get(row.robot)
+    if robot is None or (row.kind == "branches" and closed_form_of(robot) is None):
         return None
     if row.kind == "cloud":
         q = kin.configuration_at(robot, np.arange(CLOUD * size))

@@ -98,6 +98,25 @@ def test_right_answers_are_accepted_up_to_whole_turns():
     assert judge.share_of_same(sets, turned) == 1.0
 
 
+def test_the_generating_configuration_is_looked_for():
+    task = prepare(ROWS_BY_ID["ik-jaco"], 6, 1)
+    ours = answers_of(task)
+    sets, check = judge.right_sets(task, ours)
+    assert (check.success, check.recall, check.wrong) == (1.0, 1.0, 0.0)
+    others = [q[np.abs(q - own).max(axis=1) > 1e-3] for q, own in zip(sets, task.q, strict=True)]
+    assert judge.right_sets(task, [*others[:3], *ours[3:]])[1].recall == 0.5
+    answer = prepare(ROWS_BY_ID["solve-redundant7"], 2, 1)
+    assert judge.right_sets(answer, [q[None] for q in answer.q])[1].recall is None
+
+
+@pytest.mark.parametrize("name", ["ik-jaco", "ik-crx", "ik-sawyer", "ik-scorbot", "ik-elbow5", "ik-panda"])
+def test_every_arm_without_a_geometry_of_its_own_is_solved(name):
+    task = prepare(ROWS_BY_ID[name], 8, 2)
+    _, check = judge.right_sets(task, answers_of(task))
+    assert (check.success, check.recall) == (1.0, 1.0)
+    assert (check.wrong > 0.0) == task.row.unverified
+
+
 @pytest.mark.parametrize("off", [3e-6, -0.1])
 def test_an_inaccurate_answer_is_rejected(off):
     task = prepare(ROWS_BY_ID["ik-pioneer5"], 6, 1)

@@ -10,8 +10,14 @@ To add a library, write a function from `Task` to its contestants (none for task
 
 from app.bench.contestants import closed_forms, iterative, ours
 from app.bench.contestants.contestant import OURS, SOLVE_IK, Contestant, Peer, quiet
+from app.bench.rows import Task
 
 __all__ = ["FLOOR", "KINBOARD", "OURS", "PEERS", "SOLVE_IK", "Contestant", "Peer", "quiet"]
+
+
+def _toolbox(task: Task) -> list[Contestant]:
+    return iterative.toolbox(task) + closed_forms.toolbox_analytic(task)
+
 
 KINBOARD = Peer("kinboard", "kin", ours.ours)
 FLOOR = Peer("floor", "kin", ours.floor)
@@ -22,6 +28,6 @@ PEERS: tuple[Peer, ...] = (
     Peer("ssik", "ssik", closed_forms.ssik),
     Peer("ik-geo", "ik_geo", closed_forms.ik_geo),
     Peer("py-opw-kinematics", "py_opw_kinematics", closed_forms.opw),
-    Peer("roboticstoolbox-python", "roboticstoolbox", iterative.toolbox),
+    Peer("roboticstoolbox-python", "roboticstoolbox", _toolbox),
     Peer("ikpy", "ikpy", iterative.ikpy),
 )

@@ -11,6 +11,8 @@ import numpy as np
 from app.bench.arms import Arm, ortho
 from app.bench.contestants.contestant import Contestant, our_joints, with_tool_rotation, without_tool_rotation
 from app.bench.rows import Task
+from kin.dh import table_of_chain
+from kin.robot import Joint
 from kin.transforms import Array
 
 
@@ -56,10 +58,11 @@ def eaik(task: Task) -> list[Contestant]:
 def ik_geo(task: Task) -> list[Contestant]:
     from ik_geo import Robot
 
-    if task.row.kind != "branches" or task.row.batch or task.six is None or not task.six.family:
+    if task.row.kind != "branches" or task.row.batch or task.six is None:
         return []
     H, P, tool = task.six.screws
-    robot = getattr(Robot, task.six.family)(H, P)
+    # Six joints without a special geometry are solved by a search over two joint values.
+    robot = getattr(Robot, task.six.family or "gen_six_dof")(H, P)
     # It stores rotation matrices by columns, so R is passed transposed.
     inputs = [
         (np.ascontiguousarray(M[:3, :3].T), M[:3, 3].copy())
@@ -76,8 +79,8 @@ def ssik(task: Task) -> list[Contestant]:
     if task.row.batch or task.row.kind == "answer":
         return []
     arm = task.arm if task.row.kind == "fk" else task.six
-    if arm is None or (task.row.kind == "branches" and not arm.family):
-        return []  # it also solves six joints without a special geometry, but deriving that takes minutes
+    if arm is None:
+        return []
     if task.row.kind == "fk":
         if arm.n not in (6, 7):
             return []
@@ -86,10 +89,10 @@ def ssik(task: Task) -> list[Contestant]:
         H, P, tool = arm.screws
         robot = ssik.Manipulator.from_axes(H, P)
         return [Contestant("ssik", robot.fk, [(q,) for q in task.q], lambda T: [with_tool_rotation(T, tool)])]
-    artifact, tool = _ssik_artifact(arm)
+    solver, tool = _ssik_artifact(arm) if arm.family else _ssik_general(arm)
 
     def solve(T: Array) -> Any:
-        return artifact.solve(T, respect_limits=False, enumerate_windings=False)
+        return solver.solve(T, respect_limits=False, enumerate_windings=False)
 
     def read(found: Any) -> list[Array]:
         return [our_joints(task, np.array([s.q for s in found]))]
@@ -109,6 +112,45 @@ def _ssik_artifact(arm: Arm) -> tuple[Any, Array]:
     module = types.ModuleType("bench_ik")
     exec(compile(source, "bench_ik.py", "exec"), module.__dict__)
     return module, tool
+
+
+@lru_cache(maxsize=8)
+def _ssik_general(arm: Arm) -> tuple[Any, Array]:
+    """The solver of an arm without a special geometry: its derivation takes up to a minute and is kept on disk."""
+    import ssik
+
+    H, P, tool = arm.screws
+    robot = ssik.Manipulator.from_axes(H, P)
+    robot.prepare()
+    return robot, tool
+
+
+def toolbox_analytic(task: Task) -> list[Contestant]:
+    """The toolbox's symbolic solver of arms without a special geometry; deriving it takes some ten seconds.
+
+    The derivation for the Panda with joint 7 locked gives up after two minutes.
+    """
+    from roboticstoolbox import DHRobot, RevoluteDH
+    from spatialmath import SE3
+
+    six = task.six
+    if task.row.kind != "branches" or task.row.batch or six is None or six.family or task.robot.id == "panda":
+        return []
+    base, rows, tool = table_of_chain([Joint(f"joint {i + 1}") for i in range(6)], list(six.constants))
+    if len(rows) != 6:
+        return []
+    links = [RevoluteDH(d=row.d, a=row.a, alpha=row.alpha, offset=row.theta) for row in rows]
+    robot = DHRobot(links, base=SE3(np.array(base), check=False), tool=SE3(np.array(tool), check=False))
+    solver = robot.analytic_ik()
+
+    def solve(T: Array) -> Any:
+        return solver.solve(T, joint_limits=False)
+
+    return [
+        Contestant(
+            "roboticstoolbox analytic", solve, [(T,) for T in task.T], lambda found: [our_joints(task, found.q)]
+        )
+    ]
 
 
 def opw(task: Task) -> list[Contestant]:
