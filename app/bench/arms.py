@@ -1,10 +1,11 @@
 """An arm in the forms that other libraries take, all derived from its DH table.
 
 Everything starts from ``T = C_0 Rz(q_1) C_1 Rz(q_2) … Rz(q_n) C_n`` with constant C_i: any DH table, standard or
-modified, with fixed rows anywhere, is of that form. Two tricks let solvers for six joints solve arms of five and
+modified, with fixed rows anywhere, is of that form. Three tricks let solvers for six joints solve arms of five and
 seven joints:
 
-- a *virtual roll*: a sixth joint about the tool's z axis makes "point and approach direction" a whole pose;
+- a *virtual roll*: a sixth joint about the tool's z axis makes "point and approach direction" a whole pose; a
+  sixth joint about the tool's x axis, of which only the solutions at zero count, makes a whole pose of any five;
 - a *locked joint*: one of seven joints at a fixed value becomes part of a constant.
 """
 
@@ -16,7 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
-from kin.axes import screw_x, screw_z
+from kin.axes import frame_of, inverse, screw_x, screw_z
 from kin.robot import Robot
 from kin.transforms import Array
 
@@ -37,6 +38,13 @@ class Arm:
     def with_roll(self) -> Arm:
         """The same arm with one more joint, about the tool's z axis."""
         return Arm(np.concatenate([self.constants, np.eye(4)[None]]))
+
+    def with_turn(self) -> Arm:
+        """The same arm with one more joint, about the tool's x axis: at zero it changes nothing."""
+        to_x = frame_of(np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0]), np.zeros(3))
+        constants = self.constants.copy()
+        constants[-1] = constants[-1] @ to_x
+        return Arm(np.concatenate([constants, inverse(to_x)[None]]))
 
     def locked(self, joint: int, value: float) -> Arm:
         """The same arm with one joint locked at `value` radians."""

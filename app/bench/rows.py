@@ -30,7 +30,7 @@ class Row:
         batch: all targets in one call.
         approach: point and approach direction only; the roll about the tool axis does not matter.
         lock: for a redundant arm, the joint that solvers for six joints lock at `value`.
-        unverified: whether branches of our array-level call may miss the approach direction, so that wrong answers
+        unverified: whether branches of our array-level call may miss a part of the pose, so that wrong answers
             are expected of it.
         value: value of the locked joint and of our redundancy parameter in radians; NaN if there is none.
     """
@@ -74,8 +74,7 @@ ROWS: tuple[Row, ...] = (
     Row("ik-jaco", "all solutions, six joints in general position", "jaco", "branches"),
     Row("ik-crx", "all solutions, six joints in general position", "crx", "branches"),
     Row("ik-sawyer", "all solutions at one value of joint 7", "sawyer", "branches", lock=6, value=0.3),
-    Row("ik-scorbot", "all branches, five joints, three parallel axes", "scorbot", "branches", approach=True,
-        unverified=True),
+    Row("ik-scorbot", "all branches, five joints, three parallel axes", "scorbot", "branches", unverified=True),
     Row("ik-elbow5", "all solutions, five joints in general position", "elbow5", "branches", approach=True),
     Row("solve-pioneer5", "an answer inside the limits, verified", "pioneer5", "answer", approach=True),
     Row("solve-redundant7", "an answer inside the limits, verified", "redundant7", "answer"),
@@ -118,6 +117,8 @@ def prepare(row: Row, size: int, seed: int) -> Task | None:
     six = arm
     if row.approach:
         six = arm.with_roll()
+    elif arm.n == 5:
+        six = arm.with_turn()
     elif row.lock is not None:
         six = arm.locked(row.lock, row.value)
     return Task(row, robot, q, np.ascontiguousarray(arm.fk(q)), arm, six if six.n == 6 else None)

@@ -59,6 +59,9 @@ def test_every_form_is_the_same_arm(robot):
     for joint in range(robot.n):
         fewer = np.delete(q[0], joint)
         assert np.allclose(by_screws(arm.locked(joint, q[0, joint]), fewer), T[0], atol=1e-14)
+    turned = arm.with_turn()
+    assert np.allclose(turned.fk(np.append(q[0], 0.0)), T[0], atol=1e-14)
+    assert np.allclose(turned.lines(np.append(q[0], 0.0))[0][-1], T[0, :3, 0], atol=1e-14)
     rolled = arm.with_roll().fk(np.append(q[0], 0.7))
     assert np.allclose(rolled[:3, 2:], T[0, :3, 2:], atol=1e-14)
     assert rolled[:3, 0] @ T[0, :3, 0] == pytest.approx(math.cos(0.7))

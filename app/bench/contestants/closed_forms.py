@@ -41,7 +41,8 @@ def eaik(task: Task) -> list[Contestant]:
     def read(answer: tuple[Any, Any]) -> Array:
         q, least_squares = answer
         exact = ~np.asarray(least_squares, dtype=bool)
-        return np.asarray(q, dtype=np.float64).reshape(-1, whole.n)[exact, : task.robot.n]
+        q = np.asarray(q, dtype=np.float64).reshape(-1, whole.n)[exact]
+        return q if whole is task.arm else our_joints(task, q)
 
     def solve(T: Array) -> tuple[Any, Any]:
         found = robot.IK(T)

@@ -21,6 +21,7 @@ from kin.transforms import Array
 OURS = "kinboard"
 SOLVE_IK = "kinboard, solve_ik"
 FLOORS = ("floor: empty call", "floor: sine, cosine", "floor: points written")
+VIRTUAL = 1e-6  # radians: a virtual joint at zero
 TOLERANCE = 1e-13  # of iterative solvers, for half the squared error: about 1e-7 m or rad
 
 
@@ -99,6 +100,8 @@ def with_tool_rotation(M: Any, tool: Array) -> Array:
 def our_joints(task: Task, q: Array) -> Array:
     """Configurations ``(k, 6)`` of a six-joint arm as those of ours: without the roll, with the locked joint."""
     q = np.asarray(q, dtype=np.float64).reshape(-1, 6)
+    if task.robot.n == 5 and not task.row.approach:
+        q = q[np.abs(np.remainder(q[:, 5] + math.pi, 2.0 * math.pi) - math.pi) < VIRTUAL]
     if task.row.lock is not None:
         return np.insert(q, task.row.lock, task.row.value, axis=1)
     return q[:, : task.robot.n]
