@@ -6,7 +6,8 @@
   const PAUSE = 40; // ms after a key until a cell is sent
   const PATIENCE = 3000; // ms for an answer, then the next message is sent
   const LEFT = 400; // ms without focus until the table is written again, so that a click on a button finds it
-  const PART = 16000; // bytes of a file in one message
+  const PART = 16000; // bytes of a text in one message
+  const PART_OF_ZIP = 34500; // bytes of a zip in one message, which base64 makes a third longer
 
   const part = (name) => document.querySelector(`[data-arm="${name}"]`);
   const cells = () => [...document.querySelectorAll("[data-arm] input[data-cell]")];
@@ -217,11 +218,20 @@
     const input = event.target.closest?.("[data-arm-file]");
     const file = input?.files[0];
     if (!file) return;
-    const most = Number(input.dataset.most);
-    const text = await file.slice(0, most + 1).text();
+    const { most, mostZip } = input.dataset;
+    const name = file.name.slice(0, 100);
+    const head = new Uint8Array(await file.slice(0, 2).arrayBuffer());
+    const zip = head[0] === 0x50 && head[1] === 0x4b; // PK
+    const content = zip ? new Uint8Array(await file.slice(0, Number(mostZip) + 1).arrayBuffer()) : await file.slice(0, Number(most) + 1).text();
     input.value = "";
-    upload(file.name.slice(0, 100), text, 0);
+    if (zip) uploadZip(name, content, 0);
+    else upload(name, content, 0);
   });
+  function uploadZip(name, bytes, from) {
+    const to = Math.min(from + PART_OF_ZIP, bytes.length);
+    const part = btoa(String.fromCharCode(...bytes.subarray(from, to)));
+    send(["upload"], [name, from === 0, to >= bytes.length, part, "base64"], () => { if (to < bytes.length) uploadZip(name, bytes, to); });
+  }
   /** The end of the part that begins at `from`: a short enough message, and no character is cut in two. */
   function endOfPart(text, from) {
     let length = PART;

@@ -53,6 +53,15 @@ RULES: dict[str, set[str]] = {
         *("viser", "trimesh", "numpy", "jinja2", "markupsafe", "kin"),
         *("app.viewer", "app.equations", "app.exports", "app.shared"),
     },
+    "app/viewer/meshes": {
+        *("fast_simplification", "trimesh", "numpy", "kin", "app.shared", "app.viewer.meshes", "app.viewer.scene"),
+        "app.viewer.own_arm",
+    },
+    # The process that parses meshes starts without the core, which would take it a second.
+    "app/viewer/meshes/archive.py": set(),
+    "app/viewer/meshes/child.py": {"app.viewer.meshes"},
+    "app/viewer/meshes/loading.py": {"fast_simplification", "trimesh", "numpy", "app.viewer.meshes"},
+    "app/viewer/meshes/surface.py": {"numpy"},
     "app/service": {
         *("kin", "fastapi", "starlette", "pydantic", "pydantic_core", "uvicorn", "httptools", "websockets"),
         *("app.api", "app.service", "app.shared", "app.viewer"),

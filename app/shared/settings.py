@@ -69,6 +69,11 @@ class Settings(BaseSettings):
     map_memory: int = Field(
         64 * 1024 * 1024, ge=0, description="Maximum size in bytes of the cache of capability maps."
     )
+    mesh_memory: int = Field(
+        128 * 1024 * 1024,
+        ge=0,
+        description="Maximum size in bytes of the meshes of visitors' own arms that a process holds.",
+    )
     map_time: float = Field(
         600.0, ge=1, le=86400, description="Seconds that one capability map of the viewer may be computed."
     )

@@ -17,6 +17,8 @@ from app.shared.clouds import Clouds
 from app.shared.maps import Maps
 from app.shared.store import Store
 from app.shared.summaries import Summaries
+from app.viewer.meshes.bodies import Bodies
+from app.viewer.meshes.reader import MeshReader
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import Sphere
@@ -32,6 +34,8 @@ class Stage(Protocol):
     clouds: Clouds
     maps: Maps
     summaries: Summaries
+    meshes: MeshReader
+    bodies: Bodies
 
     @property
     def client(self) -> viser.ClientHandle:
@@ -95,6 +99,12 @@ class Stage(Protocol):
         Viewpoint, task and a target that is not reached stay; configuration and locks do if it has as many joints
         of the same kinds.
         """
+
+    def discard_own(self) -> OwnArm | None:
+        """Delete the visitor's own arm, and show the robot it was made from; returns the arm."""
+
+    def redraw_body(self) -> None:
+        """Draw the body of the arm on show anew: there may be another one by now."""
 
     def change_robot(self, robot: Robot) -> None:
         """Show a robot of the service, at its home configuration."""

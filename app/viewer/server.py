@@ -16,6 +16,8 @@ from app.shared.security import Rights
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.shared.summaries import Summaries
+from app.viewer.meshes.library import Library
+from app.viewer.meshes.reader import MeshReader
 from app.viewer.panel.status import READY, Notice
 from app.viewer.panel.view import configure_theme
 from app.viewer.scene.lights import light_scene
@@ -51,7 +53,9 @@ class ViewerServer:
         maps: Maps | None = None,
         summaries: Summaries | None = None,
     ) -> None:
-        self._services = Services(store, clouds, maps or Maps(), summaries or Summaries(), Pace())
+        meshes = MeshReader(settings.mesh_memory)
+        caches = clouds, maps or Maps(), summaries or Summaries()
+        self._services = Services(store, *caches, meshes, Library(meshes), Pace())
         self._owns_maps = maps is None
         self._owns_summaries = summaries is None
         self._settings = settings
@@ -95,6 +99,7 @@ class ViewerServer:
         for page in pages:
             if not page.join(max(0.0, deadline - time.monotonic())):
                 log.error("a visitor's worker did not end within %s s", STOP_TIMEOUT)
+        self._services.meshes.close()
         if self._owns_maps:
             self._services.maps.close()
         if self._owns_summaries:

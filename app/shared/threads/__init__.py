@@ -127,3 +127,4 @@ class DaemonExecutor(Executor):
         self._initializer()
         while (task := self._tasks.get()) is not None:
             task[1]()
+            del task  # whose result may be large

@@ -30,6 +30,7 @@ class Panel:
         system_dark: whether the visitor's system is dark.
         learn: whether there is a tab for lessons.
         tabs: titles of the features' tabs.
+        detailed: the robots that have a detailed body.
 
     Attributes:
         script: the connection to the page's own script.
@@ -52,6 +53,7 @@ class Panel:
         welcome: Notice,
         learn: bool,
         tabs: Sequence[str],
+        detailed: Sequence[Robot],
         post: Post,
     ) -> None:
         self.status = StatusLine(gui, welcome)
@@ -74,6 +76,6 @@ class Panel:
         with group.add_tab("View"):
             self.units = UnitChoice(gui, units, post)
             self.colours.build(view.dark)
-            self.view = ViewOptions(gui, view, post)
+            self.view = ViewOptions(gui, view, detailed, post)
             with gui.add_folder("Share"):
                 self.share = SharePanel(gui, post)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
@@ -10,7 +11,7 @@ import viser
 from app.viewer.labels import TEXT_SIZES
 from app.viewer.panel import Post, assign, listen, listen_click
 from app.viewer.views.templates import render
-from kin import InputError
+from kin import InputError, Robot
 from kin.units import LENGTHS, Length, Units
 
 BRAND = (0, 114, 178)
@@ -42,6 +43,7 @@ class ViewState:
         dark: whether the page is dark; None: as the visitor's system is.
         base_axes: whether the gizmo is aligned with the base instead of the tool.
         look: how an arm is drawn of which there is a body.
+        detailed: whether the body is that of an installed package, for arms of which there is one.
     """
 
     frames: bool = False
@@ -50,6 +52,7 @@ class ViewState:
     dark: bool | None = None
     base_axes: bool = False
     look: Look = "body"
+    detailed: bool = False
 
 
 class UnitChoice:
@@ -81,17 +84,20 @@ class UnitChoice:
 
 
 class ViewOptions:
-    """The options of the scene.
+    """The options of the scene; a choice of detailed bodies only if some robots have one.
 
     Posts ``"look"``, ``("view", name)`` (check boxes), ``"axes"``, ``"camera"``, ``"fit-arm"`` and
     ``("look-from", side)``.
     """
 
-    def __init__(self, gui: viser.GuiApi, state: ViewState, post: Post) -> None:
+    def __init__(self, gui: viser.GuiApi, state: ViewState, detailed: Sequence[Robot], post: Post) -> None:
+        self._gui = gui
         names = tuple(LOOK_NAMES.values())
         self._look = gui.add_dropdown("Show arm as", names, initial_value=LOOK_NAMES[state.look], hint=LOOK_HINT)
         listen(self._look, post, "look")
         self._boxes: dict[str, viser.GuiCheckboxHandle] = {}
+        if detailed:
+            self._add_box("detailed", "Detailed bodies", _about_detailed(detailed), state, post)
         for name, text, hint in (
             ("frames", "Link frames", "The frame of every DH row: x red, y green, z blue"),
             ("labels", "Frame labels", "The name of each frame, at the tip of its z axis"),
@@ -101,8 +107,7 @@ class ViewOptions:
                 "The axis of each joint of a skeleton; its arrow shows the positive turn",
             ),
         ):
-            self._boxes[name] = gui.add_checkbox(text, getattr(state, name), hint=hint)
-            listen(self._boxes[name], post, ("view", name))
+            self._add_box(name, text, hint, state, post)
         initial = AXES[state.base_axes]
         self._axes = gui.add_dropdown("Arrows along", AXES, initial_value=initial, hint=AXES_HINT)
         listen(self._axes, post, "axes")
@@ -111,6 +116,10 @@ class ViewOptions:
         listen_click(group, post, {"Fit arm": "fit-arm", "Reset view": "camera"})
         sides = gui.add_button_group("View from", SIDES)
         listen_click(sides, post, {side: ("look-from", side) for side in SIDES})
+
+    def _add_box(self, name: str, text: str, hint: str, state: ViewState, post: Post) -> None:
+        self._boxes[name] = self._gui.add_checkbox(text, getattr(state, name), hint=hint)
+        listen(self._boxes[name], post, ("view", name))
 
     def show(self, state: ViewState) -> None:
         """Show these choices."""
@@ -126,6 +135,11 @@ class ViewOptions:
             assign(self._look, LOOK_NAMES[before])
             raise InputError("show arm as", value, "one of " + ", ".join(LOOK_NAMES.values()))
         return found
+
+
+def _about_detailed(robots: Sequence[Robot]) -> str:
+    names = ", ".join(robot.name for robot in robots)
+    return f"The shape of the real arm, from its maker's drawings, instead of our simplified one: {names}."
 
 
 class ColourChoice:

@@ -14,19 +14,18 @@ import viser
 
 from app.viewer.labels import add_label
 from app.viewer.panel.view import Look
-from app.viewer.scene.bodies import drawing
+from app.viewer.scene.bodies import Drawing, drawing
+from app.viewer.scene.bodies.nodes import GHOST, DrawnBody
 from app.viewer.scene.bodies.parts import Part
 from app.viewer.scene.chain import turn
-from app.viewer.scene.clearance import Contact, clearance
+from app.viewer.scene.clearance import Contact, clearance_of
 from app.viewer.scene.floor import Floor
 from app.viewer.scene.gizmo_axes import GizmoAxes
 from app.viewer.scene.key_number import place_beside
 from app.viewer.scene.lights import add_lamp
 from app.viewer.scene.meshes import body
-from app.viewer.scene.shapes import merged, placed
 from app.viewer.viser_patches import assign, keep_private
 from kin import Robot, fk, link_frames
-from kin.axes import inverse
 from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
 
 # Parts without shadows: these would cost as much as the shadows of the bodies, and are not visible.
@@ -48,6 +47,7 @@ class ArmScene:
     Not thread-safe: call it from the visitor's worker, inside ``client.atomic()``.
 
     Args:
+        drawn: the body that looks like the real arm; None: the robot's own, if it has one.
         root: prefix of all node names. Use a new one for each arm of a scene: the browser keeps the pose of a
             removed node and gives it to the next node of that name, whose own pose is not sent if it is zero.
 
@@ -57,19 +57,25 @@ class ArmScene:
         gizmo_in_base: whether `place_gizmo` aligns the gizmo with the base instead of the tool.
     """
 
-    def __init__(self, scene: viser.SceneApi, robot: Robot, dark: bool = False, root: str = "/arm") -> None:
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        robot: Robot,
+        dark: bool = False,
+        root: str = "/arm",
+        drawn: Drawing | None = None,
+    ) -> None:
         self.robot = robot
         self._root = root
         self.body = body(robot)
-        self._drawing = drawing(robot)
-        self._look: Look = "skeleton" if self._drawing is None else "body"
+        self._look: Look = "body"
         self._scene = scene
         self._home_frames = link_frames(robot, robot.q_home)
         self._joints: list[viser.SceneNodeHandle] = []
         self._frames: list[viser.SceneNodeHandle] = []
         self._labels: list[viser.SceneNodeHandle] = []
         self._bodies: list[viser.MeshHandle] = []
-        self._drawn: list[viser.MeshHandle] = []
+        self._nodes: list[str] = []  # names of the nodes of the links, base first
         self._axes: list[viser.MeshHandle] = []
         self._through = False
         self._shown = [math.nan] * robot.n
@@ -81,8 +87,9 @@ class ArmScene:
             f"{root}-target", scale=GIZMO * self.body.radius, line_width=LINE, depth_test=False, opacity=0.95
         )
         keep_private(self.gizmo)
-        hands = [self.body.gripper[0], *self._drawn_hand()]
-        self._ghosts = [self._add(f"{root}-target", hand, opacity=0.35, visible=False) for hand in hands]
+        self._ghost = self._add(f"{root}-target", self.body.gripper[0], opacity=GHOST, visible=False)
+        tool, color = self.body.chain.T_last_tool, self.body.gripper[0].color
+        self._drawn = DrawnBody(self._add, self._nodes, f"{root}-target", tool, color)
         self._gap = scene.add_line_segments(
             f"{root}-gap",
             np.zeros((1, 2, 3), np.float32),
@@ -107,7 +114,7 @@ class ArmScene:
         self._ring_sets = 0
         self.gizmo_in_base = False
         self._R_gizmo_target = np.eye(3)
-        self.show_as(self._look)
+        self.use_drawing(drawn or drawing(robot))
         self.show(robot.q_home)
         self.place_gizmo(fk(robot, robot.q_home))
 
@@ -136,7 +143,7 @@ class ArmScene:
             self._R_gizmo_target = np.eye(3)
             assign(self.gizmo, T_base_tool[:3, 3], wxyz)
             turned = NO_TURN
-        for ghost in self._ghosts:
+        for ghost in (self._ghost, *self._drawn.hand):
             assign(ghost, wxyz=turned)
         for ring in self._rings:
             assign(ring, STILL, NO_TURN)
@@ -204,7 +211,7 @@ class ArmScene:
 
     def contact_at(self, q: Array) -> Contact | None:
         """Where the arm, as it is drawn, passes through pedestal or floor at a configuration ``(n,)``."""
-        return clearance(self.robot, self._look == "skeleton").at(q)
+        return (self._skeleton_clear if self._bare else self._clear).at(q)
 
     def show_contact(self, contact: Contact | None, target: Array | None = None) -> str:
         """Mark where the arm passes through pedestal or floor; returns the sentence at the mark, or "".
@@ -231,18 +238,31 @@ class ArmScene:
         self._through = on
         self._set_opacity()
 
+    def use_drawing(self, drawn: Drawing | None) -> None:
+        """Draw the body that looks like the real arm in this way; None: there is none."""
+        self._drawn.use(drawn)
+        self._skeleton_clear = clearance_of(self.robot, None)
+        self._clear = clearance_of(self.robot, drawn)
+        turned = self._ghost.wxyz
+        for ghost in self._drawn.hand:
+            assign(ghost, wxyz=turned)
+        self.show_as(self._look)
+
     def show_as(self, look: Look) -> None:
         """Draw the arm as its body, its skeleton or both; an arm without a drawn body stays a skeleton."""
-        if self._drawing is None:
-            return
         self._look = look
         for node in self._bodies:
-            node.visible = look != "body"
-        for node in self._drawn:
-            node.visible = look != "skeleton"
-        self._base_up.visible = look != "body"  # the arrow is inside the body's foot
+            node.visible = self._bare or look == "both"
+        for node in self._drawn.nodes:
+            node.visible = not self._bare
+        self._base_up.visible = self._bare or look == "both"  # the arrow is inside the body's foot
         self._show_ghost()
         self._set_opacity()
+
+    @property
+    def _bare(self) -> bool:
+        """Whether only the skeleton is drawn."""
+        return self._look == "skeleton" or not self._drawn.nodes
 
     def show_base_axes(self, visible: bool) -> None:
         """Show or hide the axes of the base frame."""
@@ -261,7 +281,7 @@ class ArmScene:
     def show_axes(self, visible: bool) -> None:
         """Show or hide the joint axes; a body hides most of them, so only a skeleton shows any."""
         for node in self._axes:
-            node.visible = visible and self._look != "body"
+            node.visible = visible and (self._bare or self._look == "both")
 
     def remove(self) -> None:
         """Remove everything from the scene."""
@@ -269,24 +289,15 @@ class ArmScene:
             node.remove()
 
     def _show_ghost(self) -> None:
-        gripper, *drawn = self._ghosts
-        gripper.visible = self._gap.visible and self._look == "skeleton"
-        for hand in drawn:
-            hand.visible = self._gap.visible and self._look != "skeleton"
+        self._ghost.visible = self._gap.visible and self._bare
+        for node in self._drawn.hand:
+            node.visible = self._gap.visible and not self._bare
 
     def _set_opacity(self) -> None:
         for node in (*self._bodies, *self._axes, self._approach):
             node.opacity = THROUGH if self._through else None
-        for node in self._drawn:
+        for node in self._drawn.nodes:
             node.opacity = THROUGH if self._through or self._look == "both" else None
-
-    def _drawn_hand(self) -> list[Part]:
-        """What the last joint of a drawn body carries, in the tool frame; nothing for an arm without a body."""
-        if self._drawing is None:
-            return []
-        T_tool_link = inverse(self.body.chain.T_last_tool)
-        parts = [placed(part.mesh, T_tool_link) for part in self._drawing.parts[-1]]
-        return [Part("hand", merged(parts), self.body.gripper[0].color)]
 
     def _build_arm(self) -> None:
         root = self._scene.add_frame(self._root, show_axes=False)
@@ -309,9 +320,7 @@ class ArmScene:
                     else self._add(name, part)
                 )
                 (self._axes if part.name == "axis" else self._bodies).append(node)
-            if self._drawing is not None:
-                shell = self._drawing.parts[link.index + 1]
-                self._drawn += [self._add(name, part, name=f"{part.name}-{link.index + 1}") for part in shell]
+            self._nodes.append(name)
             for row, T in link.frames:
                 self._add_frame(name, row, T)
         tool = self.body.chain.T_last_tool
@@ -335,6 +344,7 @@ class ArmScene:
             part.mesh.faces,
             color=part.color,
             opacity=opacity,
+            side="double" if part.double_sided else "front",
             position=T[:3, 3],
             wxyz=wxyz_from_rotation(T[:3, :3]),
             visible=visible,

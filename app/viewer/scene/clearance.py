@@ -120,8 +120,15 @@ class Clearance:
 
 @lru_cache(maxsize=32)
 def clearance(robot: Robot, skeleton: bool = False) -> Clearance:
-    """The test for a robot as it is drawn, or for its skeleton; the same object for every visitor."""
+    """The test for a robot with its own drawn body, or for its skeleton; the same object for every visitor."""
     return Clearance(robot, body(robot), None if skeleton else drawing(robot))
+
+
+def clearance_of(robot: Robot, drawn: Drawing | None) -> Clearance:
+    """The test for a robot with any drawn body; None: for its skeleton."""
+    if drawn is None or drawn is drawing(robot):
+        return clearance(robot, drawn is None)
+    return Clearance(robot, body(robot), drawn)
 
 
 def _spheres(

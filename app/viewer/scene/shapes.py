@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 import trimesh
@@ -20,6 +21,18 @@ Faces = NDArray[np.int64]
 SEGMENTS = 28
 MOST_POINTS = 100
 DIRECTIONS = 28  # corners of an outline
+
+
+class Solid(NamedTuple):
+    """The triangles of a mesh as a browser gets them, in a quarter of the memory of a `trimesh.Trimesh`."""
+
+    vertices: NDArray[np.float32]
+    faces: NDArray[np.uint32]
+
+    @property
+    def bounds(self) -> Array:
+        """Its lowest and highest coordinates ``(2, 3)``."""
+        return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)], dtype=float)
 
 
 def lathe(profile: ArrayLike) -> trimesh.Trimesh:
@@ -127,7 +140,7 @@ def merged(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
     )
 
 
-def placed(mesh: trimesh.Trimesh, T: Array) -> trimesh.Trimesh:
+def placed(mesh: trimesh.Trimesh | Solid, T: Array) -> trimesh.Trimesh:
     """A copy of the mesh moved by a transform ``(4, 4)``."""
     return _mesh(mesh.vertices @ T[:3, :3].T + T[:3, 3], np.asarray(mesh.faces))
 

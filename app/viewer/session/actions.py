@@ -45,6 +45,7 @@ NO_STEP = frozenset(
         "released",
         "snap",
         "text-size",
+        "body",
     }
 )
 # Controls that send many values on the way to the one the visitor means: how long (s) a step may pause.
@@ -93,6 +94,9 @@ class ActionsPage(TypedPage, RobotPage, Protocol):
     def use_view(self, view: ViewState) -> None:
         """Show the page and the scene as `view` says."""
 
+    def redraw_body(self) -> None:
+        """Draw the body of the arm on show anew: there may be another one by now."""
+
     def snapshot(self) -> PageState:
         """The present state."""
 
@@ -138,6 +142,7 @@ class Actions:
             "copy-as": lambda name: page.panel.share.choose(name),
             "view": self._on_view,
             "look": self._on_drawn_as,
+            "body": lambda _: page.redraw_body(),  # a detailed body was read
             "colours": self._on_colours,
             "system-dark": lambda dark: page.use_colours(page.view.dark, bool(dark)),
             "camera": lambda _: page.camera.aim(arm.scene.body, self._frames(), glide=True),

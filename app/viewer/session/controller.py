@@ -28,6 +28,7 @@ from app.viewer.panel import Post
 from app.viewer.panel.target import DEFAULT_TASK
 from app.viewer.scene import gizmo
 from app.viewer.scene.arm import ArmScene
+from app.viewer.scene.bodies import Drawing
 from app.viewer.scene.gizmo_axes import gizmo_axes
 from app.viewer.scene.motion import Motion, Pace
 from kin import IKOptions, IKResult, JointConstraints, Robot, Task
@@ -101,8 +102,10 @@ class ArmController:
         self._in_base = False
         self._drag_start: tuple[Array, Array] = np.eye(4), np.eye(3)  # target pose, gizmo orientation
 
-    def use(self, robot: Robot, q: Array | None, dark: bool, base_axes: bool) -> None:
-        """Show another robot, at its home configuration or at `q` ``(n,)``."""
+    def use(
+        self, robot: Robot, q: Array | None, dark: bool, base_axes: bool, drawn: Drawing | None = None
+    ) -> None:
+        """Show another robot with this body, at its home configuration or at `q` ``(n,)``."""
         if hasattr(self, "scene"):
             self.scene.remove()
         self.robot = robot
@@ -114,7 +117,7 @@ class ArmController:
         weights = np.where(robot.revolute, 1.0, PRISMATIC_WEIGHT)
         self._motion = Motion(robot.q_home if q is None else q, weights)
         self.q = self._motion.goal
-        self.scene = ArmScene(self._client.scene, robot, dark, f"/arm-{next(_ARMS)}")
+        self.scene = ArmScene(self._client.scene, robot, dark, f"/arm-{next(_ARMS)}", drawn)
         self._in_base = self.scene.gizmo_in_base = base_axes
         gizmo.listen(self.scene.gizmo, ring=False, post=self._post)
         self._set_gizmo_axes()

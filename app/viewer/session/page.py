@@ -19,6 +19,7 @@ import kin
 from app.shared.security import Rights
 from app.viewer.feature import Feature
 from app.viewer.lessons import LESSONS
+from app.viewer.meshes.bodies import Bodies
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import update_html
 from app.viewer.panel.joints import JointSliders, lock_notice
@@ -32,19 +33,19 @@ from app.viewer.session.lessons import LessonChoice
 from app.viewer.session.numbers import Numbers
 from app.viewer.session.persistence import Persistence
 from app.viewer.session.posture import PosturePanel
-from app.viewer.session.robots import edit, robot_of
+from app.viewer.session.robots import ShownArm, discard_own, edit, robot_of
 from app.viewer.session.services import Services
 from app.viewer.session.state import PageState
 from app.viewer.session.typed import BY_HAND
 from app.viewer.session.worker import Worker
 from app.viewer.tabs import TABS
 from app.viewer.views.templates import render
-from kin import IKOptions, IKResult, Robot, Task
+from kin import IKResult, Robot, Task
 from kin.transforms import Array
 from kin.units import DEFAULT_UNITS, Units
 
 
-class VisitorPage(Worker):
+class VisitorPage(ShownArm, Worker):
     """The page of one visitor.
 
     The methods that `Worker` calls thread-safe may be called by any thread; everything else belongs to the worker.
@@ -73,6 +74,9 @@ class VisitorPage(Worker):
         self.maps = services.maps
         self.summaries = services.summaries
         self.own: OwnArm | None = None
+        self.meshes = services.meshes
+        self._library = services.library
+        self.bodies = Bodies(services.library, lambda: self.post("body"))
         self.arm = ArmController(client, services.pace, self.post, self)
         self.view = ViewState()
         self.system_dark = False
@@ -96,34 +100,6 @@ class VisitorPage(Worker):
     # Stage: what features may use
 
     @property
-    def robot(self) -> Robot:
-        return self.arm.robot
-
-    @property
-    def task(self) -> Task:
-        return self.arm.task
-
-    @property
-    def goal(self) -> Array:
-        return self.arm.goal
-
-    @property
-    def q(self) -> Array:
-        return self.arm.q
-
-    @property
-    def target(self) -> Array | None:
-        return self.arm.target
-
-    @property
-    def options(self) -> IKOptions:
-        return self.arm.options
-
-    @property
-    def branch(self) -> str | None:
-        return self.arm.branch
-
-    @property
     def dark(self) -> bool:
         return self.system_dark if self.view.dark is None else self.view.dark
 
@@ -137,6 +113,13 @@ class VisitorPage(Worker):
 
     def edit_arm(self, own: OwnArm) -> None:
         edit(self, own)
+
+    def discard_own(self) -> OwnArm | None:
+        return discard_own(self)
+
+    def redraw_body(self) -> None:
+        self.arm.scene.use_drawing(self.bodies.of(self.robot, self.own))
+        self._apply_view()
 
     def set_target(self, T_base_tool: Array) -> None:
         self.arm.set_target(T_base_tool)
@@ -227,6 +210,9 @@ class VisitorPage(Worker):
         if view.dark != before.dark:
             self.panel.colours.show(view.dark)
             self.use_colours(view.dark, self.system_dark)
+        if view.detailed != self.bodies.detailed:
+            self.bodies.detailed = view.detailed
+            self.redraw_body()
         self._apply_view()
 
     def settle_status(self) -> None:
@@ -344,7 +330,7 @@ class VisitorPage(Worker):
             titles = [tab.title for tab in TABS]
             self.panel = Panel(
                 gui, self.store.robots, self.own, robot, self.units, self.view, self.system_dark, self._welcome,
-                bool(LESSONS), titles, self.post,
+                bool(LESSONS), titles, self._library.offered(self.store.robots), self.post,
             )  # fmt: skip
             self.status = self.panel.status
             self.posture = PosturePanel(self, self.panel.posture, self.post)
@@ -362,7 +348,8 @@ class VisitorPage(Worker):
 
     def _use_robot(self, robot: Robot, q: Array | None = None, glide: bool = False) -> None:
         """Show another robot, at its home configuration or at `q` ``(n,)``, in a fitting view."""
-        self.arm.use(robot, q, self.dark, self.view.base_axes)
+        self.bodies.detailed = self.view.detailed
+        self.arm.use(robot, q, self.dark, self.view.base_axes, self.bodies.of(robot, self.own))
         self.numbers.use_pose()
         self.panel.target.show(self.task)
         self.sliders = self._make_sliders()

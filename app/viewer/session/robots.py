@@ -4,16 +4,53 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from app.viewer.meshes.bodies import Bodies
 from app.viewer.own_arm import OwnArm
+from app.viewer.session.controller import ArmController
 from app.viewer.session.persistence import SavedPage
-from kin import Robot
+from kin import IKOptions, Robot, Task
 from kin.transforms import Array
+
+
+class ShownArm:
+    """What features may read of the arm on show; see `app.viewer.feature.Stage`."""
+
+    arm: ArmController
+
+    @property
+    def robot(self) -> Robot:
+        return self.arm.robot
+
+    @property
+    def task(self) -> Task:
+        return self.arm.task
+
+    @property
+    def goal(self) -> Array:
+        return self.arm.goal
+
+    @property
+    def q(self) -> Array:
+        return self.arm.q
+
+    @property
+    def target(self) -> Array | None:
+        return self.arm.target
+
+    @property
+    def options(self) -> IKOptions:
+        return self.arm.options
+
+    @property
+    def branch(self) -> str | None:
+        return self.arm.branch
 
 
 class RobotPage(SavedPage, Protocol):
     """What a change of the robot may use of a page."""
 
     own: OwnArm | None
+    bodies: Bodies
 
     def change_robot(self, robot: Robot, q: Array | None = None, glide: bool = False) -> None:
         """Replace the robot, at its home configuration or at `q` ``(n,)``, in a fitting view."""
@@ -24,6 +61,14 @@ def robot_of(page: RobotPage, robot_id: str | None) -> Robot:
     if page.own is not None and page.own.robot.id == robot_id:
         return page.own.robot
     return page.store.robots[0] if robot_id is None else page.store.get(robot_id)
+
+
+def discard_own(page: RobotPage) -> OwnArm | None:
+    """Delete the visitor's own arm, and show the robot it was made from; returns it."""
+    own, page.own = page.own, None
+    if own is not None:
+        page.change_robot(next((r for r in page.store.robots if r.id == own.start), page.store.robots[0]))
+    return own
 
 
 def edit(page: RobotPage, own: OwnArm) -> None:

@@ -8,15 +8,19 @@ from app.shared.clouds import Clouds
 from app.shared.maps import Maps
 from app.shared.store import Store
 from app.shared.summaries import Summaries
+from app.viewer.meshes.library import Library
+from app.viewer.meshes.reader import MeshReader
 from app.viewer.scene.motion import Pace
 
 
 @dataclass(frozen=True)
 class Services:
-    """The robots, the caches of expensive results, and the frame rate."""
+    """The robots, the caches of expensive results, the readers of meshes, and the frame rate."""
 
     store: Store
     clouds: Clouds
     maps: Maps
     summaries: Summaries
+    meshes: MeshReader
+    library: Library
     pace: Pace

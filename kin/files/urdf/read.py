@@ -218,12 +218,12 @@ def _difference(robot: Robot, chain: Sequence[UrdfJoint]) -> float:
     for joint in chain:
         T = T @ np.array(matrix_of(*joint.origin()))
         if joint.moves:
-            T = T @ _motion(joint, q[:, i])
+            T = T @ motion_of(joint, q[:, i])
             i += 1
     return float(np.abs(fk(robot, q) - T).max())
 
 
-def _motion(joint: UrdfJoint, values: Array) -> Array:
+def motion_of(joint: UrdfJoint, values: Array) -> Array:
     """The motion of a joint ``(k, 4, 4)``, by Rodrigues' formula or along its axis."""
     x, y, z = axis = np.array(joint.axis())
     T = np.tile(np.eye(4), (len(values), 1, 1))

@@ -28,12 +28,42 @@ class Tip(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class UrdfJoint:
-    """One joint of a URDF; its numbers are read where they are needed."""
+class UrdfElement:
+    """A named element of a URDF; its numbers are read where they are needed."""
 
     file: str
     element: Element
     name: str
+
+    def origin(self) -> tuple[list[float], list[float]]:
+        """xyz in metres and rpy in radians of its frame in its parent's."""
+        return self.triple("origin", "xyz", "0 0 0"), self.triple("origin", "rpy", "0 0 0")
+
+    def triple(self, tag: str, key: str, default: str) -> list[float]:
+        """Three numbers of an attribute."""
+        child = self.element.find(tag)
+        parts = (default if child is None else child.get(key, default)).split()
+        if len(parts) != 3:
+            raise self.refuse(f"{tag} {key}", " ".join(parts), "three numbers separated by spaces")
+        return [self.number(tag, f"{key}[{i}]", part) for i, part in enumerate(parts)]
+
+    def number(self, tag: str, key: str, text: str) -> float:
+        """A finite number of an attribute."""
+        value = number_of(text)
+        if not abs(value) < LARGEST:
+            hint = "; expand xacro first" if "$" in text else ""
+            raise self.refuse(f"{tag} {key}", text, "a finite number, smaller than a million" + hint)
+        return value
+
+    def refuse(self, field: str, value: object, expected: str) -> RobotFileError:
+        """The error for one of its fields."""
+        return RobotFileError(self.file, f"{self.element.tag} {self.name}: {field}", value, expected)
+
+
+@dataclass(frozen=True, eq=False)
+class UrdfJoint(UrdfElement):
+    """One joint of a URDF."""
+
     type: str
     parent: str
     child: str
@@ -47,10 +77,6 @@ class UrdfJoint:
     def kind(self) -> Kind:
         """The kind of the row."""
         return "prismatic" if self.type == "prismatic" else "revolute"
-
-    def origin(self) -> tuple[list[float], list[float]]:
-        """xyz in metres and rpy in radians of the joint's frame in its parent's."""
-        return self.triple("origin", "xyz", "0 0 0"), self.triple("origin", "rpy", "0 0 0")
 
     def axis(self) -> list[float]:
         """The joint axis, a unit vector in the joint's frame."""
@@ -89,26 +115,6 @@ class UrdfJoint:
             raise self.refuse(f"limit {key}", given, "a positive number")
         return value or None
 
-    def triple(self, tag: str, key: str, default: str) -> list[float]:
-        """Three numbers of an attribute."""
-        child = self.element.find(tag)
-        parts = (default if child is None else child.get(key, default)).split()
-        if len(parts) != 3:
-            raise self.refuse(f"{tag} {key}", " ".join(parts), "three numbers separated by spaces")
-        return [self.number(tag, f"{key}[{i}]", part) for i, part in enumerate(parts)]
-
-    def number(self, tag: str, key: str, text: str) -> float:
-        """A finite number of an attribute."""
-        value = number_of(text)
-        if not abs(value) < LARGEST:
-            hint = "; expand xacro first" if "$" in text else ""
-            raise self.refuse(f"{tag} {key}", text, "a finite number, smaller than a million" + hint)
-        return value
-
-    def refuse(self, field: str, value: object, expected: str) -> RobotFileError:
-        """The error for one of its fields."""
-        return RobotFileError(self.file, f"joint {self.name}: {field}", value, expected)
-
 
 @dataclass(frozen=True, eq=False)
 class UrdfTree:
@@ -122,6 +128,7 @@ class UrdfTree:
     name: str
     links: tuple[str, ...]
     joints: tuple[UrdfJoint, ...]
+    root: Element
 
     @cached_property
     def parents(self) -> dict[str, UrdfJoint]:
@@ -232,7 +239,7 @@ def read_tree(text: bytes | str, file: str) -> UrdfTree:
         both = " and ".join(joint.name for joint in joints if joint.child == twice[0])
         expected = "one parent: a loop is no serial arm"
         raise RobotFileError(file, f"link {twice[0]}", f"the child of {both}", expected)
-    tree = UrdfTree(file, root.get("name", ""), links, joints)
+    tree = UrdfTree(file, root.get("name", ""), links, joints, root)
     for link in links:
         if link not in tree.depths:
             tree.to_root(link)  # raises: there is a cycle

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import trimesh
 
+from app.viewer.scene.shapes import Solid
+
 Color = tuple[int, int, int]
 
 # Okabe and Ito's palette, which stays distinguishable with any colour vision; ordered for contrast between
@@ -26,13 +28,14 @@ class Part:
     """One mesh of one colour, in the coordinates of its node.
 
     `fixed_to_parent` attaches it to the previous link, in this joint's axis frame: a sleeve that a bar slides
-    through.
+    through. A `double_sided` mesh is seen from inside too: those in files may be open, or turned inside out.
     """
 
     name: str
-    mesh: trimesh.Trimesh
+    mesh: trimesh.Trimesh | Solid
     color: Color
     fixed_to_parent: bool = False
+    double_sided: bool = False
 
 
 def joint_color(index: int) -> Color:

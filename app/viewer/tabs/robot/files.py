@@ -1,62 +1,143 @@
-"""Files that a visitor sends and gets: robot files (TOML) and URDF."""
+"""Files that a visitor sends and gets: robot files (TOML), URDF, and zips of a URDF and its meshes."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import base64
+import binascii
+from dataclasses import dataclass, replace
 
 import kin
+from app.shared.memory.answers import AnswerMemory, MemoryFullError, Reservation
+from app.viewer.meshes.archive import MB, MOST_BYTES, MOST_OF_URDF, Archive, MeshError
+from app.viewer.meshes.reader import full
 from app.viewer.own_arm import OwnArm, own_arm
 from app.viewer.tabs.robot.expression import cut
-from kin import InputError, Robot
+from kin import InputError, Robot, RobotFileError
 from kin.files.urdf.tree import Tip, read_tree
 
-MOST = 300_000  # characters of a file
+MOST = 300_000  # characters of a file that is text
 
 
-class Several(NamedTuple):
-    """A URDF with several links that can be the tool."""
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A file that a visitor sent, as far as it is known what is wanted of it.
+
+    Attributes:
+        name: of the file, for messages; with the name of the URDF if it is a zip.
+        text: TOML or URDF; empty while the URDF of a zip is to be chosen.
+        archive: the zip, `data` its bytes, and `room` the memory they take.
+        urdf: name of the URDF in the zip, one of `urdfs`.
+        tips: the links that can be the tool, if there are several.
+    """
 
     name: str
     text: str
-    tips: tuple[Tip, ...]
+    archive: Archive | None = None
+    data: bytes = b""
+    room: Reservation | None = None
+    urdf: str = ""
+    urdfs: tuple[str, ...] = ()
+    tips: tuple[Tip, ...] = ()
 
-
-class TooLargeError(ValueError):
-    """A file has more than `MOST` characters."""
+    def with_urdf(self, urdf: str) -> Source:
+        """This URDF of the zip; raises `kin.KinematicsError`."""
+        assert self.archive is not None
+        if urdf not in self.urdfs:
+            raise InputError("urdf", urdf, "one of " + ", ".join(self.urdfs))
+        try:
+            text = self.archive.read(urdf, MOST_OF_URDF).decode("utf-8", "replace")
+        except MeshError as error:
+            raise file_error(self.name, error) from None
+        return replace(self, text=text, urdf=urdf, tips=tips_of(f"{self.name}: {urdf}", text))
 
 
 class Incoming:
-    """A file that arrives in parts."""
+    """A file that arrives in parts: text, or bytes in base64.
 
-    def __init__(self) -> None:
-        self._parts: list[str] = []
+    Args:
+        memory: where room for a zip is reserved while it arrives.
+    """
+
+    def __init__(self, memory: AnswerMemory) -> None:
+        self._memory = memory
+        self.forget()
+
+    def forget(self) -> None:
+        """Drop what has arrived."""
+        self._parts: list[str | bytes] = []
         self._length = 0
+        self._room = self._memory.reserve(0)
 
-    def take(self, value: object) -> tuple[str, str] | None:
-        """Add a part; name and text of the file if it was the last one.
+    @property
+    def arrived(self) -> int:
+        """Bytes of a zip of which more is to come."""
+        return self._length if self._parts and isinstance(self._parts[0], bytes) else 0
+
+    def take(self, value: object) -> tuple[str, str | bytes, Reservation] | None:
+        """Add a part; name, content and room of the file if it was the last one.
 
         Raises:
-            TooLargeError: the file is too large; its parts are forgotten.
+            MeshError: the file is too large; its parts are forgotten.
             kin.InputError: not a part of a file.
         """
-        match value:
-            case [str(name), bool(first), bool(last), str(part)] if part or last:
-                pass
-            case _:
-                raise InputError(
-                    "upload", value, "name, whether it is the first part, the last part, and its text"
-                )
-        if first:
-            self._parts, self._length = [], 0
+        name, first, last, part = _part(value)
+        if first or (self._parts and type(part) is not type(self._parts[0])):
+            self.forget()
         self._parts.append(part)
         self._length += len(part)
-        if self._length > MOST:
-            self._parts, self._length = [], 0
-            raise TooLargeError
+        most = MOST if isinstance(part, str) else MOST_BYTES
+        try:
+            self._room.resize(0 if isinstance(part, str) else min(self._length, MOST_BYTES))
+        except MemoryFullError:
+            self.forget()
+            raise full() from None
+        if self._length > most:
+            self.forget()
+            limit = f"{MOST // 1000} kB" if isinstance(part, str) else f"{MOST_BYTES // MB} MB for a zip"
+            raise MeshError(f"{name}: size", "it is too large", f"at most {limit}")
         if not last:
             return None
-        text, self._parts, self._length = "".join(self._parts), [], 0
-        return cut(name), text
+        empty: str | bytes = type(part)()
+        content, room = empty.join(self._parts), self._room  # type: ignore[arg-type]
+        self.forget()
+        return name, content, room
+
+
+def _part(value: object) -> tuple[str, bool, bool, str | bytes]:
+    """Name, whether it is the first and the last part, and content."""
+    match value:
+        case [str(name), bool(first), bool(last), str(part)] if part or last:
+            return cut(name), first, last, part
+        case [str(name), bool(first), bool(last), str(part), "base64"] if part or last:
+            try:
+                return cut(name), first, last, base64.b64decode(part, validate=True)
+            except (binascii.Error, ValueError):
+                pass
+    raise InputError("upload", value, "name, whether it is the first part, the last part, and its text or base64")
+
+
+def opened(name: str, content: str | bytes, room: Reservation) -> Source:
+    """A file as far as it says itself what is wanted of it.
+
+    Raises:
+        kin.KinematicsError: naming the field, the value and what would be valid.
+    """
+    if isinstance(content, str):
+        return Source(name, content, tips=tips_of(name, content))
+    try:
+        archive = Archive(content)
+    except MeshError as error:
+        raise file_error(name, error) from None
+    urdfs = tuple(archive.urdfs)
+    if not urdfs:
+        raise RobotFileError(name, "zip", archive.about, "a zip with a file NAME.urdf and its meshes")
+    source = Source(name, "", archive, content, room, urdfs=urdfs)
+    return source.with_urdf(urdfs[0]) if len(urdfs) == 1 else source
+
+
+def file_error(name: str, error: MeshError) -> RobotFileError:
+    """What is wrong with a zip or a mesh, with the name of the file."""
+    return RobotFileError(name, error.field, error.value, error.expected)
 
 
 def arm_of(name: str, text: str, tip: str | None = None) -> tuple[OwnArm, str]:

@@ -20,9 +20,10 @@ from app.viewer.panel.status import Notice
 from app.viewer.tabs.robot import edits, views
 from app.viewer.tabs.robot.edits import Cell, EditError
 from app.viewer.tabs.robot.expression import LONGEST, cut
-from app.viewer.tabs.robot.files import MOST, Incoming, Several, TooLargeError, arm_of, text_of, tips_of
+from app.viewer.tabs.robot.files import text_of
 from app.viewer.tabs.robot.presets import PRESETS, TITLES
-from kin import InputError, KinematicsError, Robot
+from app.viewer.tabs.robot.uploads import Uploads
+from kin import InputError, Robot, RobotFileError
 from kin.files.read import MAX_ROWS
 from kin.robot import Convention
 
@@ -38,8 +39,8 @@ class RobotTab(Feature):
     title = "Robot"
     messages = frozenset(
         {
-            *("cell", "row", "start", "convention", "convert", "reset", "discard", "left"),
-            *("download", "upload", "tip"),
+            *("cell", "row", "start", "convention", "convert", "reset", "delete", "discard", "left"),
+            *("download", "upload", "urdf", "tip"),
         }
     )
 
@@ -48,9 +49,7 @@ class RobotTab(Feature):
         self._wrong: dict[Cell, tuple[str, str]] = {}  # what was typed, and what is wrong with it
         self._revision = 0  # of the rows: a message about other rows is out of date
         self._editing = ""  # the part of the tab in which the visitor types
-        self._uploaded: OwnArm | None = None
-        self._incoming = Incoming()
-        self._several: Several | None = None  # a URDF whose tip is to be chosen
+        self._uploads = Uploads(stage, self.post, lambda own, words: self._begin(own, words))
         self._converting = False
         gui = stage.client.gui
         self._html = {name: gui.add_html("") for name in PARTS}
@@ -58,12 +57,14 @@ class RobotTab(Feature):
             "start": self._start,
             "convention": self._reread,
             "reset": lambda _: self._reset(),
+            "delete": lambda _: self._delete(),
             "discard": lambda _: self._refresh(),
             "left": lambda _: self._leave_table(),
             "convert": self._convert,
             "download": self._download,
             "upload": self._upload,
-            "tip": self._choose_tip,
+            "urdf": lambda value: self._open(lambda: self._uploads.choose("urdf", value)),
+            "tip": lambda value: self._open(lambda: self._uploads.choose("tip", value)),
         }
         self._refresh()
 
@@ -73,6 +74,9 @@ class RobotTab(Feature):
                 self._type(where, column, value)
             case ("row", str(action), int(index)):
                 self._change_rows(action, index)
+            case ("meshes", int(number)):
+                self._uploads.use_meshes(number, value)
+                self._show_files()
             case (str(name),) if name in self._handlers:
                 self._handlers[name](value)
             case _:
@@ -85,14 +89,16 @@ class RobotTab(Feature):
                 return f"{words[0].upper()}{words[1:]}"
             case ("row", str(action), int(index)):
                 return f"Row {index + 1}: {action}"
-            case ("start" | "reset" | "upload", *_):
+            case ("start" | "reset" | "upload" | "urdf" | "tip", *_):
                 return "Another arm"
+            case ("delete",):
+                return "Own arm deleted"
             case ("convention",):
                 return "Convention"
         return self.title
 
     def on_robot(self) -> None:
-        self._several = None
+        self._uploads.waiting = None
         self._refresh()
 
     def on_style(self) -> None:
@@ -128,8 +134,9 @@ class RobotTab(Feature):
         self._show("convert", views.conversion(robot, other, self.stage.units))
 
     def _show_files(self) -> None:
-        waiting = self._several or Several("", "", ())
-        self._show("files", views.files(MOST, waiting.name, waiting.tips))
+        own = self._own
+        file = "" if own is None else self.stage.bodies.file_of(own)
+        self._show("files", views.files(self._uploads.waiting, self._uploads.arrived, self._uploads.reading, file))
 
     def _leave_table(self) -> None:
         """The visitor has left the fields: write every value as it is read, unless something is wrong."""
@@ -149,7 +156,8 @@ class RobotTab(Feature):
         start = self.stage.robot.id if own is None else own.start
         if start in PRESETS or any(robot.id == start for robot in self.stage.store.robots):
             return start
-        return views.FILE if self._uploaded is not None and start == self._uploaded.robot.id else views.LINK
+        last = self._uploads.last
+        return views.FILE if last is not None and start == last.robot.id else views.LINK
 
     # Changes
 
@@ -166,8 +174,7 @@ class RobotTab(Feature):
             self._editing = ""
         lost = self._lost(before)
         if replaced is not None:
-            detail = f"{own.robot.name} is now your own arm. Undo brings the other back. {lost}"
-            self.stage.notify(Notice("advice", f"{label(replaced.robot)} was replaced", detail.strip()))
+            self._say_replaced(replaced, f"{own.robot.name} is now your own arm.", lost)
         elif lost:
             self.stage.notify(Notice("advice", "A field that was not valid is as before", lost))
 
@@ -269,7 +276,8 @@ class RobotTab(Feature):
     def _start(self, key: object) -> None:
         """Begin with an example, or show a robot of the service."""
         if isinstance(key, str) and key in PRESETS:
-            self._begin(own_arm(PRESETS[key], key))
+            own = own_arm(PRESETS[key], key)
+            self._begin(own, own.robot.description)
             return
         robot = next((r for r in self.stage.store.robots if r.id == key), None)
         if robot is None:
@@ -278,16 +286,43 @@ class RobotTab(Feature):
         self.stage.change_robot(robot)
         self.stage.notify(Notice("hand", robot.name, "Change its table: it becomes an arm of your own."))
 
-    def _begin(self, own: OwnArm) -> None:
+    def _begin(self, own: OwnArm, words: str) -> None:
+        """Show another own arm; one that this replaces is not lost without a word."""
+        replaced = self.stage.own
         self.stage.show_own(own)
-        self.stage.notify(Notice("hand", own.robot.name, own.robot.description))
+        if replaced is None or replaced == own or self._is_as_it_began(replaced):
+            self.stage.notify(Notice("hand", own.robot.name, words))
+        else:
+            self._say_replaced(replaced, f"{own.robot.name}: {words}" if words else f"{own.robot.name} is shown.")
+
+    def _is_as_it_began(self, own: OwnArm) -> bool:
+        """Whether an own arm is an example that nobody has changed."""
+        return own.start in PRESETS and own.robot == own_arm(PRESETS[own.start]).robot
+
+    def _say_replaced(self, replaced: OwnArm, words: str, lost: str = "") -> None:
+        detail = f"{words} Undo brings the other back. {lost}".strip()
+        self.stage.notify(Notice("advice", f"{label(replaced.robot)} was replaced", detail))
+
+    def _delete(self) -> None:
+        """Delete the own arm on show; undo brings it back."""
+        if self._own is None:
+            return
+        name = label(self._own.robot)
+        self.stage.discard_own()
+        detail = f"{self.stage.robot.name} is shown. Undo brings your arm back."
+        self.stage.notify(Notice("advice", f"{name} was deleted", detail))
 
     def _reset(self) -> None:
         own, origin = self._own, self._origin
         if own is None:
             return
-        if origin == views.FILE and self._uploaded is not None:
-            self._begin(self._uploaded)
+        last = self._uploads.last
+        if origin == views.FILE and last is not None:
+            self.stage.show_own(last)
+            self.stage.notify(Notice("hand", last.robot.name, last.robot.description))
+        elif origin in PRESETS:
+            self.stage.show_own(own_arm(PRESETS[origin], origin))
+            self.stage.notify(Notice("hand", self.stage.robot.name, self.stage.robot.description))
         elif origin != views.LINK:
             self._start(origin)
         else:
@@ -308,35 +343,19 @@ class RobotTab(Feature):
         self.stage.notify(Notice("hand", f"{name} is saved", "Your browser has put it where it puts downloads."))
 
     def _upload(self, value: object) -> None:
-        try:
-            file = self._incoming.take(value)
-        except TooLargeError:
-            self._refuse(UNUSED, f"It is too large; valid are {MOST // 1000} kB.")
-            return
-        if file is not None:
-            self._several = None
-            self._use_file(*file)
+        self._open(lambda: self._uploads.take(value))
 
-    def _use_file(self, name: str, text: str, tip: str | None = None) -> None:
+    def _open(self, act: Callable[[], None]) -> None:
+        """Take a file, or a choice about it, a step further."""
         try:
-            if tip is None and (tips := tips_of(name, text)):
-                self._several = Several(name, text, tips)
-                self._show_files()
-                self.stage.notify(
-                    Notice("advice", f"{name} has several ends", "Choose the link of the tool, below.")
-                )
-                return
-            own, words = arm_of(name, text, tip)
-        except KinematicsError as error:
+            act()
+        except RobotFileError as error:
             self._refuse(UNUSED, str(error))
-            return
-        self._uploaded = own = replace(own, start=own.robot.id)
-        self.stage.show_own(own)
-        self.stage.notify(Notice("hand", own.robot.name, words))
+        self._show_files()
 
-    def _choose_tip(self, value: object) -> None:
-        if self._several is not None and isinstance(value, str) and value:
-            self._use_file(self._several.name, self._several.text, tip=value)
+    def on_leave(self) -> None:
+        self._uploads.forget()
+        self.stage.bodies.clear()
 
 
 def _part(cell: Cell) -> str:

@@ -7,12 +7,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from app.shared.answers.inspection import InspectionAnswer
+from app.viewer.meshes.archive import MB, MOST_BYTES
 from app.viewer.tabs.robot.edits import ANGLES, AXES, FRAMES, KINDS, NUMBERS, Cell, frame_values, name_of
+from app.viewer.tabs.robot.files import MOST, Source
 from app.viewer.tabs.robot.presets import TITLES
 from app.viewer.views.templates import render
 from kin import Joint, Robot
 from kin.dh import SAMPLES, largest_difference
-from kin.files.urdf.tree import Tip
 from kin.units import Unit, Units
 
 FILE, LINK = "your own file", "a link"  # what an arm was made from, besides examples and robots
@@ -43,13 +44,13 @@ def text_of(value: float, unit: Unit) -> str:
     return "0" if shown in ("-0", "") else shown.replace("-", "−")
 
 
-def start(robot: Robot, chosen: str, changed: bool, robots: Sequence[Robot]) -> str:
+def start(robot: Robot, chosen: str, mine: bool, robots: Sequence[Robot]) -> str:
     """What the arm was made from, its name and its convention."""
     return render(
         "robot/start",
         chosen=chosen,
         other=chosen if chosen in (FILE, LINK) else "",
-        changed=changed,
+        mine=mine,
         presets=TITLES.items(),
         robots=[(r.id, r.name) for r in robots],
         name=robot.name,
@@ -179,11 +180,34 @@ def frames(robot: Robot, units: Units) -> str:
     return render("robot/frames", heads=AXES, rows=rows, length=length, angle=angle)
 
 
-def files(most: int, file: str, tips: Sequence[Tip]) -> str:
-    """Buttons for files of at most `most` bytes, and the ends of a URDF to choose from."""
-    more = max(0, len(tips) - MOST_TIPS)
+def files(waiting: Source | None, arrived: int, reading: str, meshes: str) -> str:
+    """Buttons for files, and what is to be chosen, arriving or known about them.
+
+    Args:
+        waiting: a file with several ends or several URDFs to choose from.
+        arrived: bytes of a zip of which more is to come.
+        reading: the file whose meshes are being read.
+        meshes: the file whose meshes the arm on show has.
+    """
+    choice: dict[str, Any] | None = None
+    if waiting is not None:
+        if waiting.text:
+            names = [f"{tip.link} ({tip.joints} joint{'s' * (tip.joints != 1)})" for tip in waiting.tips]
+            options = list(zip([tip.link for tip in waiting.tips], names, strict=True))
+            choice = {
+                "key": "tip",
+                "label": "Tool is link",
+                "words": "ends: choose the link that carries the tool",
+            }
+        else:
+            options = [(urdf, urdf) for urdf in waiting.urdfs]
+            choice = {"key": "urdf", "label": "Robot", "words": "robots: choose its URDF"}
+        choice |= {"file": waiting.name, "options": options[:MOST_TIPS], "more": max(0, len(options) - MOST_TIPS)}
+    most = f"{MOST // 1000} kB", f"{MOST_BYTES // MB} MB"
+    limits = {"text": MOST, "zip": MOST_BYTES}
+    here = f"{arrived / MB:.1f} MB" if arrived else ""
     return render(
-        "robot/files", most=f"{most // 1000} kB", bytes=most, file=file, tips=tips[:MOST_TIPS], more=more
+        "robot/files", most=most, limits=limits, choice=choice, arrived=here, reading=reading, meshes=meshes
     )
 
 

@@ -94,7 +94,7 @@ def test_an_arm_is_drawn_in_three_ways(server: viser.ViserServer) -> None:
         assert seen("body-") == {look != "skeleton"}
         assert seen("housing", "trim") == {look != "body"}
         assert seen("axis") == {look != "body"}
-        ghosts = {n.name.split("/")[-1]: n.visible for n in arm._ghosts}
+        ghosts = {n.name.split("/")[-1].split("-")[0]: n.visible for n in (arm._ghost, *arm._drawn.hand)}
         assert ghosts == {"gripper": look == "skeleton", "hand": look != "skeleton"}
     arm.see_through(True)
     arm.show_as("skeleton")

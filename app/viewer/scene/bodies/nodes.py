@@ -1,0 +1,63 @@
+"""The nodes of a drawn body in a scene; another body can take its place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import viser
+
+from app.viewer.scene.bodies import Drawing
+from app.viewer.scene.bodies.parts import Color, Part
+from app.viewer.scene.shapes import merged, placed
+from kin.axes import inverse
+from kin.transforms import Array
+
+GHOST = 0.35  # opacity of the hand at a target
+
+
+class DrawnBody:
+    """The drawn body of one arm, and its hand as a ghost at the target.
+
+    Args:
+        add: adds a part below a node of the scene.
+        links: names of the nodes of the links, base first.
+        target: name of the node that the ghost hangs on.
+        T_last_tool: the tool in the last link ``(4, 4)``.
+        color: of the ghost.
+
+    Attributes:
+        nodes: the meshes of the body; empty if there is none.
+        hand: the meshes of the ghost.
+    """
+
+    def __init__(
+        self,
+        add: Callable[..., viser.MeshHandle],
+        links: Sequence[str],
+        target: str,
+        T_last_tool: Array,
+        color: Color,
+    ) -> None:
+        self._add = add
+        self._links = links
+        self._target = target
+        self._T_tool_last = inverse(T_last_tool)
+        self._color = color
+        self._count = 0  # of bodies so far: browsers keep the poses of removed nodes, so names are used once
+        self.nodes: list[viser.MeshHandle] = []
+        self.hand: list[viser.MeshHandle] = []
+
+    def use(self, drawing: Drawing | None) -> None:
+        """Replace the body; the new one is visible, its ghost is not."""
+        for node in (*self.nodes, *self.hand):
+            node.remove()
+        self._count += 1
+        self.nodes, self.hand = [], []
+        if drawing is None:
+            return
+        for k, (parent, parts) in enumerate(zip(self._links, drawing.parts, strict=True)):
+            self.nodes += [self._add(parent, part, name=f"{part.name}-{k}-{self._count}") for part in parts]
+        if drawing.parts[-1]:
+            hand = merged([placed(part.mesh, self._T_tool_last) for part in drawing.parts[-1]])
+            ghost = Part(f"hand-{self._count}", hand, self._color)
+            self.hand = [self._add(self._target, ghost, opacity=GHOST, visible=False)]

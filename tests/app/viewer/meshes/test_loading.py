@@ -1,0 +1,214 @@
+"""Mesh files → surfaces: formats, colours, limits, sharp edges; and the process that reads them."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from zips import MTL, announced, obj, packed, robot_files
+
+from app.viewer.meshes import reader as readers
+from app.viewer.meshes.archive import MeshError
+from app.viewer.meshes.loading import PARSED, finished, read_surfaces
+from app.viewer.meshes.reader import MOST_WAITING, MeshReader
+from app.viewer.meshes.surface import GREY, Surface, by_color, pack, unpack
+
+ROOT = Path(__file__).parents[4]
+
+
+def nothing_else(name: str) -> bytes:
+    raise KeyError(name)
+
+
+def exported(kind: str, color: tuple[int, int, int, int] | None = None) -> bytes:
+    box = trimesh.creation.box((0.1, 0.2, 0.3))
+    if color is not None:
+        material = trimesh.visual.material.PBRMaterial(baseColorFactor=color)
+        box.visual = trimesh.visual.TextureVisuals(uv=np.zeros((len(box.vertices), 2)), material=material)
+    return bytes(trimesh.Scene(box).export(file_type=kind)) if kind == "glb" else bytes(box.export(file_type=kind))
+
+
+@pytest.mark.parametrize("kind", ["stl", "glb", "dae"])
+def test_each_format_is_read_in_metres(kind: str) -> None:
+    (surface,) = read_surfaces(f"a/box.{kind}", exported(kind), nothing_else)
+    assert np.allclose(surface.points.max(axis=0), (0.05, 0.1, 0.15))
+    assert len(surface.faces) == 12
+
+
+def test_a_unit_of_a_collada_file_counts() -> None:
+    text = exported("dae").decode().replace('meter="1.0"', 'meter="0.001"')
+    if 'meter="0.001"' not in text:
+        text = text.replace("<asset>", '<asset><unit name="millimeter" meter="0.001"/>')
+    (surface,) = read_surfaces("box.dae", text.encode(), nothing_else)
+    assert np.allclose(surface.points.max(axis=0), (5e-5, 1e-4, 1.5e-4))
+
+
+def test_colours_come_from_materials_beside_the_mesh_and_nothing_else_is_opened() -> None:
+    asked: list[str] = []
+
+    def read(name: str) -> bytes:
+        asked.append(name)
+        return MTL
+
+    surfaces = {s.color: len(s.faces) for s in read_surfaces("two/meshes/fore.obj", obj(), read)}
+    assert surfaces == {(255, 0, 0): 6, (255, 255, 255): 6}
+    assert asked == ["bar.mtl"]
+    (plain,) = read_surfaces("fore.obj", obj(), nothing_else)
+    assert plain.color is None
+    (red,) = read_surfaces("box.glb", exported("glb", (255, 0, 0, 255)), nothing_else)
+    assert red.color == (255, 0, 0)
+
+
+TOO_MANY = f"at most {PARSED} in a file"
+GLB_HEAD = b'{"accessors":[{"count":300000000}],"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}]}'
+HOSTILE = {
+    "ten-million.stl": (announced(10**7) + bytes(50), TOO_MANY),
+    "huge.stl": (announced(PARSED + 1) + bytes(50 * (PARSED + 1)), TOO_MANY),
+    "ascii.stl": (b"solid x\n" + b"facet endfacet " * (PARSED + 1), TOO_MANY),
+    "many.obj": (b"v 0 0 0\n" + b"\nf 1 1 1" * (PARSED + 1), TOO_MANY),
+    "many.dae": (b'<COLLADA><triangles material="m" count="10000000">', TOO_MANY),
+    "bomb.dae": (b'<!DOCTYPE x [<!ENTITY a "aaaa">]><COLLADA>&a;</COLLADA>', "without DOCTYPE"),
+    "many.glb": (
+        b"glTF\x02\x00\x00\x00\x00\x00\x00\x00" + len(GLB_HEAD).to_bytes(4, "little") + b"JSON" + GLB_HEAD,
+        TOO_MANY,
+    ),
+    "none.stl": (announced(0), "a mesh with triangles"),
+    "nan.obj": (b"v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "finite numbers"),
+    "beyond.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "."),
+    "noise.glb": (bytes(range(256)), "a mesh in the format .glb"),
+    "noise.dae": (bytes(range(256)), "a mesh in the format .dae"),
+    "noise.stl": (bytes(range(40)), "."),
+    "archive.zip": (packed(robot_files()), "one of .stl"),
+    "page.html": (b"<html>", "one of .stl"),
+    "noending": (b"", "one of .stl"),
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_hostile_mesh_is_refused_by_name(name: str) -> None:
+    data, expected = HOSTILE[name]
+    with pytest.raises(MeshError) as caught:
+        read_surfaces(name, data, nothing_else)
+    assert name in caught.value.field
+    assert expected in caught.value.expected or expected == "."
+
+
+def test_sharp_edges_stay_sharp_and_round_ones_round() -> None:
+    box = trimesh.creation.box((1.0, 1.0, 1.0))
+    ball = trimesh.creation.icosphere(3)
+    for mesh, points in ((box, 24), (ball, len(ball.vertices))):
+        loose = Surface(
+            None,
+            mesh.triangles.reshape(-1, 3).astype(np.float32),
+            np.arange(3 * len(mesh.faces)).reshape(-1, 3).astype(np.uint32),
+        )
+        done = finished(loose, 1.0)
+        assert len(done.points) == points
+        assert len(done.faces) == len(mesh.faces)
+        assert np.allclose(done.points[done.faces], mesh.triangles, atol=1e-5)
+
+
+def test_a_fine_mesh_is_simplified_and_keeps_its_shape() -> None:
+    ball = trimesh.creation.icosphere(5)
+    done = finished(Surface(GREY, ball.vertices.astype(np.float32), ball.faces.astype(np.uint32)), 0.1)
+    assert 0.05 * len(ball.faces) < len(done.faces) < 0.15 * len(ball.faces)
+    assert np.abs(np.linalg.norm(done.points, axis=1) - 1.0).max() < 0.02
+
+
+def test_rare_colours_join_the_closest_one() -> None:
+    def patch(color: tuple[int, int, int] | None, count: int) -> Surface:
+        return Surface(color, np.zeros((3, 3), np.float32), np.zeros((count, 3), np.uint32))
+
+    found = by_color([patch((255, 0, 0), 9), patch((0, 0, 255), 8), patch((200, 20, 0), 1), patch(None, 2)], 2)
+    assert {s.color: len(s.faces) for s in found} in (
+        {(255, 0, 0): 12, (0, 0, 255): 8},
+        {(255, 0, 0): 10, (0, 0, 255): 10},
+    )
+
+
+def test_surfaces_survive_the_way_between_processes() -> None:
+    one = Surface((1, 2, 3), np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.uint32))
+    found, triangles = unpack(["a", "b"], pack({"a": [one, one._replace(color=None)], "b": []}, 7))
+    assert triangles == 7
+    assert [s.color for s in found["a"]] == [(1, 2, 3), None]
+    assert np.array_equal(found["a"][1].points, one.points)
+    assert found["b"] == []
+
+
+FILES = {"two/meshes/upper.stl": 1, "two/meshes/fore.obj": 2}
+
+
+@pytest.fixture(scope="module")
+def reader():
+    made = MeshReader()
+    yield made
+    made.close()
+
+
+def test_the_process_reads_a_zip_and_its_memory_is_given_back(
+    reader: MeshReader, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.shared.memory.answers.SMALL", 0)
+    meshes = reader.read(FILES, packed(robot_files())).result()
+    assert meshes.triangles == 12 + 2 * 12
+    assert [len(s.faces) for s in meshes.files["two/meshes/upper.stl"]] == [12]
+    assert {s.color for s in meshes.files["two/meshes/fore.obj"]} == {(255, 0, 0), (255, 255, 255)}
+    assert reader.memory.held > 0
+    del meshes
+    assert reader.memory.held == 0
+
+
+def test_the_process_says_what_is_wrong_and_may_not_take_long(
+    reader: MeshReader, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(MeshError) as caught:
+        reader.read(FILES, packed({**robot_files(), "two/meshes/upper.stl": b"x" * 100})).result()
+    assert "upper.stl" in caught.value.field
+    monkeypatch.setattr(readers, "PATIENCE", 0.01)
+    with pytest.raises(MeshError, match="too much work"):
+        reader.read(FILES, packed(robot_files())).result()
+
+
+def test_requests_that_wait_are_bounded(reader: MeshReader, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reader, "_waiting", MOST_WAITING)
+    with pytest.raises(MeshError, match="are waiting"):
+        reader.read(FILES, b"")
+
+
+def test_meshes_beyond_the_memory_of_the_process_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.shared.memory.answers.SMALL", 0)
+    small = MeshReader()
+    small.memory._most = 100
+    with pytest.raises(MeshError, match="as many as it may"):
+        small.read(FILES, packed(robot_files())).result()
+    small.close()
+
+
+def test_the_process_has_bounds_and_does_not_see_the_token(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("KINBOARD_TOKEN", "a secret token")
+    script = """
+import os, resource
+from app.viewer.meshes.child import MEMORY, SECONDS, _limit
+_limit()
+assert resource.getrlimit(resource.RLIMIT_CPU)[0] == SECONDS
+assert not [name for name in os.environ if name.startswith("KINBOARD")]
+try:
+    bytearray(MEMORY)
+except MemoryError:
+    print("bounded")
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        env=readers._environment(),
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stdout == "bounded\n", done.stderr
+    assert "KINBOARD_TOKEN" in os.environ
