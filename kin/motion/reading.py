@@ -45,6 +45,7 @@ from kin.motion.program import (
     field_names,
     kind_of,
 )
+from kin.named import robot_of
 from kin.robot import LENGTHS, Robot
 from kin.transforms import as_transform
 
@@ -54,7 +55,7 @@ _TOP = (*field_names(Program), "units")
 _LENGTHS, _ANGLES = ("tool_speed", "blend"), ("tool_turn",)
 
 
-def parse_program(text: str, robot: Robot | None = None) -> Program:
+def parse_program(text: str, robot: Robot | str | None = None) -> Program:
     """The program described by TOML text; see `program_from_dict`."""
     try:
         data = tomllib.loads(text)
@@ -63,12 +64,13 @@ def parse_program(text: str, robot: Robot | None = None) -> Program:
     return program_from_dict(data, robot)
 
 
-def program_from_dict(data: Mapping[str, Any], robot: Robot | None = None) -> Program:
+def program_from_dict(data: Mapping[str, Any], robot: Robot | str | None = None) -> Program:
     """The program described by plain data.
 
     Args:
         data: the fields of `Program`, with each segment as a dict; ``units`` for the numbers in it.
-        robot: the arm; it tells which joint values are lengths. Without it all are angles.
+        robot: the arm, or the id of a built-in one: it tells which joint values are lengths; without it all are
+            angles.
 
     Raises:
         InputError: naming the field, the value and what would be valid.
@@ -76,7 +78,7 @@ def program_from_dict(data: Mapping[str, Any], robot: Robot | None = None) -> Pr
     if not isinstance(data, Mapping):
         raise InputError("program", data, "a table with the fields " + ", ".join(_TOP))
     _only(data, _TOP, "")
-    reader = _Reader(data.get("units", {}), robot)
+    reader = _Reader(data.get("units", {}), None if robot is None else robot_of(robot))
     segments = data.get("segments")
     if not isinstance(segments, list | tuple) or not 1 <= len(segments) <= MOST_SEGMENTS:
         raise InputError("segments", segments, f"1 to {MOST_SEGMENTS} segments")

@@ -21,12 +21,14 @@ CALLS = {
     "capability_map": (),
     "configuration_at": (3,),
     "convert": ("modified",),
+    "frame_pose": ("base",),
     "fk": (UR5.q_home,),
     "fk_positions": (UR5.q_home,),
     "ik_branches": (T,),
     "jacobian": (UR5.q_home,),
     "link_frames": (UR5.q_home,),
     "manipulability": (UR5.q_home,),
+    "plan_motion": ({"segments": [{"kind": "ptp", "q": [0.1, -1.0, 1.0, 0.0, 0.0, 0.0]}]},),
     "robot_to_dict": (),
     "robot_to_toml": (),
     "sample_workspace": (8,),
@@ -51,7 +53,8 @@ MORE = {
 
 def test_the_table_names_every_function_that_takes_a_robot():
     functions = {name: value for name, value in vars(kin).items() if inspect.isfunction(value)}
-    taking = {name for name, value in functions.items() if "robot" in inspect.signature(value).parameters}
+    first = {name: next(iter(inspect.signature(value).parameters), "") for name, value in functions.items()}
+    taking = {name for name, parameter in first.items() if parameter == "robot"}
     assert taking & set(kin.__all__) == set(CALLS)
 
 
@@ -72,6 +75,12 @@ def test_the_id_of_a_robot_is_as_good_as_the_robot(name, tmp_path):
         found(name, "ur6", tmp_path)
     with pytest.raises(InputError, match=r"^robot: got 5, expected a Robot"):
         found(name, 5, tmp_path)
+
+
+def test_a_program_is_read_for_a_robot_by_its_id():
+    data = {"units": {"length": "mm", "angle": "deg"}, "segments": [{"kind": "ptp", "q": [10, 20, 30, 40]}]}
+    assert kin.program_from_dict(data, "scara") == kin.program_from_dict(data, kin.get_robot("scara"))
+    assert kin.program_from_dict(data, "scara") != kin.program_from_dict(data)
 
 
 def test_results_print_as_one_line():
