@@ -128,7 +128,7 @@ class Slowed(NamedTuple):
         segment, fraction: where: the segment, and the part of it that is covered, 0 to 1.
         joint, name: which joint limits the speed.
         quantity: which of its limits.
-        ratio: the tool's speed there as a part of its largest speed on this path.
+        ratio: the speed that the limits of velocity allow there, as a part of the median on this path.
         singularity: the one that is nearest there; None if none is near.
     """
 

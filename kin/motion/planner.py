@@ -1,34 +1,70 @@
-"""From a program to a motion, segment by segment."""
+"""From a program to a motion: segments that are blended into each other are driven as one path."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
 from kin.fk import fk
 from kin.ik import solve_ik
-from kin.ik.details import JointKind, LimitViolation
 from kin.ik.options import Task
+from kin.ik.results import Status
 from kin.motion.details import (
     BlendLeftOut,
+    BlendShortened,
     Cause,
     Help,
+    JerkCost,
+    LimitMet,
+    NoCircle,
     Note,
     NotReached,
     RefusalDetails,
     StartOutside,
     TargetOutside,
 )
+from kin.motion.geometry.chain import Chain, LostError, followed
+from kin.motion.geometry.curves import Curve
+from kin.motion.geometry.splines import parted, values
 from kin.motion.limits import MotionLimits
+from kin.motion.paths import (
+    NO_LENGTH,
+    JointCurve,
+    Layout,
+    chained,
+    curve_of,
+    is_joint_move,
+    joint_path,
+    joint_radius,
+    limited,
+    radius_of,
+    tool_slowdown,
+)
 from kin.motion.pieces import Hold, JointMotion, Piece
-from kin.motion.program import Dwell, JointTarget, Program, Ptp, Segment, kind_of
+from kin.motion.program import (
+    Circ,
+    Dwell,
+    JointTarget,
+    Lin,
+    Move,
+    Program,
+    Ptp,
+    Spline,
+    Target,
+    kind_of,
+)
+from kin.motion.refusals import helps_for, limit_met, lost, slow_places, violations
 from kin.motion.results import Motion, Refusal, SegmentTimes
+from kin.motion.timing.timed import timed
 from kin.robot import Robot
 from kin.solvers import closed_form_of
-from kin.tolerances import TOLERANCES
+from kin.solvers.contract import APPROACH, POSE, POSITION
 from kin.transforms import Array
+
+CODES: dict[Task, int] = {"pose": POSE, "approach": APPROACH, "position": POSITION}
 
 
 def task_of(program: Program, robot: Robot) -> Task:
@@ -63,80 +99,266 @@ class Plan:
     notes: list[Note] = field(default_factory=list)
     time: float = 0.0
 
-    def add(self, index: int, piece: Piece) -> None:
-        """A piece that is one segment."""
-        segment = self.program.segments[index]
-        end = self.time + piece.duration
-        self.segments.append(SegmentTimes(index, kind_of(segment), segment.name, self.time, end))
-        if piece.duration > 0.0:
+    @property
+    def task(self) -> Task:
+        """What the tool keeps of a pose."""
+        return task_of(self.program, self.robot)
+
+    def add(self, first: int, piece: Piece | None, ends: Sequence[float]) -> None:
+        """A piece that is some segments, the first of them with this index; when each ends, from its start."""
+        start = 0.0
+        for k, end in enumerate(ends):
+            segment = self.program.segments[first + k]
+            times = self.time + start, self.time + end
+            self.segments.append(SegmentTimes(first + k, kind_of(segment), segment.name, *times))
+            start = end
+        if piece is not None and piece.duration > 0.0:
             self.pieces.append(piece)
-        self.time = end
+            self.time += piece.duration
+
+    def refused(
+        self,
+        index: int,
+        cause: Cause,
+        details: RefusalDetails,
+        helps: tuple[Help, ...] = (),
+        place: tuple[float, float] | None = None,
+    ) -> RefusedError:
+        """The refusal of a segment; `place`: the part of it that is covered, and how many metres that is."""
+        segment = self.program.segments[index]
+        fraction, distance = (None, None) if place is None else place
+        return RefusedError(
+            Refusal(index, kind_of(segment), segment.name, fraction, distance, cause, details, helps)
+        )
 
 
 def planned(
     robot: Robot, program: Program, limits: MotionLimits, q_start: Array, stop: Callable[[], None]
 ) -> Motion:
     """The motion of a program from a configuration ``(n,)``."""
+    _check_targets(robot, program)
     plan = Plan(robot, program, limits, q_start.copy(), stop)
     try:
         outside = violations(robot, q_start)
         if outside:
-            raise _refused(plan, 0, "start", StartOutside(outside), (Help("start"),))
-        for index, segment in enumerate(program.segments):
+            raise plan.refused(0, "start", StartOutside(outside), (Help("start"),))
+        index = 0
+        while index < len(program.segments):
             stop()
-            _drive(plan, index, segment)
+            index = _drive(plan, index)
     except RefusedError as error:
         return Motion(robot, program, limits, q_start, error.refusal, ())
-    return Motion(
-        robot, program, limits, q_start, None, tuple(plan.segments), tuple(plan.notes), tuple(plan.pieces)
-    )
+    parts = tuple(plan.segments), tuple(plan.notes), tuple(plan.pieces)
+    return Motion(robot, program, limits, q_start, None, *parts)
 
 
-def _drive(plan: Plan, index: int, segment: Segment) -> None:
-    """Add a segment to the plan."""
+def _check_targets(robot: Robot, program: Program) -> None:
+    """Raise `InputError` for a configuration with another number of joints."""
+    for i, segment in enumerate(program.segments):
+        points = segment.points if isinstance(segment, Spline) else (getattr(segment, "target", None),)
+        for k, point in enumerate(points):
+            where = f"segments[{i}].points[{k}].q" if isinstance(segment, Spline) else f"segments[{i}].q"
+            if isinstance(point, JointTarget):
+                robot.check_q(point.q, where)
+
+
+def _drive(plan: Plan, index: int) -> int:
+    """Add the segment with this index to the plan, with those that it is blended into; the index after them."""
+    segment = plan.program.segments[index]
     if isinstance(segment, Dwell):
-        plan.add(index, Hold(plan.q, segment.seconds))
+        plan.add(index, Hold(plan.q, segment.seconds), [segment.seconds])
+        return index + 1
+    return _drive_joints(plan, index) if is_joint_move(segment) else _drive_tool(plan, index)
+
+
+def _follows(plan: Plan, index: int, length: float) -> bool:
+    """Whether a segment is blended into the next one; if not although it was asked for, a note says why."""
+    segment = plan.program.segments[index]
+    assert isinstance(segment, Move)
+    if segment.blend == 0.0:
+        return False
+    why: Literal["last", "kinds", "short", "dwell"] | None = None
+    if index + 1 == len(plan.program.segments):
+        why = "last"
+    else:
+        following = plan.program.segments[index + 1]
+        if isinstance(following, Dwell):
+            why = "dwell"
+        elif is_joint_move(following) != is_joint_move(segment):
+            why = "kinds"
+        elif length < NO_LENGTH:
+            why = "short"
+    if why is not None:
+        plan.notes.append(BlendLeftOut(index, why))
+    return why is None
+
+
+def _drive_joints(plan: Plan, first: int) -> int:
+    """PTP and splines of the joints: alone from rest to rest, or blended into each other."""
+    robot, q = plan.robot, plan.q
+    curves: list[JointCurve] = []
+    radii: list[float] = []
+    index = first
+    while True:
+        segment = plan.program.segments[index]
+        assert isinstance(segment, Ptp | Spline)
+        points = segment.points if isinstance(segment, Spline) else (segment.target,)
+        rows = [q]
+        for point in points:
+            rows.append(_configuration(plan, index, point, rows[-1]))
+        curve = JointCurve.through(np.array(rows))
+        if curves and curve.length < NO_LENGTH:
+            plan.notes.append(BlendLeftOut(index - 1, "short"))
+            break
+        if curves:
+            before = plan.program.segments[index - 1]
+            assert isinstance(before, Move)
+            radii.append(joint_radius(robot, before.blend, curves[-1], curve))
+        curves.append(curve)
+        q = rows[-1]
+        index += 1
+        if not _follows(plan, index - 1, curve.length):
+            break
+    _time_joints(plan, first, curves, radii)
+    plan.q = q
+    return index
+
+
+def _time_joints(plan: Plan, first: int, curves: list[JointCurve], radii: list[float]) -> None:
+    segment = plan.program.segments[first]
+    if len(curves) == 1 and isinstance(segment, Ptp):
+        limits = np.stack([plan.limits.velocity, plan.limits.acceleration, plan.limits.jerk], axis=1)
+        limits = limits * (segment.speed, segment.acceleration, segment.acceleration)
+        end = curves[0].at(np.array([curves[0].length]))[0] if curves[0].length else plan.q
+        piece = JointMotion.between(plan.q, end, limits)
+        slower = tool_slowdown(plan.robot, segment, piece)
+        if slower > 1.0:
+            piece = JointMotion.between(plan.q, end, limits / slower ** np.arange(1.0, 4.0))
+        plan.add(first, piece, [piece.duration])
         return
-    assert isinstance(segment, Ptp)
-    end = _configuration(plan, index, segment)
-    limits = np.stack([plan.limits.velocity, plan.limits.acceleration, plan.limits.jerk], axis=1)
-    limits *= (segment.speed, segment.acceleration, segment.acceleration)
-    plan.add(index, JointMotion.between(plan.q, end, limits))
-    plan.q = end
-    if segment.blend > 0.0:
-        plan.notes.append(BlendLeftOut(index, "last" if index + 1 == len(plan.program.segments) else "kinds"))
+    if curves[0].length < NO_LENGTH:
+        plan.add(first, None, [0.0])
+        return
+    layout = Layout.of([curve.length for curve in curves], radii, first)
+    knots, pieces = joint_path(curves, radii, layout)
+    _check_limits(plan, layout, knots, pieces, ())
+    _time(plan, first, layout, knots, pieces)
 
 
-def _configuration(plan: Plan, index: int, segment: Ptp) -> Array:
-    """Where a PTP ends ``(n,)``."""
-    robot, target = plan.robot, segment.target
+def _drive_tool(plan: Plan, first: int) -> int:
+    """Lines, arcs and splines of the tool, blended into each other or alone."""
+    robot, before = plan.robot, fk(plan.robot, plan.q)
+    curves: list[Curve] = []
+    radii: list[float] = []
+    index = first
+    while True:
+        segment = plan.program.segments[index]
+        assert isinstance(segment, Lin | Circ | Spline)
+        curve = curve_of(robot, segment, before, plan.task != "approach")
+        if curve is None or isinstance(curve, tuple):
+            raise plan.refused(index, "circle", NoCircle(curve))
+        if curves and curve.length < NO_LENGTH:
+            plan.notes.append(BlendLeftOut(index - 1, "short"))
+            break
+        if curves:
+            last = plan.program.segments[index - 1]
+            assert isinstance(last, Move)
+            radius, used = radius_of(last.blend, curves[-1], curve)
+            radii.append(radius)
+            if used < last.blend * (1.0 - 1e-9):
+                plan.notes.append(BlendShortened(index - 1, last.blend, used))
+        curves.append(curve)
+        if curve.length >= NO_LENGTH:
+            before = curve.poses(np.array([curve.length]))[0]
+        index += 1
+        if not _follows(plan, index - 1, curve.length):
+            break
+    if curves[0].length < NO_LENGTH:
+        plan.add(first, None, [0.0])
+        return index
+    layout = Layout.of([curve.length for curve in curves], radii, first)
+    chain = chained(curves, radii, layout)
+    try:
+        knots, pieces = followed(robot, chain, plan.q, CODES[plan.task], plan.stop)
+    except LostError as error:
+        raise _lost(plan, layout, chain, error) from None
+    _check_limits(plan, layout, knots, pieces, chain)
+    _time(plan, first, layout, knots, pieces)
+    end = values(knots, pieces, knots[-1:])[0]
+    plan.q = robot.clip(end)
+    return index
+
+
+def _lost(plan: Plan, layout: Layout, chain: Chain, error: LostError) -> RefusedError:
+    """The refusal of a path that the joints cannot follow."""
+    robot = plan.robot
+    met = limit_met(robot, error.q[:-1])
+    s = float(error.s[-1])
+    if met is not None:
+        cause: Cause = "limits"
+        details: RefusalDetails = LimitMet(met[1])
+        s = float(error.s[met[0]])
+    else:
+        end = float(layout.bounds[np.searchsorted(layout.bounds[:-1], s, side="left")])
+        T, last = chain.poses(np.array([s, end]))
+        cause, details = lost(robot, T, last, error.q[-2], plan.task)
+    return _refused_at(plan, layout, chain, s, cause, details)
+
+
+def _check_limits(plan: Plan, layout: Layout, knots: Array, pieces: Array, chain: Chain | tuple[()]) -> None:
+    """Refuse a path that leaves the limits of the joints."""
+    met = limit_met(plan.robot, np.concatenate([pieces[:, :, 0], values(knots, pieces, knots[-1:])]))
+    if met is None:
+        # Between the knots a joint may go a little further than at them.
+        fine, cut = parted(knots, pieces, np.full(len(pieces), 8))
+        met = limit_met(plan.robot, cut[:, :, 0])
+        if met is None:
+            return
+        knots = fine
+    raise _refused_at(plan, layout, chain, float(knots[met[0]]), "limits", LimitMet(met[1]))
+
+
+def _refused_at(
+    plan: Plan, layout: Layout, chain: Chain | tuple[()], s: float, cause: Cause, details: RefusalDetails
+) -> RefusedError:
+    """The refusal at a place of a path."""
+    k = int(np.clip(np.searchsorted(layout.bounds, s, side="right") - 1, 0, len(layout.bounds) - 2))
+    low, high = float(layout.bounds[k]), float(layout.bounds[k + 1])
+    fraction = (s - low) / (high - low)
+    if isinstance(chain, tuple):
+        return plan.refused(layout.owners[0][0] + k, cause, details, (), (fraction, 0.0))
+    grid = np.linspace(0.0, s, 65)
+    points = chain.poses(grid[grid >= low])[:, :3, 3]
+    distance = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+    poses = chain.poses(np.linspace(0.0, high, 65))
+    helps = helps_for(plan.robot, poses, plan.q, plan.task, cause)
+    return plan.refused(layout.owners[0][0] + k, cause, details, helps, (fraction, distance))
+
+
+def _time(plan: Plan, first: int, layout: Layout, knots: Array, pieces: Array) -> None:
+    """Add a path to the plan."""
+    moves = {i: move for i, move in enumerate(plan.program.segments) if isinstance(move, Move)}
+    path = limited(plan.robot, plan.limits, moves, layout, knots, pieces)
+    found = timed(path, plan.program.jerk_limited, plan.stop)
+    plan.add(first, found, [*(found.when(float(s)) for s in layout.bounds[1:-1]), found.duration])
+    last = first + len(layout.bounds) - 2
+    if plan.program.jerk_limited and found.duration > found.without * (1.0 + 1e-6):
+        plan.notes.append(JerkCost(first, last, found.duration, found.without))
+    plan.notes.extend(slow_places(plan.robot, layout, path))
+
+
+def _configuration(plan: Plan, index: int, target: Target, q: Array) -> Array:
+    """Where a PTP ends ``(n,)``; `q`: where it begins."""
+    robot = plan.robot
     if isinstance(target, JointTarget):
-        q = robot.check_q(target.q, f"segments[{index}].q")
-        outside = violations(robot, q)
+        end = np.array(target.q)
+        outside = violations(robot, end)
         if outside:
-            raise _refused(plan, index, "target", TargetOutside(outside), ())
-        return robot.clip(q)
-    result = solve_ik(robot, target.pose(fk(robot, plan.q)), q_seed=plan.q, task=task_of(plan.program, robot))
-    if not result.solutions:
+            raise plan.refused(index, "target", TargetOutside(outside))
+        return robot.clip(end)
+    result = solve_ik(robot, target.pose(fk(robot, q)), q_seed=q, task=plan.task)
+    if not result.solutions or result.status is Status.APPROXIMATE:
         facts = NotReached(result.details, result.cause, result.task, result.singularities)
         helps = (Help("closer"),) if result.cause in ("too far", "too near") else ()
-        raise _refused(plan, index, "unreachable", facts, helps)
+        raise plan.refused(index, "unreachable", facts, helps)
     return robot.clip(result.solutions[0].q)
-
-
-def _refused(
-    plan: Plan, index: int, cause: Cause, details: RefusalDetails, helps: tuple[Help, ...]
-) -> RefusedError:
-    segment = plan.program.segments[index]
-    return RefusedError(Refusal(index, kind_of(segment), segment.name, None, None, cause, details, helps))
-
-
-def violations(robot: Robot, q: Array) -> tuple[LimitViolation, ...]:
-    """The joint values of a configuration ``(n,)`` that are outside the limits."""
-    found = []
-    for i, joint in enumerate(robot.joints):
-        if not robot.lower[i] - TOLERANCES.limit <= q[i] <= robot.upper[i] + TOLERANCES.limit:
-            limit = robot.lower[i] if q[i] < robot.lower[i] else robot.upper[i]
-            kind: JointKind = "prismatic" if joint.kind == "prismatic" else "revolute"
-            found.append(LimitViolation(i, joint.name, float(q[i]), float(limit), kind, False))
-    return tuple(found)

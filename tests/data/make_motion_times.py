@@ -9,7 +9,11 @@ import json
 from pathlib import Path
 
 import numpy as np
+import toppra
+import toppra.algorithm
+import toppra.constraint
 from ruckig import InputParameter, Result, Ruckig, Trajectory
+from scipy.interpolate import CubicSpline
 
 
 def joint_motions(count: int = 120) -> list[dict[str, object]]:
@@ -33,6 +37,32 @@ def joint_motions(count: int = 120) -> list[dict[str, object]]:
     return found
 
 
+def paths(count: int = 24) -> list[dict[str, object]]:
+    """Cubic splines with limits of velocity and acceleration, timed by toppra on 4000 intervals."""
+    rng = np.random.default_rng(21)
+    found = []
+    for _ in range(count):
+        n, k = int(rng.integers(1, 8)), int(rng.integers(4, 9))
+        knots, rows = np.linspace(0.0, 1.0, k), rng.uniform(-1.5, 1.5, (k, n))
+        spline = CubicSpline(knots, rows, bc_type="natural")
+        velocity, acceleration = rng.uniform(0.5, 4.0, n), rng.uniform(1.0, 15.0, n)
+        path = toppra.SplineInterpolator(knots, rows, bc_type="natural")
+        limits = [
+            toppra.constraint.JointVelocityConstraint(np.stack([-velocity, velocity], axis=1)),
+            toppra.constraint.JointAccelerationConstraint(
+                np.stack([-acceleration, acceleration], axis=1), toppra.constraint.DiscretizationType.Interpolation
+            ),
+        ]
+        grid = np.linspace(0.0, 1.0, 4001)
+        solver = toppra.algorithm.TOPPRA(limits, path, gridpoints=grid, solver_wrapper="seidel")
+        _, speeds, _ = solver.compute_parameterization(0.0, 0.0)
+        seconds = float((2.0 * np.diff(grid) / (speeds[:-1] + speeds[1:])).sum())
+        pieces = np.moveaxis(spline.c[::-1], 0, -1)
+        data = {"knots": knots, "pieces": pieces, "velocity": velocity, "acceleration": acceleration}
+        found.append({key: value.tolist() for key, value in data.items()} | {"seconds": seconds})
+    return found
+
+
 if __name__ == "__main__":
     path = Path(__file__).with_name("motion-times.json")
-    path.write_text(json.dumps({"joint_motions": joint_motions()}) + "\n", encoding="utf-8")
+    path.write_text(json.dumps({"joint_motions": joint_motions(), "paths": paths()}) + "\n", encoding="utf-8")

@@ -1,0 +1,140 @@
+"""A chain of curves with one joint path: followed, then a spline through nodes that are dense enough.
+
+The spline meets the curves at its nodes; between them it is compared with the curves, and nodes are added until it
+is within `DEVIATION` everywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kin.fk import fk
+from kin.motion.geometry.curves import Curve
+from kin.motion.geometry.splines import spline, values
+from kin.motion.geometry.tracking import follow, settle
+from kin.robot import Robot
+from kin.solvers.contract import APPROACH, POSE, POSITION
+from kin.transforms import Array
+
+DEVIATION = 4e-7  # metres and radians; what lies between the points that are compared stays below 1e-6
+ROWS = {POSE: 6, APPROACH: 5, POSITION: 3}
+_NODES = 24  # per curve at first
+_MOST_NODES, _ROUNDS = 20_000, 12
+_STEP = 0.2  # radians or metres that a joint may move between the nodes that are followed
+_CLOSEST = 1e-7  # of the whole length: nodes that are closer are not parted
+_BETWEEN = np.array([0.2, 0.5, 0.8])
+
+
+class LostError(Exception):
+    """The curves cannot be followed: the path up to there; its last configuration does not continue it."""
+
+    def __init__(self, s: Array, q: Array) -> None:
+        super().__init__(float(s[-1]))
+        self.s, self.q = s, q
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chain:
+    """Curves one after the other; `starts` ``(k + 1,)`` has s where each begins, and the end.
+
+    Attributes:
+        curves, starts: the curves.
+        offsets: which s of its own curve each begins at ``(k,)``.
+    """
+
+    curves: tuple[Curve, ...]
+    offsets: tuple[float, ...]
+    starts: Array
+
+    def poses(self, s: Array) -> Array:
+        """T_base_tool ``(m, 4, 4)`` at s ``(m,)``."""
+        which = np.clip(np.searchsorted(self.starts, s, side="right") - 1, 0, len(self.curves) - 1)
+        out: Array = np.empty((len(s), 4, 4))
+        for k in np.unique(which).tolist():
+            rows = which == k
+            out[rows] = self.curves[k].poses(s[rows] - self.starts[k] + self.offsets[k])
+        return out
+
+
+def first_nodes(starts: Array) -> Array:
+    """Evenly spaced nodes on each curve."""
+    parts = [np.linspace(a, b, _NODES, endpoint=False) for a, b in pairwise(starts)]
+    return np.concatenate([*parts, starts[-1:]])
+
+
+def followed(
+    robot: Robot, chain: Chain, q_start: Array, code: int, stop: Callable[[], None]
+) -> tuple[Array, Array]:
+    """The joint path of a chain: knots ``(k + 1,)`` and coefficients ``(k, n, 4)``.
+
+    Raises:
+        LostError: where it cannot be followed.
+    """
+    s, q = _nodes(robot, chain, first_nodes(chain.starts), q_start, code, stop)
+    for _ in range(_ROUNDS):
+        stop()
+        pieces = spline(s, q)
+        off = _deviation(robot, chain, s, pieces, code)
+        if not (off > DEVIATION).any():
+            return s, pieces
+        worst = int(np.argmax(off))
+        if len(s) > _MOST_NODES:
+            break
+        parts = np.clip(np.ceil((off / (0.5 * DEVIATION)) ** 0.25), 2, 8)
+        parts = np.where(off > DEVIATION, parts, 1.0).astype(np.int64)
+        finer, rows, new = _parted(s, q, parts)
+        guesses = np.ascontiguousarray(values(s, pieces, finer[new]))
+        errors = np.empty(len(new))
+        settle(robot.model, chain.poses(finer[new]), ROWS[code], guesses, errors)
+        rows[new] = guesses
+        if (errors > 1e-9).any():
+            lost = int(new[int(np.argmax(errors > 1e-9))])
+            raise LostError(finer[: lost + 1], rows[: lost + 1])
+        s, q = finer, rows
+    raise LostError(s[: worst + 2], q[: worst + 2])
+
+
+def _parted(s: Array, q: Array, parts: NDArray[np.int64]) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Nodes with each interval cut into equal parts, their configurations, and which of them are new."""
+    old = np.repeat(np.arange(len(parts)), parts)
+    step = np.arange(len(old)) - np.repeat(np.cumsum(parts) - parts, parts)
+    finer = np.append(s[old] + (np.diff(s) / parts)[old] * step, s[-1])
+    return finer, np.append(q[old], q[-1:], axis=0), np.flatnonzero(step > 0)
+
+
+def _nodes(
+    robot: Robot, chain: Chain, s: Array, q_start: Array, code: int, stop: Callable[[], None]
+) -> tuple[Array, Array]:
+    """Configurations at the nodes, and at further ones where a joint moves far."""
+    bounds = np.ascontiguousarray(np.stack([robot.lower, robot.upper]))
+    closest = _CLOSEST * float(s[-1])
+    targets, q, done = chain.poses(s), np.empty((len(s), robot.n)), 1
+    q[0] = q_start
+    while True:
+        stop()
+        done = follow(robot.model, targets, s, ROWS[code], bounds, _STEP, done, q)
+        if done >= len(s):
+            return s, q
+        if s[done] - s[done - 1] < closest or len(s) > _MOST_NODES:
+            raise LostError(s[: done + 1], q[: done + 1])
+        between = 0.5 * (s[done - 1] + s[done])
+        s = np.insert(s, done, between)
+        targets = np.insert(targets, done, chain.poses(np.array([between])), axis=0)
+        q = np.insert(q, done, 0.0, axis=0)
+
+
+def _deviation(robot: Robot, chain: Chain, s: Array, pieces: Array, code: int) -> Array:
+    """By how much the spline leaves the curves on each interval: metres or radians, whichever is more ``(k,)``."""
+    at = (s[:-1, None] + np.diff(s)[:, None] * _BETWEEN).ravel()
+    T, goal = fk(robot, values(s, pieces, at)), chain.poses(at)
+    off = np.linalg.norm(T[:, :3, 3] - goal[:, :3, 3], axis=1)
+    if code != POSITION:
+        first = 2 if code == APPROACH else 0
+        turn = np.linalg.norm(T[:, :3, first:3] - goal[:, :3, first:3], axis=(1, 2))
+        off = np.maximum(off, turn if code == APPROACH else turn / np.sqrt(2.0))
+    return np.asarray(off.reshape(len(s) - 1, -1).max(axis=1))

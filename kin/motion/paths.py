@@ -1,0 +1,229 @@
+"""Segments that are driven without a stop: their curves, corners, joint path and limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from kin.fk import fk, fk_positions, jacobian
+from kin.motion.geometry.chain import Chain
+from kin.motion.geometry.curves import Corner, Curve, Line, Through, Turning, arc_through, corner, natural, turning
+from kin.motion.geometry.splines import parted, spline, values
+from kin.motion.limits import MotionLimits
+from kin.motion.pieces import JointMotion
+from kin.motion.program import Circ, JointTarget, Lin, Move, Ptp, Spline, Target
+from kin.motion.timing.timed import JointPath
+from kin.robot import Robot
+from kin.transforms import Array
+
+NO_LENGTH = 1e-9  # metres: a shorter curve is none
+_INTERVALS = 240  # of a path, at least, when it is timed
+_FREE = 1e6  # the largest ṡ² where nothing else limits it
+_TOOL_MARGIN = 1e-4  # part of a limit of the tool kept free for what lies between the points that are looked at
+_SAMPLES, _TOOL_SHARE = 400, 1e-3  # points of a PTP at which the tool's speed is looked at, and what lies between
+_LOOK = 64  # points at which the distance from a corner is measured
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Layout:
+    """Where the segments of a path are.
+
+    Attributes:
+        starts: s where each part, a segment's rest or a corner, begins, and the end.
+        owners: the segments of each part: one, or two at a corner.
+        bounds: s where each segment begins, in the middle of its corner, and the end.
+    """
+
+    starts: Array
+    owners: tuple[tuple[int, ...], ...]
+    bounds: Array
+
+    @classmethod
+    def of(cls, lengths: list[float], radii: list[float], first: int) -> Layout:
+        """Segments of these lengths from index `first` on, with corners of these radii between them."""
+        starts, bounds = [0.0], [0.0]
+        owners: list[tuple[int, ...]] = []
+        for k, length in enumerate(lengths):
+            before, after = (radii[k - 1] if k else 0.0), (radii[k] if k < len(radii) else 0.0)
+            rest = length - before - after
+            if rest > NO_LENGTH:
+                starts.append(starts[-1] + rest)
+                owners.append((first + k,))
+            if k < len(radii):
+                bounds.append(starts[-1] + after)
+                starts.append(starts[-1] + 2.0 * after)
+                owners.append((first + k, first + k + 1))
+        return cls(np.array(starts), tuple(owners), np.array([*bounds, starts[-1]]))
+
+
+def pose_of(robot: Robot, target: Target, before: Array) -> Array:
+    """The pose ``(4, 4)`` of a target; `before` is the pose at the start of the segment."""
+    return fk(robot, np.array(target.q)) if isinstance(target, JointTarget) else target.pose(before)
+
+
+def curve_of(
+    robot: Robot, segment: Lin | Circ | Spline, before: Array, roll: bool
+) -> Curve | tuple[str, str] | None:
+    """The curve of a segment from a pose on; for a `Circ` what `arc_through` says if there is none.
+
+    Where the roll is not kept, the approach direction takes the shortest way.
+    """
+    if isinstance(segment, Spline):
+        poses = [before]
+        for point in segment.points:
+            T = pose_of(robot, point, poses[-1])
+            if np.abs(T - poses[-1]).max() > NO_LENGTH:
+                poses.append(T)
+        return Through.of(np.array(poses)) if len(poses) > 1 else Line(before[:3, 3], np.zeros(3), _still(before))
+    T = pose_of(robot, segment.target, before)
+    turn = turning(before[:3, :3], T[:3, :3], not roll or segment.orientation == "two-axis")
+    if isinstance(segment, Lin):
+        return Line(before[:3, 3], T[:3, 3] - before[:3, 3], turn)
+    return arc_through(before[:3, 3], np.array(segment.via), T[:3, 3], turn)
+
+
+def _still(before: Array) -> Turning:
+    return turning(before[:3, :3], before[:3, :3], False)
+
+
+def radius_of(blend: float, before: Curve, after: Curve) -> tuple[float, float]:
+    """The radius (in s) of the corner between two curves for a zone of `blend` metres, and the metres used."""
+    used, most = np.inf, np.inf
+    for curve in (before, after):
+        most = min(most, 0.5 * curve.length)
+        used = min(used, blend * curve.length / curve.metres if curve.metres > NO_LENGTH else blend)
+    radius = float(min(used, most))
+    return radius, float(blend * min(1.0, radius / used))
+
+
+def chained(curves: list[Curve], radii: list[float], layout: Layout) -> Chain:
+    """The curves with their corners."""
+    parts: list[Curve] = []
+    offsets = []
+    for k, curve in enumerate(curves):
+        before, after = (radii[k - 1] if k else 0.0), (radii[k] if k < len(radii) else 0.0)
+        if curve.length - before - after > NO_LENGTH:
+            parts.append(curve)
+            offsets.append(before)
+        if k < len(radii):
+            parts.append(Corner(curve, curves[k + 1], after))
+            offsets.append(0.0)
+    return Chain(tuple(parts), tuple(offsets), layout.starts)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointCurve:
+    """A line or spline of the joints: s is the largest motion of a joint."""
+
+    knots: Array
+    pieces: Array
+
+    @classmethod
+    def through(cls, rows: Array) -> JointCurve:
+        """Through configurations ``(k, n)``; those that repeat the one before are left out."""
+        keep = np.concatenate([[True], np.abs(np.diff(rows, axis=0)).max(axis=1) > NO_LENGTH])
+        rows = rows[keep]
+        if len(rows) < 2:
+            return cls(np.zeros(1), np.empty((0, rows.shape[1], 4)))
+        knots = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(rows, axis=0)).max(axis=1))])
+        return cls(knots, natural(knots, rows))
+
+    @property
+    def length(self) -> float:
+        """Where s ends."""
+        return float(self.knots[-1])
+
+    def at(self, s: Array) -> Array:
+        """Configurations ``(m, n)``."""
+        return values(self.knots, self.pieces, s)
+
+
+def joint_radius(robot: Robot, blend: float, before: JointCurve, after: JointCurve) -> float:
+    """The radius (in s) of the corner between two curves of the joints for a zone of `blend` metres."""
+    radius = 0.5 * min(before.length, after.length)
+    f = np.linspace(0.0, 1.0, _LOOK)
+    met = fk_positions(robot, after.at(np.zeros(1)))[0]
+    for curve, s in ((before, before.length - f * radius), (after, f * radius)):
+        away = np.linalg.norm(fk_positions(robot, curve.at(s)) - met, axis=1) > blend
+        if away.any():
+            radius *= float(f[int(np.argmax(away)) - 1])
+    return radius
+
+
+def joint_path(curves: list[JointCurve], radii: list[float], layout: Layout) -> tuple[Array, Array]:
+    """Knots and coefficients of curves of the joints with their corners."""
+    s, rows = [np.zeros(1)], [curves[0].at(np.zeros(1))]
+    begin = 0.0
+    for k, curve in enumerate(curves):
+        before, after = (radii[k - 1] if k else 0.0), (radii[k] if k < len(radii) else 0.0)
+        rest = curve.length - before - after
+        if rest > NO_LENGTH:
+            own = np.linspace(before, curve.length - after, 33)[1:]
+            s.append(begin + own - before)
+            rows.append(curve.at(own))
+            begin += rest
+        if k < len(radii):
+            u = np.linspace(0.0, 1.0, 33)[1:]
+            first, second = corner(u, after)
+            following = curves[k + 1]
+            s.append(begin + 2.0 * after * u)
+            rows.append(curve.at(curve.length + first) + following.at(second) - following.at(np.zeros(1)))
+            begin += 2.0 * after
+    knots, nodes = np.concatenate(s), np.concatenate(rows)
+    return knots, spline(knots, nodes)
+
+
+def limited(
+    robot: Robot, limits: MotionLimits, moves: Mapping[int, Move], layout: Layout, knots: Array, pieces: Array
+) -> JointPath:
+    """A path with its limits, on a grid that is fine enough to time it."""
+    parts = np.full(len(pieces), max(1, -(-_INTERVALS // len(pieces))))
+    knots, pieces = parted(knots, pieces, parts)
+    middle = 0.5 * (knots[:-1] + knots[1:])
+    part = np.clip(np.searchsorted(layout.starts, middle, side="right") - 1, 0, len(layout.owners) - 1)
+    scales = np.ones((len(layout.owners), 3))
+    tool = np.full((len(layout.owners), 2), np.inf)
+    for k, owners in enumerate(layout.owners):
+        own = [moves[i] for i in owners]
+        scales[k, 0] = min(move.speed for move in own)
+        scales[k, 1:] = min(move.acceleration for move in own)
+        tool[k, 0] = min(np.inf if move.tool_speed is None else move.tool_speed for move in own)
+        tool[k, 1] = min(np.inf if move.tool_turn is None else move.tool_turn for move in own)
+    base = np.stack([limits.velocity, limits.acceleration, limits.jerk], axis=1)
+    most = np.full(len(pieces), _FREE)
+    if np.isfinite(tool).any():
+        most = np.minimum(most, _tool_limit(robot, knots, pieces, tool[part]))
+    return JointPath(knots, pieces, base * scales[part][:, None, :], most)
+
+
+def _tool_limit(robot: Robot, knots: Array, pieces: Array, tool: Array) -> Array:
+    """The largest ṡ² on each interval that limits of the tool's speed and turning ``(k, 2)`` allow."""
+    h, p = np.diff(knots)[:, None], np.moveaxis(pieces, -1, 0)
+    largest = np.zeros((len(pieces), 2))
+    for f in (0.0, 0.5, 1.0):
+        d = f * h
+        q, slope = p[0] + d * (p[1] + d * (p[2] + d * p[3])), p[1] + d * (2.0 * p[2] + 3.0 * d * p[3])
+        twist = (jacobian(robot, np.ascontiguousarray(q)) @ slope[..., None])[..., 0]
+        sizes = np.stack([np.linalg.norm(twist[:, :3], axis=1), np.linalg.norm(twist[:, 3:], axis=1)], axis=1)
+        largest = np.maximum(largest, sizes)
+    with np.errstate(divide="ignore"):
+        speed = np.where(largest > 0.0, tool / largest, np.inf).min(axis=1)
+    return np.asarray(np.minimum((speed * (1.0 - _TOOL_MARGIN)) ** 2, _FREE))
+
+
+def tool_slowdown(robot: Robot, move: Move, piece: JointMotion) -> float:
+    """The factor by which a motion has to be slower for the tool's limits of speed and turning, at least 1."""
+    if move.tool_speed is None and move.tool_turn is None:
+        return 1.0
+    q, qd, _, _ = piece.at(np.linspace(0.0, piece.duration, _SAMPLES))
+    twist = (jacobian(robot, q) @ qd[..., None])[..., 0]
+    parts = zip((twist[:, :3], twist[:, 3:]), (move.tool_speed, move.tool_turn), strict=True)
+    most = max(float(np.linalg.norm(v, axis=1).max()) / limit for v, limit in parts if limit is not None)
+    return max(1.0, most * (1.0 + _TOOL_SHARE))
+
+
+def is_joint_move(segment: Move) -> bool:
+    """Whether a segment is a curve of the joints, not of the tool."""
+    return isinstance(segment, Ptp) or (isinstance(segment, Spline) and isinstance(segment.points[0], JointTarget))

@@ -1,0 +1,122 @@
+"""Why a path cannot be driven, and what would help."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from kin.ik import branch_names, branch_of, solve_ik
+from kin.ik.details import JointKind, LimitViolation
+from kin.ik.options import Task
+from kin.ik.results import Status
+from kin.motion.details import (
+    BranchNeeded,
+    Cause,
+    Help,
+    NotKept,
+    NotReached,
+    RefusalDetails,
+    SingularityMet,
+    Slowed,
+)
+from kin.motion.paths import Layout
+from kin.motion.timing.timed import JointPath
+from kin.path import solve_path
+from kin.path.details import JointMove
+from kin.robot import Robot
+from kin.singularity import singularities_at
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+NEAR = 0.1  # radians or metres from a singularity that counts as the reason
+_POSES = 16  # of the path, for another posture
+# A path is slow where the joints allow less than this part of its usual speed; how near a singularity is named.
+_SLOW, _WIDE = 0.4, 0.5
+
+
+def violations(robot: Robot, q: Array) -> tuple[LimitViolation, ...]:
+    """The joint values of a configuration ``(n,)`` that are outside the limits."""
+    found = []
+    for i, joint in enumerate(robot.joints):
+        if not robot.lower[i] - TOLERANCES.limit <= q[i] <= robot.upper[i] + TOLERANCES.limit:
+            limit = robot.lower[i] if q[i] < robot.lower[i] else robot.upper[i]
+            kind: JointKind = "prismatic" if joint.kind == "prismatic" else "revolute"
+            found.append(LimitViolation(i, joint.name, float(q[i]), float(limit), kind, False))
+    return tuple(found)
+
+
+def limit_met(robot: Robot, q: Array) -> tuple[int, LimitViolation] | None:
+    """The first configuration of a path ``(k, n)`` outside the limits, and how far that joint would go."""
+    slack = TOLERANCES.limit
+    outside = (q < robot.lower - slack) | (q > robot.upper + slack)
+    if not outside.any():
+        return None
+    row = int(np.argmax(outside.any(axis=1)))
+    first = violations(robot, q[row])[0]
+    beyond = q[row:, first.joint]
+    value = float(beyond.max() if first.limit == robot.upper[first.joint] else beyond.min())
+    return row, replace(first, value=value)
+
+
+def lost(robot: Robot, T: Array, end: Array, before: Array, task: Task) -> tuple[Cause, RefusalDetails]:
+    """Why the joints cannot follow the tool to a pose `T` from a configuration; `end`: where the segment ends."""
+    result = solve_ik(robot, T, q_seed=before, task=task)
+    if result.status is Status.APPROXIMATE:
+        best = solve_ik(robot, end, q_seed=before, task=task).best or result.best
+        assert best is not None
+        return "task", NotKept(robot.n, best.position_error, best.rotation_error)
+    if not result.solutions:
+        return "unreachable", NotReached(result.details, result.cause, result.task, result.singularities)
+    near = singularities_at(robot, before, NEAR)
+    jump = result.solutions[0].q - before
+    joint = int(np.argmax(np.abs(jump)))
+    row = robot.joints[joint]
+    kind: JointKind = "prismatic" if row.kind == "prismatic" else "revolute"
+    move = JointMove(joint, row.name, kind, abs(float(jump[joint])))
+    if near or abs(move.motion) < 0.5:
+        return "singularity", SingularityMet(near[0] if near else None, move if abs(move.motion) > 1e-3 else None)
+    return "branch", BranchNeeded(branch_of(robot, before) if branch_names(robot) else None)
+
+
+def helps_for(robot: Robot, poses: Array, q: Array, task: Task, cause: Cause) -> tuple[Help, ...]:
+    """What would help on a path of poses ``(k, 4, 4)`` that cannot be driven from q ``(n,)``."""
+    found: list[Help] = []
+    end = solve_ik(robot, poses[-1], q_seed=q, task=task)
+    if end.status is Status.SOLVED:
+        found.append(Help("ptp"))
+        some = np.unique(np.linspace(0, len(poses) - 1, _POSES).astype(int))
+        path = solve_path(robot, poses[some], task=task)
+        if path.continuous and not path.gaps:
+            found.append(Help("posture", branch_of(robot, path.q[0]) if branch_names(robot) else None))
+        elif cause in ("singularity", "branch"):
+            found.append(Help("via"))
+    elif end.cause in ("too far", "too near"):
+        found.append(Help("closer"))
+    elif task == "pose":
+        found.append(Help("task"))
+    return tuple(found)
+
+
+def slow_places(robot: Robot, layout: Layout, path: JointPath) -> list[Slowed]:
+    """Where a path is slow because a joint has to turn fast: its slowest place, corners and ends left out."""
+    slopes = np.abs(path.joints[:, :, 1])
+    with np.errstate(divide="ignore"):
+        speeds = (path.limits[:, :, 0] / slopes).min(axis=1)
+    part = np.clip(np.searchsorted(layout.starts, path.knots[:-1], side="right") - 1, 0, len(layout.owners) - 1)
+    straight = np.array([len(owners) == 1 for owners in layout.owners])[part]
+    speeds = np.where(straight, speeds, np.inf)
+    usual = float(np.median(speeds[straight])) if straight.any() else np.inf
+    k = int(np.argmin(speeds))
+    if not np.isfinite(usual) or speeds[k] > _SLOW * usual:
+        return []
+    q = path.joints[k, :, 0].copy()
+    near = [s for s in singularities_at(robot, q, _WIDE) if s.kind != "algorithmic"]
+    joint = int(np.argmax(slopes[k] / path.limits[k, :, 0]))
+    segment = int(
+        np.clip(np.searchsorted(layout.bounds, path.knots[k], side="right") - 1, 0, len(layout.bounds) - 2)
+    )
+    low, high = layout.bounds[segment], layout.bounds[segment + 1]
+    where = layout.owners[0][0] + segment, float((path.knots[k] - low) / (high - low))
+    ratio = float(speeds[k]) / usual
+    return [Slowed(*where, joint, robot.joints[joint].name, "velocity", ratio, near[0] if near else None)]
