@@ -2,8 +2,9 @@
 
 For each branch, one continuous function of the value is positive where the branch is feasible: the least of how
 far inside the arm's reach it is and of how far its joints are inside their limits. It is sampled over the joint's
-range. Its zeros are found between samples of opposite signs, and a peak or a dip between samples that could pass
-zero is searched for by golden sections.
+range, and more closely where it comes near zero and where the branch begins to exist. Its zeros are found between
+samples of opposite signs, and a peak or a dip between samples that could pass zero is searched for by golden
+sections.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 
 from kin.kernels.compile import jit
 from kin.solvers.common import HIGH, LOW, NEAR, wrap
-from kin.solvers.offset7.branches import all_branches
+from kin.solvers.offset7.branches import all_branches, distances, seen, two_roots
 from kin.solvers.offset7.geometry import OFFSET, SIGN
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -26,6 +27,13 @@ _GOLDEN = 0.6180339887498949
 _PEAK_STEPS = 24
 _ZERO_STEPS = 60
 _WIDTH = 1e-12  # rad, to which the end of an interval is found
+# How far from an end of the reach the slack is looked at, and the most places where.
+_BESIDE = (1e-9, -1e-9, 1e-3, -1e-3)
+_MOST_ENDS = 64
+_PARTS = 4  # of an interval between samples that is looked at more closely
+_EDGE_STEPS = 30
+# Shares of such an interval from where a branch begins to exist.
+_FROM_EDGE = np.array([0.0, 1e-4, 1e-3, 0.01, 0.03, 0.08, 0.15, 0.25, 0.4, 0.6, 0.8])
 
 
 @jit
@@ -187,6 +195,62 @@ def _ranges_of(
 
 
 @jit
+def _refine(
+    params: Array, T: Array, box: Array, k: int, coarse: Array, fine: Array, work: tuple[Array, Array, Array]
+) -> int:
+    """fine ``(3, m)`` ← coarse ``(3, n)`` with more samples of branch k between them; returns their number.
+
+    Rows: value, slack, and how far inside the arm's reach the branch is.
+    """
+    n, count = coarse.shape[1], 0
+    for i in range(n):
+        for r in range(3):
+            fine[r, count] = coarse[r, i]
+        count += 1
+        if i == n - 1 or count + n - i + _FROM_EDGE.shape[0] > fine.shape[1]:
+            continue
+        if (coarse[2, i] < 0.0) != (coarse[2, i + 1] < 0.0):
+            count = _from_edge(params, T, box, k, coarse[:, i : i + 2], fine, count, work)
+            continue
+        slope = 0.0
+        for j in range(max(i - 1, 0), min(i + 2, n - 1)):
+            slope = max(slope, abs(coarse[1, j + 1] - coarse[1, j]))
+        if min(abs(coarse[1, i]), abs(coarse[1, i + 1])) < slope:
+            for part in range(1, _PARTS):
+                x = coarse[0, i] + (coarse[0, i + 1] - coarse[0, i]) * part / _PARTS
+                fine[0, count], fine[1, count] = x, _at(params, T, x, box, work, k)
+                fine[2, count] = work[1][k]
+                count += 1
+    return count
+
+
+@jit
+def _from_edge(
+    params: Array, T: Array, box: Array, k: int, ends: Array, fine: Array, count: int,
+    work: tuple[Array, Array, Array],
+) -> int:  # fmt: skip
+    """Append samples from where branch k begins to exist between two samples ``(3, 2)``; returns their number."""
+    forward = ends[2, 0] < 0.0
+    x, y = (ends[0, 1], ends[0, 0]) if forward else (ends[0, 0], ends[0, 1])
+    whole = x
+    for _ in range(_EDGE_STEPS):
+        middle = 0.5 * (x + y)
+        _at(params, T, middle, box, work, k)
+        if work[1][k] >= 0.0:
+            x = middle
+        else:
+            y = middle
+    m = _FROM_EDGE.shape[0]
+    for j in range(m):
+        share = _FROM_EDGE[j] if forward else _FROM_EDGE[m - 1 - j]
+        value = x + share * (whole - x)
+        fine[0, count], fine[1, count] = value, _at(params, T, value, box, work, k)
+        fine[2, count] = work[1][k]
+        count += 1
+    return count
+
+
+@jit
 def _insert(marks: Array, value: float) -> None:
     """Insert a value into the sorted marks ``(n,)``, of which the last place is free."""
     i = marks.shape[0] - 1
@@ -194,6 +258,34 @@ def _insert(marks: Array, value: float) -> None:
         marks[i] = marks[i - 1]
         i -= 1
     marks[i] = value
+
+
+@jit
+def _insert_ends(params: Array, T: Array, span: tuple[float, float], marks: Array, n: int) -> int:
+    """Insert values beside those where the wrist centre is as far or as near as it can be; returns the number.
+
+    Its squared distance is a sinusoid of the given joint's angle.
+    """
+    low, high = span
+    M, square, roots = np.empty((3, 4)), np.empty(3), np.empty(2)
+    for i in range(3):
+        seen(params, T, 2.0 * math.pi * i / 3.0, M)
+        square[i] = M[0, 3] * M[0, 3] + M[1, 3] * M[1, 3] + M[2, 3] * M[2, 3]
+    mean = (square[0] + square[1] + square[2]) / 3.0
+    cosine, sine = square[0] - mean, (square[1] - square[2]) / math.sqrt(3.0)
+    constant, a, b = distances(params)
+    for end in range(2):
+        bound = constant + (2.0 - 4.0 * end) * math.sqrt(a * a + b * b)
+        if two_roots(cosine, sine, bound - mean, 0.0, roots) < 0.0 or math.isnan(roots[0]):
+            continue
+        for i in range(2):
+            first = params[SIGN] * (roots[i] - params[OFFSET])
+            first += 2.0 * math.pi * math.ceil((low - first) / (2.0 * math.pi))
+            for beside in _BESIDE:
+                if low <= first + beside <= high and n < marks.shape[0]:
+                    n += 1
+                    _insert(marks[:n], first + beside)
+    return n
 
 
 @jit
@@ -207,20 +299,28 @@ def feasible(
     """
     low, high = span
     n = max(8, math.ceil(SAMPLES * (high - low) / (2.0 * math.pi))) + 2 if high > low else 1
-    marks, samples, there = np.empty(n), np.empty((8, n)), np.empty((8, n))
     rows, room, spare = np.empty((8, 7)), np.empty(8), np.empty(8)
+    every = np.empty(n + _MOST_ENDS)
     for i in range(n):
-        marks[i] = low + (high - low) * i / (n - 2) if i < n - 1 and n > 1 else low
+        every[i] = low + (high - low) * i / (n - 2) if i < n - 1 and n > 1 else low
     if n > 1:
-        _insert(marks, min(max(wanted, low), high))
+        _insert(every[:n], min(max(wanted, low), high))
+        n = _insert_ends(params, T, span, every, n)
+    marks, samples, there = every[:n], np.empty((8, n)), np.empty((8, n))
     for i in range(n):
         slack(params, T, marks[i], box, -1, rows, room, spare)
         for k in range(8):
             samples[k, i], there[k, i] = spare[k], room[k]
     found = 0
+    work = (rows, room, spare)
+    coarse, once, twice = np.empty((3, n)), np.empty((3, 4 * n + 64)), np.empty((3, 8 * n + 256))
     for k in range(8):
         first = found
-        found = _ranges_of(params, T, box, k, marks, (samples[k], there[k]), arcs, found)
+        for i in range(n):
+            coarse[0, i], coarse[1, i], coarse[2, i] = marks[i], samples[k, i], there[k, i]
+        m = _refine(params, T, box, k, coarse, once, work)
+        m = _refine(params, T, box, k, once[:, :m], twice, work)
+        found = _ranges_of(params, T, box, k, twice[0, :m], (twice[1, :m], twice[2, :m]), arcs, found)
         chosen[k] = _nearest(arcs, first, found, wanted)
         if first == found:
             best = -math.inf

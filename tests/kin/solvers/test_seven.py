@@ -420,6 +420,29 @@ def test_the_configuration_of_the_seed_is_found_however_narrow_its_range(robot):
         assert kin.solve_ik(robot, T, q_seed=own).solutions[0].distance < 1e-6
 
 
+def ranges_missed(count, seed, rows=slice(None)):
+    """Panda's configurations whose given joint is in no range of their branch, asked for from the home pose."""
+    q = PANDA.random_q(np.random.default_rng(seed), count)[rows]
+    form, missed = closed_form_of(PANDA), 0
+    for own, T in zip(q, kin.fk(PANDA, q), strict=True):
+        asked = SolverInput(T, POSE, (math.nan,), True, PANDA.q_home, PANDA.lower, PANDA.upper)
+        arcs = form.solve(asked).arcs[0]
+        there = (arcs[:, 0] == form.branch_of(own)) & (arcs[:, 1] < own[6] + 1e-6) & (own[6] - 1e-6 < arcs[:, 2])
+        missed += not there.any()
+    return missed
+
+
+def test_ranges_narrower_than_the_samples_are_found_from_a_foreign_seed():
+    # Between the end of the reach and a limit, between two limits, or between two ends of the reach.
+    assert ranges_missed(3000, 1, [3, 195, 811, 966, 1205, 1249, 1522, 1629, 1918, 2045, 2142]) == 0
+    assert ranges_missed(12000, 2, [310, 484, 618, 879, 1426, 6544, 9570, 9577, 11193, 11351]) == 0
+
+
+@pytest.mark.slow
+def test_no_range_is_missed_from_a_foreign_seed():
+    assert ranges_missed(20_000, 3) == 0
+
+
 def test_a_branch_between_the_samples_of_narrow_limits_is_no_obstacle():
     rng = np.random.default_rng(0)
     elbow = closed_form_of(PANDA).geometry
