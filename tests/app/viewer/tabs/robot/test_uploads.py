@@ -1,0 +1,156 @@
+"""Zips with meshes in a page: what is asked, what is shown, what is refused, and that nothing is lost."""
+
+from __future__ import annotations
+
+import base64
+import html
+
+import pytest
+from fake_browser import FakeBrowser
+from test_robot_tab import UR5, part, say, shows, type_in
+from zips import TWO_JOINTS, packed, robot_files
+
+import kin
+
+pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
+
+TWO = kin.load_urdf(TWO_JOINTS)
+PART = 34_500
+
+
+def send(tab: FakeBrowser, name: str, data: bytes) -> None:
+    for at in range(0, len(data), PART):
+        tab._said = tab._said[-1:]  # as the page's script does: a message to the service has a limit
+        piece = base64.b64encode(data[at : at + PART]).decode()
+        say(tab, "upload", value=[name, at == 0, at + PART >= len(data), piece, "base64"])
+
+
+def meshes(tab: FakeBrowser) -> set[str]:
+    """The nodes that show meshes of a file, without the number of the body."""
+    return {
+        name.split("/")[-1].rsplit("-", 1)[0]
+        for name, node in tab.nodes.items()
+        if "/mesh-" in name and node["type"] == "MeshMessage"
+    }
+
+
+ALL = {"mesh-0-0", "mesh-0-1", "mesh-0-2", "mesh-1-2", "mesh-2-2"}
+
+
+def test_a_zip_shows_the_real_arm_and_undo_brings_back_what_it_replaced(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        type_in(tab, 1, "a", "250")
+        mine = tab.value("Robot")
+        send(tab, "two.zip", packed(robot_files()))
+        shows(tab, TWO, TWO.q_home)
+        assert f"{mine} was replaced" in html.unescape(tab.html)
+        assert "Its 2 meshes are being read" in tab.html
+        assert "Reading the meshes of “two.zip”" in part(tab, "files")
+        tab.wait(lambda: "The meshes of two.zip are shown" in tab.html)
+        assert meshes(tab) == ALL
+        assert "stay while this page is open" in part(tab, "files")
+        type_in(tab, "tool", "x", "50")
+        tab.wait(lambda: meshes(tab) == ALL)
+        type_in(tab, 0, "a", "450")
+        tab.wait(lambda: not meshes(tab))
+        assert "The arm is in this page and in its link only" in part(tab, "files")
+        tab.say("undo")
+        tab.wait(lambda: meshes(tab) == ALL)
+        for _ in range(2):
+            tab.say("undo")
+            tab.settle()
+        assert tab.value("Robot") == mine
+        assert not meshes(tab)
+        tab.say("redo")
+        tab.wait(lambda: meshes(tab) == ALL)
+
+
+def test_what_is_wanted_of_a_zip_is_asked(port: int) -> None:
+    fork = TWO_JOINTS.replace(
+        "</robot>",
+        '<link name="camera"/><joint name="mount" type="revolute"><parent link="upper"/><child link="camera"/>'
+        '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>',
+    )
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        send(tab, "robots.zip", packed({**robot_files(fork), "two/urdf/other.urdf": kin.to_urdf(UR5)}))
+        assert "robots.zip has several robots" in tab.html
+        assert '<option value="two/urdf/two.urdf">' in part(tab, "files")
+        say(tab, "urdf", value="two/urdf/none.urdf")
+        assert "Invalid input" in tab.html
+        say(tab, "urdf", value="two/urdf/two.urdf")
+        assert "fore (2 joints)" in part(tab, "files")
+        say(tab, "tip", value="fore")
+        shows(tab, TWO, TWO.q_home)
+        tab.wait(lambda: meshes(tab) == ALL)
+
+
+BAD = {
+    "no zip": (b"PK\x03\x04 nothing", "no list of files at its end"),
+    "escape": (packed({"../x.urdf": TWO_JOINTS}), "without .."),
+    "empty": (packed({"readme.md": ""}), "no URDF among 1 files"),
+    "broken": (packed({"x.urdf": "<robot>"}), "broken: x.urdf"),
+}
+BAD_MESHES = {
+    "missing": (packed({"x.urdf": TWO_JOINTS}), "a path of a file in the zip"),
+    "noise": (packed({**robot_files(), "two/meshes/upper.stl": b"noise" * 100}), "upper.stl"),
+    "millimetres": (packed(robot_files(TWO_JOINTS.replace('scale="0.001 0.001 0.001"', ""))), "0.001 0.001 0.001"),
+}
+
+
+def test_a_bad_zip_changes_nothing_and_bad_meshes_leave_a_skeleton(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        before = tab.value("Robot")
+        for name, (data, words) in BAD.items():
+            send(tab, name, data)
+            assert "The file was not used" in tab.html, name
+            assert words in html.unescape(tab.html), name
+            assert tab.value("Robot") == before
+        for name, (data, words) in BAD_MESHES.items():
+            send(tab, name, data)
+            tab.wait(lambda name=name: f"The meshes of {name} cannot be shown" in tab.html)
+            assert words in html.unescape(tab.html), name
+            assert "The arm is a skeleton" in tab.html
+            assert not meshes(tab)
+        for value in (["x.zip", True, True, "%%%", "base64"], ["x.zip", True, True, "", "rot13"]):
+            say(tab, "upload", value=value)
+            assert "Invalid input" in tab.html
+
+
+def test_the_shapes_of_a_urdf_need_no_zip(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        say(tab, "upload", value=["two.urdf", True, True, TWO_JOINTS])
+        assert "Open a zip of this file and its meshes" in tab.html
+        assert not meshes(tab)
+        plain = TWO_JOINTS.replace('<mesh filename="../meshes/fore.obj"/>', '<sphere radius="0.05"/>')
+        mesh = '<mesh filename="package://two_description/meshes/upper.stl" scale="0.001 0.001 0.001"/>'
+        say(tab, "upload", value=["plain.urdf", True, True, plain.replace(mesh, '<box size="0.1 0.1 0.4"/>')])
+        tab.wait(lambda: meshes(tab) == ALL - {"mesh-2-2"})
+
+
+def test_the_own_arm_can_be_deleted_and_examples_say_what_they_replace(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        assert 'data-arm-do="delete" aria-disabled="true"' in part(tab, "start")
+        tab.choose(UR5.name)
+        type_in(tab, "tool", "z", "100")
+        mine = tab.value("Robot")
+        say(tab, "delete")
+        assert f"{mine} was deleted" in tab.html
+        assert tab.value("Robot") == UR5.name
+        tab.say("undo")
+        tab.settle()
+        assert tab.value("Robot") == mine
+        say(tab, "start", value="planar-2r")
+        assert f"{mine} was replaced" in tab.html
+        tab.say("released")  # otherwise two choices within a second are one step
+        say(tab, "start", value="planar-3r")
+        assert "was replaced" not in tab.html, "an example that nobody changed is no loss"
+        tab.say("undo")
+        tab.settle()
+        tab.say("undo")
+        tab.settle()
+        assert tab.value("Robot") == mine
