@@ -97,7 +97,7 @@ class ViewOptions:
         listen(self._look, post, "look")
         self._boxes: dict[str, viser.GuiCheckboxHandle] = {}
         if detailed:
-            self._add_box("detailed", "Detailed bodies", _about_detailed(detailed), state, post)
+            self._add_box("detailed", "Real shape", _about_detailed(detailed), state, post)
         for name, text, hint in (
             ("frames", "Link frames", "The frame of every DH row: x red, y green, z blue"),
             ("labels", "Frame labels", "The name of each frame, at the tip of its z axis"),
@@ -139,7 +139,7 @@ class ViewOptions:
 
 def _about_detailed(robots: Sequence[Robot]) -> str:
     names = ", ".join(robot.name for robot in robots)
-    return f"The shape of the real arm, from its maker's drawings, instead of our simplified one: {names}."
+    return f"The body in every detail, from its maker's drawings, instead of our simplified one: {names}."
 
 
 class ColourChoice:
