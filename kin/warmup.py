@@ -20,6 +20,7 @@ from numba.core.event import install_recorder
 from kin.files import builtin_robots
 from kin.fk import fk, fk_positions, jacobian, link_frames, manipulability
 from kin.ik import solve_ik
+from kin.motion import Lin, PoseTarget, Ptp, plan_motion
 from kin.path import solve_path
 from kin.robot import Robot
 from kin.solvers import closed_form_of, general6, general7
@@ -109,6 +110,15 @@ def _call_all(robot: Robot) -> None:
     solve_path(robot, fk(robot, pair))
 
 
+def _plan(robot: Robot) -> None:
+    """A motion with a line, from the home pose and back."""
+    T = fk(robot, robot.q_home)
+    T[2, 3] -= 0.01
+    target = PoseTarget.of(T)
+    motion = plan_motion(robot, [Ptp(target), Lin(PoseTarget.of(fk(robot, robot.q_home)))])
+    motion.sample([0.0, motion.duration])
+
+
 def _solve_generally(robot: Robot) -> None:
     """The general solvers of six and seven joints, which can also solve an arm of a family."""
     form: ClosedForm | None = general6.match(robot) or general7.match(robot, general6.match)
@@ -127,6 +137,7 @@ def _rest() -> Iterator[Callable[[], object]]:
     for joints in (6, 7):
         robot = next(robot for robot in robots if robot.n == joints and robot.revolute.all())
         yield partial(_solve_generally, robot)
+    yield partial(_plan, next(robot for robot in robots if robot.n == 6))
     robot = robots[0]
     # Two moving joints call the same kernels and take the least time.
     locked = [None, None, *robot.q_home[2:].tolist()]

@@ -50,6 +50,12 @@ for strategy in ("uniform", "quasi", "boundary", "volume"):
 kin.section(arm, ((0.0, 0.0, 0.1), (0.0, 1.0, 1.0)), resolution=8, locked=locked)
 kin.section(arm, resolution=8, locked=locked)
 kin.workspace_facts(arm, effort=2, locked=locked)
+for robot in kin.builtin_robots().values():
+    end = kin.JointTarget(robot.q_home + 0.05)
+    back = kin.JointTarget(robot.home)
+    moves = [kin.Lin(end, blend=0.01), kin.Lin(back, tool_speed=0.1), kin.Ptp(end, blend=0.01), kin.Ptp(back)]
+    for jerk_limited in (True, False):
+        kin.plan_motion(robot, kin.Program(moves, jerk_limited=jerk_limited))
 after = compilations()
 assert after == before, {k: n for k, n in after.items() if before.get(k) != n}
 """

@@ -19,8 +19,9 @@ from kin.motion.timing.fastest import clock, fastest
 from kin.transforms import Array
 
 # Part of each limit that is kept free for what lies between the points that are checked; rounds of making the path
-# slower where it exceeds a limit; windows that are tried, as multiples of the longest acceleration / jerk.
-_MARGIN, _ROUNDS, _WINDOWS = 1e-3, 6, (1.0, 2.0)
+# slower where it exceeds a limit, and the power of what is missing by which it is; windows that are tried, as
+# multiples of the longest acceleration / jerk; the second one only if the first costs more than this.
+_MARGIN, _ROUNDS, _POWER, _WINDOWS, _CHEAP = 1e-3, 10, 0.6, (2.0, 0.8), 1.03
 _POINTS, _CLOSE = 3, 13  # points of each piece of s(t) that are compared with the limits, and at the end
 
 
@@ -104,19 +105,19 @@ def timed(path: JointPath, jerk_limited: bool, stop: Callable[[], None]) -> Time
     moving = np.abs(path.joints[:, :, 1:]).max(axis=(0, 2)) > 0.0
     ratio = float((path.limits[:, moving, 1] / path.limits[:, moving, 2]).max()) if moving.any() else 0.0
     kept = JointPath(path.knots, path.joints, path.limits * (1.0 - _MARGIN), path.most * (1.0 - _MARGIN) ** 2)
-    found: list[tuple[float, Array, Array, float]] = []
-    for factor in _WINDOWS:
-        found += _smoothed(kept, h, plain, factor * ratio, stop)
+    found = _smoothed(kept, h, plain, _WINDOWS[0] * ratio, stop, 4)
+    if min(found, key=lambda each: each[0])[0] > _CHEAP * without:
+        found += _smoothed(kept, h, plain, _WINDOWS[1] * ratio, stop, _ROUNDS)
     _, breaks, clocks, slower = min(found, key=lambda each: each[0])
     return _stretched(path, kept, breaks, clocks, slower, without)
 
 
 def _smoothed(
-    path: JointPath, h: Array, plain: tuple[Array, Array], window: float, stop: Callable[[], None]
+    path: JointPath, h: Array, plain: tuple[Array, Array], window: float, stop: Callable[[], None], rounds: int
 ) -> list[tuple[float, Array, Array, float]]:
     """Averaged motions with the factor that they have to be slower: (seconds, breaks, clocks, factor)."""
     scale, (times, pieces), found = np.ones(len(h)), plain, []
-    for round_ in range(_ROUNDS):
+    for round_ in range(rounds):
         stop()
         if round_:
             times, pieces = _fastest(path, h, scale)
@@ -132,7 +133,7 @@ def _smoothed(
         for c in np.flatnonzero(slow > 1.0).tolist():
             part = factor[max(first[c], 0) : last[c]]
             np.maximum(part, slow[c], out=part)
-        scale = scale / factor
+        scale = scale / factor**_POWER
     return found
 
 
