@@ -199,6 +199,30 @@ def test_far_motion_in_weak_directions_is_found(seed):
     assert not not_solved(typed_arm(2 + seed % 4, seed), 3)
 
 
+def test_a_rounded_scara_has_its_other_posture_within_the_rounding():
+    """The axes lean by the rounding, elsewhere with the other elbow: no joints make that posture exact."""
+    scara = kin.get_robot("scara")
+    rows = (scara.rows[0], replace(scara.rows[1], alpha=3.1416), *scara.rows[2:])
+    table = replace(scara, id="scara-typed", rows=rows)
+    for q in table.random_q(np.random.default_rng(0), 10):
+        T = kin.fk(table, q)
+        exact = kin.solve_ik(table, T, respect_limits=False)
+        near = kin.solve_ik(table, T, respect_limits=False, position_tolerance=1e-5, rotation_tolerance=2e-5)
+        assert len(exact.solutions) == 1
+        assert {s.branch for s in near.solutions} == {"elbow left", "elbow right"}
+        assert 1e-7 < max(s.rotation_error for s in near.solutions) < 2e-5
+
+
+@pytest.mark.parametrize("far", [10.0, 1000.0])
+def test_three_typed_joints_far_from_their_base(far):
+    """Lengths beside offsets of hundreds of metres: little is left of the singular values."""
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        twists = rng.choice((1.5708, -1.5708, 0.0, 3.1416, 1.0), 3).tolist()
+        rows = [(*rng.uniform((-3, 0, 0.1), (3, far, 0.4)).tolist(), twist) for twist in twists]
+        assert not not_solved(arm(f"far-{far}-{seed}", *rows), 2)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("joints", range(1, 6))
 def test_no_target_of_random_typed_arms_is_called_unreachable(joints):
