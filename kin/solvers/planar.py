@@ -1,4 +1,4 @@
-"""Planar chains: the elbow of two links, and three links whose last direction is free.
+"""Planar chains: the target in their plane, the elbow of two links, three links whose last direction is free.
 
 A planar arm of three links is a tuple ``(u, v, p, q, a, b)``: links of lengths a and b, then a last link in the
 direction ψ whose end, at (p, q) in its own frame, is held at (u, v); so the third axis is at ``(u, v) − Rz(ψ)(p,
@@ -28,6 +28,7 @@ from kin.solvers.common import (
     split_sum,
     wrap,
 )
+from kin.solvers.contract import APPROACH
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -35,9 +36,33 @@ _MERGE = TOLERANCES.merge
 _SINGULAR = TOLERANCES.singular
 _REACH = TOLERANCES.closure_position * 0.1
 
+# The parameter arrays of planar arms begin with the first three rows of base⁻¹ and of the tool; the links follow.
+BASE, TOOL, LINKS = 0, 12, 24
+TOOL_X, TOOL_Y, TOOL_Z = TOOL + 3, TOOL + 7, TOOL + 11  # where the tool's point is
+
 PlanarArm = tuple[float, float, float, float, float, float]
 # The sign of the elbow angle; spin and total of a fourth joint, which is at ``spin (total − ψ)``, or 0 and 0.
 LastJoints = tuple[float, float, float]
+
+
+@jit
+def held(params: Array, T: Array, task: int) -> tuple[float, float, float, float]:
+    """(x, y, z, ψ) of a target in the canonical base: the tool's point, and its angle about the axes.
+
+    Of all Rz(ψ) it is the one with the least angle to R Rtoolᵀ (largest trace); with an approach direction
+    only, the one that brings the tool's z axis nearest to it.
+    """
+    p = params
+    x = p[0] * T[0, 3] + p[1] * T[1, 3] + p[2] * T[2, 3] + p[3]
+    y = p[4] * T[0, 3] + p[5] * T[1, 3] + p[6] * T[2, 3] + p[7]
+    z = p[8] * T[0, 3] + p[9] * T[1, 3] + p[10] * T[2, 3] + p[11]
+    cosine = sine = 0.0
+    for j in range(2 if task == APPROACH else 0, 3):
+        x_j = p[0] * T[0, j] + p[1] * T[1, j] + p[2] * T[2, j]
+        y_j = p[4] * T[0, j] + p[5] * T[1, j] + p[6] * T[2, j]
+        cosine += x_j * p[TOOL + j] + y_j * p[TOOL + 4 + j]
+        sine += y_j * p[TOOL + j] - x_j * p[TOOL + 4 + j]
+    return x, y, z, math.atan2(sine, cosine)
 
 
 @jit
@@ -94,6 +119,7 @@ def planar_free(
             found = extend_arcs(arcs, first, found, branch, probes, k, n)
         elif misfit < best and found == first:
             best, psi = misfit, probes[k]
+    found = _without_ends(arcs, first, found)
     if fixed:
         psi = wanted
     elif found > first:
@@ -101,6 +127,26 @@ def planar_free(
     if planar_angles(arm, last, psi, box, angles) > _REACH:
         psi = math.nan
     return psi, found
+
+
+@jit
+def _without_ends(arcs: Array, first: int, found: int) -> int:
+    """Drop those of the arcs first…found−1 that are no more than an end of another one; returns the new number.
+
+    The end of the reach may be its own arc: where the circle closes, and where a joint meets its limit there too.
+    """
+    kept = first
+    for i in range(first, found):
+        end = False
+        for k in range(first, found):
+            if arcs[i, 2] - arcs[i, 1] < _MERGE <= arcs[k, 2] - arcs[k, 1]:
+                for side in range(1, 3):
+                    end = end or abs(wrap(arcs[i, 1] - arcs[k, side])) < _MERGE
+        if not end:
+            for j in range(3):
+                arcs[kept, j] = arcs[i, j]
+            kept += 1
+    return kept
 
 
 @jit

@@ -39,7 +39,7 @@ from kin.solvers.contract import (
     SolverInput,
 )
 from kin.solvers.names import Names, left_or_right, names_of, stance_of
-from kin.solvers.planar import planar_free, two_links
+from kin.solvers.planar import BASE, LINKS, TOOL, TOOL_X, TOOL_Y, TOOL_Z, held, planar_free, two_links
 from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -49,11 +49,10 @@ TITLE = "closed form, all axes parallel"
 _PSI = RedundancyParameter("psi", "tool angle ψ", circular=True)
 _REACH = TOLERANCES.closure_position * 0.1
 _SINGULAR = TOLERANCES.singular
-# Layout of the parameter array: the first three rows of base⁻¹ and of the tool; the two links; for θ1, θ2, θ3 and
+# Layout of the parameter array: base⁻¹ and the tool, see `kin.solvers.planar`; the two links; for θ1, θ2, θ3 and
 # the height the index of the joint (−1: none), its sign and offset; joint limits that never bind; whether the tool
 # is upright.
-_BASE, _TOOL, _A, _B, _JOINT, _SIGN, _OFFSET, _LOW, _HIGH, _UPRIGHT = 0, 12, 24, 25, 26, 30, 34, 38, 42, 46
-_TOOL_X, _TOOL_Y, _TOOL_Z = 15, 19, 23  # entries of the tool: where its point is
+_A, _B, _JOINT, _SIGN, _OFFSET, _LOW, _HIGH, _UPRIGHT = LINKS, LINKS + 1, 26, 30, 34, 38, 42, 46
 
 
 class Geometry(NamedTuple):
@@ -100,29 +99,9 @@ def match(robot: Robot) -> Scara4 | None:
     upright = is_along(tool)
     lengths, joints = [abs(upper), abs(fore)], [*order, *[-1] * (4 - robot.n)]
     limits = [*[-UNBOUNDED] * 4, *[UNBOUNDED] * 4]
-    pose = [*pose_params(base, np.eye(4))[:_TOOL], *tool[:3].ravel()]
+    pose = [*pose_params(base, np.eye(4))[:TOOL], *tool[:3].ravel()]
     params = np.array([*pose, *lengths, *joints, *sign, *offset, *limits, float(upright)])
     return Scara4(Geometry(params, order, sign, offset, abs(upper), abs(fore), upright), robot)
-
-
-@jit
-def held(params: Array, T: Array, task: int) -> tuple[float, float, float, float]:
-    """(x, y, z, ψ) of a target in the canonical base: the tool's point, and its angle about the axes.
-
-    Of all Rz(ψ) it is the one with the least angle to R Rtoolᵀ (largest trace); with an approach direction
-    only, the one that brings the tool's z axis nearest to it.
-    """
-    p = params
-    x = p[0] * T[0, 3] + p[1] * T[1, 3] + p[2] * T[2, 3] + p[3]
-    y = p[4] * T[0, 3] + p[5] * T[1, 3] + p[6] * T[2, 3] + p[7]
-    z = p[8] * T[0, 3] + p[9] * T[1, 3] + p[10] * T[2, 3] + p[11]
-    cosine = sine = 0.0
-    for j in range(2 if task == APPROACH else 0, 3):
-        x_j = p[0] * T[0, j] + p[1] * T[1, j] + p[2] * T[2, j]
-        y_j = p[4] * T[0, j] + p[5] * T[1, j] + p[6] * T[2, j]
-        cosine += x_j * p[_TOOL + j] + y_j * p[_TOOL + 4 + j]
-        sine += y_j * p[_TOOL + j] - x_j * p[_TOOL + 4 + j]
-    return x, y, z, math.atan2(sine, cosine)
 
 
 @jit
@@ -133,7 +112,7 @@ def _put(params: Array, out: Array, row: int, t1: float, t2: float, t3: float, z
     out[row, int(params[_JOINT + 2])] = wrap(params[_SIGN + 2] * (t3 - params[_OFFSET + 2]))
     slide = int(params[_JOINT + 3])
     if slide >= 0:
-        out[row, slide] = params[_SIGN + 3] * (z - params[_TOOL_Z] - params[_OFFSET + 3])
+        out[row, slide] = params[_SIGN + 3] * (z - params[TOOL_Z] - params[_OFFSET + 3])
 
 
 @jit
@@ -159,7 +138,7 @@ def _branches(
     """
     clear(out)
     x, y, z, psi = held(params, T, task)
-    a, b, p, q = params[_A], params[_B], params[_TOOL_X], params[_TOOL_Y]
+    a, b, p, q = params[_A], params[_B], params[TOOL_X], params[TOOL_Y]
     if task == POSITION or (task == APPROACH and params[_UPRIGHT] != 0.0):
         box, angles = _box(params, near, lower, upper), np.empty(4)
         fixed = not math.isnan(value)
@@ -206,7 +185,7 @@ _TINY = 1e-20  # where ψ is anything
 @inlined
 def _pairs(params: Array, near: Array, count: int, S: Array) -> int:
     """The pairs of `count` targets; S[-1] ← 1.0 for those that need the careful kernel, and how many these are."""
-    k, t = rows_of(params, _BASE), rows_of(params, _TOOL)
+    k, t = rows_of(params, BASE), rows_of(params, TOOL)
     a, b = params[_A], params[_B]
     sign, height = params[_SIGN + 3], params[_OFFSET + 3]
     found = 0
@@ -296,7 +275,7 @@ class Scara4(ClosedForm):
         """The rows are the signs of s2: positive with the elbow on the right, where z is up."""
         g = self.geometry
         sense1 = float(g.sign[0] * sense[g.order[0]])
-        stance = stance_of(robot, g.params[_BASE:_TOOL].reshape(3, 4), float(g.offset[0]), sense1)
+        stance = stance_of(robot, g.params[BASE:TOOL].reshape(3, 4), float(g.offset[0]), sense1)
         return names_of(
             (left_or_right(stance, "elbow", "the elbow", "the last axis").times(-1.0),), [(1.0,), (-1.0,)]
         )

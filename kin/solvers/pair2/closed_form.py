@@ -23,7 +23,7 @@ from kin.solvers.contract import (
     SolverInput,
 )
 from kin.solvers.names import Names, bent, names_of
-from kin.solvers.pair2.geometry import Geometry, configurations, geometry_of, straight
+from kin.solvers.pair2.geometry import GONE, REACH, Flags, Geometry, configurations, geometry_of, straight
 from kin.solvers.singular import Singularity, by_jacobian, those_within
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -31,7 +31,9 @@ from kin.transforms import Array
 NAME = "pair2"
 # Which of the tool's point (0) and directions x, y, z (1, 2, 3) a task keeps.
 KEPT = {POSE: [0, 1, 2, 3], APPROACH: [0, 3], POSITION: [0]}
+_THETA1 = RedundancyParameter("theta1", "θ1", joint=0, rare=True)
 _NONE = np.empty(0)
+_CHUNK = 1024  # targets of a batch that are solved at once: about 2.5 kB each
 
 
 def match(robot: Robot) -> Pair2 | None:
@@ -95,21 +97,26 @@ class Pair2(ClosedForm):
         return rank == self.robot.n - free
 
     def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
-        """The last joint, if it moves neither point nor direction."""
+        """The last joint, if it moves neither point nor direction; θ1 where what a task keeps is on axis 1."""
         n = self.robot.n
-        turns = self.geometry.turns[-1]
-        name, label = (f"theta{n}", f"θ{n}") if turns else (f"d{n}", f"d{n}")
-        return (RedundancyParameter(name, label, joint=n - 1),) * self._rank[task][1]
+        turns = self.geometry.turns
+        if self._rank[task][1]:
+            name, label = (f"theta{n}", f"θ{n}") if turns[-1] else (f"d{n}", f"d{n}")
+            return (RedundancyParameter(name, label, joint=n - 1),)
+        return (_THETA1,) if n == 2 and turns[0] and task != POSE else ()
 
     def solve(self, problem: SolverInput) -> Candidates:
         """All configurations that meet what the arm can meet of the target."""
-        p = problem
-        found, off = configurations(self.geometry, self.geometry.seen(p.T[None]), KEPT[p.task], p.seed)
-        q = self._wrapped(found[0])
+        p, g = problem, self.geometry
+        found = configurations(g, g.seen(p.T[None]), KEPT[p.task], p.seed, GONE * g.scale)
+        q = self._wrapped(found.q[0])
         missing = bool(np.isnan(q).all())
-        gap, obstacle = (float(off.min()), Obstacle("point")) if missing else (0.0, None)
-        if not self._rank[p.task][1]:
+        gap, obstacle = (float(found.off.min()), Obstacle("point")) if missing else (0.0, None)
+        if not self.redundancies(p.task):
             return Candidates(q, np.empty((len(q), 0)), (), gap, obstacle)
+        if not self._rank[p.task][1]:
+            values, arcs = _any_first(p, q, found.open[0])
+            return Candidates(q, values, (arcs,), gap, obstacle)
         q[1:] = math.nan
         arcs = free_last(p, q)
         return Candidates(q, q[:, -1:].copy(), (arcs,), gap, obstacle)
@@ -122,7 +129,10 @@ class Pair2(ClosedForm):
         """Batch kernels that call the vectorised formulas."""
 
         def many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
-            out[:] = self._wrapped(configurations(self.geometry, self.geometry.seen(T), KEPT[POSE], near)[0])
+            g = self.geometry
+            for k in range(0, len(T), _CHUNK):
+                found = configurations(g, g.seen(T[k : k + _CHUNK]), KEPT[POSE], near, REACH)
+                out[k : k + _CHUNK] = self._wrapped(found.q)
 
         def one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
             finite = bool(np.isfinite(T).all())
@@ -150,3 +160,15 @@ class Pair2(ClosedForm):
         """The smallest singular value of the point's Jacobian that is not zero everywhere."""
         J = jacobian(self.robot, q)[:3]
         return those_within(within, by_jacobian(J, rank=self._rank[POSITION][0]))
+
+
+def _any_first(problem: SolverInput, q: Array, free: Flags) -> tuple[Array, Array]:
+    """Values of θ1 ``(rows, 1)`` and its intervals ``(k, 3)`` where it may have any value, in place.
+
+    It is the seed's, moved inside the limits.
+    """
+    low, high = problem.lower[0], problem.upper[0]
+    rows = np.flatnonzero(free & ~np.isnan(q[:, 0]))
+    values = np.full((len(q), 1), math.nan)
+    q[rows, 0] = values[rows, 0] = min(max(problem.seed[0], low), high)
+    return values, np.array([(i, low, high) for i in rows], dtype=np.float64).reshape(-1, 3)

@@ -6,15 +6,18 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kin.axes import frame_of, inverse, lines_of, perpendicular_to, size
 from kin.robot import Robot
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
+Flags = NDArray[np.bool_]
 _DECIDES = 1e-3  # of the arm's size: joint 2 moves the point enough to follow from it
 _POLISH = 4
-_GONE = 1e-2  # of the arm's size: a point that is missed by more is not reached
+GONE = 1e-2  # of the arm's size: a point that is missed by more is not reached, however rounded it is
+REACH = TOLERANCES.closure_position * 0.1  # metres, the same for an exact point
 _FLOOR = 4e-16  # of the largest entry: a floor for singular matrices
 _TINY = TOLERANCES.singular
 
@@ -75,11 +78,24 @@ def geometry_of(robot: Robot) -> Geometry:
     return Geometry(base, fixed, wave, turns, scale)
 
 
-def configurations(g: Geometry, seen: Array, kept: list[int], near: Array) -> tuple[Array, Array]:
-    """All configurations ``(N, rows, n)`` of targets as `seen`, and how far each misses the point in metres.
+class Found(NamedTuple):
+    """Configurations of N targets.
 
-    NaN where the point is out of reach. kept: which of point and directions the task keeps. What they leave free
-    is near ``(n,)``.
+    Attributes:
+        q: ``(N, rows, n)``, NaN where the point is out of reach.
+        off: ``(N, rows)``, how far each misses the point, in metres.
+        open: ``(N, rows)``, whether joint 1 may have any value: what the task keeps is on axis 1.
+    """
+
+    q: Array
+    off: Array
+    open: Flags
+
+
+def configurations(g: Geometry, seen: Array, kept: list[int], near: Array, gone: float) -> Found:
+    """All configurations of targets as `seen`, as far as they miss the point by no more than `gone` (metres).
+
+    kept: which of point and directions the task keeps. What they leave free is near ``(n,)``.
     """
     x, y, last = _second(g, seen, kept, near)
     seen = seen[:, None]
@@ -87,11 +103,22 @@ def configurations(g: Geometry, seen: Array, kept: list[int], near: Array) -> tu
     q = np.empty((*x.shape, len(g.turns)))
     if len(g.turns) == 2:
         q[..., 1] = last
-    q[..., 0] = _first(g, v, seen, kept, near)
+    q[..., 0], free = _first(g, v, seen, kept, near)
     _polish(g, q, seen, kept)
-    off = np.linalg.norm(_moved(g, q)[0][..., 0, :] - seen[..., 0, :], axis=-1)
-    q[off > _GONE] = math.nan
-    return q, off * g.scale
+    off = _off(g, q, seen)
+    if (off > REACH).any():
+        # The point comes first where the directions cannot be met as well.
+        at_point = q.copy()
+        _polish(g, at_point, seen, [0])
+        q = np.where((off > REACH)[..., None], at_point, q)
+        off = _off(g, q, seen)
+    q[~(off <= gone)] = math.nan
+    return Found(q, off, free)
+
+
+def _off(g: Geometry, q: Array, seen: Array) -> Array:
+    """How far configurations miss the point ``(N, rows)``, in metres."""
+    return np.asarray(np.linalg.norm(_moved(g, q)[0][..., 0, :] - seen[..., 0, :], axis=-1) * g.scale)
 
 
 def _second(g: Geometry, seen: Array, kept: list[int], near: Array) -> tuple[Array, Array, Array]:
@@ -169,20 +196,24 @@ def _turned(v: Array) -> Array:
     return np.stack([-v[..., 1], v[..., 0], np.zeros(v.shape[:-1])], axis=-1)
 
 
-def _first(g: Geometry, v: Array, seen: Array, kept: list[int], near: Array) -> Array:
-    """Joint 1 ``(N, rows)`` from where the point, or else the directions, are before it moves them, and after."""
+def _first(g: Geometry, v: Array, seen: Array, kept: list[int], near: Array) -> tuple[Array, Flags]:
+    """Joint 1 ``(N, rows)`` from where the point, or else the directions, are before it moves them, and after.
+
+    Where all of them are on axis 1 it is near[0], and the second result is True.
+    """
+    free = np.full(v.shape[:2], g.turns[0])
     if not g.turns[0]:
-        return np.asarray((seen[..., 0, 2] - v[..., 0, 2]) * g.scale)
+        return np.asarray((seen[..., 0, 2] - v[..., 0, 2]) * g.scale), free
     found = np.full(v.shape[:2], near[0])
-    left = np.ones(v.shape[:2], dtype=bool)
     for some in ([0], [k for k in kept if k]):
-        a, b = v[..., some, :2], np.broadcast_to(seen[..., some, :2], v[..., some, :2].shape)
-        sine = (a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]).sum(axis=-1)
-        cosine = (a * b).sum(axis=(-1, -2))
-        decides = left & (np.hypot(sine, cosine) > _TINY) & bool(some)
-        found = np.where(decides, np.arctan2(sine, cosine), found)
-        left &= ~decides
-    return found
+        if some:
+            a, b = v[..., some, :2], np.broadcast_to(seen[..., some, :2], v[..., some, :2].shape)
+            sine = (a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]).sum(axis=-1)
+            cosine = (a * b).sum(axis=(-1, -2))
+            decides = free & (np.linalg.norm(b, axis=(-1, -2)) > _TINY)
+            found = np.where(decides, np.arctan2(sine, cosine), found)
+            free &= ~decides
+    return found, free
 
 
 def _moved(g: Geometry, q: Array) -> tuple[Array, Array]:
@@ -221,4 +252,7 @@ def _polish(g: Geometry, q: Array, seen: Array, kept: list[int]) -> None:
         step = np.linalg.solve(H, (np.swapaxes(J, -1, -2) @ e[..., None]))[..., 0] * units
         there = np.where((least < _DECIDES)[..., None], q + step, q)
         left = np.linalg.norm((seen - _moved(g, there)[0])[..., kept, :].reshape(e.shape), axis=-1)
-        q[:] = np.where((left < least)[..., None], there, q)
+        better = left < least
+        if not better.any():
+            break
+        q[:] = np.where(better[..., None], there, q)

@@ -10,14 +10,12 @@ from kin.kernels.compile import jit
 from kin.solvers.canonical import signed_box
 from kin.solvers.common import NEAR, UNBOUNDED, clear, wrap
 from kin.solvers.contract import POSE
-from kin.solvers.planar import planar_free
-from kin.solvers.scara4 import held
+from kin.solvers.planar import LINKS, TOOL_X, TOOL_Y, held, planar_free
 from kin.transforms import Array
 
-# Layout of the parameter array: the first three rows of base⁻¹ and of the tool, as `held` reads them; the three
-# links; signs and offsets of the joints.
-BASE, TOOL, LINKS, SIGN, OFFSET, SIZE = 0, 12, 24, 27, 31, 35
-_TOOL_X, _TOOL_Y = TOOL + 3, TOOL + 7
+# Layout of the parameter array: base⁻¹ and the tool, see `kin.solvers.planar`; the three links; signs and offsets
+# of the joints.
+SIGN, OFFSET, SIZE = LINKS + 3, LINKS + 7, LINKS + 11
 
 
 @jit
@@ -33,7 +31,7 @@ def solve(
     box, angles = np.empty((3, 4)), np.empty(4)
     signed_box(near, lower, upper, params[SIGN:OFFSET], params[OFFSET:SIZE], box)
     x, y, _, psi = held(params, T, task)
-    c, s, p, q = math.cos(psi), math.sin(psi), params[_TOOL_X], params[_TOOL_Y]
+    c, s, p, q = math.cos(psi), math.sin(psi), params[TOOL_X], params[TOOL_Y]
     u, v = x - p * c + q * s, y - p * s - q * c
     a, b, last = params[LINKS], params[LINKS + 1], params[LINKS + 2]
     fixed = not math.isnan(value)

@@ -20,7 +20,8 @@ from kin.solvers.contract import (
     SolverInput,
 )
 from kin.solvers.names import Names, left_or_right, names_of, stance_of
-from kin.solvers.planar4.branches import BASE, OFFSET, SIGN, TOOL, branches_many, branches_one, solve
+from kin.solvers.planar import BASE, LINKS, TOOL
+from kin.solvers.planar4.branches import OFFSET, SIGN, branches_many, branches_one, solve
 from kin.solvers.singular import Singularity, by_jacobian, those_within
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -59,7 +60,7 @@ class Planar4(ClosedForm):
 
     def __init__(self, params: Array, upright: bool, robot: Robot) -> None:
         self.robot, self.params, self.upright = robot, params, upright
-        self.lengths = tuple(params[TOOL + 12 : SIGN].tolist())
+        self.lengths = tuple(params[LINKS:SIGN].tolist())
         self.kernels = BatchKernels(params, branches_one, branches_many)
         self.branches, self.meanings = self.names(robot, np.ones(robot.n))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -114,6 +115,58 @@ def test_a_last_joint_that_keeps_the_tool_is_free():
     assert len(kin.solve_ik(robot, T).solutions) == 1
 
 
+FOLDED = kin.Robot.from_dh([(0, 0, 1, 0), (0, 0, 1, 0)])
+FOLDED_ACROSS = kin.Robot.from_dh([(0, 0, 1, PI / 2), (0, 0, 1, 0)])
+POINTER = kin.Robot.from_dh([(0, 0.3, 0, PI / 2), (PI / 2, 0, 0, PI / 2)], tool=kin.from_xyz_rpy([0, 0, 0.2]))
+
+
+@pytest.mark.parametrize(
+    ("robot", "second", "task"),
+    [
+        (FOLDED, PI, "position"),
+        (FOLDED_ACROSS, PI, "position"),
+        (POINTER, PI / 2, "position"),
+        (POINTER, -PI / 2, "approach"),
+    ],
+)
+def test_a_point_on_axis_1_leaves_joint_1_free(robot, second, task):
+    T = kin.fk(robot, [0.5, second])
+    target = T[:3, 3] if task == "position" else T
+    result = kin.solve_ik(robot, target, task=task, q_seed=[1.7, 0.3])
+    assert (result.complete, result.details.infinite, result.details.free) == (True, True, ("θ1",))
+    assert result.best.q == pytest.approx((1.7, second), abs=1e-7)
+    assert result.redundancy[0].intervals == ((-PI, PI),)
+    narrow = kin.solve_ik(robot, target, task=task, q_seed=[1.7, 0.3], limits=[(-0.2, 0.4), None])
+    assert narrow.best.q == pytest.approx((0.4, second), abs=1e-7)
+    assert narrow.redundancy[0].intervals == ((-0.2, 0.4),)
+    assert not kin.solve_ik(robot, T).details.infinite
+    beside = kin.fk(robot, [0.5, second + 1e-3])
+    assert not kin.solve_ik(robot, beside[:3, 3], task="position").details.infinite
+
+
+def test_branches_of_two_joints_exist_at_reachable_points_only():
+    T = np.eye(4)
+    for x, exists in ((2.0, True), (2.0 + 1e-8, False), (2.015, False)):
+        T[0, 3] = x
+        assert np.isnan(kin.ik_branches(FOLDED, T)).all() != exists
+    tilted = kin.fk(OBLIQUE2, (0.4, -0.7)) @ kin.from_xyz_rpy([0, 0, 0], [1e-4, 0, 0])
+    rows = kin.ik_branches(OBLIQUE2, tilted)
+    (row,) = rows[~np.isnan(rows[:, 0])]
+    assert np.linalg.norm(kin.fk(OBLIQUE2, row)[:3, 3] - tilted[:3, 3]) < 1e-12
+
+
+def test_a_batch_of_two_joints_is_solved_in_chunks():
+    targets = kin.fk(OBLIQUE2, OBLIQUE2.random_q(np.random.default_rng(3), 2500))
+    kin.ik_branches(OBLIQUE2, targets[:1])
+    tracemalloc.start()
+    rows = kin.ik_branches(OBLIQUE2, targets)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 4e6
+    for k in (0, 1023, 1024, 2499):
+        assert np.array_equal(rows[k], kin.ik_branches(OBLIQUE2, targets[k]), equal_nan=True)
+
+
 def test_one_pose_of_two_joints_that_few_digits_miss():
     """What a rounded target misses is met within its precision."""
     q = np.array([0.4, -0.7])
@@ -171,6 +224,24 @@ def test_the_ranges_of_phi_leave_nothing_out():
             inside = any(low <= value <= high for low, high in result.redundancy[0].intervals)
             asked = kin.solve_ik(robot, T, redundancy={"phi": value})
             assert (asked.status is Status.SOLVED) == inside
+
+
+def test_the_end_of_the_reach_hides_no_posture():
+    """The range of φ that ends there is closed: nearest to the seed, both postures are there and stay apart."""
+    four = kin.Robot.from_dh([(0, 0, a, 0) for a in (0.4, 0.3, 0.2, 0.1)])
+    three = kin.Robot.from_dh([(0, 0, a, 0) for a in (0.4, 0.3, 0.2)])
+    rng = np.random.default_rng(0)
+    for q in ([-0.084988, 2.336927, 2.604261, -0.853229], *four.random_q(rng, 60)):
+        for robot, target, task in (
+            (four, kin.fk(four, q), "pose"),
+            (three, kin.fk(three, q[:3])[:3, 3], "position"),
+        ):
+            result = kin.solve_ik(robot, target, task=task)
+            assert {s.branch for s in result.solutions} == {"elbow left", "elbow right"}
+            for solution in result.solutions:
+                assert abs(math.sin(solution.q[1])) > 1e-5
+                for low, high in solution.redundancy[0].intervals:
+                    assert high - low > 1e-7
 
 
 def test_four_parallel_axes_and_a_name():
