@@ -103,7 +103,7 @@ def note(fact: Note, units: Units) -> str:
         case Slowed(segment, fraction, index, name, quantity, ratio, singularity):
             near = f", close to a singularity ({short(singularity, units)})" if singularity else ""
             return (
-                f"Segment {segment + 1} slows down to {100.0 * ratio:.0f} % of its usual speed at "
+                f"Segment {segment + 1} slows down to {100.0 * ratio:.2g} % of its usual speed at "
                 f"{100.0 * fraction:.0f} % of the way{near}: {joint(index, name)} is at its limit of {quantity}."
             )
         case JerkCost(first, last, duration, without):

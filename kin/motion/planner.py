@@ -331,7 +331,15 @@ def _refused_at(
     points = chain.poses(grid[grid >= low])[:, :3, 3]
     distance = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
     poses = chain.poses(np.linspace(0.0, high, 65))
-    helps = helps_for(plan.robot, poses, plan.q, plan.task, cause)
+
+    def can_follow(q: Array) -> bool:
+        try:
+            knots, pieces = followed(plan.robot, chain, q, CODES[plan.task], plan.stop)
+        except LostError:
+            return False
+        return limit_met(plan.robot, values(knots, pieces, np.linspace(0.0, float(knots[-1]), 999))) is None
+
+    helps = helps_for(plan.robot, poses, plan.q, plan.task, cause, can_follow)
     return plan.refused(layout.owners[0][0] + k, cause, details, helps, (fraction, distance))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -79,15 +80,20 @@ def lost(robot: Robot, T: Array, end: Array, before: Array, task: Task) -> tuple
     return "branch", BranchNeeded(branch_of(robot, before) if branch_names(robot) else None)
 
 
-def helps_for(robot: Robot, poses: Array, q: Array, task: Task, cause: Cause) -> tuple[Help, ...]:
-    """What would help on a path of poses ``(k, 4, 4)`` that cannot be driven from q ``(n,)``."""
+def helps_for(
+    robot: Robot, poses: Array, q: Array, task: Task, cause: Cause, can_follow: Callable[[Array], bool]
+) -> tuple[Help, ...]:
+    """What would help on a path of poses ``(k, 4, 4)`` that cannot be driven from q ``(n,)``.
+
+    `can_follow` says whether the path can be driven from a configuration.
+    """
     found: list[Help] = []
     end = solve_ik(robot, poses[-1], q_seed=q, task=task)
     if end.status is Status.SOLVED:
         found.append(Help("ptp"))
         some = np.unique(np.linspace(0, len(poses) - 1, _POSES).astype(int))
         path = solve_path(robot, poses[some], task=task)
-        if path.continuous and not path.gaps:
+        if path.continuous and not path.gaps and can_follow(path.q[0]):
             found.append(Help("posture", branch_of(robot, path.q[0]) if branch_names(robot) else None))
         elif cause in ("singularity", "branch"):
             found.append(Help("via"))

@@ -58,11 +58,12 @@ def slowdowns(
     """
     i, last = 0, joints.shape[0] - 1
     for c in range(clocks.shape[0]):
-        worst, p = 0.0, clocks[c]
-        r0, s0 = 0.0, p[0]
+        worst = 0.0
+        p0, p1, p2, p3 = clocks[c, 0], clocks[c, 1], clocks[c, 2], clocks[c, 3]
+        r0, s0 = 0.0, p0
         for m in range(points):
             r = (breaks[c + 1] - breaks[c]) * m / (points - 1.0)
-            s = p[0] + r * (p[1] + r * (p[2] + r * p[3]))
+            s = p0 + r * (p1 + r * (p2 + r * p3))
             while i > 0 and s < knots[i]:
                 i -= 1
             while i < last and s >= knots[i + 1]:
@@ -70,31 +71,35 @@ def slowdowns(
                 if m > 0 and s > s0:
                     crossed = min(max(r0 + (r - r0) * (knots[i] - s0) / (s - s0), r0), r)
                     for _ in range(2):
-                        v = p[1] + crossed * (2.0 * p[2] + crossed * 3.0 * p[3])
-                        ahead = p[0] + crossed * (p[1] + crossed * (p[2] + crossed * p[3])) - knots[i]
+                        v = p1 + crossed * (2.0 * p2 + crossed * 3.0 * p3)
+                        ahead = p0 + crossed * (p1 + crossed * (p2 + crossed * p3)) - knots[i]
                         crossed = min(max(crossed - ahead / v, r0), r) if v > 0.0 else crossed
                     h = knots[i] - knots[i - 1]
-                    worst = _worst(joints[i - 1], limits[i - 1], most[i - 1], h, p, crossed, worst)
-                    worst = _worst(joints[i], limits[i], most[i], 0.0, p, crossed, worst)
+                    at = (p1 + crossed * (2.0 * p2 + crossed * 3.0 * p3), 2.0 * p2 + 6.0 * crossed * p3, 6.0 * p3)
+                    worst = _worst(joints, limits, most, i - 1, h, at, worst)
+                    worst = _worst(joints, limits, most, i, 0.0, at, worst)
             d = min(max(s, knots[0]), knots[last + 1]) - knots[i]
-            worst = _worst(joints[i], limits[i], most[i], d, p, r, worst)
+            at = (p1 + r * (2.0 * p2 + r * 3.0 * p3), 2.0 * p2 + 6.0 * r * p3, 6.0 * p3)
+            worst = _worst(joints, limits, most, i, d, at, worst)
             r0, s0 = r, s
         out[c] = worst
 
 
 @jit
-def _worst(joints: Array, limits: Array, most: float, d: float, p: Array, r: float, worst: float) -> float:
-    """The larger of `worst` and the factor at one point: d from its knot on the path, r from its break in time."""
-    v, a, b = p[1] + r * (2.0 * p[2] + r * 3.0 * p[3]), 2.0 * p[2] + 6.0 * r * p[3], 6.0 * p[3]
-    worst = max(worst, abs(v) / math.sqrt(most))
-    for j in range(joints.shape[0]):
-        f1, f2, f3 = joints[j, 1], joints[j, 2], joints[j, 3]
+def _worst(
+    joints: Array, limits: Array, most: Array, i: int, d: float, at: tuple[float, float, float], worst: float
+) -> float:
+    """The larger of `worst` and the factor at one point: on interval i, d from its knot, with ṡ, s̈ and s⃛."""
+    v, a, b = at
+    worst = max(worst, abs(v) / math.sqrt(most[i]))
+    for j in range(joints.shape[1]):
+        f1, f2, f3 = joints[i, j, 1], joints[i, j, 2], joints[i, j, 3]
         d1, d2, d3 = f1 + d * (2.0 * f2 + d * 3.0 * f3), 2.0 * f2 + 6.0 * d * f3, 6.0 * f3
-        worst = max(worst, abs(d1 * v) / limits[j, 0])
-        part = abs(d2 * v * v + d1 * a) / limits[j, 1]
+        worst = max(worst, abs(d1 * v) / limits[i, j, 0])
+        part = abs(d2 * v * v + d1 * a) / limits[i, j, 1]
         if part > worst * worst:
             worst = math.sqrt(part)
-        part = abs(d3 * v * v * v + 3.0 * d2 * v * a + d1 * b) / limits[j, 2]
+        part = abs(d3 * v * v * v + 3.0 * d2 * v * a + d1 * b) / limits[i, j, 2]
         if part > worst * worst * worst:
             worst = part ** (1.0 / 3.0)
     return worst
