@@ -7,7 +7,7 @@
   const PATIENCE = 3000; // ms for an answer, then the next message is sent
   const LEFT = 400; // ms without focus until the table is written again, so that a click on a button finds it
   const PART = 16000; // bytes of a text in one message
-  const PART_OF_ZIP = 34500; // bytes of a zip in one message, which base64 makes a third longer
+  const PART_OF_ZIP = 16500; // bytes of a zip in one message, which base64 makes a third longer
 
   const part = (name) => document.querySelector(`[data-arm="${name}"]`);
   const cells = () => [...document.querySelectorAll("[data-arm] input[data-cell]")];
@@ -227,10 +227,12 @@
     if (zip) uploadZip(name, content, 0);
     else upload(name, content, 0);
   });
-  function uploadZip(name, bytes, from) {
+  let uploading = 0; // the upload that goes on: a newer one ends it
+  function uploadZip(name, bytes, from, number = ++uploading) {
+    if (number !== uploading) return;
     const to = Math.min(from + PART_OF_ZIP, bytes.length);
     const part = btoa(String.fromCharCode(...bytes.subarray(from, to)));
-    send(["upload"], [name, from === 0, to >= bytes.length, part, "base64"], () => { if (to < bytes.length) uploadZip(name, bytes, to); });
+    send(["upload"], [name, from === 0, to >= bytes.length, part, "base64", from], () => { if (to < bytes.length) uploadZip(name, bytes, to, number); });
   }
   /** The end of the part that begins at `from`: a short enough message, and no character is cut in two. */
   function endOfPart(text, from) {

@@ -20,6 +20,7 @@ MOST_OF_FILE = 24 * MB  # of one file that is read
 MOST_OF_URDF = MB
 MOST_RATIO = 200  # of unpacked to packed bytes, for files of a megabyte or more
 LONGEST_NAME = 300  # bytes
+DEEPEST = 20  # folders of a path that a URDF names
 FORMATS = (".stl", ".obj", ".dae", ".glb")
 _URDF = (".urdf", ".xml")
 _END, _LOCATOR, _END_SIZE = b"PK\x05\x06", b"PK\x06\x07", 22
@@ -54,7 +55,10 @@ class Archive:
         except Exception as error:  # noqa: BLE001 - a damaged list of files raises anything
             raise MeshError("zip", str(error) or type(error).__name__, "a zip that can be read") from None
         self._files: dict[str, zipfile.ZipInfo] = {}
-        for info in self._zip.infolist():
+        listed = self._zip.infolist()
+        if len(listed) > MOST_FILES:  # whatever number the zip states
+            raise MeshError("zip: files", f"{len(listed)} files", f"at most {MOST_FILES} files")
+        for info in listed:
             _check_entry(info)
             if not info.is_dir():
                 self._files[info.filename] = info
@@ -106,10 +110,11 @@ class Archive:
             beside = _joined(PurePosixPath(urdf).parent, wanted)
             if beside is not None and beside in self._files:
                 return beside
-        parts = tuple(part for part in parts if part not in ("..", "."))
+        parts = tuple(part for part in parts if part not in ("..", "."))[-DEEPEST:]
+        alike = [name for name in self._files if parts and name.rpartition("/")[2] == parts[-1]]
         for start in range(len(parts)):
             ending = "/".join(parts[start:])
-            found = [name for name in self._files if name == ending or name.endswith("/" + ending)]
+            found = [name for name in alike if name == ending or name.endswith("/" + ending)]
             if len(found) == 1:
                 return found[0]
             if found:

@@ -19,6 +19,7 @@ from app.viewer.meshes.archive import Archive, MeshError
 
 MEMORY = 640 * 1024 * 1024  # bytes
 SECONDS = 20  # of processor time
+SLACK = 1.4  # of the triangles to draw
 ALL = 1_500_000  # triangles of all files, before they are simplified
 
 
@@ -68,7 +69,13 @@ def answer_to(request: dict[str, Any], data: bytes) -> bytes:
         found[name] = surfaces
     share = min(1.0, request["most"] / max(drawn, 1))
     for name in files:
-        found[name] = [finished(surface, share) for surface in found[name]]
+        found[name] = [done for surface in found[name] if len((done := finished(surface, share)).faces)]
+        if not found[name]:
+            raise MeshError(f"mesh {name}", "no triangle with an area", "a mesh with triangles")
+    left = sum(uses * len(surface.faces) for name, uses in files.items() for surface in found[name])
+    if left > SLACK * request["most"]:  # what is no surface cannot be simplified
+        expected = f"meshes that can be simplified to {request['most']}"
+        raise MeshError("meshes: triangles to draw", f"{left}", expected)
     return pack(found, drawn)
 
 

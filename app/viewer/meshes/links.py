@@ -22,6 +22,8 @@ PLAIN: Rgb = (196, 201, 208)  # of what nothing gives a colour
 COLORS = 8  # of one link
 FARTHEST = 10.0  # times the reach of the arm: a mesh beyond is not in metres
 COVER = 150  # points of a link that are tested against pedestal and floor
+LOOKED_AT = 20_000  # points of a link among which these are chosen
+MOST_DRAWN = 120_000  # triangles of an arm, its boxes, cylinders and spheres included
 SAME = 1e-7  # of the reach, or rad: differences of two tables that describe one arm
 
 
@@ -43,9 +45,14 @@ def drawing_of(robot: Robot, visuals: Sequence[Visual], meshes: Meshes) -> Drawi
     poses = link_poses(robot, np.zeros((1, robot.n)))[0]
     links: list[list[Surface]] = [[] for _ in poses]
     size = max(robot.reach, 0.01)
+    drawn = 0
     for visual in visuals:
         T = inverse(poses[visual.carrier]) @ visual.T_root_visual
         for surface in _surfaces(visual.shape, visual.color, meshes):
+            drawn += len(surface.faces)
+            if drawn > MOST_DRAWN:
+                expected = f"at most {MOST_DRAWN} with all shapes"
+                raise MeshError("meshes: triangles to draw", f"more than {MOST_DRAWN}", expected)
             placed = _placed(surface, T)
             extent = float(np.abs(placed.points).max())
             if not extent <= FARTHEST * size:
@@ -104,10 +111,12 @@ def _cover(clouds: Sequence[Points]) -> Array:
     """Some points of the surfaces, spread evenly, as spheres ``(k, 4)`` without a radius."""
     if not clouds:
         return np.empty((0, 4))
-    points = np.vstack(clouds).astype(float)
+    points = np.vstack(clouds)
+    points = points[:: max(1, len(points) // LOOKED_AT)].astype(float)
     low, high = points.min(axis=0), points.max(axis=0)
     cell = float((high - low).max()) / 8.0 or 1.0
-    _, first = np.unique(np.floor((points - low) / cell).astype(np.int64), axis=0, return_index=True)
+    x, y, z = np.floor((points - low) / cell).astype(np.int64).T
+    _, first = np.unique((x << 32) | (y << 16) | z, return_index=True)
     chosen = points[np.sort(first)]
     chosen = chosen[:: max(1, len(chosen) // COVER)]
     return np.column_stack([chosen, np.zeros(len(chosen))])

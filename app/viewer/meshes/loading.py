@@ -165,6 +165,8 @@ def _color(mesh: Any) -> Rgb | None:
 def finished(surface: Surface, share: float) -> Surface:
     """The surface with at most about a share of its triangles, and its sharp edges sharp."""
     points, faces = _welded(surface.points, surface.faces)
+    if not len(faces):
+        return Surface(surface.color, points[:0], faces)
     if share < 1.0 and len(faces) > LEAST:
         points, faces = fast_simplification.simplify(
             points, faces.astype(np.int32), target_count=max(LEAST, int(share * len(faces)))

@@ -65,7 +65,9 @@ class MeshReader:
             if self._waiting >= MOST_WAITING:
                 raise MeshError("meshes", f"{self._waiting} requests are waiting", "another try in a moment")
             self._waiting += 1
-        return self._executor.submit(self._read, dict(files), source)
+        future = self._executor.submit(self._read, dict(files), source)
+        future.add_done_callback(lambda _: self._done())
+        return future
 
     def close(self) -> None:
         """End what is being read; returns at once."""
@@ -75,15 +77,15 @@ class MeshReader:
         if process is not None:
             process.kill()
 
+    def _done(self) -> None:
+        with self._lock:
+            self._waiting -= 1
+
     def _read(self, files: dict[str, int], source: bytes | Path) -> Meshes:
         request: dict[str, object] = {"files": files, "most": MOST_TRIANGLES}
         if isinstance(source, Path):
             request["folder"], source = str(source), b""
-        try:
-            found, triangles = unpack(list(files), self._answer(json.dumps(request).encode() + b"\n" + source))
-        finally:
-            with self._lock:
-                self._waiting -= 1
+        found, triangles = unpack(list(files), self._answer(json.dumps(request).encode() + b"\n" + source))
         size = sum(surface.size for surfaces in found.values() for surface in surfaces)
         try:
             return Meshes(found, triangles, self.memory.reserve(size))

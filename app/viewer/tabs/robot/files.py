@@ -64,6 +64,7 @@ class Incoming:
 
     def forget(self) -> None:
         """Drop what has arrived."""
+        self._name = ""
         self._parts: list[str | bytes] = []
         self._length = 0
         self._room = self._memory.reserve(0)
@@ -80,9 +81,16 @@ class Incoming:
             MeshError: the file is too large; its parts are forgotten.
             kin.InputError: not a part of a file.
         """
-        name, first, last, part = _part(value)
-        if first or (self._parts and type(part) is not type(self._parts[0])):
+        name, first, last, part, from_ = _part(value)
+        from_ = self._length if from_ is None else from_
+        if first:
             self.forget()
+            self._name = name
+        elif not self._parts:
+            return None  # the rest of a file that was refused
+        elif not self._follows(name, part, from_):
+            self.forget()
+            raise MeshError(f"{name}: part", "a part that does not follow the one before", "another try")
         self._parts.append(part)
         self._length += len(part)
         most = MOST if isinstance(part, str) else MOST_BYTES
@@ -102,15 +110,20 @@ class Incoming:
         self.forget()
         return name, content, room
 
+    def _follows(self, name: str, part: str | bytes, before: int) -> bool:
+        """Whether a part continues what has arrived."""
+        same = name == self._name and type(part) is type(self._parts[0])
+        return same and before == self._length
 
-def _part(value: object) -> tuple[str, bool, bool, str | bytes]:
-    """Name, whether it is the first and the last part, and content."""
+
+def _part(value: object) -> tuple[str, bool, bool, str | bytes, int | None]:
+    """Name, whether it is the first and the last part, content, and of a zip how much came before."""
     match value:
         case [str(name), bool(first), bool(last), str(part)] if part or last:
-            return cut(name), first, last, part
-        case [str(name), bool(first), bool(last), str(part), "base64"] if part or last:
+            return cut(name), first, last, part, None
+        case [str(name), bool(first), bool(last), str(part), "base64", int(before)] if part or last:
             try:
-                return cut(name), first, last, base64.b64decode(part, validate=True)
+                return cut(name), first, last, base64.b64decode(part, validate=True), before
             except (binascii.Error, ValueError):
                 pass
     raise InputError("upload", value, "name, whether it is the first part, the last part, and its text or base64")

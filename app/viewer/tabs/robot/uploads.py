@@ -48,6 +48,7 @@ class Uploads:
         self._incoming = Incoming(stage.meshes.memory)
         self._number = 0
         self._reading: _Reading | None = None
+        self._future: Future[Meshes] | None = None
         self.waiting: Source | None = None
         self.last: OwnArm | None = None
 
@@ -65,6 +66,13 @@ class Uploads:
         """The visitor has left."""
         self._incoming.forget()
         self.waiting = self._reading = None
+        self._cancel()
+
+    def _cancel(self) -> None:
+        """Meshes that wait to be read are not wanted any more."""
+        if self._future is not None:
+            self._future.cancel()
+            self._future = None
 
     def take(self, value: object) -> None:
         """A part of a file; raises `kin.KinematicsError`."""
@@ -100,6 +108,7 @@ class Uploads:
             raise RobotFileError(name, error.field, error.value, error.expected) from None
         self.last = own = replace(own, start=own.robot.id)
         self.waiting, self._reading = None, None
+        self._cancel()
         wrong = ""
         if is_urdf(source.text):
             try:
@@ -140,6 +149,7 @@ class Uploads:
             raise file_error(source.name, error) from None
         self._reading = reading
         future.add_done_callback(lambda done: self._post(key, done))
+        self._future = future
         return f"Its {len(uses)} meshes are being read."
 
     def use_meshes(self, number: int, done: object) -> None:
@@ -159,7 +169,7 @@ class Uploads:
         self._stage.redraw_body()
         words = f"{len(meshes.files)} meshes with {meshes.triangles} triangles"
         if meshes.triangles > MOST_TRIANGLES:
-            words += f", simplified to {MOST_TRIANGLES}"
+            words += f", simplified to about {MOST_TRIANGLES}"
         self._stage.notify(Notice("hand", f"The meshes of {reading.source.name} are shown", f"{words}. {HERE}"))
 
     def _draw(self, reading: _Reading, meshes: Meshes) -> None:

@@ -39,6 +39,10 @@ HOSTILE = {
     "method": (with_byte(GOOD, CENTRAL, 10, b"\x63"), "stored or deflated"),
     "zip64": (GOOD[:-22] + b"PK\x06\x07" + bytes(16) + GOOD[-22:], "a plain zip"),
     "list": (with_byte(GOOD, b"PK\x05\x06", 12, b"\xff\xff\xff\x7f"), f"at most {MOST_FILES} files"),
+    "count": (
+        with_byte(packed({f"{i}": "" for i in range(MOST_FILES + 1)}), b"PK\x05\x06", 10, b"\x01"),
+        f"at most {MOST_FILES} files",
+    ),
     "shifted": (with_byte(GOOD, CENTRAL, 42, b"\xff\xff\xff\x0f"), "a file that can be unpacked"),
     "longer": (with_byte(GOOD, CENTRAL, 24, b"\xff\xff\x0f\x00"), "at most 200 times"),
 }

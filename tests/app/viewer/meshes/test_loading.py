@@ -14,6 +14,7 @@ from zips import MTL, announced, obj, packed, robot_files
 
 from app.viewer.meshes import reader as readers
 from app.viewer.meshes.archive import MeshError
+from app.viewer.meshes.child import answer_to
 from app.viewer.meshes.loading import PARSED, finished, read_surfaces
 from app.viewer.meshes.reader import MOST_WAITING, MeshReader
 from app.viewer.meshes.surface import GREY, Surface, by_color, pack, unpack
@@ -212,3 +213,16 @@ except MemoryError:
     )
     assert done.stdout == "bounded\n", done.stderr
     assert "KINBOARD_TOKEN" in os.environ
+
+
+def test_what_cannot_be_drawn_or_simplified_is_refused(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    noise = rng.random((400, 3))[rng.integers(0, 400, (6000, 3))]  # no surface: most edges have many triangles
+    flat = trimesh.Trimesh(np.zeros((3, 3)), [[0, 1, 2]], process=False)
+    soup = trimesh.Trimesh(noise.reshape(-1, 3), np.arange(18_000).reshape(-1, 3), process=False)
+    for name, mesh in (("soup.stl", soup), ("flat.stl", flat)):
+        (tmp_path / name).write_bytes(mesh.export(file_type="stl"))
+    with pytest.raises(MeshError, match="to draw"):
+        answer_to({"files": {"soup.stl": 300}, "folder": str(tmp_path), "most": 80_000}, b"")
+    with pytest.raises(MeshError, match="area"):
+        answer_to({"files": {"flat.stl": 1}, "folder": str(tmp_path), "most": 80_000}, b"")

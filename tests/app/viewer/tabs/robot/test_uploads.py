@@ -22,7 +22,7 @@ def send(tab: FakeBrowser, name: str, data: bytes) -> None:
     for at in range(0, len(data), PART):
         tab._said = tab._said[-1:]  # as the page's script does: a message to the service has a limit
         piece = base64.b64encode(data[at : at + PART]).decode()
-        say(tab, "upload", value=[name, at == 0, at + PART >= len(data), piece, "base64"])
+        say(tab, "upload", value=[name, at == 0, at + PART >= len(data), piece, "base64", at])
 
 
 def meshes(tab: FakeBrowser) -> set[str]:
@@ -114,9 +114,12 @@ def test_a_bad_zip_changes_nothing_and_bad_meshes_leave_a_skeleton(port: int) ->
             assert words in html.unescape(tab.html), name
             assert "The arm is a skeleton" in tab.html
             assert not meshes(tab)
-        for value in (["x.zip", True, True, "%%%", "base64"], ["x.zip", True, True, "", "rot13"]):
+        for value in (["x.zip", True, True, "%%%", "base64", 0], ["x.zip", True, True, "", "rot13", 0]):
             say(tab, "upload", value=value)
             assert "Invalid input" in tab.html
+        for first, before in ((True, 0), (False, 7)):
+            say(tab, "upload", value=["x.zip", first, False, "UEs=", "base64", before])
+        assert "does not follow the one before" in tab.html
 
 
 def test_the_shapes_of_a_urdf_need_no_zip(port: int) -> None:
