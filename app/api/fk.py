@@ -9,11 +9,10 @@ from pydantic import Field
 from typing_extensions import TypedDict
 
 from app.api import schemas
-from app.api.arms.frames import FrameName, FramesBody
+from app.api.arms.frames import FrameName, WorkpiecesBody
 from app.api.arms.operation import operation
 from app.api.batches import Batch, one_or_all
 from app.api.body import versioned
-from app.api.problems import FieldError, invalid, show
 from app.api.schemas import (
     POST_REFUSALS,
     Configurations,
@@ -25,7 +24,7 @@ from app.api.work import Deadline, compute_slots, computed
 from app.shared.answers.document import documented
 from app.shared.answers.fk import FkAnswer, fk_answers
 from kin import Robot
-from kin.frames import BASE, TOOL, WORLD
+from kin.frames import WORLD
 from kin.transforms import Array
 
 POSE, FRAME = 570, 520  # bytes of a pose and of a frame, about
@@ -53,7 +52,7 @@ EXAMPLES = {
 }
 
 
-class FkRequest(FramesBody):
+class FkRequest(WorkpiecesBody):
     """Which configurations to put the arm in."""
 
     q: Configurations = Field(
@@ -73,9 +72,6 @@ class FkRequest(FramesBody):
 
     def axes(self, robot: Robot) -> Array | None:
         """T_world_frame ``(4, 4)`` of the requested frame; None: the world frame. Raises 422."""
-        if self.frame == TOOL:
-            expected = "one of " + ", ".join([WORLD, BASE, *self.workpieces])
-            raise invalid(FieldError(field="frame", value=show(self.frame), expected=expected))
         return None if self.frame == WORLD else self.pose_of(robot, self.frame, "frame")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import partial
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from fastapi import Request, Response
 from pydantic import BeforeValidator, Discriminator, Field, Tag
@@ -15,7 +15,7 @@ from app.api import schemas
 from app.api.arms.operation import operation
 from app.api.batches import Batch, one_or_all
 from app.api.body import versioned
-from app.api.options import PreciseBody, Target, single_or_list
+from app.api.options import Goal, PreciseBody, Target, single_or_list
 from app.api.problems import FieldError, invalid
 from app.api.schemas import (
     POST_REFUSALS,
@@ -88,6 +88,8 @@ EXAMPLES = {
 
 class IkRequest(PreciseBody):
     """Where the tool should go, and which solutions are returned."""
+
+    present: ClassVar[str] = "q_seed"
 
     target: Annotated[
         Annotated[Target, Tag("one")] | Annotated[list[Target], Field(min_length=1, fail_fast=True), Tag("many")],
@@ -169,17 +171,17 @@ def _solve(robot: Robot, body: IkRequest, settings: Settings, deadline: Deadline
     seeds = _seeds(robot, body, count, settings)
     targets, single = body.resolve_all(robot, body.target, settings, seeds)
 
-    options = {task: body.options(task) for task in {task for task, _ in targets}}
+    options = {task: body.options(task) for task in {goal.task for goal in targets}}
 
-    def answer(task: Task, T: Array, seed: Array | None) -> IkAnswer:
+    def answer(goal: Goal, seed: Array | None) -> IkAnswer:
         deadline.check()
-        return ik_answer(solve(robot, T, options[task], seed))
+        return ik_answer(solve(robot, goal.T, options[goal.task], seed, goal.rounding))
 
     def answers(some: slice) -> list[IkAnswer]:
-        return [answer(task, T, seed) for (task, T), seed in zip(targets[some], seeds[some], strict=True)]
+        return [answer(goal, seed) for goal, seed in zip(targets[some], seeds[some], strict=True)]
 
     with SOLVE_SECONDS.labels("rest").time():
-        size = _size(robot, body, options[targets[0][0]])
+        size = _size(robot, body, options[targets[0].task])
         batch = Batch("target", len(targets), single, size, _advice(body))
         return one_or_all(answers, batch, deadline)
 

@@ -8,7 +8,7 @@ A target is where the tool should go, in whichever form its sender has it. A pos
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import cycle
 from typing import Annotated, Literal
 
@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import Discriminator, Field, Tag
 
 from app.api import schemas
-from app.api.arms.frames import FrameName, FramesBody
+from app.api.arms.frames import FrameName, WorkpiecesBody
 from app.api.problems import FieldError, from_input_error, invalid
 from app.api.schemas import Number, Vector3, Vector4, numbers
 from app.shared.settings import Settings
@@ -41,9 +41,9 @@ class Target(schemas.Body):
 
     frame: FrameName | None = Field(
         None,
-        description="The frame in which this target is: world (by default), base (that of the first DH row), tool "
-        "(where the tool is at the present configuration, `q_seed` or `q_start`), or the name of one of "
-        "`workpieces`.",
+        description="The frame in which this target is: world (by default), base (that of the first DH row), the "
+        "name of one of `workpieces`, or tool: where the tool is at the present configuration, which is `q_seed` "
+        "(`q_start` of a path).",
         examples=["world"],
     )
 
@@ -134,7 +134,22 @@ BranchNames = Annotated[
 ]
 
 
-class OptionsBody(FramesBody):
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """A target that has been read.
+
+    Attributes:
+        task: what it asks for.
+        T: pose of the tool in the world frame ``(4, 4)``.
+        rounding: how rounded it is besides the entries of `T`: frames of the request, and the target in its own.
+    """
+
+    task: Task
+    T: Array
+    rounding: float = 0.0
+
+
+class OptionsBody(WorkpiecesBody):
     """Task, joint constraints, branch."""
 
     task: Task | None = Field(
@@ -179,7 +194,7 @@ class OptionsBody(FramesBody):
 
     def resolve_all(
         self, robot: Robot, target: Target | list[Target], settings: Settings, q: Sequence[Array | None] = (None,)
-    ) -> tuple[list[tuple[Task, Array]], bool]:
+    ) -> tuple[list[Goal], bool]:
         """`resolve` of one target or of each in a list, and whether it was one.
 
         All are read before anything is computed: a mistake in the last one costs nothing. Raises 413 for too many.
@@ -195,12 +210,16 @@ class OptionsBody(FramesBody):
         places = zip(target, present, range(len(target)), strict=False)
         return [self.resolve(robot, each, f"target[{i}]", at) for each, at, i in places], False
 
-    def resolve(self, robot: Robot, target: Target, field: str, q: Array | None = None) -> tuple[Task, Array]:
-        """The task, and the target's pose ``(4, 4)`` in the world frame; raises `ProblemError` naming `field`."""
+    def resolve(self, robot: Robot, target: Target, field: str, q: Array | None = None) -> Goal:
+        """The target in the world frame; raises `ProblemError` naming `field`."""
         task, T = self._in_its_frame(target, field)
-        if target.frame in (None, WORLD):
-            return task, T
-        return task, self.pose_of(robot, str(target.frame), f"{field}.frame", q) @ T
+        frame = target.frame or WORLD
+        if frame == WORLD:
+            return Goal(task, T, self.rounding(robot, frame, T) if self.constant_frames else 0.0)
+        T_world_frame, own = self.pose_of(robot, frame, f"{field}.frame", q), 0.0
+        if target.matrix is not None:
+            T, own = read_pose(T, POSE, f"{field}.matrix", always=robot.n < 6)
+        return Goal(task, T_world_frame @ T, own + self.rounding(robot, frame, T))
 
     def _in_its_frame(self, target: Target, field: str) -> tuple[Task, Array]:
         """The task, and the target's pose in its own frame.

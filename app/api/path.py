@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import ClassVar
 
 from fastapi import Request, Response
 from pydantic import Field
@@ -49,6 +50,8 @@ EXAMPLES = {
 class PathRequest(PreciseBody):
     """Where the tool should go, one waypoint after the other."""
 
+    present: ClassVar[str] = "q_start"
+
     targets: list[Target] = Field(
         description="The waypoints in order; all of them in a form that allows the same task.",
         min_length=1,
@@ -91,10 +94,12 @@ def _solve(robot: Robot, body: PathRequest, settings: Settings, deadline: Deadli
     if body.q_start is not None:
         q_start = schemas.as_configurations(robot, body.q_start, settings, "q_start")[0][0]
     targets = [body.resolve(robot, each, f"targets[{i}]", q_start) for i, each in enumerate(body.targets)]
-    task = targets[0][0]
-    for i, (other, _) in enumerate(targets):
-        if other != task:
+    task = targets[0].task
+    for i, goal in enumerate(targets):
+        if goal.task != task:
             expected = f"a target for task {task}, as the first one, or `task` for all of them"
-            raise invalid(FieldError(field=f"targets[{i}]", value=f"a target for task {other}", expected=expected))
-    poses = [T for _, T in targets]
-    return reply(path_answer(solve(robot, poses, body.options(task), q_start, body.max_step, deadline.check)))
+            value = f"a target for task {goal.task}"
+            raise invalid(FieldError(field=f"targets[{i}]", value=value, expected=expected))
+    poses, roundings = [goal.T for goal in targets], [goal.rounding for goal in targets]
+    options = body.options(task)
+    return reply(path_answer(solve(robot, poses, options, q_start, body.max_step, deadline.check, roundings)))

@@ -100,14 +100,23 @@ def solve_ik(
 
 
 def solve(
-    robot: Robot | str, target: ArrayLike, options: IKOptions | None = None, q_seed: ArrayLike | None = None
+    robot: Robot | str,
+    target: ArrayLike,
+    options: IKOptions | None = None,
+    q_seed: ArrayLike | None = None,
+    rounding: float = 0.0,
 ) -> IKResult:
     """`solve_ik` with all options in one value; None stands for the default options.
+
+    Args:
+        rounding: how rounded the numbers are from which `target` was computed, such as the pose of a workpiece. It
+            is added to the rounding that shows in the entries of the target.
 
     Raises:
         InputError: a malformed target or seed, or an option that does not fit the arm.
     """
-    return answer(IKProblem.of(robot_of(robot), target, _plain_options() if options is None else options, q_seed))
+    given = _plain_options() if options is None else options
+    return answer(IKProblem.of(robot_of(robot), target, given, q_seed, rounding))
 
 
 def branch_names(robot: Robot | str) -> tuple[str, ...]:

@@ -56,7 +56,7 @@ class IKProblem:
         redundancies: the redundancy parameters of the closed form in this task.
         values: one per redundancy parameter, NaN to let it be chosen.
         branches: the requested rows, None for all.
-        target_error: how far the target's rotation was from a rotation, if that matters; then it was made one.
+        target_error: how rounded the target is, if that matters; then its rotation was made one.
         stop: called now and then by long computations; raises to cancel them.
     """
 
@@ -82,8 +82,17 @@ class IKProblem:
     stop: Callable[[], None] = never_cancel
 
     @classmethod
-    def of(cls, robot: Robot, target: ArrayLike, options: IKOptions, q_seed: ArrayLike | None = None) -> IKProblem:
+    def of(
+        cls,
+        robot: Robot,
+        target: ArrayLike,
+        options: IKOptions,
+        q_seed: ArrayLike | None = None,
+        rounding: float = 0.0,
+    ) -> IKProblem:
         """The problem of a target ``(4, 4)`` (task ``"position"``: or a point ``(3,)``) and a seed ``(n,)``.
+
+        `rounding` counts in addition to that of the target's own entries.
 
         Raises:
             InputError: a malformed target or seed, or an option that does not fit the arm.
@@ -94,6 +103,7 @@ class IKProblem:
         problem = object.__new__(cls)
         T, error = read_pose(target, prepared.code, always=robot.n < 6)
         problem.__dict__.update(prepared.__dict__, T=T, seed=seed)
+        error += rounding
         if error > 0.0:
             problem.__dict__["target_error"] = error
             del problem.__dict__["requirement"]  # computed again from this error

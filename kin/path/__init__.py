@@ -99,11 +99,12 @@ def solve(
     q_start: ArrayLike | None = None,
     max_step: float = MAX_STEP,
     stop: Callable[[], None] = never_cancel,
+    roundings: Sequence[float] | None = None,
 ) -> PathResult:
     """`solve_path` with the options in one value.
 
     Of the options, those that choose among the solutions of one target (`images`, `prefer`, `max_solutions`) have
-    no effect: the path chooses.
+    no effect: the path chooses. `roundings` are one per target, each as in `kin.ik.solve`.
     """
     robot = robot_of(robot)
     if q_start is not None and robot.check_q(q_start, "q_start").ndim != 1:
@@ -112,7 +113,12 @@ def solve(
     step = _checked_step(max_step)
     poses = read_poses(listed(targets), problem.code, always=robot.n < 6)
     settings = PathSettings.of(problem, step, q_start is not None, len(poses))
-    waypoints = layered([replace(problem, T=T, target_error=error) for T, error in poses], settings.grid)
+    more = [0.0] * len(poses) if roundings is None else roundings
+    problems = [
+        replace(problem, T=T, target_error=error + rounding)
+        for (T, error), rounding in zip(poses, more, strict=True)
+    ]
+    waypoints = layered(problems, settings.grid)
     sequence = LayerSequence.of(settings, waypoints)
     q = np.full((len(waypoints), robot.n), math.nan)
     ends: list[DeadEnd] = []

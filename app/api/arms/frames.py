@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from functools import cached_property
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field, field_validator
@@ -12,10 +13,15 @@ from app.api.problems import FieldError, from_input_error, invalid, show
 from app.api.schemas import Vector3, Vector4, numbers
 from kin import InputError, Robot, frame_pose
 from kin.files.read import matrix_of
-from kin.frames import FRAMES, TOOL
-from kin.transforms import Array, as_transform
+from kin.frames import BASE, FRAMES, TOOL
+from kin.ik.options import MOST_METRES
+from kin.ik.problem import read_pose
+from kin.solvers.contract import POSE
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
 
 MOST_WORKPIECES = 32
+MOST_ROUNDED = MOST_METRES / 2.0  # of frames: what it lets count as no error is at most what may be requested
 
 FrameName = Annotated[str, Field(min_length=1, max_length=40)]
 
@@ -31,15 +37,18 @@ class ConstantFrame(schemas.Body):
         None, description="4×4 homogeneous transform, row by row, instead; positions in metres."
     )
 
-    def resolve(self, field: str) -> Array:
-        """The transform ``(4, 4)``; raises 422 naming `field`."""
+    def resolve(self, field: str) -> tuple[Array, float]:
+        """The transform ``(4, 4)``, and how rounded its matrix is, as `kin.ik.problem.read_pose` says it.
+
+        Raises 422 naming `field`.
+        """
         try:
             if self.matrix is None:
                 zero = [0.0, 0.0, 0.0]
-                return np.array(matrix_of(self.xyz or zero, self.rpy or zero))
+                return np.array(matrix_of(self.xyz or zero, self.rpy or zero)), 0.0
             if self.xyz is not None or self.rpy is not None:
                 raise InputError(f"{field}.matrix", "a matrix besides xyz or rpy", "one of the two")
-            return as_transform(self.matrix, f"{field}.matrix")
+            return read_pose(self.matrix, POSE, f"{field}.matrix", always=True)
         except InputError as error:
             raise invalid(from_input_error(error)) from None
 
@@ -58,6 +67,27 @@ class FramesBody(schemas.Body):
         description="Pose of your tool (TCP) in the tool frame of the arm: all poses are those of your tool.",
     )
 
+    @cached_property
+    def constant_frames(self) -> dict[str, tuple[Array, float]]:
+        """`ConstantFrame.resolve` of each frame of this request, by field; read once. Raises 422."""
+        given = {"base": self.base, "tool": self.tool}
+        return {field: frame.resolve(field) for field, frame in given.items() if frame is not None}
+
+    def framed(self, robot: Robot) -> Robot:
+        """The arm with this base and tool; raises 422, whichever frame of this request is invalid."""
+        frames = self.constant_frames
+        if "base" in frames:
+            robot = robot.with_base(frames["base"][0] @ robot.T_world_base)
+        if "tool" in frames:
+            robot = robot.with_tool(robot.T_last_tool @ frames["tool"][0])
+        return robot
+
+
+class WorkpiecesBody(FramesBody):
+    """The same with frames in which poses may be stated."""
+
+    present: ClassVar[str] = ""  # the field that says where the tool is; none: its frame cannot be named
+
     workpieces: Annotated[dict[FrameName, ConstantFrame], Field(max_length=MOST_WORKPIECES)] = Field(
         {},
         description="Frames of your own by name, such as a table or a fixture, each with its pose in the world "
@@ -74,6 +104,12 @@ class FramesBody(schemas.Body):
                 raise ValueError("names that are not empty, and not " + ", ".join(FRAMES))
         return value
 
+    @cached_property
+    def constant_frames(self) -> dict[str, tuple[Array, float]]:
+        """The same with ``workpieces.NAME``."""
+        fields = {f"workpieces.{name}": frame for name, frame in self.workpieces.items()}
+        return super().constant_frames | {field: frame.resolve(field) for field, frame in fields.items()}
+
     def pose_of(self, robot: Robot, frame: str, field: str, q: Array | None = None) -> Array:
         """T_world_frame ``(4, 4)`` of a frame of this request; raises 422 naming `field`.
 
@@ -81,21 +117,28 @@ class FramesBody(schemas.Body):
             robot: the arm, with the base and tool of this request.
             q: the present configuration, for the frame of the tool.
         """
-        known = {}
         if frame in self.workpieces:
-            known = {frame: self.workpieces[frame].resolve(f"workpieces.{frame}")}
-        elif frame not in FRAMES:
-            expected = "one of " + ", ".join([*FRAMES, *self.workpieces])
+            return self.constant_frames[f"workpieces.{frame}"][0]
+        fixed = [name for name in FRAMES if name != TOOL or self.present]
+        if frame not in fixed:
+            expected = "one of " + ", ".join([*fixed, *self.workpieces])
             raise invalid(FieldError(field=field, value=show(frame), expected=expected))
         if frame == TOOL and q is None:
-            expected = "`q_seed` (`q_start` of a path) as well, which says where the tool is"
+            expected = f"`{self.present}` as well, which says where the tool is"
             raise invalid(FieldError(field=field, value=show(frame), expected=expected))
-        return frame_pose(robot, frame, known, q)
+        return frame_pose(robot, frame, q=q)
 
-    def framed(self, robot: Robot) -> Robot:
-        """The arm with this base and tool; raises 422."""
-        if self.base is not None:
-            robot = robot.with_base(self.base.resolve("base") @ robot.T_world_base)
-        if self.tool is not None:
-            robot = robot.with_tool(robot.T_last_tool @ self.tool.resolve("tool"))
-        return robot
+    def rounding(self, robot: Robot, frame: str, T: Array) -> float:
+        """How much the rounded frames of this request blur a pose ``(4, 4)`` in one of its frames.
+
+        As in `kin.ik.solve`, and where the entries of a target would count. The farther from a frame, the more its
+        rotation moves a point.
+        """
+        blur = 0.0
+        for field, (pose, error) in self.constant_frames.items():
+            if error > (0.0 if robot.n < 6 else TOLERANCES.rotation_matrix):
+                if field == "tool":
+                    blur += error * (1.0 + float(np.linalg.norm(pose[:3, 3])))
+                elif field == f"workpieces.{frame}" or (field == "base" and frame not in (BASE, TOOL)):
+                    blur += error * (1.0 + float(np.linalg.norm(T[:3, 3])))
+        return min(blur, MOST_ROUNDED)

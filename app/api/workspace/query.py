@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from typing import Annotated, Any, TypeVar, get_origin
 
 from pydantic import BeforeValidator, Field, ValidationError, WithJsonSchema
@@ -18,6 +19,10 @@ from kin.workspace import Measure, Strategy
 
 _FIELD_OF_CORE = {"limits": "limit", "locked": "lock"}
 _SEEDS = 1 << 64
+_LONGEST = 200  # characters of an entry
+
+# Numbers of an entry: a text with colons, or in JSON a list.
+Entry = str | Sequence[float]
 
 NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 
@@ -31,21 +36,52 @@ def _pattern(values: int) -> str:
     return rf"^[0-9]+(:{NUMBER}){{{values}}}$"
 
 
-def listed(pattern: str, count: int) -> Any:
-    """A text of numbers separated by colons that JSON may also hold as a list of `count` numbers."""
+def listed(pattern: str, form: str, *, joint: bool = True) -> Any:
+    """A text of numbers separated by colons that JSON may also hold as a list of numbers.
 
-    def joined(value: object) -> object:
-        if not isinstance(value, list) or not all(type(item) in (int, float) for item in value):
-            return value
-        return ":".join(str(int(item)) if float(item).is_integer() else repr(item) for item in value)
+    Args:
+        pattern: of the text.
+        form: of the text, in words; that of a list has the same parts.
+        joint: whether the first number counts joints.
+    """
+    count = form.count(":") + 1
+
+    def checked(value: object) -> object:
+        if isinstance(value, list) or (isinstance(value, str) and re.fullmatch(pattern, value[: _LONGEST + 1])):
+            found = numbers_of(value)
+            if len(found) == count and all(map(math.isfinite, found)) and not (joint and found[0] % 1.0):
+                return value
+        raise ValueError(f"{form} or {_as_list(form)}, numbers up to {LARGEST:g}")
 
     numbers = {"type": "array", "items": {"type": "number"}, "minItems": count, "maxItems": count}
-    text = {"type": "string", "maxLength": 200, "pattern": pattern}
-    return Annotated[
-        str, Field(max_length=200), BeforeValidator(joined), WithJsonSchema({"anyOf": [text, numbers]})
-    ]
+    text = {"type": "string", "maxLength": _LONGEST, "pattern": pattern}
+    return Annotated[Any, BeforeValidator(checked), WithJsonSchema({"anyOf": [text, numbers]})]
 
 
+def numbers_of(entry: Sequence[object]) -> tuple[float, ...]:
+    """The numbers of an entry; NaN for whatever is no number, or implausibly large."""
+    if isinstance(entry, str):
+        return tuple(map(_number, entry[: _LONGEST + 1].split(":")))
+    plain = [type(item) in (int, float) and abs(item) <= LARGEST for item in entry]  # type: ignore[arg-type]
+    return tuple(float(item) if ok else math.nan for item, ok in zip(entry, plain, strict=True))  # type: ignore[arg-type]
+
+
+def _number(text: str) -> float:
+    value = float(text) if re.fullmatch(NUMBER, text) else math.nan
+    return value if abs(value) <= LARGEST else math.nan
+
+
+def _as_list(form: str) -> str:
+    """``"JOINT:VALUE"`` → ``"[joint, value]"``."""
+    return f"[{form.lower().replace(':', ', ')}]"
+
+
+def form_of(entry: Entry, form: str) -> str:
+    """The form that a valid entry of this kind has."""
+    return form if isinstance(entry, str) else _as_list(form)
+
+
+_LIMIT, _LOCK = "JOINT:LOWER:UPPER", "JOINT:VALUE"
 _MANY = Field(max_length=100)
 
 
@@ -55,7 +91,7 @@ class RegionQuery(Body):
     @classmethod
     def in_json(cls) -> dict[str, Any]:
         """In JSON, each entry may be a list of numbers."""
-        items = {"limit": listed(_pattern(2), 3), "lock": listed(_pattern(1), 2)}
+        items = {"limit": listed(_pattern(2), _LIMIT), "lock": listed(_pattern(1), _LOCK)}
         return {name: Annotated[list[item], _MANY] for name, item in items.items()}  # type: ignore[valid-type]
 
     limit: Annotated[list[Annotated[str, _joint_values(2)]], _MANY] = Field(
@@ -73,8 +109,8 @@ class RegionQuery(Body):
 
     def constraints(self, robot: Robot) -> JointConstraints:
         """Limits and locks as the core takes them; raises 422 naming the invalid one."""
-        pairs, limit_at = _per_joint(robot, "limit", self.limit, 2)
-        values, lock_at = _per_joint(robot, "lock", self.lock, 1)
+        pairs, limit_at = _per_joint(robot, "limit", self.limit, _LIMIT)
+        values, lock_at = _per_joint(robot, "lock", self.lock, _LOCK)
         limits = tuple((p[0], p[1]) if p else None for p in pairs) if self.limit else None
         locked = tuple(v[0] if v else None for v in values) if self.lock else None
         try:
@@ -120,7 +156,7 @@ class CloudQuery(RegionQuery):
         """The cloud; raises 422 naming the invalid parameter."""
         if self.n > settings.max_points:
             most = settings.max_points
-            wrong = FieldError(field="n", value=str(self.n), expected=f"a whole number from 1 to {most}")
+            wrong = FieldError(field="n", value=show(self.n), expected=f"a whole number from 1 to {most}")
             raise invalid(
                 wrong,
                 hint="Request several clouds with different seeds; the operator can raise KINBOARD_MAX_POINTS.",
@@ -158,28 +194,21 @@ def _is_list(annotation: Any) -> bool:
 
 
 def _per_joint(
-    robot: Robot, field: str, given: list[str], count: int
-) -> tuple[list[list[float] | None], dict[int, int]]:
-    """``3:0.2`` and the like as `count` values for each joint, and the position of each joint in the list."""
-    entries: list[list[float] | None] = [None] * robot.n
+    robot: Robot, field: str, given: Sequence[Entry], form: str
+) -> tuple[list[tuple[float, ...] | None], dict[int, int]]:
+    """Entries such as ``3:0.2`` as values for each joint, and the position of each joint in the list."""
+    entries: list[tuple[float, ...] | None] = [None] * robot.n
     places: dict[int, int] = {}
-    form = "JOINT:VALUE" if count == 1 else "JOINT:LOWER:UPPER"
-    for k, text in enumerate(given):
-        joint, *parts = text.split(":")
-        values = [number(part) for part in parts]
-        known = joint.isdecimal() and joint.isascii() and 1 <= int(joint) <= robot.n
-        if not known or len(values) != count or not all(map(math.isfinite, values)):
-            expected = f"{form}, a joint from 1 to {robot.n} and values in radians (metres)"
-            raise invalid(FieldError(field=f"{field}[{k}]", value=show(text), expected=expected))
+    for k, entry in enumerate(given):
+        joint, *values = numbers_of(entry) or (math.nan,)
+        counted = not isinstance(entry, str) or re.match("[0-9]+:", entry)
+        known = counted and joint % 1.0 == 0.0 and 1.0 <= joint <= robot.n
+        if not known or len(values) != form.count(":") or not all(map(math.isfinite, values)):
+            expected = f"{form_of(entry, form)}, a joint from 1 to {robot.n} and values in radians (metres)"
+            raise invalid(FieldError(field=f"{field}[{k}]", value=show(entry), expected=expected))
         i = int(joint) - 1
         if i in places:
             expected = f"each joint once; {field}[{places[i]}] is for the same joint"
-            raise invalid(FieldError(field=f"{field}[{k}]", value=show(text), expected=expected))
-        entries[i], places[i] = values, k
+            raise invalid(FieldError(field=f"{field}[{k}]", value=show(entry), expected=expected))
+        entries[i], places[i] = tuple(values), k
     return entries, places
-
-
-def number(text: str) -> float:
-    """A number; NaN if it is not one or implausibly large."""
-    value = float(text) if re.fullmatch(NUMBER, text) else math.nan
-    return value if abs(value) <= LARGEST else math.nan

@@ -14,16 +14,15 @@ from typing_extensions import TypedDict
 
 from app.api.arms.operation import operation
 from app.api.body import versioned
-from app.api.options import OptionsBody, Target, single_or_list
+from app.api.options import Goal, OptionsBody, Target, single_or_list
 from app.api.problems import Problem, ProblemError
 from app.api.schemas import POST_REFUSALS, example, reply, settings_of
 from app.api.work import Deadline, DeadlineDep
 from app.api.workspace.streaming import ComputedResponse
 from app.shared.answers.document import documented
 from app.shared.answers.ik import ReachableAnswer, reachable_answer
-from kin import Robot, Task
+from kin import Robot
 from kin.ik import solve
-from kin.transforms import Array
 
 router = versioned("workspace")
 
@@ -99,14 +98,12 @@ def reachable(
     return ComputedResponse(pieces, "reachable", "application/json", place=deadline.place)
 
 
-def _answers(robot: Robot, body: ReachableRequest, targets: list[tuple[Task, Array]]) -> list[ReachableAnswer]:
-    options = {task: replace(body.options(task), max_solutions=1) for task, _ in targets}
-    return [reachable_answer(solve(robot, T, options[task])) for task, T in targets]
+def _answers(robot: Robot, body: ReachableRequest, targets: list[Goal]) -> list[ReachableAnswer]:
+    options = {goal.task: replace(body.options(goal.task), max_solutions=1) for goal in targets}
+    return [reachable_answer(solve(robot, goal.T, options[goal.task], rounding=goal.rounding)) for goal in targets]
 
 
-def _pieces(
-    robot: Robot, body: ReachableRequest, targets: list[tuple[Task, Array]], deadline: Deadline
-) -> Generator[bytes]:
+def _pieces(robot: Robot, body: ReachableRequest, targets: list[Goal], deadline: Deadline) -> Generator[bytes]:
     """``{"results": [...]}`` in pieces, with the problem if not all were computed in time."""
     for start in range(0, len(targets), AT_ONCE):
         try:

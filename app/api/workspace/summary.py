@@ -15,7 +15,7 @@ from app.api.body import versioned
 from app.api.problems import FieldError, invalid, show
 from app.api.schemas import refusals, reply
 from app.api.work import TooSlowError, busy, compute_slots
-from app.api.workspace.query import NUMBER, RegionQuery, listed, number
+from app.api.workspace.query import NUMBER, RegionQuery, form_of, listed, numbers_of
 from app.shared.answers.workspace import WorkspaceAnswer, workspace_answer
 from app.shared.computations import TooManyPendingError
 from app.shared.summaries import Plane, Summaries
@@ -25,7 +25,7 @@ GOES_ON = "The computation goes on: repeat the request later, or request less"
 
 router = versioned("workspace")
 
-_PLANE = rf"^{NUMBER}(:{NUMBER}){{5}}$"
+_PLANE, _FORM = rf"^{NUMBER}(:{NUMBER}){{5}}$", "X:Y:Z:NX:NY:NZ"
 
 
 class SummaryQuery(RegionQuery):
@@ -51,15 +51,15 @@ class SummaryQuery(RegionQuery):
     @classmethod
     def in_json(cls) -> dict[str, Any]:
         """In JSON, the plane may be a list of numbers."""
-        return {**super().in_json(), "plane": listed(_PLANE, 6) | None}
+        return {**super().in_json(), "plane": listed(_PLANE, _FORM, joint=False) | None}
 
     def cut(self) -> Plane | None:
         """Point and normal of the plane; raises 422."""
         if self.plane is None:
             return None
-        values = tuple(map(number, self.plane.split(":")))
+        values = numbers_of(self.plane)
         if len(values) != 6 or not all(map(math.isfinite, values)) or not any(values[3:]):
-            expected = "X:Y:Z:NX:NY:NZ, a point in metres and a normal that is not zero"
+            expected = f"{form_of(self.plane, _FORM)}, a point in metres and a normal that is not zero"
             raise invalid(FieldError(field="plane", value=show(self.plane), expected=expected))
         return values[:3], values[3:]
 

@@ -20,6 +20,10 @@ from numba.core.dispatcher import Dispatcher
 
 import kin
 from app.api.arms.description import _SCHEMA, DEFAULTS, EXAMPLE
+from app.api.arms.frames import ConstantFrame
+from app.api.workspace.capability import CapabilityQuery
+from app.api.workspace.query import CloudQuery
+from app.api.workspace.summary import SummaryQuery
 
 FILES = Path(__file__).parents[2] / "data" / "urdf"
 PIONEER = kin.get_robot("pioneer5")
@@ -425,6 +429,7 @@ def test_names_of_workpieces_are_their_own(client, name):
     assert post(client, "robots/ur5/ik", body, 422)["errors"][0]["field"].startswith("workpieces")
 
 
+CRUDE = T_TABLE.round(1).tolist()
 TWISTED = {"a": {"xyz": [0, 0, 0], "matrix": np.eye(4).tolist()}}
 
 
@@ -434,15 +439,138 @@ TWISTED = {"a": {"xyz": [0, 0, 0], "matrix": np.eye(4).tolist()}}
         ("ik", {"target": {**POSE, "frame": "desk"}}, "target.frame", "world, base, tool, table"),
         ("ik", {"target": [POSE, {**POSE, "frame": ""}]}, "target[1].frame", ""),
         ("ik", {"target": {**POSE, "frame": "tool"}}, "target.frame", "q_seed"),
-        ("reachable", {"target": {**POSE, "frame": "tool"}}, "target.frame", "q_seed"),
+        ("reachable", {"target": {**POSE, "frame": "tool"}}, "target.frame", "one of world, base, table"),
         ("ik/path", {"targets": [POSE, {**POSE, "frame": "tool"}]}, "targets[1].frame", "q_start"),
         ("fk", {"q": SIX, "frame": "tool"}, "frame", "one of world, base, table"),
-        ("fk", {"q": SIX, "frame": "desk"}, "frame", "world, base, tool, table"),
+        ("fk", {"q": SIX, "frame": "desk"}, "frame", "one of world, base, table"),
+        ("fk", {"q": SIX, "workpieces": TWISTED}, "workpieces.a.matrix", "one of the two"),
+        ("ik", {"target": POSE, "workpieces": {"a": {"matrix": CRUDE}}}, "workpieces.a.matrix", "orthonormal"),
+        ("ik", {"target": POSE, "base": {"matrix": CRUDE}}, "base.matrix", "orthonormal"),
         ("fk", {"q": SIX, "frame": "a", "workpieces": TWISTED}, "workpieces.a.matrix", "one of the two"),
         ("ik", {"target": POSE, "workpieces": {str(k): {} for k in range(33)}}, "workpieces", "32"),
     ],
 )
 def test_a_frame_that_is_none_is_refused_by_name(client, operation, body, field, valid):
     problem = post(client, f"robots/ur5/{operation}", {"workpieces": {"table": TABLE}, **body}, 422)
-    assert problem["errors"][0]["field"] == field
+    assert problem["errors"][0]["field"].startswith(field)
     assert valid in problem["errors"][0]["expected"]
+    others = {"ik": "q_start", "ik/path": "q_seed"}
+    assert others.get(operation, "q_") not in problem["errors"][0]["expected"], "only fields it has"
+
+
+def test_workpieces_are_for_operations_with_targets_or_poses(client):
+    body = {"q": SIX, "workpieces": {"table": TABLE}}
+    assert post(client, "robots/ur5/jacobian", body, 422)["errors"][0]["field"] == "workpieces"
+
+
+def test_frames_are_read_once_for_all_targets(client, monkeypatch):
+    read = []
+    resolve = ConstantFrame.resolve
+    monkeypatch.setattr(ConstantFrame, "resolve", lambda self, field: read.append(field) or resolve(self, field))
+    target = {"position": [0.1, 0.1, 0.1], "frame": "table"}
+    body = {"target": [target] * 20, "workpieces": {"table": TABLE, "desk": STAND}, "base": STAND}
+    post(client, "robots/ur5/reachable", body)
+    assert read == ["base", "workpieces.table", "workpieces.desk"]
+
+
+DOWN = PIONEER.q_home + 0.1
+
+
+@pytest.mark.parametrize("digits", [6, 4, 3])
+@pytest.mark.parametrize("field", ["workpieces", "base", "tool"])
+def test_rounded_frames_are_read_as_rounded_targets_are(client, field, digits):
+    """The target is exact in the exact frame; in the rounded one, five joints meet it as its digits say."""
+    T = T_TABLE.round(digits)
+    frame = {"matrix": T.tolist()}
+    tool = kin.fk(PIONEER, DOWN)
+    exact, asked = {
+        "workpieces": (np.linalg.solve(T_TABLE, tool), {"workpieces": {"table": frame}}),
+        "base": (T_TABLE @ tool, {"base": frame}),
+        "tool": (tool @ T_TABLE, {"tool": frame}),
+    }[field]
+    name = "table" if field == "workpieces" else "world"
+    asked |= {"task": "pose"}
+    target = {"matrix": exact.tolist(), "frame": name}
+    answer = post(client, "robots/pioneer5/ik", {"target": target, "q_seed": DOWN.tolist(), **asked})
+    assert answer["status"] == "solved", answer["reason"]
+    assert 10.0**-digits <= answer["tolerances"]["target_error"] < 30.0 * 10.0**-digits
+    assert "The target is rounded" in answer["reason"]
+    assert post(client, "robots/pioneer5/reachable", {"target": [target], **asked})["results"][0]["reachable"]
+    path = post(client, "robots/pioneer5/ik/path", {"targets": [target], "q_start": DOWN.tolist(), **asked})
+    assert path["tolerances"] == answer["tolerances"]
+    del asked["task"]
+    pose = post(client, "robots/pioneer5/fk", {"q": DOWN.tolist(), **asked, "frame": name})["pose"]
+    assert np.allclose(pose["matrix"], exact, atol=3.0 * 10.0**-digits)
+
+
+def test_a_rounded_frame_counts_only_where_it_matters(client):
+    """Six joints meet any pose, so rounding that a target may have counts neither there nor in other frames."""
+    coarse, fine = ({"matrix": T_TABLE.round(digits).tolist()} for digits in (3, 8))
+    pose = {"position": [0.1, 0.1, 0.3], "wxyz": [0, 1, 0, 0]}
+    for frame, other, rounded in (("table", coarse, True), ("table", fine, False), ("world", coarse, False)):
+        body = {"target": {**pose, "frame": frame}, "workpieces": {"table": other}}
+        assert ("tolerances" in post(client, "robots/ur5/ik", body)) == rounded
+    body = {"target": {**pose, "frame": "base"}, "base": coarse}
+    assert "tolerances" not in post(client, "robots/ur5/ik", body), "the base cancels out"
+    far = {"target": {"position": [1e5, 0, 0], "frame": "table"}, "workpieces": {"table": coarse}}
+    assert post(client, "robots/ur5/ik", far)["tolerances"]["position"] <= 0.1
+
+
+# Numbers of queries as lists
+
+HUGE = 10**400
+SPHERE = {"volume": False, "robot": EXAMPLE}
+
+
+@pytest.mark.parametrize("path", ["workspace", "capability", "workspace/summary"])
+def test_a_huge_integer_is_refused_everywhere(client, path):
+    model = {"workspace": CloudQuery, "capability": CapabilityQuery, "workspace/summary": SummaryQuery}[path]
+    lengths = {"limit": 3, "lock": 2, "plane": 6}
+    assert set(model.in_json()) <= set(lengths)
+    for name in model.model_fields:
+        numbers = [[1, 0, 0, 0, 0, 1][: lengths.get(name, 1)] for _ in range(lengths.get(name, 1))]
+        for k, row in enumerate(numbers):
+            row[k] = HUGE
+        values = numbers if name == "plane" else [[row] for row in numbers] if name in lengths else []
+        for value in [HUGE, [HUGE], *values]:
+            problem = post(client, path, {"robot": EXAMPLE, name: value}, 422)
+            assert problem["errors"][0]["field"].startswith(name)
+            assert len(problem["detail"]) < 500
+
+
+LISTS = "JOINT:LOWER:UPPER or [joint, lower, upper]"
+
+
+@pytest.mark.parametrize(
+    ("body", "field", "value", "expected"),
+    [
+        ({"limit": [1, 0, 1]}, "limit[0]", "1", LISTS),
+        ({"limit": [["1", 0, 1]]}, "limit[0]", '["1", 0, 1]', LISTS),
+        ({"limit": [[1, 0]]}, "limit[0]", "[1, 0]", LISTS),
+        ({"limit": [[]]}, "limit[0]", "[]", LISTS),
+        ({"limit": [[True, 0, 1]]}, "limit[0]", "[true, 0, 1]", LISTS),
+        ({"limit": [[1.5, 0, 1]]}, "limit[0]", "[1.5, 0, 1]", LISTS),
+        ({"limit": [None]}, "limit[0]", "null", LISTS),
+        ({"limit": ["1:0"]}, "limit[0]", '"1:0"', LISTS),
+        ({"limit": ["1.0:0:1"]}, "limit[0]", '"1.0:0:1"', LISTS),
+        ({"limit": [[9, 0, 1]]}, "limit[0]", "[9, 0, 1]", "[joint, lower, upper], a joint from 1 to 5"),
+        ({"limit": ["9:0:1"]}, "limit[0]", '"9:0:1"', "JOINT:LOWER:UPPER, a joint from 1 to 5"),
+        ({"limit": [[1, -50, 1]]}, "limit[0]", "[1, -50, 1]", ""),
+        ({"lock": [[1, 0.5], [1, 0.5]]}, "lock[1]", "[1, 0.5]", "each joint once"),
+        ({"lock": [[1]]}, "lock[0]", "[1]", "JOINT:VALUE or [joint, value]"),
+        ({"plane": [0, 0, 0, 0, 0, 0]}, "plane", "[0, 0, 0, 0, 0, 0]", "[x, y, z, nx, ny, nz], a point"),
+        ({"plane": [0, 0, 0, 1]}, "plane", "[0, 0, 0, 1]", "X:Y:Z:NX:NY:NZ or [x, y, z, nx, ny, nz]"),
+        ({"plane": "0:0:0:0:0:0"}, "plane", '"0:0:0:0:0:0"', "X:Y:Z:NX:NY:NZ, a point"),
+    ],
+)
+def test_errors_of_lists_say_what_was_sent_and_what_is_valid(client, body, field, value, expected):
+    error = post(client, "workspace/summary", {**SPHERE, **body}, 422)["errors"][0]
+    assert (error["field"], error["value"]) == (field, value)
+    assert error["expected"].startswith(expected)
+    assert "string" not in error["expected"]
+
+
+def test_texts_and_lists_of_numbers_say_the_same(client):
+    lists = {"limit": [[1, 0.25, 1.5], [2.0, 0, 1]], "lock": [[3, 1e-3]], "plane": [0, 0, 0.1, 0, 0, 1]}
+    texts = {"limit": ["1:0.25:1.5", "2:0:1"], "lock": ["3:0.001"], "plane": "0:0:0.1:0:0:1"}
+    assert post(client, "workspace/summary", SPHERE | lists) == post(client, "workspace/summary", SPHERE | texts)

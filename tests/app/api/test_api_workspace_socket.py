@@ -238,7 +238,9 @@ def test_the_cloud_of_an_arm_sent_along_is_that_of_the_same_arm_of_the_service(p
         ({"robot": {"rows": []}}, "robot."),
         ({"robot": kin.robot_to_dict(PIONEER), "n": "10"}, 'n: got "10"'),
         ({"robot": kin.robot_to_dict(PIONEER), "n": 100000001}, "n: got 100000001"),
-        ({"robot": kin.robot_to_dict(PIONEER), "limit": [[9, 0, 1]]}, 'limit[0]: got "9:0:1"'),
+        ({"robot": kin.robot_to_dict(PIONEER), "limit": [[9, 0, 1]]}, "limit[0]: got [9, 0, 1]"),
+        ({"robot": kin.robot_to_dict(PIONEER), "limit": [[10**400, 0, 1]]}, "limit[0]: got [1000"),
+        ({"robot": kin.robot_to_dict(PIONEER), "n": 10**400}, "n: got 1000"),
         ({"robot": kin.robot_to_dict(PIONEER), "format": "csv"}, 'format: got "csv"'),
     ],
 )
