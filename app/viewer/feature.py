@@ -81,8 +81,15 @@ class Stage(Protocol):
     def dark(self) -> bool:
         """Whether the page is dark."""
 
+    @property
+    def frame(self) -> float:
+        """Seconds between two frames of a moving arm, which depend on how many visitors' arms move."""
+
     def post(self, key: Hashable, value: object = None) -> None:
         """Queue an event for the worker; thread-safe. A newer value replaces a queued one of the same key."""
+
+    def play(self, on: bool) -> None:
+        """Count the arm among those that move, while a feature moves it frame by frame with `move_to`."""
 
     def move_to(self, q: Array, notice: Notice | None = None, at_once: bool = False) -> None:
         """Move the arm to a configuration ``(n,)``; the target follows the tool, the status shows `notice`.

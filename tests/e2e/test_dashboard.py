@@ -138,3 +138,60 @@ def test_a_zip_shows_the_real_arm_and_delete_removes_it(tab: Tab) -> None:
     page.get_by_role("button", name="Delete my arm").click()
     expect(tab.status.first).to_contain_text("was deleted")
     tab.show(kin.get_robot("pioneer5"))
+
+
+def test_three_poses_are_recorded_played_scrubbed_and_kept(tab: Tab) -> None:
+    angles = (30.0, 80.0, 120.0)
+    places = [kin.fk(PIONEER, home_with(PIONEER, 0, angle))[:3, 3] for angle in angles]
+    page = tab.page
+    rows = page.locator("[data-program-item]")
+    for i, angle in enumerate(angles):
+        tab.open("Move")
+        tab.type_number("1 rotating base", str(angle))
+        tab.wait_for_tool(places[i], within=0.06)
+        tab.open("Program")
+        page.locator("[data-program-do=record]").click()
+        expect(rows).to_have_count(i + 1)
+
+    clock = page.locator("[data-program=clock]")
+    page.get_by_role("button", name="Play").click()
+    page.wait_for_function("document.querySelector('[data-program=clock]').dataset.playing === '1'")
+    expect(page.get_by_role("button", name="Pause", exact=True)).to_be_visible()
+    page.wait_for_function("document.querySelector('[data-program=clock]').dataset.playing === '0'")
+    tab.wait_for_tool(places[-1], within=0.06)
+    assert clock.get_attribute("data-time") == clock.get_attribute("data-duration")
+
+    time = page.get_by_role("slider", name="Time in the program")
+    time.focus()
+    page.keyboard.press("Home")
+    tab.wait_for_tool(places[0], within=0.06)
+    plot = page.locator("[data-program-plot]")
+    plot.scroll_into_view_if_needed()
+    box = plot.bounding_box()
+    assert box is not None
+    page.mouse.click(box["x"] + box["width"] - 3, box["y"] + 40)
+    tab.wait_for_tool(places[-1], within=0.06)
+    expect(page.locator("[data-program-cursor]")).to_be_visible()
+
+    rows.nth(1).locator("[data-program-do=choose]").click()
+    name = page.locator("[data-program-field=name]")
+    name.fill("above the part")
+    name.press("Enter")
+    expect(rows.nth(1)).to_contain_text("above the part")
+    page.wait_for_function("() => location.hash.includes('s=')")
+    before = page.url
+    page.locator("[data-program-do=go]").click()
+    tab.wait_for_tool(places[1], within=0.06)
+    page.wait_for_function("before => location.href !== before", arg=before)
+
+    page.reload()
+    expect(rows).to_have_count(3)
+    expect(rows.nth(1)).to_contain_text("above the part")
+    tab.wait_for_tool(places[1], within=0.06)
+    tab.dismiss_notice()
+    page.locator("[data-program-do=clear]").click()
+    expect(rows).to_have_count(0)
+    page.get_by_role("button", name="Undo").click()
+    expect(rows).to_have_count(3)
+    page.locator("[data-program-do=clear]").click()
+    expect(rows).to_have_count(0)

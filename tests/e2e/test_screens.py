@@ -61,6 +61,25 @@ def robot(tab: Tab) -> None:
     expect(tab.page.locator('[data-arm="wrong"]')).to_contain_text("divides by zero")
 
 
+def program(tab: Tab) -> None:
+    tab.choose_lesson("None")
+    tab.select(kin.get_robot("pioneer5"))
+    for i, button in enumerate(("Home", "Random")):
+        tab.open("Move")
+        tab.page.get_by_role("button", name=button).click()
+        tab.open("Program")
+        tab.page.locator("[data-program-do=record]").click()
+        expect(tab.page.locator("[data-program-item]")).to_have_count(i + 1)
+    tab.page.locator("[data-program-do=choose]").last.click()
+    expect(tab.page.locator("[data-program-field=speed]")).to_be_visible()
+
+
+def leave_program(tab: Tab) -> None:
+    tab.open("Program")
+    tab.page.locator("[data-program-do=clear]").click()
+    expect(tab.page.locator("[data-program-item]")).to_have_count(0)
+
+
 def cloud(tab: Tab) -> None:
     tab.choose_lesson("None")
     tab.select(kin.get_robot("pioneer5"))
@@ -108,13 +127,18 @@ SCREENS: dict[str, Callable[[Tab], None]] = {
     "learn-velocity": lesson("puma560", "Velocity", "[data-singular]"),
     "learn-redundancy": lesson("redundant7-craig", "Redundancy", "[data-limits]"),
     "robot": robot,
+    "program": program,
+    "program-empty": leave_program,
     "workspace-cloud": cloud,
     "workspace-section": section,
     "workspace-capability": capability,
     "view": view,
 }
 # Every screen is checked dark in desktop size and light in phone size; these the other way round as well.
-LIGHT_DESKTOP = ("move", "learn-equations", "learn-postures", "learn-velocity", "robot", "workspace-cloud")
+LIGHT_DESKTOP = (
+    *("move", "learn-equations", "learn-postures", "learn-velocity", "robot"),
+    *("program", "program-empty", "workspace-cloud"),
+)
 DARK_PHONE = ("learn-velocity",)
 
 

@@ -77,6 +77,7 @@ class ArmController:
         q: the configuration ``(n,)`` shown in the scene.
         target: the target pose ``(4, 4)``; None while the target follows the tool.
         dragging: whether the visitor holds the gizmo.
+        playing: whether a feature moves the arm frame by frame.
         snap: whether the gizmo is dragged in fixed steps.
         scene: the arm's nodes.
     """
@@ -98,6 +99,7 @@ class ArmController:
         self.locks: list[bool] = []
         self.target: Array | None = None
         self.dragging = False
+        self.playing = False
         self.snap = False
         self._in_base = False
         self._drag_start: tuple[Array, Array] = np.eye(4), np.eye(3)  # target pose, gizmo orientation
@@ -113,7 +115,7 @@ class ArmController:
         self.branch = None
         self.locks = [False] * robot.n
         self.target = None
-        self.dragging = False
+        self.dragging = self.playing = False
         weights = np.where(robot.revolute, 1.0, PRISMATIC_WEIGHT)
         self._motion = Motion(robot.q_home if q is None else q, weights)
         self.q = self._motion.goal
@@ -306,7 +308,7 @@ class ArmController:
         # The first frame after an event already shows motion: waiting half a frame would be felt as lag.
         q = self._motion.at(now + self._pace.interval if fresh else now)
         arrived = not self._motion.moving
-        self._pace.moving(self._client.client_id, self.dragging or not arrived)
+        self._pace.moving(self._client.client_id, self.dragging or self.playing or not arrived)
         T = kin.fk(self.robot, q)
         self.scene.show(q)
         if not np.array_equal(q, self.q):

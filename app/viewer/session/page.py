@@ -103,6 +103,13 @@ class VisitorPage(ShownArm, Worker):
     def dark(self) -> bool:
         return self.system_dark if self.view.dark is None else self.view.dark
 
+    @property
+    def frame(self) -> float:
+        return self._pace.interval
+
+    def play(self, on: bool) -> None:
+        self.arm.playing = on
+
     def move_to(self, q: Array, notice: Notice | None = None, at_once: bool = False) -> None:
         self.arm.move_to(q, ease=not at_once)
         self.status.show(notice or BY_HAND)

@@ -1,0 +1,37 @@
+"""A program as a file (TOML), which the command line and Python read too."""
+
+from __future__ import annotations
+
+import json
+
+from app.viewer.own_arm import clean
+from kin import InputError, Robot
+from kin.motion import Program, parse_program, program_to_dict
+
+LARGEST = 30_000  # bytes of a file: it comes in one message of the page
+
+
+def toml_of(program: Program, robot_name: str) -> str:
+    """The program in metres and radians, digit by digit; `kin.parse_program` reads it."""
+    data = program_to_dict(program)
+    segments = data.pop("segments")
+    lines = [f"# A program for {' '.join(robot_name.split())}", *_fields(data)]
+    lines.append('units = { length = "m", angle = "rad" }')
+    for segment in segments:
+        lines += ["", "[[segments]]", *_fields(segment)]
+    return "\n".join(lines) + "\n"
+
+
+def read(value: object, robot: Robot) -> tuple[str, Program]:
+    """Name and program of a file that the page sends; raises `kin.InputError`."""
+    match value:
+        case [str(name), str(text)] if len(text) <= LARGEST:
+            return clean(name, 60) or "program", parse_program(text, robot)
+        case [str(name), None]:
+            raise InputError("file", clean(name, 60), f"a file of at most {LARGEST // 1000} kB")
+    raise InputError("upload", value, "the name and the text of a file")
+
+
+def _fields(data: dict[str, object]) -> list[str]:
+    """Strings, numbers and lists are written in TOML as in JSON."""
+    return [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in data.items()]

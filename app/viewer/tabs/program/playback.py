@@ -1,0 +1,132 @@
+"""Playing a motion: the arm of a visitor follows it in time, frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from app.viewer.feature import Stage
+from app.viewer.panel.status import Notice
+from app.viewer.tabs.program.items import Items
+from app.viewer.tabs.program.player import Player
+from kin.motion import Motion
+from kin.transforms import Array
+
+CLOCK = 0.05  # s between two reports of the time
+
+
+class Playback:
+    """Moves the arm of one visitor; the visitor's worker calls it.
+
+    Args:
+        report: shows the time.
+
+    Attributes:
+        player: the time.
+        motion: what is played; None: nothing can be.
+        items: the list that the motion was planned from.
+    """
+
+    def __init__(self, stage: Stage, report: Callable[[], None]) -> None:
+        self._stage = stage
+        self._report = report
+        self.player = Player()
+        self.motion: Motion | None = None
+        self.items: Items = ()
+        self._sent: Array | None = None  # the configuration that was requested last
+        self._leading = False  # whether the arm is on its way to where playing begins
+        self._stepped = self._reported = 0.0
+
+    @property
+    def duration(self) -> float:
+        """Seconds of the motion."""
+        return 0.0 if self.motion is None else self.motion.duration
+
+    @property
+    def here(self) -> int | None:
+        """Index of the item that is driven at the present time; that of the way back is the number of items."""
+        if self.motion is None:
+            return None
+        now = self.player.time
+        return next((s.index for s in self.motion.segments if now <= s.end), None)
+
+    def use(self, items: Items, motion: Motion | None) -> None:
+        """Take another motion, at the same time if it lasts as long."""
+        self.items, self.motion = items, motion
+        self.player.go_to(self.player.time, self.duration)
+
+    def play(self) -> None:
+        """Go on from the present time, or begin again at the end; the arm first comes to where the motion is."""
+        player = self.player
+        if player.time >= self.duration:
+            player.time = 0.0
+        player.playing = self._leading = True
+        self._go(self._notice(), ease=True)
+        self._stage.play(True)
+        self._report()
+
+    def stop(self) -> None:
+        """Leave the arm where it is."""
+        if self.player.playing:
+            self.player.playing = False
+            self._stage.play(False)
+            self._report()
+
+    def go_to(self, time: float) -> None:
+        """Move the arm to where it is at a time."""
+        self.stop()
+        self.player.go_to(time, self.duration)
+        self._go(Notice("hand", f"The program at {self.player.time:.2f} s"))
+        self._report()
+
+    def note(self, time: float) -> None:
+        """The arm is moved to where it is at this time."""
+        self.stop()
+        self.player.go_to(time, self.duration)
+        self._report()
+
+    def tick(self, now: float) -> float | None:
+        """Show the next frame if it is due; seconds until the one after it."""
+        if not self.player.playing:
+            return None
+        if self._sent is None or not np.array_equal(self._sent, self._stage.goal):
+            self.stop()  # the visitor has moved the arm
+            return None
+        if self._leading:
+            self._leading = not np.array_equal(self._stage.q, self._stage.goal)
+            self._stepped = now
+            return self._stage.frame
+        wait = self._stage.frame - (now - self._stepped)
+        if wait <= 0.0:
+            self._step(now)
+            wait = self._stage.frame
+        return wait if self.player.playing else None
+
+    def _step(self, now: float) -> None:
+        player = self.player
+        player.advance(now - self._stepped, self.duration)
+        self._stepped = now
+        if player.playing:
+            self._go(self._notice())
+        else:
+            words = f"{self.duration:.2f} s, as planned." if player.rate == 1.0 else ""
+            self._go(Notice("hand", "The program has ended", words))
+            self._stage.play(False)
+        if now - self._reported >= max(CLOCK, self._stage.frame) or not player.playing:
+            self._reported = now
+            self._report()
+
+    def _notice(self) -> Notice:
+        here = self.here
+        if here is None or here >= len(self.items):
+            return Notice("hand", "Playing", "" if here is None else "Back to the start")
+        item = self.items[here]
+        words = f"Waits {item.seconds:g} s" if item.kind == "pause" else f"To waypoint {here + 1}"
+        return Notice("hand", "Playing", f"{words}: {item.name}" if item.name else words)
+
+    def _go(self, notice: Notice, ease: bool = False) -> None:
+        """Move the arm to where it is at the present time."""
+        assert self.motion is not None
+        self._sent = self._stage.robot.clip(self.motion.derivatives(self.player.time)[0])
+        self._stage.move_to(self._sent, notice, at_once=not ease)
