@@ -228,6 +228,7 @@
     for (const node of box.querySelectorAll("[data-for]")) node.hidden = node.dataset.for !== kind;
     const rows = kind === "pose" ? ["position", "angles"] : [kind];
     const input = box.querySelector("textarea");
+    box.querySelector("[data-typed-frame]").value = "";
     input.value = rows.map((name) => numbersOf(document.querySelector(`tr[data-type="${name}"]`)).join("  ")).join("\n");
     input.setAttribute("aria-label", box.querySelector(`b[data-for="${kind}"]`).textContent);
     showError("");
@@ -256,7 +257,8 @@
 
   function sendForm() {
     const box = form();
-    send("target", [box.dataset.typed, box.querySelector("textarea").value], (error) => {
+    const frame = box.querySelector("[data-typed-frame]").value;
+    send("target", [box.dataset.typed, box.querySelector("textarea").value, ...(frame ? [frame] : [])], (error) => {
       if (error) showError(error);
       else closeForm();
     });
@@ -272,6 +274,21 @@
     if (!opener || !getSelection().isCollapsed) return;
     if (opener.ariaExpanded === "true") closeForm();
     else openForm(opener.dataset.type);
+  });
+
+  addEventListener("change", (event) => {
+    if (event.target.matches?.("[data-frame]")) {
+      if (form() && !form().hidden) closeForm(); // its numbers are in the frame of before
+      send("frame", event.target.value);
+    }
+    if (!event.target.matches?.("[data-typed-frame]")) return;
+    // From where the tool is, everything is zero; in the frame above, the present numbers.
+    const kind = form().dataset.typed;
+    const input = form().querySelector("textarea");
+    const zero = { pose: "0 0 0\n0 0 0", position: "0 0 0", angles: "0 0 0", quaternion: "1 0 0 0" };
+    if (event.target.value) input.value = zero[kind];
+    else openForm(kind);
+    input.focus();
   });
 
   // Keys of the page

@@ -17,6 +17,7 @@ from app.shared.clouds import Clouds
 from app.shared.maps import Maps
 from app.shared.store import Store
 from app.shared.summaries import Summaries
+from app.viewer.frames import Frames
 from app.viewer.meshes.bodies import Bodies
 from app.viewer.meshes.reader import MeshReader
 from app.viewer.own_arm import OwnArm
@@ -36,6 +37,7 @@ class Stage(Protocol):
     summaries: Summaries
     meshes: MeshReader
     bodies: Bodies
+    frames: Frames  # the workpieces, and the frame in which poses are shown
 
     @property
     def client(self) -> viser.ClientHandle:
@@ -112,6 +114,9 @@ class Stage(Protocol):
 
     def redraw_body(self) -> None:
         """Draw the body of the arm on show anew: there may be another one by now."""
+
+    def use_frames(self, frames: Frames) -> None:
+        """Take these frames."""
 
     def change_robot(self, robot: Robot) -> None:
         """Show a robot of the service, at its home configuration."""

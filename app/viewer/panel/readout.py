@@ -7,7 +7,10 @@ from collections.abc import Sequence
 
 import viser
 
+from app.viewer.frames import TITLES, Frames
+from app.viewer.panel import update_html
 from app.viewer.views.templates import render
+from kin.frames import WORLD
 from kin.transforms import Array, wxyz_from_rotation
 from kin.units import Units
 
@@ -23,21 +26,23 @@ def roll_pitch_yaw(R: Array) -> tuple[float, float, float]:
     return math.atan2(R[2, 1], R[2, 2]), pitch, math.atan2(R[1, 0], R[0, 0])
 
 
-def html(T_base_tool: Array, units: Units, T_base_target: Array | None = None) -> str:
+def html(T_frame_tool: Array, units: Units, T_frame_target: Array | None = None, frame: str = WORLD) -> str:
     """Position, roll/pitch/yaw and quaternion of a pose ``(4, 4)`` as a small table.
 
-    `T_base_target`: a target that the tool has missed, from which the form for a typed target starts.
+    Args:
+        T_frame_target: a target that the tool has missed, from which the form for a typed target starts.
+        frame: name of the frame in which both are.
     """
     lengths, angles = units.lengths, units.angles
     titles = (
-        ("position", "x y z", "Tool point in the base frame", lengths.name),
+        ("position", "x y z", f"Tool point in the frame {frame}", lengths.name),
         ("angles", "roll pitch yaw", ANGLES, angles.name),
         ("quaternion", "w x y z", "Quaternion, scalar first", ""),
     )
-    tool = _parts(T_base_tool, units)
-    target: Sequence[Sequence[str]] = ((),) * 3 if T_base_target is None else _parts(T_base_target, units)
+    tool = _parts(T_frame_tool, units)
+    target: Sequence[Sequence[str]] = ((),) * 3 if T_frame_target is None else _parts(T_frame_target, units)
     rows = [(*title, numbers, wanted) for title, numbers, wanted in zip(titles, tool, target, strict=True)]
-    return render("panel/readout", rows=rows)
+    return render("panel/readout", rows=rows, frame=frame)
 
 
 def _parts(T: Array, units: Units) -> tuple[list[str], list[str], list[str]]:
@@ -63,12 +68,18 @@ def _numbers(values: Sequence[float], decimals: int) -> list[str]:
 
 
 class PoseReadout:
-    """Shows the tool's pose, and below it the form for a typed target, which ``static/input.js`` opens."""
+    """Shows the tool's pose in a frame, and the form for a typed target, which ``static/input.js`` opens."""
 
-    def __init__(self, gui: viser.GuiApi, T_base_tool: Array, units: Units) -> None:
-        self._html = gui.add_html(html(T_base_tool, units))
+    def __init__(self, gui: viser.GuiApi, T_world_tool: Array, units: Units) -> None:
+        self._choice = gui.add_html("")
+        self._html = gui.add_html(html(T_world_tool, units))
         gui.add_html(render("panel/typed_target"))
 
-    def show(self, T_base_tool: Array, units: Units, T_base_target: Array | None = None) -> None:
+    def show_frames(self, frames: Frames) -> None:
+        """Offer the frames of the page."""
+        offered = [(name, TITLES.get(name, name)) for name in frames.names]
+        update_html(self._choice, render("panel/frame", frames=offered, shown=frames.shown))
+
+    def show(self, T: Array, units: Units, target: Array | None = None, frame: str = WORLD) -> None:
         """Replace the numbers; see `html`."""
-        self._html.content = html(T_base_tool, units, T_base_target)
+        self._html.content = html(T, units, target, frame)

@@ -353,7 +353,7 @@ class ArmScene:
         )
 
     def _add_base_axes(self) -> None:
-        """The axes of the base frame, in which the read-out gives the tool's pose."""
+        """The axes of the base frame."""
         T, length = self.robot.T_world_base, BASE_AXES * self.body.size
         self._base = self._scene.add_frame(
             f"{self._root}/base",

@@ -54,7 +54,7 @@ GRADUAL = {
 }  # fmt: skip
 MESSAGES = (
     "undo", "redo", "travel", "released", "snap", "nudge", "axes", "field", "target", "fit-arm", "look-from",
-    "lesson", "feature", "text-size",
+    "lesson", "feature", "text-size", "frame",
 )  # fmt: skip
 ANSWERED = frozenset({"field", "target"})  # messages whose handlers reply
 LABELS = {
@@ -75,6 +75,7 @@ LABELS = {
     "colours": "Page colours",
     "axes": "Arrows along",
     "nudge": "Target moved by keys",
+    "frame": "Frame of the read-out",
     "field": "Typed value",
     "target": "Typed target",
 }
@@ -151,6 +152,7 @@ class Actions:
             "resized": self._on_resize,
             "looked": self._on_look,  # the viewpoint is read when the camera rests
             "axes": self._typed.use_axes,
+            "frame": lambda name: page.use_frames(page.frames.choose(name)),
             "text-size": lambda name: size_labels(page.client.scene, text_factor(name)),
             # Messages of the page's own script
             "undo": self._undo,
@@ -263,6 +265,8 @@ class Actions:
         if state.units != page.units:
             page.panel.units.show(state.units)
             page.use_units(state.units)
+        if state.frames != page.frames:
+            page.use_frames(state.frames)
         if state.view != page.view:
             page.use_view(replace(state.view))
         if robot != page.robot:

@@ -11,6 +11,7 @@ from typing import Protocol
 import viser
 
 import kin
+from app.viewer.frames import FrameAxes, Frames
 from app.viewer.panel.joints import JointSliders
 from app.viewer.panel.layout import Panel
 from app.viewer.panel.status import StatusLine, key_number
@@ -18,7 +19,12 @@ from app.viewer.scene.key_number import KeyNumber
 from app.viewer.session.controller import ArmController
 from app.viewer.session.posture import PosturePanel
 from kin import IKResult
+from kin.axes import inverse
+from kin.frames import WORLD
+from kin.transforms import Array
 from kin.units import Units
+
+FRAME_AXES = 0.16  # length of the axes of a workpiece, in radii of the sphere around the arm
 
 
 class NumbersPage(Protocol):
@@ -31,6 +37,7 @@ class NumbersPage(Protocol):
     sliders: JointSliders
     status: StatusLine
     units: Units
+    frames: Frames
 
 
 class Numbers:
@@ -47,6 +54,14 @@ class Numbers:
         self._updated_at = 0.0
         self._dragged: int | None = None  # the joint whose slider the visitor holds
         self._beside_target = KeyNumber(page.client.scene)
+        self._axes = FrameAxes(page.client.scene)
+
+    def use_frames(self) -> None:
+        """The page has other frames, or another arm."""
+        arm = self._page.arm
+        self._axes.show(self._page.frames, arm.robot, FRAME_AXES * arm.scene.body.radius)
+        self._page.panel.readout.show_frames(self._page.frames)
+        self._pose_due = True
 
     def use_pose(self) -> None:
         """The arm has another pose, or numbers have other units."""
@@ -86,8 +101,16 @@ class Numbers:
                 self._pose_due = False
                 target = None if arm.open_target is None else arm.open_target[:3, 3]
                 page.status.warn(arm.scene.show_contact(arm.scene.contact_at(arm.q), target))
-                page.panel.readout.show(kin.fk(arm.robot, arm.q), page.units, arm.open_target)
+                self._show_pose(kin.fk(arm.robot, arm.q), arm.open_target)
             if self._sliders_due:
                 self._sliders_due = False
                 page.sliders.show(arm.goal, self._dragged)
                 page.posture.show()
+
+    def _show_pose(self, tool: Array, target: Array | None) -> None:
+        """Show the pose of the tool, and of a target that it has missed, in the frame of the read-out."""
+        page, frames = self._page, self._page.frames
+        if frames.shown != WORLD:
+            T = inverse(frames.pose(page.arm.robot, page.arm.q))
+            tool, target = T @ tool, None if target is None else T @ target
+        page.panel.readout.show(tool, page.units, target, frames.shown)

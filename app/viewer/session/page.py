@@ -18,6 +18,7 @@ import viser
 import kin
 from app.shared.security import Rights
 from app.viewer.feature import Feature
+from app.viewer.frames import Frames
 from app.viewer.lessons import LESSONS
 from app.viewer.meshes.bodies import Bodies
 from app.viewer.own_arm import OwnArm
@@ -77,6 +78,7 @@ class VisitorPage(ShownArm, Worker):
         self.meshes = services.meshes
         self._library = services.library
         self.bodies = Bodies(services.library, lambda: self.post("body"))
+        self.frames = Frames()
         self.arm = ArmController(client, services.pace, self.post, self)
         self.view = ViewState()
         self.system_dark = False
@@ -127,6 +129,11 @@ class VisitorPage(ShownArm, Worker):
     def redraw_body(self) -> None:
         self.arm.scene.use_drawing(self.bodies.of(self.robot, self.own))
         self._apply_view()
+
+    def use_frames(self, frames: Frames) -> None:
+        self.frames = frames
+        self.numbers.use_frames()
+        self.for_features(lambda feature: feature.on_style())
 
     def set_target(self, T_base_tool: Array) -> None:
         self.arm.set_target(T_base_tool)
@@ -325,7 +332,7 @@ class VisitorPage(ShownArm, Worker):
         gui = self.client.gui
         saved = self._persistence.load()
         self.units, self.view, self.system_dark = saved.units, saved.view, self._persistence.system_dark
-        self.own = saved.own
+        self.own, self.frames = saved.own, saved.frames
         robot = robot_of(self, saved.robot)
         with self.client.atomic():
             if self.dark:
@@ -357,7 +364,7 @@ class VisitorPage(ShownArm, Worker):
         """Show another robot, at its home configuration or at `q` ``(n,)``, in a fitting view."""
         self.bodies.detailed = self.view.detailed
         self.arm.use(robot, q, self.dark, self.view.base_axes, self.bodies.of(robot, self.own))
-        self.numbers.use_pose()
+        self.numbers.use_frames()
         self.panel.target.show(self.task)
         self.sliders = self._make_sliders()
         self.posture.use_robot()

@@ -170,6 +170,7 @@ class Persistence:
         return PageState(
             robot=page.robot.id,
             own=page.own,
+            frames=page.frames,
             q=page.goal,
             target=page.arm.open_target,
             task=page.task,

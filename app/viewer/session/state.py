@@ -21,7 +21,8 @@ from typing import Any, get_args
 
 import numpy as np
 
-from app.viewer import own_arm
+from app.viewer import frames, own_arm
+from app.viewer.frames import Frames
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel.entry import FARTHEST
 from app.viewer.panel.view import LOOKS, ViewState
@@ -59,6 +60,7 @@ class PageState:
         locks: indices of the locked joints; each is locked at its value in `q`.
         camera: viewpoint ``(3, 3)`` as `VisitorCamera.chosen`; None: the default view.
         own: the visitor's own arm, whether or not it is on show.
+        frames: the workpieces, and the frame in which poses are shown.
         missing: the requested robot's id, if this service does not have that robot.
         unreadable: whether there was a text that is not a state.
         ignored: names of entries that were invalid.
@@ -77,6 +79,7 @@ class PageState:
     locks: tuple[int, ...] = ()
     camera: Array | None = None
     own: OwnArm | None = None
+    frames: Frames = field(default_factory=Frames)
     missing: str = ""
     unreadable: bool = False
     ignored: tuple[str, ...] = ()
@@ -121,6 +124,8 @@ def encode(state: PageState) -> str:
     if state.camera is not None:
         position, look_at, up = (_rounded(row, CAMERA_DIGITS) for row in state.camera)
         data["camera"] = position + look_at + (up if up != UP.tolist() else [])
+    if state.frames != Frames():
+        data["frames"] = frames.pack(state.frames)
     if not state.units.degrees:
         data["units"] = "rad"
     if state.units.length != DEFAULT_UNITS.length:
@@ -161,6 +166,7 @@ def decode(text: str, robots: Sequence[Robot]) -> PageState:
         "features": _features(features),
         "own": own,
         "refused": refused,
+        "frames": frames.unpack(data.get("frames")),
     }
     if robot is None:
         return PageState(missing=requested[:80] if isinstance(requested, str) else "", **common)

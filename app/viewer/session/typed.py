@@ -15,6 +15,7 @@ from app.viewer.panel.view import AXES
 from app.viewer.scene.gizmo import FINE_STEP, FINE_TURN, STEP, TURN
 from app.viewer.session.persistence import SavedPage
 from app.viewer.session.posture import PosturePanel
+from kin.axes import inverse
 
 BY_HAND = Notice("hand", "Joints moved by hand", "The target follows the tool.")
 
@@ -55,14 +56,20 @@ class TypedInput:
         """A typed target."""
         match value:
             case [("position" | "angles" | "quaternion" | "pose") as kind, str(text)]:
-                self._answer(number, lambda: self._set_target(kind, text))
+                self._answer(number, lambda: self._set_target(kind, text, False))
+            case [("position" | "angles" | "quaternion" | "pose") as kind, str(text), "tool"]:
+                self._answer(number, lambda: self._set_target(kind, text, True))
             case _:
-                raise kin.InputError("target", value, "what was typed, and a text")
+                raise kin.InputError("target", value, 'what was typed, a text, and "tool" if it is relative to it')
 
-    def _set_target(self, kind: PoseKind, text: str) -> None:
+    def _set_target(self, kind: PoseKind, text: str, relative: bool) -> None:
+        """Typed numbers are in the frame of the read-out, or `relative` to the tool."""
         page, arm = self._page, self._page.arm
-        present = kin.fk(page.robot, arm.goal) if arm.target is None else arm.target
+        tool = kin.fk(page.robot, arm.goal)
+        frame = page.frames.pose(page.robot, arm.goal, relative)
+        present = inverse(frame) @ (tool if relative or arm.target is None else arm.target)
         T, oriented = read_pose(kind, text, page.units, present)
+        T = frame @ T
         arm.target = None  # a changed task must not solve for the target of before
         if not oriented and page.task != "position":
             page.set_task("position")

@@ -44,6 +44,8 @@ def name_of(cell: Cell) -> str:
     where, column = cell
     if isinstance(where, int):
         return f"row {where + 1}, {_SHOWN.get(column, column)}"
+    if where.startswith("frame-"):
+        return f"frame {int(where[6:]) + 1}, {column}"
     return "name" if where == "arm" else f"{where}, {column}"
 
 

@@ -14,10 +14,11 @@ import kin
 from app.exports.snippets import named
 from app.shared.answers.inspection import inspect
 from app.viewer.feature import Feature, Stage
+from app.viewer.frames import Frames
 from app.viewer.own_arm import KEY, OwnArm, label, own_arm
 from app.viewer.panel import update_html
 from app.viewer.panel.status import Notice
-from app.viewer.tabs.robot import edits, views
+from app.viewer.tabs.robot import edits, views, workpieces
 from app.viewer.tabs.robot.edits import Cell, EditError
 from app.viewer.tabs.robot.expression import LONGEST, cut
 from app.viewer.tabs.robot.files import text_of
@@ -41,6 +42,7 @@ class RobotTab(Feature):
         {
             *("cell", "row", "start", "convention", "convert", "reset", "delete", "discard", "left"),
             *("download", "upload", "urdf", "tip"),
+            *("frame-add", "frame-remove"),
         }
     )
 
@@ -65,6 +67,8 @@ class RobotTab(Feature):
             "upload": self._upload,
             "urdf": lambda value: self._open(lambda: self._uploads.choose("urdf", value)),
             "tip": lambda value: self._open(lambda: self._uploads.choose("tip", value)),
+            "frame-add": lambda _: self._use_frames(workpieces.added(self.stage)),
+            "frame-remove": lambda index: self._use_frames(workpieces.removed(self.stage.frames, index)),
         }
         self._refresh()
 
@@ -95,6 +99,8 @@ class RobotTab(Feature):
                 return "Own arm deleted"
             case ("convention",):
                 return "Convention"
+            case ("frame-add" | "frame-remove",):
+                return "Workpiece frames"
         return self.title
 
     def on_robot(self) -> None:
@@ -114,7 +120,7 @@ class RobotTab(Feature):
             self._revision += 1
             self._show("table", views.table(robot, units, self._revision))
         if self._editing != "frames":
-            self._show("frames", views.frames(robot, units))
+            self._show("frames", views.frames(robot, units, self.stage.frames))
         if self._editing != "start":
             self._show("start", views.start(robot, self._origin, self._own is not None, self.stage.store.robots))
         self._show("about", views.about(inspect(robot), robot, units))
@@ -190,7 +196,8 @@ class RobotTab(Feature):
 
     def _type(self, where: int | str, column: str, value: object) -> None:
         """A cell was typed into. Cells that were wrong before may be valid together with it."""
-        cell = self._cell(where, column)
+        framed = workpieces.workpiece_of(where) is not None
+        cell = (where, column) if framed else self._cell(where, column)
         match value:
             case [int(revision), str(text)]:
                 text = text[: LONGEST + 1]  # still too long to be valid, and a name is shorter
@@ -200,7 +207,11 @@ class RobotTab(Feature):
                 raise InputError("cell", value, "a revision and a text")
         editing = _part(cell)
         robot, units = self.stage.robot, self.stage.units
-        before = {key: typed for key, (typed, _) in self._wrong.items() if key != cell}
+        if framed:
+            self._type_workpiece(cell, text)
+            return
+        others = {key: typed for key, (typed, _) in self._wrong.items() if workpieces.workpiece_of(key[0]) is None}
+        before = {key: typed for key, typed in others.items() if key != cell}
         self._wrong.pop(cell, None)
         if column == "kind":
             editing, before = "", {}
@@ -223,6 +234,23 @@ class RobotTab(Feature):
         if where not in (rows if isinstance(where, int) else ("arm", *edits.FRAMES)) or column not in valid:
             raise InputError("cell", (where, column), "a cell of the table")
         return where, column
+
+    def _type_workpiece(self, cell: Cell, text: str) -> None:
+        self._wrong.pop(cell, None)
+        try:
+            frames = workpieces.typed(self.stage.frames, cell, text, self.stage.units)
+        except EditError as error:
+            self._wrong[cell] = text, error.message
+            self._show_wrong()
+        else:
+            self._use_frames(frames, "frames")
+
+    def _use_frames(self, frames: Frames, editing: str = "") -> None:
+        self._editing = editing
+        try:
+            self.stage.use_frames(frames)
+        finally:
+            self._editing = ""
 
     def _change_rows(self, action: str, index: int) -> None:
         robot, own = self.stage.robot, self._own

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from app.shared.answers.inspection import InspectionAnswer
+from app.viewer.frames import MOST as MOST_FRAMES
+from app.viewer.frames import Frames
 from app.viewer.meshes.archive import MB, MOST_BYTES
 from app.viewer.tabs.robot.edits import ANGLES, AXES, FRAMES, KINDS, NUMBERS, Cell, frame_values, name_of
 from app.viewer.tabs.robot.files import MOST, Source
@@ -163,21 +165,25 @@ def _home(found: InspectionAnswer) -> dict[str, str]:
     return _fact("Home", "every possible motion of the tool starts freely", "not singular:")
 
 
-def frames(robot: Robot, units: Units) -> str:
-    """Fields for the tool and the base."""
+def frames(robot: Robot, units: Units, page: Frames) -> str:
+    """Fields for the tool, the base, and the workpieces of the page."""
     rows = []
-    for frame in FRAMES:
+    poses = [(frame, frame, frame_values(robot, frame)) for frame in FRAMES]
+    poses += [(f"frame-{i}", each.name, each.values) for i, each in enumerate(page.workpieces)]
+    for frame, title, values in poses:
         cells = [
             {
                 "key": f"{frame} {axis}",
                 "value": text_of(value, units.of(i >= 3)),
                 "label": name_of((frame, axis)),
             }
-            for i, (axis, value) in enumerate(zip(AXES, frame_values(robot, frame), strict=True))
+            for i, (axis, value) in enumerate(zip(AXES, values, strict=True))
         ]
-        rows.append({"title": frame, "cells": cells})
+        rows.append({"key": frame, "title": title, "cells": cells, "label": name_of((frame, "name"))})
     length, angle = units.lengths.name, units.angles.name
-    return render("robot/frames", heads=AXES, rows=rows, length=length, angle=angle)
+    own, fixed = rows[len(FRAMES) :], rows[: len(FRAMES)]
+    full = len(own) >= MOST_FRAMES
+    return render("robot/frames", heads=AXES, rows=fixed, workpieces=own, full=full, length=length, angle=angle)
 
 
 def files(waiting: Source | None, arrived: int, reading: str, meshes: str) -> str:
