@@ -24,7 +24,7 @@ MOST = 8  # workpieces of a page
 NAME = 24  # characters
 FARTHEST = 1000.0  # m
 TITLES = {WORLD: "world", BASE: "base: the foot of the arm"}
-_DIGITS = 9  # of metres and radians in a link
+_DIGITS = 12  # of metres and radians in a link
 
 
 class Workpiece(NamedTuple):

@@ -140,7 +140,7 @@ def test_whatever_a_link_says_the_frames_are_valid(value: list[object]) -> None:
     assert len(set(frames.names)) == len(frames.names)
     assert all(np.isfinite(T).all() for T in frames.poses.values())
     assert unpack(pack(frames)) == Frames(
-        tuple(Workpiece(each.name, tuple(round(v, 9) + 0.0 for v in each.values)) for each in frames.workpieces),
+        tuple(Workpiece(each.name, tuple(round(v, 12) + 0.0 for v in each.values)) for each in frames.workpieces),
         frames.shown,
     )
 

@@ -7,6 +7,7 @@ typed value has its own unit there, so that the other numbers stay exactly as th
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import kin
@@ -132,6 +133,19 @@ def move_row(rows: list[Fields], index: int, by: int) -> None:
     rows[index], rows[index + by] = rows[index + by], rows[index]
 
 
+def row_change(action: str, index: int, unit: str) -> Callable[[list[Fields]], None]:
+    """What a button does to the rows; raises `kin.InputError` for an unknown one."""
+    changes: dict[str, Callable[[list[Fields]], None]] = {
+        "add": lambda rows: add_row(rows, index, unit),
+        "remove": lambda rows: rows.__delitem__(index),
+        "up": lambda rows: move_row(rows, index, -1),
+        "down": lambda rows: move_row(rows, index, 1),
+    }
+    if action not in changes:
+        raise InputError("row", action, "one of " + ", ".join(changes))
+    return changes[action]
+
+
 def reread(robot: Robot, own: OwnArm | None, convention: str) -> OwnArm:
     """The arm that the same table describes in this convention; raises `EditError`."""
     data, start = fields_of(robot, own)
@@ -197,3 +211,15 @@ def converted(robot: Robot, own: OwnArm | None) -> OwnArm:
     data, start = fields_of(robot, own)
     other = kin.convert(robot, "modified" if robot.convention == "standard" else "standard")
     return built({**kin.robot_to_dict(other), **{key: data[key] for key in ("name", "source")}}, start)
+
+
+def part_of(cell: Cell) -> str:
+    """The part of the tab that a cell is in."""
+    where, _ = cell
+    return "table" if isinstance(where, int) else "start" if where == "arm" else "frames"
+
+
+def alike(one: Robot, other: Robot, named: bool) -> bool:
+    """Whether two robots have the same table and, if `named`, the same name."""
+    unnamed = replace(other, id=one.id, name=one.name, source=one.source, description=one.description)
+    return one == unnamed and (not named or one.name == other.name)

@@ -8,7 +8,6 @@ not sent again; the rest is.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping
-from dataclasses import replace
 
 import kin
 from app.exports.snippets import named
@@ -23,8 +22,9 @@ from app.viewer.tabs.robot.edits import Cell, EditError
 from app.viewer.tabs.robot.expression import LONGEST, cut
 from app.viewer.tabs.robot.files import text_of
 from app.viewer.tabs.robot.presets import PRESETS, TITLES
+from app.viewer.tabs.robot.texts import Texts
 from app.viewer.tabs.robot.uploads import Uploads
-from kin import InputError, Robot, RobotFileError
+from kin import InputError, RobotFileError
 from kin.files.read import MAX_ROWS
 from kin.robot import Convention
 
@@ -49,6 +49,7 @@ class RobotTab(Feature):
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
         self._wrong: dict[Cell, tuple[str, str]] = {}  # what was typed, and what is wrong with it
+        self._texts = Texts()
         self._revision = 0  # of the rows: a message about other rows is out of date
         self._editing = ""  # the part of the tab in which the visitor types
         self._uploads = Uploads(stage, self.post, lambda own, words: self._begin(own, words))
@@ -103,6 +104,14 @@ class RobotTab(Feature):
                 return "Workpiece frames"
         return self.title
 
+    def state(self) -> dict[str, object]:
+        texts = self._texts.state()
+        return {"texts": texts} if texts else {}
+
+    def restore(self, state: Mapping[str, object]) -> None:
+        self._texts.restore(state.get("texts"))
+        self._refresh()
+
     def on_robot(self) -> None:
         self._uploads.waiting = None
         self._refresh()
@@ -115,12 +124,12 @@ class RobotTab(Feature):
     def _refresh(self) -> None:
         """Show the arm as it is, but not in the part in which the visitor types."""
         robot, units = self.stage.robot, self.stage.units
-        self._wrong = {cell: why for cell, why in self._wrong.items() if _part(cell) == self._editing}
+        self._wrong = {cell: why for cell, why in self._wrong.items() if edits.part_of(cell) == self._editing}
         if self._editing != "table":
             self._revision += 1
-            self._show("table", views.table(robot, units, self._revision))
+            self._show("table", views.table(robot, units, self._revision, self._texts))
         if self._editing != "frames":
-            self._show("frames", views.frames(robot, units, self.stage.frames))
+            self._show("frames", views.frames(robot, units, self.stage.frames, self._texts))
         if self._editing != "start":
             self._show("start", views.start(robot, self._origin, self._own is not None, self.stage.store.robots))
         self._show("about", views.about(inspect(robot), robot, units))
@@ -169,7 +178,7 @@ class RobotTab(Feature):
 
     def _edit(self, own: OwnArm, editing: str = "") -> None:
         mine = self._own is not None
-        if _alike(own.robot, self.stage.robot, mine) and (mine or editing != "start"):
+        if edits.alike(own.robot, self.stage.robot, mine) and (mine or editing != "start"):
             return
         replaced = None if mine else self.stage.own
         before = self._wrong
@@ -205,7 +214,7 @@ class RobotTab(Feature):
                     return  # the rows are others by now
             case _:
                 raise InputError("cell", value, "a revision and a text")
-        editing = _part(cell)
+        editing = edits.part_of(cell)
         robot, units = self.stage.robot, self.stage.units
         if framed:
             self._type_workpiece(cell, text)
@@ -221,8 +230,9 @@ class RobotTab(Feature):
             except EditError as error:
                 self._wrong[cell] = text, error.message
             else:
-                for key in texts:
+                for key, valid in texts.items():
                     self._wrong.pop(key, None)
+                    self._texts.remember(key, valid)
                 self._edit(own, editing)
                 break
         self._show_wrong()
@@ -243,6 +253,7 @@ class RobotTab(Feature):
             self._wrong[cell] = text, error.message
             self._show_wrong()
         else:
+            self._texts.remember(cell, text)
             self._use_frames(frames, "frames")
 
     def _use_frames(self, frames: Frames, editing: str = "") -> None:
@@ -257,20 +268,13 @@ class RobotTab(Feature):
         count = len(robot.rows)
         if not 0 <= index < count:
             raise InputError("row", index, f"0 to {count - 1}")
-        changes: dict[str, Callable[[list[edits.Fields]], None]] = {
-            "add": lambda rows: edits.add_row(rows, index, robot.units),
-            "remove": lambda rows: rows.__delitem__(index),
-            "up": lambda rows: edits.move_row(rows, index, -1),
-            "down": lambda rows: edits.move_row(rows, index, 1),
-        }
-        if action not in changes:
-            raise InputError("row", action, "one of " + ", ".join(changes))
+        change = edits.row_change(action, index, robot.units)
         if action == "add" and count >= MAX_ROWS:
             self._refuse("The table is full", f"An arm has at most {MAX_ROWS} rows.")
         elif action == "remove" and count == 1:
             self._refuse("The row stays", "An arm needs at least one row.")
         elif 0 <= index + {"up": -1, "down": 1}.get(action, 0) < count:
-            self._try(lambda: edits.changed_rows(robot, own, changes[action]))
+            self._try(lambda: edits.changed_rows(robot, own, change), (action, index))
 
     def _reread(self, convention: object) -> None:
         if convention not in kin.robot.CONVENTIONS:
@@ -286,12 +290,15 @@ class RobotTab(Feature):
             self._try(lambda: edits.converted(self.stage.robot, self._own))
         self._show_conversion()
 
-    def _try(self, change: Callable[[], OwnArm]) -> None:
+    def _try(self, change: Callable[[], OwnArm], rows: tuple[str, int] | None = None) -> None:
+        """Change the arm; `rows`: how its rows are changed."""
         try:
             own = change()
         except EditError as error:
             self._refuse("The arm stays as it is", error.message)
         else:
+            if rows is not None:
+                self._texts.move_rows(*rows)
             self._edit(own)
 
     def _refuse(self, title: str, detail: str) -> None:
@@ -384,15 +391,3 @@ class RobotTab(Feature):
     def on_leave(self) -> None:
         self._uploads.forget()
         self.stage.bodies.clear()
-
-
-def _part(cell: Cell) -> str:
-    """The part of the tab that a cell is in."""
-    where, _ = cell
-    return "table" if isinstance(where, int) else "start" if where == "arm" else "frames"
-
-
-def _alike(one: Robot, other: Robot, named: bool) -> bool:
-    """Whether two robots have the same table and, if `named`, the same name."""
-    unnamed = replace(other, id=one.id, name=one.name, source=one.source, description=one.description)
-    return one == unnamed and (not named or one.name == other.name)

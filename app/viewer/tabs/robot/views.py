@@ -13,6 +13,7 @@ from app.viewer.meshes.archive import MB, MOST_BYTES
 from app.viewer.tabs.robot.edits import ANGLES, AXES, FRAMES, KINDS, NUMBERS, Cell, frame_values, name_of
 from app.viewer.tabs.robot.files import MOST, Source
 from app.viewer.tabs.robot.presets import TITLES
+from app.viewer.tabs.robot.texts import Texts
 from app.viewer.views.templates import render
 from kin import Joint, Robot
 from kin.dh import SAMPLES, largest_difference
@@ -60,17 +61,17 @@ def start(robot: Robot, chosen: str, mine: bool, robots: Sequence[Robot]) -> str
     )
 
 
-def table(robot: Robot, units: Units, revision: int) -> str:
+def table(robot: Robot, units: Units, revision: int, texts: Texts) -> str:
     """The DH table with a field for each number."""
     heads = []
     for column, (name, title) in _HEADS.items():
         unit = units.of(column in ANGLES).name if column in NUMBERS[:4] else ""
         heads.append({"name": name, "unit": unit, "title": title, "left": column in ("kind", "name")})
-    rows = [[_cell(i, row, column, units) for column in _HEADS] for i, row in enumerate(robot.rows)]
+    rows = [[_cell(i, row, column, units, texts) for column in _HEADS] for i, row in enumerate(robot.rows)]
     return render("robot/table", heads=heads, rows=rows, revision=revision, convention=robot.convention)
 
 
-def _cell(index: int, row: Joint, column: str, units: Units) -> dict[str, Any]:
+def _cell(index: int, row: Joint, column: str, units: Units, texts: Texts) -> dict[str, Any]:
     cell: dict[str, Any] = {"key": f"{index} {column}", "label": name_of((index, column)), "value": "", "hint": ""}
     cell |= {"variable": False, "options": None, "none": False, "text": column == "name"}
     if column == "kind":
@@ -80,10 +81,18 @@ def _cell(index: int, row: Joint, column: str, units: Units) -> dict[str, Any]:
     if column in ("low", "high"):
         if row.limits is None:
             return {**cell, "none": row.kind == "fixed", "hint": "none"}
-        limit = row.limits[column == "high"]
-        return {**cell, "value": text_of(limit, units.of(row.kind == "revolute"))}
+        limit, angle = row.limits[column == "high"], row.kind == "revolute"
+        return {**cell, "value": _text((index, column), limit, units, angle, texts)}
     variable = column == {"revolute": "theta", "prismatic": "d"}.get(row.kind)
-    return {**cell, "value": text_of(getattr(row, column), units.of(column in ANGLES)), "variable": variable}
+    value = _text((index, column), getattr(row, column), units, column in ANGLES, texts)
+    return {**cell, "value": value, "variable": variable}
+
+
+def _text(cell: Cell, value: float, units: Units, is_angle: bool, texts: Texts) -> str:
+    """What was typed into a cell, or its value (rad or m) as a number."""
+    unit = units.of(is_angle)
+    typed = texts.shown(cell, value, unit, is_angle)
+    return text_of(value, unit) if typed is None else typed
 
 
 def wrong(messages: Mapping[Cell, str]) -> str:
@@ -165,7 +174,7 @@ def _home(found: InspectionAnswer) -> dict[str, str]:
     return _fact("Home", "every possible motion of the tool starts freely", "not singular:")
 
 
-def frames(robot: Robot, units: Units, page: Frames) -> str:
+def frames(robot: Robot, units: Units, page: Frames, texts: Texts) -> str:
     """Fields for the tool, the base, and the workpieces of the page."""
     rows = []
     poses = [(frame, frame, frame_values(robot, frame)) for frame in FRAMES]
@@ -174,7 +183,7 @@ def frames(robot: Robot, units: Units, page: Frames) -> str:
         cells = [
             {
                 "key": f"{frame} {axis}",
-                "value": text_of(value, units.of(i >= 3)),
+                "value": _text((frame, axis), value, units, i >= 3, texts),
                 "label": name_of((frame, axis)),
             }
             for i, (axis, value) in enumerate(zip(AXES, values, strict=True))

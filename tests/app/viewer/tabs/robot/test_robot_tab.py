@@ -20,8 +20,11 @@ from app.viewer.session.state import PageState, decode, encode
 from app.viewer.tabs.robot import files
 from app.viewer.tabs.robot.files import MOST
 from app.viewer.tabs.robot.presets import PRESETS
+from app.viewer.tabs.robot.texts import IN_LINK, Texts
+from app.viewer.tabs.robot.texts import MOST as MOST_TEXTS
 from app.viewer.tabs.robot.views import MOST_TIPS
 from kin.files.urdf.tree import read_tree
+from kin.units import DEFAULT_UNITS
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -473,3 +476,63 @@ def test_the_status_says_what_a_change_has_put_back_or_replaced(port: int) -> No
         tab.settle()
         tab.choose(mine)
         assert len(re.findall("data-row=", part(tab, "table"))) == len(PIONEER.rows) + 1
+
+
+def test_expressions_stay_in_their_cells_and_in_the_link(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        typed = {"0 alpha": "-pi/2 + 1/3", "1 a": "2*175", "2 high": "pi/3", "tool z": "12 cm"}
+        for key, text in typed.items():
+            row, column = key.split()
+            type_in(tab, int(row) if row.isdecimal() else row, column, text)
+        say(tab, "left")
+        shown = {key: cell(tab, key) for key in typed}
+        assert shown == typed
+        say(tab, "row", "add", 0)
+        assert (cell(tab, "0 alpha"), cell(tab, "2 a"), cell(tab, "3 high")) == ("-pi/2 + 1/3", "2*175", "pi/3")
+        tab.say("undo")
+        tab.settle()
+        tab.set("Radians", True)
+        tab.settle()
+        assert cell(tab, "1 a") == "2*175"
+        assert cell(tab, "2 high") == "pi/3", "pi is a half turn in all units"
+        assert cell(tab, "0 alpha").startswith("-1.5"), "a number without a unit would now be another angle"
+        tab.set("Radians", False)
+        state = saved(tab)
+    with FakeBrowser(port, memory=json.dumps({"state": encode(state)})) as again:
+        again.settle()
+        assert {key: cell(again, key) for key in shown} == shown
+        type_in(again, 1, "a", "350")
+        say(again, "left")
+        assert cell(again, "1 a") == "350", "a plain number is shown as numbers are"
+
+
+def test_texts_of_a_link_are_checked() -> None:
+    texts = Texts()
+    texts.restore(
+        {"0 a": "2*175", "0 name": "x*y", "99 b1": "1+1", "1 a": "9" * 99, "tool x": 5, "arm name": "pi"}
+    )
+    assert texts.state() == {"0 a": "2*175"}
+    assert texts.shown((0, "a"), 0.35, DEFAULT_UNITS.lengths, False) == "2*175"
+    assert texts.shown((0, "a"), 0.36, DEFAULT_UNITS.lengths, False) is None
+    for k in range(3 * MOST_TEXTS):
+        texts.remember((k % 30, "a" if k % 2 else "d"), f"{k}+1")
+    assert len(texts.state()) <= MOST_TEXTS
+    assert sum(len(key) + len(text) for key, text in texts.state().items()) <= IN_LINK
+    texts.restore(["0 a"])
+    assert texts.state() == {}
+
+
+@pytest.mark.parametrize(
+    ("action", "rows"),
+    [("add", [0, 1, 3, 4]), ("remove", [0, 1, 2]), ("up", [0, 2, 1, 3]), ("down", [0, 1, 3, 2])],
+)
+def test_texts_move_with_their_rows(action: str, rows: list[int]) -> None:
+    """Row 2 is the one that is changed; for an added row, row 1."""
+    texts = Texts()
+    for row in range(4):
+        texts.remember((row, "a"), f"{row}+0")
+    texts.move_rows(action, 1 if action == "add" else 2)
+    expected = {0: "0+0", 1: "1+0", 2: "2+0", 3: "3+0"}
+    kept = [row for row in range(4) if not (action == "remove" and row == 2)]
+    assert texts.state() == {f"{to} a": expected[row] for row, to in zip(kept, rows, strict=True)}
