@@ -7,7 +7,7 @@ request bodies in ``uploads``.
 
 from starlette.routing import BaseRoute
 
-from app.api import equations, fk, ik, jacobian, path
+from app.api import equations, fk, ik, jacobian, motion, path
 from app.api.arms import files, robots
 from app.api.body import UploadMemory
 from app.api.document import complete_document
@@ -25,7 +25,21 @@ __all__ = [
     "install_problem_handlers",
 ]
 
-_MODULES = (robots, files, fk, ik, path, jacobian, equations, download, socket, summary, reachable, capability)
+_MODULES = (
+    robots,
+    files,
+    fk,
+    ik,
+    path,
+    motion,
+    jacobian,
+    equations,
+    download,
+    socket,
+    summary,
+    reachable,
+    capability,
+)
 
 
 def api_routes() -> list[BaseRoute]:

@@ -234,6 +234,34 @@ def _add_target(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
 
 
+def add_move(commands: Any, parents: Parents) -> argparse.ArgumentParser:
+    """``kinboard move``."""
+    parser = _command(
+        commands,
+        "move",
+        "motion of a program: timed joint values along PTP, LIN and CIRC segments",
+        parents.robots,
+        parents.output,
+    )
+    parser.add_argument(
+        "program", metavar="PROGRAM", help="program (TOML), with its own units; - is standard input"
+    )
+    parser.add_argument(
+        "--start", type=number, nargs="+", metavar="Q",
+        help=f"where the arm is (default: its home configuration); {UNITS_NOTE}",
+    )  # fmt: skip
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", help="write the motion in radians and metres; - is standard output"
+    )
+    parser.add_argument(
+        "--format", choices=("csv", "json", "ndjson", "urscript", "python"),
+        help="format of the file (default: by the ending of its name)",
+    )  # fmt: skip
+    parser.add_argument("--rate", type=number, default=100.0, help="samples per second (default 100)")
+    parser.add_argument("--picture", metavar="FILE", help="draw joint values and speeds over time (SVG)")
+    return parser
+
+
 def add_robots(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard robots``."""
     parser = _command(

@@ -158,7 +158,13 @@ def _load_bench() -> Run:
 
 
 def _load_check() -> Run:
-    from app.cli.check import run
+    from app.cli.files import run_check
+
+    return run_check
+
+
+def _load_move() -> Run:
+    from app.cli.move import run
 
     return run
 
@@ -185,6 +191,7 @@ COMMANDS = (
     Command(declare.add_serve, _load_serve),
     Command(declare.add_fk, _load_fk, interpreted=True),
     Command(declare.add_ik, _load_ik),
+    Command(declare.add_move, _load_move),
     Command(declare.add_robots, _load_robots, interpreted=True),
     Command(declare.add_workspace, _load_workspace),
     Command(declare.add_bench, _load_bench),

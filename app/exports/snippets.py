@@ -96,12 +96,7 @@ for solution in answer["solutions"]:
 def python_kin(moment: Moment) -> str:
     """Python, with this package and without any service."""
     robot = moment.robot
-    if moment.own:
-        load = f"robot = kin.robot_from_dict({_fields(robot, 28)})"
-    elif robot == builtin_robots().get(robot.id):
-        load = f'robot = kin.get_robot("{robot.id}")'
-    else:
-        load = f"# The arm's file in the service's folder of robots:\nrobot = kin.load_robot(\"{robot.id}.toml\")"
+    load = robot_code(robot, known=not moment.own)
     return f"""import kin
 
 {load}
@@ -226,6 +221,15 @@ def named(robot: Robot) -> Robot:
     """An arm of a visitor's own with an id that people can read, for a file."""
     words = "".join(c if c.isascii() and c.isalnum() else " " for c in robot.name.lower()).split()
     return replace(robot, id="-".join(words)[:40].strip("-") or "my-arm")
+
+
+def robot_code(robot: Robot, known: bool = False) -> str:
+    """Python that assigns the arm to `robot`; `known`: an arm that is not built in has a file in the service."""
+    if robot == builtin_robots().get(robot.id):
+        return f'robot = kin.get_robot("{robot.id}")'
+    if known:
+        return f"# The arm's file in the service's folder of robots:\nrobot = kin.load_robot(\"{robot.id}.toml\")"
+    return f"robot = kin.robot_from_dict({_fields(robot, 28)})"
 
 
 def _fields(robot: Robot, indent: int) -> str:

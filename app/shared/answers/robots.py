@@ -28,6 +28,10 @@ class JointAnswer(TypedDict):
     """[lower, upper] in that unit; null if it is unlimited."""
     velocity: float | None
     """Its largest speed, in that unit per second; null if it is not known."""
+    acceleration: float | None
+    """Its largest acceleration, in that unit per second squared; null if it is not known."""
+    jerk: float | None
+    """Its largest jerk, in that unit per second cubed; null if it is not known."""
     effort: float | None
     """Its largest torque in N·m (revolute) or force in N (prismatic); null if it is not known."""
     home: float
@@ -127,6 +131,8 @@ def _joint(index: int, joint: Joint, home: float) -> JointAnswer:
         "unit": "m" if joint.kind == "prismatic" else "rad",
         "limits": list(joint.limits) if joint.limits is not None and bounded else None,
         "velocity": joint.velocity,
+        "acceleration": joint.acceleration,
+        "jerk": joint.jerk,
         "effort": joint.effort,
         "home": home,
     }

@@ -31,21 +31,8 @@ from kin.units import Units
 # Events that change nothing that undo restores.
 NO_STEP = frozenset(
     {
-        "camera",
-        "fit-arm",
-        "look-from",
-        "looked",
-        "resized",
-        "system-dark",
-        "grab",
-        "copy-as",
-        "undo",
-        "redo",
-        "travel",
-        "released",
-        "snap",
-        "text-size",
-        "body",
+        *("camera", "fit-arm", "look-from", "looked", "resized", "system-dark", "grab", "copy-as"),
+        *("undo", "redo", "travel", "released", "snap", "text-size", "body"),
     }
 )
 # Controls that send many values on the way to the one the visitor means: how long (s) a step may pause.

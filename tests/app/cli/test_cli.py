@@ -10,6 +10,7 @@ import sys
 import time
 from pathlib import Path
 from typing import get_args
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -742,3 +743,92 @@ def test_the_search_for_garbage_goes_on_after_a_command(capsys):
     assert gc.isenabled()
     assert parser.main(["fk", "pioneer5", "90", "30", "60", "30", "30"]) == 0
     assert gc.isenabled()
+
+
+# Motions
+
+PICK, SIX = str(ROOT / "tests" / "data" / "pick.toml"), str(ROOT / "tests" / "data" / "six.toml")
+
+
+def test_move_answers_as_the_core_and_writes_each_format(capsys, tmp_path):
+    panda = kin.get_robot("panda")
+    expected = kin.plan_motion(panda, kin.parse_program(Path(PICK).read_text(encoding="utf-8"), panda))
+    got = answer(capsys, "move", "panda", PICK)
+    assert got["duration"] == pytest.approx(expected.duration)
+    assert got["reason"] == expected.reason
+    for suffix, begin in (
+        (".csv", "t,q1"),
+        (".json", '{"planned":true'),
+        (".ndjson", '{"planned":true'),
+        (".py", "import kin"),
+    ):
+        file = tmp_path / f"motion{suffix}"
+        code, out, _ = run(capsys, "move", "panda", PICK, "-o", file, "--rate", 50)
+        assert (code, file.read_text(encoding="utf-8")[: len(begin)]) == (0, begin)
+        assert f"{file.stat().st_size} bytes" in out
+    rows = np.loadtxt(tmp_path / "motion.csv", delimiter=",", skiprows=1)
+    assert np.allclose(rows[:, 1:8], expected.sample(rows[:, 0]).q, atol=1e-12)
+
+
+def test_move_prints_segments_and_peaks_and_draws_a_picture(capsys, tmp_path):
+    picture = tmp_path / "motion.svg"
+    code, out, _ = run(capsys, "move", "panda", PICK, "--picture", picture)
+    assert code == 0
+    assert "above the part" in out
+    assert "100.0 %" in out
+    root = ElementTree.fromstring(picture.read_text(encoding="utf-8"))
+    assert len(root.findall(".//{*}path[@fill='none']")) == 14, "values and speeds of seven joints"
+
+
+def test_move_starts_at_a_given_place_and_writes_to_standard_output(capsys):
+    code, out, _ = run(
+        capsys, "move", "ur5", SIX, "--start", 0, -90, 90, 0, 90, 0, "-o", "-", "--format", "urscript"
+    )
+    assert code == 0
+    assert out.startswith("def six_joints():\n")
+    assert "movej([0, -1.57079633, 1.57079633, 0, 1.57079633, 0])  # the start" in out
+
+
+def test_a_program_that_cannot_be_driven_is_exit_code_1_and_a_reason(capsys, tmp_path):
+    file = tmp_path / "far.toml"
+    file.write_text('[[segments]]\nkind = "ptp"\nq = [9, 0, 0, 0, 0, 0]\n', encoding="utf-8")
+    code, out, _ = run(capsys, "move", "ur5", file)
+    assert code == 1
+    assert "cannot be driven: the target is outside the limits: joint 1" in out
+    code, out, err = run(capsys, "move", "ur5", file, "-o", "-", "--format", "csv")
+    assert (code, out) == (1, "")
+    assert "joint 1" in err
+
+
+@pytest.mark.parametrize(
+    ("text", "words", "said"),
+    [
+        ("nonsense", (), "valid TOML"),
+        ('[[segments]]\nkind = "ptp"\nq = [0]', (), "segments[0].q"),
+        ('[[segments]]\nkind = "dwell"\nseconds = 1\nspeed = 1', (), "segments[0].speed"),
+        ('[[segments]]\nkind = "dwell"\nseconds = 1', ("-o", "motion.pdf"), ".csv"),
+        ('[[segments]]\nkind = "dwell"\nseconds = 1', ("--rate", 0), "0.1 to 10000"),
+        ('[[segments]]\nkind = "dwell"\nseconds = 1', ("--start", 1, 2), "--start"),
+        (
+            '[[segments]]\nkind = "dwell"\nseconds = 1',
+            ("-o", "/no/such/folder/motion.csv"),
+            "a file that can be written",
+        ),
+        (
+            '[[segments]]\nkind = "dwell"\nseconds = 1',
+            ("--picture", "/no/such/folder/m.svg"),
+            "a file that can be written",
+        ),
+    ],
+)
+def test_a_malformed_program_or_option_is_exit_code_2(capsys, tmp_path, text, words, said):
+    file = tmp_path / "program.toml"
+    file.write_text(text, encoding="utf-8")
+    code, _, err = run(capsys, "move", "ur5", file, *words)
+    assert code == 2
+    assert said in err
+
+
+def test_a_missing_program_is_named(capsys):
+    code, _, err = run(capsys, "move", "ur5", "/no/such/program.toml")
+    assert (code, "a readable text file" in err) == (2, True)

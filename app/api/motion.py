@@ -1,0 +1,208 @@
+"""Motions over REST: a program of segments in, a timed motion out, or the reason why it cannot be driven."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Annotated, Any, Literal
+
+from fastapi import Request, Response
+from pydantic import Field, WithJsonSchema
+
+from app.api import schemas
+from app.api.arms.frames import FramesBody
+from app.api.arms.operation import operation
+from app.api.batches import Batch, one_or_all
+from app.api.body import versioned
+from app.api.problems import FieldError, from_input_error, invalid
+from app.api.schemas import POST_REFUSALS, Configuration, example, reply, settings_of
+from app.api.work import Deadline, computed
+from app.api.workspace.streaming import ComputedResponse
+from app.exports.motion import FORMATS
+from app.shared.answers.motion import MotionAnswer, motion_answer, sample_times
+from app.shared.settings import Settings
+from kin import InputError, Motion, Robot, plan_motion
+from kin.motion import program_from_dict
+from kin.motion.program import KINDS, LONGEST_NAME, MOST_SEGMENTS, TASKS
+
+router = versioned("motion")
+
+MOST_RATE = 1000.0  # samples per second
+MOST_SAMPLES = 1_000_000
+NUMBER = 21  # bytes of a number in JSON, about
+
+_SEGMENT: dict[str, Any] = {
+    "type": "object",
+    "required": ["kind"],
+    "properties": {
+        "kind": {
+            "enum": list(KINDS),
+            "description": "ptp: MoveJ, lin: MoveL, circ: MoveC, spline, or dwell: a pause.",
+        },
+        "q": {"type": "array", "items": {"type": "number"}, "description": "Target: joint values."},
+        "position": {
+            "type": "array",
+            "items": {"type": "number"},
+            "description": "Target: the tool point x, y, z.",
+        },
+        "wxyz": {
+            "type": "array",
+            "items": {"type": "number"},
+            "description": "Orientation at `position`; by default that at the start of the segment.",
+        },
+        "pose": {"type": "array", "items": {"type": "array"}, "description": "Target: a 4×4 matrix instead."},
+        "via": {"type": "array", "items": {"type": "number"}, "description": "circ: a point of the arc."},
+        "points": {"type": "array", "items": {"type": "object"}, "description": "spline: targets as above."},
+        "orientation": {"enum": ["geodesic", "two-axis"], "description": "lin, circ: how the tool turns."},
+        "seconds": {"type": "number", "description": "dwell: how long."},
+        "speed": {"type": "number", "description": "Part of the joints' velocity limits, above 0 and at most 1."},
+        "acceleration": {"type": "number", "description": "The same for acceleration and jerk."},
+        "tool_speed": {"type": "number", "description": "Largest speed of the tool point, per second."},
+        "tool_turn": {"type": "number", "description": "Largest angular velocity of the tool."},
+        "blend": {
+            "type": "number",
+            "description": "Radius about the target within which the next segment may begin.",
+        },
+        "name": {"type": "string", "maxLength": LONGEST_NAME, "description": "For people."},
+    },
+}
+_PROGRAM: dict[str, Any] = {
+    "type": "object",
+    "description": "Segments, one after the other; docs/motion.md lists their fields.",
+    "required": ["segments"],
+    "additionalProperties": False,
+    "properties": {
+        "segments": {"type": "array", "minItems": 1, "maxItems": MOST_SEGMENTS, "items": _SEGMENT},
+        "units": {
+            "type": "object",
+            "additionalProperties": False,
+            "properties": {"length": {"enum": ["m", "cm", "mm"]}, "angle": {"enum": ["rad", "deg"]}},
+            "description": "Units of the numbers in the program; by default metres and radians.",
+        },
+        "name": {"type": "string", "maxLength": LONGEST_NAME, "description": "For people."},
+        "task": {"enum": [*TASKS, None], "description": "What the tool keeps of poses; by default all it can."},
+        "jerk_limited": {"type": "boolean", "description": "Whether paths keep the limits of jerk too."},
+    },
+}
+
+EXAMPLES = {
+    "ptp": example(
+        "There and back, with a pause",
+        {
+            "program": {
+                "units": {"length": "mm", "angle": "deg"},
+                "segments": [
+                    {"kind": "ptp", "q": [60, 40, 50, 20, 30], "name": "pick"},
+                    {"kind": "dwell", "seconds": 0.5},
+                    {"kind": "ptp", "q": [90, 30, 60, 30, 30], "speed": 0.5},
+                ],
+            },
+            "rate": 20,
+        },
+    ),
+    "csv": example(
+        "As a table",
+        {"program": {"segments": [{"kind": "ptp", "q": [1.0, 0.7, 0.9, 0.3, 0.6]}]}, "format": "csv", "rate": 50},
+    ),
+    "refused": example(
+        "Outside the limits: still an answer", {"program": {"segments": [{"kind": "ptp", "q": [9, 0, 0, 0, 0.5]}]}}
+    ),
+}
+
+
+class MotionRequest(FramesBody):
+    """What the arm should do, and how the motion is answered."""
+
+    program: Annotated[dict[str, Any], WithJsonSchema(_PROGRAM)] = Field(
+        description="The segments of the motion. Poses are those of the tool in the world frame."
+    )
+    q_start: Configuration | None = Field(
+        None,
+        description="Where the arm is, in radians (metres for sliding joints); by default the home configuration.",
+    )
+    rate: float = Field(
+        100.0, ge=0.1, le=MOST_RATE, strict=True, allow_inf_nan=False, description="Samples per second."
+    )
+    samples: bool = Field(True, strict=True, description="json: whether to include samples of the motion.")
+    format: Literal["json", "csv", "ndjson", "urscript", "python"] = Field(
+        "json", description="; ".join(f"{name}: {each.meaning}" for name, each in FORMATS.items()) + "."
+    )
+
+
+@operation(
+    router,
+    "motion",
+    examples=EXAMPLES,
+    summary="Motion of a program",
+    response_model=MotionAnswer,
+    responses={
+        **POST_REFUSALS,
+        200: {
+            "description": "The motion, or why the program cannot be driven.",
+            "content": {
+                each.media_type: {"schema": {"type": "string"}} for each in FORMATS.values() if each.name != "json"
+            },
+        },
+    },
+)
+async def motion(request: Request, robot: Robot, body: MotionRequest) -> Response:
+    """A program of PTP, LIN, CIRC, spline and dwell segments, timed so that no joint exceeds its limits.
+
+    A program that cannot be driven is answered with 200 and `planned` false, in JSON whatever the format:
+    `refusal` holds the segment, the place on its path, the cause as a code with its numbers, and what would help.
+    A malformed program is refused with 422 and the field. Peaks are measured on the motion, without what the
+    planner knows.
+    """
+    settings = settings_of(request)
+    found = await computed(request, partial(_planned, robot, body, settings))
+    if isinstance(found, Response):
+        return found
+    kind = FORMATS[body.format]
+    headers = {"content-disposition": f'attachment; filename="{robot.id}-motion{kind.suffix}"'}
+    pieces = kind.pieces(found, body.rate)
+    return ComputedResponse(pieces, "motion", kind.media_type, headers, request.app.state.streams)
+
+
+def _planned(robot: Robot, body: MotionRequest, settings: Settings, deadline: Deadline) -> Motion | Response:
+    """The response, or the motion whose samples are computed while they are sent."""
+    segments = body.program.get("segments")
+    if isinstance(segments, list):
+        schemas.check_batch("program.segments", len(segments), settings, settings.max_path)
+    q_start = None
+    if body.q_start is not None:
+        q_start = schemas.as_configurations(robot, body.q_start, settings, "q_start")[0][0]
+    try:
+        found = plan_motion(robot, program_from_dict(body.program, robot), q_start, stop=deadline.check)
+    except InputError as error:
+        prefix = "" if error.field.partition("[")[0] in ("program", "q_start") else "program."
+        raise invalid(from_input_error(error, prefix)) from None
+    if not found.planned:
+        return reply(motion_answer(found, sample_times(found, body.rate) if body.samples else None))
+    _check_length(found, body.rate)
+    if body.format in ("csv", "ndjson"):
+        return found
+    if body.format == "json":
+        return _whole(found, body, deadline)
+    kind = FORMATS[body.format]
+    try:
+        text = b"".join(kind.pieces(found, body.rate))
+    except InputError as error:
+        raise invalid(from_input_error(error)) from None
+    headers = {"content-disposition": f'attachment; filename="{robot.id}-motion{kind.suffix}"'}
+    return Response(text, media_type=kind.media_type, headers=headers)
+
+
+def _check_length(found: Motion, rate: float) -> None:
+    count = found.duration * rate
+    if count > MOST_SAMPLES:
+        most = MOST_SAMPLES / found.duration
+        expected = f"at most {most:.3g} for a motion of {found.duration:.0f} s: {MOST_SAMPLES} samples"
+        raise invalid(FieldError(field="rate", value=f"{rate:g}", expected=expected))
+
+
+def _whole(found: Motion, body: MotionRequest, deadline: Deadline) -> Response:
+    """The answer with its samples, as far as there is memory for it."""
+    times = sample_times(found, body.rate) if body.samples else None
+    count = 0 if times is None else len(times)
+    size = 4000 + 400 * found.robot.n + 300 * len(found.segments) + count * NUMBER * (3 * found.robot.n + 9)
+    batch = Batch("rate", 1, True, size, "a lower rate, format ndjson, or samples false")
+    return one_or_all(lambda _: [motion_answer(found, times)], batch, deadline)

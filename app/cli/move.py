@@ -1,0 +1,106 @@
+"""``kinboard move``: the motion of a program."""
+
+from __future__ import annotations
+
+import sys
+from argparse import Namespace
+from contextlib import closing
+from pathlib import Path
+
+from app.cli.terminal import Notation, clean, configuration, print_json, robot_of, table
+from app.exports.motion import FORMATS, MotionFormat
+from app.exports.motion_plot import motion_plot
+from app.exports.save import opened
+from app.shared.answers.motion import motion_answer
+from kin import InputError, Motion, plan_motion
+from kin.motion import parse_program
+from kin.units import Units
+
+LEAST_RATE, MOST_RATE = 0.1, 10_000.0
+_UNITS = {"velocity": "/s", "acceleration": "/s²", "jerk": "/s³", "tool_speed": "/s", "tool_turn": "/s"}
+
+
+def run(arguments: Namespace) -> int:
+    """Plan the motion, print what it is, and write files; 1 if the program cannot be driven."""
+    robot = robot_of(arguments)
+    kind = _format(arguments)
+    if not LEAST_RATE <= arguments.rate <= MOST_RATE:
+        raise InputError("--rate", arguments.rate, f"{LEAST_RATE:g} to {MOST_RATE:g} samples per second")
+    start = arguments.start
+    q_start = None if start is None else configuration(robot, start, "--start", arguments.rad)
+    motion = plan_motion(robot, parse_program(_text(arguments.program), robot), q_start)
+    if arguments.json:
+        print_json(motion_answer(motion))
+    elif arguments.output != "-":
+        print(motion.explain(Units(not arguments.rad, "m" if arguments.rad else "mm")))
+        if motion.planned:
+            print("\n" + _report(motion, Notation(robot, arguments.rad)))
+    if not motion.planned:
+        if arguments.output == "-":
+            print(motion.reason, file=sys.stderr)
+        return 1
+    if arguments.output is not None and kind is not None:
+        _write(arguments.output, motion, kind, arguments.rate, arguments.json)
+    if arguments.picture is not None:
+        try:
+            Path(arguments.picture).write_text(motion_plot(motion), encoding="utf-8")
+        except OSError as error:
+            raise InputError("--picture", arguments.picture, f"a file that can be written ({error})") from None
+    return 0
+
+
+def _text(path: str) -> str:
+    try:
+        return sys.stdin.read() if path == "-" else Path(path).read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError("PROGRAM", path, f"a readable text file ({error})") from None
+
+
+def _format(arguments: Namespace) -> MotionFormat | None:
+    """The format of the file; None: none is written."""
+    if arguments.output is None:
+        return None
+    if arguments.format is not None:
+        return FORMATS[arguments.format]
+    found = next((each for each in FORMATS.values() if arguments.output.endswith(each.suffix)), None)
+    if found is None:
+        endings = ", ".join(each.suffix for each in FORMATS.values())
+        raise InputError("--output", arguments.output, f"a name that ends in {endings}, or --format")
+    return found
+
+
+def _write(path: str, motion: Motion, kind: MotionFormat, rate: float, quiet: bool) -> None:
+    size = 0
+    try:
+        with opened(path) as file, closing(kind.pieces(motion, rate)) as pieces:
+            for piece in pieces:
+                file.write(piece)
+                size += len(piece)
+            file.flush()
+    except OSError as error:
+        raise InputError("--output", path, f"a file that can be written ({error})") from None
+    if path != "-" and not quiet:
+        print(f"\n{path}: {motion.duration:.3f} s, {size} bytes")
+
+
+def _report(motion: Motion, units: Notation) -> str:
+    """When each segment is driven, and the peaks."""
+    segments = [
+        [str(each.index + 1), each.kind, each.name, f"{each.start:.3f}", f"{each.end:.3f}"]
+        for each in motion.segments
+    ]
+    peaks = []
+    for peak in motion.peaks:
+        turns = peak.quantity == "tool_turn" or (peak.joint is not None and motion.robot.revolute[peak.joint])
+
+        def shown(value: float, turns: bool = bool(turns), unit: str = _UNITS[peak.quantity]) -> str:
+            return (units.angle(value) if turns else f"{units.length(value)} {units.of_length}") + unit
+
+        limit = "" if peak.limit is None else shown(peak.limit) + (" (assumed)" if peak.assumed else "")
+        share = "" if peak.ratio is None else f"{clean(100.0 * peak.ratio, 1)} %"
+        peaks.append([peak.name, peak.quantity.replace("_", " "), shown(peak.peak), limit, share])
+    return (
+        table(["", "kind", "name", "from s", "to s"], segments)
+        + "\n\n"
+        + table(["joint", "largest", "value", "limit", "share"], peaks)
+    )

@@ -1,0 +1,198 @@
+"""Motions as text: samples as CSV and NDJSON, URScript, and Python.
+
+Samples are generated in chunks, so that a long motion is never in memory as text.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass
+from pprint import pformat
+
+import numpy as np
+
+from app.exports.snippets import robot_code
+from app.shared.answers.motion import motion_answer, sample_times
+from kin import InputError, Motion, fk
+from kin.axes import inverse
+from kin.motion import Circ, Dwell, Lin, MotionSample, PoseTarget, Ptp, Spline, program_to_dict
+from kin.motion.program import Segment
+from kin.transforms import Array, wxyz_from_rotation
+
+AT_ONCE = 500  # samples of a chunk
+
+
+@dataclass(frozen=True)
+class MotionFormat:
+    """A way to write a motion.
+
+    Attributes:
+        name: short name, the ending of a file.
+        suffix: of a file.
+        meaning: for people.
+        media_type: of a response.
+        pieces: the bytes of a motion, sampled at a rate (per second).
+    """
+
+    name: str
+    suffix: str
+    meaning: str
+    media_type: str
+    pieces: Callable[[Motion, float], Generator[bytes]]
+
+
+def columns(motion: Motion) -> list[str]:
+    """The columns of a table of samples."""
+    joints = range(1, motion.robot.n + 1)
+    names = [f"{kind}{i}" for kind in ("q", "qd", "qdd") for i in joints]
+    return ["t", *names, "x", "y", "z", "qw", "qx", "qy", "qz", "tool_speed"]
+
+
+def samples(motion: Motion, rate: float) -> Iterator[MotionSample]:
+    """The motion at `rate` samples per second, in chunks."""
+    times = sample_times(motion, rate)
+    for start in range(0, len(times), AT_ONCE):
+        yield motion.sample(times[start : start + AT_ONCE])
+
+
+def _csv(motion: Motion, rate: float) -> Generator[bytes]:
+    yield (",".join(columns(motion)) + "\n").encode()
+    for sample in samples(motion, rate):
+        parts = [sample.t[:, None], sample.q, sample.qd, sample.qdd, sample.T[:, :3, 3]]
+        parts += [wxyz_from_rotation(sample.T[:, :3, :3]), sample.tool_speed[:, None]]
+        rows = np.hstack(parts).tolist()
+        yield "".join(",".join(map(repr, row)) + "\n" for row in rows).encode()
+
+
+def _ndjson(motion: Motion, rate: float) -> Generator[bytes]:
+    """First the answer without samples, then one line per sample."""
+    yield _line(motion_answer(motion))
+    for sample in samples(motion, rate):
+        wxyz = wxyz_from_rotation(sample.T[:, :3, :3])
+        lines = zip(
+            *(part.tolist() for part in (sample.t, sample.q, sample.qd, sample.qdd, sample.T[:, :3, 3], wxyz)),
+            sample.tool_speed.tolist(),
+            strict=True,
+        )
+        names = ("t", "q", "qd", "qdd", "position", "wxyz", "tool_speed")
+        yield b"".join(_line(dict(zip(names, line, strict=True))) for line in lines)
+
+
+def _line(content: object) -> bytes:
+    return json.dumps(content, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode() + b"\n"
+
+
+def _json(motion: Motion, rate: float) -> Generator[bytes]:
+    yield _line(motion_answer(motion, sample_times(motion, rate)))
+
+
+def _python(motion: Motion, rate: float) -> Generator[bytes]:
+    """A program that plans the motion again."""
+    program = pformat(program_to_dict(motion.program), width=100, sort_dicts=False)
+    yield f"""import kin
+import numpy as np
+
+{robot_code(motion.robot)}
+program = {program}
+motion = kin.plan_motion(robot, program, q_start={json.dumps(motion.q_start.tolist())})
+print(motion.reason)
+sample = motion.sample(np.arange(0.0, motion.duration, {1.0 / rate:.9g}))
+print(sample.q.shape, sample.tool_speed.max())
+""".encode()
+
+
+def _urscript(motion: Motion, rate: float) -> Generator[bytes]:
+    """Commands of Universal Robots' controllers, which time the motion themselves."""
+    robot = motion.robot
+    if robot.n != 6 or not robot.revolute.all():
+        raise InputError("format", "urscript", "an arm with six revolute joints")
+    name = "".join(c if c.isascii() and c.isalnum() else "_" for c in motion.program.name or "program")[:60]
+    lines = [f"def {name if name[0].isalpha() else f'p_{name}'}():"]
+    lines += [f"  # {robot.id}: {motion.duration:.3f} s as planned; the controller plans speeds and blends anew."]
+    lines += [f"  movej({_list(motion.q_start)})  # the start"]
+    for times, segment in zip(motion.segments, motion.program.segments, strict=True):
+        q, T = _target(motion, segment, times.end)
+        lines += [f"  {line}" for line in _commands(motion, segment, q, T, times.index)]
+    yield "\n".join([*lines, "end", ""]).encode()
+
+
+def _target(motion: Motion, segment: Segment, end: float) -> tuple[Array, Array]:
+    """Where a segment leads to: configuration, and the tool's pose in the base frame; blends leave it earlier."""
+    sample = motion.sample(np.array([end]))
+    q, T = sample.q[0], sample.T[0]
+    if isinstance(segment, Ptp | Lin | Circ):
+        if isinstance(segment.target, PoseTarget):
+            T = segment.target.pose(T)
+        else:
+            q = np.array(segment.target.q)
+            T = fk(motion.robot, q)
+    return q, inverse(motion.robot.T_world_base) @ T
+
+
+def _commands(motion: Motion, segment: Segment, q: Array, T: Array, index: int) -> list[str]:
+    """The commands of one segment that ends at `q` ``(6,)`` with the tool at `T` in the base frame."""
+    if isinstance(segment, Dwell):
+        return [f"sleep({_number(segment.seconds)})"]
+    label = f"  # {segment.name}" if segment.name.isprintable() and segment.name else ""
+    after = motion.program.segments[index + 1 : index + 2]
+    blend = f", r={_number(segment.blend)}" if segment.blend and after and not isinstance(after[0], Dwell) else ""
+    limits = motion.limits
+    joint = (
+        f"a={_number(float(limits.acceleration.min()) * segment.acceleration)}, "
+        f"v={_number(float(limits.velocity.min()) * segment.speed)}"
+    )
+    peaks = {peak.quantity: peak.peak for peak in motion.segment_peaks(index) if peak.joint is None}
+    tool = f"a=1.2, v={_number(max(peaks['tool_speed'], 1e-3))}"
+    match segment:
+        case Ptp():
+            return [f"movej({_list(q)}, {joint}{blend}){label}"]
+        case Lin():
+            return [f"movel({_pose(T)}, {tool}{blend}){label}"]
+        case Circ():
+            via = T.copy()
+            via[:3, 3] = (inverse(motion.robot.T_world_base) @ [*segment.via, 1.0])[:3]
+            return [f"movec({_pose(via)}, {_pose(T)}, {tool}{blend}){label}"]
+    return [f"{line}{label}" for line in _through(motion, segment, joint, tool)]
+
+
+def _through(motion: Motion, segment: Spline, joint: str, tool: str) -> list[str]:
+    """A spline as commands to its points, without stops."""
+    commands = []
+    T_base_world, before = inverse(motion.robot.T_world_base), np.eye(4)
+    for point in segment.points:
+        if isinstance(point, PoseTarget):
+            before = point.pose(before)
+            commands.append(f"movep({_pose(T_base_world @ before)}, {tool}, r=0.01)")
+        else:
+            commands.append(f"movej({_list(np.array(point.q))}, {joint}, r=0.01)")
+    return [*commands[:-1], commands[-1].replace(", r=0.01", "")]
+
+
+def _pose(T: Array) -> str:
+    """``p[x, y, z, rx, ry, rz]`` with the rotation vector."""
+    w, *v = wxyz_from_rotation(T[:3, :3]).tolist()
+    size = float(np.linalg.norm(v))
+    angle = 2.0 * float(np.arctan2(size, w))
+    turn = [angle * x / size for x in v] if size > 1e-12 else [0.0, 0.0, 0.0]
+    return "p" + _list(np.array([*T[:3, 3], *turn]))
+
+
+def _list(values: Array) -> str:
+    return "[" + ", ".join(map(_number, values.tolist())) + "]"
+
+
+def _number(value: float) -> str:
+    return f"{round(value, 9) + 0.0:.9g}"
+
+
+FORMATS = {
+    each.name: each
+    for each in (
+        MotionFormat("json", ".json", "the answer with samples", "application/json", _json),
+        MotionFormat("csv", ".csv", "a table of samples", "text/csv", _csv),
+        MotionFormat("ndjson", ".ndjson", "the answer, then one line per sample", "application/x-ndjson", _ndjson),
+        MotionFormat("urscript", ".script", "commands for Universal Robots", "text/plain", _urscript),
+        MotionFormat("python", ".py", "a program for this library", "text/x-python", _python),
+    )
+}

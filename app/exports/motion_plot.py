@@ -1,0 +1,97 @@
+"""A motion as a picture: joint values and speeds over time, with the limits of speed as shares."""
+
+from __future__ import annotations
+
+from html import escape
+
+import numpy as np
+
+from app.exports.svg import joint_colour, tick_labels
+from kin import Motion
+from kin.transforms import Array
+
+WIDTH, HEIGHT = 900.0, 620.0
+LEFT, RIGHT, TOP, GAP = 84.0, 40.0, 84.0, 70.0
+SAMPLES = 1200
+LONGEST = 115  # characters of the reason
+INK, QUIET = "#20252a", "#c3c8cc"
+
+
+def motion_plot(motion: Motion) -> str:
+    """The picture as SVG text; of a motion that was refused, its reason."""
+    head = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" width="{WIDTH:g}" '
+        f'height="{HEIGHT:g}" font-family="system-ui, sans-serif" font-size="12" fill="{INK}">'
+        f'<rect width="{WIDTH:g}" height="{HEIGHT:g}" fill="#fff"/>'
+    )
+    title = escape(motion.program.name or motion.robot.name)
+    parts = [f'<text x="{LEFT:g}" y="30" font-size="17" font-weight="600">{title}</text>']
+    parts.append(f'<text x="{LEFT:g}" y="50">{escape(_cut(motion.reason))}</text>')
+    if motion.planned and motion.duration > 0.0:
+        times = np.linspace(0.0, motion.duration, SAMPLES)
+        q, qd = motion.derivatives(times)[:2]
+        height = (HEIGHT - TOP - GAP - 56.0) / 2.0
+        turning = motion.robot.revolute
+        values = np.where(turning, np.degrees(q), 1000.0 * q)
+        named = "°" if turning.all() else "mm" if not turning.any() else "° or mm"
+        parts.append(_panel(motion, times, values, TOP, height, f"joint values ({named})"))
+        share = 100.0 * qd / motion.limits.velocity
+        parts.append(
+            _panel(motion, times, share, TOP + height + GAP, height, "speeds (% of the limit)", (-100.0, 100.0))
+        )
+        parts.append(_legend(motion))
+    return head + "".join(parts) + "</svg>\n"
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= LONGEST else text[: LONGEST - 1] + "…"
+
+
+def _panel(
+    motion: Motion, times: Array, values: Array, top: float, height: float, title: str,
+    band: tuple[float, float] | None = None,
+) -> str:  # fmt: skip
+    """One line per joint over time, the ends of segments, and a band of what is allowed."""
+    low, high = (float(values.min()), float(values.max())) if band is None else (1.1 * band[0], 1.1 * band[1])
+    room = max(0.05 * (high - low), 1e-3)
+    low, high = (low - room, high + room) if band is None else (low, high)
+    wide = WIDTH - LEFT - RIGHT
+
+    def x(t: float) -> float:
+        return LEFT + wide * t / motion.duration
+
+    def y(value: float) -> float:
+        return top + height * (high - value) / (high - low)
+
+    parts = []
+    if band is not None:
+        parts.append(
+            f'<rect x="{LEFT:g}" y="{y(band[1]):.1f}" width="{wide:g}" height="{y(band[0]) - y(band[1]):.1f}" '
+            'fill="#eef4f8"/>'
+        )
+    for value, text in tick_labels(low, high, 1.0):
+        parts.append(f'<path d="M{LEFT:g} {y(value):.1f}H{LEFT + wide:g}" stroke="{QUIET}" stroke-width=".6"/>')
+        parts.append(f'<text x="{LEFT - 6:g}" y="{y(value) + 4:.1f}" text-anchor="end">{text}</text>')
+    for value, text in tick_labels(0.0, motion.duration, 1.0):
+        parts.append(f'<text x="{x(value):.1f}" y="{top + height + 16:.1f}" text-anchor="middle">{text}</text>')
+    dashes = f'stroke="{QUIET}" stroke-dasharray="4 3"'
+    ends = [x(each.end) for each in motion.segments]
+    parts.extend(f'<path d="M{end:.1f} {top:g}V{top + height:g}" {dashes}/>' for end in ends)
+    for joint in range(motion.robot.n):
+        points = "L".join(
+            f"{x(t):.1f} {y(v):.1f}" for t, v in zip(times.tolist(), values[:, joint].tolist(), strict=True)
+        )
+        parts.append(f'<path d="M{points}" fill="none" stroke="{joint_colour(joint)}" stroke-width="1.8"/>')
+    parts.append(f'<text x="{LEFT:g}" y="{top - 8:g}" font-weight="600">{title}</text>')
+    parts.append(f'<text x="{LEFT + wide:g}" y="{top + height + 32:g}" text-anchor="end">time (s)</text>')
+    return "".join(parts)
+
+
+def _legend(motion: Motion) -> str:
+    parts = []
+    step = (WIDTH - LEFT - RIGHT) / max(motion.robot.n, 6)
+    for i, joint in enumerate(motion.robot.joints):
+        x = LEFT + i * step
+        parts.append(f'<path d="M{x:.1f} {HEIGHT - 18:g}h18" stroke="{joint_colour(i)}" stroke-width="3"/>')
+        parts.append(f'<text x="{x + 23:.1f}" y="{HEIGHT - 14:g}">{i + 1} {escape(joint.name[:14])}</text>')
+    return "".join(parts)

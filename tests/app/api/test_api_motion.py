@@ -1,0 +1,209 @@
+"""REST: motions of programs, as JSON, tables, streams and code, and why some cannot be driven."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+
+import numpy as np
+import pytest
+
+import kin
+from app.api import motion as motion_module
+from app.exports.motion import AT_ONCE, FORMATS, columns
+from app.shared.answers.motion import sample_times
+
+UR5 = kin.get_robot("ur5")
+Q = [0.0, -1.57, 1.57, 0.0, 1.57, 0.0]
+PROGRAM = {
+    "name": "pick",
+    "segments": [
+        {"kind": "ptp", "q": Q, "name": "above"},
+        {"kind": "dwell", "seconds": 0.25},
+        {"kind": "ptp", "q": [0.5, -1.2, 1.4, 0.2, 1.2, 0.1], "speed": 0.5},
+    ],
+}
+EXPECTED = kin.plan_motion(UR5, PROGRAM)
+
+
+def post(client, body, status=200, path="robots/ur5/motion"):
+    response = client.post(f"/api/v1/{path}", json={"program": PROGRAM, **body})
+    assert response.status_code == status, response.text
+    return response
+
+
+def test_a_motion_is_that_of_the_core(client):
+    answer = post(client, {"rate": 50}).json()
+    assert (answer["planned"], answer["refusal"], answer["reason"]) == (True, None, EXPECTED.reason)
+    assert answer["duration"] == pytest.approx(EXPECTED.duration)
+    assert [each["kind"] for each in answer["segments"]] == ["ptp", "dwell", "ptp"]
+    assert [each["name"] for each in answer["segments"]] == ["above", "", ""]
+    peaks = [peak for peak in answer["peaks"] if peak["joint"] is not None]
+    assert len(peaks) == 18
+    assert all(peak["ratio"] <= 1 + 1e-9 for peak in peaks)
+    assert answer["limits"][0]["velocity"] == pytest.approx(EXPECTED.limits.velocity[0])
+    samples = answer["samples"]
+    times = sample_times(EXPECTED, 50)
+    assert samples["t"] == times.tolist()
+    assert samples["t"][-1] == pytest.approx(answer["duration"])
+    expected = EXPECTED.sample(times)
+    assert np.allclose(samples["q"], expected.q, atol=1e-12)
+    assert np.allclose(samples["qdd"], expected.qdd, atol=1e-9)
+    assert np.allclose(samples["position"], expected.T[:, :3, 3], atol=1e-12)
+    assert "samples" not in post(client, {"samples": False}).json()
+
+
+def test_the_same_arm_sent_along_has_the_same_motion(client):
+    sent = {"robot": kin.robot_to_dict(UR5), "rate": 20}
+    assert post(client, sent, path="motion").json() == post(client, {"rate": 20}).json()
+
+
+def test_poses_of_a_motion_are_those_of_the_tool_and_base_of_the_request(client):
+    frames = {"base": {"xyz": [0, 0, 0.5]}, "tool": {"xyz": [0, 0, 0.1]}}
+    answer = post(client, {**frames, "rate": 10, "q_start": Q}).json()["samples"]
+    arm = UR5.with_base(kin.from_xyz_rpy([0, 0, 0.5])).with_tool(UR5.T_last_tool @ kin.from_xyz_rpy([0, 0, 0.1]))
+    assert answer["q"][0] == Q
+    assert np.allclose(answer["position"][0], kin.fk(arm, np.array(Q))[:3, 3], atol=1e-12)
+
+
+def test_units_of_a_program_are_its_own(client):
+    program = {"units": {"angle": "deg"}, "segments": [{"kind": "ptp", "q": [0, -90, 90, 0, 90, 0]}]}
+    answer = post(client, {"program": program}).json()
+    assert np.allclose(answer["samples"]["q"][-1], np.radians([0, -90, 90, 0, 90, 0]), atol=1e-12)
+
+
+def test_tables_and_streams_hold_the_samples(client):
+    rate = 400.0
+    times = sample_times(EXPECTED, rate)
+    assert len(times) > AT_ONCE, "more than one chunk"
+    expected = EXPECTED.sample(times)
+    response = post(client, {"rate": rate, "format": "csv"})
+    assert response.headers["content-type"].startswith("text/csv")
+    assert response.headers["content-disposition"] == 'attachment; filename="ur5-motion.csv"'
+    head, *rows = csv.reader(io.StringIO(response.text))
+    assert head == columns(EXPECTED)
+    values = np.array(rows, float)
+    assert np.allclose(values[:, 0], times, atol=1e-12)
+    assert np.allclose(values[:, 1:7], expected.q, atol=1e-12)
+    assert np.allclose(values[:, -1], expected.tool_speed, atol=1e-9)
+    lines = [json.loads(line) for line in post(client, {"rate": rate, "format": "ndjson"}).text.splitlines()]
+    assert lines[0] == post(client, {"samples": False}).json()
+    assert np.allclose([line["q"] for line in lines[1:]], expected.q, atol=1e-12)
+    assert np.allclose([line["position"] for line in lines[1:]], expected.T[:, :3, 3], atol=1e-12)
+
+
+def test_code_is_text_and_python_plans_the_same_motion(client, capsys):
+    script = post(client, {"format": "urscript"}).text
+    assert script.startswith("def pick():\n")
+    assert "sleep(0.25)" in script
+    assert script.count("movej(") == 3
+    text = post(client, {"format": "python", "rate": 50}).text
+    found: dict[str, object] = {}
+    exec(compile(text, "motion.py", "exec"), found)
+    assert found["motion"].duration == pytest.approx(EXPECTED.duration, abs=1e-9)
+    assert EXPECTED.reason in capsys.readouterr().out
+    problem = post(client, {"format": "urscript", "program": {"segments": [{"kind": "dwell", "seconds": 1}]}}, 422,
+                   "robots/scara/motion").json()  # fmt: skip
+    assert problem["errors"][0]["field"] == "format"
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_what_cannot_be_driven_is_an_answer_with_a_reason(client, form):
+    program = {"segments": [{"kind": "ptp", "q": Q}, {"kind": "ptp", "q": [9.0, *Q[1:]], "name": "far"}]}
+    answer = post(client, {"program": program, "format": form}).json()
+    refusal = answer["refusal"]
+    assert (answer["planned"], answer["duration"], answer["segments"], answer["peaks"]) == (False, 0.0, [], [])
+    assert (refusal["segment"], refusal["kind"], refusal["name"], refusal["cause"]) == (1, "ptp", "far", "target")
+    (violation,) = refusal["details"]["violations"]
+    assert (violation["joint"], violation["value"]) == (0, 9.0)
+    assert refusal["reason"] == answer["reason"]
+    assert "joint 1" in answer["reason"]
+    assert answer["samples"]["t"] == []
+
+
+def test_a_pose_out_of_reach_is_explained_as_inverse_kinematics_does(client):
+    program = {"segments": [{"kind": "ptp", "position": [3.0, 0.0, 0.5], "wxyz": [0, 1, 0, 0]}]}
+    refusal = post(client, {"program": program}).json()["refusal"]
+    assert (refusal["cause"], refusal["details"]["cause"]) == ("unreachable", "too far")
+    assert refusal["details"]["details"]["distance"] > 1.0
+
+
+def test_a_start_outside_the_limits_is_an_answer(client):
+    refusal = post(client, {"q_start": [7.0, *Q[1:]]}).json()["refusal"]
+    assert (refusal["cause"], refusal["helps"]) == ("start", [{"code": "start", "posture": None}])
+
+
+@pytest.mark.parametrize(
+    ("body", "field"),
+    [
+        ({"program": {}}, "program.segments"),
+        ({"program": {"segments": []}}, "program.segments"),
+        ({"program": {"segments": 3}}, "program.segments"),
+        ({"program": {"segments": [{"kind": "fly"}]}}, "program.segments[0].kind"),
+        ({"program": {"segments": [{"kind": "ptp"}]}}, "program.segments[0]"),
+        ({"program": {"segments": [{"kind": "ptp", "q": Q, "blend": -1}]}}, "program.segments[0].blend"),
+        ({"program": {"segments": [{"kind": "ptp", "q": Q, "speed": 2}]}}, "program.segments[0].speed"),
+        ({"program": {"segments": [{"kind": "ptp", "q": Q[:3]}]}}, "program.segments[0].q"),
+        ({"program": {"segments": [{"kind": "dwell", "seconds": 1e9}]}}, "program.segments[0].seconds"),
+        (
+            {"program": {"segments": [{"kind": "dwell", "seconds": 1}], "units": {"length": "ft"}}},
+            "program.units.length",
+        ),
+        ({"program": {"segments": [{"kind": "dwell", "seconds": 1}], "colour": 1}}, "program.colour"),
+        ({"program": 3}, "program"),
+        ({"q_start": Q[:2]}, "q_start"),
+        ({"rate": 0}, "rate"),
+        ({"rate": 1e5}, "rate"),
+        ({"format": "pdf"}, "format"),
+        ({"program": {"segments": [{"kind": "dwell", "seconds": 3600}]}, "rate": 1000}, "rate"),
+        ({"samples": 1}, "samples"),
+    ],
+)
+def test_what_is_malformed_is_refused_by_its_field(client, body, field):
+    problem = post(client, body, 422).json()
+    assert problem["errors"][0]["field"].startswith(field), problem["errors"]
+
+
+def test_programs_and_answers_have_a_largest_size(client, app, monkeypatch):
+    narrow = app.state.settings.model_copy(update={"max_path": 2})
+    with monkeypatch.context() as patched:
+        patched.setitem(app.state._state, "settings", narrow)
+        problem = post(client, {}, 413).json()
+    assert problem["errors"][0]["field"] == "program.segments"
+    monkeypatch.setattr(motion_module, "NUMBER", 10**9)
+    problem = post(client, {}, 413).json()
+    assert problem["errors"][0]["field"] == "rate"
+    assert "ndjson" in problem["errors"][0]["expected"]
+
+
+def test_lines_and_arcs_are_written_with_their_own_targets(client):
+    p = kin.fk(UR5, np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0]))[:3, 3]
+    program = {
+        "segments": [
+            {"kind": "ptp", "q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]},
+            {"kind": "lin", "position": (p - [0, 0, 0.1]).tolist(), "blend": 0.02, "tool_speed": 0.2},
+            {"kind": "lin", "position": (p + np.array([0, 0.1, -0.1])).tolist()},
+            {
+                "kind": "circ",
+                "via": (p + np.array([0, 0.12, -0.05])).tolist(),
+                "position": (p + np.array([0, 0.1, 0])).tolist(),
+            },
+        ]
+    }
+    answer = post(client, {"program": program, "rate": 100}).json()
+    assert answer["planned"], answer["reason"]
+    assert all(peak["ratio"] <= 1 + 1e-9 for peak in answer["peaks"] if peak["ratio"] is not None)
+    assert np.allclose(answer["samples"]["position"][-1], p + np.array([0, 0.1, 0]), atol=1e-6)
+    script = post(client, {"program": program, "format": "urscript"}).text
+    assert script.count("movel(") == 2
+    assert script.count("movec(") == 1
+    assert f"{p[2] - 0.1:.9g}" in script, "the target of the line, not the middle of its blend"
+
+
+def test_a_line_that_leaves_the_workspace_is_refused_at_its_place(client):
+    program = {"segments": [{"kind": "ptp", "q": Q}, {"kind": "lin", "position": [2.0, 0.0, 0.5], "name": "away"}]}
+    refusal = post(client, {"program": program}).json()["refusal"]
+    assert (refusal["segment"], refusal["kind"], refusal["name"]) == (1, "lin", "away")
+    assert 0.0 < refusal["fraction"] < 1.0
+    assert "% of the way" in refusal["reason"]
