@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from app.viewer.feature import Stage
 from app.viewer.tabs.program.items import Items
 from kin.motion import Motion
 
 SAME = 1e-6  # rad or m: a locked joint has this value
+LOOSE, SAMPLES = 1e-4, 400  # rad or m on the way, and where it is looked at
 
 
 @dataclass(frozen=True)
@@ -39,4 +43,19 @@ def find_fault(items: Items, motion: Motion | None, stage: Stage) -> Fault | Non
                     f"{unit.text(q)}. Unlock the joint, or set the waypoint to another pose."
                 )
                 return Fault(index, words)
+    return None if motion is None else _moved(motion, locked)
+
+
+def _moved(motion: Motion, locked: Sequence[float | None]) -> Fault | None:
+    """A line on which a locked joint would move between two waypoints."""
+    joints = [(joint, value) for joint, value in enumerate(locked) if value is not None]
+    times = np.linspace(0.0, motion.duration, SAMPLES)
+    q = motion.derivatives(times)[0] if joints else np.zeros((0, motion.robot.n))
+    for joint, value in joints:
+        off = np.flatnonzero(np.abs(q[:, joint] - value) > LOOSE)
+        if off.size:
+            when = times[off[0]]
+            index = next(segment.index for segment in motion.segments if when <= segment.end)
+            words = f"Joint {joint + 1} is locked, and would move on the way. Unlock the joint, or choose PTP."
+            return Fault(index, words)
     return None

@@ -12,21 +12,23 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
+import numpy as np
+
 import kin
 from app.viewer.own_arm import clean
 from kin import InputError, Robot
-from kin.motion import Dwell, JointTarget, Program, Ptp
+from kin.motion import Dwell, JointTarget, Lin, PoseTarget, Program, Ptp
 from kin.motion.program import LONGEST_DWELL, Segment
 from kin.transforms import Array
 
-Kind = Literal["ptp", "pause"]
+Kind = Literal["ptp", "lin", "pause"]
 MOST = 40  # items of a program; a link holds some 8000 bytes of all programs
 NAME = 40  # characters
 DIGITS = 7  # of a joint value in a link
 PAUSE = 1.0  # s, of a new pause
 SLOWEST = 0.01  # part of the limits
 LARGEST = 1e6  # rad or m
-LETTERS: dict[Kind, str] = {"ptp": "p", "pause": "w"}
+LETTERS: dict[Kind, str] = {"ptp": "p", "lin": "l", "pause": "w"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +63,7 @@ def start_of(items: Items) -> Item | None:
     return next((item for item in items if item.q), None)
 
 
-def program_of(items: Items, loop: bool) -> Program:
+def program_of(items: Items, robot: Robot, loop: bool) -> Program:
     """The program of a list with at least one waypoint; `loop`: it returns to the first one."""
     first = start_of(items)
     assert first is not None
@@ -69,6 +71,9 @@ def program_of(items: Items, loop: bool) -> Program:
     for item in items:
         if not item.q:
             segments.append(Dwell(item.seconds, item.name))
+        elif item.kind == "lin" and item is not first:
+            target = PoseTarget.of(kin.fk(robot, np.array(item.q)))
+            segments.append(Lin(target, speed=item.speed, name=item.name))
         else:
             segments.append(Ptp(JointTarget(item.q), speed=item.speed, name=item.name))
     if loop:
@@ -84,22 +89,41 @@ def items_of(program: Program, robot: Robot, q: Array) -> Items:
     """
     if len(program.segments) > MOST:
         raise InputError("segments", f"{len(program.segments)} segments", f"at most {MOST} in this page")
+    _only_what_the_list_holds(program)
     first = program.segments[0]
     start = first.target.q if isinstance(first, Ptp) and isinstance(first.target, JointTarget) else q
     motion = kin.plan_motion(robot, program, start)
     if motion.refusal is not None:
         raise InputError("program", motion.refusal.reason, "a program that this arm can drive")
     found: list[Item] = []
-    for i, (segment, times) in enumerate(zip(program.segments, motion.segments, strict=True)):
+    for segment, times in zip(program.segments, motion.segments, strict=True):
         if isinstance(segment, Dwell):
             found.append(Item("pause", seconds=segment.seconds, name=clean(segment.name, NAME)))
-        elif isinstance(segment, Ptp):
-            end = robot.clip(motion.derivatives(times.end)[0])
-            speed = max(segment.speed, SLOWEST)
-            found.append(replace(waypoint(end), speed=speed, name=clean(segment.name, NAME)))
         else:
-            raise InputError(f"segments[{i}].kind", type(segment).__name__.lower(), "ptp or dwell in this page")
+            end = robot.clip(motion.derivatives(times.end)[0])
+            kind: Kind = "lin" if isinstance(segment, Lin) else "ptp"
+            speed = max(segment.speed, SLOWEST)
+            found.append(replace(waypoint(end), kind=kind, speed=speed, name=clean(segment.name, NAME)))
+    if isinstance(first, Lin):
+        found.insert(0, waypoint(robot.clip(q)))
     return tuple(found)
+
+
+def _only_what_the_list_holds(program: Program) -> None:
+    """Raise `InputError` for the first thing in a program that the list would lose."""
+    usual = Program(program.segments)
+    for field in ("task", "jerk_limited"):
+        if getattr(program, field) != getattr(usual, field):
+            raise InputError(field, getattr(program, field), "no other than the usual one in this page")
+    for i, segment in enumerate(program.segments):
+        if not isinstance(segment, Ptp | Lin | Dwell):
+            raise InputError(
+                f"segments[{i}].kind", type(segment).__name__.lower(), "ptp, lin or dwell in this page"
+            )
+        for field in ("acceleration", "tool_speed", "tool_turn", "blend", "orientation"):
+            value = getattr(segment, field, None)
+            if value not in (None, 1.0 if field == "acceleration" else 0.0, "geodesic"):
+                raise InputError(f"segments[{i}].{field}", value, "no other than the usual one in this page")
 
 
 def pack(items: Items) -> list[list[object]]:
@@ -132,12 +156,11 @@ def _item(row: object, robot: Robot) -> Item | None:
             return _pause(seconds, "")
         case ["w", seconds, str(name)]:
             return _pause(seconds, name)
-        case ["p", list(q)]:
-            return _waypoint(q, "", 1.0, robot)
-        case ["p", list(q), str(name)]:
-            return _waypoint(q, name, 1.0, robot)
-        case ["p", list(q), str(name), speed]:
-            return _waypoint(q, name, speed, robot)
+        case ["p" | "l" as letter, list(q), *rest] if len(rest) <= 2:
+            given = rest[0] if rest else ""
+            share = rest[1] if len(rest) > 1 else 1.0
+            found = _waypoint(q, given, share, robot) if isinstance(given, str) else None
+            return found if found is None or letter == "p" else replace(found, kind="lin")
     return None
 
 

@@ -199,7 +199,9 @@ class ProgramTab(Feature):
         start = changes.start_of(items)
         motion = None
         if start is not None:
-            motion = kin.plan_motion(stage.robot, changes.program_of(items, self._player.loop), start.q)
+            motion = kin.plan_motion(
+                stage.robot, changes.program_of(items, stage.robot, self._player.loop), start.q
+            )
         self._fault = find_fault(items, motion, stage)
         self._playback.use(items, motion if motion is not None and motion.planned else None)
         self._draw()
@@ -328,13 +330,15 @@ class ProgramTab(Feature):
             self._playback.go_to(float(time))
 
     def _go_to_item(self, index: int) -> None:
-        if self._motion is not None:
-            self._playback.note(self._motion.segments[index].end)
         item = self._items[index]
-        q = next((each.q for each in reversed(self._items[: index + 1]) if each.q), item.q)
-        if q:
-            title = item.name or (f"Waypoint {index + 1}" if item.q else "Pause")
-            self.stage.move_to(self.stage.robot.clip(np.array(q)), Notice("hand", title))
+        if self._motion is not None:  # a line may end in another posture than the recorded one
+            end = self._motion.segments[index].end
+            self._playback.note(end)
+            q = self._motion.derivatives(end)[0]
+        else:
+            q = np.array(next((each.q for each in reversed(self._items[: index + 1]) if each.q), self.stage.goal))
+        title = item.name or (f"Waypoint {index + 1}" if item.q else "Pause")
+        self.stage.move_to(self.stage.robot.clip(q), Notice("hand", title))
 
     # Choices
 
@@ -365,7 +369,9 @@ class ProgramTab(Feature):
         if not self._items:
             return
         robot = self.stage.robot if self._key != KEY else named(self.stage.robot)
-        program = replace(changes.program_of(self._items, self._player.loop), name=robot.name[:100])
+        program = replace(
+            changes.program_of(self._items, self.stage.robot, self._player.loop), name=robot.name[:100]
+        )
         name = f"{robot.id}-program.toml"
         self.stage.client.send_file_download(name, toml_of(program, robot.name).encode(), save_immediately=True)
         self.stage.notify(Notice("hand", f"{name} is saved", "Your browser has put it where it puts downloads."))

@@ -16,6 +16,7 @@ from kin.units import Units, fixed
 
 KINDS: dict[Kind, tuple[str, str]] = {
     "ptp": ("PTP – every joint goes the shortest way", "PTP"),
+    "lin": ("LIN – the tool moves on a straight line", "LIN"),
 }
 QUANTITIES = {"velocity": "velocities", "acceleration": "accelerations", "jerk": "jerks"}
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -30,15 +31,34 @@ ITEMS = (
 
 
 def test_item_i_is_segment_i_of_the_program() -> None:
-    motion = kin.plan_motion(PIONEER, lists.program_of(ITEMS, loop=False), ITEMS[0].q)
+    motion = kin.plan_motion(PIONEER, lists.program_of(ITEMS, PIONEER, loop=False), ITEMS[0].q)
     assert [segment.kind for segment in motion.segments] == ["ptp", "ptp", "dwell", "ptp"]
     assert motion.segments[0].end == 0.0, "the first waypoint is where it starts"
     for item, segment in zip(ITEMS, motion.segments, strict=True):
         if item.q:
             assert np.allclose(motion.derivatives(segment.end)[0], item.q, atol=1e-9)
-    back = kin.plan_motion(PIONEER, lists.program_of(ITEMS, loop=True), ITEMS[0].q)
+    back = kin.plan_motion(PIONEER, lists.program_of(ITEMS, PIONEER, loop=True), ITEMS[0].q)
     assert np.allclose(back.derivatives(back.duration)[0], ITEMS[0].q, atol=1e-9)
     assert len(back.segments) == 5
+
+
+def test_a_line_is_straight() -> None:
+    items = (lists.waypoint(UR5.q_home), replace(lists.waypoint(UR5.clip(UR5.q_home + 0.15)), kind="lin"))
+    motion = kin.plan_motion(UR5, lists.program_of(items, UR5, loop=False), items[0].q)
+    points = motion.sample(np.linspace(0.0, motion.duration, 50)).T[:, :3, 3]
+    along = points[-1] - points[0]
+    off = np.linalg.norm(np.cross(points - points[0], along / np.linalg.norm(along)), axis=1)
+    assert off.max() < 1e-5
+    assert lists.unpack(lists.pack(items), UR5) == items
+    text = toml_of(lists.program_of(items, UR5, loop=False), "UR5")
+    assert [item.kind for item in lists.items_of(kin.parse_program(text, UR5), UR5, UR5.q_home)] == ["ptp", "lin"]
+
+
+@pytest.mark.parametrize("field", ["blend = 0.1", "acceleration = 0.5", "tool_speed = 0.1"])
+def test_a_file_with_more_than_the_list_holds_is_refused(field: str) -> None:
+    text = f"[[segments]]\nkind = 'ptp'\nq = {list(ITEMS[0].q)}\n{field}\n"
+    with pytest.raises(InputError, match=field.split()[0]):
+        lists.items_of(kin.parse_program(text, PIONEER), PIONEER, PIONEER.q_home)
 
 
 names = st.text(max_size=60)
@@ -100,7 +120,7 @@ def test_typed_values() -> None:
 
 
 def test_a_file_holds_the_whole_program() -> None:
-    program = lists.program_of(ITEMS, loop=False)
+    program = lists.program_of(ITEMS, PIONEER, loop=False)
     text = toml_of(program, "Pioneer\narm")
     assert kin.parse_program(text, PIONEER) == program
     assert lists.items_of(kin.parse_program(text, PIONEER), PIONEER, PIONEER.q_home) == ITEMS

@@ -182,6 +182,17 @@ def test_a_locked_joint_keeps_its_value(port: int) -> None:
         assert np.allclose(tab.tool_pose(), before)
 
 
+def test_a_line_that_cannot_be_driven_says_what_would_help(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        record(tab, 10, 170)
+        press(tab, "field", 1, value=["kind", "lin"])
+        assert "Segment 2 (LIN) cannot be driven" in part(tab, "list")
+        assert part(tab, "list").count("kb-fault") == 1
+        press(tab, "field", 1, value=["kind", "ptp"])
+        assert "kb-fault" not in part(tab, "list")
+
+
 def test_a_file_is_opened_and_one_that_does_not_fit_is_refused(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
