@@ -48,14 +48,17 @@ def frame_pose(
     Raises:
         InputError: an unknown frame, the frame of the tool without a configuration, or a pose that is none.
     """
-    robot, known = robot_of(robot), dict(workpieces or {})
+    robot = robot_of(robot)
+    if workpieces is not None and not isinstance(workpieces, Mapping):
+        raise InputError("workpieces", workpieces, "poses (4, 4) by the names of their frames")
+    known = dict(workpieces or {})
     for name in known:
         if not isinstance(name, str) or not name.strip() or name in FRAMES:
             raise InputError("workpieces", name, "names that are not empty, and not " + ", ".join(FRAMES))
     if frame == WORLD:
         return np.eye(4)
     if frame == BASE:
-        return robot.T_world_base
+        return robot.T_world_base.copy()
     if frame == TOOL:
         if q is None:
             raise InputError("frame", frame, "a configuration as well, which tells where the tool is")
@@ -63,6 +66,6 @@ def frame_pose(
         if present.ndim != 1:
             raise InputError("q", f"shape {present.shape}", f"one configuration of {robot.n} values")
         return fk(robot, present)
-    if frame not in known:
+    if not isinstance(frame, str) or frame not in known:
         raise InputError("frame", frame, "one of " + ", ".join([*FRAMES, *known]))
     return as_transform(known[frame], f"workpieces.{frame}")

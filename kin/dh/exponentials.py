@@ -1,15 +1,15 @@
 """Arms as products of exponentials, ``T(q) = exp([S₁] q₁) … exp([Sₙ] qₙ) M`` (Lynch and Park, Modern Robotics).
 
-A screw ``S = (ω, v)`` is the twist of the whole space, seen from the base frame, when its joint moves at 1 rad/s
+A screw ``S = (ω, v)`` is the twist of the whole space, seen from the world frame, when its joint moves at 1 rad/s
 or 1 m/s and the others stand still at zero: ω is the direction of the axis and v the velocity of the point at the
-base's origin, ``v = p × ω`` for a point p of the axis. A prismatic joint has ω = 0, and v is its direction.
+world's origin, ``v = p × ω`` for a point p of the axis. A prismatic joint has ω = 0, and v is its direction.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from itertools import pairwise
-from typing import NamedTuple
+from collections.abc import Iterable
+from itertools import islice, pairwise
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,13 +24,15 @@ from kin.transforms import Array, as_transform, finite_array
 
 _ROUNDED = 1e-6  # deviation from a unit vector, or pitch in metres, that is taken as rounding
 
+Value = TypeVar("Value")
+
 
 class Screws(NamedTuple):
     """An arm as a product of exponentials.
 
     Attributes:
-        S: ``(6, n)`` screws in the base frame, one column (ω, v) per moving joint.
-        M: ``(4, 4)`` pose of the tool where all joints of the formula are zero.
+        S: ``(6, n)`` screws in the world frame, one column (ω, v) per moving joint.
+        M: ``(4, 4)`` pose of the tool in the world frame where all joints of the formula are zero.
     """
 
     S: Array
@@ -61,8 +63,8 @@ def robot_from_screws(
     S: ArrayLike,
     M: ArrayLike,
     *,
-    limits: Sequence[tuple[float, float] | None] | None = None,
-    names: Sequence[str] | None = None,
+    limits: Iterable[tuple[float, float] | None] | None = None,
+    names: Iterable[str] | None = None,
     home: Iterable[float] | None = None,
     convention: Convention = "standard",
     robot_id: str = "arm",
@@ -72,9 +74,9 @@ def robot_from_screws(
     """An arm from its screws and its tool pose at zero, with the same joint values.
 
     Args:
-        S: ``(6, n)`` one column (ω, v) per joint, in the base frame: |ω| = 1 for a revolute joint; ω = 0 and
+        S: ``(6, n)`` one column (ω, v) per joint, in the world frame: |ω| = 1 for a revolute joint; ω = 0 and
             |v| = 1 for a prismatic one.
-        M: ``(4, 4)`` pose of the tool at q = 0.
+        M: ``(4, 4)`` pose of the tool in the world frame at q = 0.
         limits: per joint (lower, upper), None for a revolute joint without limits. By default a revolute joint
             turns ±π and a prismatic one slides 0 to 1 m.
         names: of the joints.
@@ -90,15 +92,13 @@ def robot_from_screws(
     if columns.ndim != 2 or n == 0:
         raise InputError("S", f"shape {columns.shape}", "one column of six numbers (ω, v) per joint")
     tool = as_transform(M, "M")
-    given = (("limits", limits), ("names", names))
-    for field, values in given:
-        if values is not None and len(values) != n:
-            raise InputError(field, values, f"{n} values, one per joint")
+    ranges = _one_per_joint("limits", limits, n)
+    labels = _one_per_joint("names", names, n)
     joints, frames = [], []
     for i, column in enumerate(columns.T):
         kind, frame = _axis(column, f"S[:, {i}]")
-        bounds = DEFAULT_LIMITS[kind] if limits is None else limits[i]
-        joints.append(Joint(f"joint {i + 1}" if names is None else names[i], kind=kind, limits=bounds))
+        bounds = DEFAULT_LIMITS[kind] if ranges is None else ranges[i]
+        joints.append(Joint(f"joint {i + 1}" if labels is None else labels[i], kind=kind, limits=bounds))
         frames.append(frame)
     chain = [np.eye(4), *frames, tool]
     table = table_of_chain(joints, [inverse(a) @ b for a, b in pairwise(chain)])
@@ -108,8 +108,19 @@ def robot_from_screws(
     return convert(robot, convention)
 
 
+def _one_per_joint(field: str, values: Iterable[Value] | None, n: int) -> list[Value] | None:
+    """An argument with one value per joint as a list, None if it is not given."""
+    if values is None:
+        return None
+    several = isinstance(values, Iterable) and not isinstance(values, str | bytes)
+    listed = list(islice(values, n + 1)) if several else []
+    if len(listed) != n:
+        raise InputError(field, values, f"{n} values, one per joint")
+    return listed
+
+
 def _axis(column: Array, field: str) -> tuple[Kind, Array]:
-    """The kind of a joint, and a frame ``(4, 4)`` in the base frame whose z axis is the joint's."""
+    """The kind of a joint, and a frame ``(4, 4)`` in the world frame whose z axis is the joint's."""
     omega, v = column[:3], column[3:]
     size, speed = float(np.linalg.norm(omega)), float(np.linalg.norm(v))
     slides = size <= _ROUNDED and abs(speed - 1.0) <= _ROUNDED

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from kin.errors import InputError
 from kin.ik.answers import answer
 from kin.ik.options import IKOptions, JointConstraints
-from kin.ik.problem import IKProblem, listed, read_poses
+from kin.ik.problem import listed, prepare, read_poses, read_seed
 from kin.ik.results import IKResult, Status
 from kin.kernels import fk as fk_kernels
 from kin.named import robot_of
@@ -92,15 +92,19 @@ def solve_ik_many(
     constraints = JointConstraints(options.pop("limits", None), options.pop("locked", None))
     wanted = IKOptions(constraints=constraints, **options)
     given = listed(targets)
-    read_poses(given, wanted.coordinates.code)  # an error names the target that is malformed
-    seeds: list[Array | None] = [None] * len(given)
+    prepared = prepare(robot, wanted)
+    poses = read_poses(given, prepared.code, always=robot.n < 6)
+    seeds = [prepared.seed] * len(given)
     if q_seed is not None:
         rows = robot.check_q(q_seed, "q_seed")
         if rows.shape not in (robot.q_shape, (len(given), robot.n)):
             expected = f"one configuration of {robot.n} values, or one for each of the {len(given)} targets"
             raise InputError("q_seed", f"shape {rows.shape}", expected)
-        seeds = list(np.broadcast_to(rows, (len(given), robot.n)))
-    found = [answer(IKProblem.of(robot, T, wanted, seed)) for T, seed in zip(given, seeds, strict=True)]
+        if rows.ndim == 1:
+            seeds = [read_seed(robot, rows)] * len(given)
+        else:
+            seeds = [read_seed(robot, row, f"q_seed[{i}]") for i, row in enumerate(rows)]
+    found = [answer(prepared.at(*pose, seed)) for pose, seed in zip(poses, seeds, strict=True)]
     return IKResults(found, robot.n)
 
 

@@ -98,18 +98,21 @@ class IKProblem:
             InputError: a malformed target or seed, or an option that does not fit the arm.
         """
         prepared = prepare(robot, options)
-        seed = prepared.seed if q_seed is None else _seed(robot, q_seed)
-        # The same as `replace`, in a tenth of the time: this runs for every target.
-        problem = object.__new__(cls)
+        seed = prepared.seed if q_seed is None else read_seed(robot, q_seed)
         T, error = read_pose(target, prepared.code, always=robot.n < 6)
-        problem.__dict__.update(prepared.__dict__, T=T, seed=seed)
-        error += rounding
+        return prepared.at(T, error + rounding, seed)
+
+    def at(self, T: Array, error: float, seed: Array) -> IKProblem:
+        """This problem, as `prepare` gives it, with a target and its rounding, as from `read_pose`, and a seed."""
+        # The same as `replace`, in a tenth of the time: this runs for every target.
+        problem = object.__new__(IKProblem)
+        problem.__dict__.update(self.__dict__, T=T, seed=seed)
         if error > 0.0:
             problem.__dict__["target_error"] = error
             del problem.__dict__["requirement"]  # computed again from this error
-        if prepared.branches is not None and SEED in (options.branch or ()):
-            name = prepared.branch_name(prepared.branch_of(seed))
-            problem.__dict__["branches"] = prepared.branches | prepared.rows_named(name)
+        if self.branches is not None and SEED in (self.options.branch or ()):
+            name = self.branch_name(self.branch_of(seed))
+            problem.__dict__["branches"] = self.branches | self.rows_named(name)
         return problem
 
     @cached_property
@@ -287,17 +290,18 @@ def _rounding(T: Array) -> float:
     return error if digits is None else max(error, 10.0**-digits)
 
 
-def _seed(robot: Robot, q_seed: ArrayLike) -> Array:
+def read_seed(robot: Robot, q_seed: ArrayLike, field: str = "q_seed") -> Array:
+    """One configuration ``(n,)``, copied; an `InputError` names `field`."""
     if type(q_seed) is np.ndarray and q_seed.shape == robot.q_shape and q_seed.dtype == np.float64:
         seed = q_seed.copy()
         if all(abs(x) <= FAR for x in seed.tolist()):
             return seed
-    seed = np.array(robot.check_q(q_seed, "q_seed"))
+    seed = np.array(robot.check_q(q_seed, field))
     if seed.ndim != 1:
-        raise InputError("q_seed", f"shape {seed.shape}", f"one configuration of {robot.n} values")
+        raise InputError(field, f"shape {seed.shape}", f"one configuration of {robot.n} values")
     for i in np.flatnonzero(np.abs(seed) > FAR).tolist():
         # So many turns away, the whole-turn images of an angle have lost their digits.
-        raise InputError(f"q_seed[{i}]", float(seed[i]), "a value below 1e6")
+        raise InputError(f"{field}[{i}]", float(seed[i]), "a value below 1e6")
     return seed
 
 

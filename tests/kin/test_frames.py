@@ -42,6 +42,13 @@ def test_each_frame_has_its_pose():
 
 
 @pytest.mark.parametrize("frame", ["world", "base", "tool", "table"])
+def test_the_pose_of_a_frame_is_the_callers_own(frame):
+    T = kin.frame_pose(UR5, frame, {"table": T_TABLE}, Q)
+    T[0, 3] += 1.0
+    assert not np.array_equal(T, kin.frame_pose(UR5, frame, {"table": T_TABLE}, Q))
+
+
+@pytest.mark.parametrize("frame", ["world", "base", "tool", "table"])
 def test_a_target_in_a_frame_is_the_same_place(frame):
     T_world_frame = kin.frame_pose(UR5, frame, {"table": T_TABLE}, Q)
     result = kin.solve_ik(UR5, T_world_frame @ np.linalg.solve(T_world_frame, kin.fk(UR5, Q)), q_seed=Q)
@@ -58,6 +65,9 @@ def test_a_target_in_a_frame_is_the_same_place(frame):
         ("table", {"table": np.zeros((4, 4))}, Q, "workpieces.table"),
         ("world", {"base": T_TABLE}, Q, "workpieces"),
         ("world", {" ": T_TABLE}, Q, "workpieces"),
+        (["world"], {}, Q, "frame"),
+        ("world", "abc", Q, "workpieces"),
+        ("world", [], Q, "workpieces"),
     ],
 )
 def test_what_is_no_frame_is_refused_by_name(frame, workpieces, q, field):

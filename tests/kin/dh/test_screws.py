@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from arms import Draw
@@ -104,7 +106,11 @@ UNIT = np.array([[0, 0, 1, 0, 0, 0], [0, 0, 0, 1, 0, 0]]).T
         (UNIT[:, :0], {}, "^S: got"),
         (UNIT * np.nan, {}, "finite"),
         (UNIT, {"limits": [None]}, "^limits: "),
+        (UNIT, {"limits": 3}, "^limits: got 3, expected 2 values"),
+        (UNIT, {"limits": [3, None]}, "limits"),
         (UNIT, {"names": ["one"]}, "^names: "),
+        (UNIT, {"names": "ab"}, "^names: got 'ab', expected 2 values"),
+        (UNIT, {"names": itertools.count()}, "^names: "),
         (UNIT, {"home": [0.0]}, "^home: "),
         (UNIT, {"convention": "craig"}, "^convention: "),
         (UNIT, {"M": np.diag([1.0, 1.0, -1.0, 1.0])}, "^M rotation: "),
@@ -113,6 +119,11 @@ UNIT = np.array([[0, 0, 1, 0, 0, 0], [0, 0, 0, 1, 0, 0]]).T
 def test_what_is_no_product_of_exponentials_is_refused(S, more, field):
     with pytest.raises(InputError, match=field):
         kin.robot_from_screws(S, more.pop("M", np.eye(4)), **more)
+
+
+def test_names_and_limits_may_come_one_by_one():
+    arm = kin.robot_from_screws(UNIT, np.eye(4), names=(n for n in "ab"), limits=((-1.0, x) for x in (2.0, 3.0)))
+    assert [(j.name, j.limits) for j in arm.joints] == [("a", (-1.0, 2.0)), ("b", (-1.0, 3.0))]
 
 
 def test_screws_are_those_of_one_configuration():

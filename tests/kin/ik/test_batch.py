@@ -15,6 +15,7 @@ from numba import njit
 
 import kin
 from kin import InputError
+from kin.ik import problem
 from kin.kernels import simd
 from kin.robot import Joint, Robot
 from kin.solvers import closed_form_of
@@ -401,6 +402,8 @@ def test_one_seed_is_the_seed_of_all_targets_and_points_are_targets_too():
         ("poses", {}, "targets: .*a sequence of poses"),
         ([np.eye(4), np.eye(3)], {}, r"targets\[1\]"),
         ([np.eye(4)] * 2, {"q_seed": np.zeros((3, 6))}, "q_seed: .*one for each of the 2 targets"),
+        ([np.eye(4)] * 2, {"q_seed": [[0.0] * 6, [1e9] + [0.0] * 5]}, r"q_seed\[1\]\[0\]: got 1000000000.0"),
+        ([np.eye(4)] * 2, {"q_seed": [0.0, 1e9, 0.0, 0.0, 0.0, 0.0]}, r"q_seed\[1\]: got 1000000000.0"),
         ([np.eye(4)], {"task": "place"}, "task: "),
         ([np.eye(4)], {"task": []}, "task: "),
         ([np.eye(4)], {"locked": [0.0]}, "locked: "),
@@ -409,6 +412,15 @@ def test_one_seed_is_the_seed_of_all_targets_and_points_are_targets_too():
 def test_a_malformed_stack_is_refused_by_name(given, more, message):
     with pytest.raises(InputError, match=message):
         kin.solve_ik_many("ur5", given, **more)
+
+
+def test_each_target_of_a_stack_is_read_once(monkeypatch):
+    read = []
+    once = problem.read_pose
+    monkeypatch.setattr(problem, "read_pose", lambda *given, **more: read.append(1) or once(*given, **more))
+    T = targets(kin.get_robot("ur5"), 3)
+    assert kin.solve_ik_many("ur5", [T[0].round(4), *T[1:]]).solved.all()
+    assert len(read) == 3
 
 
 def test_a_stack_given_to_solve_ik_is_refused_with_what_takes_it():
