@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kin.axes import size
 from kin.fk import fk
 from kin.ik.branches import Flags, measure, solution, solve_branches
 from kin.ik.candidates import OVERRUN, POSITION_ERROR, ROTATION_ERROR
@@ -22,6 +23,8 @@ from kin.ik.results import IKSolution
 from kin.solvers.common import TURN
 from kin.solvers.contract import APPROACH, MASK, POSE, POSITION
 from kin.solvers.numeric import each_of, solve, spread
+from kin.solvers.numeric.error import Goal
+from kin.solvers.numeric.step import Bounds
 from kin.solvers.numeric.valley import follow
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -34,7 +37,7 @@ STARTS = 24
 BUDGET = 400
 _EXACT = 1e-10
 _LEVER, _LEAST_LEVER, _MOST_LEVER = 0.3, 0.03, 1.0
-# Valleys are followed from so many ends of descents, if they miss the target by less than this share of the reach.
+# Valleys are followed from so many ends of descents, if they miss the target by less than this share of the size.
 _VALLEYS = 24
 _BESIDE = 1e-3
 # At most _MOST_STARTS descents; the search stops when _MEETINGS of them have ended at the best minimum.
@@ -63,6 +66,16 @@ class Found(NamedTuple):
     starts: int
 
 
+class _Search(NamedTuple):
+    """What descents have in common: goal and bounds as in `kin.solvers.numeric`, and the error E in metres that
+    counts as exact.
+    """
+
+    goal: Goal
+    bounds: Bounds
+    enough: float
+
+
 def solve_numerically(problem: IKProblem, budget: int = BUDGET) -> Found:
     """The first configuration that meets the task: by a descent from the seed, then from points over the limits.
 
@@ -71,48 +84,57 @@ def solve_numerically(problem: IKProblem, budget: int = BUDGET) -> Found:
     """
     out = problem.seed.copy()
     weight = min(max(_LEVER * problem.robot.reach, _LEAST_LEVER), _MOST_LEVER)
-    goal = (problem.T, problem.code, problem.mask, weight)
-    bounds = (problem.low, problem.high, problem.turns)
-    enough = _EXACT * min(1.0, weight)
-    error, starts = solve(problem.robot.model, goal, bounds, budget, enough, out)
-    if error > enough:
+    search = _search(problem, problem.code, weight)
+    error, starts = solve(problem.robot.model, search.goal, search.bounds, budget, search.enough, out)
+    if error > search.enough:
         q, errors = out[None], np.array([error])
         if error < _beside(problem):
             more, others = descend_each(problem, problem.code, starting_points(problem), weight)
             q, errors = np.concatenate([q, more]), np.concatenate([errors, others])
-        followed = _followed(problem, q, errors, weight)
+        followed = _followed(problem, search, q, errors)
         if followed is not None:
             out, error = followed, 0.0
     return Found(out, float(error), int(starts))
 
 
-def _followed(problem: IKProblem, q: Array, errors: Array, weight: float) -> Array | None:
+def _search(problem: IKProblem, code: int, weight: float) -> _Search:
+    """Descents to the target in a task, at so many metres per radian."""
+    goal = (problem.T, code, problem.mask, weight)
+    return _Search(goal, (problem.low, problem.high, problem.turns), _EXACT * min(1.0, weight))
+
+
+def _followed(problem: IKProblem, search: _Search, q: Array, errors: Array) -> Array | None:
     """The configuration ``(n,)`` that meets the task in the valleys where descents ended ``(k, n)``, if any does.
 
     None if a descent met the task itself.
     """
-    enough = _EXACT * min(1.0, weight)
     order = np.argsort(errors, kind="stable").tolist()
-    if errors[order[0]] <= enough:
+    if errors[order[0]] <= search.enough:
         return None
-    near = [q[i] for i in order if errors[i] < _beside(problem)]
+    beside = _beside(problem)
+    near = [q[i] for i in order if errors[i] < beside]
     for row in _apart(near)[:_VALLEYS]:
-        there, error = at_floor(problem, row, weight)
-        if error <= enough:
+        problem.stop()
+        there, error = follow(problem.robot.model, *search, row)
+        if error <= search.enough:
             return there
     return None
 
 
 def at_floor(problem: IKProblem, q: Array, weight: float) -> tuple[Array, float]:
     """Where the floor of the valley around q ``(n,)`` comes nearest to the target, and the error E there."""
-    goal = (problem.T, problem.code, problem.mask, weight)
-    bounds = (problem.low, problem.high, problem.turns)
-    return follow(problem.robot.model, goal, bounds, _EXACT * min(1.0, weight), q)
+    return follow(problem.robot.model, *_search(problem, problem.code, weight), q)
 
 
 def _beside(problem: IKProblem) -> float:
     """The error in metres below which a descent may have ended in a valley that leads to the target."""
-    return _BESIDE * (problem.robot.reach or 1.0)
+    return _BESIDE * size(problem.robot)
+
+
+def _is_decided(problem: IKProblem) -> bool:
+    """Whether an exact closed form lists all configurations that meet the task: no valley leads to another one."""
+    form = problem.closed_form
+    return form is not None and form.off == 0.0 and form.exact_ranges and form.handles(problem.code)
 
 
 def _apart(rows: list[Array]) -> list[Array]:
@@ -160,8 +182,7 @@ def _descend(
 ) -> tuple[Array, Array]:
     """Where the descents end ``(m, n)``, and their errors ``(m,)``; m < k if the search stopped early."""
     q, errors = np.array(starts, order="C"), np.empty(len(starts))
-    goal = (problem.T, code, problem.mask, weight)
-    bounds = (problem.low, problem.high, problem.turns)
+    goal, bounds, _ = _search(problem, code, weight)
     count = each_of(problem.robot.model, goal, bounds, enough, meetings, q, errors)
     return q[:count], errors[:count]
 
@@ -228,9 +249,11 @@ def closest(problem: IKProblem, candidates: Array | None) -> IKSolution | None:
         return None
     ends, errors = ends[allowed], errors[allowed]
     q = ends[_best(errors)]
-    followed = _followed(problem, ends, errors, ORIENTATION_WEIGHT)
-    if followed is not None and (problem.branches is None or problem.allows(problem.branch_of(followed))):
-        q = followed
+    if not _is_decided(problem):
+        search = _search(problem, problem.code, ORIENTATION_WEIGHT)
+        followed = _followed(problem, search, ends, errors)
+        if followed is not None and (problem.branches is None or problem.allows(problem.branch_of(followed))):
+            q = followed
     found, stats = measure(problem, q[None])
     return solution(problem, found[0], stats[0], compromise="closest")
 

@@ -22,6 +22,7 @@ _NULL = 1e-13  # singular values of motions that do not move the tool at all
 _STRIDES = (0.5, 0.15, 0.04, 0.01)  # rad or m, the longest step along the floor
 _STEPS = 60
 _NEARER = 0.97  # of the error, at most, is left after a step that counts
+_PROMISED = 0.995  # of the error, at most, must the linear model leave
 _RETURNS = 8  # steps back to the floor
 
 
@@ -34,6 +35,8 @@ def follow(model: Array, goal: Goal, bounds: Bounds, enough: float, q: Array) ->
     at, error = q, valley.error(q)
     for _ in range(_STEPS):
         if error <= enough:
+            break
+        if not valley.leads_on(at):
             break
         steps = (valley.step(at, stride) for stride in _STRIDES)
         nearer = next(((there, left) for there, left in steps if left < _NEARER * error), None)
@@ -64,9 +67,14 @@ class _Valley:
         rows = 3 if self.goal[1] == POSITION else 6
         return self.e[:rows].copy(), J[:rows].copy()
 
-    def step(self, q: Array, stride: float) -> tuple[Array, float]:
-        """A step along the floor, and back to it: the configuration, and the error there."""
+    def leads_on(self, q: Array) -> bool:
+        """Whether the longest step promises less error; it does not where the workspace ends."""
         e, J = self._linear(q)
+        move, _ = self._along(q, e, J, _STRIDES[0])
+        return bool(np.linalg.norm(e - J @ move) < _PROMISED * np.linalg.norm(e))
+
+    def _along(self, q: Array, e: Array, J: Array, stride: float) -> tuple[Array, Flags]:
+        """A step ``(n,)`` along the floor, and which joints a limit holds."""
         least = _WEAK * float(np.sqrt(np.linalg.norm(e)))
         held = np.zeros(len(q), dtype=bool)
         for _ in range(len(q) + 1):
@@ -75,6 +83,13 @@ class _Valley:
             if not stopped.any():
                 break
             held |= stopped
+        return move, held
+
+    def step(self, q: Array, stride: float) -> tuple[Array, float]:
+        """A step along the floor, and back to it: the configuration, and the error there."""
+        e, J = self._linear(q)
+        least = _WEAK * float(np.sqrt(np.linalg.norm(e)))
+        move, held = self._along(q, e, J, stride)
         at, error = self._moved(q, move)
         for _ in range(_RETURNS):
             e, J = self._linear(at)

@@ -11,6 +11,7 @@ import math
 import os
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from kin.ik import nearest
 from kin.robot import Joint, Robot
 from kin.solvers import numeric
 from kin.solvers.contract import APPROACH, MASK, POSE, POSITION
+from kin.solvers.numeric import valley
 from kin.solvers.numeric.error import look, quadratic_model
 from kin.transforms import rotation_angle, rotation_from_wxyz, vector_angle
 
@@ -287,6 +289,66 @@ def test_closest_is_as_close_as_the_best_of_four_hundred_descents(robot_id):
             _, ends = nearest.descend_each(problem, problem.code, starts, nearest.ORIENTATION_WEIGHT)
             missed += mine > ends.min() + 1e-6
     assert missed <= 1
+
+
+def just_beyond(robot_id):
+    """A pose 0.3 mm farther out than the arm reaches."""
+    robot = kin.get_robot(robot_id)
+    point = np.array([4.0, 3.0, 2.0])
+    T = kin.fk(robot, kin.solve_ik(robot, point, task="position").closest.q)
+    outwards = point - T[:3, 3]
+    T[:3, 3] += 3e-4 * outwards / np.linalg.norm(outwards)
+    return robot, T
+
+
+def calls_of(monkeypatch, owner, name):
+    """The calls of a function from now on."""
+    calls = []
+    original = getattr(owner, name)
+    monkeypatch.setattr(owner, name, lambda *given: calls.append(given) or original(*given))
+    return calls
+
+
+@pytest.mark.parametrize("robot_id", ["ur5", "iiwa14", "scara"])
+def test_no_valley_is_followed_where_a_closed_form_decides(robot_id, monkeypatch):
+    followed = calls_of(monkeypatch, nearest, "follow")
+    robot, T = just_beyond(robot_id)
+    assert kin.solve_ik(robot, T).status is kin.Status.UNREACHABLE
+    assert not followed
+    assert kin.solve_ik(robot, T, solver="numeric").status is kin.Status.UNREACHABLE
+    assert followed
+
+
+@pytest.mark.parametrize("robot_id", ["ur5", "panda"])
+def test_no_step_is_tried_where_the_workspace_ends(robot_id, monkeypatch):
+    followed = calls_of(monkeypatch, nearest, "follow")
+    steps = calls_of(monkeypatch, valley._Valley, "step")
+    robot, T = just_beyond(robot_id)
+    nearest.closest(problem_of(robot, T, solver="numeric"), None)
+    assert followed
+    assert not steps
+
+
+def test_following_valleys_can_be_cancelled():
+    class CancelledError(Exception):
+        pass
+
+    def stop():
+        raise CancelledError
+
+    robot, T = just_beyond("ur5")
+    problem = problem_of(robot, T, solver="numeric")
+    nearest.closest(problem, None)
+    with pytest.raises(CancelledError):
+        nearest.closest(replace(problem, stop=stop), None)
+
+
+def test_a_slide_without_limits_makes_no_target_near(monkeypatch):
+    followed = calls_of(monkeypatch, nearest, "follow")
+    rows = [{"kind": "prismatic", "limits": None}, {"a": 0.3}]
+    problem = problem_of(Robot.from_dh(rows), [1.0, 0.0, 0.0], task="position", solver="numeric")
+    assert nearest.closest(problem, None).position_error == pytest.approx(0.7)
+    assert not followed
 
 
 # -- success rates ------------------------------------------------------------------------------------------------
