@@ -102,15 +102,15 @@ class Target(schemas.Body):
                 T[:3, :3] = frame_from_approach(self.approach)
             return T
         # As it was sent, so that its digits tell how closely it can be met.
-        T, error = np.array(self.matrix), read_pose(self.matrix, POSE, f"{field}.matrix", always=True)[1]
-        agreement = max(AGREEMENT, 2.0 * error)
+        T = np.array(self.matrix)
+        error = read_pose(T, POSE, f"{field}.matrix", always=self.wxyz is not None)[1]
         if self.position is not None and np.abs(T[:3, 3] - self.position).max() > AGREEMENT:
             raise _wrong(
                 f"{field}.position", str(self.position), "the position the matrix has, or only one of them"
             )
         if self.wxyz is not None:
             R = from_position_wxyz([0.0, 0.0, 0.0], self.wxyz)[:3, :3]
-            if np.abs(T[:3, :3] - R).max() > agreement:
+            if np.abs(T[:3, :3] - R).max() > max(AGREEMENT, 2.0 * error):
                 raise _wrong(f"{field}.wxyz", str(self.wxyz), "the rotation the matrix has, or only one of them")
         return T
 
