@@ -80,7 +80,8 @@
     openTab(performance.now() + 30000);
     dispatchEvent(new Event("kinboard-connect"));
     const address = location.origin + location.pathname.replace(/viewer\/?$/, "");
-    return JSON.stringify({ address, state, dark: matchMedia("(prefers-color-scheme: dark)").matches });
+    const text = document.documentElement.dataset.kbText;
+    return JSON.stringify({ address, state, text, dark: matchMedia("(prefers-color-scheme: dark)").matches });
   };
   Storage.prototype.setItem = function (name, value) {
     if (![ITEM, REPLACE, RETURN].includes(name)) return setItem.call(this, name, value);

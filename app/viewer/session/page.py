@@ -19,6 +19,7 @@ import kin
 from app.shared.security import Rights
 from app.viewer.feature import Feature
 from app.viewer.frames import Frames
+from app.viewer.labels import size_labels, text_factor
 from app.viewer.lessons import LESSONS
 from app.viewer.meshes.bodies import Bodies
 from app.viewer.own_arm import OwnArm
@@ -332,6 +333,7 @@ class VisitorPage(ShownArm, Worker):
         gui = self.client.gui
         saved = self._persistence.load()
         self.units, self.view, self.system_dark = saved.units, saved.view, self._persistence.system_dark
+        size_labels(self.client.scene, text_factor(self._persistence.text_size))
         self.own, self.frames = saved.own, saved.frames
         robot = robot_of(self, saved.robot)
         with self.client.atomic():

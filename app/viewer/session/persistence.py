@@ -69,6 +69,7 @@ class Persistence:
 
     Attributes:
         system_dark: whether the visitor's system was dark when the page was opened.
+        text_size: name of the text size with which it was opened.
         due: when the state is to be saved if nothing more happens (`time.perf_counter`'s); None: it is saved.
     """
 
@@ -81,6 +82,7 @@ class Persistence:
         self._rights = rights
         self._address = LOCAL
         self.system_dark = False
+        self.text_size = "Normal"
         self._saved = ""
         self._state = PageState()
         self._share: SharePanel
@@ -95,7 +97,7 @@ class Persistence:
             log.debug("visitor %s has no stored state: %s", client.client_id, error)
             stored = StoredPage()
         self._address = stored.address or LOCAL
-        self.system_dark = stored.dark
+        self.system_dark, self.text_size = stored.dark, stored.text_size
         saved = decode(stored.state, self._page.store.robots)
         if self._rights.compute:
             return saved

@@ -23,6 +23,7 @@ import numpy as np
 
 from app.viewer import frames, own_arm
 from app.viewer.frames import Frames
+from app.viewer.labels import TEXT_SIZES
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel.entry import FARTHEST
 from app.viewer.panel.view import LOOKS, ViewState
@@ -94,11 +95,13 @@ class StoredPage:
         address: the service's address as the visitor sees it.
         state: the encoded state.
         dark: whether the visitor's system is dark.
+        text_size: the name of the text size.
     """
 
     address: str = ""
     state: str = ""
     dark: bool = False
+    text_size: str = "Normal"
 
 
 def encode(state: PageState) -> str:
@@ -192,7 +195,9 @@ def read_stored_page(text: str | None) -> StoredPage:
     address, state = data.get("address"), data.get("state")
     usable = isinstance(address, str) and len(address) < 500 and _ADDRESS.fullmatch(address)
     state = state if isinstance(state, str) else ""
-    return StoredPage(str(address) if usable else "", state, data.get("dark") is True)
+    text_size = data.get("text")
+    size = text_size if isinstance(text_size, str) and text_size in TEXT_SIZES else "Normal"
+    return StoredPage(str(address) if usable else "", state, data.get("dark") is True, size)
 
 
 _TASKS: tuple[Task, ...] = get_args(Task)

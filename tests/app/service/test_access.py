@@ -326,13 +326,15 @@ def test_read_only_does_not_restrict_clients_with_the_token():
 def test_a_read_only_visitor_sees_the_arm_of_a_link_and_cannot_move_it():
     application = create_app(Settings(read_only=True))
     own = own_arm({**kin.robot_to_dict(PIONEER), "name": "Bob's arm"})
-    memory = json.dumps({"state": encode(PageState(own.robot.id, own=own, view=ViewState(frames=True)))})
+    state = encode(PageState(own.robot.id, own=own, view=ViewState(frames=True)))
+    memory = json.dumps({"state": state, "text": "Projector"})
     with serve(application) as port:
         wait_for(lambda: application.state.startup.status == "ready", 300)
         with FakeBrowser(port, path="/viewer", memory=memory) as tab:
             tab.settle()
             assert tab.value("Link frames") is True
             assert tab.value("Robot") == "My arm (Bob's arm)"
+            assert tab.nodes["/key-number"]["props"]["font_screen_scale"] == pytest.approx(1.7)
             before = tab.tool_pose()
             tab.say("feature", ["robot", ["start"], "planar-2r"])
             tab.set("1 rotating base", 10.0)

@@ -212,6 +212,13 @@ def test_only_an_http_address_is_accepted_as_the_address_of_the_page(address, us
     assert memory.state == "abc"
 
 
+@pytest.mark.parametrize(
+    ("sent", "used"), [("Large", "Large"), ("Tiny", "Normal"), ([], "Normal"), (None, "Normal")]
+)
+def test_the_page_opens_with_a_known_text_size(sent, used):
+    assert read_stored_page(json.dumps({"text": sent})).text_size == used
+
+
 @pytest.mark.parametrize("text", [None, "", "[]", "{", '{"state": 7}'])
 def test_an_invalid_message_of_the_page_restores_nothing(text):
     assert read_stored_page(text).state == ""
