@@ -24,6 +24,7 @@ class Connection(Protocol):
 
     subprotocol: str | None
     rights: Rights
+    client: str  # as `app.shared.clients` names it
 
     async def receive(self) -> bytes:
         """The visitor's next message; raises `ConnectionEnded`."""

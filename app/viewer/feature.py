@@ -19,7 +19,7 @@ from app.shared.store import Store
 from app.shared.summaries import Summaries
 from app.viewer.frames import Frames
 from app.viewer.meshes.bodies import Bodies
-from app.viewer.meshes.reader import MeshReader
+from app.viewer.meshes.reader import ClientMeshes
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import Sphere
@@ -35,7 +35,7 @@ class Stage(Protocol):
     clouds: Clouds
     maps: Maps
     summaries: Summaries
-    meshes: MeshReader
+    meshes: ClientMeshes
     bodies: Bodies
     frames: Frames  # the workpieces, and the frame in which poses are shown
 

@@ -53,7 +53,7 @@ class ViewerServer:
         maps: Maps | None = None,
         summaries: Summaries | None = None,
     ) -> None:
-        meshes = MeshReader(settings.mesh_memory)
+        meshes = MeshReader(settings.mesh_memory, settings.client_share, settings.receive_timeout)
         caches = clouds, maps or Maps(), summaries or Summaries()
         self._services = Services(store, *caches, meshes, Library(meshes), Pace())
         self._owns_maps = maps is None
@@ -121,6 +121,7 @@ class ViewerServer:
             welcome,
             lambda: self._restart(client, restarts),
             self._connections.rights.get(client.client_id, Rights.LOOK),  # if absent, the visitor has left
+            self._connections.clients.get(client.client_id, ""),
         )
         with self._lock:
             self._pages[client.client_id] = page

@@ -57,6 +57,7 @@ class PortlessServer(infra.WebsockServer):
         self._loop = loop
         self._ids = itertools.count()
         self.rights: dict[int, Rights] = {}  # of connected visitors, by client id
+        self.clients: dict[int, str] = {}  # their names in limits per client, by client id
         self._open = 0  # connections
         self._notes = Notes(log)
         self._stopping: asyncio.Future[None]
@@ -103,7 +104,7 @@ class PortlessServer(infra.WebsockServer):
         buffer = AsyncMessageBuffer(self._loop, persistent_messages=False)
         client = infra.WebsockClientConnection(number, _infra._ClientHandleState(buffer, self._loop))
         self._client_state_from_id[number] = client._state
-        self.rights[number] = connection.rights
+        self.rights[number], self.clients[number] = connection.rights, connection.client
         flows: list[asyncio.Task[Any]] = []
         try:
             await _call(self._client_connect_cb, client)
@@ -125,6 +126,7 @@ class PortlessServer(infra.WebsockServer):
             buffer.set_done()
             self._client_state_from_id.pop(number, None)
             self.rights.pop(number, None)
+            self.clients.pop(number, None)
             self._broadcast_buffer.generator_cursors.pop(number, None)
             await _call(self._client_disconnect_cb, client)
 

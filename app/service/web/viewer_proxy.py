@@ -133,6 +133,7 @@ class VisitorConnection:
         self.subprotocol: str | None = next(iter(visitor.scope.get("subprotocols", ())), None)
         self._visitor = visitor
         self.rights = rights_of(visitor.scope)
+        self.client = client_of(visitor.scope)
         self._streamed = STREAMED.labels("viewer")
 
     async def receive(self) -> bytes:

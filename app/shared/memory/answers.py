@@ -63,6 +63,28 @@ class AnswerMemory:
             self._held += after - before
 
 
+class MemoryShare(AnswerMemory):
+    """What one client may take of a memory.
+
+    Args:
+        whole: the memory, of which the bytes are taken, too.
+        most: bytes of the client.
+    """
+
+    def __init__(self, whole: AnswerMemory, most: int) -> None:
+        super().__init__(whole.most_of_one, most)
+        self._most = most
+        self._whole = whole
+
+    def _change(self, before: int, after: int) -> None:
+        super()._change(before, after)
+        try:
+            self._whole._change(before, after)
+        except MemoryFullError:
+            super()._change(after, before)
+            raise
+
+
 class Reservation:
     """Room for one answer, given back by `release` or when it is forgotten."""
 

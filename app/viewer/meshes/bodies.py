@@ -28,17 +28,19 @@ class Bodies:
 
     Args:
         library: bodies from installed packages.
-        loaded: called from another thread when the library has loaded one.
+        loaded: called from any thread when the library has loaded one, or with the reason why it cannot.
 
     Attributes:
+        last_refusal: the reason that the page has shown last why a body of the library cannot be shown.
         detailed: whether bodies of the library are preferred to our own drawings.
     """
 
-    def __init__(self, library: Library, loaded: Callable[[], None]) -> None:
+    def __init__(self, library: Library, loaded: Callable[[str], None]) -> None:
         self._library = library
         self._loaded = loaded
         self._own: list[_OwnBody] = []
         self.detailed = False
+        self.last_refusal = ""
 
     def add(self, robot: Robot, body: Drawing, room: Reservation | None, file: str) -> None:
         """Keep the body of an own arm, which was read from a file; the oldest ones are forgotten."""

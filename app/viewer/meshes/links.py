@@ -65,6 +65,12 @@ def drawing_of(robot: Robot, visuals: Sequence[Visual], meshes: Meshes) -> Drawi
     return _drawing(links)
 
 
+def size_of(body: Drawing) -> int:
+    """The bytes of a drawn body."""
+    meshes = [part.mesh for link in body.parts for part in link]
+    return sum(mesh.vertices.nbytes + mesh.faces.nbytes for mesh in meshes)
+
+
 def _surfaces(shape: Shape, color: tuple[float, float, float] | None, meshes: Meshes) -> list[Surface]:
     """A shape in its own coordinates; the colours of a mesh file come before that of the URDF."""
     plain: Rgb = PLAIN

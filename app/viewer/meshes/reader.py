@@ -1,4 +1,8 @@
-"""Reads meshes, one request at a time, each in a process of its own, and bounds the memory of all meshes."""
+"""Reads meshes, one request at a time, each in a process of its own, and bounds the memory of all meshes.
+
+Clients take turns, and each may take a share of the queue and of the memory. Bodies of packages have a turn and
+memory of their own.
+"""
 
 from __future__ import annotations
 
@@ -7,19 +11,24 @@ import os
 import subprocess
 import sys
 import threading
+from collections import Counter, deque
 from collections.abc import Mapping
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from weakref import WeakValueDictionary
 
-from app.shared.memory.answers import AnswerMemory, MemoryFullError, Reservation
+from app.shared.clients import share_of
+from app.shared.memory.answers import AnswerMemory, MemoryFullError, MemoryShare, Reservation
 from app.shared.threads import DaemonExecutor, lower_priority
 from app.viewer.meshes.archive import MOST_BYTES, MeshError
 from app.viewer.meshes.surface import Surface, unpack
 
 MOST_TRIANGLES = 80_000  # of an arm, in the browser
 PATIENCE = 60.0  # seconds for one request, on a busy machine
-MOST_WAITING = 8  # requests
+MOST_WAITING = 8  # requests of all visitors, with the one that is being read
+OF_PACKAGES = 32 * 1024 * 1024  # bytes of the bodies of packages
+PACKAGES = ""  # the client that asks for them
 _KEPT = ("PATH", "LANG", "LC_ALL", "SYSTEMROOT", "OPENBLAS_CORETYPE")  # variables that the process needs
 
 
@@ -37,80 +46,179 @@ class Meshes:
     room: Reservation
 
 
+@dataclass(frozen=True, eq=False)
+class _Request:
+    """Meshes that are wanted, the memory they will take, and the room of the zip, kept as long as its bytes."""
+
+    client: str
+    files: dict[str, int]
+    source: bytes | Path
+    memory: AnswerMemory
+    room: Reservation | None
+    future: Future[Meshes] = field(default_factory=Future)
+
+
 class MeshReader:
     """The reader of one service process. Any thread may use it.
 
     Args:
-        most: bytes of all meshes, and of zips that arrive, that the process holds.
+        most: bytes of all meshes, and of zips that arrive, that the process holds for visitors.
+        share: of these bytes, and of the queue, that one client may take.
+        receive_timeout: seconds that a zip may pause while it arrives.
     """
 
-    def __init__(self, most: int = 128 * 1024 * 1024) -> None:
+    def __init__(self, most: int = 128 * 1024 * 1024, share: float = 0.75, receive_timeout: float = 20.0) -> None:
         self.memory = AnswerMemory(max(MOST_BYTES, most), most)
+        self.receive_timeout = receive_timeout
+        self._of_packages = AnswerMemory(OF_PACKAGES, OF_PACKAGES)
+        self._most_of_one = share_of(MOST_WAITING, share)
+        self._memory_of_one = max(MOST_BYTES, int(most * share))
+        self._shares: WeakValueDictionary[str, MemoryShare] = WeakValueDictionary()
         self._executor = DaemonExecutor(1, "meshes", lower_priority)
         self._lock = threading.Lock()
-        self._waiting = 0
+        self._count: Counter[str] = Counter()  # requests of each client that are not done
+        self._waiting: dict[str, deque[_Request]] = {}  # the client whose turn is next is first
+        self._running: Future[Meshes] | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self._closed = False
 
-    def read(self, files: Mapping[str, int], source: bytes | Path) -> Future[Meshes]:
-        """Read meshes of a zip, or of a folder that is trusted.
-
-        Args:
-            files: their names, and how often each is drawn.
-
-        Raises:
-            MeshError: too many requests wait.
-        """
+    def of(self, client: str) -> ClientMeshes:
+        """The reader for a visitor of this client."""
         with self._lock:
-            if self._waiting >= MOST_WAITING:
-                raise MeshError("meshes", f"{self._waiting} requests are waiting", "another try in a moment")
-            self._waiting += 1
-        future = self._executor.submit(self._read, dict(files), source)
-        future.add_done_callback(lambda _: self._done())
-        return future
+            memory = self._shares.get(client)
+            if memory is None:
+                self._shares[client] = memory = MemoryShare(self.memory, self._memory_of_one)
+        return ClientMeshes(self, client, memory)
+
+    def read_package(self, files: Mapping[str, int], folder: Path) -> Future[Meshes]:
+        """Read meshes of a folder that is trusted; `files` as in `ClientMeshes.read`."""
+        return self._add(_Request(PACKAGES, dict(files), folder, self._of_packages, None))
+
+    def cancel(self, future: Future[Meshes]) -> None:
+        """End a request that is not wanted any more, whether it waits or is being read."""
+        if future.cancel():
+            return
+        with self._lock:
+            if self._running is future:
+                self._running = None
+                self._kill()
 
     def close(self) -> None:
         """End what is being read; returns at once."""
         self._closed = True
         self._executor.shutdown()
-        process = self._process
-        if process is not None:
-            process.kill()
-
-    def _done(self) -> None:
         with self._lock:
-            self._waiting -= 1
+            self._kill()
 
-    def _read(self, files: dict[str, int], source: bytes | Path) -> Meshes:
-        request: dict[str, object] = {"files": files, "most": MOST_TRIANGLES}
+    def _kill(self) -> None:
+        if self._process is not None:
+            self._process.kill()
+
+    def _add(self, request: _Request) -> Future[Meshes]:
+        client = request.client
+        with self._lock:
+            if client != PACKAGES:
+                count = self._count.total() - self._count[PACKAGES]
+                if count >= MOST_WAITING or self._count[client] >= self._most_of_one:
+                    raise MeshError("meshes", f"{count} requests are waiting", "another try in a moment")
+            self._count[client] += 1
+            self._waiting.setdefault(client, deque()).append(request)
+        request.future.add_done_callback(lambda _: self._done(client))
+        self._executor.submit(self._next)
+        return request.future
+
+    def _done(self, client: str) -> None:
+        """A request of this client is done; those that were cancelled, and their zips, are forgotten."""
+        with self._lock:
+            self._count[client] -= 1
+            left = deque(one for one in self._waiting.get(client, ()) if not one.future.cancelled())
+            if left:
+                self._waiting[client] = left  # where it was in the order
+            else:
+                self._waiting.pop(client, None)
+            if not self._count[client]:
+                del self._count[client]
+
+    def _next(self) -> None:
+        """Read what the client wants whose turn it is, if anything is still wanted."""
+        with self._lock:
+            client = next(iter(self._waiting), None)
+            if client is None:
+                return
+            queue = self._waiting.pop(client)
+            request = queue.popleft()
+            if queue:
+                self._waiting[client] = queue  # behind the others
+            if not request.future.set_running_or_notify_cancel():
+                return
+            self._running = request.future
+        try:
+            request.future.set_result(self._read(request))
+        except MeshError as error:
+            error.__context__ = None  # its frames, and that of this error, hold the zip
+            request.future.set_exception(error.with_traceback(None))
+        except BaseException as error:  # noqa: BLE001 - the future raises it
+            request.future.set_exception(error)
+
+    def _read(self, request: _Request) -> Meshes:
+        head: dict[str, object] = {"files": request.files, "most": MOST_TRIANGLES}
+        source = request.source
         if isinstance(source, Path):
-            request["folder"], source = str(source), b""
-        found, triangles = unpack(list(files), self._answer(json.dumps(request).encode() + b"\n" + source))
+            head["folder"], source = str(source), b""
+        answer = self._answer(json.dumps(head).encode() + b"\n" + source, request.future)
+        found, triangles = unpack(list(request.files), answer)
         size = sum(surface.size for surfaces in found.values() for surface in surfaces)
         try:
-            return Meshes(found, triangles, self.memory.reserve(size))
+            return Meshes(found, triangles, request.memory.reserve(size))
         except MemoryFullError:
             raise full() from None
 
-    def _answer(self, request: bytes) -> bytes:
+    def _answer(self, request: bytes, future: Future[Meshes]) -> bytes:
         command = [sys.executable, "-c", f"from {__package__}.child import main; main()"]
         with subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=_environment()
         ) as process:
-            self._process = process
-            if self._closed:
-                process.kill()
+            with self._lock:
+                self._process = process
+                if self._closed or self._running is not future:
+                    process.kill()
             try:
                 answer, _ = process.communicate(request, PATIENCE)
             except subprocess.TimeoutExpired:
                 process.kill()
                 answer = b""
-            self._process = None
+            with self._lock:
+                self._process = self._running = None
         if answer[:1] == b"E":
             raise MeshError(*json.loads(answer[1:]))
         if answer[:1] != b"N" or process.returncode != 0:
             raise MeshError("meshes", "too much work or memory", "fewer or simpler meshes")
         return answer[1:]
+
+
+@dataclass(frozen=True, eq=False)
+class ClientMeshes:
+    """The reader as visitors of one client use it.
+
+    Attributes:
+        memory: the client's share, for meshes and zips that arrive.
+    """
+
+    reader: MeshReader
+    client: str
+    memory: MemoryShare
+
+    def read(self, files: Mapping[str, int], source: bytes, room: Reservation | None = None) -> Future[Meshes]:
+        """Read meshes of a zip.
+
+        Args:
+            files: their names, and how often each is drawn.
+            room: of the zip's bytes, kept until the request is done or cancelled.
+
+        Raises:
+            MeshError: too many requests wait, of this client or of all.
+        """
+        return self.reader._add(_Request(self.client, dict(files), source, self.memory, room))
 
 
 def full() -> MeshError:

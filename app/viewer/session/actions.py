@@ -82,8 +82,8 @@ class ActionsPage(TypedPage, RobotPage, Protocol):
     def use_view(self, view: ViewState) -> None:
         """Show the page and the scene as `view` says."""
 
-    def redraw_body(self) -> None:
-        """Draw the body of the arm on show anew: there may be another one by now."""
+    def use_library(self, why: str) -> None:
+        """A detailed body was read, or could not be, for this reason."""
 
     def snapshot(self) -> PageState:
         """The present state."""
@@ -130,7 +130,7 @@ class Actions:
             "copy-as": lambda name: page.panel.share.choose(name),
             "view": self._on_view,
             "look": self._on_drawn_as,
-            "body": lambda _: page.redraw_body(),  # a detailed body was read
+            "body": page.use_library,
             "colours": self._on_colours,
             "system-dark": lambda dark: page.use_colours(page.view.dark, bool(dark)),
             "camera": lambda _: page.camera.aim(arm.scene.body, self._frames(), glide=True),

@@ -59,6 +59,7 @@ class VisitorPage(ShownArm, Worker):
         token: whether programs must send an access token.
         failed: called last by a worker that cannot continue.
         rights: what the visitor may cause.
+        address: the visitor's name in limits per client.
     """
 
     def __init__(
@@ -69,6 +70,7 @@ class VisitorPage(ShownArm, Worker):
         welcome: Notice = READY,
         failed: Callable[[], None] | None = None,
         rights: Rights = Rights.FULL,
+        address: str = "",
     ) -> None:
         super().__init__(client.client_id, failed)
         self.store = services.store
@@ -76,9 +78,9 @@ class VisitorPage(ShownArm, Worker):
         self.maps = services.maps
         self.summaries = services.summaries
         self.own: OwnArm | None = None
-        self.meshes = services.meshes
+        self.meshes = services.meshes.of(address)
         self._library = services.library
-        self.bodies = Bodies(services.library, lambda: self.post("body"))
+        self.bodies = Bodies(services.library, lambda why: self.post("body", why))
         self.frames = Frames()
         self.arm = ArmController(client, services.pace, self.post, self)
         self.view = ViewState()
@@ -135,6 +137,15 @@ class VisitorPage(ShownArm, Worker):
         self.frames = frames
         self.numbers.use_frames()
         self.for_features(lambda feature: feature.on_style())
+
+    def use_library(self, why: str) -> None:
+        """A detailed body was read, or could not be, for this reason: then our own drawing stays."""
+        if not why:
+            self.redraw_body()
+        elif self.bodies.detailed and why != self.bodies.last_refusal:
+            self.bodies.last_refusal = why
+            detail = f"{why} The simple drawing stays."
+            self.notify(Notice("error", f"The real shape of {self.robot.name} cannot be shown", detail))
 
     def set_target(self, T_base_tool: Array) -> None:
         self.arm.set_target(T_base_tool)
@@ -226,7 +237,7 @@ class VisitorPage(ShownArm, Worker):
             self.panel.colours.show(view.dark)
             self.use_colours(view.dark, self.system_dark)
         if view.detailed != self.bodies.detailed:
-            self.bodies.detailed = view.detailed
+            self.bodies.detailed, self.bodies.last_refusal = view.detailed, ""
             self.redraw_body()
         self._apply_view()
 

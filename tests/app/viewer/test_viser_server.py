@@ -45,6 +45,7 @@ class Visit:
     def __init__(self, *messages: dict[str, Any], subprotocol: str | None = PROTOCOL, stays: bool = False) -> None:
         self.subprotocol = subprotocol
         self.rights = Rights.FULL
+        self.client = "10.0.0.1"
         self.sent = 0
         self._messages = list(messages)
         self._stays = stays

@@ -11,6 +11,7 @@ from __future__ import annotations
 import logging
 import math
 import threading
+import time
 import tomllib
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
@@ -21,8 +22,9 @@ from pathlib import Path
 
 import numpy as np
 
+from app.shared.memory.answers import Reservation
 from app.viewer.meshes.archive import MeshError
-from app.viewer.meshes.links import drawing_of, mesh_files
+from app.viewer.meshes.links import drawing_of, mesh_files, size_of
 from app.viewer.meshes.reader import Meshes, MeshReader
 from app.viewer.scene.bodies import Drawing
 from app.viewer.scene.chain import link_poses
@@ -34,6 +36,7 @@ from kin.files.urdf.visuals import MeshFile, Visual
 log = logging.getLogger(__name__)
 
 FOLDER = Path(__file__).parent
+PAUSE = 60.0  # seconds
 
 
 @dataclass(frozen=True)
@@ -84,51 +87,67 @@ def _rgb(text: str | None) -> tuple[float, float, float] | None:
 
 
 class Library:
-    """The detailed bodies of one service process, read when they are first wanted. Any thread may use it."""
+    """The detailed bodies of one service process, read when they are first wanted. Any thread may use it.
+
+    A body that cannot be read is not tried again for `PAUSE` seconds.
+    """
 
     def __init__(self, reader: MeshReader) -> None:
         self._reader = reader
+        self._refused: dict[str, tuple[float, str]] = {}  # when, and why
         self._lock = threading.Lock()
-        self._found: dict[str, tuple[Drawing, Meshes]] = {}
-        self._wanted: dict[str, list[Callable[[], None]]] = {}
+        self._found: dict[str, tuple[Drawing, Reservation]] = {}
+        self._wanted: dict[str, list[Callable[[str], None]]] = {}
 
     def offered(self, robots: Sequence[Robot]) -> list[Robot]:
         """Those of these robots that have a detailed body."""
         return [robot for robot in robots if detailed(robot) is not None]
 
-    def get(self, robot: Robot, loaded: Callable[[], None]) -> Drawing | None:
-        """The detailed body of a robot; None if it has none, or not yet: then `loaded` is called when it has."""
+    def get(self, robot: Robot, loaded: Callable[[str], None]) -> Drawing | None:
+        """The detailed body of a robot; None if it has none, or not yet.
+
+        Args:
+            loaded: called from any thread: with "" when the body is there, or with why it cannot be read.
+        """
         source = detailed(robot)
         if source is None:
             return None
         with self._lock:
             if robot.id in self._found:
                 return self._found[robot.id][0]
+            when, why = self._refused.get(robot.id, (-math.inf, ""))
+            paused = time.monotonic() < when + PAUSE
             first = robot.id not in self._wanted
-            self._wanted.setdefault(robot.id, []).append(loaded)
-        if first:
-            try:
-                future = self._reader.read(mesh_files(source.visuals), source.folder)
-            except MeshError as error:
-                self._give_up(robot, error)
-            else:
-                future.add_done_callback(lambda done: self._keep(robot, source, done))
+            if not paused:
+                self._wanted.setdefault(robot.id, []).append(loaded)
+        if paused:
+            loaded(why)
+        elif first:
+            future = self._reader.read_package(mesh_files(source.visuals), source.folder)
+            future.add_done_callback(lambda done: self._keep(robot, source, done))
         return None
 
     def _keep(self, robot: Robot, source: Detailed, done: Future[Meshes]) -> None:
         try:
             meshes = done.result()
             body = drawing_of(robot, source.visuals, meshes)
+            meshes.room.resize(size_of(body))
         except Exception as error:  # noqa: BLE001 - our own drawing is shown instead
             self._give_up(robot, error)
             return
         with self._lock:
-            self._found[robot.id] = body, meshes
+            self._found[robot.id] = body, meshes.room
             waiting = self._wanted.pop(robot.id)
         for loaded in waiting:
-            loaded()
+            loaded("")
 
     def _give_up(self, robot: Robot, error: Exception) -> None:
         log.warning("the detailed body of %s could not be read: %s", robot.name, error)
+        why = "The service's log has the reason."
+        if isinstance(error, MeshError):
+            why = f"{error.field}: {error.value}."
         with self._lock:
-            self._wanted.pop(robot.id, None)
+            self._refused[robot.id] = time.monotonic(), why
+            waiting = self._wanted.pop(robot.id, [])
+        for loaded in waiting:
+            loaded(why)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import binascii
+import time
 from dataclasses import dataclass, replace
 
 import kin
@@ -56,6 +57,10 @@ class Incoming:
 
     Args:
         memory: where room for a zip is reserved while it arrives.
+
+    Attributes:
+        name: of the file of which more is to come; empty if there is none.
+        last: when the last part came, as `time.perf_counter` tells it.
     """
 
     def __init__(self, memory: AnswerMemory) -> None:
@@ -64,7 +69,7 @@ class Incoming:
 
     def forget(self) -> None:
         """Drop what has arrived."""
-        self._name = ""
+        self.name, self.last = "", 0.0
         self._parts: list[str | bytes] = []
         self._length = 0
         self._room = self._memory.reserve(0)
@@ -85,13 +90,14 @@ class Incoming:
         from_ = self._length if from_ is None else from_
         if first:
             self.forget()
-            self._name = name
+            self.name = name
         elif not self._parts:
             return None  # the rest of a file that was refused
         elif not self._follows(name, part, from_):
             self.forget()
             raise MeshError(f"{name}: part", "a part that does not follow the one before", "another try")
         self._parts.append(part)
+        self.last = time.perf_counter()
         self._length += len(part)
         most = MOST if isinstance(part, str) else MOST_BYTES
         try:
@@ -112,7 +118,7 @@ class Incoming:
 
     def _follows(self, name: str, part: str | bytes, before: int) -> bool:
         """Whether a part continues what has arrived."""
-        same = name == self._name and type(part) is type(self._parts[0])
+        same = name == self.name and type(part) is type(self._parts[0])
         return same and before == self._length
 
 

@@ -87,6 +87,11 @@ class RobotTab(Feature):
             case _:
                 raise InputError("robot", key, "the key of a field or a button")
 
+    def tick(self, now: float) -> None:
+        self.due = self._uploads.end_stalled(now)
+        if self.due is None:
+            self._show_files()
+
     def step_name(self, key: Hashable) -> str:
         match key:
             case ("cell", int() | str() as where, str(column)):
@@ -378,6 +383,7 @@ class RobotTab(Feature):
         self.stage.notify(Notice("hand", f"{name} is saved", "Your browser has put it where it puts downloads."))
 
     def _upload(self, value: object) -> None:
+        self.due = 0.0  # `tick` says when to look whether the next part has come
         self._open(lambda: self._uploads.take(value))
 
     def _open(self, act: Callable[[], None]) -> None:

@@ -6,10 +6,11 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 
+from app.shared.memory.answers import MemoryFullError
 from app.viewer.feature import Stage
 from app.viewer.meshes.archive import MeshError
-from app.viewer.meshes.links import drawing_of, mesh_files
-from app.viewer.meshes.reader import MOST_TRIANGLES, Meshes
+from app.viewer.meshes.links import drawing_of, mesh_files, size_of
+from app.viewer.meshes.reader import MOST_TRIANGLES, Meshes, full
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import Post
 from app.viewer.panel.status import Notice
@@ -69,9 +70,9 @@ class Uploads:
         self._cancel()
 
     def _cancel(self) -> None:
-        """Meshes that wait to be read are not wanted any more."""
+        """Meshes that wait or are being read are not wanted any more."""
         if self._future is not None:
-            self._future.cancel()
+            self._stage.meshes.reader.cancel(self._future)
             self._future = None
 
     def take(self, value: object) -> None:
@@ -83,6 +84,26 @@ class Uploads:
         if file is not None:
             self.waiting = None
             self._open(opened(*file))
+
+    def end_stalled(self, now: float) -> float | None:
+        """End an upload whose next part does not come.
+
+        Args:
+            now: `time.perf_counter`'s.
+
+        Returns:
+            The seconds after which to call this again; None: nothing is on its way.
+        """
+        name, last = self._incoming.name, self._incoming.last
+        if not name:
+            return None
+        timeout = self._stage.meshes.reader.receive_timeout
+        if now - last < timeout:
+            return last + timeout - now
+        self._incoming.forget()
+        detail = f"For {timeout:g} s no part of it has come. Open it again."
+        self._stage.notify(Notice("error", f"{name} did not arrive", detail))
+        return None
 
     def choose(self, what: str, value: object) -> None:
         """The URDF or the tip that was chosen; raises `kin.KinematicsError`."""
@@ -126,9 +147,7 @@ class Uploads:
         if source.archive is None:
             shapes = [visual for visual in visuals if not isinstance(visual.shape, MeshFile)]
             if not files and shapes:
-                self._draw(
-                    _Reading(robot, source, shapes, {}), Meshes({}, 0, self._stage.meshes.memory.reserve(0))
-                )
+                self._draw(_Reading(robot, source, shapes, {}), self._no_meshes())
             return "Open a zip of this file and its meshes, and they are shown." if files else ""
         try:
             names = {path: source.archive.find(path, source.urdf) for path in files}
@@ -144,7 +163,7 @@ class Uploads:
         self._number += 1
         key = ("meshes", self._number)
         try:
-            future = self._stage.meshes.read(uses, source.data)
+            future = self._stage.meshes.read(uses, source.data, source.room)
         except MeshError as error:
             raise file_error(source.name, error) from None
         self._reading = reading
@@ -157,7 +176,7 @@ class Uploads:
         reading = self._reading
         if number != self._number or reading is None or not isinstance(done, Future):
             return
-        self._reading = None
+        self._reading = self._future = None
         try:
             meshes: Meshes = done.result()
             files = {path: meshes.files[name] for path, name in reading.names.items()}
@@ -175,8 +194,11 @@ class Uploads:
     def _draw(self, reading: _Reading, meshes: Meshes) -> None:
         try:
             body = drawing_of(reading.robot, reading.visuals, meshes)
+            meshes.room.resize(size_of(body))
         except MeshError as error:
             raise file_error(reading.source.name, error) from None
+        except MemoryFullError:
+            raise file_error(reading.source.name, full()) from None
         if any(body.parts):
             self._stage.bodies.add(reading.robot, body, meshes.room, reading.source.name)
 

@@ -74,7 +74,7 @@ def two(reader: MeshReader) -> tuple[Robot, Drawing, Meshes]:
     names = {"package://two_description/meshes/upper.stl": "two/meshes/upper.stl"}
     names["../meshes/fore.obj"] = "two/meshes/fore.obj"
     assert list(mesh_files(visuals)) == list(names)
-    read = reader.read(dict.fromkeys(names.values(), 1), packed(robot_files())).result()
+    read = reader.of("a").read(dict.fromkeys(names.values(), 1), packed(robot_files())).result()
     meshes = replace(read, files={path: read.files[name] for path, name in names.items()})
     return robot, drawing_of(robot, visuals, meshes), meshes
 
@@ -151,7 +151,7 @@ def test_a_body_is_tested_against_the_floor(two: tuple[Robot, Drawing, Meshes]) 
 
 def test_the_visitors_own_bodies_are_kept_for_undo_and_forgotten(two: tuple[Robot, Drawing, Meshes]) -> None:
     robot, body, meshes = two
-    bodies = Bodies(Library(MeshReader()), lambda: None)
+    bodies = Bodies(Library(MeshReader()), lambda why: None)
     own = OwnArm(robot)
     bodies.add(robot, body, meshes.room, "two.zip")
     assert bodies.of(robot, own) is body
@@ -166,7 +166,7 @@ def test_the_visitors_own_bodies_are_kept_for_undo_and_forgotten(two: tuple[Robo
 
 
 def test_an_own_arm_keeps_the_body_of_the_robot_it_was_made_from() -> None:
-    bodies = Bodies(Library(MeshReader()), lambda: None)
+    bodies = Bodies(Library(MeshReader()), lambda why: None)
     ur5 = kin.get_robot("ur5")
     T = np.eye(4)
     T[2, 3] = 0.1
@@ -224,7 +224,7 @@ def library(reader: MeshReader) -> dict[str, Drawing]:
     for name in DETAILED:
         source = detailed(kin.get_robot(name))
         assert source is not None, "its package is one of the test dependencies"
-        meshes = reader.read(mesh_files(source.visuals), source.folder).result()
+        meshes = reader.read_package(mesh_files(source.visuals), source.folder).result()
         found[name] = drawing_of(kin.get_robot(name), source.visuals, meshes)
     return found
 
@@ -286,12 +286,35 @@ def test_the_library_loads_a_body_once_and_says_when(reader: MeshReader) -> None
     assert offered == set(DETAILED)
     puma = kin.get_robot("puma560")
     loaded: list[str] = []
-    assert library.get(kin.get_robot("scara"), lambda: loaded.append("scara")) is None
-    assert library.get(puma, lambda: loaded.append("first")) is None
-    library.get(puma, lambda: loaded.append("second"))
+    assert library.get(kin.get_robot("scara"), lambda why: loaded.append("scara")) is None
+    assert library.get(puma, lambda why: loaded.append("first" + why)) is None
+    library.get(puma, lambda why: loaded.append("second" + why))
     reader._executor.submit(lambda: None).result()
     assert loaded == ["first", "second"]
-    assert library.get(puma, lambda: None) is not None
+    assert library.get(puma, lambda why: None) is not None
+
+
+def test_bodies_of_packages_have_room_of_their_own_and_say_why_they_cannot_be_read(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    reader = MeshReader()
+    reader.memory._most = 0  # visitors have taken it all
+    library = Library(reader)
+    puma = kin.get_robot("puma560")
+    for bytes_left, expected in ((0, "as many as it may"), (reader._of_packages._most, "")):
+        said: list[str] = []
+        reader._of_packages._most = bytes_left
+        library.get(puma, said.append)
+        reader._executor.submit(lambda: None).result()
+        if expected:
+            library.get(puma, said.append)  # not tried again, but said
+            assert len(said) == 2
+            assert expected in said[1]
+            monkeypatch.setattr("app.viewer.meshes.library.PAUSE", 0.0)
+        assert expected in said[0]
+        assert bool(expected) == bool(said[0])
+    assert library.get(puma, said.append) is not None
+    reader.close()
 
 
 def test_without_its_package_a_robot_has_no_detailed_body(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,18 +5,21 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import trimesh
 from zips import MTL, announced, obj, packed, robot_files
 
+from app.shared.memory.answers import MemoryFullError
 from app.viewer.meshes import reader as readers
-from app.viewer.meshes.archive import MeshError
+from app.viewer.meshes.archive import MOST_BYTES, MeshError
 from app.viewer.meshes.child import answer_to
 from app.viewer.meshes.loading import PARSED, finished, read_surfaces
-from app.viewer.meshes.reader import MOST_WAITING, MeshReader
+from app.viewer.meshes.reader import PACKAGES, Meshes, MeshReader
 from app.viewer.meshes.surface import GREY, Surface, by_color, pack, unpack
 
 ROOT = Path(__file__).parents[4]
@@ -155,7 +158,7 @@ def test_the_process_reads_a_zip_and_its_memory_is_given_back(
     reader: MeshReader, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("app.shared.memory.answers.SMALL", 0)
-    meshes = reader.read(FILES, packed(robot_files())).result()
+    meshes = reader.of("a").read(FILES, packed(robot_files())).result()
     assert meshes.triangles == 12 + 2 * 12
     assert [len(s.faces) for s in meshes.files["two/meshes/upper.stl"]] == [12]
     assert {s.color for s in meshes.files["two/meshes/fore.obj"]} == {(255, 0, 0), (255, 255, 255)}
@@ -168,17 +171,109 @@ def test_the_process_says_what_is_wrong_and_may_not_take_long(
     reader: MeshReader, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with pytest.raises(MeshError) as caught:
-        reader.read(FILES, packed({**robot_files(), "two/meshes/upper.stl": b"x" * 100})).result()
+        reader.of("a").read(FILES, packed({**robot_files(), "two/meshes/upper.stl": b"x" * 100})).result()
     assert "upper.stl" in caught.value.field
     monkeypatch.setattr(readers, "PATIENCE", 0.01)
     with pytest.raises(MeshError, match="too much work"):
-        reader.read(FILES, packed(robot_files())).result()
+        reader.of("a").read(FILES, packed(robot_files())).result()
 
 
-def test_requests_that_wait_are_bounded(reader: MeshReader, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reader, "_waiting", MOST_WAITING)
+class Queue(MeshReader):
+    """A reader that notes whose meshes it reads, and waits until `go` is set before it has read any."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self.go, self.begun = threading.Event(), threading.Event()
+        self.order: list[str] = []
+
+    def _read(self, request: readers._Request) -> Meshes:
+        self.order.append(request.client)
+        self.begun.set()
+        assert self.go.wait(30.0)
+        return Meshes({}, 0, request.memory.reserve(0))
+
+
+@pytest.fixture
+def queue():
+    made = Queue(share=0.75)
+    yield made
+    made.go.set()
+    made.close()
+
+
+def test_one_client_leaves_places_for_others_and_clients_take_turns(queue: Queue) -> None:
+    futures = [queue.of("greedy").read(FILES, b"") for _ in range(6)]
+    assert queue.begun.wait(30.0)
     with pytest.raises(MeshError, match="are waiting"):
-        reader.read(FILES, b"")
+        queue.of("greedy").read(FILES, b"")
+    futures += [queue.of(name).read(FILES, b"") for name in ("second", "third")]
+    with pytest.raises(MeshError, match="8 requests are waiting"):
+        queue.of("fourth").read(FILES, b"")
+    futures.append(queue.read_package(FILES, Path("package")))
+    queue.go.set()
+    for future in futures:
+        future.result(30.0)
+    assert queue.order == ["greedy", "greedy", "second", "third", PACKAGES, *["greedy"] * 4]
+    queue.of("fourth").read(FILES, b"").result(30.0)
+
+
+def test_a_cancelled_request_gives_back_its_place_and_the_room_of_its_zip(
+    queue: Queue, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.shared.memory.answers.SMALL", 0)
+    mine = queue.of("a")
+    running = mine.read(FILES, b"", mine.memory.reserve(7))
+    assert queue.begun.wait(30.0)
+    waiting = [mine.read(FILES, b"", mine.memory.reserve(1000)) for _ in range(5)]
+    assert queue.memory.held == mine.memory.held == 5007
+    for future in waiting:
+        queue.cancel(future)
+    assert queue.memory.held == 7, "the room is kept exactly as long as the zip"
+    waiting = [mine.read(FILES, b"") for _ in range(5)]
+    queue.go.set()
+    running.result(30.0)
+    for future in waiting:
+        future.result(30.0)
+    assert queue.memory.held == 0
+
+
+def test_meshes_that_are_being_read_can_be_cancelled(reader: MeshReader, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.shared.memory.answers.SMALL", 0)
+    mine = reader.of("a")
+    begun = threading.Event()
+
+    class Asleep(subprocess.Popen):  # type: ignore[type-arg]
+        def __init__(self, command: list[str], **options: Any) -> None:
+            super().__init__([sys.executable, "-c", "import time; time.sleep(50)"], **options)
+            begun.set()
+
+    with monkeypatch.context() as patch:
+        patch.setattr(subprocess, "Popen", Asleep)
+        future = mine.read(FILES, packed(robot_files()), mine.memory.reserve(1000))
+        assert begun.wait(30.0)
+        reader.cancel(future)
+        with pytest.raises(MeshError):
+            future.result(30.0)
+    assert mine.read(FILES, packed(robot_files())).result().triangles == 36
+    assert reader.memory.held == 0
+
+
+def test_one_client_may_take_a_share_of_the_memory() -> None:
+    half = MeshReader(most=2 * MOST_BYTES, share=0.5)
+    one, other = half.of("one"), half.of("other")
+    assert half.of("one").memory is one.memory
+    held = one.memory.reserve(MOST_BYTES)
+    with pytest.raises(MemoryFullError):
+        one.memory.reserve(MOST_BYTES // 2)
+    more = other.memory.reserve(MOST_BYTES)
+    assert half.memory.held == 2 * MOST_BYTES
+    third = half.of("third")
+    with pytest.raises(MemoryFullError):
+        third.memory.reserve(MOST_BYTES)
+    assert third.memory.held == 0
+    held.release()
+    more.release()
+    assert half.memory.held == one.memory.held == other.memory.held == 0
 
 
 def test_meshes_beyond_the_memory_of_the_process_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -186,7 +281,7 @@ def test_meshes_beyond_the_memory_of_the_process_are_refused(monkeypatch: pytest
     small = MeshReader()
     small.memory._most = 100
     with pytest.raises(MeshError, match="as many as it may"):
-        small.read(FILES, packed(robot_files())).result()
+        small.of("a").read(FILES, packed(robot_files())).result()
     small.close()
 
 

@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import base64
 import html
+import threading
+import time
 
 import pytest
 from fake_browser import FakeBrowser
-from test_robot_tab import UR5, part, say, shows, type_in
+from live_server import serve_viewer
+from test_robot_tab import STORE, UR5, part, say, shows, type_in
 from zips import TWO_JOINTS, packed, robot_files
 
 import kin
+from app.shared.clouds import Clouds
+from app.shared.settings import Settings
+from app.shared.store import Store
+from app.viewer.meshes.archive import MeshError
+from app.viewer.server import ViewerServer
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -120,6 +128,70 @@ def test_a_bad_zip_changes_nothing_and_bad_meshes_leave_a_skeleton(port: int) ->
         for first, before in ((True, 0), (False, 7)):
             say(tab, "upload", value=["x.zip", first, False, "UEs=", "base64", before])
         assert "does not follow the one before" in tab.html
+
+
+def test_an_upload_that_stalls_ends_and_gives_back_its_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.shared.memory.answers.SMALL", 0)
+    viewer = ViewerServer(Store(), Settings(), Clouds())
+    reader = viewer._services.meshes
+    memory = reader.memory
+    with serve_viewer(viewer) as port, FakeBrowser(port) as tab:
+        tab.settle()
+        piece = base64.b64encode(bytes(15_000)).decode()
+        say(tab, "upload", value=["slow.zip", True, False, piece, "base64", 0])
+        assert memory.held == 15_000
+        reader.receive_timeout = 0.2
+        say(tab, "upload", value=["slow.zip", False, False, piece, "base64", 15_000])
+        tab.wait(lambda: "slow.zip did not arrive" in tab.html)
+        assert "For 0.2 s no part of it has come" in tab.html
+        assert "Receiving the zip" not in part(tab, "files")
+        assert memory.held == 0
+        send(tab, "two.zip", packed(robot_files()))
+        tab.wait(lambda: meshes(tab) == ALL)
+        tab.settle(0.5)
+        assert "did not arrive" not in tab.html
+
+
+def test_the_next_zip_and_leaving_end_what_is_being_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.shared.memory.answers.SMALL", 0)
+    viewer = ViewerServer(Store(), Settings(), Clouds())
+    reader = viewer._services.meshes
+    begun, ended = threading.Semaphore(0), threading.Event()
+
+    def answer(request: bytes, future: object) -> bytes:
+        begun.release()
+        while reader._running is future:
+            ended.wait(0.01)
+        raise MeshError("meshes", "ended", "nothing")
+
+    monkeypatch.setattr(reader, "_answer", answer)
+    with serve_viewer(viewer) as port, FakeBrowser(port) as tab:
+        tab.settle()
+        for name in ("first.zip", "second.zip", "third.zip"):
+            send(tab, name, packed(robot_files()))
+            assert begun.acquire(timeout=30.0)
+        tab.wait(lambda: sum(reader._count.values()) == 1)
+        assert set(reader._count) == {"127.0.0.1"}, "limits per client count the address of the connection"
+        tab.close()
+        deadline = time.monotonic() + 30.0
+        while (reader._count or reader.memory.held) and time.monotonic() < deadline:
+            ended.wait(0.02)
+        assert not reader._count
+        assert reader.memory.held == 0
+
+
+def test_a_real_shape_that_cannot_be_read_is_said_in_the_page() -> None:
+    viewer = ViewerServer(Store(), Settings(), Clouds())
+    viewer._services.meshes._of_packages._most = 0
+    with serve_viewer(viewer) as port, FakeBrowser(port) as tab:
+        tab.settle()
+        tab.choose(STORE.get("puma560").name)
+        tab.set("Real shape", True)
+        tab.wait(lambda: f"The real shape of {STORE.get('puma560').name} cannot be shown" in tab.html)
+        assert "The simple drawing stays" in tab.html
+        say(tab, "download", value="toml")
+        type_in(tab, "tool", "z", "50")
+        assert "cannot be shown" not in tab.html, "it is said once"
 
 
 def test_the_shapes_of_a_urdf_need_no_zip(port: int) -> None:
