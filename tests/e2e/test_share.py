@@ -312,7 +312,7 @@ def test_an_arm_of_ones_own_is_typed_and_kept(tab: Tab) -> None:
     expect(name).not_to_be_focused()
 
     page.reload()
-    expect(cell).to_have_value("250")
+    expect(cell).to_have_value("2*125")
     tab.wait_for_tool(longer("250 mm"), within=0.06)
     tab.dismiss_notice()
     page.go_back()
