@@ -3,7 +3,7 @@
 // the server, which decides what they mean; app/viewer/panel/script.py describes how.
 (() => {
   const KEPT = 20; // messages in the field at once
-  const LONGEST = 48000; // bytes in the field; the service closes a connection that sends more than 64 KiB at once
+  const LONGEST = 56000; // bytes in the field; the service closes a connection that sends more than 64 KiB at once
   const HOLD = 600; // ms without a key until the next press counts as another step of the history
   const DECIMALS = 1e9;
   // Letters that move the target: axis and direction. The same places on QWERTY, QWERTZ and AZERTY keyboards.

@@ -4,10 +4,11 @@
 // then the cell that had the focus gets it back.
 (() => {
   const PAUSE = 40; // ms after a key until a cell is sent
+  const REST = 400; // the same where the arm on show has meshes: some megabytes are sent for each change
   const PATIENCE = 3000; // ms for an answer, then the next message is sent
   const LEFT = 400; // ms without focus until the table is written again, so that a click on a button finds it
   const PART = 16000; // bytes of a text in one message
-  const PART_OF_ZIP = 16500; // bytes of a zip in one message, which base64 makes a third longer
+  const PART_OF_ZIP = 32000; // bytes of a zip in one message, which base64 makes a third longer
 
   const part = (name) => document.querySelector(`[data-arm="${name}"]`);
   const cells = () => [...document.querySelectorAll("[data-arm] input[data-cell]")];
@@ -18,7 +19,8 @@
 
   const typed = new Map(); // cell → its key and value, not sent yet
   let busy = 0; // the timer of the message that waits for its answer
-  let pause = 0;
+  let pause = 0; // the timer of `push`
+  let due = 0; // when it ends
   addEventListener("kinboard-connect", () => { typed.clear(); clearTimeout(busy); busy = 0; });
 
   function keyOf(name) {
@@ -31,9 +33,15 @@
     if (busy || !typed.size) return;
     const [[name, value]] = typed;
     typed.delete(name);
-    const next = () => { clearTimeout(busy); busy = 0; push(); };
+    const next = () => { clearTimeout(busy); busy = 0; pushLater(); };
     busy = setTimeout(next, PATIENCE);
     send(keyOf(name), value, next);
+  }
+
+  /** Send what was typed, once typing has rested. */
+  function pushLater() {
+    clearTimeout(pause);
+    pause = setTimeout(push, Math.max(0, due - performance.now()));
   }
 
   /** Send everything that was typed, before something else is sent. */
@@ -47,8 +55,8 @@
     const cell = event.target.closest?.("[data-arm] input[data-cell]");
     if (!cell) return;
     typed.set(cell.dataset.cell, [revision(), cell.value]);
-    clearTimeout(pause);
-    pause = setTimeout(push, PAUSE);
+    due = performance.now() + (part("files")?.hasAttribute("data-meshes") ? REST : PAUSE);
+    pushLater();
   });
   addEventListener("change", (event) => {
     const choice = event.target.closest?.("[data-arm] select[data-cell]");

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 
 import numpy as np
 import pytest
@@ -14,6 +15,18 @@ from tests.app.zips import TWO_JOINTS, packed, robot_files
 
 pytestmark = pytest.mark.browser
 
+TYPE_SLOWLY = """texts => new Promise(done => {
+    const sent = [], cell = document.querySelector('[data-arm] input[data-cell="tool z"]');
+    addEventListener("kinboard-send", ({ detail: [, message] }) => {
+        if (message?.[1]?.[0] !== "cell") return;
+        sent.push(message[2][1]);
+        setTimeout(done, 500, sent);
+    });
+    texts.forEach((text, i) => setTimeout(() => {
+        cell.value = text;
+        cell.dispatchEvent(new Event("input", { bubbles: true }));
+    }, 150 * i));
+})"""  # what is sent of texts that are typed
 PIONEER = kin.get_robot("pioneer5")
 SRS = kin.get_robot("redundant7-craig")
 
@@ -129,12 +142,15 @@ def test_phone(phone: Tab) -> None:
 def test_a_zip_shows_the_real_arm_and_delete_removes_it(tab: Tab) -> None:
     page, two = tab.page, kin.load_urdf(TWO_JOINTS)
     tab.open("Robot")
-    file = {"name": "two.zip", "mimeType": "application/zip", "buffer": packed(robot_files())}
+    files = {**robot_files(), "two/noise.bin": random.Random(1).randbytes(200_000)}  # in several parts
+    file = {"name": "two.zip", "mimeType": "application/zip", "buffer": packed(files)}
     page.locator("[data-arm-file]").set_input_files([file])
     expect(tab.status.first).to_contain_text("The meshes of two.zip are shown")
     expect(page.locator('[data-arm="files"]')).to_contain_text("stay while this page is open")
     tab.wait_for_tool(kin.fk(two, two.q_home)[:3, 3], within=0.06)
     tab.screenshot("meshes")
+    sent = page.evaluate(TYPE_SLOWLY, ["0", "1", "10", "100"])
+    assert sent == ["100"], "an arm with meshes is sent once typing rests"
     page.get_by_role("button", name="Delete my arm").click()
     expect(tab.status.first).to_contain_text("was deleted")
     tab.show(kin.get_robot("pioneer5"))

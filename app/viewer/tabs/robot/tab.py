@@ -156,7 +156,8 @@ class RobotTab(Feature):
     def _show_files(self) -> None:
         own = self._own
         file = "" if own is None else self.stage.bodies.file_of(own)
-        self._show("files", views.files(self._uploads.waiting, self._uploads.arrived, self._uploads.reading, file))
+        heavy, uploads = bool(file) or self.stage.bodies.detailed, self._uploads
+        self._show("files", views.files(uploads.waiting, uploads.arrived, uploads.reading, file, heavy))
 
     def _leave_table(self) -> None:
         """The visitor has left the fields: write every value as it is read, unless something is wrong."""

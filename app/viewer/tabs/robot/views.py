@@ -195,7 +195,7 @@ def frames(robot: Robot, units: Units, page: Frames, texts: Texts) -> str:
     return render("robot/frames", heads=AXES, rows=fixed, workpieces=own, full=full, length=length, angle=angle)
 
 
-def files(waiting: Source | None, arrived: int, reading: str, meshes: str) -> str:
+def files(waiting: Source | None, arrived: int, reading: str, meshes: str, heavy: bool) -> str:
     """Buttons for files, and what is to be chosen, arriving or known about them.
 
     Args:
@@ -203,6 +203,7 @@ def files(waiting: Source | None, arrived: int, reading: str, meshes: str) -> st
         arrived: bytes of a zip of which more is to come.
         reading: the file whose meshes are being read.
         meshes: the file whose meshes the arm on show has.
+        heavy: whether it may have meshes, of that file or of a package: they are sent again with each change.
     """
     choice: dict[str, Any] | None = None
     if waiting is not None:
@@ -222,7 +223,14 @@ def files(waiting: Source | None, arrived: int, reading: str, meshes: str) -> st
     limits = {"text": MOST, "zip": MOST_BYTES}
     here = f"{arrived / MB:.1f} MB" if arrived else ""
     return render(
-        "robot/files", most=most, limits=limits, choice=choice, arrived=here, reading=reading, meshes=meshes
+        "robot/files",
+        most=most,
+        limits=limits,
+        choice=choice,
+        arrived=here,
+        reading=reading,
+        meshes=meshes,
+        heavy=heavy,
     )
 
 

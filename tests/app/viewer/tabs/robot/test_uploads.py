@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import base64
 import html
+import re
 import threading
 import time
+from pathlib import Path
 
 import pytest
 from fake_browser import FakeBrowser
@@ -14,6 +16,7 @@ from test_robot_tab import STORE, UR5, part, say, shows, type_in
 from zips import TWO_JOINTS, packed, robot_files
 
 import kin
+from app.service.web.inspection import MAX_MESSAGE
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
@@ -23,7 +26,8 @@ from app.viewer.server import ViewerServer
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
 TWO = kin.load_urdf(TWO_JOINTS)
-PART = 34_500
+PART = 32_000
+STATIC = Path(__file__).parents[5] / "static"
 
 
 def send(tab: FakeBrowser, name: str, data: bytes) -> None:
@@ -49,6 +53,7 @@ def test_a_zip_shows_the_real_arm_and_undo_brings_back_what_it_replaced(port: in
     with FakeBrowser(port) as tab:
         tab.settle()
         type_in(tab, 1, "a", "250")
+        assert "data-meshes" not in part(tab, "files")
         mine = tab.value("Robot")
         send(tab, "two.zip", packed(robot_files()))
         shows(tab, TWO, TWO.q_home)
@@ -57,6 +62,7 @@ def test_a_zip_shows_the_real_arm_and_undo_brings_back_what_it_replaced(port: in
         assert "Reading the meshes of “two.zip”" in part(tab, "files")
         tab.wait(lambda: "The meshes of two.zip are shown" in tab.html)
         assert meshes(tab) == ALL
+        assert 'data-arm="files" data-meshes' in part(tab, "files"), "changes are sent once typing rests"
         assert "stay while this page is open" in part(tab, "files")
         type_in(tab, "tool", "x", "50")
         tab.wait(lambda: meshes(tab) == ALL)
@@ -92,6 +98,16 @@ def test_what_is_wanted_of_a_zip_is_asked(port: int) -> None:
         say(tab, "tip", value="fore")
         shows(tab, TWO, TWO.q_home)
         tab.wait(lambda: meshes(tab) == ALL)
+
+
+def test_parts_of_a_zip_fit_the_field_beside_other_messages_and_the_field_fits_a_message() -> None:
+    constants = {
+        name: int(value)
+        for file in ("robot", "input")
+        for name, value in re.findall(r"const (\w+) = (\d+);", (STATIC / f"{file}.js").read_text(encoding="utf-8"))
+    }
+    assert 4 / 3 * constants["PART_OF_ZIP"] + 12_000 < constants["LONGEST"] < MAX_MESSAGE - 8_000
+    assert constants["PAUSE"] < constants["REST"]
 
 
 BAD = {
