@@ -137,7 +137,7 @@ def _rest() -> Iterator[Callable[[], object]]:
     for joints in (6, 7):
         robot = next(robot for robot in robots if robot.n == joints and robot.revolute.all())
         yield partial(_solve_generally, robot)
-    yield partial(_plan, next(robot for robot in robots if robot.n == 6))
+        yield partial(_plan, robot)
     robot = robots[0]
     # Two moving joints call the same kernels and take the least time.
     locked = [None, None, *robot.q_home[2:].tolist()]

@@ -30,7 +30,7 @@ RULES: dict[str, set[str]] = {
     "kin/solvers": {"numpy", "kin.dh", "kin.kernels", "kin.solvers", *MODEL - {"kin.singularity"}},
     "kin/ik": {"numpy", "kin.kernels", "kin.solvers", "kin.ik", *MODEL},
     "kin/path": {"numpy", "kin.kernels", "kin.solvers", "kin.ik", "kin.path", *MODEL},
-    "kin/motion": {"numpy", "kin.kernels", "kin.solvers", "kin.ik", "kin.path", "kin.motion", *MODEL},
+    "kin/motion": {"numpy", "kin.files", "kin.kernels", "kin.solvers", "kin.ik", "kin.path", "kin.motion", *MODEL},
     "kin/workspace": {"numpy", "kin.kernels", "kin.solvers", "kin.ik", "kin.workspace", *MODEL},
     "app": {"app", "kin"},
     "app/shared": {

@@ -22,7 +22,7 @@ def number_of(text: str) -> float:
 def scaled(value: float, scale: float) -> float:
     """A number in a unit as metres or radians.
 
-    Units of length are divided by their whole number per metre: 109.15 mm is 0.10915 m, not 0.10915000000000001 m.
+    Units of length are divided by their whole number per metre: 102 mm is 0.102 m, not 0.10200000000000001 m.
     """
     per = 1.0 / scale
     return value / per if per.is_integer() else value * scale

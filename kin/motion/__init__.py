@@ -1,7 +1,8 @@
 """Motions: a program of segments, timed so that the joints keep their limits.
 
 1. :mod:`kin.motion.program` holds the program, :mod:`kin.motion.reading` reads it from plain data.
-2. :mod:`kin.motion.limits` knows how fast each joint may move.
+2. :mod:`kin.motion.limits` knows how fast each joint may move, :mod:`kin.motion.tasks` what the tool can
+   keep of a pose.
 3. :mod:`kin.motion.planner` turns the program into pieces (:mod:`kin.motion.pieces`): a PTP is timed
    joint by joint (:mod:`kin.motion.scurve`). Curves of the tool and corners are built in :mod:`kin.motion.paths`
    from :mod:`kin.motion.geometry`, which also finds the joint path; :mod:`kin.motion.timing` times it.
@@ -79,4 +80,8 @@ def plan_motion(
     q = robot.q_home if q_start is None else robot.check_q(q_start, "q_start")
     if q.ndim != 1:
         raise InputError("q_start", f"shape {q.shape}", f"one configuration of {robot.n} values")
-    return planned(robot, program, limits_of(robot) if limits is None else limits, q.copy(), stop)
+    if limits is None:
+        limits = limits_of(robot)
+    elif not isinstance(limits, MotionLimits) or len(limits.velocity) != robot.n:
+        raise InputError("limits", limits, f"MotionLimits of {robot.n} joints")
+    return planned(robot, program, limits, q.copy(), stop)

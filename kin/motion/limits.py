@@ -14,12 +14,15 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from kin.errors import InputError
 from kin.robot import Joint, Robot
 from kin.transforms import Array
 
 TURNING, SLIDING = math.pi, 1.0  # rad/s, m/s
 ACCELERATION_TIME, JERK_TIME = 0.25, 0.1  # seconds
+LEAST, MOST = 1e-9, 1e12  # of any limit, so that times are finite numbers
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,6 +33,9 @@ class MotionLimits:
         velocity, acceleration, jerk: in both directions alike.
         effort: torque or force (N·m or N), NaN where none is stated; a motion is not checked against it.
         assumed: for each joint the names of the limits that no robot file states.
+
+    Raises:
+        InputError: a limit that is not a number from `LEAST` to `MOST`, or not as many as rows of `assumed`.
     """
 
     velocity: Array
@@ -38,14 +44,37 @@ class MotionLimits:
     effort: Array
     assumed: tuple[tuple[str, ...], ...]
 
+    def __post_init__(self) -> None:
+        """Check the values; they become read-only arrays of floats."""
+        n = len(self.assumed)
+        for key in ("velocity", "acceleration", "jerk"):
+            values = _checked(key, getattr(self, key), n, f"numbers from {LEAST:g} to {MOST:g}")
+            for i in np.flatnonzero(~((values >= LEAST) & (values <= MOST))).tolist():
+                raise InputError(f"limits.{key}[{i}]", float(values[i]), f"a number from {LEAST:g} to {MOST:g}")
+            object.__setattr__(self, key, values)
+        efforts = _checked("effort", self.effort, n, f"numbers from 0 to {MOST:g} or NaN")
+        for i in np.flatnonzero(~(((efforts >= 0.0) & (efforts <= MOST)) | np.isnan(efforts))).tolist():
+            raise InputError(f"limits.effort[{i}]", float(efforts[i]), f"a number from 0 to {MOST:g}, or NaN")
+        object.__setattr__(self, "effort", efforts)
+
+
+def _checked(key: str, values: ArrayLike, n: int, expected: str) -> Array:
+    """A limit of all joints as a read-only array ``(n,)``."""
+    try:
+        found = np.array(values, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        found = np.empty(0)
+    if found.shape != (n,):
+        raise InputError(f"limits.{key}", values, f"{n} {expected}, one for each joint")
+    found.flags.writeable = False
+    return found
+
 
 @lru_cache(maxsize=256)
 def limits_of(robot: Robot) -> MotionLimits:
     """The limits of an arm: stated in its file, or assumed."""
     rows = [_of_joint(joint) for joint in robot.joints]
-    values = np.array([row[:4] for row in rows]).T.copy()
-    values.flags.writeable = False
-    velocity, acceleration, jerk, effort = values
+    velocity, acceleration, jerk, effort = np.array([row[:4] for row in rows]).T
     return MotionLimits(velocity, acceleration, jerk, effort, tuple(row[4] for row in rows))
 
 
@@ -56,10 +85,10 @@ def _of_joint(joint: Joint) -> tuple[float, float, float, float, tuple[str, ...]
         velocity = TURNING if joint.kind == "revolute" else SLIDING
         assumed.append("velocity")
     if acceleration is None:
-        acceleration = velocity / ACCELERATION_TIME
+        acceleration = min(velocity / ACCELERATION_TIME, MOST)
         assumed.append("acceleration")
     if jerk is None:
-        jerk = acceleration / JERK_TIME
+        jerk = min(acceleration / JERK_TIME, MOST)
         assumed.append("jerk")
     effort = math.nan if joint.effort is None else joint.effort
     return velocity, acceleration, jerk, effort, tuple(assumed)

@@ -56,11 +56,11 @@ from kin.motion.program import (
     Target,
     kind_of,
 )
-from kin.motion.refusals import helps_for, limit_met, lost, slow_places, violations
+from kin.motion.refusals import helps_at, helps_for, limit_met, lost, slow_places, violations
 from kin.motion.results import Motion, Refusal, SegmentTimes
+from kin.motion.tasks import most_kept
 from kin.motion.timing.timed import timed
 from kin.robot import Robot
-from kin.solvers import closed_form_of
 from kin.solvers.contract import APPROACH, POSE, POSITION
 from kin.transforms import Array
 
@@ -69,12 +69,7 @@ CODES: dict[Task, int] = {"pose": POSE, "approach": APPROACH, "position": POSITI
 
 def task_of(program: Program, robot: Robot) -> Task:
     """What the tool keeps of a pose: by default as much as the joints of the arm can keep."""
-    if program.task is not None:
-        return program.task
-    if robot.n < 5:
-        form = closed_form_of(robot)
-        return "pose" if form is not None and form.name == "scara4" else "position"
-    return "approach" if robot.n == 5 else "pose"
+    return most_kept(robot) if program.task is None else program.task
 
 
 class RefusedError(Exception):
@@ -364,9 +359,14 @@ def _configuration(plan: Plan, index: int, target: Target, q: Array) -> Array:
         if outside:
             raise plan.refused(index, "target", TargetOutside(outside))
         return robot.clip(end)
-    result = solve_ik(robot, target.pose(fk(robot, q)), q_seed=q, task=plan.task)
-    if not result.solutions or result.status is Status.APPROXIMATE:
+    T = target.pose(fk(robot, q))
+    if plan.program.task is None and plan.task != "pose":
+        # An arm of few joints may meet the whole pose nevertheless.
+        result = solve_ik(robot, T, q_seed=q, task="pose")
+        if result.status is Status.SOLVED:
+            return robot.clip(result.solutions[0].q)
+    result = solve_ik(robot, T, q_seed=q, task=plan.task)
+    if result.status is not Status.SOLVED:
         facts = NotReached(result.details, result.cause, result.task, result.singularities)
-        helps = (Help("closer"),) if result.cause in ("too far", "too near") else ()
-        raise plan.refused(index, "unreachable", facts, helps)
+        raise plan.refused(index, "unreachable", facts, helps_at(robot, T, q, result))
     return robot.clip(result.solutions[0].q)

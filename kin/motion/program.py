@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -134,6 +134,11 @@ class Ptp(Move):
 
     target: Target
 
+    def __post_init__(self) -> None:
+        """Check the values."""
+        Move.__post_init__(self)
+        _check_target("target", self.target)
+
 
 @dataclass(frozen=True, slots=True)
 class Lin(Move):
@@ -150,6 +155,7 @@ class Lin(Move):
     def __post_init__(self) -> None:
         """Check the values."""
         Move.__post_init__(self)
+        _check_target("target", self.target)
         _check_orientation(self.orientation)
 
 
@@ -168,6 +174,7 @@ class Circ(Move):
     def __post_init__(self) -> None:
         """Check the values."""
         Move.__post_init__(self)
+        _check_target("target", self.target)
         _check_orientation(self.orientation)
         object.__setattr__(self, "via", _numbers("via", self.via, 3, "three numbers x, y, z in metres"))
 
@@ -181,9 +188,12 @@ class Spline(Move):
     def __post_init__(self) -> None:
         """Check the values."""
         Move.__post_init__(self)
-        points = tuple(self.points)
+        expected = f"1 to {MOST_POINTS} poses, or as many configurations"
+        points = _items("points", self.points, expected)
+        for i, point in enumerate(points):
+            _check_target(f"points[{i}]", point)
         if not 1 <= len(points) <= MOST_POINTS or len({type(point) for point in points}) > 1:
-            raise InputError("points", self.points, f"1 to {MOST_POINTS} poses, or as many configurations")
+            raise InputError("points", self.points, expected)
         object.__setattr__(self, "points", points)
 
     @property
@@ -233,7 +243,7 @@ class Program:
 
     def __post_init__(self) -> None:
         """Check the fields."""
-        segments = tuple(self.segments)
+        segments = _items("segments", self.segments, f"1 to {MOST_SEGMENTS} segments")
         if not 1 <= len(segments) <= MOST_SEGMENTS:
             raise InputError("segments", f"{len(segments)} segments", f"1 to {MOST_SEGMENTS} segments")
         for i, segment in enumerate(segments):
@@ -269,6 +279,17 @@ def _numbers(field: str, values: object, count: int | None, expected: str) -> tu
         if abs(value) > _FAR:
             raise InputError(f"{field}[{i}]", value, "a number below a million")
     return found
+
+
+def _items(field: str, values: object, expected: str) -> tuple[Any, ...]:
+    if not isinstance(values, list | tuple):
+        raise InputError(field, values, expected)
+    return tuple(values)
+
+
+def _check_target(field: str, value: object) -> None:
+    if not isinstance(value, JointTarget | PoseTarget):
+        raise InputError(field, value, "a JointTarget or a PoseTarget")
 
 
 def _check_orientation(value: object) -> None:

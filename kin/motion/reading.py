@@ -20,7 +20,6 @@ A target is `q`, or `position` with or without `wxyz`, or `pose`, a 4×4 matrix.
 
 from __future__ import annotations
 
-import math
 import tomllib
 from collections.abc import Mapping
 from typing import Any, NoReturn
@@ -28,6 +27,8 @@ from typing import Any, NoReturn
 import numpy as np
 
 from kin.errors import InputError, shorten
+from kin.files.numbers import scaled
+from kin.files.read import ANGLES
 from kin.ik.options import finite_number
 from kin.motion.program import (
     KINDS,
@@ -49,7 +50,6 @@ from kin.named import robot_of
 from kin.robot import LENGTHS, Robot
 from kin.transforms import as_transform
 
-ANGLES = {"rad": 1.0, "deg": math.pi / 180.0}
 _TARGET = ("q", "position", "wxyz", "pose")
 _TOP = (*field_names(Program), "units")
 _LENGTHS, _ANGLES = ("tool_speed", "blend"), ("tool_turn",)
@@ -167,7 +167,7 @@ class _Reader:
         if value is None or key not in (*_LENGTHS, *_ANGLES):
             return value
         scale = self.length if key in _LENGTHS else self.angle
-        return finite_number(f"{where}.{key}", value, "a finite number") * scale
+        return scaled(finite_number(f"{where}.{key}", value, "a finite number"), scale)
 
     def points(self, data: object, where: str) -> tuple[Target, ...]:
         if not isinstance(data, list | tuple) or not 1 <= len(data) <= MOST_POINTS:
@@ -190,7 +190,7 @@ class _Reader:
                 return self.joints(JointTarget(data["q"]))
             if given == ["pose"]:
                 T = as_transform(data["pose"], "pose")
-                T[:3, 3] *= self.length
+                T[:3, 3] = _times(tuple(T[:3, 3].tolist()), self.length)
                 return PoseTarget.of(T)
             read = PoseTarget(data["position"], data.get("wxyz"))
         except InputError as error:
@@ -199,11 +199,11 @@ class _Reader:
 
     def joints(self, target: JointTarget) -> JointTarget:
         if self.robot is None:
-            return JointTarget(tuple(value * self.angle for value in target.q))
+            return JointTarget(tuple(scaled(value, self.angle) for value in target.q))
         if len(target.q) != self.robot.n:
             raise InputError("q", list(target.q), f"{self.robot.n} joint values")
         scale = np.where(self.robot.revolute, self.angle, self.length).tolist()
-        return JointTarget(tuple(value * each for value, each in zip(target.q, scale, strict=True)))
+        return JointTarget(tuple(scaled(value, each) for value, each in zip(target.q, scale, strict=True)))
 
     def via(self, data: object, where: str) -> tuple[float, float, float]:
         if isinstance(data, Mapping):
@@ -217,7 +217,7 @@ class _Reader:
 
 def _times(position: tuple[float, float, float], scale: float) -> tuple[float, float, float]:
     x, y, z = position
-    return x * scale, y * scale, z * scale
+    return scaled(x, scale), scaled(y, scale), scaled(z, scale)
 
 
 def _unit(units: Mapping[str, Any], key: str, valid: Mapping[str, float], default: str) -> float:

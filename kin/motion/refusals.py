@@ -10,7 +10,7 @@ import numpy as np
 from kin.ik import branch_names, branch_of, solve_ik
 from kin.ik.details import JointKind, LimitViolation
 from kin.ik.options import Task
-from kin.ik.results import Status
+from kin.ik.results import IKResult, Status
 from kin.motion.details import (
     BranchNeeded,
     Cause,
@@ -23,7 +23,6 @@ from kin.motion.details import (
 )
 from kin.motion.paths import Layout
 from kin.motion.timing.timed import JointPath
-from kin.path import solve_path
 from kin.path.details import JointMove
 from kin.robot import Robot
 from kin.singularity import singularities_at
@@ -31,7 +30,7 @@ from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 NEAR = 0.1  # radians or metres from a singularity that counts as the reason
-_POSES = 16  # of the path, for another posture
+_SAME = 1e-6  # radians or metres between two configurations that count as one
 # A path is slow where the joints allow less than this part of its usual speed; how near a singularity is named.
 _SLOW, _WIDE = 0.4, 0.5
 
@@ -87,21 +86,25 @@ def helps_for(
 
     `can_follow` says whether the path can be driven from a configuration.
     """
-    found: list[Help] = []
     end = solve_ik(robot, poses[-1], q_seed=q, task=task)
-    if end.status is Status.SOLVED:
-        found.append(Help("ptp"))
-        some = np.unique(np.linspace(0, len(poses) - 1, _POSES).astype(int))
-        path = solve_path(robot, poses[some], task=task)
-        if path.continuous and not path.gaps and can_follow(path.q[0]):
-            found.append(Help("posture", branch_of(robot, path.q[0]) if branch_names(robot) else None))
-        elif cause in ("singularity", "branch"):
-            found.append(Help("via"))
-    elif end.cause in ("too far", "too near"):
-        found.append(Help("closer"))
-    elif task == "pose":
-        found.append(Help("task"))
+    if end.status is not Status.SOLVED:
+        return helps_at(robot, poses[-1], q, end)
+    found = [Help("ptp")]
+    others = solve_ik(robot, poses[0], q_seed=q, task=task).solutions
+    other = next((each for each in others if np.abs(each.q - q).max() > _SAME and can_follow(each.q)), None)
+    if other is not None:
+        found.append(Help("posture", branch_of(robot, other.q) if branch_names(robot) else None))
+    elif cause in ("singularity", "branch"):
+        found.append(Help("via"))
     return tuple(found)
+
+
+def helps_at(robot: Robot, T: Array, q: Array, result: IKResult) -> tuple[Help, ...]:
+    """What would help where a pose cannot be met: another place, or keeping less of it."""
+    if result.cause in ("too far", "too near"):
+        return (Help("closer"),)
+    point = None if result.task == "position" else solve_ik(robot, T, q_seed=q, task="position")
+    return (Help("task"),) if point is not None and point.status is Status.SOLVED else ()
 
 
 def slow_places(robot: Robot, layout: Layout, path: JointPath) -> list[Slowed]:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
+from itertools import repeat
+from operator import itemgetter
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +23,9 @@ from kin.units import DEFAULT_UNITS, Units
 
 Quantity = Literal["velocity", "acceleration", "jerk", "tool_speed", "tool_turn"]
 _JOINT: tuple[Quantity, ...] = ("velocity", "acceleration", "jerk")
+_TOOL: tuple[Quantity, ...] = ("tool_speed", "tool_turn")
+_ROUNDING = 1e-13  # of the time at which a segment ends: a shorter overlap with a piece is none
+_CLOSER, _FINE = 3, 33  # how often the tool's peak is looked at, and at how many points each time but the first
 
 
 def _times(t: ArrayLike) -> Array:
@@ -210,7 +215,8 @@ class Motion:
     def peaks(self) -> tuple[Peak, ...]:
         """The largest velocity, acceleration and jerk of each joint, and those of the tool.
 
-        They are read off the motion itself by fine sampling, without what the planner knows.
+        They are read off the motion itself by fine sampling, without what the planner knows; about its largest
+        value the tool is sampled more finely.
         """
         return self._peaks(0.0, self.duration, 1.0, 1.0, (None, None))
 
@@ -225,23 +231,58 @@ class Motion:
     def _peaks(
         self, start: float, end: float, speed: float, acceleration: float, tool: tuple[float | None, float | None]
     ) -> tuple[Peak, ...]:
-        times = np.concatenate([[start], *(p.grid() + s for p, s in zip(self.pieces, self.starts, strict=False))])
-        times = times[(times >= start) & (times <= end)]
-        sample = self.sample(times)
+        parts = [
+            each for each in map(_Part.of, self.pieces, self.starts.tolist(), repeat(start), repeat(end)) if each
+        ]
+        times = np.concatenate([[start], *(part.first + part.times for part in parts)])
+        rest = np.zeros((3, 1, self.robot.n))
+        rows = np.concatenate([rest, *(part.values[1:] for part in parts)], axis=1)
         found = []
         scales = (speed, acceleration, acceleration)
-        for quantity, values, scale in zip(_JOINT, (sample.qd, sample.qdd, sample.qddd), scales, strict=True):
+        for quantity, values, scale in zip(_JOINT, rows, scales, strict=True):
             sizes = np.abs(values)
             limit = getattr(self.limits, quantity) * scale
             for i, at in enumerate(np.argmax(sizes, axis=0).tolist()):
                 name, assumed = self.robot.joints[i].name, quantity in self.limits.assumed[i]
                 size, when = float(sizes[at, i]), float(times[at])
                 found.append(Peak(i, name, quantity, size, when, float(limit[i]), assumed))
-        parts: tuple[tuple[Quantity, Array], ...] = (
-            ("tool_speed", sample.tool_speed),
-            ("tool_turn", sample.tool_turn),
-        )
-        for (quantity, sizes), most in zip(parts, tool, strict=True):
-            at = int(np.argmax(sizes))
-            found.append(Peak(None, "tool", quantity, float(sizes[at]), float(times[at]), most))
+        for k, quantity in enumerate(_TOOL):
+            peaks = [part.tool_peak(self.robot, slice(3 * k, 3 * k + 3)) for part in parts]
+            size, when = max(peaks, default=(0.0, start), key=itemgetter(0))
+            found.append(Peak(None, "tool", quantity, size, when, tool[k]))
         return tuple(found)
+
+
+class _Part(NamedTuple):
+    """The part of a piece that lies between two times of the motion.
+
+    Attributes:
+        piece, first: the piece, and when it begins.
+        times, values: when it is looked at, from its beginning, and the joints then ``(4, k, n)``.
+    """
+
+    piece: Piece
+    first: float
+    times: Array
+    values: Array
+
+    @classmethod
+    def of(cls, piece: Piece, first: float, start: float, end: float) -> _Part | None:
+        """The part between two times of the motion; None if there is none."""
+        low, high = max(start - first, 0.0), min(end - first, piece.duration)
+        if high - low <= _ROUNDING * end:
+            return None
+        grid = piece.grid()
+        times = np.concatenate([[low], grid[(grid > low) & (grid < high)], [high]])
+        return cls(piece, first, times, piece.at(times))
+
+    def tool_peak(self, robot: Robot, rows: slice) -> tuple[float, float]:
+        """The largest size of these rows of the tool's twist, and when. About it, times are closer."""
+        times, values = self.times, self.values
+        for _ in range(_CLOSER):
+            sizes = np.linalg.norm((jacobian(robot, values[0]) @ values[1][..., None])[:, rows, 0], axis=1)
+            k = int(np.argmax(sizes))
+            size, when = float(sizes[k]), float(times[k])
+            times = np.linspace(times[max(k - 1, 0)], times[min(k + 1, len(times) - 1)], _FINE)
+            values = self.piece.at(times)
+        return size, self.first + when

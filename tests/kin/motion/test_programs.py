@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kin
@@ -41,6 +41,7 @@ programs = st.builds(
 )
 
 
+@settings(max_examples=20)
 @given(programs)
 def test_what_is_written_is_read_again(program):
     assert kin.program_from_dict(kin.program_to_dict(program)) == program
@@ -128,6 +129,31 @@ def test_a_malformed_program_names_the_field(data, field):
         kin.program_from_dict(data)
     assert caught.value.field == field
     assert str(caught.value).startswith(f"{field}: got ")
+
+
+@pytest.mark.parametrize(
+    ("make", "field"),
+    [
+        (lambda: kin.Ptp(target=(0, -1, 1, 0, 1, 0)), "target"),
+        (lambda: kin.Lin(target=None), "target"),
+        (lambda: kin.Circ(via=(0, 0, 0), target=5), "target"),
+        (lambda: kin.Spline(points=[(1, 2)]), "points[0]"),
+        (lambda: kin.Spline(points=3), "points"),
+        (lambda: kin.Program(5), "segments"),
+    ],
+)
+def test_targets_have_a_type(make, field):
+    with pytest.raises(kin.InputError) as caught:
+        make()
+    assert caught.value.field == field
+
+
+def test_lengths_are_those_that_are_written():
+    pose = [[1, 0, 0, 102], [0, 1, 0, 0], [0, 0, 1, 100.7], [0, 0, 0, 1]]
+    rows = [{"kind": "lin", "position": [102, 0, 100.7], "blend": 102.5}, {"kind": "lin", "pose": pose}]
+    first, second = kin.program_from_dict({"units": {"length": "mm"}, "segments": rows}).segments
+    assert (first.target.position, first.blend) == ((0.102, 0, 0.1007), 0.1025)
+    assert second.target.position == (0.102, 0, 0.1007)
 
 
 def test_the_number_of_joint_values_is_checked_against_the_arm():

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import kin
 from kin.motion.pieces import JointMotion
+from kin.motion.tasks import most_kept, motion_dimension
 
 CASES = json.loads((Path(__file__).parents[2] / "data/motion-times.json").read_text(encoding="utf-8"))
 ARMS = tuple(kin.builtin_robots())
@@ -58,7 +59,7 @@ def test_start_and_end_the_same_takes_no_time():
     assert [peak.peak for peak in motion.peaks] == [0.0] * 20
 
 
-@settings(max_examples=30)
+@settings(max_examples=20)
 @given(st.sampled_from(ARMS), st.integers(0, 2**32 - 1), st.floats(0.05, 1), st.floats(0.05, 1))
 def test_random_programs_keep_every_limit_on_every_arm(arm, seed, speed, acceleration):
     robot = kin.get_robot(arm)
@@ -155,6 +156,120 @@ def test_assumed_limits_are_marked():
     assert found.velocity.tolist() == [1.0, math.pi]
     peaks = kin.plan_motion(own, [kin.Ptp(kin.JointTarget((0.2, 1)))]).peaks
     assert all(peak.assumed for peak in peaks if peak.joint is not None)
+
+
+@pytest.mark.parametrize(
+    ("arm", "task", "why"),
+    [("scara", None, "4 joints cannot hold this orientation"), ("pioneer5", "pose", "reached with roll error")],
+)
+def test_a_compromise_is_no_target(arm, task, why):
+    robot = kin.get_robot(arm)
+    T = kin.fk(robot, robot.q_home) @ kin.from_xyz_rpy((0, 0, 0), (0.3, 0, 0))
+    motion = kin.plan_motion(robot, kin.Program([kin.Ptp(kin.PoseTarget.of(T))], task=task))
+    assert motion.refusal.cause == "unreachable"
+    assert why in motion.reason
+    assert [help_.code for help_ in motion.refusal.helps] == ["task"]
+    kept = kin.plan_motion(robot, kin.Program([kin.Ptp(kin.PoseTarget.of(T))], task="position"))
+    assert np.abs(kept.sample(kept.duration).T[:3, 3] - T[:3, 3]).max() < 1e-9
+
+
+@pytest.mark.parametrize("joints", [1, 2, 3, 4, 5])
+def test_arms_of_few_joints_meet_whole_poses_where_they_can(joints):
+    planar = kin.Robot.from_dh([(0, 0, 0.3, 0)] * joints, home=[0.3, 0.5, 0.7, 0.4, 0.2][:joints])
+    T = kin.fk(planar, planar.q_home + np.array([0.2, 0.3, -0.2, 0.1, 0.1])[:joints])
+    motion = kin.plan_motion(planar, [kin.Ptp(kin.PoseTarget.of(T))])
+    assert motion.planned
+    assert np.abs(motion.sample(motion.duration).T - T).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("rows", "dimension", "task"),
+    [
+        ([(0, 0, 0.3, 0)], 1, "pose"),
+        ([(0, 0, 0.3, 0)] * 2, 3, "position"),
+        ([(0, 0, 0.3, 0)] * 4, 3, "pose"),
+        ([(0, 0, 0, math.pi / 2)] * 3, 3, "pose"),
+        ([(0, 0.1, 0.2, math.pi / 2), (0, 0, 0.3, 0), (0, 0, 0.3, 0)], 6, "position"),
+        ([(0, 0.1, 0.2, 0.5)] * 5, 6, "approach"),
+    ],
+)
+def test_what_an_arm_keeps_follows_from_the_group_of_its_motions(rows, dimension, task):
+    robot = kin.Robot.from_dh(rows)
+    assert (motion_dimension(robot), most_kept(robot)) == (dimension, task)
+    assert [motion_dimension(kin.get_robot(arm)) for arm in ("scara", "pioneer5", "ur5")] == [4, 6, 6]
+
+
+def test_the_peaks_of_a_segment_are_its_own():
+    robot = kin.get_robot("ur5")
+    q = kin.JointTarget(robot.q_home + 0.5)
+    motion = kin.plan_motion(robot, [kin.Ptp(q), kin.Dwell(0.5), kin.Ptp(q), kin.Ptp(kin.JointTarget(robot.home))])
+    assert motion.segments[2].start == motion.segments[2].end
+    assert [max(peak.peak for peak in motion.segment_peaks(i)) > 0 for i in range(4)] == [True, False, False, True]
+    whole = [
+        max(sizes) for sizes in zip(*([p.peak for p in motion.segment_peaks(i)] for i in (0, 3)), strict=True)
+    ]
+    assert [peak.peak for peak in motion.peaks] == pytest.approx(whole, rel=1e-12)
+
+
+def test_a_slow_segment_after_a_fast_one_has_its_own_peaks():
+    robot = kin.get_robot("ur5")
+    ends = [kin.JointTarget(robot.q_home + 0.01 * k * (-1) ** k) for k in range(60)]
+    motion = kin.plan_motion(robot, [kin.Ptp(q, acceleration=(0.05, 1)[k % 2]) for k, q in enumerate(ends)])
+    for i in range(len(ends)):
+        assert all(peak.ratio <= 1 + 1e-9 for peak in motion.segment_peaks(i) if peak.ratio is not None)
+
+
+def test_the_peak_of_the_tool_is_not_understated():
+    robot = kin.get_robot("puma560")
+    motion = kin.plan_motion(robot, [kin.Ptp(kin.JointTarget((1, 0.5, -1, 0.5, -1, 2)))])
+    sample = motion.sample(np.linspace(0, motion.duration, 20001))
+    for peak, sizes in zip(motion.peaks[-2:], (sample.tool_speed, sample.tool_turn), strict=True):
+        assert sizes.max() <= peak.peak * (1 + 1e-9)
+        assert getattr(motion.sample(peak.time), peak.quantity) == pytest.approx(peak.peak, rel=1e-9)
+
+
+@pytest.mark.parametrize("jerk", [1e6, 1e12, 2e17, 1e20])
+def test_a_large_jerk_does_not_exceed_the_acceleration(jerk):
+    motion = JointMotion.between(np.zeros(2), np.array([0.33, 0.0]), limits_of([1, 1], [4, 4], [jerk, jerk]))
+    times = np.concatenate([motion.grid(), motion.breaks[0]])
+    assert (np.abs(motion.at(times))[2] <= 4 * (1 + 1e-9)).all()
+    assert motion.duration == pytest.approx(0.33 + 0.25, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"velocity": np.zeros(6)}, "limits.velocity[0]"),
+        ({"acceleration": [1, 1, -1, 1, 1, 1]}, "limits.acceleration[2]"),
+        ({"jerk": [math.inf] * 6}, "limits.jerk[0]"),
+        ({"jerk": [1, 1, 1, 1, 1, math.nan]}, "limits.jerk[5]"),
+        ({"velocity": np.ones(5)}, "limits.velocity"),
+        ({"velocity": "fast"}, "limits.velocity"),
+        ({"effort": [-1] * 6}, "limits.effort[0]"),
+    ],
+)
+def test_limits_are_checked(change, field):
+    given = kin.limits_of(kin.get_robot("ur5"))
+    values = {key: getattr(given, key) for key in ("velocity", "acceleration", "jerk", "effort", "assumed")}
+    with pytest.raises(kin.InputError) as caught:
+        kin.MotionLimits(**values | change)
+    assert caught.value.field == field
+
+
+def test_limits_are_those_of_the_arm():
+    ur5, panda = kin.get_robot("ur5"), kin.get_robot("panda")
+    program = [kin.Ptp(kin.JointTarget(ur5.q_home + 0.5))]
+    with pytest.raises(kin.InputError, match=r"limits: .* of 6 joints"):
+        kin.plan_motion(ur5, program, limits=kin.limits_of(panda))
+    none = [math.nan] * 6
+    whole = kin.MotionLimits([1] * 6, np.full(6, 2), [10**9] * 6, none, ((),) * 6)
+    assert not whole.velocity.flags.writeable
+    assert kin.plan_motion(ur5, program, limits=whole).duration == pytest.approx(0.5 + 0.5)
+    wild = kin.Robot.from_dh([kin.Joint("a", velocity=1e308), (0, 0, 1, 0)])
+    with pytest.raises(kin.InputError, match=r"limits.velocity\[0\]"):
+        kin.limits_of(wild)
+    fast = kin.limits_of(kin.Robot.from_dh([kin.Joint("a", velocity=1e12), (0, 0, 1, 0)]))
+    assert (fast.acceleration[0], fast.jerk[0]) == (1e12, 1e12)
 
 
 @pytest.mark.parametrize("bad", [[1, 2], [[0] * 6] * 2, ["a"] * 6])
