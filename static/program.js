@@ -59,7 +59,7 @@
       setText(button, playing ? "❚❚" : "▶");
       if (button.ariaLabel !== (playing ? "Pause" : "Play")) button.ariaLabel = playing ? "Pause" : "Play";
     }
-    for (const item of all("[data-program-item]")) item.classList.toggle("kb-here", item.dataset.programItem === clock.dataset.here);
+    for (const item of all("[data-program-item]")) item.classList.toggle("kb-here", item.dataset.programItem === clock.dataset.at);
   }
 
   addEventListener("input", (event) => {
@@ -146,6 +146,6 @@
   });
 
   addEventListener("DOMContentLoaded", () => {
-    new MutationObserver(() => { if (part("clock")) { restore(); showClock(); } }).observe(document.body, { subtree: true, childList: true, attributes: true, attributeFilter: ["data-time", "data-playing", "data-here", "data-duration"] });
+    new MutationObserver(() => { if (part("clock")) { restore(); showClock(); } }).observe(document.body, { subtree: true, childList: true, attributes: true, attributeFilter: ["data-time", "data-playing", "data-at", "data-duration"] });
   });
 })();

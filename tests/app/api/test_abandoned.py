@@ -132,10 +132,10 @@ def test_a_client_that_leaves_while_it_waits_for_a_slot_is_forgotten(live, monke
     solve = ik.solve
     release = threading.Event()
 
-    def held(robot, T, options, seed):
+    def held(robot, T, *arguments):
         begun.append(T[0, 3])
         release.wait(20)
-        return solve(robot, T, options, seed)
+        return solve(robot, T, *arguments)
 
     monkeypatch.setattr(ik, "solve", held)
     with ThreadPoolExecutor(1) as other:

@@ -306,13 +306,13 @@ def test_few_poses_run_on_the_event_loop_and_more_in_a_thread(app, client, monke
     """Only short computations run on the event loop, and none while kernels may be compiling."""
     on_the_loop = []
 
-    def watched(robot, q, frames):
+    def watched(*arguments):
         try:
             asyncio.get_running_loop()
             on_the_loop.append(True)
         except RuntimeError:
             on_the_loop.append(False)
-        return fk_answers(robot, q, frames)
+        return fk_answers(*arguments)
 
     monkeypatch.setattr("app.api.fk.fk_answers", watched)
     monkeypatch.setattr(app.state.startup, "status", status)

@@ -235,7 +235,7 @@ def test_a_wrong_configuration(client, what, q, field, value, expected):
     ("what", "body", "field", "expected"),
     [
         ("fk", {}, "q", "a value"),
-        ("fk", {"q": Q, "frame": True}, "frame", "only the fields base, tool, q, frames"),
+        ("fk", {"q": Q, "pose": True}, "pose", "only the fields base, tool, workpieces, q, frames, frame"),
         ("fk", {"q": Q, "frames": "yes"}, "frames", "a valid boolean"),
         ("jacobian", {"q": Q, "frame": "world"}, "frame", "'base' or 'tool'"),
         ("ik", {}, "target", "a value"),
@@ -249,7 +249,7 @@ def test_a_wrong_configuration(client, what, q, field, value, expected):
         ("ik", {"target": {"position": [0, 0]}}, "target.position", "at least 3 items"),
         ("ik", {"target": {"position": [0, 0, 0, 0]}}, "target.position", "at most 3 items"),
         ("ik", {"target": {"position": [0, 0, 1e308]}}, "target.position[2]", "1000000"),
-        ("ik", {"target": {"position": [0, 0, 0], "rpy": [0, 0, 0]}}, "target.rpy", "only the fields position"),
+        ("ik", {"target": {"position": [0, 0, 0], "rpy": [0, 0, 0]}}, "target.rpy", "only the fields frame, "),
         ("ik", {"target": {"position": [0, 0, 0], "wxyz": [0, 0, 0, 0]}}, "target.wxyz", "not zero"),
         ("ik", {"target": [{"position": [0, 0, 0], "approach": [0, 0, 0]}]}, "target[0].approach", "not zero"),
         ("ik", {"target": {"matrix": EYE[:3]}}, "target.matrix", "at least 4 items"),

@@ -286,7 +286,7 @@ def test_maps_of_arms_with_too_few_joints_for_directions_have_points_only():
     flat = made(Joint("a", a=0.3, limits=(-3.0, 3.0)), Joint("b", a=0.2, limits=(-2.0, 2.0)))
     found = kin.capability_map(flat, resolution=9, directions=12)
     assert found.grid.shape[2] == 1
-    assert found.grid.method == "search"
+    assert found.grid.method == "closed form"
     assert len(found.index) > 20
     # The tool's z axis is always up, which is a direction of the icosahedron.
     assert set(found.share.tolist()) == {np.float32(1 / 12).item()}

@@ -353,8 +353,7 @@ def test_standard_views_and_fit_arm(port: int) -> None:
         assert np.allclose(np.cross(fitted[0] - fitted[1], out), 0.0, atol=1e-6), "the direction stays"
         assert np.allclose(decode(tab.kept[-1], STORE.robots).camera, fitted, atol=1e-3)
         tab.set("Camera", "Reset view")
-        tab.settle(quiet=0.6)
-        assert np.allclose(shown(tab), default(PIONEER, DESKTOP))
+        tab.wait(lambda: np.allclose(shown(tab), default(PIONEER, DESKTOP)))
 
 
 def test_the_camera_returns_from_below_the_floor_and_from_far_aside(port: int) -> None:
