@@ -58,9 +58,9 @@ from kin import RobotFileError, __version__
 # Seconds that a thread may keep the interpreter while others wait. A drag passes through three threads; next to a
 # REST batch, Python's default of 5 ms would make one drag in twenty take 36 ms instead of 13.
 SWITCH_INTERVAL = 5e-4
-# Full collections are left to idle moments (`app.shared.memory.process`): one among requests with many thousand
-# targets stops all visitors for 80 ms. Those of young objects take less than a millisecond.
-COLLECTIONS = (700, 10, 1000)
+# Full collections are rare, besides those when the process is idle or has grown (`app.shared.memory.process`): one
+# among requests with many thousand targets stops all visitors for 80 ms, one of young objects for a millisecond.
+COLLECTIONS = (700, 10, 100)
 
 OPEN_TO_ALL = """\
 **************************************************************************

@@ -77,8 +77,7 @@ class MemoryKeeper:
         grown = resident_bytes() - self._least
         if grown < (IDLE_GROWTH if idle else BUSY_GROWTH):
             return
-        if idle:
-            gc.collect()
+        gc.collect()
         release_free_memory()
         self._least = resident_bytes()
 
