@@ -48,7 +48,7 @@ def _malloc_trim() -> Callable[[int], int] | None:
 
 
 class MemoryKeeper:
-    """A thread that gives free memory back after work, sooner and more thoroughly when the service is idle.
+    """A thread that gives free memory back after work, sooner when the service is idle.
 
     Args:
         idle: whether nobody would notice a pause of some ten milliseconds.
@@ -73,9 +73,8 @@ class MemoryKeeper:
     def look(self) -> None:
         """Give memory back if it is worthwhile."""
         self._each()
-        idle = self._idle()
         grown = resident_bytes() - self._least
-        if grown < (IDLE_GROWTH if idle else BUSY_GROWTH):
+        if grown < (IDLE_GROWTH if self._idle() else BUSY_GROWTH):
             return
         gc.collect()
         release_free_memory()
