@@ -162,8 +162,7 @@ def test_an_arm_of_ones_own_has_a_program_and_a_refusal_is_at_its_waypoint(port:
         assert "Segment 2 (PTP) cannot be driven: the target is outside the limits" in rows[2]
         assert 'aria-disabled="true" aria-label="Play"' in part(tab, "player")
         tab.say("undo")
-        tab.settle()
-        assert "kb-fault" not in part(tab, "list")
+        tab.wait(lambda: "kb-fault" not in part(tab, "list"))
 
 
 def test_a_locked_joint_keeps_its_value(port: int) -> None:
