@@ -46,7 +46,7 @@
     if (!cursor) return;
     const [left, right] = [Number(plot.dataset.left), Number(plot.dataset.right)];
     cursor.hidden = !duration;
-    cursor.style.left = `${left + (right - left) * Math.min(1, duration ? time / duration : 0)}%`;
+    cursor.style.left = `${left + (right - left) * Math.min(1, duration ? time / Number(plot.dataset.span) : 0)}%`;
   }
 
   function showClock() {
@@ -76,7 +76,7 @@
     const box = plot.getBoundingClientRect();
     const [left, right] = [Number(plot.dataset.left), Number(plot.dataset.right)];
     const at = (100 * (event.clientX - box.left) / box.width - left) / (right - left);
-    goTo(Number(clock.dataset.duration) * Math.min(Math.max(at, 0), 1));
+    goTo(Math.min(Number(clock.dataset.duration), Number(plot.dataset.span) * Math.max(at, 0)));
   }
   addEventListener("pointerdown", (event) => {
     plot = event.button === 0 ? event.target.closest?.("[data-program-plot]") ?? null : null;
@@ -103,12 +103,12 @@
   addEventListener("change", (event) => {
     const target = event.target;
     const choice = target.closest?.("[data-program-choice]");
-    if (choice) act(choice.dataset.programChoice, choice.type === "checkbox" ? choice.checked : Number(choice.value));
+    if (choice) act(choice.dataset.programChoice, choice.type === "checkbox" ? choice.checked : "text" in choice.dataset ? choice.value : Number(choice.value));
     const field = target.closest?.("[data-program-field]");
     if (field) act("field", [field.dataset.programField, field.value], Number(field.dataset.index));
   });
   addEventListener("keydown", (event) => {
-    if (event.key !== "Enter" || !event.target.matches?.("input[data-program-field]")) return;
+    if (event.key !== "Enter" || !event.target.matches?.("input[data-program-field], input[data-text]")) return;
     event.preventDefault();
     event.stopImmediatePropagation();
     event.target.blur();
@@ -134,6 +134,14 @@
     document.querySelector(`[data-program] ${focus}`)?.focus({ preventScroll: true });
   }
 
+  // A table that was opened stays open when it is sent again.
+  const opened = new Set();
+  addEventListener("toggle", (event) => {
+    const name = event.target.dataset?.programDetails;
+    if (name) opened[event.target.open ? "add" : "delete"](name);
+  }, true);
+  function reopen() { for (const node of all("[data-program-details]")) if (opened.has(node.dataset.programDetails) && !node.open) node.open = true; }
+
   // Files
 
   addEventListener("change", async (event) => {
@@ -146,6 +154,6 @@
   });
 
   addEventListener("DOMContentLoaded", () => {
-    new MutationObserver(() => { if (part("clock")) { restore(); showClock(); } }).observe(document.body, { subtree: true, childList: true, attributes: true, attributeFilter: ["data-time", "data-playing", "data-at", "data-duration"] });
+    new MutationObserver(() => { if (part("clock")) { restore(); reopen(); showClock(); } }).observe(document.body, { subtree: true, childList: true, attributes: true, attributeFilter: ["data-time", "data-playing", "data-at", "data-duration"] });
   });
 })();

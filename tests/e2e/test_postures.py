@@ -8,8 +8,8 @@ from page import Tab
 from playwright.sync_api import expect
 
 import kin
-from app.viewer.lessons.postures.ghosts import places
 from app.viewer.lessons.postures.survey import survey
+from app.viewer.skeleton import places
 
 pytestmark = pytest.mark.browser
 

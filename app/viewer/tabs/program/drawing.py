@@ -1,7 +1,8 @@
-"""The drawings of a program: the path of the tool, coloured by its speed, and a frame at each waypoint."""
+"""The drawings of a program: the path of the tool, coloured by its speed, and its waypoints."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import count
 
 import numpy as np
@@ -9,6 +10,9 @@ import viser
 
 from app.viewer.labels import add_label
 from app.viewer.scene.meshes import body
+from app.viewer.skeleton import cylinder, places, skeleton
+from app.viewer.tabs.program.faults import Fault
+from app.viewer.tabs.program.items import Items
 from app.viewer.tabs.workspace.colours import table
 from kin import Robot, fk
 from kin.motion import Motion
@@ -17,48 +21,78 @@ from kin.transforms import Array, wxyz_from_rotation
 MAP = "viridis"
 LEVELS = 8  # colours of the path
 FINEST, MOST = 0.01, 1200  # s between two samples of the path; samples at most
-FAULT = (213, 94, 0)
+FAULT, VIA, OTHER, GHOST = (213, 94, 0), (204, 121, 167), (213, 94, 0), (120, 144, 168)
+GHOSTS = 12  # at most; waypoints between are left out evenly
+FRAMES = 14  # frames along the path
 _NUMBERS = count(1)
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What is drawn beside waypoints and faults: the path, copies of the arm, frames along the path."""
+
+    path: bool = True
+    ghosts: bool = False
+    frames: bool = False
 
 
 class Drawing:
     """The drawings of one program; the visitor's worker calls it.
 
     Args:
-        q: configurations ``(k, n)`` of the waypoints, and the text at each.
-        fault: index of the waypoint that cannot be reached; None: there is none.
+        names: the text at each waypoint.
+        fault: what cannot be driven; None: nothing.
     """
 
-    def __init__(self, scene: viser.SceneApi, robot: Robot, q: Array, names: list[str], fault: int | None) -> None:
-        self._scene = scene
+    def __init__(
+        self, scene: viser.SceneApi, robot: Robot, items: Items, names: list[str], fault: Fault | None
+    ) -> None:
+        self._scene, self._robot = scene, robot
         self._root = f"/program-{next(_NUMBERS)}"
-        self._size = size = body(robot).size
+        self._size = body(robot).size
         self._top = scene.add_frame(self._root, show_axes=False)
         self.top_speed = 0.0
-        poses = fk(robot, q)
-        scene.add_batched_axes(
-            f"{self._root}/waypoints",
-            wxyz_from_rotation(poses[:, :3, :3]),
-            poses[:, :3, 3],
-            axes_length=2.2 * size,
-            axes_radius=0.11 * size,
-        )
+        waypoints = [item for item in items if item.q]
+        self._q = np.array([item.q for item in waypoints])
+        poses = fk(robot, self._q)
+        self._axes("waypoints", poses, 2.2, 0.11)
         at: dict[tuple[float, ...], list[str]] = {}  # names of waypoints at the same place share a label
         for pose, name in zip(poses, names, strict=True):
             at.setdefault(tuple(np.round(pose[:3, 3], 3).tolist()), []).append(name)
         for i, (place, words) in enumerate(at.items()):
             add_label(scene, f"{self._root}/name-{i}", " · ".join(words), position=np.array(place), scale=0.9)
-        if fault is not None:
-            scene.add_icosphere(
-                f"{self._root}/fault", 0.5 * size, FAULT, opacity=0.55, position=poses[fault, :3, 3],
-                cast_shadow=False, receive_shadow=False,
-            )  # fmt: skip
+        for i, item in enumerate(waypoints[1:]):
+            if item.kind == "circ" and item.via is not None:
+                self._dot(f"via-{i}", 0.3, VIA, 1.0, np.array(item.via))
+        if fault is not None and fault.index < len(items) and items[fault.index].q:
+            self._show_fault(fault, poses[sum(bool(item.q) for item in items[: fault.index])][:3, 3])
+
+    def _show_fault(self, fault: Fault, end: Array) -> None:
+        self._dot("fault", 0.5, FAULT, 0.55, end)
+        if len(fault.way) > 1:
+            points = np.array(fault.way, dtype=np.float32)
+            chords = np.stack([points[:-1], points[1:]], axis=1)
+            self._scene.add_line_segments(f"{self._root}/fault-way", chords, FAULT, thickness=0.22 * self._size)
+        if fault.place is not None:
+            place = np.array(fault.place)
+            self._dot("fault-place", 0.36, FAULT, 1.0, place)
+            add_label(self._scene, f"{self._root}/fault-name", "✕ cannot go on", position=place, scale=0.9)
+
+    def _dot(self, name: str, radius: float, colour: tuple[int, int, int], opacity: float, at: Array) -> None:
+        self._scene.add_icosphere(
+            f"{self._root}/{name}", radius * self._size, colour, opacity=opacity, position=at,
+            cast_shadow=False, receive_shadow=False,
+        )  # fmt: skip
+
+    def _axes(self, name: str, poses: Array, length: float, radius: float) -> None:
+        self._scene.add_batched_axes(
+            f"{self._root}/{name}", wxyz_from_rotation(poses[:, :3, :3]), poses[:, :3, 3],
+            axes_length=length * self._size, axes_radius=radius * self._size,
+        )  # fmt: skip
 
     def show_path(self, motion: Motion) -> None:
         """Draw the path of the tool. One node for each colour: the browser shows colours of points brighter."""
-        times = np.linspace(0.0, motion.duration, path_samples(motion.duration))
-        sample = motion.sample(times)
-        points, speed = sample.T[:, :3, 3], sample.tool_speed
+        points, speed = _path(motion)
         self.top_speed = float(speed.max())
         if self.top_speed < 1e-6:
             return
@@ -71,9 +105,45 @@ class Drawing:
                 f"{self._root}/path-{k}", chords[level == k], (r, g, b), thickness=0.3 * self._size
             )
 
+    def show_other(self, motion: Motion) -> None:
+        """Draw the path of a motion that is compared with the program, as dashes."""
+        points, _ = _path(motion)
+        chords = np.stack([points[:-1:2], points[1::2]], axis=1) if len(points) % 2 == 0 else None
+        if chords is None:
+            chords = np.stack([points[:-2:2], points[1:-1:2]], axis=1)
+        self._scene.add_line_segments(
+            f"{self._root}/other", chords.astype(np.float32), OTHER, thickness=0.18 * self._size
+        )
+
+    def show_frames(self, motion: Motion) -> None:
+        """Draw small frames along the path, at equal distances."""
+        T = motion.sample(np.linspace(0.0, motion.duration, path_samples(motion.duration))).T
+        steps = np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1) + 1e-9
+        way = np.concatenate([[0.0], np.cumsum(steps)])
+        rows = np.searchsorted(way, np.linspace(0.0, way[-1], FRAMES + 2)[1:-1])
+        self._axes("frames", T[rows], 1.1, 0.05)
+
+    def show_ghosts(self) -> None:
+        """Draw translucent copies of the arm at the waypoints."""
+        bones, (vertices, faces) = skeleton(self._robot), cylinder()
+        rows = np.unique(np.linspace(0, len(self._q) - 1, min(len(self._q), GHOSTS)).astype(int))
+        positions, wxyz, _ = places(self._robot, self._q[rows])
+        self._scene.add_batched_meshes_simple(
+            f"{self._root}/ghosts", vertices, faces, batched_wxyzs=wxyz.reshape(-1, 4).astype(np.float32),
+            batched_positions=positions.reshape(-1, 3).astype(np.float32),
+            batched_scales=np.tile(bones.scales, (len(rows), 1)), batched_colors=GHOST, opacity=0.3, lod="off",
+            cast_shadow=False, receive_shadow=False,
+        )  # fmt: skip
+
     def remove(self) -> None:
         """Remove everything from the scene."""
         self._top.remove()
+
+
+def _path(motion: Motion) -> tuple[Array, Array]:
+    """Points ``(k, 3)`` of the tool's path, and its speed there."""
+    sample = motion.sample(np.linspace(0.0, motion.duration, path_samples(motion.duration)))
+    return sample.T[:, :3, 3], sample.tool_speed
 
 
 def path_samples(duration: float) -> int:

@@ -7,12 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+import kin
 from app.viewer.feature import Stage
-from app.viewer.tabs.program.items import Items
+from app.viewer.tabs.program.items import Item, Items, Point, passed_through, point
+from app.viewer.tabs.program.planning import Plan
 from kin.motion import Motion
 
 SAME = 1e-6  # rad or m: a locked joint has this value
 LOOSE, SAMPLES = 1e-4, 400  # rad or m on the way, and where it is looked at
+_TOOL = ("lin", "circ", "spline")
 
 
 @dataclass(frozen=True)
@@ -22,19 +25,27 @@ class Fault:
     Attributes:
         index: of the item at fault; that of the way back to the start is the number of items.
         words: sentences.
+        ptp: whether a PTP to the same waypoint would help.
+        way: points of the tool's way at fault (m); a line is drawn through them.
+        place: where on it the arm cannot go on (m); None: at its end, or not known.
     """
 
     index: int
     words: str
+    ptp: bool = False
+    way: tuple[Point, ...] = ()
+    place: Point | None = None
 
 
-def find_fault(items: Items, motion: Motion | None, stage: Stage) -> Fault | None:
+def find_fault(plan: Plan | None, stage: Stage) -> Fault | None:
     """The planner's refusal, or a locked joint that would have to move; None: nothing."""
-    if motion is not None and motion.refusal is not None:
-        return Fault(motion.refusal.segment, motion.refusal.explain(stage.units))
+    if plan is None:
+        return None
+    if plan.motion.refusal is not None:
+        return _refused(plan, stage)
     constraints = stage.options.constraints
     locked = () if constraints is None or constraints.locked is None else constraints.locked
-    for index, item in enumerate(items):
+    for index, item in enumerate(plan.items):
         for joint, (q, value) in enumerate(zip(item.q, locked, strict=False)):
             if value is not None and abs(q - value) > SAME:
                 unit = stage.units.of(bool(stage.robot.revolute[joint]))
@@ -43,19 +54,52 @@ def find_fault(items: Items, motion: Motion | None, stage: Stage) -> Fault | Non
                     f"{unit.text(q)}. Unlock the joint, or set the waypoint to another pose."
                 )
                 return Fault(index, words)
-    return None if motion is None else _moved(motion, locked)
+    return _moved(plan, plan.motion, locked)
 
 
-def _moved(motion: Motion, locked: Sequence[float | None]) -> Fault | None:
-    """A line on which a locked joint would move between two waypoints."""
+def _refused(plan: Plan, stage: Stage) -> Fault:
+    refusal, items = plan.motion.refusal, plan.items
+    assert refusal is not None
+    index = plan.item_of(refusal.segment)
+    helps = any(each.code == "ptp" for each in refusal.helps)
+    if index >= len(items) or items[index].kind not in _TOOL:
+        return Fault(index, plan.explain(stage.units))
+    way = _way(items, index, stage)
+    place = None
+    if refusal.fraction is not None and items[index].kind == "lin" and len(way) == 2:
+        start, end = np.array(way)
+        place = point(start + refusal.fraction * (end - start))
+    return Fault(index, plan.explain(stage.units), helps, way, place)
+
+
+def _way(items: Items, index: int, stage: Stage) -> tuple[Point, ...]:
+    """From the waypoint before a segment of the tool to its end, by its via point or its inner points."""
+    first = index
+    while first > 0 and passed_through(items, first - 1):
+        first -= 1
+    before = [item for item in items[:first] if item.q][-1:]
+    found: list[Point] = []
+    for item in (*before, *items[first : index + 1]):
+        if item.kind == "circ" and item is items[index] and item.via is not None:
+            found.append(item.via)
+        found.append(_place(item, stage))
+    return tuple(found)
+
+
+def _place(item: Item, stage: Stage) -> Point:
+    return point(kin.fk(stage.robot, np.array(item.q))[:3, 3])
+
+
+def _moved(plan: Plan, motion: Motion, locked: Sequence[float | None]) -> Fault | None:
+    """A path on which a locked joint would move between two waypoints."""
     joints = [(joint, value) for joint, value in enumerate(locked) if value is not None]
     times = np.linspace(0.0, motion.duration, SAMPLES)
     q = motion.derivatives(times)[0] if joints else np.zeros((0, motion.robot.n))
     for joint, value in joints:
         off = np.flatnonzero(np.abs(q[:, joint] - value) > LOOSE)
         if off.size:
-            when = times[off[0]]
-            index = next(segment.index for segment in motion.segments if when <= segment.end)
+            index = plan.item_at(float(times[off[0]])) or 0
             words = f"Joint {joint + 1} is locked, and would move on the way. Unlock the joint, or choose PTP."
-            return Fault(index, words)
+            ptp = index < len(plan.items) and plan.items[index].kind in _TOOL
+            return Fault(index, words, ptp)
     return None

@@ -33,5 +33,13 @@ def read(value: object, robot: Robot) -> tuple[str, Program]:
 
 
 def _fields(data: dict[str, object]) -> list[str]:
-    """Strings, numbers and lists are written in TOML as in JSON."""
-    return [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in data.items()]
+    return [f"{key} = {_value(value)}" for key, value in data.items()]
+
+
+def _value(value: object) -> str:
+    """Strings and numbers are written in TOML as in JSON; points of a spline are tables."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(_fields(value)) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_value, value)) + "]"
+    return json.dumps(value, ensure_ascii=False)

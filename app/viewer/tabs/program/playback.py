@@ -1,19 +1,52 @@
-"""Playing a motion: the arm of a visitor follows it in time, frame by frame."""
+"""Playing a motion: its time, and the arm of a visitor that follows it frame by frame."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from app.viewer.feature import Stage
 from app.viewer.panel.status import Notice
 from app.viewer.tabs.program.items import Items
-from app.viewer.tabs.program.player import Player
+from app.viewer.tabs.program.planning import Plan
 from kin.motion import Motion
 from kin.transforms import Array
 
+RATES = (0.1, 0.25, 0.5, 1.0, 2.0)  # of the real speed
 CLOCK = 0.05  # s between two reports of the time
+
+
+@dataclass
+class Player:
+    """Where in a motion the arm is, and how the time goes on.
+
+    Attributes:
+        time: seconds since the beginning of the motion.
+        rate: seconds of the motion for each second.
+        loop: whether it begins again at its end.
+        playing: whether the time goes on.
+    """
+
+    time: float = 0.0
+    rate: float = 1.0
+    loop: bool = False
+    playing: bool = False
+
+    def advance(self, seconds: float, duration: float) -> None:
+        """Let `seconds` pass; at the end of the motion begin again or stop."""
+        self.time += seconds * self.rate
+        if self.time < duration:
+            return
+        if self.loop and duration > 0.0:
+            self.time %= duration
+        else:
+            self.time, self.playing = duration, False
+
+    def go_to(self, time: float, duration: float) -> None:
+        """Go to a time of the motion."""
+        self.time = min(max(time, 0.0), duration)
 
 
 class Playback:
@@ -24,19 +57,26 @@ class Playback:
 
     Attributes:
         player: the time.
-        motion: what is played; None: nothing can be.
-        items: the list that the motion was planned from.
+        plan: what is played; None: nothing can be.
     """
 
     def __init__(self, stage: Stage, report: Callable[[], None]) -> None:
         self._stage = stage
         self._report = report
         self.player = Player()
-        self.motion: Motion | None = None
-        self.items: Items = ()
+        self.plan: Plan | None = None
         self._sent: Array | None = None  # the configuration that was requested last
         self._leading = False  # whether the arm is on its way to where playing begins
         self._stepped = self._reported = 0.0
+
+    @property
+    def motion(self) -> Motion | None:
+        """The motion that is played."""
+        return None if self.plan is None else self.plan.motion
+
+    @property
+    def _items(self) -> Items:
+        return () if self.plan is None else self.plan.items
 
     @property
     def duration(self) -> float:
@@ -46,14 +86,11 @@ class Playback:
     @property
     def here(self) -> int | None:
         """Index of the item that is driven at the present time; that of the way back is the number of items."""
-        if self.motion is None:
-            return None
-        now = self.player.time
-        return next((s.index for s in self.motion.segments if now <= s.end), None)
+        return None if self.plan is None else self.plan.item_at(self.player.time)
 
-    def use(self, items: Items, motion: Motion | None) -> None:
+    def use(self, plan: Plan | None) -> None:
         """Take another motion, at the same time if it lasts as long."""
-        self.items, self.motion = items, motion
+        self.plan = plan
         self.player.go_to(self.player.time, self.duration)
 
     def play(self) -> None:
@@ -119,9 +156,9 @@ class Playback:
 
     def _notice(self) -> Notice:
         here = self.here
-        if here is None or here >= len(self.items):
+        if here is None or here >= len(self._items):
             return Notice("hand", "Playing", "" if here is None else "Back to the start")
-        item = self.items[here]
+        item = self._items[here]
         words = f"Waits {item.seconds:g} s" if item.kind == "pause" else f"To waypoint {here + 1}"
         return Notice("hand", "Playing", f"{words}: {item.name}" if item.name else words)
 

@@ -13,31 +13,31 @@ from dataclasses import replace
 import numpy as np
 
 import kin
+from app.exports.motion_snippets import SNIPPETS
 from app.exports.snippets import named
 from app.viewer.feature import Feature, Stage
 from app.viewer.own_arm import KEY
-from app.viewer.panel import update_html
+from app.viewer.panel.entry import EntryError
 from app.viewer.panel.status import Notice
 from app.viewer.tabs.program import items as changes
-from app.viewer.tabs.program import views
-from app.viewer.tabs.program.drawing import Drawing
+from app.viewer.tabs.program.compare import CHOICES, ZONE, Choice, other_motion
 from app.viewer.tabs.program.faults import Fault, find_fault
-from app.viewer.tabs.program.files import LARGEST, read, toml_of
+from app.viewer.tabs.program.files import read, toml_of
 from app.viewer.tabs.program.items import MOST, PAUSE, Item, Items
-from app.viewer.tabs.program.playback import Playback
-from app.viewer.tabs.program.player import RATES
-from app.viewer.tabs.program.plot import plot_html
+from app.viewer.tabs.program.links import pack, unpack
+from app.viewer.tabs.program.planning import Plan, halfway, items_of, plan
+from app.viewer.tabs.program.playback import RATES, Playback
+from app.viewer.tabs.program.screen import Screen
 from app.viewer.tabs.program.views import KINDS
-from app.viewer.views.templates import render
 from kin import InputError, KinematicsError
 from kin.motion import Motion
 
-PARTS = ("player", "clock", "list", "plot", "summary", "files")
 LINK = 7000  # bytes of all programs in a link
 _LABELS = {
     "record": "Record a pose", "pause": "Add a pause", "set": "Set to this pose", "duplicate": "Duplicate",
     "up": "Move up", "down": "Move down", "delete": "Delete", "go": "Go to", "scrub": "Time of the program",
     "clear": "Clear the program", "upload": "Open a program", "loop": "Loop", "field": "Waypoint",
+    "via": "Via point", "ptp": "PTP instead",
 }  # fmt: skip
 
 
@@ -46,60 +46,28 @@ class ProgramTab(Feature):
 
     key = "program"
     title = "Program"
-    messages = frozenset(
-        {
-            *("record", "pause", "choose", "field", "go", "set", "duplicate", "up", "down", "delete", "clear"),
-            *("play", "scrub", "rate", "loop", "path", "joint", "download", "upload"),
-        }
-    )
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
         self._programs: dict[str, Items] = {}  # by robot; `KEY` stands for the visitor's own arm
         self._playback = Playback(stage, self._show_clock)
         self._player = self._playback.player
-        self._path = True  # whether the program is drawn in the scene
-        self._joint: int | None = None  # the one in the plots; None: all
-        self._chosen: int | None = None  # the item that is open
-        self._revision = 0
+        self._plan: Plan | None = None
         self._fault: Fault | None = None
-        self._drawing: Drawing | None = None
-        self._drawn: tuple[object, ...] = ()
-        gui = stage.client.gui
-        self._html = {name: gui.add_html("") for name in PARTS}
-        self._item_handlers: dict[str, Callable[[int, object], None]] = {
-            "choose": self._choose,
-            "field": self._type,
-            "go": lambda index, _: self._go_to_item(index),
-            "set": lambda index, _: self._set_pose(index),
-            "duplicate": lambda index, _: self._insert(index + 1, self._items[index]),
-            "up": lambda index, _: self._move(index, index - 1),
-            "down": lambda index, _: self._move(index, index + 1),
-            "delete": lambda index, _: self._delete(index),
-        }
-        self._handlers: dict[str, Callable[[object], None]] = {
-            "record": lambda _: self._record(),
-            "pause": lambda _: self._insert(self._after, Item("pause", seconds=PAUSE)),
-            "clear": lambda _: self._use((), None),
-            "play": lambda _: self._playback.stop() if self._player.playing else self._play(),
-            "scrub": self._scrub,
-            "rate": self._set_rate,
-            "loop": self._set_loop,
-            "path": self._set_path,
-            "joint": self._set_joint,
-            "download": lambda _: self._download(),
-            "upload": self._upload,
-        }
+        self._compared: Choice | None = None
+        self._zone = ZONE
+        self._other: Motion | None = None
+        self._screen = Screen(stage)
         self._refresh()
 
     def handle(self, key: Hashable, value: object) -> None:
         match key:
-            case (str(name), int(index), *_) if name in self._item_handlers and 0 <= index < len(self._items):
-                self._item_handlers[name](index, value)
-            case (str(name), int(), *_) if name in self._item_handlers:
+            case (str(name), int(index), *_) if name in _ITEM_HANDLERS and 0 <= index < len(self._items):
+                _ITEM_HANDLERS[name](self, index, value)
+            case (str(name), int(), *_) if name in _ITEM_HANDLERS:
                 pass  # the item was deleted since
-            case (str(name), *_) if name in self._handlers:
-                self._handlers[name](value)
+            case (str(name), *_) if name in _HANDLERS:
+                _HANDLERS[name](self, value)
             case _:
                 raise InputError("program", key, "the key of a button or a field")
 
@@ -109,12 +77,12 @@ class ProgramTab(Feature):
     # Reports of the session
 
     def on_robot(self) -> None:
-        self._chosen, self._joint, self._player.time = None, None, 0.0
+        self._screen.chosen, self._screen.joint, self._player.time = None, None, 0.0
         self._playback.stop()
         self._refresh()
 
     def on_request(self) -> None:
-        if find_fault(self._items, self._motion, self.stage) != self._fault:
+        if find_fault(self._plan, self.stage) != self._fault:
             self._refresh()
 
     def on_style(self) -> None:
@@ -124,16 +92,14 @@ class ProgramTab(Feature):
         self.due = self._playback.tick(now)
 
     def state(self) -> dict[str, object]:
-        found: dict[str, object] = {
-            "programs": {key: changes.pack(items) for key, items in self._programs.items()}
-        }
-        if self._player.loop:
-            found["loop"] = True
-        if self._player.rate != 1.0:
-            found["rate"] = self._player.rate
-        if not self._path:
-            found["path"] = False
-        return found
+        found: dict[str, object] = {"programs": {key: pack(items) for key, items in self._programs.items()}}
+        usual = {"loop": False, "rate": 1.0, "path": True, "ghosts": False, "frames": False, "compare": None}
+        shown = self._screen.shown
+        now = {
+            "loop": self._player.loop, "rate": self._player.rate, "path": shown.path, "ghosts": shown.ghosts,
+            "frames": shown.frames, "compare": self._compared,
+        }  # fmt: skip
+        return found | {key: value for key, value in now.items() if value != usual[key]}
 
     def restore(self, state: dict[str, object]) -> None:
         programs = state.get("programs")
@@ -142,20 +108,22 @@ class ProgramTab(Feature):
         if self.stage.own is not None:
             robots[KEY] = self.stage.own.robot
         for key, value in programs.items() if isinstance(programs, dict) else ():
-            items = changes.unpack(value, robots[key]) if key in robots else None
+            items = unpack(value, robots[key]) if key in robots else None
             if items is not None:
                 self._programs[key] = items
-        rate = state.get("rate", 1.0)
+        rate, compared = state.get("rate", 1.0), state.get("compare")
         self._player.loop = state.get("loop") is True
         self._player.rate = next((each for each in RATES if each == rate), 1.0)
-        self._path = state.get("path") is not False
+        self._compared = next((each for each in CHOICES if each == compared), None)
+        ghosts, frames = (state.get(each) is True for each in ("ghosts", "frames"))
+        shown = replace(self._screen.shown, path=state.get("path") is not False, ghosts=ghosts, frames=frames)
+        self._screen.shown = shown
         self._playback.stop()
         self._refresh()
 
     def remove(self) -> None:
         self._playback.stop()
-        self._path = False
-        self._draw()
+        self._screen.remove()
 
     # The program
 
@@ -170,21 +138,16 @@ class ProgramTab(Feature):
         items = self._programs.get(self._key, ())
         return items if all(len(item.q) in (0, self.stage.robot.n) for item in items) else ()
 
-    @property
-    def _after(self) -> int:
-        """Where a new item goes: behind the open one, else at the end."""
-        return len(self._items) if self._chosen is None else self._chosen + 1
-
     def _use(self, items: Items, chosen: int | None) -> None:
         """Take another list, with this item open."""
         programs = {key: value for key, value in self._programs.items() if key != self._key}
         if items:
             programs[self._key] = items
-        packed = {key: changes.pack(value) for key, value in programs.items()}
+        packed = {key: pack(value) for key, value in programs.items()}
         if len(items) > len(self._items) and len(json.dumps(packed, ensure_ascii=False).encode()) > LINK:
             self._refuse("The link is full", "Delete waypoints, or save the program as a file and clear it.")
             return
-        self._programs, self._chosen = programs, chosen
+        self._programs, self._screen.chosen = programs, chosen
         self._playback.stop()
         self._refresh()
 
@@ -193,80 +156,43 @@ class ProgramTab(Feature):
         """The motion of the list; None: there is none, or it cannot be driven."""
         return self._playback.motion
 
-    def _refresh(self) -> None:
-        """Plan the motion, and show everything."""
-        items, stage = self._items, self.stage
-        start = changes.start_of(items)
-        motion = None
-        if start is not None:
-            motion = kin.plan_motion(
-                stage.robot, changes.program_of(items, stage.robot, self._player.loop), start.q
-            )
-        self._fault = find_fault(items, motion, stage)
-        self._playback.use(items, motion if motion is not None and motion.planned else None)
-        self._draw()
+    def _refresh(self, anew: bool = False) -> None:
+        """Plan the motion, and show everything; `anew`: what was typed into the fields is replaced."""
+        items, stage, loop = self._items, self.stage, self._player.loop
+        self._plan = plan(items, stage.robot, loop)
+        self._fault = find_fault(self._plan, stage)
+        self._playback.use(self._plan if self._plan is not None and self._plan.motion.planned else None)
+        self._other = None
+        if self._compared is not None and self._motion is not None:
+            self._other = other_motion(items, stage.robot, loop, self._compared, self._zone)
+        self._screen.draw(items, self._plan, self._fault, loop, self._other)
         self._show_player()
-        self._show_list()
-        self._show_plot()
-        summary = ""
-        if self._motion is not None:
-            summary = views.summary(self._motion, self._motion.limits, stage.robot, self._key == KEY, stage.units)
-        self._show("summary", summary)
-        most = f"{LARGEST // 1000} kB"
-        self._show("files", render("program/files", any=bool(items), most=most, bytes=LARGEST))
+        self._show_list(anew)
+        self._screen.plot(self._motion, self._other)
+        self._screen.summary(self._plan, self._key == KEY)
+        self._screen.compare(self._motion, self._other, self._compared, self._zone)
+        self._screen.files(self._motion, bool(items), self._key == KEY)
         self._show_clock()
 
-    def _show(self, name: str, html: str) -> None:
-        update_html(self._html[name], html)
-
     def _show_player(self) -> None:
-        top = 0.0 if self._drawing is None else self._drawing.top_speed
         playable = self._motion is not None and self._motion.duration > 0.0 and self._fault is None
-        shown = views.player(self._player, self._motion, playable, self._path, top) if self._items else ""
-        self._show("player", shown)
+        self._screen.player(self._playback, bool(self._items), playable)
 
-    def _show_list(self) -> None:
-        shown = views.items_html(
-            self._items, self._chosen, self._motion, self._fault, self._player.loop, self._revision
-        )
-        self._show("list", shown)
-
-    def _show_plot(self) -> None:
-        motion = self._motion
-        lasts = motion is not None and motion.duration > 0.0
-        self._show(
-            "plot", plot_html(motion, self._joint, self.stage.units) if motion is not None and lasts else ""
-        )
+    def _show_list(self, anew: bool = False) -> None:
+        self._screen.list(self._items, self._plan, self._fault, self._player.loop, anew)
 
     def _show_clock(self) -> None:
-        self._show("clock", views.clock(self._player, self._playback.duration, self._playback.here))
-
-    def _draw(self) -> None:
-        """Draw the program in the scene, if it is another one than before."""
-        stage = self.stage
-        items = [item for item in self._items if item.q] if self._path else []
-        faults = [] if self._fault is None else [i for i, item in enumerate(self._items) if item.q]
-        fault = (
-            faults.index(self._fault.index) if self._fault is not None and self._fault.index in faults else None
-        )
-        names = views.shown_names(self._items)
-        drawn = (stage.robot, tuple(items), tuple(names), self._items, self._player.loop, fault)
-        if drawn == self._drawn:
-            return
-        self._drawn = drawn
-        if self._drawing is not None:
-            self._drawing.remove()
-            self._drawing = None
-        if items:
-            q = np.array([item.q for item in items])
-            self._drawing = Drawing(stage.client.scene, stage.robot, q, names, fault)
-            if self._motion is not None:
-                self._drawing.show_path(self._motion)
+        self._screen.clock(self._playback)
 
     # Changes of the list
 
-    def _record(self) -> None:
+    def _record(self, _: object) -> None:
         self._insert(len(self._items), changes.waypoint(self.stage.goal), choose=False)
+
+    def _pause(self, _: object) -> None:
+        """Add a pause behind the open item, else at the end."""
+        chosen = self._screen.chosen
+        self._insert(len(self._items) if chosen is None else chosen + 1, Item("pause", seconds=PAUSE))
 
     def _insert(self, index: int, item: Item, choose: bool = True) -> None:
         if len(self._items) >= MOST:
@@ -275,47 +201,69 @@ class ProgramTab(Feature):
             self._use(changes.inserted(self._items, index, item), index if choose else None)
 
     def _choose(self, index: int, _: object) -> None:
-        self._chosen = None if index == self._chosen else index
+        self._screen.chosen = None if index == self._screen.chosen else index
         self._show_list()
 
-    def _set_pose(self, index: int) -> None:
+    def _set_pose(self, index: int, _: object) -> None:
         q = changes.waypoint(self.stage.goal).q
         self._use(changes.changed(self._items, index, q=q), index)
+
+    def _set_via(self, index: int, _: object) -> None:
+        via = changes.point(kin.fk(self.stage.robot, self.stage.goal)[:3, 3])
+        self._use(changes.changed(self._items, index, kind="circ", via=via), index)
 
     def _move(self, index: int, to: int) -> None:
         if 0 <= to < len(self._items):
             self._use(changes.moved(self._items, index, to), to)
 
-    def _delete(self, index: int) -> None:
+    def _delete(self, index: int, _: object) -> None:
         items = changes.removed(self._items, index)
         if not any(item.q for item in items):
             items = ()  # pauses alone are no program
         self._use(items, min(index, len(items) - 1) if items else None)
 
+    def _use_ptp(self, index: int, _: object) -> None:
+        """Drive to a waypoint, and to those of the same spline before it, by PTP."""
+        items, first = self._items, index
+        while first > 0 and changes.passed_through(items, first - 1):
+            first -= 1
+        for i in range(first, index + 1):
+            if items[i].q:
+                items = changes.changed(items, i, kind="ptp", via=None)
+        self._use(items, self._screen.chosen)
+
     def _type(self, index: int, value: object) -> None:
+        item = self._items[index]
         match value:
-            case ["kind", str(kind)] if kind in KINDS and self._items[index].kind in KINDS:
-                values = {"kind": kind}
+            case ["kind", str(kind)] if kind in KINDS and item.kind in KINDS:
+                via = (item.via or halfway(self._items, index, self.stage.robot)) if kind == "circ" else None
+                values = {"kind": kind, "via": via}
+            case ["values", ("joints" | "pose") as shown]:
+                self._screen.by_pose = shown == "pose"
+                self._show_list()
+                return
             case [str(field), text]:
                 try:
-                    values = dict(changes.value_of(field, text))
-                except InputError as error:
-                    self._refuse("The field stays as it was", f"“{text}” is not valid: expected {error.expected}.")
+                    values = dict(self._screen.fields.read(field, text, item))
+                except EntryError as error:
+                    self._refuse(error.title, error.detail)
                     return
             case _:
-                raise InputError("field", value, "name, kind, speed or seconds, and a text")
-        self._revision += 1
+                raise InputError("field", value, "the name of a field, and a text")
         self._use(changes.changed(self._items, index, **values), index)
+        self._show_list(anew=True)
 
     def _refuse(self, title: str, detail: str) -> None:
-        self._revision += 1  # what was typed is replaced
-        self._show_list()
+        self._show_list(anew=True)
         self.stage.notify(Notice("error", title, detail))
 
     # Playing
 
-    def _play(self) -> None:
-        self._fault = find_fault(self._items, self._motion, self.stage)
+    def _play(self, _: object) -> None:
+        if self._player.playing:
+            self._playback.stop()
+            return
+        self._fault = find_fault(self._plan, self.stage)
         if self._motion is None or self._motion.duration == 0.0 or self._fault is not None:
             words = "Record at least two poses." if self._fault is None else self._fault.words
             self._refuse("The program cannot be played", words)
@@ -329,12 +277,14 @@ class ProgramTab(Feature):
         if self._motion is not None and self._fault is None:
             self._playback.go_to(float(time))
 
-    def _go_to_item(self, index: int) -> None:
+    def _go_to_item(self, index: int, _: object) -> None:
         item = self._items[index]
-        if self._motion is not None:  # a line may end in another posture than the recorded one
-            end = self._motion.segments[index].end
+        if self._plan is not None and self._motion is not None:
+            end = self._plan.ends[index]  # a line may end in another posture than the recorded one
             self._playback.note(end)
             q = self._motion.derivatives(end)[0]
+            if item.blend:
+                q = np.array(item.q)  # the motion leaves before
         else:
             q = np.array(next((each.q for each in reversed(self._items[: index + 1]) if each.q), self.stage.goal))
         title = item.name or (f"Waypoint {index + 1}" if item.q else "Pause")
@@ -353,25 +303,40 @@ class ProgramTab(Feature):
         self._playback.stop()
         self._refresh()
 
-    def _set_path(self, on: object) -> None:
-        self._path = bool(on)
-        self._draw()
+    def _set_shown(self, name: str, on: object) -> None:
+        self._screen.shown = replace(self._screen.shown, **{name: bool(on)})
+        self._screen.draw(self._items, self._plan, self._fault, self._player.loop, self._other)
         self._show_player()
 
     def _set_joint(self, text: object) -> None:
         joint = int(text) if isinstance(text, str) and text.isdecimal() and len(text) < 4 else None
-        self._joint = joint if joint is not None and joint < self.stage.robot.n else None
-        self._show_plot()
+        self._screen.joint = joint if joint is not None and joint < self.stage.robot.n else None
+        self._screen.plot(self._motion, self._other)
+
+    def _compare(self, value: object) -> None:
+        self._compared = next((each for each in CHOICES if each == value), None)
+        self._refresh()
+
+    def _set_zone(self, text: object) -> None:
+        try:
+            self._zone = self._screen.fields.read("blend", text, Item("ptp"))["blend"]
+        except EntryError as error:
+            self.stage.notify(Notice("error", error.title, error.detail))
+        self._refresh()
+
+    def _set_language(self, name: object) -> None:
+        if name not in SNIPPETS:
+            raise InputError("language", name, "one of " + ", ".join(SNIPPETS))
+        self._screen.language = str(name)
+        self._screen.files(self._motion, bool(self._items), self._key == KEY)
 
     # Files
 
-    def _download(self) -> None:
-        if not self._items:
+    def _download(self, _: object) -> None:
+        if self._plan is None:
             return
         robot = self.stage.robot if self._key != KEY else named(self.stage.robot)
-        program = replace(
-            changes.program_of(self._items, self.stage.robot, self._player.loop), name=robot.name[:100]
-        )
+        program = replace(self._plan.motion.program, name=robot.name[:100])
         name = f"{robot.id}-program.toml"
         self.stage.client.send_file_download(name, toml_of(program, robot.name).encode(), save_immediately=True)
         self.stage.notify(Notice("hand", f"{name} is saved", "Your browser has put it where it puts downloads."))
@@ -379,9 +344,42 @@ class ProgramTab(Feature):
     def _upload(self, value: object) -> None:
         try:
             name, program = read(value, self.stage.robot)
-            items = changes.items_of(program, self.stage.robot, self.stage.goal)
+            items = items_of(program, self.stage.robot, self.stage.goal)
         except KinematicsError as error:
             self._refuse("The file was not used", str(error))
         else:
             self._use(items, None)
             self.stage.notify(Notice("hand", name, f"{len(items)} waypoints and pauses."))
+
+
+_ITEM_HANDLERS: dict[str, Callable[[ProgramTab, int, object], None]] = {
+    "choose": ProgramTab._choose,
+    "field": ProgramTab._type,
+    "go": ProgramTab._go_to_item,
+    "set": ProgramTab._set_pose,
+    "via": ProgramTab._set_via,
+    "ptp": ProgramTab._use_ptp,
+    "duplicate": lambda tab, index, _: tab._insert(index + 1, tab._items[index]),
+    "up": lambda tab, index, _: tab._move(index, index - 1),
+    "down": lambda tab, index, _: tab._move(index, index + 1),
+    "delete": ProgramTab._delete,
+}
+_HANDLERS: dict[str, Callable[[ProgramTab, object], None]] = {
+    "record": ProgramTab._record,
+    "pause": ProgramTab._pause,
+    "clear": lambda tab, _: tab._use((), None),
+    "play": ProgramTab._play,
+    "scrub": ProgramTab._scrub,
+    "rate": ProgramTab._set_rate,
+    "loop": ProgramTab._set_loop,
+    "path": lambda tab, on: tab._set_shown("path", on),
+    "ghosts": lambda tab, on: tab._set_shown("ghosts", on),
+    "frames": lambda tab, on: tab._set_shown("frames", on),
+    "joint": ProgramTab._set_joint,
+    "compare": ProgramTab._compare,
+    "zone": ProgramTab._set_zone,
+    "language": ProgramTab._set_language,
+    "download": ProgramTab._download,
+    "upload": ProgramTab._upload,
+}
+ProgramTab.messages = frozenset({*_ITEM_HANDLERS, *_HANDLERS})

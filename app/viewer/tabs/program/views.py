@@ -5,20 +5,35 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from app.viewer.tabs.program.compare import CHOICES, Choice, about
+from app.viewer.tabs.program.drawing import Shown
 from app.viewer.tabs.program.faults import Fault
-from app.viewer.tabs.program.items import MOST, Item, Items, Kind, start_of
-from app.viewer.tabs.program.player import RATES, Player
+from app.viewer.tabs.program.items import MOST, Item, Items, Kind, passed_through, start_of
+from app.viewer.tabs.program.planning import Plan
+from app.viewer.tabs.program.playback import RATES, Player
+from app.viewer.tabs.program.typed import Fields
 from app.viewer.tabs.workspace.colours import bar
 from app.viewer.views.templates import render
 from kin import Robot
-from kin.motion import Motion, MotionLimits
+from kin.motion import Motion, MotionLimits, Peak
+from kin.motion.results import Quantity
 from kin.units import Units, fixed
 
 KINDS: dict[Kind, tuple[str, str]] = {
     "ptp": ("PTP – every joint goes the shortest way", "PTP"),
     "lin": ("LIN – the tool moves on a straight line", "LIN"),
+    "circ": ("CIRC – the tool moves on an arc through a via point", "CIRC"),
+    "spline": ("Spline – a smooth curve through neighbouring points", "spline"),
 }
-QUANTITIES = {"velocity": "velocities", "acceleration": "accelerations", "jerk": "jerks"}
+QUANTITIES: dict[Quantity, str] = {"velocity": "velocities", "acceleration": "accelerations", "jerk": "jerks"}
+EXCEEDED = 1.0 + 1e-6
+# Least part of a limit, the word for it, and its colour.
+STATES = (
+    (EXCEEDED, "exceeded", "kb-vermilion"),
+    (0.995, "at limit", "kb-amber"),
+    (0.8, "near", ""),
+    (0.0, "below", ""),
+)
 
 
 def rate_name(rate: float) -> str:
@@ -26,17 +41,20 @@ def rate_name(rate: float) -> str:
     return f"{rate:g}×"
 
 
-def player(player: Player, motion: Motion | None, playable: bool, path: bool, top_speed: float) -> str:
+def player(
+    player: Player, motion: Motion | None, playable: bool, drawn: Shown, top_speed: float, units: Units
+) -> str:
     """Buttons and time; below them the meaning of the path's colours."""
-    legend = bar("program", "0 m/s", f"{top_speed:.2f} m/s", "speed of the tool along its path", "viridis")
+    top = f"{units.lengths.number(top_speed, 0)} {units.lengths.name}/s"
+    legend = bar("program", f"0 {units.lengths.name}/s", top, "speed of the tool along its path", "viridis")
     return render(
         "program/player",
         playable=playable,
         duration=0.0 if motion is None else motion.duration,
         rates=[(rate, rate_name(rate), rate == player.rate) for rate in RATES],
         loop=player.loop,
-        path=path,
-        legend=legend if path and top_speed > 1e-6 else "",
+        drawn=drawn,
+        legend=legend if drawn.path and top_speed > 1e-6 else "",
     )
 
 
@@ -48,29 +66,29 @@ def clock(player: Player, duration: float, here: int | None) -> str:
 
 
 def items_html(
-    items: Items, chosen: int | None, motion: Motion | None, fault: Fault | None, loop: bool, revision: int
-) -> str:
-    """The list; the chosen item is open."""
+    items: Items, chosen: int | None, plan: Plan | None, fault: Fault | None, loop: bool, fields: Fields,
+    by_pose: bool, revision: int,
+) -> str:  # fmt: skip
+    """The list; the chosen item is open. `by_pose`: its values are those of the tool, not of the joints."""
     first = start_of(items)
+    ends = plan.ends if plan is not None and fault is None else ()
     rows = []
     for i, item in enumerate(items):
-        starts = item is first
         rows.append(
             {
                 "title": item.name or ("Pause" if item.kind == "pause" else f"Waypoint {i + 1}"),
-                "words": _words(item, starts),
-                "time": "" if motion is None else f"{motion.segments[i].end:.2f} s",
+                "words": _words(items, i, fields),
+                "time": f"{ends[i]:.2f} s" if ends else "",
                 "item": item,
-                "starts": starts,
-                "speed": f"{100.0 * item.speed:g}",
-                "seconds": f"{item.seconds:g}",
-                "fault": fault.words if fault is not None and fault.index == i else "",
+                "starts": item is first,
+                "inner": item is not first and passed_through(items, i),
+                "fault": fault if fault is not None and fault.index == i else None,
             }
         )
     back = None
     if loop and first is not None:
-        time = "" if motion is None else f"{motion.duration:.2f} s"
-        back = {"time": time, "fault": fault.words if fault is not None and fault.index == len(items) else ""}
+        time = f"{ends[-1]:.2f} s" if ends else ""
+        back = {"time": time, "fault": fault if fault is not None and fault.index == len(items) else None}
     return render(
         "program/list",
         rows=rows,
@@ -79,41 +97,101 @@ def items_html(
         kinds=KINDS,
         full=len(items) >= MOST,
         revision=revision,
+        fields=fields,
+        by_pose=by_pose,
     )
 
 
-def _words(item: Item, starts: bool) -> str:
+def _words(items: Items, index: int, fields: Fields) -> str:
+    """How the arm comes to an item, in a few words."""
+    item, lengths = items[index], fields.units.lengths
     if item.kind == "pause":
         return f"waits {item.seconds:g} s"
-    if starts:
+    if item is start_of(items):
         return "start"
-    speed = "" if item.speed == 1.0 else f" at {100.0 * item.speed:g} % speed"
-    return KINDS[item.kind][1] + speed
+    if passed_through(items, index):
+        return "spline, passed"
+    words = KINDS[item.kind][1]
+    if item.speed != 1.0:
+        words += f" at {100.0 * item.speed:g} %"
+    if item.tool_speed is not None:
+        words += f" ≤ {fields.size(item.tool_speed)} {lengths.name}/s"
+    if item.blend:
+        words += f", zone {fields.size(item.blend)} {lengths.name}"
+    return words
 
 
-def summary(motion: Motion, limits: MotionLimits, robot: Robot, own: bool, units: Units) -> str:
-    """How long the motion takes, what limits it, and what is assumed of the limits."""
+def summary(plan: Plan, robot: Robot, own: bool, units: Units) -> str:
+    """How long the motion takes, how near each joint comes to its limits, and what is assumed of them."""
+    motion, limits = plan.motion, plan.motion.limits
     heads = [f"{units.angles.name}{per}" for per in ("/s", "/s²", "/s³")]
     if not robot.revolute.all():
         heads = [
             f"{head} or {units.lengths.name}{per}" for head, per in zip(heads, ("/s", "/s²", "/s³"), strict=True)
         ]
+    peaks = {(peak.joint, peak.quantity): peak for peak in motion.peaks}
     rows = []
     for i, joint in enumerate(robot.joints):
         scale = units.of(joint.kind == "revolute").scale
-        values = (limits.velocity[i], limits.acceleration[i], limits.jerk[i])
-        cells = [
-            (_number(value * scale), quantity in limits.assumed[i])
-            for value, quantity in zip(values, QUANTITIES, strict=True)
-        ]
-        rows.append((joint.name, cells))
+        rows.append((joint.name, [_cell(peaks[i, quantity], scale) for quantity in QUANTITIES]))
+    speed, turn = peaks[None, "tool_speed"].peak, peaks[None, "tool_turn"].peak
     return render(
         "program/summary",
         words=_busiest(motion),
-        notes=motion.explain(units) if motion.notes else "",
+        notes=plan.explain(units) if motion.notes else "",
         assumed=assumption(limits, own, units),
-        heads=heads,
+        heads=list(zip(QUANTITIES, heads, strict=True)),
         rows=rows,
+        tool=f"{_number(speed * units.lengths.scale)} {units.lengths.name}/s, "
+        f"{_number(turn * units.angles.scale)} {units.angles.name}/s",
+        source=robot.source,
+        data="" if own else f"../api/v1/robots/{robot.id}",
+    )
+
+
+def _share(ratio: float) -> tuple[str, str]:
+    """A part of a limit, and its colour."""
+    return (
+        (f"{100.0 * ratio:.0f} %, exceeded", "kb-vermilion")
+        if ratio > EXCEEDED
+        else (f"{100.0 * ratio:.0f} %", "")
+    )
+
+
+def _cell(peak: Peak, scale: float) -> dict[str, object]:
+    """A peak beside its limit: numbers, a word, and the colour of its state."""
+    ratio = peak.ratio or 0.0
+    word, colour = next((word, colour) for least, word, colour in STATES if ratio >= least)
+    return {
+        "share": f"{100.0 * ratio:.0f} %",
+        "word": word,
+        "colour": colour,
+        "numbers": f"{_number(peak.peak * scale)} / {_number((peak.limit or 0.0) * scale)}",
+        "assumed": peak.assumed,
+    }
+
+
+def comparison(
+    motion: Motion, other: Motion | None, choice: Choice | None, zone: float, fields: Fields, words: str
+) -> str:
+    """Another motion of the same waypoints beside the program; `words`: why there is none."""
+    both = [each for each in (motion, other) if each is not None and each.planned]
+    lengths = fields.units.lengths
+    rows = [("duration", [(f"{each.duration:.2f} s", "") for each in both])]
+    for quantity in QUANTITIES:
+        ratios = [max(peak.ratio or 0.0 for peak in each.peaks if peak.quantity == quantity) for each in both]
+        rows.append((quantity, [_share(ratio) for ratio in ratios]))
+    speeds = [max(peak.peak for peak in each.peaks if peak.quantity == "tool_speed") for each in both]
+    rows.append(("tool", [(f"{lengths.number(speed, 0)} {lengths.name}/s", "") for speed in speeds]))
+    return render(
+        "program/compare",
+        choices=CHOICES,
+        choice=choice,
+        zone=fields.size(zone),
+        unit=lengths.name,
+        rows=rows,
+        words=words or (about(choice, motion) if choice is not None else ""),
+        refused=bool(words),
     )
 
 

@@ -6,6 +6,7 @@ import html
 import json
 import math
 import re
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -21,6 +22,28 @@ pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connecti
 STORE = Store()
 PIONEER, UR5 = STORE.get("pioneer5"), STORE.get("ur5")
 TURN = "1 rotating base"
+
+
+@pytest.fixture(scope="module")
+def page(port: int) -> Iterator[FakeBrowser]:
+    """One connection for most tests of this file."""
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        yield tab
+
+
+@pytest.fixture
+def tab(page: FakeBrowser) -> FakeBrowser:
+    """The shared page with the first arm and without a program."""
+    page.choose(PIONEER.name)
+    for name, value in (("loop", False), ("rate", 1.0), ("compare", ""), ("joint", ""), ("ghosts", False)):
+        press(page, name, value=value)
+    home = f"[[segments]]\nkind = 'ptp'\nq = {PIONEER.q_home.tolist()}\n"
+    press(page, "upload", value=["home.toml", home])
+    press(page, "go", 0)
+    shows(page, PIONEER, PIONEER.q_home)
+    press(page, "clear")
+    return page
 
 
 def part(tab: FakeBrowser, name: str) -> str:
@@ -57,6 +80,10 @@ def shows(tab: FakeBrowser, robot: kin.Robot, q: np.ndarray) -> None:
     tab.wait(lambda: np.allclose(tab.tool_pose(), T, atol=1e-5))
 
 
+def tool(tab: FakeBrowser) -> bytes:
+    return tab.tool_pose().tobytes()
+
+
 def record(tab: FakeBrowser, *degrees: float) -> None:
     for angle in degrees:
         tab.set(TURN, angle)
@@ -64,61 +91,58 @@ def record(tab: FakeBrowser, *degrees: float) -> None:
         press(tab, "record")
 
 
-def test_recorded_poses_are_played(port: int) -> None:
-    with FakeBrowser(port) as tab:
-        tab.settle()
-        record(tab, 20, 50)
-        assert titles(tab) == ["Waypoint 1", "Waypoint 2"]
-        program = [kin.motion.Ptp(target=kin.motion.JointTarget(tuple(turned(50))))]
-        motion = kin.plan_motion(PIONEER, program, turned(20))
-        assert float(clock(tab)["duration"]) == pytest.approx(motion.duration, abs=2e-3)
-        tab.set(TURN, 100)
-        shows(tab, PIONEER, turned(100))
-        press(tab, "play")
-        assert clock(tab)["playing"] == "1"
-        tab.wait(lambda: clock(tab)["playing"] == "0")
-        assert clock(tab)["time"] == clock(tab)["duration"]
-        shows(tab, PIONEER, turned(50))
-        press(tab, "scrub", value=0.0)
-        shows(tab, PIONEER, turned(20))
-        assert tab.script["undo"] == "Time of the program"
+def test_recorded_poses_are_played(tab: FakeBrowser) -> None:
+    record(tab, 20, 50)
+    assert titles(tab) == ["Waypoint 1", "Waypoint 2"]
+    program = [kin.motion.Ptp(target=kin.motion.JointTarget(tuple(turned(50))))]
+    motion = kin.plan_motion(PIONEER, program, turned(20))
+    assert float(clock(tab)["duration"]) == pytest.approx(motion.duration, abs=2e-3)
+    tab.set(TURN, 100)
+    shows(tab, PIONEER, turned(100))
+    press(tab, "play")
+    assert clock(tab)["playing"] == "1"
+    tab.wait(lambda: clock(tab)["playing"] == "0")
+    assert clock(tab)["time"] == clock(tab)["duration"]
+    shows(tab, PIONEER, turned(50))
+    press(tab, "scrub", value=0.0)
+    shows(tab, PIONEER, turned(20))
+    assert tab.script["undo"] == "Time of the program"
 
 
-def test_moving_the_arm_ends_playing(port: int) -> None:
-    with FakeBrowser(port) as tab:
-        tab.settle()
-        record(tab, 10, 170)
-        press(tab, "loop", value=True)
-        press(tab, "play")
-        tab.wait(lambda: float(clock(tab)["time"]) > 0.05)
-        tab.set(TURN, 35)
-        tab.wait(lambda: clock(tab)["playing"] == "0")
-        shows(tab, PIONEER, turned(35))
+def test_moving_the_arm_ends_playing(tab: FakeBrowser) -> None:
+    record(tab, 10, 170)
+    press(tab, "loop", value=True)
+    press(tab, "play")
+    tab.wait(lambda: float(clock(tab)["time"]) > 0.05)
+    tab.set(TURN, 35)
+    tab.wait(lambda: clock(tab)["playing"] == "0")
+    shows(tab, PIONEER, turned(35))
 
 
-def test_every_change_can_be_undone(port: int) -> None:
-    with FakeBrowser(port) as tab:
-        tab.settle()
-        record(tab, 20, 50)
-        press(tab, "field", 1, value=["name", "<b>above</b>"])
-        assert titles(tab) == ["Waypoint 1", "<b>above</b>"]
-        press(tab, "duplicate", 0)
-        press(tab, "up", 2)
-        assert titles(tab) == ["Waypoint 1", "<b>above</b>", "Waypoint 3"]
-        press(tab, "delete", 0)
-        press(tab, "clear")
-        assert titles(tab) == []
-        for expected in (2, 3, 3, 2, 2, 1, 0):
-            tab.wait(lambda: bool(tab.script["undo"]))
-            while tab.script["undo"] in ("Joint 1",):
-                tab.say("undo")
-                tab.settle()
+def test_every_change_can_be_undone(tab: FakeBrowser) -> None:
+    record(tab, 20, 50)
+    press(tab, "field", 1, value=["name", "<b>above</b>"])
+    assert titles(tab) == ["Waypoint 1", "<b>above</b>"]
+    press(tab, "duplicate", 0)
+    press(tab, "up", 2)
+    assert titles(tab) == ["Waypoint 1", "<b>above</b>", "Waypoint 3"]
+    press(tab, "delete", 0)
+    press(tab, "clear")
+    assert titles(tab) == []
+    for expected in (2, 3, 3, 2, 2, 1, 0):
+        tab.wait(lambda: bool(tab.script["undo"]))
+        while tab.script["undo"] == "Joint 1":
+            left = tab.script["undo"], tool(tab)
             tab.say("undo")
-            tab.settle()
-            assert len(titles(tab)) == expected
-        tab.say("redo")
-        tab.settle()
-        assert titles(tab) == ["Waypoint 1"]
+            tab.wait(lambda left=left: (tab.script["undo"], tool(tab)) != left)  # type: ignore[misc]
+        tab.say("undo")
+        tab.wait(lambda expected=expected: len(titles(tab)) == expected)  # type: ignore[misc]
+    tab.say("redo")
+    tab.wait(lambda: titles(tab) == ["Waypoint 1"])
+
+
+def programs(link: str) -> dict[str, object]:
+    return decode(link, STORE.robots).features.get("program", {}).get("programs", {})  # type: ignore[return-value]
 
 
 def test_a_program_lives_in_the_link_one_for_each_robot(port: int) -> None:
@@ -127,18 +151,15 @@ def test_a_program_lives_in_the_link_one_for_each_robot(port: int) -> None:
         record(tab, 20, 50)
         press(tab, "field", 1, value=["speed", "50"])
         tab.choose(UR5.name)
-        assert titles(tab) == []
+        tab.wait(lambda: titles(tab) == [])
         press(tab, "record")
-        tab.settle(0.8)
+        tab.wait(lambda: bool(tab.kept) and set(programs(tab.kept[-1])) == {"pioneer5", "ur5"})
         link = tab.kept[-1]
-        programs = decode(link, STORE.robots).features["program"]["programs"]
-        assert set(programs) == {"pioneer5", "ur5"}  # type: ignore[call-overload]
     with FakeBrowser(port, memory=json.dumps({"state": link})) as tab:
-        tab.settle()
-        assert titles(tab) == ["Waypoint 1"]
+        tab.wait(lambda: titles(tab) == ["Waypoint 1"])
         tab.choose(PIONEER.name)
-        assert titles(tab) == ["Waypoint 1", "Waypoint 2"]
-        assert "PTP at 50 % speed" in part(tab, "list")
+        tab.wait(lambda: titles(tab) == ["Waypoint 1", "Waypoint 2"])
+        assert "PTP at 50 %" in part(tab, "list")
 
 
 def type_limit(tab: FakeBrowser, text: str) -> None:
@@ -153,7 +174,7 @@ def test_an_arm_of_ones_own_has_a_program_and_a_refusal_is_at_its_waypoint(port:
         tab.settle()
         record(tab, 20)
         type_limit(tab, "170")
-        assert titles(tab) == []
+        tab.wait(lambda: titles(tab) == [])
         record(tab, 20, 150, 40)
         assert titles(tab) == ["Waypoint 1", "Waypoint 2", "Waypoint 3"]
         type_limit(tab, "100")
@@ -167,65 +188,148 @@ def test_an_arm_of_ones_own_has_a_program_and_a_refusal_is_at_its_waypoint(port:
 
 def test_a_locked_joint_keeps_its_value(port: int) -> None:
     with FakeBrowser(port) as tab:
-        tab.settle()
         record(tab, 20, 50)
         lock = next(
             u for u, m in tab.gui.items() if m["type"] == "GuiButtonGroupMessage" and "1" in m["props"]["options"]
         )
         tab.send("GuiUpdateMessage", uuid=lock, updates={"value": "1"})
-        tab.settle()
-        assert "Joint 1 is locked at 50.0°, and this waypoint has it at 20.0°" in html.unescape(part(tab, "list"))
+        words = "Joint 1 is locked at 50.0°, and this waypoint has it at 20.0°"
+        tab.wait(lambda: words in html.unescape(part(tab, "list")))
         before = tab.tool_pose()
         press(tab, "play")
         assert clock(tab)["playing"] == "0"
         assert np.allclose(tab.tool_pose(), before)
 
 
-def test_a_line_that_cannot_be_driven_says_what_would_help(port: int) -> None:
-    with FakeBrowser(port) as tab:
-        tab.settle()
-        record(tab, 10, 170)
-        press(tab, "field", 1, value=["kind", "lin"])
-        assert "Segment 2 (LIN) cannot be driven" in part(tab, "list")
-        assert part(tab, "list").count("kb-fault") == 1
-        press(tab, "field", 1, value=["kind", "ptp"])
-        assert "kb-fault" not in part(tab, "list")
+def test_a_line_that_cannot_be_driven_says_what_would_help(tab: FakeBrowser) -> None:
+    record(tab, 10, 170)
+    press(tab, "field", 1, value=["kind", "lin"])
+    assert "Segment 2 (LIN) cannot be driven" in part(tab, "list")
+    assert part(tab, "list").count("kb-fault") == 1
+    assert any(name.endswith("/fault-way") for name in tab.nodes), "the line is red in the scene"
+    assert 'data-program-do="ptp" data-index="1"' in part(tab, "list")
+    press(tab, "ptp", 1)
+    assert "kb-fault" not in part(tab, "list")
+    assert not any(name.endswith("/fault-way") for name in tab.nodes)
+    tab.say("undo")
+    tab.wait(lambda: "kb-fault" in part(tab, "list"))
 
 
-def test_a_file_is_opened_and_one_that_does_not_fit_is_refused(port: int) -> None:
-    with FakeBrowser(port) as tab:
-        tab.settle()
-        text = "units = { angle = 'deg' }\n" + "[[segments]]\nkind = 'ptp'\nq = [90, 30, 60, 30, 30]\n" * 2
-        press(tab, "upload", value=["two.toml", text])
+def test_a_file_is_opened_and_one_that_does_not_fit_is_refused(tab: FakeBrowser) -> None:
+    text = "units = { angle = 'deg' }\n" + "[[segments]]\nkind = 'ptp'\nq = [90, 30, 60, 30, 30]\n" * 2
+    press(tab, "upload", value=["two.toml", text])
+    assert titles(tab) == ["Waypoint 1", "Waypoint 2"]
+    for name, content in (
+        ("wrong.toml", "kind ="),
+        ("other.toml", text.replace(", 30]", "]")),
+        ("big.toml", None),
+    ):
+        press(tab, "upload", value=[name, content])
+        tab.wait(lambda: "The file was not used" in tab.html)
         assert titles(tab) == ["Waypoint 1", "Waypoint 2"]
-        for name, content in (
-            ("wrong.toml", "kind ="),
-            ("other.toml", text.replace(", 30]", "]")),
-            ("big.toml", None),
-        ):
-            press(tab, "upload", value=[name, content])
-            tab.wait(lambda: "The file was not used" in tab.html)
-            assert titles(tab) == ["Waypoint 1", "Waypoint 2"]
 
 
-def test_a_program_has_an_end(port: int) -> None:
-    with FakeBrowser(port) as tab:
-        tab.settle()
-        for _ in range(MOST + 2):
-            press(tab, "record")
-        assert len(titles(tab)) == MOST
-        assert "The program is full" in tab.html
+def test_a_program_has_an_end(tab: FakeBrowser) -> None:
+    for _ in range(MOST + 2):
+        press(tab, "record")
+    assert len(titles(tab)) == MOST
+    assert "The program is full" in tab.html
 
 
 @pytest.mark.parametrize(
     ("key", "value"),
     [("scrub", "x"), ("scrub", -1), ("rate", 3), ("field", ["q", 1]), ("upload", 5), ("nothing", 1)],
 )
-def test_messages_that_no_control_sends(port: int, key: str, value: object) -> None:
-    with FakeBrowser(port) as tab:
-        tab.settle()
+def test_messages_that_no_control_sends(tab: FakeBrowser, key: str, value: object) -> None:
+    press(tab, "record")
+    press(tab, key, *([0] if key == "field" else []), value=value)
+    tab.wait(lambda: 'data-status="error"' in tab.html)
+    press(tab, "record")
+    assert titles(tab) == ["Waypoint 1", "Waypoint 2"]
+
+
+def inputs(tab: FakeBrowser) -> dict[str, str]:
+    """The fields of the open waypoint and their texts."""
+    return {
+        name: html.unescape(value)
+        for name, value in re.findall(
+            r'data-program-field="(\w+)" data-index="\d+" value="(.*?)"', part(tab, "list")
+        )
+    }
+
+
+def test_the_values_of_a_waypoint_are_typed_as_joints_or_as_a_pose(tab: FakeBrowser) -> None:
+    record(tab, 20)
+    press(tab, "choose", 0)
+    assert inputs(tab)["q0"] == "20.000"
+    press(tab, "field", 0, value=["q0", "30.125"])
+    assert inputs(tab)["q0"] == "30.125"
+    press(tab, "field", 0, value=["q0", "1000"])
+    assert "outside the limits" in tab.html
+    assert inputs(tab)["q0"] == "30.125"
+    press(tab, "field", 0, value=["values", "pose"])
+    x, y, z = map(float, inputs(tab)["position"].replace("−", "-").split())
+    press(tab, "field", 0, value=["position", f"{x:.3f} {y:.3f} {z - 10:.3f}"])
+    assert inputs(tab)["position"].split()[2].replace("−", "-") == f"{z - 10:.3f}"
+    press(tab, "go", 0)
+    tab.wait(lambda: abs(1000 * tab.tool_pose()[2, 3] - (z - 10)) < 1e-3)
+    press(tab, "field", 0, value=["values", "joints"])
+
+
+def test_an_arc_has_a_via_point_and_a_spline_its_points(tab: FakeBrowser) -> None:
+    tab.choose(UR5.name)
+    press(tab, "clear")
+    names = [label for label in tab.sliders if label[0].isdigit()]
+    for k in range(3):
         press(tab, "record")
-        press(tab, key, *([0] if key == "field" else []), value=value)
-        tab.wait(lambda: 'data-status="error"' in tab.html)
-        press(tab, "record")
-        assert titles(tab) == ["Waypoint 1", "Waypoint 2"]
+        q = UR5.q_home + np.array([0.1, 0.08, -0.1, 0.0, 0.0, 0.0]) * (k + 1)
+        if k < 2:
+            for joint in range(3):
+                tab.set(names[joint], math.degrees(q[joint]))
+            tab.wait(lambda q=q: np.allclose(tab.tool_pose(), kin.fk(UR5, q), atol=1e-3))  # type: ignore[misc]
+    press(tab, "field", 2, value=["kind", "circ"])
+    assert "CIRC" in part(tab, "list")
+    assert any("/via-" in name for name in tab.nodes)
+    assert len(inputs(tab)["via"].split()) == 3
+    for field, text in (("acceleration", "50"), ("blend", "15"), ("tool_speed", "120"), ("tool_turn", "90")):
+        press(tab, "field", 2, value=[field, text])
+    assert [inputs(tab)[name] for name in ("acceleration", "blend", "tool_speed", "tool_turn")] == [
+        "50", "15", "120", "90",
+    ]  # fmt: skip
+    press(tab, "via", 2)  # where the tool is: at the waypoint itself
+    assert "Segment 3 (CIRC) cannot be driven" in part(tab, "list")
+    for index in (1, 2):
+        press(tab, "field", index, value=["kind", "spline"])
+    assert "spline, passed" in part(tab, "list")
+    assert "kb-fault" not in part(tab, "list")
+
+
+def test_two_motions_are_compared_and_code_is_copied(tab: FakeBrowser) -> None:
+    record(tab, 20, 80)
+    assert part(tab, "plot").count('<path class="kb-motion-curve') == 3 * PIONEER.n + 1
+    press(tab, "compare", value="quintic")
+    times = [float(x) for x in re.findall(r">([\d.]+) s</span>", part(tab, "compare"))]
+    assert len(times) == 2
+    assert times[1] > times[0]
+    assert "kb-motion-other" in part(tab, "plot")
+    assert any(name.endswith("/other") for name in tab.nodes)
+    press(tab, "compare", value="lin")
+    press(tab, "compare", value="")
+    assert "kb-motion-other" not in part(tab, "plot")
+    for language, word in (("curl", "/api/v1/robots/pioneer5/motion"), ("URScript", "six revolute joints")):
+        press(tab, "language", value=language)
+        assert word in html.unescape(part(tab, "files"))
+    press(tab, "language", value="Python, kin")
+    assert "kin.plan_motion(" in part(tab, "files")
+    assert "at limit" in part(tab, "summary")
+    assert "Limits from: " in part(tab, "summary")
+
+
+def test_ghosts_and_frames_are_switched(tab: FakeBrowser) -> None:
+    record(tab, 20, 80)
+    for name in ("ghosts", "frames"):
+        assert not any(node.endswith(f"/{name}") for node in tab.nodes)
+        press(tab, name, value=True)
+        assert any(node.endswith(f"/{name}") for node in tab.nodes)
+        press(tab, name, value=False)
+        assert not any(node.endswith(f"/{name}") for node in tab.nodes)

@@ -1,0 +1,140 @@
+"""Another motion of the same waypoints, to be compared with the program: other segments, zones or profiles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+import numpy as np
+
+import kin
+from app.viewer.tabs.program.items import Items, start_of
+from app.viewer.tabs.program.planning import program_of
+from kin import Robot
+from kin.motion import Dwell, Motion, Ptp, profiles
+from kin.motion.pieces import Piece, look_between
+from kin.motion.profiles import Profile
+from kin.transforms import Array
+
+Choice = Literal["ptp", "lin", "zone", "cubic", "quintic", "trapezoidal", "s_curve", "fastest"]
+CHOICES: dict[Choice, str] = {
+    "ptp": "every move as PTP",
+    "lin": "every move as LIN",
+    "zone": "other zones (blend radius)",
+    "cubic": "cubic profile",
+    "quintic": "quintic profile",
+    "trapezoidal": "trapezoidal profile (LSPB)",
+    "s_curve": "S-curve profile",
+    "fastest": "time-optimal without limits of jerk",
+}
+ZONE = 0.05  # m, of the other zones at first
+_SAME = 1e-9  # s
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Straight:
+    """All joints on a straight line from `start` to `end` ``(n,)``, in proportion to one profile from 0 to 1."""
+
+    start: Array
+    end: Array
+    profile: Profile
+
+    @property
+    def duration(self) -> float:
+        """Seconds."""
+        return self.profile.duration
+
+    def at(self, times: Array) -> Array:
+        """Joint values and their first three derivatives ``(4, k, n)``."""
+        out: Array = self.profile.sample(times)[..., None] * (self.end - self.start)
+        out[0] += self.start
+        return out
+
+    def grid(self) -> Array:
+        """Times at which to look for peaks."""
+        return look_between(np.unique(self.profile.breaks))
+
+
+def other_motion(items: Items, robot: Robot, loop: bool, choice: Choice, zone: float) -> Motion:
+    """The other motion of a list with at least one waypoint; it may be refused."""
+    first = start_of(items)
+    assert first is not None
+    if choice in ("ptp", "lin"):
+        kind: Literal["ptp", "lin"] = "ptp" if choice == "ptp" else "lin"
+        items = tuple(replace(item, kind=kind, via=None) if item.q else item for item in items)
+    elif choice == "zone":
+        items = tuple(replace(item, blend=zone) if item.q else item for item in items)
+    program = program_of(items, robot, loop)
+    if choice == "fastest":
+        program = replace(program, jerk_limited=False)
+    motion = kin.plan_motion(robot, program, first.q)
+    return motion if choice not in _PROFILES or not motion.planned else with_profile(motion, _PROFILES[choice])
+
+
+def with_profile(motion: Motion, profile: Callable[[Array], Profile]) -> Motion:
+    """The motion with another profile of each PTP from rest to rest; `profile` takes limits ``(3,)``."""
+    pieces: list[Piece] = list(motion.pieces)
+    for times, segment in zip(motion.segments, motion.program.segments, strict=True):
+        k = int(np.argmin(np.abs(motion.starts[:-1] - times.start))) if pieces else 0
+        whole = (
+            isinstance(segment, Ptp)
+            and times.end > times.start
+            and abs(motion.starts[k] - times.start) < _SAME
+            and abs(motion.starts[k + 1] - times.end) < _SAME
+        )
+        if whole and not isinstance(segment, Dwell):
+            start, end = motion.derivatives(np.array([times.start, times.end]))[0]
+            scales = np.array([segment.speed, segment.acceleration, segment.acceleration])
+            way = np.abs(end - start)
+            limits = np.array([motion.limits.velocity, motion.limits.acceleration, motion.limits.jerk])
+            moving = way > 1e-12
+            pieces[k] = Straight(start, end, profile((limits[:, moving] / way[moving]).min(axis=1) * scales))
+    starts = np.concatenate([[0.0], np.cumsum([piece.duration for piece in pieces])])
+
+    def new(time: float) -> float:
+        return float(np.interp(time, motion.starts, starts))
+
+    segments = tuple(replace(each, start=new(each.start), end=new(each.end)) for each in motion.segments)
+    return replace(motion, pieces=tuple(pieces), segments=segments)
+
+
+def _polynomial(kind: Callable[[float, float, float], Profile]) -> Callable[[Array], Profile]:
+    """The fastest of a family that is stretched in time: its peaks fall with the time, its square and its cube."""
+
+    def made(limits: Array) -> Profile:
+        peaks = np.abs(kind(0.0, 1.0, 1.0).sample(np.linspace(0.0, 1.0, 1001))[1:]).max(axis=1)
+        duration = max(
+            (peak / limit) ** (1.0 / k) for k, (peak, limit) in enumerate(zip(peaks, limits, strict=True), 1)
+        )
+        return kind(0.0, 1.0, math.nextafter(duration, math.inf))
+
+    return made
+
+
+_PROFILES: dict[Choice, Callable[[Array], Profile]] = {
+    "cubic": _polynomial(profiles.cubic),
+    "quintic": _polynomial(profiles.quintic),
+    "trapezoidal": lambda limits: profiles.trapezoidal(0.0, 1.0, *limits[:2].tolist()),
+    "s_curve": lambda limits: profiles.s_curve(0.0, 1.0, *limits.tolist()),
+}
+_ABOUT: dict[Choice, str] = {
+    "cubic": "Velocity is continuous, acceleration jumps at both ends: its jerk there is infinite.",
+    "quintic": "Velocity and acceleration start and end at zero.",
+    "trapezoidal": "Velocity is continuous, acceleration jumps four times: its jerk there is infinite.",
+    "s_curve": "Acceleration is continuous, jerk keeps its limit.",
+    "fastest": "Acceleration may jump where the path is LIN, CIRC or a spline: jerk is not limited there.",
+}
+
+
+def about(choice: Choice, motion: Motion) -> str:
+    """What the choice means for a program."""
+    words = _ABOUT.get(choice, "")
+    others = [each for each in motion.program.segments if not isinstance(each, Ptp | Dwell)]
+    if choice in _PROFILES and (others or any(getattr(each, "blend", 0.0) for each in motion.program.segments)):
+        words += " The profile replaces that of each PTP without a zone; other moves stay as planned."
+    return words
+
+
+assert set(CHOICES) == set(get_args(Choice))

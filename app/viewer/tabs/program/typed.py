@@ -1,0 +1,129 @@
+"""What is typed into the fields of a waypoint or a pause, in the visitor's units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+import kin
+from app.viewer.own_arm import clean
+from app.viewer.panel.entry import EntryError, PoseKind, read_pose, read_value
+from app.viewer.panel.readout import roll_pitch_yaw
+from app.viewer.tabs.program.items import NAME, Item, configuration, point
+from kin import InputError, Robot, Task
+from kin.axes import inverse
+from kin.motion.program import LONGEST_DWELL
+from kin.transforms import Array
+from kin.units import Units
+
+FARTHEST, FASTEST = 1000.0, 1000.0  # m; m/s or rad/s
+EXACT = 12  # digits of a typed joint value
+
+
+@dataclass(frozen=True, eq=False)
+class Fields:
+    """How the values of an item are written and read.
+
+    Attributes:
+        robot, units: of the visitor.
+        frame: the frame ``(4, 4)`` in which poses are shown, in the world frame.
+        task: how much of a typed pose is to be met.
+    """
+
+    robot: Robot
+    units: Units
+    frame: Array
+    task: Task
+
+    def joints(self, item: Item) -> list[tuple[str, str, str]]:
+        """Name, value and unit of each joint."""
+        rows = zip(self.robot.joints, self.robot.revolute.tolist(), item.q, strict=True)
+        named = [(joint.name, self.units.of(turning), value) for joint, turning, value in rows]
+        return [(name, unit.number(value, 3), unit.name) for name, unit, value in named]
+
+    def place(self, item: Item) -> tuple[str, str]:
+        """The tool's position, and roll, pitch and yaw."""
+        T = inverse(self.frame) @ kin.fk(self.robot, np.array(item.q))
+        lengths, angles = self.units.lengths, self.units.angles
+        turns = " ".join(angles.number(value, 3) for value in roll_pitch_yaw(T[:3, :3]))
+        return " ".join(lengths.number(value, 3) for value in T[:3, 3].tolist()), turns
+
+    def via(self, item: Item) -> str:
+        """The via point of an arc."""
+        shown = inverse(self.frame) @ [*(item.via or (0.0, 0.0, 0.0)), 1.0]
+        return " ".join(self.units.lengths.number(value, 3) for value in shown[:3].tolist())
+
+    def size(self, value: float | None, is_angle: bool = False) -> str:
+        """A zone or a limit of the tool; empty if there is none."""
+        return "" if not value else f"{value * self.units.of(is_angle).scale:.6g}"
+
+    def read(self, field: str, text: object, item: Item) -> Mapping[str, Any]:
+        """The values of an item that a typed text changes.
+
+        Raises:
+            EntryError: with what would be valid.
+            InputError: no field of an item.
+        """
+        if not isinstance(text, str):
+            raise InputError(field, text, "a text")
+        match field:
+            case "name":
+                return {"name": clean(text, NAME)}
+            case "speed" | "acceleration":
+                return {field: _number(text.replace("%", ""), 1.0, 100.0, "percent") / 100.0}
+            case "seconds":
+                return {"seconds": _number(text.removesuffix("s"), 0.0, LONGEST_DWELL, "seconds")}
+            case "blend":
+                return {"blend": self._size(text, "Zone", False, FARTHEST) or 0.0}
+            case "tool_speed" | "tool_turn":
+                return {field: self._size(text, "Limit of the tool", field == "tool_turn", FASTEST)}
+        if not item.q:
+            raise InputError("field", field, "name or seconds")
+        return self._pose(field, text, item)
+
+    def _size(self, text: str, name: str, is_angle: bool, most: float) -> float | None:
+        """A typed size; None for an empty text and for 0."""
+        unit = self.units.of(is_angle)
+        cleaned = text.replace("/s", "").strip()
+        return read_value(cleaned, name, unit, is_angle, (0.0, most)) or None if cleaned else None
+
+    def _pose(self, field: str, text: str, item: Item) -> Mapping[str, Any]:
+        robot, kind = self.robot, field.rstrip("0123456789")
+        if kind == "q" and field[1:].isdecimal() and int(field[1:]) < robot.n:
+            joint = int(field[1:])
+            turning = bool(robot.revolute[joint])
+            limits = float(robot.lower[joint]), float(robot.upper[joint])
+            value = read_value(text, f"Joint {joint + 1}", self.units.of(turning), turning, limits)
+            return {"q": (*item.q[:joint], round(value, EXACT), *item.q[joint + 1 :])}
+        present = inverse(self.frame) @ kin.fk(robot, np.array(item.q))
+        if field == "via":
+            T, _ = read_pose("position", text, self.units, present)
+            return {"via": point((self.frame @ T)[:3, 3])}
+        named: dict[str, PoseKind] = {"position": "position", "angles": "angles"}
+        if field in named:
+            T, _ = read_pose(named[field], text, self.units, present)
+            return {"q": self._solved(self.frame @ T, item)}
+        raise InputError("field", field, "a field of a waypoint")
+
+    def _solved(self, T: Array, item: Item) -> tuple[float, ...]:
+        """The configuration closest to that of the item with the tool at a pose ``(4, 4)``."""
+        found = kin.solve_ik(self.robot, T, q_seed=np.array(item.q), task=self.task)
+        if not found.solutions:
+            said = found.explain(self.units)
+            raise EntryError("The waypoint stays as it was", f"{said.headline}: {said.body}")
+        return configuration(found.solutions[0].q, EXACT)
+
+
+def _number(text: str, low: float, high: float, unit: str) -> float:
+    try:
+        value = float(text.strip().replace(",", "."))
+    except ValueError:
+        value = math.nan
+    if not low <= value <= high:
+        title = "The field stays as it was"
+        raise EntryError(title, f"“{text.strip()[:24]}” is not valid: {low:g} to {high:g} {unit}.")
+    return round(value, 3)
