@@ -9,8 +9,9 @@ import numpy as np
 
 from kin.fk import fk, fk_positions, jacobian
 from kin.motion.geometry.chain import Chain
-from kin.motion.geometry.curves import Corner, Curve, Line, Through, Turning, arc_through, corner, natural, turning
+from kin.motion.geometry.curves import Corner, Curve, Line, Through, Turning, arc_through, natural, turning
 from kin.motion.geometry.splines import parted, spline, values
+from kin.motion.geometry.tables import corner_at
 from kin.motion.limits import MotionLimits
 from kin.motion.pieces import JointMotion
 from kin.motion.program import Circ, JointTarget, Lin, Move, Ptp, Spline, Target
@@ -110,7 +111,7 @@ def chained(curves: list[Curve], radii: list[float], layout: Layout) -> Chain:
         if k < len(radii):
             parts.append(Corner(curve, curves[k + 1], after))
             offsets.append(0.0)
-    return Chain(tuple(parts), tuple(offsets), layout.starts)
+    return Chain(parts, offsets, layout.starts)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -166,7 +167,7 @@ def joint_path(curves: list[JointCurve], radii: list[float], layout: Layout) -> 
             begin += rest
         if k < len(radii):
             u = np.linspace(0.0, 1.0, 33)[1:]
-            first, second = corner(u, after)
+            first, second = np.array([corner_at(float(part), after) for part in u]).T
             following = curves[k + 1]
             s.append(begin + 2.0 * after * u)
             rows.append(curve.at(curve.length + first) + following.at(second) - following.at(np.zeros(1)))

@@ -27,7 +27,7 @@ from kin.motion.details import (
     TargetOutside,
 )
 from kin.motion.geometry.chain import Chain, LostError, followed
-from kin.motion.geometry.curves import Curve
+from kin.motion.geometry.curves import Curve, poses
 from kin.motion.geometry.splines import parted, values
 from kin.motion.limits import MotionLimits
 from kin.motion.paths import (
@@ -264,7 +264,7 @@ def _drive_tool(plan: Plan, first: int) -> int:
                 plan.notes.append(BlendShortened(index - 1, last.blend, used))
         curves.append(curve)
         if curve.length >= NO_LENGTH:
-            before = curve.poses(np.array([curve.length]))[0]
+            before = poses(curve, np.array([curve.length]))[0]
         index += 1
         if not _follows(plan, index - 1, curve.length):
             break
@@ -343,7 +343,7 @@ def _time(plan: Plan, first: int, layout: Layout, knots: Array, pieces: Array) -
     moves = {i: move for i, move in enumerate(plan.program.segments) if isinstance(move, Move)}
     path = limited(plan.robot, plan.limits, moves, layout, knots, pieces)
     found = timed(path, plan.program.jerk_limited, plan.stop)
-    plan.add(first, found, [*(found.when(float(s)) for s in layout.bounds[1:-1]), found.duration])
+    plan.add(first, found, [*found.when(layout.bounds[1:-1]).tolist(), found.duration])
     last = first + len(layout.bounds) - 2
     if plan.program.jerk_limited and found.duration > found.without * (1.0 + 1e-6):
         plan.notes.append(JerkCost(first, last, found.duration, found.without))

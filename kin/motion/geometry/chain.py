@@ -6,16 +6,18 @@ is within `DEVIATION` everywhere.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kin.fk import fk
+from kin.kernels.compile import jit
+from kin.kernels.fk import fk_into
 from kin.motion.geometry.curves import Curve
-from kin.motion.geometry.splines import spline, values
+from kin.motion.geometry.splines import spline, values, values_into
+from kin.motion.geometry.tables import Table, poses_into
 from kin.motion.geometry.tracking import follow, settle
 from kin.robot import Robot
 from kin.solvers.contract import APPROACH, POSE, POSITION
@@ -27,7 +29,7 @@ _NODES = 24  # per curve at first
 _MOST_NODES, _ROUNDS = 20_000, 12
 _STEP = 0.2  # radians or metres that a joint may move between the nodes that are followed
 _CLOSEST = 1e-7  # of the whole length: nodes that are closer are not parted
-_BETWEEN = np.array([0.2, 0.5, 0.8])
+_BETWEEN = (0.2, 0.5, 0.8)
 
 
 class LostError(Exception):
@@ -38,26 +40,25 @@ class LostError(Exception):
         self.s, self.q = s, q
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class Chain:
-    """Curves one after the other; `starts` ``(k + 1,)`` has s where each begins, and the end.
+    """Curves one after the other.
 
-    Attributes:
-        curves, starts: the curves.
-        offsets: which s of its own curve each begins at ``(k,)``.
+    Args:
+        curves: the curves.
+        offsets: which s of its own curve each begins at.
+        starts: ``(k + 1,)`` has s where each begins, and the end.
     """
 
-    curves: tuple[Curve, ...]
-    offsets: tuple[float, ...]
-    starts: Array
+    def __init__(self, curves: Sequence[Curve], offsets: Sequence[float], starts: Array) -> None:
+        table = Table()
+        self.starts = starts
+        self._which = np.array([table.index(curve) for curve in curves])
+        self._numbers, self._offsets = table.numbers, np.array(offsets)
 
     def poses(self, s: Array) -> Array:
         """T_base_tool ``(m, 4, 4)`` at s ``(m,)``."""
-        which = np.clip(np.searchsorted(self.starts, s, side="right") - 1, 0, len(self.curves) - 1)
         out: Array = np.empty((len(s), 4, 4))
-        for k in np.unique(which).tolist():
-            rows = which == k
-            out[rows] = self.curves[k].poses(s[rows] - self.starts[k] + self.offsets[k])
+        poses_into(self._numbers, self._which, self.starts, self._offsets, s, out)
         return out
 
 
@@ -131,10 +132,22 @@ def _nodes(
 def _deviation(robot: Robot, chain: Chain, s: Array, pieces: Array, code: int) -> Array:
     """By how much the spline leaves the curves on each interval: metres or radians, whichever is more ``(k,)``."""
     at = (s[:-1, None] + np.diff(s)[:, None] * _BETWEEN).ravel()
-    T, goal = fk(robot, values(s, pieces, at)), chain.poses(at)
-    off = np.linalg.norm(T[:, :3, 3] - goal[:, :3, 3], axis=1)
-    if code != POSITION:
-        first = 2 if code == APPROACH else 0
-        turn = np.linalg.norm(T[:, :3, first:3] - goal[:, :3, first:3], axis=(1, 2))
-        off = np.maximum(off, turn if code == APPROACH else turn / np.sqrt(2.0))
-    return np.asarray(off.reshape(len(s) - 1, -1).max(axis=1))
+    off, q = np.zeros(len(s) - 1), np.empty((len(at), robot.n))
+    values_into(s, pieces, at, q)
+    _compare(robot.model, q, chain.poses(at), len(_BETWEEN), ROWS[code], off)
+    return off
+
+
+@jit
+def _compare(model: Array, q: Array, goals: Array, points: int, rows: int, off: Array) -> None:
+    """off ← the largest distance from a goal, of each so many configurations; `rows` as in `follow`."""
+    T = np.empty((4, 4))
+    for i in range(q.shape[0]):
+        fk_into(model, q[i], T)
+        goal, away, turn = goals[i], 0.0, 0.0
+        for r in range(3):
+            away += (T[r, 3] - goal[r, 3]) ** 2
+            for c in range(3 if rows == 3 else (2 if rows == 5 else 0), 3):
+                turn += (T[r, c] - goal[r, c]) ** 2
+        turn = turn if rows == 5 else 0.5 * turn
+        off[i // points] = max(off[i // points], math.sqrt(max(away, turn)))

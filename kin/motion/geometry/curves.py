@@ -12,7 +12,9 @@ from typing import Protocol
 
 import numpy as np
 
-from kin.motion.geometry.splines import spline, values
+from kin.motion.geometry import tables
+from kin.motion.geometry.splines import spline
+from kin.motion.geometry.tables import Table
 from kin.transforms import Array, wxyz_from_rotation
 
 TURN = 0.25  # metres that count as much as a radian
@@ -31,8 +33,8 @@ class Curve(Protocol):
         """How far the tool point travels, about."""
         ...
 
-    def poses(self, s: Array) -> Array:
-        """T_base_tool ``(k, 4, 4)`` at s ``(k,)``."""
+    def describe(self, table: Table, row: Array) -> None:
+        """row ← the numbers of this curve."""
         ...
 
 
@@ -47,7 +49,7 @@ class Turning:
     @property
     def angle(self) -> float:
         """How far it turns, at most."""
-        return float(np.linalg.norm(self.base) + np.linalg.norm(self.tool))
+        return math.hypot(*self.base) + math.hypot(*self.tool)
 
     def rotations(self, f: Array) -> Array:
         """Rotations ``(k, 3, 3)`` at parts ``(k,)`` of the way."""
@@ -81,17 +83,17 @@ class Line:
     @property
     def length(self) -> float:
         """Where s ends."""
-        return max(float(np.linalg.norm(self.way)), TURN * self.turn.angle)
+        return max(self.metres, TURN * self.turn.angle)
 
     @property
     def metres(self) -> float:
         """How far the tool point travels."""
-        return float(np.linalg.norm(self.way))
+        return math.hypot(*self.way)
 
-    def poses(self, s: Array) -> Array:
+    def describe(self, table: Table, row: Array) -> None:
         """As in `Curve`."""
-        f = s / self.length
-        return _poses(self.start + f[:, None] * self.way, self.turn.rotations(f))
+        tables.line(row, self.length, self.start, self.way)
+        tables.turn(row, self.turn.R0, self.turn.base, self.turn.tool)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,20 +109,17 @@ class Arc:
     @property
     def length(self) -> float:
         """Where s ends."""
-        return max(float(np.linalg.norm(self.along)) * self.angle, TURN * self.turn.angle)
+        return max(self.metres, TURN * self.turn.angle)
 
     @property
     def metres(self) -> float:
         """How far the tool point travels."""
-        return float(np.linalg.norm(self.along)) * self.angle
+        return math.hypot(*self.along) * self.angle
 
-    def poses(self, s: Array) -> Array:
+    def describe(self, table: Table, row: Array) -> None:
         """As in `Curve`."""
-        f = s / self.length
-        angle = (self.angle * f)[:, None]
-        return _poses(
-            self.centre + np.cos(angle) * self.along + np.sin(angle) * self.across, self.turn.rotations(f)
-        )
+        tables.arc(row, self.length, self.centre, self.along, self.across, self.angle)
+        tables.turn(row, self.turn.R0, self.turn.base, self.turn.tool)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -153,15 +152,9 @@ class Through:
         """How far the tool point travels, about."""
         return self.length
 
-    def poses(self, s: Array) -> Array:
+    def describe(self, table: Table, row: Array) -> None:
         """As in `Curve`."""
-        found = values(self.knots, self.pieces, s)
-        w, x, y, z = (found[:, 3:] / np.linalg.norm(found[:, 3:], axis=1)[:, None]).T
-        R = np.empty((len(s), 3, 3))
-        R[:, 0, 0], R[:, 0, 1], R[:, 0, 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
-        R[:, 1, 0], R[:, 1, 1], R[:, 1, 2] = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
-        R[:, 2, 0], R[:, 2, 1], R[:, 2, 2] = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
-        return _poses(found[:, :3], R)
+        table.spline(row, self.knots, self.pieces)
 
 
 def natural(knots: Array, rows: Array) -> Array:
@@ -178,17 +171,6 @@ def natural(knots: Array, rows: Array) -> Array:
         full[0, :, 1] = slopes[0] - bend * h0
         full[1, :, 1] = slopes[0] + bend * h0
     return full
-
-
-def corner(u: Array, radius: float) -> tuple[Array, Array]:
-    """How far a corner of this radius has come on both of its curves, relative to where they meet.
-
-    On the first from −radius to 0, on the second from 0 to radius, with u from 0 to 1. Both are Bézier polynomials
-    of degree five whose first and second derivatives continue the curves before and after the corner.
-    """
-    v = 1.0 - u
-    first = -radius * (v**5 + 0.6 * 5.0 * u * v**4 + 0.2 * 10.0 * u**2 * v**3)
-    return first, radius * (u**5 + 0.6 * 5.0 * v * u**4 + 0.2 * 10.0 * v**2 * u**3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -209,12 +191,9 @@ class Corner:
         """How far the tool point travels, at most."""
         return self.length
 
-    def poses(self, s: Array) -> Array:
+    def describe(self, table: Table, row: Array) -> None:
         """As in `Curve`."""
-        first, second = corner(s / self.length, self.radius)
-        T0, T1 = self.before.poses(self.before.length + first), self.after.poses(second)
-        met = self.after.poses(np.zeros(1))[0]
-        return _poses(T0[:, :3, 3] + T1[:, :3, 3] - met[:3, 3], T0[:, :3, :3] @ met[:3, :3].T @ T1[:, :3, :3])
+        tables.corner(row, self.radius, table.index(self.before), table.index(self.after))
 
 
 def rotation_vector(R: Array) -> Array:
@@ -235,10 +214,12 @@ def rotations(vector: Array, f: Array) -> Array:
     return np.asarray(np.eye(3) + np.sin(a) * K + (1.0 - np.cos(a)) * (K @ K))
 
 
-def _poses(points: Array, R: Array) -> Array:
-    T = np.zeros((len(points), 4, 4))
-    T[:, :3, :3], T[:, :3, 3], T[:, 3, 3] = R, points, 1.0
-    return T
+def poses(curve: Curve, s: Array) -> Array:
+    """Poses of the tool, T_base_tool ``(k, 4, 4)``, on a curve at s ``(k,)``."""
+    table, out = Table(), np.empty((len(s), 4, 4))
+    which = np.array([table.index(curve)])
+    tables.poses_into(table.numbers, which, np.zeros(1), np.zeros(1), np.ascontiguousarray(s), out)
+    return out
 
 
 def arc_through(start: Array, via: Array, end: Array, turn: Turning) -> Arc | Line | tuple[str, str] | None:

@@ -57,26 +57,50 @@ def spline(s: Array, q: Array) -> Array:
     return out
 
 
+@jit
+def values_into(s: Array, pieces: Array, at: Array, out: Array) -> None:
+    """out ← the spline at points ``(m,)``: ``(m, n)``."""
+    i, last = 0, pieces.shape[0] - 1
+    for m in range(at.shape[0]):
+        if i > 0 and at[m] < s[i]:
+            i = min(max(int(np.searchsorted(s, at[m])) - 1, 0), last)
+        while i < last and at[m] >= s[i + 1]:
+            i += 1
+        d = at[m] - s[i]
+        for j in range(pieces.shape[1]):
+            p = pieces[i, j]
+            out[m, j] = p[0] + d * (p[1] + d * (p[2] + d * p[3]))
+
+
 def values(s: Array, pieces: Array, at: Array) -> Array:
-    """The spline at points ``(m,)``: ``(m, n)``."""
-    i = np.clip(np.searchsorted(s, at, side="right") - 1, 0, len(pieces) - 1)
-    r, p = (at - s[i])[:, None], np.moveaxis(pieces[i], -1, 0)
-    return np.asarray(p[0] + r * (p[1] + r * (p[2] + r * p[3])))
+    """As `values_into`, into a new array."""
+    out: Array = np.empty((len(at), pieces.shape[1]))
+    values_into(s, pieces, np.ascontiguousarray(at), out)
+    return out
 
 
 def parted(s: Array, pieces: Array, parts: NDArray[np.int64]) -> tuple[Array, Array]:
     """The same spline with each interval cut into equal parts ``(k,)``: knots, coefficients."""
-    old = np.repeat(np.arange(len(parts)), parts)
-    step = np.arange(len(old)) - np.repeat(np.cumsum(parts) - parts, parts)
-    r = (np.diff(s) / parts)[old] * step
-    p, d = np.moveaxis(pieces[old], -1, 0), r[:, None]
-    cut = np.stack(
-        [
-            p[0] + d * (p[1] + d * (p[2] + d * p[3])),
-            p[1] + d * (2 * p[2] + 3 * d * p[3]),
-            p[2] + 3 * d * p[3],
-            p[3],
-        ],
-        axis=-1,
-    )
-    return np.append(s[old] + r, s[-1]), np.ascontiguousarray(cut)
+    count = int(parts.sum())
+    knots, cut = np.empty(count + 1), np.empty((count, pieces.shape[1], 4))
+    _part(s, pieces, parts, knots, cut)
+    return knots, cut
+
+
+@jit
+def _part(s: Array, pieces: Array, parts: NDArray[np.int64], knots: Array, cut: Array) -> None:
+    """knots, cut ← as in `parted`."""
+    k = 0
+    for i in range(pieces.shape[0]):
+        h = (s[i + 1] - s[i]) / parts[i]
+        for m in range(parts[i]):
+            d = h * m
+            knots[k] = s[i] + d
+            for j in range(pieces.shape[1]):
+                p = pieces[i, j]
+                cut[k, j, 0] = p[0] + d * (p[1] + d * (p[2] + d * p[3]))
+                cut[k, j, 1] = p[1] + d * (2.0 * p[2] + d * 3.0 * p[3])
+                cut[k, j, 2] = p[2] + 3.0 * d * p[3]
+                cut[k, j, 3] = p[3]
+            k += 1
+    knots[k] = s[pieces.shape[0]]

@@ -23,13 +23,13 @@ ROUNDING = 1e-7  # part of each limit that is left for rounding errors
 
 
 @jit
-def fastest(h: Array, pieces: Array, velocity: Array, acceleration: Array, most: Array, x: Array) -> None:
+def fastest(h: Array, pieces: Array, limits: Array, most: Array, x: Array) -> None:
     """x ← ṡ² at the knots ``(k + 1,)`` of the fastest motion from rest to rest.
 
     Args:
         h: lengths of the intervals ``(k,)``.
         pieces: coefficients of the joints on each, the constant one first ``(k, n, 4)``.
-        velocity, acceleration: limits on each interval ``(k, n)``.
+        limits: velocity and acceleration, and anything after them, on each interval ``(k, n, 2)``.
         most: the largest x on each interval ``(k,)`` that other limits allow.
         x: result.
     """
@@ -37,7 +37,7 @@ def fastest(h: Array, pieces: Array, velocity: Array, acceleration: Array, most:
     rows = np.empty((k, 3 * n, 3))
     cap = np.full(k + 1, math.inf)
     for i in range(k):
-        before, after = _conditions(h[i], pieces[i], velocity[i], acceleration[i], rows[i])
+        before, after = _conditions(h[i], pieces[i], limits[i], rows[i])
         cap[i] = min(cap[i], min(before, most[i]) * (1.0 - ROUNDING))
         cap[i + 1] = min(after, most[i]) * (1.0 - ROUNDING)
     x[k] = 0.0
@@ -50,7 +50,7 @@ def fastest(h: Array, pieces: Array, velocity: Array, acceleration: Array, most:
 
 
 @jit
-def _conditions(h: float, pieces: Array, velocity: Array, acceleration: Array, rows: Array) -> tuple[float, float]:
+def _conditions(h: float, pieces: Array, limits: Array, rows: Array) -> tuple[float, float]:
     """rows ← (α, β, a) with |α x₀ + β x₁| ≤ a ``(3n, 3)``; returns the largest x₀ and x₁ for the velocities."""
     before = after = math.inf
     for j in range(pieces.shape[0]):
@@ -58,9 +58,9 @@ def _conditions(h: float, pieces: Array, velocity: Array, acceleration: Array, r
         b0, b1, b2 = c1, c1 + c2 * h, c1 + h * (2.0 * c2 + 3.0 * c3 * h)
         e0, e1 = 2.0 * c2, 2.0 * c2 + 6.0 * c3 * h
         p, q = _speeds(b0, b1, b2)
-        square = velocity[j] * velocity[j]
+        square = limits[j, 0] * limits[j, 0]
         before, after = min(before, square / p), min(after, square / q)
-        f, a, r = 0.5 / h, acceleration[j] * (1.0 - ROUNDING), 3 * j
+        f, a, r = 0.5 / h, limits[j, 1] * (1.0 - ROUNDING), 3 * j
         rows[r, 0], rows[r, 1], rows[r, 2] = e0 - f * b0, f * b0, a
         rows[r + 1, 0], rows[r + 1, 1], rows[r + 1, 2] = 0.5 * e1 - f * b1, 0.5 * e0 + f * b1, a
         rows[r + 2, 0], rows[r + 2, 1], rows[r + 2, 2] = -f * b2, e1 + f * b2, a

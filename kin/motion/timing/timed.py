@@ -1,9 +1,10 @@
-"""From a joint path to a motion: time-optimal, then with limited jerk.
+"""From a joint path to a motion: time-optimal under limits of velocity and acceleration, or of jerk too.
 
-For limited jerk the time-optimal s(t) is averaged over a window of time. Then s̈ is continuous, and its slope is
-the change of s̈ within the window divided by its length; the motion takes one window longer. Where the averaged
-motion exceeds a limit, the path is made slower there and timed again, some times; what is left is removed by
-making the whole motion slower. `TimedPath.without` is the time-optimal duration, so that the cost is known.
+Without limits of jerk :mod:`kin.motion.timing.fastest` is the answer. Its s(t), averaged over a window of time and
+slowed down evenly until it keeps the limits of jerk, is where :mod:`kin.motion.timing.jerk` begins. That compares
+limits at points; between them :mod:`kin.motion.timing.check` bounds what is exceeded. Where it is, the limits are
+tightened and the motion is improved again, some times; what is left is removed by making the whole motion slower.
+`TimedPath.without` is the time-optimal duration without limits of jerk, so that their cost is known.
 """
 
 from __future__ import annotations
@@ -12,17 +13,20 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kin.motion.pieces import look_between
-from kin.motion.timing.check import evaluate_path, slowdowns
+from kin.motion.timing.check import evaluate_path, reached, slowdowns
 from kin.motion.timing.fastest import clock, fastest
+from kin.motion.timing.jerk import averaged, conditions, faster, passing, rest_to_rest
 from kin.transforms import Array
 
-# Part of each limit that is kept free for what lies between the points that are checked; rounds of making the path
-# slower where it exceeds a limit, and the power of what is missing by which it is; windows that are tried, as
-# multiples of the longest acceleration / jerk; the second one only if the first costs more than this.
-_MARGIN, _ROUNDS, _POWER, _WINDOWS, _CHEAP = 1e-3, 10, 0.6, (2.0, 0.8), 1.03
-_POINTS, _CLOSE = 3, 13  # points of each piece of s(t) that are compared with the limits, and at the end
+# Intervals of a motion with limited jerk: of the time in which an acceleration rises, and how many.
+_SHARE, _EVEN, _PARTS, _MOST = 0.15, 400, 40, 2000
+_FAR, _NEAR, _GAP, _STEPS = 0.3, 0.05, 0.01, 60  # how much longer than necessary, as a part; steps at most
+_JUMP = 0.2  # of a limit: a change at a knot of the path that is worth a knot of s(t)
+_ENDS = 1.01  # the first and the last interval are slowed down by this factor: the spline differs there
+_ROUNDS, _CLOSE = 3, 1.003  # of tightening limits that are exceeded; less than this factor is not worth another
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,16 +78,11 @@ class TimedPath:
         """As in `kin.motion.pieces.Piece`."""
         return look_between(self.breaks)
 
-    def when(self, s: float) -> float:
-        """The time at which s is reached."""
-        c = int(np.clip(np.searchsorted(self.clocks[:, 0], s, side="right") - 1, 0, len(self.clocks) - 1))
-        low, high = 0.0, float(self.breaks[c + 1] - self.breaks[c])
-        p0, p1, p2, p3 = self.clocks[c].tolist()
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            below = p0 + middle * (p1 + middle * (p2 + middle * p3)) < s
-            low, high = (middle, high) if below else (low, middle)
-        return float(self.breaks[c]) + low
+    def when(self, places: Array) -> Array:
+        """The times at which s reaches rising places ``(m,)``."""
+        out: Array = np.empty(len(places))
+        reached(self.breaks, self.clocks, places, out)
+        return out
 
     def passed(self, times: Array) -> Array:
         """s at times ``(m,)``."""
@@ -94,107 +93,110 @@ class TimedPath:
 
 def timed(path: JointPath, jerk_limited: bool, stop: Callable[[], None]) -> TimedPath:
     """The fastest motion along a path, at rest at both ends."""
-    h = np.diff(path.knots)
-    plain = _fastest(path, h, np.ones(len(h)))
+    plain = _fastest(path)
     without = float(plain[0][-1])
-    if not jerk_limited:
-        endless = path.limits.copy()
-        endless[:, :, 2] = np.inf
-        free = JointPath(path.knots, path.joints, endless, path.most)
-        return _stretched(path, free, *plain, 1.0, without)
+    if jerk_limited:
+        return _limited(path, plain, stop)
+    endless = path.limits.copy()
+    endless[:, :, 2] = np.inf
+    free = JointPath(path.knots, path.joints, endless, path.most)
+    factor = float(_slowdowns(free, *plain).max())
+    return _stretched(path, *plain, max(factor, 1.0), without)
+
+
+def _limited(path: JointPath, plain: tuple[Array, Array], stop: Callable[[], None]) -> TimedPath:
+    """The fastest motion that keeps the limits of jerk too, from the fastest one that does not."""
     moving = np.abs(path.joints[:, :, 1:]).max(axis=(0, 2)) > 0.0
-    ratio = float((path.limits[:, moving, 1] / path.limits[:, moving, 2]).max()) if moving.any() else 0.0
-    kept = JointPath(path.knots, path.joints, path.limits * (1.0 - _MARGIN), path.most * (1.0 - _MARGIN) ** 2)
-    found = _smoothed(kept, h, plain, _WINDOWS[0] * ratio, stop, 4)
-    if min(found, key=lambda each: each[0])[0] > _CHEAP * without:
-        found += _smoothed(kept, h, plain, _WINDOWS[1] * ratio, stop, _ROUNDS)
-    _, breaks, clocks, slower = min(found, key=lambda each: each[0])
-    return _stretched(path, kept, breaks, clocks, slower, without)
-
-
-def _smoothed(
-    path: JointPath, h: Array, plain: tuple[Array, Array], window: float, stop: Callable[[], None], rounds: int
-) -> list[tuple[float, Array, Array, float]]:
-    """Averaged motions with the factor that they have to be slower: (seconds, breaks, clocks, factor)."""
-    scale, (times, pieces), found = np.ones(len(h)), plain, []
-    for round_ in range(rounds):
+    rise = float((path.limits[:, moving, 1] / path.limits[:, moving, 2]).max()) if moving.any() else 0.0
+    without = float(plain[0][-1])
+    rise = max(rise, 1e-6 * without)
+    u, s = _nodes(path, plain, rise)
+    slower, best = np.ones(len(u) - 1), (np.inf, u, np.empty((0, 4)), 1.0)
+    slower[[0, -1]] = _ENDS
+    for round_ in range(_ROUNDS):
         stop()
-        if round_:
-            times, pieces = _fastest(path, h, scale)
-        breaks, clocks = averaged(times, pieces, window)
-        slow = _slowdowns(path, breaks, clocks)
-        worst = max(float(slow.max()), 1.0)
-        found.append((worst * float(breaks[-1]), breaks, clocks, worst))
-        if worst < 1.0 + 1e-9:
+        u, clocks = _improved(path, u, s, slower, _FAR if round_ == 0 else _NEAR)
+        factors = _slowdowns(path, u, clocks)
+        factor = float(factors.max())
+        if factor * u[-1] < best[0]:
+            best = factor * float(u[-1]), u, clocks, factor
+        if factor < _CLOSE:
             break
-        first = np.searchsorted(times, breaks[:-1] - window, side="right") - 1
-        last = np.searchsorted(times, breaks[1:], side="left")
-        factor = np.ones(len(h))
-        for c in np.flatnonzero(slow > 1.0).tolist():
-            part = factor[max(first[c], 0) : last[c]]
-            np.maximum(part, slow[c], out=part)
-        scale = scale / factor**_POWER
-    return found
+        slower = slower * np.maximum(factors, 1.0)
+    _, times, clocks, factor = best
+    return _stretched(path, times, clocks, factor, without)
 
 
-def _fastest(path: JointPath, h: Array, scale: Array) -> tuple[Array, Array]:
-    """s(t) of the fastest motion; speeds are scaled on each interval ``(k,)``, accelerations twice."""
+def _nodes(path: JointPath, plain: tuple[Array, Array], rise: float) -> tuple[Array, Array]:
+    """Times and places of a motion to begin with: where the knots of the path are passed, and some between."""
+    duration = float(plain[0][-1]) + rise
+    u, s = np.linspace(0.0, duration, _EVEN + 1), np.empty(_EVEN + 1)
+    averaged(*plain, rise, u, s)
+    s[-1] = path.knots[-1]
+    clocks = np.empty((_EVEN, 4))
+    rest_to_rest(u, s, clocks)
+    found = TimedPath(path, u, clocks, duration)
+    times = np.concatenate([[0.0], found.when(path.knots[1:-1]), [duration]])
+    longest = max(_SHARE * rise, duration / _MOST)
+    kept = _kept(path, found, times, 0.5 * longest)
+    times = times[kept]
+    h = np.diff(times)
+    parts = np.minimum(np.ceil(h / longest), _PARTS).astype(np.int64)
+    old = np.repeat(np.arange(len(h)), parts)
+    step = np.arange(len(old)) - np.repeat(np.cumsum(parts) - parts, parts)
+    u = np.append(times[old] + (h / parts)[old] * step, duration)
+    s = found.passed(u)
+    s[np.append(step == 0, True)] = path.knots[kept]
+    return u, s
+
+
+def _kept(path: JointPath, found: TimedPath, times: Array, shortest: float) -> NDArray[np.int64]:
+    """Which knots of the path become knots of s(t): no close ones, but all where q‴ or a limit jumps."""
+    c = np.clip(np.searchsorted(found.breaks, times[1:-1], side="right") - 1, 0, len(found.clocks) - 1)
+    r, p = times[1:-1] - found.breaks[c], found.clocks[c].T
+    speed = p[1] + r * (2.0 * p[2] + 3.0 * r * p[3])
+    jumps = 6.0 * np.abs(np.diff(path.joints[:, :, 3], axis=0)) * speed[:, None] ** 3 / path.limits[1:, :, 2]
+    wanted = jumps.max(axis=1) > _JUMP
+    wanted |= (path.limits[1:] != path.limits[:-1]).any(axis=(1, 2))
+    wanted |= np.abs(np.diff(np.log(path.most))) > _JUMP
+    place = np.floor(times / shortest)
+    wanted |= place[1:-1] != place[:-2]
+    return np.flatnonzero(np.concatenate([[True], wanted, [True]]))
+
+
+def _improved(path: JointPath, u: Array, s: Array, slower: Array, away: float) -> tuple[Array, Array]:
+    """s(t) of the fastest motion, from any motion that is at s ``(k + 1,)`` at times u: breaks, coefficients.
+
+    `away`: by which part of its time that is too slow, about.
+    """
+    k, n = len(u) - 1, path.joints.shape[1]
+    base, clocks, times = np.empty((k, 4)), np.empty((k, 4)), np.empty(k + 1)
+    rows, caps = np.empty((2 * k, n, 5)), np.empty(2 * k)
+    rest_to_rest(u, s, base)
+    x = conditions(path.knots, path.joints, path.limits, path.most, u, base, slower, rows, caps)
+    c = np.full(k + 2, x)
+    faster(u, rows, caps, away, _GAP, _STEPS, c)
+    passing(u, c, times)
+    rest_to_rest(times, s, clocks)
+    return times, clocks
+
+
+def _fastest(path: JointPath) -> tuple[Array, Array]:
+    """s(t) of the fastest motion without limits of jerk."""
+    h = np.diff(path.knots)
     x, times, pieces = np.empty(len(h) + 1), np.empty(len(h) + 1), np.empty((len(h), 4))
-    one = scale[:, None]
-    velocity, acceleration = path.limits[:, :, 0] * one, path.limits[:, :, 1] * one**2
-    fastest(h, path.joints, velocity, acceleration, path.most * scale**2, x)
+    fastest(h, path.joints, path.limits, path.most, x)
     clock(h, x, times, pieces)
     pieces[:, 0] += path.knots[0]
     return times, pieces
 
 
-def _slowdowns(path: JointPath, breaks: Array, clocks: Array, points: int = _POINTS) -> Array:
+def _slowdowns(path: JointPath, breaks: Array, clocks: Array) -> Array:
     out: Array = np.empty(len(clocks))
-    slowdowns(path.knots, path.joints, path.limits, path.most, breaks, clocks, points, out)
+    slowdowns(path.knots, path.joints, path.limits, path.most, breaks, clocks, out)
     return out
 
 
-def _stretched(
-    path: JointPath, near: JointPath, breaks: Array, clocks: Array, factor: float, without: float
-) -> TimedPath:
-    """The motion, slower by a factor, and by what a closer look at the limits of `near` demands."""
-    breaks, clocks = breaks * factor, clocks / factor ** np.arange(4.0)
-    more = float(_slowdowns(near, breaks, clocks, _CLOSE).max())
-    if more > 1.0:
-        breaks, clocks = breaks * more, clocks / more ** np.arange(4.0)
-    return TimedPath(path, breaks, clocks, without)
-
-
-def averaged(times: Array, pieces: Array, window: float) -> tuple[Array, Array]:
-    """s(t), at rest before and after, averaged over a window of time: breaks and cubic coefficients."""
-    if window <= 0.0:
-        return times, pieces
-    total = float(times[-1])
-    breaks = np.unique(np.concatenate([times, times + window]))
-    breaks = breaks[np.concatenate([[True], np.diff(breaks) > 1e-12 * (total + window)])]
-    breaks[-1] = total + window
-    h = np.diff(times)
-    sums = np.concatenate(
-        [[0.0], np.cumsum(h * (pieces[:, 0] + h * (pieces[:, 1] / 2.0 + h * pieces[:, 2] / 3.0)))]
-    )
-    end = float(pieces[-1, 0] + h[-1] * (pieces[-1, 1] + h[-1] * pieces[-1, 2]))
-
-    def moments(t: Array) -> tuple[Array, Array, Array, Array]:
-        """The integral of s, s, ṡ and s̈ at any times."""
-        inside = np.clip(t, 0.0, total)
-        i = np.clip(np.searchsorted(times, inside, side="right") - 1, 0, len(h) - 1)
-        r, (p0, p1, p2, _) = inside - times[i], pieces[i].T
-        moving = (t > 0.0) & (t < total)
-        integral = sums[i] + r * (p0 + r * (p1 / 2.0 + r * p2 / 3.0)) + (t - inside) * np.where(t > total, end, p0)
-        return (
-            integral,
-            p0 + r * (p1 + r * p2),
-            np.where(moving, p1 + 2.0 * r * p2, 0.0),
-            np.where(moving, p2, 0.0),
-        )
-
-    middle = 0.5 * (breaks[:-1] + breaks[1:])
-    late, early = moments(breaks[:-1]), moments(breaks[:-1] - window)
-    jerk = moments(middle)[3] - moments(middle - window)[3]
-    rows = [(a - b) / window for a, b in zip(late[:3], early[:3], strict=True)]
-    return breaks, np.stack([rows[0], rows[1], rows[2] / 2.0, jerk / (3.0 * window)], axis=1)
+def _stretched(path: JointPath, breaks: Array, clocks: Array, factor: float, without: float) -> TimedPath:
+    """The motion, slower by a factor."""
+    return TimedPath(path, breaks * factor, clocks / factor ** np.arange(4.0), without)

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kin
-from kin.motion.geometry.curves import arc_through, rotation_vector, rotations, turning
+from kin.motion.geometry.curves import arc_through, poses, rotation_vector, rotations, turning
 
 ARMS = tuple(kin.builtin_robots())
 
@@ -320,7 +320,7 @@ def test_points_that_define_no_arc(via, end, expected):
 
 def test_a_via_point_on_the_line_gives_a_line():
     curve = arc_through(P, P + by(0.1, 0, 0), P + by(0.3, 0, 0), turning(np.eye(3), np.eye(3), False))
-    assert curve.poses(np.array([0.15]))[0, :3, 3] == pytest.approx(P + by(0.15, 0, 0))
+    assert poses(curve, np.array([0.15]))[0, :3, 3] == pytest.approx(P + by(0.15, 0, 0))
 
 
 @settings(max_examples=30)

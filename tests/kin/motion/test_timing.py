@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from kin.motion.geometry.splines import parted, spline, values
+from kin.motion.timing.check import evaluate_path, slowdowns
 from kin.motion.timing.fastest import fastest
-from kin.motion.timing.timed import JointPath, averaged, timed
+from kin.motion.timing.jerk import averaged, rest_to_rest
+from kin.motion.timing.timed import JointPath, timed
 
 CASES = json.loads((Path(__file__).parents[2] / "data/motion-times.json").read_text(encoding="utf-8"))["paths"]
 
@@ -55,10 +57,10 @@ def test_limited_jerk_is_kept_and_its_cost_is_known(case):
     found, plain = timed(path, True, never), timed(path, False, never)
     times = (found.breaks[:-1, None] + np.diff(found.breaks)[:, None] * np.linspace(1e-9, 1 - 1e-9, 40)).ravel()
     assert ratios(found, path.limits[0], times).max() <= 1 + 1e-9
-    assert found.without == pytest.approx(plain.duration, rel=1e-6)
-    assert plain.duration < found.duration < 1.25 * plain.duration
+    assert found.without == pytest.approx(plain.duration, rel=1e-3)
+    assert case["seconds"] * (1 - 1e-4) < found.duration < 1.03 * case["seconds"]
     # With almost no limit of jerk almost nothing is lost.
-    assert timed(path_of(case, 100, 1e5), True, never).duration < 1.01 * plain.duration
+    assert timed(path_of(case, 100, 1e4), True, never).duration < 1.01 * case["seconds"]
 
 
 def test_a_straight_path_takes_the_time_of_a_trapezoid():
@@ -66,22 +68,59 @@ def test_a_straight_path_takes_the_time_of_a_trapezoid():
     limits = np.broadcast_to(np.array([[[1.0, 4.0, 1e9]]]), (100, 1, 3)).copy()
     found = timed(JointPath(s, spline(s, q), limits, np.full(100, 1e6)), False, never)
     assert found.duration == pytest.approx(2.25, rel=2e-3)
-    assert found.when(0.5) == pytest.approx(found.duration / 2, rel=1e-6)
+    assert found.when(np.array([0.5]))[0] == pytest.approx(found.duration / 2, rel=1e-6)
 
 
 def test_the_average_keeps_the_ends_and_takes_one_window_longer():
     times, pieces = np.array([0.0, 1.0, 2.0]), np.array([[0, 0, 0.5, 0], [0.5, 1, -0.5, 0]])
-    breaks, clocks = averaged(times, pieces, 0.25)
-    assert breaks.tolist() == [0.0, 0.25, 1.0, 1.25, 2.0, 2.25]
-    end = clocks[-1] @ (0.25 ** np.arange(4))
-    assert (clocks[0, 0], end) == (0.0, pytest.approx(1.0, abs=1e-12))
-    assert clocks[:, 3] * 6 == pytest.approx([4, 0, -8, 0, 4], abs=1e-12)
+    u, s = np.linspace(0, 2.25, 10), np.empty(10)
+    averaged(times, pieces, 0.25, u, s)
+    assert s[[0, -1]] == pytest.approx([0, 1], abs=1e-12)
+    # The integral of t³/6 over a window, in the first half and until the motion has begun everywhere in it.
+    assert s[1] == pytest.approx(0.25**3 / 6 / 0.25, abs=1e-12)
+    assert s[4] == pytest.approx((1 - 0.75**3) / 6 / 0.25, abs=1e-12)
+
+
+def test_a_spline_from_rest_to_rest_has_two_derivatives_and_meets_its_points():
+    rng = np.random.default_rng(2)
+    t, s = np.cumsum(rng.uniform(0.5, 1, 12)), np.sort(rng.uniform(0, 1, 12))
+    pieces = np.empty((11, 4))
+    rest_to_rest(t, s, pieces)
+    h = np.diff(t)[:, None] ** np.arange(4)
+    ends = (h * pieces).sum(axis=1)
+    assert np.append(pieces[:, 0], ends[-1])[[0, *range(2, 10), 11]] == pytest.approx(s[[0, *range(2, 10), 11]])
+    assert ends[:-1] == pytest.approx(pieces[1:, 0])
+    slope = (h[:, :3] * pieces[:, 1:] * [1, 2, 3]).sum(axis=1)
+    assert slope[:-1] == pytest.approx(pieces[1:, 1])
+    bend = (h[:, :2] * pieces[:, 2:] * [2, 6]).sum(axis=1)
+    assert bend[:-1] == pytest.approx(2 * pieces[1:, 2])
+    assert [pieces[0, 1], pieces[0, 2], slope[-1], bend[-1]] == pytest.approx([0] * 4, abs=1e-12)
+
+
+def test_a_straight_path_with_limited_jerk_takes_the_time_of_seven_phases():
+    s, q = np.linspace(0, 1, 241), np.linspace(0, 2, 241)[:, None]
+    limits = np.broadcast_to(np.array([[[1.0, 4.0, 20.0]]]), (240, 1, 3)).copy()
+    found = timed(JointPath(s, spline(s, q), limits, np.full(240, 1e6)), True, never)
+    best = 2.0 + 1.0 / 4.0 + 4.0 / 20.0
+    assert best <= found.duration < 1.01 * best
+
+
+def test_what_is_between_the_points_is_bounded():
+    # q = s² on one interval; s(t) has its largest jerk and acceleration inside its only piece.
+    knots, joints = np.array([0.0, 1.0]), np.array([[[0.0, 0.3, 1.0, -0.6]]])
+    breaks, clocks = np.array([0.0, 1.0]), np.array([[0.0, 0.2, 1.6, -0.9]])
+    limits, out = np.ones((1, 1, 3)), np.empty(1)
+    slowdowns(knots, joints, limits, np.full(1, 1e6), breaks, clocks, out)
+    found = np.empty((4, 9999, 1))
+    evaluate_path(knots, joints, breaks, clocks, np.linspace(0, 1, 9999), found)
+    largest = np.abs(found[1:]).max(axis=(1, 2)) ** (1 / np.arange(1, 4))
+    assert largest.max() <= out[0] <= 1.3 * largest.max()
 
 
 def test_no_motion_is_not_too_fast():
     pieces = np.zeros((3, 2, 4))
     x = np.empty(4)
-    fastest(np.ones(3), pieces, np.ones((3, 2)), np.ones((3, 2)), np.full(3, 4.0), x)
+    fastest(np.ones(3), pieces, np.ones((3, 2, 2)), np.full(3, 4.0), x)
     assert x[[0, -1]].tolist() == [0.0, 0.0]
     assert x.max() <= 4.0
 
