@@ -142,6 +142,9 @@ class Stage(Protocol):
     def show_legend(self, html: str) -> None:
         """Say what is drawn in the scene, on whatever tab; "" removes the legend."""
 
+    def show_joints(self, folder: viser.GuiFolderHandle | None) -> None:
+        """Show the joint sliders in this folder as well; None: in the tab Move only."""
+
     def fit_view(self, spheres: Sequence[Sphere]) -> None:
         """Make the default view show these spheres as well as the arm. A view chosen by the visitor stays."""
 

@@ -53,13 +53,7 @@ def read_value(text: str, name: str, unit: Unit, is_angle: bool, limits: tuple[f
     low, high = (unit.shown(limit, LIMIT_DIGITS) for limit in limits)
     title = f"{name} was not changed"
     valid = f"Valid: {_brief(low)} … {_brief(high)}{unit.suffix}."
-    cleaned = _clean(text)
-    match = re.fullmatch(rf"({_NUMBER.pattern})\s*(\D*)", cleaned.replace(",", "."))
-    if not cleaned:
-        raise EntryError(title, f"The field was empty. {valid}")
-    if match is None:
-        raise EntryError(title, f"“{_cut(text)}” is not a number. {valid}")
-    number, suffix = float(match[1]), match[2].strip()
+    number, suffix = _number_and_unit(text, title, valid)
     scales = _ANGLES if is_angle else _LENGTHS
     if suffix and suffix not in scales:
         raise EntryError(title, f"“{_cut(suffix)}” is not a unit of this joint. Valid: {', '.join(scales)}.")
@@ -70,6 +64,37 @@ def read_value(text: str, name: str, unit: Unit, is_angle: bool, limits: tuple[f
         raise EntryError(title, f"“{_cut(text)}” is outside the limits of this joint. {valid}")
     # The shown limit may be rounded outwards.
     return min(max(value, limits[0]), limits[1])
+
+
+def read_number(text: str, unit: Unit) -> float:
+    """A typed number in radians, metres, or as it is if `unit` is neither of an angle nor of a length.
+
+    Args:
+        unit: of numbers without a unit.
+
+    Raises:
+        EntryError: not a number, or another kind of unit.
+    """
+    scales = next((scales for scales in (_ANGLES, _LENGTHS) if unit.name in scales), {unit.name: 1.0 / unit.scale})
+    units = ", ".join(filter(None, scales)) or "none"
+    title = "The answer was not read"
+    number, suffix = _number_and_unit(text, title, f"Valid: a number, such as 12.5. Units: {units}.")
+    if not math.isfinite(number):
+        raise EntryError(title, "The number is too large.")
+    if suffix and suffix not in scales:
+        raise EntryError(title, f"“{_cut(suffix)}” is not a unit of this answer. Valid: {units}.")
+    return number * scales[suffix] if suffix else unit.read(number)
+
+
+def _number_and_unit(text: str, title: str, valid: str) -> tuple[float, str]:
+    """A typed number and the unit after it, if any; an error has this title and says what is valid."""
+    cleaned = _clean(text)
+    match = re.fullmatch(rf"({_NUMBER.pattern})\s*(\D*)", cleaned.replace(",", "."))
+    if not cleaned:
+        raise EntryError(title, f"The field was empty. {valid}")
+    if match is None:
+        raise EntryError(title, f"“{_cut(text)}” is not a number. {valid}")
+    return float(match[1]), match[2].strip()
 
 
 def read_pose(kind: PoseKind, text: str, units: Units, T: Array) -> tuple[Array, bool]:

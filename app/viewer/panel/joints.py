@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from app.viewer.panel import Post, assign, listen
+from app.viewer.panel import Post, assign, listen, listen_click
 from app.viewer.panel.entry import read_value
 from app.viewer.panel.fields import field, fields_html, limit_marks, shown
 from app.viewer.panel.status import Notice
@@ -55,16 +55,19 @@ def lock_notice(locked: Sequence[bool]) -> Notice:
 
 
 class JointSliders:
-    """The sliders of one robot in the visitor's units; rebuilt when either changes.
+    """The sliders of one robot in the visitor's units; rebuilt when either changes, or the folders.
 
-    Posts ``("joint", robot id, i, units)`` with the slider's value in screen units, and
+    Posts ``("joint", robot id, i, units, k)`` with the value of the slider in the k-th folder in screen units, and
     ``("lock", robot id, i)`` with whether to lock the joint (i is None for all joints).
+
+    Args:
+        folders: each gets a slider per joint; all show the same values.
     """
 
     def __init__(
         self,
         gui: viser.GuiApi,
-        folder: viser.GuiFolderHandle,
+        folders: Sequence[viser.GuiFolderHandle],
         robot: Robot,
         q: Array,
         locked: Sequence[bool],
@@ -73,32 +76,42 @@ class JointSliders:
     ) -> None:
         self.robot = robot
         self._units = units
-        self._sliders: list[viser.GuiSliderHandle[float]] = []
-        with folder:
-            for i, joint in enumerate(robot.joints):
-                unit = self._unit(i)
-                low, high = joint.limits or (-math.pi, math.pi)
-                bounds = (unit.shown(low, DIGITS), unit.shown(high, DIGITS))
-                limits = f"{bounds[0]:g} … {bounds[1]:g}{unit.suffix}".replace("-", "−")
-                slider = gui.add_slider(
-                    label(robot, i),
-                    min=bounds[0],
-                    max=bounds[1],
-                    step=unit.step(DIGITS),
-                    marks=limit_marks(*bounds),
-                    initial_value=min(max(shown(float(q[i]), unit, DIGITS), bounds[0]), bounds[1]),
-                    hint=f"{joint.name}: {limits}. Arrow keys: {unit.step(0):g}{unit.suffix}.",
-                )
-                listen(slider, post, ("joint", robot.id, i, units))
-                self._sliders.append(slider)
-            self._locks = gui.add_button_group("Locked", lock_buttons(locked), hint=LOCK_HINT)
-            self._fields = dict(field(slider, self._unit(i)) for i, slider in enumerate(self._sliders))
-            self._html = gui.add_html(fields_html(self._fields))
-        self._listen_locks(post)
+        self._held = 0  # index of the folder whose slider was moved last
+        self._fields: dict[str, dict[str, Any]] = {}
+        self._sliders: list[list[viser.GuiSliderHandle[float]]] = []
+        self._others: list[Any] = []  # controls besides sliders
+        self._locks: list[viser.GuiButtonGroupHandle] = []
+        for place, folder in enumerate(folders):
+            with folder:
+                self._sliders.append([self._slider(gui, i, q, place, post) for i in range(robot.n)])
+                locks = gui.add_button_group("Locked", lock_buttons(locked), hint=LOCK_HINT)
+                fields = dict(field(slider, self._unit(i)) for i, slider in enumerate(self._sliders[-1]))
+                self._others.append(gui.add_html(fields_html(fields)))
+            self._fields |= fields
+            self._locks.append(locks)
+            self._listen_locks(locks, post)
+
+    def _slider(self, gui: viser.GuiApi, i: int, q: Array, place: int, post: Post) -> viser.GuiSliderHandle[float]:
+        joint, unit = self.robot.joints[i], self._unit(i)
+        low, high = joint.limits or (-math.pi, math.pi)
+        bounds = (unit.shown(low, DIGITS), unit.shown(high, DIGITS))
+        limits = f"{bounds[0]:g} … {bounds[1]:g}{unit.suffix}".replace("-", "−")
+        slider = gui.add_slider(
+            label(self.robot, i),
+            min=bounds[0],
+            max=bounds[1],
+            step=unit.step(DIGITS),
+            marks=limit_marks(*bounds),
+            initial_value=min(max(shown(float(q[i]), unit, DIGITS), bounds[0]), bounds[1]),
+            hint=f"{joint.name}: {limits}. Arrow keys: {unit.step(0):g}{unit.suffix}.",
+        )
+        listen(slider, post, ("joint", self.robot.id, i, self._units, place))
+        return slider
 
     def index_of(self, uuid: object) -> int | None:
         """The joint whose slider has this id; None if there is none."""
-        return next((i for i, key in enumerate(self._fields) if key == uuid), None)
+        found = next((i for i, key in enumerate(self._fields) if key == uuid), None)
+        return None if found is None else found % self.robot.n
 
     def read_text(self, index: int, text: str) -> float:
         """A typed value in radians or metres; raises `EntryError` unless it is within the limits."""
@@ -106,8 +119,13 @@ class JointSliders:
         limits = self.robot.joints[index].limits or (-math.pi, math.pi)
         return read_value(text, f"Joint {index + 1}", unit, is_angle, limits)
 
-    def read(self, index: int, value: object) -> float:
-        """A slider's value in radians or metres, within the limits; raises `InputError` for anything else."""
+    def read(self, index: int, value: object, place: int = 0) -> float:
+        """A slider's value in radians or metres, within the limits; raises `InputError` for anything else.
+
+        Args:
+            place: index of the slider's folder.
+        """
+        self._held = place
         if not isinstance(value, int | float) or not math.isfinite(value):
             raise InputError(f"joint {index + 1}", value, "a finite number")
         raw = self._unit(index).read(float(value))
@@ -118,20 +136,22 @@ class JointSliders:
 
         That one is set too if the value typed into it is outside the limits.
         """
-        for i, slider in enumerate(self._sliders):
-            if i != dragged or not slider.min <= slider.value <= slider.max:
-                assign(slider, min(max(shown(float(q[i]), self._unit(i), DIGITS), slider.min), slider.max))
+        for place, sliders in enumerate(self._sliders):
+            for i, slider in enumerate(sliders):
+                if i != dragged or place != self._held or not slider.min <= slider.value <= slider.max:
+                    assign(slider, min(max(shown(float(q[i]), self._unit(i), DIGITS), slider.min), slider.max))
 
     def show_locks(self, locked: Sequence[bool]) -> None:
         """Show which joints are locked ``(n,)``."""
-        if self._locks.options != lock_buttons(locked):
-            self._locks.options = lock_buttons(locked)
+        for locks in self._locks:
+            if locks.options != lock_buttons(locked):
+                locks.options = lock_buttons(locked)
 
     def _unit(self, index: int) -> Unit:
         return self._units.of(self.robot.joints[index].kind == "revolute")
 
-    def _listen_locks(self, post: Post) -> None:
-        @self._locks.on_click
+    def _listen_locks(self, locks: viser.GuiButtonGroupHandle, post: Post) -> None:
+        @locks.on_click
         async def _(event: Any) -> None:
             if event.client is None:
                 return
@@ -145,7 +165,11 @@ class JointSliders:
 
     def remove(self) -> None:
         """Remove the sliders from the panel."""
-        self._locks.remove()
-        self._html.remove()
-        for slider in self._sliders:
-            slider.remove()
+        for control in (*self._locks, *self._others, *(s for sliders in self._sliders for s in sliders)):
+            control.remove()
+
+
+def go_to_buttons(gui: viser.GuiApi, post: Post) -> None:
+    """The buttons that move the arm. Post ``"home"`` and ``"random"``."""
+    buttons = gui.add_button_group("Go to", ("Home", "Random"))
+    listen_click(buttons, post, {"Home": "home", "Random": "random"})

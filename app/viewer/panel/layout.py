@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import viser
 
 from app.viewer.own_arm import OwnArm
-from app.viewer.panel import Post, listen_click
+from app.viewer.panel import Post
+from app.viewer.panel.joints import go_to_buttons
 from app.viewer.panel.readout import PoseReadout
 from app.viewer.panel.robots import RobotMenu
 from app.viewer.panel.script import PageScript
@@ -65,8 +66,7 @@ class Panel:
         group = gui.add_tab_group()
         with group.add_tab("Move"):
             self.joints = gui.add_folder("Joints")
-            buttons = gui.add_button_group("Go to", ("Home", "Random"))
-            listen_click(buttons, post, {"Home": "home", "Random": "random"})
+            go_to_buttons(gui, post)
             self.target = TargetChoice(gui, DEFAULT_TASK, post)
             self.posture = gui.add_folder("Posture and redundancy")
         self.legend = gui.add_html("")

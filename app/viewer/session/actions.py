@@ -308,11 +308,11 @@ class Actions:
         self._gesture = None
         self._page.arm.pull(pull)
 
-    def _on_slider(self, robot_id: str, index: int, units: Units, value: object) -> None:
+    def _on_slider(self, robot_id: str, index: int, units: Units, place: int, value: object) -> None:
         page = self._page
         # An event of sliders that have been replaced since is ignored.
         if (robot_id, units) == (page.robot.id, page.units):
-            page.arm.move_joint(index, page.sliders.read(index, value))
+            page.arm.move_joint(index, page.sliders.read(index, value, place))
             page.status.show(BY_HAND)
 
     def _on_redundancy(self, robot_id: str, name: str, units: Units, value: object) -> None:
@@ -381,7 +381,7 @@ class Actions:
 def _label(gesture: tuple[object, ...], features: Sequence[Feature]) -> str:
     """What changed, for people."""
     match gesture:
-        case ("joint", _, int(index)):
+        case ("joint", _, int(index), int()):
             return f"Joint {index + 1}"
         case ("feature", name, key, *_):
             return next((feature.step_name(key) for feature in features if feature.key == name), "Lesson")

@@ -1,4 +1,4 @@
-"""The choice of a lesson: a dropdown, and below it the lesson's own controls."""
+"""The choice of a lesson: a dropdown, and below it the steps and questions of the lesson and its own controls."""
 
 from __future__ import annotations
 
@@ -6,16 +6,24 @@ import viser
 
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons import LESSONS
+from app.viewer.lessons.guide.feature import Guide
+from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.panel import Post, assign, listen
 from app.viewer.views.templates import render
 from kin import InputError
 
 NONE = "None"
+KEPT = 50  # lessons of which the progress is kept, in the order in which they were left
 HINT = "The drawings of a lesson stay in the scene while other tabs are open."
 
 
 class LessonChoice:
-    """Holds the open lesson, in a tab of its own. Posts ``"lesson"``."""
+    """Holds the open lesson, in a tab of its own. Posts ``"lesson"``.
+
+    Attributes:
+        shown: the open lesson.
+        guide: its goal, steps and questions.
+    """
 
     def __init__(self, gui: viser.GuiApi, parent: viser.GuiTabHandle, stage: Stage, post: Post) -> None:
         self._gui = gui
@@ -27,7 +35,9 @@ class LessonChoice:
             self._overview: viser.GuiHtmlHandle | None = gui.add_html(_overview())
         listen(self._choice, post, "lesson")
         self._box: viser.GuiFolderHandle | None = None
-        self.shown: Feature | None = None
+        self.shown: Lesson | None = None
+        self.guide: Guide | None = None
+        self._left: dict[tuple[str, str], dict[str, object]] = {}  # progress, by lesson and robot
 
     def choose(self, title: object) -> None:
         """Open this lesson instead of the present one; raises `kin.InputError` for an unknown one."""
@@ -44,7 +54,15 @@ class LessonChoice:
         with self._parent:
             self._box = self._gui.add_folder(None)
         with self._box:
+            self.guide = Guide(self._stage, chosen)
+            if (left := self._left.get((chosen.key, self._stage.robot.id))) is not None:
+                self.guide.restore(left)
             self.shown = chosen(self._stage)
+
+    @property
+    def features(self) -> list[Feature]:
+        """The open lesson and its guide."""
+        return [feature for feature in (self.guide, self.shown) if feature is not None]
 
     def open(self, key: str | None) -> None:
         """Open the lesson with this key, if there is one; None: close the open one."""
@@ -54,15 +72,26 @@ class LessonChoice:
 
     def remove(self) -> None:
         """Remove the open lesson, or the overview if none is open."""
-        if self.shown is not None:
+        if self.shown is not None and self.guide is not None:
+            self._keep(self.shown.key, self.guide.state())
             self.shown.remove()
-            self.shown = None
+        if self.guide is not None:
+            self.guide.remove()
+        self.shown = self.guide = None
         if self._box is not None:
             self._box.remove()
             self._box = None
         if self._overview is not None:
             self._overview.remove()
             self._overview = None
+
+    def _keep(self, lesson: str, progress: dict[str, object]) -> None:
+        """Keep the progress in a lesson that is closed."""
+        key = (lesson, self._stage.robot.id)
+        self._left.pop(key, None)
+        self._left[key] = progress
+        while len(self._left) > KEPT:
+            del self._left[next(iter(self._left))]
 
 
 def _overview() -> str:

@@ -99,6 +99,7 @@ class VisitorPage(ShownArm, Worker):
         self.panel: Panel
         self.status: StatusLine
         self.sliders: JointSliders
+        self._more_joints: viser.GuiFolderHandle | None = None
         self.numbers: Numbers
         self._actions = Actions(self)
 
@@ -169,6 +170,11 @@ class VisitorPage(ShownArm, Worker):
     def show_legend(self, html: str) -> None:
         update_html(self.panel.legend, html)
 
+    def show_joints(self, folder: viser.GuiFolderHandle | None) -> None:
+        self._more_joints = folder
+        self.sliders.remove()
+        self.sliders = self._make_sliders()
+
     def fit_view(self, spheres: Sequence[Sphere]) -> None:
         self.camera.fit(spheres)
 
@@ -176,9 +182,8 @@ class VisitorPage(ShownArm, Worker):
 
     @property
     def features(self) -> list[Feature]:
-        """The tabs, and the open lesson."""
-        lesson = self.lessons.shown if self.lessons is not None else None
-        return [*self._tabs, lesson] if lesson is not None else self._tabs
+        """The tabs, and the open lesson with its steps."""
+        return self._tabs if self.lessons is None else [*self._tabs, *self.lessons.features]
 
     def set_locks(self, locks: Sequence[bool]) -> None:
         """Lock exactly these joints ``(n,)``."""
@@ -386,6 +391,5 @@ class VisitorPage(ShownArm, Worker):
         self.camera.aim(self.arm.scene.body, kin.link_frames(robot, self.goal)[:, :3, 3], glide)
 
     def _make_sliders(self) -> JointSliders:
-        return JointSliders(
-            self.client.gui, self.panel.joints, self.robot, self.goal, self.arm.locks, self.units, self.post
-        )
+        folders = [self.panel.joints] if self._more_joints is None else [self.panel.joints, self._more_joints]
+        return JointSliders(self.client.gui, folders, self.robot, self.goal, self.arm.locks, self.units, self.post)

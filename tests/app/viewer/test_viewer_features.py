@@ -18,6 +18,8 @@ from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer import lessons
 from app.viewer.feature import Feature
+from app.viewer.lessons.guide.lesson import Lesson
+from app.viewer.lessons.guide.outline import Choice, Option, Outline, Step
 from app.viewer.panel import listen
 from app.viewer.server import ViewerServer
 from app.viewer.session import lessons as choice
@@ -77,10 +79,15 @@ class Witness(Feature):
         self.note("remove")
 
 
-class Pupil(Witness):
+class Pupil(Witness, Lesson):
     key = "pupil"
     title = "Pupil"
     about = "Learns & reports."
+
+    @staticmethod
+    def outline(robot, units):
+        sum_ = Choice("1 + 1?", (Option("2", "Counted.", True), Option("3", "One too many.")))
+        return Outline("You can count.", (Step("Sums", f"At the {robot.id}.", sum_, "It is 2."),), (sum_,))
 
 
 @pytest.fixture

@@ -14,10 +14,12 @@ from itertools import count
 import numpy as np
 import viser
 
-from app.viewer.feature import Feature, Stage
+from app.viewer.feature import Stage
 from app.viewer.lessons.dh import views
 from app.viewer.lessons.dh.drawing import OtherDrawing, WalkDrawing, aside
+from app.viewer.lessons.dh.questions import outline
 from app.viewer.lessons.dh.steps import MOTIONS, ORDERS, length, place, value
+from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.panel import assign, listen, update_html
 from app.viewer.scene import camera
 from app.viewer.scene.meshes import body
@@ -35,12 +37,13 @@ BUTTONS, WHILE_PLAYING = ("Back", "Play", "Next"), ("Back", "Pause", "Next")
 _fresh = count(1)  # for node names: browsers give the pose of a removed node to the next one of that name
 
 
-class DHLesson(Feature):
+class DHLesson(Lesson):
     """The walk through the table of the selected robot."""
 
     key = "dh"
     title = "DH table step by step"
     about = "How four motions per row lead from the base to the tool, one after another."
+    outline = staticmethod(outline)
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)

@@ -16,9 +16,11 @@ import viser
 
 from app.equations import Book, DerivationError, Equation, TooManyRowsError, book_later
 from app.shared.computations import Subscription
-from app.viewer.feature import Feature, Stage
+from app.viewer.feature import Stage
 from app.viewer.labels import add_label
 from app.viewer.lessons.equations import views
+from app.viewer.lessons.equations.questions import outline
+from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.panel import assign, listen, update_html
 from app.viewer.panel.status import Notice
 from kin import InputError, fk
@@ -31,12 +33,13 @@ PRINTED, TRUE = (170, 29, 0), (0, 87, 43)
 _fresh = count()
 
 
-class EquationsLesson(Feature):
+class EquationsLesson(Lesson):
     """One equation at a time, chosen from a list."""
 
     key = "equations"
     title = "Equations"
     about = "The arm’s equations. For the book’s arms, also its misprints."
+    outline = staticmethod(outline)
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)

@@ -19,10 +19,12 @@ import numpy as np
 import viser
 
 import kin
-from app.viewer.feature import Feature, Stage
+from app.viewer.feature import Stage
+from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.postures import remedies
 from app.viewer.lessons.postures.directions import has_cone, patch, reachable, share
 from app.viewer.lessons.postures.ghosts import Ghosts
+from app.viewer.lessons.postures.questions import outline
 from app.viewer.lessons.postures.remedies import Remedy, Request
 from app.viewer.lessons.postures.survey import CLOSEST, Posture, html, survey
 from app.viewer.panel import assign, listen, listen_click, update_html
@@ -48,12 +50,13 @@ UNNAMED = "The postures of this arm have no names: the list shows only the close
 _NUMBERS = count(1)
 
 
-class Postures(Feature):
+class Postures(Lesson):
     """See the module."""
 
     key = "postures"
     title = "Postures"
     about = "All ways to reach a target, and the reason if there is none."
+    outline = staticmethod(outline)
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)

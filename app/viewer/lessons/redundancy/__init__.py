@@ -18,9 +18,11 @@ import numpy as np
 import viser
 
 import kin
-from app.viewer.feature import Feature, Stage
+from app.viewer.feature import Stage
+from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.redundancy import views
 from app.viewer.lessons.redundancy.drawing import Drawing
+from app.viewer.lessons.redundancy.questions import outline
 from app.viewer.lessons.redundancy.ring import coaxial, elbow_circle
 from app.viewer.panel import assign, listen, update_html
 from app.viewer.panel.fields import limit_marks
@@ -43,12 +45,13 @@ MOVING = Notice("reached", "Self-motion", "The arm moves, the tool does not.")
 _NUMBERS = count(1)
 
 
-class RedundancyLesson(Feature):
+class RedundancyLesson(Lesson):
     """See the module."""
 
     key = "redundancy"
     title = "Redundancy"
     about = "How seven joints move while the tool stays where it is."
+    outline = staticmethod(outline)
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)

@@ -16,10 +16,12 @@ import numpy as np
 import viser
 
 import kin
-from app.viewer.feature import Feature, Stage
+from app.viewer.feature import Stage
+from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.velocity import views
 from app.viewer.lessons.velocity.drawing import Drawing
 from app.viewer.lessons.velocity.jog import BUTTONS, Frame, Press, Step, button, step
+from app.viewer.lessons.velocity.questions import outline
 from app.viewer.lessons.velocity.rates import (
     Axes,
     Ellipsoid,
@@ -59,12 +61,13 @@ V = TypeVar("V")
 Field = viser.GuiNumberHandle[float]
 
 
-class VelocityLesson(Feature):
+class VelocityLesson(Lesson):
     """See the module."""
 
     key = "velocity"
     title = "Velocity"
     about = "The velocities and forces of the tool: Jacobian, ellipsoids, singularities."
+    outline = staticmethod(outline)
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)

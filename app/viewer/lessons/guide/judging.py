@@ -1,0 +1,84 @@
+"""Whether an answer is right, and the reason: never only "wrong"."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from app.viewer.lessons.guide.outline import PLAIN, WHOLE, Choice, Number, Question
+from app.viewer.panel.entry import read_number
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether an answer is right, and why."""
+
+    right: bool
+    reason: str
+
+
+def judge(question: Question, given: float) -> Verdict:
+    """Judge an answer: the index of an option, or a value in radians, metres or SI units."""
+    if isinstance(question, Choice):
+        option = question.options[int(given)]
+        return Verdict(option.right, option.reason)
+    if _near(question, given, question.answer):
+        return Verdict(True, f"The exact value is {value_text(question)}.")
+    for mistake in question.mistakes:
+        if _near(question, given, mistake.value):
+            return Verdict(False, mistake.reason)
+    if _near(question, -given, question.answer):
+        return Verdict(False, f"The size is right, the sign is not. {question.method}")
+    if question.whole_turns:
+        return Verdict(False, question.method)
+    return Verdict(False, f"Too {'large' if given > question.answer else 'small'}. {question.method}")
+
+
+def is_answer(question: Question, given: object) -> bool:
+    """Whether `given` can be an answer at all."""
+    if isinstance(question, Choice):
+        return type(given) is int and 0 <= given < len(question.options)
+    return type(given) in (int, float) and math.isfinite(given)  # type: ignore[arg-type]
+
+
+def read(question: Number, text: str) -> float:
+    """A typed answer in radians, metres or SI units; raises `EntryError` with what is valid."""
+    return read_number(text, question.unit)
+
+
+def solution_text(question: Question) -> str:
+    """The right answer with its reason, as it is shown on request."""
+    if isinstance(question, Number):
+        return f"{value_text(question)}. {question.method}"
+    return " ".join(f"{option.text.rstrip('.')}. {option.reason}" for option in question.options if option.right)
+
+
+def value_text(question: Number) -> str:
+    """The right value, in decimals that the tolerance leaves meaningful."""
+    return number_text(question.answer, question)
+
+
+def number_text(value: float, question: Number) -> str:
+    """A value in the question's unit."""
+    if _is_count(question):
+        return f"{value:.0f}"
+    decimals = max(0, -math.floor(math.log10(question.tolerance * question.unit.scale)))
+    return question.unit.text(value, decimals - question.unit.finer).rstrip()
+
+
+def tolerance_text(question: Number) -> str:
+    """The accepted error, such as ± 1°."""
+    if _is_count(question):
+        return "a whole number"
+    return f"± {question.unit.brief(question.tolerance)}".rstrip()
+
+
+def _is_count(question: Number) -> bool:
+    return question.unit == PLAIN and question.tolerance == WHOLE
+
+
+def _near(question: Number, given: float, value: float) -> bool:
+    difference = given - value
+    if question.whole_turns:
+        difference = math.remainder(difference, 2.0 * math.pi)
+    return abs(difference) <= question.tolerance * (1.0 + 1e-9)

@@ -1,0 +1,19 @@
+"""A lesson: a feature that says what it teaches and asks."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+from app.viewer.feature import Feature
+from app.viewer.lessons.guide.outline import Outline
+from kin import Robot
+from kin.units import Units
+
+
+class Lesson(Feature, ABC):
+    """A feature of the tab *Learn*. The page shows its outline above its controls."""
+
+    @staticmethod
+    @abstractmethod
+    def outline(robot: Robot, units: Units) -> Outline:
+        """Goal, steps and check for this arm, in a few milliseconds: it is made again for each arm and unit."""

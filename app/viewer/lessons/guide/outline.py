@@ -1,0 +1,132 @@
+"""What a lesson teaches and asks: its goal, its steps with their predictions, and the check at its end.
+
+An outline is made for one arm, in the reader's units. All numbers are computed from `kin` for that arm; values are
+in radians, metres and SI units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from kin.units import Unit
+
+Configuration = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Option:
+    """One answer to choose, and the reason why it is right or wrong."""
+
+    text: str
+    reason: str
+    right: bool = False
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A question with answers to choose from; more than one may be right."""
+
+    prompt: str
+    options: tuple[Option, ...]
+
+    def __post_init__(self) -> None:
+        """Check that it can be answered."""
+        texts = {option.text for option in self.options}
+        if len(texts) < max(2, len(self.options)) or not any(option.right for option in self.options):
+            raise ValueError(
+                f"{self.prompt}: two or more different options are needed, at least one of them right"
+            )
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """A value that a usual mistake gives, and the reason why it is wrong."""
+
+    value: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class Number:
+    """A question whose answer is typed.
+
+    Attributes:
+        answer: the right value, in radians, metres or SI units.
+        unit: of typed numbers, unless another unit follows them.
+        tolerance: the largest accepted error, as `answer`.
+        method: how to find the answer; the reason given for a wrong one that is no known mistake.
+        mistakes: known wrong values.
+        whole_turns: whether values that differ by whole turns are equal.
+    """
+
+    prompt: str
+    answer: float
+    unit: Unit
+    tolerance: float
+    method: str
+    mistakes: tuple[Mistake, ...] = ()
+    whole_turns: bool = False
+
+
+PLAIN = Unit("", 1.0, 2)  # of counts and ratios
+WHOLE = 0.1  # accepted error of a count
+
+
+def count(prompt: str, answer: int, method: str, mistakes: Sequence[tuple[int, str]] = ()) -> Number:
+    """A question whose answer is a whole number; mistakes that give the right one are left out."""
+    wrong = tuple(Mistake(value, reason) for value, reason in mistakes if value != answer)
+    return Number(prompt, answer, PLAIN, WHOLE, method, wrong)
+
+
+Question = Choice | Number
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of a lesson.
+
+    Attributes:
+        text: what to do or to know.
+        question: the prediction that is asked before `shown`.
+        shown: what is revealed after a right answer, or on request.
+        start: the configuration that the step is about; a button moves the arm there.
+        end: the configuration to which the arm moves when the answer is revealed.
+    """
+
+    title: str
+    text: str
+    question: Question | None = None
+    shown: str = ""
+    start: Configuration | None = None
+    end: Configuration | None = None
+
+
+@dataclass(frozen=True)
+class Outline:
+    """The goal of a lesson in one sentence, its steps in order, and the questions of its check."""
+
+    goal: str
+    steps: tuple[Step, ...]
+    check: tuple[Question, ...]
+
+    def questions(self) -> Iterator[tuple[str, Question]]:
+        """Every question with its key: the number of its step, or c and its number in the check."""
+        for number, step in enumerate(self.steps, 1):
+            if step.question is not None:
+                yield str(number), step.question
+        for number, question in enumerate(self.check, 1):
+            yield f"c{number}", question
+
+
+def one_right(prompt: str, right: tuple[str, str], wrong: Sequence[tuple[str, str]], place: int) -> Choice:
+    """A choice with one right option, at this place among the wrong ones; each option is a text and a reason.
+
+    Wrong options with the text of one before are left out: for some arms two of them agree.
+    """
+    options: list[Option] = []
+    for text, reason in wrong:
+        if text != right[0] and all(option.text != text for option in options):
+            options.append(Option(text, reason))
+    options.insert(min(place, len(options)), Option(*right, right=True))
+    return Choice(prompt, tuple(options))

@@ -1,0 +1,56 @@
+"use strict";
+// Runs in viser's page: the steps of a lesson (app/viewer/lessons/guide). It sends what is pressed and typed there.
+(() => {
+  let serial = 0; // each press is a step of its own in the history
+  const send = (kind, value, ...rest) => dispatchEvent(new CustomEvent("kinboard-send", { detail: ["feature", ["guide", [kind, ...rest, ++serial], value]] }));
+
+  function press(button) {
+    if (button.ariaDisabled === "true") return;
+    const { guideDo: kind, questionKey: key, argument } = button.dataset;
+    if (kind === "type") typed(document.querySelector(`input[data-guide-field="${key}"]`));
+    else send(kind, argument === undefined ? null : Number(argument), ...(key === undefined ? [] : [key]));
+  }
+  function typed(input) {
+    if (!input.readOnly) send("type", input.value, input.dataset.guideField);
+  }
+
+  addEventListener("click", (event) => {
+    const button = event.target instanceof Element ? event.target.closest("[data-guide-do]") : null;
+    if (button) press(button);
+  });
+  addEventListener("keydown", (event) => {
+    if (event.key !== "Enter" || !event.target.matches?.("[data-guide-field]")) return;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    typed(event.target);
+  }, true);
+
+  // Focus: kept when the server sends the block again; where its control is gone, the question or the block gets it.
+  const NAMES = ["data-guide-do", "data-guide-field", "data-question-key", "data-argument"];
+  let focus = null; // selector of the control, and key of its question
+  let gone = false; // the visitor has moved the focus away
+  addEventListener("focusin", (event) => {
+    const node = event.target.closest?.("[data-guide=steps] :is([data-guide-do], [data-guide-field])");
+    gone = false;
+    focus = node && {
+      control: NAMES.filter((name) => node.hasAttribute(name)).map((name) => `[${name}="${node.getAttribute(name)}"]`).join(""),
+      question: node.closest("[data-question]")?.dataset.question,
+    };
+  });
+  addEventListener("pointerdown", () => { gone = true; }, true);
+  addEventListener("focusout", (event) => {
+    // A control that is taken away loses the focus without the visitor's doing.
+    if (!event.relatedTarget && event.target.closest?.("[data-guide=steps]")) queueMicrotask(() => { gone = event.target.isConnected; });
+  });
+  function restore() {
+    if (!focus || gone || document.activeElement !== document.body) return;
+    const block = document.querySelector("[data-guide=steps]");
+    const node = block?.querySelector(focus.control)
+      ?? block?.querySelector(`[data-question="${focus.question}"] [data-guide-do]`)
+      ?? block?.querySelector(".kb-guide-turn button:last-child");
+    node?.focus({ preventScroll: true });
+  }
+  addEventListener("DOMContentLoaded", () => {
+    new MutationObserver(restore).observe(document.body, { subtree: true, childList: true });
+  });
+})();

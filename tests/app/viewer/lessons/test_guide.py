@@ -1,0 +1,456 @@
+"""Goal, steps and questions of every lesson: judging, progress, and each number against `kin`."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from fake_browser import FakeBrowser
+from hypothesis import given
+from hypothesis import strategies as st
+from live_server import serve_viewer
+
+import kin
+from app.shared.clouds import Clouds
+from app.shared.settings import Settings
+from app.shared.store import Store
+from app.viewer.lessons import LESSONS
+from app.viewer.lessons.dh import questions as dh
+from app.viewer.lessons.equations import questions as equations
+from app.viewer.lessons.guide.judging import (
+    is_answer,
+    judge,
+    read,
+    solution_text,
+    tolerance_text,
+    value_text,
+)
+from app.viewer.lessons.guide.outline import (
+    Choice,
+    Mistake,
+    Number,
+    Option,
+    Outline,
+    Question,
+    Step,
+    count,
+    one_right,
+)
+from app.viewer.lessons.guide.poses import moved
+from app.viewer.lessons.guide.progress import Progress
+from app.viewer.lessons.guide.views import steps_html
+from app.viewer.lessons.postures import questions as postures
+from app.viewer.lessons.redundancy import questions as redundancy
+from app.viewer.lessons.velocity import questions as velocity
+from app.viewer.panel.entry import EntryError
+from app.viewer.server import ViewerServer
+from kin import InputError, Robot
+from kin.axes import pairs
+from kin.transforms import Array
+from kin.units import Units
+
+pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
+
+STORE = Store()
+ROBOTS = STORE.robots
+DEGREES, RADIANS = Units(), Units(degrees=False, length="m")
+PAIRS = [(robot, lesson) for robot in ROBOTS for lesson in LESSONS]
+ANGLE = Number("θ?", math.pi / 2, DEGREES.angles, math.radians(1.0), "Add.", (Mistake(0.0, "Forgot it."),), True)
+LENGTH = Number("d?", -0.2, DEGREES.lengths, 0.001, "Measure.")
+SUM = Choice("1 + 1?", (Option("2", "Counted.", True), Option("3", "One too many.")))
+SMALL = Outline("Count.", (Step("Sums", "Think.", SUM, "It is 2."), Step("Rest", "Look.")), (ANGLE, LENGTH))
+
+
+@pytest.fixture(params=PAIRS, ids=[f"{robot.id}-{lesson.key}" for robot, lesson in PAIRS], scope="module")
+def outline(request: pytest.FixtureRequest) -> Outline:
+    robot, lesson = request.param
+    return lesson.outline(robot, DEGREES)
+
+
+@pytest.fixture(params=ROBOTS, ids=[robot.id for robot in ROBOTS])
+def robot(request: pytest.FixtureRequest) -> Robot:
+    found: Robot = request.param
+    return found
+
+
+# Judging
+
+
+def test_an_answer_is_right_within_its_tolerance_only() -> None:
+    for error, right in ((0.9, True), (-0.9, True), (1.1, False), (-1.1, False)):
+        assert judge(ANGLE, math.pi / 2 + math.radians(error)).right is right
+    assert judge(ANGLE, math.pi / 2 - 2 * math.pi).right, "a whole turn away"
+    assert not judge(LENGTH, -0.2 + 2 * math.pi).right
+
+
+def test_a_wrong_answer_gets_its_reason() -> None:
+    assert judge(ANGLE, 0.0).reason == "Forgot it."
+    assert judge(ANGLE, 1.0).reason == "Add."
+    assert judge(LENGTH, 0.2).reason == "The size is right, the sign is not. Measure."
+    assert judge(LENGTH, -0.3).reason == "Too small. Measure."
+    assert judge(LENGTH, 0.0).reason == "Too large. Measure."
+    assert (judge(SUM, 1).right, judge(SUM, 1).reason) == (False, "One too many.")
+    assert (judge(SUM, 0).right, judge(SUM, 0).reason) == (True, "Counted.")
+
+
+def test_typed_answers_take_units() -> None:
+    assert read(ANGLE, "90") == read(ANGLE, "90°") == pytest.approx(math.pi / 2)
+    assert read(ANGLE, " 1.5 rad ") == 1.5
+    assert read(LENGTH, "−200") == read(LENGTH, "-20 cm") == read(LENGTH, "-0,2 m") == pytest.approx(-0.2)
+    for text in ("", "x", "2 m", "1e999"):
+        with pytest.raises(EntryError):
+            read(ANGLE, text)
+    with pytest.raises(EntryError, match="is not a unit"):
+        read(count("n?", 3, "Count."), "3 mm")
+
+
+def test_solutions_are_shown_as_fine_as_they_are_asked() -> None:
+    assert (value_text(ANGLE), tolerance_text(ANGLE)) == ("90°", "± 1°")
+    assert (value_text(LENGTH), tolerance_text(LENGTH)) == ("−200 mm", "± 1 mm")
+    assert (value_text(count("n?", 3, "")), tolerance_text(count("n?", 3, ""))) == ("3", "a whole number")
+    assert solution_text(SUM) == "2. Counted."
+    assert solution_text(LENGTH) == "−200 mm. Measure."
+
+
+def test_a_question_must_have_a_right_answer() -> None:
+    for options in (
+        (),
+        (Option("2", "", True),),
+        (Option("2", ""), Option("3", "")),
+        (Option("2", "", True),) * 2,
+    ):
+        with pytest.raises(ValueError, match="options are needed"):
+            Choice("?", options)
+    made = one_right("?", ("b", "yes"), [("a", "no"), ("b", "the same text"), ("a", "again")], 5)
+    assert [(option.text, option.right) for option in made.options] == [("a", False), ("b", True)]
+    assert count("n?", 3, "", [(3, "would be right"), (4, "no")]).mistakes == (Mistake(4, "no"),)
+
+
+# Progress
+
+
+def test_progress_keeps_the_last_answer_until_the_right_one_is_on_show() -> None:
+    progress = Progress(SMALL)
+    assert progress.mark("1") == "open"
+    assert not progress.answer("1", 1).right
+    assert progress.mark("1") == "wrong"
+    assert progress.answer("1", 0).right
+    progress.answer("1", 1)
+    progress.reveal("1")
+    assert progress.mark("1") == "right", "what is settled stays"
+    progress.answer("c1", 0.0)
+    progress.reveal("c1")
+    progress.answer("c1", math.pi / 2)
+    progress.answer("c2", -0.2)
+    assert (progress.mark("c1"), progress.mark("c2"), progress.score) == ("shown", "right", (1, 2))
+
+
+def test_progress_refuses_what_no_control_sends() -> None:
+    progress = Progress(SMALL)
+    for key, value in (("9", 0), ("1", 2), ("1", True), ("1", 0.0), ("c1", math.nan), ("c1", "x"), (1, 0)):
+        with pytest.raises(InputError):
+            progress.answer(key, value)
+    for at in (-1, 3, True, "1"):
+        with pytest.raises(InputError):
+            progress.go(at)
+    assert progress.state() == Progress(SMALL).state()
+
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.sampled_from(["1", "c1", "c2"]),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.sampled_from(["1", "c1", "x"]), inner),
+    max_leaves=6,
+)
+
+
+@given(st.dictionaries(st.sampled_from(["step", "given", "revealed"]), JSON))
+def test_any_state_can_be_restored(state: dict[str, object]) -> None:
+    progress = Progress(SMALL)
+    progress.restore(state)
+    for at in range(3):
+        progress.go(at)
+        assert steps_html(progress, {})
+    again = Progress(SMALL)
+    again.restore(json.loads(json.dumps(progress.state())))
+    assert again.state() == progress.state()
+
+
+# The lessons
+
+
+def wrong_answers(question: Question) -> Iterator[float]:
+    if isinstance(question, Choice):
+        yield from (i for i, option in enumerate(question.options) if not option.right)
+        return
+    yield from (m.value for m in question.mistakes if abs(m.value - question.answer) > question.tolerance)
+    yield from (question.answer + k * question.tolerance for k in (-1.5, 1.5))
+
+
+def test_every_answer_is_judged_with_a_reason(outline: Outline) -> None:
+    assert outline.goal.startswith("You can ")
+    assert outline.goal.count(".") == 1
+    assert len(outline.steps) >= 2
+    assert 2 <= len(outline.check) <= 4
+    for step in outline.steps:
+        assert step.question is None or step.shown
+        assert step.text.endswith("."), step.text
+    for key, question in outline.questions():
+        progress = Progress(outline)
+        right = (
+            question.answer
+            if isinstance(question, Number)
+            else next(i for i, option in enumerate(question.options) if option.right)
+        )
+        wrong = list(wrong_answers(question))
+        assert wrong, question.prompt
+        for value in wrong:
+            verdict = progress.answer(key, value)
+            assert not verdict.right, (question.prompt, value)
+            assert len(verdict.reason) > 9, (question.prompt, value)
+        assert progress.answer(key, right).right, question.prompt
+        assert is_answer(question, right)
+        text = solution_text(question)
+        if isinstance(question, Number):
+            shown = value_text(question)
+            assert judge(question, read(question, shown)).right, f"the shown answer is accepted: {shown}"
+            for mistake in question.mistakes:
+                assert mistake.reason.endswith(".")
+        assert text.endswith("."), text
+
+
+def test_steps_move_the_arm_within_its_limits(outline: Outline, request: pytest.FixtureRequest) -> None:
+    robot: Robot = request.node.callspec.params["outline"][0]
+    for step in outline.steps:
+        for q in (step.start, step.end):
+            if q is not None:
+                low, high = robot.lower - 1e-9, robot.upper + 1e-9
+                assert ((low <= np.array(q)) & (np.array(q) <= high)).all(), step.title
+
+
+@pytest.mark.parametrize("robot", [ROBOTS[0], STORE.get("scara")], ids=["pioneer5", "scara"])
+def test_units_change_the_words_but_not_the_answers(robot: Robot) -> None:
+    for lesson in LESSONS:
+        for (_, a), (_, b) in zip(
+            lesson.outline(robot, DEGREES).questions(), lesson.outline(robot, RADIANS).questions(), strict=True
+        ):
+            if isinstance(a, Number) and isinstance(b, Number):
+                assert (a.answer, a.tolerance) == (b.answer, b.tolerance)
+            elif isinstance(a, Choice) and isinstance(b, Choice):
+                assert [o.right for o in a.options] == [o.right for o in b.options]
+
+
+# Each number against the core
+
+
+def numbers(outline: Outline) -> dict[str, float]:
+    return {key: q.answer for key, q in outline.questions() if isinstance(q, Number)}
+
+
+def rights(outline: Outline) -> dict[str, list[str]]:
+    return {key: [o.text for o in q.options if o.right] for key, q in outline.questions() if isinstance(q, Choice)}
+
+
+def frames(robot: Robot, q: Array) -> Array:
+    return np.concatenate([robot.T_world_base[None], kin.link_frames(robot, q)])
+
+
+def test_dh_numbers(robot: Robot) -> None:
+    outline = dh.outline(robot, DEGREES)
+    found, chosen = numbers(outline), rights(outline)
+    T = frames(robot, robot.q_home)
+    assert found["1"] == len(T)
+    row = int(outline.steps[2].title.split()[1])
+    assert found["3"] == pytest.approx(np.linalg.norm(T[row, :3, 3] - T[row - 1, :3, 3]))
+    first = chosen["2"][0].split()[2]
+    assert first == ("θ" if robot.convention == "standard" else "α")
+    end = np.array(outline.steps[4].end)
+    assert np.flatnonzero(end != robot.q_home).tolist() == [0]
+    ways = [kin.fk(robot, q)[:3, 3] for q in (robot.q_home, end)]
+    assert found["5"] == pytest.approx(np.linalg.norm(ways[1] - ways[0]))
+    # The last joint: the tool point moves exactly if the Jacobian says so.
+    moves = np.linalg.norm(kin.jacobian(robot, robot.q_home)[:3, -1]) > 1e-9
+    assert chosen["c4"] == ["Yes" if moves else "No"]
+
+
+def test_dh_offsets(robot: Robot) -> None:
+    outline = dh.outline(robot, DEGREES)
+    question = outline.check[0]
+    assert isinstance(question, Number)
+    joint = int(question.prompt.split("joint ")[1].split()[0]) - 1
+    row = robot.rows[robot.joint_rows[joint]]
+    # The matrix of the row, from two neighbouring frames.
+    T = frames(robot, robot.q_home)
+    A = np.linalg.inv(T[robot.joint_rows[joint]]) @ T[robot.joint_rows[joint] + 1]
+    if row.kind == "prismatic":
+        expected = A[2, 3] if robot.convention == "standard" else np.linalg.norm(A[:3, 3])
+        assert question.answer == pytest.approx(expected)
+    else:
+        x = A[:2, 0] if robot.convention == "standard" else [A[0, 0], -A[0, 1]]
+        turned = math.atan2(x[1], x[0])
+        assert math.remainder(question.answer - turned, 2 * math.pi) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_dh_relations(robot: Robot) -> None:
+    for pair in pairs(robot):
+        kind = dh.relation(robot, pair.joint)
+        if kind == "skew":
+            assert pair.distance > 1e-4
+        if kind == "perpendicular":
+            assert pair.angle == pytest.approx(math.pi / 2)
+        if kind in ("one", "parallel"):
+            assert pair.angle == pytest.approx(0.0, abs=1e-6)
+            assert (kind == "one") == (pair.distance < 1e-6)
+
+
+def test_equations_numbers(robot: Robot) -> None:
+    outline = equations.outline(robot, DEGREES)
+    found, chosen = numbers(outline), rights(outline)
+    T = kin.fk(robot, robot.q_home)
+    assert found["2"] == pytest.approx(np.linalg.norm(T[:3, 3]))
+    question = outline.steps[2].question
+    assert isinstance(question, Number)
+    component = "xyz".index(question.prompt.split()[2][1])
+    assert found["3"] == pytest.approx(T[component, 2], abs=1e-12)
+    assert found["c1"] == pytest.approx(0.0, abs=1e-9)
+    q = robot.random_q(np.random.default_rng(9), 20)
+    with_joint_1 = q.copy()
+    with_joint_1[:, 0] = robot.q_home[0]
+    changes = np.abs(kin.fk(robot, q)[:, 2, 3] - kin.fk(robot, with_joint_1)[:, 2, 3]).max() > 1e-9
+    assert chosen["c2"] == ["Yes" if changes else "No"]
+
+
+def test_a_wrong_sign_shows_in_the_products_of_columns() -> None:
+    T = kin.fk(ROBOTS[0], ROBOTS[0].q_home)
+    for row, column in itertools.product(range(3), range(3)):
+        others = [k for k in range(3) if k != column]
+        expected = max(2 * abs(T[row, column] * T[row, k]) for k in others)
+        assert equations.flipped(T, row, column) == pytest.approx(expected, abs=1e-12)
+
+
+def test_postures_numbers(robot: Robot) -> None:
+    outline = postures.outline(robot, DEGREES)
+    found, chosen = numbers(outline), rights(outline)
+    names = kin.branch_names(robot)
+    assert found["1"] == len(names)
+    assert chosen["2"] == [kin.branch_of(robot, robot.q_home)]
+    T = kin.fk(robot, robot.q_home)
+    solutions = kin.solve_ik(robot, T, q_seed=robot.q_home).solutions
+    assert found["3"] == len(solutions)
+    if outline.steps[2].end is not None:
+        assert np.allclose(kin.fk(robot, np.array(outline.steps[2].end)), T, atol=1e-6), "the tool is where it was"
+    assert chosen["4"] == ["None"]
+    assert chosen["c1"] == ["Yes" if robot.n >= 6 else "No"]
+
+
+def test_redundancy_numbers(robot: Robot) -> None:
+    found = numbers(redundancy.outline(robot, DEGREES))
+    q = robot.random_q(np.random.default_rng(11), 5)
+    J = kin.jacobian(robot, q)
+    assert found["1"] == robot.n - max(np.linalg.matrix_rank(j, tol=1e-9) for j in J)
+    assert found["2"] == robot.n - max(np.linalg.matrix_rank(j[:3], tol=1e-9) for j in J)
+    z = redundancy.null_vector(robot)
+    assert np.linalg.norm(kin.jacobian(robot, robot.q_home) @ z) == pytest.approx(0.0, abs=1e-9)
+    assert found["c1"] == pytest.approx(0.0, abs=1e-9)
+    if found["1"]:
+        assert np.linalg.norm(z) == pytest.approx(1.0)
+        question = redundancy.outline(robot, DEGREES).steps[2].question
+        assert isinstance(question, Choice)
+        fastest = {f"Joint {k + 1}" for k in np.flatnonzero(np.abs(z) > np.abs(z).max() - 1e-6)}
+        assert {o.text for o in question.options if o.right} <= fastest
+
+
+def test_velocity_numbers(robot: Robot) -> None:
+    outline = velocity.outline(robot, DEGREES)
+    found, chosen = numbers(outline), rights(outline)
+    step = 1e-6
+    q, _ = moved(robot, 0, step)
+    ways = [kin.fk(robot, x)[:3, 3] for x in (robot.q_home, q)]
+    assert found["1"] == pytest.approx(np.linalg.norm(ways[1] - ways[0]) / step, abs=1e-5)
+    assert found["2"] == (1.0 if robot.joints[-1].kind == "revolute" else 0.0)
+    question = outline.steps[2].question
+    assert isinstance(question, Number)
+    k = int(question.prompt.split("joint ")[1].split()[0]) - 1
+    # Virtual work: the joint lifts the weight.
+    q, taken = moved(robot, k, step)
+    lifted = (kin.fk(robot, q) - kin.fk(robot, robot.q_home))[2, 3]
+    assert found["3"] == pytest.approx(velocity.LOAD * lifted / taken, abs=1e-3)
+    if (singular := velocity.singular(robot)) is not None:
+        assert found["4"] == velocity.rank_of(robot, singular[0]) < velocity.usual_rank(robot)
+        assert kin.singularities(robot, singular[0])[0].distance == pytest.approx(0.0, abs=1e-9)
+    longest = np.linalg.svd(kin.jacobian(robot, robot.q_home)[:3], compute_uv=False)[0]
+    assert found["c2"] == pytest.approx(longest)
+    assert chosen["c1"] == ["Yes" if abs(kin.jacobian(robot, robot.q_home)[2, 0]) > 1e-10 else "No"]
+
+
+# In a page
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[int]:
+    with serve_viewer(ViewerServer(STORE, Settings(), Clouds())) as port:
+        yield port
+
+
+def press(tab: FakeBrowser, key: list[object], value: object) -> None:
+    tab.say("feature", ["guide", key, value])
+
+
+def test_a_visitor_answers_and_the_link_keeps_it(server: int) -> None:
+    with FakeBrowser(server) as tab:
+        tab.settle()
+        tab.set("Lesson", "DH table step by step")
+        tab.wait(lambda: "Goal:" in tab.html and "1. Rows and frames" in tab.html)
+        press(tab, ["type", "1", 1], "6")
+        tab.wait(lambda: "Frame 0, at the base, is one more" in tab.html)
+        press(tab, ["type", "1", 2], "seven")
+        tab.wait(lambda: "is not a number" in tab.html)
+        press(tab, ["type", "1", 3], "7")
+        tab.wait(lambda: "Right." in tab.html and "every fourth motion" in tab.html)
+        press(tab, ["go", 4], 4)
+        tab.wait(lambda: "5. A joint and its column" in tab.html)
+        press(tab, ["reveal", "5", 5], None)
+        pioneer = ROBOTS[0]
+        end = dh.outline(pioneer, DEGREES).steps[4].end
+        tab.wait(lambda: np.allclose(tab.tool_pose(), kin.fk(pioneer, np.array(end)), atol=1e-6))
+        assert "The answer." in tab.html
+        press(tab, ["go", 6], 5)
+        tab.wait(lambda: "0 of 4 right" in tab.html)
+        press(tab, ["answer", "c2", 7], 1)
+        tab.wait(lambda: "1 of 4 right" in tab.html)
+        tab.set("Lesson", "Velocity")
+        tab.wait(lambda: "1. A column" in tab.html)
+        tab.set("Lesson", "DH table step by step")
+        tab.wait(lambda: "1 of 4 right" in tab.html)
+        tab.wait(lambda: bool(tab.kept))
+        tab.settle()
+        kept = tab.kept[-1]
+    memory = json.dumps({"address": "http://127.0.0.1/", "state": kept})
+    with FakeBrowser(server, memory=memory) as tab:
+        tab.wait(lambda: "1 of 4 right" in tab.html)
+        press(tab, ["go", 1], 0)
+        tab.wait(lambda: "Right." in tab.html)
+        tab.set("Robot", STORE.get("scara").name)
+        tab.wait(lambda: "The table has 4 rows" in tab.html and "Right." not in tab.html)
+
+
+def test_joint_sliders_in_a_lesson_move_the_arm_and_each_other(server: int) -> None:
+    with FakeBrowser(server) as tab:
+        tab.settle()
+        tab.set("Lesson", "Velocity")
+        tab.wait(lambda: "1. A column" in tab.html)
+        tab.set("Joint sliders", True)
+        tab.wait(lambda: tab.sliders.count("1 rotating base") == 2)
+        first, second = [u for u, m in tab.gui.items() if m["props"].get("label") == "1 rotating base"]
+        for uuid, value, other in ((first, 20.0, second), (second, 40.0, first)):
+            tab.values[uuid] = value
+            tab.send("GuiUpdateMessage", uuid=uuid, updates={"value": value})
+            tab.wait(lambda other=other, value=value: tab.values[other] == value)  # type: ignore[misc]
+        q = ROBOTS[0].q_home.copy()
+        q[0] = math.radians(40.0)
+        tab.wait(lambda: np.allclose(tab.tool_pose(), kin.fk(ROBOTS[0], q), atol=1e-6))
+        tab.set("Lesson", "None")
+        tab.wait(lambda: tab.sliders.count("1 rotating base") == 1)
