@@ -7,8 +7,6 @@
   const REST = 400; // the same where the arm on show has meshes: some megabytes are sent for each change
   const PATIENCE = 3000; // ms for an answer, then the next message is sent
   const LEFT = 400; // ms without focus until the table is written again, so that a click on a button finds it
-  const PART = 16000; // bytes of a text in one message
-  const PART_OF_ZIP = 32000; // bytes of a zip in one message, which base64 makes a third longer
 
   const part = (name) => document.querySelector(`[data-arm="${name}"]`);
   const cells = () => [...document.querySelectorAll("[data-arm] input[data-cell]")];
@@ -203,7 +201,7 @@
   addEventListener("scroll", (event) => { if (event.target === scroller()) showMore(); }, true);
   const resized = new ResizeObserver(showMore);
 
-  // Buttons and files
+  // Buttons
 
   addEventListener("click", (event) => {
     const target = event.target instanceof Element ? event.target : document.body;
@@ -219,40 +217,7 @@
       const box = scroller();
       box.scrollTo({ left: box.scrollLeft > 8 ? 0 : box.scrollWidth, behavior: "smooth" });
     }
-    if (target.closest("[data-arm-upload]")) part("files").querySelector("[data-arm-file]").click();
   });
-
-  addEventListener("change", async (event) => {
-    const input = event.target.closest?.("[data-arm-file]");
-    const file = input?.files[0];
-    if (!file) return;
-    const { most, mostZip } = input.dataset;
-    const name = file.name.slice(0, 100);
-    const head = new Uint8Array(await file.slice(0, 2).arrayBuffer());
-    const zip = head[0] === 0x50 && head[1] === 0x4b; // PK
-    const content = zip ? new Uint8Array(await file.slice(0, Number(mostZip) + 1).arrayBuffer()) : await file.slice(0, Number(most) + 1).text();
-    input.value = "";
-    if (zip) uploadZip(name, content, 0);
-    else upload(name, content, 0);
-  });
-  let uploading = 0; // the upload that goes on: a newer one ends it
-  function uploadZip(name, bytes, from, number = ++uploading) {
-    if (number !== uploading) return;
-    const to = Math.min(from + PART_OF_ZIP, bytes.length);
-    const part = btoa(String.fromCharCode(...bytes.subarray(from, to)));
-    send(["upload"], [name, from === 0, to >= bytes.length, part, "base64", from], () => { if (to < bytes.length) uploadZip(name, bytes, to, number); });
-  }
-  /** The end of the part that begins at `from`: a short enough message, and no character is cut in two. */
-  function endOfPart(text, from) {
-    let length = PART;
-    while (new TextEncoder().encode(JSON.stringify(text.slice(from, from + length))).length > PART + 2) length >>= 1;
-    const inside = text.codePointAt(from + length - 1) > 0xffff; // the second half of that character comes next
-    return from + length - inside;
-  }
-  function upload(name, text, from) {
-    const to = endOfPart(text, from);
-    send(["upload"], [name, from === 0, to >= text.length, text.slice(from, to)], () => { if (to < text.length) upload(name, text, to); });
-  }
 
   addEventListener("DOMContentLoaded", () => {
     new MutationObserver(() => { if (part("table")) { restore(); mark(); markWrong(); resized.observe(scroller()); showMore(); } }).observe(document.body, { subtree: true, childList: true });

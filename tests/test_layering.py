@@ -61,6 +61,7 @@ RULES: dict[str, set[str]] = {
     "app/viewer/meshes/archive.py": set(),
     "app/viewer/meshes/child.py": {"app.viewer.meshes"},
     "app/viewer/meshes/loading.py": {"fast_simplification", "trimesh", "numpy", "app.viewer.meshes"},
+    "app/viewer/meshes/placing.py": {"numpy", "app.viewer.meshes"},
     "app/viewer/meshes/surface.py": {"numpy"},
     "app/service": {
         *("kin", "fastapi", "starlette", "pydantic", "pydantic_core", "uvicorn", "httptools", "websockets"),

@@ -139,7 +139,7 @@ def test_phone(phone: Tab) -> None:
     phone.wait_for_tool(kin.fk(PIONEER, home_with(PIONEER, 0, 60))[:3, 3], within=0.06)
 
 
-def test_a_zip_shows_the_real_arm_and_delete_removes_it(tab: Tab) -> None:
+def test_a_zip_or_several_files_show_the_real_arm_and_delete_removes_it(tab: Tab) -> None:
     page, two = tab.page, kin.load_urdf(TWO_JOINTS)
     tab.open("Robot")
     files = {**robot_files(), "two/noise.bin": random.Random(1).randbytes(200_000)}  # in several parts
@@ -153,6 +153,17 @@ def test_a_zip_shows_the_real_arm_and_delete_removes_it(tab: Tab) -> None:
     assert sent == ["100"], "an arm with meshes is sent once typing rests"
     page.get_by_role("button", name="Delete my arm").click()
     expect(tab.status.first).to_contain_text("was deleted")
+    several = [
+        {
+            "name": name.rpartition("/")[2],
+            "mimeType": "",
+            "buffer": text.encode() if isinstance(text, str) else text,
+        }
+        for name, text in robot_files().items()
+    ]
+    page.locator("[data-arm-file]").set_input_files(several)
+    expect(tab.status.first).to_contain_text("The meshes of two.urdf are shown")
+    page.get_by_role("button", name="Delete my arm").click()
     tab.show(kin.get_robot("pioneer5"))
 
 

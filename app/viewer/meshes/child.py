@@ -1,15 +1,20 @@
 """The process that parses meshes: little memory, little time, no settings of the service.
 
 It reads one request from standard input, writes one answer to standard output, and ends. The request is a line of
-JSON and, after it, the zip: ``files`` are the names of the meshes with the number of times each is drawn,
-``folder`` the folder of an installed package instead of a zip, ``most`` the triangles to draw in all. The answer
-is ``E`` and an error in JSON, or ``N`` and what `app.viewer.meshes.surface.pack` writes.
+JSON, then the solids that `app.viewer.meshes.surface.pack` has packed, then the zip: ``pieces`` are what is to be
+drawn (`app.viewer.meshes.placing.Piece`), ``links`` and ``reach`` those of the arm, ``urdf`` the name in the zip
+of the file that names the meshes, ``folder`` that of an installed package instead of a zip, ``most`` the triangles
+to draw in all, and ``solids`` the number of bytes of the solids.
+
+Answers begin with lines ``P``, the number of meshes that are read, and of all meshes. Then comes ``E`` and an
+error in JSON, or ``N`` and the finished links, packed.
 """
 
 from __future__ import annotations
 
 import json
 import sys
+from collections import Counter
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path, PurePosixPath
@@ -26,11 +31,18 @@ ALL = 1_500_000  # triangles of all files, before they are simplified
 def main() -> None:
     """Answer one request."""
     _limit()
+    # trimesh reads files without SciPy, whose import would take as long as reading a mesh.
+    sys.modules["scipy"] = None  # type: ignore[assignment]
     line = sys.stdin.buffer.readline()
     data = sys.stdin.buffer.read()
     answer = sys.stdout.buffer
+
+    def report(done: int, count: int) -> None:
+        answer.write(f"P{done} {count}\n".encode())
+        answer.flush()
+
     try:
-        answer.write(b"N" + answer_to(json.loads(line), data))
+        answer.write(b"N" + answer_to(json.loads(line), data, report))
     except MeshError as error:
         answer.write(b"E" + json.dumps([error.field, str(error.value), error.expected]).encode())
     except MemoryError:
@@ -51,40 +63,53 @@ def _limit() -> None:
         resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
 
 
-def answer_to(request: dict[str, Any], data: bytes) -> bytes:
-    """The surfaces of all files of a request; raises `MeshError`."""
-    from app.viewer.meshes.loading import finished, read_surfaces
-    from app.viewer.meshes.surface import Surface, pack
+def answer_to(request: dict[str, Any], data: bytes, report: Callable[[int, int], None] = lambda *_: None) -> bytes:
+    """The finished links of a request; raises `MeshError`.
 
-    files: dict[str, int] = request["files"]
-    read = _reader(request, data)
+    Args:
+        report: called with the number of meshes that are read, and of all meshes.
+    """
+    from app.viewer.meshes.loading import finished, read_surfaces
+    from app.viewer.meshes.placing import Piece, Shapes, placed
+    from app.viewer.meshes.surface import Surface, pack, unpack
+
+    solids = unpack(data[: request["solids"]], ALL)[0][0].surfaces
+    pieces = [Piece(*piece) for piece in request["pieces"]]
+    shapes = Shapes(pieces, solids, request["links"], request["reach"])
+    find, read = _source(request, data[request["solids"] :])
+    names = {path: find(path) for path in shapes.files}
+    uses: Counter[str] = Counter()
+    for path, count in shapes.files.items():
+        uses[names[path]] += count
     found: dict[str, list[Surface]] = {}
     total = drawn = 0
-    for name, uses in files.items():
+    for name in uses:
+        report(len(found), len(uses))
         surfaces = read_surfaces(name, read(name), partial(_read_beside, read, name))
         count = sum(len(surface.faces) for surface in surfaces)
-        total, drawn = total + count, drawn + uses * count
+        total, drawn = total + count, drawn + uses[name] * count
         if total > ALL:
             raise MeshError("meshes: triangles", f"more than {ALL}", f"at most {ALL} in all files")
         found[name] = surfaces
     share = min(1.0, request["most"] / max(drawn, 1))
-    for name in files:
+    for name in uses:
         found[name] = [done for surface in found[name] if len((done := finished(surface, share)).faces)]
         if not found[name]:
             raise MeshError(f"mesh {name}", "no triangle with an area", "a mesh with triangles")
-    left = sum(uses * len(surface.faces) for name, uses in files.items() for surface in found[name])
+    left = sum(count * len(surface.faces) for name, count in uses.items() for surface in found[name])
     if left > SLACK * request["most"]:  # what is no surface cannot be simplified
         expected = f"meshes that can be simplified to {request['most']}"
         raise MeshError("meshes: triangles to draw", f"{left}", expected)
-    return pack(found, drawn)
+    return pack(placed(shapes, {path: found[name] for path, name in names.items()}), drawn)
 
 
-def _reader(request: dict[str, Any], data: bytes) -> Callable[[str], bytes]:
+def _source(request: dict[str, Any], data: bytes) -> tuple[Callable[[str], str], Callable[[str], bytes]]:
+    """What finds a mesh that is named, and what reads it."""
     if "folder" not in request:
         archive = Archive(data)
-        return archive.read
+        return partial(archive.find, urdf=request["urdf"]), archive.read
     folder = Path(request["folder"])
-    return lambda name: (folder / name).read_bytes()
+    return str, lambda name: (folder / name).read_bytes()
 
 
 def _read_beside(read: Callable[[str], bytes], mesh: str, name: str) -> bytes:

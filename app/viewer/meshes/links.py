@@ -6,63 +6,53 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from app.viewer.meshes.archive import MeshError
-from app.viewer.meshes.reader import Meshes
-from app.viewer.meshes.surface import Points, Rgb, Surface, by_color
+from app.viewer.meshes.placing import PLAIN, Piece, Shapes, placed
+from app.viewer.meshes.surface import LinkBody, Surface
 from app.viewer.scene.bodies import Drawing
 from app.viewer.scene.bodies.parts import Part
 from app.viewer.scene.chain import link_poses
 from app.viewer.scene.shapes import Solid, ball, box, cylinder
 from kin import Robot
 from kin.axes import inverse
-from kin.files.urdf.visuals import Box, Cylinder, MeshFile, Shape, Sphere, Visual
+from kin.files.urdf.visuals import Box, Cylinder, MeshFile, Sphere, Visual
 from kin.transforms import Array
 
-PLAIN: Rgb = (196, 201, 208)  # of what nothing gives a colour
-COLORS = 8  # of one link
-FARTHEST = 10.0  # times the reach of the arm: a mesh beyond is not in metres
-COVER = 150  # points of a link that are tested against pedestal and floor
-LOOKED_AT = 20_000  # points of a link among which these are chosen
-MOST_DRAWN = 120_000  # triangles of an arm, its boxes, cylinders and spheres included
 SAME = 1e-7  # of the reach, or rad: differences of two tables that describe one arm
 
 
-def mesh_files(visuals: Sequence[Visual]) -> dict[str, int]:
-    """The paths of the mesh files, and how often each is drawn."""
-    paths = [visual.shape.path for visual in visuals if isinstance(visual.shape, MeshFile)]
-    return {path: paths.count(path) for path in dict.fromkeys(paths)}
-
-
-def drawing_of(robot: Robot, visuals: Sequence[Visual], meshes: Meshes) -> Drawing:
-    """The drawn body of a robot that was read from a URDF.
-
-    Args:
-        meshes: of all files in `visuals`, by their path there.
-
-    Raises:
-        MeshError: a mesh is far too large, as one in millimetres is.
-    """
-    poses = link_poses(robot, np.zeros((1, robot.n)))[0]
-    links: list[list[Surface]] = [[] for _ in poses]
-    size = max(robot.reach, 0.01)
-    drawn = 0
+def shapes_of(robot: Robot, visuals: Sequence[Visual]) -> Shapes:
+    """The visible bodies of a robot that was read from a URDF, where they are in its links."""
+    poses = [inverse(T) for T in link_poses(robot, np.zeros((1, robot.n)))[0]]
+    pieces: list[Piece] = []
+    solids: list[Surface] = []
     for visual in visuals:
-        T = inverse(poses[visual.carrier]) @ visual.T_root_visual
-        for surface in _surfaces(visual.shape, visual.color, meshes):
-            drawn += len(surface.faces)
-            if drawn > MOST_DRAWN:
-                expected = f"at most {MOST_DRAWN} with all shapes"
-                raise MeshError("meshes: triangles to draw", f"more than {MOST_DRAWN}", expected)
-            placed = _placed(surface, T)
-            extent = float(np.abs(placed.points).max())
-            if not extent <= FARTHEST * size:
-                mesh = visual.shape.path if isinstance(visual.shape, MeshFile) else ""
-                name = f"mesh {mesh}" if mesh else f"a shape of link {visual.link}"
-                expected = f"at most {FARTHEST:g} times the reach of {robot.reach:.3g} m"
-                hint = "; is it in millimetres? Then give it the scale 0.001 0.001 0.001"
-                raise MeshError(f"{name}: size", f"{extent:.3g} m", expected + hint)
-            links[visual.carrier].append(placed)
-    return _drawing(links)
+        pose = (poses[visual.carrier] @ visual.T_root_visual)[:3].ravel().tolist()
+        color = None if visual.color is None else [round(255 * value) for value in visual.color]
+        if isinstance(visual.shape, MeshFile):
+            path, scale = visual.shape
+            pieces.append(Piece(path, visual.carrier, pose, scale, color, visual.link))
+        else:
+            pieces.append(Piece(len(solids), visual.carrier, pose, color=color, link=visual.link))
+            solids.append(_solid(visual.shape))
+    return Shapes(pieces, solids, len(poses), robot.reach)
+
+
+def drawing_without_meshes(shapes: Shapes) -> Drawing:
+    """The drawn body of a robot whose URDF has boxes, cylinders and spheres only; raises `MeshError`."""
+    return drawing_of(placed(shapes, {}))
+
+
+def drawing_of(links: Sequence[LinkBody]) -> Drawing:
+    """The drawn body of finished links."""
+    parts = tuple(
+        tuple(
+            Part(f"mesh-{k}", Solid(surface.points, surface.faces), surface.color or PLAIN, double_sided=True)
+            for k, surface in enumerate(link.surfaces)
+        )
+        for link in links
+    )
+    spheres = tuple(np.column_stack([link.cover.astype(float), np.zeros(len(link.cover))]) for link in links)
+    return Drawing(parts, spheres)
 
 
 def size_of(body: Drawing) -> int:
@@ -71,19 +61,8 @@ def size_of(body: Drawing) -> int:
     return sum(mesh.vertices.nbytes + mesh.faces.nbytes for mesh in meshes)
 
 
-def _surfaces(shape: Shape, color: tuple[float, float, float] | None, meshes: Meshes) -> list[Surface]:
-    """A shape in its own coordinates; the colours of a mesh file come before that of the URDF."""
-    plain: Rgb = PLAIN
-    if color is not None:
-        red, green, blue = (round(255 * value) for value in color)
-        plain = red, green, blue
-    if isinstance(shape, MeshFile):
-        scale = np.array(shape.scale, dtype=np.float32)
-        mirrored = scale.prod() < 0.0
-        return [
-            Surface(color or plain, points * scale, faces[:, ::-1] if mirrored else faces)
-            for color, points, faces in meshes.files[shape.path]
-        ]
+def _solid(shape: Box | Cylinder | Sphere) -> Surface:
+    """A shape in its own coordinates."""
     match shape:
         case Box(size):
             solid = box(-0.5 * np.array(size), 0.5 * np.array(size))
@@ -91,41 +70,7 @@ def _surfaces(shape: Shape, color: tuple[float, float, float] | None, meshes: Me
             solid = cylinder(radius, -0.5 * length, 0.5 * length, bevel=0.0)
         case Sphere(radius):
             solid = ball(radius)
-    return [Surface(plain, np.asarray(solid.vertices, dtype=np.float32), np.asarray(solid.faces, dtype=np.uint32))]
-
-
-def _placed(surface: Surface, T: Array) -> Surface:
-    points = surface.points @ T[:3, :3].T.astype(np.float32) + T[:3, 3].astype(np.float32)
-    return surface._replace(points=points)
-
-
-def _drawing(links: Sequence[Sequence[Surface]]) -> Drawing:
-    parts, spheres = [], []
-    for surfaces in links:
-        joined = by_color(surfaces, COLORS)
-        parts.append(
-            tuple(
-                Part(f"mesh-{k}", Solid(surface.points, surface.faces), surface.color or PLAIN, double_sided=True)
-                for k, surface in enumerate(joined)
-            )
-        )
-        spheres.append(_cover([surface.points for surface in joined]))
-    return Drawing(tuple(parts), tuple(spheres))
-
-
-def _cover(clouds: Sequence[Points]) -> Array:
-    """Some points of the surfaces, spread evenly, as spheres ``(k, 4)`` without a radius."""
-    if not clouds:
-        return np.empty((0, 4))
-    points = np.vstack(clouds)
-    points = points[:: max(1, len(points) // LOOKED_AT)].astype(float)
-    low, high = points.min(axis=0), points.max(axis=0)
-    cell = float((high - low).max()) / 8.0 or 1.0
-    x, y, z = np.floor((points - low) / cell).astype(np.int64).T
-    _, first = np.unique((x << 32) | (y << 16) | z, return_index=True)
-    chosen = points[np.sort(first)]
-    chosen = chosen[:: max(1, len(chosen) // COVER)]
-    return np.column_stack([chosen, np.zeros(len(chosen))])
+    return Surface(None, np.asarray(solid.vertices, dtype=np.float32), np.asarray(solid.faces, dtype=np.uint32))
 
 
 def carried_over(drawing: Drawing, before: Robot, robot: Robot) -> Drawing | None:

@@ -17,6 +17,7 @@ import fast_simplification
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
+from trimesh.exchange.load import mesh_loaders
 from trimesh.resolvers import Resolver
 
 from app.viewer.meshes.archive import FORMATS, MeshError
@@ -44,10 +45,7 @@ def read_surfaces(name: str, data: bytes, read: Callable[[str], bytes]) -> list[
         raise MeshError(f"mesh {name}", kind or "no ending", "one of " + ", ".join(FORMATS))
     _check_count(name, kind, data)
     try:
-        scene = trimesh.load_scene(
-            io.BytesIO(data), file_type=kind[1:], resolver=_Beside(read), process=False, maintain_order=True
-        )
-        pieces = _pieces(name, scene)
+        pieces = _pieces(name, _load(kind[1:], data, _Beside(read)))
     except (MeshError, MemoryError):
         raise
     except Exception as error:  # noqa: BLE001 - the loaders of many formats raise anything
@@ -56,6 +54,16 @@ def read_surfaces(name: str, data: bytes, read: Callable[[str], bytes]) -> list[
     if not pieces:
         raise MeshError(f"mesh {name}", "no triangles", "a mesh with triangles")
     return by_color(pieces, COLORS)
+
+
+def _load(kind: str, data: bytes, beside: Resolver) -> Any:
+    """The scene of a file. trimesh would merge the points of each mesh, which `finished` does as well."""
+    load: Any = mesh_loaders[kind]
+    loaded = load(file_obj=io.BytesIO(data), file_type=kind, resolver=beside, maintain_order=True)
+    for mesh in loaded.get("geometry", {"": loaded}).values():
+        mesh["process"] = False
+    scene: Any = trimesh.load_scene(loaded)
+    return scene
 
 
 class _Beside(Resolver):

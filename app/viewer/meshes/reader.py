@@ -6,55 +6,69 @@ memory of their own.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
+import re
 import subprocess
 import sys
 import threading
 from collections import Counter, deque
-from collections.abc import Mapping
+from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from pathlib import Path
 from weakref import WeakValueDictionary
 
+import numpy as np
+
 from app.shared.clients import share_of
 from app.shared.memory.answers import AnswerMemory, MemoryFullError, MemoryShare, Reservation
 from app.shared.threads import DaemonExecutor, lower_priority
 from app.viewer.meshes.archive import MOST_BYTES, MeshError
-from app.viewer.meshes.surface import Surface, unpack
+from app.viewer.meshes.placing import MOST_DRAWN, Shapes
+from app.viewer.meshes.surface import LinkBody, pack, unpack
 
 MOST_TRIANGLES = 80_000  # of an arm, in the browser
 PATIENCE = 60.0  # seconds for one request, on a busy machine
 MOST_WAITING = 8  # requests of all visitors, with the one that is being read
 OF_PACKAGES = 32 * 1024 * 1024  # bytes of the bodies of packages
 PACKAGES = ""  # the client that asks for them
+LONGEST_ANSWER = 64 * MOST_DRAWN  # bytes: each triangle with three points of its own takes 48
 _KEPT = ("PATH", "LANG", "LC_ALL", "SYSTEMROOT", "OPENBLAS_CORETYPE")  # variables that the process needs
+
+
+Progress = Callable[[int, int], None]  # the number of meshes that are read, and of all meshes
 
 
 @dataclass(frozen=True, eq=False)
 class Meshes:
-    """The surfaces of mesh files, by name.
+    """What the links of an arm look like, base first.
 
     Attributes:
         triangles: how many there were before they were simplified, each file as often as it is drawn.
         room: the memory they take, given back when they are forgotten.
     """
 
-    files: Mapping[str, list[Surface]]
+    links: list[LinkBody]
     triangles: int
     room: Reservation
 
 
 @dataclass(frozen=True, eq=False)
 class _Request:
-    """Meshes that are wanted, the memory they will take, and the room of the zip, kept as long as its bytes."""
+    """Meshes that are wanted, the memory they will take, and the room of the zip, kept as long as its bytes.
+
+    `urdf` is the file of the zip that names the meshes.
+    """
 
     client: str
-    files: dict[str, int]
+    shapes: Shapes
     source: bytes | Path
     memory: AnswerMemory
-    room: Reservation | None
+    room: Reservation | None = None
+    urdf: str = ""
+    progress: Progress = lambda done, count: None
     future: Future[Meshes] = field(default_factory=Future)
 
 
@@ -90,9 +104,9 @@ class MeshReader:
                 self._shares[client] = memory = MemoryShare(self.memory, self._memory_of_one)
         return ClientMeshes(self, client, memory)
 
-    def read_package(self, files: Mapping[str, int], folder: Path) -> Future[Meshes]:
-        """Read meshes of a folder that is trusted; `files` as in `ClientMeshes.read`."""
-        return self._add(_Request(PACKAGES, dict(files), folder, self._of_packages, None))
+    def read_package(self, shapes: Shapes, folder: Path) -> Future[Meshes]:
+        """Read meshes of a folder that is trusted, whose paths are relative to it."""
+        return self._add(_Request(PACKAGES, shapes, folder, self._of_packages))
 
     def cancel(self, future: Future[Meshes]) -> None:
         """End a request that is not wanted any more, whether it waits or is being read."""
@@ -161,39 +175,77 @@ class MeshReader:
             request.future.set_exception(error)
 
     def _read(self, request: _Request) -> Meshes:
-        head: dict[str, object] = {"files": request.files, "most": MOST_TRIANGLES}
-        source = request.source
-        if isinstance(source, Path):
-            head["folder"], source = str(source), b""
-        answer = self._answer(json.dumps(head).encode() + b"\n" + source, request.future)
-        found, triangles = unpack(list(request.files), answer)
-        size = sum(surface.size for surfaces in found.values() for surface in surfaces)
+        answer = self._answer(request)
         try:
-            return Meshes(found, triangles, request.memory.reserve(size))
+            links, triangles = unpack(answer, MOST_DRAWN)
+        except (ValueError, KeyError, TypeError):
+            raise too_much() from None
+        if len(links) != request.shapes.links:
+            raise too_much()
+        size = sum(surface.size for link in links for surface in link.surfaces)
+        try:
+            return Meshes(links, triangles, request.memory.reserve(size))
         except MemoryFullError:
             raise full() from None
 
-    def _answer(self, request: bytes, future: Future[Meshes]) -> bytes:
+    def _answer(self, request: _Request) -> bytes:
         command = [sys.executable, "-c", f"from {__package__}.child import main; main()"]
         with subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=_environment()
         ) as process:
             with self._lock:
                 self._process = process
-                if self._closed or self._running is not future:
+                if self._closed or self._running is not request.future:
                     process.kill()
-            try:
-                answer, _ = process.communicate(request, PATIENCE)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                answer = b""
+            patience = threading.Timer(PATIENCE, process.kill)
+            patience.daemon = True
+            patience.start()
+            sender = threading.Thread(target=_send, args=(process, request), daemon=True)
+            sender.start()
+            answer = _receive(process, request.progress)
+            process.kill()  # if it would say more than it may
+            process.wait()
+            sender.join()
+            patience.cancel()
             with self._lock:
                 self._process = self._running = None
         if answer[:1] == b"E":
             raise MeshError(*json.loads(answer[1:]))
-        if answer[:1] != b"N" or process.returncode != 0:
-            raise MeshError("meshes", "too much work or memory", "fewer or simpler meshes")
+        if answer[:1] != b"N":
+            raise too_much()
         return answer[1:]
+
+
+def _send(process: subprocess.Popen[bytes], request: _Request) -> None:
+    """Tell the process what is wanted."""
+    shapes, source = request.shapes, request.source
+    solids = pack([LinkBody(shapes.solids, np.empty((0, 3), np.float32))])
+    head: dict[str, object] = {
+        "pieces": shapes.pieces,
+        "links": shapes.links,
+        "reach": shapes.reach,
+        "most": MOST_TRIANGLES,
+        "solids": len(solids),
+    }
+    if isinstance(source, Path):
+        head["folder"], source = str(source), b""
+    else:
+        head["urdf"] = request.urdf
+    assert process.stdin is not None
+    with contextlib.suppress(OSError), process.stdin as stdin:  # it may have ended
+        stdin.write(json.dumps(head).encode() + b"\n")
+        stdin.write(solids)
+        stdin.write(source)
+
+
+def _receive(process: subprocess.Popen[bytes], progress: Progress) -> bytes:
+    """The answer of the process, without its reports; cut off if it is too long."""
+    assert process.stdout is not None
+    answer = process.stdout.readline(LONGEST_ANSWER)
+    while report := re.fullmatch(rb"P(\d{1,4}) (\d{1,4})\n", answer):
+        progress(int(report[1]), int(report[2]))
+        answer = process.stdout.readline(LONGEST_ANSWER)
+    return answer + process.stdout.read(LONGEST_ANSWER)
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,17 +260,30 @@ class ClientMeshes:
     client: str
     memory: MemoryShare
 
-    def read(self, files: Mapping[str, int], source: bytes, room: Reservation | None = None) -> Future[Meshes]:
+    def read(
+        self,
+        shapes: Shapes,
+        source: bytes,
+        urdf: str,
+        room: Reservation | None = None,
+        progress: Progress = lambda done, count: None,
+    ) -> Future[Meshes]:
         """Read meshes of a zip.
 
         Args:
-            files: their names, and how often each is drawn.
+            urdf: the file of the zip that names them.
             room: of the zip's bytes, kept until the request is done or cancelled.
+            progress: called by another thread.
 
         Raises:
             MeshError: too many requests wait, of this client or of all.
         """
-        return self.reader._add(_Request(self.client, dict(files), source, self.memory, room))
+        return self.reader._add(_Request(self.client, shapes, source, self.memory, room, urdf, progress))
+
+
+def too_much() -> MeshError:
+    """The error when the process ended without an answer, or with none that can be."""
+    return MeshError("meshes", "too much work or memory", "fewer or simpler meshes")
 
 
 def full() -> MeshError:

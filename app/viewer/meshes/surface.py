@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import io
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+import json
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,6 @@ Rgb = tuple[int, int, int]
 Points = NDArray[np.float32]
 Faces = NDArray[np.uint32]
 GREY = (128, 128, 128)  # what a surface without a colour is compared as
-_NONE = (-1, -1, -1)
 
 
 class Surface(NamedTuple):
@@ -51,30 +50,75 @@ def _joined(color: Rgb | None, pieces: Sequence[Surface]) -> Surface:
     return Surface(color, np.vstack([piece.points for piece in pieces]), np.vstack(faces))
 
 
-def pack(files: Mapping[str, Sequence[Surface]], triangles: int) -> bytes:
-    """The surfaces of files as a file of NumPy.
+class LinkBody(NamedTuple):
+    """What a link looks like: a surface for each colour, and points ``(k, 3)`` spread over them."""
+
+    surfaces: Sequence[Surface]
+    cover: Points
+
+
+def pack(links: Sequence[LinkBody], triangles: int = 0) -> bytes:
+    """Finished links as bytes: a line of JSON with all sizes, and the arrays one after the other.
 
     Args:
         triangles: how many there were before they were simplified.
     """
-    arrays: dict[str, NDArray[np.generic]] = {"triangles": np.array(triangles)}
-    for i, surfaces in enumerate(files.values()):
-        for k, surface in enumerate(surfaces):
-            arrays[f"{i} {k} points"], arrays[f"{i} {k} faces"] = surface.points, surface.faces
-            arrays[f"{i} {k} color"] = np.array(_NONE if surface.color is None else surface.color)
-    stream = io.BytesIO()
-    np.savez(stream, **arrays)  # type: ignore[arg-type]
-    return stream.getvalue()
+    sizes = [
+        [len(link.cover), [[surface.color, len(surface.points), len(surface.faces)] for surface in link.surfaces]]
+        for link in links
+    ]
+    parts = [json.dumps({"triangles": triangles, "links": sizes}).encode(), b"\n"]
+    for link in links:
+        parts.append(np.ascontiguousarray(link.cover, dtype="<f4").tobytes())
+        for surface in link.surfaces:
+            parts.append(np.ascontiguousarray(surface.points, dtype="<f4").tobytes())
+            parts.append(np.ascontiguousarray(surface.faces, dtype="<u4").tobytes())
+    return b"".join(parts)
 
 
-def unpack(names: Sequence[str], packed: bytes) -> tuple[dict[str, list[Surface]], int]:
-    """What `pack` has packed, for files of these names."""
-    found: dict[str, list[Surface]] = {name: [] for name in names}
-    with np.load(io.BytesIO(packed), allow_pickle=False) as arrays:
-        for key in arrays.files:
-            if key.endswith(" points"):
-                i, k, _ = key.split()
-                red, green, blue = arrays[f"{i} {k} color"].tolist()
-                color = None if (red, green, blue) == _NONE else (red, green, blue)
-                found[names[int(i)]].append(Surface(color, arrays[key], arrays[f"{i} {k} faces"]))
-        return found, int(arrays["triangles"])
+def unpack(packed: bytes, most: int) -> tuple[list[LinkBody], int]:
+    """What `pack` has packed, and its number of triangles; every size and index is checked.
+
+    Args:
+        most: triangles that there may be in all.
+
+    Raises:
+        ValueError: it is not what `pack` has packed, or it is too much.
+    """
+    head, _, data = packed.partition(b"\n")
+    sizes = json.loads(head)
+    at, left = 0, most
+
+    def array(count: object, kind: str) -> NDArray[Any]:
+        nonlocal at
+        if not isinstance(count, int) or not 0 <= count <= len(data):
+            raise ValueError("a size that is no size")
+        found = np.frombuffer(data, kind, 3 * count, at).reshape(count, 3)
+        at += found.nbytes
+        if not np.isfinite(found).all():
+            raise ValueError("numbers that are not finite")
+        return found
+
+    links = []
+    for cover, surfaces in sizes["links"]:
+        points_of_link = array(cover, "<f4")
+        found = []
+        for color, points, faces in surfaces:
+            surface = Surface(_checked(color), array(points, "<f4"), array(faces, "<u4"))
+            left -= len(surface.faces)
+            if left < 0 or (len(surface.faces) and int(surface.faces.max()) >= len(surface.points)):
+                raise ValueError("triangles that there may not be")
+            found.append(surface)
+        links.append(LinkBody(found, points_of_link))
+    if at != len(data):
+        raise ValueError("more than was announced")
+    return links, int(sizes["triangles"])
+
+
+def _checked(color: object) -> Rgb | None:
+    match color:
+        case None:
+            return None
+        case [int(red), int(green), int(blue)] if all(0 <= value <= 255 for value in (red, green, blue)):
+            return red, green, blue
+    raise ValueError("no colour")

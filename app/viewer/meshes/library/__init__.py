@@ -24,7 +24,7 @@ import numpy as np
 
 from app.shared.memory.answers import Reservation
 from app.viewer.meshes.archive import MeshError
-from app.viewer.meshes.links import drawing_of, mesh_files, size_of
+from app.viewer.meshes.links import drawing_of, shapes_of, size_of
 from app.viewer.meshes.reader import Meshes, MeshReader
 from app.viewer.scene.bodies import Drawing
 from app.viewer.scene.chain import link_poses
@@ -73,7 +73,7 @@ def detailed(robot: Robot) -> Detailed | None:
         T = robot.T_world_base @ np.array(matrix_of(part.get("xyz", (0, 0, 0)), rpy))
         shape = MeshFile(part["mesh"], (part.get("scale", 1.0),) * 3)
         visuals.append(Visual("", k, at_zero[k] @ inverse(at_pose[k]) @ T, shape, _rgb(part.get("color"))))
-    if not all((folder / name).is_file() for name in mesh_files(visuals)):
+    if not all((folder / name).is_file() for name in shapes_of(robot, visuals).files):
         log.warning("%s has not the meshes of %s that were expected", data["package"], robot.name)
         return None
     return Detailed(folder, tuple(visuals))
@@ -123,14 +123,14 @@ class Library:
         if paused:
             loaded(why)
         elif first:
-            future = self._reader.read_package(mesh_files(source.visuals), source.folder)
-            future.add_done_callback(lambda done: self._keep(robot, source, done))
+            future = self._reader.read_package(shapes_of(robot, source.visuals), source.folder)
+            future.add_done_callback(lambda done: self._keep(robot, done))
         return None
 
-    def _keep(self, robot: Robot, source: Detailed, done: Future[Meshes]) -> None:
+    def _keep(self, robot: Robot, done: Future[Meshes]) -> None:
         try:
             meshes = done.result()
-            body = drawing_of(robot, source.visuals, meshes)
+            body = drawing_of(meshes.links)
             meshes.room.resize(size_of(body))
         except Exception as error:  # noqa: BLE001 - our own drawing is shown instead
             self._give_up(robot, error)

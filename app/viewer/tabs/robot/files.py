@@ -6,6 +6,7 @@ import base64
 import binascii
 import time
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import kin
 from app.shared.memory.answers import AnswerMemory, MemoryFullError, Reservation
@@ -17,6 +18,15 @@ from kin import InputError, Robot, RobotFileError
 from kin.files.urdf.tree import Tip, read_tree
 
 MOST = 300_000  # characters of a file that is text
+
+
+class Busy(NamedTuple):
+    """Something that takes a while: how much of it is done, and of how much; 0: not known."""
+
+    words: str
+    done: int
+    total: int
+    unit: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +71,7 @@ class Incoming:
     Attributes:
         name: of the file of which more is to come; empty if there is none.
         last: when the last part came, as `time.perf_counter` tells it.
+        total: bytes of a zip of which more is to come, as its sender says.
     """
 
     def __init__(self, memory: AnswerMemory) -> None:
@@ -69,7 +80,7 @@ class Incoming:
 
     def forget(self) -> None:
         """Drop what has arrived."""
-        self.name, self.last = "", 0.0
+        self.name, self.last, self.total = "", 0.0, 0
         self._parts: list[str | bytes] = []
         self._length = 0
         self._room = self._memory.reserve(0)
@@ -86,11 +97,11 @@ class Incoming:
             MeshError: the file is too large; its parts are forgotten.
             kin.InputError: not a part of a file.
         """
-        name, first, last, part, from_ = _part(value)
+        name, first, last, part, from_, total = _part(value)
         from_ = self._length if from_ is None else from_
         if first:
             self.forget()
-            self.name = name
+            self.name, self.total = name, total
         elif not self._parts:
             return None  # the rest of a file that was refused
         elif not self._follows(name, part, from_):
@@ -122,14 +133,14 @@ class Incoming:
         return same and before == self._length
 
 
-def _part(value: object) -> tuple[str, bool, bool, str | bytes, int | None]:
-    """Name, whether it is the first and the last part, content, and of a zip how much came before."""
+def _part(value: object) -> tuple[str, bool, bool, str | bytes, int | None, int]:
+    """Name, whether it is the first and the last part, content; of a zip how much came before, and its size."""
     match value:
         case [str(name), bool(first), bool(last), str(part)] if part or last:
-            return cut(name), first, last, part, None
-        case [str(name), bool(first), bool(last), str(part), "base64", int(before)] if part or last:
+            return cut(name), first, last, part, None, 0
+        case [str(name), bool(first), bool(last), str(part), "base64", int(before), int(total)] if part or last:
             try:
-                return cut(name), first, last, base64.b64decode(part, validate=True), before
+                return cut(name), first, last, base64.b64decode(part, validate=True), before, total
             except (binascii.Error, ValueError):
                 pass
     raise InputError("upload", value, "name, whether it is the first part, the last part, and its text or base64")

@@ -14,14 +14,14 @@ from app.exports.snippets import named
 from app.shared.answers.inspection import inspect
 from app.viewer.feature import Feature, Stage
 from app.viewer.frames import Frames
-from app.viewer.own_arm import KEY, OwnArm, label, own_arm
+from app.viewer.own_arm import OwnArm
 from app.viewer.panel import update_html
 from app.viewer.panel.status import Notice
 from app.viewer.tabs.robot import edits, views, workpieces
+from app.viewer.tabs.robot.beginnings import Beginnings
 from app.viewer.tabs.robot.edits import Cell, EditError
 from app.viewer.tabs.robot.expression import LONGEST, cut
 from app.viewer.tabs.robot.files import text_of
-from app.viewer.tabs.robot.presets import PRESETS, TITLES
 from app.viewer.tabs.robot.texts import Texts
 from app.viewer.tabs.robot.uploads import Uploads
 from kin import InputError, RobotFileError
@@ -41,7 +41,7 @@ class RobotTab(Feature):
     messages = frozenset(
         {
             *("cell", "row", "start", "convention", "convert", "reset", "delete", "discard", "left"),
-            *("download", "upload", "urdf", "tip"),
+            *("download", "upload", "urdf", "tip", "cancel"),
             *("frame-add", "frame-remove"),
         }
     )
@@ -52,15 +52,16 @@ class RobotTab(Feature):
         self._texts = Texts()
         self._revision = 0  # of the rows: a message about other rows is out of date
         self._editing = ""  # the part of the tab in which the visitor types
-        self._uploads = Uploads(stage, self.post, lambda own, words: self._begin(own, words))
+        self._uploads = Uploads(stage, self.post, lambda own, words: self._beginnings.begin(own, words))
+        self._beginnings = Beginnings(stage, lambda: self._uploads.last)
         self._converting = False
         gui = stage.client.gui
         self._html = {name: gui.add_html("") for name in PARTS}
         self._handlers: dict[str, Callable[[object], None]] = {
-            "start": self._start,
+            "start": self._beginnings.start,
             "convention": self._reread,
             "reset": lambda _: self._reset(),
-            "delete": lambda _: self._delete(),
+            "delete": lambda _: self._beginnings.delete(),
             "discard": lambda _: self._refresh(),
             "left": lambda _: self._leave_table(),
             "convert": self._convert,
@@ -68,6 +69,7 @@ class RobotTab(Feature):
             "upload": self._upload,
             "urdf": lambda value: self._open(lambda: self._uploads.choose("urdf", value)),
             "tip": lambda value: self._open(lambda: self._uploads.choose("tip", value)),
+            "cancel": lambda _: self._cancel(),
             "frame-add": lambda _: self._use_frames(workpieces.added(self.stage)),
             "frame-remove": lambda index: self._use_frames(workpieces.removed(self.stage.frames, index)),
         }
@@ -81,6 +83,9 @@ class RobotTab(Feature):
                 self._change_rows(action, index)
             case ("meshes", int(number)):
                 self._uploads.use_meshes(number, value)
+                self._show_files()
+            case ("reading", int(number)):
+                self._uploads.note_progress(number, value)
                 self._show_files()
             case (str(name),) if name in self._handlers:
                 self._handlers[name](value)
@@ -136,7 +141,10 @@ class RobotTab(Feature):
         if self._editing != "frames":
             self._show("frames", views.frames(robot, units, self.stage.frames, self._texts))
         if self._editing != "start":
-            self._show("start", views.start(robot, self._origin, self._own is not None, self.stage.store.robots))
+            self._show(
+                "start",
+                views.start(robot, self._beginnings.origin, self._own is not None, self.stage.store.robots),
+            )
         self._show("about", views.about(inspect(robot), robot, units))
         self._show_conversion()
         self._show_files()
@@ -157,7 +165,7 @@ class RobotTab(Feature):
         own = self._own
         file = "" if own is None else self.stage.bodies.file_of(own)
         heavy, uploads = bool(file) or self.stage.bodies.detailed, self._uploads
-        self._show("files", views.files(uploads.waiting, uploads.arrived, uploads.reading, file, heavy))
+        self._show("files", views.files(uploads.waiting, uploads.busy, file, heavy))
 
     def _leave_table(self) -> None:
         """The visitor has left the fields: write every value as it is read, unless something is wrong."""
@@ -167,18 +175,7 @@ class RobotTab(Feature):
     @property
     def _own(self) -> OwnArm | None:
         """The visitor's own arm if it is on show."""
-        own = self.stage.own
-        return own if own is not None and own.robot == self.stage.robot else None
-
-    @property
-    def _origin(self) -> str:
-        """What the arm on show was made from: a key of *Start from*, or `views.FILE` or `views.LINK`."""
-        own = self._own
-        start = self.stage.robot.id if own is None else own.start
-        if start in PRESETS or any(robot.id == start for robot in self.stage.store.robots):
-            return start
-        last = self._uploads.last
-        return views.FILE if last is not None and start == last.robot.id else views.LINK
+        return self._beginnings.own
 
     # Changes
 
@@ -195,7 +192,7 @@ class RobotTab(Feature):
             self._editing = ""
         lost = self._lost(before)
         if replaced is not None:
-            self._say_replaced(replaced, f"{own.robot.name} is now your own arm.", lost)
+            self._beginnings.say_replaced(replaced, f"{own.robot.name} is now your own arm.", lost)
         elif lost:
             self.stage.notify(Notice("advice", "A field that was not valid is as before", lost))
 
@@ -312,68 +309,9 @@ class RobotTab(Feature):
         self._refresh()
         self.stage.notify(Notice("error", title, f"{detail} {self._lost(before)}".strip()))
 
-    # Beginnings
-
-    def _start(self, key: object) -> None:
-        """Begin with an example, or show a robot of the service."""
-        if isinstance(key, str) and key in PRESETS:
-            own = own_arm(PRESETS[key], key)
-            self._begin(own, own.robot.description)
-            return
-        robot = next((r for r in self.stage.store.robots if r.id == key), None)
-        if robot is None:
-            valid = [*TITLES, *(r.id for r in self.stage.store.robots)]
-            raise InputError("start", key, "one of " + ", ".join(valid))
-        self.stage.change_robot(robot)
-        self.stage.notify(Notice("hand", robot.name, "Change its table: it becomes an arm of your own."))
-
-    def _begin(self, own: OwnArm, words: str) -> None:
-        """Show another own arm; one that this replaces is not lost without a word."""
-        replaced = self.stage.own
-        self.stage.show_own(own)
-        if replaced is None or replaced == own or self._is_as_it_began(replaced):
-            self.stage.notify(Notice("hand", own.robot.name, words))
-        else:
-            self._say_replaced(replaced, f"{own.robot.name}: {words}" if words else f"{own.robot.name} is shown.")
-
-    def _is_as_it_began(self, own: OwnArm) -> bool:
-        """Whether an own arm is an example that nobody has changed."""
-        return own.start in PRESETS and own.robot == own_arm(PRESETS[own.start]).robot
-
-    def _say_replaced(self, replaced: OwnArm, words: str, lost: str = "") -> None:
-        detail = f"{words} Undo brings the other back. {lost}".strip()
-        self.stage.notify(Notice("advice", f"{label(replaced.robot)} was replaced", detail))
-
-    def _delete(self) -> None:
-        """Delete the own arm on show; undo brings it back."""
-        if self._own is None:
-            return
-        name = label(self._own.robot)
-        self.stage.discard_own()
-        detail = f"{self.stage.robot.name} is shown. Undo brings your arm back."
-        self.stage.notify(Notice("advice", f"{name} was deleted", detail))
-
     def _reset(self) -> None:
-        own, origin = self._own, self._origin
-        if own is None:
-            return
-        last = self._uploads.last
-        if origin == views.FILE and last is not None:
-            self.stage.show_own(last)
-            self.stage.notify(Notice("hand", last.robot.name, last.robot.description))
-        elif origin in PRESETS:
-            self.stage.show_own(own_arm(PRESETS[origin], origin))
-            self.stage.notify(Notice("hand", self.stage.robot.name, self.stage.robot.description))
-        elif origin != views.LINK:
-            self._start(origin)
-        else:
-            if own.start.startswith(f"{KEY}-"):
-                words = "The arm came from a file, which this page no longer has: open the file again."
-            elif own.start:
-                words = f"The arm was made from “{own.start}”, which this service does not have."
-            else:
-                words = "The arm came with a link."
-            self._refuse("There is nothing to reset to", f"{words} Undo goes back one step.")
+        if words := self._beginnings.reset():
+            self._refuse("There is nothing to reset to", words)
 
     # Files
 
@@ -393,6 +331,12 @@ class RobotTab(Feature):
             act()
         except RobotFileError as error:
             self._refuse(UNUSED, str(error))
+        self._show_files()
+
+    def _cancel(self) -> None:
+        """End what goes on with a file."""
+        if words := self._uploads.stop():
+            self.stage.notify(Notice("hand", "Cancelled", words))
         self._show_files()
 
     def on_leave(self) -> None:

@@ -2,37 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
+from functools import partial
 
-from app.shared.memory.answers import MemoryFullError
+from app.shared.memory.answers import MemoryFullError, Reservation
 from app.viewer.feature import Stage
 from app.viewer.meshes.archive import MeshError
-from app.viewer.meshes.links import drawing_of, mesh_files, size_of
+from app.viewer.meshes.links import drawing_of, drawing_without_meshes, shapes_of, size_of
+from app.viewer.meshes.placing import Shapes
 from app.viewer.meshes.reader import MOST_TRIANGLES, Meshes, full
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import Post
 from app.viewer.panel.status import Notice
-from app.viewer.tabs.robot.files import Incoming, Source, arm_of, file_error, is_urdf, opened
+from app.viewer.scene.bodies import Drawing
+from app.viewer.tabs.robot.files import Busy, Incoming, Source, arm_of, file_error, is_urdf, opened
 from kin import InputError, KinematicsError, Robot, RobotFileError
-from kin.files.urdf.visuals import MeshFile, Visual, read_visuals
+from kin.files.urdf.visuals import MeshFile, read_visuals
 
 HERE = "They are in this page only, not in its link."
 
 
 @dataclass(frozen=True, eq=False)
 class _Reading:
-    """Meshes that are being read: of which arm and file, and what they are called in the zip."""
+    """Meshes that are being read: of which arm and file, how many, and how many have been read."""
 
     robot: Robot
     source: Source
-    visuals: Sequence[Visual]
-    names: dict[str, str]
+    count: int
+    done: int = 0
 
 
 class Uploads:
-    """The files of one visitor. Posts ``("meshes", number)`` when meshes were read.
+    """The files of one visitor.
+
+    Posts ``("reading", number)`` while meshes are being read, and ``("meshes", number)`` when they were.
 
     Args:
         begin: shows an own arm that a file gave, with what is to be said about it.
@@ -54,14 +59,24 @@ class Uploads:
         self.last: OwnArm | None = None
 
     @property
-    def arrived(self) -> int:
-        """Bytes of a zip of which more is to come."""
-        return self._incoming.arrived
+    def busy(self) -> Busy | None:
+        """What goes on."""
+        if self._incoming.arrived:
+            return Busy("Receiving the zip", self._incoming.arrived, self._incoming.total, "MB")
+        if self._reading is not None:
+            name = self._reading.source.name
+            return Busy(f"Reading the meshes of “{name}”", self._reading.done, self._reading.count)
+        return None
 
-    @property
-    def reading(self) -> str:
-        """The file whose meshes are being read; empty: none."""
-        return "" if self._reading is None else self._reading.source.name
+    def stop(self) -> str:
+        """End what goes on; returns what is to be said about it."""
+        receiving, reading = bool(self._incoming.arrived), self._reading
+        self._incoming.forget()
+        self._reading = None
+        self._cancel()
+        if receiving:
+            return "The file was not used; the arm stays as it is."
+        return "" if reading is None else "The arm is a skeleton; open the file again to see its meshes."
 
     def forget(self) -> None:
         """The visitor has left."""
@@ -143,33 +158,34 @@ class Uploads:
     def _look(self, robot: Robot, source: Source, tip: str | None) -> str:
         """Draw what the links look like, or have their meshes read; returns what is to be said about it."""
         visuals = read_visuals(source.text, tip, source.name)
-        files = mesh_files(visuals)
         if source.archive is None:
-            shapes = [visual for visual in visuals if not isinstance(visual.shape, MeshFile)]
-            if not files and shapes:
-                self._draw(_Reading(robot, source, shapes, {}), self._no_meshes())
-            return "Open a zip of this file and its meshes, and they are shown." if files else ""
-        try:
-            names = {path: source.archive.find(path, source.urdf) for path in files}
-        except MeshError as error:
-            raise file_error(source.name, error) from None
-        reading = _Reading(robot, source, visuals, names)
-        if not files:
-            self._draw(reading, self._no_meshes())
+            plain = [visual for visual in visuals if not isinstance(visual.shape, MeshFile)]
+            if plain == list(visuals):
+                self._draw_plain(robot, source, shapes_of(robot, plain))
+                return ""
+            return "Open it together with its meshes, and they are shown."
+        shapes = shapes_of(robot, visuals)
+        count = len(shapes.files)
+        if not count:
+            self._draw_plain(robot, source, shapes)
             return ""
-        uses: dict[str, int] = {}
-        for path, name in names.items():
-            uses[name] = uses.get(name, 0) + files[path]
         self._number += 1
-        key = ("meshes", self._number)
+        done, read = ("meshes", self._number), ("reading", self._number)
         try:
-            future = self._stage.meshes.read(uses, source.data, source.room)
+            future = self._stage.meshes.read(
+                shapes, source.data, source.urdf, source.room, lambda k, _: self._post(read, k)
+            )
         except MeshError as error:
             raise file_error(source.name, error) from None
-        self._reading = reading
-        future.add_done_callback(lambda done: self._post(key, done))
+        self._reading = _Reading(robot, source, count)
+        future.add_done_callback(partial(self._post, done))
         self._future = future
-        return f"Its {len(uses)} meshes are being read."
+        return f"Its {count} meshes are being read."
+
+    def note_progress(self, number: int, done: object) -> None:
+        """So many meshes of the file have been read."""
+        if self._reading is not None and number == self._number and isinstance(done, int):
+            self._reading = replace(self._reading, done=done)
 
     def use_meshes(self, number: int, done: object) -> None:
         """Draw meshes that were read, unless another file was opened since."""
@@ -177,33 +193,36 @@ class Uploads:
         if number != self._number or reading is None or not isinstance(done, Future):
             return
         self._reading = self._future = None
+        source = reading.source
         try:
             meshes: Meshes = done.result()
-            files = {path: meshes.files[name] for path, name in reading.names.items()}
-            self._draw(reading, replace(meshes, files=files))
+            self._draw(reading.robot, source, drawing_of(meshes.links), meshes.room)
         except (MeshError, KinematicsError) as error:
-            known = file_error(reading.source.name, error) if isinstance(error, MeshError) else error
-            self._say_wrong(reading.source, str(known))
+            known = file_error(source.name, error) if isinstance(error, MeshError) else error
+            self._say_wrong(source, str(known))
             return
         self._stage.redraw_body()
-        words = f"{len(meshes.files)} meshes with {meshes.triangles} triangles"
+        words = f"{reading.count} meshes with {meshes.triangles} triangles"
         if meshes.triangles > MOST_TRIANGLES:
             words += f", simplified to about {MOST_TRIANGLES}"
-        self._stage.notify(Notice("hand", f"The meshes of {reading.source.name} are shown", f"{words}. {HERE}"))
+        self._stage.notify(Notice("hand", f"The meshes of {source.name} are shown", f"{words}. {HERE}"))
 
-    def _draw(self, reading: _Reading, meshes: Meshes) -> None:
+    def _draw_plain(self, robot: Robot, source: Source, shapes: Shapes) -> None:
+        """Draw boxes, cylinders and spheres."""
+        if not shapes.pieces:
+            return
         try:
-            body = drawing_of(reading.robot, reading.visuals, meshes)
-            meshes.room.resize(size_of(body))
+            self._draw(robot, source, drawing_without_meshes(shapes), self._stage.meshes.memory.reserve(0))
         except MeshError as error:
-            raise file_error(reading.source.name, error) from None
-        except MemoryFullError:
-            raise file_error(reading.source.name, full()) from None
-        if any(body.parts):
-            self._stage.bodies.add(reading.robot, body, meshes.room, reading.source.name)
+            raise file_error(source.name, error) from None
 
-    def _no_meshes(self) -> Meshes:
-        return Meshes({}, 0, self._stage.meshes.memory.reserve(0))
+    def _draw(self, robot: Robot, source: Source, body: Drawing, room: Reservation) -> None:
+        try:
+            room.resize(size_of(body))
+        except MemoryFullError:
+            raise file_error(source.name, full()) from None
+        if any(body.parts):
+            self._stage.bodies.add(robot, body, room, source.name)
 
     def _say_wrong(self, source: Source, words: str) -> None:
         detail = f"The arm is a skeleton. {words}"

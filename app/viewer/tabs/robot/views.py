@@ -11,7 +11,7 @@ from app.viewer.frames import MOST as MOST_FRAMES
 from app.viewer.frames import Frames
 from app.viewer.meshes.archive import MB, MOST_BYTES
 from app.viewer.tabs.robot.edits import ANGLES, AXES, FRAMES, KINDS, NUMBERS, Cell, frame_values, name_of
-from app.viewer.tabs.robot.files import MOST, Source
+from app.viewer.tabs.robot.files import MOST, Busy, Source
 from app.viewer.tabs.robot.presets import TITLES
 from app.viewer.tabs.robot.texts import Texts
 from app.viewer.views.templates import render
@@ -195,15 +195,14 @@ def frames(robot: Robot, units: Units, page: Frames, texts: Texts) -> str:
     return render("robot/frames", heads=AXES, rows=fixed, workpieces=own, full=full, length=length, angle=angle)
 
 
-def files(waiting: Source | None, arrived: int, reading: str, meshes: str, heavy: bool) -> str:
+def files(waiting: Source | None, busy: Busy | None, meshes: str, heavy: bool) -> str:
     """Buttons for files, and what is to be chosen, arriving or known about them.
 
     Args:
         waiting: a file with several ends or several URDFs to choose from.
-        arrived: bytes of a zip of which more is to come.
-        reading: the file whose meshes are being read.
+        busy: what goes on with a file.
         meshes: the file whose meshes the arm on show has.
-        heavy: whether it may have meshes, of that file or of a package: they are sent again with each change.
+        heavy: whether it may have meshes, of that file or of a package.
     """
     choice: dict[str, Any] | None = None
     if waiting is not None:
@@ -221,17 +220,22 @@ def files(waiting: Source | None, arrived: int, reading: str, meshes: str, heavy
         choice |= {"file": waiting.name, "options": options[:MOST_TIPS], "more": max(0, len(options) - MOST_TIPS)}
     most = f"{MOST // 1000} kB", f"{MOST_BYTES // MB} MB"
     limits = {"text": MOST, "zip": MOST_BYTES}
-    here = f"{arrived / MB:.1f} MB" if arrived else ""
     return render(
         "robot/files",
         most=most,
         limits=limits,
         choice=choice,
-        arrived=here,
-        reading=reading,
+        busy=busy,
+        shown="" if busy is None else _amount(busy),
         meshes=meshes,
         heavy=heavy,
     )
+
+
+def _amount(busy: Busy) -> str:
+    """How much is done, such as ``1.2 of 7.5 MB``."""
+    done, total = (f"{n / MB:.1f}" if busy.unit == "MB" else f"{n}" for n in (busy.done, busy.total))
+    return f"{done} of {total} {busy.unit}".strip() if busy.total else f"{done} {busy.unit}".strip()
 
 
 def conversion(robot: Robot, other: Robot | None, units: Units) -> str:

@@ -18,7 +18,8 @@ import kin
 from app.viewer.meshes.archive import MeshError
 from app.viewer.meshes.bodies import KEPT, Bodies
 from app.viewer.meshes.library import Library, detailed
-from app.viewer.meshes.links import PLAIN, carried_over, drawing_of, mesh_files
+from app.viewer.meshes.links import carried_over, drawing_of, shapes_of
+from app.viewer.meshes.placing import PLAIN
 from app.viewer.meshes.reader import Meshes, MeshReader
 from app.viewer.own_arm import OwnArm
 from app.viewer.scene.bodies import Drawing, drawing
@@ -70,13 +71,14 @@ def reader():
 @pytest.fixture(scope="module")
 def two(reader: MeshReader) -> tuple[Robot, Drawing, Meshes]:
     robot = kin.load_urdf(TWO_JOINTS)
-    visuals = read_visuals(TWO_JOINTS)
-    names = {"package://two_description/meshes/upper.stl": "two/meshes/upper.stl"}
-    names["../meshes/fore.obj"] = "two/meshes/fore.obj"
-    assert list(mesh_files(visuals)) == list(names)
-    read = reader.of("a").read(dict.fromkeys(names.values(), 1), packed(robot_files())).result()
-    meshes = replace(read, files={path: read.files[name] for path, name in names.items()})
-    return robot, drawing_of(robot, visuals, meshes), meshes
+    meshes = read_two(reader, robot)
+    return robot, drawing_of(meshes.links), meshes
+
+
+def read_two(reader: MeshReader, robot: Robot, urdf: str = TWO_JOINTS) -> Meshes:
+    shapes = shapes_of(robot, read_visuals(urdf))
+    assert list(shapes.files) == ["package://two_description/meshes/upper.stl", "../meshes/fore.obj"]
+    return reader.of("a").read(shapes, packed(robot_files()), "two/urdf/two.urdf").result()
 
 
 def test_every_body_moves_with_its_link(two: tuple[Robot, Drawing, Meshes]) -> None:
@@ -103,19 +105,17 @@ def test_colours_are_those_of_the_mesh_or_else_of_the_urdf(two: tuple[Robot, Dra
     assert colors == [{PLAIN}, {(0, 0, 255)}, {(255, 0, 0), (255, 255, 255), PLAIN}]
 
 
-def test_a_mesh_in_millimetres_is_refused_with_the_remedy(two: tuple[Robot, Drawing, Meshes]) -> None:
-    robot, _, meshes = two
-    visuals = read_visuals(TWO_JOINTS.replace('scale="0.001 0.001 0.001"', ""))
+def test_a_mesh_in_millimetres_is_refused_with_the_remedy(reader: MeshReader) -> None:
     with pytest.raises(MeshError) as caught:
-        drawing_of(robot, visuals, meshes)
+        read_two(reader, kin.load_urdf(TWO_JOINTS), TWO_JOINTS.replace('scale="0.001 0.001 0.001"', ""))
     assert "upper.stl: size" in caught.value.field
     assert "0.001 0.001 0.001" in caught.value.expected
 
 
-def test_a_mirrored_mesh_is_not_inside_out(two: tuple[Robot, Drawing, Meshes]) -> None:
-    robot, body, meshes = two
-    mirrored = read_visuals(TWO_JOINTS.replace('scale="0.001 0.001 0.001"', 'scale="0.001 -0.001 0.001"'))
-    other = drawing_of(robot, mirrored, meshes)
+def test_a_mirrored_mesh_is_not_inside_out(reader: MeshReader, two: tuple[Robot, Drawing, Meshes]) -> None:
+    robot, body, _ = two
+    mirrored = TWO_JOINTS.replace('scale="0.001 0.001 0.001"', 'scale="0.001 -0.001 0.001"')
+    other = drawing_of(read_two(reader, robot, mirrored).links)
     for found in (body, other):
         mesh = found.parts[1][0].mesh
         a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
@@ -224,8 +224,8 @@ def library(reader: MeshReader) -> dict[str, Drawing]:
     for name in DETAILED:
         source = detailed(kin.get_robot(name))
         assert source is not None, "its package is one of the test dependencies"
-        meshes = reader.read_package(mesh_files(source.visuals), source.folder).result()
-        found[name] = drawing_of(kin.get_robot(name), source.visuals, meshes)
+        shapes = shapes_of(kin.get_robot(name), source.visuals)
+        found[name] = drawing_of(reader.read_package(shapes, source.folder).result().links)
     return found
 
 

@@ -12,15 +12,19 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from zips import MTL, announced, obj, packed, robot_files
+from zips import MTL, TWO_JOINTS, announced, obj, packed, robot_files
 
+import kin
 from app.shared.memory.answers import MemoryFullError
 from app.viewer.meshes import reader as readers
 from app.viewer.meshes.archive import MOST_BYTES, MeshError
 from app.viewer.meshes.child import answer_to
+from app.viewer.meshes.links import shapes_of
 from app.viewer.meshes.loading import PARSED, finished, read_surfaces
-from app.viewer.meshes.reader import PACKAGES, Meshes, MeshReader
-from app.viewer.meshes.surface import GREY, Surface, by_color, pack, unpack
+from app.viewer.meshes.placing import Piece
+from app.viewer.meshes.reader import PACKAGES, ClientMeshes, Meshes, MeshReader
+from app.viewer.meshes.surface import GREY, LinkBody, Surface, by_color, pack, unpack
+from kin.files.urdf.visuals import read_visuals
 
 ROOT = Path(__file__).parents[4]
 
@@ -136,15 +140,41 @@ def test_rare_colours_join_the_closest_one() -> None:
 
 
 def test_surfaces_survive_the_way_between_processes() -> None:
-    one = Surface((1, 2, 3), np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.uint32))
-    found, triangles = unpack(["a", "b"], pack({"a": [one, one._replace(color=None)], "b": []}, 7))
+    (first, second), triangles = unpack(pack(LINKS, 7), 2)
     assert triangles == 7
-    assert [s.color for s in found["a"]] == [(1, 2, 3), None]
-    assert np.array_equal(found["a"][1].points, one.points)
-    assert found["b"] == []
+    assert [s.color for s in first.surfaces] == [(1, 2, 3), None]
+    assert np.array_equal(first.surfaces[1].points, ONE.points)
+    assert np.array_equal(first.cover, ONE.points)
+    assert list(second.surfaces) == []
 
 
-FILES = {"two/meshes/upper.stl": 1, "two/meshes/fore.obj": 2}
+ONE = Surface((1, 2, 3), np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.uint32))
+LINKS = [LinkBody([ONE, ONE._replace(color=None)], ONE.points), LinkBody([], np.empty((0, 3), np.float32))]
+WRONG = {
+    "too many triangles": pack(LINKS),
+    "an index that is none": pack([LinkBody([ONE._replace(faces=np.array([[0, 1, 3]], np.uint32))], ONE.points)]),
+    "no number": pack([LinkBody([ONE._replace(points=np.full((3, 3), np.nan, np.float32))], ONE.points)]),
+    "a longer answer": pack(LINKS[1:]) + b"more",
+    "a shorter one": pack(LINKS[:1])[:-4],
+    "a negative size": pack(LINKS[1:]).replace(b"[0,", b"[-1,"),
+    "a size that is no number": pack(LINKS[1:]).replace(b"[0,", b'["1",'),
+    "no colour": pack(LINKS[:1]).replace(b"[1, 2, 3]", b"[1, 2, 256]"),
+    "no JSON": b"\x00\n",
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_an_answer_of_the_process_is_checked(what: str) -> None:
+    with pytest.raises((ValueError, KeyError, TypeError)):
+        unpack(WRONG[what], 1)
+
+
+TWO, URDF = kin.load_urdf(TWO_JOINTS), "two/urdf/two.urdf"
+SHAPES = shapes_of(TWO, read_visuals(TWO_JOINTS))
+
+
+def read(mine: ClientMeshes, data: bytes, room: Any = None) -> Any:
+    return mine.read(SHAPES, data, URDF, room)
 
 
 @pytest.fixture(scope="module")
@@ -158,10 +188,13 @@ def test_the_process_reads_a_zip_and_its_memory_is_given_back(
     reader: MeshReader, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("app.shared.memory.answers.SMALL", 0)
-    meshes = reader.of("a").read(FILES, packed(robot_files())).result()
-    assert meshes.triangles == 12 + 2 * 12
-    assert [len(s.faces) for s in meshes.files["two/meshes/upper.stl"]] == [12]
-    assert {s.color for s in meshes.files["two/meshes/fore.obj"]} == {(255, 0, 0), (255, 255, 255)}
+    reports: list[tuple[int, int]] = []
+    files, mine = packed(robot_files()), reader.of("a")
+    meshes = mine.read(SHAPES, files, URDF, None, lambda *report: reports.append(report)).result()
+    assert reports == [(0, 2), (1, 2)]
+    assert meshes.triangles == 12 + 12
+    assert [[len(s.faces) for s in link.surfaces] for link in meshes.links][1] == [12]
+    assert {s.color for s in meshes.links[2].surfaces} > {(255, 0, 0), (255, 255, 255)}
     assert reader.memory.held > 0
     del meshes
     assert reader.memory.held == 0
@@ -171,11 +204,11 @@ def test_the_process_says_what_is_wrong_and_may_not_take_long(
     reader: MeshReader, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with pytest.raises(MeshError) as caught:
-        reader.of("a").read(FILES, packed({**robot_files(), "two/meshes/upper.stl": b"x" * 100})).result()
+        read(reader.of("a"), packed({**robot_files(), "two/meshes/upper.stl": b"x" * 100})).result()
     assert "upper.stl" in caught.value.field
     monkeypatch.setattr(readers, "PATIENCE", 0.01)
     with pytest.raises(MeshError, match="too much work"):
-        reader.of("a").read(FILES, packed(robot_files())).result()
+        read(reader.of("a"), packed(robot_files())).result()
 
 
 class Queue(MeshReader):
@@ -190,7 +223,7 @@ class Queue(MeshReader):
         self.order.append(request.client)
         self.begun.set()
         assert self.go.wait(30.0)
-        return Meshes({}, 0, request.memory.reserve(0))
+        return Meshes([], 0, request.memory.reserve(0))
 
 
 @pytest.fixture
@@ -202,19 +235,19 @@ def queue():
 
 
 def test_one_client_leaves_places_for_others_and_clients_take_turns(queue: Queue) -> None:
-    futures = [queue.of("greedy").read(FILES, b"") for _ in range(6)]
+    futures = [read(queue.of("greedy"), b"") for _ in range(6)]
     assert queue.begun.wait(30.0)
     with pytest.raises(MeshError, match="are waiting"):
-        queue.of("greedy").read(FILES, b"")
-    futures += [queue.of(name).read(FILES, b"") for name in ("second", "third")]
+        read(queue.of("greedy"), b"")
+    futures += [read(queue.of(name), b"") for name in ("second", "third")]
     with pytest.raises(MeshError, match="8 requests are waiting"):
-        queue.of("fourth").read(FILES, b"")
-    futures.append(queue.read_package(FILES, Path("package")))
+        read(queue.of("fourth"), b"")
+    futures.append(queue.read_package(SHAPES, Path("package")))
     queue.go.set()
     for future in futures:
         future.result(30.0)
     assert queue.order == ["greedy", "greedy", "second", "third", PACKAGES, *["greedy"] * 4]
-    queue.of("fourth").read(FILES, b"").result(30.0)
+    read(queue.of("fourth"), b"").result(30.0)
 
 
 def test_a_cancelled_request_gives_back_its_place_and_the_room_of_its_zip(
@@ -222,14 +255,14 @@ def test_a_cancelled_request_gives_back_its_place_and_the_room_of_its_zip(
 ) -> None:
     monkeypatch.setattr("app.shared.memory.answers.SMALL", 0)
     mine = queue.of("a")
-    running = mine.read(FILES, b"", mine.memory.reserve(7))
+    running = read(mine, b"", mine.memory.reserve(7))
     assert queue.begun.wait(30.0)
-    waiting = [mine.read(FILES, b"", mine.memory.reserve(1000)) for _ in range(5)]
+    waiting = [read(mine, b"", mine.memory.reserve(1000)) for _ in range(5)]
     assert queue.memory.held == mine.memory.held == 5007
     for future in waiting:
         queue.cancel(future)
     assert queue.memory.held == 7, "the room is kept exactly as long as the zip"
-    waiting = [mine.read(FILES, b"") for _ in range(5)]
+    waiting = [read(mine, b"") for _ in range(5)]
     queue.go.set()
     running.result(30.0)
     for future in waiting:
@@ -249,12 +282,12 @@ def test_meshes_that_are_being_read_can_be_cancelled(reader: MeshReader, monkeyp
 
     with monkeypatch.context() as patch:
         patch.setattr(subprocess, "Popen", Asleep)
-        future = mine.read(FILES, packed(robot_files()), mine.memory.reserve(1000))
+        future = read(mine, packed(robot_files()), mine.memory.reserve(1000))
         assert begun.wait(30.0)
         reader.cancel(future)
         with pytest.raises(MeshError):
             future.result(30.0)
-    assert mine.read(FILES, packed(robot_files())).result().triangles == 36
+    assert read(mine, packed(robot_files())).result().triangles == 24
     assert reader.memory.held == 0
 
 
@@ -281,7 +314,7 @@ def test_meshes_beyond_the_memory_of_the_process_are_refused(monkeypatch: pytest
     small = MeshReader()
     small.memory._most = 100
     with pytest.raises(MeshError, match="as many as it may"):
-        small.of("a").read(FILES, packed(robot_files())).result()
+        read(small.of("a"), packed(robot_files())).result()
     small.close()
 
 
@@ -317,7 +350,25 @@ def test_what_cannot_be_drawn_or_simplified_is_refused(tmp_path: Path) -> None:
     soup = trimesh.Trimesh(noise.reshape(-1, 3), np.arange(18_000).reshape(-1, 3), process=False)
     for name, mesh in (("soup.stl", soup), ("flat.stl", flat)):
         (tmp_path / name).write_bytes(mesh.export(file_type="stl"))
-    with pytest.raises(MeshError, match="to draw"):
-        answer_to({"files": {"soup.stl": 300}, "folder": str(tmp_path), "most": 80_000}, b"")
-    with pytest.raises(MeshError, match="area"):
-        answer_to({"files": {"flat.stl": 1}, "folder": str(tmp_path), "most": 80_000}, b"")
+    for name, count, expected in (("soup.stl", 300, "to draw"), ("flat.stl", 1, "area")):
+        with pytest.raises(MeshError, match=expected):
+            answer_to(*asked(name, count, tmp_path))
+
+
+def asked(name: str, count: int, folder: Path) -> tuple[dict[str, Any], bytes]:
+    """A request for a file that is drawn so often."""
+    pose = np.eye(4)[:3].ravel().tolist()
+    solids = pack([LinkBody([], np.empty((0, 3), np.float32))])
+    request = {"pieces": [Piece(name, 0, pose)] * count, "links": 1, "reach": 1.0, "most": 80_000}
+    return {**request, "solids": len(solids), "folder": str(folder)}, solids
+
+
+def test_an_answer_without_end_is_cut_off(reader: MeshReader, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Talkative(subprocess.Popen):  # type: ignore[type-arg]
+        def __init__(self, command: list[str], **options: Any) -> None:
+            endless = "import sys\nwhile True: sys.stdout.write('N' * 10000)"
+            super().__init__([sys.executable, "-c", endless], **options)
+
+    monkeypatch.setattr(subprocess, "Popen", Talkative)
+    with pytest.raises(MeshError, match="too much work"):
+        read(reader.of("a"), packed(robot_files())).result()

@@ -20,6 +20,7 @@ from app.service.web.inspection import MAX_MESSAGE
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
+from app.viewer.meshes import reader as readers
 from app.viewer.meshes.archive import MeshError
 from app.viewer.server import ViewerServer
 
@@ -34,7 +35,7 @@ def send(tab: FakeBrowser, name: str, data: bytes) -> None:
     for at in range(0, len(data), PART):
         tab._said = tab._said[-1:]  # as the page's script does: a message to the service has a limit
         piece = base64.b64encode(data[at : at + PART]).decode()
-        say(tab, "upload", value=[name, at == 0, at + PART >= len(data), piece, "base64", at])
+        say(tab, "upload", value=[name, at == 0, at + PART >= len(data), piece, "base64", at, len(data)])
 
 
 def meshes(tab: FakeBrowser) -> set[str]:
@@ -103,7 +104,7 @@ def test_what_is_wanted_of_a_zip_is_asked(port: int) -> None:
 def test_parts_of_a_zip_fit_the_field_beside_other_messages_and_the_field_fits_a_message() -> None:
     constants = {
         name: int(value)
-        for file in ("robot", "input")
+        for file in ("robot", "upload", "input")
         for name, value in re.findall(r"const (\w+) = (\d+);", (STATIC / f"{file}.js").read_text(encoding="utf-8"))
     }
     assert 4 / 3 * constants["PART_OF_ZIP"] + 12_000 < constants["LONGEST"] < MAX_MESSAGE - 8_000
@@ -138,11 +139,14 @@ def test_a_bad_zip_changes_nothing_and_bad_meshes_leave_a_skeleton(port: int) ->
             assert words in html.unescape(tab.html), name
             assert "The arm is a skeleton" in tab.html
             assert not meshes(tab)
-        for value in (["x.zip", True, True, "%%%", "base64", 0], ["x.zip", True, True, "", "rot13", 0]):
+        for value in (
+            ["x.zip", True, True, "%%%", "base64", 0, 100_000],
+            ["x.zip", True, True, "", "rot13", 0, 1],
+        ):
             say(tab, "upload", value=value)
             assert "Invalid input" in tab.html
         for first, before in ((True, 0), (False, 7)):
-            say(tab, "upload", value=["x.zip", first, False, "UEs=", "base64", before])
+            say(tab, "upload", value=["x.zip", first, False, "UEs=", "base64", before, 9])
         assert "does not follow the one before" in tab.html
 
 
@@ -154,14 +158,22 @@ def test_an_upload_that_stalls_ends_and_gives_back_its_room(monkeypatch: pytest.
     with serve_viewer(viewer) as port, FakeBrowser(port) as tab:
         tab.settle()
         piece = base64.b64encode(bytes(15_000)).decode()
-        say(tab, "upload", value=["slow.zip", True, False, piece, "base64", 0])
+        say(tab, "upload", value=["slow.zip", True, False, piece, "base64", 0, 100_000])
         assert memory.held == 15_000
         reader.receive_timeout = 0.2
-        say(tab, "upload", value=["slow.zip", False, False, piece, "base64", 15_000])
+        say(tab, "upload", value=["slow.zip", False, False, piece, "base64", 15_000, 100_000])
         tab.wait(lambda: "slow.zip did not arrive" in tab.html)
         assert "For 0.2 s no part of it has come" in tab.html
         assert "Receiving the zip" not in part(tab, "files")
         assert memory.held == 0
+        tab._said, reader.receive_timeout = tab._said[-1:], 30.0
+        say(tab, "upload", value=["slow.zip", True, False, piece, "base64", 0, 2_000_000])
+        assert "Receiving the zip: 0.0 of 2.0 MB" in part(tab, "files")
+        say(tab, "cancel")
+        assert "The file was not used; the arm stays as it is" in tab.html
+        assert memory.held == 0
+        say(tab, "upload", value=["slow.zip", False, False, piece, "base64", 15_000, 2_000_000])
+        assert "Receiving" not in part(tab, "files"), "what is still on its way is dropped"
         send(tab, "two.zip", packed(robot_files()))
         tab.wait(lambda: meshes(tab) == ALL)
         tab.settle(0.5)
@@ -174,9 +186,9 @@ def test_the_next_zip_and_leaving_end_what_is_being_read(monkeypatch: pytest.Mon
     reader = viewer._services.meshes
     begun, ended = threading.Semaphore(0), threading.Event()
 
-    def answer(request: bytes, future: object) -> bytes:
+    def answer(request: readers._Request) -> bytes:
         begun.release()
-        while reader._running is future:
+        while reader._running is request.future:
             ended.wait(0.01)
         raise MeshError("meshes", "ended", "nothing")
 
@@ -187,6 +199,12 @@ def test_the_next_zip_and_leaving_end_what_is_being_read(monkeypatch: pytest.Mon
             send(tab, name, packed(robot_files()))
             assert begun.acquire(timeout=30.0)
         tab.wait(lambda: sum(reader._count.values()) == 1)
+        say(tab, "cancel")
+        assert "open the file again to see its meshes" in tab.html
+        assert "Reading" not in part(tab, "files")
+        tab.wait(lambda: not reader._count)
+        send(tab, "fourth.zip", packed(robot_files()))
+        assert begun.acquire(timeout=30.0)
         assert set(reader._count) == {"127.0.0.1"}, "limits per client count the address of the connection"
         tab.close()
         deadline = time.monotonic() + 30.0
@@ -214,7 +232,7 @@ def test_the_shapes_of_a_urdf_need_no_zip(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
         say(tab, "upload", value=["two.urdf", True, True, TWO_JOINTS])
-        assert "Open a zip of this file and its meshes" in tab.html
+        assert "Open it together with its meshes" in tab.html
         assert not meshes(tab)
         plain = TWO_JOINTS.replace('<mesh filename="../meshes/fore.obj"/>', '<sphere radius="0.05"/>')
         mesh = '<mesh filename="package://two_description/meshes/upper.stl" scale="0.001 0.001 0.001"/>'
