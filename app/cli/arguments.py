@@ -339,9 +339,9 @@ def add_bench(commands: Any, parents: Parents) -> argparse.ArgumentParser:
 def add_check(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard check``."""
     parser = _command(
-        commands, "check", "validate a robot file and describe the arm", parents.output, takes_robot=False
+        commands, "check", "validate a file of an arm, describe it", parents.output, takes_robot=False
     )
-    parser.add_argument("file", metavar="FILE", help="robot file (*.toml) or URDF (*.urdf)")
+    parser.add_argument("file", metavar="FILE", help="robot file (*.toml), URDF (*.urdf) or *.xacro")
     _add_links(parser)
     return parser
 
@@ -349,7 +349,7 @@ def add_check(commands: Any, parents: Parents) -> argparse.ArgumentParser:
 def add_import(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard import``."""
     parser = _command(commands, "import", "read an arm from a URDF as a robot file", takes_robot=False)
-    parser.add_argument("file", metavar="FILE", help="URDF; xacro has to be expanded first")
+    parser.add_argument("file", metavar="FILE", help="URDF, or xacro (*.xacro, with kinboard[xacro])")
     _add_links(parser)
     parser.add_argument("-o", "--output", metavar="FILE", help="write the robot file and print a report")
     parser.add_argument("--json", action="store_true", help="print the arm and the report as JSON")
@@ -359,6 +359,10 @@ def add_import(commands: Any, parents: Parents) -> argparse.ArgumentParser:
 def _add_links(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--base", metavar="LINK", help="link of the URDF that is the base (default: the root)")
     parser.add_argument("--tip", metavar="LINK", help="link of the URDF that is the tool, if several are possible")
+    parser.add_argument("--arg", action="append", default=[], metavar="NAME:=VALUE", help="argument of the xacro")
+    parser.add_argument(
+        "--folder", metavar="DIR", help="where the packages of the xacro are; none is read outside"
+    )
 
 
 def add_export(commands: Any, parents: Parents) -> argparse.ArgumentParser:
@@ -376,13 +380,9 @@ def add_export(commands: Any, parents: Parents) -> argparse.ArgumentParser:
 def add_capability(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard capability``."""
     parser = _command(
-        commands,
-        "capability",
-        "capability map: from which directions the tool reaches each place",
-        parents.robots,
-        parents.output,
-        parents.joints,
-    )
+        commands, "capability", "capability map: from which directions the tool reaches each place",
+        parents.robots, parents.output, parents.joints,
+    )  # fmt: skip
     size = parser.add_mutually_exclusive_group()
     size.add_argument("--voxel", type=number, metavar="SIDE", help="side of a voxel, millimetres (--rad: metres)")
     size.add_argument(

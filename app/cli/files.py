@@ -9,16 +9,17 @@ from argparse import Namespace
 from pathlib import Path
 
 from app.cli.terminal import Notation, print_json, robot_of, table
+from app.cli.xacro import expanded, is_xacro
 from app.exports.robots import robot_file
 from app.shared.answers.exchange import import_answer
 from app.shared.answers.inspection import InspectionAnswer, inspect
-from kin import InputError, UrdfReport, builtin_robots, load_robot, read_urdf, robot_to_toml
+from kin import InputError, UrdfReport, UrdfRobot, builtin_robots, load_robot, read_urdf, robot_to_toml
 from kin.files.builtin import BUILTIN
 
 
 def run_import(arguments: Namespace) -> int:
     """Read a URDF; print the robot file, or write it and print the report."""
-    found = read_urdf(Path(arguments.file), arguments.base, arguments.tip)
+    found = _read(arguments)
     text = robot_to_toml(found.robot)
     if arguments.output is not None:
         _write(arguments.output, text)
@@ -29,6 +30,17 @@ def run_import(arguments: Namespace) -> int:
         return 0
     print("\n".join([f"{arguments.output}: {found.robot.name}", *report_lines(found.report)]))
     return 0
+
+
+def _read(arguments: Namespace) -> UrdfRobot:
+    """The arm of a URDF, or of a xacro file."""
+    path, base, tip = Path(arguments.file), arguments.base, arguments.tip
+    if is_xacro(path):
+        return read_urdf(expanded(path, arguments.arg, arguments.folder), base, tip, file=str(path))
+    for option, given in (("--arg", arguments.arg), ("--folder", arguments.folder)):
+        if given:
+            raise InputError(option, given, "nothing: only xacro (*.xacro) is expanded")
+    return read_urdf(path, base, tip)
 
 
 def run_export(arguments: Namespace) -> int:
@@ -69,14 +81,14 @@ def run_check(arguments: Namespace) -> int:
     """Describe the arm of a robot file."""
     path = Path(arguments.file)
     lines: list[str] = []
-    if path.suffix == ".urdf":
-        robot, report = read_urdf(path, arguments.base, arguments.tip)
+    if path.suffix in (".urdf", ".xacro"):
+        robot, report = _read(arguments)
         lines = ["", *report_lines(report)]
     else:
+        for option in ("base", "tip", "arg", "folder"):
+            if given := getattr(arguments, option):
+                raise InputError(f"--{option}", given, "nothing: only URDF and xacro have links and arguments")
         robot = load_robot(path)
-        for option, link in (("--base", arguments.base), ("--tip", arguments.tip)):
-            if link is not None:
-                raise InputError(option, link, "no link: only a URDF has links")
     answer = inspect(robot, robot.id in builtin_robots() and path.resolve().parent != BUILTIN.resolve())
     if arguments.json:
         return print_json(answer)

@@ -77,7 +77,9 @@ class ImportRequest(schemas.Body):
     """A URDF and the part of it that is the arm."""
 
     urdf: str = Field(
-        description="The text of the URDF; xacro has to be expanded first.", min_length=1, max_length=MAX_BYTES
+        description="The text of the URDF. Expand xacro first: `xacro FILE.xacro > FILE.urdf`.",
+        min_length=1,
+        max_length=MAX_BYTES,
     )
     base: str | None = Field(
         None, description="The link the arm stands on; by default the root.", max_length=200, min_length=1

@@ -77,7 +77,7 @@ class Archive:
     def about(self) -> str:
         """What is in an archive without a URDF, for a message."""
         for ending, words in (
-            (".xacro", "xacro, which has to be expanded first"),
+            (".xacro", "xacro, which `xacro FILE.xacro > FILE.urdf` expands"),
             (".zip", "a zip inside the zip"),
         ):
             if any(name.lower().endswith(ending) for name in self._files):

@@ -219,7 +219,7 @@ def read_tree(text: bytes | str, file: str) -> UrdfTree:
     if root.tag != "robot":
         raise RobotFileError(file, "root element", root.tag, "<robot>, the root of a URDF")
     if any(element.tag.startswith("xacro:") for element in root.iter()):
-        expected = "plain URDF: expand it first with `xacro FILE.xacro > FILE.urdf`"
+        expected = "plain URDF; `xacro FILE.xacro > FILE.urdf`, or `kinboard import FILE.xacro`, expands it"
         raise RobotFileError(file, "file", "xacro elements", expected)
     links = tuple(_attribute(element, "name", file, "link") for element in root.findall("link"))
     if len(links) > MAX_LINKS:
