@@ -74,7 +74,8 @@ RULES: dict[str, set[str]] = {
     "app/cli": {"kin", "numpy", "pydantic", "typing_extensions", "app.cli", "app.exports", "app.shared"},
     "app/cli/parser.py": {"kin", "app.bench.command", "app.cli"},
     "app/cli/arguments.py": set(),
-    "app/cli/expansion.py": {"xacrodoc"},
+    "app/cli/xacro": {"kin", "app.cli.xacro"},
+    "app/cli/xacro/expansion.py": {"xacrodoc"},
     "app/cli/startup.py": set(),
     "app/cli/serve.py": {"pydantic", "app.cli.startup", "app.service.main", "app.shared"},
 }

@@ -41,7 +41,7 @@ def main() -> None:
 
 def _packages(folder: Path) -> dict[str, str]:
     """The packages below a folder, by the name of their own folder."""
-    found = {}
+    found: dict[str, str] = {}
     for parent, folders, files in os.walk(folder):
         depth = len(Path(parent).relative_to(folder).parts)
         folders[:] = sorted(name for name in folders if not name.startswith(".") and depth < DEEPEST)

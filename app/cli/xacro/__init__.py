@@ -1,4 +1,4 @@
-"""xacro files → URDF, by the extra ``kinboard[xacro]``, in a process of its own (`app.cli.expansion`)."""
+"""xacro files → URDF, by the extra ``kinboard[xacro]``, in a process of its own (`app.cli.xacro.expansion`)."""
 
 from __future__ import annotations
 
