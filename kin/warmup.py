@@ -78,7 +78,8 @@ def made_up_arms() -> tuple[Robot, ...]:
     parallel = ((0, 0.1, 0, quarter), (0, 0, 0.3, 0), (0, 0, 0.2, 0), (0, 0.05, 0, quarter), (0, 0.1, 0, 0))
     oblique = tuple((0.3 * i, 0.1 + 0.1 * i, 0.3 - 0.05 * i, 0.7 + 0.1 * i) for i in range(5))
     planar = ((0, 0.1, 0.3, 0),) * 4
-    tables = (parallel, planar, oblique, oblique[:2])
+    turned = (*oblique[:2], (0, 0.2, 0, 0.4))
+    tables = (parallel, planar, oblique, oblique[:2], turned)
     return tuple(Robot.from_dh(rows, home=[0.3, 0.5, 0.7, 0.4, 0.6][: len(rows)]) for rows in tables)
 
 

@@ -24,6 +24,7 @@ from kin.solvers import (
     scara4,
     slide6,
     srs7,
+    turned,
     wrist5,
     wrist6,
 )
@@ -46,13 +47,14 @@ UNDIRECTED: tuple[Callable[[Robot], ClosedForm | None], ...] = (
     offset7.match,
     planar4.match,
     pair2.match,
+    turned.match,
 )
 # Radians, shares of the arm's size.
 FAR = 2e-5
 # For arms that fit no family.
 GENERAL: tuple[Callable[[Robot], ClosedForm | None], ...] = (
     general6.match,
-    lambda robot: general5.match(robot, _six_joints),
+    lambda robot: turned.with_point(robot, general5.match(robot, _six_joints), _six_joints),
     lambda robot: general7.match(robot, _six_joints),
 )
 

@@ -174,23 +174,23 @@ def planar_breaks(arm: PlanarArm, box: Array, breaks: Array) -> int:
     """Every ψ where a planar arm reaches the end of its reach or a limit of its three angles; returns how many."""
     u, v, p, q, a, b = arm
     low, high = box[LOW], box[HIGH]
-    count = _distance_roots(u, v, p, q, (a + b) ** 2, breaks, 0)
-    count = _distance_roots(u, v, p, q, (a - b) ** 2, breaks, count)
+    count = distance_roots(u, v, p, q, (a + b) ** 2, breaks, 0)
+    count = distance_roots(u, v, p, q, (a - b) ** 2, breaks, count)
     for side in range(2):
         if high[0] - low[0] < TURN:
             t = low[0] if side == 0 else high[0]
-            count = _distance_roots(u - a * math.cos(t), v - a * math.sin(t), p, q, b * b, breaks, count)
+            count = distance_roots(u - a * math.cos(t), v - a * math.sin(t), p, q, b * b, breaks, count)
         if high[1] - low[1] < TURN:
             t = low[1] if side == 0 else high[1]
-            count = _distance_roots(u, v, p, q, a * a + b * b + 2.0 * a * b * math.cos(t), breaks, count)
+            count = distance_roots(u, v, p, q, a * a + b * b + 2.0 * a * b * math.cos(t), breaks, count)
         if high[2] - low[2] < TURN:
             t = low[2] if side == 0 else high[2]
-            count = _distance_roots(u, v, p + b * math.cos(t), q - b * math.sin(t), a * a, breaks, count)
+            count = distance_roots(u, v, p + b * math.cos(t), q - b * math.sin(t), a * a, breaks, count)
     return count
 
 
 @jit
-def _distance_roots(u: float, v: float, p: float, q: float, square: float, breaks: Array, count: int) -> int:
+def distance_roots(u: float, v: float, p: float, q: float, square: float, breaks: Array, count: int) -> int:
     """Append the ψ at which ``|(u, v) − Rz(ψ)(p, q)|² = square``; returns the new count."""
     constant = u * u + v * v + p * p + q * q - square
     return int(add_roots(-2.0 * (u * p + v * q), -2.0 * (v * p - u * q), constant, breaks, count))

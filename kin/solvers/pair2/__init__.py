@@ -8,8 +8,9 @@ Joint 1 follows from the point, or from the directions where the point is on axi
 A pose fixes more than two joints can meet. Where not all of it can be met, the point comes first; the caller
 measures what is left.
 
-Modules: `geometry` (vectors, invariants), `closed_form` (the solver contract).
+Modules: `geometry` (vectors, invariants), `configurations` (kernels), `closed_form` (the solver contract).
 """
 
 from kin.solvers.pair2.closed_form import Pair2 as Pair2
+from kin.solvers.pair2.closed_form import kernels_of as kernels_of
 from kin.solvers.pair2.closed_form import match as match

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kin.axes import is_zero
 from kin.fk import fk, jacobian
@@ -23,17 +24,15 @@ from kin.solvers.contract import (
     SolverInput,
 )
 from kin.solvers.names import Names, bent, names_of
-from kin.solvers.pair2.geometry import GONE, REACH, Flags, Geometry, configurations, geometry_of, straight
+from kin.solvers.pair2.configurations import GONE, OFF, OPEN, branches_many, branches_one, configurations
+from kin.solvers.pair2.geometry import Geometry, geometry_of, straight
 from kin.solvers.singular import Singularity, by_jacobian, those_within
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 NAME = "pair2"
-# Which of the tool's point (0) and directions x, y, z (1, 2, 3) a task keeps.
-KEPT = {POSE: [0, 1, 2, 3], APPROACH: [0, 3], POSITION: [0]}
+_TASKS = (POSE, APPROACH, POSITION)
 _THETA1 = RedundancyParameter("theta1", "θ1", joint=0, rare=True)
-_NONE = np.empty(0)
-_CHUNK = 1024  # targets of a batch that are solved at once: about 2.5 kB each
 
 
 def match(robot: Robot) -> Pair2 | None:
@@ -44,12 +43,9 @@ def match(robot: Robot) -> Pair2 | None:
     return form if form.handles(POSE) else None
 
 
-class _NotCompiled(BatchKernels):
-    """Batch functions that check nothing and are not compiled."""
-
-    def unchecked(self) -> BatchKernels:
-        """The same."""
-        return self
+def kernels_of(robot: Robot, task: int) -> BatchKernels:
+    """The batch kernels of one or two joints for a task."""
+    return BatchKernels(geometry_of(robot).params(task), branches_one, branches_many)
 
 
 class Pair2(ClosedForm):
@@ -62,8 +58,8 @@ class Pair2(ClosedForm):
         count = "one joint" if robot.n == 1 else "two joints"
         self.title, self.reason = f"closed form, {count}", f"the arm has {count}"
         self.lengths = ()
-        self.kernels = self._kernels()
-        self._rank = {task: self._ranks(task) for task in KEPT}
+        self.kernels = kernels_of(robot, POSE)
+        self._rank = {task: self._ranks(task) for task in _TASKS}
         # Parallel axes: an elbow, which has two sides. Otherwise the values of joint 2 have no names.
         self.named = geometry.rows == 1 or (all(geometry.turns) and is_zero(*geometry.wave[:, 0, 2]))
         self.branches, self.meanings = self.names(robot, np.ones(robot.n))
@@ -91,7 +87,7 @@ class Pair2(ClosedForm):
 
     def handles(self, task: int) -> bool:
         """Every task, unless it leaves another joint free than the last."""
-        if task not in KEPT:
+        if task not in _TASKS:
             return False
         rank, free = self._rank[task]
         return rank == self.robot.n - free
@@ -108,41 +104,18 @@ class Pair2(ClosedForm):
     def solve(self, problem: SolverInput) -> Candidates:
         """All configurations that meet what the arm can meet of the target."""
         p, g = problem, self.geometry
-        found = configurations(g, g.seen(p.T[None]), KEPT[p.task], p.seed, GONE * g.scale)
-        q = self._wrapped(found.q[0])
+        q, told = np.empty((g.rows, self.robot.n)), np.empty((g.rows, 2))
+        configurations(self.kernels.params, p.T, p.task, p.seed, GONE * g.scale, q, told)
         missing = bool(np.isnan(q).all())
-        gap, obstacle = (float(found.off.min()), Obstacle("point")) if missing else (0.0, None)
+        gap, obstacle = (float(told[:, OFF].min()), Obstacle("point")) if missing else (0.0, None)
         if not self.redundancies(p.task):
             return Candidates(q, np.empty((len(q), 0)), (), gap, obstacle)
         if not self._rank[p.task][1]:
-            values, arcs = _any_first(p, q, found.open[0])
+            values, arcs = _any_first(p, q, told[:, OPEN] > 0.0)
             return Candidates(q, values, (arcs,), gap, obstacle)
         q[1:] = math.nan
         arcs = free_last(p, q)
         return Candidates(q, q[:, -1:].copy(), (arcs,), gap, obstacle)
-
-    def _wrapped(self, q: Array) -> Array:
-        """The same with angles in (−π, π]."""
-        return np.where(self.geometry.turns, math.pi - (math.pi - q) % TURN, q)
-
-    def _kernels(self) -> BatchKernels:
-        """Batch kernels that call the vectorised formulas."""
-
-        def many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
-            g = self.geometry
-            for k in range(0, len(T), _CHUNK):
-                found = configurations(g, g.seen(T[k : k + _CHUNK]), KEPT[POSE], near, REACH)
-                out[k : k + _CHUNK] = self._wrapped(found.q)
-
-        def one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
-            finite = bool(np.isfinite(T).all())
-            if finite:
-                many(params, T[None], _NONE, near, out[None])
-            else:
-                out[:] = math.nan
-            return finite
-
-        return _NotCompiled(_NONE, one, many)
 
     def branch_of(self, q: Array) -> int:
         """The side of the elbow, or the row of q ``(n,)`` among all configurations of its pose."""
@@ -151,7 +124,8 @@ class Pair2(ClosedForm):
         if self.named:
             return int(math.sin(q[1] - straight(self.geometry)) < 0.0)
         out = np.empty((2, 2))
-        self.kernels.one(_NONE, fk(self.robot, q), math.nan, np.asarray(q), out)
+        near = np.array(q, dtype=np.float64)
+        self.kernels.one(self.kernels.params, fk(self.robot, q), math.nan, near, out)
         apart = np.where(self.geometry.turns, np.abs((out - q + math.pi) % TURN - math.pi), np.abs(out - q))
         apart = np.where(np.isnan(apart), math.inf, apart).max(axis=1)
         return int(np.argmin(apart))
@@ -162,7 +136,7 @@ class Pair2(ClosedForm):
         return those_within(within, by_jacobian(J, rank=self._rank[POSITION][0]))
 
 
-def _any_first(problem: SolverInput, q: Array, free: Flags) -> tuple[Array, Array]:
+def _any_first(problem: SolverInput, q: Array, free: NDArray[np.bool_]) -> tuple[Array, Array]:
     """Values of θ1 ``(rows, 1)`` and its intervals ``(k, 3)`` where it may have any value, in place.
 
     It is the seed's, moved inside the limits.

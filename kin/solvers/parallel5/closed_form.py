@@ -64,23 +64,33 @@ class Parallel5(ClosedForm):
 
     def handles(self, task: int) -> bool:
         """Poses; a point or a direction if the roll, where there is one, keeps both."""
-        if task == APPROACH and not self.rolls:
-            return not is_zero(*self.geometry.params[TOOL_Z : TOOL_Z + 2])
+        if task == APPROACH and not self.rolls and not self._upright:
+            return True
         return task == POSE or (task in (APPROACH, POSITION) and self.geometry.tool_on_axis)
+
+    @property
+    def _upright(self) -> bool:
+        """Whether the tool's z axis is parallel to axes 2, 3 and 4."""
+        return is_zero(*self.geometry.params[TOOL_Z : TOOL_Z + 2])
+
+    def _frees_psi(self, task: int) -> bool:
+        """Whether a task leaves ψ free: a point, and a direction across the arm's plane, which θ1 alone turns."""
+        return task == POSITION or (task == APPROACH and not self.rolls and self._upright)
 
     def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
         """ψ for a point alone, and the roll for whatever it keeps."""
-        return (_PSI,) * (task == POSITION) + (_THETA5,) * (self.rolls and task != POSE)
+        return (_PSI,) * self._frees_psi(task) + (_THETA5,) * (self.rolls and task != POSE)
 
     def solve(self, problem: SolverInput) -> Candidates:
         """All branches, at the requested ψ and θ5 or those nearest to the seed's."""
         p, n = problem, len(problem.seed)
         out, arcs = np.empty((ROWS, n + 1)), np.empty((256, 3))
-        psi = p.values[0] if p.task == POSITION else math.nan
-        gap, count = solve(self.geometry.params, p.T, p.task, psi, p.seed, p.lower, p.upper, arcs, out)
+        free = self._frees_psi(p.task)
+        psi, task = (p.values[0], POSITION) if free else (math.nan, p.task)
+        gap, count = solve(self.geometry.params, p.T, task, psi, p.seed, p.lower, p.upper, arcs, out)
         q = out[:, :n]
         columns, ranges = [], []
-        if p.task == POSITION:
+        if free:
             columns.append(out[:, n])
             ranges.append(arcs[:count])
         if self.rolls and p.task != POSE:

@@ -89,6 +89,7 @@ def random_arm(joints: int, seed: int) -> Robot:
 
 
 OBLIQUE2 = random_arm(2, 1)
+TURNED3 = arm("turned3", (0.3, 0.2, 0.3, 1.1), (-0.4, 0.1, 0.25, 0.7), (0.2, 0.15, 0, 0.4))
 GENERAL = (ELBOW5, ELBOW3, SPATIAL3, random_arm(5, 1), random_arm(4, 1), random_arm(3, 1))
 
 

@@ -209,9 +209,6 @@ def test_four_parallel_axes(seed):
                 assert asked.redundancy[0].value == pytest.approx(value, abs=1e-9)
         rows = kin.ik_branches(robot, T, phi.value)
         assert np.nan_to_num(apart(robot, rows, q), nan=9.0).min() < 1e-6
-        point = kin.solve_ik(robot, T[:3, 3], task="position")
-        assert point.status is Status.SOLVED
-        assert not point.complete
 
 
 def test_the_ranges_of_phi_leave_nothing_out():
@@ -250,3 +247,42 @@ def test_four_parallel_axes_and_a_name():
         name = kin.branch_of(PLANAR4, q)
         # Seen from axis 1 towards the third axis, the elbow is on the right where joint 2 turns to the left.
         assert name == ("elbow right" if math.sin(q[1] + 0.1) > 0 else "elbow left")
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_point_of_four_parallel_axes(seed):
+    """θ4 and φ are free: the ranges are the values for which there is a posture."""
+    robot = planar(seed)
+    rng = np.random.default_rng(seed)
+    for q in robot.random_q(rng, 2):
+        point = kin.fk(robot, q)[:3, 3]
+        assert np.abs(kin.solve_ik(robot, point, task="position", q_seed=q).best.q - q).max() < 1e-6
+        result = kin.solve_ik(robot, point, task="position", q_seed=robot.random_q(rng))
+        assert (result.status, result.complete, result.details.infinite) == (Status.SOLVED, True, True)
+        assert [r.name for r in result.redundancy] == ["theta4", "phi"]
+        for s in result.solutions:
+            for own, held in zip(s.redundancy, ({}, {"theta4": s.redundancy[0].value}), strict=True):
+                for low, high in own.intervals:
+                    for value in (low + 1e-7, 0.5 * (low + high), high - 1e-7) if high - low > 1e-6 else ():
+                        asked = {own.name: value, **held}
+                        found = kin.solve_ik(robot, point, task="position", redundancy=asked, branch=s.branch)
+                        assert found.status is Status.SOLVED
+                        assert {r.name: r.value for r in found.redundancy}.items() >= asked.items()
+        intervals = result.redundancy[0].intervals
+        for value in rng.uniform(robot.lower[3], robot.upper[3], 8).tolist():
+            inside = any(low <= value <= high for low, high in intervals)
+            asked = kin.solve_ik(robot, point, task="position", redundancy={"theta4": value})
+            assert (asked.status is Status.SOLVED) == inside
+        asked = kin.solve_ik(robot, point, task="position", redundancy={"phi": float(q[:3].sum()) + 0.3})
+        assert asked.status in (Status.SOLVED, Status.LIMITS, Status.UNREACHABLE)
+
+
+def test_a_point_at_the_border_of_the_workspace_of_four_parallel_axes():
+    robot = kin.Robot.from_dh([(0, 0, a, 0) for a in (0.4, 0.3, 0.2, 0.1)])
+    result = kin.solve_ik(robot, (math.cos(0.3), math.sin(0.3), 0.0), task="position")
+    assert result.best.q == pytest.approx((0.3, 0.0, 0.0, 0.0), abs=1e-6)
+    far = kin.solve_ik(robot, (1.001, 0.0, 0.0), task="position")
+    assert (far.status, far.cause) == (Status.UNREACHABLE, "too far")
+    along = kin.solve_ik(robot, kin.fk(robot, (0.3, 0.4, 0.5, 0.6)), task="approach")
+    assert along.complete
+    assert [r.name for r in along.redundancy] == ["theta4", "phi"]
