@@ -6,6 +6,7 @@ the whole path is chosen at once, as the shortest path through layers:
 
 1. :mod:`kin.path.layers` gives each waypoint a layer of configurations, at most 4000, which is 0.2 MB per waypoint
    for seven joints. They are computed and measured in :mod:`kin.path.configurations`.
+   At singular waypoints :mod:`kin.path.crossings` adds those that their neighbours lead to.
 2. :mod:`kin.path.viterbi` finds the path through the layers with the fewest jumps and, of these, the smallest sum
    of squared joint motion. A step is a *jump* if some joint moves more than `max_step`
    (:mod:`kin.path.waypoints`).

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kin.path.configurations import continued, nearest_solution, pool, with_images
+from kin.path.crossings import with_crossings
 from kin.path.layers import sampled
 from kin.path.smoothing import smoothed
 from kin.path.viterbi import Trellis, shortest
@@ -45,7 +46,7 @@ def best_path(sequence: LayerSequence) -> tuple[Array, list[DeadEnd]]:
     is searched, then other sizes of what counts as a jump; the best path is kept.
     """
     settings = sequence.settings
-    layers = [waypoint.layer for waypoint in sequence.waypoints]
+    layers = with_crossings(sequence, [waypoint.layer for waypoint in sequence.waypoints])
     loose = max(settings.max_step, 2.0 * settings.grid - 0.05)
     found: list[tuple[tuple[int, float], Array]] = []
     ends: list[DeadEnd] = []

@@ -6,8 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from kin.errors import InputError
-from kin.ik.options import FREE, JointConstraints, Limits, Locks
+from kin.ik.options import JointConstraints, Limits, Locks
 from kin.ik.problem import never_cancel
 from kin.named import robot_of
 from kin.robot import Robot
@@ -43,11 +42,7 @@ def workspace_facts(
         InputError: naming the wrong argument, or a joint that slides without limits.
     """
     robot, constraints = robot_of(robot), JointConstraints.of(limits, locked, constraints)
-    endless = slides_without_end(robot, constraints)
-    if endless:
-        name = robot.joints[endless[0]].name
-        raise InputError(f"limits of {name}", "none", "limits, given here or by the robot: it slides without end")
-    region = Region.of(robot, constraints)
+    region = Region.finite(robot, constraints)
     tries = checked_integer("effort", effort, 2, 64, "a whole number from 2 to 64")
     point, axis, shoulder = base_axis(region)
     x, y, z = (along(region, direction) for direction in np.eye(3))
@@ -65,12 +60,6 @@ def workspace_facts(
         volume=size[0],
         surface=size[1],
     )
-
-
-def slides_without_end(robot: Robot, constraints: JointConstraints = FREE) -> tuple[int, ...]:
-    """Indices of the joints that slide without limits: the workspace has no end then."""
-    lower, upper, _ = constraints.bounds(robot)
-    return tuple(np.flatnonzero(~robot.revolute & ~np.isfinite(upper - lower)).tolist())
 
 
 def _turns(region: Region) -> bool:

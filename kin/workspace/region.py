@@ -49,6 +49,15 @@ class Region:
         upper = np.where(np.isfinite(upper), upper, math.pi)
         return cls(robot, tuple(zip(lower.tolist(), upper.tolist(), strict=True)))
 
+    @classmethod
+    def finite(cls, robot: Robot, constraints: JointConstraints = FREE) -> Region:
+        """As `of`; raises `InputError` for a slide without limits, which has no end."""
+        lower, upper, _ = constraints.bounds(robot)
+        for i in np.flatnonzero(~robot.revolute & ~np.isfinite(upper - lower)).tolist():
+            expected = "limits, given here or by the robot: it slides without end"
+            raise InputError(f"limits of {robot.joints[i].name}", "none", expected)
+        return cls.of(robot, constraints)
+
     @cached_property
     def arm(self) -> BoundedArm:
         """The region as compiled functions take it."""

@@ -176,7 +176,7 @@ def capability_grid(
     lower, upper, _ = allowed.bounds(robot)
     bounds = tuple(zip(lower.tolist(), upper.tolist(), strict=True))
     count = checked_integer("resolution", resolution, 1, 256, "a whole number from 1 to 256")
-    region = Region.of(robot, allowed)
+    region = Region.finite(robot, allowed)
     box = [along(region, axis) for axis in np.eye(3)]
     low, high = (np.array([getattr(span, end).value for span in box]) for end in ("least", "largest"))
     size = high - low

@@ -144,7 +144,7 @@ class _Samples:
         if strategy not in STRATEGIES:
             raise InputError("strategy", strategy, "one of " + ", ".join(f'"{name}"' for name in STRATEGIES))
         checked = checked_integer("seed", seed, 0, (1 << 64) - 1, "a whole number from 0 to 2⁶⁴ − 1")
-        return cls(Region.of(robot, constraints), checked, strategy)
+        return cls(Region.finite(robot, constraints), checked, strategy)
 
     @property
     def by_target(self) -> bool:

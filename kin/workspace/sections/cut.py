@@ -69,7 +69,7 @@ def section(
     Raises:
         InputError: naming the wrong argument.
     """
-    region = Region.of(robot_of(robot), JointConstraints.of(limits, locked, constraints))
+    region = Region.finite(robot_of(robot), JointConstraints.of(limits, locked, constraints))
     count = checked_integer("resolution", resolution, 8, 1000, "a whole number from 8 to 1000")
     if plane is None:
         if region.robot.joints[0].kind != "revolute":

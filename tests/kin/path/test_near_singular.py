@@ -113,6 +113,14 @@ def test_a_wrist_that_is_almost_singular(robot, solver):
     assert not jumps(robot, motion, solver, 8)
 
 
+def test_a_wrist_that_is_singular_at_a_waypoint():
+    """The path comes to that waypoint with a split of joints 4 and 6 that is far from the seed's."""
+    rng = np.random.default_rng(11)
+    middle = 0.4 * M1013.random_q(rng)
+    middle[4] = 0.0
+    assert not jumps(M1013, (middle, *rng.uniform(-1.2, 1.2, (2, 6))), "auto", 40, started=False)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("solver", ["auto", "numeric"])
 @pytest.mark.parametrize("robot", [M1013, OFFSET, ELBOW5], ids=lambda robot: robot.id)

@@ -507,6 +507,10 @@ def test_the_workspace_of_a_slide_without_limits_has_no_end():
     robot = replace(arm, id="railed", rows=(rail, *arm.rows), home=(0.0, *arm.home))
     with pytest.raises(InputError, match=r"limits of rail.*slides without end"):
         kin.workspace_facts(robot, volume=False)
+    for ask in (kin.workspace_slice, kin.section, kin.capability_map):
+        given = (10, 0, 10) if ask is kin.workspace_slice else ()
+        with pytest.raises(InputError, match=r"limits of rail.*slides without end"):
+            ask(robot, *given)
     limits = [(-1.0, 1.0), *[None] * 6]
     found = kin.workspace_facts(robot, limits=limits, volume=False)
     assert found.z.largest.value - found.z.least.value > 2.0
