@@ -104,14 +104,14 @@ class Pair2(ClosedForm):
     def solve(self, problem: SolverInput) -> Candidates:
         """All configurations that meet what the arm can meet of the target."""
         p, g = problem, self.geometry
-        q, told = np.empty((g.rows, self.robot.n)), np.empty((g.rows, 2))
-        configurations(self.kernels.params, p.T, p.task, p.seed, GONE * g.scale, q, told)
+        q, notes = np.empty((g.rows, self.robot.n)), np.empty((g.rows, 2))
+        configurations(self.kernels.params, p.T, p.task, p.seed, GONE * g.scale, q, notes)
         missing = bool(np.isnan(q).all())
-        gap, obstacle = (float(told[:, OFF].min()), Obstacle("point")) if missing else (0.0, None)
+        gap, obstacle = (float(notes[:, OFF].min()), Obstacle("point")) if missing else (0.0, None)
         if not self.redundancies(p.task):
             return Candidates(q, np.empty((len(q), 0)), (), gap, obstacle)
         if not self._rank[p.task][1]:
-            values, arcs = _any_first(p, q, told[:, OPEN] > 0.0)
+            values, arcs = _any_first(p, q, notes[:, OPEN] > 0.0)
             return Candidates(q, values, (arcs,), gap, obstacle)
         q[1:] = math.nan
         arcs = free_last(p, q)

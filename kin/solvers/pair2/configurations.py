@@ -33,16 +33,16 @@ GONE = 1e-2  # of the arm's size: a point that is missed by more is not reached,
 REACH = TOLERANCES.closure_position * 0.1  # metres, the same for an exact point
 _FLOOR = 4e-16  # of the squared length of the derivatives: a floor where they are singular
 _TINY = TOLERANCES.singular
-OFF, OPEN = 0, 1  # columns of what is told of a configuration
+OFF, OPEN = 0, 1  # columns of what is notes of a configuration
 
 
 @jit
 def configurations(
-    params: Array, T: Array, task: int, near: Array, gone: float, out: Array, told: Array
+    params: Array, T: Array, task: int, near: Array, gone: float, out: Array, notes: Array
 ) -> None:  # fmt: skip
     """out ``(rows, n)`` ← the configurations of a target, NaN where they miss its point by more than `gone` (m).
 
-    What a task leaves free is near ``(n,)``. told ``(rows, 2)`` ← by how many metres each misses the point, and
+    What a task leaves free is near ``(n,)``. notes ``(rows, 2)`` ← by how many metres each misses the point, and
     1.0 where joint 1 may have any value: what the task keeps is on axis 1.
     """
     n, rows = int(params[JOINTS]), out.shape[0]
@@ -52,11 +52,11 @@ def configurations(
     for row in range(rows):
         q[1], x, y = _second(params, seen, task, near, 1.0 - 2.0 * row)
         before_joint_1(params, x, y, v)
-        q[0], told[row, OPEN] = _first(params, v, seen, task, near[0])
+        q[0], notes[row, OPEN] = _first(params, v, seen, task, near[0])
         off = _polish(params, q, seen, task, v, J)
         if off > REACH:  # the point comes first where the directions cannot be met as well
             off = _polish(params, q, seen, POSITION, v, J)
-        told[row, OFF] = off
+        notes[row, OFF] = off
         for i in range(n):
             turned = wrap(q[i]) if params[TURNS + i] else q[i]
             out[row, i] = turned if off <= gone else math.nan
