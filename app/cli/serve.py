@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import sys
 from argparse import Namespace
 
 from pydantic import ValidationError
 
-from app.cli.startup import no_collections
+from app.cli.startup import no_collections, shared_metrics
 from app.shared.settings import Settings
 
 FLAGS = ("host", "port", "root_path", "robots", "read_only", "workers", "pin")  # they override the environment
@@ -29,8 +30,9 @@ def run(arguments: Namespace) -> int:
             got = "a value that is not shown" if name in SECRET else repr(item["input"])
             print(f"kinboard: {where}: got {got}: {item['msg']}", file=sys.stderr)
         return 2
-    with no_collections():
-        import app.service.main as service
+    with shared_metrics() if settings.workers + settings.rest_workers > 1 else contextlib.nullcontext():
+        with no_collections():
+            import app.service.main as service
 
-        gc.freeze()  # later collections skip what has been imported
-    return service.run(settings, open_browser=arguments.open)
+            gc.freeze()  # later collections skip what has been imported
+        return service.run(settings, open_browser=arguments.open)

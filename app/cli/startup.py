@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import os
 import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -19,6 +20,24 @@ def no_collections() -> Iterator[None]:
     finally:
         if collecting:
             gc.enable()
+
+
+@contextmanager
+def shared_metrics() -> Iterator[None]:
+    """A folder through which the processes of a service count together: known before the metrics are imported.
+
+    Without a place to write, each process counts for itself.
+    """
+    for place in (None, "/dev/shm"):
+        try:
+            folder = tempfile.TemporaryDirectory(prefix="kinboard-", dir=place)
+        except OSError:
+            continue
+        with folder as name:
+            os.environ["PROMETHEUS_MULTIPROC_DIR"] = name
+            yield
+        return
+    yield
 
 
 def disable_compiler() -> None:

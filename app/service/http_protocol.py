@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import selectors
 import socket
+import urllib.parse
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, Final, cast
 
@@ -22,6 +23,7 @@ from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
 
 from app.api.problems import MEDIA_TYPE, ProblemError
 from app.service.guard import Guard, Outflow
+from app.service.handover import LARGEST, Handover
 from app.shared.threads.turns import urgent
 
 if TYPE_CHECKING:
@@ -31,6 +33,9 @@ MAX_PIPELINE: Final = 16  # requests of a connection that wait for the one being
 MAX_HEAD: Final = 64 * 1024  # bytes
 MAX_HEADERS: Final = 128
 MIN_RATE: Final = 1024.0  # bytes per second, on average, at which a body must arrive
+PIECE: Final = (
+    LARGEST - MAX_HEAD
+)  # bytes read at once: with a head that came before, one message to another process
 
 
 def require_shape(kind: type, *names: str) -> None:
@@ -54,9 +59,10 @@ require_shape(
 
 
 class GuardedConfig(uvicorn.Config):
-    """uvicorn's configuration, and the guard of its connections."""
+    """uvicorn's configuration, the guard of its connections, and other processes to hand them to."""
 
     guard: Guard
+    handover: Handover | None = None
 
     def get_loop_factory(self) -> Callable[[], asyncio.AbstractEventLoop] | None:
         """asyncio's event loop, for which computations wait. Others, as uvloop, do not tell when they sleep."""
@@ -107,12 +113,19 @@ class _Flow(FlowControl):
 
 
 class HttpProtocol(HttpToolsProtocol):
-    """One HTTP connection."""
+    """One HTTP connection.
 
-    def __init__(self, config: GuardedConfig, *args: Any, **kwargs: Any) -> None:
+    Args:
+        first: bytes that another process has read from it: at least the head of a request that is for this one.
+    """
+
+    def __init__(self, config: GuardedConfig, *args: Any, first: bytes = b"", **kwargs: Any) -> None:
         super().__init__(config, *args, **kwargs)
         self.guard = config.guard
         self.ended = False  # no more requests are read from this connection
+        self._handover = config.handover
+        self._first = first
+        self._raw: bytearray | None = None  # what has arrived of a request, until its head is complete
         self._host: str | None = None  # None: not counted
         self._outflow: Outflow
         self._in_message = False
@@ -140,6 +153,10 @@ class HttpProtocol(HttpToolsProtocol):
         self._outflow = Outflow(transport, self.guard.send_timeout)
         self._since = self._last = self.loop.time()
         self.guard.add(self, host)
+        if self._handover is not None:
+            transport.max_size = PIECE  # type: ignore[attr-defined]
+        if self._first:
+            self.data_received(self._first)
 
     def connection_lost(self, exc: Exception | None) -> None:
         if self._host is not None:
@@ -199,6 +216,8 @@ class HttpProtocol(HttpToolsProtocol):
         self._unset_keepalive_if_required()
         self._received += len(data)
         self._last = self.loop.time()
+        if self._handover is not None:
+            self._keep(data)
         try:
             self.parser.feed_data(data)
         except httptools.HttpParserUpgrade:
@@ -212,6 +231,8 @@ class HttpProtocol(HttpToolsProtocol):
             self._head += len(data) if self._head >= 0 else 1
             if self._head > MAX_HEAD or len(self.headers) > MAX_HEADERS:
                 self._refuse(_head_too_large())
+        else:
+            self._raw = None
 
     def on_message_begin(self) -> None:
         if len(self.pipeline) >= MAX_PIPELINE:
@@ -224,7 +245,11 @@ class HttpProtocol(HttpToolsProtocol):
     def on_headers_complete(self) -> None:
         if len(self.headers) > MAX_HEADERS:
             raise _head_too_large()
-        self._head_complete = True
+        if self._handover is not None and not self._first:
+            path = urllib.parse.unquote((httptools.parse_url(self.url).path or b"").decode("ascii", "replace"))
+            if (elsewhere := self._handover.destination(path)) is not None:
+                raise _ElsewhereError(elsewhere)
+        self._head_complete, self._first = True, b""
         super().on_headers_complete()
 
     def on_message_complete(self) -> None:
@@ -245,11 +270,35 @@ class HttpProtocol(HttpToolsProtocol):
             self.ended = True
             self.flow.pause_reading()
             self.cycle.keep_alive = False
+        elif isinstance(error, _ElsewhereError):
+            self._hand_over(error.number)
         elif isinstance(error, ProblemError):
             self._refuse(error)
         else:
             self.guard.note("malformed", f"{self._host} sent something that is not HTTP; the connection is closed")
             self._refuse(ProblemError(400, "bad-request", "This is not a valid HTTP request."))
+
+    def _keep(self, data: bytes) -> None:
+        """Keep what arrives of a request until it is known which process it is for."""
+        if not self._in_message:
+            self._raw = bytearray(data)
+        elif self._raw is not None:
+            self._raw += data
+
+    def _hand_over(self, number: int) -> None:
+        """Let another process go on with this connection, if no earlier request is under way.
+
+        Otherwise the earlier ones are answered, then the connection is closed: clients send the rest again.
+        """
+        self.ended = True
+        self.flow.pause_reading()
+        if self.pipeline or (self.cycle is not None and not self.cycle.response_complete):
+            self.cycle.keep_alive = False
+        elif self._handover is None or self._raw is None or self.transport.get_write_buffer_size():
+            self.transport.close()
+        else:
+            self._handover.send(number, self.transport, bytes(self._raw))
+        self._raw = None
 
     def _refuse(self, error: ProblemError) -> None:
         """Answer with a problem document, if no answer to an earlier request is on its way, and close."""
@@ -301,6 +350,14 @@ def raw_answer(error: ProblemError, headers: Iterable[tuple[bytes, bytes]]) -> b
 
 class _PipelineFullError(Exception):
     """A client sends requests faster than they are answered."""
+
+
+class _ElsewhereError(Exception):
+    """A request belongs to the process of this number."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.number = number
 
 
 def _head_too_large() -> ProblemError:

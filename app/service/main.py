@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import contextlib
 import gc
+import multiprocessing
 import os
+import random
 import signal
-import socket
 import sys
-import tempfile
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, MutableSequence
 from contextlib import asynccontextmanager
 from functools import partial
+from typing import cast
 
 from fastapi import FastAPI
 from starlette.concurrency import run_in_threadpool
@@ -32,6 +33,7 @@ from app.api import (
 )
 from app.service import status
 from app.service.gauges import update_gauges
+from app.service.handover import SUPPORTED, Member, Phase, Role, members
 from app.service.server import STOP_TIMEOUT, Greeting, Server, is_loopback, listen, url_of
 from app.service.startup import Startup
 from app.service.web.access import Access
@@ -62,6 +64,14 @@ SWITCH_INTERVAL = 5e-4
 # among requests with many thousand targets stops all visitors for 80 ms, one of young objects for a millisecond.
 COLLECTIONS = (700, 10, 100)
 
+# Of a process for REST, so that visitors go first where both want the same processor.
+NICENESS = 5
+
+DESCRIPTION = (
+    "Metres and radians everywhere; quaternions are `wxyz`. "
+    "A target out of reach is an answer with a `status` and a `reason`, not an error."
+)
+
 OPEN_TO_ALL = """\
 **************************************************************************
   Kinboard is open to everybody who can reach this machine, without a token.
@@ -70,9 +80,15 @@ OPEN_TO_ALL = """\
 
 
 def create_app(
-    settings: Settings, store: Store | None = None, on_ready: Callable[[], None] | None = None
+    settings: Settings,
+    store: Store | None = None,
+    member: Member | None = None,
+    on_ready: Callable[[], None] | None = None,
 ) -> FastAPI:
     """The whole service as one ASGI application; `on_ready` is called when it has warmed up.
+
+    Args:
+        member: what its process is among those of the service.
 
     Raises:
         RobotFileError: a file in the operator's folder of robots is invalid.
@@ -83,7 +99,7 @@ def create_app(
     maps = Maps(settings.map_memory, seconds=settings.map_time)
     memory = AnswerMemory(settings.max_answer, settings.answer_memory)
     work = ComputeSlots(settings.max_requests, settings.time_budget, settings.client_share, memory)
-    startup = Startup(settings, store, clouds, maps, summaries, bridge, on_ready)
+    startup = Startup(settings, store, clouds, maps, summaries, bridge, member, on_ready)
 
     def idle() -> bool:
         return not (bridge.places.taken or work.used or state.streams.open or summaries.pending or maps.pending)
@@ -104,8 +120,7 @@ def create_app(
         title="Kinboard",
         version=__version__,
         summary="Kinematics of robot arms: forward, inverse, Jacobian.",
-        description="Metres and radians everywhere; quaternions are `wxyz`. "
-        "A target out of reach is an answer with a `status` and a `reason`, not an error.",
+        description=DESCRIPTION,
         license_info={"name": "MIT", "identifier": "MIT"},
         docs_url=None,  # our own page, with its files: it works without internet
         redoc_url=None,
@@ -176,47 +191,60 @@ def run(settings: Settings, open_browser: bool = False) -> int:
             elif not settings.allowed_hosts:
                 settings = settings.model_copy(update={"allowed_hosts": (*LOCAL_NAMES, settings.host)})
         greeting = Greeting(url_of(settings, listeners[0].getsockname()[1]), open_browser)
-        if len(listeners) == 1:
-            return _serve(settings, listeners[0], store=store, greeting=greeting)
-        os.environ["PROMETHEUS_MULTIPROC_DIR"] = stack.enter_context(
-            tempfile.TemporaryDirectory(prefix="kinboard-")
+        partners = settings.rest_workers if SUPPORTED else 0
+        parts = members(
+            listeners, partners, lambda size: cast("MutableSequence[int]", multiprocessing.RawArray("B", size))
         )
-        greeting.show()
+        for part in parts:
+            for link in part.links.values():
+                stack.enter_context(link)
+        if len(parts) == 1:
+            return _serve(settings, parts[0], store=store, greeting=greeting)
         return supervise(
             # One reading of the robots for all processes, also for those that start later.
-            partial(_serve, settings, store=store),
-            listeners,
+            partial(_serve, settings, store=store, processor=random.randrange(1024)),
+            parts,
             grace=settings.drain + STOP_TIMEOUT + 1.0,
             silence=settings.worker_timeout,
-            on_end=forget_process,
+            on_start=greeting.show,
+            on_end=_forget,
         )
+
+
+def _forget(member: Member, pid: int) -> None:
+    """Drop what a process that has ended reported."""
+    member.report(Phase.AWAY)
+    forget_process(pid)
 
 
 def _serve(
     settings: Settings,
-    listener: socket.socket,
-    number: int | None = None,
+    member: Member,
     alive: Callable[[], None] | None = None,
     store: Store | None = None,
     greeting: Greeting | None = None,
+    processor: int = 0,
 ) -> int:
-    """Serve on one socket until a signal ends this process; returns 1 if it could not start.
+    """Serve until a signal ends this process; returns 1 if it could not start.
 
     Args:
-        number, alive: the number of this worker process, and what it calls once a second, if there are several.
+        alive: what this process calls once a second, if there are several.
+        processor: on which the first of several processes is kept, and the others on those that follow.
     """
     if settings.pin:
-        pin(number)
+        pin(None if alive is None else processor + member.number)
+    if member.role is Role.REST:
+        os.nice(NICENESS)
     if settings.access_log:
         write_to_stderr()
     sys.setswitchinterval(SWITCH_INTERVAL)
     gc.set_threshold(*COLLECTIONS)
     # Kernels and routes live as long as the process: one collection among them would stop all visitors for 50 ms.
-    server = Server(create_app(settings, store, on_ready=gc.freeze), settings, greeting, alive)
+    server = Server(create_app(settings, store, member, gc.freeze), settings, member, greeting, alive)
     # uvicorn shuts down in order and then raises the signal again, which is the expected end here.
     before = signal.signal(signal.SIGTERM, server.handle_exit)
     try:
-        server.run(sockets=[listener])
+        server.run(sockets=[member.listener] if member.accepts else [])
     except KeyboardInterrupt:
         pass
     finally:

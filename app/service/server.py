@@ -19,6 +19,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from app.service.guard import Guard
+from app.service.handover import AT_ONCE, Handover, Member, Phase
 from app.service.http_protocol import GuardedConfig, HttpProtocol
 from app.service.web.inspection import MAX_MESSAGE
 from app.service.web.prefix import clean_prefix
@@ -35,7 +36,7 @@ logger = logging.getLogger("kinboard.server")
 QUEUE = 2048  # connections that may wait to be accepted
 # Connections accepted in one round of the event loop (asyncio takes uvicorn's backlog for it). Each holds a file
 # for two more rounds, even if it is refused, so this must be a quarter of `guard.SPARE_FILES`.
-ACCEPTED = 4
+ACCEPTED = AT_ONCE
 STOP_TIMEOUT = 3.0  # s for the end of the service itself, after requests have ended
 PING_INTERVAL = 20.0  # seconds between two pings of a websocket
 
@@ -74,6 +75,7 @@ class Server(uvicorn.Server):
     """Prints the greeting once it accepts connections; on shutdown ends requests that would be cut off.
 
     Args:
+        member: what this process is among those of the service.
         alive: called about once a second by the event loop.
     """
 
@@ -81,11 +83,18 @@ class Server(uvicorn.Server):
         self,
         app: FastAPI,
         settings: Settings,
+        member: Member,
         greeting: Greeting | None = None,
         alive: Callable[[], None] | None = None,
     ) -> None:
         config = server_config(app, settings, open_files())
         super().__init__(config)
+        self._config = config
+        self._member = member
+        self._handover = Handover(member, clean_prefix(settings.root_path))
+        if member.links:
+            config.handover = self._handover
+        self._adopting: set[asyncio.Task[object]] = set()
         self._note = config.guard.note
         self._end_work = app.state.compute.close
         self._drain = settings.drain
@@ -98,6 +107,9 @@ class Server(uvicorn.Server):
         await super().startup(sockets=sockets)
         for listener in sockets or ():
             listener.listen(QUEUE)  # asyncio has just made the queue as short as `ACCEPTED`
+        self._handover.start(self._adopt)
+        if self._member.away(self._member.number):
+            self._member.report(Phase.SERVING)
         if self._greeting is not None:
             self._greeting.show()
 
@@ -112,7 +124,33 @@ class Server(uvicorn.Server):
     async def on_tick(self, counter: int) -> bool:
         if self._alive is not None and counter % 10 == 0:  # called ten times a second
             self._alive()
+        if not self._member.accepts:
+            await self._stand_in()
         return await super().on_tick(counter)
+
+    async def _stand_in(self) -> None:
+        """Accept connections while the process that should do so is away."""
+        away = self._member.away(self._member.group[0])
+        if away and not self.servers:
+            listener = self._member.listener.dup()
+            self.servers = [
+                await asyncio.get_running_loop().create_server(self._protocol, sock=listener, backlog=ACCEPTED)
+            ]
+            listener.listen(QUEUE)
+        elif not away and self.servers:
+            self.servers.pop().close()
+
+    def _protocol(self, first: bytes = b"") -> HttpProtocol:
+        return HttpProtocol(
+            self._config, server_state=self.server_state, app_state=self.lifespan.state, first=first
+        )
+
+    def _adopt(self, connection: socket.socket, data: bytes) -> None:
+        """Go on with a connection that another process has accepted."""
+        loop = asyncio.get_running_loop()
+        task = loop.create_task(loop.connect_accepted_socket(lambda: self._protocol(data), connection))
+        self._adopting.add(task)
+        task.add_done_callback(self._adopting.discard)
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """Stop, at most `STOP_TIMEOUT` after running requests have had their time."""
@@ -128,6 +166,9 @@ class Server(uvicorn.Server):
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         asyncio.get_running_loop().call_later(self._drain - min(1.0, 0.5 * self._drain), self._end_work)
+        self._member.report(Phase.AWAY)
+        self._handover.stop()
+        await asyncio.gather(*self._adopting, return_exceptions=True)
         await super().shutdown(sockets=sockets)
 
 

@@ -3,6 +3,7 @@
 The landing page is served at once and shows "warming up" until ``/readyz`` reports ready. Kernels are loaded from
 numba's cache in milliseconds, or are compiled, which takes seconds and should delay no visitor. Kernels that are
 rarely needed in the first minute, such as those of workspace clouds, are compiled after the service is ready.
+Of several processes the first one compiles, and the others wait and load what it has compiled.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal
 
+from app.service.handover import Member, Phase, Role
 from app.service.web.viewer_proxy import ViewerBridge
 from app.shared.clouds import Clouds
 from app.shared.maps import Maps
@@ -28,12 +30,14 @@ if TYPE_CHECKING:
 logger = logging.getLogger("kinboard.startup")
 
 Status = Literal["warming", "ready", "failed"]
+STEP = 0.02  # seconds between two looks at the first process
 
 
 class Startup:
     """Starts the viewer and compiles the kernels in a thread; ``/readyz`` reports `status`.
 
     Args:
+        member: what this process is among those of the service.
         on_ready: called by that thread when everything is ready, just before `status` says so.
     """
 
@@ -45,9 +49,11 @@ class Startup:
         maps: Maps,
         summaries: Summaries,
         bridge: ViewerBridge,
+        member: Member | None = None,
         on_ready: Callable[[], None] | None = None,
     ) -> None:
         self.status: Status = "warming"
+        self._member = member
         self._settings = settings
         self._store = store
         self._clouds = clouds
@@ -62,6 +68,16 @@ class Startup:
         # A daemon, so that Ctrl-C need not wait for the end of a compilation.
         self._thread = threading.Thread(target=self._run, name="kinboard-startup", daemon=True)
         self._rest = threading.Thread(target=self._warm_up_rest, name="kinboard-warm-up", daemon=True)
+
+    @property
+    def readiness(self) -> Status:
+        """The status of this process and its partners together."""
+        if self._member is None:
+            return self.status
+        phases = [self._member.phases[number] for number in self._member.group]
+        if Phase.FAILED in phases:
+            return "failed"
+        return self.status if min(phases) >= Phase.READY else "warming"
 
     def start(self) -> None:
         """Start; returns at once. The viewer serves its visitors in the running event loop."""
@@ -79,26 +95,45 @@ class Startup:
     def _run(self) -> None:
         try:
             self._start_viewer()
+            self._wait_for_first(Phase.READY)
             if not self._stopping.is_set():
                 warm_up()
                 if self._on_ready is not None:
                     self._on_ready()
                 self.status = "ready"
+                self._report(Phase.READY)
                 self._rest.start()
         except Exception:
             # REST goes on working; /readyz reports the failure.
             logger.exception("the viewer could not be started, or a kernel could not be compiled")
             self.status = "failed"
+            self._report(Phase.FAILED)
+
+    def _report(self, phase: Phase) -> None:
+        if self._member is not None and not self._stopping.is_set():
+            self._member.report(phase)
+
+    def _wait_for_first(self, phase: Phase) -> None:
+        """Wait until the first process of the service, which compiles the kernels, is so far."""
+        member = self._member
+        while member is not None and member.number and member.phases[0] < phase:
+            if self._stopping.wait(STEP):
+                return
 
     def _warm_up_rest(self) -> None:
         lower_priority()
+        self._wait_for_first(Phase.COMPLETE)
         try:
             warm_up_rest(self._stopping.is_set)
+            self._report(Phase.COMPLETE)
         except Exception:
             # Requests that need this kernel fail; everything else works.
             logger.exception("a kernel could not be compiled ahead of its use")
 
     def _start_viewer(self) -> None:
+        if self._member is not None and self._member.role is Role.REST:
+            self._viewer_settled.set()
+            return
         try:
             # Importing viser takes half a second, for which the landing page and REST need not wait.
             from app.viewer.server import ViewerServer

@@ -45,7 +45,7 @@ async def livez() -> Alive:
     responses={503: {"model": Readiness, "description": "Still warming up, or the viewer failed."}},
 )
 async def readyz(request: Request, response: Response) -> Readiness:
-    status: Status = request.app.state.startup.status
+    status: Status = request.app.state.startup.readiness
     response.headers["cache-control"] = "no-store"
     response.status_code = 200 if status == "ready" else 503
     return Readiness(status=status)

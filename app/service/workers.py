@@ -1,9 +1,13 @@
 """Several worker processes behind one port, and their supervisor.
 
-Each process is a complete service: REST, a viewer, and the visitors connected to it. Processes share nothing, so
-any of them can answer any request, and a visitor stays with the process that accepted the connection. Each has its
-own listening socket on the same port, and the kernel distributes new connections evenly (``SO_REUSEPORT``); with
-one shared socket, the first process to wake up could take all connections of a burst.
+A worker is a complete service: REST, a viewer, and the visitors connected to it, in one process or in several that
+hand connections to one another (:mod:`app.service.handover`). Workers share nothing, so any of them can answer any
+request, and a visitor stays with the worker that accepted the connection. Each has its own listening socket on the
+same port, and the kernel distributes new connections evenly (``SO_REUSEPORT``); with one shared socket, the first
+process to wake up could take all connections of a burst.
+
+On Linux processes begin as copies of this one, which has only one thread: they start at once and share the memory
+of what it has imported.
 
 A process that is killed is restarted; one that exits with an error would do so again, and ends the service. Each
 process reports once a second that its event loop runs; one that is silent for too long, because it is stopped or
@@ -15,45 +19,51 @@ from __future__ import annotations
 
 import logging
 import multiprocessing
+import os
 import signal
-import socket
+import sys
 import threading
 import time
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Sequence
 from multiprocessing.connection import wait
-from multiprocessing.context import SpawnProcess
-from typing import Any
+from multiprocessing.process import BaseProcess
+from typing import Any, Generic, TypeVar
 
 logger = logging.getLogger("kinboard.workers")
 
-Serve = Callable[[socket.socket, int, Callable[[], None]], int]
+Part = TypeVar("Part")
+Serve = Callable[[Part, Callable[[], None]], int]
 
 STEP = 0.2  # s between two looks at the processes
 START_TIMEOUT = 120.0  # s from the start of a process until it first reports
 
 
 def supervise(
-    serve: Serve,
-    sockets: list[socket.socket],
+    serve: Serve[Part],
+    parts: Sequence[Part],
     grace: float,
     silence: float,
-    on_end: Callable[[int], None] = lambda pid: None,
+    on_start: Callable[[], None] = lambda: None,
+    on_end: Callable[[Part, int], None] = lambda part, pid: None,
 ) -> int:
-    """Run `serve` in one process per socket until SIGTERM or Ctrl-C; returns the exit code.
+    """Run `serve` in one process per part until SIGTERM or Ctrl-C; returns the exit code.
 
     Args:
-        serve: called with a socket, the number of the process, and a function that it calls once a second; serves
-            until SIGTERM and returns 0, or another code on failure. Picklable.
+        serve: called with its part and a function that it calls once a second; serves until SIGTERM and returns 0,
+            or another code on failure. Picklable.
         grace: seconds from SIGTERM until a process that has not ended is killed.
         silence: seconds without a report after which a process is replaced.
-        on_end: called with the id of a process that has ended and is replaced.
+        on_start: called when all processes have been started.
+        on_end: called with the part and the id of a process that has ended and is replaced.
     """
     stopping = threading.Event()
     before = {
         number: signal.signal(number, lambda *_: stopping.set()) for number in (signal.SIGTERM, signal.SIGINT)
     }
-    workers = [Worker(serve, each, k) for k, each in enumerate(sockets)]
+    workers = [Worker(serve, part) for part in parts]
     try:
+        on_start()
         code = _watch(workers, silence, stopping, on_end)
     finally:
         _end([worker.process for worker in workers], grace)
@@ -62,21 +72,29 @@ def supervise(
     return code
 
 
-class Worker:
+class Worker(Generic[Part]):
     """One server process, and the one that replaces it."""
 
-    def __init__(self, serve: Serve, listener: socket.socket, number: int) -> None:
-        self._arguments = (serve, listener, number)
+    def __init__(self, serve: Serve[Part], part: Part) -> None:
+        self._serve = serve
+        self.part = part
         self.start()
 
     def start(self) -> None:
         """Start a process."""
-        context = multiprocessing.get_context("spawn")
+        # A copy has only the thread that made it: locks of others would stay locked.
+        alone = sys.platform == "linux" and threading.active_count() == 1
+        context: Any = multiprocessing.get_context("fork" if alone else "spawn")
         self._reports = context.RawValue("Q", 0)
         self._last = 0
         self._silent = 0.0
-        self.process = context.Process(target=_run, args=(*self._arguments, self._reports), name="kinboard-worker")
-        self.process.start()
+        self.process: BaseProcess = context.Process(
+            target=_run, args=(self._serve, self.part, self._reports), name="kinboard-worker"
+        )
+        with warnings.catch_warnings():
+            # Python cannot know that the threads of numpy's linear algebra are made for this.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            self.process.start()
 
     def silent(self) -> float:
         """Seconds without a report, by the number of calls of this method, one per `STEP`.
@@ -94,14 +112,22 @@ class Worker:
         return self._last > 0
 
 
-def _run(serve: Serve, listener: socket.socket, number: int, reports: Any) -> None:
+def _run(serve: Serve[Part], part: Part, reports: Any) -> None:
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # a copy of the supervisor has its handlers
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    supervisor = os.getppid()
+
     def alive() -> None:
         reports.value += 1
+        if os.getppid() != supervisor:  # it was killed: nobody else would stop this process
+            os.kill(os.getpid(), signal.SIGTERM)
 
-    raise SystemExit(serve(listener, number, alive))
+    raise SystemExit(serve(part, alive))
 
 
-def _watch(workers: list[Worker], silence: float, stopping: threading.Event, on_end: Callable[[int], None]) -> int:
+def _watch(
+    workers: list[Worker[Part]], silence: float, stopping: threading.Event, on_end: Callable[[Part, int], None]
+) -> int:
     while not stopping.is_set():
         ended = wait([worker.process.sentinel for worker in workers], timeout=STEP)
         for worker in workers:
@@ -117,12 +143,12 @@ def _watch(workers: list[Worker], silence: float, stopping: threading.Event, on_
             if (process.exitcode or 0) > 0:
                 return 1
             logger.error("worker %s ended with code %s and is restarted", process.pid, process.exitcode)
-            on_end(process.pid or 0)
+            on_end(worker.part, process.pid or 0)
             worker.start()
     return 0
 
 
-def _end(processes: list[SpawnProcess], grace: float) -> None:
+def _end(processes: list[BaseProcess], grace: float) -> None:
     for process in processes:
         process.terminate()
     deadline = time.monotonic() + grace

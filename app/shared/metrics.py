@@ -56,7 +56,8 @@ STREAMED = Counter("kinboard_stream_bytes", "Bytes sent in streamed responses.",
 
 def forget_process(pid: int) -> None:
     """Drop what a process that has ended reported of its present state, such as its visitors; counters stay."""
-    mark_process_dead(pid)  # type: ignore[no-untyped-call]
+    if "PROMETHEUS_MULTIPROC_DIR" in os.environ:
+        mark_process_dead(pid)  # type: ignore[no-untyped-call]
 
 
 def exposition() -> bytes:

@@ -87,7 +87,17 @@ class Settings(BaseSettings):
     )
     cors_origins: Names = Field((), description="Origins whose pages may read REST answers.")
     workers: int = Field(
-        1, ge=1, le=64, description="Number of server processes; each serves REST and the viewer."
+        1,
+        ge=1,
+        le=64,
+        description="Number of server processes; each has its visitors, and serves REST and the viewer.",
+    )
+    rest_workers: int = Field(
+        1,
+        ge=0,
+        le=16,
+        description="Number of further processes beside each of these, which answer REST instead of it, so that "
+        "visitors do not wait for programs; on Linux. 0: none.",
     )
     worker_timeout: float = Field(
         30.0,

@@ -141,7 +141,7 @@ def test_the_health_check_asks_the_port_and_tells_by_its_exit_code() -> None:
         "cap_drop:\n      - ALL",
         "no-new-privileges:true",
         'cpus: "2"',
-        "memory: 2g",
+        "memory: 2560m",
         "pids: 256",
         '"127.0.0.1:8000:8000"',
     ],

@@ -297,7 +297,7 @@ def test_the_process_starts_and_a_signal_stops_it_without_errors(stop, ready):
 )
 def test_a_public_service_without_a_token_logs_a_warning(capfd, monkeypatch, settings, warned):
     monkeypatch.setattr("app.service.main._serve", lambda *_, **__: 0)
-    assert run(Settings(port=0, **settings)) == 0
+    assert run(Settings(port=0, rest_workers=0, **settings)) == 0
     assert ("open to everybody" in capfd.readouterr().err) is warned
 
 

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 
-def fails(listener: socket.socket, number: int, alive: Callable[[], None]) -> int:
+def fails(part: object, alive: Callable[[], None]) -> int:
     """Ends at once."""
     return 3
 
 
-def stops_once(noted: Path, listener: socket.socket, number: int, alive: Callable[[], None]) -> int:
+def stops_once(noted: Path, part: object, alive: Callable[[], None]) -> int:
     """The first time it stops after its first report; the second time it ends the service."""
     first = not noted.exists()
     with noted.open("a") as file:
@@ -26,7 +25,7 @@ def stops_once(noted: Path, listener: socket.socket, number: int, alive: Callabl
     return 0
 
 
-def ignores(code: int, listener: socket.socket, number: int, alive: Callable[[], None]) -> int:
+def ignores(code: int, part: object, alive: Callable[[], None]) -> int:
     """Ignores the signal to stop."""
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     os.kill(os.getppid(), signal.SIGTERM)

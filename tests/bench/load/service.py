@@ -58,10 +58,11 @@ class Service:
         return sum(process.memory_info().rss for process in _family(self.pid))
 
     def loop_seconds(self) -> float:
-        """Processor time that the thread of the event loop has spent; of one worker."""
-        return sum(
-            each.user_time + each.system_time for each in psutil.Process(self.pid).threads() if each.id == self.pid
-        )
+        """Processor time that the event loop has spent that serves visitors; of one worker."""
+        service = psutil.Process(self.pid)
+        children = [child for child in service.children() if child.nice() == service.nice()]
+        process = children[0] if children else service
+        return sum(each.user_time + each.system_time for each in process.threads() if each.id == process.pid)
 
     def seconds(self) -> float:
         """Processor time spent so far: cheaper to find out than `usage`."""

@@ -26,7 +26,8 @@ VISITORS = 10
 ATTACKED, SETTLING, QUIET = 110.0, 10.0, 60.0
 RATIO = 3.0  # of the 95th percentile of drags, attacked to quiet
 LONGEST = 30.0  # seconds until a visitor's connection counts as lost
-PROGRAM = 0.3e9  # bytes of program, kernels and robots, as docs/limits.md states them
+# Bytes of program, kernels and robots of one process, and of the one that starts them, as in docs/limits.md.
+PROGRAM, STARTER = 0.3e9, 0.1e9
 BODIES = 0.03e9  # of the bodies of packages
 _TARGET = json.dumps({"target": {"position": [0.045, 0.191, -0.211]}}).encode()
 _COUNTED = re.compile(r'^kinboard_requests_total\{.*status="(\d+)"\} (\S+)$', re.MULTILINE)
@@ -73,9 +74,12 @@ class Phase:
 
 
 def limit(settings: Settings) -> float:
-    """Bytes that a process may hold, besides visitors and computations: the sum in docs/limits.md."""
-    caches = settings.cloud_memory + settings.map_memory
-    return PROGRAM + caches + settings.answer_memory + settings.upload_memory + settings.mesh_memory + BODIES
+    """Bytes that a worker may hold, besides visitors and computations: the sum in docs/limits.md."""
+    partners = settings.rest_workers
+    viewer = PROGRAM + settings.cloud_memory + settings.map_memory + settings.mesh_memory + BODIES
+    programs = max(1, partners) * (settings.answer_memory + settings.upload_memory)
+    rest = partners * (PROGRAM + settings.map_memory)
+    return viewer + programs + rest + (STARTER if partners else 0.0)
 
 
 class Siege:
