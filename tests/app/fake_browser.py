@@ -5,7 +5,8 @@ from __future__ import annotations
 import html
 import json
 import time
-from collections.abc import Callable
+import weakref
+from collections.abc import Callable, Hashable
 from typing import Any
 
 import msgspec
@@ -15,10 +16,38 @@ import zstandard
 from websockets.sync.client import connect
 
 from app.viewer.panel.script import LABEL
+from app.viewer.session.worker.inbox import Inbox
 from kin.transforms import from_position_wxyz, wxyz_from_rotation
 
 ANSWER = 1.5  # s until a message is answered on a busy machine
 PATIENCE = 30.0  # s until something that must happen has happened, on a machine that does much else
+WORK = 10.0  # s for which `settle` waits for a worker that has something to do
+
+# Inboxes of this process, and those whose workers act on what they have taken.
+_inboxes: weakref.WeakSet[Inbox] = weakref.WeakSet()
+_acting: weakref.WeakSet[Inbox] = weakref.WeakSet()
+_post, _take = Inbox.post, Inbox.take
+
+
+def _watched_post(self: Inbox, key: Hashable, value: object = None) -> None:
+    _inboxes.add(self)
+    _post(self, key, value)
+
+
+def _watched_take(self: Inbox, timeout: float | None = None) -> list[tuple[Hashable, object]] | None:
+    _acting.discard(self)
+    taken = _take(self, timeout)
+    if taken:
+        _acting.add(self)
+    return taken
+
+
+Inbox.post, Inbox.take = _watched_post, _watched_take  # type: ignore[method-assign]
+
+
+def _working() -> bool:
+    """Whether a viewer in this process has something to do that was posted: a page is not at rest then."""
+    return any(not each.closed and (each in _acting or each._values) for each in list(_inboxes))
 
 
 class FakeBrowser:
@@ -211,10 +240,11 @@ class FakeBrowser:
             self._read(left)
 
     def settle(self, quiet: float = 0.3, timeout: float = PATIENCE) -> None:
-        """Read messages until none arrives for `quiet` seconds; the first answer may take longer."""
+        """Read messages until none arrives for `quiet` seconds and no worker acts; the first may take longer."""
         end = time.monotonic() + timeout
+        late = time.monotonic() + WORK
         self._owed, patience = False, ANSWER if self._owed else quiet
-        while self._read(patience):
+        while self._read(patience) or (_working() and time.monotonic() < late):
             patience = quiet
             assert time.monotonic() < end, f"the page did not come to rest within {timeout} s"
 

@@ -6,7 +6,7 @@ import asyncio
 from math import cos, isnan, sin
 
 import pytest
-from load import attackers, attacks, cloud, drag, rest, siege, soak, storm
+from load import attackers, attacks, cloud, drag, play, rest, siege, soak, storm
 from load.raw import Socket
 from load.service import Usage, serve
 from load.visitor import STEP, SWING, Visitor
@@ -130,3 +130,10 @@ def test_leaks_are_reported(more, word):
     after = Usage(*(a + b for a, b in zip((1.0, 1 << 28, 10, 20), more, strict=True)))
     (message,) = soak.left_behind(before, after, 100)
     assert word in message
+
+
+@pytest.mark.slow
+def test_programs_are_played_evenly(service):
+    row = asyncio.run(play.measure(service, 2, 2.0))
+    assert row["pictures/s each"] > 5
+    assert 0 < row["gap p50 ms"] <= row["gap p95 ms"]

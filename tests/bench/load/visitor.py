@@ -46,6 +46,7 @@ class Visitor:
         self.bytes = 0
         self.pictures = 0
         self.latencies: list[float] = []
+        self.times: deque[float] = deque(maxlen=5000)  # when the pictures came
         self._poses: dict[str, dict[str, Any]] = {}
         self._joint = ""
         self._home: Any = None
@@ -135,6 +136,7 @@ class Visitor:
     def _shown(self, wxyz: list[float], now: float) -> None:
         """The base joint has been posed."""
         self.pictures += 1
+        self.times.append(now)
         if not self._waiting:
             return
         w, _, _, z = _product((self._home[0], *(-x for x in self._home[1:])), wxyz)

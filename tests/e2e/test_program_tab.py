@@ -1,0 +1,81 @@
+"""The tab *Program* in a browser: record three poses, play, scrub, read the plot, save the program."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from page import Tab
+from playwright.sync_api import expect
+
+import kin
+
+pytestmark = pytest.mark.browser
+
+PIONEER = kin.get_robot("pioneer5")
+ANGLES = (90.0, 140.0, 60.0)  # of joint 1, degrees
+
+
+def at(angle: float) -> np.ndarray:
+    """Where the tool is with joint 1 at an angle."""
+    q = PIONEER.q_home.copy()
+    q[0] = np.radians(angle)
+    return kin.fk(PIONEER, q)[:3, 3]
+
+
+@pytest.fixture
+def program(desktop: Tab) -> Iterator[Tab]:
+    desktop.select(PIONEER)
+    desktop.open("Move")
+    desktop.page.get_by_role("button", name="Home").click()
+    desktop.wait_for_tool(at(90), within=0.06)
+    yield desktop
+    desktop.open("Program")
+    desktop.page.locator("[data-program-do=clear]").click()
+
+
+def test_three_poses_are_recorded_played_and_saved(program: Tab, tmp_path: Path) -> None:
+    page = program.page
+    for i, angle in enumerate(ANGLES):
+        program.open("Move")
+        program.type_number("1 rotating base", str(angle))
+        program.wait_for_tool(at(angle), within=0.06)
+        program.open("Program")
+        page.locator("[data-program-do=record]").click()
+        expect(page.locator("[data-program-item]")).to_have_count(i + 1)
+    now = page.locator("[data-program-now]")
+    duration = float(re.findall(r"/ ([\d.]+) s", now.inner_text())[0])
+
+    page.get_by_role("button", name="Play").click()
+    expect(now).to_have_text(f"{duration:.2f} / {duration:.2f} s")
+    program.wait_for_tool(at(ANGLES[-1]), within=0.06)
+
+    slider = page.get_by_role("slider", name="Time in the program")
+    slider.fill("0")
+    program.wait_for_tool(at(ANGLES[0]), within=0.06)
+
+    plot = page.locator("[data-program-plot]")
+    plot.scroll_into_view_if_needed()
+    box = plot.bounding_box()
+    assert box is not None
+    ends = [float(plot.get_attribute(f"data-{side}") or "nan") / 100 for side in ("left", "right")]
+    page.mouse.click(box["x"] + box["width"] * ends[1] - 1, box["y"] + 40)
+    program.wait_for_tool(at(ANGLES[-1]), within=2.0)
+    left = page.locator("[data-program-cursor]").evaluate("node => parseFloat(node.style.left)")
+    assert left == pytest.approx(100 * ends[1], abs=1.0)
+    page.locator('[data-program-do=joint][data-argument="0"]').click()
+    expect(plot.locator("svg")).to_have_attribute("aria-label", re.compile("joint 1"))
+    expect(plot.locator(".kb-motion-band").first).to_be_attached()
+
+    with page.expect_download() as download:
+        page.locator("[data-program-do=download]").click()
+    file = tmp_path / "program.toml"
+    download.value.save_as(file)
+    segments = tomllib.loads(file.read_text("utf-8"))["segments"]
+    assert [round(np.degrees(segment["q"][0])) for segment in segments] == list(ANGLES)
+    page.locator("[data-program-choice=language]").select_option("URScript")
+    expect(page.locator("[data-program=files] code")).to_contain_text("six revolute joints")
