@@ -52,6 +52,14 @@ def lesson(robot: str, title: str, ready: str) -> Callable[[Tab], None]:
     return show
 
 
+def trajectories(tab: Tab) -> None:
+    lesson("ur5", "Trajectories", "[data-guide=steps]")(tab)
+    tab.page.get_by_role("button", name="Step 2").click()
+    if tab.page.locator(".kb-reveal").count():
+        tab.page.locator(".kb-reveal").click()
+    expect(tab.page.locator(".kb-chart")).to_be_visible()
+
+
 def robot(tab: Tab) -> None:
     tab.open("Robot")
     if not tab.page.locator(".kb-arm-converted").count():
@@ -126,6 +134,7 @@ SCREENS: dict[str, Callable[[Tab], None]] = {
     "learn-postures": lesson("puma560", "Postures", "[data-posture]"),
     "learn-velocity": lesson("puma560", "Velocity", "[data-singular]"),
     "learn-redundancy": lesson("redundant7-craig", "Redundancy", "[data-limits]"),
+    "learn-trajectories": trajectories,
     "robot": robot,
     "program": program,
     "program-empty": leave_program,

@@ -6,8 +6,8 @@ import asyncio
 import time
 from typing import Any
 
+from load import percentile, table
 from load.attackers import ATTACKS
-from load.figures import percentile, table
 from load.raw import Http, request
 from load.service import Service, serve
 from load.siege import TOKEN, Siege

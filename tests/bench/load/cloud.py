@@ -14,7 +14,7 @@ import kin
 from app.bench import run as bench
 from app.bench.contestants import OURS, PEERS
 from app.bench.rows import ROWS
-from load.figures import table
+from load import table
 from load.raw import Http, Socket, request
 from load.service import Service, serve
 from load.visitor import Visitor

@@ -7,9 +7,9 @@ import json
 import time
 from typing import Any
 
+from load import percentile, table
 from load.drag import connected
 from load.drag import measure as measure_drag
-from load.figures import percentile, table
 from load.service import Service, serve
 from load.visitor import Visitor
 

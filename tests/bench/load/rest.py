@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import kin
-from load.figures import percentile, table
+from load import percentile, table
 from load.raw import Http, request
 from load.service import Service, serve
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from app.shared.settings import Settings
+from load import percentile, table
 from load.attackers import attack
 from load.drag import HZ, hand
-from load.figures import percentile, table
 from load.raw import Http, request
 from load.service import Service, serve
 from load.visitor import Visitor

@@ -7,8 +7,8 @@ import json
 import time
 from typing import Any
 
+from load import table
 from load.drag import HZ, hand
-from load.figures import table
 from load.raw import Http, request
 from load.service import Service, Usage, serve
 from load.visitor import Visitor

@@ -6,7 +6,7 @@ import asyncio
 import time
 from typing import Any
 
-from load.figures import percentile, table
+from load import percentile, table
 from load.raw import Http, request
 from load.service import Service, serve
 from load.visitor import Visitor

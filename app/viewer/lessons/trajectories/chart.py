@@ -1,0 +1,102 @@
+"""Curves over time as SVG: one row for each quantity, with a shared axis and a legend of the curves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from markupsafe import Markup, escape
+
+from app.exports.svg import joint_colour, tick_labels
+from kin.transforms import Array
+
+WIDTH, LEFT, RIGHT, HIGH, GAP, TOP, BOTTOM = 320.0, 44.0, 8.0, 62.0, 22.0, 16.0, 18.0
+FEW = 4  # numbers on an axis
+
+
+class Curve(NamedTuple):
+    """One curve: its name, and for each row its values ``(k,)`` at `times` ``(k,)``; None: not in this row."""
+
+    name: str
+    times: Array
+    rows: tuple[Array | None, ...]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One quantity.
+
+    Attributes:
+        title: with the unit.
+        limit: drawn as a dashed line in both directions; None: there is none.
+    """
+
+    title: str
+    limit: float | None = None
+
+
+def chart(rows: tuple[Row, ...], curves: tuple[Curve, ...], label: str, axis: str = "s") -> Markup:
+    """The curves with their legend; `axis`: unit of the horizontal axis."""
+    start = min(float(curve.times[0]) for curve in curves)
+    end = max(float(curve.times[-1]) for curve in curves)
+    parts: list[str] = []
+    for k, row in enumerate(rows):
+        parts += _row(row, k, curves, (start, end))
+    bottom = TOP + len(rows) * HIGH + (len(rows) - 1) * GAP
+    marks = _thin(tick_labels(start, end, 1.0), 7)
+    for value, text in marks:
+        x = LEFT + (value - start) / (end - start) * (WIDTH - LEFT - RIGHT)
+        unit = f" {axis}" if value == marks[-1][0] else ""
+        parts.append(
+            f'<text x="{min(x, WIDTH - RIGHT - 8):.1f}" y="{bottom + 13:.1f}" text-anchor="middle" '
+            f'class="kb-axis">{text}{unit}</text>'
+        )
+    name = Markup('<span class="kb-chart-name"><i style="background:{}"></i>{}</span> ')
+    legend = Markup("").join(name.format(joint_colour(i), curve.name) for i, curve in enumerate(curves))
+    svg = Markup(
+        f'<svg class="kb-plot" viewBox="0 0 {WIDTH:.0f} {bottom + BOTTOM:.0f}" width="100%" role="img" '
+        f'aria-label="{escape(label)}">{"".join(parts)}</svg>'
+    )
+    return Markup('<span class="kb-chart">') + svg + legend + Markup("</span>")
+
+
+def _row(row: Row, k: int, curves: tuple[Curve, ...], ends: tuple[float, float]) -> list[str]:
+    """One quantity of all curves."""
+    values = [shown for curve in curves if (shown := curve.rows[k]) is not None]
+    low, high = min(float(v.min()) for v in values), max(float(v.max()) for v in values)
+    if row.limit is not None:
+        low, high = (min(low, -row.limit) if low < 0.0 else low), max(high, row.limit)
+    room = 0.08 * max(high - low, 1e-9)
+    low, high = low - room, high + room
+    top, right = TOP + k * (HIGH + GAP), WIDTH - RIGHT
+
+    def y(value: float) -> float:
+        return top + (high - value) / (high - low) * HIGH
+
+    parts = [f'<text x="{LEFT}" y="{top - 5:.1f}" class="kb-axis kb-motion-title">{escape(row.title)}</text>']
+    for value, text in _thin(tick_labels(low, high, 1.0), FEW):
+        parts.append(
+            f'<path d="M{LEFT} {y(value):.1f}H{right:.1f}" stroke="currentColor" stroke-opacity=".16"/>'
+            f'<text x="{LEFT - 5:.1f}" y="{y(value) + 3.4:.1f}" text-anchor="end" class="kb-axis">{text}</text>'
+        )
+    limits = () if row.limit is None else (row.limit, -row.limit)
+    shown_limits = [y(limit) for limit in limits if low < limit < high]
+    parts += [f'<path class="kb-motion-limit" d="M{LEFT} {at:.1f}H{right:.1f}"/>' for at in shown_limits]
+    for i, curve in enumerate(curves):
+        shown = curve.rows[k]
+        if shown is not None:
+            across = LEFT + (curve.times - ends[0]) / (ends[1] - ends[0]) * (right - LEFT)
+            points = zip(across.tolist(), np.vectorize(y)(shown).tolist(), strict=True)
+            path = "L".join(f"{a:.1f} {b:.1f}" for a, b in points)
+            parts.append(f'<path class="kb-motion-curve" d="M{path}" stroke="{joint_colour(i)}"/>')
+    parts.append(
+        f'<rect x="{LEFT}" y="{top:.1f}" width="{right - LEFT:.1f}" height="{HIGH}" fill="none" '
+        'stroke="currentColor" stroke-opacity=".4"/>'
+    )
+    return parts
+
+
+def _thin(labels: list[tuple[float, str]], most: int) -> list[tuple[float, str]]:
+    """At most `most` of evenly spread labels."""
+    return labels[:: -(-len(labels) // most)]
