@@ -28,6 +28,7 @@ from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 SOLUTIONS = 16
+_CLOSE = 1e-3  # rad; a solution farther from the root that led to it belongs to another root
 _MERGE = TOLERANCES.merge
 # Rows are sorted by a weighted sum of cosines, which does not jump where an angle passes ±180°.
 _WEIGHTS = np.array([1.0, 0.7548776662, 0.5698402910, 0.4301597090, 0.3247179572, 0.2451223338])
@@ -65,7 +66,7 @@ def _times(X: Array, Y: Array, out: Array) -> None:
 
 
 @jit
-def solve_cut(params: Array, T: Array, out: Array, count: int) -> int:
+def solve_cut(params: Array, T: Array, doubtful: bool, out: Array, count: int) -> int:
     """Add the solutions found with one cut to the first `count` rows of out ``(16, 6)``; returns their number."""
     F, E = np.empty((6, 3, 4)), np.empty((3, 6, 9))
     B, Q, diagonal = np.empty((QUANTITIES, 9)), np.empty((QUANTITIES, 9)), np.empty(UNKNOWN)
@@ -74,11 +75,11 @@ def solve_cut(params: Array, T: Array, out: Array, count: int) -> int:
     shift = int(params[SHIFT])
     loop_of(params, T, F)
     eliminate(F, B, Q, diagonal, E)
-    for k in range(zeros(E, found)):
-        before = count
+    for k in range(zeros(E, doubtful, found)):
+        own = False
         for least in range(1, 3):
             # A root that leads to a known solution has a close neighbour: two null vectors span both solutions.
-            if count > before:
+            if own:
                 break
             condense(E, math.cos(found[k]), math.sin(found[k]), A, W)
             for m in range(monomials(vectors, null_vectors(W, vectors, least))):
@@ -87,6 +88,7 @@ def solve_cut(params: Array, T: Array, out: Array, count: int) -> int:
                 others(F, B, Q, diagonal, t)
                 if not polish(F, t) or count == SOLUTIONS:
                     continue
+                close = abs(wrap(t[2] - found[k])) < _CLOSE
                 t[3] += TURN_D
                 t[4] += TURN_E
                 for i in range(6):
@@ -94,6 +96,7 @@ def solve_cut(params: Array, T: Array, out: Array, count: int) -> int:
                     out[count, j] = wrap(params[SIGN + j] * (t[i] - params[OFFSET + j]))
                 if _is_new(out, count):
                     count += 1
+                    own = own or close
     return count
 
 
@@ -131,8 +134,8 @@ def _sort(out: Array, count: int) -> None:
 def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
     """out ``(16, 6)`` ← all solutions of the target T ``(4, 4)``, then NaN; False if T is not finite.
 
-    Solutions come in pairs, but for double ones: with an odd number, or none, the next cut is tried too. `value`
-    and `near` are not used: a pose leaves nothing free.
+    Solutions come in pairs, but for double ones: with an odd number, or none, the next cut is tried too, and at
+    last the first one with doubtful roots. `value` and `near` are not used: a pose leaves nothing free.
     """
     clear(out)
     for r in range(4):
@@ -140,8 +143,10 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
             if not math.isfinite(T[r, k]):
                 return False
     count = 0
-    for cut in range(params.shape[0] // SIZE):
-        count = solve_cut(params[cut * SIZE : (cut + 1) * SIZE], T, out, count)
+    cuts = params.shape[0] // SIZE
+    for k in range(cuts + 1):
+        first = (k % cuts) * SIZE
+        count = solve_cut(params[first : first + SIZE], T, k == cuts, out, count)
         if count > 0 and count % 2 == 0:
             break
     if count < SOLUTIONS:  # the row after the last may hold a duplicate

@@ -20,7 +20,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from kin.kernels.compile import jit
+from kin.kernels.compile import inlined, jit
 from kin.transforms import Array
 
 Numbers = Array | NDArray[np.complex128]
@@ -193,6 +193,12 @@ def eliminate(F: Array, B: Array, Q: Array, diagonal: Array, E: Array) -> None:
         _half_angles(E[part])
 
 
+@inlined
+def _square(x: complex) -> float:
+    """|x|², which costs no root as |x| does."""
+    return x.real * x.real + x.imag * x.imag
+
+
 @jit
 def condense(E: Array, c: complex, s: complex, A: Numbers, W: Numbers) -> complex:
     """W ``(6, 6)`` ← what is left of Z(c) once its first and last three columns are eliminated; product of pivots.
@@ -211,7 +217,7 @@ def condense(E: Array, c: complex, s: complex, A: Numbers, W: Numbers) -> comple
         for k in range(3):
             pivot = k
             for n in range(k + 1, 6):
-                if abs(U[n, first + k]) > abs(U[pivot, first + k]):
+                if _square(U[n, first + k]) > _square(U[pivot, first + k]):
                     pivot = n
             if pivot != k:
                 product = -product
@@ -221,8 +227,9 @@ def condense(E: Array, c: complex, s: complex, A: Numbers, W: Numbers) -> comple
             product *= value
             if value == 0.0:
                 continue
+            back = 1.0 / value
             for n in range(k + 1, 6):
-                factor = U[n, first + k] / value
+                factor = U[n, first + k] * back
                 for j in range(k + 1, 3):
                     U[n, first + j] -= factor * U[k, first + j]
                 for m in range(start, start + 6):
@@ -239,7 +246,7 @@ def times_determinant(product: complex, W: Numbers) -> complex:
     for k in range(6):
         pivot = k
         for n in range(k + 1, 6):
-            if abs(W[n, k]) > abs(W[pivot, k]):
+            if _square(W[n, k]) > _square(W[pivot, k]):
                 pivot = n
         if pivot != k:
             product = -product
@@ -249,8 +256,9 @@ def times_determinant(product: complex, W: Numbers) -> complex:
         product *= value
         if value == 0.0:
             return product
+        back = 1.0 / value
         for n in range(k + 1, 6):
-            factor = W[n, k] / value
+            factor = W[n, k] * back
             for m in range(k + 1, 6):
                 W[n, m] -= factor * W[k, m]
     return product

@@ -15,7 +15,7 @@ from kin.solvers.general6.elimination import QUANTITIES, SCALARS, UNKNOWN, moved
 from kin.transforms import Array
 
 _FLAT = 1e-7  # of the largest entry: a pivot that leaves a second null vector
-_STEPS = 30
+_STEPS = 10
 _ARRIVED = 1e-14
 _THERE = 1e-11  # radians, shares of the arm's size: the loop is closed
 
@@ -199,9 +199,8 @@ def polish(F: Array, t: Array) -> bool:
     close(F, t, T, axes)
     cost = _miss(T, e)
     damping = 1e-3
-    for _ in range(_STEPS):
-        if cost < _ARRIVED * _ARRIVED:
-            break
+    left = _STEPS
+    while cost >= _ARRIVED * _ARRIVED and left > 0:
         for i in range(6):
             total = 0.0
             for r in range(6):
@@ -213,7 +212,8 @@ def polish(F: Array, t: Array) -> bool:
                     total += axes[i, r] * axes[j, r]
                 H[i, j] = total
         better = math.inf
-        for _ in range(8):
+        while left > 0:
+            left -= 1
             if _damped_step(H, g, damping * cost + 1e-16, step):
                 for i in range(6):
                     trial[i] = t[i] + step[i]

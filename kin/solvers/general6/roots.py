@@ -31,13 +31,15 @@ _COSINES, _SINES = np.cos(_ANGLES) / TERMS, np.sin(_ANGLES) / TERMS
 _START = np.exp(1j * (0.4 + 2.0 * np.pi * np.arange(ROOTS) / ROOTS)) * 1.07
 _START_X, _START_Y = _START.real.copy(), _START.imag.copy()
 _STEPS = 40
-_SETTLED = 1e-24  # square of a step
+_SETTLED = 1e-16  # square of a step; the iteration is of third order
 _NOISE = 4e-15  # of the largest coefficient
 _SURE = 1e-7  # radius of uncertainty below which a root needs no correction
 _NEARBY = 0.4  # |log |z||: roots that are corrected
 _ON_CIRCLE = 0.03  # |log |z||: roots that are tried as real angles
+_OFF_CIRCLE = 1e4  # radii of uncertainty: a root that is farther from the circle is no real angle
 _CORRECTIONS = 40
 _STRIDE = 0.1  # of one correction at most
+_RADII = 100.0  # the same in radii of uncertainty
 
 
 @jit
@@ -101,7 +103,9 @@ def aberth(re: Array, im: Array, zx: Array, zy: Array, slope: Array) -> None:
             zx[i] -= x
             zy[i] -= y
             size = zx[i] * zx[i] + zy[i] * zy[i]
-            largest = max(largest, (x * x + y * y) / size if 0.25 < size < 4.0 else 0.0)
+            # Where the polynomial is noise, or far from the circle, steps need not become small.
+            moves = 0.25 < size < 4.0 and px[i] * px[i] + py[i] * py[i] > _NOISE * _NOISE
+            largest = max(largest, x * x + y * y if moves else 0.0)
         if largest < _SETTLED:
             break
     for i in range(ROOTS):
@@ -134,11 +138,11 @@ def _correct(E: Array, z: Numbers, slope: Array) -> None:
             if not 0.0 < square < math.inf:
                 continue
             step = polynomial_at(E, z[i], A, W) * far.conjugate() / square
-            size = abs(step)
-            if not size < _STRIDE:
-                step *= _STRIDE / size
+            size, most = abs(step), min(_STRIDE, _RADII * _NOISE / (slope[i] + _NOISE))
+            if not size < most:
+                step *= most / size
             z[i] -= step
-            largest = max(largest, min(size, _STRIDE))
+            largest = max(largest, min(size, most))
         if largest < _SURE:
             break
 
@@ -148,7 +152,9 @@ def polynomial_at(E: Array, z: complex, A: Numbers, W: Numbers) -> complex:
     """z⁸ det Z; A ``(2, 6, 9)`` and W ``(6, 6)`` complex are scratch."""
     back = 1.0 / z
     cosine, sine = 0.5 * (z + back), -0.5j * (z - back)
-    return times_determinant(condense(E, cosine, sine, A, W), W) * z**DEGREE
+    z2 = z * z
+    z4 = z2 * z2
+    return times_determinant(condense(E, cosine, sine, A, W), W) * (z4 * z4)
 
 
 @jit
@@ -167,8 +173,11 @@ def _leading(E: Array, z: Numbers) -> complex:
 
 
 @jit
-def zeros(E: Array, out: Array) -> int:
-    """out ``(16,)`` ← the angles of all roots on the unit circle or almost there; returns their number."""
+def zeros(E: Array, doubtful: bool, out: Array) -> int:
+    """out ``(16,)`` ← the angles of all roots on the unit circle or almost there; returns their number.
+
+    With `doubtful` these are also roots that lie beside the circle by more than rounding explains.
+    """
     re, im, zx, zy, slope = np.empty(TERMS), np.empty(TERMS), np.empty(ROOTS), np.empty(ROOTS), np.empty(ROOTS)
     coefficients(E, re, im)
     aberth(re, im, zx, zy, slope)
@@ -178,7 +187,8 @@ def zeros(E: Array, out: Array) -> int:
     _correct(E, z, slope)
     count = 0
     for i in range(ROOTS):
-        if _near_circle(z[i], _ON_CIRCLE):
+        off = abs(math.hypot(z[i].real, z[i].imag) - 1.0)
+        if off < _ON_CIRCLE and (doubtful or off * slope[i] < _OFF_CIRCLE * _NOISE):
             out[count] = math.atan2(z[i].imag, z[i].real)
             count += 1
     return count
