@@ -85,16 +85,28 @@
     node.style.setProperty("--kb-tip", `${Math.min(Math.max(box.left + box.width / 2 - parseFloat(node.style.left), 16), width - 16)}px`);
   }
 
+  /** Move a hint below those it would cover, or above where there is no room; returns its place. */
+  function apart(node, placed) {
+    for (const other of placed) {
+      const { left, right, top, bottom, height } = node.getBoundingClientRect();
+      if (left >= other.right || right <= other.left || top >= other.bottom + 4 || bottom + 4 <= other.top) continue;
+      const below = other.bottom + 8;
+      node.style.top = `${below + height <= innerHeight - 8 ? below : Math.max(8, other.top - height - 8)}px`;
+      node.dataset.arrow = "none";
+    }
+    return node.getBoundingClientRect();
+  }
+
   function draw() {
     if (document.querySelector("[data-hints]") === null) return;
-    let shown = 0;
+    const placed = [];
     for (const hint of open.values()) {
       const box = hint.target();
       let node = document.querySelector(`.kb-hint[data-hint="${hint.key}"]`);
-      if (!visible(box) || (innerWidth < NARROW && shown)) { node?.remove(); continue; }
+      if (!visible(box) || (innerWidth < NARROW && placed.length)) { node?.remove(); continue; }
       node ??= bubble(hint);
       put(node, box, hint.key);
-      shown += 1;
+      placed.push(apart(node, placed));
     }
   }
 

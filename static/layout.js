@@ -214,7 +214,11 @@
 
   addEventListener("click", (event) => {
     const button = event.target instanceof Element ? event.target.closest("[data-text-size]") : null;
-    if (button) chooseSize(button.dataset.textSize);
+    if (!button) return;
+    const before = root.dataset.kbText;
+    chooseSize(button.dataset.textSize);
+    // Who may only look can tell the service the size of labels only while the page opens; the view stays.
+    if (document.querySelector("[data-looking]") && root.dataset.kbText !== before) location.reload();
   });
 
   /** Make the panel's edge a control for the keyboard too. */

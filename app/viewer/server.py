@@ -18,7 +18,7 @@ from app.shared.store import Store
 from app.shared.summaries import Summaries
 from app.viewer.meshes.library import Library
 from app.viewer.meshes.reader import MeshReader
-from app.viewer.panel.status import READY, Notice
+from app.viewer.panel.status import LOOKING, READY, Notice
 from app.viewer.panel.view import configure_theme
 from app.viewer.scene.lights import light_scene
 from app.viewer.scene.motion import Pace
@@ -114,13 +114,14 @@ class ViewerServer:
         self._start_page(client, READY, RESTARTS)
 
     def _start_page(self, client: viser.ClientHandle, welcome: Notice, restarts: int) -> None:
+        rights = self._connections.rights.get(client.client_id, Rights.LOOK)  # if absent, the visitor has left
         page = VisitorPage(
             client,
             self._services,
             self._settings.token is not None,
-            welcome,
+            LOOKING if welcome is READY and rights is Rights.LOOK else welcome,
             lambda: self._restart(client, restarts),
-            self._connections.rights.get(client.client_id, Rights.LOOK),  # if absent, the visitor has left
+            rights,
             self._connections.clients.get(client.client_id, ""),
         )
         with self._lock:

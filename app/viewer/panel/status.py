@@ -44,6 +44,8 @@ class Notice:
 
 READY = Notice("hand", "Ready", "Drag the coloured arrows at the gripper, or move a joint slider.")
 
+LOOKING = Notice("hand", "Ready", "You may look: drag the picture to turn the view, and scroll to come closer.")
+
 
 def notice(result: IKResult, units: Units) -> Notice:
     """The result for a target as a message."""

@@ -19,7 +19,7 @@ from app.viewer.panel.status import Notice, introduction
 from app.viewer.panel.target import DEFAULT_TASK, TASKS
 from app.viewer.panel.view import SIDES, ViewState
 from app.viewer.scene.gizmo import Pull
-from app.viewer.session.history import LONG_PAUSE, SHORT_PAUSE, History, Step, same, without_results
+from app.viewer.session.history import LONG_PAUSE, SHORT_PAUSE, History, Step, is_gradual, same, without_results
 from app.viewer.session.persistence import link_notice
 from app.viewer.session.robots import RobotPage, robot_of
 from app.viewer.session.state import PageState, decode
@@ -179,7 +179,7 @@ class Actions:
         shown = self._page.status.count
         gesture = (name, *(a for a in arguments if not isinstance(a, Units)))
         now = time.perf_counter()
-        if self._continues(gesture, now):
+        if self._continues(gesture, value, now):
             action(*arguments, value)
             return
         before = self._page.snapshot()
@@ -210,9 +210,11 @@ class Actions:
         returned, self._returned = self._returned, False
         return returned
 
-    def _continues(self, gesture: tuple[object, ...], now: float) -> bool:
+    def _continues(self, gesture: tuple[object, ...], value: object, now: float) -> bool:
         """Whether an event belongs to the same step as the one before."""
         if gesture != self._gesture or now - self._changed_at > GRADUAL.get(str(gesture[0]), 0.0):
+            return False
+        if gesture[0] == "feature" and not is_gradual(gesture[2], value):
             return False
         self._changed_at = now
         return True
@@ -268,7 +270,7 @@ class Actions:
             page.lessons.open(state.lesson)
         for feature in page.features:
             wanted = without_results(state.features.get(feature.key, {}))
-            if wanted and wanted != without_results(feature.state()):
+            if wanted != without_results(feature.state()):
                 feature.restore(wanted)
         page.for_features(lambda feature: feature.on_request())
 

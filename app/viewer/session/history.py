@@ -80,6 +80,13 @@ def _settings(state: PageState) -> PageState:
     return replace(state, camera=None, features=features)
 
 
+def is_gradual(key: object, value: object) -> bool:
+    """Whether an event of a feature is part of a drag or of typing; a choice or a button is a step of its own."""
+    if isinstance(key, tuple) and key and key[0] == "cell":
+        return bool(key[-1] != "kind")
+    return isinstance(value, int | float | tuple) and not isinstance(value, bool)
+
+
 def without_results(values: dict[str, object]) -> dict[str, object]:
     """A feature's state without the entries that say whether something is drawn."""
     return {

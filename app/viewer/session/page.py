@@ -90,6 +90,7 @@ class VisitorPage(ShownArm, Worker):
         self._pace = services.pace
         self._welcome = welcome
         self._persistence = Persistence(self, token, self._guard, rights)
+        self._looking = rights is Rights.LOOK
         self.units = DEFAULT_UNITS
         self._tabs: list[Feature] = []
         self._result: IKResult | None = None  # for the last target
@@ -338,10 +339,14 @@ class VisitorPage(ShownArm, Worker):
             self._show_hints()
 
     def _show_hints(self) -> None:
-        """Tell ``static/hints.js`` where the gizmo is in the picture, and how long its arrows are there."""
+        """Tell ``static/hints.js`` where the gizmo is in the picture, and how long its arrows are there.
+
+        Who may only look gets no hints.
+        """
         gizmo = self.arm.scene.gizmo
         x, y, length = self.camera.place(gizmo.position, gizmo.scale)
-        update_html(self.panel.hints, render("panel/hints", place=f"{x:.3f} {y:.3f} {length:.3f}"))
+        place = "" if self._looking else f"{x:.3f} {y:.3f} {length:.3f}"
+        update_html(self.panel.hints, render("panel/hints", place=place))
 
     # Building
 

@@ -334,6 +334,8 @@ def test_a_read_only_visitor_sees_the_arm_of_a_link_and_cannot_move_it():
             tab.settle()
             assert tab.value("Link frames") is True
             assert tab.value("Robot") == "My arm (Bob's arm)"
+            assert "You may look" in tab.html
+            assert "data-hints" not in tab.html, "no hint asks to drag what cannot be dragged"
             assert tab.nodes["/key-number"]["props"]["font_screen_scale"] == pytest.approx(1.7)
             before = tab.tool_pose()
             tab.say("feature", ["robot", ["start"], "planar-2r"])

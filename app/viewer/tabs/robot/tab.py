@@ -28,7 +28,7 @@ from kin import InputError, RobotFileError
 from kin.files.read import MAX_ROWS
 from kin.robot import Convention
 
-PARTS = ("start", "table", "wrong", "about", "frames", "convert", "files")
+PARTS = ("start", "table", "wrong", "about", "frames", "wrong-frames", "convert", "files")
 OTHER: dict[Convention, Convention] = {"standard": "modified", "modified": "standard"}
 UNUSED = "The file was not used"
 
@@ -154,7 +154,9 @@ class RobotTab(Feature):
         update_html(self._html[name], html)
 
     def _show_wrong(self) -> None:
-        self._show("wrong", views.wrong({cell: message for cell, (_, message) in self._wrong.items()}))
+        messages = {cell: message for cell, (_, message) in self._wrong.items()}
+        self._show("wrong", views.wrong(messages))
+        self._show("wrong-frames", views.wrong_frames(messages))
 
     def _show_conversion(self) -> None:
         robot = self.stage.robot

@@ -10,7 +10,7 @@ from app.shared.answers.inspection import InspectionAnswer
 from app.viewer.frames import MOST as MOST_FRAMES
 from app.viewer.frames import Frames
 from app.viewer.meshes.archive import MB, MOST_BYTES
-from app.viewer.tabs.robot.edits import ANGLES, AXES, FRAMES, KINDS, NUMBERS, Cell, frame_values, name_of
+from app.viewer.tabs.robot.edits import ANGLES, AXES, FRAMES, KINDS, NUMBERS, Cell, frame_values, name_of, part_of
 from app.viewer.tabs.robot.files import MOST, Busy, Source
 from app.viewer.tabs.robot.presets import TITLES
 from app.viewer.tabs.robot.texts import Texts
@@ -96,10 +96,21 @@ def _text(cell: Cell, value: float, units: Units, is_angle: bool, texts: Texts) 
 
 
 def wrong(messages: Mapping[Cell, str]) -> str:
-    """What is wrong, and in which cells, for ``static/robot.js``."""
+    """What is wrong in the table, and in which cells of all parts, for ``static/robot.js``."""
     cells = {" ".join(map(str, cell)): message for cell, message in messages.items()}
-    words = [_sentence(cell, message) for cell, message in messages.items()]
-    return render("robot/wrong", cells=json.dumps(cells), messages=words)
+    return render(
+        "robot/wrong", part="wrong", cells=json.dumps(cells), messages=_said(messages, ("table", "start"))
+    )
+
+
+def wrong_frames(messages: Mapping[Cell, str]) -> str:
+    """What is wrong in tool, base and workpieces."""
+    return render("robot/wrong", part="wrong-frames", cells="", messages=_said(messages, ("frames",)))
+
+
+def _said(messages: Mapping[Cell, str], parts: Sequence[str]) -> list[str]:
+    """The messages about cells of these parts of the tab, with the names of the cells."""
+    return [_sentence(cell, message) for cell, message in messages.items() if part_of(cell) in parts]
 
 
 def _sentence(cell: Cell, message: str) -> str:

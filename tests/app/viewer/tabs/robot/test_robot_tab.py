@@ -115,6 +115,38 @@ def test_a_typed_cell_changes_the_arm_and_undo_takes_it_back(port: int) -> None:
         assert tab.value("Robot") == f"My arm ({PIONEER.name} variant)"
 
 
+def test_undo_forgets_the_only_expression_that_was_typed(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        type_in(tab, 2, "alpha", "pi/3")
+        assert saved(tab).features["robot"]["texts"] == {"2 alpha": "pi/3"}
+        tab.say("undo")
+        tab.settle()
+        assert "texts" not in saved(tab).features.get("robot", {})
+
+
+def test_each_choice_is_a_step_and_typing_is_one(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        say(tab, "cell", 1, "kind", value=[revision(tab), "prismatic"])
+        say(tab, "cell", 1, "kind", value=[revision(tab), "fixed"])
+        tab.say("undo")
+        tab.settle()
+        assert '<option value="prismatic" selected>' in part(tab, "table")
+        tab.say("undo")
+        tab.settle()
+        assert tab.value("Robot") == PIONEER.name
+
+
+def test_what_is_wrong_with_a_frame_is_said_below_the_frames(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        type_in(tab, "tool", "x", "5o")
+        assert "Tool, x: “5o” is not a number" in part(tab, "wrong-frames")
+        assert list(wrong(tab)) == ["tool x"]
+        assert "5o" not in part(tab, "wrong").partition(">")[2]
+
+
 def test_a_wrong_cell_is_marked_and_the_last_valid_arm_stays(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
