@@ -142,7 +142,7 @@ def test_the_health_check_asks_the_port_and_tells_by_its_exit_code() -> None:
         "no-new-privileges:true",
         'cpus: "2"',
         "memory: 2560m",
-        "pids: 256",
+        "pids: 512",
         '"127.0.0.1:8000:8000"',
     ],
 )
