@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
+from contextlib import closing
 from functools import partial
 from typing import Annotated, Any, Literal
 
@@ -20,6 +22,7 @@ from app.api.workspace.streaming import ComputedResponse
 from app.exports.motion import FORMATS
 from app.shared.answers.motion import MotionAnswer, motion_answer, sample_times
 from app.shared.settings import Settings
+from app.shared.threads.turns import Turn
 from kin import InputError, Motion, Robot, plan_motion
 from kin.motion import program_from_dict
 from kin.motion.program import KINDS, LONGEST_NAME, MOST_SEGMENTS, TASKS
@@ -158,8 +161,19 @@ async def motion(request: Request, robot: Robot, body: MotionRequest) -> Respons
         return found
     kind = FORMATS[body.format]
     headers = {"content-disposition": f'attachment; filename="{robot.id}-motion{kind.suffix}"'}
-    pieces = kind.pieces(found, body.rate)
+    pieces = in_turns(kind.pieces(found, body.rate), Turn(request.app.state.compute.turns))
     return ComputedResponse(pieces, "motion", kind.media_type, headers, request.app.state.streams)
+
+
+def in_turns(pieces: Generator[bytes], turn: Turn) -> Generator[bytes]:
+    """The same pieces, each computed when it is the turn of this request; closing it ends their computation."""
+    with closing(pieces):
+        while True:
+            with turn:
+                piece = next(pieces, None)
+            if piece is None:
+                return
+            yield piece
 
 
 def _planned(robot: Robot, body: MotionRequest, settings: Settings, deadline: Deadline) -> Motion | Response:

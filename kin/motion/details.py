@@ -118,7 +118,7 @@ class BlendLeftOut(NamedTuple):
     """The arm stops at the end of a segment although a zone was asked for."""
 
     segment: int
-    why: Literal["last", "kinds", "short", "dwell"]
+    why: Literal["last", "short", "dwell"]
 
 
 class Slowed(NamedTuple):

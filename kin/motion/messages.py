@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 _STOPS = {
     "last": "it is the last one",
-    "kinds": "the next segment is of another kind",
     "short": "one of the two segments has no length",
     "dwell": "the arm pauses there",
 }

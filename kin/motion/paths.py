@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +24,8 @@ _INTERVALS = 240  # of a path, at least, when it is timed
 _FREE = 1e6  # the largest ṡ² where nothing else limits it
 _TOOL_MARGIN = 1e-4  # part of a limit of the tool kept free for what lies between the points that are looked at
 _SAMPLES, _TOOL_SHARE = 400, 1e-3  # points of a PTP at which the tool's speed is looked at, and what lies between
-_LOOK = 64  # points at which the distance from a corner is measured
+_LOOK, _LOOKS = 48, 3  # points at which the distance from a corner is measured, and how often, ever closer
+_NODES = 33  # of a curve of the joints or a part of a corner
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,6 +58,15 @@ class Layout:
                 starts.append(starts[-1] + 2.0 * after)
                 owners.append((first + k, first + k + 1))
         return cls(np.array(starts), tuple(owners), np.array([*bounds, starts[-1]]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """Segments that are one path of the joints: where they are, and q(s): knots ``(k + 1,)``, ``(k, n, 4)``."""
+
+    layout: Layout
+    knots: Array
+    pieces: Array
 
 
 def pose_of(robot: Robot, target: Target, before: Array) -> Array:
@@ -143,14 +153,69 @@ class JointCurve:
 
 def joint_radius(robot: Robot, blend: float, before: JointCurve, after: JointCurve) -> float:
     """The radius (in s) of the corner between two curves of the joints for a zone of `blend` metres."""
-    radius = 0.5 * min(before.length, after.length)
-    f = np.linspace(0.0, 1.0, _LOOK)
-    met = fk_positions(robot, after.at(np.zeros(1)))[0]
-    for curve, s in ((before, before.length - f * radius), (after, f * radius)):
-        away = np.linalg.norm(fk_positions(robot, curve.at(s)) - met, axis=1) > blend
-        if away.any():
-            radius *= float(f[int(np.argmax(away)) - 1])
-    return radius
+    most = 0.5 * min(before.length, after.length)
+    back = _within(robot, lambda s: before.at(before.length - s), blend, most)
+    return min(back, _within(robot, after.at, blend, most))
+
+
+def _within(robot: Robot, at: Callable[[Array], Array], blend: float, most: float) -> float:
+    """How far s may go, at most, so that the tool stays within `blend` metres of where it is at s = 0."""
+    met = fk_positions(robot, at(np.zeros(1)))[0]
+    low, high = 0.0, most
+    for _ in range(_LOOKS):
+        s = np.linspace(low, high, _LOOK)
+        away = np.linalg.norm(fk_positions(robot, at(s)) - met, axis=1) > blend
+        if not away.any():
+            return high
+        k = int(np.argmax(away))
+        low, high = float(s[max(k - 1, 0)]), float(s[k])
+    return low
+
+
+def _dense(run: Run) -> Run:
+    """A path with enough knots for a spline through them; a PTP alone has two."""
+    if len(run.knots) >= _NODES:
+        return run
+    parts = np.full(len(run.pieces), -(-_NODES // len(run.pieces)))
+    return Run(run.layout, *parted(run.knots, run.pieces, parts))
+
+
+def joined(robot: Robot, first: Run, second: Run, blend: float) -> tuple[Run, float]:
+    """Two paths as one, with a corner of the joints between them; and the zone in metres that it takes.
+
+    s of the second is scaled, so that the corner takes as much of both.
+    """
+    first, second = _dense(first), _dense(second)
+    radii = []
+    length, met = first.knots[-1], values(second.knots, second.pieces, np.zeros(1))[0]
+    for run, end in ((first, True), (second, False)):
+        starts, bounds, at = run.layout.starts, run.layout.bounds, run.knots[-1] if end else 0.0
+        most = float(min(starts[-1] - starts[-2], 0.5 * (bounds[-1] - bounds[-2])) if end else 0.5 * bounds[1])
+        most = most if end else float(min(starts[1], most))
+
+        def near(s: Array, run: Run = run, at: float = at, sign: float = -1.0 if end else 1.0) -> Array:
+            return values(run.knots, run.pieces, at + sign * s)
+
+        radii.append(_within(robot, near, blend, most))
+    r, scale = radii[0], radii[0] / radii[1]
+    knots, pieces = second.knots * scale, second.pieces / scale ** np.arange(4.0)
+    u = np.linspace(0.0, 1.0, 2 * _NODES - 1)
+    back, ahead = np.array([corner_at(float(part), r) for part in u]).T
+    rows = values(first.knots, first.pieces, length + back) + values(knots, pieces, ahead) - met
+    away = np.linalg.norm(fk_positions(robot, rows[[0, -1]]) - fk_positions(robot, met), axis=1)
+    close = 1e-3 * r / _NODES
+    early, late = first.knots < length - r - close, knots > r + close
+    s = np.concatenate([first.knots[early], length - r + 2.0 * r * u, length + knots[late]])
+    before = values(first.knots, first.pieces, first.knots[early])
+    after = values(knots, pieces, knots[late])
+    layout = Layout(
+        np.concatenate(
+            [first.layout.starts[:-1], [length - r, length + r], length + scale * second.layout.starts[1:]]
+        ),
+        (*first.layout.owners, (first.layout.owners[-1][-1], second.layout.owners[0][0]), *second.layout.owners),
+        np.concatenate([first.layout.bounds, length + scale * second.layout.bounds[1:]]),
+    )
+    return Run(layout, s, spline(s, np.concatenate([before, rows, after]))), float(away.min())
 
 
 def joint_path(curves: list[JointCurve], radii: list[float], layout: Layout) -> tuple[Array, Array]:
@@ -161,12 +226,12 @@ def joint_path(curves: list[JointCurve], radii: list[float], layout: Layout) -> 
         before, after = (radii[k - 1] if k else 0.0), (radii[k] if k < len(radii) else 0.0)
         rest = curve.length - before - after
         if rest > NO_LENGTH:
-            own = np.linspace(before, curve.length - after, 33)[1:]
+            own = np.linspace(before, curve.length - after, _NODES)[1:]
             s.append(begin + own - before)
             rows.append(curve.at(own))
             begin += rest
         if k < len(radii):
-            u = np.linspace(0.0, 1.0, 33)[1:]
+            u = np.linspace(0.0, 1.0, _NODES)[1:]
             first, second = np.array([corner_at(float(part), after) for part in u]).T
             following = curves[k + 1]
             s.append(begin + 2.0 * after * u)
@@ -212,6 +277,16 @@ def _tool_limit(robot: Robot, knots: Array, pieces: Array, tool: Array) -> Array
     with np.errstate(divide="ignore"):
         speed = np.where(largest > 0.0, tool / largest, np.inf).min(axis=1)
     return np.asarray(np.minimum((speed * (1.0 - _TOOL_MARGIN)) ** 2, _FREE))
+
+
+def alone(robot: Robot, limits: MotionLimits, segment: Ptp, run: Run) -> JointMotion:
+    """A PTP from rest to rest."""
+    start, end = values(run.knots, run.pieces, run.knots[[0, -1]])
+    scaled = np.stack([limits.velocity, limits.acceleration, limits.jerk], axis=1)
+    scaled *= (segment.speed, segment.acceleration, segment.acceleration)
+    piece = JointMotion.between(start, end, scaled)
+    slower = tool_slowdown(robot, segment, piece)
+    return piece if slower == 1.0 else JointMotion.between(start, end, scaled / slower ** np.arange(1.0, 4.0))
 
 
 def tool_slowdown(robot: Robot, move: Move, piece: JointMotion) -> float:

@@ -28,22 +28,24 @@ from kin.motion.details import (
 )
 from kin.motion.geometry.chain import Chain, LostError, followed
 from kin.motion.geometry.curves import Curve, poses
-from kin.motion.geometry.splines import parted, values
+from kin.motion.geometry.splines import turning_points, values
 from kin.motion.limits import MotionLimits
 from kin.motion.paths import (
     NO_LENGTH,
     JointCurve,
     Layout,
+    Run,
+    alone,
     chained,
     curve_of,
     is_joint_move,
+    joined,
     joint_path,
     joint_radius,
     limited,
     radius_of,
-    tool_slowdown,
 )
-from kin.motion.pieces import Hold, JointMotion, Piece
+from kin.motion.pieces import Hold, Piece
 from kin.motion.program import (
     Circ,
     Dwell,
@@ -72,6 +74,9 @@ def task_of(program: Program, robot: Robot) -> Task:
     return most_kept(robot) if program.task is None else program.task
 
 
+_SAME_ZONE = 1e-6  # part of a zone that may be missing without a note
+
+
 class RefusedError(Exception):
     """Ends the planning of a segment that cannot be driven."""
 
@@ -93,6 +98,7 @@ class Plan:
     segments: list[SegmentTimes] = field(default_factory=list)
     notes: list[Note] = field(default_factory=list)
     time: float = 0.0
+    done: int = 0  # the index after the last segment that has a path
 
     @property
     def task(self) -> Task:
@@ -163,7 +169,45 @@ def _drive(plan: Plan, index: int) -> int:
     if isinstance(segment, Dwell):
         plan.add(index, Hold(plan.q, segment.seconds), [segment.seconds])
         return index + 1
-    return _drive_joints(plan, index) if is_joint_move(segment) else _drive_tool(plan, index)
+    run, first = _run(plan, index), index
+    index = plan.done
+    while run is not None and _joins(plan, index - 1):
+        following = _run(plan, index)
+        if following is None:
+            plan.notes.append(BlendLeftOut(index - 1, "short"))
+            _time(plan, first, run)
+            plan.add(index, None, [0.0])
+            return plan.done
+        before = plan.program.segments[index - 1]
+        assert isinstance(before, Move)
+        run, used = joined(plan.robot, run, following, before.blend)
+        if used < before.blend * (1.0 - _SAME_ZONE):
+            plan.notes.append(BlendShortened(index - 1, before.blend, used))
+        _check_limits(plan, run, ())
+        index = plan.done
+    if run is None:
+        plan.add(first, None, [0.0])
+    else:
+        _time(plan, first, run)
+    return index
+
+
+def _run(plan: Plan, first: int) -> Run | None:
+    """The segments from this one on that are one path of the joints or of the tool; None if it has no length.
+
+    `plan.done` becomes the index after them, and `plan.q` where they end.
+    """
+    segment = plan.program.segments[first]
+    assert isinstance(segment, Move)
+    return _joint_run(plan, first) if is_joint_move(segment) else _tool_run(plan, first)
+
+
+def _joins(plan: Plan, index: int) -> bool:
+    """Whether a segment is blended into one of the other kind, of the joints or of the tool."""
+    segment, after = plan.program.segments[index], plan.program.segments[index + 1 : index + 2]
+    if not isinstance(segment, Move) or segment.blend == 0.0 or not after or not isinstance(after[0], Move):
+        return False
+    return is_joint_move(after[0]) != is_joint_move(segment)
 
 
 def _follows(plan: Plan, index: int, length: float) -> bool:
@@ -172,24 +216,24 @@ def _follows(plan: Plan, index: int, length: float) -> bool:
     assert isinstance(segment, Move)
     if segment.blend == 0.0:
         return False
-    why: Literal["last", "kinds", "short", "dwell"] | None = None
+    why: Literal["last", "short", "dwell"] | None = None
     if index + 1 == len(plan.program.segments):
         why = "last"
     else:
         following = plan.program.segments[index + 1]
         if isinstance(following, Dwell):
             why = "dwell"
-        elif is_joint_move(following) != is_joint_move(segment):
-            why = "kinds"
         elif length < NO_LENGTH:
             why = "short"
+        elif is_joint_move(following) != is_joint_move(segment):
+            return False
     if why is not None:
         plan.notes.append(BlendLeftOut(index, why))
     return why is None
 
 
-def _drive_joints(plan: Plan, first: int) -> int:
-    """PTP and splines of the joints: alone from rest to rest, or blended into each other."""
+def _joint_run(plan: Plan, first: int) -> Run | None:
+    """PTP and splines of the joints, blended into each other or alone."""
     robot, q = plan.robot, plan.q
     curves: list[JointCurve] = []
     radii: list[float] = []
@@ -214,33 +258,18 @@ def _drive_joints(plan: Plan, first: int) -> int:
         index += 1
         if not _follows(plan, index - 1, curve.length):
             break
-    _time_joints(plan, first, curves, radii)
-    plan.q = q
-    return index
-
-
-def _time_joints(plan: Plan, first: int, curves: list[JointCurve], radii: list[float]) -> None:
-    segment = plan.program.segments[first]
-    if len(curves) == 1 and isinstance(segment, Ptp):
-        limits = np.stack([plan.limits.velocity, plan.limits.acceleration, plan.limits.jerk], axis=1)
-        limits = limits * (segment.speed, segment.acceleration, segment.acceleration)
-        end = curves[0].at(np.array([curves[0].length]))[0] if curves[0].length else plan.q
-        piece = JointMotion.between(plan.q, end, limits)
-        slower = tool_slowdown(plan.robot, segment, piece)
-        if slower > 1.0:
-            piece = JointMotion.between(plan.q, end, limits / slower ** np.arange(1.0, 4.0))
-        plan.add(first, piece, [piece.duration])
-        return
+    plan.q, plan.done = q, index
     if curves[0].length < NO_LENGTH:
-        plan.add(first, None, [0.0])
-        return
+        return None
     layout = Layout.of([curve.length for curve in curves], radii, first)
-    knots, pieces = joint_path(curves, radii, layout)
-    _check_limits(plan, layout, knots, pieces, ())
-    _time(plan, first, layout, knots, pieces)
+    if len(curves) == 1 and isinstance(plan.program.segments[first], Ptp):
+        return Run(layout, curves[0].knots, curves[0].pieces)
+    run = Run(layout, *joint_path(curves, radii, layout))
+    _check_limits(plan, run, ())
+    return run
 
 
-def _drive_tool(plan: Plan, first: int) -> int:
+def _tool_run(plan: Plan, first: int) -> Run | None:
     """Lines, arcs and splines of the tool, blended into each other or alone."""
     robot, before = plan.robot, fk(plan.robot, plan.q)
     curves: list[Curve] = []
@@ -268,20 +297,18 @@ def _drive_tool(plan: Plan, first: int) -> int:
         index += 1
         if not _follows(plan, index - 1, curve.length):
             break
+    plan.done = index
     if curves[0].length < NO_LENGTH:
-        plan.add(first, None, [0.0])
-        return index
+        return None
     layout = Layout.of([curve.length for curve in curves], radii, first)
     chain = chained(curves, radii, layout)
     try:
-        knots, pieces = followed(robot, chain, plan.q, CODES[plan.task], plan.stop)
+        run = Run(layout, *followed(robot, chain, plan.q, CODES[plan.task], plan.stop))
     except LostError as error:
         raise _lost(plan, layout, chain, error) from None
-    _check_limits(plan, layout, knots, pieces, chain)
-    _time(plan, first, layout, knots, pieces)
-    end = values(knots, pieces, knots[-1:])[0]
-    plan.q = robot.clip(end)
-    return index
+    _check_limits(plan, run, chain)
+    plan.q = robot.clip(values(run.knots, run.pieces, run.knots[-1:])[0])
+    return run
 
 
 def _lost(plan: Plan, layout: Layout, chain: Chain, error: LostError) -> RefusedError:
@@ -300,17 +327,12 @@ def _lost(plan: Plan, layout: Layout, chain: Chain, error: LostError) -> Refused
     return _refused_at(plan, layout, chain, s, cause, details)
 
 
-def _check_limits(plan: Plan, layout: Layout, knots: Array, pieces: Array, chain: Chain | tuple[()]) -> None:
-    """Refuse a path that leaves the limits of the joints."""
-    met = limit_met(plan.robot, np.concatenate([pieces[:, :, 0], values(knots, pieces, knots[-1:])]))
-    if met is None:
-        # Between the knots a joint may go a little further than at them.
-        fine, cut = parted(knots, pieces, np.full(len(pieces), 8))
-        met = limit_met(plan.robot, cut[:, :, 0])
-        if met is None:
-            return
-        knots = fine
-    raise _refused_at(plan, layout, chain, float(knots[met[0]]), "limits", LimitMet(met[1]))
+def _check_limits(plan: Plan, run: Run, chain: Chain | tuple[()]) -> None:
+    """Refuse a path that leaves the limits of the joints anywhere."""
+    at = turning_points(run.knots, run.pieces)
+    met = limit_met(plan.robot, values(run.knots, run.pieces, at))
+    if met is not None:
+        raise _refused_at(plan, run.layout, chain, float(at[met[0]]), "limits", LimitMet(met[1]))
 
 
 def _refused_at(
@@ -338,10 +360,15 @@ def _refused_at(
     return plan.refused(layout.owners[0][0] + k, cause, details, helps, (fraction, distance))
 
 
-def _time(plan: Plan, first: int, layout: Layout, knots: Array, pieces: Array) -> None:
-    """Add a path to the plan."""
+def _time(plan: Plan, first: int, run: Run) -> None:
+    """Add a path to the plan, or a PTP that is alone."""
+    segment, layout = plan.program.segments[first], run.layout
+    if len(layout.owners) == 1 and isinstance(segment, Ptp):
+        piece = alone(plan.robot, plan.limits, segment, run)
+        plan.add(first, piece, [piece.duration])
+        return
     moves = {i: move for i, move in enumerate(plan.program.segments) if isinstance(move, Move)}
-    path = limited(plan.robot, plan.limits, moves, layout, knots, pieces)
+    path = limited(plan.robot, plan.limits, moves, layout, run.knots, run.pieces)
     found = timed(path, plan.program.jerk_limited, plan.stop)
     plan.add(first, found, [*found.when(layout.bounds[1:-1]).tolist(), found.duration])
     last = first + len(layout.bounds) - 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Literal, NotRequired, cast
 
 import numpy as np
@@ -166,6 +167,8 @@ class JointLimitsAnswer(TypedDict):
     """Largest acceleration."""
     jerk: float
     """Largest jerk."""
+    effort: float | None
+    """Largest torque or force (N·m or N), null where none is stated. Not checked: masses are unknown."""
     assumed: list[str]
     """Which of these are assumed, because no robot file states them."""
 
@@ -284,15 +287,16 @@ def _note(fact: Note) -> NoteAnswer:
 
 
 def _limits(robot: Robot, limits: MotionLimits) -> list[JointLimitsAnswer]:
-    columns = zip(limits.velocity, limits.acceleration, limits.jerk, limits.assumed, strict=True)
+    columns = zip(limits.velocity, limits.acceleration, limits.jerk, limits.effort, limits.assumed, strict=True)
     return [
         {
             "velocity": float(velocity),
             "acceleration": float(acceleration),
             "jerk": float(jerk),
+            "effort": None if math.isnan(effort) else float(effort),
             "assumed": list(assumed),
         }
-        for velocity, acceleration, jerk, assumed in columns
+        for velocity, acceleration, jerk, effort, assumed in columns
     ]
 
 

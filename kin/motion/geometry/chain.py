@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from kin.kernels.compile import jit
 from kin.kernels.fk import fk_into
 from kin.motion.geometry.curves import Curve
+from kin.motion.geometry.redundancy import relax
 from kin.motion.geometry.splines import spline, values, values_into
 from kin.motion.geometry.tables import Table, poses_into
 from kin.motion.geometry.tracking import follow, settle
@@ -29,6 +30,7 @@ _NODES = 24  # per curve at first
 _MOST_NODES, _ROUNDS = 20_000, 12
 _STEP = 0.2  # radians or metres that a joint may move between the nodes that are followed
 _CLOSEST = 1e-7  # of the whole length: nodes that are closer are not parted
+_MOVING = (0.2, 0.02)  # weights of motion where a joint is left over; the second one if a limit is passed
 _BETWEEN = (0.2, 0.5, 0.8)
 
 
@@ -77,6 +79,8 @@ def followed(
         LostError: where it cannot be followed.
     """
     s, q = _nodes(robot, chain, first_nodes(chain.starts), q_start, code, stop)
+    if robot.n == ROWS[code] + 1:
+        _relax(robot, chain, s, q, ROWS[code], stop)
     for _ in range(_ROUNDS):
         stop()
         pieces = spline(s, q)
@@ -98,6 +102,17 @@ def followed(
             raise LostError(finer[: lost + 1], rows[: lost + 1])
         s, q = finer, rows
     raise LostError(s[: worst + 2], q[: worst + 2])
+
+
+def _relax(robot: Robot, chain: Chain, s: Array, q: Array, rows: int, stop: Callable[[], None]) -> None:
+    """Move a joint that is left over away from limits and singularities, further where a limit is passed."""
+    bounds = np.ascontiguousarray(np.stack([robot.lower, robot.upper]))
+    targets = chain.poses(s)
+    for moving in _MOVING:
+        stop()
+        relax(robot.model, targets, s, rows, bounds, 2.0 * _STEP, moving, q)
+        if (q >= robot.lower).all() and (q <= robot.upper).all():
+            return
 
 
 def _parted(s: Array, q: Array, parts: NDArray[np.int64]) -> tuple[Array, Array, NDArray[np.int64]]:

@@ -104,3 +104,15 @@ def _part(s: Array, pieces: Array, parts: NDArray[np.int64], knots: Array, cut: 
                 cut[k, j, 3] = p[3]
             k += 1
     knots[k] = s[pieces.shape[0]]
+
+
+def turning_points(s: Array, pieces: Array) -> Array:
+    """All places where a value of the spline may be largest or smallest: the knots, and where a slope is 0."""
+    h = np.diff(s)[:, None]
+    a, b, c = 3.0 * pieces[:, :, 3], pieces[:, :, 2], pieces[:, :, 1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # a d² + 2 b d + c = 0, without cancellation
+        size = -(b + np.copysign(np.sqrt(b * b - a * c), b))
+        roots = np.concatenate([size / a, c / size], axis=1)
+    inside = (roots > 0.0) & (roots < h)
+    return np.sort(np.concatenate([s, (s[:-1, None] + roots)[inside]]))

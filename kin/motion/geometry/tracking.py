@@ -63,7 +63,7 @@ def approach(model: Array, target: Array, rows: int, q: Array) -> float:
         if size < 1e-14 or (size < MET and size > 0.25 * last):
             break
         last = size
-        _to_tool(J, T, rows)
+        to_tool(J, T, rows)
         _step(J, e, rows, min(size * size, 1e-2) + 1e-20, q)
     for j in range(n):
         q[j] = best[j]
@@ -71,7 +71,7 @@ def approach(model: Array, target: Array, rows: int, q: Array) -> float:
 
 
 @jit
-def _to_tool(J: Array, T: Array, rows: int) -> None:
+def to_tool(J: Array, T: Array, rows: int) -> None:
     """For an approach direction: the turning about the tool's x and y axes instead of the base's."""
     if rows != 5:
         return
@@ -95,7 +95,7 @@ def _step(J: Array, e: Array, rows: int, damping: float, q: Array) -> None:
                 for j in range(n):
                     total += J[r, j] * J[c, j]
                 A[r, c] = total
-        _solve(A, y)
+        solve_into(A, y)
         for j in range(n):
             for r in range(rows):
                 q[j] += J[r, j] * y[r]
@@ -110,13 +110,13 @@ def _step(J: Array, e: Array, rows: int, damping: float, q: Array) -> None:
             for r in range(rows):
                 total += J[r, i] * J[r, j]
             B[i, j] = total
-    _solve(B, z)
+    solve_into(B, z)
     for i in range(n):
         q[i] += z[i]
 
 
 @jit
-def _solve(A: Array, y: Array) -> None:
+def solve_into(A: Array, y: Array) -> None:
     """y ← A⁻¹ y for a positive definite A, which is overwritten (Cholesky)."""
     m = y.shape[0]
     for i in range(m):

@@ -13,6 +13,7 @@ import kin
 from app.api import motion as motion_module
 from app.exports.motion import AT_ONCE, FORMATS, columns
 from app.shared.answers.motion import sample_times
+from app.shared.threads.turns import Turn, Turns
 
 UR5 = kin.get_robot("ur5")
 Q = [0.0, -1.57, 1.57, 0.0, 1.57, 0.0]
@@ -91,6 +92,51 @@ def test_tables_and_streams_hold_the_samples(client):
     assert lines[0] == post(client, {"samples": False}).json()
     assert np.allclose([line["q"] for line in lines[1:]], expected.q, atol=1e-12)
     assert np.allclose([line["position"] for line in lines[1:]], expected.T[:, :3, 3], atol=1e-12)
+
+
+class CountedTurns(Turns):
+    """Counts who has a turn."""
+
+    def __init__(self):
+        super().__init__()
+        self.taken = self.running = 0
+
+    def take(self, used):
+        super().take(used)
+        self.taken += 1
+        self.running += 1
+
+    def give(self):
+        self.running -= 1
+        super().give()
+
+
+@pytest.mark.parametrize("form", ["csv", "ndjson"])
+def test_samples_are_computed_in_turns(client, app, monkeypatch, form):
+    turns = CountedTurns()
+    monkeypatch.setattr(app.state.compute, "turns", turns)
+    lines = post(client, {"rate": 1000, "format": form}).text.splitlines()
+    assert turns.taken >= 2 + len(lines) / AT_ONCE
+    assert turns.running == 0
+
+
+def test_samples_that_nobody_reads_are_not_computed():
+    seen = []
+
+    def pieces():
+        try:
+            for piece in (b"1", b"2", b"3"):
+                seen.append(turns.running)
+                yield piece
+        finally:
+            seen.append("closed")
+
+    turns = CountedTurns()
+    found = motion_module.in_turns(pieces(), Turn(turns))
+    assert next(found) == b"1"
+    assert turns.running == 0
+    found.close()
+    assert seen == [1, "closed"]
 
 
 def test_code_is_text_and_python_plans_the_same_motion(client, capsys):

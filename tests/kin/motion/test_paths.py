@@ -179,6 +179,39 @@ def test_ptp_with_a_blend_does_not_stop():
     assert np.linalg.norm(motion.sample(times).T[:, :3, 3] - corner, axis=1).min() < 0.05
 
 
+@pytest.mark.parametrize("arm", ["ur5", "panda", "scara", "irb120"])
+def test_ptp_and_lines_are_blended_in_the_joints(arm):
+    robot = kin.get_robot(arm)
+    rng = np.random.default_rng(5)
+    q = moved(robot, robot.q_home, rng, 0.2)
+    p = kin.fk(robot, q)[:3, 3]
+    end = p + by(0.0, 0.08, 0.0 if arm == "scara" else -0.03)
+    segments = [
+        kin.Ptp(kin.JointTarget(q), blend=0.02),
+        kin.Lin(kin.PoseTarget(end), blend=0.015, speed=0.5),
+        kin.Ptp(kin.JointTarget(robot.q_home)),
+    ]
+    motion = kin.plan_motion(robot, segments)
+    assert motion.planned
+    assert not [note for note in motion.notes if hasattr(note, "why")]
+    assert_limits(motion)
+    assert_continuous(motion)
+    for segment in motion.segments[:2]:
+        assert motion.sample(segment.end).tool_speed > 0.01
+    assert motion.sample(motion.duration).q == pytest.approx(robot.q_home, abs=1e-9)
+    points = motion.sample(np.linspace(0, motion.duration, 4000)).T[:, :3, 3]
+    to_first, to_second = np.linalg.norm(points - p, axis=1), np.linalg.norm(points - end, axis=1)
+    assert 1e-4 < to_first.min() < 0.02
+    assert 1e-4 < to_second.min() < 0.015
+    # Between the zones the tool is on the line.
+    between = slice(int(to_first.argmin()), int(to_second.argmin()))
+    on_line = (to_first[between] > 0.02) & (to_second[between] > 0.015)
+    assert on_line.sum() > 50
+    way = (end - p) / np.linalg.norm(end - p)
+    off = points[between][on_line] - p
+    assert np.linalg.norm(off - np.outer(off @ way, way), axis=1).max() < 1e-6
+
+
 def test_splines_pass_their_points():
     robot = kin.get_robot("panda")
     T = kin.fk(robot, robot.q_home)
@@ -262,6 +295,20 @@ def test_a_suggested_posture_can_follow_the_line(arm, seed):
     ).planned
 
 
+@pytest.mark.parametrize(
+    ("arm", "seed"), [("panda", 6), ("panda", 13), ("panda", 17), ("iiwa14", 4), ("iiwa14", 37)]
+)
+def test_a_joint_that_is_left_over_moves_away_from_limits_along_the_line(arm, seed):
+    robot = kin.get_robot(arm)
+    rng = np.random.default_rng(seed)
+    q = robot.clip(robot.q_home + rng.normal(0, 0.5, robot.n))
+    # With the least motion of the joints one of them would pass its limit.
+    motion = line_of(robot, q, robot.clip(q + rng.normal(0, 0.5, robot.n)))
+    assert motion.planned
+    assert_limits(motion)
+    assert_continuous(motion)
+
+
 def test_what_few_joints_cannot_keep_is_refused():
     robot = kin.get_robot("scara")
     T = kin.fk(robot, robot.q_home)
@@ -285,7 +332,10 @@ def line(*offset, **fields):
         ([line(0, 0.1, 0, blend=0.1), line(0, 0.1, 0)], ["short"]),
         ([line(0, 0.1, 0, blend=0.1), kin.Dwell(0.1)], ["dwell"]),
         ([line(0, 0.1, 0, blend=0.1)], ["last"]),
-        ([line(0, 0.1, 0, blend=0.1), kin.Ptp(kin.JointTarget(kin.get_robot("panda").home))], ["kinds"]),
+        ([line(0, 0.1, 0, blend=0.1), kin.Ptp(kin.JointTarget(kin.get_robot("panda").home))], [0.05]),
+        ([line(0, 0.1, 0, blend=0.1), kin.Ptp(line(0, 0.1, 0).target)], ["short"]),
+        ([kin.Ptp(line(0, 0.1, 0).target, blend=0.01), line(0, 0.1, 0)], ["short"]),
+        ([kin.Ptp(line(0, 0, 0).target, blend=0.01), line(0, 0.1, 0)], ["short"]),
         ([line(0, 0.1, 0, blend=9), line(0, 0, 0.1)], [0.05]),
         ([line(0, 0.1, 0, blend=0.02), line(0, 0, 0)], []),
         ([line(0, 0.1, 0, blend=0.02), line(0, 0.2, 0)], []),
