@@ -45,8 +45,9 @@ class Victim:
         return "".join(self.errors)
 
     def memory(self) -> int:
-        """Resident bytes."""
-        return psutil.Process(self.process.pid).memory_info().rss
+        """Resident bytes of all processes."""
+        service = psutil.Process(self.process.pid)
+        return sum(each.memory_info().rss for each in (service, *service.children(recursive=True)))
 
     def answers_after(self) -> float:
         """Seconds until a new connection's request is answered."""

@@ -238,8 +238,10 @@ def test_a_wrong_folder_of_robots_is_reported(capfd, tmp_path):
 
 
 def listening(pid: int) -> list[int]:
-    connections = psutil.Process(pid).net_connections("inet")
-    return [each.laddr.port for each in connections if each.status == psutil.CONN_LISTEN]
+    """Ports on which a service listens, whichever of its processes does."""
+    service = psutil.Process(pid)
+    found = [each for process in (service, *service.children()) for each in process.net_connections("inet")]
+    return sorted({each.laddr.port for each in found if each.status == psutil.CONN_LISTEN})
 
 
 SOON = 30  # s; a loaded machine may need most of it
