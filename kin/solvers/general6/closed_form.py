@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from kin.axes import is_along, is_zero, links_of
+from kin.axes import is_along, is_zero, links_of, screw_x, screw_z
 from kin.fk import fk, jacobian
 from kin.robot import Robot
 from kin.solvers.canonical import free_last, without_last
-from kin.solvers.common import TURN
+from kin.solvers.common import TURN, UNBOUNDED
 from kin.solvers.contract import (
     APPROACH,
     POSE,
@@ -22,7 +22,8 @@ from kin.solvers.contract import (
 )
 from kin.solvers.general6.backwards import backwards, turned_round
 from kin.solvers.general6.batch import SOLUTIONS, branches_many, branches_one, misfit_of_degree
-from kin.solvers.general6.cuts import cut_at
+from kin.solvers.general6.cuts import SHIFT, SIZE, cut_at
+from kin.solvers.numeric import each_of
 from kin.solvers.singular import Singularity, by_jacobian, those_within
 from kin.transforms import Array
 
@@ -34,6 +35,14 @@ _VALID = 1e-9  # largest misfit of degree of a valid cut
 _POSES = 24  # random poses that decide among valid cuts
 _PROBES = 5  # of these poses, those on which the degree is checked
 _CUTS = 3  # the most that are kept
+# Targets close by, in radians and shares of the reach; the error of a solution, how far apart two are, and the
+# smallest singular value of a double one.
+_STEPS = tuple(
+    screw_z(1e-3 * a, 1e-3 * b) @ screw_x(1e-3 * c, 1e-3 * d)
+    for a, b, c, d in ((1.0, 0.6, -0.8, 0.9), (-0.7, 0.8, 1.1, -0.5), (0.3, -1.2, 0.9, 0.4))
+)
+_MASK = np.array([1.0] * 6 + [0.0])
+_MET, _SAME, _SHARED, _DOUBLE = 1e-10, 1e-6, 1e-5, 1e-5
 _RARE = 1  # of these poses, those with an odd number of solutions on an arm without special axes
 
 
@@ -54,7 +63,7 @@ def match(robot: Robot) -> General6 | None:
         links = links_of(back, (1,) * 5)
         other = _best_cuts(back, [cut_at(links, shift) for shift in range(6)])
         if _missed(back, other) < missed:
-            return General6(robot, turned_round(BatchKernels(other, branches_one, branches_many)), on_axis)
+            return General6(robot, turned_round(BatchKernels(other, branches_one, branches_many)), on_axis, True)
     return General6(robot, kernels, on_axis) if len(params) else None
 
 
@@ -109,10 +118,12 @@ class General6(ClosedForm):
     lengths = ()
     named = False
 
-    def __init__(self, robot: Robot, kernels: BatchKernels, tool_on_axis: bool) -> None:
+    def __init__(self, robot: Robot, kernels: BatchKernels, tool_on_axis: bool, turned: bool = False) -> None:
         self.robot = robot
         self.tool_on_axis = tool_on_axis
         self.kernels = kernels
+        solved = {int(2 + shift) % 6 for shift in kernels.params[SHIFT::SIZE]}
+        self._solved_for = [5 - joint if turned else joint for joint in sorted(solved)]
 
     def handles(self, task: int) -> bool:
         """Poses, and an approach direction when it is the last joint's own axis (then that joint is free)."""
@@ -127,11 +138,44 @@ class General6(ClosedForm):
         out, free_roll = np.empty((SOLUTIONS, 6)), problem.task == APPROACH
         T = without_last(problem)[0] if free_roll else problem.T
         self.kernels.one(self.kernels.params, T, math.nan, problem.seed, out)
+        complete = self._is_plain(out) or self._add_nearby(T, problem.seed, out)
         values, ranges = np.full((SOLUTIONS, int(free_roll)), math.nan), []
         if free_roll:
             ranges.append(free_last(problem, out))
             values[:, -1] = out[:, 5]
-        return Candidates(out, values, tuple(ranges))
+        return Candidates(out, values, tuple(ranges), complete=complete)
+
+    def _is_plain(self, q: Array) -> bool:
+        """Whether solutions ``(16, 6)`` come in pairs, and none share an angle that the elimination solves for."""
+        there = q[~np.isnan(q[:, 0])]
+        return len(there) % 2 == 0 and all(
+            np.diff(np.sort(there[:, joint])).min(initial=1.0) > _SHARED for joint in self._solved_for
+        )
+
+    def _add_nearby(self, T: Array, near: Array, q: Array) -> bool:
+        """Add to doubtful solutions ``(16, 6)`` what targets close by lead to; whether none is missing.
+
+        Where several share the angle that the elimination solves for, it may miss one. Close by they differ.
+        """
+        rows, count = np.empty((SOLUTIONS, 6)), int((~np.isnan(q[:, 0])).sum())
+        wide, errors = np.full(6, UNBOUNDED), np.empty(SOLUTIONS)
+        for step in _STEPS:
+            moved = T @ step
+            moved[:3, 3] = T[:3, 3] + self.robot.reach * step[:3, 3]
+            self.kernels.one(self.kernels.params, moved, math.nan, near, rows)
+            there = rows[~np.isnan(rows[:, 0])].copy()
+            goal = (np.ascontiguousarray(T), POSE, _MASK, 1.0)
+            each_of(self.robot.model, goal, (-wide, wide, np.zeros(6)), -1.0, len(there) + 1, there, errors)
+            for row, error in zip(there, errors, strict=False):
+                apart = np.abs((q[:count] - row + math.pi) % TURN - math.pi).max(axis=1, initial=0.0)
+                if error < _MET and count < SOLUTIONS and (count == 0 or apart.min() > _SAME):
+                    q[count] = math.pi - (math.pi - row) % TURN
+                    count += 1
+        if count and count % 2 == 0:
+            return True
+        # A double solution counts once.
+        sigma = np.linalg.svd(jacobian(self.robot, q[:count]), compute_uv=False)[:, -1]
+        return bool(sigma.min(initial=math.inf) < _DOUBLE)
 
     def branch_of(self, q: Array) -> int:
         """The row of q ``(6,)`` among all solutions of its pose."""

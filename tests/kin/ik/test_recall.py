@@ -6,8 +6,10 @@ The slow tests take 100 tables of each number of joints; the others a few of the
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kin
+from app.bench.robots import robots
 from kin import Joint, Robot, Status, solve_ik
 
 PI = math.pi
@@ -40,6 +43,18 @@ def random_table(joints: int, seed: int) -> Robot:
     return Robot.from_dh(rows, ("standard", "modified")[seed // 2 % 2], robot_id=f"{joints}-{seed}", home=home)
 
 
+def with_slides(robot: Robot, seed: int) -> Robot:
+    """The same table with about a third of the joints sliding, at least one."""
+    rng = np.random.default_rng([robot.n, seed, 7])
+    slides = rng.random(robot.n) < 0.35
+    slides[rng.integers(robot.n)] = True
+    rows = [
+        replace(row, kind="prismatic", limits=(-0.6, 0.6)) if sliding else row
+        for row, sliding in zip(robot.rows, slides, strict=True)
+    ]
+    return replace(robot, id=f"{robot.id}-slides", rows=tuple(rows))
+
+
 def turns_between(a, b):
     """Largest joint difference, whole turns aside."""
     return np.abs((a - b + PI) % (2 * PI) - PI).max(axis=-1)
@@ -52,19 +67,25 @@ def given_value(robot: Robot, T, q) -> float | None:
     return float(q[joint[0]]) if joint else None
 
 
-def faults(robot: Robot, targets: int) -> tuple[int, list[str]]:
+def apart(robot: Robot, a, b):
+    """Largest joint difference, whole turns of revolute joints aside."""
+    turned = np.abs((a - b + PI) % (2 * PI) - PI)
+    return np.where(robot.revolute, turned, np.abs(a - b)).max(axis=-1)
+
+
+def faults(robot: Robot, targets: int, task: str = "pose") -> tuple[int, list[str]]:
     """How many answers claimed to be complete, and what was wrong."""
     rng = np.random.default_rng(1)
     complete, wrong = 0, []
     for q in robot.random_q(rng, targets):
         T = kin.fk(robot, q)
-        value = given_value(robot, T, q) if robot.n == 7 else None
-        result = solve_ik(robot, T, redundancy=value)
+        value = given_value(robot, T, q) if robot.n == 7 and task == "pose" else None
+        result = solve_ik(robot, T, task=task, redundancy=value)
         if result.status is not Status.SOLVED:
             wrong.append(f"{robot.id}: {result.status.value} at {q.tolist()}")
         elif result.complete and not result.details.infinite:
             complete += 1
-            if min(turns_between(s.q, q) for s in result.solutions) > SAME:
+            if min(apart(robot, s.q, q) for s in result.solutions) > SAME:
                 wrong.append(f"{robot.id}: {q.tolist()} is missing")
     return complete, wrong
 
@@ -83,6 +104,64 @@ def test_what_is_reachable_is_found_on_a_hundred_tables(joints):
     wrong = [fault for _, each in found for fault in each]
     print(f"{joints} joints: {sum(count for count, _ in found)} of 2000 complete, {len(wrong)} wrong")
     assert wrong == []
+
+
+@pytest.mark.parametrize("joints", COUNTS)
+def test_what_is_reachable_is_found_with_slides(joints):
+    for seed in range(2):
+        robot = with_slides(random_table(joints, seed), seed)
+        for task in ("pose", "approach", "position"):
+            assert faults(robot, 1, task)[1] == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("joints", COUNTS)
+def test_what_is_reachable_is_found_with_slides_on_a_hundred_tables(joints):
+    tables = [with_slides(random_table(joints, seed), seed) for seed in range(100)]
+    for task in ("pose", "approach", "position"):
+        found = [faults(robot, 20, task) for robot in tables]
+        wrong = [fault for _, each in found for fault in each]
+        print(f"{joints} joints, {task}: {sum(count for count, _ in found)} of 2000 complete, {len(wrong)} wrong")
+        assert wrong == []
+
+
+PEERS = json.loads((Path(__file__).parents[2] / "data/golden-peers.json").read_text(encoding="utf-8"))["arms"]
+
+
+@pytest.mark.parametrize("name", PEERS)
+def test_every_posture_that_other_libraries_find_is_found(name):
+    """The recorded union of their postures, also where several share an angle."""
+    robot = robots()[name] if name in robots() else kin.get_robot(name)
+    robot = replace(robot, rows=tuple(replace(row, limits=row.limits and (-PI, PI)) for row in robot.rows))
+    known = PEERS[name]
+    free = 1 if known["approach"] else 0
+    for case in known["cases"]:
+        q = np.array(case["q"])
+        options = {"task": "approach" if free else "pose"}
+        if name == "iiwa14":
+            options["locked"] = [known["value"] if i == known["locked"] else None for i in range(robot.n)]
+        elif known["locked"] is not None:
+            options["redundancy"] = known["value"]
+        found = np.array([s.q for s in solve_ik(robot, kin.fk(robot, q), **options).solutions])
+        for posture in np.array(case["postures"]):
+            assert turns_between(found[:, : robot.n - free], posture[: robot.n - free]).min() < 1e-5
+
+
+@pytest.mark.parametrize("name", ["redundant7", "redundant7-craig", "iiwa14", "panda", "pioneer5"])
+def test_a_single_feasible_value_is_found(name):
+    """Two limits exactly met block the self-motion in both directions."""
+    whole = kin.get_robot(name)
+    task, rows = ("position", 3) if name == "pioneer5" else ("pose", 6)
+    rng = np.random.default_rng(3)
+    for q in whole.random_q(rng, 6):
+        motion = np.linalg.svd(kin.jacobian(whole, q)[:rows])[2][-1]
+        one, other = rng.permutation(np.flatnonzero(np.abs(motion) > 0.05))[:2].tolist()
+        limits = np.column_stack([whole.lower, whole.upper])
+        limits[one, int(motion[one] > 0.0)] = q[one]
+        limits[other, int(motion[other] < 0.0)] = q[other]
+        result = solve_ik(whole, kin.fk(whole, q), task=task, q_seed=q, limits=[tuple(pair) for pair in limits])
+        assert result.status is Status.SOLVED
+        assert turns_between(result.best.q, q) < 1e-5
 
 
 # -- what postures do not depend on ------------------------------------------------------------------------------
