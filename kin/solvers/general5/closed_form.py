@@ -187,8 +187,14 @@ class General5(ClosedForm):
                 out[part] = np.where(rows[..., None] >= 0, q, math.nan)
 
         def one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
-            many(params, T[None], np.array([value]), near, out[None])
-            return bool(np.isfinite(T).all())
+            if not self._rolls:
+                many(params, T[None], np.array([value]), near, out[None])
+                return bool(np.isfinite(T).all())
+            longer, rows = np.zeros(6), np.empty((len(out), 6))
+            longer[:n] = near
+            finite = form.one(params, T, value, longer, rows)
+            out[:] = rows[:, :n]
+            return finite
 
         return WrappedKernels(form.params, one, many, self._kernels, form)
 

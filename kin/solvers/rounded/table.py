@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.axes import NEARLY, Lines, Links, inverse, lines_of, links_of, screw_x, screw_z, size
+from kin.axes import NEARLY, Lines, Links, cross, inverse, lines_of, links_of, screw_x, screw_z, size
 from kin.fk import fk
 from kin.robot import Joint, Robot
 from kin.solvers.general5.completion import link_to
@@ -66,7 +66,7 @@ def _parallel(lines: Lines) -> tuple[Lines, Array]:
     turned = np.zeros(len(z))
     for i in range(1, len(z)):
         points[i] += ((points[i - 1] - points[i]) @ z[i]) * z[i]
-        across = np.cross(z[i], z[i - 1])
+        across = cross(z[i], z[i - 1])
         sine = float(np.linalg.norm(across))
         if not 0.0 < sine < NEARLY:
             continue
@@ -123,7 +123,7 @@ def _snapped(links: Links, scale: float) -> tuple[Links, Array]:
     wanted = (
         np.array([x, y, 0.0]) / math.hypot(x, y) if abs(z) < 0.5 else np.array([0.0, 0.0, math.copysign(1.0, z)])
     )
-    across = np.cross(tool[:3, 2], wanted)
+    across = cross(tool[:3, 2], wanted)
     sine = float(np.linalg.norm(across))
     if 0.0 < sine < NEARLY:
         tool[:3, :3] = _rotation(across / sine, math.asin(sine)) @ tool[:3, :3]
