@@ -39,6 +39,14 @@ class Shot(NamedTuple):
 
 PUMA = [0.35, 0.75, -2.9, 0.3, 0.7, 0.2]
 CLOUD = {"drawn": True, "n": 200_000, "strategy": "uniform", "axis": "y", "at": 0.0}
+UR5 = [3.1416, -1.9199, 1.7453, -1.3963, -1.5708, 0.0]
+MOVES = [
+    ["p", UR5],
+    ["p", [3.9, -1.5, 1.7, -1.77, -1.5708, 0.0], "above the part"],
+    ["l", [3.9, -1.4, 1.9, -2.07, -1.5708, 0.0], "on the part", 1.0, {"v": 0.2}],
+    ["p", [2.6, -1.7, 1.6, -1.47, -1.5708, 0.0], "tray"],
+]
+PROGRAM = {"programs": {"ur5": MOVES}, "ghosts": True, "compare": "lin"}
 SHOTS = (
     Shot("dashboard", "Move", {"robot": "puma560", "q": PUMA}),
     Shot("dh", "Learn", {"robot": "stanford", "lesson": "dh", "features": {"dh": {"at": 8.0}}}),
@@ -47,6 +55,7 @@ SHOTS = (
     Shot("redundancy", "Learn", {"robot": "iiwa14", "lesson": "redundancy"}, 8.0),
     Shot("velocity", "Learn", {"robot": "ur5", "lesson": "velocity"}, 8.0),
     Shot("own-arm", "Robot", {"robot": KEY, "own": pack(own_arm(PRESETS["wrist-6r"], "wrist-6r"))}),
+    Shot("program", "Program", {"robot": "ur5", "q": UR5, "features": {"program": PROGRAM}}, 8.0),
     Shot("workspace", "Workspace", {"robot": "irb120", "features": {"workspace": CLOUD}}, 25.0),
 )
 
