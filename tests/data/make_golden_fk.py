@@ -12,7 +12,8 @@ Two sources, independent of the DH tables in ``kin/robots`` wherever that is pos
 - **Robotics Toolbox for Python** (P. Corke), its own DH models, where it has the arm. Where its frames differ
   from ours, the difference is written out below.
 
-An arm that both know must come out the same from both, else nothing is written.
+An arm that both know must come out the same from both, else nothing is written. The planar arms come from the
+formulas on the first pages of every textbook.
 """
 
 from __future__ import annotations
@@ -169,6 +170,20 @@ def stanford(q):
     return (arm.fkine(turned) * SE3.Tz(0.263)).A  # it ends at the wrist's centre
 
 
+# Lengths of the links of planar arms, in metres.
+PLANAR = {"planar2r": (1.0, 0.6), "planar3r": (1.0, 0.6, 0.3)}
+
+
+def by_hand(lengths, q):
+    """x = l₁ cos θ₁ + l₂ cos(θ₁ + θ₂) + …, y with sines; the tool is turned by the sum of all angles."""
+    turned = np.cumsum(q)
+    T = np.eye(4)
+    c, s = np.cos(turned[-1]), np.sin(turned[-1])
+    T[:2, :2] = [[c, -s], [s, c]]
+    T[:2, 3] = np.dot(lengths, np.cos(turned)), np.dot(lengths, np.sin(turned))
+    return T
+
+
 TOOLBOX = {"puma560": puma560, "ur5": ur5, "panda": panda, "scara": scara, "stanford": stanford}
 
 
@@ -189,6 +204,13 @@ def main() -> None:
             cases.append({"q": q.tolist(), "T": (np.round(T, 12) + 0.0).tolist()})
         also = f"; roboticstoolbox {rtb.__version__} agrees" if robot_id in TOOLBOX else ""
         golden[robot_id] = {"source": f"pinocchio {pinocchio.__version__}: {source}{also}", "cases": cases}
+    for seed, (robot_id, lengths) in enumerate(PLANAR.items(), len(ORIGINS)):
+        rng = np.random.default_rng(seed)
+        drawn = rng.uniform(-math.pi, math.pi, (CASES - 1, len(lengths)))
+        configurations = np.round([np.zeros(len(lengths)), *drawn], 6)
+        poses = [np.round(by_hand(lengths, q), 12) + 0.0 for q in configurations]
+        cases = [{"q": q.tolist(), "T": T.tolist()} for q, T in zip(configurations, poses, strict=True)]
+        golden[robot_id] = {"source": "sums of cosines and sines, by hand", "cases": cases}
     lines = ",\n".join(
         f'"{robot_id}": {{"source": {json.dumps(arm["source"], ensure_ascii=False)}, "cases": [\n'
         + ",\n".join(json.dumps(case) for case in arm["cases"])

@@ -65,10 +65,10 @@ def angle_difference(a, b):
 
 
 def closure(robot, T, q):
-    """Largest difference of point and approach direction (and of the rest, with six joints or more)."""
+    """Largest difference of point and approach direction (of the point alone with two joints; of all with six)."""
     there = ~np.isnan(q[..., 0])
     wanted = np.broadcast_to(T[..., None, :, :], (*q.shape[:-1], 4, 4))[there]
-    return np.abs(kin.fk(robot, q[there]) - wanted)[..., 2 if robot.n == 5 else 0 :].max()
+    return np.abs(kin.fk(robot, q[there]) - wanted)[..., {2: 3, 5: 2}.get(robot.n, 0) :].max()
 
 
 # Single targets, batches and solvers compared

@@ -19,6 +19,7 @@ from app.viewer.lessons.guide.outline import (
     one_right,
 )
 from app.viewer.lessons.guide.poses import as_configuration
+from app.viewer.lessons.postures import planar
 from app.viewer.scene.chain import rotation
 from kin import IKOptions, Robot, branch_names, branch_of, fk
 from kin.ik import solve
@@ -99,7 +100,8 @@ def outline(robot: Robot, units: Units) -> Outline:
             "Drag the target away from the arm: above the list it says why it is missed, and what helps.",
         ),
     )
-    return Outline(GOAL, steps, _check(robot, known, units))
+    by_hand = planar.steps(robot, units) if planar.is_planar(robot) else ()
+    return Outline(GOAL, steps + by_hand, _check(robot, known, units))
 
 
 def _many(robot: Robot) -> str:

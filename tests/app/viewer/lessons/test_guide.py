@@ -43,6 +43,7 @@ from app.viewer.lessons.guide.outline import (
 from app.viewer.lessons.guide.poses import moved
 from app.viewer.lessons.guide.progress import Progress
 from app.viewer.lessons.guide.views import steps_html
+from app.viewer.lessons.postures import planar
 from app.viewer.lessons.postures import questions as postures
 from app.viewer.lessons.redundancy import questions as redundancy
 from app.viewer.lessons.velocity import questions as velocity
@@ -344,6 +345,33 @@ def test_postures_numbers(robot: Robot) -> None:
         assert np.allclose(kin.fk(robot, np.array(outline.steps[2].end)), T, atol=1e-6), "the tool is where it was"
     assert chosen["4"] == ["None"]
     assert chosen["c1"] == ["Yes" if robot.n >= 6 else "No"]
+
+
+@pytest.mark.parametrize("robot", [STORE.get("planar2r"), STORE.get("planar3r")], ids=["2r", "3r"])
+def test_planar_arms_by_hand(robot: Robot) -> None:
+    steps = postures.outline(robot, DEGREES).steps[-3:]
+    ring, bend, theta = (step.question for step in steps)
+    assert isinstance(ring, Number)
+    assert isinstance(bend, Number)
+    assert isinstance(theta, Number)
+    q, folded = robot.q_home.copy(), robot.q_home.copy()
+    folded[1] = math.pi
+    wrist = kin.link_frames(robot, np.stack([q, folded]))[:, 1, :3, 3]
+    assert ring.answer == pytest.approx(np.linalg.norm(wrist[1]))
+    assert bend.answer == pytest.approx(abs(q[1]))
+    other = np.array(steps[2].end)
+    assert theta.answer == pytest.approx(other[0])
+    # Both are the solutions of the core, for the point or for the pose.
+    T = kin.fk(robot, q)
+    result = kin.solve_ik(robot, T[:3, 3] if robot.n == 2 else T, task="position" if robot.n == 2 else "pose")
+    assert len(result.solutions) == 2
+    for expected in (q, other):
+        assert min(np.abs(solution.q - expected).max() for solution in result.solutions) < 1e-9
+
+
+def test_only_planar_tables_are_solved_by_hand() -> None:
+    assert [robot.id for robot in ROBOTS if planar.is_planar(robot)] == ["planar2r", "planar3r"]
+    assert not planar.is_planar(STORE.get("planar2r").with_base(np.diag([1.0, -1.0, -1.0, 1.0])))
 
 
 def test_redundancy_numbers(robot: Robot) -> None:
