@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from markupsafe import Markup
 
+from app.viewer.lessons.dh.nine_steps import CRAIG_NOTE, NINE_STEPS
 from app.viewer.lessons.dh.steps import (
     LETTERS,
     MOVED,
@@ -34,29 +35,6 @@ ABOUT_Z, ABOUT_X = (0, 114, 178), (213, 94, 0)
 TITLES: dict[Convention, str] = {"standard": "Standard convention", "modified": "Craig’s convention (modified)"}
 WIDTHS = {"mm": 4.2, "cm": 4.2, "m": 4.8}  # em of a column
 MATRIX = 0.74  # em, so that sixteen numbers and a name fit a panel of 300 pixels
-
-NINE_STEPS = (
-    "Draw the axis of every joint: the line it turns about or slides along. From the base outwards, these are "
-    "z₀, z₁, "
-    "z₂ …",
-    "Place frame 0 anywhere on z₀, with x₀ in any direction.",
-    "Find the common normal of each two neighbouring axes. Origin i is where it meets the outer axis. If the axes "
-    "intersect, take the intersection. If they are parallel, choose; best so that d becomes 0.",
-    "Lay xᵢ along that normal, away from the inner axis. If the axes intersect: perpendicular to both.",
-    "yᵢ follows from the right-hand rule: from x to y, with the thumb along z.",
-    "Place the last frame at the tool point, with z in the approach direction and x perpendicular to the last "
-    "joint "
-    "axis.",
-    "Read the table. θ: from old x to new x, about old z. d: along old z to the normal. a: length of the normal. "
-    "α: from old z to new z, about new x.",
-    "Write each row as a matrix Aᵢ: its four motions, multiplied in order.",
-    "Multiply the rows, A₁ A₂ … Aₙ: the pose of the tool in the base frame.",
-)
-CRAIG_STEPS = (
-    "Craig’s tables differ in steps 3, 4 and 7: frame i is on the axis of joint i itself. So a row begins with "
-    "the "
-    "link before the joint, α and a, and ends with the joint, θ and d."
-)
 
 
 def color(factor: Factor, strength: float = 1.0) -> str:
@@ -163,7 +141,9 @@ def _symbols(robot: Robot, at: Place, unit: Unit) -> m.MathML:
 
 def nine_steps_html(convention: Convention) -> str:
     """How to find the table of an arm, collapsed."""
-    return render("dh/nine_steps", steps=NINE_STEPS, note=CRAIG_STEPS if convention == "modified" else "")
+    return render(
+        "dh/nine_steps", steps=NINE_STEPS[convention], note=CRAIG_NOTE if convention == "modified" else ""
+    )
 
 
 def compare_html(robot: Robot, other: Robot, q: Array, place_other: Place, distance: float, units: Units) -> str:

@@ -168,6 +168,29 @@ def test_every_page_is_well_formed(robot: kin.Robot, symbols: bool) -> None:
         assert "nan" not in text
 
 
+def test_the_nine_steps_name_where_the_conventions_differ() -> None:
+    standard, craig = (views.NINE_STEPS[convention] for convention in ("standard", "modified"))
+    assert len(standard) == len(craig) == 9
+    differing = [str(i) for i, (a, b) in enumerate(zip(standard, craig, strict=True), 1) if a != b]
+    assert f"Steps {', '.join(differing[:-1])} and {differing[-1]} differ" in views.CRAIG_NOTE
+    assert views.CRAIG_NOTE in words(views.nine_steps_html("modified"))
+    assert views.CRAIG_NOTE not in words(views.nine_steps_html("standard"))
+
+
+@pytest.mark.parametrize("robot", READINGS, ids=lambda r: f"{r.id}-{r.convention}")
+def test_a_row_is_read_off_the_frames_as_step_seven_says(robot: kin.Robot) -> None:
+    frames = np.concatenate([robot.T_world_base[None], kin.link_frames(robot, robot.q_home)])
+    for row, (old, new) in enumerate(itertools.pairwise(frames)):
+        theta, d, a, alpha = (steps.value(robot, row, f, robot.q_home) for f in ("theta", "d", "a", "alpha"))
+        z, x = (old[:3, 2], new[:3, 0]) if robot.convention == "standard" else (new[:3, 2], old[:3, 0])
+        between = new[:3, 3] - old[:3, 3]
+        # d along z and a along x, which are perpendicular; a has a sign.
+        assert between == pytest.approx(d * z + a * x, abs=1e-9)
+        for axis, start, end, angle in ((x, old[:3, 2], new[:3, 2], alpha), (z, old[:3, 0], new[:3, 0], theta)):
+            turned = np.arctan2(np.cross(start, end) @ axis, start @ end)
+            assert np.remainder(turned - angle + np.pi, 2 * np.pi) - np.pi == pytest.approx(0.0, abs=1e-6)
+
+
 def test_the_table_marks_the_current_step_and_the_joint_variables() -> None:
     at = steps.place(CRAIG, CRAIG.q_home, 6.5)
     html = views.table_html(CRAIG, CRAIG.q_home, at, DEFAULT_UNITS)
