@@ -155,7 +155,17 @@ def test_the_built_in_arms_are_named():
         for robot_id in re.findall(r"`(.+?)`", row[0])
     ]
     assert sorted(rows) == sorted((robot.id, str(robot.n)) for robot in robots.values())
-    words = {3: "Three", 4: "Four", 5: "Five", 6: "Six", 7: "Seven", 8: "Eight", 9: "Nine", 10: "Ten"}
+    words = {
+        3: "Three",
+        4: "Four",
+        5: "Five",
+        6: "Six",
+        7: "Seven",
+        8: "Eight",
+        9: "Nine",
+        10: "Ten",
+        12: "Twelve",
+    }
     assert f"{words[len(robots)]} arms are built in" in PAGES["docs/robot-files.md"]
     assert f"**{words[len(robots)]} arms**" in README
 
