@@ -404,7 +404,8 @@ def test_the_rights_of_a_visitor_who_may_only_look():
     assert not look.allow_websocket("/api/v1/robots/pioneer5/workspace/stream")
     known = {kind for kind in ALLOWED if look.allow_message(kind)}
     assert known == {"ViewerCameraMessage", "LocalStorageGetItemResponseMessage"}
-    assert [lesson.key for lesson in LESSONS if not look.allow_lesson(lesson.key)] == ["postures", "redundancy"]
+    refused = [lesson.key for lesson in LESSONS if not look.allow_lesson(lesson.key)]
+    assert refused == ["postures", "redundancy", "trajectories"]
 
 
 # Rate limits
