@@ -196,6 +196,9 @@ class Handover:
                 data, files, _, _ = socket.recv_fds(self._member.links[number], LARGEST, 1)
             except BlockingIOError:
                 return k > 0
+            if not data:  # no other process has the far end any more: this one is about to stop
+                asyncio.get_running_loop().remove_reader(self._member.links[number])
+                return False
             for file in files:  # none if this process may open no more
                 connection = socket.socket(fileno=file)
                 connection.setblocking(False)
