@@ -55,7 +55,7 @@ FAR = 2e-5
 GENERAL: tuple[Callable[[Robot], ClosedForm | None], ...] = (
     general6.match,
     lambda robot: turned.with_point(robot, general5.match(robot, _six_joints), _six_joints),
-    lambda robot: general7.match(robot, _six_joints),
+    lambda robot: general7.match(robot, _six_joints, lambda other: _closed_form(other, ())),
 )
 
 
@@ -66,14 +66,22 @@ def closed_form_of(robot: Robot) -> ClosedForm | None:
     A table that is rounded gets the family that was meant. Where no family fits then either, or the table is far
     from it, a general solver takes the arm.
     """
+    return _closed_form(robot, GENERAL)
+
+
+def _closed_form(robot: Robot, solvers: tuple[Callable[[Robot], ClosedForm | None], ...]) -> ClosedForm | None:
+    """`closed_form_of`, with these general solvers for an arm that fits no family."""
     found, intended = _family(robot, robot), meant(robot)
     if intended is None:
-        return found or _first_match(robot, GENERAL)
+        return found or _first_match(robot, solvers)
     if found is None:
         form = _family(intended.table, robot)
         # Close to singularities some postures of a table that is far from its family would be missed.
-        general = _first_match(robot, GENERAL) if form is None or (intended.off > FAR and robot.n < 7) else None
-        return Rounded(robot, form, intended.off) if form is not None and general is None else general
+        far = form is not None and intended.off > FAR and robot.n < 7
+        general = _first_match(robot, solvers) if form is None or far else None
+        if form is None or general is not None or (far and not solvers):
+            return general
+        return Rounded(robot, form, intended.off)
     return Rounded(robot, found, intended.off) if intended.hidden else found
 
 

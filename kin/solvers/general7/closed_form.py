@@ -34,18 +34,25 @@ TITLE = "all solutions, seven revolute joints of which one is given"
 _SCAN = 64  # values that are tried where none near the seed's is feasible
 
 
-def match(robot: Robot, form_of: Callable[[Robot], ClosedForm | None]) -> General7 | None:
+Match = Callable[[Robot], ClosedForm | None]
+
+
+def match(robot: Robot, form_of: Match, family_of: Match) -> General7 | None:
     """The solver with the last joint given, or the first one if only that leaves an arm with a closed form.
 
-    `form_of` gives the solver of an arm with six joints.
+    Args:
+        form_of: gives the solver of an arm with six joints.
+        family_of: gives it only if the arm fits a family, in less time.
     """
     if robot.n != 7 or not robot.revolute.all():
         return None
-    found = [(joint, form) for joint in (6, 0) if (form := form_of(fixed(robot, {joint: 0.0}))) is not None]
-    if not found:
-        return None
-    joint, form = min(found, key=lambda entry: not entry[1].named)
-    return General7(robot, joint, form)
+    without_last, without_first = (fixed(robot, {joint: 0.0}) for joint in (6, 0))
+    last = form_of(without_last)
+    if last is not None and last.named:
+        return General7(robot, 6, last)
+    if first := family_of(without_first) if last is not None else form_of(without_first):
+        return General7(robot, 0, first)
+    return None if last is None else General7(robot, 6, last)
 
 
 class _Fold:

@@ -251,7 +251,7 @@ def test_arms_of_another_kind_are_left_alone():
     slide = replace(PANDA, rows=(replace(PANDA.rows[0], kind="prismatic"), *PANDA.rows[1:]))
     for robot in (slide, eight_joints(PANDA), kin.get_robot("ur5")):
         assert offset7.match(robot) is None
-        assert general7.match(robot, closed_form_of) is None
+        assert general7.match(robot, closed_form_of, closed_form_of) is None
 
 
 @robots
