@@ -122,7 +122,7 @@ def _plan(robot: Robot) -> None:
 
 def _solve_generally(robot: Robot) -> None:
     """The general solvers of six and seven joints, which can also solve an arm of a family."""
-    form: ClosedForm | None = general6.match(robot) or general7.match(robot, general6.match)
+    form: ClosedForm | None = general6.match(robot) or general7.match(robot, general6.match, lambda other: None)
     if form is not None:
         values = (math.nan,) * len(form.redundancies(POSE))
         T = fk(robot, robot.q_home)
