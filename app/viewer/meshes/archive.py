@@ -41,6 +41,10 @@ class MeshError(Exception):
         self.field, self.value, self.expected = field, value, expected
 
 
+class TooLargeError(MeshError):
+    """A mesh is larger than any that is read, or made to do harm: nothing of its zip is used."""
+
+
 class Archive:
     """The files of a zip.
 
@@ -88,7 +92,7 @@ class Archive:
         """The content of a file; raises `MeshError`."""
         info = self._files[name]
         if info.file_size > most:
-            raise MeshError(f"{name}: size", f"{info.file_size / MB:.1f} MB", f"at most {most // MB} MB")
+            raise TooLargeError(f"{name}: size", f"{info.file_size / MB:.1f} MB", f"at most {most // MB} MB")
         try:
             with self._zip.open(info) as file:
                 return file.read(most)

@@ -7,7 +7,7 @@ of the file that names the meshes, ``folder`` that of an installed package inste
 to draw in all, and ``solids`` the number of bytes of the solids.
 
 Answers begin with lines ``P``, the number of meshes that are read, and of all meshes. Then comes ``E`` and an
-error in JSON, or ``N`` and the finished links, packed.
+error in JSON (``L``: one about what is too large), or ``N`` and the finished links, packed.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from app.viewer.meshes.archive import Archive, MeshError
+from app.viewer.meshes.archive import Archive, MeshError, TooLargeError
 
 MEMORY = 640 * 1024 * 1024  # bytes
 SECONDS = 20  # of processor time
@@ -44,10 +44,11 @@ def main() -> None:
     try:
         answer.write(b"N" + answer_to(json.loads(line), data, report))
     except MeshError as error:
-        answer.write(b"E" + json.dumps([error.field, str(error.value), error.expected]).encode())
+        kind = b"L" if isinstance(error, TooLargeError) else b"E"
+        answer.write(kind + json.dumps([error.field, str(error.value), error.expected]).encode())
     except MemoryError:
         words = ["meshes", "more memory than they may take", "fewer or simpler meshes"]
-        answer.write(b"E" + json.dumps(words).encode())
+        answer.write(b"L" + json.dumps(words).encode())
 
 
 def _limit() -> None:
@@ -89,7 +90,7 @@ def answer_to(request: dict[str, Any], data: bytes, report: Callable[[int, int],
         count = sum(len(surface.faces) for surface in surfaces)
         total, drawn = total + count, drawn + uses[name] * count
         if total > ALL:
-            raise MeshError("meshes: triangles", f"more than {ALL}", f"at most {ALL} in all files")
+            raise TooLargeError("meshes: triangles", f"more than {ALL}", f"at most {ALL} in all files")
         found[name] = surfaces
     share = min(1.0, request["most"] / max(drawn, 1))
     for name in uses:
@@ -99,7 +100,7 @@ def answer_to(request: dict[str, Any], data: bytes, report: Callable[[int, int],
     left = sum(count * len(surface.faces) for name, count in uses.items() for surface in found[name])
     if left > SLACK * request["most"]:  # what is no surface cannot be simplified
         expected = f"meshes that can be simplified to {request['most']}"
-        raise MeshError("meshes: triangles to draw", f"{left}", expected)
+        raise TooLargeError("meshes: triangles to draw", f"{left}", expected)
     return pack(placed(shapes, {path: found[name] for path, name in names.items()}), drawn)
 
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from trimesh.exchange.load import mesh_loaders
 from trimesh.resolvers import Resolver
 
-from app.viewer.meshes.archive import FORMATS, MeshError
+from app.viewer.meshes.archive import FORMATS, MeshError, TooLargeError
 from app.viewer.meshes.surface import Faces, Points, Rgb, Surface, by_color
 
 PARSED = 600_000  # triangles of one file, before it is simplified
@@ -100,12 +100,12 @@ def _check_count(name: str, kind: str, data: bytes) -> None:
         count = _count_of_glb(data)
     elif kind == ".dae":
         if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
-            raise MeshError(f"mesh {name}", "DOCTYPE", "a file without DOCTYPE and entities")
+            raise TooLargeError(f"mesh {name}", "DOCTYPE", "a file without DOCTYPE and entities")
         count = sum(
             int(number) for number in re.findall(rb'<(?:triangles|polylist)[^>]{0,200}?count="(\d{1,9})"', data)
         )
     if count > PARSED:
-        raise MeshError(f"mesh {name}: triangles", f"{count}", f"at most {PARSED} in a file")
+        raise TooLargeError(f"mesh {name}: triangles", f"{count}", f"at most {PARSED} in a file")
 
 
 def _count_of_glb(data: bytes) -> int:
@@ -132,7 +132,7 @@ def _pieces(name: str, scene: Any) -> list[Surface]:
             continue
         total += len(mesh.faces)
         if total > PARSED:
-            raise MeshError(f"mesh {name}: triangles", f"more than {PARSED}", f"at most {PARSED} in a file")
+            raise TooLargeError(f"mesh {name}: triangles", f"more than {PARSED}", f"at most {PARSED} in a file")
         T = np.asarray(T, dtype=float)
         points = np.asarray(mesh.vertices, dtype=float) @ T[:3, :3].T + T[:3, 3]
         points *= _metres(mesh)

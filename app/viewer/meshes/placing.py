@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.viewer.meshes.archive import MeshError
+from app.viewer.meshes.archive import MeshError, TooLargeError
 from app.viewer.meshes.surface import LinkBody, Points, Rgb, Surface, by_color
 
 PLAIN: Rgb = (196, 201, 208)  # of what nothing gives a colour
@@ -78,7 +78,7 @@ def placed(shapes: Shapes, files: Mapping[str, Sequence[Surface]]) -> list[LinkB
             drawn += len(surface.faces)
             if drawn > MOST_DRAWN:
                 expected = f"at most {MOST_DRAWN} with all shapes"
-                raise MeshError("meshes: triangles to draw", f"more than {MOST_DRAWN}", expected)
+                raise TooLargeError("meshes: triangles to draw", f"more than {MOST_DRAWN}", expected)
             moved = _moved(surface, piece)
             _check_extent(float(np.abs(moved.points).max()), piece, shapes.reach)
             links[piece.carrier].append(moved)

@@ -25,7 +25,7 @@ import numpy as np
 from app.shared.clients import share_of
 from app.shared.memory.answers import AnswerMemory, MemoryFullError, MemoryShare, Reservation
 from app.shared.threads import DaemonExecutor, lower_priority
-from app.viewer.meshes.archive import MOST_BYTES, MeshError
+from app.viewer.meshes.archive import MOST_BYTES, MeshError, TooLargeError
 from app.viewer.meshes.placing import MOST_DRAWN, Shapes
 from app.viewer.meshes.surface import LinkBody, pack, unpack
 
@@ -211,6 +211,8 @@ class MeshReader:
                 self._process = self._running = None
         if answer[:1] == b"E":
             raise MeshError(*json.loads(answer[1:]))
+        if answer[:1] == b"L":
+            raise TooLargeError(*json.loads(answer[1:]))
         if answer[:1] != b"N":
             raise too_much()
         return answer[1:]
@@ -281,9 +283,9 @@ class ClientMeshes:
         return self.reader._add(_Request(self.client, shapes, source, self.memory, room, urdf, progress))
 
 
-def too_much() -> MeshError:
+def too_much() -> TooLargeError:
     """The error when the process ended without an answer, or with none that can be."""
-    return MeshError("meshes", "too much work or memory", "fewer or simpler meshes")
+    return TooLargeError("meshes", "too much work or memory", "fewer or simpler meshes")
 
 
 def full() -> MeshError:

@@ -84,6 +84,9 @@ class RobotTab(Feature):
             case ("meshes", int(number)):
                 self._uploads.use_meshes(number, value)
                 self._show_files()
+            case ("refused",):
+                if words := self._uploads.refuse(value):
+                    self._refuse(UNUSED, words)
             case ("reading", int(number)):
                 self._uploads.note_progress(number, value)
                 self._show_files()

@@ -9,7 +9,7 @@ from functools import partial
 
 from app.shared.memory.answers import MemoryFullError, Reservation
 from app.viewer.feature import Stage
-from app.viewer.meshes.archive import MeshError
+from app.viewer.meshes.archive import MeshError, TooLargeError
 from app.viewer.meshes.links import drawing_of, drawing_without_meshes, shapes_of, size_of
 from app.viewer.meshes.placing import Shapes
 from app.viewer.meshes.reader import MOST_TRIANGLES, Meshes, full
@@ -21,14 +21,20 @@ from app.viewer.tabs.robot.files import Busy, Incoming, Source, arm_of, file_err
 from kin import InputError, KinematicsError, Robot, RobotFileError
 from kin.files.urdf.visuals import MeshFile, read_visuals
 
+MOST_BACK = 20  # steps that are taken back to the arm that a refused file has replaced
 HERE = "They are in this page only, not in its link."
 
 
 @dataclass(frozen=True, eq=False)
 class _Reading:
-    """Meshes that are being read: of which arm and file, how many, and how many have been read."""
+    """Meshes that are being read: of which arm and file, how many, and how many have been read.
+
+    Attributes:
+        replaced: the id of the robot that was on show before.
+    """
 
     robot: Robot
+    replaced: str
     source: Source
     count: int
     done: int = 0
@@ -37,7 +43,8 @@ class _Reading:
 class Uploads:
     """The files of one visitor.
 
-    Posts ``("reading", number)`` while meshes are being read, and ``("meshes", number)`` when they were.
+    Posts ``("reading", number)`` while meshes are being read, ``("meshes", number)`` when they were, and
+    ``("refused",)`` with a reason and whose arm it is when nothing of the file is used.
 
     Args:
         begin: shows an own arm that a file gave, with what is to be said about it.
@@ -177,7 +184,7 @@ class Uploads:
             )
         except MeshError as error:
             raise file_error(source.name, error) from None
-        self._reading = _Reading(robot, source, count)
+        self._reading = _Reading(robot, self._stage.robot.id, source, count)
         future.add_done_callback(partial(self._post, done))
         self._future = future
         return f"Its {count} meshes are being read."
@@ -197,6 +204,9 @@ class Uploads:
         try:
             meshes: Meshes = done.result()
             self._draw(reading.robot, source, drawing_of(meshes.links), meshes.room)
+        except TooLargeError as error:
+            self._post(("refused",), (reading, str(file_error(source.name, error)), MOST_BACK))
+            return
         except (MeshError, KinematicsError) as error:
             known = file_error(source.name, error) if isinstance(error, MeshError) else error
             self._say_wrong(source, str(known))
@@ -206,6 +216,24 @@ class Uploads:
         if meshes.triangles > MOST_TRIANGLES:
             words += f", simplified to about {MOST_TRIANGLES}"
         self._stage.notify(Notice("hand", f"The meshes of {source.name} are shown", f"{words}. {HERE}"))
+
+    def refuse(self, value: object) -> str:
+        """Bring back the arm that a refused file has replaced, as undo does.
+
+        Returns:
+            What is to be said about it; "" while it is not there yet.
+        """
+        match value:
+            case (_Reading() as reading, str(words), int(left)):
+                pass
+            case _:
+                raise InputError("refused", value, "the file that is refused")
+        robot = self._stage.robot
+        if robot != reading.robot or robot.id == reading.replaced or not left:
+            return words
+        self._stage.post("undo")  # once more for each step that the visitor has made since
+        self._post(("refused",), (reading, words, left - 1))
+        return ""
 
     def _draw_plain(self, robot: Robot, source: Source, shapes: Shapes) -> None:
         """Draw boxes, cylinders and spheres."""

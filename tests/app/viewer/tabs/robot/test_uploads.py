@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from fake_browser import FakeBrowser
 from live_server import serve_viewer
-from test_robot_tab import STORE, UR5, part, say, shows, type_in
-from zips import TWO_JOINTS, packed, robot_files
+from test_robot_tab import STORE, UR5, cell, part, say, shows, type_in
+from zips import TWO_JOINTS, announced, packed, robot_files
 
 import kin
 from app.service.web.inspection import MAX_MESSAGE
@@ -21,7 +21,8 @@ from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.meshes import reader as readers
-from app.viewer.meshes.archive import MeshError
+from app.viewer.meshes.archive import MeshError, TooLargeError
+from app.viewer.meshes.loading import PARSED
 from app.viewer.server import ViewerServer
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -119,7 +120,7 @@ BAD = {
 }
 BAD_MESHES = {
     "missing": (packed({"x.urdf": TWO_JOINTS}), "a path of a file in the zip"),
-    "noise": (packed({**robot_files(), "two/meshes/upper.stl": b"noise" * 100}), "upper.stl"),
+    "noise": (packed({**robot_files(), "two/meshes/upper.stl": b"noise"}), "upper.stl"),
     "millimetres": (packed(robot_files(TWO_JOINTS.replace('scale="0.001 0.001 0.001"', ""))), "0.001 0.001 0.001"),
 }
 
@@ -148,6 +149,65 @@ def test_a_bad_zip_changes_nothing_and_bad_meshes_leave_a_skeleton(port: int) ->
         for first, before in ((True, 0), (False, 7)):
             say(tab, "upload", value=["x.zip", first, False, "UEs=", "base64", before, 9])
         assert "does not follow the one before" in tab.html
+
+
+TOO_LARGE = {
+    "announced": (
+        packed({**robot_files(), "two/meshes/upper.stl": announced(10**7)}),
+        "10000000",
+        f"at most {PARSED}",
+    ),
+    "heavy": (packed({**robot_files(), "two/meshes/upper.stl": bytes(25 * 10**6)}), "times", "at most 200 times"),
+    "entities": (
+        packed({**robot_files(TWO_JOINTS.replace("fore.obj", "fore.dae")), "two/meshes/fore.dae": "<!DOCTYPE x>"}),
+        "DOCTYPE",
+        "without DOCTYPE",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", TOO_LARGE)
+def test_a_mesh_that_is_too_large_refuses_the_file_and_the_arm_on_show_stays(port: int, name: str) -> None:
+    data, value, valid = TOO_LARGE[name]
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        send(tab, "two.zip", packed(robot_files()))
+        tab.wait(lambda: meshes(tab) == ALL)
+        type_in(tab, "tool", "x", "50")
+        tab.wait(lambda: meshes(tab) == ALL)
+        mine = tab.value("Robot")
+        send(tab, name, data)
+        tab.wait(lambda: "The file was not used" in tab.html)
+        words = html.unescape(tab.html)
+        assert value in words
+        assert valid in words
+        tab.wait(lambda: tab.value("Robot") == mine and meshes(tab) == ALL)
+        tab.wait(lambda: cell(tab, "tool x") == "50")
+
+
+def test_steps_made_while_a_file_is_read_that_is_refused_are_taken_back_with_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    viewer = ViewerServer(Store(), Settings(), Clouds())
+    done = threading.Event()
+
+    def answer(request: readers._Request) -> bytes:
+        done.wait(30.0)
+        raise TooLargeError("meshes", "more", "less")
+
+    monkeypatch.setattr(viewer._services.meshes, "_answer", answer)
+    with serve_viewer(viewer) as port, FakeBrowser(port) as tab:
+        tab.settle()
+        before = tab.value("Robot")
+        send(tab, "two.zip", packed(robot_files()))
+        tab.wait(lambda: tab.value("Robot") != before)
+        tab.settle()
+        for slider in tab.sliders[:2]:
+            tab.set(slider, 20.0)
+            tab.settle()
+        done.set()
+        tab.wait(lambda: "The file was not used" in tab.html)
+        assert tab.value("Robot") == before
 
 
 def test_an_upload_that_stalls_ends_and_gives_back_its_room(monkeypatch: pytest.MonkeyPatch) -> None:
