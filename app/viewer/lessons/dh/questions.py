@@ -7,7 +7,18 @@ import math
 import numpy as np
 
 from app.viewer.lessons.dh.steps import MOVED, ORDERS, amount, axis_name, low, symbol, turns, value
-from app.viewer.lessons.guide.outline import Choice, Mistake, Number, Option, Outline, Step, count, one_right
+from app.viewer.lessons.guide.outline import (
+    Choice,
+    Mistake,
+    Number,
+    Option,
+    Outline,
+    Step,
+    apart,
+    count,
+    one_right,
+    two_percent,
+)
 from app.viewer.lessons.guide.poses import as_configuration, distance, moved
 from kin import Robot, fk, link_frames
 from kin.axes import joint_axes, pairs
@@ -129,7 +140,7 @@ def _origins(robot: Robot, row: int, units: Units) -> Number:
         Mistake(max(a, d), "That is only one of the two lengths."),
         Mistake(min(a, d), "That is only one of the two lengths."),
     )
-    return Number(
+    question = Number(
         f"How far is the origin of frame {row + 1} from the origin of frame {row}, with the arm at home?",
         origin_distance(robot, row, robot.q_home),
         units.lengths,
@@ -137,6 +148,7 @@ def _origins(robot: Robot, row: int, units: Units) -> Number:
         "d and a are the sides of a right angle: the distance is √(d² + a²).",
         mistakes,
     )
+    return apart(question)
 
 
 def relation(robot: Robot, joint: int) -> str:
@@ -186,14 +198,16 @@ def _swing(robot: Robot, q: Array, units: Units) -> Number:
         far = float(np.linalg.norm(foot - (foot @ axis.direction) * axis.direction))
         method = "The tool moves on a circle about axis 1: with its distance r from that axis, 2 r sin(θ/2)."
         mistakes = (Mistake(far, "That is the distance r of the tool from axis 1."),)
-    return Number(
+    way = distance(before, after)
+    question = Number(
         "How far from its old place is the tool point then?",
-        distance(before, after),
+        way,
         units.lengths,
-        0.01 * max(robot.reach, 0.1),
+        two_percent(way),
         f"{method} Read x, y and z of the tool above.",
         mistakes,
     )
+    return apart(question)
 
 
 def _check(robot: Robot, units: Units) -> tuple[Number | Choice, ...]:
@@ -228,7 +242,7 @@ def _check(robot: Robot, units: Units) -> tuple[Number | Choice, ...]:
         1,
     )
     last = robot.n - 2 if robot.n > 1 else 0
-    return column, product, _relation(robot, last), _tool_axis(robot)
+    return apart(column), product, _relation(robot, last), _tool_axis(robot)
 
 
 def _offset_joint(robot: Robot) -> int:

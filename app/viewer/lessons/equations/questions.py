@@ -4,9 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.viewer.lessons.guide.outline import PLAIN, Choice, Mistake, Number, Option, Outline, Step, one_right
+from app.viewer.lessons.guide.outline import (
+    PLAIN,
+    Choice,
+    Mistake,
+    Number,
+    Option,
+    Outline,
+    Step,
+    apart,
+    one_right,
+)
 from app.viewer.lessons.guide.poses import as_configuration
+from app.viewer.lessons.guide.rank import lifts
 from kin import Robot, fk, jacobian
+from kin.axes import NEARLY
 from kin.transforms import Array
 from kin.units import Units, fixed
 
@@ -73,7 +85,7 @@ def _approach(T: Array) -> Choice:
 
 def _distance(T: Array, units: Units) -> Number:
     x, y, z = np.abs(T[:3, 3]).tolist()
-    return Number(
+    question = Number(
         "How far is the tool point from the origin of the frame in which p is given?",
         float(np.linalg.norm(T[:3, 3])),
         units.lengths,
@@ -84,6 +96,7 @@ def _distance(T: Array, units: Units) -> Number:
             Mistake(float(np.hypot(x, y)), "That is the distance from the z axis; z is missing."),
         ),
     )
+    return apart(question)
 
 
 def _cross(T: Array) -> Number:
@@ -92,7 +105,7 @@ def _cross(T: Array) -> Number:
     i, j = (k + 1) % 3, (k + 2) % 3
     names = "xyz"
     terms = f"n{names[i]} o{names[j]} − n{names[j]} o{names[i]}"
-    return Number(
+    question = Number(
         f"What is a{names[k]}, the {names[k]} component of a?",
         float(a[k]),
         PLAIN,
@@ -100,6 +113,7 @@ def _cross(T: Array) -> Number:
         f"a = n × o, so a{names[k]} = {terms}.",
         (Mistake(float(-a[k]), f"That is o × n. The order counts: a{names[k]} = {terms}."),),
     )
+    return apart(question)
 
 
 def flipped(T: Array, row: int, column: int) -> float:
@@ -111,7 +125,7 @@ def flipped(T: Array, row: int, column: int) -> float:
 
 def _test(T: Array) -> Choice:
     k = int(np.argmax(np.abs(T[:3, 0])))
-    shown = flipped(T, k, 0) > 1e-9
+    shown = flipped(T, k, 0) > NEARLY
     entry = f"n{'xyz'[k]}"
     why = (
         f"Its square is the same, but n·o or n·a is {fixed(flipped(T, k, 0), 3)} then instead of 0."
@@ -127,7 +141,7 @@ def _test(T: Array) -> Choice:
 def changes_height(robot: Robot, joint: int) -> bool:
     """Whether a joint ever changes z of the tool point."""
     q = robot.random_q(np.random.default_rng(5), SAMPLES)
-    return bool(np.abs(jacobian(robot, q)[:, 2, joint]).max() > 1e-9)
+    return lifts(robot, jacobian(robot, q), joint)
 
 
 def _check(robot: Robot, T: Array, units: Units) -> tuple[Number | Choice, ...]:

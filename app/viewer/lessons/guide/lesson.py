@@ -16,4 +16,8 @@ class Lesson(Feature, ABC):
     @staticmethod
     @abstractmethod
     def outline(robot: Robot, units: Units) -> Outline:
-        """Goal, steps and check for this arm, in a few milliseconds: it is made again for each arm and unit."""
+        """Goal, steps and check for this arm.
+
+        It is made again for each arm and unit while the visitor waits. So what needs inverse kinematics is kept
+        for the arm: without a closed form, a target that is missed takes some tenths of a second.
+        """

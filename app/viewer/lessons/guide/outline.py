@@ -6,8 +6,9 @@ in radians, metres and SI units.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from kin.units import Unit
 
@@ -77,6 +78,41 @@ def count(prompt: str, answer: int, method: str, mistakes: Sequence[tuple[int, s
     """A question whose answer is a whole number; mistakes that give the right one are left out."""
     wrong = tuple(Mistake(value, reason) for value, reason in mistakes if value != answer)
     return Number(prompt, answer, PLAIN, WHOLE, method, wrong)
+
+
+LEAST = 2e-4  # the finest error that is asked for, in metres and radians: values are shown with 0.1 mm
+_SHARE = 0.45  # of the distance to the nearest wrong value
+
+
+def apart(question: Number, least: float = LEAST) -> Number:
+    """The question with a tolerance that tells its answer from its known mistakes and from zero.
+
+    Mistakes within twice `least` of the answer are left out: for this arm they give the right value.
+    """
+    wrong = tuple(m for m in question.mistakes if _gap(question, m.value) > 2.0 * least)
+    gaps = [gap for value in (0.0, *(m.value for m in wrong)) if (gap := _gap(question, value)) > 2.0 * least]
+    tolerance = max(question.tolerance, least)
+    if gaps and tolerance > _SHARE * min(gaps):
+        tolerance = _rounded_down(_SHARE * min(gaps))
+    return replace(question, tolerance=tolerance, mistakes=wrong)
+
+
+def two_percent(answer: float) -> float:
+    """The usual tolerance of a measured value."""
+    return _rounded_down(0.02 * abs(answer))
+
+
+def _rounded_down(size: float) -> float:
+    """To two digits, as people write a tolerance."""
+    if size == 0.0:
+        return 0.0
+    digit = math.floor(math.log10(size)) - 1
+    return float(f"{math.floor(size * 10.0**-digit)}e{digit}")
+
+
+def _gap(question: Number, value: float) -> float:
+    gap = value - question.answer
+    return abs(math.remainder(gap, 2.0 * math.pi) if question.whole_turns else gap)
 
 
 Question = Choice | Number

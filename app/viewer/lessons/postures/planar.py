@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from app.viewer.lessons.guide.outline import Mistake, Number, Step
+from app.viewer.lessons.guide.outline import Mistake, Number, Step, apart
 from app.viewer.lessons.guide.poses import as_configuration
 from kin import Robot
 from kin.robot import IDENTITY
@@ -44,25 +44,25 @@ def steps(robot: Robot, units: Units) -> tuple[Step, ...]:
     bend = abs(float(q[1]))
     links = f"l₁ = {length.text(l1)} and l₂ = {length.text(l2)}"
     at = f"({length.number(x)}, {length.number(y)}){length.suffix}"
-    ring = Number(
+    ring = apart(Number(
         f"How near can {point} come to axis 1?",
         abs(l1 - l2), length, LENGTH,
         "Folded back, the shorter link lies on the longer one.",
         (Mistake(l1 + l2, "That is how far it can go: the outer radius of the ring."),),
-    )  # fmt: skip
-    triangle = Number(
+    ))  # fmt: skip
+    triangle = apart(Number(
         "How large is θ₂, without its sign?",
         bend, units.angles, ANGLE,
         "The cosine rule: cos θ₂ = (x² + y² − l₁² − l₂²) / (2 l₁ l₂).",
         (Mistake(math.pi - bend, "That is the angle inside the triangle; θ₂ is 0 for the stretched arm."),),
-    )  # fmt: skip
-    elbow = Number(
+    ))  # fmt: skip
+    elbow = apart(Number(
         "Which θ₁ belongs to the other sign of θ₂?",
         float(other[0]), units.angles, ANGLE,
         "θ₁ = atan2(y, x) − atan2(l₂ sin θ₂, l₁ + l₂ cos θ₂), with the other sign of θ₂.",
         (Mistake(float(q[0]), "That is θ₁ of the arm at home. The elbow is on the other side now."),),
         whole_turns=True,
-    )  # fmt: skip
+    ))  # fmt: skip
     turned = "The tool points elsewhere." if robot.n == 2 else "θ₃ keeps the direction of the tool."
     return (
         Step(

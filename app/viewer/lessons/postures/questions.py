@@ -19,10 +19,12 @@ from app.viewer.lessons.guide.outline import (
     one_right,
 )
 from app.viewer.lessons.guide.poses import as_configuration
+from app.viewer.lessons.guide.rank import rank, self_motions
 from app.viewer.lessons.postures import planar
 from app.viewer.scene.chain import rotation
-from kin import IKOptions, Robot, branch_names, branch_of, fk
+from kin import IKOptions, IKSolution, Robot, Status, branch_names, branch_of, fk, jacobian
 from kin.ik import solve
+from kin.transforms import Array
 from kin.units import Units
 
 GOAL = "You can say how many postures reach a target, what tells them apart, and why a target is missed."
@@ -38,34 +40,38 @@ class Facts(NamedTuple):
         here: the branch of home.
         found: the solutions within the limits.
         other: the solution that differs most from home; None if there is no other one.
-        far: the status for the same orientation at a point that is too far away.
         rolled: how many solutions within the limits there are if the tool is rolled by `ROLL`.
+        roll: the status of that target.
+        rank: of the Jacobian at home.
     """
 
     names: tuple[str, ...]
     here: str
     found: int
     other: Configuration | None
-    far: str
     rolled: int
+    roll: Status
+    rank: int
 
 
 @lru_cache(maxsize=64)
 def facts(robot: Robot) -> Facts:
-    """Solve for the pose of home."""
+    """Solve for the pose of home, and for the one that is rolled."""
     names = branch_names(robot)
     T, q = fk(robot, robot.q_home), robot.q_home
-    solutions = solve(robot, T, IKOptions(), q).solutions
+    _, solutions = _exact(robot, T)
     turns = robot.revolute
     away = [float(np.abs(np.angle(np.exp(1j * (s.q - q)[turns]))).sum()) for s in solutions]
     other = as_configuration(solutions[int(np.argmax(away))].q) if away and max(away) > 1e-3 else None
-    far = T.copy()
-    out = far[:3, 3] - robot.T_world_base[:3, 3]
-    size = float(np.linalg.norm(out))
-    far[:3, 3] = robot.T_world_base[:3, 3] + BEYOND * robot.reach * (out / size if size else np.eye(3)[0])
-    status = solve(robot, far, IKOptions(), q).status
-    rolled = len(solve(robot, T @ rotation(2, ROLL), IKOptions(), q).solutions)
-    return Facts(names, branch_of(robot, q) if names else "", len(solutions), other, status, rolled)
+    status, rolled = _exact(robot, T @ rotation(2, ROLL))
+    here = branch_of(robot, q) if names else ""
+    return Facts(names, here, len(solutions), other, len(rolled), status, rank(robot, jacobian(robot, q)))
+
+
+def _exact(robot: Robot, T: Array) -> tuple[Status, tuple[IKSolution, ...]]:
+    """The status of a target, and the solutions that meet the whole pose: compromises do not."""
+    result = solve(robot, T, IKOptions(), robot.q_home)
+    return result.status, result.solutions if result.status is Status.SOLVED else ()
 
 
 def outline(robot: Robot, units: Units) -> Outline:
@@ -96,7 +102,7 @@ def outline(robot: Robot, units: Units) -> Outline:
         Step(
             "Out of reach",
             f"The target moves straight away from the base, to {BEYOND:g} times the arm’s reach.",
-            _missed(known),
+            _missed(),
             "Drag the target away from the arm: above the list it says why it is missed, and what helps.",
         ),
     )
@@ -105,7 +111,7 @@ def outline(robot: Robot, units: Units) -> Outline:
 
 
 def _many(robot: Robot) -> str:
-    if robot.n > 6:
+    if self_motions(robot):
         return "A redundant arm has infinitely many solutions; one for each posture is counted."
     return "Solutions are counted that keep the joint limits."
 
@@ -159,8 +165,8 @@ def _solutions(known: Facts) -> Number:
     )
 
 
-def _missed(known: Facts) -> Choice:
-    reached = known.far == "solved"
+def _missed() -> Choice:
+    """Nothing is reached there: the reach is an upper bound."""
     return Choice(
         "How many postures reach it?",
         (
@@ -168,54 +174,53 @@ def _missed(known: Facts) -> Choice:
                 "As many as before", "Beyond the reach, the triangle of shoulder, elbow and wrist does not close."
             ),
             Option("One, the stretched arm", "Exactly one at the border of the workspace; beyond it, none."),
-            Option("None", "The cosine rule would need a cosine above 1: no real solution.", not reached),
-            *(
-                (Option("Some", "This arm has a prismatic joint, which is longer than its reach.", True),)
-                if reached
-                else ()
-            ),
+            Option("None", "The cosine rule would need a cosine above 1: no real solution.", True),
         ),
     )
 
 
 def _check(robot: Robot, known: Facts, units: Units) -> tuple[Number | Choice, ...]:
-    any_pose = robot.n >= 6
+    every = known.rank == 6
+    ways = f"At home the Jacobian has rank {known.rank}: so many of the six coordinates can be chosen freely."
     pose = Choice(
-        "A pose has six coordinates. Can this arm take every pose near the one at home?",
-        (
-            Option("Yes", _joints(robot.n), any_pose),
-            Option("No", _joints(robot.n), not any_pose),
-        ),
+        "A pose has six coordinates. Can small motions of the joints from home change each of them at will?",
+        (Option("Yes", ways, every), Option("No", ways, not every)),
     )
-    infinite = robot.n > 6
-    many = Choice(
+    return pose, _many_or_few(robot, known), _rolled(known, units)
+
+
+def _many_or_few(robot: Robot, known: Facts) -> Choice:
+    """Whether the configurations that hold a pose can be counted."""
+    free = self_motions(robot)
+    why = f"Of {_counted(robot.n, 'joint')}, {robot.n - free} move the tool independently. "
+    why += f"That leaves {_counted(free, 'self-motion')}." if free else "None is left for a self-motion."
+    options = [
+        Option("Infinitely many", why, free > 0),
+        Option("Finitely many, one per posture", why, free == 0),
+    ]
+    if free or known.found > 1 or robot.n >= 6:  # with fewer joints there may be a single one
+        options.append(Option("Exactly one", "Signs can be chosen: elbow up or down, for one."))
+    return Choice(
         "How many configurations hold one pose that the arm can reach, away from singularities and limits?",
-        (
-            Option(
-                "Infinitely many", f"That needs more joints than conditions; this arm has {robot.n}.", infinite
-            ),
-            Option("A few, one per posture", f"The arm has {robot.n} joints for six conditions.", not infinite),
-            Option("Exactly one", "Signs can be chosen: elbow up or down, for one.", False),
-        ),
+        tuple(options),
     )
-    return pose, many, _rolled(robot, known, units)
 
 
-def _rolled(robot: Robot, known: Facts, units: Units) -> Choice:
+def _counted(number: int, thing: str) -> str:
+    return f"{number} {thing}{'' if number == 1 else 's'}"
+
+
+def _rolled(known: Facts, units: Units) -> Choice:
     """Whether the pose of home can be rolled."""
     if known.rolled:
         why = f"{known.rolled} posture{'s reach' if known.rolled > 1 else ' reaches'} it within the joint limits."
-    elif robot.n < 6:
-        why = f"{robot.n} joints leave no choice of the roll at a point with an approach direction."
-    else:
+    elif known.roll is Status.LIMITS:
         why = "The postures that would reach it are outside the joint limits."
+    elif known.rank < 6:
+        why = f"The rank is {known.rank} of six: this roll is not among the motions of the tool."
+    else:
+        why = "The point can be reached, but not with this orientation."
     return Choice(
         f"The pose of home is rolled by {units.angles.brief(ROLL)} about the approach. Can the arm take it?",
         (Option("Yes", why, known.rolled > 0), Option("No", why, not known.rolled)),
     )
-
-
-def _joints(n: int) -> str:
-    if n < 6:
-        return f"{n} joints can meet {n} conditions. The rest of the pose follows."
-    return f"{n} joints are enough for six conditions."

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from app.viewer.lessons.guide.outline import PLAIN, Choice, Number, Option, Outline, Step, count, one_right
 from app.viewer.lessons.guide.poses import as_configuration
+from app.viewer.lessons.guide.rank import point_motions, rank, self_motions
 from kin import Robot, jacobian
 from kin.transforms import Array
 from kin.units import Units, fixed
@@ -16,20 +15,12 @@ GOAL = "You can say how many motions of the joints leave the tool in place, and 
 STILL = 1e-6
 
 
-@lru_cache(maxsize=64)
-def self_motions(robot: Robot) -> int:
-    """The dimension of the null space of the Jacobian almost everywhere: joints less rank."""
-    q = robot.random_q(np.random.default_rng(2), 8)
-    return robot.n - int(np.linalg.matrix_rank(jacobian(robot, q), rtol=1e-9).max())
-
-
 def null_vector(robot: Robot) -> Array:
     """Joint speeds ``(n,)`` of norm 1 that do not move the tool at home; zeros if there are none."""
-    _, values, Vt = np.linalg.svd(jacobian(robot, robot.q_home))
-    rank = int((values > 1e-9 * values[0]).sum())
-    if rank == robot.n:
+    J = jacobian(robot, robot.q_home)
+    free: Array = np.linalg.svd(J)[2][rank(robot, J) :]
+    if not len(free):
         return np.zeros(robot.n)
-    free: Array = Vt[rank:]
     # Of several, the direction in which a single joint moves most.
     joint = int(np.argmax(np.linalg.norm(free, axis=0)))
     direction: Array = free.T @ free[:, joint]
@@ -85,16 +76,10 @@ def _dimension(robot: Robot, free: int) -> Number:
     )
 
 
-def point_freedom(robot: Robot) -> int:
-    """The dimension of the null space of the linear part of J."""
-    q = robot.random_q(np.random.default_rng(2), 8)
-    return robot.n - int(np.linalg.matrix_rank(jacobian(robot, q)[:, :3], rtol=1e-9).max())
-
-
 def _point(robot: Robot) -> Number:
     return count(
         "How many independent motions of the joints leave the tool point where it is?",
-        point_freedom(robot),
+        point_motions(robot),
         "The number of joints less the rank of the upper three rows of J.",
         [(robot.n, "Each condition that is independent of the others takes one away.")],
     )

@@ -12,12 +12,15 @@ from app.viewer.lessons.guide.outline import (
     Option,
     Outline,
     Step,
+    apart,
     count,
     one_right,
+    two_percent,
 )
 from app.viewer.lessons.guide.poses import as_configuration
+from app.viewer.lessons.guide.rank import lifts
 from kin import Robot, Singularity, fk, jacobian, singularities
-from kin.axes import joint_axes
+from kin.axes import NEARLY, joint_axes, size
 from kin.ik.messages.singularity import short
 from kin.singularity import task_jacobian, usual_rank
 from kin.transforms import Array
@@ -26,6 +29,7 @@ from kin.units import Unit, Units
 GOAL = "You can read the columns of the Jacobian, predict speeds and joint torques, and explain a singularity."
 SPEED, TORQUE, FORCE = Unit("m/s", 1.0, 3), Unit("N·m", 1.0, 2), Unit("N", 1.0, 2)
 LOAD = 10.0  # N
+LEAST = 5e-4  # m/s: speeds are shown with three decimals
 
 
 def outline(robot: Robot, units: Units) -> Outline:
@@ -107,11 +111,11 @@ def _column(robot: Robot, J: Array) -> Number:
             "On a circle, speed is angular velocity times radius; the radius is the tool’s distance from axis 1."
         )
     point = joint_axes(robot)[0].point
-    return Number(
+    question = Number(
         "Joint 1 moves at 1 rad/s (1 m/s if it slides). How fast is the tool point, with the arm at home?",
         speed,
         SPEED,
-        0.01 * max(robot.reach, 0.1),
+        two_percent(speed),
         method,
         (
             Mistake(
@@ -120,6 +124,7 @@ def _column(robot: Robot, J: Array) -> Number:
             ),
         ),
     )
+    return apart(question, LEAST)
 
 
 def _omega(robot: Robot, k: int) -> Number:
@@ -140,21 +145,26 @@ def _omega(robot: Robot, k: int) -> Number:
 
 
 def _torque(robot: Robot, J: Array, k: int) -> Number:
-    value = torque(J, k)
     turns = robot.joints[k].kind == "revolute"
-    return Number(
-        f"Which {'torque' if turns else 'force'} does joint {k + 1} apply at home? (The arm has no weight.)",
+    prompt = f"Which {'torque' if turns else 'force'} does joint {k + 1} apply at home? (The arm has no weight.)"
+    unit = TORQUE if turns else FORCE
+    least = 0.25 * LOAD * NEARLY * (size(robot) if turns else 1.0)
+    if not lifts(robot, J, k):
+        method = "At home no joint raises or lowers the tool, so no joint carries the weight: the structure does."
+        return Number(prompt, 0.0, unit, least, method)
+    value = torque(J, k)
+    question = Number(
+        prompt,
         value,
-        TORQUE if turns else FORCE,
-        max(0.02 * abs(value), 0.02),
+        unit,
+        two_percent(value),
         f"Only vz counts: {LOAD:g} N times the third entry of column {k + 1}.",
         (
             Mistake(-value, "That is the torque of the weight. The joint holds against it."),
             Mistake(value / LOAD, f"That is the lever, in metres. Multiply by {LOAD:g} N."),
-        )
-        if value
-        else (),
+        ),
     )
+    return apart(question, least)
 
 
 def _rank(robot: Robot, q: Array) -> Number:
@@ -168,7 +178,7 @@ def _rank(robot: Robot, q: Array) -> Number:
 
 
 def _check(robot: Robot, J: Array) -> tuple[Number | Choice, ...]:
-    vertical = abs(torque(J, 0)) > 1e-9
+    vertical = lifts(robot, J, 0)
     why = (
         "Its column has a vertical part: the weight works on it."
         if vertical
@@ -179,14 +189,17 @@ def _check(robot: Robot, J: Array) -> tuple[Number | Choice, ...]:
         (Option("Yes", why, vertical), Option("No", why, not vertical)),
     )
     values = np.linalg.svd(J[:3], compute_uv=False)
-    fastest = Number(
-        "The largest singular value of the upper three rows is the longest semi-axis of the velocity ellipsoid. "
-        "How long is it at home?",
-        float(values[0]),
-        SPEED,
-        0.02 * float(values[0]) + 1e-6,
-        "Read the semi-axes under Ellipsoid, with Linear velocity on show and the arm at home.",
-        (Mistake(float(values[-1]), "That is the shortest one: the slowest direction."),),
+    fastest = apart(
+        Number(
+            "The largest singular value of the upper three rows is the longest semi-axis of the velocity "
+            "ellipsoid. How long is it at home?",
+            float(values[0]),
+            SPEED,
+            two_percent(float(values[0])),
+            "Read the semi-axes under Ellipsoid, with Linear velocity on show and the arm at home.",
+            (Mistake(float(values[-1]), "That is the shortest one: the slowest direction."),),
+        ),
+        LEAST,
     )
     near = one_right(
         "The tool moves at a constant speed and comes close to a singularity. What happens to the joints?",
