@@ -115,10 +115,16 @@ class BlendShortened(NamedTuple):
 
 
 class BlendLeftOut(NamedTuple):
-    """The arm stops at the end of a segment although a zone was asked for."""
+    """The arm stops at the end of a segment although a zone was asked for.
+
+    Attributes:
+        segment: which.
+        why: ``"last"``: nothing follows; ``"short"``: it or the next one has no length; ``"small"``: the zone is
+            too small for it or the next one; ``"dwell"``: a pause follows.
+    """
 
     segment: int
-    why: Literal["last", "short", "dwell"]
+    why: Literal["last", "short", "small", "dwell"]
 
 
 class Slowed(NamedTuple):

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 _STOPS = {
     "last": "it is the last one",
     "short": "one of the two segments has no length",
+    "small": "the zone is less than a thousandth of one of the two segments",
     "dwell": "the arm pauses there",
 }
 _HELP = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from kin.robot import Robot
 from kin.transforms import Array
 
 NO_LENGTH = 1e-9  # metres: a shorter curve is none
+SMALLEST = 1e-3  # of a segment: with limits of jerk, a smaller corner takes longer than a stop
 _INTERVALS = 240  # of a path, at least, when it is timed
 _FREE = 1e6  # the largest ṡ² where nothing else limits it
 _TOOL_MARGIN = 1e-4  # part of a limit of the tool kept free for what lies between the points that are looked at
@@ -109,6 +111,13 @@ def radius_of(blend: float, before: Curve, after: Curve) -> tuple[float, float]:
     return radius, float(blend * min(1.0, radius / used))
 
 
+def left_out(radius: float, *lengths: float) -> Literal["short", "small"] | None:
+    """Why there is no corner of this radius between segments of these lengths, all in s; None if there is one."""
+    if min(lengths) < NO_LENGTH:
+        return "short"
+    return "small" if radius < SMALLEST * max(lengths) else None
+
+
 def chained(curves: list[Curve], radii: list[float], layout: Layout) -> Chain:
     """The curves with their corners."""
     parts: list[Curve] = []
@@ -153,6 +162,8 @@ class JointCurve:
 
 def joint_radius(robot: Robot, blend: float, before: JointCurve, after: JointCurve) -> float:
     """The radius (in s) of the corner between two curves of the joints for a zone of `blend` metres."""
+    if after.length < NO_LENGTH:
+        return 0.0
     most = 0.5 * min(before.length, after.length)
     back = _within(robot, lambda s: before.at(before.length - s), blend, most)
     return min(back, _within(robot, after.at, blend, most))
@@ -180,8 +191,10 @@ def _dense(run: Run) -> Run:
     return Run(run.layout, *parted(run.knots, run.pieces, parts))
 
 
-def joined(robot: Robot, first: Run, second: Run, blend: float) -> tuple[Run, float]:
+def joined(robot: Robot, first: Run, second: Run, blend: float) -> tuple[Run, float] | None:
     """Two paths as one, with a corner of the joints between them; and the zone in metres that it takes.
+
+    None if the corner is too small for one of the paths.
 
     s of the second is scaled, so that the corner takes as much of both.
     """
@@ -190,13 +203,14 @@ def joined(robot: Robot, first: Run, second: Run, blend: float) -> tuple[Run, fl
     length, met = first.knots[-1], values(second.knots, second.pieces, np.zeros(1))[0]
     for run, end in ((first, True), (second, False)):
         starts, bounds, at = run.layout.starts, run.layout.bounds, run.knots[-1] if end else 0.0
-        most = float(min(starts[-1] - starts[-2], 0.5 * (bounds[-1] - bounds[-2])) if end else 0.5 * bounds[1])
-        most = most if end else float(min(starts[1], most))
+        rest, own = (float(part[-1] - part[-2] if end else part[1]) for part in (starts, bounds))
 
         def near(s: Array, run: Run = run, at: float = at, sign: float = -1.0 if end else 1.0) -> Array:
             return values(run.knots, run.pieces, at + sign * s)
 
-        radii.append(_within(robot, near, blend, most))
+        radii.append(_within(robot, near, blend, min(rest, 0.5 * own)))
+        if left_out(radii[-1], own):
+            return None
     r, scale = radii[0], radii[0] / radii[1]
     knots, pieces = second.knots * scale, second.pieces / scale ** np.arange(4.0)
     u = np.linspace(0.0, 1.0, 2 * _NODES - 1)

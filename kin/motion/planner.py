@@ -42,6 +42,7 @@ from kin.motion.paths import (
     joined,
     joint_path,
     joint_radius,
+    left_out,
     limited,
     radius_of,
 )
@@ -117,6 +118,12 @@ class Plan:
             self.pieces.append(piece)
             self.time += piece.duration
 
+    def move(self, index: int) -> Move:
+        """A segment that is not a pause."""
+        segment = self.program.segments[index]
+        assert isinstance(segment, Move)
+        return segment
+
     def refused(
         self,
         index: int,
@@ -172,17 +179,16 @@ def _drive(plan: Plan, index: int) -> int:
     run, first = _run(plan, index), index
     index = plan.done
     while run is not None and _joins(plan, index - 1):
-        following = _run(plan, index)
-        if following is None:
-            plan.notes.append(BlendLeftOut(index - 1, "short"))
+        following, blend = _run(plan, index), plan.move(index - 1).blend
+        found = None if following is None else joined(plan.robot, run, following, blend)
+        if found is None:
+            plan.notes.append(BlendLeftOut(index - 1, "small" if following else "short"))
             _time(plan, first, run)
-            plan.add(index, None, [0.0])
-            return plan.done
-        before = plan.program.segments[index - 1]
-        assert isinstance(before, Move)
-        run, used = joined(plan.robot, run, following, before.blend)
-        if used < before.blend * (1.0 - _SAME_ZONE):
-            plan.notes.append(BlendShortened(index - 1, before.blend, used))
+            run, first, index = following, index, plan.done
+            continue
+        run, used = found
+        if used < blend * (1.0 - _SAME_ZONE):
+            plan.notes.append(BlendShortened(index - 1, blend, used))
         _check_limits(plan, run, ())
         index = plan.done
     if run is None:
@@ -197,9 +203,7 @@ def _run(plan: Plan, first: int) -> Run | None:
 
     `plan.done` becomes the index after them, and `plan.q` where they end.
     """
-    segment = plan.program.segments[first]
-    assert isinstance(segment, Move)
-    return _joint_run(plan, first) if is_joint_move(segment) else _tool_run(plan, first)
+    return _joint_run(plan, first) if is_joint_move(plan.move(first)) else _tool_run(plan, first)
 
 
 def _joins(plan: Plan, index: int) -> bool:
@@ -212,21 +216,18 @@ def _joins(plan: Plan, index: int) -> bool:
 
 def _follows(plan: Plan, index: int, length: float) -> bool:
     """Whether a segment is blended into the next one; if not although it was asked for, a note says why."""
-    segment = plan.program.segments[index]
-    assert isinstance(segment, Move)
-    if segment.blend == 0.0:
+    if plan.move(index).blend == 0.0:
         return False
     why: Literal["last", "short", "dwell"] | None = None
-    if index + 1 == len(plan.program.segments):
+    following = plan.program.segments[index + 1 : index + 2]
+    if not following:
         why = "last"
-    else:
-        following = plan.program.segments[index + 1]
-        if isinstance(following, Dwell):
-            why = "dwell"
-        elif length < NO_LENGTH:
-            why = "short"
-        elif is_joint_move(following) != is_joint_move(segment):
-            return False
+    elif isinstance(following[0], Dwell):
+        why = "dwell"
+    elif length < NO_LENGTH:
+        why = "short"
+    elif is_joint_move(following[0]) != is_joint_move(plan.move(index)):
+        return False
     if why is not None:
         plan.notes.append(BlendLeftOut(index, why))
     return why is None
@@ -246,13 +247,13 @@ def _joint_run(plan: Plan, first: int) -> Run | None:
         for point in points:
             rows.append(_configuration(plan, index, point, rows[-1]))
         curve = JointCurve.through(np.array(rows))
-        if curves and curve.length < NO_LENGTH:
-            plan.notes.append(BlendLeftOut(index - 1, "short"))
-            break
         if curves:
-            before = plan.program.segments[index - 1]
-            assert isinstance(before, Move)
-            radii.append(joint_radius(robot, before.blend, curves[-1], curve))
+            radius = joint_radius(robot, plan.move(index - 1).blend, curves[-1], curve)
+            why = left_out(radius, curves[-1].length, curve.length)
+            if why:
+                plan.notes.append(BlendLeftOut(index - 1, why))
+                break
+            radii.append(radius)
         curves.append(curve)
         q = rows[-1]
         index += 1
@@ -281,16 +282,16 @@ def _tool_run(plan: Plan, first: int) -> Run | None:
         curve = curve_of(robot, segment, before, plan.task != "approach")
         if curve is None or isinstance(curve, tuple):
             raise plan.refused(index, "circle", NoCircle(curve))
-        if curves and curve.length < NO_LENGTH:
-            plan.notes.append(BlendLeftOut(index - 1, "short"))
-            break
         if curves:
-            last = plan.program.segments[index - 1]
-            assert isinstance(last, Move)
-            radius, used = radius_of(last.blend, curves[-1], curve)
+            blend = plan.move(index - 1).blend
+            radius, used = radius_of(blend, curves[-1], curve)
+            why = left_out(radius, curves[-1].length, curve.length)
+            if why:
+                plan.notes.append(BlendLeftOut(index - 1, why))
+                break
             radii.append(radius)
-            if used < last.blend * (1.0 - 1e-9):
-                plan.notes.append(BlendShortened(index - 1, last.blend, used))
+            if used < blend * (1.0 - 1e-9):
+                plan.notes.append(BlendShortened(index - 1, blend, used))
         curves.append(curve)
         if curve.length >= NO_LENGTH:
             before = poses(curve, np.array([curve.length]))[0]

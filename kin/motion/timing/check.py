@@ -14,6 +14,7 @@ from kin.kernels.compile import jit
 from kin.transforms import Array
 
 BACK = 1e6  # the factor where s(t) would go back
+_SAME = 1e-12  # of the path: a break of s(t) that is so close to a knot of the path is at the knot
 
 
 def _bernstein(degree: int) -> Array:
@@ -29,6 +30,19 @@ _TO_EIGHT, _TO_SEVEN, _TO_SIX = _bernstein(8), _bernstein(7), _bernstein(6)
 
 
 @jit
+def _met(knots: Array, clocks: Array, c: int) -> tuple[int, int]:
+    """The first and the last interval of the path that a piece of s(t) meets.
+
+    It follows from where the piece begins and ends, not from a time: at a break that is at a knot, rounding would
+    take the jerk of s(t) before the break for that of the path after the knot.
+    """
+    last, close = knots.shape[0] - 2, _SAME * knots[knots.shape[0] - 1]
+    end = clocks[c + 1, 0] if c + 1 < clocks.shape[0] else knots[last + 1]
+    first = min(max(np.searchsorted(knots, clocks[c, 0] + close, side="right") - 1, 0), last)
+    return first, min(max(np.searchsorted(knots, end - close) - 1, first), last)
+
+
+@jit
 def evaluate_path(knots: Array, joints: Array, breaks: Array, clocks: Array, times: Array, out: Array) -> None:
     """out ← joint values and three derivatives ``(4, m, n)`` of a path at times ``(m,)``.
 
@@ -37,22 +51,26 @@ def evaluate_path(knots: Array, joints: Array, breaks: Array, clocks: Array, tim
         breaks, clocks: s(t): breaks ``(c + 1,)`` and coefficients ``(c, 4)``.
         times, out: when, and the result.
     """
-    i, c = 0, 0
-    last, ends = joints.shape[0] - 1, clocks.shape[0] - 1
+    c, ends = 0, clocks.shape[0] - 1
+    first, last = _met(knots, clocks, 0)
+    i = first
     for m in range(times.shape[0]):
-        t = times[m]
+        t, before = times[m], c
         if t < breaks[c]:
             c = 0
         while c < ends and t >= breaks[c + 1]:
             c += 1
+        if c != before:
+            first, last = _met(knots, clocks, c)
+            i = first
         r, p = t - breaks[c], clocks[c]
         s = p[0] + r * (p[1] + r * (p[2] + r * p[3]))
         v, a, b = p[1] + r * (2.0 * p[2] + r * 3.0 * p[3]), 2.0 * p[2] + 6.0 * r * p[3], 6.0 * p[3]
         if s < knots[i]:
-            i = 0
+            i = first
         while i < last and s >= knots[i + 1]:
             i += 1
-        d = min(max(s, knots[0]), knots[last + 1]) - knots[i]
+        d = min(max(s, knots[0]), knots[knots.shape[0] - 1]) - knots[i]
         for j in range(joints.shape[1]):
             f0, f1, f2, f3 = joints[i, j, 0], joints[i, j, 1], joints[i, j, 2], joints[i, j, 3]
             d1, d2, d3 = f1 + d * (2.0 * f2 + d * 3.0 * f3), 2.0 * f2 + 6.0 * d * f3, 6.0 * f3
@@ -74,25 +92,15 @@ def slowdowns(
         most: the largest ṡ² on each interval ``(k,)``.
         out: result.
     """
-    i, last = 0, joints.shape[0] - 1
     shares = np.empty((3, 3, 9))
     for c in range(clocks.shape[0]):
         out[c] = 0.0
-        p = clocks[c]
-        begin, end = 0.0, breaks[c + 1] - breaks[c]
-        s = p[0] + end * (p[1] + end * (p[2] + end * p[3]))
-        while begin < end:
-            here = p[0] + begin * (p[1] + begin * (p[2] + begin * p[3]))
-            while i > 0 and here < knots[i] and begin == 0.0:
-                i -= 1
-            while i < last and (here >= knots[i + 1] or knots[i + 1] - here < 1e-15 * knots[last + 1]):
-                i += 1
-            until = end
-            if i < last and s > knots[i + 1]:
-                until = _crossing(p, knots[i + 1], begin, end)
-            out[c] = max(out[c], _between(p, begin, until, knots[i], shares, joints[i], limits[i], most[i]))
-            if until < end:
-                i += 1
+        p, begin, end = clocks[c], 0.0, breaks[c + 1] - breaks[c]
+        first, last = _met(knots, clocks, c)
+        for i in range(first, last + 1):
+            until = _crossing(p, knots[i + 1], begin, end) if i < last else end
+            if until > begin:
+                out[c] = max(out[c], _between(p, begin, until, knots[i], shares, joints[i], limits[i], most[i]))
             begin = until
 
 

@@ -4,6 +4,7 @@ Without limits of jerk :mod:`kin.motion.timing.fastest` is the answer. Its s(t),
 slowed down evenly until it keeps the limits of jerk, is where :mod:`kin.motion.timing.jerk` begins. That compares
 limits at points; between them :mod:`kin.motion.timing.check` bounds what is exceeded. Where it is, the limits are
 tightened and the motion is improved again, some times; what is left is removed by making the whole motion slower.
+Where that fails, as it may at a very small corner, the pace is that of a polynomial of degree five, slowed down.
 `TimedPath.without` is the time-optimal duration without limits of jerk, so that their cost is known.
 """
 
@@ -26,6 +27,7 @@ _SHARE, _EVEN, _PARTS, _MOST = 0.15, 400, 40, 2000
 _FAR, _NEAR, _GAP, _STEPS = 0.3, 0.05, 0.01, 60  # how much longer than necessary, as a part; steps at most
 _JUMP = 0.2  # of a limit: a change at a knot of the path that is worth a knot of s(t)
 _ENDS = 1.01  # the first and the last interval are slowed down by this factor: the spline differs there
+_FAILED = 100.0  # a motion that has to be slower by this factor goes back, or almost
 _ROUNDS, _CLOSE = 3, 1.003  # of tightening limits that are exceeded; less than this factor is not worth another
 
 
@@ -124,6 +126,9 @@ def _limited(path: JointPath, plain: tuple[Array, Array], stop: Callable[[], Non
             break
         slower = slower * np.maximum(factors, 1.0)
     _, times, clocks, factor = best
+    if factor > _FAILED:
+        times, clocks = _smooth(path, without)
+        factor = float(_slowdowns(path, times, clocks).max())
     return _stretched(path, times, clocks, factor, without)
 
 
@@ -179,6 +184,14 @@ def _improved(path: JointPath, u: Array, s: Array, slower: Array, away: float) -
     passing(u, c, times)
     rest_to_rest(times, s, clocks)
     return times, clocks
+
+
+def _smooth(path: JointPath, duration: float) -> tuple[Array, Array]:
+    """s(t) from rest to rest close to the polynomial of degree five: breaks, coefficients. It never goes back."""
+    f = np.linspace(0.0, 1.0, _EVEN + 1)
+    clocks = np.empty((_EVEN, 4))
+    rest_to_rest(f * duration, path.knots[-1] * f**3 * (10.0 - f * (15.0 - 6.0 * f)), clocks)
+    return f * duration, clocks
 
 
 def _fastest(path: JointPath) -> tuple[Array, Array]:

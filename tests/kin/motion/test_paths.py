@@ -351,6 +351,41 @@ def test_degenerate_programs_are_driven_sensibly(segments, notes):
     assert not np.abs(end.qd).max() > 1e-9
 
 
+def to(robot, kind, q, **fields):
+    return {"L": kin.Lin, "P": kin.Ptp}[kind](target(robot, q), **fields)
+
+
+@pytest.mark.parametrize("blend", [1e-5, 1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("kinds", ["LL", "LP", "PL", "PP"])
+@pytest.mark.parametrize("arm", ["redundant7-craig", "puma560"])
+def test_a_zone_that_is_too_small_is_left_out(arm, kinds, blend):
+    robot = kin.get_robot(arm)
+    a = robot.clip(robot.q_home + 0.3 * np.cos(np.arange(robot.n)))
+    b = robot.clip(a + 0.3 * np.sin(1 + np.arange(robot.n)))
+
+    def drive(blend):
+        return kin.plan_motion(robot, [to(robot, kinds[0], a, blend=blend), to(robot, kinds[1], b)])
+
+    found, stopped = drive(blend), drive(0)
+    assert [note.why for note in found.notes if hasattr(note, "why")] == ["small"]
+    assert "a thousandth of one of the two segments" in found.reason
+    assert found.duration == pytest.approx(stopped.duration)
+    assert np.isfinite(found.derivatives(np.linspace(0, found.duration, 500))).all()
+    assert_limits(found)
+
+
+def test_a_zone_beside_a_short_segment_is_left_out():
+    segments = [
+        kin.Lin(line(0, 0.2, 0).target, blend=0.01),
+        kin.Lin(line(0, 0.20001, 0).target, blend=0.01),
+        kin.Lin(line(0, 0.2, 0.2).target),
+    ]
+    motion = kin.plan_motion("panda", segments)
+    assert [note.why for note in motion.notes if hasattr(note, "why")] == ["small", "small"]
+    assert motion.duration < 5.0
+    assert_limits(motion)
+
+
 P = np.array([0.4, 0.1, 0.3])
 
 

@@ -117,6 +117,43 @@ def test_what_is_between_the_points_is_bounded():
     assert largest.max() <= out[0] <= 1.3 * largest.max()
 
 
+def test_at_a_break_that_is_at_a_knot_the_jerk_of_one_side_is_taken():
+    # q‴ and the jerk of s(t) jump together.
+    knots, breaks = np.array([0.0, 0.5, 1.0]), np.array([0.0, 0.3, 0.7])
+    joints = np.array([[[0.0, 1.0, 0.0, 8.0]], [[1.5, 7.0, 12.0, -8.0]]])
+    first = np.array([0.0, 1.8, 0.0, (0.5 - 1.8 * 0.3) / 0.3**3])
+    speed, bend = 1.8 + 3 * first[3] * 0.09, 3 * first[3] * 0.3
+    last = np.array([0.5, speed, bend, (0.5 - speed * 0.4 - bend * 0.16) / 0.4**3])
+    clocks, limits, factors = np.array([first, last]), np.ones((2, 1, 3)), np.empty((2, 2))
+    sides = np.array([0.3 * (1 - 1e-9), 0.3 * (1 + 1e-9)])
+    ends = sides[:, None] + np.array([-1e-10, 1e-10])
+    jerks = np.empty((4, 4, 1))
+    evaluate_path(knots, joints, breaks, clocks, ends.ravel(), jerks)
+    allowed = jerks[3, [0, 2], 0]
+    for moved in (-1e-15, 0.0, 1e-15):
+        near = clocks.copy()
+        near[1, 0] += moved
+        found = np.empty((4, 41, 1))
+        times = 0.3 + np.arange(-20, 21) * np.spacing(0.3)
+        evaluate_path(knots, joints, breaks, near, times, found)
+        assert found[3, :20, 0] == pytest.approx(allowed[0], rel=1e-6)
+        assert found[3, 20:, 0] == pytest.approx(allowed[1], rel=1e-6)
+        slowdowns(knots, joints, limits, np.full(2, 1e6), breaks, near, factors[0])
+        slowdowns(knots, joints, limits, np.full(2, 1e6), breaks * 1.1, near / 1.1 ** np.arange(4), factors[1])
+        assert factors[1] * 1.1 == pytest.approx(factors[0], rel=1e-9)
+
+
+def test_where_no_pace_is_found_a_smooth_one_is_slowed_down(monkeypatch):
+    path = path_of(CASES[0], 100)
+    best = timed(path, True, never).duration
+    monkeypatch.setattr("kin.motion.timing.timed._FAILED", 0.0)
+    found = timed(path, True, never)
+    times = np.linspace(0, found.duration, 20001)
+    assert best < found.duration < 10 * best
+    assert 0.99 < ratios(found, path.limits[0], times).max() <= 1 + 1e-9
+    assert (np.diff(found.passed(times)) >= 0).all()
+
+
 def test_no_motion_is_not_too_fast():
     pieces = np.zeros((3, 2, 4))
     x = np.empty(4)
