@@ -1,8 +1,10 @@
-"""Example arms to start from: the fields of robot files, in millimetres and degrees."""
+"""Example arms to start from: the fields of robot files, in millimetres and degrees, or those of built-in arms."""
 
 from __future__ import annotations
 
 from typing import Any
+
+from kin import builtin_robots, robot_to_dict
 
 UNITS = {"length": "mm", "angle": "deg"}
 
@@ -23,24 +25,15 @@ def _row(name: str, theta: float, d: float, a: float, alpha: float, **more: Any)
     return {"name": name, "theta": theta, "d": d, "a": a, "alpha": alpha, **more}
 
 
+def _builtin(robot_id: str) -> dict[str, Any]:
+    """The same arm as one of the service's."""
+    return {**robot_to_dict(builtin_robots()[robot_id], angle="deg"), "source": "an example of the tab Robot"}
+
+
 # By the key that a link carries.
 PRESETS: dict[str, dict[str, Any]] = {
-    "planar-2r": _arm(
-        "Planar 2R",
-        "Two links in one plane: the first arm of every course.",
-        [_row("shoulder", 0, 0, 400, 0), _row("elbow", 0, 0, 300, 0, limits=[-150, 150])],
-        [30, 60],
-    ),
-    "planar-3r": _arm(
-        "Planar 3R",
-        "Three links in one plane: position and orientation in that plane.",
-        [
-            _row("shoulder", 0, 0, 400, 0),
-            _row("elbow", 0, 0, 300, 0, limits=[-150, 150]),
-            _row("wrist", 0, 0, 120, 0, limits=[-150, 150]),
-        ],
-        [30, 60, -45],
-    ),
+    "planar-2r": _builtin("planar2r"),
+    "planar-3r": _builtin("planar3r"),
     "wrist-6r": _arm(
         "Spherical wrist arm",
         "Six joints; the last three axes meet in one point, so that position and orientation separate.",

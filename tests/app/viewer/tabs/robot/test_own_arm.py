@@ -56,6 +56,20 @@ def test_every_example_is_an_arm_with_a_regular_home(key):
     assert not inspect(own.robot)["singular_at_home"]
 
 
+@pytest.mark.parametrize(("key", "robot_id"), [("planar-2r", "planar2r"), ("planar-3r", "planar3r")])
+def test_the_planar_examples_are_the_arms_of_the_service(key, robot_id):
+    own, builtin = own_arm(PRESETS[key], key).robot, kin.builtin_robots()[robot_id]
+    assert own.rows == builtin.rows
+    assert own.name == builtin.name
+    assert np.allclose(own.q_home, builtin.q_home, atol=1e-12)
+
+
+def test_a_link_of_a_planar_example_with_its_former_lengths_still_opens():
+    own = unpack({"n": "Planar 2R", "r": [[0, 0, 400, 0], [0, 0, 300, 0, [-150, 150]]], "from": "planar-2r"})
+    assert own.start == "planar-2r"
+    assert [row.a for row in own.robot.rows] == [0.4, 0.3]
+
+
 def test_a_page_with_an_own_arm_is_restored_from_its_link():
     own = own_arm(PRESETS["wrist-6r"], "wrist-6r")
     q = own.robot.random_q(np.random.default_rng(1))

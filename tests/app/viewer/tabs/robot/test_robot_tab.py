@@ -379,13 +379,13 @@ def test_a_target_out_of_reach_waits_for_a_longer_arm(port: int) -> None:
         tab.settle()
         say(tab, "start", value="planar-2r")
         tab.set("Target must match", "Point only")
-        tab.say("target", ["position", "850 0 0"])
+        tab.say("target", ["position", "1750 0 0"])
         tab.wait(lambda: "Out of reach by" in tab.html)
-        type_in(tab, 0, "a", "500")
+        type_in(tab, 0, "a", "1100")
         assert "Out of reach by" in tab.html
-        type_in(tab, 0, "a", "600")
+        type_in(tab, 0, "a", "1200")
         tab.wait(lambda: 'data-status="reached"' in tab.html)
-        tab.wait(lambda: np.allclose(tab.tool_pose()[:3, 3], [0.85, 0.0, 0.0], atol=1e-6))
+        tab.wait(lambda: np.allclose(tab.tool_pose()[:3, 3], [1.75, 0.0, 0.0], atol=1e-6))
 
 
 def test_the_own_arm_keeps_its_pose_while_another_robot_is_on_show(port: int) -> None:
