@@ -75,7 +75,8 @@ RULES: dict[str, set[str]] = {
     "app/cli/parser.py": {"kin", "app.bench.command", "app.cli"},
     "app/cli/arguments.py": set(),
     "app/cli/xacro": {"kin", "app.cli.xacro"},
-    "app/cli/xacro/expansion.py": {"xacrodoc"},
+    "app/cli/xacro/expansion.py": {"xacro", "xacrodoc", "yaml", "app.cli.xacro"},
+    "app/cli/xacro/expressions.py": {"xacro"},
     "app/cli/startup.py": set(),
     "app/cli/serve.py": {"pydantic", "app.cli.startup", "app.service.main", "app.shared"},
 }

@@ -14,6 +14,9 @@ from kin import InputError, RobotFileError
 
 PATIENCE = 60.0  # seconds
 PACKAGE = "package.xml"  # the file at the top of a ROS package
+START = (  # the interpreter's own first place would be the folder that it is started in
+    f"import sys; sys.path[:] = sys.argv[1:]; from {__package__}.expansion import main; main()"
+)
 HOW = "`pip install 'kinboard[xacro]'`, or a URDF that `xacro FILE.xacro > FILE.urdf` writes"
 
 
@@ -41,9 +44,8 @@ def expanded(path: Path, arguments: Sequence[str] = (), folder: str | None = Non
     if not root.is_dir() or not file.is_relative_to(root):
         raise InputError("--folder", folder, f"a folder with {path.name} in it")
     request = json.dumps({"file": str(file), "folder": str(root), "values": values})
-    command = [sys.executable, "-c", f"from {__package__}.expansion import main; main()"]
-    kept = {name: os.environ[name] for name in ("PATH", "LANG", "LC_ALL", "SYSTEMROOT") if name in os.environ}
-    environment = kept | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, "-I", "-W", "ignore", "-X", "utf8", "-c", START, *_places(root)]
+    environment = {name: os.environ[name] for name in ("SYSTEMROOT",) if name in os.environ}
     try:
         done = subprocess.run(
             command, input=request.encode(), capture_output=True, timeout=PATIENCE, env=environment, check=False
@@ -51,10 +53,35 @@ def expanded(path: Path, arguments: Sequence[str] = (), folder: str | None = Non
     except subprocess.TimeoutExpired:
         raise RobotFileError(str(path), "file", f"more than {PATIENCE:g} s of work", "a smaller file") from None
     if done.returncode != 0:
-        lines = done.stderr.decode("utf-8", "replace").strip().splitlines()
-        why = lines[-1][:300] if lines else "it took too much time or memory"
-        raise RobotFileError(str(path), "file", why, f"xacro that can be expanded with files of {root}")
+        raise _refusal(str(path), done.stderr.decode("utf-8", "replace"))
     return done.stdout.decode("utf-8", "replace")
+
+
+def _places(folder: Path) -> list[str]:
+    """Where the process imports from: nowhere in the folder, unless Python or this package is installed there."""
+    own = Path(__file__).resolve().parents[len(__package__.split("."))]
+    installed = (Path(sys.prefix).resolve(), Path(sys.base_prefix).resolve())
+    places = [place for place in map(Path, sys.path) if place.is_absolute()]
+    real = {place: place.resolve() for place in places}
+    return [
+        str(place)
+        for place in places
+        if not real[place].is_relative_to(folder)
+        or real[place] == own
+        or any(real[place].is_relative_to(prefix) for prefix in installed)
+    ]
+
+
+def _refusal(file: str, said: str) -> RobotFileError:
+    """What the process says of a file; its last line is JSON, unless a limit ended it."""
+    lines = said.strip().splitlines()
+    try:
+        report = json.loads(lines[-1]) if lines else {}
+    except ValueError:
+        report = {}
+    if not report:
+        return RobotFileError(file, "file", "too much work, or memory", "xacro that can be expanded")
+    return RobotFileError(file, report["where"], report["value"], report["expected"])
 
 
 def _value(argument: str) -> tuple[str, str]:
