@@ -20,7 +20,7 @@ from numba.core.event import install_recorder
 from kin.files import builtin_robots
 from kin.fk import fk, fk_positions, jacobian, link_frames, manipulability
 from kin.ik import solve_ik
-from kin.motion import Lin, PoseTarget, Ptp, plan_motion
+from kin.motion import JointTarget, Lin, PoseTarget, Ptp, plan_motion
 from kin.path import solve_path
 from kin.robot import Robot
 from kin.solvers import closed_form_of, general6, general7
@@ -112,11 +112,12 @@ def _call_all(robot: Robot) -> None:
 
 
 def _plan(robot: Robot) -> None:
-    """A motion with a line, from the home pose and back."""
+    """A motion with lines and a corner of joint moves, from the home pose and back."""
     T = fk(robot, robot.q_home)
     T[2, 3] -= 0.01
     target = PoseTarget.of(T)
-    motion = plan_motion(robot, [Ptp(target), Lin(PoseTarget.of(fk(robot, robot.q_home)))])
+    there, back = JointTarget(tuple((robot.q_home + 0.05).tolist())), PoseTarget.of(fk(robot, robot.q_home))
+    motion = plan_motion(robot, [Ptp(target), Ptp(there, blend=0.01), Lin(target), Lin(back)])
     motion.sample([0.0, motion.duration])
 
 

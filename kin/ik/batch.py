@@ -128,7 +128,8 @@ def ik_branches(robot: Robot | str, target: ArrayLike, redundancy: ArrayLike = m
     Row i is branch i of :func:`kin.branch_names`, NaN where it does not exist; where two have merged, both rows
     hold the same joint values. Angles are in (−π, π], except for a joint whose value is requested. Limits are not
     applied and nothing is verified; the rotation is assumed to be orthonormal. An arm with five joints does not
-    meet the rotation about the tool's z axis.
+    meet the rotation about the tool's z axis. The general solvers of six and seven joints may miss a solution that
+    shares a joint value with another one; `kin.solve_ik` looks for it.
 
     Args:
         robot: an arm with a closed form, or the id of a built-in one.

@@ -185,6 +185,10 @@ class ClosedForm(ABC):
     def solve(self, problem: SolverInput) -> Candidates:
         """All branches of a target, each with its redundancy parameters as near the seed as the limits allow."""
 
+    def add_missing(self, T: Array, near: Array, q: Array) -> bool:
+        """Add to the solutions ``(branches, n)`` of the batch kernels what they miss; whether none is missing."""
+        return True
+
     @abstractmethod
     def branch_of(self, q: Array) -> int:
         """The branch that a configuration ``(n,)`` is on: a row of `branches`."""

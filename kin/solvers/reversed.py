@@ -157,7 +157,7 @@ class ReversedJoints(ClosedForm):
         values = tuple([value * sign for value, sign in zip(p.values, signs, strict=True)])
         found = self.form.solve(replace(p, values=values, seed=p.seed * self._signs, lower=lower, upper=upper))
         arcs = [x if sign > 0.0 else _opposite(x) for x, sign in zip(found.arcs, signs, strict=True)]
-        return Candidates(found.q * self._signs, found.values * signs, tuple(arcs), found.gap, found.obstacle)
+        return replace(found, q=found.q * self._signs, values=found.values * signs, arcs=tuple(arcs))
 
     def branch_of(self, q: Array) -> int:
         """The branch a configuration ``(n,)`` is on."""

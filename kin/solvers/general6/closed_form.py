@@ -138,12 +138,16 @@ class General6(ClosedForm):
         out, free_roll = np.empty((SOLUTIONS, 6)), problem.task == APPROACH
         T = without_last(problem)[0] if free_roll else problem.T
         self.kernels.one(self.kernels.params, T, math.nan, problem.seed, out)
-        complete = self._is_plain(out) or self._add_nearby(T, problem.seed, out)
+        complete = self.add_missing(T, problem.seed, out)
         values, ranges = np.full((SOLUTIONS, int(free_roll)), math.nan), []
         if free_roll:
             ranges.append(free_last(problem, out))
             values[:, -1] = out[:, 5]
         return Candidates(out, values, tuple(ranges), complete=complete)
+
+    def add_missing(self, T: Array, near: Array, q: Array) -> bool:
+        """Add to solutions ``(16, 6)`` those that share an angle with another and may be missing."""
+        return self._is_plain(q) or self._add_nearby(T, near, q)
 
     def _is_plain(self, q: Array) -> bool:
         """Whether solutions ``(16, 6)`` come in pairs, and none share an angle that the elimination solves for."""

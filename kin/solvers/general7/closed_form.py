@@ -108,7 +108,8 @@ class General7(ClosedForm):
             f"seven revolute joints whose axes fit no closed form; joint {joint + 1} is given ({form.name})"
         )
         self.branches = tuple(f"solution {i + 1}" for i in range(len(form.branches)))
-        self.kernels = _Fold(robot, joint).kernels(form.kernels)
+        self._fold = _Fold(robot, joint)
+        self.kernels = self._fold.kernels(form.kernels)
         self._roll = rolled.roll_sense(robot)
         self._parameter = RedundancyParameter(f"theta{joint + 1}", f"θ{joint + 1}", joint=joint)
 
@@ -133,9 +134,10 @@ class General7(ClosedForm):
         out = self._at(p, np.array([value]))[0]
         if math.isnan(requested) and p.respect_limits and not self._inside(p, out).any():
             value, out = self._nearest_value(p, value, out)
+        complete = self._add_missing(p, value, out)
         values = np.where(np.isnan(out[:, :1]), math.nan, value)
         arcs = self._ranges(p, out) if p.respect_limits else np.empty((0, 3))
-        return Candidates(out, values, (arcs,))
+        return Candidates(out, values, (arcs,), complete=complete)
 
     def _at(self, problem: SolverInput, values: Array) -> Array:
         """All solutions ``(N, rows, 7)`` at these values of the given joint."""
@@ -143,6 +145,15 @@ class General7(ClosedForm):
         T = np.ascontiguousarray(np.broadcast_to(problem.T, (len(values), 4, 4)))
         self.kernels.many(self.kernels.params, T, values, problem.seed, out)
         return out
+
+    def _add_missing(self, problem: SolverInput, value: float, out: Array) -> bool:
+        """Add to solutions ``(rows, 7)`` what the solver of six joints finds besides; whether none is missing."""
+        others = self._fold.others
+        q, T = np.ascontiguousarray(out[:, others]), self._fold.targets(problem.T, np.array([value]))[0]
+        complete = self.form.add_missing(T, problem.seed[others], q)
+        out[:, others] = q
+        out[:, self.given] = np.where(np.isnan(q[:, 0]), math.nan, value)
+        return complete
 
     def _outside(self, problem: SolverInput, q: Array) -> Array:
         """How far configurations ``(..., 7)`` are outside the limits, in all; ∞ for those that do not exist."""

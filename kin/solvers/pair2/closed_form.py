@@ -24,13 +24,14 @@ from kin.solvers.contract import (
     SolverInput,
 )
 from kin.solvers.names import Names, bent, names_of
-from kin.solvers.pair2.configurations import GONE, OFF, OPEN, branches_many, branches_one, configurations
+from kin.solvers.pair2.configurations import GONE, OFF, OPEN, REACH, branches_many, branches_one, configurations
 from kin.solvers.pair2.geometry import Geometry, geometry_of, straight
 from kin.solvers.singular import Singularity, by_jacobian, those_within
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 NAME = "pair2"
+_ALIKE = 100.0
 _TASKS = (POSE, APPROACH, POSITION)
 _THETA1 = RedundancyParameter("theta1", "θ1", joint=0, rare=True)
 
@@ -106,8 +107,11 @@ class Pair2(ClosedForm):
         p, g = problem, self.geometry
         q, notes = np.empty((g.rows, self.robot.n)), np.empty((g.rows, 2))
         configurations(self.kernels.params, p.T, p.task, p.seed, GONE * g.scale, q, notes)
+        off = notes[:, OFF]
+        # With rounded numbers all rows miss the point about alike: one that misses it by far more is none.
+        q[off > max(REACH, _ALIKE * float(off.min()))] = math.nan
         missing = bool(np.isnan(q).all())
-        gap, obstacle = (float(notes[:, OFF].min()), Obstacle("point")) if missing else (0.0, None)
+        gap, obstacle = (float(off.min()), Obstacle("point")) if missing else (0.0, None)
         if not self.redundancies(p.task):
             return Candidates(q, np.empty((len(q), 0)), (), gap, obstacle)
         if not self._rank[p.task][1]:
