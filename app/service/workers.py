@@ -36,6 +36,7 @@ Part = TypeVar("Part")
 Serve = Callable[[Part, Callable[[], None]], int]
 
 STEP = 0.2  # s between two looks at the processes
+_SIGNALS = (signal.SIGTERM, signal.SIGINT)  # that stop the service
 START_TIMEOUT = 120.0  # s from the start of a process until it first reports
 
 
@@ -58,9 +59,7 @@ def supervise(
         on_end: called with the part and the id of a process that has ended and is replaced.
     """
     stopping = threading.Event()
-    before = {
-        number: signal.signal(number, lambda *_: stopping.set()) for number in (signal.SIGTERM, signal.SIGINT)
-    }
+    before = {number: signal.signal(number, lambda *_: stopping.set()) for number in _SIGNALS}
     workers = [Worker(serve, part) for part in parts]
     try:
         on_start()
@@ -94,7 +93,13 @@ class Worker(Generic[Part]):
         with warnings.catch_warnings():
             # Python cannot know that the threads of numpy's linear algebra are made for this.
             warnings.simplefilter("ignore", DeprecationWarning)
-            self.process.start()
+            if alone:  # a copy that got a signal before `_run` would run the supervisor's handler, and go on
+                signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
+            try:
+                self.process.start()
+            finally:
+                if alone:
+                    signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
 
     def silent(self) -> float:
         """Seconds without a report, by the number of calls of this method, one per `STEP`.
@@ -115,6 +120,8 @@ class Worker(Generic[Part]):
 def _run(serve: Serve[Part], part: Part, reports: Any) -> None:
     signal.signal(signal.SIGTERM, signal.SIG_DFL)  # a copy of the supervisor has its handlers
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    if sys.platform == "linux":
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
     supervisor = os.getppid()
 
     def alive() -> None:

@@ -553,7 +553,7 @@ def test_check_of_a_urdf(capsys, tmp_path):
     file = ROOT / "kin" / "robots" / "ur5.toml"
     code, _, err = run(capsys, "check", file, "--tip", "ee_link")
     assert code == 2
-    assert "only a URDF has links" in err
+    assert "only URDF and xacro have links" in err
 
 
 # -- workspace -------------------------------------------------------------------------------------------------

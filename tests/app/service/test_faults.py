@@ -94,7 +94,7 @@ def stopped(process: subprocess.Popen[str], within: float) -> str:
 
 def test_a_stop_completes_answers_in_progress_and_notifies_visitors():
     with service(KINBOARD_DRAIN="30") as (process, base):
-        asking = Asking(base, "panda", "ik", {"target": [FAR] * 60, "max_solutions": 1})
+        asking = Asking(base, "panda", "ik", {"target": [FAR] * 600, "max_solutions": 1})
         with connect(f"ws://{base}/viewer", subprotocols=[f"viser-v{viser.__version__}"], proxy=None) as visitor:
             assert visitor.recv(timeout=20)
             time.sleep(0.3)
@@ -104,7 +104,7 @@ def test_a_stop_completes_answers_in_progress_and_notifies_visitors():
                 read_to_the_end(visitor)
         asking.join(5)
     assert asking.answer is not None, asking.error
-    assert len(asking.answer.json()["results"]) == 60
+    assert len(asking.answer.json()["results"]) == 600
     assert closed.value.rcvd is not None
     assert closed.value.rcvd.code in (1001, 1012)
 
