@@ -272,3 +272,9 @@ def test_every_rule_is_shown_to_have_teeth():
 )
 def test_what_the_rules_allow_passes(rule: Rule, sources: Sources):
     assert list(rule(sources)) == []
+
+
+def test_modules_of_tests_have_names_of_their_own():
+    """pytest refuses to collect two modules of one name, with all others of that run."""
+    names = Counter(path.name for path in (ROOT / "tests").rglob("test_*.py"))
+    assert [name for name, count in names.items() if count > 1] == []

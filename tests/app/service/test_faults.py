@@ -139,7 +139,10 @@ def started_and_stopped(code: str) -> str:
     ) as process:
         try:
             assert process.stdout is not None
-            assert process.stdout.readline()
+            found = re.search(r":(\d+)/", process.stdout.readline())
+            assert found
+            answer = httpx2.get(f"http://127.0.0.1:{found[1]}/livez", timeout=60, trust_env=False)
+            assert answer.status_code == 200
             return stopped(process, 20.0)
         finally:
             process.kill()
