@@ -9,6 +9,8 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+FOLDER_OF_COUNTS = "PROMETHEUS_MULTIPROC_DIR"  # read by prometheus_client when it is imported
+
 
 @contextmanager
 def no_collections() -> Iterator[None]:
@@ -34,8 +36,15 @@ def shared_metrics() -> Iterator[None]:
         except OSError:
             continue
         with folder as name:
-            os.environ["PROMETHEUS_MULTIPROC_DIR"] = name
-            yield
+            before = os.environ.get(FOLDER_OF_COUNTS)
+            os.environ[FOLDER_OF_COUNTS] = name
+            try:
+                yield
+            finally:  # what this process starts later must not count in a folder that is gone
+                if before is None:
+                    del os.environ[FOLDER_OF_COUNTS]
+                else:
+                    os.environ[FOLDER_OF_COUNTS] = before
         return
     yield
 

@@ -54,7 +54,9 @@ def lesson(robot: str, title: str, ready: str) -> Callable[[Tab], None]:
 
 def trajectories(tab: Tab) -> None:
     lesson("ur5", "Trajectories", "[data-guide=steps]")(tab)
-    tab.page.get_by_role("button", name="Step 2").click()
+    step = tab.page.get_by_role("button", name="Step 2")
+    step.click()
+    expect(step).to_have_attribute("aria-current", "step")
     if tab.page.locator(".kb-reveal").count():
         tab.page.locator(".kb-reveal").click()
     expect(tab.page.locator(".kb-chart")).to_be_visible()
@@ -62,6 +64,7 @@ def trajectories(tab: Tab) -> None:
 
 def robot(tab: Tab) -> None:
     tab.open("Robot")
+    expect(tab.page.locator('[data-arm-do="convert"]').first).to_be_visible()
     if not tab.page.locator(".kb-arm-converted").count():
         tab.page.locator('[data-arm-do="convert"]').click()
     expect(tab.page.locator(".kb-arm-converted")).to_be_visible()
