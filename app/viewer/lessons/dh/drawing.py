@@ -28,6 +28,7 @@ from app.viewer.lessons.dh.steps import (
     turns,
 )
 from app.viewer.lessons.dh.views import ABOUT_X, ABOUT_Z, TITLES
+from app.viewer.lessons.figures import GREY, Angle, Dimension, Figure, Segments
 from app.viewer.scene.bodies.parts import joint_color
 from app.viewer.scene.camera import DIRECTION
 from app.viewer.scene.meshes import body
@@ -35,56 +36,11 @@ from kin import Robot
 from kin.transforms import Array, wxyz_from_rotation
 from kin.units import Units
 
-Segments = NDArray[np.float32]
-
-GREY = (128, 134, 145)
 AXES = ((204, 0, 0), (51, 153, 0), (0, 0, 204))  # x, y, z, as viser paints the axes of a frame
-ARC = 32  # segments
 # In units of the arm's thickness.
-MOVING, PLACED, RADIUS, ASIDE = 8.0, 4.5, 6.0, 4.0
+MOVING, PLACED = 8.0, 4.5
 ROOM = 4.0  # between two labels
 HEIGHTS = (1.2, -0.6, 1.7)  # of a frame's label, in lengths of its z axis
-
-
-def arc(axis_: int, radius: float, angle: float) -> Segments:
-    """A rotation about z from x, or about x from z: first and last ray, arc, arrow head ``(ARC + 4, 2, 3)``."""
-    angles = np.linspace(0.0, angle, ARC + 1)
-    # About x, the arc starts at z and goes towards −y, as z itself does.
-    c, s, o = np.cos(angles), np.sin(angles), np.zeros(ARC + 1)
-    way = radius * (np.stack([c, s, o], 1) if axis_ == 2 else np.stack([o, -s, c], 1))
-    along = way[-1] - way[-2]
-    along = along / (float(np.linalg.norm(along)) or 1.0)
-    back = min(0.16 * radius, radius * abs(angle) / 2)
-    lines = np.zeros((ARC + 4, 2, 3), np.float32)
-    lines[:2, 1] = 1.12 * way[[0, -1]]
-    lines[2:-2, 0], lines[2:-2, 1] = way[:-1], way[1:]
-    lines[-2:, 0] = way[-1]
-    lines[-2:, 1] = way[-1] - back * along + np.array([[-0.5], [0.5]]) * back / radius * way[-1]
-    return lines
-
-
-def ruler(axis_: int, aside: float, distance: float) -> Segments:
-    """A translation along z or x, at `aside` in y: extension and dimension lines, arrow heads ``(7, 2, 3)``."""
-    e, y = np.eye(3)[axis_], np.eye(3)[1]
-    start, end = aside * y, aside * y + distance * e
-    back = math.copysign(min(0.16 * aside, abs(distance) / 2), distance)
-    barbs = [
-        (tip, tip + way * back * e + side * 0.4 * abs(back) * y)
-        for tip, way in ((start, 1.0), (end, -1.0))
-        for side in (-1.0, 1.0)
-    ]
-    witness = [(np.zeros(3), 1.12 * start), (distance * e, distance * e + 1.12 * start)]
-    return np.array([*witness, (start, end), *barbs], dtype=np.float32)
-
-
-def middle(factor: Factor, shown: float, radius: float, aside: float) -> Array:
-    """The place ``(3,)`` of the value's label, in the frame before the motion."""
-    if turns(factor):
-        c, s = 1.3 * radius * math.cos(shown / 2), 1.3 * radius * math.sin(shown / 2)
-        return np.array([c, s, 0.0]) if axis(factor) == 2 else np.array([0.0, -s, c])
-    at = np.array([0.0, 1.35 * aside, 0.0])
-    at[axis(factor)] = shown / 2
-    return at
 
 
 def triads(frames: Array, size: float) -> Segments:
@@ -148,11 +104,13 @@ class WalkDrawing:
             add_label(scene, f"{root}/name-{group[0]}", "", anchor="center-center", visible=False)
             for group in self._groups
         ]
-        self._value = add_label(scene, f"{root}/value", "", anchor="center-center", visible=False, scale=1.15)
+        figure = Figure(scene, f"{root}/present", self._size)
+        self._quantities: dict[Factor, Angle | Dimension] = {
+            factor: (figure.angle if turns(factor) else figure.dimension)("", color)
+            for factor, color in (("theta", ABOUT_Z), ("d", ABOUT_Z), ("a", ABOUT_X), ("alpha", ABOUT_X))
+        }
         self._placed: viser.LineSegmentsHandle | None = None
         self._count = -1
-        self._quantity: viser.LineSegmentsHandle | None = None
-        self._applied: tuple[int, int] | None = None
         self._made = 0
 
     def show(self, at: Place, frames: Array, units: Units, names: bool) -> None:
@@ -189,34 +147,23 @@ class WalkDrawing:
                 label.position = T[:3, 3] + height * PLACED * self._size * T[:3, 2]
 
     def _show_quantity(self, at: Place, units: Units) -> None:
-        shown = at.value * at.share
         there = at.motion >= 0 and at.value != 0.0
-        self._value.visible = there
+        for factor, part in self._quantities.items():
+            if part.shown and not (there and factor == at.factor):
+                part.hide()
         if not there:
-            self._forget_quantity()
             return
-        about = axis(at.factor)
-        radius, aside = RADIUS * self._size, ASIDE * self._size
-        points = arc(about, radius, shown) if turns(at.factor) else ruler(about, aside, shown)
-        R, p = at.T_0_before[:3, :3].astype(np.float32), at.T_0_before[:3, 3].astype(np.float32)
-        points = points @ R.T + p
-        if self._applied == (at.row, at.motion) and self._quantity is not None:
-            self._quantity.points = points
-        else:
-            self._forget_quantity()
-            colors = np.empty((len(points), 2, 3), np.uint8)
-            colors[:2], colors[2:] = linear(GREY), linear(ABOUT_Z if about == 2 else ABOUT_X)
-            self._quantity = self._lines("quantity", points, colors, 0.42)
-            self._applied = (at.row, at.motion)
+        shown = at.value * at.share
         whole = amount(at.factor, at.value, units)
         so_far = "= " if at.share == 1.0 else f"{amount(at.factor, shown, units)} of "
-        self._value.text = f"{symbol(self._robot, at.row, at.factor)} {so_far}{whole}"
-        self._value.position = R @ middle(at.factor, shown, radius, aside) + p
-
-    def _forget_quantity(self) -> None:
-        if self._quantity is not None:
-            self._quantity.remove()
-            self._quantity, self._applied = None, None
+        text = f"{symbol(self._robot, at.row, at.factor)} {so_far}{whole}"
+        p, R, about = at.T_0_before[:3, 3], at.T_0_before[:3, :3], axis(at.factor)
+        part = self._quantities[at.factor]
+        if isinstance(part, Angle):
+            # About z from x, and about x from z.
+            part.show(p, R[:, 2 - about], R[:, about], shown, units, text=text)
+        else:
+            part.show(p, p + shown * R[:, about], units, R[:, 1], text=text)
 
     def _lines(
         self, name: str, points: Segments, colors: NDArray[np.uint8], width: float

@@ -279,25 +279,6 @@ def test_lengths_follow_the_units(length: str, d: str, d_short: str) -> None:
 # The drawing
 
 
-@pytest.mark.parametrize("factor", ["theta", "alpha"])
-@pytest.mark.parametrize("angle", [0.7, -2.9, 6.0])
-def test_an_arc_ends_where_the_rotation_ends(factor: steps.Factor, angle: float) -> None:
-    lines = drawing.arc(steps.axis(factor), 2.0, angle)
-    start = np.eye(3)[0 if factor == "theta" else 2]
-    turned = steps.elementary(factor, angle)[:3, :3] @ start
-    assert np.allclose(lines[2, 0], 2.0 * start, atol=1e-6)
-    assert np.allclose(lines[-3, 1], 2.0 * turned, atol=1e-6)
-    assert np.allclose(np.linalg.norm(lines[2:-2], axis=-1), 2.0, atol=1e-6)
-    assert np.allclose(np.cross(lines[1, 1], turned), 0.0, atol=1e-6)
-
-
-@pytest.mark.parametrize("distance", [0.3, -0.3])
-def test_a_ruler_is_as_long_as_the_translation(distance: float) -> None:
-    for factor in ("d", "a"):
-        line = drawing.ruler(steps.axis(factor), 0.1, distance)[2]
-        assert np.allclose(line[1] - line[0], steps.elementary(factor, distance)[:3, 3], atol=1e-7)
-
-
 @pytest.mark.parametrize("robot", READINGS, ids=lambda r: f"{r.id}-{r.convention}")
 def test_a_skeleton_is_connected_and_bends_at_right_angles(robot: kin.Robot) -> None:
     frames = kin.link_frames(robot, some_q(robot))

@@ -1,0 +1,355 @@
+"""Parts of figures in the scene: lines, dimensions, angles, points and faces, each with its label.
+
+A figure belongs to one arm and one visitor. Its parts are made once and are hidden until they are shown; to show a
+part again moves it, so that nothing flickers while the arm is dragged. Everything is in the base frame, in metres
+and radians; values are written in the reader's units::
+
+    figure = Figure(stage.client.scene, "/triangle", body(stage.robot).size)
+    normal, upper = figure.line("x₁", RED), figure.dimension("l₁", BLUE)
+    elbow, plane = figure.angle("β", GREEN), figure.face(3, BLUE)
+    wrist = figure.point("wrist centre W", AMBER)
+
+    def on_pose(self, T_base_tool):                # and in on_style: the units may have changed
+        plane.show([shoulder, elbow_point, wrist_point])
+        upper.show(shoulder, elbow_point, units, clear_of(shoulder, elbow_point, joints))
+        elbow.show_between(elbow_point, shoulder, wrist_point, units)
+        wrist.show(wrist_point)
+
+    def remove(self):
+        figure.remove()
+
+The links of an arm hide what is inside them: call ``stage.see_through(True)`` while a figure is on show, and take
+another `root` for each figure, because browsers give the pose of a removed node to the next one of its name.
+Labels are in front of everything, on a plate of their own, so they are readable in light and dark. Dimensions and
+angles are beside what they measure, at a distance from the arm.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import viser
+from numpy.typing import ArrayLike, NDArray
+
+from app.viewer.labels import add_label
+from app.viewer.viser_patches import assign
+from kin.axes import cross, perpendicular_to
+from kin.transforms import Array
+from kin.units import Units
+
+Color = tuple[int, int, int]
+Segments = NDArray[np.float32]
+
+# Okabe and Ito's colours, of middle brightness: they show on a light and on a dark background.
+BLUE, VERMILION, GREEN, AMBER, PURPLE, SKY = (
+    (0, 114, 178), (213, 94, 0), (0, 158, 115), (230, 159, 0), (204, 121, 167), (86, 180, 233),
+)  # fmt: skip
+GREY = (128, 134, 145)
+ARC = 32  # segments
+# In units of the arm's thickness.
+ASIDE, RADIUS, POINT = 4.0, 6.0, 0.55
+LINE, MEASURE = 0.26, 0.42  # thickness
+BEYOND = 1.2  # from the end of a line to its label
+_TINY = 1e-9
+
+
+class Figure:
+    """Parts that are removed together; the visitor's worker calls it.
+
+    Args:
+        root: name of the node of which all parts are children; a new one for each figure.
+        size: the arm's thickness (m), ``body(robot).size``, the unit of widths and distances.
+    """
+
+    def __init__(self, scene: viser.SceneApi, root: str, size: float) -> None:
+        self.scene, self.root, self.size = scene, root, size
+        self._top = scene.add_frame(root, show_axes=False)
+        self._count = 0
+
+    def line(self, text: str = "", color: Color = GREY, width: float = LINE) -> Line:
+        """A straight line, such as an axis, with its label beyond the end."""
+        return Line(self, text, color, width)
+
+    def dimension(self, text: str, color: Color = BLUE) -> Dimension:
+        """A dimension line between two points, with its value."""
+        return Dimension(self, text, color)
+
+    def angle(self, text: str, color: Color = BLUE) -> Angle:
+        """The arc of an angle, with its value."""
+        return Angle(self, text, color)
+
+    def point(self, text: str = "", color: Color = AMBER, radius: float = POINT) -> Point:
+        """A small ball with a label above it."""
+        return Point(self, text, color, radius)
+
+    def face(self, corners: int = 3, color: Color = BLUE, opacity: float = 0.22) -> Face:
+        """A translucent triangle, or a plane polygon with this number of corners."""
+        return Face(self, corners, color, opacity)
+
+    def remove(self) -> None:
+        """Remove all parts from the scene."""
+        self._top.remove()
+
+    def name(self) -> str:
+        """A name for a new node."""
+        self._count += 1
+        return f"{self.root}/{self._count}"
+
+    def lines(self, count: int, color: Color, width: float) -> viser.LineSegmentsHandle:
+        """A node of `count` lines of one colour, hidden."""
+        # One node for each colour: the browser shows colours given per point brighter.
+        none = np.zeros((count, 2, 3), np.float32)
+        return self.scene.add_line_segments(self.name(), none, color, thickness=width * self.size, visible=False)
+
+
+class Part:
+    """A part of a figure: its nodes, and the label."""
+
+    def __init__(self, figure: Figure, text: str, scale: float = 1.0) -> None:
+        self.size = figure.size
+        self.text = text
+        self.label = add_label(
+            figure.scene, figure.name(), text, anchor="center-center", visible=False, scale=scale
+        )
+        self.nodes: list[viser.SceneNodeHandle] = []
+
+    @property
+    def shown(self) -> bool:
+        """Whether it is on show."""
+        return self.nodes[0].visible
+
+    def hide(self) -> None:
+        """Hide the part until it is shown again."""
+        for node in (*self.nodes, self.label):
+            _set_visible(node, False)
+
+    def _write(self, text: str, at: Array) -> None:
+        """Show the nodes, and the label with this text at this point ``(3,)``."""
+        for node in self.nodes:
+            _set_visible(node, True)
+        _set_visible(self.label, bool(text))
+        if text != self.label.text:
+            self.label.text = text
+        assign(self.label, at)
+
+
+class Line(Part):
+    """A straight line with its label beyond the end."""
+
+    def __init__(self, figure: Figure, text: str, color: Color, width: float) -> None:
+        super().__init__(figure, text)
+        self._line = figure.lines(1, color, width)
+        self.nodes = [self._line]
+
+    def show(self, start: ArrayLike, end: ArrayLike, text: str | None = None) -> None:
+        """Draw it between two points ``(3,)``; `text`: another label from now on."""
+        a, b = np.asarray(start, float), np.asarray(end, float)
+        self.text = self.text if text is None else text
+        self._line.points = np.array([[a, b]], np.float32)
+        self._write(self.text, b + BEYOND * self.size * _unit(b - a))
+
+    def show_axis(self, point: ArrayLike, direction: ArrayLike, reach: float, text: str | None = None) -> None:
+        """Draw an axis through a point ``(3,)``, to a distance `reach` (m) on both sides."""
+        at, way = np.asarray(point, float), reach * _unit(np.asarray(direction, float))
+        self.show(at - way, at + way, text)
+
+
+class Dimension(Part):
+    """A distance as in an engineering drawing: two extension lines, and the dimension line between them."""
+
+    def __init__(self, figure: Figure, text: str, color: Color) -> None:
+        super().__init__(figure, text, scale=1.15)
+        self._witness = figure.lines(2, GREY, LINE)
+        self._measure = figure.lines(5, color, MEASURE)
+        self.nodes = [self._measure, self._witness]
+
+    def show(
+        self,
+        start: ArrayLike,
+        end: ArrayLike,
+        units: Units,
+        aside: ArrayLike,
+        *,
+        value: float | None = None,
+        text: str | None = None,
+    ) -> None:
+        """Draw it between two points ``(3,)``; equal points have no dimension line, only the label.
+
+        Args:
+            aside: direction ``(3,)`` from the points to the dimension line, such as `clear_of` gives.
+            value: what the label says (m), where it has a sign; otherwise the distance.
+            text: the whole label, instead of the name and the value.
+        """
+        a, b, e = np.asarray(start, float), np.asarray(end, float), _unit(np.asarray(aside, float))
+        lines = ruler(a, b, ASIDE * self.size * e)
+        self._witness.points, self._measure.points = lines[:2], lines[2:]
+        value = float(np.linalg.norm(b - a)) if value is None else value
+        words = f"{self.text} = {units.lengths.text(value)}" if text is None else text
+        self._write(words, (a + b) / 2 + 1.35 * ASIDE * self.size * e)
+
+
+class Angle(Part):
+    """An angle: its two sides, and the arc between them with an arrow head."""
+
+    def __init__(self, figure: Figure, text: str, color: Color) -> None:
+        super().__init__(figure, text, scale=1.15)
+        self._sides = figure.lines(2, GREY, LINE)
+        self._arc = figure.lines(ARC + 2, color, MEASURE)
+        self.nodes = [self._arc, self._sides]
+
+    def show(
+        self,
+        corner: ArrayLike,
+        start: ArrayLike,
+        about: ArrayLike,
+        angle: float,
+        units: Units,
+        *,
+        radius: float | None = None,
+        text: str | None = None,
+    ) -> None:
+        """Draw a rotation from the direction `start` ``(3,)`` about the axis `about` ``(3,)``, right-handed.
+
+        Args:
+            angle: signed (rad); its label is `name = value`, unless `text` is the whole label.
+            radius: of the arc (m); otherwise six times the arm's thickness.
+        """
+        at, radius = np.asarray(corner, float), RADIUS * self.size if radius is None else radius
+        lines = arc(at, start, about, radius, angle)
+        self._sides.points, self._arc.points = lines[:2], lines[2:]
+        words = f"{self.text} = {units.angles.text(angle)}" if text is None else text
+        self._write(words, at + 1.3 * radius * turned(start, about, [angle / 2])[0])
+
+    def show_between(
+        self,
+        corner: ArrayLike,
+        one: ArrayLike,
+        other: ArrayLike,
+        units: Units,
+        *,
+        radius: float | None = None,
+        text: str | None = None,
+    ) -> None:
+        """Draw the angle at a corner of a triangle, between the sides to two points ``(3,)``."""
+        at = np.asarray(corner, float)
+        a, b = _unit(np.asarray(one, float) - at), _unit(np.asarray(other, float) - at)
+        normal = cross(a, b)
+        sine = float(np.linalg.norm(normal))
+        about = normal / sine if sine > _TINY else perpendicular_to(a)
+        self.show(at, a, about, math.atan2(sine, float(a @ b)), units, radius=radius, text=text)
+
+
+class Point(Part):
+    """A small ball with a label above it."""
+
+    def __init__(self, figure: Figure, text: str, color: Color, radius: float) -> None:
+        super().__init__(figure, text)
+        self._radius = radius * figure.size
+        self._ball = figure.scene.add_icosphere(
+            figure.name(), self._radius, color, cast_shadow=False, receive_shadow=False, visible=False
+        )
+        self.nodes = [self._ball]
+
+    def show(self, at: ArrayLike, beside: ArrayLike = (0.0, 0.0, 1.0), text: str | None = None) -> None:
+        """Draw it at a point ``(3,)``, the label in the direction `beside` from it."""
+        point = np.asarray(at, float)
+        self.text = self.text if text is None else text
+        assign(self._ball, point)
+        self._write(self.text, point + (self._radius + BEYOND * self.size) * _unit(np.asarray(beside, float)))
+
+
+class Face:
+    """A translucent plane polygon, visible from both sides."""
+
+    def __init__(self, figure: Figure, corners: int, color: Color, opacity: float) -> None:
+        fan = [(0, k, k + 1) for k in range(1, corners - 1)]
+        self.node = figure.scene.add_mesh_simple(
+            figure.name(),
+            np.zeros((corners, 3), np.float32),
+            np.array(fan, np.uint32),
+            color=color,
+            opacity=opacity,
+            side="double",
+            flat_shading=True,
+            cast_shadow=False,
+            receive_shadow=False,
+            visible=False,
+        )
+
+    def show(self, corners: ArrayLike) -> None:
+        """Draw it with these corners ``(k, 3)``, in order, convex."""
+        self.node.vertices = np.asarray(corners, np.float32)
+        _set_visible(self.node, True)
+
+    def hide(self) -> None:
+        """Hide it until it is shown again."""
+        _set_visible(self.node, False)
+
+
+def arc(corner: ArrayLike, start: ArrayLike, about: ArrayLike, radius: float, angle: float) -> Segments:
+    """A rotation: first and last side, the arc, and its arrow head ``(ARC + 4, 2, 3)``."""
+    way = radius * turned(start, about, np.linspace(0.0, angle, ARC + 1))
+    along = _unit(way[-1] - way[-2])
+    back = min(0.16 * radius, radius * abs(angle) / 2)
+    lines = np.zeros((ARC + 4, 2, 3))
+    lines[:2, 1] = 1.12 * way[[0, -1]]
+    lines[2:-2, 0], lines[2:-2, 1] = way[:-1], way[1:]
+    lines[-2:, 0] = way[-1]
+    lines[-2:, 1] = way[-1] - back * along + np.array([[-0.5], [0.5]]) * back / radius * way[-1]
+    return (lines + np.asarray(corner, float)).astype(np.float32)
+
+
+def ruler(start: Array, end: Array, aside: Array) -> Segments:
+    """A distance: two extension lines, the dimension line at `aside` ``(3,)``, and arrow heads ``(7, 2, 3)``."""
+    far, length = float(np.linalg.norm(aside)), float(np.linalg.norm(end - start))
+    e, y = _unit(end - start), _unit(aside)
+    back = min(0.16 * far, length / 2)
+    barbs = [
+        (tip + aside, tip + aside + way * back * e + side * 0.4 * back * y)
+        for tip, way in ((start, 1.0), (end, -1.0))
+        for side in (-1.0, 1.0)
+    ]
+    witness = [(start, start + 1.12 * aside), (end, end + 1.12 * aside)]
+    return np.array([*witness, (start + aside, end + aside), *barbs], dtype=np.float32)
+
+
+def turned(start: ArrayLike, about: ArrayLike, angles: ArrayLike) -> Array:
+    """The direction `start`, perpendicular to `about`, turned by each angle about it ``(k, 3)``."""
+    z, x = _unit(np.asarray(about, float)), _unit(np.asarray(start, float))
+    y, each = cross(z, x), np.asarray(angles, float)[:, None]
+    return np.asarray(np.cos(each) * x + np.sin(each) * y)
+
+
+def clear_of(start: ArrayLike, end: ArrayLike, others: Iterable[ArrayLike]) -> Array:
+    """The direction ``(3,)`` perpendicular to a line in which a dimension is clear of points ``(3,)``, such as the
+    joints: away from their middle. Where they are on the line themselves, any perpendicular direction.
+    """
+    a, b = np.asarray(start, float), np.asarray(end, float)
+    e = _unit(b - a)
+    away = (a + b) / 2 - np.mean([np.asarray(each, float) for each in others], axis=0)
+    across = away - (away @ e) * e
+    far = float(np.linalg.norm(across))
+    if far > 1e-3 * max(float(np.linalg.norm(away)), float(np.linalg.norm(b - a)), _TINY):
+        return np.asarray(across / far)
+    return perpendicular_to(e) if e.any() else np.array([0.0, 0.0, 1.0])
+
+
+def plane_corners(center: ArrayLike, normal: ArrayLike, reach: float) -> Sequence[Array]:
+    """The corners of a square about a center, of 2 `reach` (m) each side, for a `Face` of four corners."""
+    at, z = np.asarray(center, float), _unit(np.asarray(normal, float))
+    x = perpendicular_to(z)
+    y = cross(z, x)
+    return [at + reach * (i * x + j * y) for i, j in ((1, 1), (-1, 1), (-1, -1), (1, -1))]
+
+
+def _unit(v: Array) -> Array:
+    """The unit vector, or zero."""
+    length = float(np.linalg.norm(v))
+    return np.asarray(v / length if length > _TINY else np.zeros(3))
+
+
+def _set_visible(node: viser.SceneNodeHandle, visible: bool) -> None:
+    if node.visible != visible:
+        node.visible = visible
