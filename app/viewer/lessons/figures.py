@@ -298,7 +298,8 @@ def arc(corner: ArrayLike, start: ArrayLike, about: ArrayLike, radius: float, an
     lines[2:-2, 0], lines[2:-2, 1] = way[:-1], way[1:]
     lines[-2:, 0] = way[-1]
     lines[-2:, 1] = way[-1] - back * along + np.array([[-0.5], [0.5]]) * back / radius * way[-1]
-    return (lines + np.asarray(corner, float)).astype(np.float32)
+    moved: Segments = (lines + np.asarray(corner, float)).astype(np.float32)
+    return moved
 
 
 def ruler(start: Array, end: Array, aside: Array) -> Segments:

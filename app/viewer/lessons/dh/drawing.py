@@ -106,8 +106,10 @@ class WalkDrawing:
         ]
         figure = Figure(scene, f"{root}/present", self._size)
         self._quantities: dict[Factor, Angle | Dimension] = {
-            factor: (figure.angle if turns(factor) else figure.dimension)("", color)
-            for factor, color in (("theta", ABOUT_Z), ("d", ABOUT_Z), ("a", ABOUT_X), ("alpha", ABOUT_X))
+            "theta": figure.angle("", ABOUT_Z),
+            "d": figure.dimension("", ABOUT_Z),
+            "a": figure.dimension("", ABOUT_X),
+            "alpha": figure.angle("", ABOUT_X),
         }
         self._placed: viser.LineSegmentsHandle | None = None
         self._count = -1
