@@ -25,7 +25,6 @@ from app.viewer.lessons.dh.steps import (
     frames_name,
     reread,
     symbol,
-    turns,
 )
 from app.viewer.lessons.dh.views import ABOUT_X, ABOUT_Z, TITLES
 from app.viewer.lessons.figures import GREY, Angle, Dimension, Figure, Segments
