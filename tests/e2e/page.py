@@ -34,6 +34,15 @@ window.setInterval = (act, ms, ...rest) => setInterval(act, ms === 1000 ? 20000 
 # As after the first minute: the hints are closed.
 NO_HINTS = 'localStorage.setItem("kinboard-hints", "drag joint learn");'
 
+UNCHANGED = """() => {
+  const texts = [...document.querySelectorAll("[data-status], td, input")].map((e) => e.value ?? e.textContent);
+  const now = texts.join("\\n"), before = window.kbRest;
+  if (before?.now !== now) window.kbRest = { now, since: performance.now() };
+  const rests = before?.now === now && performance.now() - before.since > 500;
+  if (rests) delete window.kbRest;
+  return rests;
+}"""
+
 
 class Tab:
     """One browser tab: actions on its controls, and readings of what it shows."""
@@ -118,6 +127,10 @@ class Tab:
         while np.abs(np.array(self.tool()) - 1000 * xyz).max() > within:
             assert time.monotonic() < end, f"the tool is at {self.tool()}, expected {1000 * xyz}"
             self.page.wait_for_timeout(50)
+
+    def rest(self) -> None:
+        """Wait until the numbers of the panel no longer change, after an action with several answers."""
+        self.page.wait_for_function(UNCHANGED, polling=100)
 
     def pixel(self, robot: kin.Robot, point: np.ndarray, room: Sequence[camera.Sphere] = ()) -> np.ndarray:
         """Page coordinates of a point of the scene, in the default view with room for these spheres."""

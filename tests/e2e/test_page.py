@@ -300,6 +300,7 @@ def test_a_finger_drags_a_slider(phone: Tab) -> None:
     touch(phone, start, start + np.array([60.0, 0.0]))
     expect(phone.status).to_contain_text("Joints moved by hand")
     expect(phone.page.locator(".mantine-Tooltip-tooltip:visible")).to_have_count(0)
+    phone.rest()
     degrees = phone.number("1 rotating base")
     assert degrees > 110
     q = PIONEER.q_home.copy()
@@ -315,6 +316,7 @@ def test_a_finger_drags_the_gizmo(phone: Tab) -> None:
     assert at["y"] < arrow[0][1] < at["y"] + at["height"], "the gizmo is in the picture"
     touch(phone, arrow[0], arrow[0] - 0.6 * (arrow[1] - arrow[0]))
     expect(phone.status).to_have_attribute("data-status", "reached")
+    phone.rest()
     moved = np.array(phone.tool()) / 1000 - home[:3, 3]
     assert moved @ home[:3, 2] < -0.03, "the tool went backwards along its own axis"
     assert np.linalg.norm(moved - home[:3, 2] * (moved @ home[:3, 2])) < 1e-3, "and nowhere else"
@@ -325,6 +327,7 @@ def test_a_phone_that_is_turned_keeps_tab_and_history(phone: Tab) -> None:
     phone.open("Move")
     page.get_by_role("button", name="Home").tap()
     phone.open("Learn")
+    phone.rest()
     history = page.locator("[data-send=undo]").get_attribute("title")
     for width, height in ((844, 390), (390, 844)):
         page.set_viewport_size({"width": width, "height": height})

@@ -79,7 +79,7 @@ def test_the_ring_of_arm_angles(tab: Tab) -> None:
     p = kin.fk(SRS, SRS.q_home)[:3, 3]
     tab.type_number("Set ψ (tool held)", "70")
     expect(tab.row("Set ψ (tool held)").locator("input:visible").last).to_have_value("70")
-    tab.page.wait_for_timeout(1500)
+    tab.rest()
     tab.wait_for_tool(p, within=0.06)
     expect(tab.page.locator("[data-residual]")).to_contain_text("Tool held to")
     expect(tab.page.locator("[data-limits]")).to_contain_text("limit of joint 6")
@@ -100,6 +100,7 @@ def test_lock_buttons(tab: Tab) -> None:
     tab.row("Locked").get_by_role("button", name="2", exact=True).click()
     expect(tab.status).to_contain_text("Joint 2 locked")
     tab.drag_arrow(PUMA, kin.fk(PUMA, PUMA.q_home), axis=0, lengths=0.4)
+    tab.rest()
     assert tab.number("2 shoulder") == 45
     tab.page.get_by_role("button", name="Unlock all").click()
     expect(tab.status).to_have_attribute("data-status", "reached")
