@@ -14,11 +14,13 @@ from app.equations.books import (
     book_later,
     check,
 )
+from app.equations.compare import Compared, compared, gram, suspects
 from app.equations.derive import Line
 from app.equations.symbols import Symbol
 
 __all__ = [
     "Book",
+    "Compared",
     "DerivationError",
     "Equation",
     "Line",
@@ -28,4 +30,7 @@ __all__ = [
     "book",
     "book_later",
     "check",
+    "compared",
+    "gram",
+    "suspects",
 ]

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from app.equations.derive import AXES, COLUMNS, Line, derive
-from app.equations.expression import Expression, astray, from_text, names, value
+from app.equations.expression import Expression, astray, from_text, names, value, written_out
 from app.equations.symbols import Symbol, chapter_symbols
 from app.shared.computations import ComputationCache, SharedComputation, Subscription
 from kin import Robot, chapter, fk, get_robot
@@ -133,6 +133,17 @@ class Book:
         T = fk(self.robot, q)
         values: dict[str, Array] = {}
         return [(e, self._values(e, q, T, values)) for e in self.equations if e.correct is not None]
+
+    def as_printed(self, q: Array) -> Array:
+        """The tool's pose ``(..., 4, 4)`` by the equations as they are printed; it need not be one."""
+        T = np.array(fk(self.robot, q))
+        for equation, values in self.compare(q):
+            T[(..., *equation.index)] = values.correct if values.printed is None else values.printed
+        return T
+
+    def written_out(self, expression: Expression) -> Expression:
+        """The expression as the chapter writes it, which has no names for intermediate results."""
+        return written_out(expression, {name: line.expression for name, line in self._lines.items()})
 
     def _values(self, equation: Equation, q: Array, T: Array, values: dict[str, Array]) -> Values:
         forms = [form for form in (equation.printed, equation.correct) if form is not None]

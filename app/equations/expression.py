@@ -158,22 +158,42 @@ def astray(expression: Expression, other: Expression) -> tuple[bool, ...]:
     return tuple(bool(expanded(term) - known) for term in terms(expression))
 
 
-def expanded(expression: Expression) -> Counter[tuple[bool, tuple[str, ...]]]:
-    """Multiplied out: its terms, each a sign (True for minus) with sorted names, and how often it occurs."""
+def expanded(expression: Expression) -> Counter[Term]:
+    """Multiplied out: its terms with sorted names, and how often each occurs."""
+    return Counter((minus, tuple(sorted(factors))) for minus, factors in multiplied_out(expression))
+
+
+Term = tuple[bool, tuple[str, ...]]  # whether it is negative, and its names and numbers
+
+
+def multiplied_out(expression: Expression) -> list[Term]:
+    """Its terms without brackets, in order of appearance."""
     match expression:
         case Name(id=name):
-            return Counter([(False, (name,))])
+            return [(False, (name,))]
         case Number(value=number):
-            return Counter([(False, (str(number),))])
+            return [(False, (str(number),))]
         case Negative(of=inner):
-            return Counter({(not minus, found): k for (minus, found), k in expanded(inner).items()})
+            return [(not minus, factors) for minus, factors in multiplied_out(inner)]
         case Sum(terms=parts):
-            return sum((expanded(part) for part in parts), Counter())
+            return [term for part in parts for term in multiplied_out(part)]
         case Product(factors=parts):
-            return Counter(
-                (
-                    sum(minus for minus, _ in choice) % 2 == 1,
-                    tuple(sorted(n for _, found in choice for n in found)),
-                )
-                for choice in product(*(expanded(part).elements() for part in parts))
-            )
+            return [
+                (sum(minus for minus, _ in choice) % 2 == 1, tuple(name for _, names in choice for name in names))
+                for choice in product(*map(multiplied_out, parts))
+            ]
+
+
+def written_out(expression: Expression, meanings: Mapping[str, Expression]) -> Expression:
+    """The expression with these names replaced by what they stand for."""
+    match expression:
+        case Name(id=name):
+            return meanings.get(name, expression)
+        case Number():
+            return expression
+        case Negative(of=inner):
+            return negative(written_out(inner, meanings))
+        case Product(factors=factors):
+            return multiply([written_out(factor, meanings) for factor in factors])
+        case Sum(terms=parts):
+            return add([written_out(part, meanings) for part in parts])

@@ -43,6 +43,16 @@ def mathml(expression: Expression, left: str = "") -> str:
     return _math(_mathml_left(left) + _mathml(expression))
 
 
+def mathml_inside(expression: Expression) -> str:
+    """The pieces of a formula, without ``<math>`` around them."""
+    return f"<mrow>{_mathml(expression)}</mrow>"
+
+
+def mathml_signed(term: Expression) -> str:
+    """A whole ``<math>`` element with one term, its sign always written."""
+    return _math(f'<mo form="prefix">{"−" if _minus(term) else "+"}</mo>{_mathml(_positive(term))}')
+
+
 def mathml_name(name: str) -> str:
     """A whole ``<math>`` element with nothing but a name."""
     return _math(_mathml_name(name))

@@ -58,6 +58,14 @@ def test_equations_are_typeset_and_marked_and_the_largest_error_is_shown(tab: Ta
     tab.page.get_by_role("button", name="Show the worst pose").click()
     expect(off(tab)).to_contain_text("by 35.3° here, by 35.3° at worst")
     stays_inside(tab)
+    expect(tab.page.locator('[aria-label="term by term"] tr[data-kind=factor]')).to_have_count(1)
+    expect(tab.page.locator("[data-finding]")).to_contain_text("Column a and row x cannot be right")
+    tab.choose("Equation", "(3) the whole matrix ? unreadable")
+    matrix = tab.page.locator("[data-matrix]")
+    expect(matrix).to_be_visible()
+    assert matrix.evaluate("(box) => box.scrollWidth > box.clientWidth"), "wider than the panel: it scrolls"
+    assert tab.page.evaluate("document.fonts.check('16px \"Kinboard Math\"', '𝑐')"), "the font has its letters"
+    tab.screenshot("equations-matrix")
     tab.choose("Equation", "(4) x of p ✓")
     expect(off(tab)).to_contain_text("equal to the DH product")
 

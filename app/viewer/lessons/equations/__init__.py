@@ -69,6 +69,9 @@ class EquationsLesson(Lesson):
                 self.post("worst")
 
         self._text = gui.add_html("")
+        self._test_folder = gui.add_folder("Find misprints: RᵀR − I", visible=False)
+        with self._test_folder:
+            self._test = gui.add_html("")
         self._folder = gui.add_folder("Symbols", expand_by_default=False)
         with self._folder:
             self._symbols = gui.add_html("")
@@ -153,8 +156,10 @@ class EquationsLesson(Lesson):
     def remove(self) -> None:
         self._stop_deriving()
         self._clear_scene()
-        for handle in (self._about, self._choice, self._text, self._values, self._button, self._folder):
+        for handle in (self._about, self._choice, self._text, self._values, self._button):
             handle.remove()
+        self._test_folder.remove()
+        self._folder.remove()
 
     def _take(self) -> None:
         """Take the derived book, or the reason why there is none."""
@@ -170,6 +175,7 @@ class EquationsLesson(Lesson):
             self._empty("The equations of this arm could not be derived.")
             raise
         self._about.content = views.message(views.summary(self._book))
+        self._test_folder.visible = self._book.source == "chapter"
         self._choice.options = tuple(views.label(e) for e in self._book.equations)
         self._choice.visible = True
         self._show(self._first(self._book))
@@ -233,6 +239,8 @@ class EquationsLesson(Lesson):
         equation = self._equation
         if self._book is None or equation is None:
             return
+        if self._book.source == "chapter":
+            update_html(self._test, views.test_html(self._book, self.stage.q))
         if equation.correct is None:
             update_html(self._values, views.unreadable_html(equation))
             return
@@ -267,4 +275,4 @@ class EquationsLesson(Lesson):
         self._clear_scene()
         self._about.content = views.message(message)
         self._text.content = self._values.content = self._symbols.content = ""
-        self._choice.visible = self._button.visible = self._folder.visible = False
+        self._choice.visible = self._button.visible = self._folder.visible = self._test_folder.visible = False

@@ -9,8 +9,11 @@ from html import escape
 import numpy as np
 from markupsafe import Markup
 
-from app.equations import Book, Equation, Line, Symbol, Values, typeset
+from app.equations import Book, Compared, Equation, Line, Symbol, Values, compared, gram, suspects, typeset
+from app.equations.compare import SMALLEST
 from app.equations.expression import Expression, names
+from app.viewer.views import mathml
+from app.viewer.views.mathml import MathML
 from app.viewer.views.templates import render
 from kin.transforms import Array
 from kin.units import Units, fixed
@@ -52,18 +55,21 @@ def summary(book: Book) -> str:
 def equation_html(book: Book, equation: Equation) -> str:
     """The equation as printed and corrected, or as derived, with its intermediate results."""
     formulas = []
+    rows: list[dict[str, object]] = []
+    lines = book.lines_of(equation)
     if equation.printed is not None:
         wrong = equation.wrong_terms if equation.verdict == "misprinted" else ()
-        formulas.append(_formula("As printed", equation.entry, equation.printed, wrong, "misprinted", "wrong"))
+        written = book.written_out(equation.printed)
+        formulas.append(_formula("As printed", equation.entry, written, wrong, "misprinted", "wrong"))
         if equation.verdict == "misprinted":
             assert equation.correct is not None
-            corrected = equation.mended_terms
-            formulas.append(
-                _formula("Corrected", equation.entry, equation.correct, corrected, "right", "corrected")
-            )
+            corrected, written = equation.mended_terms, book.written_out(equation.correct)
+            formulas.append(_formula("Corrected", equation.entry, written, corrected, "right", "corrected"))
+            rows = [_compared_row(row) for row in compared(equation.printed, equation.correct)]
     elif equation.correct is not None:
         formulas.append(_formula("Closed form", equation.entry, equation.correct))
-    lines = book.lines_of(equation)
+    if book.source == "chapter" and not rows:
+        lines = []  # written out, as in print
     separate = []
     if equation.verdict == "derived" and equation.correct is not None:
         separate = [f"a_{axis}" for axis in "xyz" if f"a_{axis}" in names(equation.correct)]
@@ -74,6 +80,8 @@ def equation_html(book: Book, equation: Equation) -> str:
         verdict=equation.verdict,
         formulas=formulas,
         note=note_html(equation.note) if equation.note else "",
+        rows=rows,
+        matrix=_corrected_matrix(book) if equation.entry == "T" else "",
         lines=[Markup(typeset.mathml(line.expression, line.name)) for line in lines],
         legend=_legend(lines, equation) if book.source == "derived" else "",
         separate=[Markup(typeset.mathml_name(name)) for name in separate],
@@ -95,7 +103,7 @@ def unreadable_html(equation: Equation) -> str:
 def note_html(note: str) -> Markup:
     """A note with its products typeset: c5 with an index, no asterisks."""
     text = escape(note).replace("*", "\u2009").replace("-", "−")
-    return Markup(re.sub(r"\b([acds])(\d+)", r"<i>\1</i><sub>\2</sub>", text))
+    return Markup(re.sub(r"\b[acds]\d+", lambda found: typeset.mathml_name(found[0]), text))
 
 
 def symbols_html(symbols: Iterable[Symbol], units: Units) -> str:
@@ -169,6 +177,78 @@ def _formula(
     marks = marked or (False,) * len(terms)
     parts = [{"term": Markup(term), "marked": mark} for term, mark in zip(terms, marks, strict=True)]
     return {"title": title, "parts": parts, "color": LOOKS[look][2], "word": word}
+
+
+# What a term of the print is, by how it differs from the right one: words and CSS class.
+DIFFERENCES = {
+    "same": ("the same", ""),
+    "sign": ("wrong sign", "kb-vermilion"),
+    "factor": ("{wrong} should be {right}", "kb-amber"),
+    "sign and factor": ("wrong sign, and {wrong} should be {right}", "kb-vermilion"),
+    "spurious": ("does not belong here", "kb-mauve"),
+    "missing": ("missing in print", "kb-blue"),
+}
+
+
+def _compared_row(row: Compared) -> dict[str, object]:
+    """A term as printed, the right one, and how they differ."""
+    words, color = DIFFERENCES[row.kind]
+    wrong, right = (Markup(typeset.mathml_name(name)) if name else "" for name in (row.wrong, row.right))
+    printed, correct = (
+        "—" if term is None else Markup(typeset.mathml_signed(term)) for term in (row.printed, row.correct)
+    )
+    text = Markup(words).format(wrong=wrong, right=right)
+    return {"printed": printed, "correct": correct, "kind": row.kind, "words": text, "color": color}
+
+
+def _corrected_matrix(book: Book) -> Markup:
+    """The whole matrix [n o a p] with the right entries; those of misprinted equations are marked."""
+    entries = {e.entry: e for e in book.equations if e.correct is not None}
+    marks = {e.index: "rgba(0, 158, 115, .22)" for e in entries.values() if e.verdict == "misprinted"}
+    rows: list[list[MathML]] = []
+    for axis in "xyz":
+        row = [entries[f"{column}_{axis}"].correct for column in "noap"]
+        rows.append([MathML(typeset.mathml_inside(entry)) for entry in row if entry is not None])
+    rows.append([mathml.short(float(k == 3)) for k in range(4)])
+    left = [mathml.ident("T"), mathml.op("=")]
+    return mathml.math(*left, mathml.matrix(rows, marks=marks), alt="T, the whole matrix, corrected")
+
+
+def test_html(book: Book, q: Array) -> str:
+    """RᵀR − I and RRᵀ − I of the printed R at a configuration, and what they say."""
+    R = book.as_printed(q)[:3, :3]
+    tables, found = [], []
+    for title, off, heads in (
+        ("RᵀR − I compares the columns", gram(R), ("n", "o", "a")),
+        ("RRᵀ − I compares the rows", gram(R.T), ("x", "y", "z")),
+    ):
+        wrong = suspects(off)
+        found.append([heads[k] for k in wrong])
+        cells = [[(fixed(float(v), 3), int(abs(v) > SMALLEST)) for v in row] for row in off]
+        tables.append({"title": title, "heads": heads, "rows": list(zip(heads, cells, strict=True))})
+    mark, words, color = _finding(book, *found)
+    return render("equations/test", tables=tables, mark=mark, words=words, color=color)
+
+
+def _finding(book: Book, columns: list[str], rows: list[str]) -> tuple[str, Markup, str]:
+    """Mark, words and CSS class: where the misprint must be."""
+    right, wrong = LOOKS["right"], LOOKS["misprinted"]
+    if not columns:
+        text = "Zero at this pose: no misprint shows here. Move the arm: elsewhere one may."
+        return right[0], Markup(text), right[2]
+    by_entry = {e.entry: e for e in book.equations}
+    found = [by_entry[f"{column}_{row}"] for column in columns for row in rows]
+    names = [Markup("{} in ({})").format(Markup(typeset.mathml_name(e.entry)), e.number) for e in found]
+    text = Markup("{} {} and {} {} cannot be right: look at {}.").format(
+        "Columns" if len(columns) > 1 else "Column", _listed(columns),
+        "rows" if len(rows) > 1 else "row", _listed(rows), _listed(names),
+    )  # fmt: skip
+    return wrong[0], text, wrong[2]
+
+
+def _listed(items: list[str] | list[Markup]) -> Markup:
+    *first, last = items
+    return (Markup(", ").join(first) + " and " if first else Markup("")) + last
 
 
 def _legend(lines: list[Line], equation: Equation) -> str:

@@ -16,7 +16,7 @@ from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
 import kin
-from app.equations import book, books
+from app.equations import book, books, typeset
 from app.equations.derive import derive
 from app.shared.clouds import Clouds
 from app.shared.computations import ComputationCache
@@ -191,7 +191,7 @@ def test_an_arm_with_very_many_rows_has_no_equations() -> None:
     fixed_rows = tuple(kin.Joint(f"spacer {k}", kind="fixed") for k in range(books.MOST_ROWS))
     robot = replace(PUMA, rows=(*PUMA.rows, *fixed_rows))
     stage = MagicMock(robot=robot, q=robot.q_home, units=DEFAULT_UNITS)
-    boxes = [MagicMock(name=str(k)) for k in range(4)]
+    boxes = [MagicMock(name=str(k)) for k in range(5)]
     stage.client.gui.add_html.side_effect = boxes
     EquationsLesson(stage)
     assert "at most 16 rows, this arm has 23" in boxes[0].content
@@ -253,7 +253,19 @@ def test_lengths_follow_the_units(length: str) -> None:
 
 
 def test_notes_are_typeset() -> None:
-    assert views.note_html("-d4*s23 & 5") == "−<i>d</i><sub>4</sub>\u2009<i>s</i><sub>23</sub> &amp; 5"
+    d4, s23 = typeset.mathml_name("d4"), typeset.mathml_name("s23")
+    assert views.note_html("-d4*s23 & 5") == f"−{d4}\u2009{s23} &amp; 5"
+
+
+def test_the_columns_that_fail_are_named() -> None:
+    found = book(PIONEER)
+    text = views.test_html(found, np.radians([40.0, 40.0, 40.0, 40.0, 40.0]))
+    assert text.count('data-wrong="1"') == 5 + 5
+    assert "Column a and row x cannot be right" in text
+    assert "(13)" in text
+    still = views.test_html(found, np.array([0.3, 0.5, 0.7, 0.0, 0.4]))  # θ4 is 0
+    assert 'data-wrong="1"' not in still
+    assert "Zero at this pose" in still
 
 
 def test_small_and_vanishing_differences_are_not_called_zero() -> None:
