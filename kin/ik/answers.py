@@ -12,15 +12,14 @@ import numpy as np
 from kin.axes import size
 from kin.fk import fk
 from kin.ik import failures, nearest, preferences
-from kin.ik.assembly import by_key, leaves_motion, make_result, solutions_of
+from kin.ik.assembly import Found, by_key, leaves_motion, make_result
 from kin.ik.branches import Branches, Flags, is_closed, measure, solution, solve_branches
 from kin.ik.candidates import DISTANCE, OVERRUN
-from kin.ik.details import NotOnBranch, Redundancy, Solved
+from kin.ik.details import NotOnBranch, Solved
 from kin.ik.images import with_images
 from kin.ik.problem import IKProblem
 from kin.ik.results import IKResult, Status
 from kin.solvers.contract import APPROACH, POSE, POSITION
-from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 _SUSPICIOUS = 1e3  # times the rounding: where the formulas of a rounded table may miss postures
@@ -61,27 +60,16 @@ def _solved(problem: IKProblem, branches: Branches, good: Flags) -> IKResult:
         order = branches.order
     else:
         order = by_key(branches.q, good, branches.stats[:, DISTANCE])
-    solutions, redundancy = solutions_of(problem, branches, order, good)
-    fixed = tuple(parameter.label for parameter in problem.requested)
-    free = tuple(r.label for r in redundancy if r.label not in fixed and _has_width(r))
-    postures = len({found.branch for found in solutions})
-    if problem.options.images == "all":
-        solutions = with_images(problem, solutions)
-        if redundancy and solutions[0].redundancy:
-            redundancy = tuple(
-                r._replace(value=own.value) for r, own in zip(redundancy, solutions[0].redundancy, strict=True)
-            )
-    movable = {p.name for p in problem.redundancies if p.joint < 0 or not problem.locked[p.joint]}
-    details = Solved(
-        configurations=len(solutions),
-        redundant=any(r.name in movable for r in redundancy),
-        chosen_branches=problem.chosen_branches,
-        infinite=bool(free),
-        postures=postures,
-        free=free,
-        fixed=fixed,
-        complete=branches.complete,
-    )
+    found = Found(problem, branches, order, good)
+    if problem.options.images == "nearest":
+        return found.result()
+    solutions = with_images(problem, found.all_solutions())
+    redundancy = found.redundancy
+    if redundancy and solutions[0].redundancy:
+        redundancy = tuple(
+            r._replace(value=own.value) for r, own in zip(redundancy, solutions[0].redundancy, strict=True)
+        )
+    details = found.details._replace(configurations=len(solutions))
     return make_result(problem, Status.SOLVED, "", details, solutions=solutions, redundancy=redundancy)
 
 
@@ -159,11 +147,6 @@ def _by_descents(problem: IKProblem) -> IKResult | None:
         solutions=solutions,
         solver="numeric" if closed_form is None else closed_form.name,
     )
-
-
-def _has_width(redundancy: Redundancy) -> bool:
-    """Whether a redundancy parameter may have more than one value."""
-    return any(high - low > TOLERANCES.merge for low, high in redundancy.intervals)
 
 
 def _usable(problem: IKProblem, q: Array, stats: Array) -> tuple[Array, Array]:

@@ -14,10 +14,12 @@ from kin.ik.options import Frame
 from kin.ik.problem import IKProblem
 from kin.ik.results import BlockedBranch, Cause, IKResult, IKSolution, Status
 from kin.singularity import Singularity, singularities_at
-from kin.solvers.contract import APPROACH, MASK, POSITION
+from kin.solvers.contract import APPROACH, MASK, POSITION, ClosedForm
 from kin.solvers.numeric import spread
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
+
+Parameters = tuple[list[tuple[Redundancy, ...]], tuple[Redundancy, ...]]
 
 
 def by_key(q: Array, rows: Flags, key: Array) -> list[int]:
@@ -27,20 +29,116 @@ def by_key(q: Array, rows: Flags, key: Array) -> list[int]:
     return order
 
 
-def solutions_of(
-    problem: IKProblem, branches: Branches, order: list[int], every: Flags, compromise: str | None = None
-) -> tuple[tuple[IKSolution, ...], tuple[Redundancy, ...]]:
-    """Rows as solutions in this order, and the redundancy of the rows in `every` together."""
-    q, stats = branches.q.copy(), branches.stats.tolist()
-    q.flags.writeable = False
-    each, together = redundancy_of(problem, branches, order, every)
-    assert problem.closed_form is not None  # whose branches these are
-    names = problem.closed_form.branches
-    solutions = []
-    for i, own in zip(order, each, strict=True):
-        position, rotation, distance, overrun, _ = stats[i]
-        solutions.append(IKSolution(q[i], names[i], position, rotation, overrun == 0.0, distance, own, compromise))
-    return tuple(solutions), together
+class Found:
+    """Exact solutions as the kernels left them: what their `IKResult` contains is made when it is first read.
+
+    Args:
+        order: the rows that are solutions, the best first.
+        every: ``(k,)`` the rows whose intervals together are those of the best solution's redundancy.
+    """
+
+    __slots__ = ("_branches", "_every", "_order", "_problem", "_redundancies")
+
+    def __init__(self, problem: IKProblem, branches: Branches, order: list[int], every: Flags) -> None:
+        self._problem, self._branches, self._order, self._every = problem, branches, order, every
+        self._redundancies: Parameters | None = None
+
+    def result(self) -> IKResult:
+        """The answer; its solutions, details, redundancy and singularities are those below."""
+        problem, form, requirement = self._problem, form_of(self._problem), self._problem.requirement
+        result = IKResult.__new__(IKResult)
+        result.read_from(self)
+        result.status, result.cause, result.distance, result.target_error = (
+            Status.SOLVED, "", 0.0, problem.target_error,
+        )  # fmt: skip
+        result.closest = result.nearest_orientation = None
+        result.blocked, result.complete, result.task = (), self._branches.complete, problem.task
+        result.solver, result.solver_reason = form.name, form.reason
+        result.tolerances = (requirement.position, requirement.rotation)
+        return result
+
+    @property
+    def solutions(self) -> tuple[IKSolution, ...]:
+        """As many solutions as are wanted."""
+        return self.all_solutions()[: self._problem.options.max_solutions]
+
+    def all_solutions(self, compromise: str | None = None) -> tuple[IKSolution, ...]:
+        """Every solution."""
+        q, stats = self._branches.q.copy(), self._branches.stats.tolist()
+        q.flags.writeable = False
+        names, plain = form_of(self._problem).branches, not self._branches.redundancies
+        solutions = []
+        for place, row in enumerate(self._order):
+            made = IKSolution.__new__(IKSolution)
+            made.q, made.branch, made.compromise = q[row], names[row], compromise
+            made.position_error, made.rotation_error, made.distance, overrun, _ = stats[row]
+            made.in_limits = overrun == 0.0
+            if plain:
+                made.redundancy = ()
+            else:
+                made.read_from(_Place(self, place))
+            solutions.append(made)
+        return tuple(solutions)
+
+    def redundancies(self) -> Parameters:
+        """Of each solution, and of the best one with the intervals of all branches."""
+        if self._redundancies is None:
+            self._redundancies = redundancy_of(self._problem, self._branches, self._order, self._every)
+        return self._redundancies
+
+    @property
+    def redundancy(self) -> tuple[Redundancy, ...]:
+        """The parameters of the best solution."""
+        return self.redundancies()[1]
+
+    @property
+    def details(self) -> Solved:
+        """How many solutions there are, and what the task leaves free."""
+        problem, names = self._problem, form_of(self._problem).branches
+        fixed = tuple([parameter.label for parameter in problem.requested])
+        free = tuple([r.label for r in self.redundancy if r.label not in fixed and _has_width(r)])
+        movable = {p.name for p in problem.redundancies if p.joint < 0 or not problem.locked[p.joint]}
+        return Solved(
+            configurations=len(self._order),
+            redundant=any(r.name in movable for r in self.redundancy),
+            chosen_branches=problem.chosen_branches,
+            infinite=bool(free),
+            postures=len({names[row] for row in self._order}),
+            free=free,
+            fixed=fixed,
+            complete=self._branches.complete,
+        )
+
+    @property
+    def singularities(self) -> tuple[Singularity, ...]:
+        """Those of the best solution."""
+        best = self._branches.q[self._order[0]]
+        return singularities_at(self._problem.robot, best, TOLERANCES.at_singularity)
+
+
+class _Place:
+    """Of one solution, the redundancy parameters, made when they are first read."""
+
+    __slots__ = ("_found", "_place")
+
+    def __init__(self, found: Found, place: int) -> None:
+        self._found, self._place = found, place
+
+    @property
+    def redundancy(self) -> tuple[Redundancy, ...]:
+        """The parameters on its branch."""
+        return self._found.redundancies()[0][self._place]
+
+
+def form_of(problem: IKProblem) -> ClosedForm:
+    """The closed form that the branches of a problem are from."""
+    assert problem.closed_form is not None
+    return problem.closed_form
+
+
+def _has_width(redundancy: Redundancy) -> bool:
+    """Whether a redundancy parameter may have more than one value."""
+    return any(high - low > TOLERANCES.merge for low, high in redundancy.intervals)
 
 
 def leaves_motion(problem: IKProblem) -> bool:

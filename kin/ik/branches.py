@@ -17,6 +17,8 @@ from kin.solvers.contract import APPROACH, Obstacle, RedundancyParameter, Solver
 from kin.transforms import Array
 
 _NO_LIMIT = 1e6
+_BOOL, _WHOLE = np.dtype(bool), np.dtype(np.int64)
+_empty = np.empty
 _WHOLE_CIRCLE = ((-math.pi, math.pi),)
 
 
@@ -73,7 +75,7 @@ def solve_branches(
         values = problem.values if code == problem.code else (math.nan,) * len(redundancies)
     seed = problem.seed if seed is None else seed
     roll = 0.0
-    if code == APPROACH and "roll" in [parameter.name for parameter in redundancies]:
+    if code == APPROACH and any(parameter.name == "roll" for parameter in redundancies):
         x = fk(problem.robot, seed)[:3, 0]
         roll = math.atan2(float(T[:3, 1] @ x), float(T[:3, 0] @ x))
     lower, upper = problem.lower, problem.upper
@@ -81,9 +83,9 @@ def solve_branches(
         # Limits that are ignored must not pull redundancy parameters away from the seed either.
         lower, upper = np.full_like(lower, -_NO_LIMIT), np.full_like(upper, _NO_LIMIT)
     found = closed_form.solve(SolverInput(T, code, values, problem.respect, seed, lower, upper, roll))
-    q = np.array(found.q, order="C")
+    q = found.q.copy()
     k = len(q)
-    rows = Rows(q, np.empty((k, 5)), np.empty(k, bool), np.empty(k, bool), np.empty(k, int))
+    rows = Rows(q, _empty((k, 5)), _empty(k, _BOOL), _empty(k, _BOOL), _empty(k, _WHOLE))
     count = unchecked()(problem.requirement, problem.T, seed, problem.seed, rows)
     return Branches(
         q, rows.stats, rows.closed, rows.good, rows.order[:count].tolist(), redundancies, found.values,

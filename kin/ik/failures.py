@@ -15,7 +15,7 @@ import numpy as np
 
 from kin.fk import fk, link_frames
 from kin.ik import nearest
-from kin.ik.assembly import by_key, leaves_motion, make_result, solutions_of
+from kin.ik.assembly import Found, by_key, leaves_motion, make_result
 from kin.ik.branches import (
     Branches,
     Flags,
@@ -155,7 +155,8 @@ def compromise(problem: IKProblem, branches: Branches, allowed: Flags) -> IKResu
     approach_q, approach_stats = measure(problem, branches.q, code=APPROACH)
     possible = allowed & is_closed(problem, approach_stats)
     rows = possible & (stats[:, OVERRUN] == 0.0) if problem.respect else possible
-    solutions, _ = solutions_of(problem, branches, by_key(branches.q, rows, np.abs(stats[:, ROLL])), rows, "roll")
+    order = by_key(branches.q, rows, np.abs(stats[:, ROLL]))
+    solutions = Found(problem, branches, order, rows).all_solutions("roll")
     oriented = nearest.nearest_orientation(problem, branches.q if rows.any() else None)
     if oriented is not None and (problem.branches is None or problem.allows(problem.branch_of(oriented.q))):
         solutions += (oriented,)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,6 +19,7 @@ from kin.errors import InputError
 from kin.ik.candidates import Requirement
 from kin.ik.options import IKOptions, shape_of
 from kin.kernels.checks import straighten
+from kin.kernels.compile import direct
 from kin.robot import Robot
 from kin.solvers.common import TURN
 from kin.solvers.contract import POSITION, ClosedForm, RedundancyParameter
@@ -29,6 +30,8 @@ from kin.transforms import Array, as_transform, finite_array
 FAR = 1e6  # metres, radians; the coordinates of targets and the values of seeds are smaller
 SEED = "seed"  # stands for the branch of the seed
 _FLOAT = np.dtype(np.float64)
+_POSE = (4, 4)
+_empty, _ndarray = np.empty, np.ndarray
 _LEVER = 0.1  # metres
 _SINGLE = float(np.finfo(np.float32).eps)
 _DOUBLE = 1e-9  # deviation of RᵀR from I that does not matter
@@ -106,10 +109,12 @@ class IKProblem:
         """This problem, as `prepare` gives it, with a target and its rounding, as from `read_pose`, and a seed."""
         # The same as `replace`, in a tenth of the time: this runs for every target.
         problem = object.__new__(IKProblem)
-        problem.__dict__.update(self.__dict__, T=T, seed=seed)
+        values = problem.__dict__
+        values.update(self.__dict__)
+        values["T"], values["seed"] = T, seed
         if error > 0.0:
-            problem.__dict__["target_error"] = error
-            del problem.__dict__["requirement"]  # computed again from this error
+            values["target_error"] = error
+            del values["requirement"]  # computed again from this error
         if self.branches is not None and SEED in (self.options.branch or ()):
             name = self.branch_name(self.branch_of(seed))
             problem.__dict__["branches"] = self.branches | self.rows_named(name)
@@ -226,10 +231,11 @@ def read_pose(target: ArrayLike, code: int, field: str = "target", always: bool 
     With `always`, whatever is more than rounding of doubles counts: an arm with few joints meets few poses
     exactly, and the digits of a target decide which of them are meant.
     """
-    if type(target) is np.ndarray and target.shape == (4, 4) and target.dtype is _FLOAT and target.flags.carray:
-        T = np.empty((4, 4))
-        if straighten(target, FAR, T):
-            return T, _rounding(target) if always else 0.0
+    if type(target) is _ndarray and target.shape == _POSE and target.dtype is _FLOAT and target.flags.carray:
+        T = _empty(_POSE)
+        error = _straighten()(target, FAR, T)
+        if error >= 0.0:
+            return T, _rounding(target) if always and error > 0.5 * _DOUBLE else 0.0
     if code == POSITION and shape_of(target) == (3,):
         T = np.eye(4)
         T[:3, 3] = finite_array(field, target, (3,))
@@ -239,6 +245,12 @@ def read_pose(target: ArrayLike, code: int, field: str = "target", always: bool 
     if max(abs(T.item(3)), abs(T.item(7)), abs(T.item(11))) > FAR:
         raise InputError(f"{field} position", T[:3, 3].tolist(), "coordinates below 1e6 m")
     return T, error
+
+
+@cache
+def _straighten() -> Callable[[Array, float, Array], float]:
+    """`straighten` without type dispatch."""
+    return direct(straighten, 2, float, 2)
 
 
 def listed(targets: object) -> list[ArrayLike]:

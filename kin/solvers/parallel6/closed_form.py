@@ -87,13 +87,16 @@ class Parallel6(ClosedForm):
         T, lower, upper = without_last(problem) if free_roll else (problem.T, problem.lower, problem.upper)
         value = math.nan if free_roll else problem.values[0]
         gap, count = solve(g.params, T, value, problem.seed, lower, upper, arcs, out)
-        q, free = out[:, :6], out[:, 6:]
+        q = out[:, :6]
         if free_roll:
             ranges = free_last(problem, q)
             values = q[:, 5:].copy()
         else:
             ranges = arcs[:count]
-            values = np.where(free == 1.0, q[:, 5:], math.nan)
+            values = np.empty((8, 1))
+            values.fill(math.nan)
+            if 1.0 in out[:, 6].tolist():
+                values = np.where(out[:, 6:] == 1.0, q[:, 5:], math.nan)
         obstacle = None if gap <= _REACH else Obstacle("wrist centre beyond the elbow's reach")
         return Candidates(q, values, (ranges,), max(gap, 0.0), obstacle)
 

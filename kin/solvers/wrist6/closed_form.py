@@ -103,10 +103,12 @@ class Wrist6(ClosedForm):
         g, free_roll = self.geometry, problem.task == APPROACH
         out, arcs = np.empty((8, 6)), np.empty((128, 3))
         T, lower, upper = without_last(problem) if free_roll else (problem.T, problem.lower, problem.upper)
-        value = problem.values[0] if self._reaches_axis_1 else math.nan
+        reaches_axis_1 = self._reaches_axis_1
+        value = problem.values[0] if reaches_axis_1 else math.nan
         gap, count = solve(g.params, T, value, problem.seed, lower, upper, arcs, out)
-        values, ranges = np.full((8, len(self.redundancies(problem.task))), math.nan), []
-        if self._reaches_axis_1:
+        values, ranges = np.empty((8, reaches_axis_1 + free_roll)), []
+        values.fill(math.nan)
+        if reaches_axis_1:
             rows = arcs[: max(count, 0)]
             rows[:, 1:] -= g.offset[0]
             if g.sign[0] < 0.0:
