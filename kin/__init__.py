@@ -7,7 +7,7 @@
 """
 
 from kin._version import __version__
-from kin.dh import Screws, convert, robot_from_screws, screws
+from kin.dh import Screws, convert, exp_screw, robot_from_screws, screws
 from kin.errors import InputError, KinematicsError, RobotFileError, UnknownRobotError
 from kin.files import (
     UrdfReport,
@@ -138,6 +138,7 @@ __all__ = [
     "capability_map",
     "configuration_at",
     "convert",
+    "exp_screw",
     "fk",
     "fk_positions",
     "frame_pose",

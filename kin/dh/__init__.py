@@ -1,6 +1,15 @@
 """DH tables of arms that are described otherwise: by the other convention, by frames, by screws."""
 
-from kin.dh.exponentials import Screws, robot_from_screws, screws
+from kin.dh.exponentials import Screws, exp_screw, robot_from_screws, screws
 from kin.dh.tables import SAMPLES, convert, largest_difference, table_of_chain
 
-__all__ = ["SAMPLES", "Screws", "convert", "largest_difference", "robot_from_screws", "screws", "table_of_chain"]
+__all__ = [
+    "SAMPLES",
+    "Screws",
+    "convert",
+    "exp_screw",
+    "largest_difference",
+    "robot_from_screws",
+    "screws",
+    "table_of_chain",
+]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from itertools import islice, pairwise
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -37,6 +37,47 @@ class Screws(NamedTuple):
 
     S: Array
     M: Array
+
+    @property
+    def B(self) -> Array:
+        """The same screws ``(6, n)``, seen from the tool at zero: ``T(q) = M exp([B₁] q₁) … exp([Bₙ] qₙ)``."""
+        R, p = self.M[:3, :3], self.M[:3, 3]
+        omega, v = self.S[:3], self.S[3:]
+        moved = v - np.cross(p, omega, axisb=0, axisc=0)  # the velocity of the tool point
+        return np.concatenate([R.T @ omega, R.T @ moved]) + 0.0
+
+    def pose(self, q: ArrayLike) -> Array:
+        """The product of exponentials ``(..., 4, 4)`` for values ``(..., n)`` of its joints."""
+        values = finite_array("q", q, (self.S.shape[1],))
+        T = np.broadcast_to(np.eye(4), (*values.shape[:-1], 4, 4))
+        for i, S in enumerate(self.S.T):
+            T = T @ exp_screw(S, values[..., i])
+        return T @ self.M
+
+
+def exp_screw(S: ArrayLike, value: ArrayLike) -> Array:
+    """The motion ``exp([S] value)`` ``(..., 4, 4)`` along one screw (ω, v) ``(6,)``, for values ``(...)``.
+
+    With |ω| = 1 a rotation by that angle about the axis; with a pitch h = ω·v, also a slide by h times the angle.
+    With ω = 0 a translation by v times the value.
+    """
+    screw, angle = finite_array("S", S, (6,)), _values(value)
+    if screw.ndim != 1:
+        raise InputError("S", f"shape {screw.shape}", "one screw of six numbers (ω, v)")
+    omega, v = screw[:3], screw[3:]
+    speed = float(np.linalg.norm(omega))
+    out = np.zeros((*angle.shape, 4, 4))
+    out[..., 3, 3] = 1.0
+    if speed == 0.0:
+        out[..., :3, :3] = np.eye(3)
+        out[..., :3, 3] = angle[..., None] * v
+        return out
+    W = np.cross(np.eye(3), omega / speed)  # [ω]: W a = ω × a
+    turn = (angle * speed)[..., None, None]
+    sine, cosine = np.sin(turn), 1.0 - np.cos(turn)
+    out[..., :3, :3] = np.eye(3) + sine * W + cosine * (W @ W)
+    out[..., :3, 3] = (turn * np.eye(3) + cosine * W + (turn - sine) * (W @ W)) @ (v / speed)
+    return out
 
 
 def screws(robot: Robot | str, q: ArrayLike | None = None) -> Screws:
@@ -106,6 +147,12 @@ def robot_from_screws(
         table.rows, robot_id=robot_id, name=name, source=source, home=home, base=table.base, tool=table.tool
     )
     return convert(robot, convention)
+
+
+def _values(value: ArrayLike) -> Array:
+    """Finite numbers of any shape, none included."""
+    several: list[Any] = [value]
+    return np.asarray(finite_array("value", several, (None,))[0])
 
 
 def _one_per_joint(field: str, values: Iterable[Value] | None, n: int) -> list[Value] | None:

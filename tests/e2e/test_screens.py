@@ -133,6 +133,7 @@ SCREENS: dict[str, Callable[[Tab], None]] = {
     "move": lambda tab: tab.open("Move"),
     "learn": lambda tab: tab.choose_lesson("None"),
     "learn-dh": lesson("pioneer5", "DH table step by step", "[data-dh=table]"),
+    "learn-screws": lesson("scara", "Screws", "[data-product]"),
     "learn-equations": lesson("pioneer5", "Equations", "[data-equation]"),
     "learn-postures": lesson("puma560", "Postures", "[data-posture]"),
     "learn-velocity": lesson("puma560", "Velocity", "[data-singular]"),

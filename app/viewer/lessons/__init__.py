@@ -11,12 +11,14 @@ from app.viewer.lessons.equations import EquationsLesson
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.postures import Postures
 from app.viewer.lessons.redundancy import RedundancyLesson
+from app.viewer.lessons.screws import ScrewsLesson
 from app.viewer.lessons.trajectories import TrajectoriesLesson
 from app.viewer.lessons.velocity import VelocityLesson
 
 # In the order of a course.
 LESSONS: tuple[type[Lesson], ...] = (
     DHLesson,
+    ScrewsLesson,
     EquationsLesson,
     Postures,
     RedundancyLesson,

@@ -56,6 +56,42 @@ def test_the_formula_is_the_arm_and_comes_back(robot):
         assert max(np.abs(again.S - S).max(), np.abs(again.M - M).max()) < 1e-13
 
 
+@pytest.mark.parametrize("robot", kin.builtin_robots().values(), ids=lambda robot: robot.id)
+def test_space_and_body_form_are_forward_kinematics(robot):
+    rng = np.random.default_rng(2)
+    q = robot.random_q(rng, 20)
+    T = kin.fk(robot, q)
+    for zero in (np.zeros(robot.n), robot.q_home):
+        found = kin.screws(robot, zero)
+        assert np.abs(found.pose(q - zero) - T).max() < 1e-12
+        body = np.broadcast_to(found.M, T.shape)
+        for i, B in enumerate(found.B.T):
+            body = body @ kin.exp_screw(B, q[:, i] - zero[i])
+        assert np.abs(body - T).max() < 1e-12
+        J = kin.jacobian(robot, zero, frame="tool")
+        assert np.abs(found.B - np.concatenate([J[3:], J[:3]])).max() < 1e-12, "at zero: the body Jacobian"
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.lists(st.floats(-2, 2), min_size=6, max_size=6), st.floats(-2, 2))
+def test_a_screw_with_any_pitch_and_speed(S, value):
+    S = np.array(S)
+    if 0.0 < np.linalg.norm(S[:3]) < 1e-3:  # the axis is then kilometres away
+        S[:3] = 0.0
+    assert np.abs(kin.exp_screw(S, value) - exponential(S, value)).max() < 1e-6
+    one = kin.exp_screw(S, value / 2)
+    assert np.abs(one @ one - kin.exp_screw(S, value)).max() < 1e-6
+    assert kin.exp_screw(S, [[0.0, value]]).shape == (1, 2, 4, 4)
+
+
+def test_a_screw_is_six_numbers():
+    for S in (np.zeros(5), np.zeros((2, 6)), [0, 0, np.nan, 0, 0, 0]):
+        with pytest.raises(InputError):
+            kin.exp_screw(S, 1.0)
+    with pytest.raises(InputError, match="q"):
+        kin.screws("ur5").pose(np.zeros(5))
+
+
 def random_screws(seed):
     draw = Draw(seed)
     columns = []

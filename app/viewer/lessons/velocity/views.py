@@ -185,7 +185,7 @@ def legend_html(kind: Ellipsoid | None, chosen: int | None, state: State, twists
         items.append(("arrow", color, f"motion that is {word}"))
     if len(twists) and (np.linalg.norm(twists[:, 3:], axis=1) > 1e-3).any():
         items.append(("ring", color, f"rotation that is {word}"))
-    return render("velocity/legend", items=items)
+    return render("panel/legend", label="drawn at the tool", items=items)
 
 
 # Ellipsoid and singular values
