@@ -25,6 +25,7 @@ from app.viewer.scene.camera import round_points
 from kin import InputError, Screws
 from kin.transforms import Array
 
+LABELS = 1.15  # room for the labels beyond the ends of the axes
 INTERVAL = 0.05  # s between two updates of the numbers
 FORMS: dict[str, Form] = {"Space (world frame)": "space", "Body (tool frame)": "body"}
 PLACES = {"All joints at zero": "zero", "Where they are now": "now"}
@@ -164,7 +165,8 @@ class ScrewsLesson(Lesson):
         listen(self._slider, self.post, ("factors", robot.id))
         stage.see_through(True)
         self._show()
-        stage.fit_view([round_points(self._drawing.tips)])
+        center, radius = round_points(self._drawing.tips)
+        stage.fit_view([(center, LABELS * radius)])
 
     def _screws(self) -> Screws:
         return kin.screws(self.stage.robot, self.stage.q) if self._now else self._zero
@@ -175,7 +177,9 @@ class ScrewsLesson(Lesson):
         found = self._screws()
         points, directions = axes_at(robot, stage.q if self._now else np.zeros(robot.n))
         self._drawing.show_axes(points, directions)
-        self._drawing.show_chosen(self._chosen, found.S[:, self._chosen], origin_of(found, self._form))
+        self._drawing.show_chosen(
+            self._chosen, found.S[:, self._chosen], origin_of(found, self._form), stage.units
+        )
         self._drawing.show_ghost(self._ghost())
 
     def _ghost(self) -> Array | None:

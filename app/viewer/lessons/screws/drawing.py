@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import viser
 
-from app.viewer.labels import add_label
+from app.viewer.lessons.figures import GREY, Figure, clear_of
 from app.viewer.lessons.screws.product import foot
 from app.viewer.lessons.velocity.drawing import arrow_color, ring_arrow, wxyz_along
 from app.viewer.scene.bodies.parts import joint_color
@@ -13,10 +13,11 @@ from app.viewer.scene.meshes import body
 from app.viewer.skeleton import cylinder, places, skeleton
 from kin import Robot
 from kin.transforms import Array, wxyz_from_rotation
+from kin.units import Units
 
 REACH = 0.42  # of an axis to both sides, relative to the radius of the sphere around the arm
-RING, APART, BEYOND = 0.06, 0.13, 0.07
-VELOCITY, FOOT = (213, 40, 0), (120, 120, 120)
+RING, APART = 0.06, 0.13
+VELOCITY = (213, 40, 0)
 GHOST = (86, 180, 233)
 OPACITY = 0.45
 _SHORT = 1e-3  # relative; shorter arrows are not drawn
@@ -33,19 +34,16 @@ class Drawing:
         self._robot = robot
         self._radius = r = body(robot).radius
         self.tips = np.zeros((robot.n, 3))
-        self._root = scene.add_frame(root, show_axes=False)
-        none = np.zeros((1, 2, 3), np.float32)
+        self._figure = figure = Figure(scene, root, body(robot).size)
         ring = ring_arrow(False)
-        self._lines, self._marks, self._labels = [], [], []
+        self._lines, self._marks = [], []
         for i in range(robot.n):
-            color, name = joint_color(i), f"{root}/{i + 1}"
-            self._lines.append(
-                scene.add_line_segments(f"{name}/axis", none, color, thickness=2.5, thickness_units="screen")
-            )
+            color, name = joint_color(i), figure.name()
+            self._lines.append(figure.line(f"S{_subscript(i + 1)}", color))
             mark: viser.ArrowsHandle | viser.MeshHandle
             if robot.revolute[i]:
                 mark = scene.add_mesh_simple(
-                    f"{name}/turn",
+                    name,
                     np.asarray(ring.vertices),
                     np.asarray(ring.faces),
                     color=color,
@@ -53,16 +51,12 @@ class Drawing:
                     cast_shadow=False,
                 )
             else:
-                mark = self._arrow(scene, f"{name}/slide", color)
+                mark = self._arrow(scene, name, color)
             self._marks.append(mark)
-            label = f"S{_subscript(i + 1)}"
-            self._labels.append(add_label(scene, f"{name}/name", label, anchor="center-center"))
         self._frame = scene.add_frame(
             f"{root}/frame", axes_length=0.18 * r, axes_radius=0.006 * r, origin_radius=0.012 * r
         )
-        self._foot = scene.add_line_segments(
-            f"{root}/foot", none, FOOT, thickness=2.0, thickness_units="screen", visible=False
-        )
+        self._foot = figure.dimension("|v|", GREY)
         self._velocity = self._arrow(scene, f"{root}/velocity", VELOCITY)
         self._ghost = self._new_ghost(scene, f"{root}/ghost")
 
@@ -102,7 +96,7 @@ class Drawing:
         r = self._radius
         self.tips = tips = spread_tips(points, directions, REACH * r, APART * r)
         for i, (point, z, tip) in enumerate(zip(points, directions, tips, strict=True)):
-            self._lines[i].points = np.array([[point - REACH * r * z, tip]], np.float32)
+            self._lines[i].show(point - REACH * r * z, tip)
             mark = self._marks[i]
             if isinstance(mark, viser.ArrowsHandle):
                 mark.points = np.array([[tip - 0.2 * r * z, tip + 0.02 * r * z]], np.float32)
@@ -110,9 +104,8 @@ class Drawing:
             else:
                 mark.position = tip - 0.02 * r * z
                 mark.wxyz = wxyz_along(z)
-            self._labels[i].position = tip + BEYOND * r * z
 
-    def show_chosen(self, joint: int, S: Array, T: Array) -> None:
+    def show_chosen(self, joint: int, S: Array, T: Array, units: Units) -> None:
         """Draw where the numbers of one screw ``(6,)`` come from, seen from the frame T ``(4, 4)``.
 
         The perpendicular from its origin to the axis, and there the velocity v of a point that moves along.
@@ -123,9 +116,12 @@ class Drawing:
         local = np.concatenate([S[:3], v])
         size = float(np.linalg.norm(v))
         there = size > _SHORT * self._radius
-        _set_visible(self._foot, there and bool(self._robot.revolute[joint]))
         _set_visible(self._velocity, there)
-        self._foot.points = np.array([[origin, origin + foot(local)]], np.float32)
+        if there and self._robot.revolute[joint]:
+            end = origin + foot(local)
+            self._foot.show(origin, end, units, clear_of(origin, end, self.tips))
+        else:
+            self._foot.hide()
         if there:
             self._velocity.points = np.array([[origin, origin + 0.35 * self._radius * v / size]], np.float32)
 
@@ -139,7 +135,7 @@ class Drawing:
 
     def remove(self) -> None:
         """Remove everything from the scene."""
-        self._root.remove()
+        self._figure.remove()
 
 
 def spread_tips(points: Array, directions: Array, reach: float, apart: float) -> Array:

@@ -43,7 +43,7 @@ def outline(robot: Robot, units: Units) -> Outline:
             "How far the axis is",
             "p may be any point of the axis: along the axis, ω × p does not change. So v depends on the line.",
             _distance(robot, units, found.S),
-            "The grey line in the scene is this distance, the red arrow the direction of v.",
+            "The dimension |v| in the scene is this distance, the red arrow the direction of v.",
         ),
         Step(
             "A joint that slides",

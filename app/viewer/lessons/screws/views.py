@@ -7,7 +7,8 @@ import math
 import numpy as np
 from markupsafe import Markup
 
-from app.viewer.lessons.screws.drawing import FOOT, GHOST, VELOCITY
+from app.viewer.lessons.figures import GREY
+from app.viewer.lessons.screws.drawing import GHOST, VELOCITY
 from app.viewer.lessons.screws.product import Form, foot, product
 from app.viewer.panel.joints import label
 from app.viewer.scene.bodies.parts import joint_color
@@ -108,7 +109,7 @@ def legend_html(robot: Robot, form: Form, now: bool, ghost: int | None, chosen: 
     where = "where they are now" if now else "at zero"
     items = [("ring", joint_color(chosen), f"joint axes {where}, in their positive sense")]
     if robot.revolute[chosen]:
-        items.append(("line", FOOT, f"distance of axis {chosen + 1} from the {FRAME[form]} frame"))
+        items.append(("line", GREY, f"distance of axis {chosen + 1} from the {FRAME[form]} frame"))
     items.append(("arrow", VELOCITY, f"v of joint {chosen + 1}, direction only"))
     if ghost is not None:
         words = (
