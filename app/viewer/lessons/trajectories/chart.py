@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -13,6 +14,7 @@ from kin.transforms import Array
 
 WIDTH, LEFT, RIGHT, HIGH, GAP, TOP, BOTTOM = 320.0, 44.0, 8.0, 62.0, 22.0, 16.0, 18.0
 FEW = 4  # numbers on an axis
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 class Curve(NamedTuple):
@@ -30,21 +32,28 @@ class Row:
     Attributes:
         title: with the unit.
         limit: drawn as a dashed line in both directions; None: there is none.
+        log: whether the values, all positive, are drawn on a logarithmic scale.
     """
 
     title: str
     limit: float | None = None
+    log: bool = False
 
 
-def chart(rows: tuple[Row, ...], curves: tuple[Curve, ...], label: str, axis: str = "s") -> Markup:
-    """The curves with their legend; `axis`: unit of the horizontal axis."""
+def chart(rows: tuple[Row, ...], curves: tuple[Curve, ...], label: str, axis: str = "s", whole: int = 0) -> Markup:
+    """The curves with their legend.
+
+    Args:
+        axis: unit of the horizontal axis.
+        whole: not 0: the axis has whole numbers, and at least as many.
+    """
     start = min(float(curve.times[0]) for curve in curves)
-    end = max(float(curve.times[-1]) for curve in curves)
+    end = max(float(whole), *(float(curve.times[-1]) for curve in curves))
     parts: list[str] = []
     for k, row in enumerate(rows):
         parts += _row(row, k, curves, (start, end))
     bottom = TOP + len(rows) * HIGH + (len(rows) - 1) * GAP
-    marks = _thin(tick_labels(start, end, 1.0), 7)
+    marks = _thin([mark for mark in tick_labels(start, end, 1.0) if not whole or mark[0] % 1.0 == 0.0], 7)
     for value, text in marks:
         x = LEFT + (value - start) / (end - start) * (WIDTH - LEFT - RIGHT)
         unit = f" {axis}" if value == marks[-1][0] else ""
@@ -63,7 +72,10 @@ def chart(rows: tuple[Row, ...], curves: tuple[Curve, ...], label: str, axis: st
 
 def _row(row: Row, k: int, curves: tuple[Curve, ...], ends: tuple[float, float]) -> list[str]:
     """One quantity of all curves."""
-    values = [shown for curve in curves if (shown := curve.rows[k]) is not None]
+    drawn = [
+        None if (shown := curve.rows[k]) is None else np.log10(shown) if row.log else shown for curve in curves
+    ]
+    values = [shown for shown in drawn if shown is not None]
     low, high = min(float(v.min()) for v in values), max(float(v.max()) for v in values)
     if row.limit is not None:
         low, high = (min(low, -row.limit) if low < 0.0 else low), max(high, row.limit)
@@ -75,7 +87,8 @@ def _row(row: Row, k: int, curves: tuple[Curve, ...], ends: tuple[float, float])
         return top + (high - value) / (high - low) * HIGH
 
     parts = [f'<text x="{LEFT}" y="{top - 5:.1f}" class="kb-axis kb-motion-title">{escape(row.title)}</text>']
-    for value, text in _thin(tick_labels(low, high, 1.0), FEW):
+    marks = _powers(low, high) if row.log else tick_labels(low, high, 1.0)
+    for value, text in _thin(marks, FEW):
         parts.append(
             f'<path d="M{LEFT} {y(value):.1f}H{right:.1f}" stroke="currentColor" stroke-opacity=".16"/>'
             f'<text x="{LEFT - 5:.1f}" y="{y(value) + 3.4:.1f}" text-anchor="end" class="kb-axis">{text}</text>'
@@ -83,8 +96,7 @@ def _row(row: Row, k: int, curves: tuple[Curve, ...], ends: tuple[float, float])
     limits = () if row.limit is None else (row.limit, -row.limit)
     shown_limits = [y(limit) for limit in limits if low < limit < high]
     parts += [f'<path class="kb-motion-limit" d="M{LEFT} {at:.1f}H{right:.1f}"/>' for at in shown_limits]
-    for i, curve in enumerate(curves):
-        shown = curve.rows[k]
+    for i, (curve, shown) in enumerate(zip(curves, drawn, strict=True)):
         if shown is not None:
             across = LEFT + (curve.times - ends[0]) / (ends[1] - ends[0]) * (right - LEFT)
             points = zip(across.tolist(), np.vectorize(y)(shown).tolist(), strict=True)
@@ -95,6 +107,14 @@ def _row(row: Row, k: int, curves: tuple[Curve, ...], ends: tuple[float, float])
         'stroke="currentColor" stroke-opacity=".4"/>'
     )
     return parts
+
+
+def _powers(low: float, high: float) -> list[tuple[float, str]]:
+    """The powers of ten between two logarithms; the ends themselves if there are fewer than two."""
+    whole = range(math.ceil(low), math.floor(high) + 1)
+    if len(whole) < 2:
+        return [(value, f"{10.0**value:.2g}") for value in (low, high)]
+    return [(float(power), "10" + str(power).translate(_RAISED)) for power in whole]
 
 
 def _thin(labels: list[tuple[float, str]], most: int) -> list[tuple[float, str]]:

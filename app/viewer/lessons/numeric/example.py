@@ -1,0 +1,48 @@
+"""The example of the steps: a target far from singularities, and a start near it."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from app.viewer.lessons.numeric import methods
+from app.viewer.lessons.numeric.methods import Match, Problem, Run, Settings
+from kin import Robot, fk
+from kin.transforms import Array
+
+_SAMPLES, _OFFSETS = 64, (0.3, 0.15, 0.075, 0.03)
+_SLIDE = 0.4  # of an offset, for prismatic joints
+
+
+class Example(NamedTuple):
+    """A target far from singularities, and a start near it from which Newton converges."""
+
+    problem: Problem
+    start: Array
+    newton: Run
+
+
+def usual_match(robot: Robot) -> Match:
+    """What a target asks of this arm: the whole pose needs six joints."""
+    return "pose" if robot.n >= 6 else "point"
+
+
+@lru_cache(maxsize=64)
+def example(robot: Robot) -> Example:
+    """The example of the steps for this arm."""
+    rng = np.random.default_rng(7)
+    q = robot.q_home + 0.6 * (robot.random_q(rng, _SAMPLES) - robot.q_home)
+    match = usual_match(robot)
+    probe = Problem(robot, fk(robot, robot.q_home), match)
+    smallest = np.linalg.svd(probe.jacobian(q), compute_uv=False)[:, -1]
+    aim = q[int(np.argmax(smallest))]
+    problem = Problem(robot, fk(robot, aim), match)
+    pattern = np.where(np.arange(robot.n) % 2, -1.0, 1.0) * np.where(robot.revolute, 1.0, _SLIDE) * problem.travel
+    for offset in _OFFSETS:
+        start = np.clip(aim + offset * pattern, robot.lower, robot.upper)
+        found = methods.run(problem, Settings("newton"), start)
+        if found.outcome == "reached":
+            break
+    return Example(problem, start, found)
