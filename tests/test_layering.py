@@ -39,6 +39,7 @@ RULES: dict[str, set[str]] = {
     },
     "app/exports": {"kin", "numpy", "scipy", "tqdm", "trimesh", "PIL", "app.exports", "app.shared"},
     "app/equations": {"kin", "numpy", "sympy", "app.equations", "app.shared.computations"},
+    "app/exercises": {"kin", "numpy", "app.exercises"},
     "app/bench": {"kin", "numpy", "numba", "app.bench"},
     "app/bench/contestants": {
         *("kin", "numpy", "numba", "app.bench"),
@@ -51,7 +52,7 @@ RULES: dict[str, set[str]] = {
     },
     "app/viewer": {
         *("viser", "trimesh", "numpy", "jinja2", "markupsafe", "kin"),
-        *("app.viewer", "app.equations", "app.exports", "app.shared"),
+        *("app.viewer", "app.equations", "app.exercises", "app.exports", "app.shared"),
     },
     "app/viewer/meshes": {
         *("fast_simplification", "trimesh", "numpy", "kin", "app.shared", "app.viewer.meshes", "app.viewer.scene"),
@@ -65,13 +66,22 @@ RULES: dict[str, set[str]] = {
     "app/viewer/meshes/surface.py": {"numpy"},
     "app/service": {
         *("kin", "fastapi", "starlette", "pydantic", "pydantic_core", "uvicorn", "httptools", "websockets"),
-        *("app.api", "app.service", "app.shared", "app.viewer"),
+        *("app.api", "app.exercises", "app.service", "app.shared", "app.viewer"),
     },
     "app/service/web": {
         *("starlette", "msgspec", "itsdangerous", "kin"),
         *("app.api.problems", "app.service.web", "app.shared"),
     },
-    "app/cli": {"kin", "numpy", "pydantic", "typing_extensions", "app.cli", "app.exports", "app.shared"},
+    "app/cli": {
+        "kin",
+        "numpy",
+        "pydantic",
+        "typing_extensions",
+        "app.cli",
+        "app.exercises",
+        "app.exports",
+        "app.shared",
+    },
     "app/cli/parser.py": {"kin", "app.bench.command", "app.cli"},
     "app/cli/arguments.py": set(),
     "app/cli/xacro": {"kin", "app.cli.xacro"},
@@ -142,6 +152,8 @@ def test_every_row_of_the_table_has_its_module(row):
         ("app/shared/store.py", "from app.api import schemas"),
         ("app/bench/run.py", "import pinocchio"),
         ("app/shared/new.py", "import requests"),
+        ("app/exercises/kinds/new.py", "from app.viewer.feature import Feature"),
+        ("app/exercises/new.py", "from app.shared.store import Store"),
     ],
 )
 def test_the_table_has_teeth(module, source):

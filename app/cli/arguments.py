@@ -338,10 +338,9 @@ def add_bench(commands: Any, parents: Parents) -> argparse.ArgumentParser:
 
 def add_check(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard check``."""
-    parser = _command(
-        commands, "check", "validate a file of an arm, describe it", parents.output, takes_robot=False
-    )
-    parser.add_argument("file", metavar="FILE", help="robot file (*.toml), URDF (*.urdf) or *.xacro")
+    about = "validate an arm or an exercise"
+    parser = _command(commands, "check", about, parents.robots, parents.output, takes_robot=False)
+    parser.add_argument("file", metavar="FILE", help="robot file or exercise (*.toml), URDF (*.urdf) or *.xacro")
     _add_links(parser)
     return parser
 

@@ -1,20 +1,25 @@
-"""``kinboard import``, ``kinboard export`` and ``kinboard check``: files of arms.
+"""``kinboard import``, ``kinboard export`` and ``kinboard check``: files of arms, and of exercises.
 
 A file that is not a valid robot is rejected earlier, by :mod:`kin.files`.
 """
 
 from __future__ import annotations
 
+import tomllib
 from argparse import Namespace
 from pathlib import Path
 
 from app.cli.terminal import Notation, print_json, robot_of, table
 from app.cli.xacro import expanded, is_xacro
+from app.exercises import Exercise, ExerciseFileError, VariantError, load_exercise
+from app.exercises.exercise import CHECKED_SEEDS
 from app.exports.robots import robot_file
 from app.shared.answers.exchange import import_answer
 from app.shared.answers.inspection import InspectionAnswer, inspect
+from app.shared.store import Store
 from kin import InputError, UrdfReport, UrdfRobot, builtin_robots, load_robot, read_urdf, robot_to_toml
 from kin.files.builtin import BUILTIN
+from kin.units import DEFAULT_UNITS
 
 
 def run_import(arguments: Namespace) -> int:
@@ -78,8 +83,10 @@ def _write(path: str, text: str) -> None:
 
 
 def run_check(arguments: Namespace) -> int:
-    """Describe the arm of a robot file."""
+    """Describe the arm of a robot file, or check an exercise."""
     path = Path(arguments.file)
+    if path.suffix == ".toml" and _is_exercise(path):
+        return _check_exercise(path, arguments.robots, arguments.json)
     lines: list[str] = []
     if path.suffix in (".urdf", ".xacro"):
         robot, report = _read(arguments)
@@ -130,3 +137,47 @@ def _about(answer: InspectionAnswer, units: Notation) -> list[str]:
         *(f"warning: {text}" for text in answer["warnings"]),
     ]
     return lines if answer["warnings"] else [*lines, "No warnings."]
+
+
+def _is_exercise(path: Path) -> bool:
+    """Whether a file is meant as an exercise: a robot file has rows, an exercise a kind and an answer."""
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except (OSError, ValueError, RecursionError):
+        return False  # reading it as a robot file says why
+    return "rows" not in data and ("kind" in data or "answer" in data)
+
+
+def _check_exercise(path: Path, robots: str | None, as_json: bool) -> int:
+    """Validate an exercise file, try it for some seeds, and show one variant with its answer."""
+    exercise = load_exercise(path, Store(Path(robots) if robots else None).get)
+    try:
+        exercise.verify()
+    except VariantError as error:
+        raise ExerciseFileError(str(path), "answer", str(error), "an exercise that can be solved") from None
+    if as_json:
+        return print_json(_exercise_facts(exercise))
+    facts = _exercise_facts(exercise)
+    print(f"{facts['title']} ({facts['id']})\n{facts['topic']}, level {facts['level']}, {facts['robot']}\n")
+    print(f"{facts['text']}\n")
+    for i, hint in enumerate(exercise.hints, 1):
+        print(f"hint {i}      {hint}")
+    print(f"kind        {facts['kind']}: {exercise.kind.about}")
+    print(f"answer      {facts['answer']}")
+    seeds = len(CHECKED_SEEDS) if exercise.vary else 1
+    print(f"\nSolved for {seeds} variant{'s' * (seeds > 1)}; the one above has seed 0.")
+    return 0
+
+
+def _exercise_facts(exercise: Exercise) -> dict[str, object]:
+    variant = exercise.variant(0)
+    return {
+        "id": exercise.id,
+        "title": exercise.title,
+        "topic": exercise.topic,
+        "level": exercise.level,
+        "robot": exercise.robot.id,
+        "kind": exercise.kind.name,
+        "text": variant.text(exercise.text, DEFAULT_UNITS),
+        "answer": exercise.solution(variant, DEFAULT_UNITS),
+    }

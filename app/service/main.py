@@ -31,6 +31,7 @@ from app.api import (
     complete_document,
     install_problem_handlers,
 )
+from app.exercises import ExerciseFileError, Exercises
 from app.service import status
 from app.service.gauges import update_gauges
 from app.service.handover import SUPPORTED, Member, Phase, Role, members
@@ -182,7 +183,8 @@ def run(settings: Settings, open_browser: bool = False) -> int:
             stack.enter_context(listener)
         try:
             store = Store(settings.robots)
-        except RobotFileError as error:
+            Exercises(settings.exercises, store.get)  # each process reads them again; here errors are shown
+        except (RobotFileError, ExerciseFileError) as error:
             print(f"kinboard: {error}", file=sys.stderr)
             return 1
         if settings.token is None and not settings.read_only:

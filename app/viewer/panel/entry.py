@@ -11,32 +11,19 @@ from typing import Literal
 
 import numpy as np
 
+from app.exercises.typed import ANGLE_UNITS, LENGTH_UNITS, NUMBER, EntryError, clean, cut, number_and_unit
 from app.viewer.panel.readout import ANGLES
 from kin import InputError, KinematicsError
 from kin.transforms import Array, as_transform, rotation_from_wxyz
 from kin.units import Unit, Units
 
 PoseKind = Literal["position", "angles", "quaternion", "pose"]
-LONGEST = 2000  # characters
 FARTHEST = 1000.0  # m: the largest coordinate of a target or a camera
 LIMIT_DIGITS = 2  # decimals of a degree or a millimetre in which limits are shown
 # A quaternion typed with three decimals is normalised; one that is further off was mistyped.
 _NORM_SLACK = 0.01
 # Matrices copied from a screen have few decimals.
 _MATRIX_SLACK = 2e-3
-
-_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
-_ANGLES = {"°": math.pi / 180, "deg": math.pi / 180, "rad": 1.0}
-_LENGTHS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
-
-
-class EntryError(ValueError):
-    """A typed text has no valid value: a headline, and a sentence that says what is valid."""
-
-    def __init__(self, title: str, detail: str) -> None:
-        self.title = title
-        self.detail = detail
-        super().__init__(f"{title}: {detail}")
 
 
 def read_value(text: str, name: str, unit: Unit, is_angle: bool, limits: tuple[float, float]) -> float:
@@ -53,48 +40,17 @@ def read_value(text: str, name: str, unit: Unit, is_angle: bool, limits: tuple[f
     low, high = (unit.shown(limit, LIMIT_DIGITS) for limit in limits)
     title = f"{name} was not changed"
     valid = f"Valid: {_brief(low)} … {_brief(high)}{unit.suffix}."
-    number, suffix = _number_and_unit(text, title, valid)
-    scales = _ANGLES if is_angle else _LENGTHS
+    number, suffix = number_and_unit(text, title, valid)
+    scales = ANGLE_UNITS if is_angle else LENGTH_UNITS
     if suffix and suffix not in scales:
-        raise EntryError(title, f"“{_cut(suffix)}” is not a unit of this joint. Valid: {', '.join(scales)}.")
+        raise EntryError(title, f"“{cut(suffix)}” is not a unit of this joint. Valid: {', '.join(scales)}.")
     value = number * scales[suffix] if suffix else unit.read(number)
     shown = value * unit.scale
     slack = 1e-9 * max(1.0, abs(low), abs(high))
     if not low - slack <= shown <= high + slack:
-        raise EntryError(title, f"“{_cut(text)}” is outside the limits of this joint. {valid}")
+        raise EntryError(title, f"“{cut(text)}” is outside the limits of this joint. {valid}")
     # The shown limit may be rounded outwards.
     return min(max(value, limits[0]), limits[1])
-
-
-def read_number(text: str, unit: Unit) -> float:
-    """A typed number in radians, metres, or as it is if `unit` is neither of an angle nor of a length.
-
-    Args:
-        unit: of numbers without a unit.
-
-    Raises:
-        EntryError: not a number, or another kind of unit.
-    """
-    scales = next((scales for scales in (_ANGLES, _LENGTHS) if unit.name in scales), {unit.name: 1.0 / unit.scale})
-    units = ", ".join(filter(None, scales)) or "none"
-    title = "The answer was not read"
-    number, suffix = _number_and_unit(text, title, f"Valid: a number, such as 12.5. Units: {units}.")
-    if not math.isfinite(number):
-        raise EntryError(title, "The number is too large.")
-    if suffix and suffix not in scales:
-        raise EntryError(title, f"“{_cut(suffix)}” is not a unit of this answer. Valid: {units}.")
-    return number * scales[suffix] if suffix else unit.read(number)
-
-
-def _number_and_unit(text: str, title: str, valid: str) -> tuple[float, str]:
-    """A typed number and the unit after it, if any; an error has this title and says what is valid."""
-    cleaned = _clean(text)
-    match = re.fullmatch(rf"({_NUMBER.pattern})\s*(\D*)", cleaned.replace(",", "."))
-    if not cleaned:
-        raise EntryError(title, f"The field was empty. {valid}")
-    if match is None:
-        raise EntryError(title, f"“{_cut(text)}” is not a number. {valid}")
-    return float(match[1]), match[2].strip()
 
 
 def read_pose(kind: PoseKind, text: str, units: Units, T: Array) -> tuple[Array, bool]:
@@ -164,13 +120,13 @@ def _whole_pose(numbers: list[float], units: Units, pose: Array) -> tuple[Array,
 
 def _numbers(text: str) -> list[float]:
     """All numbers in a text; brackets, commas, semicolons and line breaks separate them."""
-    words = re.split(r"[\s,;|\[\](){}]+", _clean(text))
+    words = re.split(r"[\s,;|\[\](){}]+", clean(text))
     found = []
     for word in filter(None, words):
-        if _NUMBER.fullmatch(word) is None:
+        if NUMBER.fullmatch(word) is None:
             if word in ("array", "np.array"):
                 continue
-            raise EntryError("The target was not changed", f"“{_cut(word)}” is not a number.")
+            raise EntryError("The target was not changed", f"“{cut(word)}” is not a number.")
         found.append(float(word))
     if not np.isfinite(found).all():
         raise EntryError("The target was not changed", "A number is too large.")
@@ -215,17 +171,6 @@ def _matrix(numbers: list[float]) -> Array:
         raise EntryError("Not the matrix of a pose", str(error)) from None
     _check_distance(T[:3, 3])
     return T
-
-
-def _clean(text: str) -> str:
-    if len(text) > LONGEST:
-        raise EntryError("The text is too long", f"Valid: up to {LONGEST} characters.")
-    return text.strip().replace("−", "-").replace("\u00a0", " ")
-
-
-def _cut(text: str) -> str:
-    text = " ".join(text.split())
-    return text if len(text) <= 24 else text[:23] + "…"
 
 
 def _brief(value: float) -> str:

@@ -7,9 +7,9 @@ from dataclasses import replace
 import viser
 
 import kin
+from app.exercises.typed import EntryError
 from app.viewer.feature import Stage
 from app.viewer.panel import Post
-from app.viewer.panel.entry import EntryError
 from app.viewer.panel.posture import BranchChoice, RedundancySliders, short
 from app.viewer.panel.status import Notice
 from app.viewer.self_motion import self_motion

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from typing import Protocol
 
 import kin
-from app.viewer.panel.entry import EntryError, PoseKind, read_pose
+from app.exercises.typed import EntryError
+from app.viewer.panel.entry import PoseKind, read_pose
 from app.viewer.panel.joints import JointSliders
 from app.viewer.panel.layout import Panel
 from app.viewer.panel.script import Reply

@@ -7,8 +7,8 @@ from page import Tab
 from playwright.sync_api import Locator, expect
 
 import kin
+from app.exercises.judging import value_text
 from app.viewer.lessons import LESSONS
-from app.viewer.lessons.guide.judging import value_text
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.guide.outline import Choice, Number, Question
 from kin.units import Units

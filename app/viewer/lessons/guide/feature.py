@@ -10,14 +10,14 @@ from collections.abc import Hashable
 import numpy as np
 import viser
 
+from app.exercises.judging import read
+from app.exercises.typed import EntryError
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons.guide import views
-from app.viewer.lessons.guide.judging import read
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.guide.outline import Configuration, Number, Outline
 from app.viewer.lessons.guide.progress import Progress
 from app.viewer.panel import assign, listen, update_html
-from app.viewer.panel.entry import EntryError
 from app.viewer.panel.joints import go_to_buttons
 from app.viewer.panel.status import Notice
 from kin import InputError

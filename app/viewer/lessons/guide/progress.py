@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from app.viewer.lessons.guide.judging import Verdict, is_answer, judge
+from app.exercises.judging import Verdict, is_answer, judge
 from app.viewer.lessons.guide.outline import Outline, Question
 from kin import InputError
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.viewer.lessons.guide.judging import solution_text, tolerance_text, value_text
+from app.exercises.judging import solution_text, tolerance_text, value_text
 from app.viewer.lessons.guide.outline import Choice, Number, Question
 from app.viewer.lessons.guide.progress import Mark, Progress
 from app.viewer.views.templates import render

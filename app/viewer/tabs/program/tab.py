@@ -13,11 +13,11 @@ from dataclasses import replace
 import numpy as np
 
 import kin
+from app.exercises.typed import EntryError
 from app.exports.motion_snippets import SNIPPETS
 from app.exports.snippets import named
 from app.viewer.feature import Feature, Stage
 from app.viewer.own_arm import KEY
-from app.viewer.panel.entry import EntryError
 from app.viewer.panel.status import Notice
 from app.viewer.tabs.program import items as changes
 from app.viewer.tabs.program.compare import CHOICES, ZONE, Choice, other_motion

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 import kin
+from app.exercises.typed import EntryError
 from app.viewer.own_arm import clean
-from app.viewer.panel.entry import EntryError, PoseKind, read_pose, read_value
+from app.viewer.panel.entry import PoseKind, read_pose, read_value
 from app.viewer.panel.readout import roll_pitch_yaw
 from app.viewer.tabs.program.items import NAME, Item, configuration, point
 from kin import InputError, Robot, Task

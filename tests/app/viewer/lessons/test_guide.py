@@ -15,13 +15,7 @@ from hypothesis import strategies as st
 from live_server import serve_viewer
 
 import kin
-from app.shared.clouds import Clouds
-from app.shared.settings import Settings
-from app.shared.store import Store
-from app.viewer.lessons import LESSONS
-from app.viewer.lessons.dh import questions as dh
-from app.viewer.lessons.equations import questions as equations
-from app.viewer.lessons.guide.judging import (
+from app.exercises.judging import (
     is_answer,
     judge,
     read,
@@ -29,6 +23,13 @@ from app.viewer.lessons.guide.judging import (
     tolerance_text,
     value_text,
 )
+from app.exercises.typed import EntryError
+from app.shared.clouds import Clouds
+from app.shared.settings import Settings
+from app.shared.store import Store
+from app.viewer.lessons import LESSONS
+from app.viewer.lessons.dh import questions as dh
+from app.viewer.lessons.equations import questions as equations
 from app.viewer.lessons.guide.outline import (
     Choice,
     Mistake,
@@ -47,7 +48,6 @@ from app.viewer.lessons.postures import planar
 from app.viewer.lessons.postures import questions as postures
 from app.viewer.lessons.redundancy import questions as redundancy
 from app.viewer.lessons.velocity import questions as velocity
-from app.viewer.panel.entry import EntryError
 from app.viewer.server import ViewerServer
 from kin import InputError, Robot
 from kin.axes import pairs

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import kin
+from app.exercises.judging import judge, read, value_text
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.dh import questions as dh
 from app.viewer.lessons.equations import questions as equations
-from app.viewer.lessons.guide.judging import judge, read, value_text
 from app.viewer.lessons.guide.outline import Choice, Mistake, Number, Outline, apart, two_percent
 from app.viewer.lessons.guide.rank import rank, self_motions
 from app.viewer.lessons.postures import questions as postures

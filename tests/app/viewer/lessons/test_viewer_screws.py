@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from app.viewer.lessons.guide.judging import judge
 from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
@@ -16,7 +17,6 @@ import kin
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
-from app.viewer.lessons.guide.judging import judge
 from app.viewer.lessons.guide.outline import Choice, Number
 from app.viewer.lessons.screws import FORMS, PLACES, views
 from app.viewer.lessons.screws.drawing import spread_tips

@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import kin
-from app.viewer.panel.entry import EntryError, read_pose, read_value, rotation_from_angles
+from app.exercises.typed import EntryError
+from app.viewer.panel.entry import read_pose, read_value, rotation_from_angles
 from app.viewer.panel.fields import shown
 from app.viewer.panel.readout import roll_pitch_yaw
 from kin.transforms import wxyz_from_rotation

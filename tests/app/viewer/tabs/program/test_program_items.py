@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import kin
+from app.exercises.typed import EntryError
 from app.viewer.own_arm import clean
-from app.viewer.panel.entry import EntryError
 from app.viewer.tabs.program import items as lists
 from app.viewer.tabs.program.compare import CHOICES, Choice, other_motion
 from app.viewer.tabs.program.files import toml_of

@@ -3,18 +3,38 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from app.viewer.lessons.guide.outline import PLAIN, WHOLE, Choice, Number, Question
-from app.viewer.panel.entry import read_number
+from app.exercises.questions import PLAIN, WHOLE, Choice, Number, Question
+from app.exercises.typed import read_number
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether an answer is right, and why."""
+    """Whether an answer is right, and why.
+
+    Attributes:
+        credit: the part of the answer that is right, 0 to 1.
+        parts: what was asked in parts: whether each is right, and why.
+    """
 
     right: bool
     reason: str
+    credit: float = 0.0
+    parts: tuple[tuple[bool, str], ...] = ()
+
+    def __post_init__(self) -> None:
+        """What is right has full credit."""
+        if self.right:
+            object.__setattr__(self, "credit", 1.0)
+
+    @classmethod
+    def of(cls, parts: Sequence[tuple[bool, str]], right: str = "") -> Verdict:
+        """The verdict on an answer in parts: right if all are; the reason is that of the first wrong one."""
+        wrong = [reason for fine, reason in parts if not fine]
+        share = 1.0 - len(wrong) / len(parts)
+        return cls(not wrong, wrong[0] if wrong else right or parts[-1][1], share, tuple(parts))
 
 
 def judge(question: Question, given: float) -> Verdict:

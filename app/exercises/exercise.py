@@ -1,0 +1,167 @@
+"""An exercise: its text, what a seed draws, and its question."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+import kin
+from app.exercises.contract import Asked, Kind
+from app.exercises.expressions import Expression, ExpressionError, Function
+from app.exercises.judging import Verdict
+from app.exercises.variant import Facts, Joined, Quantity, Variant
+from kin import Robot
+from kin.transforms import Array, from_position_wxyz
+from kin.units import Units
+
+TOPICS = ("Frames and DH tables", "Forward kinematics", "Inverse kinematics", "Velocity", "Motions")
+CHECKED_SEEDS = range(8)
+_DRAWS = 500
+
+
+class VariantError(ValueError):
+    """An exercise has no valid variant for a seed; the message says why."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A number that the seed draws.
+
+    Attributes:
+        low, high, step: the values that are drawn from, in radians, metres or as they are.
+        chosen: instead, a list of values.
+        measure: ``"angle"``, ``"length"`` or "".
+    """
+
+    low: float
+    high: float
+    step: float
+    chosen: tuple[float, ...]
+    measure: str
+
+    def draw(self, source: random.Random) -> Quantity:
+        """One of the values."""
+        if self.chosen:
+            return Quantity(source.choice(self.chosen), self.measure)
+        steps = int((self.high - self.low) / self.step + 1e-9)
+        return Quantity(self.low + source.randint(0, steps) * self.step, self.measure)
+
+
+@dataclass(frozen=True)
+class Target:
+    """A pose: that of the tool at a configuration, or a point with the orientation at the configuration."""
+
+    q: tuple[Expression, ...] = ()
+    position: tuple[Expression, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Exercise:
+    """One exercise. It knows neither student nor page: exercise, seed and answer give a verdict.
+
+    Attributes:
+        id, title, topic, level, lesson: for lists; level 1 is the easiest, lesson the key of a lesson, or "".
+        robot: the id of the arm.
+        text: the task; numbers drawn stand in braces.
+        hints: shown one after the other.
+        shown: why the answer is right; shown at the end.
+        vary, let: what is drawn, and what is computed from it, each with its measure.
+        require: what must hold of the numbers drawn.
+        q: the configuration that the exercise is about; the home pose if empty.
+        target: the pose that it is about.
+        kind: its question.
+        file: where it was read, for messages.
+        builtin: whether it belongs to the package.
+    """
+
+    id: str
+    title: str
+    topic: str
+    level: int
+    lesson: str
+    robot: Robot
+    text: str
+    hints: tuple[str, ...]
+    shown: str
+    vary: Mapping[str, Drawn]
+    let: Mapping[str, tuple[Expression, str]]
+    require: tuple[Expression, ...]
+    q: tuple[Expression, ...]
+    target: Target | None
+    kind: Kind
+    file: str = ""
+    builtin: bool = False
+
+    def variant(self, seed: int) -> Variant:
+        """The variant of a seed: the same in every process and version of Python.
+
+        Raises:
+            VariantError: no valid numbers were drawn.
+        """
+        name = f"{self.id}:{seed}"
+        source = random.Random(name)
+        for _ in range(_DRAWS if self.vary else 1):
+            drawn = {key: rule.draw(source) for key, rule in self.vary.items()}
+            try:
+                variant = self._made(name, drawn)
+                if all(variant.number(condition) for condition in self.require):
+                    return variant
+            except ExpressionError as error:
+                raise VariantError(str(error)) from None
+        raise VariantError(f"no numbers that meet the conditions under require were drawn for seed {seed}")
+
+    def _made(self, name: str, drawn: dict[str, Quantity]) -> Variant:
+        robot, values = self.robot, dict(drawn)
+        plain = {key: value.value for key, value in drawn.items()}
+        scope: Mapping[str, float | Function] = plain
+        q = robot.q_home
+        waiting = dict(self.let)
+        for needs_arm in (False, True):  # q may use what is computed without the arm
+            for key, (expression, measure) in tuple(waiting.items()):
+                if needs_arm or expression.names <= plain.keys():
+                    values[key] = Quantity(expression.value(scope), measure)
+                    plain[key] = values[key].value
+                    del waiting[key]
+            if not needs_arm:
+                q = np.array([value.value(scope) for value in self.q]) if self.q else q
+                scope = Joined(plain, Facts(robot, q))
+        return Variant(name, robot, q, values, self._pose(q, scope))
+
+    def _pose(self, q: Array, scope: Mapping[str, float | Function]) -> Array | None:
+        if self.target is None:
+            return None
+        if self.target.q:
+            return np.asarray(kin.fk(self.robot, np.array([value.value(scope) for value in self.target.q])))
+        T = from_position_wxyz([value.value(scope) for value in self.target.position])
+        T[:3, :3] = kin.fk(self.robot, q)[:3, :3]
+        return T
+
+    def asked(self, variant: Variant, units: Units) -> Asked:
+        """What is asked; nothing in it gives the answer away."""
+        return self.kind.asked(variant, units)
+
+    def judge(self, variant: Variant, given: object, units: Units) -> Verdict:
+        """Judge an answer; raises `kin.InputError` or `EntryError` for what is no answer."""
+        return self.kind.judge(variant, given, units)
+
+    def solution(self, variant: Variant, units: Units) -> str:
+        """The right answer and why, for who has answered or given up."""
+        return " ".join(filter(None, (self.kind.solution(variant, units), variant.text(self.shown, units))))
+
+    def verify(self, tick: Callable[[], None] = lambda: None) -> None:
+        """Try some seeds; raises `VariantError` naming the first for which the exercise makes no sense."""
+        for seed in CHECKED_SEEDS if self.vary else (0,):
+            tick()
+            try:
+                variant = self.variant(seed)
+                if not self.robot.in_limits(variant.q, 1e-9):
+                    raise ValueError("q is outside the limits of the arm")
+                self.kind.verify(variant)
+                for text in (self.text, *self.hints):
+                    variant.text(text, Units())
+                self.solution(variant, Units())
+            except (ValueError, ExpressionError) as error:
+                raise VariantError(f"seed {seed}: {error}") from None

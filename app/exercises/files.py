@@ -1,0 +1,207 @@
+"""Exercise files: TOML → `Exercise`; the built-in exercises and those of a folder."""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+from app.exercises.exercise import TOPICS, Drawn, Exercise, Target
+from app.exercises.expressions import Expression
+from app.exercises.fields import ExerciseFileError, Fields
+from app.exercises.kinds import KINDS
+from kin import KinematicsError, Robot, get_robot
+
+BUILTIN = Path(__file__).parent / "library"
+UNITS = {"deg": (math.pi / 180, "angle"), "rad": (1.0, "angle"), "mm": (1e-3, "length"), "m": (1.0, "length")}
+LESSONS = ("dh", "screws", "equations", "postures", "redundancy", "velocity", "trajectories")
+MOST_HINTS = 5
+_ID = re.compile(r"[a-z0-9][a-z0-9-]{0,39}")
+_NAME = re.compile(r"[a-z][a-z0-9_]{0,19}")
+
+Find = Callable[[str], Robot]
+
+
+def parse_exercise(text: str, file: str = "exercise", find: Find = get_robot, builtin: bool = False) -> Exercise:
+    """The exercise described by TOML text; `find` gives the arm of an id, `file` is the name in messages.
+
+    Raises:
+        ExerciseFileError: naming the file, the field, the value and what would be valid.
+    """
+    try:
+        data = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise ExerciseFileError(file, "file", str(error), "valid TOML") from None
+    vary = _vary(Fields(file, data.get("vary", {}), "vary."))
+    let = _let(Fields(file, data.get("let", {}), "let."), frozenset(vary))
+    names = frozenset((*vary, *let))
+    fields = Fields(file, data, names=names)
+    for table in ("vary", "let"):
+        fields.get(table)
+    robot = _robot(fields, find)
+    kind = KINDS[fields.choice("kind", KINDS)]
+    exercise_id = fields.text("id")
+    if not _ID.fullmatch(exercise_id):
+        raise fields.refuse("id", exercise_id, "lower-case letters, digits and hyphens, at most 40")
+    hints = fields.texts("hints")
+    if len(hints) > MOST_HINTS:
+        raise fields.refuse("hints", len(hints), f"at most {MOST_HINTS} hints")
+    q = fields.expressions("q")
+    if q and len(q) != robot.n:
+        raise fields.refuse("q", len(q), f"{robot.n} values, one per joint")
+    answer = fields.sub("answer")
+    question = kind.read(answer)
+    answer.done()
+    exercise = Exercise(
+        exercise_id,
+        fields.text("title"),
+        fields.choice("topic", TOPICS),
+        fields.whole("level", 1, 3, 1),
+        fields.choice("lesson", LESSONS) if fields.has("lesson") else "",
+        robot,
+        fields.text("text"),
+        hints,
+        fields.text("shown", ""),
+        vary,
+        let,
+        fields.expressions("require"),
+        q,
+        _target(fields, robot),
+        question,
+        file,
+        builtin,
+    )
+    fields.done()
+    return exercise
+
+
+def load_exercise(path: Path | str, find: Find = get_robot, builtin: bool = False) -> Exercise:
+    """The exercise of a file; raises `ExerciseFileError`."""
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ExerciseFileError(str(path), "file", str(error), "a readable UTF-8 text file") from error
+    return parse_exercise(text, str(path), find, builtin)
+
+
+def load_folder(folder: Path, find: Find = get_robot, builtin: bool = False) -> tuple[Exercise, ...]:
+    """The exercises of every ``*.toml`` file of a folder, by topic and level.
+
+    Raises:
+        ExerciseFileError: a file is invalid, two files have the same id, or the folder cannot be read.
+    """
+    try:
+        paths = sorted(path for path in folder.iterdir() if path.suffix == ".toml")
+    except OSError as error:
+        raise ExerciseFileError(str(folder), "folder", str(error), "a folder that can be read") from error
+    found: dict[str, Exercise] = {}
+    for path in paths:
+        exercise = load_exercise(path, find, builtin)
+        if exercise.id in found:
+            raise ExerciseFileError(str(path), "id", exercise.id, "an id that no other file of the folder uses")
+        found[exercise.id] = exercise
+    return tuple(sorted(found.values(), key=lambda one: (TOPICS.index(one.topic), one.level, one.id)))
+
+
+@cache
+def builtin_exercises() -> tuple[Exercise, ...]:
+    """The exercises of the package."""
+    return load_folder(BUILTIN, builtin=True)
+
+
+class Exercises:
+    """The built-in exercises, and those of the operator's folder. Read-only, so any thread may use it.
+
+    Raises:
+        ExerciseFileError: a file of the folder is invalid, or its id is taken.
+    """
+
+    def __init__(self, folder: Path | None = None, find: Find = get_robot) -> None:
+        own = () if folder is None else load_folder(folder, find)
+        taken = {exercise.id for exercise in builtin_exercises()}
+        for exercise in own:
+            if exercise.id in taken:
+                raise ExerciseFileError(exercise.file, "id", exercise.id, "an id that no built-in exercise has")
+        both = (*builtin_exercises(), *own)
+        self.all = tuple(sorted(both, key=lambda one: (TOPICS.index(one.topic), one.level)))
+        self._by_id = {exercise.id: exercise for exercise in self.all}
+
+    def get(self, exercise_id: object) -> Exercise | None:
+        """One exercise; None if there is none with this id."""
+        return self._by_id.get(exercise_id) if isinstance(exercise_id, str) else None
+
+    def topics(self) -> tuple[tuple[str, tuple[Exercise, ...]], ...]:
+        """The topics that have exercises, with these."""
+        found = ((topic, tuple(one for one in self.all if one.topic == topic)) for topic in TOPICS)
+        return tuple((topic, exercises) for topic, exercises in found if exercises)
+
+
+def _robot(fields: Fields, find: Find) -> Robot:
+    robot_id = fields.text("robot")
+    try:
+        return find(robot_id)
+    except KinematicsError as error:
+        raise fields.refuse("robot", robot_id, f"the id of a robot ({error})") from None
+
+
+def _vary(fields: Fields) -> dict[str, Drawn]:
+    found: dict[str, Drawn] = {}
+    for name in fields.table:
+        _check_name(fields, name)
+        rule = fields.sub(name)
+        scale, measure = _unit(rule)
+        chosen = rule.items("choose")
+        if not all(type(value) in (int, float) and math.isfinite(value) for value in chosen):
+            raise rule.refuse("choose", chosen, "numbers")
+        if chosen:
+            found[name] = Drawn(0.0, 0.0, 0.0, tuple(scale * value for value in chosen), measure)
+        else:
+            low = rule.number("from")
+            high, step = rule.number("to", above=low), rule.number("step", above=0.0)
+            found[name] = Drawn(scale * low, scale * high, scale * step, (), measure)
+        rule.done()
+    return found
+
+
+def _let(fields: Fields, drawn: frozenset[str]) -> dict[str, tuple[Expression, str]]:
+    found: dict[str, tuple[Expression, str]] = {}
+    for name, value in fields.table.items():
+        _check_name(fields, name)
+        if name in drawn:
+            raise fields.refuse(name, value, "a name that is not in [vary]")
+        if isinstance(value, dict):
+            rule = fields.sub(name)
+            found[name] = rule.expression("value"), _unit(rule)[1]
+            rule.done()
+        else:
+            found[name] = fields.expression(name), ""
+    return found
+
+
+def _check_name(fields: Fields, name: str) -> None:
+    if not _NAME.fullmatch(name):
+        raise fields.refuse(name, name, "a name of lower-case letters, digits and _, at most 20")
+
+
+def _unit(rule: Fields) -> tuple[float, str]:
+    if not rule.has("unit"):
+        return 1.0, ""
+    return UNITS[rule.choice("unit", UNITS)]
+
+
+def _target(fields: Fields, robot: Robot) -> Target | None:
+    if not fields.has("target"):
+        return None
+    table = fields.sub("target")
+    q, position = table.expressions("q"), table.expressions("position")
+    if bool(q) == bool(position):
+        raise table.refuse("q", table.get("q"), "either q, a configuration, or position, a point")
+    if q and len(q) != robot.n:
+        raise table.refuse("q", len(q), f"{robot.n} values, one per joint")
+    if position and len(position) != 3:
+        raise table.refuse("position", len(position), "three values x, y, z")
+    table.done()
+    return Target(q, position)

@@ -1,0 +1,223 @@
+"""Rows of a DH table. Every choice of frames that describes the same arm is right."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+import kin
+from app.exercises.contract import LONGEST, Asked, Kind, typed
+from app.exercises.fields import Fields
+from app.exercises.judging import Verdict
+from app.exercises.typed import EntryError, read_number
+from app.exercises.variant import Variant
+from kin import InputError, Robot
+from kin.axes import screw_x, screw_z
+from kin.robot import CONVENTIONS, Convention
+from kin.transforms import Array
+from kin.units import DEGREES, Units
+
+NAMES = ("θ", "d", "a", "α")
+ANGULAR = (True, False, False, True)
+CLOSE, ALIGNED = 2e-3, math.radians(1.0)  # m, rad
+_WORDS: dict[Convention, str] = {"standard": "the standard convention", "modified": "Craig’s convention"}
+
+Row = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class DHKind(Kind):
+    """See the module.
+
+    The values are those of the posture on show, so that no zero of a joint has to be agreed. What counts is where
+    the joint axes are as lines, and where the tool is: two tables that agree in these move in the same way.
+    """
+
+    name: ClassVar[str] = "dh"
+    about: ClassVar[str] = "Rows of a DH table are filled in; any legitimate choice of frames is right."
+
+    first: int
+    last: int
+    convention: Convention | None
+
+    @classmethod
+    def read(cls, fields: Fields) -> Self:
+        rows = fields.items("rows", 1)
+        if not all(type(row) is int and row >= 1 for row in rows) or rows != list(
+            range(rows[0], rows[0] + len(rows))
+        ):
+            raise fields.refuse("rows", rows, "consecutive numbers of rows, from 1")
+        convention = fields.choice("convention", CONVENTIONS) if fields.has("convention") else None
+        return cls(rows[0] - 1, rows[-1] - 1, convention)  # type: ignore[arg-type]  # checked by choice()
+
+    def _arm(self, variant: Variant) -> Robot:
+        robot = variant.robot
+        arm = robot if self.convention is None else kin.convert(robot, self.convention)
+        if self.last >= len(arm.rows):
+            raise ValueError(f"row {self.last + 1} does not exist: the arm has {len(arm.rows)} rows")
+        return arm
+
+    def asked(self, variant: Variant, units: Units) -> Asked:
+        arm = self._arm(variant)
+        names = tuple(units.of(angular).name for angular in ANGULAR)
+        note = (
+            f"In {_WORDS[arm.convention]}, with the values of the posture on show. "
+            f"± {units.angles.brief(ALIGNED)}, ± {units.lengths.brief(CLOSE)}."
+        )
+        return Asked("table", NAMES, names, note, self.last - self.first + 1)
+
+    def judge(self, variant: Variant, given: object, units: Units) -> Verdict:
+        arm, count = self._arm(variant), self.last - self.first + 1
+        rows = _read(given, count, self.first, units)
+        wrong = self._faults(arm, variant.q, rows)
+        if not any(wrong):
+            return Verdict(True, self._praise(variant, arm, rows))
+        parts = tuple((not why, f"Row {self.first + i + 1}: {why or 'right.'}") for i, why in enumerate(wrong))
+        credit = round(sum(not why for why in wrong) / count, 3)
+        other: Convention = "modified" if arm.convention == "standard" else "standard"
+        if not any(self._faults(kin.convert(arm, other), variant.q, rows)):
+            said = f"This is correct for the other convention, {_WORDS[other]}. Asked is {_WORDS[arm.convention]}."
+            return Verdict(False, said, 0.5, parts)
+        if slip := self._unit_slip(arm, variant.q, rows, units):
+            return Verdict(False, slip, 0.5, parts)
+        place = next(i for i, why in enumerate(wrong) if why)
+        sign = self._sign_slip(arm, variant.q, rows, place)
+        return Verdict(False, sign or f"Row {self.first + place + 1}: {wrong[place]}", credit, parts)
+
+    def _faults(self, arm: Robot, q: Array, rows: Sequence[Row]) -> list[str]:
+        """What is wrong after each row; "" where nothing is. After a wrong row the right frame is taken."""
+        frames = [arm.T_world_base, *_chain(arm.T_world_base, _rows_at(arm, q), arm.convention)]
+        found: list[str] = []
+        T = frames[self.first]
+        for i, row in enumerate(rows):
+            k = self.first + i
+            T = T @ _matrix(row, arm.convention)
+            fault = _fault(arm, k, T, frames[k + 1])
+            found.append(fault)
+            if fault:
+                T = frames[k + 1]
+        return found
+
+    def _praise(self, variant: Variant, arm: Robot, rows: Sequence[Row]) -> str:
+        """Whether these are the arm's own rows, or another choice."""
+        own = _rows_at(arm, variant.q)[self.first : self.last + 1]
+        same = all(
+            np.allclose(_matrix(a, arm.convention), _matrix(b, arm.convention), atol=CLOSE)
+            for a, b in zip(rows, own, strict=True)
+        )
+        if same:
+            return "These rows are those of the arm’s own table."
+        return "Other frames than in the arm’s own table, for the same joint axes: the arm moves in the same way."
+
+    def _unit_slip(self, arm: Robot, q: Array, rows: Sequence[Row], units: Units) -> str:
+        if units.degrees:
+            turned = [(row[0] * DEGREES.scale, row[1], row[2], row[3] * DEGREES.scale) for row in rows]
+            if not any(self._faults(arm, q, turned)):
+                return "The angles are in radians; the unit is degrees. Type rad after a number to give radians."
+        for scale, words in ((units.lengths.scale, "metres"), (1e-3 * units.lengths.scale, "millimetres")):
+            longer = [(row[0], row[1] * scale, row[2] * scale, row[3]) for row in rows]
+            if abs(scale - 1.0) > 1e-9 and not any(self._faults(arm, q, longer)):
+                return f"The lengths are in {words}; the unit is {units.lengths.name}."
+        return ""
+
+    def _sign_slip(self, arm: Robot, q: Array, rows: Sequence[Row], place: int) -> str:
+        for j, name in enumerate(NAMES):
+            values = list(rows[place])
+            values[j] = -values[j]
+            tried = [*rows[:place], (values[0], values[1], values[2], values[3]), *rows[place + 1 :]]
+            if not self._faults(arm, q, tried)[place]:
+                return f"Row {self.first + place + 1} is right but for the sign of {name}."
+        return ""
+
+    def answer(self, variant: Variant) -> object:
+        units = Units()
+        rows = _rows_at(self._arm(variant), variant.q)[self.first : self.last + 1]
+        return [
+            [typed(value, units.of(angular)) for value, angular in zip(row, ANGULAR, strict=True)] for row in rows
+        ]
+
+    def solution(self, variant: Variant, units: Units) -> str:
+        rows = _rows_at(self._arm(variant), variant.q)[self.first : self.last + 1]
+        said = [
+            f"Row {self.first + i + 1}: "
+            + ", ".join(
+                f"{name} = {units.of(angular).text(value, 1)}"
+                for name, value, angular in zip(NAMES, row, ANGULAR, strict=True)
+            )
+            for i, row in enumerate(rows)
+        ]
+        return f"{'; '.join(said)}."
+
+
+def _read(given: object, count: int, first: int, units: Units) -> list[Row]:
+    if not isinstance(given, list | tuple) or len(given) != count:
+        raise InputError("answer", given, f"{count} rows of the texts θ, d, a, α")
+    rows: list[Row] = []
+    for i, row in enumerate(given):
+        if not isinstance(row, list | tuple) or len(row) != 4 or not all(isinstance(x, str) for x in row):
+            raise InputError(f"answer[{i}]", row, "four texts θ, d, a, α")
+        values = []
+        for text, name, angular in zip(row, NAMES, ANGULAR, strict=True):
+            try:
+                values.append(read_number(text[:LONGEST], units.of(angular)))
+            except EntryError as error:
+                raise EntryError(f"{name} of row {first + i + 1} was not read", error.detail) from None
+        rows.append((values[0], values[1], values[2], values[3]))
+    return rows
+
+
+def _rows_at(arm: Robot, q: Array) -> list[Row]:
+    """The rows with the joint values added."""
+    found: list[Row] = []
+    values = dict(zip(arm.joint_rows, q.tolist(), strict=True))
+    for i, row in enumerate(arm.rows):
+        value = values.get(i, 0.0)
+        turns = row.kind == "revolute"
+        theta, d = row.theta + (value if turns else 0.0), row.d + (0.0 if turns else value)
+        found.append((theta, d, row.a, row.alpha))
+    return found
+
+
+def _matrix(row: Row, convention: Convention) -> Array:
+    theta, d, a, alpha = row
+    first, second = screw_z(theta, d), screw_x(a, alpha)
+    return np.asarray(first @ second if convention == "standard" else second @ first)
+
+
+def _chain(base: Array, rows: Sequence[Row], convention: Convention) -> list[Array]:
+    frames, T = [], base
+    for row in rows:
+        T = T @ _matrix(row, convention)
+        frames.append(T)
+    return frames
+
+
+def _fault(arm: Robot, k: int, T: Array, right: Array) -> str:
+    """What is wrong with the frame after row k; "" if its z axis is the joint's line, or the tool is right."""
+    joint_row = k + 1 if arm.convention == "standard" else k
+    last = k == len(arm.rows) - 1
+    kind = arm.rows[joint_row].kind if joint_row < len(arm.rows) else "fixed"
+    offset, angle = T[:3, 3] - right[:3, 3], _between(T[:3, 2], right[:3, 2])
+    if kind == "fixed" or last:
+        if float(np.linalg.norm(offset)) > CLOSE:
+            return f"the frame after it is {1e3 * float(np.linalg.norm(offset)):.0f} mm from its place."
+        if angle > ALIGNED:
+            return f"the z axis after it is off by {math.degrees(angle):.0f}°."
+        return ""
+    number = 1 + arm.joint_rows.index(joint_row)
+    off = min(angle, math.pi - angle)
+    if off > ALIGNED:
+        return f"the axis of joint {number} points elsewhere, off by {math.degrees(off):.0f}°."
+    z = right[:3, 2]
+    away = float(np.linalg.norm(offset - (offset @ z) * z))
+    if kind == "revolute" and away > CLOSE:
+        return f"the axis of joint {number} has the right direction, but it is {1e3 * away:.0f} mm from its place."
+    return ""
+
+
+def _between(a: Array, b: Array) -> float:
+    return math.atan2(float(np.linalg.norm(np.cross(a, b))), float(a @ b))

@@ -1,0 +1,117 @@
+"""Put transforms in order so that their product is a given pose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import permutations
+from typing import ClassVar, Self
+
+import numpy as np
+
+from app.exercises.contract import Asked, Kind
+from app.exercises.fields import Fields
+from app.exercises.judging import Verdict
+from app.exercises.poses import Elementary, errors, pose_text, product
+from app.exercises.variant import Variant
+from kin import InputError
+from kin.transforms import Array
+from kin.units import Units
+
+MOST = 6
+_CLOSE = 1e-9
+
+
+@dataclass(frozen=True)
+class OrderKind(Kind):
+    """See the module. Every order with the same product is right."""
+
+    name: ClassVar[str] = "order"
+    about: ClassVar[str] = "Motions are put in order; every order with the same product is right."
+
+    motions: tuple[Elementary, ...]
+    fixed_axes: bool
+
+    @classmethod
+    def read(cls, fields: Fields) -> Self:
+        motions = tuple(Elementary.read(item) for item in fields.tables("motions", 2))
+        if len(motions) > MOST:
+            raise fields.refuse("motions", len(motions), f"2 to {MOST} motions")
+        return cls(motions, fields.flag("fixed_axes"))
+
+    def _places(self, variant: Variant) -> list[int]:
+        """The motion behind each label; never in the right order."""
+        places = list(range(len(self.motions)))
+        random = variant.draw("order")
+        for _ in range(100):
+            random.shuffle(places)
+            if not self._is_right(variant, places):
+                return places
+        return list(reversed(range(len(self.motions))))
+
+    def _product(self, variant: Variant, order: Sequence[int]) -> Array:
+        """Motions about the frame's own axes are multiplied from the right, about fixed axes from the left."""
+        matrices = [self.motions[i].matrix(variant) for i in order]
+        return product(matrices[::-1] if self.fixed_axes else matrices)
+
+    def _is_right(self, variant: Variant, order: Sequence[int]) -> bool:
+        right = self._product(variant, range(len(self.motions)))
+        return max(errors(self._product(variant, order), right)) < _CLOSE
+
+    def asked(self, variant: Variant, units: Units) -> Asked:
+        labels = tuple(self.motions[i].text(variant, units) for i in self._places(variant))
+        axes = "the axes of the base" if self.fixed_axes else "the frame’s own axes at that moment"
+        goal = self._product(variant, range(len(self.motions)))
+        note = f"Motions are about {axes}; the first one is done first. At the end: {pose_text(goal, units)}."
+        return Asked("order", labels, note=note, goal=goal)
+
+    def judge(self, variant: Variant, given: object, units: Units) -> Verdict:
+        n = len(self.motions)
+        if not isinstance(given, list | tuple) or sorted(map(str, given)) != sorted(map(str, range(n))):
+            raise InputError("answer", given, f"each of the numbers 0 to {n - 1} once")
+        places = self._places(variant)
+        order = [places[int(i)] for i in given]
+        if self._is_right(variant, order):
+            return Verdict(True, "The product of these motions, in this order, is the pose.")
+        credit = max(
+            next((k for k, (a, b) in enumerate(zip(order, right, strict=True)) if a != b), n) / n
+            for right in permutations(range(n))
+            if self._is_right(variant, right)
+        )
+        if self._is_table_row() and self._is_right(variant, [*order[2:], *order[:2]]):
+            why = (
+                "This order is correct for the other convention, which begins with the other pair of motions: "
+                "both of x, or both of z."
+            )
+        elif self._is_right(variant, order[::-1]):
+            other = "the frame’s own axes" if self.fixed_axes else "the axes of the base"
+            why = (
+                f"This order is right for motions about {other}. Each motion is on the wrong side of the product."
+            )
+        else:
+            first = self.motions[order[0]].text(variant, units)
+            T, right = self._product(variant, order), self._product(variant, range(n))
+            off, turned = errors(T, right)
+            ends = [f"{units.lengths.text(off, 0)} away"] if off > _CLOSE else []
+            ends += [f"turned by {units.angles.text(turned, 0)}"] if turned > _CLOSE else []
+            why = f"After this order, which begins with “{first}”, the frame is {' and '.join(ends)}."
+        return Verdict(False, why, round(credit, 3))
+
+    def _is_table_row(self) -> bool:
+        """Whether the motions are the four of a row, in either convention."""
+        return (
+            len(self.motions) == 4 and {motion.axis for motion in self.motions} == {0, 2} and not self.fixed_axes
+        )
+
+    def answer(self, variant: Variant) -> object:
+        places = self._places(variant)
+        order = list(range(len(self.motions)))
+        return [places.index(i) for i in order]
+
+    def solution(self, variant: Variant, units: Units) -> str:
+        return "First " + ", then ".join(motion.text(variant, units) for motion in self.motions) + "."
+
+    def verify(self, variant: Variant) -> None:
+        super().verify(variant)
+        if np.all([self._is_right(variant, order) for order in permutations(range(len(self.motions)))]):
+            raise ValueError("every order of the motions gives the same pose")

@@ -1,0 +1,167 @@
+"""Reach a pose or a point, with what else the posture has to meet."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+import kin
+from app.exercises.contract import Asked, Kind, listed, numbers
+from app.exercises.expressions import Expression
+from app.exercises.fields import Fields
+from app.exercises.judging import Verdict
+from app.exercises.variant import Variant
+from kin import IKOptions, JointConstraints, Robot, Task
+from kin.ik.options import TASKS
+from kin.transforms import Array, rotation_angle, vector_angle
+from kin.units import Units
+
+LOCKED = (math.radians(0.5), 5e-4)  # rad, m: a locked joint may be off by this
+
+
+@dataclass(frozen=True)
+class ReachKind(Kind):
+    """See the module. The answer is a configuration: in the page, that of the arm."""
+
+    name: ClassVar[str] = "reach"
+    about: ClassVar[str] = "The arm is moved to a target, in a posture that meets further conditions."
+
+    task: Task
+    branch: str
+    locked: tuple[tuple[int, Expression], ...]
+    margin: float
+    manipulability: Expression
+    position_tolerance: float
+    rotation_tolerance: float
+
+    @classmethod
+    def read(cls, fields: Fields) -> Self:
+        locked = []
+        for item in fields.tables("locked"):
+            locked.append((item.whole("joint", 1, 32) - 1, item.expression("value")))
+            item.done()
+        return cls(
+            fields.choice("task", TASKS, "position"),  # type: ignore[arg-type]  # checked by choice()
+            fields.text("branch", ""),
+            tuple(locked),
+            fields.number("margin", 0.0),
+            fields.expression("manipulability", "0"),
+            1e-3 * fields.number("position_tolerance", 3.0, above=0.0),
+            math.radians(fields.number("rotation_tolerance", 3.0, above=0.0)),
+        )
+
+    def asked(self, variant: Variant, units: Units) -> Asked:
+        robot = variant.robot
+        conditions = [f"the tool within {units.lengths.brief(self.position_tolerance)}"]
+        if self.task != "position":
+            what = "orientation" if self.task == "pose" else "approach direction"
+            conditions.append(f"its {what} within {units.angles.brief(self.rotation_tolerance)}")
+        if self.branch:
+            conditions.append(f"posture: {self.branch}")
+        for joint, value in self.locked:
+            unit = units.of(bool(robot.revolute[joint]))
+            conditions.append(f"joint {joint + 1} at {unit.brief(variant.number(value))}")
+        if self.margin:
+            conditions.append(f"every joint {self.margin:g} % of its range away from its limits")
+        if (least := variant.number(self.manipulability)) > 0.0:
+            conditions.append(f"manipulability at least {least:.3g}")
+        return Asked("posture", note=f"Counts: {listed(conditions)}.", goal=variant.pose)
+
+    def judge(self, variant: Variant, given: object, units: Units) -> Verdict:
+        robot = variant.robot
+        q = numbers(given, robot.n, "one configuration in radians and metres")
+        parts = [self._at_target(variant, q, units)]
+        if not robot.in_limits(q, 1e-6):
+            outside = [f"joint {i + 1}" for i in range(robot.n) if not robot.lower[i] <= q[i] <= robot.upper[i]]
+            parts.append((False, f"Outside its limits: {listed(outside)}."))
+        if self.branch:
+            name = kin.branch_of(robot, q)
+            fits = has_parts(name, self.branch)
+            parts.append((fits, f"The posture is “{name}”{'' if fits else f', asked is “{self.branch}”'}."))
+        for joint, value in self.locked:
+            unit, wanted = units.of(bool(robot.revolute[joint])), variant.number(value)
+            fits = abs(q[joint] - wanted) <= LOCKED[0 if robot.revolute[joint] else 1]
+            there = unit.text(float(q[joint]), 1)
+            parts.append(
+                (fits, f"Joint {joint + 1} is at {there}{'' if fits else f', not at {unit.brief(wanted)}'}.")
+            )
+        if self.margin:
+            parts.append(self._in_margin(robot, q, units))
+        if (least := variant.number(self.manipulability)) > 0.0:
+            w = float(kin.manipulability(robot, q))
+            parts.append(
+                (w >= least, f"The manipulability is {w:.3g}{'' if w >= least else f', below {least:.3g}'}.")
+            )
+        return Verdict.of(parts, " ".join(reason for _, reason in parts))
+
+    def _at_target(self, variant: Variant, q: Array, units: Units) -> tuple[bool, str]:
+        T, goal = kin.fk(variant.robot, q), variant.pose
+        off = float(np.linalg.norm(T[:3, 3] - goal[:3, 3]))
+        if off > self.position_tolerance:
+            return False, f"The tool is {units.lengths.text(off, 1)} from the target.{self._negated(variant, q)}"
+        turned = (
+            float(rotation_angle(T[:3, :3], goal[:3, :3]))
+            if self.task == "pose"
+            else float(vector_angle(T[:3, 2], goal[:3, 2]))
+        )
+        if self.task != "position" and turned > self.rotation_tolerance:
+            what = "orientation" if self.task == "pose" else "approach direction"
+            return False, f"The point is reached; the {what} is off by {units.angles.text(turned, 1)}."
+        return True, "The target is reached."
+
+    def _negated(self, variant: Variant, q: Array) -> str:
+        """Whether one joint with the other sign would reach the target."""
+        for i in range(variant.robot.n):
+            flipped = q.copy()
+            flipped[i] = -flipped[i]
+            point = kin.fk(variant.robot, flipped)[:3, 3]
+            if abs(q[i]) > 1e-3 and np.linalg.norm(point - variant.pose[:3, 3]) <= self.position_tolerance:
+                return f" This is the posture with joint {i + 1} negated."
+        return ""
+
+    def _in_margin(self, robot: Robot, q: Array, units: Units) -> tuple[bool, str]:
+        span = robot.upper - robot.lower
+        share = 100.0 * np.minimum(q - robot.lower, robot.upper - q) / span
+        worst = int(np.nanargmin(share))
+        fits = bool(share[worst] >= self.margin)
+        left = units.of(bool(robot.revolute[worst])).text(
+            float(min(q[worst] - robot.lower[worst], robot.upper[worst] - q[worst])), 1
+        )
+        return fits, f"Joint {worst + 1} is nearest to a limit, {left} away, {share[worst]:.0f} % of its range."
+
+    def answer(self, variant: Variant) -> object:
+        robot = variant.robot
+        locks = dict(self.locked)
+        limits, locked = None, None
+        if locks:
+            locked = tuple(variant.number(locks[i]) if i in locks else None for i in range(robot.n))
+        if self.margin:
+            inset = (self.margin + 1e-6) / 100.0 * (robot.upper - robot.lower)
+            limits = [
+                (float(low + by), float(high - by)) if np.isfinite(by) else None
+                for low, high, by in zip(robot.lower, robot.upper, inset, strict=True)
+            ]
+        options = IKOptions(
+            task=self.task, branch=self.branch or None, constraints=JointConstraints(limits=limits, locked=locked),
+            prefer="manipulability" if variant.number(self.manipulability) > 0.0 else "nearest",
+        )  # fmt: skip
+        found = kin.ik.solve(robot, variant.pose, options, robot.q_home)
+        if not found.solutions:
+            raise ValueError(f"no posture meets the conditions: {found.reason}")
+        return found.solutions[0].q.tolist()
+
+    def solution(self, variant: Variant, units: Units) -> str:
+        robot = variant.robot
+        values = ", ".join(
+            f"joint {i + 1} at {units.of(bool(turns)).text(value, 1)}"
+            for i, (value, turns) in enumerate(zip(self.answer(variant), robot.revolute, strict=True))  # type: ignore[call-overload]
+        )
+        return f"For instance {values}."
+
+
+def has_parts(name: str, wanted: str) -> bool:
+    """Whether the name of a branch, such as ``"shoulder left · elbow up"``, has the parts asked for."""
+    return all(part.strip() in name for part in wanted.split(","))

@@ -1,0 +1,102 @@
+"""Poses of exercises: elementary motions, errors between poses, and sentences about them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import reduce
+
+import numpy as np
+
+from app.exercises.expressions import Expression
+from app.exercises.fields import Fields
+from app.exercises.variant import Variant
+from kin import wxyz_from_rotation
+from kin.transforms import Array, rotation_angle
+from kin.units import Units
+
+AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class Elementary:
+    """A turn about one axis, or a slide along it, by an expression."""
+
+    turns: bool
+    axis: int
+    by: Expression
+
+    @classmethod
+    def read(cls, fields: Fields) -> Elementary:
+        """From a table ``{ turn = "z", by = "t1" }`` or ``{ slide = "x", by = "a1" }``."""
+        turns = fields.has("turn")
+        if turns == fields.has("slide"):
+            raise fields.refuse("turn", fields.table, "either turn or slide, with the axis x, y or z")
+        axis = fields.choice("turn" if turns else "slide", AXES)
+        motion = cls(turns, AXES.index(axis), fields.expression("by"))
+        fields.done()
+        return motion
+
+    def matrix(self, variant: Variant, factor: float = 1.0) -> Array:
+        """The motion as a transform ``(4, 4)``; a factor of −1 is the motion the other way."""
+        return elementary(self.turns, self.axis, factor * variant.number(self.by))
+
+    def text(self, variant: Variant, units: Units) -> str:
+        """``turn by 30° about z``."""
+        value, name = variant.number(self.by), AXES[self.axis]
+        amount = units.of(self.turns).brief(value)
+        return f"turn by {amount} about {name}" if self.turns else f"slide by {amount} along {name}"
+
+
+def elementary(turns: bool, axis: int, value: float) -> Array:
+    """A turn about, or a slide along, one axis of the frame ``(4, 4)``."""
+    T = np.eye(4)
+    if not turns:
+        T[axis, 3] = value
+        return T
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    c, s = math.cos(value), math.sin(value)
+    T[i, i] = T[j, j] = c
+    T[i, j], T[j, i] = -s, s
+    return T
+
+
+def product(matrices: list[Array]) -> Array:
+    """The product of transforms, in this order."""
+    return reduce(np.matmul, matrices, np.eye(4))
+
+
+def errors(given: Array, right: Array) -> tuple[float, float]:
+    """Distance of the origins (m) and angle between the orientations (rad)."""
+    return (
+        float(np.linalg.norm(given[:3, 3] - right[:3, 3])),
+        float(rotation_angle(given[:3, :3], right[:3, :3])),
+    )
+
+
+def as_numbers(T: Array) -> list[float]:
+    """A pose as x, y, z and a quaternion w, x, y, z."""
+    return [*map(float, T[:3, 3]), *map(float, wxyz_from_rotation(T[:3, :3]))]
+
+
+def point_text(point: Array, units: Units) -> str:
+    """``x = 10 mm, y = 20 mm, z = 30 mm``."""
+    return ", ".join(f"{axis} = {units.lengths.text(float(v), 1)}" for axis, v in zip(AXES, point, strict=True))
+
+
+def pose_text(T: Array, units: Units) -> str:
+    """Where a frame is, and where its axes point."""
+    columns = ", ".join(
+        f"{axis} = ({', '.join(f'{v:.2f}'.replace('-0.00', '0.00').replace('-', '−') for v in T[:3, j])})"
+        for j, axis in enumerate(AXES)
+    )
+    return f"{point_text(T[:3, 3], units)}; its axes: {columns}"
+
+
+def joints_text(variant: Variant, q: Array, units: Units) -> str:
+    """Joint values, such as ``θ₁ = 30°, θ₂ = 45°``."""
+    robot = variant.robot
+    return ", ".join(
+        f"joint {i + 1} at {units.of(bool(turns)).text(float(value), 1)}"
+        for i, (value, turns) in enumerate(zip(q, robot.revolute, strict=True))
+    )

@@ -1,0 +1,376 @@
+"""Every kind of exercise: other right answers, reasons for wrong ones, partial credit, and what is no answer."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import kin
+from app.exercises import Exercise, Variant, Verdict, parse_exercise
+from app.exercises.kinds import KINDS
+from app.exercises.typed import EntryError
+from kin import InputError
+from kin.dh import convert
+from kin.units import Units
+
+UNITS, RADIANS = Units(), Units(degrees=False, length="m")
+HEAD = 'id = "x"\ntitle = "X"\ntopic = "Velocity"\ntext = "?"\n'
+
+
+def made(robot: str, kind: str, body: str) -> tuple[Exercise, Variant]:
+    exercise = parse_exercise(f'{HEAD}robot = "{robot}"\nkind = "{kind}"\n{body}')
+    return exercise, exercise.variant(0)
+
+
+def judged(one: tuple[Exercise, Variant], given: Any, units: Units = UNITS) -> Verdict:
+    return one[0].judge(one[1], given, units)
+
+
+# Numbers
+
+ANGLE = made("planar2r", "number", '[answer]\nvalue = "30*deg"\nunit = "deg"\ntolerance = 1\nmethod = "Add."')
+POINT = made(
+    "planar2r", "number",
+    '[answer]\nvalue = [0.2, -0.1, 0.3]\nlabels = ["x", "y", "z"]\nunit = "mm"\ntolerance = 1\nmethod = "Add."',
+)  # fmt: skip
+
+
+def test_numbers_are_read_in_the_readers_units() -> None:
+    for text, units in (
+        ("30", UNITS),
+        ("30.9", UNITS),
+        ("0.5236", RADIANS),
+        ("30°", RADIANS),
+        ("0.5236 rad", UNITS),
+    ):
+        assert judged(ANGLE, [text], units).right
+    assert not judged(ANGLE, ["31.2"]).right
+
+
+def test_a_number_in_another_unit_is_named() -> None:
+    assert judged(ANGLE, ["0.5236"]).reason.startswith("This is the value in radians. The unit is degrees")
+    assert judged(ANGLE, ["30"], RADIANS).reason.startswith("This is the value in degrees. The unit is radians")
+    assert "in metres" in judged(POINT, ["0.2", "-0.1", "0.3"]).parts[0][1]
+
+
+def test_vectors_get_credit_for_each_component() -> None:
+    assert judged(POINT, ["200", "-100", "300"]).right
+    verdict = judged(POINT, ["200", "-100", "200"])
+    assert (verdict.right, round(verdict.credit, 3)) == (False, 0.667)
+    assert "x and y are exchanged" in judged(POINT, ["-100", "200", "300"]).reason
+    assert "opposite vector" in judged(POINT, ["-200", "100", "-300"]).reason
+    assert judged(POINT, ["200", "100", "300"]).reason == "y: The size is right, the sign is not. Add."
+
+
+@pytest.mark.parametrize("answer", [None, 3, ["1", "2"], [3.0], "30"])
+def test_what_is_no_number_is_refused(answer: object) -> None:
+    with pytest.raises(InputError, match="answer"):
+        judged(ANGLE, answer)
+
+
+def test_texts_that_are_no_numbers_say_what_is_valid() -> None:
+    for text in ("", "x", "3 mm", "1e999"):
+        with pytest.raises(EntryError):
+            judged(ANGLE, [text])
+
+
+# DH rows
+
+ROWS = made("irb120", "dh", 'q = ["0.3", "0.2", "-0.4", "0.1", "0.6", "0.2"]\n[answer]\nrows = [1, 2, 3, 4, 5, 6]')
+
+
+def rows_of(one: tuple[Exercise, Variant], robot: kin.Robot) -> list[list[str]]:
+    """The table of a robot at the exercise's configuration, as a student types it."""
+    values = dict(zip(robot.joint_rows, one[1].q.tolist(), strict=True))
+    return [
+        [
+            repr(math.degrees(row.theta + (values.get(i, 0.0) if row.kind == "revolute" else 0.0))),
+            repr(1000 * (row.d + (values.get(i, 0.0) if row.kind == "prismatic" else 0.0))),
+            repr(1000 * row.a),
+            repr(math.degrees(row.alpha)),
+        ]
+        for i, row in enumerate(robot.rows)
+    ]
+
+
+@given(st.lists(st.booleans(), min_size=5, max_size=5), st.integers(-2, 2))
+def test_every_choice_of_the_directions_of_axes_is_right(flips: list[bool], turns: int) -> None:
+    """z of each frame may point either way: then θ, a and α change, and the arm is the same."""
+    rows = [[float(x) for x in row] for row in rows_of(ROWS, ROWS[1].robot)]
+    for k, flip in enumerate(flips):
+        if flip:  # a half turn of frame k+1 about its x axis
+            rows[k][3] += 180.0
+            theta, d, a, alpha = rows[k + 1]
+            rows[k + 1] = [-theta, -d, a, alpha + 180.0]
+            # Rx(π) Rz(θ) Tz(d) = Rz(−θ) Tz(−d) Rx(π); Rx(π) commutes with Tx(a) Rx(α).
+    rows[0][0] += 360.0 * turns
+    verdict = judged(ROWS, [[repr(x) for x in row] for row in rows])
+    assert verdict.right, verdict
+    assert any(flips) == ("Other frames" in verdict.reason)
+
+
+def test_a_frame_may_turn_half_about_its_own_z() -> None:
+    rows = [[float(x) for x in row] for row in rows_of(ROWS, ROWS[1].robot)]
+    rows[1][0] += 180.0  # x of frame 2 the other way: a and α change their signs, and the next θ
+    rows[1][2] *= -1
+    rows[1][3] *= -1
+    rows[2][0] += 180.0
+    assert judged(ROWS, [[repr(x) for x in row] for row in rows]).right
+
+
+def test_the_other_convention_is_recognised() -> None:
+    """The same arm in Craig's convention: its numbers are right there, and are said to be."""
+    arm = ROWS[1].robot
+    verdict = judged(ROWS, rows_of(ROWS, convert(arm, "modified")))
+    assert not verdict.right
+    assert verdict.reason.startswith("This is correct for the other convention, Craig’s convention.")
+    assert verdict.credit == 0.5
+
+
+def test_a_wrong_sign_and_a_wrong_row_are_named() -> None:
+    rows = rows_of(ROWS, ROWS[1].robot)
+    turned = [list(row) for row in rows]
+    turned[5][1] = repr(-float(turned[5][1]))
+    verdict = judged(ROWS, turned)
+    assert verdict.reason == "Row 6 is right but for the sign of d."
+    assert verdict.credit == pytest.approx(5 / 6, abs=1e-3)
+    moved = [list(row) for row in rows]
+    moved[1][2] = "300"
+    assert (
+        "the axis of joint 3 has the right direction, but it is 30 mm from its place" in judged(ROWS, moved).reason
+    )
+    moved = [list(row) for row in rows]
+    moved[0][3] = "-40"
+    assert "the axis of joint 2 points elsewhere, off by 50°" in judged(ROWS, moved).reason
+
+
+def test_units_of_a_table_are_recognised() -> None:
+    rows = rows_of(ROWS, ROWS[1].robot)
+    radians = [[repr(math.radians(float(r[0]))), r[1], r[2], repr(math.radians(float(r[3])))] for r in rows]
+    assert judged(ROWS, radians).reason.startswith("The angles are in radians; the unit is degrees.")
+    metres = [[r[0], repr(float(r[1]) / 1000), repr(float(r[2]) / 1000), r[3]] for r in rows]
+    assert judged(ROWS, metres).reason == "The lengths are in metres; the unit is mm."
+    with pytest.raises(EntryError, match="α of row 2"):
+        judged(ROWS, [rows[0], [*rows[1][:3], "x"], *rows[2:]])
+
+
+# Reach
+
+REACH = made(
+    "puma560", "reach",
+    '[target]\nq = ["0.3", "0.9", "-2.0", "0", "0.8", "0"]\n'
+    '[answer]\ntask = "pose"\nbranch = "elbow up, wrist no-flip"\nmargin = 2',
+)  # fmt: skip
+
+
+def test_a_posture_is_judged_by_all_conditions() -> None:
+    robot = REACH[1].robot
+    results = {}
+    for solution in kin.solve_ik(robot, REACH[1].pose).solutions:
+        verdict = judged(REACH, solution.q.tolist())
+        results[solution.branch] = verdict.right
+        if not verdict.right:
+            assert 0.0 < verdict.credit < 1.0
+            assert "posture is" in verdict.reason or "limit" in verdict.reason
+    assert any(results.values())
+    assert all("elbow up" in name and "no-flip" in name for name, fine in results.items() if fine)
+
+
+def test_a_negated_joint_is_recognised() -> None:
+    q = np.array(REACH[0].kind.answer(REACH[1]))
+    wrong = q.copy()
+    wrong[0] = -wrong[0]
+    assert judged(REACH, wrong.tolist()).reason.endswith("This is the posture with joint 1 negated.")
+    for given_ in ([0.0] * 5, [math.nan] * 6, "home", [True] * 6):
+        with pytest.raises(InputError):
+            judged(REACH, given_)
+
+
+# Solutions
+
+ALL = made("puma560", "solutions", '[target]\nq = ["0.3", "0.9", "-2.0", "0.4", "0.8", "0.5"]\n[answer]\nrows = 8')
+
+
+def test_all_solutions_are_found_only_by_all_of_them() -> None:
+    right = ALL[0].kind.answer(ALL[1])
+    assert isinstance(right, list)
+    assert len(right) >= 2
+    assert judged(ALL, right[::-1]).right
+    assert judged(ALL, [*right, [""] * 6]).right, "empty rows do not count"
+    part = judged(ALL, right[1:])
+    assert (part.right, part.reason) == (False, "There is another solution.")
+    assert part.credit == pytest.approx(1 - 1 / len(right), abs=1e-3)
+    twice = judged(ALL, [*right, right[0]])
+    assert "once more" in twice.reason
+    assert not judged(ALL, []).right
+
+
+def test_a_row_that_is_no_solution_gets_its_reason() -> None:
+    right = ALL[0].kind.answer(ALL[1])
+    assert isinstance(right, list)
+    row = list(right[0])
+    row[4] = repr(-float(row[4]))
+    assert "this is a solution with joint 5 negated" in judged(ALL, [row, *right[1:]]).reason
+    radians = [repr(math.radians(float(x))) for x in right[0]]
+    assert "these are radians" in judged(ALL, [radians]).reason
+    turned = [repr(float(right[0][0]) + 360.0), *right[0][1:]]
+    assert "outside its limits" in judged(ALL, [turned]).reason
+    assert "from the target" in judged(ALL, [["10", "20", "-90", "5", "40", "7"]]).reason
+
+
+# Singularities
+
+
+def test_a_direction_may_have_any_length_and_sign() -> None:
+    lost = made("scara", "singularity", 'q = ["0.4", "0", "0.1", "0"]\n[answer]\nasks = "direction"')
+    x, y = math.cos(0.4), math.sin(0.4)
+    for factor in (1.0, -3.0, 0.01):
+        assert judged(lost, [repr(factor * x), repr(factor * y), "0"]).right
+    verdict = judged(lost, ["0", "0", "1"])
+    assert (
+        verdict.reason
+        == "The tool point can move in this direction: joint 3, sliding at 1 m/s, moves it by 1 m/s."
+    )
+    with pytest.raises(InputError, match="not zero"):
+        judged(lost, ["0", "0", "0"])
+
+
+def test_a_wrong_singularity_is_given_its_distance() -> None:
+    named = made("puma560", "singularity", 'q = ["0", "0.9", "-2.6", "0.4", "0", "0.5"]\n[answer]\nasks = "name"')
+    labels = named[0].asked(named[1], UNITS).labels
+    for i, label in enumerate(labels):
+        verdict = judged(named, i)
+        assert verdict.right == ("xes 4 and 6" in label)
+        if not verdict.right:
+            assert "away from that singularity" in verdict.reason
+
+
+# Frames and orders
+
+FRAME = made(
+    "planar2r", "frame",
+    '[answer]\nmotions = [{ slide = "x", by = "0.5" }, { turn = "z", by = "60*deg" }, '
+    '{ turn = "x", by = "90*deg" }]',
+)  # fmt: skip
+
+
+def pose_numbers(T: np.ndarray) -> list[float]:
+    return [*T[:3, 3].tolist(), *kin.wxyz_from_rotation(T[:3, :3]).tolist()]
+
+
+def test_a_ghost_is_judged_by_place_and_direction() -> None:
+    right = FRAME[0].kind.answer(FRAME[1])
+    assert isinstance(right, list)
+    assert judged(FRAME, right).right
+    assert judged(FRAME, [*right[:3], *(-x for x in right[3:])]).right, "−q is the same rotation"
+    assert judged(FRAME, [right[0] + 0.05, *right[1:]]).reason.startswith("The axes point the right way.")
+    assert judged(FRAME, [right[0] + 0.05, *right[1:]]).credit == 0.5
+    base = pose_numbers(_turn(0, math.pi / 2) @ _turn(2, math.pi / 3) @ _slide(0.5))
+    assert "about the axes of the base" in judged(FRAME, base).reason
+    other = pose_numbers(_slide(0.5) @ _turn(2, -math.pi / 3) @ _turn(0, math.pi / 2))
+    assert "Turn 2 goes the other way." in judged(FRAME, other).reason
+    for given_ in ([0.0] * 7, [0.0] * 6, None):
+        with pytest.raises(InputError):
+            judged(FRAME, given_)
+
+
+def _turn(axis: int, angle: float) -> np.ndarray:
+    T, (i, j) = np.eye(4), ((axis + 1) % 3, (axis + 2) % 3)
+    T[i, i] = T[j, j] = math.cos(angle)
+    T[i, j], T[j, i] = -math.sin(angle), math.sin(angle)
+    return T
+
+
+def _slide(x: float) -> np.ndarray:
+    T = np.eye(4)
+    T[0, 3] = x
+    return T
+
+
+def test_the_frame_of_a_row_knows_negated_joints() -> None:
+    row = made("scara", "frame", 'q = ["0.5", "0.8", "0.1", "0"]\n[answer]\nrow = 2')
+    frames = kin.link_frames("scara", [0.5, -0.8, 0.1, 0.0])
+    assert judged(row, pose_numbers(frames[1])).reason == "This is the frame with joint 2 negated."
+    assert judged(row, pose_numbers(frames[0])).reason == "This is frame 1. Frame 2 is asked."
+
+
+ORDER = made(
+    "planar2r", "order",
+    '[answer]\nmotions = [{ turn = "z", by = "0.4" }, { slide = "z", by = "0.2" }, '
+    '{ slide = "x", by = "0.3" }, { turn = "x", by = "1.0" }]',
+)  # fmt: skip
+
+
+def test_orders_with_the_same_product_are_right() -> None:
+    right = ORDER[0].kind.answer(ORDER[1])
+    assert isinstance(right, list)
+    a, b, c, d = right
+    for order in ([a, b, c, d], [b, a, c, d], [b, a, d, c], [a, b, d, c]):
+        assert judged(ORDER, order).right
+    other = judged(ORDER, [c, d, a, b])
+    assert other.reason.startswith("This order is correct for the other convention")
+    fixed = made(
+        "planar2r", "order", '[answer]\nmotions = [{ turn = "x", by = "0.4" }, { turn = "y", by = "0.2" }]'
+    )
+    swapped = fixed[0].kind.answer(fixed[1])[::-1]  # type: ignore[index]
+    assert "right for motions about the axes of the base" in judged(fixed, swapped).reason
+    assert judged(ORDER, [a, d, b, c]).credit == 0.25
+    for given_ in ([a, b, c], [a, a, b, c], "abcd", [a, b, c, 9]):
+        with pytest.raises(InputError):
+            judged(ORDER, given_)
+
+
+# Terms and programs
+
+
+def test_the_wrong_term_is_drawn_by_the_seed() -> None:
+    exercise = parse_exercise(
+        f'{HEAD}robot = "planar2r"\nkind = "term"\n[answer]\nname = "x"\nentry = "x"\n'
+        'terms = [{ value = "cos(q1)", shown = "A" }, { value = "0.6*cos(q1 + q2)", shown = "B" }]\n'
+        'misprints = [{ term = 1, value = "sin(q1)", shown = "C", reason = "First one wrong." },\n'
+        '{ term = 2, value = "0.6*cos(q2)", shown = "D", reason = "Second one wrong." }]'
+    )
+    drawn = set()
+    for seed in range(12):
+        variant = exercise.variant(seed)
+        labels = exercise.asked(variant, UNITS).labels
+        drawn.add(labels)
+        wrong = 0 if labels == ("C", "B") else 1
+        assert exercise.judge(variant, wrong, UNITS).right
+        assert "This term is right" in exercise.judge(variant, 1 - wrong, UNITS).reason
+    assert drawn == {("C", "B"), ("A", "D")}
+    exercise.verify()
+
+
+LINE = made(
+    "irb120", "program", '[target]\nposition = ["x", "y + 0.2", "z"]\n[answer]\nstraight = 2\ntool_speed = 0.2'
+)
+
+
+def test_programs_are_refused_with_the_planners_own_reasons() -> None:
+    x, y, z = (1000 * LINE[1].pose[:3, 3]).tolist()
+    head = 'units = { length = "mm", angle = "deg" }\n[[segments]]\n'
+    ptp = judged(LINE, f'{head}kind = "ptp"\nposition = [{x}, {y}, {z}]\ntool_speed = 200')
+    assert "off the line. A PTP is straight in the joints" in ptp.reason
+    fast = judged(LINE, f'{head}kind = "lin"\nposition = [{x}, {y}, {z}]')
+    assert "0.2 m/s are allowed" in fast.reason
+    assert fast.credit == pytest.approx(2 / 3)
+    short = judged(LINE, f'{head}kind = "lin"\nposition = [{x}, {y - 50}, {z}]\ntool_speed = 200')
+    assert short.reason == "The program ends 50 mm from the end of the line."
+    far = judged(LINE, f'{head}kind = "lin"\nposition = [3000, 0, {z}]')
+    assert far.reason.startswith("Segment 1 (LIN) cannot be driven")
+    for text in ("", "x", 5, "[[segments]]\nkind = 'fly'", "#" * 5000):
+        with pytest.raises(InputError):
+            judged(LINE, text)
+
+
+def test_every_kind_is_tested_here_or_in_the_library() -> None:
+    assert list(KINDS) == [
+        "number", "choice", "dh", "reach", "solutions", "singularity", "term", "frame", "order", "program",
+    ]  # fmt: skip
+    assert all(kind.about.endswith(".") for kind in KINDS.values())
