@@ -132,6 +132,15 @@ class Tab:
         """Wait until the numbers of the panel no longer change, after an action with several answers."""
         self.page.wait_for_function(UNCHANGED, polling=100)
 
+    def mark_is_under_thumb(self, label: str, degrees: float) -> None:
+        """Assert that this value of ψ is where the strip of feasible values and the slider below both have it."""
+        strip = self.page.locator("[data-redundancy=psi]:visible > div").first.bounding_box()
+        thumb = self.row(label).get_by_role("slider").first.bounding_box()
+        assert strip is not None
+        assert thumb is not None
+        middle = strip["x"] + strip["width"] * (degrees + 180) / 360
+        assert abs(middle - (thumb["x"] + thumb["width"] / 2)) < 8
+
     def pixel(self, robot: kin.Robot, point: np.ndarray, room: Sequence[camera.Sphere] = ()) -> np.ndarray:
         """Page coordinates of a point of the scene, in the default view with room for these spheres."""
         area = self.page.locator("canvas").first.bounding_box()

@@ -106,12 +106,7 @@ def test_branches_and_the_arm_angle_move_the_arm_and_not_the_tool(tab: Tab) -> N
     assert np.abs(kin.fk(SRS, q)[:3, 3] - home).max() < 5e-4
     assert abs(q[0]) > 0.2, "the elbow swung out"
     expect(tab.page.locator("[data-redundancy=psi]")).to_contain_text("feasible: −111.7 … 111.7°")
-    strip = tab.page.locator("[data-redundancy=psi] > div").first.bounding_box()
-    track = tab.row("Arm angle ψ").get_by_role("slider").first.bounding_box()
-    assert strip is not None
-    assert track is not None
-    middle = strip["x"] + strip["width"] * (60 + 180) / 360
-    assert abs(middle - (track["x"] + track["width"] / 2)) < 8, "the mark of the strip is under the slider's thumb"
+    tab.mark_is_under_thumb("Arm angle ψ", 60)
     tab.screenshot("posture-light")
     tab.type_number("Arm angle ψ", "150")
     expect(tab.status).to_contain_text("111.7")

@@ -83,12 +83,7 @@ def test_the_ring_of_arm_angles(tab: Tab) -> None:
     tab.wait_for_tool(p, within=0.06)
     expect(tab.page.locator("[data-residual]")).to_contain_text("Tool held to")
     expect(tab.page.locator("[data-limits]")).to_contain_text("limit of joint 6")
-    strip = tab.page.locator("[data-redundancy=psi]:visible > div").first.bounding_box()
-    track = tab.row("Set ψ (tool held)").get_by_role("slider").first.bounding_box()
-    assert strip is not None
-    assert track is not None
-    middle = strip["x"] + strip["width"] * (70 + 180) / 360
-    assert abs(middle - (track["x"] + track["width"] / 2)) < 8, "the mark is under the slider's thumb"
+    tab.mark_is_under_thumb("Set ψ (tool held)", 70)
     tab.screenshot("redundancy-ring")
     learn(tab, PRINTED, "Redundancy")
     expect(tab.page.locator("[data-idea]")).to_contain_text("The axes of joints 1 and 2 coincide")
