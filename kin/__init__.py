@@ -7,6 +7,7 @@
 """
 
 from kin._version import __version__
+from kin.collision import Capsule, NearestLinks, capsules, nearest_links, self_distance
 from kin.dh import Screws, convert, exp_screw, robot_from_screws, screws
 from kin.errors import InputError, KinematicsError, RobotFileError, UnknownRobotError
 from kin.files import (
@@ -85,6 +86,7 @@ __all__ = [
     "CapabilityBlock",
     "CapabilityGrid",
     "CapabilityMap",
+    "Capsule",
     "Circ",
     "Dwell",
     "Estimate",
@@ -103,6 +105,7 @@ __all__ = [
     "Motion",
     "MotionLimits",
     "MotionSample",
+    "NearestLinks",
     "PathGap",
     "PathJump",
     "PathResult",
@@ -136,6 +139,7 @@ __all__ = [
     "capability_grid",
     "capability_join",
     "capability_map",
+    "capsules",
     "configuration_at",
     "convert",
     "exp_screw",
@@ -153,6 +157,7 @@ __all__ = [
     "load_robot",
     "load_urdf",
     "manipulability",
+    "nearest_links",
     "parse_program",
     "parse_robot",
     "plan_motion",
@@ -168,6 +173,7 @@ __all__ = [
     "save_robot",
     "screws",
     "section",
+    "self_distance",
     "singularities",
     "solve_ik",
     "solve_ik_many",

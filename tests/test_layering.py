@@ -29,6 +29,7 @@ RULES: dict[str, set[str]] = {
     "kin/files": {"numpy", "kin.dh", "kin.files", *MODEL},
     "kin/solvers": {"numpy", "kin.dh", "kin.kernels", "kin.solvers", *MODEL - {"kin.singularity"}},
     "kin/ik": {"numpy", "kin.kernels", "kin.solvers", "kin.ik", *MODEL},
+    "kin/collision": {"numpy", "kin.kernels", "kin.collision", *MODEL},
     "kin/path": {"numpy", "kin.kernels", "kin.solvers", "kin.ik", "kin.path", *MODEL},
     "kin/motion": {"numpy", "kin.files", "kin.kernels", "kin.solvers", "kin.ik", "kin.path", "kin.motion", *MODEL},
     "kin/workspace": {"numpy", "kin.kernels", "kin.solvers", "kin.ik", "kin.workspace", *MODEL},

@@ -1,0 +1,78 @@
+"""Whether an arm touches itself: distances between capsules that stand for its links.
+
+`self_distance` is the number for any batch of configurations, `nearest_links` says for one configuration which two
+links it is and where. Distances are between capsules (`kin.collision.bodies`), which are assumed from the DH table:
+they warn early or late by the difference to the real bodies.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kin.collision.bodies import Capsule, bodies_of, capsules
+from kin.collision.kernels import least_distance, least_distances
+from kin.errors import InputError
+from kin.named import robot_of
+from kin.robot import Robot
+from kin.transforms import Array
+
+CROSSING = 1e-9  # m between two axes: below this it has no direction
+
+__all__ = ["Capsule", "NearestLinks", "capsules", "nearest_links", "self_distance"]
+
+
+@dataclass(frozen=True, eq=False)
+class NearestLinks:
+    """The two links of an arm that are nearest to each other.
+
+    Attributes:
+        distance: m, negative where their capsules overlap.
+        links: 0 for the base, k for the link that joint k moves.
+        points: where the distance is, on the surfaces of both capsules ``(2, 3)``, m in the base frame; if their
+            axes cross, twice the crossing.
+    """
+
+    distance: float
+    links: tuple[int, int]
+    points: Array
+
+
+def self_distance(robot: Robot | str, q: ArrayLike) -> Array:
+    """Least distance between links ``(...)`` in metres, for configurations ``(..., n)``.
+
+    Negative where capsules overlap; infinite for an arm of which no two links could meet.
+    """
+    robot = robot_of(robot)
+    q = np.ascontiguousarray(robot.check_q(q))
+    body = bodies_of(robot)
+    out = np.empty(q.shape[:-1])
+    least_distances(robot.model, body.rows, body.shape, body.pairs, q.reshape(-1, robot.n), out.reshape(-1))
+    return out
+
+
+def nearest_links(robot: Robot | str, q: ArrayLike) -> NearestLinks | None:
+    """The two nearest links at one configuration ``(n,)``; None for an arm of which no two links could meet.
+
+    Raises:
+        InputError: q is not one configuration.
+    """
+    robot = robot_of(robot)
+    q = robot.check_q(q)
+    if q.ndim != 1:
+        raise InputError("q", f"shape {q.shape}", f"one configuration of {robot.n} values")
+    body = bodies_of(robot)
+    found = np.empty(7)
+    ends = np.empty((len(body.rows), 6))
+    pair = least_distance(robot.model, body.rows, body.shape, body.pairs, np.ascontiguousarray(q), ends, found)
+    if pair < 0:
+        return None
+    first, second = (body.capsules[k] for k in body.pairs[pair].tolist())
+    points = found[1:].reshape(2, 3)
+    apart = float(np.linalg.norm(points[1] - points[0]))
+    if apart > CROSSING:
+        way = (points[1] - points[0]) / apart
+        points = points + np.outer([first.radius, -second.radius], way)
+    return NearestLinks(float(found[0]), (first.link, second.link), points)
