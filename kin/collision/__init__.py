@@ -1,8 +1,8 @@
 """Whether an arm touches itself: distances between capsules that stand for its links.
 
-`self_distance` is the number for any batch of configurations, `nearest_links` says for one configuration which two
-links it is and where. Distances are between capsules (`kin.collision.bodies`), which are assumed from the DH table:
-they warn early or late by the difference to the real bodies.
+`self_distance` is the number for any batch of configurations; `nearest_links` says which two links, and where.
+Distances are between capsules, which are assumed from the DH table (`kin.collision.bodies`): they warn early or
+late by the difference to the real bodies.
 """
 
 from __future__ import annotations
