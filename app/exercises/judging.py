@@ -43,7 +43,10 @@ def judge(question: Question, given: float) -> Verdict:
         option = question.options[int(given)]
         return Verdict(option.right, option.reason)
     if _near(question, given, question.answer):
-        return Verdict(True, f"The exact value is {value_text(question)}.")
+        return Verdict(True, " ".join(filter(None, (f"The exact value is {value_text(question)}.", question.named))))
+    for way in question.ways:
+        if _near(question, given, way.value):
+            return Verdict(True, way.reason)
     for mistake in question.mistakes:
         if _near(question, given, mistake.value):
             return Verdict(False, mistake.reason)
@@ -64,6 +67,12 @@ def is_answer(question: Question, given: object) -> bool:
 def read(question: Number, text: str) -> float:
     """A typed answer in radians, metres or SI units; raises `EntryError` with what is valid."""
     return read_number(text, question.unit)
+
+
+def way_of(question: Number, given: float) -> int:
+    """Which right value is given: 0 for the answer, 1 for the first of the other ways, −1 for none."""
+    rights = (question.answer, *(way.value for way in question.ways))
+    return next((i for i, right in enumerate(rights) if _near(question, given, right)), -1)
 
 
 def solution_text(question: Question) -> str:

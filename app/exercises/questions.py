@@ -46,6 +46,14 @@ class Mistake:
 
 
 @dataclass(frozen=True)
+class Way:
+    """Another value that is right, and a sentence that names it."""
+
+    value: float
+    reason: str
+
+
+@dataclass(frozen=True)
 class Number:
     """A question whose answer is typed.
 
@@ -56,6 +64,8 @@ class Number:
         method: how to find the answer; the reason given for a wrong one that is no known mistake.
         mistakes: known wrong values.
         whole_turns: whether values that differ by whole turns are equal.
+        ways: further right values.
+        named: a sentence that tells `answer` from the other ways.
     """
 
     prompt: str
@@ -65,6 +75,8 @@ class Number:
     method: str
     mistakes: tuple[Mistake, ...] = ()
     whole_turns: bool = False
+    ways: tuple[Way, ...] = ()
+    named: str = ""
 
 
 PLAIN = Unit("", 1.0, 2)  # of counts and ratios
@@ -82,9 +94,9 @@ _SHARE = 0.45  # of the distance to the nearest wrong value
 
 
 def apart(question: Number, least: float = LEAST) -> Number:
-    """The question with a tolerance that tells its answer from its known mistakes and from zero.
+    """The question with a tolerance that tells its right values from its known mistakes and from zero.
 
-    Mistakes within twice `least` of the answer are left out: for this arm they give the right value.
+    Mistakes within twice `least` of a right value are left out: for this arm they give the right value.
     """
     wrong = tuple(m for m in question.mistakes if _gap(question, m.value) > 2.0 * least)
     gaps = [gap for value in (0.0, *(m.value for m in wrong)) if (gap := _gap(question, value)) > 2.0 * least]
@@ -108,8 +120,9 @@ def _rounded_down(size: float) -> float:
 
 
 def _gap(question: Number, value: float) -> float:
-    gap = value - question.answer
-    return abs(math.remainder(gap, 2.0 * math.pi) if question.whole_turns else gap)
+    """The distance to the nearest right value."""
+    gaps = [value - right for right in (question.answer, *(way.value for way in question.ways))]
+    return min(abs(math.remainder(gap, 2.0 * math.pi) if question.whole_turns else gap) for gap in gaps)
 
 
 Question = Choice | Number

@@ -58,6 +58,7 @@ class LessonChoice:
             if (left := self._left.get((chosen.key, self._stage.robot.id))) is not None:
                 self.guide.restore(left)
             self.shown = chosen(self._stage)
+            self.guide.attach(self.shown)
 
     @property
     def features(self) -> list[Feature]:

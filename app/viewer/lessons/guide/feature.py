@@ -47,6 +47,13 @@ class Guide(Feature):
         with gui.add_folder(None) as self._container:
             pass
         self._joints: viser.GuiFolderHandle | None = None
+        self._shown: Lesson | None = None
+        self._show()
+
+    def attach(self, lesson: Lesson) -> None:
+        """Let the lesson below the steps follow them."""
+        self._shown = lesson
+        lesson.show_steps = self._show
         self._show()
 
     def handle(self, key: Hashable, value: object) -> None:
@@ -141,6 +148,8 @@ class Guide(Feature):
             self.stage.move_to(np.array(q), Notice("hand", f"Step {progress.at + 1}: {step.title}", words))
 
     def _show(self) -> None:
+        if self._shown is not None and (outline := self._shown.on_steps(self._progress)) is not None:
+            self._progress.use(outline)
         update_html(self._goal, views.goal_html(self._progress.outline.goal))
         update_html(self._steps, views.steps_html(self._progress, self._errors))
 

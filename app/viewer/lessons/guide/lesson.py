@@ -3,15 +3,29 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 
-from app.viewer.feature import Feature
+from app.viewer.feature import Feature, Stage
 from app.viewer.lessons.guide.outline import Outline
+from app.viewer.lessons.guide.progress import Progress
 from kin import Robot
 from kin.units import Units
 
 
 class Lesson(Feature, ABC):
-    """A feature of the tab *Learn*. The page shows its outline above its controls."""
+    """A feature of the tab *Learn*. The page shows its outline above its controls.
+
+    Attributes:
+        show_steps: shows the outline again, after a change that concerns `on_steps`.
+    """
+
+    def __init__(self, stage: Stage) -> None:
+        super().__init__(stage)
+        self.show_steps: Callable[[], None] = _nothing
+
+    def on_steps(self, progress: Progress) -> Outline | None:
+        """The steps are about to be shown, after an answer for example; returns another outline to go on with."""
+        return None
 
     @staticmethod
     @abstractmethod
@@ -21,3 +35,7 @@ class Lesson(Feature, ABC):
         It is made again for each arm and unit while the visitor waits. So what needs inverse kinematics is kept
         for the arm: without a closed form, a target that is missed takes some tenths of a second.
         """
+
+
+def _nothing() -> None:
+    """What a lesson calls that has no steps on show."""

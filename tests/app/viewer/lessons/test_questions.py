@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import kin
-from app.exercises.judging import judge, read, value_text
+from app.exercises.judging import judge, read, value_text, way_of
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.dh import questions as dh
 from app.viewer.lessons.equations import questions as equations
@@ -180,6 +180,8 @@ def indistinct(outline: Outline) -> list[tuple[str, float, float]]:
         shown = value_text(asked)
         assert judge(asked, read(asked, shown)).right, f"the shown answer is accepted: {shown}"
         for wrong in (0.0, *(mistake.value for mistake in asked.mistakes)):
+            if way_of(asked, wrong) > 0:  # zero is one of the right values
+                continue
             gap = wrong - asked.answer
             gap = math.remainder(gap, 2 * math.pi) if asked.whole_turns else gap
             if abs(gap) > seen and judge(asked, wrong).right:
