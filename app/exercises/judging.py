@@ -43,7 +43,9 @@ def judge(question: Question, given: float) -> Verdict:
         option = question.options[int(given)]
         return Verdict(option.right, option.reason)
     if _near(question, given, question.answer):
-        return Verdict(True, " ".join(filter(None, (f"The exact value is {value_text(question)}.", question.named))))
+        return Verdict(
+            True, " ".join(filter(None, (f"The exact value is {value_text(question)}.", question.named)))
+        )
     for way in question.ways:
         if _near(question, given, way.value):
             return Verdict(True, way.reason)

@@ -10,6 +10,7 @@ from app.viewer.lessons.dh import DHLesson
 from app.viewer.lessons.equations import EquationsLesson
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.numeric import NumericLesson
+from app.viewer.lessons.inverse import InverseLesson
 from app.viewer.lessons.postures import Postures
 from app.viewer.lessons.redundancy import RedundancyLesson
 from app.viewer.lessons.screws import ScrewsLesson
@@ -21,6 +22,7 @@ LESSONS: tuple[type[Lesson], ...] = (
     DHLesson,
     ScrewsLesson,
     EquationsLesson,
+    InverseLesson,
     Postures,
     NumericLesson,
     RedundancyLesson,

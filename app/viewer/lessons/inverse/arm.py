@@ -1,7 +1,8 @@
 """Which arms the lesson can derive, and the numbers that their formulas need.
 
-The lesson's frame has its z axis along axis 1 and its origin at the arm's base. Where axis 1 is vertical there, it is
-the base frame of the arm. The angles θ of the formulas are counted from where links are in line: θ = sense q + offset.
+The lesson's frame has its z axis along axis 1 and its origin at the arm's base. Where axis 1 is vertical there, it
+is the base frame of the arm. The angles θ of the formulas are counted from where links are in line:
+θ = sense q + offset.
 """
 
 from __future__ import annotations
@@ -130,7 +131,7 @@ def _placed(
     (base, tool), (sense, offset) = poses, joints
     own, offset = robot.T_world_base, offset.copy()
     frame = base.copy()
-    if base[2, 2] > 1.0 - 1e-12 and own[2, 2] > 1.0 - 1e-12 or np.allclose(base[:3, 2], own[:3, 2], atol=1e-12):
+    if (base[2, 2] > 1.0 - 1e-12 and own[2, 2] > 1.0 - 1e-12) or np.allclose(base[:3, 2], own[:3, 2], atol=1e-12):
         frame[:3, :3] = own[:3, :3]
     x = frame[:3, :3].T @ base[:3, 0]
     offset[0] += math.atan2(x[1], x[0])
@@ -142,6 +143,8 @@ def _placed(
         offset[-1] -= math.atan2(R[1, 0], R[0, 0])
         R = np.eye(3)
     turn = offset % (2.0 * math.pi)
-    offset = np.where(np.minimum(turn, 2.0 * math.pi - turn) < 1e-12, 0.0, math.pi - (math.pi - offset) % (2.0 * math.pi))
+    offset = np.where(
+        np.minimum(turn, 2.0 * math.pi - turn) < 1e-12, 0.0, math.pi - (math.pi - offset) % (2.0 * math.pi)
+    )
     lengths = {name: 0.0 if is_zero(length) else length for name, length in {**lengths, "d1": d1}.items()}
     return Arm(robot, family, frame, wrist, R, sense, offset, lengths, x, names)

@@ -9,6 +9,7 @@ import numpy as np
 
 from app.viewer.lessons.inverse.arm import Arm
 from app.viewer.lessons.inverse.sheet import CLOSED, SINGULAR, Derivation, Sheet, minus
+from kin.axes import inverse
 from kin.transforms import Array
 
 FLAT = 1e-6  # m, or of a sine: a target further off the plane of a planar arm is off it
@@ -36,8 +37,8 @@ def signs_of(arm: Arm, q: Array) -> Signs:
         return (_sign(sine[1]),)
     if arm.family == "srs7":
         return _sign(sine[1]), _sign(sine[3]), _sign(sine[5])
-    l = arm.lengths
-    x = l["a1"] + l["a2"] * math.cos(t[1]) + l["d4" if arm.family == "wrist5" else "f"] * math.cos(t[1] + t[2])
+    lengths, fore = arm.lengths, "d4" if arm.family == "wrist5" else "f"
+    x = lengths["a1"] + lengths["a2"] * math.cos(t[1]) + lengths[fore] * math.cos(t[1] + t[2])
     return _sign(x), _sign(sine[2]), _sign(sine[4])
 
 
@@ -81,7 +82,7 @@ def derive(arm: Arm, T: Array, signs: Signs, near: Array, psi: float = 0.0) -> D
         near: configuration ``(n,)`` whose angles are kept where the target leaves them free.
         psi: arm angle of an S-R-S arm.
     """
-    sheet, M = Sheet(), np.linalg.solve(arm.T_base_lesson, T)
+    sheet, M = Sheet(), inverse(arm.T_base_lesson) @ T
     sheet.given(p=M[:3, 3].copy(), a=M[:3, 2].copy(), R=M[:3, :3].copy(), **arm.lengths)
     theta = arm.angles(near)
     if arm.family == "planar":
@@ -214,9 +215,7 @@ def _three_axes(sheet: Sheet, arm: Arm, sign: int, theta: Array) -> bool:
 def _lower(arm: Arm, sheet: Sheet, theta: Array, joints: int, rest: tuple[float, ...]) -> Array:
     """The rotation up to a joint, by forward kinematics with the angles beyond it at 0."""
     given = np.array([*(sheet[f"θ{i + 1}"] for i in range(joints)), *rest])
-    R = arm.rotation(given)
-    # Of five joints, the wrist's frame at 0 is that of axis 4 with the tool along it.
-    return R
+    return arm.rotation(given)
 
 
 def _put_rotation(sheet: Sheet, arm: Arm, lower: str) -> None:

@@ -38,7 +38,14 @@ _OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Pow: lambda a, b: a**b,
     ast.MatMult: lambda a, b: a @ b,
 }
-_LEVELS: dict[type[ast.operator], int] = {ast.Add: 1, ast.Sub: 1, ast.Mult: 2, ast.MatMult: 2, ast.Div: 3, ast.Pow: 3}
+_LEVELS: dict[type[ast.operator], int] = {
+    ast.Add: 1,
+    ast.Sub: 1,
+    ast.Mult: 2,
+    ast.MatMult: 2,
+    ast.Div: 3,
+    ast.Pow: 3,
+}
 _BETWEEN: dict[type[ast.operator], str] = {ast.Add: "+", ast.Sub: "−", ast.Mult: "\u2062", ast.MatMult: "\u2062"}
 
 
@@ -98,7 +105,7 @@ def _open(node: ast.expr) -> str:
         case ast.Name(id=name):
             return _name(name)
         case ast.Constant(value=number):
-            return f"<mn>{number}</mn>"
+            return f"<mn>{number!r}</mn>"
         case ast.UnaryOp(op=ast.USub(), operand=inner):
             return f'<mo form="prefix">−</mo>{_mathml(inner, 2)}'
         case ast.BinOp(left=left, op=ast.Div(), right=right):
