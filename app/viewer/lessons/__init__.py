@@ -9,8 +9,8 @@ from __future__ import annotations
 from app.viewer.lessons.dh import DHLesson
 from app.viewer.lessons.equations import EquationsLesson
 from app.viewer.lessons.guide.lesson import Lesson
-from app.viewer.lessons.numeric import NumericLesson
 from app.viewer.lessons.inverse import InverseLesson
+from app.viewer.lessons.numeric import NumericLesson
 from app.viewer.lessons.postures import Postures
 from app.viewer.lessons.redundancy import RedundancyLesson
 from app.viewer.lessons.screws import ScrewsLesson

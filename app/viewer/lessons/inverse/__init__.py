@@ -62,6 +62,7 @@ class InverseLesson(Lesson):
         self._opened: tuple[bool, ...] = ()
         self._at = 0
         self._restart = False
+        self._taken: dict[str, float] = {}  # answers whose way was followed, by question: it may be left again
         self._shown_at = 0.0
         self._arm: Arm | None
         self._exercise: Exercise | None
@@ -106,6 +107,7 @@ class InverseLesson(Lesson):
         if self._restart:
             progress.restart()
             self._restart = False
+            self._taken.clear()
         assert self._exercise is not None
         keys = keys_of(self._arm)
         progress.use(outline_of(self._exercise, self.stage.units))
@@ -145,12 +147,19 @@ class InverseLesson(Lesson):
     def state(self) -> dict[str, object]:
         if self._exercise is None:
             return {}
-        return {"q": self._exercise.q.tolist(), "signs": list(self._exercise.signs), "all": self._all}
+        return {
+            "q": self._exercise.q.tolist(),
+            "signs": list(self._exercise.signs),
+            "all": self._all,
+            "taken": dict(self._taken),
+        }
 
     def restore(self, state: dict[str, object]) -> None:
         q, signs, arm = state.get("q"), state.get("signs"), self._arm
         if isinstance(shown := state.get("all"), bool):
             self._all = shown
+        if isinstance(taken := state.get("taken"), dict):
+            self._taken = {str(key): x for key, x in taken.items() if type(x) in (int, float)}
         if arm is not None and _is_row(q, arm.robot.n) and _is_row(signs, arm.splits):
             followed = tuple(1 if sign > 0 else -1 for sign in signs)
             self._exercise = exercise(arm, np.array(q, float), followed)
@@ -168,6 +177,7 @@ class InverseLesson(Lesson):
         arm = self._arm = arm_of(self.stage.robot)
         self._exercise = None if arm is None else exercise(arm, example(arm))
         self._psi, self._opened, self._at = None, (), 0
+        self._taken.clear()
         self._build()
         self._update()
 
@@ -177,7 +187,11 @@ class InverseLesson(Lesson):
         question = dict(progress.outline.questions()).get(number)
         if given is None or not isinstance(question, Number) or number not in progress.given:
             return
-        if number in progress.revealed or way_of(question, progress.given[number]) <= 0:
+        answer = progress.given[number]
+        if number in progress.revealed or self._taken.get(number) == answer:
+            return
+        self._taken[number] = answer
+        if way_of(question, answer) <= 0:
             return
         step = given.followed.derivation.step(key)
         if step is not None and step.split >= 0:

@@ -427,12 +427,12 @@ def followed(tab: FakeBrowser) -> str:
 
 
 def test_a_typed_way_is_followed_to_its_posture(port: int) -> None:
-    arm = of(PUMA)
+    arm = of(ABB)
     given = exercise(arm, example(arm))
     asked = numbers(given)
     with FakeBrowser(port) as tab:
         tab.settle()
-        tab.choose(PUMA.name)
+        tab.choose(ABB.name)
         tab.set("Lesson", "Inverse kinematics step by step")
         tab.wait(lambda: "data-derivation" in tab.html)
         assert followed(tab) == given.followed.name
@@ -453,7 +453,7 @@ def test_a_typed_way_is_followed_to_its_posture(port: int) -> None:
         tab.wait(lambda: followed(tab) == q.name)
         press(tab, "Show this posture")
         assert q.q is not None
-        T = kin.fk(PUMA, q.q)
+        T = kin.fk(ABB, q.q)
         tab.settle()
         assert np.allclose(tab.tool_pose()[:3, 3], T[:3, 3], atol=1e-3)
         assert any(name.startswith("/inverse-") for name in tab.nodes)
