@@ -18,8 +18,8 @@ import numpy as np
 import viser
 
 import kin
+from app.exercises.judging import way_of
 from app.viewer.feature import Stage
-from app.viewer.lessons.guide.judging import way_of
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.guide.outline import Number, Outline
 from app.viewer.lessons.guide.progress import Progress

@@ -14,10 +14,10 @@ from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
 import kin
+from app.exercises.judging import judge, value_text, way_of
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
-from app.viewer.lessons.guide.judging import judge, value_text, way_of
 from app.viewer.lessons.guide.outline import Number
 from app.viewer.lessons.inverse import formulas, views, words
 from app.viewer.lessons.inverse.arm import Arm, arm_of

@@ -9,11 +9,11 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from app.viewer.lessons.guide.judging import judge
 from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
 import kin
+from app.exercises.judging import judge
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
