@@ -2,16 +2,26 @@
 // Runs in viser's page: the steps of a lesson (app/viewer/lessons/guide). It sends what is pressed and typed there.
 (() => {
   let serial = 0; // each press is a step of its own in the history
-  const send = (kind, value, ...rest) => dispatchEvent(new CustomEvent("kinboard-send", { detail: ["feature", ["guide", [kind, ...rest, ++serial], value]] }));
+  // A block with data-feature belongs to that lesson, others to the block that all lessons have.
+  const send = (node, kind, value, ...rest) => dispatchEvent(new CustomEvent("kinboard-send", {
+    detail: ["feature", [node.closest("[data-feature]")?.dataset.feature ?? "guide", [kind, ...rest, ++serial], value]],
+  }));
 
   function press(button) {
     if (button.ariaDisabled === "true") return;
     const { guideDo: kind, questionKey: key, argument } = button.dataset;
     if (kind === "type") typed(document.querySelector(`input[data-guide-field="${key}"]`));
-    else send(kind, argument === undefined ? null : Number(argument), ...(key === undefined ? [] : [key]));
+    else if (kind === "check") check(button);
+    else send(button, kind, argument === undefined ? null : Number(argument), ...(key === undefined ? [] : [key]));
   }
   function typed(input) {
-    if (!input.readOnly) send("type", input.value, input.dataset.guideField);
+    if (input.closest("[data-feature]")) check(input);
+    else if (!input.readOnly) send(input, "type", input.value, input.dataset.guideField);
+  }
+  // All fields of a block together.
+  function check(node) {
+    const fields = node.closest("[data-feature]").querySelectorAll("input[data-guide-field]");
+    send(node, "check", Object.fromEntries([...fields].map((field) => [field.dataset.guideField, field.value])));
   }
 
   addEventListener("click", (event) => {
@@ -30,9 +40,10 @@
   let focus = null; // selector of the control, and key of its question
   let gone = false; // the visitor has moved the focus away
   addEventListener("focusin", (event) => {
-    const node = event.target.closest?.("[data-guide=steps] :is([data-guide-do], [data-guide-field])");
+    const node = event.target.closest?.(".kb-guide :is([data-guide-do], [data-guide-field])");
     gone = false;
     focus = node && {
+      block: `[data-guide="${node.closest(".kb-guide").dataset.guide}"]`,
       control: NAMES.filter((name) => node.hasAttribute(name)).map((name) => `[${name}="${node.getAttribute(name)}"]`).join(""),
       question: node.closest("[data-question]")?.dataset.question,
     };
@@ -40,13 +51,14 @@
   addEventListener("pointerdown", () => { gone = true; }, true);
   addEventListener("focusout", (event) => {
     // A control that is taken away loses the focus without the visitor's doing.
-    if (!event.relatedTarget && event.target.closest?.("[data-guide=steps]")) queueMicrotask(() => { gone = event.target.isConnected; });
+    if (!event.relatedTarget && event.target.closest?.(".kb-guide")) queueMicrotask(() => { gone = event.target.isConnected; });
   });
   function restore() {
     if (!focus || gone || document.activeElement !== document.body) return;
-    const block = document.querySelector("[data-guide=steps]");
+    const block = document.querySelector(focus.block);
     const node = block?.querySelector(focus.control)
       ?? block?.querySelector(`[data-question="${focus.question}"] [data-guide-do]`)
+      ?? (block?.dataset.feature && block.querySelector(".kb-question :is(button, input)"))
       ?? block?.querySelector(".kb-guide-turn button:last-child");
     node?.focus({ preventScroll: true });
   }

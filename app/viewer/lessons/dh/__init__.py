@@ -16,9 +16,12 @@ import viser
 
 from app.viewer.feature import Stage
 from app.viewer.lessons.dh import views
+from app.viewer.lessons.dh.assign import Assigning
+from app.viewer.lessons.dh.axes_drawing import AxesDrawing, axis_names, room
 from app.viewer.lessons.dh.drawing import OtherDrawing, WalkDrawing, aside
 from app.viewer.lessons.dh.questions import outline
 from app.viewer.lessons.dh.steps import MOTIONS, ORDERS, length, place, value
+from app.viewer.lessons.figures import Figure
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.panel import assign, listen, update_html
 from app.viewer.scene import camera
@@ -31,6 +34,8 @@ READ = 0.1  # s between updates of the texts
 MOTION_TIME = 1.3  # s for one motion at speed 1
 REST = 0.5  # s of rest after each motion; a motion by zero takes only this time
 SPEEDS = {"Half": 0.5, "Normal": 1.0, "Double": 2.0}
+ASSIGN_HINT = "Choose the frames of this arm, fill in its table, and see what a wrong entry would mean"
+LINES_HINT = "Joint axes z, and the common normals of neighbours with their feet"
 BUTTONS, WHILE_PLAYING = ("Back", "Play", "Next"), ("Back", "Pause", "Next")
 
 
@@ -43,6 +48,7 @@ class DHLesson(Lesson):
     key = "dh"
     title = "DH table step by step"
     about = "How four motions per row lead from the base to the tool, one after another."
+    messages = Assigning.messages
     outline = staticmethod(outline)
 
     def __init__(self, stage: Stage) -> None:
@@ -57,7 +63,15 @@ class DHLesson(Lesson):
         self._drawing: WalkDrawing | None = None
         self._other: OtherDrawing | None = None
         self._view: tuple[Array, Array, Array] | None = None  # camera before the comparison, and where that put it
+        self._lines = True
+        self._assigning: Assigning | None = None
+        self._axes: AxesDrawing | None = None
+        self._figure: Figure | None = None
         gui = stage.client.gui
+        self._assign_box = gui.add_checkbox("Assign it yourself", False, hint=ASSIGN_HINT)
+        listen(self._assign_box, self.post, "assign")
+        with gui.add_folder(None) as self._assign_block:
+            pass
         self._caption = gui.add_html("")
         self._slider = gui.add_slider(
             "Row",
@@ -83,6 +97,8 @@ class DHLesson(Lesson):
         self._comparison = gui.add_html("", visible=False)
         self._speed_choice = gui.add_dropdown("Speed", tuple(SPEEDS), initial_value=self._speed)
         listen(self._speed_choice, self.post, "speed")
+        self._lines_box = gui.add_checkbox("Axes and normals", True, hint=LINES_HINT)
+        listen(self._lines_box, self.post, "lines")
         self._nine = gui.add_html("")
         self._start()
 
@@ -107,8 +123,15 @@ class DHLesson(Lesson):
                 self._compare = bool(value)
                 self._show_other(aim=True)
                 self._write()
+            case "lines":
+                self._lines = bool(value)
+                self._draw()
+            case "assign":
+                self._assign(bool(value))
+            case _ if self._assigning is not None:
+                self._assigning.handle(key, value)
             case _:
-                raise KeyError(key)
+                raise InputError("lesson", key, "a control of this lesson that is on show")
 
     def on_robot(self) -> None:
         self._pause()
@@ -116,6 +139,9 @@ class DHLesson(Lesson):
         self._remove_drawings()
         self._view = None  # the page has moved the camera already
         self._start()
+        if self._assigning is not None:
+            self._assign(False)
+            self._assign(True)
 
     def on_pose(self, T_base_tool: Array) -> None:
         read = time.perf_counter() - self._read_at >= READ
@@ -145,7 +171,11 @@ class DHLesson(Lesson):
             self.due = None
 
     def state(self) -> dict[str, object]:
-        return {"at": self._at, "symbols": self._symbols, "compare": self._compare, "speed": self._speed}
+        own = None if self._assigning is None else self._assigning.attempt.state()
+        return {
+            "at": self._at, "symbols": self._symbols, "compare": self._compare, "speed": self._speed,
+            "lines": self._lines, "assign": own,
+        }  # fmt: skip
 
     def restore(self, state: dict[str, object]) -> None:
         at, symbols, compare, speed = (state.get(name) for name in ("at", "symbols", "compare", "speed"))
@@ -161,13 +191,24 @@ class DHLesson(Lesson):
             assign(self._speed_choice, speed)
         if isinstance(at, int | float) and not isinstance(at, bool) and 0.0 <= at <= length(self.stage.robot):
             self._at = float(at)
+        if isinstance(lines := state.get("lines"), bool):
+            self._lines = lines
+            assign(self._lines_box, lines)
         self._pause()
         self._go(self._at)
+        if "assign" in state:
+            own = state["assign"]
+            self._assign(isinstance(own, dict))
+            if self._assigning is not None:
+                self._assigning.restore(own)
 
     def remove(self) -> None:
         self._remove_drawings()
+        if self._assigning is not None:
+            self._assigning.remove()
         self._restore_camera()
         self.stage.see_through(False)
+        self.stage.fit_view(())
 
     # The player
 
@@ -246,18 +287,44 @@ class DHLesson(Lesson):
         self._slider.max = float(len(robot.rows))
         assign(self._slider, self._at / MOTIONS)
         self._nine.content = views.nine_steps_html(robot.convention)
-        frames = link_frames(robot, robot.q_home)
         self.stage.see_through(True)
-        self._drawing = WalkDrawing(self.stage.client.scene, robot, frames, f"/dh-{next(_fresh)}")
+        self.stage.fit_view(room(robot))
+        if self._assigning is not None:
+            return
+        scene, frames = self.stage.client.scene, link_frames(robot, robot.q_home)
+        self._drawing = WalkDrawing(scene, robot, frames, f"/dh-{next(_fresh)}")
+        self._figure = Figure(scene, f"/dh-{next(_fresh)}", body(robot).size)
+        self._axes = AxesDrawing(self._figure, robot)
         self._show_other(aim=True)
         self._draw()
         self._write()
 
     def _remove_drawings(self) -> None:
-        for drawing in (self._drawing, self._other):
+        for drawing in (self._drawing, self._other, self._figure):
             if drawing is not None:
                 drawing.remove()
-        self._drawing = self._other = None
+        self._drawing = self._other = self._axes = self._figure = None
+
+    def _assign(self, on: bool) -> None:
+        """Begin *Assign it yourself*, instead of the walk, or go back to the walk."""
+        assign(self._assign_box, on)
+        if on == (self._assigning is not None):
+            return
+        self._pause()
+        for control in (
+            self._caption, self._slider, self._buttons, self._table, self._matrices, self._symbols_box,
+            self._compare_box, self._speed_choice, self._lines_box,
+        ):  # fmt: skip
+            control.visible = not on
+        self._comparison.visible = self._compare and not on
+        self._remove_drawings()
+        self._restore_camera()
+        if on:
+            self._assigning = Assigning(self.stage, self._assign_block, f"/dh-{next(_fresh)}")
+        elif self._assigning is not None:
+            self._assigning.remove()
+            self._assigning = None
+            self._start()
 
     def _show_other(self, aim: bool = False) -> None:
         """Show or hide the table in the other convention; `aim`: with the camera on both arms."""
@@ -275,8 +342,14 @@ class DHLesson(Lesson):
     def _draw(self, names: bool = True) -> None:
         """Update the scene; without `names`, the labels of frames are left out: they cost as much as the rest."""
         robot, q = self.stage.robot, self.stage.q
+        if self._assigning is not None:
+            self._assigning.draw()
         if self._drawing is None:
             return
+        if self._axes is not None and self._lines:
+            self._axes.show(q, axis_names(robot))
+        elif self._axes is not None:
+            self._axes.hide()
         frames = link_frames(robot, q)
         self._drawing.show(place(robot, q, self._at, frames), frames, self.stage.units, names)
         if self._other is not None:
@@ -288,6 +361,9 @@ class DHLesson(Lesson):
         self._read_at = time.perf_counter()
         self._stale = False
         robot, q, units = self.stage.robot, self.stage.q, self.stage.units
+        if self._assigning is not None:
+            self._assigning.write()
+            return
         at = place(robot, q, self._at)
         update_html(self._caption, views.caption_html(robot, at, units))
         update_html(self._table, views.table_html(robot, q, at, units))

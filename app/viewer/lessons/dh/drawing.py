@@ -16,22 +16,25 @@ from numpy.typing import NDArray
 
 from app.viewer.labels import add_label
 from app.viewer.lessons.dh.steps import (
+    ORDERS,
     Factor,
     Place,
     amount,
     axis,
     coaxial_joints,
     coinciding,
+    elementary,
+    expression,
     frames_name,
     reread,
-    symbol,
 )
 from app.viewer.lessons.dh.views import ABOUT_X, ABOUT_Z, TITLES
-from app.viewer.lessons.figures import GREY, Angle, Dimension, Figure, Segments
+from app.viewer.lessons.figures import GREY, Angle, Dimension, Figure, Segments, clear_of
 from app.viewer.scene.bodies.parts import joint_color
 from app.viewer.scene.camera import DIRECTION
 from app.viewer.scene.meshes import body
 from kin import Robot
+from kin.axes import inverse
 from kin.transforms import Array, wxyz_from_rotation
 from kin.units import Units
 
@@ -118,7 +121,7 @@ class WalkDrawing:
         """Show a place, with the arm's ``link_frames``; `names`: update the labels of frames as well."""
         pose(self._moving, at.T_0_now)
         self._show_placed(np.concatenate([self._robot.T_world_base[None], frames[: at.placed]]), names)
-        self._show_quantity(at, units)
+        self._show_quantities(at, frames[:, :3, 3], units)
 
     def remove(self) -> None:
         """Remove everything from the scene."""
@@ -147,24 +150,30 @@ class WalkDrawing:
                 T = frames[min(member, len(frames) - 1)]
                 label.position = T[:3, 3] + height * PLACED * self._size * T[:3, 2]
 
-    def _show_quantity(self, at: Place, units: Units) -> None:
-        there = at.motion >= 0 and at.value != 0.0
-        for factor, part in self._quantities.items():
-            if part.shown and not (there and factor == at.factor):
-                part.hide()
-        if not there:
-            return
-        shown = at.value * at.share
-        whole = amount(at.factor, at.value, units)
-        so_far = "= " if at.share == 1.0 else f"{amount(at.factor, shown, units)} of "
-        text = f"{symbol(self._robot, at.row, at.factor)} {so_far}{whole}"
-        p, R, about = at.T_0_before[:3, 3], at.T_0_before[:3, :3], axis(at.factor)
-        part = self._quantities[at.factor]
-        if isinstance(part, Angle):
-            # About z from x, and about x from z.
-            part.show(p, R[:, 2 - about], R[:, about], shown, units, text=text)
-        else:
-            part.show(p, p + shown * R[:, about], units, R[:, 1], text=text)
+    def _show_quantities(self, at: Place, origins: Array, units: Units) -> None:
+        """The parameters of the row so far, each beside what it measures; the present one with its share."""
+        robot = self._robot
+        order = ORDERS[robot.convention]
+        T = at.T_0_now @ inverse(at.A)  # the frame before the row
+        for k, factor in enumerate(order):
+            part = self._quantities[factor]
+            value = at.values[k]
+            if k > at.motion or value == 0.0:
+                if part.shown:
+                    part.hide()
+                continue
+            shown = value * (at.share if k == at.motion else 1.0)
+            whole = amount(factor, value, units)
+            so_far = f"{amount(factor, shown, units)} of " if shown != value else ""
+            text = f"{expression(robot, at.row, factor, units)} = {so_far}{whole}"
+            p, R, about = T[:3, 3], T[:3, :3], axis(factor)
+            if isinstance(part, Angle):
+                # About z from x, and about x from z.
+                part.show(p, R[:, 2 - about], R[:, about], shown, units, text=text)
+            else:
+                aside = clear_of(p, p + value * R[:, about], origins)
+                part.show(p, p + shown * R[:, about], units, aside, text=text)
+            T = T @ elementary(factor, shown)
 
     def _lines(
         self, name: str, points: Segments, colors: NDArray[np.uint8], width: float

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from app.viewer.lessons.dh.steps import MOVED, ORDERS, amount, axis_name, low, symbol, turns, value
+from app.viewer.lessons.dh.steps import MOVED, ORDERS, amount, axis_name, expression, low, symbol, turns, value
 from app.viewer.lessons.guide.outline import (
     Choice,
     Mistake,
@@ -215,10 +215,10 @@ def _check(robot: Robot, units: Units) -> tuple[Number | Choice, ...]:
     row = robot.joint_rows[k]
     factor = MOVED[robot.rows[row].kind]
     offset, q = float(getattr(robot.rows[row], factor)), float(robot.q_home[k])
-    name = symbol(robot, row, factor)
+    name = expression(robot, row, factor, units)
     column = Number(
-        f"At home, joint {k + 1} is at {amount(factor, q, units)}, and its row has the offset "
-        f"{amount(factor, offset, units)}. Which {name} does the matrix of the row get?",
+        f"At home, joint {k + 1} is at {amount(factor, q, units)}, and row {row + 1} has {name}. "
+        f"How far does this row {'turn about' if turns(factor) else 'slide along'} z?",
         value(robot, row, factor, robot.q_home),
         units.of(turns(factor)),
         math.radians(0.5) if turns(factor) else 0.001,

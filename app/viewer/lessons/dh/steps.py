@@ -17,7 +17,7 @@ import numpy as np
 from app.viewer.scene.chain import rotation, translation
 from kin import Robot, link_frames
 from kin.axes import joint_axes, pairs
-from kin.robot import Convention
+from kin.robot import Convention, exact_cos_sin
 from kin.transforms import Array
 from kin.units import Units
 
@@ -45,6 +45,7 @@ class Place:
         T_0_before: the frame before that motion ``(4, 4)``, in the base frame.
         T_0_now: the moving frame ``(4, 4)``, in the base frame.
         A: the row's product so far ``(4, 4)``.
+        values: all four parameters of the row, in the order of the motions (rad or m).
     """
 
     row: int
@@ -55,6 +56,7 @@ class Place:
     T_0_before: Array
     T_0_now: Array
     A: Array
+    values: tuple[float, ...]
 
     @property
     def placed(self) -> int:
@@ -110,21 +112,21 @@ def place(robot: Robot, q: Array, at: float, frames: Array | None = None) -> Pla
     start = robot.T_world_base if row == 0 else frames[row - 1]
     order = ORDERS[robot.convention]
     A = np.eye(4)
-    for factor in order[: max(motion, 0)]:
-        A = A @ elementary(factor, value(robot, row, factor, q))
-    factor = order[max(motion, 0)]
-    whole = value(robot, row, factor, q)
+    values = tuple(value(robot, row, factor, q) for factor in order)
+    for factor, amount_ in zip(order[: max(motion, 0)], values, strict=False):
+        A = A @ elementary(factor, amount_)
+    factor, whole = order[max(motion, 0)], values[max(motion, 0)]
     before = start @ A
     if share > 0.0:
         A = A @ elementary(factor, whole * share)
-    return Place(row, motion, share, factor, whole, before, start @ A, A)
+    return Place(row, motion, share, factor, whole, before, start @ A, A, values)
 
 
 @dataclass(frozen=True, eq=False)
 class Symbolic:
     """A matrix as a linear combination of functions of the joint variable: one ``(4, 4)`` coefficient per name.
 
-    The variable is θ or d of the table, the joint's value plus the constant of the row. `names` are "1", and "cos"
+    The variable is the joint's value; the constant of its row is in the coefficients. `names` are "1", and "cos"
     and "sin" of the variable, or "q", the variable itself.
     """
 
@@ -140,24 +142,26 @@ def symbolic(robot: Robot, row: int, motions: int = MOTIONS) -> Symbolic:
     parts = np.eye(4)[None]
     for factor in ORDERS[robot.convention][:motions]:
         if factor == open_:
-            names, free = _open(factor)
+            names, free = _open(factor, float(getattr(joint, factor)))
             parts = parts @ free
         else:
             parts = parts @ elementary(factor, float(getattr(joint, factor)))
     return Symbolic(names, parts)
 
 
-def _open(factor: Factor) -> tuple[tuple[str, ...], Array]:
-    """Rz or Tz of a variable: the names and their coefficients ``(names, 4, 4)``."""
+def _open(factor: Factor, offset: float) -> tuple[tuple[str, ...], Array]:
+    """Rz or Tz of a variable plus a constant: the names and their coefficients ``(names, 4, 4)``."""
     rest = np.eye(4)
     if factor == "theta":
         cosine, sine = np.zeros((4, 4)), np.zeros((4, 4))
         cosine[0, 0] = cosine[1, 1] = 1.0
         sine[0, 1], sine[1, 0] = -1.0, 1.0
-        return ("1", "cos", "sin"), np.array([rest - cosine, cosine, sine])
+        c, s = exact_cos_sin(offset)
+        # cos(θ + offset) and sin(θ + offset), expanded.
+        return ("1", "cos", "sin"), np.array([rest - cosine, c * cosine + s * sine, c * sine - s * cosine])
     slide = np.zeros((4, 4))
     slide[2, 3] = 1.0
-    return ("1", "q"), np.array([rest, slide])
+    return ("1", "q"), np.array([rest + offset * slide, slide])
 
 
 def low(number: int) -> str:
@@ -173,6 +177,23 @@ def index(robot: Robot, row: int, factor: Factor) -> int:
 def symbol(robot: Robot, row: int, factor: Factor) -> str:
     """θ₂, or α₁ in row 2 of a table in Craig's convention."""
     return LETTERS[factor] + low(index(robot, row, factor))
+
+
+def expression(robot: Robot, row: int, factor: Factor, units: Units, sense: float = 1.0) -> str:
+    """The symbol of a parameter; where a joint changes it, with its offset: θ₃ − 90°. θ₃ is the joint's value.
+
+    `sense`: −1 if the joint counts backwards, as in 90° − θ₃.
+    """
+    name, joint = symbol(robot, row, factor), robot.rows[row]
+    offset = float(getattr(joint, factor))
+    if MOVED.get(joint.kind) != factor:
+        return name
+    unit = units.of(turns(factor))
+    if not round(offset * unit.scale, 6):
+        return name if sense > 0.0 else f"−{name}"
+    if sense < 0.0:
+        return f"{unit.brief(offset)} − {name}"
+    return f"{name} {'−' if offset < 0.0 else '+'} {unit.brief(abs(offset))}"
 
 
 def axis_name(robot: Robot, row: int, factor: Factor) -> str:
@@ -191,7 +212,7 @@ def caption(robot: Robot, at: Place, units: Units) -> str:
     if at.motion < 0:
         return "Frame 0 is at the base. Each row of the table carries a copy of it to the next frame."
     joint = robot.rows[at.row]
-    name = symbol(robot, at.row, at.factor)
+    name = expression(robot, at.row, at.factor, units)
     line = axis_name(robot, at.row, at.factor)
     opening = f"Row {at.row + 1} of {len(robot.rows)}: "
     mover = ""
@@ -199,8 +220,7 @@ def caption(robot: Robot, at: Place, units: Units) -> str:
         mover = f", joint {robot.joint_rows.index(at.row) + 1}"
         offset = float(getattr(joint, at.factor))
         if offset:
-            own, constant = (amount(at.factor, x, units) for x in (at.value - offset, abs(offset)))
-            mover += f" at {own} {'−' if offset < 0.0 else '+'} {constant}"
+            mover += f" at {amount(at.factor, at.value - offset, units)}"
     if at.value == 0.0 and not mover:
         none = "no rotation about" if turns(at.factor) else "no translation along"
         words = f"{name} = 0, {none} {line}"

@@ -6,6 +6,8 @@ or with weight.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from markupsafe import Markup
 
 from app.viewer.lessons.dh.nine_steps import CRAIG_NOTE, NINE_STEPS
@@ -15,17 +17,20 @@ from app.viewer.lessons.dh.steps import (
     ORDERS,
     Factor,
     Place,
+    amount,
     axis,
     caption,
+    expression,
     index,
+    low,
     symbolic,
     turns,
-    value,
     verdict,
 )
 from app.viewer.views import mathml as m
 from app.viewer.views.templates import render
 from kin import Robot
+from kin.dh.tables import convert
 from kin.robot import Convention
 from kin.transforms import Array
 from kin.units import Unit, Units
@@ -33,6 +38,8 @@ from kin.units import Unit, Units
 # Okabe and Ito's blue for motions about or along z, and vermilion for x.
 ABOUT_Z, ABOUT_X = (0, 114, 178), (213, 94, 0)
 TITLES: dict[Convention, str] = {"standard": "Standard convention", "modified": "Craig’s convention (modified)"}
+COMMON: tuple[Factor, ...] = ("theta", "d")
+LINK: tuple[Factor, ...] = ("a", "alpha")
 WIDTHS = {"mm": 4.2, "cm": 4.2, "m": 4.8}  # em of a column
 MATRIX = 0.74  # em, so that sixteen numbers and a name fit a panel of 300 pixels
 
@@ -45,15 +52,15 @@ def color(factor: Factor, strength: float = 1.0) -> str:
 
 def caption_html(robot: Robot, at: Place, units: Units) -> str:
     """The present motion, in words and highlighted in the row's product of four. The height is constant."""
-    return render("dh/caption", words=caption(robot, at, units), formula=_product(robot, at))
+    return render("dh/caption", words=caption(robot, at, units), formula=_product(robot, at, units))
 
 
-def _product(robot: Robot, at: Place) -> Markup:
+def _product(robot: Robot, at: Place, units: Units) -> Markup:
     parts = [m.sub(m.ident("A"), m.short(at.row + 1)), m.op("=")]
     for k, factor in enumerate(ORDERS[robot.convention]):
         parts.append(m.gap())
         name = m.sub(m.text("R" if turns(factor) else "T"), m.ident("xyz"[axis(factor)]))
-        piece = m.row(name, m.brackets(_symbol(robot, at.row, factor)))
+        piece = m.row(name, m.brackets(_expression(robot, at.row, factor, units)))
         if k == at.motion:
             piece = m.mark(piece, color(factor, 0.3))
         parts.append(piece)
@@ -64,26 +71,60 @@ def _symbol(robot: Robot, row: int, factor: Factor) -> m.MathML:
     return m.sub(m.ident(LETTERS[factor]), m.short(index(robot, row, factor)))
 
 
-def table_html(robot: Robot, q: Array, at: Place | None, units: Units) -> str:
-    """The table at a configuration ``(n,)``, columns in the order of application, the place `at` highlighted."""
+def _expression(robot: Robot, row: int, factor: Factor, units: Units) -> m.MathML:
+    """The parameter; where a joint changes it, with its offset, as in θ₃ − 90°."""
+    offset = float(getattr(robot.rows[row], factor))
+    piece = _symbol(robot, row, factor)
+    if MOVED.get(robot.rows[row].kind) != factor or not offset:
+        return piece
+    return m.row(piece, m.op("-" if offset < 0.0 else "+"), m.text(units.of(turns(factor)).brief(abs(offset))))
+
+
+def table_html(
+    robot: Robot,
+    q: Array,
+    at: Place | None,
+    units: Units,
+    title: str = "",
+    senses: Sequence[float] = (),
+) -> str:
+    """The table at a configuration ``(n,)``, columns in the order of application, the place `at` highlighted.
+
+    Where a joint changes a parameter, the table has its symbol and offset, and the last column its value.
+    `senses`: of each joint, −1 if it counts backwards.
+    """
     order = ORDERS[robot.convention]
     heads = [{"name": "", "unit": "row"}]
     for factor in order:
         name = LETTERS[factor] + ("ᵢ₋₁" if index(robot, 0, factor) == 0 else "ᵢ")
         heads.append({"name": name, "unit": units.of(turns(factor)).name})
+    heads.append({"name": "now", "unit": ""})
     rows = []
     for i, row in enumerate(robot.rows):
         here = at is not None and at.motion >= 0 and i == at.row
+        sense = senses[robot.joint_rows.index(i)] if senses and i in robot.joint_rows else 1.0
+        variable = MOVED.get(row.kind)
         cells = [
             {
-                "value": units.of(turns(factor)).number(value(robot, i, factor, q)),
-                "variable": MOVED.get(row.kind) == factor,
+                "value": _entry(robot, i, factor, units, sense),
+                "variable": variable == factor,
                 "mark": color(factor) if here and at is not None and k == at.motion else "",
             }
             for k, factor in enumerate(order)
         ]
-        rows.append({"here": here, "cells": cells})
-    return render("dh/table", title=TITLES[robot.convention], heads=heads, rows=rows)
+        now = ""
+        if variable is not None:
+            offset, joint = float(getattr(row, variable)), robot.joint_rows.index(i)
+            now = units.of(turns(variable)).text(offset + sense * float(q[joint]))
+        rows.append({"here": here, "cells": cells, "now": now})
+    return render("dh/table", title=title or TITLES[robot.convention], heads=heads, rows=rows)
+
+
+def _entry(robot: Robot, row: int, factor: Factor, units: Units, sense: float) -> str:
+    """A constant, or the joint variable with its offset."""
+    if MOVED.get(robot.rows[row].kind) == factor:
+        return expression(robot, row, factor, units, sense).removesuffix(units.of(turns(factor)).suffix)
+    return units.of(turns(factor)).number(float(getattr(robot.rows[row], factor)))
 
 
 def matrices_html(robot: Robot, at: Place, symbols: bool, units: Units) -> str:
@@ -146,10 +187,38 @@ def nine_steps_html(convention: Convention) -> str:
     )
 
 
+def same_arm_html(robot: Robot, units: Units) -> str:
+    """The same arm in both conventions: θ and d are common, a and α move down by a row; what is left over."""
+    tables = {convention: convert(robot, convention) for convention in TITLES}
+    standard, craig = tables["standard"], tables["modified"]
+    rows = []
+    for i, row in enumerate(standard.rows):
+        common, pairs = [], []
+        for factor in COMMON:
+            variable = MOVED.get(row.kind) == factor
+            common.append({"value": _entry(standard, i, factor, units, 1.0), "variable": variable})
+        for k, table in enumerate((standard, craig)):
+            # The pair of row i in the standard table is that of row i + 1 in Craig's.
+            link = i if k == 0 else i - 1
+            moved = 0 <= link < len(standard.rows) - 1
+            for factor in LINK:
+                number = units.of(turns(factor)).number(float(getattr(table.rows[i], factor)))
+                pairs.append({"value": number, "moved": moved, "odd": link % 2 == 1, "first": factor == "a"})
+        rows.append({"common": common, "pairs": pairs})
+    # What has no row to move to: the last pair of a standard table, the first of Craig's.
+    end = robot.rows[-1] if robot.convention == "standard" else robot.rows[0]
+    index = len(robot.rows) if robot.convention == "standard" else 0
+    left = [f"{LETTERS[f]}{low(index)} = {amount(f, getattr(end, f), units)}" for f in LINK if getattr(end, f)]
+    where = "the tool transform" if robot.convention == "standard" else "the base transform"
+    rest = f"{' and '.join(left)} {'go' if len(left) > 1 else 'goes'} into {where}." if left else ""
+    return render("dh/same_arm", rows=rows, angle=units.angles.name, length=units.lengths.name, rest=rest)
+
+
 def compare_html(robot: Robot, other: Robot, q: Array, place_other: Place, distance: float, units: Units) -> str:
     """The same numbers in the other convention: table, differences and reasons; `distance` of the tools (m)."""
     return render(
         "dh/compare",
+        same=Markup(same_arm_html(robot, units)),
         table=Markup(table_html(other, q, place_other, units)),
         paragraphs=verdict(robot, units),
         distance=units.lengths.text(distance),

@@ -20,6 +20,7 @@ from app.viewer.lessons import dh
 from app.viewer.lessons.dh import drawing, steps, views
 from app.viewer.scene.meshes import body
 from app.viewer.server import ViewerServer
+from kin.dh.tables import convert
 from kin.units import DEFAULT_UNITS, Units
 
 ROBOTS = [*kin.builtin_robots().values()]
@@ -70,8 +71,7 @@ def test_a_fraction_of_a_motion_is_that_fraction_of_its_value() -> None:
 def test_symbols_with_numbers_inserted_give_the_matrix(robot: kin.Robot) -> None:
     q = some_q(robot)
     for row in range(len(robot.rows)):
-        moved = steps.MOVED.get(robot.rows[row].kind)
-        free = 0.0 if moved is None else steps.value(robot, row, moved, q)
+        free = float(q[robot.joint_rows.index(row)]) if row in robot.joint_rows else 0.0
         numbers = {"1": 1.0, "cos": np.cos(free), "sin": np.sin(free), "q": free}
         for motions in range(1, 5):
             found = steps.symbolic(robot, row, motions)
@@ -191,16 +191,52 @@ def test_a_row_is_read_off_the_frames_as_step_seven_says(robot: kin.Robot) -> No
             assert np.remainder(turned - angle + np.pi, 2 * np.pi) - np.pi == pytest.approx(0.0, abs=1e-6)
 
 
+def test_a_parameter_has_one_meaning_its_offset_is_written() -> None:
+    def cells(robot: kin.Robot, row: int, units: Units = DEFAULT_UNITS) -> list[str | None]:
+        html = views.table_html(robot, robot.q_home, None, units)
+        return [cell.text for cell in [*ET.fromstring(html).iter("tr")][row]]
+
+    assert cells(PIONEER, 3) == ["3", "θ₃ − 90", "0.0", "0.0", "−90.0", "−30.0°"]
+    assert cells(PIONEER, 3, RADIANS)[1] == "θ₃ − 1.571"
+    assert cells(PIONEER, 6) == ["6", "0.0", "120.0", "0.0", "0.0", None], "a fixed row has constants only"
+    formula = words(views.caption_html(PIONEER, steps.place(PIONEER, PIONEER.q_home, 9), DEFAULT_UNITS))
+    assert "θ3−90°" in formula.replace(" ", "")
+    assert steps.expression(PIONEER, 2, "theta", DEFAULT_UNITS, -1.0) == "−90° − θ₃"
+    assert steps.expression(PIONEER, 0, "theta", DEFAULT_UNITS, -1.0) == "−θ₁"
+
+
+@pytest.mark.parametrize("robot", ROBOTS, ids=lambda r: r.id)
+def test_both_tables_of_one_arm_have_the_same_pairs_one_row_apart(robot: kin.Robot) -> None:
+    html = views.same_arm_html(robot, DEFAULT_UNITS)
+    rows = [[cell.text for cell in row] for row in ET.fromstring(f"<d>{html}</d>").iter("tr")][2:]
+    assert len(rows) == len(robot.rows)
+    for above, below in itertools.pairwise(rows):
+        assert above[3:5] == below[5:7], "a and α of a standard row are in the next row of Craig’s"
+    own = slice(3, 5) if robot.convention == "standard" else slice(5, 7)
+    for shown, row in zip(rows, robot.rows, strict=True):
+        a, alpha = DEFAULT_UNITS.lengths.number(row.a), DEFAULT_UNITS.angles.number(row.alpha)
+        assert shown[own] == [a, alpha]
+
+
+def test_what_no_row_takes_is_said() -> None:
+    craig = convert(PIONEER, "modified")
+    assert "transform" not in views.same_arm_html(PIONEER, DEFAULT_UNITS), "the last row has no a and α"
+    assert "transform" not in views.same_arm_html(craig, DEFAULT_UNITS)
+    planar = kin.get_robot("planar2r")
+    assert "a₂ = " in views.same_arm_html(planar, DEFAULT_UNITS)
+    assert "goes into the tool transform" in views.same_arm_html(planar, DEFAULT_UNITS)
+
+
 def test_the_table_marks_the_current_step_and_the_joint_variables() -> None:
     at = steps.place(CRAIG, CRAIG.q_home, 6.5)
     html = views.table_html(CRAIG, CRAIG.q_home, at, DEFAULT_UNITS)
     rows = [*ET.fromstring(html).iter("tr")]
     assert [words(ET.tostring(th, encoding="unicode")) for th in rows[0]] == [
-        *(" row", "αᵢ₋₁ °", "aᵢ₋₁ mm", "θᵢ °", "dᵢ mm"),
+        *(" row", "αᵢ₋₁ °", "aᵢ₋₁ mm", "θᵢ °", "dᵢ mm", "now"),
     ]
     assert [row.get("class") == "kb-here" for row in rows[1:]] == [i == 1 for i in range(8)]
-    assert [cell.text for cell in rows[2]] == ["2", "−90.0", "0.0", "30.0", "0.0"]
-    assert ["--kb-mark" in cell.get("style", "") for cell in rows[2]] == [False, False, False, True, False]
+    assert [cell.text for cell in rows[2]] == ["2", "−90.0", "0.0", "θ₂", "0.0", "30.0°"]
+    assert ["--kb-mark" in cell.get("style", "") for cell in rows[2]] == [False, False, False, True, False, False]
     bold = [[c for c, cell in enumerate(row) if cell.get("class") == "kb-variable"] for row in rows[1:]]
     assert bold == [[3]] * 7 + [[]]
 
@@ -217,10 +253,10 @@ def test_symbols_insert_constants_and_keep_the_joint_variable() -> None:
         *("0", "−1", "0", "130"),
         *("0", "0", "0", "1"),
     ]
-    # θ3 is the table's: the joint's value − 90°, as the caption says.
-    assert entries(PIONEER, 2)[:4] == ["cosθ3", "0", "−sinθ3", "0"]
+    # θ3 is the joint's value: cos(θ3 − 90°) = sin θ3, sin(θ3 − 90°) = −cos θ3.
+    assert entries(PIONEER, 2)[:4] == ["sinθ3", "0", "cosθ3", "0"]
     words_of_row = steps.caption(PIONEER, steps.place(PIONEER, PIONEER.q_home, 9), DEFAULT_UNITS)
-    assert words_of_row == "Row 3 of 6: turn −30.0° about z₂ (θ₃, joint 3 at 60.0° − 90.0°)."
+    assert words_of_row == "Row 3 of 6: turn −30.0° about z₂ (θ₃ − 90°, joint 3 at 60.0°)."
     assert entries(SCARA, 2)[8:12] == ["0", "0", "1", "d3"]
 
 
@@ -391,9 +427,9 @@ def test_moving_the_arm_updates_the_lesson(tab: FakeBrowser) -> None:
     q = np.array([np.radians(20.0), *q[1:]])
     tab.wait(lambda: shows(tab, at(PIONEER, q, 12)))
     tab.settle()
-    assert ">20.0<" in tab.html
+    assert ">20.0°<" in tab.html
     tab.set("Radians", True)
-    tab.wait(lambda: ">0.349<" in tab.html)
+    tab.wait(lambda: ">0.349 rad<" in tab.html)
 
 
 def test_another_arm_restarts_the_walk_in_its_own_convention(tab: FakeBrowser) -> None:
@@ -443,9 +479,10 @@ def test_a_shared_address_restores_the_settings_and_ignores_invalid_ones(
     served: tuple[ViewerServer, int], tab: FakeBrowser
 ) -> None:
     lesson = lesson_of(served[0])
-    lesson.restore({"at": 6.5, "symbols": True, "compare": True, "speed": "Double"})
+    settings = {"at": 6.5, "symbols": True, "compare": True, "speed": "Double", "lines": False, "assign": None}
+    lesson.restore(settings)
     kept = lesson.state()
-    assert kept == {"at": 6.5, "symbols": True, "compare": True, "speed": "Double"}
+    assert kept == settings
     for hostile in (
         {"at": float("nan")},
         {"at": 1e9},
@@ -453,6 +490,8 @@ def test_a_shared_address_restores_the_settings_and_ignores_invalid_ones(
         {"at": [1]},
         {"speed": ["x"]},
         {"symbols": 1},
+        {"lines": "yes"},
+        {"assign": 3},
     ):
         lesson.restore(hostile)
         assert lesson.state() == kept

@@ -1,0 +1,235 @@
+"""*Assign it yourself*: the way through it, what is said about mistakes, and what is kept in the link."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import xml.etree.ElementTree as ET
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import kin
+from app.viewer.lessons.dh import choices
+from app.viewer.lessons.dh.assign import assign_html, rows_html
+from app.viewer.lessons.dh.assignment import FACTORS, Assignment, read_row
+from app.viewer.lessons.dh.attempt import Attempt, error_of
+from app.viewer.lessons.dh.steps import OTHER, Factor, turns
+from kin.dh.tables import convert
+from kin.units import DEFAULT_UNITS, Units
+
+BUILT_IN = [*kin.builtin_robots().values()]
+ARMS = [arm for robot in BUILT_IN for arm in (robot, convert(robot, OTHER[robot.convention]))]
+arms = pytest.mark.parametrize("robot", ARMS, ids=lambda r: f"{r.id}-{r.convention}")
+PIONEER, CRAIG = kin.get_robot("pioneer5"), kin.get_robot("redundant7-craig")
+IN_M = Units(degrees=False, length="m")
+
+
+def begin(robot: kin.Robot) -> Attempt:
+    return Attempt(Assignment(robot))
+
+
+def answers(attempt: Attempt, units: Units = DEFAULT_UNITS) -> dict[str, str]:
+    """The right values of the next row at home, as they are read off the scene."""
+    q = attempt.work.robot.q_home
+    row = read_row(attempt.work.convention, attempt.work.frames[-1], attempt.chosen)
+    own = {attempt.variable(): attempt.own_value(q)}
+    return {
+        factor: units.of(turns(factor)).number(getattr(row, factor) + own.get(factor, 0.0)) for factor in FACTORS
+    }
+
+
+def to_row(attempt: Attempt, number: int) -> None:
+    """Go on until the row with this number is to be typed."""
+    while attempt.part is not None or attempt.number < number:
+        attempt.show()
+
+
+@arms
+def test_a_student_who_answers_right_gets_a_table_of_the_arm(robot: kin.Robot) -> None:
+    attempt = begin(robot)
+    for _ in range(100):
+        if attempt.work.complete:
+            break
+        if attempt.part is not None:
+            found = attempt.offered()[attempt.part]
+            attempt.choose(attempt.part, next(i for i, choice in enumerate(found) if choice.right))
+        else:
+            attempt.check(answers(attempt), robot.q_home, DEFAULT_UNITS)
+        assert attempt.feedback is not None
+        assert attempt.feedback.right
+    assert attempt.work.complete
+    assert error_of(attempt.work) < 1e-9
+    page = assign_html(attempt, DEFAULT_UNITS)
+    assert "exactly as the arm does" in page
+
+
+@arms
+def test_every_page_is_well_formed_and_kept_in_the_link(robot: kin.Robot) -> None:
+    attempt = begin(robot)
+    pages = set()
+    for _ in range(100):
+        html = assign_html(attempt, DEFAULT_UNITS) + rows_html(attempt.work, robot.q_home, DEFAULT_UNITS)
+        text = "".join(ET.fromstring(f"<div>{html}</div>").itertext())
+        assert "-" not in re.sub(r"[a-z]-[a-z]", "", text), "every minus is a true one"
+        assert "nan" not in text
+        pages.add(html)
+        kept = json.loads(json.dumps(attempt.state()))
+        again = Attempt.restored(robot, kept)
+        assert (again.number, again.part, again.made) == (attempt.number, attempt.part, attempt.made)
+        assert again.state() == kept
+        if attempt.work.complete:
+            break
+        attempt.show()
+    assert attempt.work.complete
+    assert len(pages) > robot.n
+
+
+@pytest.mark.parametrize("factor", FACTORS)
+def test_a_wrong_entry_is_named_and_its_ghost_is_where_it_leads(factor: Factor) -> None:
+    attempt = begin(PIONEER)
+    to_row(attempt, 1)
+    right = answers(attempt)
+    typed = {**right, factor: "12.3"}
+    attempt.check(typed, PIONEER.q_home, DEFAULT_UNITS)
+    assert attempt.wrong == (factor,)
+    assert attempt.feedback is not None
+    assert attempt.feedback.title == f"{attempt.symbol(factor)} is wrong"
+    assert attempt.meaning(factor) in attempt.feedback.sentences[0]
+    assert attempt.ghost is not None
+    ghost = attempt.work.frames_at(PIONEER.q_home, attempt.ghost, attempt.chosen)[-1]
+    chosen = attempt.work.with_row(read_row("standard", attempt.work.frames[-1], attempt.chosen))
+    assert not np.allclose(ghost, chosen.frames_at(PIONEER.q_home)[-1], atol=1e-3)
+    html = ET.fromstring(assign_html(attempt, DEFAULT_UNITS))
+    invalid = [field.get("data-guide-field") for field in html.iter("input") if field.get("aria-invalid")]
+    assert invalid == [factor]
+    values = {field.get("data-guide-field"): field.get("value") for field in html.iter("input")}
+    assert values == typed, "what was typed stays"
+    attempt.check(right, PIONEER.q_home, DEFAULT_UNITS)
+    assert attempt.number == 2
+    assert (attempt.ghost, attempt.wrong) == (None, ())
+
+
+def test_usual_mistakes_are_recognised() -> None:
+    attempt = begin(PIONEER)
+    to_row(attempt, 2)
+    right = answers(attempt)
+
+    def said(**typed: str) -> str:
+        attempt.check({**right, **typed}, PIONEER.q_home, DEFAULT_UNITS)
+        assert attempt.feedback is not None
+        assert not attempt.feedback.right
+        return " ".join(attempt.feedback.sentences)
+
+    flip = f"{-float(right['theta'].replace('−', '-')):g}"
+    assert "its sign is not" in said(theta=flip)
+    assert "with joint 2 at 0" in said(theta="0")
+    assert "half a turn off" in said(alpha="180")
+    assert "the other length" in said(a="0")
+    assert "is not a number" in said(a="seven")
+    assert "not a unit" in said(a="7 °")
+    assert attempt.number == 2
+
+
+def test_the_opposite_x_is_accepted_and_said() -> None:
+    attempt = begin(PIONEER)
+    to_row(attempt, 1)
+    right = {key: float(text.replace("−", "-")) for key, text in answers(attempt).items()}
+    other = {"theta": right["theta"] + 180.0, "d": right["d"], "a": -right["a"], "alpha": -right["alpha"]}
+    attempt.check({key: str(value) for key, value in other.items()}, PIONEER.q_home, DEFAULT_UNITS)
+    assert attempt.feedback is not None
+    assert attempt.feedback.right
+    assert "x₁ points the other way" in attempt.feedback.sentences[0]
+    while not attempt.work.complete:
+        attempt.show()
+    assert error_of(attempt.work) < 1e-9
+
+
+def test_units_of_the_reader_are_read() -> None:
+    attempt = begin(CRAIG)
+    to_row(attempt, 2)
+    attempt.check(answers(attempt, IN_M), CRAIG.q_home, IN_M)
+    assert attempt.number == 3
+    assert "rad" in assign_html(attempt, IN_M) or attempt.part is not None
+
+
+def test_a_wrong_choice_has_its_reason_and_can_be_changed() -> None:
+    attempt = begin(PIONEER)
+    while attempt.number < 1:
+        attempt.show()
+    assert attempt.part == "axis"
+    attempt.choose("axis", 0)
+    assert attempt.part == "axis"
+    assert attempt.feedback is not None
+    assert attempt.feedback.sentences == (
+        "z₁ is the axis of joint 2: zᵢ is that of joint i + 1, because the row of joint i ends there.",
+    )
+    attempt.choose("axis", 1)
+    assert attempt.part == "direction"
+    with pytest.raises(kin.InputError, match="choice"):
+        attempt.choose("x", 0)
+    with pytest.raises(kin.InputError, match="index"):
+        attempt.choose("direction", 7)
+    with pytest.raises(kin.InputError, match="row"):
+        attempt.check({}, PIONEER.q_home, DEFAULT_UNITS)
+
+
+@pytest.mark.parametrize("robot", [PIONEER, CRAIG], ids=lambda r: r.id)
+def test_back_undoes_one_step_at_a_time(robot: kin.Robot) -> None:
+    attempt = begin(robot)
+    states = [attempt.state()]
+    while not attempt.work.complete:
+        attempt.show()
+        states.append(attempt.state())
+    for _ in range(3 * len(states)):
+        attempt.back()
+    assert attempt.state() == states[0]
+    to_row(attempt, 2)
+    attempt.restart()
+    assert attempt.state() == states[0]
+
+
+@pytest.mark.parametrize(
+    "state",
+    [
+        None, 3, {"base": [1]}, {"base": ["x"] * 16}, {"base": [math.inf] * 16}, {"base": [0.0] * 16},
+        {"rows": [[1, 2, 3, 4]]}, {"made": {"axis": 99, "x": True}}, {"made": {"axis": -1}},
+    ],
+)  # fmt: skip
+def test_a_hostile_link_starts_at_the_beginning(state: object) -> None:
+    assert Attempt.restored(PIONEER, state).state() == begin(PIONEER).state()
+
+
+def test_rows_of_a_link_are_taken_as_far_as_they_are_numbers() -> None:
+    base = np.eye(4).ravel().tolist()
+    rows = [[0.0, 0.13, 0.07, -math.pi / 2], [0.0, 1e9, 0.0, 0.0]]
+    attempt = Attempt.restored(PIONEER, {"base": base, "rows": rows, "made": {}})
+    assert len(attempt.work.rows) == 1
+
+
+def test_a_joint_that_counts_backwards_has_a_minus_in_the_table() -> None:
+    attempt = begin(PIONEER)
+    attempt.show()
+    attempt.back()
+    while attempt.part != "direction":
+        attempt.show()
+    attempt.choose("direction", 1)
+    while not attempt.work.complete:
+        attempt.show()
+    assert "−θ₁" in rows_html(attempt.work, PIONEER.q_home, DEFAULT_UNITS)
+    assert "Joint 1 counts backwards" in assign_html(attempt, DEFAULT_UNITS)
+    assert error_of(attempt.work) < 1e-9
+
+
+def test_choices_come_in_the_order_of_the_steps() -> None:
+    attempt = begin(PIONEER)
+    seen = []
+    while attempt.number < 2:
+        if attempt.number == 1 and attempt.part is not None:
+            seen.append(attempt.part)
+        attempt.show()
+    places = [choices.PARTS.index(part) for part in seen]
+    assert all(one < other for one, other in pairwise(places))
+    assert seen == ["axis", "direction", "normal", "origin", "x"]
