@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from app.exercises.typed import EntryError, read_number
 from app.viewer.lessons.dh import choices
 from app.viewer.lessons.dh.assignment import (
     FACTORS,
@@ -24,7 +25,6 @@ from app.viewer.lessons.dh.assignment import (
 )
 from app.viewer.lessons.dh.choices import PARTS, Choice, Part
 from app.viewer.lessons.dh.steps import MOVED, Factor, low, turns
-from app.viewer.panel.entry import EntryError, read_number
 from kin import InputError, Robot
 from kin.transforms import Array, as_transform
 from kin.units import Units
