@@ -44,8 +44,8 @@ RULES: dict[str, set[str]] = {
     "app/bench": {"kin", "numpy", "numba", "app.bench"},
     "app/bench/contestants": {
         *("kin", "numpy", "numba", "app.bench"),
-        *("eaik", "ik_geo", "ikpy", "pinocchio", "py_opw_kinematics", "roboticstoolbox", "scipy", "spatialmath"),
-        "ssik",
+        *("eaik", "ik_geo", "ikpy", "pinocchio", "py_opw_kinematics", "roboticstoolbox", "ruckig", "scipy"),
+        *("spatialmath", "ssik", "toppra"),
     },
     "app/api": {
         *("fastapi", "starlette", "pydantic", "pydantic_core", "typing_extensions", "numpy", "kin"),

@@ -57,6 +57,24 @@ def judge_poses(task: Task, poses: list[Array]) -> Check:
     return Check(right / count, None, position, rotation, (count - right) / count, None)
 
 
+def judge_motions(task: Task, motions: list[Array], limits: Array) -> Check:
+    """Motions as values and derivatives ``(d, k, n)``, one per target: at rest at both ends, within the limits.
+
+    Args:
+        task, motions: the targets, and what leads to them from home.
+        limits: ``(n, 3)``, of the first three derivatives.
+    """
+    right, worst = 0, 0.0
+    for got, q in zip(motions, task.q, strict=True):
+        miss = max(float(np.abs(got[0, 0] - task.robot.q_home).max()), float(np.abs(got[0, -1] - q).max()))
+        moving = float(np.abs(got[1][[0, -1]]).max())
+        peaks = np.abs(got[1:]).max(axis=1) / limits.T[: len(got) - 1]
+        if max(miss, moving) <= ACCURACY and peaks.max() <= 1.0 + ACCURACY:
+            right += 1
+            worst = max(worst, miss)
+    return Check(right / len(task.q), None, worst, 0.0, (len(task.q) - right) / len(task.q), None)
+
+
 def right_sets(task: Task, answers: list[Array]) -> tuple[list[Array], Check]:
     """The correct and distinct answers ``(k, n)`` of each target, and their check without `same`."""
     kept: list[Array] = []

@@ -17,7 +17,7 @@ time            median per pose or target
 noise           interquartile range, relative to the time
 × array         time relative to our array-level call: median of the ratios within each round
 × solve         the same relative to kin.solve_ik
-solved          share of targets with a correct answer
+solved          share of targets with a correct answer; of motions: that arrive at rest and keep the limits
 branches        correct, distinct answers per target
 recall          share of targets whose generating configuration is among the answers
 wrong           answers per target with an error above 1e-6

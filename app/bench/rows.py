@@ -15,7 +15,8 @@ from kin.robot import Robot
 from kin.solvers import closed_form_of
 from kin.transforms import Array
 
-Kind = Literal["fk", "branches", "answer", "cloud"]
+Kind = Literal["fk", "branches", "answer", "cloud", "ptp", "points", "pace", "line"]
+MOTIONS: tuple[Kind, ...] = ("ptp", "points", "pace", "line")
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +27,9 @@ class Row:
         id, title: name on the command line, and for people.
         robot: id of the arm, see :mod:`app.bench.robots`.
         kind: ``"fk"``; ``"branches"``, all configurations, ignoring limits; ``"answer"``, at least one inside the
-            limits, verified; ``"cloud"``, tool points of configurations that the contestant samples itself.
+            limits, verified; ``"cloud"``, tool points of configurations that the contestant samples itself;
+            ``"ptp"``, a motion from home to a configuration; ``"points"``, points of one; ``"pace"``, the fastest
+            motion along a given path of the joints; ``"line"``, points of a line of the tool from home.
         batch: all targets in one call.
         approach: point and approach direction only; the roll about the tool axis does not matter.
         lock: for a redundant arm, the joint that solvers for six joints lock at `value`.
@@ -46,6 +49,7 @@ class Row:
     unverified: bool = False
 
 
+_SHORT = 0.05  # of the way from home to a random configuration: the end of a line that can be driven
 CLOUD = 16  # batches in a cloud, so that call overhead is negligible and caches are as full as in real use
 
 ROWS: tuple[Row, ...] = (
@@ -80,6 +84,10 @@ ROWS: tuple[Row, ...] = (
     Row("solve-redundant7", "an answer inside the limits, verified", "redundant7", "answer"),
     Row("solve-redundant7-craig", "an answer inside the limits, verified", "redundant7-craig", "answer"),
     Row("solve-panda", "an answer inside the limits, verified", "panda", "answer"),
+    Row("motion-ptp", "a motion of the joints with limits of jerk", "panda", "ptp"),
+    Row("motion-points", "100 points of a motion of the joints", "panda", "points"),
+    Row("motion-pace", "the fastest pace on a path, limits of velocity and acceleration", "panda", "pace"),
+    Row("motion-line", "100 points of a line of the tool", "ur5", "line"),
 )  # fmt: skip
 
 
@@ -113,6 +121,8 @@ def prepare(row: Row, size: int, seed: int) -> Task | None:
         q = robot.random_q(np.random.default_rng(seed), size)
     if row.lock is not None:
         q[:, row.lock] = row.value
+    if row.kind == "line":
+        q = robot.clip(robot.q_home + _SHORT * (q - robot.q_home))
     arm = arm_of(robot)
     six = arm
     if row.approach:

@@ -15,9 +15,10 @@ import numpy as np
 
 import kin
 from app.bench.contestants import FLOOR, KINBOARD, OURS, PEERS, SOLVE_IK, Contestant, Peer, quiet
-from app.bench.judge import Check, judge_poses, right_sets, share_of_same
+from app.bench.contestants.motions import limits_of
+from app.bench.judge import Check, judge_motions, judge_poses, right_sets, share_of_same
 from app.bench.measure import Clock, Turns, measure, ratio
-from app.bench.rows import ROWS, Row, Task, prepare
+from app.bench.rows import MOTIONS, ROWS, Row, Task, prepare
 from kin.solvers import closed_form_of
 from kin.transforms import Array
 
@@ -179,8 +180,10 @@ def _checked(
                     ]
                     if contestant.floor:
                         found.append((contestant, None))
-                    elif task.row.kind in ("fk", "cloud"):
+                    elif task.row.kind in ("fk", "cloud", "line"):
                         found.append((contestant, judge_poses(task, answers)))
+                    elif task.row.kind in MOTIONS:
+                        found.append((contestant, judge_motions(task, answers, limits_of(task))))
                     else:
                         sets, check = right_sets(task, answers)
                         if contestant.name == OURS and _comparable(task):

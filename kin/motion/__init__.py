@@ -3,9 +3,10 @@
 1. :mod:`kin.motion.program` holds the program, :mod:`kin.motion.reading` reads it from plain data.
 2. :mod:`kin.motion.limits` knows how fast each joint may move, :mod:`kin.motion.tasks` what the tool can
    keep of a pose.
-3. :mod:`kin.motion.planner` turns the program into pieces (:mod:`kin.motion.pieces`): a PTP is timed
-   joint by joint (:mod:`kin.motion.scurve`). Curves of the tool and corners are built in :mod:`kin.motion.paths`
-   from :mod:`kin.motion.geometry`, which also finds the joint path; :mod:`kin.motion.timing` times it.
+3. :mod:`kin.motion.planner` turns the program into pieces (:mod:`kin.motion.pieces`), with the steps of
+   :mod:`kin.motion.planning`: a PTP is timed joint by joint (:mod:`kin.motion.scurve`). Curves of the tool and
+   corners are built in :mod:`kin.motion.paths` from :mod:`kin.motion.geometry`, which also finds the joint path;
+   :mod:`kin.motion.timing` times it.
 4. :mod:`kin.motion.results` holds the answer, :mod:`kin.motion.details` the facts behind a refusal or a note, and
    :mod:`kin.motion.messages` words them.
 """

@@ -120,11 +120,16 @@ class BlendLeftOut(NamedTuple):
     Attributes:
         segment: which.
         why: ``"last"``: nothing follows; ``"short"``: it or the next one has no length; ``"small"``: the zone is
-            too small for it or the next one; ``"dwell"``: a pause follows.
+            too small for it or the next one; ``"dwell"``: a pause follows; ``"slower"``: with the blend the motion
+            would take longer.
+        passing, stopping: for ``"slower"``: seconds from the middle of the segment to the middle of the next one,
+            with the blend and with the stop; else None.
     """
 
     segment: int
-    why: Literal["last", "short", "small", "dwell"]
+    why: Literal["last", "short", "small", "dwell", "slower"]
+    passing: float | None = None
+    stopping: float | None = None
 
 
 class Slowed(NamedTuple):

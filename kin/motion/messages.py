@@ -98,6 +98,13 @@ def note(fact: Note, units: Units) -> str:
         case BlendShortened(segment, asked, used):
             sizes = f"{units.lengths.value(used)} instead of {units.lengths.value(asked)}"
             return f"Segment {segment + 1} is blended within {sizes}: at most half of the shorter segment is used."
+        case BlendLeftOut(segment, "slower", passing, stopping):
+            times = (
+                f"from the middle of this segment to that of the next {passing:.3f} s instead of {stopping:.3f} s"
+            )
+            return (
+                f"The arm stops at the end of segment {segment + 1}: with the blend it would take longer, {times}."
+            )
         case BlendLeftOut(segment, why):
             return f"The arm stops at the end of segment {segment + 1} although a blend is set: {_STOPS[why]}."
         case Slowed(segment, fraction, index, name, quantity, ratio, singularity):

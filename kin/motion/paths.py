@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kin.fk import fk, fk_positions, jacobian
 from kin.motion.geometry.chain import Chain
@@ -16,7 +18,8 @@ from kin.motion.geometry.tables import corner_at
 from kin.motion.limits import MotionLimits
 from kin.motion.pieces import JointMotion
 from kin.motion.program import Circ, JointTarget, Lin, Move, Ptp, Spline, Target
-from kin.motion.timing.timed import JointPath
+from kin.motion.scurve import shortest_time
+from kin.motion.timing.timed import JointPath, shortest
 from kin.robot import Robot
 from kin.transforms import Array
 
@@ -64,11 +67,18 @@ class Layout:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
-    """Segments that are one path of the joints: where they are, and q(s): knots ``(k + 1,)``, ``(k, n, 4)``."""
+    """Segments that are one path of the joints.
+
+    Attributes:
+        layout: where they are.
+        knots, pieces: q(s): knots ``(k + 1,)`` and coefficients ``(k, n, 4)``.
+        ends: configurations ``(m + 1, n)`` between which the m segments lead if the arm stops at each target.
+    """
 
     layout: Layout
     knots: Array
     pieces: Array
+    ends: Array
 
 
 def pose_of(robot: Robot, target: Target, before: Array) -> Array:
@@ -188,7 +198,7 @@ def _dense(run: Run) -> Run:
     if len(run.knots) >= _NODES:
         return run
     parts = np.full(len(run.pieces), -(-_NODES // len(run.pieces)))
-    return Run(run.layout, *parted(run.knots, run.pieces, parts))
+    return Run(run.layout, *parted(run.knots, run.pieces, parts), run.ends)
 
 
 def joined(robot: Robot, first: Run, second: Run, blend: float) -> tuple[Run, float] | None:
@@ -229,7 +239,8 @@ def joined(robot: Robot, first: Run, second: Run, blend: float) -> tuple[Run, fl
         (*first.layout.owners, (first.layout.owners[-1][-1], second.layout.owners[0][0]), *second.layout.owners),
         np.concatenate([first.layout.bounds, length + scale * second.layout.bounds[1:]]),
     )
-    return Run(layout, s, spline(s, np.concatenate([before, rows, after]))), float(away.min())
+    ends = np.concatenate([first.ends, second.ends[1:]])
+    return Run(layout, s, spline(s, np.concatenate([before, rows, after])), ends), float(away.min())
 
 
 def joint_path(curves: list[JointCurve], radii: list[float], layout: Layout) -> tuple[Array, Array]:
@@ -261,8 +272,7 @@ def limited(
     """A path with its limits, on a grid that is fine enough to time it."""
     parts = np.full(len(pieces), max(1, -(-_INTERVALS // len(pieces))))
     knots, pieces = parted(knots, pieces, parts)
-    middle = 0.5 * (knots[:-1] + knots[1:])
-    part = np.clip(np.searchsorted(layout.starts, middle, side="right") - 1, 0, len(layout.owners) - 1)
+    part = _parts_of(layout, knots)
     scales = np.ones((len(layout.owners), 3))
     tool = np.full((len(layout.owners), 2), np.inf)
     for k, owners in enumerate(layout.owners):
@@ -276,6 +286,12 @@ def limited(
     if np.isfinite(tool).any():
         most = np.minimum(most, _tool_limit(robot, knots, pieces, tool[part]))
     return JointPath(knots, pieces, base * scales[part][:, None, :], most)
+
+
+def _parts_of(layout: Layout, knots: Array) -> NDArray[np.int64]:
+    """Which part of the layout each interval between knots ``(k + 1,)`` belongs to ``(k,)``."""
+    middle = 0.5 * (knots[:-1] + knots[1:])
+    return np.clip(np.searchsorted(layout.starts, middle, side="right") - 1, 0, len(layout.owners) - 1)
 
 
 def _tool_limit(robot: Robot, knots: Array, pieces: Array, tool: Array) -> Array:
@@ -301,6 +317,35 @@ def alone(robot: Robot, limits: MotionLimits, segment: Ptp, run: Run) -> JointMo
     piece = JointMotion.between(start, end, scaled)
     slower = tool_slowdown(robot, segment, piece)
     return piece if slower == 1.0 else JointMotion.between(start, end, scaled / slower ** np.arange(1.0, 4.0))
+
+
+def stopping_times(limits: MotionLimits, moves: list[Move], run: Run, path: JointPath, jerk: bool) -> list[float]:
+    """About how long each segment takes from rest to rest, rather less than more.
+
+    It takes at least as long as a PTP between the same configurations. The other estimate is the time of the path
+    with stops in the middle of its corners, without limits of jerk, and what these cost on a straight path.
+    """
+    cuts, found = np.searchsorted(path.knots, run.layout.bounds - NO_LENGTH).tolist(), []
+    corners = np.array([len(owners) > 1 for owners in run.layout.owners])[_parts_of(run.layout, path.knots)]
+    most = np.where(corners, _FREE, path.most)  # in a corner that is of both segments
+    base = np.stack([limits.velocity, limits.acceleration, limits.jerk], axis=1)
+    for k, (move, way) in enumerate(zip(moves, np.abs(np.diff(run.ends, axis=0)).tolist(), strict=True)):
+        own = base * (move.speed, move.acceleration, move.acceleration if jerk else np.inf)
+        part = slice(cuts[k], cuts[k + 1])
+        rows = np.broadcast_to(own, path.limits[part].shape).copy()
+        knots = path.knots[cuts[k] : cuts[k + 1] + 1]
+        plain = shortest(JointPath(knots, path.joints[part], rows, most[part]))
+        least = max(shortest_time(d, *row) for d, row in zip(way, own.tolist(), strict=True))
+        free = move.tool_speed is None and move.tool_turn is None
+        found.append(max(least, _with_jerk(plain, own) if jerk and free else plain))
+    return found
+
+
+def _with_jerk(plain: float, limits: Array) -> float:
+    """Seconds from rest to rest on a straight path with limits ``(n, 3)``; `plain`: without those of jerk."""
+    ramp, rise = (float((limits[:, i] / limits[:, i + 1]).min()) for i in (0, 1))
+    cost = rise if ramp > rise else 2.0 * math.sqrt(ramp * rise) - ramp
+    return min(plain + cost, 2.0 * math.cbrt(rise * plain * plain))
 
 
 def tool_slowdown(robot: Robot, move: Move, piece: JointMotion) -> float:

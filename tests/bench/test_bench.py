@@ -17,6 +17,7 @@ import kin
 from app.bench import command, judge, report
 from app.bench.arms import arm_of, ortho
 from app.bench.contestants import FLOOR, KINBOARD, OURS, PEERS, SOLVE_IK, Contestant, Peer
+from app.bench.contestants.motions import limits_of
 from app.bench.measure import Turns, measure, ratio
 from app.bench.rows import ROWS, prepare
 from app.bench.run import Settings, run
@@ -159,6 +160,25 @@ def test_a_wrong_pose_is_detected():
     assert judge.judge_poses(task, list(task.T.swapaxes(1, 2))).success == 0.0
 
 
+def test_a_motion_that_exceeds_a_limit_or_misses_its_end_is_detected():
+    task = prepare(ROWS_BY_ID["motion-ptp"], 4, 1)
+    limits = limits_of(task)
+    ours = answers_of(task)
+    assert judge.judge_motions(task, ours, limits).success == 1.0
+    assert (
+        judge.judge_motions(task, [m * np.array([1, 1, 1, 1.01])[:, None, None] for m in ours], limits).wrong
+        == 1.0
+    )
+    assert judge.judge_motions(task, [m + 1e-3 for m in ours], limits).wrong == 1.0
+    assert judge.judge_motions(task, [m[:, :-5] for m in ours], limits).success == 0.0
+
+
+@pytest.mark.parametrize("name", ["motion-points", "motion-pace"])
+def test_motions_of_all_rows_keep_the_limits(name):
+    task = prepare(ROWS_BY_ID[name], 4, 1)
+    assert judge.judge_motions(task, answers_of(task), limits_of(task)).success == 1.0
+
+
 # -- timing ------------------------------------------------------------------------------------------------------
 
 
@@ -206,19 +226,20 @@ def test_contestants_take_turns_and_every_target_is_used():
 
 
 def test_a_run_without_peers_measures_us_against_the_floor():
-    found = run(brief("fk", "fk-batch", "ik-pioneer5", "ik-srs-batch", "solve-redundant7"))
+    found = run(brief("fk", "fk-batch", "ik-pioneer5", "ik-srs-batch", "solve-redundant7", "motion-line"))
     assert [row.task.row.id for row in found.rows] == [
         "fk",
         "fk-batch",
         "ik-pioneer5",
         "ik-srs-batch",
         "solve-redundant7",
+        "motion-line",
     ]
     assert found.faults == ()
     assert found.rounds == 3
     names = [[entry.contestant.name for entry in row.entries] for row in found.rows]
-    assert [OURS in n for n in names] == [True, True, True, True, False]
-    assert [SOLVE_IK in n for n in names] == [False, False, True, False, True]
+    assert [OURS in n for n in names] == [True, True, True, True, False, True]
+    assert [SOLVE_IK in n for n in names] == [False, False, True, False, True, False]
     both = found.rows[2]
     assert both.named(OURS).to_array == both.named(SOLVE_IK).to_solve == 1.0
     assert both.named(SOLVE_IK).check.same == 1.0

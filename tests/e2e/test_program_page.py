@@ -38,6 +38,35 @@ def program(desktop: Tab) -> Iterator[Tab]:
     desktop.page.locator("[data-program-do=clear]").click()
 
 
+def test_the_table_of_peaks_stays_open_while_the_page_updates(program: Tab) -> None:
+    page = program.page
+    for i in range(2):
+        program.open("Move")
+        program.type_number("1 rotating base", str(ANGLES[i]))
+        program.wait_for_tool(at(ANGLES[i]), within=0.06)
+        program.open("Program")
+        page.locator("[data-program-do=record]").click()
+        expect(page.locator("[data-program-item]")).to_have_count(i + 1)
+    table = page.get_by_role("table", name="Peaks and limits of the joints")
+    words = page.locator("[data-program=summary] > p").first
+    expect(table).to_be_hidden()
+    page.get_by_text("Peaks and limits of the joints").click()
+    expect(table).to_be_visible()
+    before = words.inner_text()
+    page.locator("[data-program-do=choose]").nth(1).click()
+    speed = page.locator("[data-program-field=speed]")
+    speed.fill("20")
+    speed.press("Enter")
+    expect(words).not_to_have_text(before)
+    expect(table).to_be_visible()
+    page.get_by_text("Peaks and limits of the joints").click()
+    expect(table).to_be_hidden()
+    speed.fill("40")
+    speed.press("Enter")
+    expect(page.locator("[data-program-item]").nth(1)).to_contain_text("at 40 %")
+    expect(table).to_be_hidden()
+
+
 def test_three_poses_are_recorded_played_and_saved(program: Tab, tmp_path: Path) -> None:
     page = program.page
     for i, angle in enumerate(ANGLES):

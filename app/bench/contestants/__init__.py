@@ -8,14 +8,16 @@ To add a library, write a function from `Task` to its contestants (none for task
 `PEERS`.
 """
 
-from app.bench.contestants import closed_forms, iterative, ours
+from app.bench.contestants import closed_forms, iterative, motions, ours
 from app.bench.contestants.contestant import OURS, SOLVE_IK, Contestant, Peer, quiet
-from app.bench.rows import Task
+from app.bench.rows import MOTIONS, Task
 
 __all__ = ["FLOOR", "KINBOARD", "OURS", "PEERS", "SOLVE_IK", "Contestant", "Peer", "quiet"]
 
 
 def _toolbox(task: Task) -> list[Contestant]:
+    if task.row.kind in MOTIONS:
+        return motions.toolbox(task)
     return iterative.toolbox(task) + closed_forms.toolbox_analytic(task)
 
 
@@ -29,5 +31,7 @@ PEERS: tuple[Peer, ...] = (
     Peer("ik-geo", "ik_geo", closed_forms.ik_geo),
     Peer("py-opw-kinematics", "py_opw_kinematics", closed_forms.opw),
     Peer("roboticstoolbox-python", "roboticstoolbox", _toolbox),
+    Peer("ruckig", "ruckig", motions.ruckig),
+    Peer("toppra", "toppra", motions.toppra),
     Peer("ikpy", "ikpy", iterative.ikpy),
 )

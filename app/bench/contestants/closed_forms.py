@@ -77,7 +77,7 @@ def ik_geo(task: Task) -> list[Contestant]:
 
 
 def ssik(task: Task) -> list[Contestant]:
-    if task.row.batch or task.row.kind == "answer":
+    if task.row.batch or task.row.kind not in ("fk", "branches"):
         return []
     arm = task.arm if task.row.kind == "fk" else task.six
     if arm is None:
@@ -160,7 +160,7 @@ def opw(task: Task) -> list[Contestant]:
 
     six = task.arm.with_roll() if task.row.kind == "fk" and task.arm.n == 5 else task.six
     shape = ortho(six) if six is not None else None
-    if shape is None or task.row.kind in ("answer", "cloud"):
+    if shape is None or task.row.kind not in ("fk", "branches"):
         return []
     robot = Robot(KinematicModel(**shape.lengths), degrees=False)
     tool = RigidTransform.from_matrix(shape.tool)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from app.bench.contestants.contestant import TOLERANCE, Contestant, one_answer, search_range, start_of
-from app.bench.rows import Task
+from app.bench.rows import MOTIONS, Task
 from kin.transforms import Array
 
 
@@ -79,6 +79,8 @@ def ikpy(task: Task) -> list[Contestant]:
     from ikpy.link import OriginLink, URDFLink
     from scipy.spatial.transform import Rotation
 
+    if task.row.kind in MOTIONS:
+        return []
     arm = task.arm
     lower, upper = search_range(task, arm)
 

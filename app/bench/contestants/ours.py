@@ -10,8 +10,9 @@ import numpy as np
 
 import kin
 from app.bench import floors
+from app.bench.contestants import motions
 from app.bench.contestants.contestant import FLOORS, OURS, SOLVE_IK, Contestant, no_answers, one_answer
-from app.bench.rows import Task
+from app.bench.rows import MOTIONS, Task
 from kin.transforms import Array
 from kin.workspace.region import Region
 from kin.workspace.sampling.kernels import Points, sample_configurations, sample_points
@@ -34,6 +35,8 @@ def ours(task: Task) -> list[Contestant]:
     robot, row = task.robot, task.row
     if row.kind == "cloud":
         return _cloud(task)
+    if row.kind in MOTIONS:
+        return motions.ours(task)
     if row.kind == "fk" and row.batch:
         return [Contestant(OURS, kin.fk_positions, [(robot, task.q)], list, len(task.q))]
     if row.kind == "fk":
