@@ -146,7 +146,7 @@ class CloudQuery(RegionQuery):
     measure: list[Measure] = Field(
         [],
         max_length=8,
-        description="A further column: manipulability, as `all` in the answer of `jacobian`, or "
+        description="A further column: manipulability (pose), as `all` in the answer of `jacobian`, or "
         "limit_margin (older name: limits), the relative distance to the nearest joint limit, 0 at a limit and 1 "
         "in the middle; may be repeated.",
     )

@@ -41,7 +41,7 @@ class CapabilityAnswer(TypedDict):
     best_share_at: list[float] | None
     """Centre of the voxel with the largest share, in metres; null if no direction is possible anywhere."""
     best_manipulability: float
-    """The largest manipulability found at any centre, as `all` in the answer of `jacobian`."""
+    """The largest manipulability (pose) found at any centre, as `all` in the answer of `jacobian`."""
     best_manipulability_at: list[float] | None
     """Centre of that voxel, in metres; null if it is 0 everywhere."""
 
@@ -56,7 +56,7 @@ class VoxelAnswer(TypedDict):
     """Share of the directions along which the tool can approach the centre, 0 to 1; 0 if only directions between
     the tested ones are possible."""
     manipulability: list[float]
-    """The largest manipulability found there."""
+    """The largest manipulability (pose) found there."""
     approachable: list[str] | None
     """Possible directions, "1" or "0" for each; null unless requested."""
 

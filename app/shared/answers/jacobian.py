@@ -15,14 +15,14 @@ from kin.transforms import Array
 
 @documented
 class Manipulability(TypedDict):
-    """Yoshikawa's manipulability: the product of the singular values of the Jacobian; 0 at a singularity."""
+    """Yoshikawa's manipulability, by task: the product of the singular values of its rows; 0 at a singularity."""
 
     all: float
-    """Of all six rows (mixed units)."""
+    """Of the pose: all six rows (mixed units)."""
     linear: float
-    """Of the three linear rows (m³ if all joints are revolute)."""
+    """Linear, of the tool point: the three linear rows (m³ if all joints are revolute)."""
     angular: float
-    """Of the three angular rows (dimensionless)."""
+    """Angular: the three angular rows (dimensionless)."""
 
 
 @documented

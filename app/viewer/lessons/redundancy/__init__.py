@@ -3,7 +3,8 @@
 A slider, or a continuous sweep, takes the redundancy parameter through its range. Each frame shows a configuration
 that was solved for, never an interpolated one, so the tool is held exactly; the residual shows it. For an arm with
 spherical shoulder and wrist, the feasible arm angles form a ring about the line from shoulder to wrist. For an arm
-whose joints 1 and 2 are coaxial, the drawing shows that only these two joints turn against each other.
+whose joints 1 and 2 are coaxial, the drawing shows that only these two joints turn against each other. Where the
+core has no redundancy parameter, a joint of the null space leads and the others follow numerically.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from app.viewer.lessons.redundancy import views
 from app.viewer.lessons.redundancy.drawing import Drawing
 from app.viewer.lessons.redundancy.questions import outline
 from app.viewer.lessons.redundancy.ring import coaxial, elbow_circle
+from app.viewer.null_space import lead, leaders, within
 from app.viewer.panel import assign, listen, update_html
 from app.viewer.panel.fields import limit_marks
 from app.viewer.panel.posture import on_side_of
@@ -42,6 +44,9 @@ SLIDER_HINT = "Moves the arm while the tool stays where it is"
 SWEEP_HINT = "Moves back and forth between the ends of the range"
 CHOICE_HINT = "The redundancy parameter to change"
 MOVING = Notice("reached", "Self-motion", "The arm moves, the tool does not.")
+BLOCKED = Notice(
+    "limits", "The self-motion ends here", "A joint is at its limit, or the joint cannot lead further."
+)
 _NUMBERS = count(1)
 
 
@@ -62,6 +67,7 @@ class RedundancyLesson(Lesson):
         self._arrival = MOVING  # the notice on arrival at the target value
         self._sent: Array | None = None  # the configuration this lesson requested last
         self._parameters: tuple[Redundancy, ...] = ()
+        self._numeric = False  # whether they are joints of the numeric null space
         self._ends: tuple[End, ...] = ()
         self._ends_key: tuple[object, ...] = ()
         self._control_key: tuple[object, ...] = ()
@@ -245,17 +251,38 @@ class RedundancyLesson(Lesson):
         """Move the arm to a value of the parameter, unless a joint would jump."""
         stage = self.stage
         assert self._sent is not None
-        result = self_motion(stage.robot, self._T_held, stage.options, self._sent, item.name, value)
-        best = result.solutions[0] if result.solutions else None
-        if best is None or float(np.abs(best.q - self._sent).max()) > SMOOTH:
+        q = self._led(item, value) if self._numeric else self._solved(item, value)
+        if q is None or float(np.abs(q - self._sent).max()) > SMOOTH:
+            if self._numeric and self._target is not None:
+                stage.notify(BLOCKED)
             self._up, self._target = not self._up, None
             return
-        self._sent = np.array(best.q)
+        self._sent = q
+        if self._numeric:
+            value = float(q[int(item.name.removeprefix("theta")) - 1])
         self._parameters = tuple(i._replace(value=value) if i is item else i for i in self._parameters)
         notice = MOVING
         if self._target is not None and abs(self._target - value) < NEAR:
             self._target, notice = None, self._arrival
         stage.move_to(self._sent, notice, at_once=True)
+
+    def _solved(self, item: Redundancy, value: float) -> Array | None:
+        """The configuration for a value of an exact parameter."""
+        stage = self.stage
+        assert self._sent is not None
+        result = self_motion(stage.robot, self._T_held, stage.options, self._sent, item.name, value)
+        return np.array(result.solutions[0].q) if result.solutions else None
+
+    def _led(self, item: Redundancy, value: float) -> Array | None:
+        """The configuration near the present one in which a joint of the null space has a value."""
+        stage, joint = self.stage, int(item.name.removeprefix("theta")) - 1
+        assert self._sent is not None
+        near = within(stage.robot, self._sent, stage.task, joint, value, self._locked())
+        return lead(stage.robot, self._sent, self._T_held, stage.task, joint, near, self._locked())
+
+    def _locked(self) -> tuple[int, ...]:
+        locked = self.stage.options.constraints.locked or ()
+        return tuple(i for i, value in enumerate(locked) if value is not None)
 
     # What is shown
 
@@ -269,6 +296,9 @@ class RedundancyLesson(Lesson):
         if key != self._read_key:
             self._read_key, self._changed = key, now
             self._parameters = redundancy_at(robot, self._T_held, stage.options, goal)
+            self._numeric = not self._parameters
+            if self._numeric:
+                self._parameters = leaders(robot, goal, stage.task, self._locked())
             if not any(item.name == self._name for item in self._parameters):
                 self._name = self._parameters[0].name if self._parameters else ""
             self._show_controls()
@@ -285,9 +315,10 @@ class RedundancyLesson(Lesson):
             self._wake(QUIET - (now - self._changed))
             return
         self._ends_key = ends_key
-        self._ends = () if item is None else ends(robot, self._T_held, stage.options, goal, item)
-        update_html(self._limits, "" if item is None else views.limits_html(robot, self._ends, stage.units))
-        shown = item if stage.task == "pose" or (item is not None and item.name == "psi") else None
+        exact = None if self._numeric else item
+        self._ends = () if exact is None else ends(robot, self._T_held, stage.options, goal, exact)
+        update_html(self._limits, "" if exact is None else views.limits_html(robot, self._ends, stage.units))
+        shown = exact if stage.task == "pose" or (exact is not None and exact.name == "psi") else None
         self._drawing.show_ring(goal, self._T_held, shown, self._ends)
 
     def _show_numbers(self) -> None:
@@ -299,7 +330,7 @@ class RedundancyLesson(Lesson):
             return
         if self._slider is not None:
             item = on_side_of(self._slider.value, item, stage.units.angles)
-        update_html(self._bar, views.range_html(robot, item, stage.units))
+        update_html(self._bar, "" if self._numeric else views.range_html(robot, item, stage.units))
         if self._slider is not None and self._target is None:
             value = stage.units.angles.shown(item.value)
             assign(self._slider, min(max(value, self._slider.min), self._slider.max))
@@ -313,13 +344,16 @@ class RedundancyLesson(Lesson):
     @property
     def _trades(self) -> bool:
         """Whether the parameter only turns two coaxial joints against each other."""
-        return self._name == "theta1" and coaxial(self.stage.robot)
+        return self._name == "theta1" and not self._numeric and coaxial(self.stage.robot)
 
     def _show_controls(self) -> None:
         """Slider, sweep and choice; rebuilt when the parameters change."""
         stage = self.stage
         circle = elbow_circle(stage.robot, stage.goal)
-        idea = views.idea(stage.robot, stage.task, self._parameters, coaxial(stage.robot), circle is not None)
+        exact = () if self._numeric else self._parameters
+        idea = views.idea(stage.robot, stage.task, exact, coaxial(stage.robot), circle is not None)
+        if self._numeric and self._parameters:
+            idea = views.numeric_idea(stage.robot, stage.task, self._locked())
         update_html(self._idea, views.idea_html(idea))
         key = (stage.robot.id, stage.units, self._name, *(item.name for item in self._parameters))
         if key == self._control_key:

@@ -8,6 +8,7 @@ import numpy as np
 from markupsafe import Markup
 
 import kin
+from app.viewer.null_space import free_motions
 from app.viewer.panel.posture import feasible_html
 from app.viewer.self_motion import End
 from app.viewer.views.templates import render
@@ -68,6 +69,18 @@ def idea(robot: Robot, task: Task, parameters: tuple[Redundancy, ...], trades: b
         return GIVEN.format(label=parameters[0].label, number=parameters[0].name.removeprefix("theta"))
     names = " and ".join(item.label for item in parameters)
     return f"To match {MATCHED[task]}, {names} can have any value within the joint limits."
+
+
+def numeric_idea(robot: Robot, task: Task, locked: tuple[int, ...] = ()) -> str:
+    """The redundancy where no closed form describes it: by the null space of the Jacobian."""
+    free = free_motions(robot, task, locked)
+    moving = f"{robot.n - len(locked)} joints" if locked else f"{robot.n} joints"
+    kinds = "one self-motion" if free == 1 else f"{free} independent self-motions"
+    return (
+        f"{moving}, and matching {MATCHED[task]} takes {robot.n - len(locked) - free} of their motions: {kinds}. "
+        "No formula gives the feasible ranges here, so the null space of the Jacobian is followed in steps: one "
+        "joint leads, and the others move as little as possible. The limits of all joints hold."
+    )
 
 
 def idea_html(text: str) -> str:

@@ -264,10 +264,10 @@ def values_html(robot: Robot, rates: TaskRates, J: Array) -> str:
         share = min(max((math.log10(max(value, 1e-300)) - low) / (high - low), 0.0), 1.0)
         color = LOOKS["at"][2] if value < 1e-3 else LOOKS["near"][2] if value < 0.05 else "kb-blue"
         bars.append({"value": fixed(value, 4), "percent": f"{100.0 * share:.1f}", "color": color})
-    named = (("all six", J), ("linear, m/s", J[:3]), ("angular, rad/s", J[3:]))
+    named = (("pose", J), ("linear", J[:3]), ("angular", J[3:]))
     parts = [(name, np.asarray(np.linalg.svd(rows, compute_uv=False), np.float64)) for name, rows in named]
     if robot.n == 5:
-        parts.insert(1, ("these five", rates.values))
+        parts.insert(1, ("point + approach", rates.values))
     rows = [{"name": name, "product": _small(_product(s)), "ratio": _ratio(s)} for name, s in parts]
     return render("velocity/values", task=task_words(robot), bars=bars, rows=rows)
 

@@ -47,7 +47,7 @@ BY: dict[str, By] = {
 MEANING: dict[By, str] = {
     "radius": "distance from joint 1's axis",
     "height": "height above the base",
-    "manipulability": "manipulability w (all six rows)",
+    "manipulability": "manipulability w (pose)",
     "limit_margin": "distance to the nearest joint limit, relative to half its range",
 }
 # Okabe and Ito's blue and orange, for the robot's own cloud and that of another one.

@@ -93,7 +93,7 @@ def picked(robot: Robot, constraints: JointConstraints, index: int, q: Array, po
     rows = (
         ("point", grouped(index), ""),
         ("x y z", GAP.join(units.lengths.number(v) for v in point.tolist()), units.lengths.name),
-        ("manipulability w", f"{manipulability:.4f}", ""),
+        ("manipulability w (pose)", f"{manipulability:.4f}", ""),
         ("limit margin", f"{100.0 * margin:.0f}", "%"),
     )
     return render("panel/facts", label="picked point", rows=rows, note="w: all six rows of the Jacobian")

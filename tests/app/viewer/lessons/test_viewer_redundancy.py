@@ -363,6 +363,26 @@ def test_the_choice_between_two_redundancy_at(tab: FakeBrowser) -> None:
     assert tab.value("5 pivoting wrist") == pytest.approx(40, abs=0.01)
 
 
+def test_without_a_closed_form_a_joint_leads(tab: FakeBrowser) -> None:
+    robot = STORE.get("puma560")
+    tab.choose(robot.name)
+    assert "No redundancy" in tab.html
+    tab.set("Target must match", "Point only")
+    tab.wait(lambda: "3 independent self-motions" in tab.html)
+    tab.set("Parameter", "θ2")
+    tab.wait(lambda: "Set θ2 (tool held)" in tab.sliders)
+    p, before = home(robot)[:3, 3], math.degrees(robot.q_home[1])
+    goal = before + 1.5  # the wrist stays within 56 mm of the point
+    poses = swing(tab, "Set θ2 (tool held)", goal)
+    assert max(np.abs(pose[:3, 3] - p).max() for pose in poses) < 1e-6
+    assert max(np.abs(pose[:3, :3] - home(robot)[:3, :3]).max() for pose in poses) > 0.01, "the tool turns"
+    assert tab.value(label(robot, 1)) == pytest.approx(goal, abs=0.01)
+    # As far as it goes: the end is named, and the tool is still there.
+    swing(tab, "Set θ2 (tool held)", math.degrees(robot.upper[1]))
+    tab.wait(lambda: "The self-motion ends here" in tab.html)
+    assert np.abs(tab.tool_pose()[:3, 3] - p).max() < 1e-6
+
+
 def test_invalid_values_are_refused_and_the_lesson_keeps_working(tab: FakeBrowser) -> None:
     tab.choose(SRS.name)
     for name, value in ((free_label(tab), math.nan), (free_label(tab), math.inf)):

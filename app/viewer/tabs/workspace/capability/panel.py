@@ -315,7 +315,8 @@ class Capability:
                     "Voxels show",
                     tuple(BY),
                     initial_value=self._written("by"),
-                    hint="Directions: share of possible approach directions. Manipulability: the best value. "
+                    hint="Directions: share of possible approach directions. Manipulability: the best w of "
+                    "the pose. "
                     "The colours are those chosen above.",
                 ),
             )

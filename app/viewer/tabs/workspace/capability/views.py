@@ -29,7 +29,7 @@ SYMBOLS: dict[State, str] = {
 }
 MEANING: dict[By, str] = {
     "share": "share of possible approach directions",
-    "manipulability": "best manipulability w (all six rows)",
+    "manipulability": "best manipulability w (pose)",
 }
 CERTAINTY: dict[Method, str] = {
     "closed form": "Exact: directions not counted cannot be reached.",
@@ -87,7 +87,7 @@ def facts(found: CapabilityMap, locked: Locks | None, complete: bool, units: Uni
         ("their volume", f"{found.volume:.4g}", "m³"),
         ("mean share", f"{100.0 * mean:.3g}", "%"),
         ("best share", f"{100.0 * float(share.max(initial=0.0)):.3g}", "%"),
-        ("best manipulability", f"{best:.3g}", ""),
+        ("best manipulability (pose)", f"{best:.3g}", ""),
     )
     note = CERTAINTY[found.grid.method] if complete else "Of the part computed so far."
     if locked is not None:
@@ -103,7 +103,7 @@ def picked(found: CapabilityMap, row: int, units: Units) -> str:
         ("centre x y z", centre, units.lengths.name),
         ("approached from", f"{possible} of {count} directions", ""),
         ("share", f"{100.0 * possible / count:.3g}", "%"),
-        ("best manipulability", f"{float(found.manipulability[row]):.3g}", ""),
+        ("best manipulability (pose)", f"{float(found.manipulability[row]):.3g}", ""),
     )
     note = "" if possible else "Reachable, but not along any of these directions."
     return render("panel/facts", label="picked voxel", rows=rows, note=note)
