@@ -44,8 +44,8 @@ def outline(robot: Robot, units: Units) -> Outline:
             "Only the point",
             "Now the tool may turn, and only its point has to stay.",
             _point(robot),
-            "For a task of fewer conditions an arm of six joints is redundant too: choose Point only (tab Move, Target "
-            "must match), and a joint leads below.",
+            "For a task of fewer conditions an arm of six joints is redundant too: choose Point only (tab Move, "
+            "Target must match), and a joint leads below.",
         ),
     ]
     if np.any(z):
