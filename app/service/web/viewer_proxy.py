@@ -56,7 +56,18 @@ _FULL_PAGE = _PAGE.format(
 _UNSENDABLE = {1005: 1000, 1006: 1011, 1015: 1011}
 
 # A tab's memory, and what viser's page lacks. Relative, so that it holds behind any path prefix.
-_SCRIPTS = (b"viewer", b"input", b"robot", b"upload", b"program", b"lesson", b"layout", b"page", b"hints")
+_SCRIPTS = (
+    b"viewer",
+    b"input",
+    b"robot",
+    b"upload",
+    b"program",
+    b"lesson",
+    b"sheets",
+    b"layout",
+    b"page",
+    b"hints",
+)
 _STYLES = (b"viewer", b"robot", b"program", b"layout", b"hints")
 _OURS = b"".join(
     [b'<link rel="stylesheet" href="../static/%s.css">' % name for name in _STYLES]

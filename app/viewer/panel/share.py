@@ -29,6 +29,7 @@ class SharePanel:
         self._choice = gui.add_dropdown("Copy as", tuple(SNIPPETS), initial_value=self._name, hint=hint)
         listen(self._choice, post, "copy-as")
         self._code = gui.add_html("")
+        gui.add_html(render("sheet/in_view"))
         self._moment: Moment | None = None
 
     def show(self, link: str, moment: Moment) -> None:

@@ -10,6 +10,7 @@ from app.viewer.lessons.guide.feature import Guide
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.panel import Post, assign, listen
 from app.viewer.views.templates import render
+from app.viewer.worksheet import Worksheets
 from kin import InputError
 
 NONE = "None"
@@ -23,6 +24,7 @@ class LessonChoice:
     Attributes:
         shown: the open lesson.
         guide: its goal, steps and questions.
+        sheets: the worksheet of the lesson, or of the arm.
     """
 
     def __init__(self, gui: viser.GuiApi, parent: viser.GuiTabHandle, stage: Stage, post: Post) -> None:
@@ -33,6 +35,7 @@ class LessonChoice:
         with parent:
             self._choice = gui.add_dropdown("Lesson", self._titles, initial_value=NONE, hint=HINT)
             self._overview: viser.GuiHtmlHandle | None = gui.add_html(_overview())
+            self.sheets = Worksheets(stage, None)
         listen(self._choice, post, "lesson")
         self._box: viser.GuiFolderHandle | None = None
         self.shown: Lesson | None = None
@@ -50,6 +53,7 @@ class LessonChoice:
         if chosen is None:
             with self._parent:
                 self._overview = self._gui.add_html(_overview())
+                self.sheets = Worksheets(self._stage, None)
             return
         with self._parent:
             self._box = self._gui.add_folder(None)
@@ -59,11 +63,13 @@ class LessonChoice:
                 self.guide.restore(left)
             self.shown = chosen(self._stage)
             self.guide.attach(self.shown)
+        with self._parent:
+            self.sheets = Worksheets(self._stage, self.shown)
 
     @property
     def features(self) -> list[Feature]:
-        """The open lesson and its guide."""
-        return [feature for feature in (self.guide, self.shown) if feature is not None]
+        """The open lesson, its guide, and its worksheet."""
+        return [feature for feature in (self.guide, self.shown, self.sheets) if feature is not None]
 
     def open(self, key: str | None) -> None:
         """Open the lesson with this key, if there is one; None: close the open one."""
@@ -73,6 +79,7 @@ class LessonChoice:
 
     def remove(self) -> None:
         """Remove the open lesson, or the overview if none is open."""
+        self.sheets.remove()
         if self.shown is not None and self.guide is not None:
             self._keep(self.shown.key, self.guide.state())
             self.shown.remove()

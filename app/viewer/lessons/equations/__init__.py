@@ -15,6 +15,7 @@ import numpy as np
 import viser
 
 from app.equations import Book, DerivationError, Equation, TooManyRowsError, book_later
+from app.exports.worksheet import Formula
 from app.shared.computations import Subscription
 from app.viewer.feature import Stage
 from app.viewer.labels import add_label
@@ -160,6 +161,9 @@ class EquationsLesson(Lesson):
             handle.remove()
         self._test_folder.remove()
         self._folder.remove()
+
+    def formulas(self) -> tuple[Formula, ...]:
+        return () if self._book is None else views.formulas(self._book)
 
     def _take(self) -> None:
         """Take the derived book, or the reason why there is none."""

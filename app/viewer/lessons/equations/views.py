@@ -12,6 +12,7 @@ from markupsafe import Markup
 from app.equations import Book, Compared, Equation, Line, Symbol, Values, compared, gram, suspects, typeset
 from app.equations.compare import SMALLEST
 from app.equations.expression import Expression, names
+from app.exports.worksheet import Formula
 from app.viewer.views import mathml
 from app.viewer.views.mathml import MathML
 from app.viewer.views.templates import render
@@ -265,6 +266,26 @@ def _legend(lines: list[Line], equation: Equation) -> str:
 def message(text: str) -> str:
     """A sentence."""
     return render("equations/message", text=text)
+
+
+def formulas(book: Book) -> tuple[Formula, ...]:
+    """All equations for a worksheet: as printed, with the corrected ones among the solutions; or as derived."""
+    lines = [(line.name, line.name, line.expression, False) for line in book.lines if book.source == "derived"]
+    for equation in book.equations:
+        number = equation.entry.replace("_", "") if equation.number is None else f"({equation.number})"
+        if equation.printed is not None:
+            lines.append((number, equation.entry, equation.printed, False))
+        if equation.correct is not None and equation.verdict in ("misprinted", "derived"):
+            title = number if equation.printed is None else f"{number}, corrected"
+            lines.append((title, equation.entry, equation.correct, equation.printed is not None))
+    written = [
+        (title, name, book.written_out(form) if book.source == "chapter" else form, solution)
+        for title, name, form, solution in lines
+    ]
+    return tuple(
+        Formula(title, "".join(typeset.mathml_terms(form, name)), typeset.latex(form, name), solution)
+        for title, name, form, solution in written
+    )
 
 
 def segments(equation: Equation, values: Values, T_base_tool: Array, length: float) -> Array:

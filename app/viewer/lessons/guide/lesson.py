@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 
+from app.exports.worksheet import Formula
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons.guide.outline import Outline
 from app.viewer.lessons.guide.progress import Progress
@@ -35,6 +36,10 @@ class Lesson(Feature, ABC):
         It is made again for each arm and unit while the visitor waits. So what needs inverse kinematics is kept
         for the arm: without a closed form, a target that is missed takes some tenths of a second.
         """
+
+    def formulas(self) -> tuple[Formula, ...]:
+        """The equations of its worksheet."""
+        return ()
 
 
 def _nothing() -> None:

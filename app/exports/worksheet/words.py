@@ -1,0 +1,66 @@
+"""Text of the page as LaTeX: Greek letters, indices and signs become commands, and nothing is left to compile."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+
+_SPECIAL = {
+    "\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "$": r"\$", "&": r"\&", "#": r"\#", "_": r"\_", "%": r"\%",
+    "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "<": r"\textless{}", ">": r"\textgreater{}",
+    "|": r"\textbar{}",
+}  # fmt: skip
+_MATH = {
+    "−": "-", "×": r"\times", "·": r"\cdot", "⋅": r"\cdot", "°": r"^\circ", "±": r"\pm", "√": r"\surd",
+    "≤": r"\le", "≥": r"\ge", "≠": r"\ne", "≈": r"\approx", "→": r"\to", "∞": r"\infty", "′": "'", "∈": r"\in",
+    "⊥": r"\perp", "∥": r"\parallel", "ᵀ": "^{T}", "⁺": "^{+}", "⁻": "^{-}", "¹": "^{1}", "²": "^{2}", "³": "^{3}",
+    "⁴": "^{4}", "ᵢ": "_{i}", "ₙ": "_{n}", "₋": "_{-}", "₊": "_{+}", "∑": r"\sum", "∂": r"\partial",
+    "∠": r"\angle", "½": r"\frac12",
+}  # fmt: skip
+_TEXT = {
+    "…": r"\dots{}", "–": "--", "—": "---", "’": "'", "‘": "`", "“": "``", "”": "''", "\u00a0": "~",
+    "\u202f": r"\,", "\u2009": r"\,", "✓": "", "✕": "", "ü": r'\"u', "ö": r'\"o', "ä": r'\"a',
+}  # fmt: skip
+_INDICES = re.compile("([₀-₉ᵢₙ₋₊]+)")
+_DIGITS = str.maketrans("₀₁₂₃₄₅₆₇₈₉ᵢₙ₋₊", "0123456789in-+")
+
+
+def to_latex(text: str) -> str:
+    """A sentence for a LaTeX document. Characters that LaTeX knows by itself stay."""
+    text = unicodedata.normalize("NFC", text)
+    out = []
+    for piece in _INDICES.split(text):
+        if _INDICES.fullmatch(piece):
+            out.append(f"$_{{{piece.translate(_DIGITS)}}}$")
+            continue
+        for k, character in enumerate(piece):
+            dotted = piece[k + 1 : k + 2] == "\u0307"
+            out.append(_dot(character) if dotted else _one(character))
+    return "".join(out)
+
+
+def _dot(character: str) -> str:
+    inside = _one(character).strip("$")
+    return rf"$\dot{{{inside}}}$"
+
+
+def _one(character: str) -> str:
+    if character == "\u0307":
+        return ""
+    if character in _SPECIAL:
+        return _SPECIAL[character]
+    if character in _TEXT:
+        return _TEXT[character]
+    if character in _MATH:
+        return f"${_MATH[character]}$"
+    name = unicodedata.name(character, "")
+    if name.startswith(("GREEK SMALL LETTER ", "GREEK CAPITAL LETTER ")):
+        letter = name.rsplit(" ", 1)[1].lower()
+        letter = {"lamda": "lambda"}.get(letter, letter)
+        return f"$\\{letter.capitalize() if 'CAPITAL' in name else letter}$"
+    raised = re.fullmatch("<(super|sub)> ([0-9A-F]+)", unicodedata.decomposition(character))
+    if raised is not None:
+        return f"${'^' if raised[1] == 'super' else '_'}{{{chr(int(raised[2], 16))}}}$"
+    if "WITH DOT ABOVE" in name:
+        return rf"$\dot{{{unicodedata.normalize('NFD', character)[0]}}}$"
+    return character

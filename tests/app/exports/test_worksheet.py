@@ -1,0 +1,138 @@
+"""Worksheets: their numbers are those of `kin`, and their files can be read by others."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import kin
+from app.exports.worksheet import Formula, Part, Question, Sheet, csv_text, draw, latex
+from app.exports.worksheet.words import to_latex
+from kin.units import Units
+
+ROBOTS = tuple(kin.builtin_robots().values())
+PIONEER = kin.get_robot("pioneer5")
+SLANTED = replace(
+    PIONEER, base=((0.8, 0.0, 0.6, 0.2), (0.0, 1.0, 0.0, 0.3), (-0.6, 0.0, 0.8, 0.9), (0, 0, 0, 1.0))
+)
+each_robot = pytest.mark.parametrize("robot", [*ROBOTS, SLANTED], ids=lambda robot: robot.name)
+PARTS = (
+    Part(
+        "1. First", "A text with θ₁ − 90° & 5 %.", (Question("How far is it?", "12.0 mm. √(x² + y²).", (), "mm"),)
+    ),
+    Part("Check", "", (Question("Which?", "n. It is n.", ("n", "o_1", "{a}")),)),
+)
+
+
+def sheet(robot, units=None, **more):
+    q = robot.random_q(np.random.default_rng(1), 1)[0]
+    return Sheet("A title", robot, q, units or Units(), **more)
+
+
+@each_robot
+def test_the_product_of_the_matrices_is_the_pose(robot):
+    made = sheet(robot)
+    T = robot.T_world_base
+    for A in made.matrices:
+        T = T @ A
+    assert np.allclose(T @ robot.T_last_tool, kin.fk(robot, made.q), atol=1e-12)
+    assert ("B" in made.product.split()) == (not np.array_equal(robot.T_world_base, np.eye(4)))
+    assert made.product.count("A") == len(robot.rows)
+
+
+@each_robot
+@pytest.mark.parametrize("units", [Units(), Units(False, "m")], ids=["mm", "m"])
+def test_csv_is_read_back(robot, units):
+    made = sheet(robot, units)
+    rows = list(csv.DictReader(io.StringIO(csv_text(made))))
+    assert len(rows) == len(robot.rows) + 1
+    angle, length = (np.pi / 180, 1e-3) if units.degrees else (1.0, 1.0)
+    names = (
+        ("theta_deg", "d_mm", "a_mm", "alpha_deg") if units.degrees else ("theta_rad", "d_m", "a_m", "alpha_rad")
+    )
+    values = []
+    for row, line in zip(robot.rows, rows, strict=False):
+        scales = (angle, length, length, angle)
+        read = [float(line[name]) * scale for name, scale in zip(names, scales, strict=True)]
+        assert np.allclose(read, (row.theta, row.d, row.a, row.alpha), atol=1e-13)
+        if line["value"]:
+            values.append(float(line["value"]) * (angle if row.kind == "revolute" else length))
+    assert np.allclose(values, made.q, atol=1e-13)
+    T = np.array(
+        [float(rows[-1][f"m{r}{c}"]) * (length if c == 4 else 1) for r in (1, 2, 3) for c in (1, 2, 3, 4)]
+    )
+    assert np.allclose(T.reshape(3, 4), kin.fk(robot, made.q)[:3], atol=1e-12)
+    assert rows[-1]["row"] == "tool"
+
+
+@each_robot
+def test_the_drawing_is_svg_and_inside_its_box(robot):
+    drawing = draw(sheet(robot))
+    root = ET.fromstring(drawing.svg())
+    _, _, width, height = map(float, root.attrib["viewBox"].split())
+    for line in drawing.lines:
+        assert (line.points >= -1.0).all()
+        assert (line.points <= (width + 1.0, height + 1.0)).all()
+    texts = ["".join(node.itertext()) for node in root.iter("{http://www.w3.org/2000/svg}text")]
+    assert {str(k + 1) for k in range(robot.n)} <= set(texts)
+    labels = " ".join(texts).split()
+    subscript = str(len(robot.rows)).translate(str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉"))
+    assert {"z₀", f"z{subscript}", f"x{subscript}"} <= set(labels)
+
+
+def balanced(text):
+    """Assert what a LaTeX compiler needs first: brackets, environments, math and tables are balanced."""
+    plain = re.sub(r"\\[\\{}$%&#_]", "", text)
+    assert plain.count("{") == plain.count("}")
+    assert plain.count("$") % 2 == 0
+    stack = []
+    for kind, name in re.findall(r"\\(begin|end)\{(\w+)\}", text):
+        if kind == "begin":
+            stack.append(name)
+        else:
+            assert stack.pop() == name
+    assert not stack
+    assert text.count(r"\[") == text.count(r"\]")
+    assert text.count(r"\left(") == text.count(r"\right)")
+    for table in re.findall(r"\\begin\{tabular\}\{([|rc]+)\}(.*?)\\end", text, re.DOTALL):
+        columns = table[0].replace("|", "")
+        for line in table[1].split(r"\\ \hline")[:-1]:
+            assert line.count("&") - line.count(r"\&") == len(columns) - 1
+
+
+@each_robot
+@pytest.mark.parametrize("blank", [True, False])
+def test_latex_is_balanced(robot, blank):
+    formula = Formula("(6)", "<math></math>", r"p_{z} = \left(c_{1}\right)", True)
+    text = latex(sheet(robot, parts=PARTS, formulas=(formula,), blank=blank, goal="You can & will."))
+    balanced(text)
+    assert text.isascii()
+    questions, solutions = text.split(r"\newpage")
+    assert "12.0 mm" not in questions
+    assert "12.0 mm" in solutions
+    assert "(6)" in solutions
+    assert "(6)" not in questions
+    assert r"\begin{bmatrix}" in (solutions if blank else questions)
+    assert (r"\begin{bmatrix}" in questions) != blank
+
+
+def test_a_sheet_without_questions_has_no_solutions():
+    made = sheet(PIONEER)
+    assert not made.has_solutions
+    assert r"\newpage" not in latex(made)
+    assert [row.cells[0] for row in made.rows] == ["θ₁", "θ₂", "θ₃ − 90.0", "θ₄", "θ₅", "0.0"]
+    assert made.heads == ("θ (°)", "d (mm)", "a (mm)", "α (°)")
+
+
+def test_text_becomes_latex():
+    assert to_latex("θ₁₂ − 90° & 5 % of x²") == r"$\theta$$_{12}$ $-$ 90$^\circ$ \& 5 \% of x$^{2}$"
+    assert to_latex("q̇ and ẋ") == r"$\dot{q}$ and $\dot{x}$"
+    assert to_latex("a_b{c}\\") == r"a\_b\{c\}\textbackslash{}"
+    assert to_latex("xₖ") == "x$_{k}$"
+    assert to_latex("“R” = RᵀR ≤ λ") == r"``R'' = R$^{T}$R $\le$ $\lambda$"

@@ -1,0 +1,101 @@
+"""Worksheets of every lesson, for every kind of arm: questions first, solutions on pages of their own."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from types import SimpleNamespace
+from unittest.mock import MagicMock
+
+import numpy as np
+import pytest
+
+import kin
+from app.equations import book
+from app.exports.worksheet import Sheet, latex
+from app.viewer.lessons import LESSONS
+from app.viewer.lessons.equations import views
+from app.viewer.worksheet import FILES, Worksheets, parts_of
+from app.viewer.worksheet.views import page_html
+from kin.units import DEFAULT_UNITS, Units
+
+PIONEER = kin.get_robot("pioneer5")
+ARMS = [PIONEER, kin.get_robot("planar2r"), kin.get_robot("redundant7-craig")]
+
+
+def as_sheet(lesson, robot, units=DEFAULT_UNITS):
+    outline = lesson.outline(robot, units)
+    return Sheet(lesson.title, robot, robot.q_home, units, outline.goal, parts_of(outline), (), lesson.key == "dh")
+
+
+def parsed(html):
+    """The page as a tree: it is well-formed XML but for a few names of characters."""
+    return ET.fromstring(f"<div>{html.replace('&nbsp;', ' ')}</div>")
+
+
+@pytest.mark.parametrize("robot", ARMS, ids=lambda robot: robot.id)
+@pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.key)
+def test_every_question_is_asked_and_solved(lesson, robot):
+    sheet = as_sheet(lesson, robot)
+    outline = lesson.outline(robot, DEFAULT_UNITS)
+    assert len(sheet.questions) == len(list(outline.questions()))
+    articles = parsed(page_html(sheet)).findall("article")
+    asked, solved = (" ".join("".join(article.itertext()).split()) for article in articles)
+    for question in sheet.questions:
+        assert " ".join(question.prompt.split()) in asked
+        assert " ".join(question.solution.split()) in solved
+        assert " ".join(question.solution.split()) not in asked
+    left = {character for character in latex(sheet) if not character.isascii()}
+    assert not left, "app/exports/worksheet/words.py says what they are in LaTeX"
+    cells = [cell.text for cell in articles[0].iter("td")]
+    assert (None in cells or "" in cells) == sheet.blank
+
+
+def test_the_page_has_the_units_of_the_reader():
+    sheet = as_sheet(LESSONS[0], PIONEER, Units(False, "m"))
+    html = page_html(sheet)
+    assert "θ (rad)" in html
+    assert "d (m)" in html
+    assert " mm" not in html
+    assert f">{kin.fk(PIONEER, PIONEER.q_home)[2, 3]:.4f}<".replace("-", "−") in html
+
+
+def test_equations_are_on_the_sheet_with_their_corrections_among_the_solutions():
+    formulas = views.formulas(book(PIONEER))
+    assert [f.title for f in formulas if f.solution] == ["(6), corrected", "(13), corrected"]
+    assert len([f for f in formulas if not f.solution]) == 12
+    sheet = Sheet("Equations", PIONEER, PIONEER.q_home, DEFAULT_UNITS, formulas=formulas)
+    assert page_html(sheet).count("<math") >= 12
+    derived = views.formulas(book(kin.get_robot("ur5")))
+    assert {f.title for f in derived} >= {"nx", "pz"}
+    assert not any(f.solution for f in derived)
+
+
+@pytest.fixture
+def worksheets():
+    stage = MagicMock(robot=PIONEER, goal=PIONEER.q_home, units=DEFAULT_UNITS)
+    lesson = SimpleNamespace(key="dh", formulas=tuple)
+    made = Worksheets(stage, lesson)
+    made.sheet = lambda: Sheet("An arm", PIONEER, np.array(PIONEER.q_home), DEFAULT_UNITS)
+    return made
+
+
+def test_the_page_is_handed_to_the_script_that_asked(worksheets):
+    worksheets.handle(("page", 7), None)
+    content = worksheets._html.content
+    assert 'data-sheet="7"' in content
+    assert "<template data-sheet-page>" in content
+    assert "An arm</h1>" in content
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_files_are_sent(worksheets, name):
+    worksheets.handle((name, 1), None)
+    (file, data), _ = worksheets.stage.client.send_file_download.call_args
+    assert file == f"pioneer-arm-dh.{FILES[name][0]}"
+    assert len(data) > 500
+
+
+def test_other_messages_are_refused(worksheets):
+    for key in (("pdf", 1), ("page", "1"), "page"):
+        with pytest.raises(kin.InputError, match="one of page"):
+            worksheets.handle(key, None)

@@ -1,0 +1,29 @@
+"""The worksheet of a lesson in a real browser: the printable page opens, filled, and files are saved."""
+
+from __future__ import annotations
+
+import pytest
+from page import Tab
+from playwright.sync_api import expect
+
+pytestmark = pytest.mark.browser
+
+
+def test_the_worksheet_of_a_lesson_is_printed_and_saved(tab: Tab) -> None:
+    tab.choose_lesson("DH table step by step")
+    row = tab.page.locator("[data-sheet] .kb-sheet")
+    expect(row).to_be_visible()
+    with tab.page.context.expect_page() as opened:
+        row.get_by_role("button", name="Print").click()
+    sheet = opened.value
+    expect(sheet.locator("body")).to_have_attribute("data-ready", "1")
+    expect(sheet).to_have_title("DH table step by step – Kinboard")
+    expect(sheet.locator("article")).to_have_count(2)
+    expect(sheet.locator("article").first.locator("figure svg")).to_be_visible()
+    expect(sheet.locator("[data-solutions] .dh")).to_contain_text("θ₃ − 90.0")
+    sheet.emulate_media(media="print")
+    expect(sheet.get_by_role("button")).to_be_hidden()
+    sheet.close()
+    with tab.page.expect_download() as saved:
+        row.get_by_role("button", name="CSV").click()
+    assert saved.value.suggested_filename == "pioneer-arm-dh.csv"
