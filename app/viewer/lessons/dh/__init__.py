@@ -346,7 +346,7 @@ class DHLesson(Lesson):
             self._assigning.draw()
         if self._drawing is None:
             return
-        if self._axes is not None and self._lines:
+        if self._axes is not None and self._lines and not self._compare:  # the comparison has axes of its own
             self._axes.show(q, axis_names(robot))
         elif self._axes is not None:
             self._axes.hide()

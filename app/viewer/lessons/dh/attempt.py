@@ -24,7 +24,7 @@ from app.viewer.lessons.dh.assignment import (
     read_row,
 )
 from app.viewer.lessons.dh.choices import PARTS, Choice, Part
-from app.viewer.lessons.dh.steps import MOVED, Factor, low, turns
+from app.viewer.lessons.dh.steps import MOVED, ORDERS, Factor, low, turns
 from kin import InputError, Robot
 from kin.transforms import Array, as_transform
 from kin.units import Units
@@ -124,10 +124,11 @@ class Attempt:
         last = self.number == self.work.robot.n
         verdict = judge(self.work, self.chosen, typed, [there] if last and there is not None else [])
         if verdict.wrong:
-            self.ghost, self.wrong = typed, verdict.wrong
-            sentences = tuple(self._explain(factor, typed, verdict, q) for factor in verdict.wrong)
-            names = ", ".join(self.symbol(factor) for factor in verdict.wrong)
-            are = "is" if len(verdict.wrong) == 1 else "are"
+            wrong = tuple(factor for factor in ORDERS[self.work.convention] if factor in verdict.wrong)
+            self.ghost, self.wrong = typed, wrong
+            sentences = tuple(self._explain(factor, typed, verdict, q) for factor in wrong)
+            names = ", ".join(self.symbol(factor) for factor in wrong)
+            are = "is" if len(wrong) == 1 else "are"
             self.feedback = Feedback(False, f"{names} {are} wrong", sentences)
             return
         self._accept(verdict, "Right")

@@ -48,7 +48,8 @@ def spans(robot: Robot, lines: Sequence[Line], thickness: float) -> list[tuple[A
 def room(robot: Robot) -> list[Sphere]:
     """What a view has to show besides the arm: the ends of the axes at home, where their names are."""
     lines = axis_lines(robot, robot.q_home)
-    return [(end, 0.0) for pair in spans(robot, lines, body(robot).size) for end in pair]
+    thickness = body(robot).size
+    return [(end, 2.0 * thickness) for pair in spans(robot, lines, thickness) for end in pair]
 
 
 class AxesDrawing:

@@ -233,3 +233,32 @@ def test_choices_come_in_the_order_of_the_steps() -> None:
     places = [choices.PARTS.index(part) for part in seen]
     assert all(one < other for one, other in pairwise(places))
     assert seen == ["axis", "direction", "normal", "origin", "x"]
+
+
+def random_arm(seed: int) -> kin.Robot:
+    """Any kinds of joints and fixed rows, with zeros and right angles among the numbers."""
+    rng = np.random.default_rng(seed)
+    rows = []
+    for i in range(int(rng.integers(2, 8))):
+        kind = "revolute" if i == 0 else str(rng.choice(["revolute", "prismatic", "fixed"], p=[0.6, 0.2, 0.2]))
+        theta, alpha = (
+            float(rng.choice([0.0, np.pi / 2, -np.pi / 2, np.pi, rng.uniform(-3, 3)])) for _ in range(2)
+        )
+        d, a = (float(rng.choice([0.0, rng.uniform(-0.5, 0.5)])) for _ in range(2))
+        rows.append({"name": f"j{i}", "theta": theta, "d": d, "a": a, "alpha": alpha, "kind": kind})
+        if kind != "fixed":
+            rows[-1]["limits"] = (-1.0, 1.0)
+    return kin.Robot.from_dh(rows, "standard" if seed % 2 else "modified")
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_any_right_choices_on_any_arm_give_a_table_of_it(seed: int) -> None:
+    robot, rng = random_arm(seed), np.random.default_rng(seed)
+    attempt = begin(robot)
+    while not attempt.work.complete:
+        if attempt.part is None:
+            attempt.show()
+            continue
+        found = attempt.offered()[attempt.part]
+        attempt.choose(attempt.part, int(rng.choice([i for i, choice in enumerate(found) if choice.right])))
+    assert error_of(attempt.work) < 1e-9

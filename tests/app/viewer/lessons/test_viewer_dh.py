@@ -497,3 +497,33 @@ def test_a_shared_address_restores_the_settings_and_ignores_invalid_ones(
         assert lesson.state() == kept
     tab.wait(lambda: tab.value("Row") == 6.5 / 4)
     assert tab.value("Compare conventions") is True
+
+
+def test_assigning_replaces_the_walk_and_follows_the_arm_in_place(tab: FakeBrowser) -> None:
+    tab.set("Assign it yourself", True)
+    tab.wait(lambda: "Which line is z₀?" in tab.html)
+    assert not [name for name in tab.nodes if name.endswith("/moving")]
+    for number in range(9):
+        tab.say("feature", ["dh", ["show", number], None])
+        tab.settle()
+    tab.wait(lambda: "Fill in row 1" in tab.html)
+    tab.say("feature", ["dh", ["check", 10], {"theta": "1", "d": "2", "a": "3", "alpha": "4"}])
+    tab.wait(lambda: "are wrong" in tab.html)
+    tab.settle()
+    before = {name for name in tab.nodes if name.startswith("/dh-")}
+    axis = next(n for n, m in tab.nodes.items() if m["props"].get("text") == "joint 3")
+    place = tab.local(axis)
+    tab.set("1 rotating base", 20.0)
+    tab.wait(lambda: not np.allclose(tab.local(axis), place))
+    tab.settle()
+    assert {name for name in tab.nodes if name.startswith("/dh-")} == before, "nothing is made anew"
+    tab.say("feature", ["dh", ["choose", "axis", 11], 0])
+    tab.wait(lambda: "the row is typed" in tab.html)
+    tab.set("Robot", CRAIG.name)
+    tab.wait(lambda: "Frame 0 of 7" in tab.html)
+    tab.set("Assign it yourself", False)
+    tab.wait(lambda: any(name.endswith("/moving") for name in tab.nodes))
+    tab.set("Lesson", "None")
+    tab.wait(lambda: "Row" not in tab.sliders)
+    tab.settle()
+    assert not [n for n in tab.nodes if n.startswith("/dh-")]
