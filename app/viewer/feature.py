@@ -136,8 +136,11 @@ class Stage(Protocol):
     def notify(self, notice: Notice) -> None:
         """Show a notice in the status line."""
 
-    def see_through(self, on: bool) -> None:
-        """Make way for drawings inside the arm: translucent links, no gizmo. Another robot undoes it."""
+    def see_through(self, on: bool, gizmo: bool = False) -> None:
+        """Make way for drawings inside the arm: translucent links, and no gizmo unless it is kept.
+
+        Another robot undoes it.
+        """
 
     def show_legend(self, html: str) -> None:
         """Say what is drawn in the scene, on whatever tab; "" removes the legend."""

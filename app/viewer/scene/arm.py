@@ -231,9 +231,9 @@ class ArmScene:
             self._contact_label.text = text
         return text
 
-    def see_through(self, on: bool) -> None:
-        """Make way for drawings inside the arm: translucent links, no gizmo, no axes at the base."""
-        self.gizmo.visible = not on
+    def see_through(self, on: bool, gizmo: bool = False) -> None:
+        """Make way for drawings inside the arm: translucent links, no axes at the base, no gizmo unless kept."""
+        self.gizmo.visible = gizmo or not on
         self.show_base_axes(not on)
         self._through = on
         self._set_opacity()

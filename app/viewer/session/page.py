@@ -165,8 +165,8 @@ class VisitorPage(ShownArm, Worker):
     def notify(self, notice: Notice) -> None:
         self.status.show(notice)
 
-    def see_through(self, on: bool) -> None:
-        self.arm.scene.see_through(on)
+    def see_through(self, on: bool, gizmo: bool = False) -> None:
+        self.arm.scene.see_through(on, gizmo)
 
     def show_legend(self, html: str) -> None:
         update_html(self.panel.legend, html)

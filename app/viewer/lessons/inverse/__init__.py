@@ -329,7 +329,7 @@ class InverseLesson(Lesson):
         """Draw the figure of the step on show; the check has that of the whole posture."""
         if self._drawing is None:
             self._drawing = Drawing(self.stage.client.scene, arm)
-            self.stage.see_through(True)
+            self.stage.see_through(True, gizmo=True)
         at = min(self._at, len(keys) - 1)
         self._drawing.show(shapes(arm, branch.derivation, keys[at]), self.stage.units, not opened[at])
 

@@ -79,6 +79,8 @@ class Drawing:
     def _made(self, shape: Shape) -> Part:
         figure, name = self._figure, shape.name
         label, color = LABELS.get(name, sub(name)), COLORS.get(name)
+        if name == "w" and self._arm.family == "planar":
+            label = "end of link 2"
         match shape:
             case Point():
                 return figure.point(label, color or AMBER)

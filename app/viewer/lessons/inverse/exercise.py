@@ -16,6 +16,7 @@ from kin.transforms import Array, rotation_angle, vector_angle
 SLACK = 1e-6  # rad: a limit is exceeded by more
 PLAIN = 0.1  # of a sine: an example keeps off special angles by as much
 ASIDE = math.radians(20.0)
+ACROSS = math.radians(-40.0)  # of joint 1 where it is not seen which way the arm bends: across the default view
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +83,9 @@ def example(arm: Arm) -> Array:
     robot, q = arm.robot, arm.robot.q_home.copy()
     for i in range(robot.n):
         if abs(math.sin(arm.angles(q)[i])) < PLAIN:
+            if i == 0 and arm.family == "srs7" and robot.lower[0] < ACROSS:
+                q[0] += ACROSS
+                continue
             q[i] += ASIDE if q[i] + ASIDE <= robot.upper[i] else -ASIDE
     return q
 
