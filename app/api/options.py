@@ -29,6 +29,7 @@ from kin.solvers.contract import POSE
 from kin.transforms import Array, frame_from_approach, from_position_wxyz
 
 AGREEMENT = 1e-6  # metres, and matrix entries
+_IDENTITY = np.eye(4)
 FORMS = {
     "pose": "`position` and `wxyz`, or `matrix`",
     "approach": "`position` and `approach`, or `position` and `wxyz`, or `matrix`",
@@ -97,7 +98,9 @@ class Target(schemas.Body):
     def _transform(self, field: str) -> Array:
         if self.matrix is None:
             assert self.position is not None
-            T = from_position_wxyz(self.position, self.wxyz)
+            # These numbers have been checked: nothing is left to do for a point.
+            T = _IDENTITY.copy() if self.wxyz is None else from_position_wxyz(self.position, self.wxyz)
+            T[:3, 3] = self.position
             if self.approach is not None:
                 T[:3, :3] = frame_from_approach(self.approach)
             return T

@@ -60,18 +60,18 @@ class Found:
     @property
     def solutions(self) -> tuple[IKSolution, ...]:
         """As many solutions as are wanted."""
-        return self.all_solutions()[: self._problem.options.max_solutions]
+        return self.all_solutions(most=self._problem.options.max_solutions)
 
-    def all_solutions(self, compromise: str | None = None) -> tuple[IKSolution, ...]:
-        """Every solution."""
-        q, stats = self._branches.q.copy(), self._branches.stats.tolist()
+    def all_solutions(self, compromise: str | None = None, most: int | None = None) -> tuple[IKSolution, ...]:
+        """Every solution, or the first ones."""
+        q, stats = self._branches.q.copy(), self._branches.stats
         q.flags.writeable = False
         names, plain = form_of(self._problem).branches, not self._branches.redundancies
         solutions = []
-        for place, row in enumerate(self._order):
+        for place, row in enumerate(self._order[:most]):
             made = IKSolution.__new__(IKSolution)
             made.q, made.branch, made.compromise = q[row], names[row], compromise
-            made.position_error, made.rotation_error, made.distance, overrun, _ = stats[row]
+            made.position_error, made.rotation_error, made.distance, overrun, _ = stats[row].tolist()
             made.in_limits = overrun == 0.0
             if plain:
                 made.redundancy = ()
@@ -96,11 +96,14 @@ class Found:
         """How many solutions there are, and what the task leaves free."""
         problem, names = self._problem, form_of(self._problem).branches
         fixed = tuple([parameter.label for parameter in problem.requested])
-        free = tuple([r.label for r in self.redundancy if r.label not in fixed and _has_width(r)])
-        movable = {p.name for p in problem.redundancies if p.joint < 0 or not problem.locked[p.joint]}
+        redundancy = self.redundancy
+        free = tuple([r.label for r in redundancy if r.label not in fixed and _has_width(r)])
+        movable = redundancy and {
+            p.name for p in problem.redundancies if p.joint < 0 or not problem.locked[p.joint]
+        }
         return Solved(
             configurations=len(self._order),
-            redundant=any(r.name in movable for r in self.redundancy),
+            redundant=any(r.name in movable for r in redundancy),
             chosen_branches=problem.chosen_branches,
             infinite=bool(free),
             postures=len({names[row] for row in self._order}),

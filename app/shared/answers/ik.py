@@ -21,6 +21,7 @@ from kin import BlockedBranch, IKResult, IKSolution, PathResult, Status
 from kin.ik.results import Cause
 from kin.tolerances import TOLERANCES
 
+TaskName = Literal["pose", "approach", "position", "mask"]
 EXACT = (TOLERANCES.closure_position, TOLERANCES.closure_rotation)
 
 
@@ -88,7 +89,7 @@ class IkAnswer(TypedDict):
     """The numbers behind `cause`."""
     reason: str
     """Status and cause in a sentence for people, in degrees and millimetres."""
-    task: Literal["pose", "approach", "position", "mask"]
+    task: TaskName
     """The task that was solved for."""
     complete: bool
     """Whether a closed form gave every posture, so that no further one exists on the requested branches; false
@@ -120,20 +121,19 @@ class IkAnswer(TypedDict):
 
 def ik_answer(result: IKResult) -> IkAnswer:
     """One result of `kin.solve_ik`."""
+    closest, oriented = result.closest, result.nearest_orientation
     answer: IkAnswer = {
         "status": result.status.value,
         "cause": result.cause,
         "details": details_answer(result.details),
         "reason": result.reason,
-        "task": cast(Literal["pose", "approach", "position", "mask"], result.task),
+        "task": cast(TaskName, result.task),
         "complete": result.complete,
         "solver": result.solver,
         "solver_reason": result.solver_reason,
         "solutions": [_solution(solution) for solution in result.solutions],
-        "closest": None if result.closest is None else _solution(result.closest),
-        "nearest_orientation": None
-        if result.nearest_orientation is None
-        else _solution(result.nearest_orientation),
+        "closest": None if closest is None else _solution(closest),
+        "nearest_orientation": None if oriented is None else _solution(oriented),
         "blocked": [_blocked(blocked) for blocked in result.blocked],
         "violations": [violation_answer(violation) for violation in result.violations],
         "distance": result.distance,

@@ -6,6 +6,7 @@ for a page that sets them apart; its `text` is one line.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 from kin.ik.details import (
@@ -83,10 +84,19 @@ def explain(
         singularities: those of the solution, or of the closest configuration where there is no solution.
         units: of all numbers.
     """
+    if isinstance(details, Solved) and not singularities:
+        return _reached(details, task, units)
     headline, body = _outcome(details, cause, task, units)
     solved = isinstance(details, Solved | RollError | RotationError)
     note = _singular(singularities, "This" if solved else "The closest", units)
     return Explanation(_title(details, headline, units), headline, body, note)
+
+
+@lru_cache(maxsize=512)
+def _reached(details: Solved, task: str, units: Units) -> Explanation:
+    """Most answers: there are few different ones."""
+    headline, body = _outcome(details, "", task, units)
+    return Explanation(_title(details, headline, units), headline, body)
 
 
 def rounded_target(error: float, tolerances: tuple[float, float], units: Units, path: bool = False) -> str:
