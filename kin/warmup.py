@@ -1,8 +1,8 @@
 """Load or compile the kernels of a service before its first request.
 
-Loading a kernel takes hundredths of a second, compiling one takes seconds. A service is ready once every kernel
-of forward and inverse kinematics is compiled: with a warm cache as soon as the first arm has answered, on a new
-machine after some tens of seconds. The remaining kernels are loaded while the first visitors are served.
+Loading a kernel takes hundredths of a second, compiling one takes seconds, and all of them minutes. A service is
+ready once the arm that a page shows first can be moved (`warm_up_first`). The remaining kernels are loaded or
+compiled while the first visitors are served, those of that arm first (`warm_up_rest`).
 
 The array-level call (:mod:`kin.ik.batch`) is not part of a service: its kernels are compiled on first use. Kernels
 belong to solver families, not to arms, so one arm of each family is enough.
@@ -34,6 +34,11 @@ from kin.workspace import (
     workspace_facts,
     workspace_slice,
 )
+
+
+def warm_up_first() -> None:
+    """Load or compile what moves the first arm."""
+    _move(_first())
 
 
 def warm_up() -> None:
@@ -81,6 +86,10 @@ def made_up_arms() -> tuple[Robot, ...]:
     turned = (*oblique[:2], (0, 0.2, 0, 0.4))
     tables = (parallel, planar, oblique, oblique[:2], turned)
     return tuple(Robot.from_dh(rows, home=[0.3, 0.5, 0.7, 0.4, 0.6][: len(rows)]) for rows in tables)
+
+
+def _first() -> Robot:
+    return next(iter(builtin_robots().values()))
 
 
 def _move(robot: Robot) -> None:
@@ -131,6 +140,7 @@ def _solve_generally(robot: Robot) -> None:
 
 
 def _rest() -> Iterator[Callable[[], object]]:
+    yield partial(_call_all, _first())
     robots = one_of_each_family()
     for act in (_move, _call_all):
         for robot in (*robots, *made_up_arms()):

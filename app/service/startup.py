@@ -1,8 +1,8 @@
 """The slow part of the start, in threads next to the running server: the viewer and the compiled kernels.
 
 The landing page is served at once and shows "warming up" until ``/readyz`` reports ready. Kernels are loaded from
-numba's cache in milliseconds, or are compiled, which takes seconds and should delay no visitor. Kernels that are
-rarely needed in the first minute, such as those of workspace clouds, are compiled after the service is ready.
+numba's cache in milliseconds, or are compiled, which takes seconds. The service is ready when those of the first
+arm are; all others are compiled after that.
 Of several processes the first one compiles, and the others wait and load what it has compiled.
 """
 
@@ -22,7 +22,7 @@ from app.shared.settings import Settings
 from app.shared.store import Store
 from app.shared.summaries import Summaries
 from app.shared.threads import lower_priority
-from kin import warm_up, warm_up_rest
+from kin.warmup import warm_up_first, warm_up_rest
 
 if TYPE_CHECKING:
     from app.viewer.server import ViewerServer
@@ -53,6 +53,7 @@ class Startup:
         on_ready: Callable[[], None] | None = None,
     ) -> None:
         self.status: Status = "warming"
+        self._complete = False
         self._member = member
         self._settings = settings
         self._store = store
@@ -79,6 +80,13 @@ class Startup:
             return "failed"
         return self.status if min(phases) >= Phase.READY else "warming"
 
+    @property
+    def complete(self) -> bool:
+        """Whether all kernels are compiled, for this process and its partners."""
+        if self._member is None:
+            return self._complete
+        return all(self._member.phases[number] == Phase.COMPLETE for number in self._member.group)
+
     def start(self) -> None:
         """Start; returns at once. The viewer serves its visitors in the running event loop."""
         self._loop = asyncio.get_running_loop()
@@ -97,7 +105,7 @@ class Startup:
             self._start_viewer()
             self._wait_for_first(Phase.READY)
             if not self._stopping.is_set():
-                warm_up()
+                warm_up_first()
                 if self._on_ready is not None:
                     self._on_ready()
                 self.status = "ready"
@@ -125,6 +133,7 @@ class Startup:
         self._wait_for_first(Phase.COMPLETE)
         try:
             warm_up_rest(self._stopping.is_set)
+            self._complete = not self._stopping.is_set()
             self._report(Phase.COMPLETE)
         except Exception:
             # Requests that need this kernel fail; everything else works.

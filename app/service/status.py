@@ -23,9 +23,12 @@ class Alive(BaseModel):
 
 
 class Readiness(BaseModel):
-    """Whether the kernels that move an arm are compiled and the viewer listens."""
+    """Whether the kernels that move the first arm are compiled and the viewer listens."""
 
     status: Status
+    complete: bool = Field(
+        description="Whether all kernels are compiled. Until then, first uses may take seconds."
+    )
 
 
 @router.get("/metrics", summary="Metrics, for Prometheus", response_class=PlainTextResponse)
@@ -45,7 +48,8 @@ async def livez() -> Alive:
     responses={503: {"model": Readiness, "description": "Still warming up, or the viewer failed."}},
 )
 async def readyz(request: Request, response: Response) -> Readiness:
-    status: Status = request.app.state.startup.readiness
+    startup = request.app.state.startup
+    status: Status = startup.readiness
     response.headers["cache-control"] = "no-store"
     response.status_code = 200 if status == "ready" else 503
-    return Readiness(status=status)
+    return Readiness(status=status, complete=startup.complete)
