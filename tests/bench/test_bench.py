@@ -33,6 +33,13 @@ def brief(*ids, peers=()):
     return replace(BRIEF, rows=tuple(ROWS_BY_ID[name] for name in ids), peers=peers)
 
 
+@pytest.fixture(autouse=True)
+def one_thread(monkeypatch):
+    """What the command sets before it imports libraries."""
+    for name in ("OMP", "OPENBLAS", "MKL", "NUMEXPR"):
+        monkeypatch.setenv(f"{name}_NUM_THREADS", "1")
+
+
 # -- arms in other forms -----------------------------------------------------------------------------------------
 
 
