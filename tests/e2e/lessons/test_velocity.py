@@ -11,6 +11,7 @@ from page import Tab
 from playwright.sync_api import expect
 
 import kin
+from kin.units import fixed
 
 pytestmark = pytest.mark.browser
 
@@ -76,6 +77,30 @@ def test_a_singular_pose_and_the_lost_direction(lesson: Tab) -> None:
     expect(warning).to_contain_text("Cannot move along base y")
     lesson.choose("Show", "Force")
     lesson.screenshot("velocity-singular")
+
+
+def test_force_null_space_and_line_by_mouse_and_keyboard(lesson: Tab) -> None:
+    page = lesson.page
+    for folder in ("Forces", "Null space", "Along a line"):
+        page.get_by_role("button", name=folder, exact=True).press("Enter")
+    lesson.type_number("Fz, N", "-20")
+    torques = page.locator("[data-torque]")
+    expect(torques).to_have_count(6)
+    expected = kin.jacobian(ABB, ABB.q_home)[2] * -20.0
+    expect(torques.nth(1)).to_have_text(fixed(float(expected[1]), 2))
+    page.get_by_role("button", name="Cheapest direction").click()
+    expect(page.locator("[data-cheap]")).to_contain_text("per newton")
+    expect(page.locator("[data-null]")).to_contain_text("null space: only 0")
+    page.get_by_role("button", name="Plot the line").press("Enter")
+    expect(page.locator("[data-line]")).to_contain_text("Start and end are the same")
+    page.get_by_role("button", name="−z", exact=True).click()
+    expect(lesson.status.first).to_contain_text("Jogged")
+    page.get_by_role("button", name="Plot the line").press("Enter")
+    expect(page.locator("[data-line] .kb-motion-curve")).to_have_count(3)
+    lesson.check("Force at the tool")
+    expect(torques).to_have_count(0)
+    for folder in ("Forces", "Null space", "Along a line"):
+        page.get_by_role("button", name=folder, exact=True).press("Enter")
 
 
 def test_seven_columns_fit_a_phone(phone: Tab) -> None:

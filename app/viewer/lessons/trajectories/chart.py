@@ -33,11 +33,13 @@ class Row:
         title: with the unit.
         limit: drawn as a dashed line in both directions; None: there is none.
         log: whether the values, all positive, are drawn on a logarithmic scale.
+        shows: values, or their decimal logarithms, that are on the axis whatever the curves are.
     """
 
     title: str
     limit: float | None = None
     log: bool = False
+    shows: tuple[float, ...] = ()
 
 
 def chart(rows: tuple[Row, ...], curves: tuple[Curve, ...], label: str, axis: str = "s", whole: int = 0) -> Markup:
@@ -76,7 +78,8 @@ def _row(row: Row, k: int, curves: tuple[Curve, ...], ends: tuple[float, float])
         None if (shown := curve.rows[k]) is None else np.log10(shown) if row.log else shown for curve in curves
     ]
     values = [shown for shown in drawn if shown is not None]
-    low, high = min(float(v.min()) for v in values), max(float(v.max()) for v in values)
+    low = min(*(float(v.min()) for v in values), *row.shows, math.inf)
+    high = max(*(float(v.max()) for v in values), *row.shows, -math.inf)
     if row.limit is not None:
         low, high = (min(low, -row.limit) if low < 0.0 else low), max(high, row.limit)
     room = 0.08 * max(high - low, 1e-9)

@@ -21,6 +21,8 @@ from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.velocity import views
 from app.viewer.lessons.velocity.drawing import Drawing
 from app.viewer.lessons.velocity.jog import BUTTONS, Frame, Press, Step, button, step
+from app.viewer.lessons.velocity.line import Line
+from app.viewer.lessons.velocity.null_motion import FRAME, NullMotion
 from app.viewer.lessons.velocity.questions import outline
 from app.viewer.lessons.velocity.rates import (
     Axes,
@@ -34,6 +36,7 @@ from app.viewer.lessons.velocity.rates import (
     state_of,
     task_rates,
 )
+from app.viewer.lessons.velocity.statics import Statics
 from app.viewer.panel import assign, listen, listen_click, update_html
 from kin import InputError
 from kin.transforms import Array
@@ -104,6 +107,12 @@ class VelocityLesson(Lesson):
             self._values = gui.add_html("")
         with gui.add_folder("Singularities", expand_by_default=False):
             self._others = gui.add_html("")
+        with gui.add_folder("Forces", expand_by_default=False):
+            self._statics = Statics(stage, self.post)
+        with gui.add_folder("Null space", expand_by_default=False):
+            self._null = NullMotion(stage, self.post)
+        with gui.add_folder("Along a line", expand_by_default=False):
+            self._line = Line(stage, self.post)
         self._use_robot()
 
     def _build_jog(self, gui: viser.GuiApi) -> None:
@@ -172,6 +181,14 @@ class VelocityLesson(Lesson):
                     self._turn = _number("turn", value, TURNS, units.angles)
             case ("jog", int(number), int()):
                 self._jog(*BUTTONS[number])
+            case ("statics", *_) as named:
+                self._statics.handle(tuple(named), value)
+                self._show_numbers()
+            case ("null", *_) as named:
+                self._null.handle(tuple(named), value)
+                self.due = 0.0
+            case ("line", *_) as named:
+                self._line.handle(tuple(named))
             case _:
                 raise InputError("velocity", key, "a control of this lesson")
 
@@ -180,6 +197,8 @@ class VelocityLesson(Lesson):
 
     def on_robot(self) -> None:
         self._drawing.remove()
+        self._null.stop()
+        self._line.forget()
         if self._columns is not None:
             self._columns.remove()
         self._use_robot()
@@ -198,11 +217,15 @@ class VelocityLesson(Lesson):
         self._show_numbers()
 
     def tick(self, now: float) -> None:
+        self._null.step(now)
         wait = INTERVAL - (now - self._shown_at)
-        if wait > 0.0:
+        if wait <= 0.0:
+            self._show_numbers()
+            wait = INTERVAL
+        elif not self._null.runs:
             self.due = wait
-            return
-        self._show_numbers()
+        if self._null.runs:
+            self.due = min(wait, FRAME)
 
     def state(self) -> dict[str, object]:
         return {
@@ -211,6 +234,7 @@ class VelocityLesson(Lesson):
             "joint": 0 if self._chosen is None else self._chosen + 1,
             "step": self._step,
             "turn": self._turn,
+            "statics": self._statics.state(),
         }
 
     def restore(self, state: dict[str, object]) -> None:
@@ -230,6 +254,7 @@ class VelocityLesson(Lesson):
             self._step = size
         if isinstance(turn, float) and TURNS[0] <= turn <= TURNS[1]:
             self._turn = turn
+        self._statics.restore(state.get("statics"))
         units = self.stage.units
         assign(self._step_field, units.lengths.shown(self._step))
         assign(self._turn_field, units.angles.shown(self._turn))
@@ -261,7 +286,9 @@ class VelocityLesson(Lesson):
         """Create drawings, scales and column buttons of the selected robot."""
         stage, robot = self.stage, self.stage.robot
         self._chosen, self._refused = None, ()
-        self._drawing = Drawing(stage.client.scene, robot, f"/velocity-{next(_NUMBERS)}")
+        root = f"/velocity-{next(_NUMBERS)}"
+        self._drawing = Drawing(stage.client.scene, robot, root)
+        self._statics.use_robot(root)
         self._scales = {kind: self._scale(kind) for kind in ELLIPSOIDS.values() if kind is not None}
         options = tuple(str(i + 1) for i in range(robot.n))
         with self._column_folder:
@@ -286,6 +313,7 @@ class VelocityLesson(Lesson):
         self._J = J = kin.jacobian(self.stage.robot, q)
         self._T = T_base_tool
         self._drawing.place(T_base_tool[:3, 3])
+        self._statics.draw(J, T_base_tool)
         self._axes = None
         if self._kind is not None:
             self._axes = axes_of(part_of(J, self._kind))
@@ -311,6 +339,8 @@ class VelocityLesson(Lesson):
         self._show_singularities(R)
         rates = task_rates(robot, stage.q)
         update_html(self._values, views.values_html(robot, rates, J))
+        self._statics.show_numbers()
+        self._null.show_numbers()
         if self._kind is None or self._axes is None:
             update_html(self._ellipsoid, "")
             return
@@ -331,7 +361,7 @@ class VelocityLesson(Lesson):
         self._drawing.show_lost(twists, state == "at")
         words = [views.lost_words(twist, R_base_tool, slowest=state == "near") for twist in twists]
         update_html(self._warning, views.warning_html(robot, found, stage.units, words))
-        stage.show_legend(views.legend_html(self._kind, self._chosen, state, twists))
+        stage.show_legend(views.legend_html(self._kind, self._chosen, state, twists, self._statics.shown))
         update_html(self._others, views.others_html(robot, found, stage.units))
 
 

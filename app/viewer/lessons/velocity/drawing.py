@@ -14,6 +14,7 @@ import viser
 
 from app.viewer.labels import add_label
 from app.viewer.lessons.velocity.rates import Ellipsoid
+from app.viewer.scene.arm import GIZMO
 from app.viewer.scene.meshes import body
 from app.viewer.scene.shapes import cone, merged, placed, tube
 from kin import Robot
@@ -28,8 +29,10 @@ COLORS: dict[Ellipsoid, tuple[int, int, int]] = {
 COLUMN, LOST, SLOW = (0, 114, 178), (213, 40, 0), (184, 122, 0)
 AXIS_LINE = (90, 90, 90)
 # Relative to the radius of the sphere around the arm.
-FLAT, LONGEST = 0.004, 1.1
-RING, LOST_RING, LOST_ARROW = 0.13, 0.2, 0.36
+FLAT, LONGEST = 0.004, 0.62
+# What is lost is drawn outside of the gizmo, whose arrows are `GIZMO` long: from `CLEAR` on.
+CLEAR = 1.12 * GIZMO
+RING, LOST_RING, LOST_ARROW = 0.13, 0.075, CLEAR + 0.2
 MOST_LOST = 3
 CHOICES = np.array([(1.0, b, c) for b in (1.0, -1.0) for c in (1.0, -1.0)])
 
@@ -80,9 +83,17 @@ class Drawing:
         )
         self._turn = self._ring(scene, f"{root}/turn", False, COLUMN, RING)
         self._lost_turns = [
-            self._ring(scene, f"{root}/lost-turn-{k + 1}", True, LOST, LOST_RING + 0.04 * k)
-            for k in range(MOST_LOST)
+            self._ring(scene, f"{root}/lost-turn-{k + 1}", True, LOST, LOST_RING) for k in range(MOST_LOST)
         ]
+
+        self._lost_axes = scene.add_line_segments(
+            f"{root}/lost-axes",
+            np.zeros((1, 2, 3), np.float32),
+            LOST,
+            thickness=1.5,
+            thickness_units="screen",
+            visible=False,
+        )
 
     def _ring(
         self, scene: viser.SceneApi, name: str, double: bool, color: tuple[int, int, int], radius: float
@@ -115,7 +126,8 @@ class Drawing:
         self._R = R
         self._body.wxyz = wxyz_from_rotation(R)
         self._ellipsoid.scale = self._axes.scale = (float(shown[0]), float(shown[1]), float(shown[2]))
-        self._tips = shown + 0.05 * self.radius
+        # Values are outside of the gizmo too.
+        self._tips = np.maximum(shown + 0.05 * self.radius, CLEAR * self.radius)
         return bool((lengths > LONGEST * self.radius).any())
 
     def write_values(self, texts: tuple[str, str, str], eye: Array) -> None:
@@ -149,17 +161,37 @@ class Drawing:
             size = float(np.linalg.norm(twist[:3]))
             if size > 1e-3:
                 end = twist[:3] / size * LOST_ARROW * self.radius
-                arrows += [[np.zeros(3), end], [np.zeros(3), -end]]
+                start = end * (CLEAR / LOST_ARROW)
+                arrows += [[start, end], [-start, -end]]
         _set_visible(self._lost, bool(arrows))
         if arrows:
             self._lost.points = np.array(arrows, np.float32)
             self._lost.colors = np.array(arrow_color(color), np.uint8)
+        turning = [twist for twist in twists[:MOST_LOST] if float(np.linalg.norm(twist[3:])) > 1e-3]
+        _set_visible(self._lost_axes, bool(turning))
+        if turning:
+            places = np.array([[np.zeros(3), self._ring_place(twist)] for twist in turning], np.float32)
+            self._lost_axes.points = places
+            self._lost_axes.colors = np.array(color, np.uint8)
         for k, node in enumerate(self._lost_turns):
             shown = k < len(twists) and float(np.linalg.norm(twists[k, 3:])) > 1e-3
             _set_visible(node, shown)
             if shown:
                 node.wxyz = wxyz_along(twists[k, 3:])
+                node.position = self._ring_place(twists[k])
                 node.color = color
+
+    def _ring_place(self, twist: Array) -> Array:
+        """Where the arrow of a lost rotation is, on its axis ``(3,)``: at the side that is farther up.
+
+        Beyond the arrow of the motion that is lost with it, if they are along the same line.
+        """
+        axis = twist[3:] / float(np.linalg.norm(twist[3:]))
+        axis = axis if axis[2] >= 0.0 else -axis
+        along = float(np.linalg.norm(twist[:3])) > 1e-3 and abs(float(axis @ twist[:3])) > 0.8 * float(
+            np.linalg.norm(twist[:3])
+        )
+        return np.asarray(axis * ((LOST_ARROW if along else CLEAR) + 0.5 * LOST_RING) * self.radius)
 
     def remove(self) -> None:
         """Remove everything from the scene."""

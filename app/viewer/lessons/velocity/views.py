@@ -173,13 +173,15 @@ def axis_name(direction: Array, R_base_tool: Array) -> str:
 # Legend
 
 
-def legend_html(kind: Ellipsoid | None, chosen: int | None, state: State, twists: Array) -> str:
+def legend_html(kind: Ellipsoid | None, chosen: int | None, state: State, twists: Array, force: bool) -> str:
     """What is drawn at the tool: mark, colour and meaning of each drawing; `twists` ``(k, 6)`` are drawn too."""
     items = []
     if kind is not None:
         items.append(("ellipsoid", COLORS[kind], LEGEND[kind]))
     if chosen is not None:
         items.append(("arrow", COLUMN, f"column of joint {chosen + 1}: motion of the tool, and its turning"))
+    if force:
+        items.append(("arrow", COLORS["force"], "force F of the tool; drag its tip"))
     color, word = (LOST, "impossible here") if state == "at" else (SLOW, "slowest here")
     if len(twists) and (np.linalg.norm(twists[:, :3], axis=1) > 1e-3).any():
         items.append(("arrow", color, f"motion that is {word}"))
@@ -268,8 +270,9 @@ def values_html(robot: Robot, rates: TaskRates, J: Array) -> str:
     parts = [(name, np.asarray(np.linalg.svd(rows, compute_uv=False), np.float64)) for name, rows in named]
     if robot.n == 5:
         parts.insert(1, ("point + approach", rates.values))
+    least = fixed(float(rates.values[-1]), 4) if len(rates.values) else "–"
     rows = [{"name": name, "product": _small(_product(s)), "ratio": _ratio(s)} for name, s in parts]
-    return render("velocity/values", task=task_words(robot), bars=bars, rows=rows)
+    return render("velocity/values", task=task_words(robot), bars=bars, rows=rows, least=least)
 
 
 def jog_html() -> str:

@@ -460,12 +460,13 @@ def test_a_shared_state_is_restored_and_an_invalid_one_is_ignored() -> None:
         )
         lesson = VelocityLesson(stage)  # type: ignore[arg-type]
         first = lesson.state()
-        other = {"frame": "tool", "ellipsoid": "moment", "joint": 6, "step": 0.02, "turn": 0.1}
+        force = {"on": True, "force": [1.0, -2.0, 3.0]}
+        other = {"frame": "tool", "ellipsoid": "moment", "joint": 6, "step": 0.02, "turn": 0.1, "statics": force}
         lesson.restore(other)
         assert lesson.state() == other
         lesson.restore({"frame": ["tool"], "ellipsoid": "soul", "joint": 7, "step": math.nan, "turn": "1"})
         assert lesson.state() == other
-        lesson.restore({"joint": True, "step": 1e9, "turn": -1.0})
+        lesson.restore({"joint": True, "step": 1e9, "turn": -1.0, "statics": {"on": True, "force": [1e9, 0, 0]}})
         assert lesson.state() == other
         lesson.restore(first)
         assert lesson.state() == first

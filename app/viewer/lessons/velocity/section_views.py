@@ -1,0 +1,104 @@
+"""HTML of the lesson's sections on statics, null space and lines."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.viewer.lessons.trajectories.chart import Curve, Row, chart
+from app.viewer.lessons.velocity.along import SHARE, Along
+from app.viewer.lessons.velocity.views import axis_name
+from app.viewer.null_space import NullSpace
+from app.viewer.panel.joints import label
+from app.viewer.views.templates import render
+from kin import Robot, Task
+from kin.transforms import Array
+from kin.units import Units, fixed
+
+FORCE = (230, 159, 0)  # as the ellipsoid of forces
+FREE = 1e-6  # m; a direction whose force needs less torque per newton needs none
+TASKS: dict[Task, str] = {"pose": "pose", "approach": "point + approach", "position": "point"}
+CONDITION = "Condition number κ"
+
+
+def statics_html(robot: Robot, force: Array, tau: Array, least: Array, cost: float, R: Array) -> str:
+    """τ = JᵀF for each joint, and the direction ``(3,)`` whose force takes the least torque, `cost` per newton."""
+    rows = [
+        {"name": label(robot, i), "value": fixed(value, 2), "unit": "N·m" if robot.revolute[i] else "N",
+         "most": abs(value) > 0.999 * float(np.abs(tau).max()) and abs(value) > 5e-3}
+        for i, value in enumerate(tau.tolist())
+    ]  # fmt: skip
+    where = axis_name(least, R)
+    if cost < FREE:
+        cheap = f"A force along {where} costs nothing: the structure carries it; no joint moves the tool there."
+    else:
+        cheap = f"A force along {where} is the cheapest: |τ| = {fixed(cost, 3)} N·m per newton, σ_min of v."
+    return render(
+        "velocity/statics",
+        rows=rows,
+        size=fixed(float(np.linalg.norm(force)), 1),
+        norm=fixed(float(np.linalg.norm(tau)), 2),
+        cheap=cheap,
+    )
+
+
+def null_html(robot: Robot, task: Task, space: NullSpace, speeds: tuple[Array, Array, Array], w: float) -> str:
+    """Rank and null space of the task, and the joint speeds z, J⁺v and (I − J⁺J) z ``(n,)`` with their sum."""
+    z, by_v, own = speeds
+    free = robot.n - space.rank
+    dimension = (
+        f"dimension {free}: {'one self-motion' if free == 1 else f'{free} self-motions'}" if free else "only 0"
+    )
+    rows = [
+        {"name": label(robot, i), "values": [fixed(x, 3) for x in line]}
+        for i, line in enumerate(np.stack([z, by_v, own, by_v + own], axis=1).tolist())
+    ]
+    moved = float(np.abs(space.J @ own).max())
+    return render(
+        "velocity/null",
+        task=TASKS[task],
+        size=f"{len(space.J)} × {robot.n}",
+        rank=space.rank,
+        dimension=dimension,
+        rows=rows,
+        residual=power(moved),
+        w=fixed(w, 4),
+    )
+
+
+def margin_html(share: float) -> str:
+    """How near the nearest joint limit is."""
+    return render("velocity/margin", share=f"{100.0 * share:.0f}")
+
+
+def line_html(robot: Robot, found: Along, units: Units) -> str:
+    """σ_min, condition number and rank along the line."""
+    unit = units.lengths
+    by_length = found.length > 1e-6
+    x = found.share * (found.length * unit.scale if by_length else 100.0)
+    if len(x) < 2:
+        return render("velocity/line", chart="", words=f"No way to plot. {found.end}")
+    most = float(found.rank.max())
+    rows = (
+        Row("σ_min", shows=(0.0,)),
+        Row(CONDITION, log=True, shows=(0.0, 1.0)),
+        Row(f"Rank (σ above {SHARE:g} of the largest)", shows=(0.0, most)),
+    )
+    curve = Curve(TASKS[found.task], x, (found.least, found.kappa, found.rank))
+    at = int(found.least.argmin())
+    words = f"Smallest σ_min {fixed(float(found.least[at]), 4)} at {100.0 * found.share[at]:.0f} % of the line, "
+    words += f"κ there {found.kappa[at]:.3g}. {found.end}"
+    axis = unit.name if by_length else "%"
+    return render("velocity/line", chart=chart(rows, (curve,), "along the line", axis), words=words)
+
+
+def power(value: float) -> str:
+    """A small number as a power of ten."""
+    if value < 1e-99:
+        return "0"
+    mantissa, exponent = f"{value:.0e}".split("e")
+    return f"{mantissa}·10" + str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+def note_html(text: str) -> str:
+    """A sentence instead of a plot."""
+    return render("velocity/line", chart="", words=text)
