@@ -136,6 +136,7 @@ SCREENS: dict[str, Callable[[Tab], None]] = {
     "learn-screws": lesson("scara", "Screws", "[data-product]"),
     "learn-equations": lesson("pioneer5", "Equations", "[data-equation]"),
     "learn-postures": lesson("puma560", "Postures", "[data-posture]"),
+    "learn-rotations": lesson("ur5", "Rotations and frames", "[data-lock]"),
     "learn-numeric": lesson("ur5", "Numeric IK", "[data-outcome]"),
     "learn-velocity": lesson("puma560", "Velocity", "[data-singular]"),
     "learn-redundancy": lesson("redundant7-craig", "Redundancy", "[data-limits]"),

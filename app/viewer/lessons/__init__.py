@@ -13,12 +13,14 @@ from app.viewer.lessons.inverse import InverseLesson
 from app.viewer.lessons.numeric import NumericLesson
 from app.viewer.lessons.postures import Postures
 from app.viewer.lessons.redundancy import RedundancyLesson
+from app.viewer.lessons.rotations import RotationsLesson
 from app.viewer.lessons.screws import ScrewsLesson
 from app.viewer.lessons.trajectories import TrajectoriesLesson
 from app.viewer.lessons.velocity import VelocityLesson
 
 # In the order of a course.
 LESSONS: tuple[type[Lesson], ...] = (
+    RotationsLesson,
     DHLesson,
     ScrewsLesson,
     EquationsLesson,

@@ -54,7 +54,7 @@ def power(value: float) -> str:
 def amount(unit: Unit, value: float) -> str:
     """A length or an angle; in powers of ten if a tenth of a unit would show too little of it."""
     scaled = abs(value) * unit.scale
-    return unit.text(value) if scaled >= 10.0 * unit.step(1) else f"{power(scaled)}{unit.suffix}"
+    return unit.text(value) if scaled >= 10.0 * unit.step(1) else f"{power(scaled)} {unit.name}"
 
 
 def method_html(method: Method, problem: Problem) -> str:

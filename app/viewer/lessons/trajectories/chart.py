@@ -13,6 +13,7 @@ from app.exports.svg import joint_colour, tick_labels
 from kin.transforms import Array
 
 WIDTH, LEFT, RIGHT, HIGH, GAP, TOP, BOTTOM = 320.0, 44.0, 8.0, 62.0, 22.0, 16.0, 18.0
+_SHORT = 4  # characters
 FEW = 4  # numbers on an axis
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -59,9 +60,10 @@ def chart(rows: tuple[Row, ...], curves: tuple[Curve, ...], label: str, axis: st
     for value, text in marks:
         x = LEFT + (value - start) / (end - start) * (WIDTH - LEFT - RIGHT)
         unit = f" {axis}" if value == marks[-1][0] else ""
+        # A long unit is kept within the plot.
+        side, at = ("end", WIDTH - RIGHT) if len(unit) > _SHORT else ("middle", min(x, WIDTH - RIGHT - 8))
         parts.append(
-            f'<text x="{min(x, WIDTH - RIGHT - 8):.1f}" y="{bottom + 13:.1f}" text-anchor="middle" '
-            f'class="kb-axis">{text}{unit}</text>'
+            f'<text x="{at:.1f}" y="{bottom + 13:.1f}" text-anchor="{side}" class="kb-axis">{text}{unit}</text>'
         )
     name = Markup('<span class="kb-chart-name"><i style="background:{}"></i>{}</span> ')
     legend = Markup("").join(name.format(joint_colour(i), curve.name) for i, curve in enumerate(curves))

@@ -1,0 +1,355 @@
+"""What the lesson "Rotations and frames" teaches and asks."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+
+from app.viewer.lessons.guide.outline import (
+    PLAIN,
+    Mistake,
+    Number,
+    Outline,
+    Step,
+    apart,
+    one_right,
+)
+from app.viewer.lessons.guide.poses import as_configuration
+from app.viewer.lessons.rotations.check import CHECK
+from app.viewer.lessons.rotations.conventions import PAGE, Convention, axis_angle
+from app.viewer.panel.readout import ANGLES
+from app.viewer.scene.chain import rotation
+from kin import Robot, fk
+from kin.axes import inverse
+from kin.transforms import Array, wxyz_from_rotation
+from kin.units import Units, fixed
+
+GOAL = (
+    "You can read a rotation matrix, name the convention of three angles, put rotations in the right order, and "
+    "invert a transform."
+)
+ANGLE, ENTRY, LENGTH = math.radians(2.0), 0.02, 0.002
+_SAMPLES = 64
+ZYZ = Convention("zyz", False)
+
+
+@lru_cache(maxsize=128)
+def outline(robot: Robot, units: Units) -> Outline:
+    """The outline for this arm."""
+    q = example(robot)
+    T = fk(robot, q)
+    start = as_configuration(q)
+    steps = (
+        _columns(T, start),
+        _inverse_rotation(T, start),
+        _order(),
+        _same(),
+        _pitch(T, start, units),
+        _other(T, start, units),
+        _axis(T, start, units),
+        _quaternion(T),
+        _lock(units),
+        _inverse(T, start, units),
+        _chain(),
+    )
+    return Outline(GOAL, steps, CHECK)
+
+
+@lru_cache(maxsize=64)
+def example(robot: Robot) -> Array:
+    """A configuration near home in which the tool is turned about all axes, if it can be."""
+    q = robot.q_home + 0.5 * (robot.random_q(np.random.default_rng(5), _SAMPLES) - robot.q_home)
+    R = np.abs(fk(robot, q)[:, :3, :3]).reshape(_SAMPLES, 9)
+    return np.asarray(q[int(np.argmax(R.min(axis=1)))])
+
+
+def _columns(T: Array, start: tuple[float, ...]) -> Step:
+    R = T[:3, :3]
+    row = int(np.argmax(np.abs(R[:, 2])))
+    return Step(
+        "Columns",
+        "The columns of R are the axes of the turned frame in coordinates of the fixed one. The "
+        "third column is the "
+        f"tool’s z axis. At the pose of this step it is ({', '.join(fixed(v) for v in R[:, 2].tolist())}).",
+        apart(
+            Number(
+                f"What is the cosine of the angle between the tool’s z axis and the fixed {'xyz'[row]} axis?",
+                float(R[row, 2]),
+                PLAIN,
+                ENTRY,
+                "The scalar product of two unit vectors is the cosine of their angle: one entry of R.",
+                (Mistake(float(R[2, row]), "That is the entry of Rᵀ: row and column are exchanged."),),
+            ),
+            ENTRY / 2.0,
+        ),
+        "Each entry of R is such a cosine. “From tool” below shows the tool’s frame beside the arm.",
+        start=start,
+    )
+
+
+def _inverse_rotation(T: Array, start: tuple[float, ...]) -> Step:
+    R = T[:3, :3]
+    row, column = max(((0, 1), (0, 2), (1, 2)), key=lambda at: abs(abs(R[at]) - abs(R[at[::-1]])))
+    names = [f"r{'₁₂₃'[i]}{'₁₂₃'[j]}" for i, j in ((row, column), (column, row))]
+    return Step(
+        "The inverse",
+        f"R has orthonormal columns: RᵀR = I. For the tool, {names[0]} = {fixed(float(R[row, column]))} and "
+        f"{names[1]} = {fixed(float(R[column, row]))}.",
+        apart(
+            Number(
+                f"What is the entry of R⁻¹ in row {row + 1} and column {column + 1}?",
+                float(R[column, row]),
+                PLAIN,
+                ENTRY,
+                "R⁻¹ = Rᵀ: exchange rows and columns.",
+                (
+                    Mistake(float(R[row, column]), "That is the entry of R itself."),
+                    Mistake(-float(R[row, column]), "The inverse has other entries, not other signs: R⁻¹ = Rᵀ."),
+                ),
+            ),
+            ENTRY / 2.0,
+        ),
+        "To turn back is to exchange rows and columns; nothing has to be solved.",
+        start=start,
+    )
+
+
+def pointing(first: Array, second: Array) -> str:
+    """Where the z axis points after two turns, as a name such as ``+x``; `first` is the left factor."""
+    z = (first @ second)[:, 2]
+    k = int(np.argmax(np.abs(z)))
+    return f"{'+' if z[k] > 0 else '−'}{'xyz'[k]}"
+
+
+def quarter(axis: str) -> Array:
+    """A turn by 90° ``(3, 3)``."""
+    return rotation("xyz".index(axis), math.pi / 2)[:3, :3]
+
+
+def _order() -> Step:
+    own, fixed_axes = pointing(quarter("z"), quarter("x")), pointing(quarter("x"), quarter("z"))
+    return Step(
+        "Order",
+        "A frame turns by 90° about z, then by 90° about its own x axis. Turns about own axes "
+        "multiply from the right: "
+        "R = Rz(90°) Rx(90°).",
+        one_right(
+            "Where does the z axis of the frame point then?",
+            (f"Along {own}", "Rx takes z to −y; Rz takes −y to +x."),
+            (
+                (
+                    f"Along {fixed_axes}",
+                    "That is the other order: Rx(90°) Rz(90°), the second turn about the fixed x.",
+                ),
+                ("Along −x", "Rx takes z to −y, and Rz takes −y to +x, not to −x."),
+            ),
+            1,
+        ),
+        "About the fixed x axis, the second turn multiplies from the left, and z ends elsewhere. "
+        "Build both chains "
+        "below, with own and with fixed axes.",
+    )
+
+
+def _same() -> Step:
+    return Step(
+        "Fixed and moving axes",
+        "Turns about moving axes z, y, x by α, β, γ give R = Rz(α) Ry(β) Rx(γ).",
+        one_right(
+            "Which turns about fixed axes give the same R?",
+            (
+                "x by γ, then y by β, then z by α",
+                "Fixed axes multiply from the left: the last turn stands first. Order and angles are reversed.",
+            ),
+            (
+                ("z by α, then y by β, then x by γ", "That is Rx(γ) Ry(β) Rz(α): the factors in the other order."),
+                ("x by α, then y by β, then z by γ", "Each angle stays with its axis."),
+            ),
+            0,
+        ),
+        "So 24 conventions make 12 pairs. Roll pitch yaw is such a name: on this page it is X-Y-Z "
+        f"fixed, {ANGLES}.",
+    )
+
+
+def _pitch(T: Array, start: tuple[float, ...], units: Units) -> Step:
+    R = T[:3, :3]
+    _, pitch, _ = PAGE.angles(R)
+    return Step(
+        "Roll pitch yaw",
+        f"In the page’s convention, {ANGLES}, the entry r₃₁ is −sin(pitch). For the tool, r₃₁ = "
+        f"{fixed(float(R[2, 0]))}.",
+        apart(
+            Number(
+                "How large is the pitch?",
+                pitch,
+                units.angles,
+                ANGLE,
+                "pitch = −asin(r₃₁).",
+                (
+                    Mistake(-pitch, "r₃₁ is minus the sine of the pitch."),
+                    Mistake(math.acos(max(-1.0, min(1.0, -float(R[2, 0])))), "It is a sine, not a cosine."),
+                ),
+            ),
+            ANGLE / 2.0,
+        ),
+        "roll = atan2(r₃₂, r₃₃) and yaw = atan2(r₂₁, r₁₁): the read-out above the tabs shows them.",
+        start=start,
+    )
+
+
+def _other(T: Array, start: tuple[float, ...], units: Units) -> Step:
+    R = T[:3, :3]
+    _, beta, _ = ZYZ.angles(R)
+    return Step(
+        "The same in Z-Y-Z",
+        f"With moving axes z, y, z the entry r₃₃ is cos β. For the tool, r₃₃ = {fixed(float(R[2, 2]))}.",
+        apart(
+            Number(
+                "How large is β, from 0 to half a turn?",
+                beta,
+                units.angles,
+                2.0 * ANGLE,
+                "β = acos(r₃₃): the angle between the two z axes.",
+                (Mistake(math.asin(max(-1.0, min(1.0, float(R[2, 2])))), "It is a cosine, not a sine."),),
+            ),
+            ANGLE / 2.0,
+        ),
+        "The same rotation has other numbers in each convention: always say which one it is. Try all "
+        "of them below.",
+        start=start,
+    )
+
+
+def _axis(T: Array, start: tuple[float, ...], units: Units) -> Step:
+    R = T[:3, :3]
+    _, angle = axis_angle(R)
+    trace = float(np.trace(R))
+    cosine = (trace - 1.0) / 2.0
+    return Step(
+        "Axis and angle",
+        "Each rotation is one turn about one axis, with trace R = 1 + 2 cos θ. For the tool, the "
+        f"trace is {fixed(trace)}.",
+        apart(
+            Number(
+                "How large is θ, from 0 to half a turn?",
+                angle,
+                units.angles,
+                2.0 * ANGLE,
+                "θ = acos((trace − 1) / 2).",
+                (
+                    Mistake(math.acos(max(-1.0, min(1.0, trace / 2.0))), "Subtract 1 before halving."),
+                    Mistake(math.pi - angle, f"The cosine is {fixed(cosine)}: look at its sign."),
+                ),
+            ),
+            ANGLE / 2.0,
+        ),
+        "“From tool” below draws the axis: the one direction that R leaves as it is.",
+        start=start,
+    )
+
+
+def _quaternion(T: Array) -> Step:
+    R = T[:3, :3]
+    w = float(wxyz_from_rotation(R)[0])
+    _, angle = axis_angle(R)
+    return Step(
+        "Quaternion",
+        "The quaternion of a turn by θ about a unit axis is w = cos(θ/2), and (x, y, z) = sin(θ/2) "
+        "times the axis. For "
+        f"the tool, cos θ = {fixed(math.cos(angle))}.",
+        apart(
+            Number(
+                "How large is w, taken as positive?",
+                w,
+                PLAIN,
+                ENTRY,
+                "cos²(θ/2) = (1 + cos θ) / 2.",
+                (
+                    Mistake(math.cos(angle), "That is cos θ. A quaternion has half the angle."),
+                    Mistake((1.0 + math.cos(angle)) / 2.0, "Take the root."),
+                ),
+            ),
+            ENTRY / 2.0,
+        ),
+        "q and −q are the same rotation: half a turn more of θ/2 is a whole turn more of θ.",
+    )
+
+
+def _lock(units: Units) -> Step:
+    quarter_turn = units.angles.brief(math.pi / 2)
+    return Step(
+        "Gimbal lock",
+        f"In the page’s convention, set the pitch to {quarter_turn} below: the 1st and the 3rd axis coincide.",
+        one_right(
+            "What is lost there?",
+            (
+                "Small turns about one axis, for the angles: roll and yaw do the same.",
+                "The frame can still turn there; only these three angles cannot follow smoothly.",
+            ),
+            (
+                (
+                    "The tool can no longer turn about one axis.",
+                    "That would be a singularity of the arm, not of the angles.",
+                ),
+                (
+                    "R is no longer a rotation.",
+                    "R is as good as any: choose another convention, and the lock is gone.",
+                ),
+            ),
+            2,
+        ),
+        "Each set of three angles locks somewhere: Tait–Bryan angles where the second one is a "
+        "quarter turn, proper "
+        "Euler angles where it is zero or half a turn. R, axis with angle, and quaternions do not lock.",
+    )
+
+
+def _inverse(T: Array, start: tuple[float, ...], units: Units) -> Step:
+    lengths, p = units.lengths, T[:3, 3]
+    back = inverse(T)[:3, 3]
+    k = int(np.argmax(np.abs(back)))
+    column = T[:3, k]
+    vectors = [", ".join(fixed(v) for v in column.tolist()), ", ".join(lengths.number(v) for v in p.tolist())]
+    return Step(
+        "T⁻¹",
+        "T = (R, p) is the tool in the base; T⁻¹ = (Rᵀ, −Rᵀp) is the base in the tool. Here column "
+        f"{k + 1} of R is "
+        f"({vectors[0]}), and p = ({vectors[1]}){lengths.suffix}.",
+        apart(
+            Number(
+                f"Which {'xyz'[k]} coordinate has the origin of the base, seen from the tool?",
+                float(back[k]),
+                lengths,
+                LENGTH,
+                f"Minus the scalar product of p with column {k + 1} of R.",
+                (
+                    Mistake(-float(p[k]), "That is −p in axes of the base. Turn it into the tool’s axes: −Rᵀp."),
+                    Mistake(-float(T[k, :3] @ p), "That is a row of R. Rᵀ has the columns of R as its rows."),
+                ),
+            )
+        ),
+        "T⁻¹ needs no matrix inversion: transpose R, and turn −p.",
+        start=start,
+    )
+
+
+def _chain() -> Step:
+    return Step(
+        "A chain of frames",
+        "A camera is known in the base, T₀₁, and a workpiece in the camera, T₁₂.",
+        one_right(
+            "Where is the workpiece in the base?",
+            ("T₀₁ T₁₂", "Equal inner indices cancel: 0 1 · 1 2 = 0 2."),
+            (
+                ("T₁₂ T₀₁", "The inner indices 2 and 0 do not agree."),
+                ("T₀₁⁻¹ T₁₂", "The inverse is T₁₀: its second index 0 does not agree with 1."),
+            ),
+            0,
+        ),
+        "Choose Chain of frames below, and add motions: about own axes they multiply from the right, "
+        "about fixed axes "
+        "from the left.",
+    )
