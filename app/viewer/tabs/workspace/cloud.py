@@ -60,7 +60,7 @@ class CloudView:
         self._window = window
         self._new_root = new_root
         self._wake = wake
-        self._running = self._stopped = False
+        self._running = self._stopped = self._grey = False
         self._cut: Cut | None = None
         self._slabs: NDArray[np.bool_] | None = None
         # When the clock for the speed was started last, and its time before that.
@@ -104,7 +104,7 @@ class CloudView:
         for nodes in self.nodes:
             nodes.remove()
         self.nodes = []
-        self._running = self._stopped = False
+        self._running = self._stopped = self._grey = False
         self._elapsed = 0.0
         self.show_legend()
         self.report()
@@ -229,6 +229,9 @@ class CloudView:
         line = views.progress(state, drawn, total or self.settings.n, speed, constraints.locked, old)
         percent = round(100.0 * drawn / total, 1) if total else 0.0
         update_html(self._controls.line, line)
+        if old != self._grey:
+            self._grey = old
+            self.recolour()
         self._controls.show_buttons(views.buttons(state, old))
         if self._controls.bar.value != percent:
             assign(self._controls.bar, percent)
@@ -271,8 +274,8 @@ class CloudView:
             self.nodes.append(self._add(replace(own, robot=other, measures=(), constraints=FREE), 1))
 
     def show_legend(self) -> None:
-        """Update the legend. It is empty without points, because it needs sampled data."""
-        if not any(nodes.parts for nodes in self.nodes):
+        """Update the legend. It is empty without points, because it needs sampled data, and for an old cloud."""
+        if self._grey or not any(nodes.parts for nodes in self.nodes):
             update_html(self._controls.legend, "")
             return
         robot, other = self._stage.robot, self.other
@@ -286,5 +289,7 @@ class CloudView:
         update_html(self._controls.legend, content)
 
     def _look(self, which: int) -> Look:
+        if self._grey:
+            return Look("one", self.settings.map, colours.OLD, self._cut)
         by: colours.By = "one" if self.other is not None else self.settings.by
         return Look(by, self.settings.map, (colours.OWN, colours.OTHER)[which], self._cut)

@@ -53,6 +53,7 @@ MEANING: dict[By, str] = {
 # Okabe and Ito's blue and orange, for the robot's own cloud and that of another one.
 OWN: Colour = (0, 114, 178)
 OTHER: Colour = (230, 159, 0)
+OLD: Colour = (138, 145, 153)  # of a cloud of other settings
 SAMPLES = 4096  # configurations that determine the ends of a scale
 
 

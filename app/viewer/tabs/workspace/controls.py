@@ -25,6 +25,12 @@ STRATEGIES: dict[str, Strategy] = {
 }
 SMOOTH = 200_000  # points: a picture of them takes some tenths of a second without a graphics card
 PRESETS = {"10 k": 10_000, "100 k": 100_000, "1 M": 1_000_000, "4 M": MAX_POINTS}
+# The workspaces that the source chapter shows, and their arms.
+FIGURES = {"Figure 8": "pioneer5", "Figure 10": "redundant7"}
+FIGURES_HINT = (
+    "The two workspaces that the source chapter shows as still pictures: figure 8 of the Pioneer arm, figure 10 "
+    "of the redundant arm. Shows that arm, and its cloud with axes."
+)
 NONE = "none"
 FINE = 3  # decimals of a millimetre
 STRATEGY_HINT = (
@@ -33,7 +39,7 @@ STRATEGY_HINT = (
 )
 CLOUD_HINT = (
     "Start: sample points; locked joints keep their values. Pause: stop for now. Stop: end sampling, the points "
-    "stay. Clear: remove the points."
+    "stay. Clear: remove the points. Restart: sample again with the present settings."
 )
 CUT_HINT = "Along the arm: the vertical plane of the arm's present pose. The cut moves in steps."
 
@@ -160,13 +166,18 @@ class Controls:
         presets = gui.add_button_group(" ", tuple(PRESETS), hint="Common numbers of points")
         for label, number in PRESETS.items():
             listen_click(presets, self._post, {label: ("preset", number)})
+        if set(FIGURES.values()) <= {robot.id for robot in self._robots}:
+            figures = gui.add_button_group("As in the book", tuple(FIGURES), hint=FIGURES_HINT)
+            for label, robot_id in FIGURES.items():
+                listen_click(figures, self._post, {label: ("figure", robot_id)})
         self._heavy = gui.add_html(heavy(settings.n))
         self._add_dropdown("strategy", "Sampling", settings.strategy, STRATEGY_HINT)
         hint = "Another seed gives other random configurations"
         self._add("seed", gui.add_number("Seed", settings.seed, min=0, step=1, hint=hint))
         self._buttons = gui.add_button_group("Cloud", ("Start",), hint=CLOUD_HINT)
         actions = ("start", "pause", "continue", "stop", "clear")
-        listen_click(self._buttons, self._post, {action.capitalize(): action for action in actions})
+        keys = {action.capitalize(): action for action in actions}
+        listen_click(self._buttons, self._post, {**keys, "Restart": "start"})
         self.bar = gui.add_progress_bar(0.0)
         self.line = gui.add_html("")
 
@@ -187,6 +198,8 @@ class Controls:
             "The outline in the scene faces as joint 1 does."
         )
         self._add_checkbox("section", "Section plot", settings.section, hint)
+        hint = "Axes with numbers, along the edges of a box around the workspace"
+        self._add_checkbox("axes", "Axes with numbers", settings.axes, hint)
         hint = "Bounding box, reach, holes, volume and surface; locked joints are ignored"
         self._add_checkbox("sizes", "Sizes", settings.sizes, hint)
         self.sizes = self._gui.add_html("")

@@ -26,7 +26,7 @@ class WorkspaceSettings:
         size: diameter of a point (m).
         axis, at, keep: direction of the cut, None for none; its position (m along the normal); the visible side.
         compare: id of the other robot, None for none.
-        sizes, section: whether the sizes and the section plot are shown.
+        sizes, section, axes: whether the sizes, the section plot and axes with numbers are shown.
         clicks: whether a click moves the arm to a point.
     """
 
@@ -42,6 +42,7 @@ class WorkspaceSettings:
     compare: str | None = None
     sizes: bool = False
     section: bool = False
+    axes: bool = False
     clicks: bool = True
 
     def with_value(self, name: str, value: object, others: Iterable[str]) -> WorkspaceSettings:
@@ -80,7 +81,7 @@ def _read(name: str, value: object, others: tuple[str, ...]) -> object:
         return _whole({"n": "points"}.get(name, name), value, low, high)
     if name in ("size", "at"):
         return _number(name, value, *((MIN_SIZE, MAX_SIZE) if name == "size" else (-FAR, FAR)))
-    if name in ("sizes", "section", "clicks"):
+    if name in ("sizes", "section", "axes", "clicks"):
         if not isinstance(value, bool):
             raise InputError(name, value, "true or false")
         return value

@@ -12,6 +12,7 @@ from typing import Any, ClassVar, cast
 
 import kin
 from app.viewer.feature import Feature, Stage
+from app.viewer.tabs.workspace.axes import Axes
 from app.viewer.tabs.workspace.capability.panel import Capability
 from app.viewer.tabs.workspace.cloud import CloudView
 from app.viewer.tabs.workspace.controls import Controls
@@ -27,6 +28,7 @@ from kin.units import Units
 
 REDRAW = 1.0  # s between two updates of the section plot with more points
 DOT = 0.05  # s between two updates of the tool in the section plot
+FIGURE: dict[str, object] = {"n": 20_000, "strategy": "uniform", "by": "one", "axis": None, "axes": True}
 MOVED = 0.3  # s after its last frame, the arm still counts as moving
 
 
@@ -50,6 +52,7 @@ class Workspace(Feature):
         self._picker = PointPicker(stage, self._controls, self._new_root, self.post)
         self._sizes = Sizes(stage, self._controls, self.post)
         self._section: SectionPanel | None = None
+        self._axes = Axes(stage.client.scene, self._new_root)
         self._cut: Cut | None = None
         self._plotted = self._dotted = self._moved = 0.0
         self._tool = kin.fk(stage.robot, stage.q)[:3, 3]
@@ -79,6 +82,7 @@ class Workspace(Feature):
             "plotted": lambda made: self._section.show_cloud(made) if self._section is not None else None,
             "capability": self._capability.handle,
             "preset": self._use_preset,
+            "figure": self._show_figure,
             "length": self._set_length,
         }
         self._clouds.report()
@@ -97,7 +101,7 @@ class Workspace(Feature):
 
     def on_robot(self) -> None:
         self._clear()
-        self._capability.clear()
+        self._capability.use_robot()
         robot = self.stage.robot
         self._tool = kin.fk(robot, robot.q_home)[:3, 3]
         self._controls.use_robot(robot)
@@ -108,6 +112,7 @@ class Workspace(Feature):
             self._show_section(False)
             self._show_section(True)
         self._sizes.show(self._settings.sizes)
+        self._show_axes()
         self.due = 0.0
 
     def on_request(self) -> None:
@@ -117,6 +122,7 @@ class Workspace(Feature):
     def on_style(self) -> None:
         units = self.stage.units
         self._controls.use_units(units, self._settings, self._cut)
+        self._show_axes()
         self._clouds.show_legend()
         self._picker.refresh()
         self._sizes.refresh()
@@ -174,6 +180,7 @@ class Workspace(Feature):
         self._clear()
         self._capability.clear()
         self._sizes.leave()
+        self._axes.remove()
         self._show_section(False)
 
     def _post_capability(self, key: Hashable, value: object = None) -> None:
@@ -208,6 +215,8 @@ class Workspace(Feature):
                 self._clouds.recolour()
             case "clicks":
                 self._listen_clicks()
+            case "axes":
+                self._show_axes()
             case "section" if before.section != self._settings.section:
                 self._show_section(self._settings.section)
             case "sizes" if before.sizes != self._settings.sizes:
@@ -216,6 +225,19 @@ class Workspace(Feature):
     def _use_preset(self, number: int, _: object) -> None:
         self._apply("n", number)
         self._controls.show(self._settings)
+
+    def _show_figure(self, robot_id: str, _: object) -> None:
+        """A workspace as the source chapter shows it."""
+        robot = self.stage.store.get(robot_id)
+        if robot != self.stage.robot:
+            self.stage.change_robot(robot)  # which calls `on_robot`
+        for name, value in FIGURE.items():
+            self._apply(name, value)
+        self._controls.show(self._settings)
+        self._start()
+
+    def _show_axes(self) -> None:
+        self._axes.show(self.stage.robot if self._settings.axes else None, self.stage.units, self.stage.dark)
 
     def _set_length(self, name: str, units: Units, value: object) -> None:
         """Set a length; an event of a slider in other units is ignored, because it was replaced since."""

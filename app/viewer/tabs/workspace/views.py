@@ -59,13 +59,13 @@ def buttons(state: State, old: bool) -> tuple[str, ...]:
         case "preparing" | "running":
             return "Pause", "Stop"
         case "paused":
-            return ("Continue", "Start", "Clear") if old else ("Continue", "Clear")
-        case "stopped":
+            return ("Continue", "Restart", "Clear") if old else ("Continue", "Clear")
+        case "stopped" if not old:
             return "Start", "Clear"
-    return ("Start", "Clear") if old else ("Clear",)
+    return ("Restart", "Clear") if old else ("Clear",)
 
 
-OLD = "Settings or locks have changed: Start samples a new cloud"
+OLD = "Settings or locks have changed: the grey cloud is the old one. Restart samples a new one"
 
 
 def progress(

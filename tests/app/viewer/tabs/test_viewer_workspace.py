@@ -27,7 +27,7 @@ from app.shared.store import Store
 from app.shared.summaries import Summaries
 from app.viewer.panel.joints import UNLOCK_ALL
 from app.viewer.server import ViewerServer
-from app.viewer.tabs.workspace import colours, cut, pick, send_window, sizes, views
+from app.viewer.tabs.workspace import axes, colours, cut, pick, send_window, sizes, views
 from app.viewer.tabs.workspace.section import plot
 from app.viewer.tabs.workspace.section.panel import SectionPanel, subscribe_section
 from app.viewer.tabs.workspace.settings import MAX_POINTS, WorkspaceSettings, default_size
@@ -655,12 +655,39 @@ def test_a_cloud_of_other_settings_or_locks_says_so(tab):
     tab.wait(lambda: tab.state == "done")
     tab.set("Seed", 7)
     tab.wait(lambda: tab.state == "outdated" and views.OLD in tab.html)
+    grey = [list(colours.OLD)]
+    tab.wait(lambda: all(m["props"]["colors"].reshape(-1, 3).tolist() == grey for m in tab.clouds))
+    assert offered(tab) == ("Restart", "Clear")
     tab.set("Seed", 0)
     tab.wait(lambda: tab.state == "done" and views.OLD not in tab.html)
+    tab.wait(lambda: all(len(m["props"]["colors"].reshape(-1, 3)) > 1 for m in tab.clouds))
     tab.set("Sampling", "joints spread evenly")
     tab.wait(lambda: tab.state == "outdated")
-    tab.click("Start")
+    tab.click("Restart")
     tab.wait(lambda: tab.state == "done" and views.OLD not in tab.html)
+
+
+def test_a_figure_of_the_chapter_is_one_click(tab):
+    tab.set("As in the book", "Figure 10")
+    tab.done(20_000)
+    expected = whole(kin.get_robot("redundant7"), 20_000, 0).points
+    assert np.abs(tab.points() - expected).max() < HALF
+    texts = {
+        m["props"]["text"]
+        for m in tab.nodes.values()
+        if m["name"].startswith("/workspace") and "text" in m["props"]
+    }
+    assert {"x (mm)", "y (mm)", "z (mm)", "0", "1000", "−1000"} <= texts
+    tab.set("Axes with numbers", False)
+    tab.wait(lambda: not any("(mm)" in m["props"].get("text", "") for m in tab.nodes.values()))
+
+
+@pytest.mark.parametrize("robot", kin.builtin_robots().values(), ids=lambda robot: robot.id)
+def test_the_box_of_the_axes_contains_the_workspace(robot):
+    low, high = axes.box_of(robot)
+    points = kin.fk_positions(robot, robot.random_q(np.random.default_rng(3), 500))
+    assert (points > low).all()
+    assert (points < high).all()
 
 
 def test_two_arms_in_one_scene_have_different_colours(tab):

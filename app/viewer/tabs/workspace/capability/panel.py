@@ -20,7 +20,14 @@ from app.viewer.feature import Stage
 from app.viewer.panel import Post, assign, listen, listen_click, update_html
 from app.viewer.scene.camera import Sphere
 from app.viewer.tabs.workspace.capability import views
-from app.viewer.tabs.workspace.capability.settings import BY, CHOICES, DIRECTIONS, SIZES, MapSettings
+from app.viewer.tabs.workspace.capability.settings import (
+    BY,
+    CHOICES,
+    DIRECTIONS,
+    SIZES,
+    MapSettings,
+    default_directions,
+)
 from app.viewer.tabs.workspace.capability.voxels import LEVELS, Look, Voxels, mark
 from app.viewer.tabs.workspace.cut import Cut
 from app.viewer.tabs.workspace.send_window import SendWindow
@@ -54,7 +61,7 @@ class Capability:
         self._window = window
         self._post = post
         self._new_root = new_root
-        self._settings = MapSettings()
+        self._settings = MapSettings(directions=default_directions(stage.robot))
         self._look = Look(self._settings.by, colours)
         self._reader: Subscription[CapabilityMap] | None = None
         self._state: views.State = "ready"
@@ -148,6 +155,12 @@ class Capability:
         self._forget_pick()
         self._update()
         self.report()
+
+    def use_robot(self) -> None:
+        """Another robot was selected: remove the map, and choose directions that suit the robot."""
+        self.clear()
+        self._apply("directions", default_directions(self._stage.robot))
+        assign(self._handles["directions"], self._written("directions"))
 
     def leave(self) -> None:
         """Leave the shared computation."""
@@ -298,7 +311,8 @@ class Capability:
                     "Directions",
                     tuple(DIRECTIONS),
                     initial_value=self._written("directions"),
-                    hint="Number of evenly spread approach directions, tested at each voxel's centre",
+                    hint="Number of evenly spread approach directions, tested at each voxel's centre. Arms with "
+                    "fewer than six joints need many: they reach a place from a few directions only",
                 ),
             )
             self._buttons = gui.add_button_group(

@@ -7,13 +7,22 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Literal
 
-from kin import InputError
+from kin import InputError, Robot
 
 By = Literal["share", "manipulability"]
 SIZES = {"15 voxels long": 15, "25 voxels long": 25, "40 voxels long": 40}
 DIRECTIONS = {"12": 12, "24": 24, "48": 48, "96": 96}
 BY: dict[str, By] = {"Directions": "share", "Manipulability": "manipulability"}
 CHOICES: dict[str, Mapping[str, object]] = {"resolution": SIZES, "directions": DIRECTIONS, "by": BY}
+
+
+def default_directions(robot: Robot) -> int:
+    """Enough that a map says something.
+
+    An arm with fewer than six joints reaches most places from a few per cent of all directions only. The Pioneer
+    arm has at least one of 24 directions in 23 % of its voxels, and of 96 in 60 %.
+    """
+    return 24 if robot.n >= 6 else 96
 
 
 @dataclass(frozen=True)

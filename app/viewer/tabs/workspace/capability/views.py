@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 import numpy as np
@@ -56,6 +57,11 @@ def progress(state: State, done: int, total: int) -> str:
     return render("workspace/map_progress", state=state, symbol=SYMBOLS[state], done=counts[0], total=counts[1])
 
 
+def apart(directions: int) -> float:
+    """About the angle between neighbours of so many evenly spread directions, radians."""
+    return math.sqrt(4.0 * math.pi / directions)
+
+
 def value_text(by: By, value: float) -> str:
     """A value as text."""
     return f"{100.0 * value:.3g} %" if by == "share" else f"{value:.3g}"
@@ -83,6 +89,7 @@ def facts(found: CapabilityMap, locked: Locks | None, complete: bool, units: Uni
     mean = float(share.mean(dtype=np.float64)) if count else 0.0
     rows = (
         ("voxel", units.lengths.number(found.grid.voxel), units.lengths.name),
+        ("directions", f"{found.grid.count}, about {units.angle(apart(found.grid.count))} apart", ""),
         ("reachable", grouped(count), ""),
         ("their volume", f"{found.volume:.4g}", "m³"),
         ("mean share", f"{100.0 * mean:.3g}", "%"),
