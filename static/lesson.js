@@ -1,5 +1,6 @@
 "use strict";
-// Runs in viser's page: the steps of a lesson (app/viewer/lessons/guide). It sends what is pressed and typed there.
+// Runs in viser's page: the steps of a lesson (app/viewer/lessons/guide) and the exercises (app/viewer/exercises).
+// It sends what is pressed and typed there.
 (() => {
   let serial = 0; // each press is a step of its own in the history
   // A block with data-feature belongs to that lesson, others to the block that all lessons have.
@@ -12,8 +13,11 @@
     const { guideDo: kind, questionKey: key, argument } = button.dataset;
     if (kind === "type") typed(document.querySelector(`input[data-guide-field="${key}"]`));
     else if (kind === "check") check(button);
+    else if (kind === "fields") send(button, kind, cells(button.closest("fieldset")));
     else send(button, kind, argument === undefined ? null : Number(argument), ...(key === undefined ? [] : [key]));
   }
+  // The typed cells of an exercise, row by row.
+  const cells = (block) => [...block.querySelectorAll("[data-row]")].map((row) => [...row.querySelectorAll("[data-cell]")].map((cell) => cell.value));
   function typed(input) {
     if (input.closest("[data-feature]")) check(input);
     else if (!input.readOnly) send(input, "type", input.value, input.dataset.guideField);
@@ -29,18 +33,19 @@
     if (button) press(button);
   });
   addEventListener("keydown", (event) => {
-    if (event.key !== "Enter" || !event.target.matches?.("[data-guide-field]")) return;
+    if (event.key !== "Enter" || !event.target.matches?.("[data-guide-field], input[data-cell]")) return;
     event.preventDefault();
     event.stopImmediatePropagation();
-    typed(event.target);
+    if (event.target.dataset.cell === undefined) typed(event.target);
+    else event.target.closest("fieldset").querySelector("[data-guide-do=fields]")?.click();
   }, true);
 
   // Focus: kept when the server sends the block again; where its control is gone, the question or the block gets it.
-  const NAMES = ["data-guide-do", "data-guide-field", "data-question-key", "data-argument"];
+  const NAMES = ["data-guide-do", "data-guide-field", "data-question-key", "data-argument", "data-cell"];
   let focus = null; // selector of the control, and key of its question
   let gone = false; // the visitor has moved the focus away
   addEventListener("focusin", (event) => {
-    const node = event.target.closest?.(".kb-guide :is([data-guide-do], [data-guide-field])");
+    const node = event.target.closest?.(".kb-guide :is([data-guide-do], [data-guide-field], [data-cell])");
     gone = false;
     focus = node && {
       block: `[data-guide="${node.closest(".kb-guide").dataset.guide}"]`,
@@ -56,10 +61,10 @@
   function restore() {
     if (!focus || gone || document.activeElement !== document.body) return;
     const block = document.querySelector(focus.block);
-    const node = block?.querySelector(focus.control)
+    const node = block?.querySelector(focus.control) ?? document.querySelector(`.kb-guide ${focus.control}`)
       ?? block?.querySelector(`[data-question="${focus.question}"] [data-guide-do]`)
       ?? (block?.dataset.feature && block.querySelector(".kb-question :is(button, input)"))
-      ?? block?.querySelector(".kb-guide-turn button:last-child");
+      ?? block?.querySelector(".kb-guide-turn button:last-child") ?? block?.querySelector("[data-first]");
     node?.focus({ preventScroll: true });
   }
   addEventListener("DOMContentLoaded", () => {

@@ -57,10 +57,12 @@ class Kind(ABC):
     Attributes:
         name: as in files.
         about: one sentence for the documentation.
+        shows_posture: whether the arm may stand at the exercise's configuration before the answer.
     """
 
     name: ClassVar[str]
     about: ClassVar[str]
+    shows_posture: ClassVar[bool] = False
 
     @classmethod
     @abstractmethod

@@ -63,7 +63,8 @@ class Exercise:
     """One exercise. It knows neither student nor page: exercise, seed and answer give a verdict.
 
     Attributes:
-        id, title, topic, level, lesson: for lists; level 1 is the easiest, lesson the key of a lesson, or "".
+        id, title, topic, level, place, lesson: for lists; level 1 is the easiest, place orders those of one level,
+            lesson is the key of a lesson, or "".
         robot: the id of the arm.
         text: the task; numbers drawn stand in braces.
         hints: shown one after the other.
@@ -81,6 +82,7 @@ class Exercise:
     title: str
     topic: str
     level: int
+    place: int
     lesson: str
     robot: Robot
     text: str
@@ -94,6 +96,11 @@ class Exercise:
     kind: Kind
     file: str = ""
     builtin: bool = False
+
+    @property
+    def rank(self) -> tuple[int, int, int]:
+        """Where it is in a list: by topic, level and place."""
+        return TOPICS.index(self.topic), self.level, self.place
 
     def variant(self, seed: int) -> Variant:
         """The variant of a seed: the same in every process and version of Python.

@@ -17,8 +17,9 @@ from kin import KinematicsError, Robot, get_robot
 
 BUILTIN = Path(__file__).parent / "library"
 UNITS = {"deg": (math.pi / 180, "angle"), "rad": (1.0, "angle"), "mm": (1e-3, "length"), "m": (1.0, "length")}
-LESSONS = ("dh", "screws", "equations", "postures", "redundancy", "velocity", "trajectories")
+LESSONS = ("dh", "screws", "equations", "postures", "numeric", "redundancy", "velocity", "trajectories")
 MOST_HINTS = 5
+LAST = 999  # place of an exercise without one
 _ID = re.compile(r"[a-z0-9][a-z0-9-]{0,39}")
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,19}")
 
@@ -60,6 +61,7 @@ def parse_exercise(text: str, file: str = "exercise", find: Find = get_robot, bu
         fields.text("title"),
         fields.choice("topic", TOPICS),
         fields.whole("level", 1, 3, 1),
+        fields.whole("place", 1, LAST, LAST),
         fields.choice("lesson", LESSONS) if fields.has("lesson") else "",
         robot,
         fields.text("text"),
@@ -103,7 +105,7 @@ def load_folder(folder: Path, find: Find = get_robot, builtin: bool = False) -> 
         if exercise.id in found:
             raise ExerciseFileError(str(path), "id", exercise.id, "an id that no other file of the folder uses")
         found[exercise.id] = exercise
-    return tuple(sorted(found.values(), key=lambda one: (TOPICS.index(one.topic), one.level, one.id)))
+    return tuple(sorted(found.values(), key=lambda one: (*one.rank, one.id)))
 
 
 @cache
@@ -126,7 +128,7 @@ class Exercises:
             if exercise.id in taken:
                 raise ExerciseFileError(exercise.file, "id", exercise.id, "an id that no built-in exercise has")
         both = (*builtin_exercises(), *own)
-        self.all = tuple(sorted(both, key=lambda one: (TOPICS.index(one.topic), one.level)))
+        self.all = tuple(sorted(both, key=lambda one: one.rank))
         self._by_id = {exercise.id: exercise for exercise in self.all}
 
     def get(self, exercise_id: object) -> Exercise | None:

@@ -9,6 +9,7 @@ import time
 
 import viser
 
+from app.exercises import Exercises
 from app.shared.clouds import Clouds
 from app.shared.connection import Connection, ConnectionEnded
 from app.shared.maps import Maps
@@ -53,9 +54,10 @@ class ViewerServer:
         maps: Maps | None = None,
         summaries: Summaries | None = None,
     ) -> None:
+        exercises = Exercises(settings.exercises, store.get)
         meshes = MeshReader(settings.mesh_memory, settings.client_share, settings.receive_timeout)
         caches = clouds, maps or Maps(), summaries or Summaries()
-        self._services = Services(store, *caches, meshes, Library(meshes), Pace())
+        self._services = Services(store, *caches, meshes, Library(meshes), Pace(), exercises)
         self._owns_maps = maps is None
         self._owns_summaries = summaries is None
         self._settings = settings

@@ -39,6 +39,7 @@ class DHKind(Kind):
 
     name: ClassVar[str] = "dh"
     about: ClassVar[str] = "Rows of a DH table are filled in; any legitimate choice of frames is right."
+    shows_posture: ClassVar[bool] = True
 
     first: int
     last: int

@@ -28,6 +28,7 @@ class ProgramKind(Kind):
 
     name: ClassVar[str] = "program"
     about: ClassVar[str] = "A program is written that drives the tool along a line within limits."
+    shows_posture: ClassVar[bool] = True
 
     straight: float
     arrives: float

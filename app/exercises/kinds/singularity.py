@@ -30,6 +30,7 @@ class SingularityKind(Kind):
 
     name: ClassVar[str] = "singularity"
     about: ClassVar[str] = "The singularity is named, or the lost direction of the tool point is given."
+    shows_posture: ClassVar[bool] = True
 
     direction: bool
     tolerance: float

@@ -265,8 +265,7 @@ class Actions:
         elif changed:
             page.panel.robots.show(robot, page.own)
         self._restore_arm(state)
-        lesson = None if page.lessons is None or page.lessons.shown is None else page.lessons.shown.key
-        if page.lessons is not None and state.lesson != lesson:
+        if page.lessons is not None and state.lesson != page.lessons.key:
             page.lessons.open(state.lesson)
         for feature in page.features:
             wanted = without_results(state.features.get(feature.key, {}))

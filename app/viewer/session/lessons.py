@@ -1,9 +1,14 @@
-"""The choice of a lesson: a dropdown, and below it the steps and questions of the lesson and its own controls."""
+"""The choice of a lesson: a dropdown, and below it the steps and questions of the lesson and its own controls.
+
+The exercises are one of the choices.
+"""
 
 from __future__ import annotations
 
 import viser
 
+from app.exercises import Exercises
+from app.viewer.exercises.feature import Practising
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.feature import Guide
@@ -24,18 +29,22 @@ class LessonChoice:
     Attributes:
         shown: the open lesson.
         guide: its goal, steps and questions.
-        sheets: the worksheet of the lesson, or of the arm.
+        sheets: the worksheet of the lesson, or of the arm; the exercises have none.
+        exercises: the exercises, which live as long as the page.
     """
 
-    def __init__(self, gui: viser.GuiApi, parent: viser.GuiTabHandle, stage: Stage, post: Post) -> None:
+    def __init__(
+        self, gui: viser.GuiApi, parent: viser.GuiTabHandle, stage: Stage, post: Post, exercises: Exercises
+    ) -> None:
         self._gui = gui
         self._parent = parent
         self._stage = stage
-        self._titles = (NONE, *(lesson.title for lesson in LESSONS))
+        self._titles = (NONE, *(lesson.title for lesson in LESSONS), Practising.title)
+        self.exercises = Practising(stage, exercises)
         with parent:
             self._choice = gui.add_dropdown("Lesson", self._titles, initial_value=NONE, hint=HINT)
             self._overview: viser.GuiHtmlHandle | None = gui.add_html(_overview())
-            self.sheets = Worksheets(stage, None)
+            self.sheets: Worksheets | None = Worksheets(stage, None)
         listen(self._choice, post, "lesson")
         self._box: viser.GuiFolderHandle | None = None
         self.shown: Lesson | None = None
@@ -45,10 +54,14 @@ class LessonChoice:
     def choose(self, title: object) -> None:
         """Open this lesson instead of the present one; raises `kin.InputError` for an unknown one."""
         if title not in self._titles:
-            assign(self._choice, NONE if self.shown is None else self.shown.title)
+            assign(self._choice, self._title)
             raise InputError("lesson", title, "one of " + ", ".join(self._titles))
         assign(self._choice, title)
         self.remove()
+        if title == Practising.title:
+            with self._parent:
+                self.exercises.show()
+            return
         chosen = next((lesson for lesson in LESSONS if lesson.title == title), None)
         if chosen is None:
             with self._parent:
@@ -68,18 +81,36 @@ class LessonChoice:
 
     @property
     def features(self) -> list[Feature]:
-        """The open lesson, its guide, and its worksheet."""
-        return [feature for feature in (self.guide, self.shown, self.sheets) if feature is not None]
+        """The open lesson, its guide and its worksheet, and the exercises."""
+        every = (self.guide, self.shown, self.sheets, self.exercises)
+        return [feature for feature in every if feature is not None]
+
+    @property
+    def key(self) -> str | None:
+        """Of the open lesson, or of the exercises if they are open."""
+        if self.exercises.shown:
+            return self.exercises.key
+        return None if self.shown is None else self.shown.key
+
+    @property
+    def _title(self) -> str:
+        if self.exercises.shown:
+            return self.exercises.title
+        return NONE if self.shown is None else self.shown.title
 
     def open(self, key: str | None) -> None:
         """Open the lesson with this key, if there is one; None: close the open one."""
-        lesson = next((lesson for lesson in LESSONS if lesson.key == key), None)
-        if key is None or lesson is not None:
-            self.choose(NONE if lesson is None else lesson.title)
+        choices: tuple[type[Feature], ...] = (*LESSONS, Practising)
+        chosen = next((each for each in choices if each.key == key), None)
+        if key is None or chosen is not None:
+            self.choose(NONE if chosen is None else chosen.title)
 
     def remove(self) -> None:
-        """Remove the open lesson, or the overview if none is open."""
-        self.sheets.remove()
+        """Remove the open lesson or the exercises, or the overview if none is open."""
+        if self.sheets is not None:
+            self.sheets.remove()
+            self.sheets = None
+        self.exercises.hide()
         if self.shown is not None and self.guide is not None:
             self._keep(self.shown.key, self.guide.state())
             self.shown.remove()
@@ -104,4 +135,4 @@ class LessonChoice:
 
 def _overview() -> str:
     """All lessons, with one sentence each."""
-    return render("panel/lessons", lessons=LESSONS)
+    return render("panel/lessons", lessons=LESSONS, exercises=Practising)

@@ -167,7 +167,6 @@ class Persistence:
     def snapshot(self) -> PageState:
         """The present state."""
         page = self._page
-        lesson = page.lessons.shown if page.lessons is not None else None
         states = {feature.key: feature.state() for feature in page.features}
         return PageState(
             robot=page.robot.id,
@@ -177,7 +176,7 @@ class Persistence:
             target=page.arm.open_target,
             task=page.task,
             branch=page.branch,
-            lesson=None if lesson is None else lesson.key,
+            lesson=None if page.lessons is None else page.lessons.key,
             units=page.units,
             view=replace(page.view),
             features={key: state for key, state in states.items() if state},

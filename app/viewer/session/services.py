@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from app.exercises import Exercises
 from app.shared.clouds import Clouds
 from app.shared.maps import Maps
 from app.shared.store import Store
@@ -15,7 +16,7 @@ from app.viewer.scene.motion import Pace
 
 @dataclass(frozen=True)
 class Services:
-    """The robots, the caches of expensive results, the readers of meshes, and the frame rate."""
+    """The robots, the caches of expensive results, the readers of meshes, the frame rate, and the exercises."""
 
     store: Store
     clouds: Clouds
@@ -24,3 +25,4 @@ class Services:
     meshes: MeshReader
     library: Library
     pace: Pace
+    exercises: Exercises

@@ -1,0 +1,329 @@
+"""The exercises of one visitor's page. ``static/lesson.js`` sends what is pressed and typed there."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Hashable
+
+import numpy as np
+import viser
+
+from app.exercises import Asked, Exercise, Exercises, Variant, VariantError
+from app.exercises.contract import LONGEST, LONGEST_PROGRAM
+from app.exercises.typed import EntryError
+from app.viewer.exercises import views
+from app.viewer.exercises.drawing import GHOST, Drawing
+from app.viewer.exercises.practice import Practice
+from app.viewer.exercises.views import Sheet
+from app.viewer.feature import Feature, Stage
+from app.viewer.panel import update_html
+from app.viewer.panel.entry import read_pose
+from app.viewer.panel.readout import roll_pitch_yaw
+from app.viewer.panel.status import Notice
+from kin import InputError
+from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
+
+ROWS = 20  # of typed cells at most
+
+
+class Practising(Feature):
+    """A list by topic, or one exercise.
+
+    It lives as long as the page; `show` and `hide` build and remove its HTML.
+    """
+
+    key = "exercises"
+    title = "Exercises"
+    about = "Questions with your own numbers, hints and reasons."
+    messages = frozenset(
+        {"open", "list", "answer", "fields", "posture", "place", "pick", "hint", "reveal", "again", "scene"}
+    )
+
+    def __init__(self, stage: Stage, exercises: Exercises) -> None:
+        super().__init__(stage)
+        self._exercises = exercises
+        self._practice = Practice(exercises)
+        self._sheet = Sheet()
+        self._ghost: Array = np.eye(4)
+        self._variant: Variant | None = None
+        self._since = 0.0
+        self._box: viser.GuiFolderHandle | None = None
+        self._blocks: list[viser.GuiHtmlHandle] = []
+        self._container: viser.GuiFolderHandle
+        self._joints: viser.GuiFolderHandle | None = None
+        self._drawing = Drawing(stage.client.scene, self.post)
+
+    def show(self) -> None:
+        """Build the HTML in the container that is open."""
+        gui = self.stage.client.gui
+        self._box = gui.add_folder(None)
+        with self._box:
+            self._blocks = [gui.add_html(""), gui.add_html("")]
+            with gui.add_folder(None) as self._container:
+                pass
+            self._blocks.append(gui.add_html(""))
+        if self._practice.at is not None:
+            self._begin(self._practice.at)
+        self._update()
+
+    def hide(self) -> None:
+        """Remove HTML and drawings; what was done is kept."""
+        self._drawing.clear()
+        self._show_joints(False)
+        if self._box is not None:
+            self._box.remove()
+        self._box, self._blocks = None, []
+
+    @property
+    def shown(self) -> bool:
+        """Whether the HTML is built."""
+        return self._box is not None
+
+    # Events
+
+    def handle(self, key: Hashable, value: object) -> None:
+        if not self.shown:
+            return  # a late click on what has been removed
+        if key == GHOST:
+            self._drag(value)
+            return
+        match key:
+            case ("list", int()):
+                self._practice.at = None
+                self._drawing.clear()
+            case ("open", str(exercise_id), int()):
+                self._practice.open(exercise_id)
+                self._begin(self._now)
+            case _ if self._practice.at is not None:
+                self._act(key, value)
+        self._update()
+
+    def _act(self, key: Hashable, value: object) -> None:
+        """An event of the exercise on show."""
+        exercise, record = self._now, self._practice.record(self._now)
+        match key:
+            case ("hint", int()):
+                record.hints = min(record.hints + 1, len(exercise.hints))
+            case ("reveal", int()):
+                if not record.closed:
+                    record.mark = "shown"
+                    self._sheet.verdict, self._sheet.error = None, ""
+                    self._show_answer()
+            case ("again", int()):
+                self._practice.again(exercise)
+                self._begin(exercise)
+            case ("scene", int()):
+                self._set_scene(exercise)
+            case ("pick", int()) if not record.closed:
+                self._pick(value)
+            case ("answer" | "fields" | "posture" | "place", int()) if not record.closed:
+                self._answer(str(key[0]), value)
+            case (str(), int()) if record.closed:
+                pass  # a late click
+            case _:
+                raise InputError("exercise", key, "a control of the exercise")
+
+    def step_name(self, key: Hashable) -> str:
+        names = {"open": "Exercise", "list": "List of exercises", "hint": "Hint", "again": "New numbers"}
+        return names.get(str(key[0]), "Answer") if isinstance(key, tuple) else "Ghost"
+
+    def on_robot(self) -> None:
+        self._update()
+
+    def on_style(self) -> None:
+        self._update()
+
+    def state(self) -> dict[str, object]:
+        return self._practice.state()
+
+    def restore(self, state: dict[str, object]) -> None:
+        self._practice.restore(state)
+        if not self.shown:
+            return
+        if self._practice.at is None:
+            self._drawing.clear()
+        else:
+            self._begin(self._practice.at, move=False)
+        self._update()
+
+    def remove(self) -> None:
+        self.hide()
+
+    # The exercise on show
+
+    @property
+    def _now(self) -> Exercise:
+        if self._practice.at is None:
+            raise InputError("exercise", None, "an open exercise")
+        return self._practice.at
+
+    def _begin(self, exercise: Exercise, move: bool = True) -> None:
+        """Draw the numbers, and set the scene for an exercise."""
+        self._sheet, self._ghost, self._since = Sheet(), np.eye(4), time.perf_counter()
+        try:
+            self._variant = self._practice.variant(exercise)
+        except VariantError as error:  # of an operator's file that was not checked
+            self._practice.at, self._variant = None, None
+            self.stage.notify(Notice("error", f"{exercise.title} cannot be used", str(error)))
+            return
+        if move:
+            self._set_scene(exercise)
+        else:
+            self._draw(exercise)
+
+    def _set_scene(self, exercise: Exercise) -> None:
+        stage, variant = self.stage, self._variant
+        assert variant is not None
+        if stage.robot != exercise.robot:
+            stage.change_robot(exercise.robot)
+        shows = exercise.kind.shows_posture or self._practice.record(exercise).closed
+        q = variant.q if shows else exercise.robot.q_home
+        stage.move_to(q, Notice("hand", exercise.title, "The arm is ready for the exercise."))
+        self._draw(exercise)
+
+    def _draw(self, exercise: Exercise) -> None:
+        """The frames of the exercise."""
+        self._drawing.clear()
+        variant, asked = self._variant, self._asked
+        assert variant is not None
+        reach = exercise.robot.reach
+        goal = asked.goal if asked.goal is not None else variant.target
+        closed = self._practice.record(exercise).closed
+        if goal is not None:
+            self._drawing.goal(goal, reach, "target")
+        if asked.form == "frame":
+            if closed:
+                self._drawing.goal(_pose(exercise.kind.answer(variant)), reach, "right place")
+            else:
+                self._drawing.ghost(self._ghost, reach)
+
+    @property
+    def _asked(self) -> Asked:
+        assert self._variant is not None
+        return self._now.asked(self._variant, self.stage.units)
+
+    def _drag(self, value: object) -> None:
+        """The ghost was dragged."""
+        match value:
+            case (list(position), list(wxyz)):
+                self._ghost = from_position_wxyz(position, np.array(wxyz))
+                self._sheet.cells = [[self._ghost_text()]]
+                self._update()
+
+    def _ghost_text(self) -> str:
+        units, T = self.stage.units, self._ghost
+        point = [units.lengths.number(float(x), 0) for x in T[:3, 3]]
+        return " ".join([*point, *(units.angles.number(float(a), 0) for a in roll_pitch_yaw(T[:3, :3]))])
+
+    def _pick(self, option: object) -> None:
+        """Take a motion as the next one, or take it and those after it back."""
+        picked = self._sheet.picked
+        if type(option) is not int or not 0 <= option < len(self._asked.labels):
+            raise InputError("motion", option, "the index of a motion")
+        if option in picked:
+            del picked[picked.index(option) :]
+        else:
+            picked.append(option)
+        self._sheet.verdict = None
+
+    def _answer(self, how: str, value: object) -> None:
+        """Judge an answer."""
+        exercise, variant, sheet, form = self._now, self._variant, self._sheet, self._asked.form
+        assert variant is not None
+        sheet.error, sheet.verdict = "", None
+        if how == "fields":
+            sheet.cells = _cells(value)
+        try:
+            given = self._given(form, value)
+            verdict = exercise.judge(variant, given, self.stage.units)
+        except EntryError as error:
+            sheet.error = error.detail if error.title == "The answer was not read" else str(error)
+            return
+        except InputError as error:
+            sheet.error = f"{str(error)[:1].upper()}{str(error)[1:]}."
+            return
+        sheet.verdict = verdict
+        now = time.perf_counter()
+        self._practice.take(exercise, verdict, now - self._since)
+        self._since = now
+        if verdict.right:
+            self._show_answer()
+
+    def _given(self, form: str, value: object) -> object:
+        """The answer in the form that the kind takes."""
+        cells = self._sheet.cells
+        match form:
+            case "options":
+                self._sheet.chosen = value if type(value) is int else None
+                return value
+            case "order":
+                return list(self._sheet.picked)
+            case "posture":
+                return self.stage.goal.tolist()
+            case "frame":
+                if cells and cells[0]:
+                    self._ghost, _ = read_pose("pose", cells[0][0], self.stage.units, self._ghost)
+                    self._drawing.place(self._ghost)
+                return [*self._ghost[:3, 3].tolist(), *wxyz_from_rotation(self._ghost[:3, :3]).tolist()]
+            case "program":
+                return cells[0][0] if cells and cells[0] else ""
+            case "fields":
+                return cells[0] if cells else []
+        return cells
+
+    def _show_answer(self) -> None:
+        """Let the scene show it."""
+        exercise, variant = self._now, self._variant
+        assert variant is not None
+        notice = Notice("hand", exercise.title, "The arm shows the answer.")
+        if self._asked.form == "posture" and self._practice.record(exercise).mark == "shown":
+            self.stage.move_to(np.array(exercise.kind.answer(variant)), notice)
+        elif exercise.q and not exercise.kind.shows_posture and self.stage.robot == exercise.robot:
+            self.stage.move_to(variant.q, notice)
+        self._draw(exercise)
+
+    def _show_joints(self, on: bool) -> None:
+        """The joint sliders, where the arm is the answer."""
+        if on == (self._joints is not None):
+            return
+        if self._joints is not None:
+            self.stage.show_joints(None)
+            self._joints.remove()
+            self._joints = None
+            return
+        with self._container:
+            self._joints = self.stage.client.gui.add_folder("Joints of the arm")
+        self.stage.show_joints(self._joints)
+
+    def _update(self) -> None:
+        if not self.shown:
+            return
+        exercise, practice, units = self._practice.at, self._practice, self.stage.units
+        if exercise is None or self._variant is None:
+            contents = [views.list_html(self._exercises, practice), "", ""]
+        else:
+            variant, record = self._variant, practice.record(exercise)
+            contents = [
+                views.task_html(exercise, variant, units, self.stage.robot == exercise.robot),
+                views.question_html(self._asked, self._sheet, record.closed),
+                views.foot_html(exercise, variant, units, record, self._sheet, practice.after(exercise)),
+            ]
+        posture = exercise is not None and self._asked.form == "posture"
+        self._show_joints(posture and exercise is not None and not practice.record(exercise).closed)
+        for block, content in zip(self._blocks, contents, strict=True):
+            update_html(block, content)
+
+
+def _cells(value: object) -> list[list[str]]:
+    """Typed cells, cut to what an answer can need."""
+    rows = value if isinstance(value, list) else []
+    if not all(isinstance(row, list) and all(isinstance(text, str) for text in row) for row in rows[:ROWS]):
+        raise InputError("cells", value, "rows of texts")
+    return [
+        [text[: LONGEST_PROGRAM + 1 if len(row) == 1 else LONGEST] for text in row[:ROWS]] for row in rows[:ROWS]
+    ]
+
+
+def _pose(numbers: object) -> Array:
+    assert isinstance(numbers, list)
+    return from_position_wxyz(numbers[:3], np.array(numbers[3:]))

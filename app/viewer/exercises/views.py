@@ -1,0 +1,110 @@
+"""The list of exercises and the exercise on show as HTML."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from app.exercises import Asked, Exercise, Exercises, Variant, Verdict
+from app.viewer.exercises.practice import Mark, Practice, Record
+from app.viewer.views.templates import render
+from kin.units import Units
+
+# Symbol, words and colour of what has become of an exercise.
+MARKS: dict[Mark, tuple[str, str, str]] = {
+    "open": ("", "not begun", ""),
+    "wrong": ("◐", "not right yet", "amber"),
+    "right": ("✓", "solved", "green"),
+    "shown": ("●", "answer shown", "blue"),
+}
+LEVELS = ("", "easy", "medium", "hard")
+
+
+@dataclass
+class Sheet:
+    """What the student has entered, and what was said about it.
+
+    Attributes:
+        cells: rows of typed texts.
+        picked: indices of the motions that were put in order so far.
+        chosen: the option that was chosen last.
+        verdict: on the last answer.
+        error: why it could not be read.
+    """
+
+    cells: list[list[str]] = field(default_factory=list)
+    picked: list[int] = field(default_factory=list)
+    chosen: int | None = None
+    verdict: Verdict | None = None
+    error: str = ""
+
+
+def list_html(exercises: Exercises, practice: Practice) -> str:
+    """All exercises by topic, with what has become of each."""
+    topics = []
+    for title, members in exercises.topics():
+        rows = []
+        for exercise in members:
+            record = practice.records.get(exercise.id, Record())
+            symbol, words, color = MARKS[record.mark]
+            rows.append(
+                {
+                    "id": exercise.id, "title": exercise.title, "level": exercise.level,
+                    "level_words": LEVELS[exercise.level], "symbol": symbol, "words": words, "color": color,
+                }
+            )  # fmt: skip
+        solved = sum(practice.records.get(one.id, Record()).mark == "right" for one in members)
+        topics.append({"title": title, "rows": rows, "solved": solved, "count": len(rows)})
+    total, solved = len(exercises.all), sum(topic["solved"] for topic in topics)  # type: ignore[misc]
+    return render("exercises/list", topics=topics, total=total, solved=solved)
+
+
+def task_html(exercise: Exercise, variant: Variant, units: Units, at_home: bool) -> str:
+    """The head of an exercise: title and text; `at_home`: the exercise's arm is on show."""
+    return render(
+        "exercises/task", exercise=exercise, level=LEVELS[exercise.level], text=variant.text(exercise.text, units),
+        at_home=at_home,
+    )  # fmt: skip
+
+
+def question_html(asked: Asked, sheet: Sheet, closed: bool) -> str:
+    """The fields, options or buttons of the answer."""
+    columns = len(asked.labels)
+    rows = [
+        [cells[j] if j < len(cells) else "" for j in range(columns)]
+        for cells in (sheet.cells[i] if i < len(sheet.cells) else [] for i in range(asked.rows))
+    ]
+    text = sheet.cells[0][0] if sheet.cells and sheet.cells[0] else asked.start
+    places = {option: place for place, option in enumerate(sheet.picked, 1)}
+    return render(
+        "exercises/question", asked=asked, rows=rows, text=text, places=places, chosen=sheet.chosen, closed=closed,
+        complete=len(sheet.picked) == columns, invalid=bool(sheet.error),
+    )  # fmt: skip
+
+
+def foot_html(
+    exercise: Exercise, variant: Variant, units: Units, record: Record, sheet: Sheet, following: Exercise | None
+) -> str:
+    """Verdict, hints, solution and what can be done next."""
+    hints = [variant.text(hint, units) for hint in exercise.hints[: record.hints]]
+    verdict = sheet.verdict
+    title, color, detail = "", "", ""
+    if sheet.error:
+        title, color, detail = "! Not read", "amber", sheet.error
+    elif verdict is not None:
+        title = "✓ Right" if verdict.right else "◐ Partly right" if verdict.credit > 0.0 else "✗ Not quite"
+        color = "green" if verdict.right else "amber" if verdict.credit > 0.0 else "vermilion"
+        detail = verdict.reason
+    parts = verdict.parts if verdict is not None and not verdict.right and len(verdict.parts) > 1 else ()
+    if any(reason == detail for _, reason in parts):
+        detail = ""
+    return render(
+        "exercises/foot", title=title, color=color, detail=detail, parts=parts, hints=hints,
+        credit=0 if verdict is None or verdict.right else round(100 * verdict.credit),
+        more_hints=len(exercise.hints) - record.hints, record=record, time=_time(record.seconds),
+        solution=exercise.solution(variant, units) if record.closed else "", following=following,
+        varies=bool(exercise.vary),
+    )  # fmt: skip
+
+
+def _time(seconds: int) -> str:
+    return f"{seconds} s" if seconds < 60 else f"{seconds // 60} min {seconds % 60} s"
