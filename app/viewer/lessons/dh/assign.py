@@ -253,10 +253,7 @@ class AssignDrawing:
         named = {work.carrier(number) for number in range(attempt.number)}
         if not work.complete and "axis" in attempt.made and attempt.part != "axis":
             named.add(work.carrier(attempt.number))
-        texts = [
-            f"{names[joint]} (joint {joint + 1})" if joint in named else f"joint {joint + 1}"
-            for joint in range(self._robot.n)
-        ]
+        texts = [name if joint in named else f"joint {joint + 1}" for joint, name in enumerate(names)]
         partner = None if work.complete else work.partner(attempt.number)
         carrier = None if work.complete else work.carrier(attempt.number)
         shown = [] if partner is None or carrier is None else [min(partner, carrier)]

@@ -49,7 +49,7 @@ def room(robot: Robot) -> list[Sphere]:
     """What a view has to show besides the arm: the ends of the axes at home, where their names are."""
     lines = axis_lines(robot, robot.q_home)
     thickness = body(robot).size
-    return [(end, 2.0 * thickness) for pair in spans(robot, lines, thickness) for end in pair]
+    return [(end, 4.0 * thickness) for pair in spans(robot, lines, thickness) for end in pair]
 
 
 class AxesDrawing:
