@@ -20,6 +20,8 @@ from numba.core.event import install_recorder
 from kin.files import builtin_robots
 from kin.fk import fk, fk_positions, jacobian, link_frames, manipulability
 from kin.ik import solve_ik
+from kin.kernels.cached import is_cached
+from kin.kernels.fk import fk_one
 from kin.motion import JointTarget, Lin, PoseTarget, Ptp, plan_motion
 from kin.path import solve_path
 from kin.robot import Robot
@@ -34,6 +36,7 @@ from kin.workspace import (
     workspace_facts,
     workspace_slice,
 )
+from kin.workspace.capability.kernels import raise_best
 
 
 def warm_up_first() -> None:
@@ -66,6 +69,16 @@ def warm_up_rest(stop: Callable[[], bool] = lambda: False, *, backwards: bool = 
         if stop():
             return
         step()
+
+
+def compiled() -> bool:
+    """Whether the kernels of `warm_up_first` are in the cache, judged by one of them; True without a cache."""
+    return is_cached(fk_one)
+
+
+def rest_compiled() -> bool:
+    """Whether those of `warm_up_rest` are, judged by one of the last."""
+    return is_cached(raise_best)
 
 
 def one_of_each_family() -> tuple[Robot, ...]:

@@ -2,14 +2,18 @@
 
 The landing page is served at once and shows "warming up" until ``/readyz`` reports ready. Kernels are loaded from
 numba's cache in milliseconds, or are compiled, which takes seconds. The service is ready when those of the first
-arm are; all others are compiled after that.
-Of several processes the first one compiles, and the others wait and load what it has compiled.
+arm are; all others are compiled after that. A compiler keeps a gigabyte of memory as long as its process lives:
+another process compiles, and ends. Of several processes of a service the first one has the kernels compiled, and
+the others wait and load them.
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
+import os
+import subprocess
+import sys
 import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal
@@ -22,7 +26,7 @@ from app.shared.settings import Settings
 from app.shared.store import Store
 from app.shared.summaries import Summaries
 from app.shared.threads import lower_priority
-from kin.warmup import warm_up_first, warm_up_rest
+from kin.warmup import compiled, rest_compiled, warm_up_first, warm_up_rest
 
 if TYPE_CHECKING:
     from app.viewer.server import ViewerServer
@@ -104,6 +108,8 @@ class Startup:
         try:
             self._start_viewer()
             self._wait_for_first(Phase.READY)
+            if not compiled():
+                self._compile_apart(warm_up_first)
             if not self._stopping.is_set():
                 warm_up_first()
                 if self._on_ready is not None:
@@ -132,12 +138,33 @@ class Startup:
         lower_priority()
         self._wait_for_first(Phase.COMPLETE)
         try:
+            if not rest_compiled():
+                self._compile_apart(warm_up_rest)
             warm_up_rest(self._stopping.is_set)
             self._complete = not self._stopping.is_set()
             self._report(Phase.COMPLETE)
         except Exception:
             # Requests that need this kernel fail; everything else works.
             logger.exception("a kernel could not be compiled ahead of its use")
+
+    def _compile_apart(self, step: Callable[[], None]) -> None:
+        """Let another process fill the cache; what it leaves out, for whatever reason, this one compiles."""
+        program = f"from {step.__module__} import {step.__name__} as step; step()"
+        # In a session of its own it gets no Ctrl-C.
+        child = subprocess.Popen(
+            [sys.executable, "-c", program],
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        try:
+            while child.poll() is None and not self._stopping.wait(STEP):
+                pass
+        finally:
+            child.kill()
+            child.wait()
 
     def _start_viewer(self) -> None:
         if self._member is not None and self._member.role is Role.REST:

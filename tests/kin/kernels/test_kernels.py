@@ -16,9 +16,10 @@ def test_kernels_are_compiled_again_when_a_kernel_they_call_has_changed(tmp_path
     package = tmp_path / "kin"
     shutil.copytree(Path(kin.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
     program = (
-        "import numpy as np; from kin.ik.candidates import select; "
+        "import numpy as np; from kin.ik.candidates import select; from kin.kernels.cached import is_cached; "
+        "before = is_cached(select); "
         "rows, count = select(np.array([[0.0], [1e-3]]), np.array([1.0, 2.0])); "
-        "print(count, sum(select.stats.cache_hits.values()))"
+        "print(count, sum(select.stats.cache_hits.values()), before, is_cached(select))"
     )
 
     def run() -> str:
@@ -31,8 +32,8 @@ def test_kernels_are_compiled_again_when_a_kernel_they_call_has_changed(tmp_path
             check=True,
         ).stdout.strip()
 
-    assert run() == "2 0"
-    assert run() == "2 1", "kept"
+    assert run() == "2 0 False True"
+    assert run() == "2 1 True True", "kept"
     common = package / "solvers" / "common.py"
     common.write_text(common.read_text(encoding="utf-8") + "\n# changed\n", encoding="utf-8")
-    assert run() == "2 0", "compiled anew"
+    assert run() == "2 0 False True", "compiled anew"
