@@ -89,7 +89,9 @@ def test_missing_kernels_are_compiled_by_another_process_which_a_stop_ends(monke
         wait_for(lambda: client.get("/readyz").status_code == 200, 120)
         wait_for(lambda: len(started) == 2)
         assert started[1].poll() is None
-    assert steps == [f"from kin.warmup import {name} as step; step()" for name in ("warm_up_first", "warm_up_rest")]
+    assert steps == [
+        f"from kin.warmup import {name} as step; step()" for name in ("warm_up_first", "warm_up_rest")
+    ]
     wait_for(lambda: started[1].poll() is not None)
 
 
