@@ -13,11 +13,14 @@ import numpy as np
 
 from app.exercises.typed import ANGLE_UNITS, LENGTH_UNITS, NUMBER, EntryError, clean, cut, number_and_unit
 from app.viewer.panel.readout import ANGLES
-from kin import InputError, KinematicsError
-from kin.transforms import Array, as_transform, rotation_from_wxyz
+from kin import InputError, KinematicsError, Task
+from kin.transforms import Array, as_transform, frame_from_approach, rotation_from_wxyz
 from kin.units import Unit, Units
 
 PoseKind = Literal["position", "angles", "quaternion", "pose"]
+ALONG = "along"  # between a point and a direction
+SHORTEST = 1e-9  # of a direction
+OPPOSITE = -0.999  # cosine of an angle near a half turn
 FARTHEST = 1000.0  # m: the largest coordinate of a target or a camera
 LIMIT_DIGITS = 2  # decimals of a degree or a millimetre in which limits are shown
 # A quaternion typed with three decimals is normalised; one that is further off was mistyped.
@@ -53,23 +56,26 @@ def read_value(text: str, name: str, unit: Unit, is_angle: bool, limits: tuple[f
     return min(max(value, limits[0]), limits[1])
 
 
-def read_pose(kind: PoseKind, text: str, units: Units, T: Array) -> tuple[Array, bool]:
+def read_pose(kind: PoseKind, text: str, units: Units, T: Array) -> tuple[Array, Task]:
     """A typed target.
 
     Args:
         kind: what was typed: ``"position"`` x y z, ``"angles"`` roll pitch yaw, ``"quaternion"`` w x y z, or
             a whole ``"pose"``: 3 numbers (a point), 6 (with roll pitch yaw), 7 (with a quaternion), 12 or 16 (a
-            matrix).
+            matrix), or a point, the word *along* and the direction of the tool.
         T: the present target pose ``(4, 4)``; what was not typed is taken from it.
 
     Returns:
-        The target pose ``(4, 4)``, and whether it gives an orientation: a whole pose of 3 numbers does not.
+        The target pose ``(4, 4)``, and what of it was given.
 
     Raises:
         EntryError: with what is wrong.
     """
-    numbers = _numbers(text)
     pose = T.copy()
+    point, along, direction = text.partition(ALONG)
+    if kind == "pose" and along:
+        return _approach(_numbers(point), _numbers(direction), units, pose), "approach"
+    numbers = _numbers(text)
     if kind == "pose":
         return _whole_pose(numbers, units, pose)
     if kind == "position":
@@ -81,7 +87,7 @@ def read_pose(kind: PoseKind, text: str, units: Units, T: Array) -> tuple[Array,
     else:
         _expect(numbers, 4, "a quaternion w x y z, scalar first")
         pose[:3, :3] = _rotation(numbers)
-    return pose, True
+    return pose, "pose"
 
 
 def rotation_from_angles(roll: float, pitch: float, yaw: float) -> Array:
@@ -96,11 +102,36 @@ def rotation_from_angles(roll: float, pitch: float, yaw: float) -> Array:
     )
 
 
-def _whole_pose(numbers: list[float], units: Units, pose: Array) -> tuple[Array, bool]:
+def _approach(point: list[float], direction: list[float], units: Units, pose: Array) -> Array:
+    """The pose at a point with the tool along a direction, turned no more than it takes."""
+    if len(point) != 3 or len(direction) != 3:
+        detail = f"Found {len(point)} before and {len(direction)} after “{ALONG}”. Valid: x y z along x y z."
+        raise EntryError("A point and a direction are needed", detail)
+    pose[:3, 3] = _position(point, units)
+    length = math.hypot(*direction)
+    if length < SHORTEST:
+        raise EntryError("The direction has no length", f"“{ALONG}” needs three numbers that are not all zero.")
+    pose[:3, :3] = turned_to(pose[:3, :3], np.array(direction) / length)
+    return pose
+
+
+def turned_to(R: Array, z: Array) -> Array:
+    """R ``(3, 3)`` turned by no more than it takes for its third column to be the unit vector z ``(3,)``."""
+    now = R[:, 2]
+    axis = np.cross(now, z)
+    cosine = float(now @ z)
+    if cosine < OPPOSITE:  # many axes would do about as well
+        return frame_from_approach(z)
+    K = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
+    turned: Array = (np.eye(3) + K + K @ K / (1.0 + cosine)) @ R
+    return turned
+
+
+def _whole_pose(numbers: list[float], units: Units, pose: Array) -> tuple[Array, Task]:
     match len(numbers):
         case 3:
             pose[:3, 3] = _position(numbers, units)
-            return pose, False
+            return pose, "position"
         case 6:
             pose[:3, 3] = _position(numbers[:3], units)
             pose[:3, :3] = rotation_from_angles(*(units.angles.read(v) for v in numbers[3:]))
@@ -112,10 +143,11 @@ def _whole_pose(numbers: list[float], units: Units, pose: Array) -> tuple[Array,
         case count:
             detail = (
                 f"Found {count}. Valid: 3 numbers (x y z, point only), 6 (x y z roll pitch yaw), "
-                "7 (x y z and a quaternion w x y z), 12 or 16 (a 3×4 or 4×4 matrix in metres)."
+                "7 (x y z and a quaternion w x y z), 12 or 16 (a 3×4 or 4×4 matrix in metres), "
+                "or x y z along x y z (a point and the direction of the tool)."
             )
             raise EntryError("The target needs another count of numbers", detail)
-    return pose, True
+    return pose, "pose"
 
 
 def _numbers(text: str) -> list[float]:

@@ -69,12 +69,12 @@ class TypedInput:
         tool = kin.fk(page.robot, arm.goal)
         frame = page.frames.pose(page.robot, arm.goal, relative)
         present = inverse(frame) @ (tool if relative or arm.target is None else arm.target)
-        T, oriented = read_pose(kind, text, page.units, present)
+        T, given = read_pose(kind, text, page.units, present)
         T = frame @ T
         arm.target = None  # a changed task must not solve for the target of before
-        if not oriented and page.task != "position":
-            page.set_task("position")
-        elif oriented and kind != "position" and page.task == "position":
+        if given != "pose" and page.task != given:
+            page.set_task(given)
+        elif given == "pose" and kind != "position" and page.task == "position":
             page.set_task("pose")
         arm.set_target(T)
         page.camera.keep(kin.link_frames(page.robot, arm.goal)[:, :3, 3], T[:3, 3])

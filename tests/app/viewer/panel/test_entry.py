@@ -93,17 +93,17 @@ def test_every_way_to_type_a_pose_gives_that_pose(seed: int) -> None:
         ("pose", T[:3].ravel()),
     ):
         text = ", ".join(f"{v:.12f}" for v in numbers)
-        read, oriented = read_pose(kind, text, DEGREES, START)  # type: ignore[arg-type]
-        assert oriented
+        read, given = read_pose(kind, text, DEGREES, START)  # type: ignore[arg-type]
+        assert given == "pose"
         assert np.abs(read - T).max() < 1e-9
-    read, oriented = read_pose("pose", np.array2string(T, precision=10), DEGREES, START)
-    assert oriented
+    read, given = read_pose("pose", np.array2string(T, precision=10), DEGREES, START)
+    assert given == "pose"
     assert np.abs(read - T).max() < 1e-9
 
 
 def test_parts_keep_the_rest_of_the_target() -> None:
-    T, oriented = read_pose("position", "1 2 3", RADIANS, START)
-    assert oriented
+    T, given = read_pose("position", "1 2 3", RADIANS, START)
+    assert given == "pose"
     assert T[:3, 3].tolist() == [1.0, 2.0, 3.0]
     assert np.array_equal(T[:3, :3], START[:3, :3])
     T, _ = read_pose("angles", "0 0 90", DEGREES, START)
@@ -111,9 +111,26 @@ def test_parts_keep_the_rest_of_the_target() -> None:
     T, _ = read_pose("quaternion", "(0.707, 0, 0, 0.707)", DEGREES, START)
     assert np.allclose(T[:3, :3], [[0, -1, 0], [1, 0, 0], [0, 0, 1]])
     assert np.array_equal(T[:3, 3], START[:3, 3])
-    T, oriented = read_pose("pose", "100 200 300", DEGREES, START)
-    assert not oriented
+    T, given = read_pose("pose", "100 200 300", DEGREES, START)
+    assert given == "position"
     assert T[:3, 3].tolist() == [0.1, 0.2, 0.3]
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 1e-9, 1e-4, 0.02, 0.05, 3.0]))
+def test_a_point_and_a_direction_turn_the_tool_by_no_more_than_it_takes(seed: int, off: float) -> None:
+    rng = np.random.default_rng(seed)
+    T = kin.fk(UR5, UR5.random_q(rng))
+    way = off * rng.normal(size=3) + rng.choice([-1.0, 1.0]) * T[:3, 2]
+    text = "100 200 300 along " + " ".join(f"{v:.17g}" for v in way)
+    read, given = read_pose("pose", text, DEGREES, T)
+    z = way / np.linalg.norm(way)
+    assert given == "approach"
+    assert read[:3, 3].tolist() == [0.1, 0.2, 0.3]
+    assert np.abs(read[:3, 2] - z).max() < 1e-12
+    assert np.abs(read[:3, :3].T @ read[:3, :3] - np.eye(3)).max() < 1e-12
+    turn = np.arccos(np.clip((np.trace(read[:3, :3] @ T[:3, :3].T) - 1.0) / 2.0, -1.0, 1.0))
+    least = np.arctan2(np.linalg.norm(np.cross(T[:3, 2], z)), T[:3, 2] @ z)
+    assert turn == pytest.approx(least, abs=1e-6) or least > np.radians(177.0)
 
 
 @pytest.mark.parametrize(
@@ -121,6 +138,11 @@ def test_parts_keep_the_rest_of_the_target() -> None:
     [
         ("pose", "1 2", "Found 2"),
         ("pose", "", "Found 0"),
+        ("pose", "1 2 3 along 0 0", "Found 3 before and 2 after"),
+        ("pose", "1 2 3 along 0 0 0", "not all zero"),
+        ("pose", "1 2 3 along a b c", "“a” is not a number"),
+        ("pose", "1 2 3 4 along 0 0 1", "Found 4 before and 3 after"),
+        ("position", "1 2 3 along 0 0 1", "“along” is not a number"),
         ("position", "1 2 x", "“x” is not a number"),
         ("position", "1 2 3 4", "x y z in mm"),
         ("position", "1e9 0 0", "too far away"),

@@ -135,6 +135,16 @@ def test_a_point_alone_sets_the_task_and_a_pose_sets_it_back(port: int) -> None:
         assert tab.value("Target must match") == "Full pose"
 
 
+def test_a_point_and_a_direction_set_the_task_to_both(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.choose(UR5.name)
+        x, y, z = 1000 * HOME[:3, 3] + (30, 20, -10)
+        tab.say("target", ["pose", f"{x} {y} {z} along 0 0.6 -0.8"])
+        tab.wait(lambda: tab.value("Target must match") == "Point + approach")
+        tab.wait(lambda: np.allclose(1000 * tab.tool_pose()[:3, 3], (x, y, z), atol=1e-3))
+        assert np.allclose(tab.tool_pose()[:3, 2], (0.0, 0.6, -0.8), atol=1e-6)
+
+
 def test_keys_move_the_target_along_tool_and_base_axes(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.choose(UR5.name)
