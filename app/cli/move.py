@@ -26,6 +26,8 @@ def run(arguments: Namespace) -> int:
     kind = _format(arguments)
     if not LEAST_RATE <= arguments.rate <= MOST_RATE:
         raise InputError("--rate", arguments.rate, f"{LEAST_RATE:g} to {MOST_RATE:g} samples per second")
+    if arguments.picture is not None and Path(arguments.picture).suffix.lower() != ".svg":
+        raise InputError("--picture", arguments.picture, "a name that ends in .svg")
     start = arguments.start
     q_start = None if start is None else configuration(robot, start, "--start", arguments.rad)
     motion = plan_motion(robot, parse_program(_text(arguments.program), robot), q_start)

@@ -17,7 +17,8 @@ from app.shared.answers.motion import motion_answer, sample_times
 from kin import InputError, Motion, fk
 from kin.axes import inverse
 from kin.motion import Circ, Dwell, Lin, MotionSample, PoseTarget, Ptp, Spline, program_to_dict
-from kin.motion.program import Segment
+from kin.motion.details import BlendLeftOut, BlendShortened
+from kin.motion.program import Move, Segment
 from kin.transforms import Array, wxyz_from_rotation
 
 AT_ONCE = 500  # samples of a chunk
@@ -135,8 +136,8 @@ def _commands(motion: Motion, segment: Segment, q: Array, T: Array, index: int) 
     if isinstance(segment, Dwell):
         return [f"sleep({_number(segment.seconds)})"]
     label = f"  # {segment.name}" if segment.name.isprintable() and segment.name else ""
-    after = motion.program.segments[index + 1 : index + 2]
-    blend = f", r={_number(segment.blend)}" if segment.blend and after and not isinstance(after[0], Dwell) else ""
+    radius = _radius(motion, segment, index)
+    blend = f", r={_number(radius)}" if radius else ""
     limits = motion.limits
     joint = (
         f"a={_number(float(limits.acceleration.min()) * segment.acceleration)}, "
@@ -153,11 +154,22 @@ def _commands(motion: Motion, segment: Segment, q: Array, T: Array, index: int) 
             via = T.copy()
             via[:3, 3] = (inverse(motion.robot.T_world_base) @ [*segment.via, 1.0])[:3]
             return [f"movec({_pose(via)}, {_pose(T)}, {tool}{blend}){label}"]
-    return [f"{line}{label}" for line in _through(motion, segment, joint, tool)]
+    return [f"{line}{label}" for line in _through(motion, segment, joint, tool, blend)]
 
 
-def _through(motion: Motion, segment: Spline, joint: str, tool: str) -> list[str]:
-    """A spline as commands to its points, without stops."""
+def _radius(motion: Motion, segment: Move, index: int) -> float:
+    """The zone that is planned at the end of a segment, in metres; 0 where the arm stops."""
+    radius = segment.blend
+    for fact in motion.notes:
+        if isinstance(fact, BlendLeftOut) and fact.segment == index:
+            return 0.0
+        if isinstance(fact, BlendShortened) and fact.segment == index:
+            radius = fact.used
+    return radius
+
+
+def _through(motion: Motion, segment: Spline, joint: str, tool: str, blend: str) -> list[str]:
+    """A spline as commands to its points, without stops; `blend`: the argument of the last one."""
     commands = []
     T_base_world, before = inverse(motion.robot.T_world_base), np.eye(4)
     for point in segment.points:
@@ -166,7 +178,7 @@ def _through(motion: Motion, segment: Spline, joint: str, tool: str) -> list[str
             commands.append(f"movep({_pose(T_base_world @ before)}, {tool}, r=0.01)")
         else:
             commands.append(f"movej({_list(np.array(point.q))}, {joint}, r=0.01)")
-    return [*commands[:-1], commands[-1].replace(", r=0.01", "")]
+    return [*commands[:-1], commands[-1].replace(", r=0.01", blend)]
 
 
 def _pose(T: Array) -> str:

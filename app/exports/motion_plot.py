@@ -10,7 +10,7 @@ from app.exports.svg import joint_colour, tick_labels
 from kin import Motion
 from kin.transforms import Array
 
-WIDTH, HEIGHT = 900.0, 620.0
+WIDTH, HEIGHT = 900.0, 636.0
 LEFT, RIGHT, TOP, GAP = 84.0, 40.0, 84.0, 70.0
 SAMPLES = 1200
 LONGEST = 115  # characters of the reason
@@ -30,7 +30,7 @@ def motion_plot(motion: Motion) -> str:
     if motion.planned and motion.duration > 0.0:
         times = np.linspace(0.0, motion.duration, SAMPLES)
         q, qd = motion.derivatives(times)[:2]
-        height = (HEIGHT - TOP - GAP - 56.0) / 2.0
+        height = (HEIGHT - TOP - GAP - 72.0) / 2.0
         turning = motion.robot.revolute
         values = np.where(turning, np.degrees(q), 1000.0 * q)
         named = "°" if turning.all() else "mm" if not turning.any() else "° or mm"
@@ -93,5 +93,7 @@ def _legend(motion: Motion) -> str:
     for i, joint in enumerate(motion.robot.joints):
         x = LEFT + i * step
         parts.append(f'<path d="M{x:.1f} {HEIGHT - 18:g}h18" stroke="{joint_colour(i)}" stroke-width="3"/>')
-        parts.append(f'<text x="{x + 23:.1f}" y="{HEIGHT - 14:g}">{i + 1} {escape(joint.name[:14])}</text>')
+        plain = joint.name.lower() in (f"joint {i + 1}", str(i + 1))
+        name = joint.name if plain else f"{i + 1} {joint.name}"
+        parts.append(f'<text x="{x + 23:.1f}" y="{HEIGHT - 14:g}">{escape(name[:16])}</text>')
     return "".join(parts)

@@ -28,7 +28,10 @@ class TargetOutside(NamedTuple):
 
 
 class NotReached(NamedTuple):
-    """Cause ``unreachable``: no configuration meets a pose, as in the `kin.IKResult` of it."""
+    """Cause ``unreachable``: no configuration meets a pose, as in the `kin.IKResult` of it.
+
+    Of a segment that can be driven for a part, the pose of the rest that is missed most.
+    """
 
     details: Details
     cause: str

@@ -53,7 +53,8 @@ def refusal(
     """Why a segment cannot be driven, where, and what would help."""
     which = f"Segment {segment + 1} ({kind.upper()}{f', {name}' if name else ''})"
     where = "" if fraction is None else f", {100.0 * fraction:.1f} % of the way"
-    text = f"{which} cannot be driven{where}: {_why(details, units)}."
+    worst = "at the worst place after it, " if where and isinstance(details, NotReached) else ""
+    text = f"{which} cannot be driven{where}: {worst}{_why(details, units)}."
     for help_ in helps:
         said = _HELP[help_.code] + (f" ({help_.posture})" if help_.posture else "")
         text += f" {said[0].upper()}{said[1:]}."

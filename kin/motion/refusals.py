@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from kin.ik import branch_names, branch_of, solve_ik
-from kin.ik.details import JointKind, LimitViolation
+from kin.ik.details import JointKind, LimitViolation, OrientationNotMet, OutOfReach
 from kin.ik.options import Task
 from kin.ik.results import IKResult, Status
 from kin.motion.details import (
@@ -59,15 +59,20 @@ def limit_met(robot: Robot, q: Array) -> tuple[int, LimitViolation] | None:
     return row, replace(first, value=value)
 
 
-def lost(robot: Robot, T: Array, end: Array, before: Array, task: Task) -> tuple[Cause, RefusalDetails]:
-    """Why the joints cannot follow the tool to a pose `T` from a configuration; `end`: where the segment ends."""
-    result = solve_ik(robot, T, q_seed=before, task=task)
+def lost(robot: Robot, poses: Array, before: Array, task: Task) -> tuple[Cause, RefusalDetails]:
+    """Why the joints cannot follow the tool from a configuration to the first of the poses ``(k, 4, 4)``.
+
+    The others lead from there to the end of the segment.
+    """
+    result = solve_ik(robot, poses[0], q_seed=before, task=task)
     if result.status is Status.APPROXIMATE:
-        best = solve_ik(robot, end, q_seed=before, task=task).best or result.best
+        best = solve_ik(robot, poses[-1], q_seed=before, task=task).best or result.best
         assert best is not None
         return "task", NotKept(robot.n, best.position_error, best.rotation_error)
     if not result.solutions:
-        return "unreachable", NotReached(result.details, result.cause, result.task, result.singularities)
+        others = [solve_ik(robot, T, q_seed=before, task=task) for T in poses[1:]]
+        worst = max([result, *others], key=_shortfall)
+        return "unreachable", NotReached(worst.details, worst.cause, worst.task, worst.singularities)
     near = singularities_at(robot, before, NEAR)
     jump = result.solutions[0].q - before
     joint = int(np.argmax(np.abs(jump)))
@@ -77,6 +82,16 @@ def lost(robot: Robot, T: Array, end: Array, before: Array, task: Task) -> tuple
     if near or abs(move.motion) < 0.5:
         return "singularity", SingularityMet(near[0] if near else None, move if abs(move.motion) > 1e-3 else None)
     return "branch", BranchNeeded(branch_of(robot, before) if branch_names(robot) else None)
+
+
+def _shortfall(result: IKResult) -> tuple[float, float]:
+    """By how much a pose is missed: first its point (metres), then its orientation (radians)."""
+    match result.details:
+        case OutOfReach(distance):
+            return distance, 0.0
+        case OrientationNotMet(nearest_rotation=rotation, rotation_error=error):
+            return 0.0, rotation or error or 0.0
+    return 0.0, 0.0
 
 
 def helps_for(

@@ -41,6 +41,8 @@ from kin.motion.program import Circ, Dwell, JointTarget, Lin, Ptp, Spline, Targe
 from kin.motion.refusals import helps_at, helps_for, limit_met, lost, violations
 from kin.transforms import Array
 
+_REST = 9  # places of the rest of a segment that are asked how far out of reach they are
+
 
 def run_from(plan: Plan, first: int) -> Run | None:
     """The segments from this one on that are one path of the joints or of the tool; None if it has no length.
@@ -170,8 +172,8 @@ def _lost(plan: Plan, layout: Layout, chain: Chain, error: LostError) -> Refused
         s = float(error.s[met[0]])
     else:
         end = float(layout.bounds[np.searchsorted(layout.bounds[:-1], s, side="left")])
-        T, last = chain.poses(np.array([s, end]))
-        cause, details = lost(robot, T, last, error.q[-2], plan.task)
+        poses = chain.poses(np.linspace(s, end, _REST))
+        cause, details = lost(robot, poses, error.q[-2], plan.task)
     return _refused_at(plan, layout, chain, s, cause, details)
 
 

@@ -10,7 +10,7 @@ from kin.motion.details import BlendLeftOut
 from kin.motion.planning.plan import Plan, RefusedError
 from kin.motion.planning.steps import drive
 
-_DOUBT = {True: 0.97, False: 1.0}  # with and without limits of jerk: a larger part of the estimate is a doubt
+_DOUBT = {True: 0.97, False: 0.95}  # with and without limits of jerk: a larger part of the estimate is a doubt
 _WORTH = 2e-3  # part of its time by which a motion must be faster with a stop, so that a blend is left out
 
 

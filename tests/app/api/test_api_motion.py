@@ -247,9 +247,34 @@ def test_lines_and_arcs_are_written_with_their_own_targets(client):
     assert f"{p[2] - 0.1:.9g}" in script, "the target of the line, not the middle of its blend"
 
 
+def test_zones_of_urscript_are_those_that_are_planned(client):
+    p = kin.fk(UR5, np.array(Q))[:3, 3]
+    places = [(0.1, 0, 0), (0.1, 0, 0.1), (0.2, 0, 0.1), (0.2, 0, 0.2)]
+    blends = [0.04, 0.0003, 0.2, 0.01]
+    program = {
+        "segments": [
+            {"kind": "lin", "position": (p - np.array(place)).tolist(), "blend": blend}
+            for place, blend in zip(places, blends, strict=True)
+        ]
+    }
+    answer = post(client, {"program": program, "q_start": Q}).json()
+    assert answer["planned"], answer["reason"]
+    lines = post(client, {"program": program, "q_start": Q, "format": "urscript"}).text.splitlines()
+    lines = [line for line in lines if "movel" in line]
+    assert lines[0].endswith(", r=0.04)")
+    assert " r=" not in lines[1], "passing takes longer than a stop"
+    assert lines[2].endswith(", r=0.05)"), "half of the shorter segment"
+    assert " r=" not in lines[3], "the last one"
+
+
 def test_a_line_that_leaves_the_workspace_is_refused_at_its_place(client):
     program = {"segments": [{"kind": "ptp", "q": Q}, {"kind": "lin", "position": [2.0, 0.0, 0.5], "name": "away"}]}
     refusal = post(client, {"program": program}).json()["refusal"]
     assert (refusal["segment"], refusal["kind"], refusal["name"]) == (1, "lin", "away")
     assert 0.0 < refusal["fraction"] < 1.0
     assert "% of the way" in refusal["reason"]
+    ends = kin.fk(UR5, np.array(Q))
+    ends[:3, 3] = 2.0, 0.0, 0.5
+    missing = kin.solve_ik(UR5, ends).details.distance
+    assert missing > 0.5
+    assert f"at the worst place after it, out of reach by {missing * 1000:.1f} mm" in refusal["reason"]

@@ -819,6 +819,7 @@ def test_a_program_that_cannot_be_driven_is_exit_code_1_and_a_reason(capsys, tmp
             ("--picture", "/no/such/folder/m.svg"),
             "a file that can be written",
         ),
+        ('[[segments]]\nkind = "dwell"\nseconds = 1', ("--picture", "m.png"), "a name that ends in .svg"),
     ],
 )
 def test_a_malformed_program_or_option_is_exit_code_2(capsys, tmp_path, text, words, said):
