@@ -159,15 +159,29 @@ class Tab:
         )
 
     def arrow(
-        self, robot: kin.Robot, T: np.ndarray, axis: int, lengths: float = 1.0
+        self,
+        robot: kin.Robot,
+        T: np.ndarray,
+        axis: int,
+        lengths: float = 1.0,
+        room: Sequence[camera.Sphere] = (),
     ) -> tuple[np.ndarray, np.ndarray]:
         """Page coordinates of a point on an arrow of the gizmo at pose T, and of one farther by its length."""
         arrow = GIZMO * (FOR_FINGERS if self.touch else 1.0) * body(robot).radius * T[:3, axis]
-        return self.pixel(robot, T[:3, 3] + 0.8 * arrow), self.pixel(robot, T[:3, 3] + (0.8 + lengths) * arrow)
+        start, end = (self.pixel(robot, T[:3, 3] + far * arrow, room) for far in (0.8, 0.8 + lengths))
+        return start, end
 
-    def drag_arrow(self, robot: kin.Robot, T: np.ndarray, axis: int, lengths: float, steps: int = 6) -> None:
+    def drag_arrow(
+        self,
+        robot: kin.Robot,
+        T: np.ndarray,
+        axis: int,
+        lengths: float,
+        steps: int = 6,
+        room: Sequence[camera.Sphere] = (),
+    ) -> None:
         """Drag an arrow of the gizmo at pose T along its own direction, by a multiple of its length."""
-        at, to = self.arrow(robot, T, axis, lengths)
+        at, to = self.arrow(robot, T, axis, lengths, room)
         self.page.mouse.move(*at.tolist())
         self.page.wait_for_timeout(300)  # the arrow lights up under the pointer
         self.page.mouse.down()

@@ -7,7 +7,7 @@ and radians; values are written in the reader's units::
     figure = Figure(stage.client.scene, "/triangle", body(stage.robot).size)
     normal, upper = figure.line("x₁", RED), figure.dimension("l₁", BLUE)
     elbow, plane = figure.angle("β", GREEN), figure.face(3, BLUE)
-    wrist = figure.point("wrist centre W", AMBER)
+    wrist = figure.point("wrist centre w", AMBER)
 
     def on_pose(self, T_base_tool):                # and in on_style: the units may have changed
         plane.show([shoulder, elbow_point, wrist_point])
@@ -21,7 +21,8 @@ and radians; values are written in the reader's units::
 The links of an arm hide what is inside them: call ``stage.see_through(True)`` while a figure is on show, and take
 another `root` for each figure, because browsers give the pose of a removed node to the next one of its name.
 Labels are in front of everything, on a plate of their own, so they are readable in light and dark. Dimensions and
-angles are beside what they measure, at a distance from the arm.
+angles are beside what they measure, at a distance from the arm. A label that would cover another one of its
+figure, as seen in the default view, takes the next of a few places, and stays there while that is free.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ import viser
 from numpy.typing import ArrayLike, NDArray
 
 from app.viewer.labels import add_label
+from app.viewer.lessons.label_room import HEIGHT, label_room
 from app.viewer.viser_patches import assign
 from kin.axes import cross, perpendicular_to
 from kin.transforms import Array
@@ -67,6 +69,7 @@ class Figure:
         self.scene, self.root, self.size = scene, root, size
         self._top = scene.add_frame(root, show_axes=False)
         self._count = 0
+        self.labels: dict[Part, Array] = {}  # where each label on show is
 
     def line(self, text: str = "", color: Color = GREY, width: float = LINE) -> Line:
         """A straight line, such as an axis, with its label beyond the end."""
@@ -103,6 +106,17 @@ class Figure:
         none = np.zeros((count, 2, 3), np.float32)
         return self.scene.add_line_segments(self.name(), none, color, thickness=width * self.size, visible=False)
 
+    def room(self, part: Part, text: str, at: Array) -> float:
+        """The room of a part's label at a point ``(3,)``: below 1 it covers another label in the default view."""
+        return min(
+            (
+                label_room(at - place, text, other.label.text, self.size)
+                for other, place in self.labels.items()
+                if other is not part
+            ),
+            default=math.inf,
+        )
+
 
 class Part:
     """A part of a figure: its nodes, and the label."""
@@ -110,6 +124,8 @@ class Part:
     def __init__(self, figure: Figure, text: str, scale: float = 1.0) -> None:
         self.size = figure.size
         self.text = text
+        self._figure = figure
+        self._place = 0  # which of the label's places it has
         self.label = add_label(
             figure.scene, figure.name(), text, anchor="center-center", visible=False, scale=scale
         )
@@ -124,14 +140,27 @@ class Part:
         """Hide the part until it is shown again."""
         for node in (*self.nodes, self.label):
             _set_visible(node, False)
+        self._figure.labels.pop(self, None)
+        self._place = 0
 
-    def _write(self, text: str, at: Array) -> None:
-        """Show the nodes, and the label with this text at this point ``(3,)``."""
+    def _write(self, text: str, *places: Array) -> None:
+        """Show the nodes, and the label with this text at the first of these points ``(3,)`` that has room."""
         for node in self.nodes:
             _set_visible(node, True)
         _set_visible(self.label, bool(text))
         if text != self.label.text:
             self.label.text = text
+        if not text:
+            self._figure.labels.pop(self, None)
+            return
+        order = [self._place, *(k for k in range(len(places)) if k != self._place)]
+        rooms = dict.fromkeys(order, -1.0)
+        for k in order:
+            rooms[k] = self._figure.room(self, text, places[k])
+            if rooms[k] >= 1.0:
+                break
+        self._place = max(rooms, key=rooms.__getitem__)
+        at = self._figure.labels[self] = places[self._place]
         assign(self.label, at)
 
 
@@ -148,7 +177,8 @@ class Line(Part):
         a, b = np.asarray(start, float), np.asarray(end, float)
         self.text = self.text if text is None else text
         self._line.points = np.array([[a, b]], np.float32)
-        self._write(self.text, b + BEYOND * self.size * _unit(b - a))
+        way = self.size * _unit(b - a)
+        self._write(self.text, b + BEYOND * way, b + (BEYOND + HEIGHT) * way, a - BEYOND * way)
 
     def show_axis(self, point: ArrayLike, direction: ArrayLike, reach: float, text: str | None = None) -> None:
         """Draw an axis through a point ``(3,)``, to a distance `reach` (m) on both sides."""
@@ -187,7 +217,11 @@ class Dimension(Part):
         self._witness.points, self._measure.points = lines[:2], lines[2:]
         value = float(np.linalg.norm(b - a)) if value is None else value
         words = f"{self.text} = {units.lengths.text(value)}" if text is None else text
-        self._write(words, (a + b) / 2 + 1.35 * ASIDE * self.size * e)
+        off = ASIDE * self.size * e
+        self._write(
+            words,
+            *(a + share * (b - a) + far * off for far in (1.35, 2.0, 2.7) for share in (0.5, 0.2, 0.8)),
+        )
 
 
 class Angle(Part):
@@ -220,7 +254,8 @@ class Angle(Part):
         lines = arc(at, start, about, radius, angle)
         self._sides.points, self._arc.points = lines[:2], lines[2:]
         words = f"{self.text} = {units.angles.text(angle)}" if text is None else text
-        self._write(words, at + 1.3 * radius * turned(start, about, [angle / 2])[0])
+        ways = turned(start, about, angle * np.array([0.5, 0.15, 0.85]))
+        self._write(words, *(at + far * radius * way for far in (1.3, 1.75, 2.2) for way in ways))
 
     def show_between(
         self,
@@ -257,7 +292,9 @@ class Point(Part):
         point = np.asarray(at, float)
         self.text = self.text if text is None else text
         assign(self._ball, point)
-        self._write(self.text, point + (self._radius + BEYOND * self.size) * _unit(np.asarray(beside, float)))
+        way = _unit(np.asarray(beside, float))
+        near, far = self._radius + BEYOND * self.size, self._radius + (BEYOND + HEIGHT) * self.size
+        self._write(self.text, point + near * way, point - near * way, point + far * way, point - far * way)
 
 
 class Face:

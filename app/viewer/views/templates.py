@@ -7,10 +7,12 @@ styles.
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
+from markupsafe import Markup, escape
 
 _ENVIRONMENT = Environment(
     loader=FileSystemLoader(Path(__file__).parent / "templates"),
@@ -20,6 +22,15 @@ _ENVIRONMENT = Environment(
     lstrip_blocks=True,
     auto_reload=False,
 )
+_COMPONENT = re.compile(r"\b([a-z])_([xyz])\b")
+
+
+def components(text: str) -> Markup:
+    """A text with its components of vectors, such as w_y, as a letter and its index."""
+    return Markup(_COMPONENT.sub(r"<i>\1</i><sub>\2</sub>", str(escape(text))))
+
+
+_ENVIRONMENT.filters["components"] = components
 
 
 def render(name: str, /, **values: object) -> str:

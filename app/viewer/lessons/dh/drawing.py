@@ -30,6 +30,7 @@ from app.viewer.lessons.dh.steps import (
 )
 from app.viewer.lessons.dh.views import ABOUT_X, ABOUT_Z, TITLES
 from app.viewer.lessons.figures import GREY, Angle, Dimension, Figure, Segments, clear_of
+from app.viewer.lessons.label_room import label_room
 from app.viewer.scene.bodies.parts import joint_color
 from app.viewer.scene.camera import DIRECTION
 from app.viewer.scene.meshes import body
@@ -41,8 +42,8 @@ from kin.units import Units
 AXES = ((204, 0, 0), (51, 153, 0), (0, 0, 204))  # x, y, z, as viser paints the axes of a frame
 # In units of the arm's thickness.
 MOVING, PLACED = 8.0, 4.5
-ROOM = 4.0  # between two labels
-HEIGHTS = (1.2, -0.6, 1.7)  # of a frame's label, in lengths of its z axis
+FRAME = "frame 0"  # a label of usual length
+HEIGHTS = (1.2, -0.6, 1.7, -1.2, 0.6)  # of a frame's label, in lengths of its z axis
 
 
 def triads(frames: Array, size: float) -> Segments:
@@ -283,10 +284,10 @@ def label_places(groups: Sequence[Sequence[int]], frames: Array, size: float) ->
         best, most = (group[0], HEIGHTS[0]), -1.0
         for member, height in ((member, height) for height in HEIGHTS for member in group):
             point = frames[member, :3, 3] + height * PLACED * size * frames[member, :3, 2]
-            room = min((float(np.linalg.norm(point - other)) for other in taken), default=math.inf)
+            room = min((label_room(point - other, FRAME, FRAME, size) for other in taken), default=math.inf)
             if room > most:
                 best, most = (member, height), room
-            if room > ROOM * size:
+            if room >= 1.0:
                 break
         chosen.append(best)
         taken.append(frames[best[0], :3, 3] + best[1] * PLACED * size * frames[best[0], :3, 2])

@@ -26,7 +26,7 @@ from app.viewer.lessons.guide.progress import Progress
 from app.viewer.lessons.inverse import views
 from app.viewer.lessons.inverse.arm import Arm, arm_of
 from app.viewer.lessons.inverse.derive import Signs, arm_angle, signs_of
-from app.viewer.lessons.inverse.drawing import Drawing
+from app.viewer.lessons.inverse.drawing import Drawing, room
 from app.viewer.lessons.inverse.exercise import Branch, Exercise, all_branches, example, exercise, flipped
 from app.viewer.lessons.inverse.questions import keys_of, outline, outline_of
 from app.viewer.lessons.inverse.shapes import shapes
@@ -330,6 +330,7 @@ class InverseLesson(Lesson):
         if self._drawing is None:
             self._drawing = Drawing(self.stage.client.scene, arm)
             self.stage.see_through(True, gizmo=True)
+            self.stage.fit_view(room(arm, branch.derivation, keys))
         at = min(self._at, len(keys) - 1)
         self._drawing.show(shapes(arm, branch.derivation, keys[at]), self.stage.units, not opened[at])
 
@@ -339,6 +340,7 @@ class InverseLesson(Lesson):
             self._drawing.remove()
             self._drawing = None
             self.stage.see_through(False)
+            self.stage.fit_view(())
 
 
 def _is_row(values: object, size: int) -> TypeGuard[list[float]]:

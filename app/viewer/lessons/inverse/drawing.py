@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import count
 
 import numpy as np
@@ -10,15 +11,17 @@ import viser
 from app.viewer.lessons import figures
 from app.viewer.lessons.figures import AMBER, BLUE, GREEN, GREY, PURPLE, SKY, VERMILION, Figure
 from app.viewer.lessons.inverse.arm import Arm
-from app.viewer.lessons.inverse.shapes import Angle, Face, Length, Line, Point, Shape
+from app.viewer.lessons.inverse.shapes import Angle, Face, Length, Line, Point, Shape, shapes
+from app.viewer.lessons.inverse.sheet import Derivation, StepKey
 from app.viewer.lessons.inverse.words import sub
+from app.viewer.scene.camera import Sphere
 from app.viewer.scene.meshes import body
 from kin.transforms import Array
 from kin.units import Units
 
 Part = figures.Line | figures.Dimension | figures.Angle | figures.Point | figures.Face
 LABELS = {
-    "w": "wrist centre W", "p": "tool point P", "S": "shoulder S", "E": "elbow E", "2": "axis 2", "t": "tool",
+    "w": "wrist centre w", "p": "tool point p", "S": "shoulder S", "E": "elbow E", "2": "axis 2", "t": "tool",
     "z0": "axis 1", "x0": "x₀", "x3": "x₃", "y3": "y₃", "z3": "z₃", "down": "", "SW": "", "tilt": "", "tilt2": "",
     "circle": "", "k": "",
 }  # fmt: skip
@@ -26,6 +29,15 @@ COLORS = {"a": VERMILION, "x3": GREY, "y3": GREY, "z3": BLUE, "z0": GREY, "X": G
 QUIET = ("tilt", "tilt2", "circle")  # arcs without a value
 BONE, THIN = 0.5, 0.2  # width
 _NUMBERS = count(1)
+
+
+def room(arm: Arm, found: Derivation, keys: Iterable[StepKey]) -> list[Sphere]:
+    """What a view has to show besides the arm: the ends of the lines of all steps, where their names are."""
+    T, reach = arm.T_base_lesson, 4.0 * body(arm.robot).size
+    lines = [
+        shape for key in keys for shape in shapes(arm, found, key) if isinstance(shape, Line) and not shape.bone
+    ]
+    return [(T[:3, :3] @ line.end + T[:3, 3], reach) for line in lines]
 
 
 class Drawing:
@@ -36,13 +48,13 @@ class Drawing:
         self._figure = Figure(scene, f"/inverse-{next(_NUMBERS)}", body(arm.robot).size)
         self._parts: dict[tuple[type, str], Part] = {}
 
-    def show(self, shapes: list[Shape], units: Units, hidden: bool) -> None:
+    def show(self, figure: list[Shape], units: Units, hidden: bool) -> None:
         """Show these shapes and no others; `hidden`: their values are asked for."""
-        wanted = {(type(shape), shape.name) for shape in shapes}
+        wanted = {(type(shape), shape.name) for shape in figure}
         for key, part in self._parts.items():
             if key not in wanted:
                 part.hide()
-        for shape in shapes:
+        for shape in figure:
             self._show(shape, units, hidden)
 
     def remove(self) -> None:

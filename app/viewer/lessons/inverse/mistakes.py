@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from app.viewer.lessons.guide.outline import Mistake
+from app.viewer.lessons.inverse.arm import Family
 from app.viewer.lessons.inverse.exercise import Exercise
 from app.viewer.lessons.inverse.sheet import Derivation, StepKey, wrapped
 from kin.units import Unit
@@ -15,6 +16,11 @@ from kin.units import Unit
 TOOL_POINT = "That is found with the tool point p. Go back to the wrist centre w first."
 INSIDE = "That is the angle inside the triangle, from the cosine rule of school. θ is 0 for the stretched arm."
 SWAPPED = "The arguments are swapped: atan2 takes y first."
+
+# The names of the two links of the triangle.
+SIDES: dict[Family, tuple[str, str]] = {
+    "planar": ("l1", "l2"), "wrist5": ("a2", "d4"), "wrist6": ("a2", "f"), "srs7": ("d3", "d5"),
+}  # fmt: skip
 
 
 def split_name(key: StepKey, derivation: Derivation) -> str:
@@ -162,7 +168,6 @@ def _wrong_distances(exercise: Exercise, found: Derivation) -> Iterator[tuple[fl
 
 
 def _bend(exercise: Exercise, distance: float) -> float | None:
-    sides = {"planar": ("l1", "l2"), "wrist5": ("a2", "d4"), "wrist6": ("a2", "f"), "srs7": ("d3", "d5")}
-    a, b = (exercise.arm.lengths[name] for name in sides[exercise.arm.family])
+    a, b = (exercise.arm.lengths[name] for name in SIDES[exercise.arm.family])
     cosine = (distance**2 - a**2 - b**2) / (2.0 * a * b)
     return math.acos(cosine) if abs(cosine) <= 1.0 else None

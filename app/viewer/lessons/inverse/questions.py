@@ -32,7 +32,6 @@ GOAL = (
 )
 LENGTH, ANGLE = 0.001, math.radians(0.5)
 _METHODS: dict[StepKey, str] = {
-    "elbow": "Put the cosine rule into arccos. Either sign is right.",
     "theta2": "θ₂ = atan2(h, ρ) − β, with β = atan2(forearm · sin θ₃, upper arm + forearm · cos θ₃).",
     "shoulder": "θ₁ = atan2(k_y, k_x), or the opposite direction.",
     "last": "θ₃ = φ − θ₁ − θ₂.",
@@ -150,6 +149,10 @@ def _method(given: Exercise, key: StepKey) -> str:
             return "θ₄ = atan2(−u_y, −u_x), or atan2(u_y, u_x) with the other sign of θ₅; u = R₀₃ᵀ a."
         first = words.sub(mistakes.split_name("wrist", derivation))
         return f"{first} = atan2(N₂₃, N₁₃), or with both signs changed."
+    if key == "elbow":
+        one, other = (words.sub(side) for side in mistakes.SIDES[given.arm.family])
+        angle = words.sub(mistakes.split_name("elbow", derivation))
+        return f"cos {angle} = (D² − {one}² − {other}²) / (2 {one} {other}). Either sign of {angle} is right."
     return _METHODS[key]
 
 

@@ -16,6 +16,7 @@ import kin
 from app.viewer.lessons import figures
 from app.viewer.lessons.dh import steps
 from app.viewer.lessons.figures import BLUE, Figure, arc, clear_of, plane_corners, ruler
+from app.viewer.lessons.label_room import label_room
 from app.viewer.scene.meshes import body
 from kin.transforms import Array
 from kin.units import DEFAULT_UNITS, Units
@@ -157,3 +158,21 @@ def test_the_module_shows_how_it_is_used() -> None:
     for name in ("line", "dimension", "angle", "point", "face", "remove"):
         assert f"figure.{name}(" in figures.__doc__
         assert callable(getattr(Figure, name))
+
+
+def test_labels_of_a_figure_have_room_and_stay_where_they_are(figure: Figure) -> None:
+    one, other, point = figure.dimension("a₁"), figure.dimension("a₂"), figure.point("W")
+
+    def show(x: float) -> list[float]:
+        for part in (one, other):
+            part.show((x, 0, 0), (x, 0, 0.6), DEFAULT_UNITS, (1, 0, 0))
+        point.show(figure.labels[one], (0, 0, 1))
+        pairs = itertools.combinations([part.label for part in (one, other, point)], 2)
+        return [label_room(np.subtract(a.position, b.position), a.text, b.text, SIZE) for a, b in pairs]
+
+    first = show(0.0)
+    assert min(first) >= 1.0
+    assert np.allclose(show(0.2), first), "they move together"
+    for part in (one, other, point):
+        part.hide()
+    assert figure.labels == {}, "hidden labels take no room"

@@ -454,8 +454,7 @@ def test_a_typed_way_is_followed_to_its_posture(port: int) -> None:
         press(tab, "Show this posture")
         assert q.q is not None
         T = kin.fk(ABB, q.q)
-        tab.settle()
-        assert np.allclose(tab.tool_pose()[:3, 3], T[:3, 3], atol=1e-3)
+        tab.wait(lambda: np.allclose(tab.tool_pose()[:3, 3], T[:3, 3], atol=1e-3))
         assert any(name.startswith("/inverse-") for name in tab.nodes)
         press(tab, "Ask about this pose")
         tab.wait(lambda: "New questions" in tab.html or 'data-step="1"' in tab.html)
