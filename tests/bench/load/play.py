@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import sys
 import time
 from typing import Any
 
@@ -66,6 +67,11 @@ async def measure(service: Service, count: int, seconds: float) -> dict[str, Any
     }
 
 
+def _say(text: str) -> None:
+    """What is being done, on stderr: the tables come at the end."""
+    print(time.strftime("%H:%M:%S"), text, file=sys.stderr, flush=True)
+
+
 def run(quick: bool, workers: int, counts: list[int] | None = None) -> dict[str, Any]:
     """The table on stdout with that of as many dragging visitors, and what is in them."""
     counts = counts or ([1, 10] if quick else [1, 10, 30])
@@ -73,7 +79,9 @@ def run(quick: bool, workers: int, counts: list[int] | None = None) -> dict[str,
     played, dragged = [], []
     for count in counts:
         for rows, drags in ((played, False), (dragged, True)):
+            _say(f"{count} visitors who {'drag' if drags else 'play'}: the service starts")
             with serve(workers) as service:
+                _say("measuring")
                 asyncio.run(measure_drag(service, 1, 1.0))  # nobody's first drag
                 if drags:
                     rows.append(asyncio.run(measure_drag(service, count, seconds)))
