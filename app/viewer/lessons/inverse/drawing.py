@@ -54,7 +54,7 @@ class Drawing:
         for key, part in self._parts.items():
             if key not in wanted:
                 part.hide()
-        for shape in figure:
+        for shape in sorted(figure, key=lambda each: isinstance(each, Length)):  # their labels can give way best
             self._show(shape, units, hidden)
 
     def remove(self) -> None:
