@@ -38,6 +38,7 @@ class Asked:
         units: of the fields or columns.
         note: the accepted error, and what else an answer needs.
         rows: how many rows a table has.
+        first: the number of the first one.
         start: a text or a pose to begin with.
         goal: a pose ``(4, 4)`` that is drawn.
     """
@@ -47,6 +48,7 @@ class Asked:
     units: tuple[str, ...] = ()
     note: str = ""
     rows: int = 1
+    first: int = 1
     start: str = ""
     goal: Array | None = None
 

@@ -28,7 +28,9 @@ CAMERA = "ViewerCameraMessage"
 MEMORY = "LocalStorageGetItemResponseMessage"
 
 _COMPUTING = re.compile(r"/(workspace|capability)\b")
-_LOOKING_LESSONS = frozenset({"dh", "equations", "velocity"})  # the others solve the pose
+_LOOKING_LESSONS = frozenset(
+    {"dh", "equations", "velocity"}
+)  # others solve the pose, or have a scene of their own
 
 
 class Rights(Enum):

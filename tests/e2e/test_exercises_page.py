@@ -66,6 +66,9 @@ def test_exercises_by_keyboard_and_mouse(tab: Tab) -> None:
     field.press("Enter")
     expect(page.locator("[data-exercises-verdict]")).to_contain_text("Right")
     expect(field).to_have_attribute("readonly", "")
+    following = page.locator("[data-exercises=foot] [data-guide-do=open]")
+    following.hover()
+    expect(following).to_have_css("background-color", "rgb(23, 74, 109)")  # white letters stay legible
 
     page.locator("[data-guide-do=list]").click()
     expect(block(tab, "list")).to_contain_text(f"2 of {len(ALL.all)} solved")

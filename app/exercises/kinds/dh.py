@@ -33,8 +33,8 @@ Row = tuple[float, float, float, float]
 class DHKind(Kind):
     """See the module.
 
-    The values are those of the posture on show, so that no zero of a joint has to be agreed. What counts is where
-    the joint axes are as lines, and where the tool is: two tables that agree in these move in the same way.
+    The values are those of the exercise’s posture, so that no zero of a joint has to be agreed. What counts is
+    where the joint axes are as lines, and where the tool is: two tables that agree in these move in the same way.
     """
 
     name: ClassVar[str] = "dh"
@@ -66,10 +66,11 @@ class DHKind(Kind):
         arm = self._arm(variant)
         names = tuple(units.of(angular).name for angular in ANGULAR)
         note = (
-            f"In {_WORDS[arm.convention]}, with the values of the posture on show. "
-            f"± {units.angles.brief(ALIGNED)}, ± {units.lengths.brief(CLOSE)}."
+            f"In {_WORDS[arm.convention]}, with the values of the exercise’s posture. "
+            f"± {units.angles.brief(ALIGNED)}, ± {units.lengths.brief(CLOSE)}. "
+            "The tab Robot shows the arm’s whole table: answer first, then compare."
         )
-        return Asked("table", NAMES, names, note, self.last - self.first + 1)
+        return Asked("table", NAMES, names, note, self.last - self.first + 1, self.first + 1)
 
     def judge(self, variant: Variant, given: object, units: Units) -> Verdict:
         arm, count = self._arm(variant), self.last - self.first + 1

@@ -107,7 +107,10 @@ class ProgramKind(Kind):
         return f'[[segments]]\nkind = "lin"\nposition = [{x!r}, {y!r}, {z!r}]\n{extra}'
 
     def solution(self, variant: Variant, units: Units) -> str:
-        return f"One program: {str(self.answer(variant)).strip()}"
+        end = _segment("lin", variant.pose[:3, 3])
+        if fastest := variant.number(self.fastest):
+            end += f"tool_speed = {1000.0 * fastest:g}\n"
+        return f"One program:\n{_text(variant, [end])}"
 
 
 def _segment(kind: str, point: Array) -> str:

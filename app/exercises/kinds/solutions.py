@@ -86,7 +86,7 @@ class SolutionsKind(Kind):
             return Verdict(True, said, parts=tuple(parts))
         wrong = [reason for fine, reason in parts if not fine]
         missing = "" if not open_ else "There is another solution." if found else "There is a solution."
-        if not wrong and len(open_) > 1:
+        if found and not wrong and len(open_) > 1:
             missing = "There are more solutions. Which joint can be bent the other way?"
         share = found / (len(solutions) + len(wrong)) if solutions else 0.0
         return Verdict(False, " ".join(filter(None, [*wrong[:1], missing])), round(share, 3), tuple(parts))

@@ -71,7 +71,7 @@ class TermKind(Kind):
         value = variant.number(self.terms[chosen][0])
         return Verdict(
             False,
-            f"This term is right: in the posture on show it is {value:.4g}, as it has to be. "
+            f"This term is right: in the posture of this exercise it is {value:.4g}, as it has to be. "
             "Choose a posture in which the other terms vanish, and compare.".replace("-", "−"),
         )
 

@@ -8,11 +8,12 @@ from collections.abc import Hashable
 import numpy as np
 import viser
 
+import kin
 from app.exercises import Asked, Exercise, Exercises, Variant, VariantError
 from app.exercises.contract import LONGEST, LONGEST_PROGRAM
 from app.exercises.typed import EntryError
 from app.viewer.exercises import views
-from app.viewer.exercises.drawing import GHOST, Drawing
+from app.viewer.exercises.drawing import GHOST, SIZE, Drawing
 from app.viewer.exercises.practice import Practice
 from app.viewer.exercises.views import Sheet
 from app.viewer.feature import Feature, Stage
@@ -20,6 +21,7 @@ from app.viewer.panel import update_html
 from app.viewer.panel.entry import read_pose
 from app.viewer.panel.readout import roll_pitch_yaw
 from app.viewer.panel.status import Notice
+from app.viewer.scene.camera import round_points
 from kin import InputError
 from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
 
@@ -68,10 +70,11 @@ class Practising(Feature):
 
     def hide(self) -> None:
         """Remove HTML and drawings; what was done is kept."""
-        self._drawing.clear()
+        if self._box is None:
+            return
+        self._undraw()
         self._show_joints(False)
-        if self._box is not None:
-            self._box.remove()
+        self._box.remove()
         self._box, self._blocks = None, []
 
     @property
@@ -90,7 +93,7 @@ class Practising(Feature):
         match key:
             case ("list", int()):
                 self._practice.at = None
-                self._drawing.clear()
+                self._undraw()
             case ("open", str(exercise_id), int()):
                 self._practice.open(exercise_id)
                 self._begin(self._now)
@@ -141,7 +144,7 @@ class Practising(Feature):
         if not self.shown:
             return
         if self._practice.at is None:
-            self._drawing.clear()
+            self._undraw()
         else:
             self._begin(self._practice.at, move=False)
         self._update()
@@ -186,16 +189,26 @@ class Practising(Feature):
         self._drawing.clear()
         variant, asked = self._variant, self._asked
         assert variant is not None
-        reach = exercise.robot.reach
+        reach, shown = exercise.robot.reach, []
         goal = asked.goal if asked.goal is not None else variant.target
         closed = self._practice.record(exercise).closed
         if goal is not None:
+            shown.append(goal)
             self._drawing.goal(goal, reach, "target")
         if asked.form == "frame":
             if closed:
-                self._drawing.goal(_pose(exercise.kind.answer(variant)), reach, "right place")
+                shown.append(right := _pose(exercise.kind.answer(variant)))
+                self._drawing.goal(right, reach, "right place")
             else:
                 self._drawing.ghost(self._ghost, reach)
+        room = [(T[:3, 3], SIZE * reach) for T in shown]
+        if exercise.q and (closed or exercise.kind.shows_posture):
+            room.append(round_points(kin.link_frames(exercise.robot, variant.q)[:, :3, 3]))
+        self.stage.fit_view(room)
+
+    def _undraw(self) -> None:
+        self._drawing.clear()
+        self.stage.fit_view(())
 
     @property
     def _asked(self) -> Asked:

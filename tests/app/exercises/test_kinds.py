@@ -14,6 +14,7 @@ import kin
 from app.exercises import Exercise, Variant, Verdict, parse_exercise
 from app.exercises.kinds import KINDS
 from app.exercises.typed import EntryError
+from app.viewer.exercises.views import Sheet, question_html
 from kin import InputError
 from kin.dh import convert
 from kin.units import Units
@@ -80,6 +81,14 @@ def test_texts_that_are_no_numbers_say_what_is_valid() -> None:
 
 
 # DH rows
+
+
+def test_a_table_counts_its_rows_as_the_arm_does() -> None:
+    one = made("irb120", "dh", "[answer]\nrows = [4, 5]")
+    asked = one[0].asked(one[1], UNITS)
+    assert (asked.first, asked.rows) == (4, 2)
+    assert 'aria-label="θ, row 4"' in question_html(asked, Sheet(), False)
+
 
 ROWS = made("irb120", "dh", 'q = ["0.3", "0.2", "-0.4", "0.1", "0.6", "0.2"]\n[answer]\nrows = [1, 2, 3, 4, 5, 6]')
 
@@ -207,7 +216,7 @@ def test_all_solutions_are_found_only_by_all_of_them() -> None:
     assert part.credit == pytest.approx(1 - 1 / len(right), abs=1e-3)
     twice = judged(ALL, [*right, right[0]])
     assert "once more" in twice.reason
-    assert not judged(ALL, []).right
+    assert judged(ALL, []).reason == "There is a solution."
 
 
 def test_a_row_that_is_no_solution_gets_its_reason() -> None:
@@ -367,6 +376,12 @@ def test_programs_are_refused_with_the_planners_own_reasons() -> None:
     for text in ("", "x", 5, "[[segments]]\nkind = 'fly'", "#" * 5000):
         with pytest.raises(InputError):
             judged(LINE, text)
+
+
+def test_the_shown_program_is_right_as_it_stands() -> None:
+    said = LINE[0].solution(LINE[1], UNITS)
+    assert judged(LINE, said.removeprefix("One program:")).right
+    assert LINE[0].asked(LINE[1], UNITS).start.splitlines()[0] in said, "in the units of the text to begin with"
 
 
 def test_every_kind_is_tested_here_or_in_the_library() -> None:

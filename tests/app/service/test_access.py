@@ -405,7 +405,7 @@ def test_the_rights_of_a_visitor_who_may_only_look():
     known = {kind for kind in ALLOWED if look.allow_message(kind)}
     assert known == {"ViewerCameraMessage", "LocalStorageGetItemResponseMessage"}
     refused = [lesson.key for lesson in LESSONS if not look.allow_lesson(lesson.key)]
-    assert refused == ["postures", "redundancy", "trajectories"]
+    assert refused == ["rotations", "screws", "inverse", "postures", "numeric", "redundancy", "trajectories"]
 
 
 # Rate limits

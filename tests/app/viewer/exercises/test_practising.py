@@ -22,7 +22,7 @@ from app.shared.store import Store
 from app.viewer.exercises.practice import Practice, Record
 from app.viewer.lessons import LESSONS
 from app.viewer.server import ViewerServer
-from app.viewer.session.state import PageState, encode
+from app.viewer.session.state import PageState, decode, encode
 from kin import InputError
 from kin.units import Units
 
@@ -152,8 +152,7 @@ def test_a_student_solves_exercises_and_the_page_keeps_it(server: int) -> None:
         tab.wait(lambda: np.allclose(tab.tool_pose(), kin.fk(one.robot, variant.q), atol=1e-6))
         tab.set("Lesson", "Velocity")
         tab.wait(lambda: "1. A column" in tab.html)
-        tab.wait(lambda: bool(tab.kept))
-        tab.settle()
+        tab.wait(lambda: any(decode(text, [one.robot]).lesson == "velocity" for text in tab.kept[-1:]))
         kept = tab.kept[-1]
     memory = json.dumps({"address": "http://127.0.0.1/", "state": kept})
     with FakeBrowser(server, memory=memory) as tab:
