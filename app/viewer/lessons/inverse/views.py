@@ -136,7 +136,7 @@ def _result(arm: Arm, branch: Branch, units: Units) -> dict[str, str]:
         "code": "reached",
         "symbol": "✓",
         "color": "green",
-        "text": f"{check} All joints are within their limits.",
+        "text": check + " All joints are within their limits.",
     }
 
 
