@@ -20,6 +20,7 @@ from numba.core.event import install_recorder
 from kin.files import builtin_robots
 from kin.fk import fk, fk_positions, jacobian, link_frames, manipulability
 from kin.ik import solve_ik
+from kin.ik.options import Task
 from kin.kernels.cached import is_cached
 from kin.kernels.fk import fk_one
 from kin.motion import JointTarget, Lin, PoseTarget, Ptp, plan_motion
@@ -37,6 +38,8 @@ from kin.workspace import (
     workspace_slice,
 )
 from kin.workspace.capability.kernels import raise_best
+
+TASKS: tuple[Task, ...] = ("pose", "approach")
 
 
 def warm_up_first() -> None:
@@ -112,8 +115,8 @@ def _move(robot: Robot) -> None:
     link_frames(robot, q)
     jacobian(robot, q)
     manipulability(robot, q)
-    solve_ik(robot, T, task="pose")
-    solve_ik(robot, T, task="approach")
+    for task in TASKS:
+        _ = solve_ik(robot, T, task=task).redundancy  # made when it is read
 
 
 def _call_all(robot: Robot) -> None:
@@ -125,7 +128,7 @@ def _call_all(robot: Robot) -> None:
     jacobian(robot, pair)
     far = T.copy()
     far[:3, 3] *= 10.0
-    solve_ik(robot, T, task="position")
+    _ = solve_ik(robot, T, task="position").redundancy
     solve_ik(robot, T, task="position", prefer="limits")
     solve_ik(robot, far, task="pose")
     solve_ik(robot, T, mask=(True, True, False, False, False, False))

@@ -35,4 +35,7 @@ def run(arguments: Namespace) -> int:
             import app.service.main as service
 
             gc.freeze()  # later collections skip what has been imported
-        return service.run(settings, open_browser=arguments.open)
+        try:
+            return service.run(settings, open_browser=arguments.open)
+        finally:
+            gc.unfreeze()

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kin.collision.kernels import distances_of_pairs
+from kin.named import robot_of
 from kin.robot import Joint, Robot, exact_cos_sin
 from kin.transforms import Array
 
@@ -62,9 +63,9 @@ class Bodies:
     pairs: NDArray[np.int64]
 
 
-def capsules(robot: Robot) -> tuple[Capsule, ...]:
+def capsules(robot: Robot | str) -> tuple[Capsule, ...]:
     """The assumed capsules of an arm, base first."""
-    return bodies_of(robot).capsules
+    return bodies_of(robot_of(robot)).capsules
 
 
 @lru_cache(maxsize=64)
