@@ -94,7 +94,7 @@ def pose_text(T: Array, units: Units) -> str:
 
 
 def joints_text(variant: Variant, q: Array, units: Units) -> str:
-    """Joint values, such as ``θ₁ = 30°, θ₂ = 45°``."""
+    """Joint values, such as ``joint 1 at 30°, joint 2 at 45°``."""
     robot = variant.robot
     return ", ".join(
         f"joint {i + 1} at {units.of(bool(turns)).text(float(value), 1)}"

@@ -35,7 +35,6 @@ def read_rotation(text: str, convention: Convention, units: Units) -> Array:
         case found:
             detail = (
                 f"Found {found}. Valid: 3 angles in {units.angles.name}, a quaternion w x y z, or the "
-                "9 numbers of a "
-                "matrix, row by row."
+                "9 numbers of a matrix, row by row."
             )
             raise EntryError("The rotation needs another count of numbers", detail)
