@@ -148,8 +148,11 @@ class Stage(Protocol):
     def show_joints(self, folder: viser.GuiFolderHandle | None) -> None:
         """Show the joint sliders in this folder as well; None: in the tab Move only."""
 
-    def fit_view(self, spheres: Sequence[Sphere]) -> None:
-        """Make the default view show these spheres as well as the arm. A view chosen by the visitor stays."""
+    def fit_view(self, spheres: Sequence[Sphere], points: Array | None = None) -> None:
+        """Make the default view show these spheres and points ``(n, 3)`` as well as the arm.
+
+        A view chosen by the visitor stays.
+        """
 
 
 class Feature:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from app.viewer.panel import Post
 from app.viewer.panel.view import Side
 from app.viewer.scene.meshes import Body
-from app.viewer.scene.viewpoints import DIRECTIONS, FOV, GLIDE, UP, between, contains, place
+from app.viewer.scene.viewpoints import DIRECTIONS, FOV, GLIDE, UP, between, contains, distance_to_see, place
 from kin.transforms import Array
 
 DIRECTION = np.array([0.80, 0.92, 0.46])  # of the default view, from the arm to the camera
@@ -36,6 +36,7 @@ _SMALL_PICTURE = 420  # pixels
 _ABOVE = 0.3  # room above a target for the number that is written there, in these radii
 _OUTLOOK = 5.0  # in these radii: a target farther away is not shown
 _SMALLEST = 0.01  # metres; viser's own limit of zooming in
+_INSIDE = 0.88  # share of the picture, in both directions, that contains the extra points: they have labels
 _RESIZED = 0.01  # relative change of the picture's narrow side that moves the camera
 Sphere = tuple[Array, float]  # centre ``(3,)`` and radius, m
 
@@ -102,17 +103,19 @@ class VisitorCamera:
         self.chosen: Array | None = None
         self._body: Body | None = None
         self._room: tuple[Sphere, ...] = ()
+        self._extra = np.zeros((0, 3))  # points that the default view shows besides `_room`
         self._points = np.zeros((0, 3))
         self._glide: tuple[Array, float] | None = None  # start of the way to `_aimed`, and when it began
         self._camera.on_update(self._on_update)
 
     def aim(self, body: Body, points: Array | None = None, glide: bool = False) -> None:
-        """Move to the default view, at once or in a glide; for another arm, the extra spheres are dropped.
+        """Move to the default view, at once or in a glide; for another arm, what `fit` added is dropped.
 
         The view also contains the origins of the arm's frames `points` ``(n, 3)``, by default the last ones given.
         """
         if body is not self._body:
-            self._body, self._room, self._points = body, (), np.zeros((0, 3))
+            self._body, self._room = body, ()
+            self._points = self._extra = np.zeros((0, 3))
         if points is not None:
             self._points = points
         self._camera.fov = FOV
@@ -122,6 +125,9 @@ class VisitorCamera:
         viewpoint = np.stack([*view(body, self._framed, self._room), UP])
         if not self._shows(viewpoint, self._points):
             viewpoint = np.stack([*view(body, self._framed, [*self._room, self._arm(self._points)]), UP])
+        if len(self._extra):
+            least = distance_to_see(viewpoint, self._framed, self._extra, _INSIDE)
+            viewpoint = _at_distance(viewpoint, max(1.0, least / _distance(viewpoint)))
         self._go(viewpoint, glide)
         self._camera.min_orbit_distance = _SMALLEST  # never above the upper limit
         self._camera.max_orbit_distance = max(_REMOTEST * body.radius, 1.5 * _distance(viewpoint))
@@ -185,11 +191,12 @@ class VisitorCamera:
         """Where a point ``(3,)`` will be in the picture, and how long a length there; see `viewpoints`."""
         return place(self._viewpoint, self._aspect, point, length)
 
-    def fit(self, spheres: Sequence[Sphere]) -> None:
-        """Make the default view show these spheres as well; a `chosen` view stays as it is."""
-        before, self._room = self._room, tuple(spheres)
+    def fit(self, spheres: Sequence[Sphere], points: Array | None = None) -> None:
+        """Make the default view show these spheres and points ``(n, 3)`` as well; a `chosen` view stays."""
+        before = len(self._room) + len(self._extra)
+        self._room, self._extra = tuple(spheres), np.zeros((0, 3)) if points is None else points
         self.look()
-        if self._body is not None and self.chosen is None and (before or spheres):
+        if self._body is not None and self.chosen is None and before + len(self._room) + len(self._extra):
             self.aim(self._body)
 
     def restore(self, viewpoint: Array) -> None:

@@ -33,6 +33,17 @@ def contains(viewpoint: Array, aspect: float, points: Array, margin: float) -> b
     return bool((seen[:, 2] > margin).all() and (np.abs(seen[:, :2]) <= room).all())
 
 
+def distance_to_see(viewpoint: Array, aspect: float, points: Array, share: float) -> float:
+    """Least distance to the look-at point, in the viewpoint's direction, that shows all these points ``(n, 3)``.
+
+    They are within this share (0–1) of the picture's width and height.
+    """
+    seen = _seen(viewpoint, points)
+    half = share * math.tan(FOV / 2.0)
+    ahead = seen[:, 2] - float(np.linalg.norm(viewpoint[1] - viewpoint[0]))  # of the look-at point
+    return float(((np.abs(seen[:, :2]) / (half * aspect, half)).max(axis=1) - ahead).max())
+
+
 def place(viewpoint: Array, aspect: float, point: Array, length: float) -> tuple[float, float, float]:
     """Where a point ``(3,)`` is in the picture, to the right of and above the middle, and how long a length there.
 

@@ -176,8 +176,8 @@ class VisitorPage(ShownArm, Worker):
         self.sliders.remove()
         self.sliders = self._make_sliders()
 
-    def fit_view(self, spheres: Sequence[Sphere]) -> None:
-        self.camera.fit(spheres)
+    def fit_view(self, spheres: Sequence[Sphere], points: Array | None = None) -> None:
+        self.camera.fit(spheres, points)
 
     # SavedPage: what persistence may use besides
 

@@ -13,7 +13,7 @@ from app.exports.svg import joint_colour, tick_labels
 from kin.transforms import Array
 
 WIDTH, LEFT, RIGHT, HIGH, GAP, TOP, BOTTOM = 320.0, 44.0, 8.0, 62.0, 22.0, 16.0, 18.0
-_SHORT = 4  # characters
+_HALF = 3.1  # half of the width of a character
 FEW = 4  # numbers on an axis
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -57,14 +57,16 @@ def chart(rows: tuple[Row, ...], curves: tuple[Curve, ...], label: str, axis: st
         parts += _row(row, k, curves, (start, end))
     bottom = TOP + len(rows) * HIGH + (len(rows) - 1) * GAP
     marks = _thin([mark for mark in tick_labels(start, end, 1.0) if not whole or mark[0] % 1.0 == 0.0], 7)
-    for value, text in marks:
-        x = LEFT + (value - start) / (end - start) * (WIDTH - LEFT - RIGHT)
-        unit = f" {axis}" if value == marks[-1][0] else ""
-        # A long unit is kept within the plot.
-        side, at = ("end", WIDTH - RIGHT) if len(unit) > _SHORT else ("middle", min(x, WIDTH - RIGHT - 8))
-        parts.append(
-            f'<text x="{at:.1f}" y="{bottom + 13:.1f}" text-anchor="{side}" class="kb-axis">{text}{unit}</text>'
-        )
+    free = WIDTH  # right end of the room for the next number; the last one, with the unit, has priority
+    for value, text in reversed(marks):
+        words = f"{text} {axis}" if value == marks[-1][0] else text
+        half = _HALF * len(words)
+        x = min(LEFT + (value - start) / (end - start) * (WIDTH - LEFT - RIGHT), WIDTH - half)
+        if x + half <= free:
+            free = x - half - _HALF
+            parts.append(
+                f'<text x="{x:.1f}" y="{bottom + 13:.1f}" text-anchor="middle" class="kb-axis">{words}</text>'
+            )
     name = Markup('<span class="kb-chart-name"><i style="background:{}"></i>{}</span> ')
     legend = Markup("").join(name.format(joint_colour(i), curve.name) for i, curve in enumerate(curves))
     svg = Markup(

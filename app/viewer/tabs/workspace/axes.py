@@ -31,6 +31,9 @@ def box_of(robot: Robot) -> tuple[Array, Array]:
 class Axes:
     """The axes of one visitor's scene.
 
+    Attributes:
+        corners: the ends of the axes and the places of their titles ``(n, 3)``; None: no axes are shown.
+
     Args:
         new_root: returns a prefix of node names that was never used before.
     """
@@ -40,6 +43,7 @@ class Axes:
         self._new_root = new_root
         self._top: viser.FrameHandle | None = None
         self._shown: tuple[Robot, Units, bool] | None = None
+        self.corners: Array | None = None
 
     def show(self, robot: Robot | None, units: Units, dark: bool) -> None:
         """Draw the axes of this arm's workspace; None: no axes."""
@@ -55,13 +59,13 @@ class Axes:
         """Remove the axes."""
         if self._top is not None:
             self._top.remove()
-        self._top = self._shown = None
+        self._top = self._shown = self.corners = None
 
     def _draw(self, low: Array, high: Array, units: Units, ink: tuple[int, int, int]) -> None:
         root, scene, unit = self._new_root(), self._scene, units.lengths
         self._top = scene.add_frame(root, show_axes=False)
         size = float((high - low).max())
-        segments = []
+        segments, titles = [], []
         for axis, letter in enumerate("xyz"):
             start = low.copy()
             # The vertical axis stands at another corner than that where x and y meet: their numbers are apart.
@@ -80,6 +84,8 @@ class Axes:
                     add_label(scene, name, text, position=at + 2.4 * out, scale=0.75, anchor="center-center")
             title = f"{letter} ({unit.name})"
             beyond = end + 0.05 * size * np.eye(3)[axis]
+            titles.append(beyond)
             add_label(scene, f"{root}/{letter}", title, position=beyond, scale=0.9, anchor="center-center")
+        self.corners = np.vstack([low, *titles])
         lines = np.array(segments, np.float32)
         scene.add_line_segments(f"{root}/lines", lines, ink, thickness=1.5, thickness_units="screen")

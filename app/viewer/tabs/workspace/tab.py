@@ -57,7 +57,8 @@ class Workspace(Feature):
         self._plotted = self._dotted = self._moved = 0.0
         self._tool = kin.fk(stage.robot, stage.q)[:3, 3]
         self._dot_due = False
-        self._in_view: tuple[int, bool] = (0, False)  # number of clouds, and whether there is a map
+        # Number of clouds, whether there is a map, and the arm whose axes are shown.
+        self._in_view: tuple[int, bool, Robot | None] = (0, False, None)
         self._capability = Capability(
             stage,
             window,
@@ -279,12 +280,13 @@ class Workspace(Feature):
         return f"/workspace-{self._roots}"
 
     def _fit_view(self) -> None:
-        """Fit the default view to the clouds and the map when they appear, and to the arm when they are gone."""
+        """Fit the default view to clouds, map and axes when they appear, and to the arm when they are gone."""
         clouds, mapped = self._clouds.extents, self._capability.extent
-        in_view = (len(clouds), mapped is not None)
+        corners = self._axes.corners
+        in_view = (len(clouds), mapped is not None, None if corners is None else self.stage.robot)
         if in_view != self._in_view:
             self._in_view = in_view
-            self.stage.fit_view(clouds if mapped is None else [*clouds, mapped])
+            self.stage.fit_view(clouds if mapped is None else [*clouds, mapped], corners)
 
     # Cut
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
@@ -9,7 +11,7 @@ from fake_browser import FakeBrowser
 import kin
 from app.viewer.lessons.guide.outline import Number
 from app.viewer.lessons.trajectories import motions
-from app.viewer.lessons.trajectories.chart import Curve, Row, chart
+from app.viewer.lessons.trajectories.chart import WIDTH, Curve, Row, chart
 from app.viewer.lessons.trajectories.questions import OFFSETS, SPEED, outline
 from kin import Robot
 from kin.motion import profiles
@@ -64,6 +66,20 @@ def test_a_load_behind_a_ramp_of_its_own_period_rests_after_the_stop() -> None:
     times, x = motions.swing(push, 1.0)
     first = x[(times > 0.0) & (times < 1.0)]
     assert first.min() == pytest.approx(-2.0 / (2 * np.pi) ** 2, rel=0.05)
+
+
+@pytest.mark.parametrize("axis", ["s", "mm", "iterations"])
+@pytest.mark.parametrize("end", [0.3, 1.0, 250.0])
+def test_the_numbers_of_the_horizontal_axis_stay_inside_and_apart(end: float, axis: str) -> None:
+    times = np.linspace(0.0, end, 5)
+    shown = str(chart((Row("a"),), (Curve("b", times, (times,)),), "c", axis))
+    numbers = re.findall(r'<text x="([\d.]+)" y="[\d.]+" text-anchor="middle" class="kb-axis">([^<]+)', shown)
+    numbers.reverse()
+    assert numbers[-1][1].endswith(f" {axis}")
+    half = [3.0 * len(text) for _, text in numbers]  # of the widths, in pixels
+    middle = [float(x) for x, _ in numbers]
+    assert middle[-1] + half[-1] <= WIDTH
+    assert all(middle[i] + half[i] < middle[i + 1] - half[i + 1] for i in range(len(numbers) - 1))
 
 
 def test_names_in_a_chart_are_escaped() -> None:

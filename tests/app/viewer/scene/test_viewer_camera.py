@@ -242,6 +242,11 @@ def test_the_camera_makes_room_for_drawings_but_keeps_a_chosen_view() -> None:
     assert distance() > 1.5
     of_visitor.fit([])
     assert np.array_equal(lens.position, near), "and comes near again"
+    of_visitor.fit([], points)
+    there = np.stack([lens.position, lens.look_at, lens.up_direction])
+    assert viewpoints.contains(there, 956 / 720, points, 0.0)
+    of_visitor.fit([])
+    assert np.array_equal(lens.position, near)
     of_visitor.restore(ASIDE)
     of_visitor.fit(room)
     assert np.array_equal(lens.position, ASIDE[0]), "it is the visitor's now"

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from app.viewer.panel.view import SIDES
-from app.viewer.scene.viewpoints import DIRECTIONS, FOV, UP, between, contains, place
+from app.viewer.scene.viewpoints import DIRECTIONS, FOV, UP, between, contains, distance_to_see, place
 
 POINT = arrays(float, 3, elements=st.floats(-3.0, 3.0))
 
@@ -34,6 +34,16 @@ def test_a_picture_contains_what_lies_between_its_edges(side: str, aspect: float
             assert not contains(viewpoint, aspect, np.array([0.98 * sign * edge * axis]), 0.1 * edge)
             assert not contains(viewpoint, aspect, np.array([1.02 * sign * edge * axis]), 0.0)
     assert not contains(viewpoint, aspect, np.array([2.0 * viewpoint[0]]), 0.0), "behind the camera"
+
+
+@given(points=arrays(float, (6, 3), elements=st.floats(-3.0, 3.0)), aspect=st.floats(0.4, 2.5))
+def test_at_the_least_distance_a_point_is_at_the_edge_none_outside(points: np.ndarray, aspect: float) -> None:
+    start = from_side(DIRECTIONS["Corner"])
+    points[0] = (0.0, 0.0, 1.0)  # at least one off the line of sight
+    least = distance_to_see(start, aspect, points, 1.0)
+    assert contains(from_side(DIRECTIONS["Corner"], 1.001 * least), aspect, points, 0.0)
+    assert not contains(from_side(DIRECTIONS["Corner"], 0.999 * least), aspect, points, 0.0)
+    assert distance_to_see(start, aspect, points, 0.8) >= least
 
 
 def test_from_the_top_y_points_up() -> None:

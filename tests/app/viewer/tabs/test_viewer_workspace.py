@@ -401,7 +401,7 @@ def test_pause_stops_the_cloud_and_continue_resumes_it(tab):
     tab.done(n)
     assert offered(tab) == ("Clear",)
     tab.set("Seed", 13)
-    tab.wait(lambda: offered(tab) == ("Start", "Clear"))
+    tab.wait(lambda: offered(tab) == ("Restart", "Clear"))
     tab.set("Seed", 12)
     assert np.abs(tab.points() - whole(PIONEER, n, 12).points).max() < HALF
     tab.click("Clear")
