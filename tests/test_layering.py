@@ -45,7 +45,7 @@ RULES: dict[str, set[str]] = {
     "app/bench/contestants": {
         *("kin", "numpy", "numba", "app.bench"),
         *("eaik", "ik_geo", "ikpy", "pinocchio", "py_opw_kinematics", "roboticstoolbox", "ruckig", "scipy"),
-        *("spatialmath", "ssik", "toppra"),
+        *("roboplan", "spatialmath", "ssik", "toppra"),
     },
     "app/api": {
         *("fastapi", "starlette", "pydantic", "pydantic_core", "typing_extensions", "numpy", "kin"),

@@ -33,5 +33,6 @@ PEERS: tuple[Peer, ...] = (
     Peer("roboticstoolbox-python", "roboticstoolbox", _toolbox),
     Peer("ruckig", "ruckig", motions.ruckig),
     Peer("toppra", "toppra", motions.toppra),
+    Peer("roboplan", "roboplan.toppra", motions.roboplan),
     Peer("ikpy", "ikpy", iterative.ikpy),
 )

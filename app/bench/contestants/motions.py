@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+import tempfile
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -127,6 +130,37 @@ def toppra(task: Task) -> list[Contestant]:
         return [np.array([found(times, order) for order in range(3)])]
 
     return [Contestant("toppra", solve, paths, read)]
+
+
+def roboplan(task: Task) -> list[Contestant]:
+    from roboplan import core, toppra
+
+    if task.row.kind != "pace":
+        return []
+    # Joints and links have one name space there.
+    urdf = re.sub(r'<joint name="([^"]*)"', r'<joint name="joint of \1"', kin.to_urdf(task.robot))
+    scene = core.Scene("arm", core.loadUrdfSceneDescriptionFromXml(urdf))
+    names = scene.getJointNames()
+    lines = ["joint_limits:"]
+    for name, (velocity, acceleration, _) in zip(names, limits_of(task).tolist(), strict=True):
+        lines += [f"  {name}:", f"    max_velocity: [{velocity}]", f"    max_acceleration: [{acceleration}]"]
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "limits.yaml")
+        file.write_text("\n".join(lines), "utf-8")
+        scene.importJointLimitsFromConfig(core.loadJointLimitsConfig(file))
+    options = toppra.TOPPRAOptions()
+    options.mode = toppra.SplineFittingMode.Cubic
+    inputs = []
+    for q in task.q:
+        path = core.JointPath()
+        path.joint_names, path.positions = names, list(waypoints(task, q))
+        inputs.append((path, options))
+
+    def read(found: Any) -> list[Array]:
+        return [np.array([found.positions, found.velocities, found.accelerations])]
+
+    solve = toppra.PathParameterizerTOPPRA(scene).generate
+    return [Contestant("roboplan, sampled", solve, inputs, read)]
 
 
 def toolbox(task: Task) -> list[Contestant]:
