@@ -50,13 +50,13 @@ GATES: tuple[Gate, ...] = (
     Gate("fk-batch", OURS, 1.5),
     Gate("workspace", OURS, 0.5),
     Gate("ik-pioneer5", OURS, 15.0),
-    Gate("ik-pioneer5", SOLVE_IK, 700.0),
+    Gate("ik-pioneer5", SOLVE_IK, 260.0),
     Gate("ik-pioneer5-batch", OURS, 4.0),
     Gate("ik-srs", OURS, 15.0),
     Gate("ik-srs-batch", OURS, 2.5),
     Gate("ik-puma560-batch", OURS, 3.0),
     Gate("ik-ur5-batch", OURS, 3.0),
-    Gate("solve-redundant7-craig", SOLVE_IK, 1200.0),
+    Gate("solve-redundant7-craig", SOLVE_IK, 360.0),
 )
 
 
