@@ -46,5 +46,5 @@ failed=0
 pytest $twice -n 3 --dist loadfile -m "not slow and not browser and not bench" || failed=1
 wait $browsing || failed=1
 cat "$log"
-pytest -m "not slow and bench" || failed=1
+pytest $twice -m "not slow and bench" || failed=1
 exit $failed
