@@ -139,15 +139,15 @@ class Part:
     def hide(self) -> None:
         """Hide the part until it is shown again."""
         for node in (*self.nodes, self.label):
-            _set_visible(node, False)
+            set_visible(node, False)
         self._figure.labels.pop(self, None)
         self._place = 0
 
     def _write(self, text: str, *places: Array) -> None:
         """Show the nodes, and the label with this text at the first of these points ``(3,)`` that has room."""
         for node in self.nodes:
-            _set_visible(node, True)
-        _set_visible(self.label, bool(text))
+            set_visible(node, True)
+        set_visible(self.label, bool(text))
         if text != self.label.text:
             self.label.text = text
         if not text:
@@ -318,11 +318,11 @@ class Face:
     def show(self, corners: ArrayLike) -> None:
         """Draw it with these corners ``(k, 3)``, in order, convex."""
         self.node.vertices = np.asarray(corners, np.float32)
-        _set_visible(self.node, True)
+        set_visible(self.node, True)
 
     def hide(self) -> None:
         """Hide it until it is shown again."""
-        _set_visible(self.node, False)
+        set_visible(self.node, False)
 
 
 def arc(corner: ArrayLike, start: ArrayLike, about: ArrayLike, radius: float, angle: float) -> Segments:
@@ -388,6 +388,7 @@ def _unit(v: Array) -> Array:
     return np.asarray(v / length if length > _TINY else np.zeros(3))
 
 
-def _set_visible(node: viser.SceneNodeHandle, visible: bool) -> None:
+def set_visible(node: viser.SceneNodeHandle, visible: bool) -> None:
+    """Show or hide a node; nothing is sent if it is so already."""
     if node.visible != visible:
         node.visible = visible

@@ -12,6 +12,7 @@ import numpy as np
 import viser
 
 from app.viewer.labels import add_label
+from app.viewer.lessons.figures import set_visible
 from app.viewer.lessons.redundancy.path import elbow_paths, has_path
 from app.viewer.lessons.redundancy.ring import FLAT, Circle, arc_segments, elbow_circle, trade_segments
 from app.viewer.scene.bodies.parts import JOINT_COLORS
@@ -107,13 +108,13 @@ class Drawing:
         """Draw the configuration ``(n,)``: the line from shoulder to wrist and the elbow, or the trade."""
         circle = self._circle_at(q) if item is not None and item.name == "psi" else None
         for node in (self._line, self._circle, self._pointer):
-            _set_visible(node, circle is not None)
+            set_visible(node, circle is not None)
         if circle is not None and item is not None:
             _set_points(self._line, np.array([[circle.shoulder, circle.wrist]]))
             _set_points(self._circle, arc_segments(circle, (), 1.0)[0])
             _set_points(self._pointer, np.array([[circle.center, circle.at(item.value, RING + 0.1)]]))
         for node in self._trade:
-            _set_visible(node, trades)
+            set_visible(node, trades)
         if trades:
             chords, joints = trade_segments(self._robot, q, TRADE_RADIUS * self._size)
             for i, node in enumerate(self._trade):
@@ -123,11 +124,6 @@ class Drawing:
         circle = elbow_circle(self._robot, q)
         smallest = max(FLAT, SMALLEST_CIRCLE * self._size)
         return circle if circle is not None and circle.radius > smallest else None
-
-
-def _set_visible(node: viser.SceneNodeHandle, visible: bool) -> None:
-    if node.visible != visible:
-        node.visible = visible
 
 
 def _set_points(node: viser.LineSegmentsHandle, points: Array) -> None:

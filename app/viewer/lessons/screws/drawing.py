@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import viser
 
-from app.viewer.lessons.figures import GREY, Figure, clear_of
+from app.viewer.lessons.figures import GREY, Figure, clear_of, set_visible
 from app.viewer.lessons.screws.product import foot
 from app.viewer.lessons.velocity.drawing import arrow_color, ring_arrow, wxyz_along
 from app.viewer.scene.bodies.parts import joint_color
@@ -100,7 +100,7 @@ class Drawing:
             mark = self._marks[i]
             if isinstance(mark, viser.ArrowsHandle):
                 mark.points = np.array([[tip - 0.2 * r * z, tip + 0.02 * r * z]], np.float32)
-                _set_visible(mark, True)
+                set_visible(mark, True)
             else:
                 mark.position = tip - 0.02 * r * z
                 mark.wxyz = wxyz_along(z)
@@ -116,7 +116,7 @@ class Drawing:
         local = np.concatenate([S[:3], v])
         size = float(np.linalg.norm(v))
         there = size > _SHORT * self._radius
-        _set_visible(self._velocity, there)
+        set_visible(self._velocity, there)
         if there and self._robot.revolute[joint]:
             end = origin + foot(local)
             self._foot.show(origin, end, units, clear_of(origin, end, self.tips))
@@ -127,7 +127,7 @@ class Drawing:
 
     def show_ghost(self, q: Array | None) -> None:
         """Draw the arm at a configuration ``(n,)``; None hides it."""
-        _set_visible(self._ghost, q is not None)
+        set_visible(self._ghost, q is not None)
         if q is not None:
             positions, wxyz, _ = places(self._robot, q[None])
             self._ghost.batched_positions = positions[0].astype(np.float32)
@@ -151,8 +151,3 @@ def spread_tips(points: Array, directions: Array, reach: float, apart: float) ->
 
 def _subscript(number: int) -> str:
     return str(number).translate(str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉"))
-
-
-def _set_visible(node: viser.SceneNodeHandle, visible: bool) -> None:
-    if node.visible != visible:
-        node.visible = visible

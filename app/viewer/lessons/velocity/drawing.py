@@ -13,6 +13,7 @@ import trimesh
 import viser
 
 from app.viewer.labels import add_label
+from app.viewer.lessons.figures import set_visible
 from app.viewer.lessons.velocity.rates import Ellipsoid
 from app.viewer.scene.arm import GIZMO
 from app.viewer.scene.meshes import body
@@ -145,11 +146,11 @@ class Drawing:
     def show_column(self, linear: Array | None, angular: Array | None) -> None:
         """Draw a straight arrow ``(3,)`` in metres and a turning arrow about ``(3,)``; None or zero hides one."""
         straight = linear is not None and float(np.linalg.norm(linear)) > 0.02 * self.radius
-        _set_visible(self._column, straight)
+        set_visible(self._column, straight)
         if straight:
             self._column.points = np.array([[np.zeros(3), linear]], np.float32)
         turning = angular is not None and float(np.linalg.norm(angular)) > 1e-6
-        _set_visible(self._turn, turning)
+        set_visible(self._turn, turning)
         if angular is not None and turning:
             self._turn.wxyz = wxyz_along(angular)
 
@@ -163,19 +164,19 @@ class Drawing:
                 end = twist[:3] / size * LOST_ARROW * self.radius
                 start = end * (CLEAR / LOST_ARROW)
                 arrows += [[start, end], [-start, -end]]
-        _set_visible(self._lost, bool(arrows))
+        set_visible(self._lost, bool(arrows))
         if arrows:
             self._lost.points = np.array(arrows, np.float32)
             self._lost.colors = np.array(arrow_color(color), np.uint8)
         turning = [twist for twist in twists[:MOST_LOST] if float(np.linalg.norm(twist[3:])) > 1e-3]
-        _set_visible(self._lost_axes, bool(turning))
+        set_visible(self._lost_axes, bool(turning))
         if turning:
             places = np.array([[np.zeros(3), self._ring_place(twist)] for twist in turning], np.float32)
             self._lost_axes.points = places
             self._lost_axes.colors = np.array(color, np.uint8)
         for k, node in enumerate(self._lost_turns):
             shown = k < len(twists) and float(np.linalg.norm(twists[k, 3:])) > 1e-3
-            _set_visible(node, shown)
+            set_visible(node, shown)
             if shown:
                 node.wxyz = wxyz_along(twists[k, 3:])
                 node.position = self._ring_place(twists[k])
@@ -218,11 +219,6 @@ def sides(tips: Array, towards: Array) -> Array:
     # The first of equals: the labels of a moving arm must not jump needlessly.
     best: Array = CHOICES[int(np.argmax(apart > apart.max() - 1e-3 * np.abs(tips).max()))]
     return best
-
-
-def _set_visible(node: viser.SceneNodeHandle, visible: bool) -> None:
-    if node.visible != visible:
-        node.visible = visible
 
 
 def wxyz_along(direction: Array) -> tuple[float, float, float, float]:
