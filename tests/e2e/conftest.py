@@ -20,6 +20,17 @@ CHROMIUM = Path(os.environ.get("KINBOARD_TEST_CHROMIUM", "/usr/bin/chromium"))
 ROOT = Path(__file__).parents[2]
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
+    """Add what the pages showed to the report of a test that failed."""
+    report: pytest.TestReport = yield  # type: ignore[assignment, misc]
+    if report.when == "call" and report.failed:
+        for name, opened in getattr(item, "funcargs", {}).items():
+            if isinstance(opened, Tab):
+                report.sections.append((f"page of {name}", opened.text()))
+    return report  # type: ignore[return-value]
+
+
 @pytest.fixture(scope="session")
 def address() -> Iterator[str]:
     """The service as a user starts it, on a free port."""

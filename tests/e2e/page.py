@@ -68,6 +68,10 @@ class Tab:
         if notice.is_visible():
             notice.click()
 
+    def text(self) -> str:
+        """The address and all texts and buttons of the page, as a screen reader has them."""
+        return f"{self.page.url}\n{self.page.locator('body').aria_snapshot()}"
+
     def close(self) -> None:
         self.page.close()
         assert self.errors == []
