@@ -103,6 +103,7 @@
     clearTimeout(left);
     gone = false;
     if (cell?.matches("input") && name !== focus) cell.select();
+    if (focus && name !== focus) { flush(); dispatchEvent(new CustomEvent("kinboard-send", { detail: ["released"] })); }
     if (focus && !cell) left = setTimeout(leave, LEFT);
     focus = name;
   });

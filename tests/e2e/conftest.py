@@ -28,6 +28,7 @@ def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
         for name, opened in getattr(item, "funcargs", {}).items():
             if isinstance(opened, Tab):
                 report.sections.append((f"page of {name}", opened.text()))
+                opened.spoilt = True
     return report  # type: ignore[return-value]
 
 
@@ -92,8 +93,17 @@ def phone(browser: Browser, address: str) -> Iterator[Tab]:
     opened.close()
 
 
+@pytest.fixture(autouse=True)
+def no_spoilt_page(request: pytest.FixtureRequest) -> None:
+    """A test never begins on a page that a failed one has left in some state."""
+    for name in {"desktop", "phone"} & set(request.fixturenames):
+        opened: Tab = request.getfixturevalue(name)
+        if opened.spoilt:
+            opened.reopen()
+
+
 @pytest.fixture
-def tab(desktop: Tab) -> Tab:
+def tab(desktop: Tab, no_spoilt_page: None) -> Tab:
     """The desktop tab with the Pioneer arm in its home configuration."""
     desktop.show(kin.get_robot("pioneer5"))
     return desktop

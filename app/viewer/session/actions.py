@@ -19,7 +19,7 @@ from app.viewer.panel.status import Notice, introduction
 from app.viewer.panel.target import DEFAULT_TASK, TASKS
 from app.viewer.panel.view import SIDES, ViewState
 from app.viewer.scene.gizmo import Pull
-from app.viewer.session.history import LONG_PAUSE, SHORT_PAUSE, History, Step, is_gradual, same, without_results
+from app.viewer.session.history import LONG_PAUSE, SHORT_PAUSE, History, Step, pause_within, same, without_results
 from app.viewer.session.persistence import link_notice
 from app.viewer.session.robots import RobotPage, robot_of
 from app.viewer.session.state import PageState, decode
@@ -37,7 +37,7 @@ NO_STEP = frozenset(
 )
 # Controls that send many values on the way to the one the visitor means: how long (s) a step may pause.
 GRADUAL = {
-    "gizmo": math.inf, "joint": LONG_PAUSE, "redundancy": LONG_PAUSE, "feature": SHORT_PAUSE, "nudge": SHORT_PAUSE,
+    "gizmo": math.inf, "joint": LONG_PAUSE, "redundancy": LONG_PAUSE, "nudge": SHORT_PAUSE,
 }  # fmt: skip
 MESSAGES = (
     "undo", "redo", "travel", "released", "snap", "nudge", "axes", "field", "target", "fit-arm", "look-from",
@@ -212,9 +212,9 @@ class Actions:
 
     def _continues(self, gesture: tuple[object, ...], value: object, now: float) -> bool:
         """Whether an event belongs to the same step as the one before."""
-        if gesture != self._gesture or now - self._changed_at > GRADUAL.get(str(gesture[0]), 0.0):
-            return False
-        if gesture[0] == "feature" and not is_gradual(gesture[2], value):
+        name = str(gesture[0])
+        longest = pause_within(gesture[2], value) if name == "feature" else GRADUAL.get(name, 0.0)
+        if gesture != self._gesture or longest == 0.0 or now - self._changed_at > longest:
             return False
         self._changed_at = now
         return True

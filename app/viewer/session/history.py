@@ -8,7 +8,7 @@ from app.viewer.session.state import PageState, encode
 
 LIMIT = 100  # steps; older ones are forgotten
 # s: further changes by the same control within this time belong to the same step. The page reports when a slider
-# is released; the longer time is for a report that was lost.
+# is released or a cell is left; the longer time is for a report that was lost.
 SHORT_PAUSE, LONG_PAUSE = 1.0, 20.0
 # The part of a feature's state that is a result and not a setting: undo neither repeats nor clears it.
 RESULT = "drawn"
@@ -80,11 +80,15 @@ def _settings(state: PageState) -> PageState:
     return replace(state, camera=None, features=features)
 
 
-def is_gradual(key: object, value: object) -> bool:
-    """Whether an event of a feature is part of a drag or of typing; a choice or a button is a step of its own."""
+def pause_within(key: object, value: object) -> float:
+    """Seconds that may pass between two events of a feature's control that belong to one step.
+
+    Drags and typing are one step each; a choice or a button is always one of its own. Typing into a cell ends when
+    the visitor leaves the cell, which the page reports.
+    """
     if isinstance(key, tuple) and key and key[0] == "cell":
-        return bool(key[-1] != "kind")
-    return isinstance(value, int | float | tuple) and not isinstance(value, bool)
+        return LONG_PAUSE if key[-1] != "kind" else 0.0
+    return SHORT_PAUSE if isinstance(value, int | float | tuple) and not isinstance(value, bool) else 0.0
 
 
 def without_results(values: dict[str, object]) -> dict[str, object]:

@@ -7,6 +7,7 @@ import html
 import json
 import math
 import re
+import time
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ import kin
 from app.shared.store import Store
 from app.viewer.lessons import LESSONS
 from app.viewer.own_arm import own_arm, pack
+from app.viewer.session.history import SHORT_PAUSE
 from app.viewer.session.state import PageState, decode, encode
 from app.viewer.tabs.robot import files
 from app.viewer.tabs.robot.files import MOST
@@ -133,6 +135,22 @@ def test_each_choice_is_a_step_and_typing_is_one(port: int) -> None:
         tab.say("undo")
         tab.settle()
         assert '<option value="prismatic" selected>' in part(tab, "table")
+        tab.say("undo")
+        tab.settle()
+        assert tab.value("Robot") == PIONEER.name
+
+
+def test_slow_typing_is_one_step_until_the_cell_is_left(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        type_in(tab, 1, "a", "2")
+        time.sleep(1.1 * SHORT_PAUSE)
+        type_in(tab, 1, "a", "250")
+        tab.say("released")
+        type_in(tab, 1, "a", "255")
+        tab.say("undo")
+        tab.settle()
+        assert cell(tab, "1 a") == "250"
         tab.say("undo")
         tab.settle()
         assert tab.value("Robot") == PIONEER.name
