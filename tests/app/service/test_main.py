@@ -280,9 +280,16 @@ def listening(pid: int) -> list[int]:
 SOON = 30  # s; a loaded machine may need most of it
 
 
-@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("ready", [False, True], ids=["while warming", "when ready"])
-def test_the_process_starts_and_a_signal_stops_it_without_errors(stop, ready):
+@pytest.mark.parametrize(
+    ("ready", "stop"),
+    [
+        pytest.param(False, signal.SIGINT, id="while warming, SIGINT"),
+        pytest.param(True, signal.SIGTERM, id="when ready, SIGTERM"),
+        pytest.param(False, signal.SIGTERM, id="while warming, SIGTERM", marks=pytest.mark.slow),
+        pytest.param(True, signal.SIGINT, id="when ready, SIGINT", marks=pytest.mark.slow),
+    ],
+)
+def test_the_process_starts_and_a_signal_stops_it_without_errors(ready, stop):
     code = (
         "import sys; from app.service.main import run; from app.shared.settings import Settings; "
         "sys.exit(run(Settings()))"

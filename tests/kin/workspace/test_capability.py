@@ -118,7 +118,12 @@ def test_a_closed_form_map_equals_inverse_kinematics_everywhere(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "method"), [("tilted puma560", "sweep"), ("panda", "sweep"), ("longer panda", "search")]
+    ("name", "method"),
+    [
+        ("tilted puma560", "sweep"),
+        pytest.param("panda", "sweep", marks=pytest.mark.slow),
+        pytest.param("longer panda", "search", marks=pytest.mark.slow),
+    ],
 )
 def test_other_maps_have_no_false_positives_and_few_misses(name, method):
     found = mapped(name, 5)

@@ -12,7 +12,11 @@ from kin.transforms import Array
 from kin.workspace.region import Region
 
 # At these resolutions the workspace extends beyond the window of the spread configurations by more than a square.
-OVERSHOOTING = (("panda", 160), ("panda", 400), ("iiwa14", 350))
+OVERSHOOTING = (
+    ("panda", 160),
+    pytest.param("panda", 400, marks=pytest.mark.slow),
+    pytest.param("iiwa14", 350, marks=pytest.mark.slow),
+)
 ROBOTS = tuple(kin.builtin_robots())
 PER_REGION = 20
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
@@ -23,6 +23,7 @@ from app.viewer.null_space import margin, measure, null_space, secondary, task_r
 from app.viewer.panel.joints import label
 from app.viewer.scene.meshes import body
 from app.viewer.server import ViewerServer
+from kin.transforms import Array
 from kin.units import Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -180,25 +181,46 @@ def test_a_force_is_typed_dragged_and_turned(server: int) -> None:
         tab.wait(lambda: not any(name.startswith("/velocity-") for name in tab.nodes))
 
 
+def shown_q(tab: FakeBrowser, robot: kin.Robot) -> Array:
+    return np.radians([tab.value(label(robot, i)) for i in range(robot.n)])
+
+
+def run_a_self_motion(tab: FakeBrowser, panda: kin.Robot, ended: Callable[[Array], bool], timeout: float) -> None:
+    """Run it until `ended` at the configuration shown; the tool was held and the measure has grown."""
+    tab.settle()
+    tab.choose(panda.name)
+    tab.set("Lesson", "Velocity")
+    tab.wait(lambda: "(I−J⁺J)z" in tab.html)
+    tab.set(label(panda, 2), 40.0)
+    tab.settle()
+    T = tab.tool_pose()
+    before = measure(panda, shown_q(tab, panda), "pose", 6)
+    tab.set("Secondary goal", list(GOALS)[1])
+    tab.set("Run", True)
+    tab.wait(lambda: ended(shown_q(tab, panda)), timeout=timeout)
+    tab.set("Run", False)
+    tab.settle()
+    assert np.abs(tab.tool_pose() - T).max() < 1e-5
+    assert measure(panda, shown_q(tab, panda), "pose", 6) > before
+
+
 def test_the_self_motion_runs_with_the_tool_held(server: int) -> None:
     panda = STORE.get("panda")
     with FakeBrowser(server) as tab:
-        tab.settle()
-        tab.choose(panda.name)
-        tab.set("Lesson", "Velocity")
-        tab.wait(lambda: "(I−J⁺J)z" in tab.html)
-        tab.set(label(panda, 2), 40.0)
-        tab.settle()
-        T = tab.tool_pose()
-        q = np.radians([tab.value(label(panda, i)) for i in range(7)])
-        before = measure(panda, q, "pose", 6)
-        tab.set("Secondary goal", list(GOALS)[1])
-        tab.set("Run", True)
-        tab.wait(lambda: tab.value("Run") is False, timeout=40.0)
-        tab.settle()
-        assert np.abs(tab.tool_pose() - T).max() < 1e-5
-        q = np.radians([tab.value(label(panda, i)) for i in range(7)])
-        assert measure(panda, q, "pose", 6) > before
+        seen: list[Array] = []
+
+        def has_moved(q: Array) -> bool:
+            seen.append(q)
+            return bool(np.abs(q - seen[0]).max() > 0.1)
+
+        run_a_self_motion(tab, panda, has_moved, 40.0)
+
+
+@pytest.mark.slow
+def test_the_self_motion_ends_at_the_best_place(server: int) -> None:
+    with FakeBrowser(server) as tab:
+        run_a_self_motion(tab, STORE.get("panda"), lambda q: tab.value("Run") is False, 120.0)
+        assert "The best place is reached" in tab.html
 
 
 def test_a_line_is_plotted(server: int) -> None:
