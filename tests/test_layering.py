@@ -41,6 +41,7 @@ RULES: dict[str, set[str]] = {
     "app/exports": {"kin", "numpy", "scipy", "tqdm", "trimesh", "PIL", "app.exports", "app.shared"},
     "app/equations": {"kin", "numpy", "sympy", "app.equations", "app.shared.computations"},
     "app/exercises": {"kin", "numpy", "app.exercises"},
+    "app/classroom/courses": {"kin", "app.exercises", "app.classroom.courses"},
     "app/bench": {"kin", "numpy", "numba", "app.bench"},
     "app/bench/contestants": {
         *("kin", "numpy", "numba", "app.bench"),
@@ -53,7 +54,7 @@ RULES: dict[str, set[str]] = {
     },
     "app/viewer": {
         *("viser", "trimesh", "numpy", "jinja2", "markupsafe", "kin"),
-        *("app.viewer", "app.equations", "app.exercises", "app.exports", "app.shared"),
+        *("app.viewer", "app.classroom", "app.equations", "app.exercises", "app.exports", "app.shared"),
     },
     "app/viewer/meshes": {
         *("fast_simplification", "trimesh", "numpy", "kin", "app.shared", "app.viewer.meshes", "app.viewer.scene"),
@@ -67,7 +68,7 @@ RULES: dict[str, set[str]] = {
     "app/viewer/meshes/surface.py": {"numpy"},
     "app/service": {
         *("kin", "fastapi", "starlette", "pydantic", "pydantic_core", "uvicorn", "httptools", "websockets"),
-        *("app.api", "app.exercises", "app.service", "app.shared", "app.viewer"),
+        *("app.api", "app.classroom", "app.exercises", "app.service", "app.shared", "app.viewer"),
     },
     "app/service/web": {
         *("starlette", "msgspec", "itsdangerous", "kin"),
@@ -78,6 +79,7 @@ RULES: dict[str, set[str]] = {
         "numpy",
         "pydantic",
         "typing_extensions",
+        "app.classroom",
         "app.cli",
         "app.exercises",
         "app.exports",

@@ -338,9 +338,9 @@ def add_bench(commands: Any, parents: Parents) -> argparse.ArgumentParser:
 
 def add_check(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard check``."""
-    about = "validate an arm or an exercise"
+    about = "validate an arm, an exercise or a course"
     parser = _command(commands, "check", about, parents.robots, parents.output, takes_robot=False)
-    parser.add_argument("file", metavar="FILE", help="robot file or exercise (*.toml), URDF (*.urdf) or *.xacro")
+    parser.add_argument("file", metavar="FILE", help="robot, exercise or course (*.toml), *.urdf or *.xacro")
     _add_links(parser)
     return parser
 

@@ -1,14 +1,16 @@
-"""``kinboard import``, ``kinboard export`` and ``kinboard check``: files of arms, and of exercises.
+"""``kinboard import``, ``kinboard export`` and ``kinboard check``: files of arms, exercises and courses.
 
 A file that is not a valid robot is rejected earlier, by :mod:`kin.files`.
 """
 
 from __future__ import annotations
 
+import os
 import tomllib
 from argparse import Namespace
 from pathlib import Path
 
+from app.cli.classroom.courses import check_course
 from app.cli.terminal import Notation, print_json, robot_of, table
 from app.cli.xacro import expanded, is_xacro
 from app.exercises import Exercise, ExerciseFileError, VariantError, load_exercise
@@ -83,9 +85,11 @@ def _write(path: str, text: str) -> None:
 
 
 def run_check(arguments: Namespace) -> int:
-    """Describe the arm of a robot file, or check an exercise."""
+    """Describe the arm of a robot file, or check an exercise or a course."""
     path = Path(arguments.file)
-    if path.suffix == ".toml" and _is_exercise(path):
+    if path.suffix == ".toml" and (meant := _meant(path)):
+        if meant == "course":
+            return check_course(path, arguments.robots, os.environ.get("KINBOARD_EXERCISES"), arguments.json)
         return _check_exercise(path, arguments.robots, arguments.json)
     lines: list[str] = []
     if path.suffix in (".urdf", ".xacro"):
@@ -139,13 +143,17 @@ def _about(answer: InspectionAnswer, units: Notation) -> list[str]:
     return lines if answer["warnings"] else [*lines, "No warnings."]
 
 
-def _is_exercise(path: Path) -> bool:
-    """Whether a file is meant as an exercise: a robot file has rows, an exercise a kind and an answer."""
+def _meant(path: Path) -> str:
+    """What a file is meant as; empty: a robot. A robot file has rows, an exercise an answer, a course items."""
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError, RecursionError):
-        return False  # reading it as a robot file says why
-    return "rows" not in data and ("kind" in data or "answer" in data)
+        return ""  # reading it as a robot file says why
+    if "rows" in data:
+        return ""
+    return (
+        "exercise" if "kind" in data or "answer" in data else "course" if data.keys() & {"item", "items"} else ""
+    )
 
 
 def _check_exercise(path: Path, robots: str | None, as_json: bool) -> int:

@@ -1,4 +1,4 @@
-"""Reads the fields of exercise files; every error names the file, the field, the value and what is valid."""
+"""Reads the fields of exercises and courses; errors name the file, the field, the value and what is valid."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _PLACE = re.compile(r"\{([^{}]*)\}")
 
 
 class ExerciseFileError(KinematicsError):
-    """An exercise file is invalid; the message names the file, the field, the value and what would be valid."""
+    """A file of an exercise or course is invalid; the message names file, field, value and what is valid."""
 
     def __init__(self, file: str, field: str, value: object, expected: str) -> None:
         self.file, self.field, self.expected = file, field, expected
@@ -96,14 +96,14 @@ class Fields:
     def tables(self, field: str, least: int = 0) -> list[Fields]:
         """A list of tables."""
         return [
-            Fields(self.file, item, f"{self.prefix}{field}[{i}].", self.names)
+            type(self)(self.file, item, f"{self.prefix}{field}[{i}].", self.names)
             for i, item in enumerate(self.items(field, least))
         ]
 
     def sub(self, field: str) -> Fields:
         """A table inside this one; an empty one if it is missing."""
         value = self.get(field)
-        return Fields(self.file, {} if value is None else value, f"{self.prefix}{field}.", self.names)
+        return type(self)(self.file, {} if value is None else value, f"{self.prefix}{field}.", self.names)
 
     def choice(self, field: str, choices: Iterable[str], default: str | None = None) -> str:
         """One of these texts."""

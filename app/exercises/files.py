@@ -17,7 +17,10 @@ from kin import KinematicsError, Robot, get_robot
 
 BUILTIN = Path(__file__).parent / "library"
 UNITS = {"deg": (math.pi / 180, "angle"), "rad": (1.0, "angle"), "mm": (1e-3, "length"), "m": (1.0, "length")}
-LESSONS = ("dh", "screws", "equations", "inverse", "postures", "numeric", "redundancy", "velocity", "trajectories")
+LESSONS = (
+    "rotations", "dh", "screws", "equations", "inverse", "postures", "numeric", "redundancy", "velocity",
+    "trajectories",
+)  # fmt: skip
 MOST_HINTS = 5
 LAST = 999  # place of an exercise without one
 _ID = re.compile(r"[a-z0-9][a-z0-9-]{0,39}")

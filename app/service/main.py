@@ -31,6 +31,7 @@ from app.api import (
     complete_document,
     install_problem_handlers,
 )
+from app.classroom.courses import Courses
 from app.exercises import ExerciseFileError, Exercises
 from app.service import status
 from app.service.gauges import update_gauges
@@ -183,7 +184,8 @@ def run(settings: Settings, open_browser: bool = False) -> int:
             stack.enter_context(listener)
         try:
             store = Store(settings.robots)
-            Exercises(settings.exercises, store.get)  # each process reads them again; here errors are shown
+            exercises = Exercises(settings.exercises, store.get)  # each process reads them again; errors show here
+            _ = Courses(exercises, settings.courses, store.get).all
         except (RobotFileError, ExerciseFileError) as error:
             print(f"kinboard: {error}", file=sys.stderr)
             return 1

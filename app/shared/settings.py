@@ -37,6 +37,7 @@ class Settings(BaseSettings):
     root_path: str = Field("", description="Path prefix that a reverse proxy adds, e.g. /kinboard.")
     robots: Path | None = Field(None, description="Folder with further robot files (*.toml).")
     exercises: Path | None = Field(None, description="Folder with further exercises (*.toml).")
+    courses: Path | None = Field(None, description="Folder with further courses (*.toml).")
     max_batch: int = Field(10_000, ge=1, description="Maximum number of configurations or targets in a request.")
     max_path: int = Field(1000, ge=1, description="Maximum number of waypoints in a path.")
     max_points: int = Field(100_000_000, ge=1, description="Maximum number of points in a workspace cloud.")

@@ -9,6 +9,7 @@ import time
 
 import viser
 
+from app.classroom.courses import Courses
 from app.exercises import Exercises
 from app.shared.clouds import Clouds
 from app.shared.connection import Connection, ConnectionEnded
@@ -55,9 +56,10 @@ class ViewerServer:
         summaries: Summaries | None = None,
     ) -> None:
         exercises = Exercises(settings.exercises, store.get)
+        courses = Courses(exercises, settings.courses, store.get)
         meshes = MeshReader(settings.mesh_memory, settings.client_share, settings.receive_timeout)
         caches = clouds, maps or Maps(), summaries or Summaries()
-        self._services = Services(store, *caches, meshes, Library(meshes), Pace(), exercises)
+        self._services = Services(store, *caches, meshes, Library(meshes), Pace(), exercises, courses)
         self._owns_maps = maps is None
         self._owns_summaries = summaries is None
         self._settings = settings

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from app.classroom.courses import Courses
 from app.exercises import Exercises
 from app.shared.clouds import Clouds
 from app.shared.maps import Maps
@@ -16,7 +17,7 @@ from app.viewer.scene.motion import Pace
 
 @dataclass(frozen=True)
 class Services:
-    """The robots, the caches of expensive results, the readers of meshes, the frame rate, and the exercises."""
+    """The robots, the caches of expensive results, the readers of meshes, the frame rate, exercises, courses."""
 
     store: Store
     clouds: Clouds
@@ -26,3 +27,4 @@ class Services:
     library: Library
     pace: Pace
     exercises: Exercises
+    courses: Courses

@@ -1,0 +1,1 @@
+"""The classroom: rooms, courses, results. It knows neither viser nor FastAPI."""

@@ -1,0 +1,165 @@
+"""Course files: TOML ↔ `Course`, and the same fields as JSON in links.
+
+What is read is checked the same way wherever it comes from. Every error names the file, the field, the value and
+what is valid.
+"""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Callable
+from difflib import get_close_matches
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from app.classroom.courses.course import LONGEST, Course, Item
+from app.exercises import ExerciseFileError, Exercises
+from app.exercises.fields import Fields
+from app.exercises.files import LESSONS
+from kin import KinematicsError, Robot, get_robot
+
+BUILTIN = Path(__file__).parent / "library"
+MOST_BYTES = 6000  # of a course as JSON: links and pages keep it
+MOST_IN_FILE = 16_000  # bytes of a file that a page opens
+
+Find = Callable[[str], Robot]
+
+
+class _CourseFields(Fields):
+    """Texts of a course: braces mean nothing, and each has its own limit."""
+
+    def checked(self, field: str, text: str) -> str:
+        longest = LONGEST.get(field, 80)
+        if len(text) > longest:
+            raise self.refuse(field, text, f"a text of 1 to {longest} characters")
+        if not all(char.isprintable() or char == "\n" for char in text.replace("\u00a0", " ")):
+            raise self.refuse(field, text, "a text without control characters")
+        return text
+
+
+def course_of(data: object, exercises: Exercises, file: str = "course", find: Find = get_robot) -> Course:
+    """The course of a file's or a link's fields.
+
+    Args:
+        exercises: those of the service; the course may name no others.
+        file: the name in messages.
+        find: gives the arm of an id.
+
+    Raises:
+        ExerciseFileError: naming the file, the field, the value and what would be valid.
+    """
+    fields = _CourseFields(file, data)
+    title, about = fields.text("title"), fields.text("about", "")
+    answers = fields.flag("answers", True)
+    items = tuple(_item(each, exercises, find) for each in fields.tables("item"))
+    fields.done()
+    course = Course(title, about, items, answers)
+    size = len(json.dumps(to_data(course), ensure_ascii=False, separators=(",", ":")).encode())
+    if size > MOST_BYTES:
+        raise fields.refuse("item", f"{size} bytes", f"at most {MOST_BYTES} bytes in all: shorten the notes")
+    return course
+
+
+def parse_course(text: str, exercises: Exercises, file: str = "course", find: Find = get_robot) -> Course:
+    """The course described by TOML text; raises `ExerciseFileError`. It has an item at least."""
+    try:
+        data = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise ExerciseFileError(file, "file", str(error), "valid TOML") from None
+    course = course_of(data, exercises, file, find)
+    if not course.items:
+        raise ExerciseFileError(file, "item", data.get("item"), "at least one [[item]]: a lesson or an exercise")
+    return course
+
+
+def load_course(path: Path | str, exercises: Exercises, find: Find = get_robot) -> Course:
+    """The course of a file; raises `ExerciseFileError`."""
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ExerciseFileError(str(path), "file", str(error), "a readable UTF-8 text file") from error
+    return parse_course(text, exercises, str(path), find)
+
+
+def to_data(course: Course) -> dict[str, Any]:
+    """A course as JSON, with the fields of a file."""
+    items = []
+    for item in course.items:
+        row: dict[str, str] = {item.kind: item.key}
+        row |= {name: text for name in ("title", "note", "robot") if (text := getattr(item, name))}
+        items.append(row)
+    data: dict[str, Any] = {"title": course.title}
+    if course.about:
+        data["about"] = course.about
+    if not course.answers:
+        data["answers"] = False
+    return data | {"item": items}
+
+
+def to_toml(course: Course) -> str:
+    """A course as a file."""
+    data = to_data(course)
+    lines = [f"{name} = {_value(value)}" for name, value in data.items() if name != "item"]
+    for row in data["item"]:
+        lines += ["", "[[item]]", *(f"{name} = {_value(text)}" for name, text in row.items())]
+    return "\n".join(lines) + "\n"
+
+
+class Courses:
+    """The built-in courses, and those of the operator's folder. Read-only, so any thread may use it.
+
+    The files are read when they are first asked for.
+    """
+
+    def __init__(self, exercises: Exercises, folder: Path | None = None, find: Find = get_robot) -> None:
+        self.exercises = exercises
+        self.find = find
+        self._folders = [BUILTIN] if folder is None else [BUILTIN, folder]
+
+    @cached_property
+    def all(self) -> tuple[Course, ...]:
+        """In the order of the files' names; raises `ExerciseFileError`."""
+        found: list[Course] = []
+        for folder in self._folders:
+            try:
+                paths = sorted(path for path in folder.iterdir() if path.suffix == ".toml")
+            except OSError as error:
+                raise ExerciseFileError(str(folder), "folder", str(error), "a folder that can be read") from error
+            found += [load_course(path, self.exercises, self.find) for path in paths]
+        return tuple(found)
+
+
+def _item(fields: Fields, exercises: Exercises, find: Find) -> Item:
+    given = [kind for kind in ("lesson", "exercise") if fields.has(kind)]
+    if len(given) != 1:
+        valid = "either lesson, the key of a lesson, or exercise, the id of an exercise"
+        raise fields.refuse("lesson", fields.get("lesson"), valid)
+    title, note = fields.text("title", ""), fields.text("note", "")
+    if given == ["lesson"]:
+        robot = fields.text("robot", "")
+        try:
+            if robot:
+                find(robot)
+        except KinematicsError as error:
+            raise fields.refuse("robot", robot, f"the id of a robot ({error})") from None
+        item = Item("lesson", fields.choice("lesson", LESSONS), title, note, robot)
+    else:
+        item = Item("exercise", _exercise(fields, exercises), title, note)
+    fields.done()
+    return item
+
+
+def _exercise(fields: Fields, exercises: Exercises) -> str:
+    key = fields.get("exercise")
+    if isinstance(key, str) and exercises.get(key) is not None:
+        return key
+    near = get_close_matches(key, [one.id for one in exercises.all], 2) if isinstance(key, str) else []
+    hint = f", such as {' or '.join(near)}" if near else ""
+    raise fields.refuse("exercise", key, f"the id of an exercise of this service{hint}")
+
+
+def _value(value: object) -> str:
+    """A text or a flag in TOML; texts have no control characters, so that JSON's escapes are TOML's."""
+    return json.dumps(value, ensure_ascii=False)
