@@ -36,12 +36,13 @@ RULES: dict[str, set[str]] = {
     "app": {"app", "kin"},
     "app/shared": {
         *("kin", "numpy", "app.shared", "pydantic", "pydantic_settings", "prometheus_client", "starlette"),
-        *("typing_extensions", "distributed"),
+        *("typing_extensions", "distributed", "platformdirs"),
     },
     "app/exports": {"kin", "numpy", "scipy", "tqdm", "trimesh", "PIL", "app.exports", "app.shared"},
     "app/equations": {"kin", "numpy", "sympy", "app.equations", "app.shared.computations"},
     "app/exercises": {"kin", "numpy", "app.exercises"},
     "app/classroom/courses": {"kin", "app.exercises", "app.classroom.courses"},
+    "app/classroom": {"sqlalchemy", "alembic", "itsdangerous", "app.classroom", "app.shared"},
     "app/bench": {"kin", "numpy", "numba", "app.bench"},
     "app/bench/contestants": {
         *("kin", "numpy", "numba", "app.bench"),
@@ -72,7 +73,7 @@ RULES: dict[str, set[str]] = {
     },
     "app/service/web": {
         *("starlette", "msgspec", "itsdangerous", "kin"),
-        *("app.api.problems", "app.service.web", "app.shared"),
+        *("app.api.problems", "app.classroom", "app.service.web", "app.shared"),
     },
     "app/cli": {
         "kin",

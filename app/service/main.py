@@ -31,6 +31,7 @@ from app.api import (
     complete_document,
     install_problem_handlers,
 )
+from app.classroom import Hub
 from app.classroom.courses import Courses
 from app.exercises import ExerciseFileError, Exercises
 from app.service import status
@@ -101,7 +102,8 @@ def create_app(
     maps = Maps(settings.map_memory, seconds=settings.map_time)
     memory = AnswerMemory(settings.max_answer, settings.answer_memory)
     work = ComputeSlots(settings.max_requests, settings.time_budget, settings.client_share, memory)
-    startup = Startup(settings, store, clouds, maps, summaries, bridge, member, on_ready)
+    classroom = Hub.of(settings)
+    startup = Startup(settings, store, clouds, maps, summaries, classroom, bridge, member, on_ready)
 
     def idle() -> bool:
         return not (bridge.places.taken or work.used or state.streams.open or summaries.pending or maps.pending)
@@ -114,9 +116,8 @@ def create_app(
         yield
         keeper.stop()
         work.close()  # computations still running have had their time to finish
-        await run_in_threadpool(startup.stop)
-        for cache in (clouds, maps, summaries):
-            cache.close()
+        for step in (startup.stop, classroom.close, clouds.close, maps.close, summaries.close):
+            await run_in_threadpool(step)
 
     app = FastAPI(
         title="Kinboard",
@@ -130,7 +131,7 @@ def create_app(
         lifespan=lifespan,
     )
     state = app.state
-    state.store, state.settings, state.startup = store, settings, startup
+    state.store, state.settings, state.startup, state.classroom = store, settings, startup, classroom
     state.clouds, state.maps, state.summaries = clouds, maps, summaries
     state.streams, state.compute = StreamLimit(settings.max_streams, settings.client_share), work
     state.uploads = UploadMemory(max(settings.upload_memory, settings.max_body), settings.client_share)

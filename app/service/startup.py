@@ -18,6 +18,7 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal
 
+from app.classroom import Hub
 from app.service.handover import Member, Phase, Role
 from app.service.web.viewer_proxy import ViewerBridge
 from app.shared.clouds import Clouds
@@ -52,6 +53,7 @@ class Startup:
         clouds: Clouds,
         maps: Maps,
         summaries: Summaries,
+        classroom: Hub,
         bridge: ViewerBridge,
         member: Member | None = None,
         on_ready: Callable[[], None] | None = None,
@@ -64,6 +66,7 @@ class Startup:
         self._clouds = clouds
         self._maps = maps
         self._summaries = summaries
+        self._classroom = classroom
         self._bridge = bridge
         self._on_ready = on_ready
         self._viewer: ViewerServer | None = None
@@ -174,7 +177,8 @@ class Startup:
             # Importing viser takes half a second, for which the landing page and REST need not wait.
             from app.viewer.server import ViewerServer
 
-            viewer = ViewerServer(self._store, self._settings, self._clouds, self._maps, self._summaries)
+            caches = self._clouds, self._maps, self._summaries
+            viewer = ViewerServer(self._store, self._settings, *caches, self._classroom)
             viewer.start(self._loop)
             self._viewer = self._bridge.viewer = viewer
         finally:

@@ -25,6 +25,7 @@ class Connection(Protocol):
     subprotocol: str | None
     rights: Rights
     client: str  # as `app.shared.clients` names it
+    room_token: str  # of a classroom, as the browser's cookie has it; not verified; empty: none
 
     async def receive(self) -> bytes:
         """The visitor's next message; raises `ConnectionEnded`."""

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Annotated
 
+import platformdirs
 from pydantic import BeforeValidator, Field, SecretStr, field_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
@@ -38,6 +39,15 @@ class Settings(BaseSettings):
     robots: Path | None = Field(None, description="Folder with further robot files (*.toml).")
     exercises: Path | None = Field(None, description="Folder with further exercises (*.toml).")
     courses: Path | None = Field(None, description="Folder with further courses (*.toml).")
+    data: Path | None = Field(
+        None, description="Folder for the database of classrooms, made with the first room. Unset: the user's own."
+    )
+    database_url: SecretStr | None = Field(
+        None,
+        description="Database of classrooms instead of a file, for several machines: "
+        "postgresql://user:password@host/name.",
+    )
+    max_rooms: int = Field(100, ge=0, description="Maximum number of classrooms at a time; 0: none may be opened.")
     max_batch: int = Field(10_000, ge=1, description="Maximum number of configurations or targets in a request.")
     max_path: int = Field(1000, ge=1, description="Maximum number of waypoints in a path.")
     max_points: int = Field(100_000_000, ge=1, description="Maximum number of points in a workspace cloud.")
@@ -151,3 +161,8 @@ class Settings(BaseSettings):
     def _are_networks(cls, values: tuple[str, ...]) -> tuple[str, ...]:
         Proxies(values)  # raises ValueError
         return values
+
+    @property
+    def data_folder(self) -> Path:
+        """The folder for the database of classrooms, whether or not it exists."""
+        return self.data or Path(platformdirs.user_data_dir("kinboard", appauthor=False))

@@ -9,6 +9,7 @@ import time
 
 import viser
 
+from app.classroom import Hub
 from app.classroom.courses import Courses
 from app.exercises import Exercises
 from app.shared.clouds import Clouds
@@ -44,7 +45,7 @@ class ViewerServer:
     """Serves the 3-D page to connections that the service has accepted, and whose access it has checked.
 
     Args:
-        maps, summaries: shared with REST; None: the viewer creates and closes its own.
+        maps, summaries, classroom: shared with REST; None: the viewer creates and closes its own.
     """
 
     def __init__(
@@ -54,14 +55,17 @@ class ViewerServer:
         clouds: Clouds,
         maps: Maps | None = None,
         summaries: Summaries | None = None,
+        classroom: Hub | None = None,
     ) -> None:
         exercises = Exercises(settings.exercises, store.get)
         courses = Courses(exercises, settings.courses, store.get)
         meshes = MeshReader(settings.mesh_memory, settings.client_share, settings.receive_timeout)
+        hub = classroom or Hub.of(settings)
         caches = clouds, maps or Maps(), summaries or Summaries()
-        self._services = Services(store, *caches, meshes, Library(meshes), Pace(), exercises, courses)
+        self._services = Services(store, *caches, meshes, Library(meshes), Pace(), exercises, courses, hub)
         self._owns_maps = maps is None
         self._owns_summaries = summaries is None
+        self._owns_classroom = classroom is None
         self._settings = settings
         self._server: viser.ViserServer | None = None
         self._connections: PortlessServer
@@ -108,6 +112,8 @@ class ViewerServer:
             self._services.maps.close()
         if self._owns_summaries:
             self._services.summaries.close()
+        if self._owns_classroom:
+            self._services.classroom.close()
 
     @property
     def visitors(self) -> int:

@@ -58,6 +58,7 @@ class PortlessServer(infra.WebsockServer):
         self._ids = itertools.count()
         self.rights: dict[int, Rights] = {}  # of connected visitors, by client id
         self.clients: dict[int, str] = {}  # their names in limits per client, by client id
+        self.room_tokens: dict[int, str] = {}  # of classrooms, not verified, by client id
         self._open = 0  # connections
         self._notes = Notes(log)
         self._stopping: asyncio.Future[None]
@@ -105,6 +106,7 @@ class PortlessServer(infra.WebsockServer):
         client = infra.WebsockClientConnection(number, _infra._ClientHandleState(buffer, self._loop))
         self._client_state_from_id[number] = client._state
         self.rights[number], self.clients[number] = connection.rights, connection.client
+        self.room_tokens[number] = connection.room_token
         flows: list[asyncio.Task[Any]] = []
         try:
             await _call(self._client_connect_cb, client)
@@ -127,6 +129,7 @@ class PortlessServer(infra.WebsockServer):
             self._client_state_from_id.pop(number, None)
             self.rights.pop(number, None)
             self.clients.pop(number, None)
+            self.room_tokens.pop(number, None)
             self._broadcast_buffer.generator_cursors.pop(number, None)
             await _call(self._client_disconnect_cb, client)
 

@@ -24,6 +24,7 @@ from starlette.responses import HTMLResponse, RedirectResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
+from app.classroom import COOKIE as ROOM_COOKIE
 from app.service.web.access import rights_of
 from app.service.web.inspection import MalformedMessageError, admitted
 from app.service.web.negotiation import accepts_gzip, is_current
@@ -145,6 +146,7 @@ class VisitorConnection:
         self._visitor = visitor
         self.rights = rights_of(visitor.scope)
         self.client = client_of(visitor.scope)
+        self.room_token: str = visitor.cookies.get(ROOM_COOKIE, "")
         self._streamed = STREAMED.labels("viewer")
 
     async def receive(self) -> bytes:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from app.classroom import Hub
 from app.classroom.courses import Courses
 from app.exercises import Exercises
 from app.shared.clouds import Clouds
@@ -17,7 +18,8 @@ from app.viewer.scene.motion import Pace
 
 @dataclass(frozen=True)
 class Services:
-    """The robots, the caches of expensive results, the readers of meshes, the frame rate, exercises, courses."""
+    """The robots, the caches of expensive results, the readers of meshes, the frame rate, exercises, courses, and the
+    live state of classrooms."""
 
     store: Store
     clouds: Clouds
@@ -28,3 +30,4 @@ class Services:
     pace: Pace
     exercises: Exercises
     courses: Courses
+    classroom: Hub

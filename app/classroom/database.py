@@ -1,0 +1,210 @@
+"""The classroom's database: SQLite in a folder, or PostgreSQL.
+
+Nothing happens before the first transaction: then the folder and the file are made, and migrations are run.
+Several processes may do so at the same time; the database makes them wait for each other. Every error of the
+database becomes `ClassroomUnavailable`, with a sentence for the page and the error itself in the log.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import secrets
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from alembic import command
+from alembic.config import Config
+from sqlalchemy import Connection, Engine, create_engine, event, insert, inspect, select, text
+from sqlalchemy.engine import make_url
+from sqlalchemy.exc import SQLAlchemyError
+
+from app.classroom.clock import steady
+from app.classroom.tables import REVISION, Setting
+from app.classroom.views import ClassroomUnavailable
+
+logger = logging.getLogger("kinboard.classroom")
+
+FILE = "classroom.db"
+WAIT = 3.0  # seconds for a lock, or for a connection
+LOG_EVERY = 10.0  # seconds between two lines about errors
+_MIGRATION_LOCK = 0x6B696E  # of PostgreSQL
+_KEY = "key"
+
+
+class Database:
+    """Transactions on one database; thread-safe.
+
+    Args:
+        folder: where SQLite's file is, or will be.
+        url: of another database, such as ``postgresql://user@host/name``.
+    """
+
+    def __init__(self, folder: Path, url: str | None = None) -> None:
+        self._file = None if url else folder / FILE
+        self._url = make_url(url or f"sqlite:///{folder / FILE}")
+        if self._url.drivername in ("postgresql", "postgres"):
+            self._url = self._url.set(drivername="postgresql+psycopg")
+        self._engine: Engine | None = None
+        self._inode: tuple[int, int] | None = None
+        self._lock = threading.Lock()
+        self._logged = -LOG_EVERY
+
+    @contextlib.contextmanager
+    def read(self) -> Iterator[Connection]:
+        """A transaction that only reads; raises `ClassroomUnavailable`."""
+        with self._words(), self._ready().connect() as connection, connection.begin():
+            self._still_there()
+            yield connection
+
+    @contextlib.contextmanager
+    def write(self, durable: bool = True) -> Iterator[Connection]:
+        """A transaction that is stored when the block ends; raises `ClassroomUnavailable`.
+
+        Args:
+            durable: whether it survives a power failure; False: it may be lost together with all later ones.
+        """
+        with self._words(), self._ready().connect() as connection:
+            if self._file is not None:
+                connection.execution_options(kinboard_write=True)
+                level = "FULL" if durable else "NORMAL"
+                raw = connection.connection.driver_connection
+                assert raw is not None
+                raw.execute(f"PRAGMA synchronous={level}")
+            with connection.begin():
+                yield connection
+                self._still_there()
+
+    def key(self) -> str:
+        """The key that signs tokens."""
+        query = select(Setting.value).where(Setting.name == _KEY)
+        with self.read() as connection:
+            found = connection.scalar(query)
+        if found is not None:
+            return found
+        with contextlib.suppress(ClassroomUnavailable), self.write() as connection:
+            if connection.scalar(query) is None:
+                connection.execute(insert(Setting).values(name=_KEY, value=secrets.token_hex(32)))
+        with self.read() as connection:  # another process may have been the first
+            return str(connection.execute(query).scalar_one())
+
+    def shrink(self) -> None:
+        """Erase what was deleted from SQLite's files; elsewhere the database does so."""
+        if self._file is not None:
+            with contextlib.suppress(ClassroomUnavailable), self._words(), self._ready().connect() as connection:
+                raw = connection.connection.driver_connection
+                assert raw is not None
+                raw.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
+
+    def close(self) -> None:
+        """Close all connections."""
+        with self._lock:
+            engine, self._engine = self._engine, None
+        if engine is not None:
+            engine.dispose()
+
+    def _ready(self) -> Engine:
+        """The engine, with all tables."""
+        with self._lock:
+            if self._engine is None:
+                self._engine = self._open()
+            return self._engine
+
+    def _open(self) -> Engine:
+        if self._file is None:
+            engine = create_engine(
+                self._url,
+                pool_pre_ping=True,
+                pool_timeout=WAIT,
+                connect_args={"connect_timeout": max(2, int(WAIT))},
+            )
+        else:
+            if self._inode is not None and not self._file.exists():
+                raise FileNotFoundError(f"{self._file} has disappeared")  # an empty one would end all rooms
+            self._file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            engine = create_engine(self._url, pool_timeout=WAIT, connect_args={"timeout": WAIT})
+            event.listen(engine, "connect", _configure_sqlite)
+            event.listen(engine, "begin", _begin_sqlite)
+        try:
+            _migrate(engine)
+        except BaseException:
+            engine.dispose()
+            raise
+        if self._file is not None:
+            found = self._file.stat()
+            self._inode = found.st_dev, found.st_ino
+        return engine
+
+    def _still_there(self) -> None:
+        """Raises if SQLite's file was deleted or replaced: what is written to an open file would be lost."""
+        if self._file is not None:
+            found = self._file.stat()
+            if (found.st_dev, found.st_ino) != self._inode:
+                raise FileNotFoundError(f"{self._file} was replaced by another file")
+
+    @contextlib.contextmanager
+    def _words(self) -> Iterator[None]:
+        """Turn errors of the database into `ClassroomUnavailable`."""
+        try:
+            yield
+        except (SQLAlchemyError, OSError) as error:
+            if isinstance(error, OSError):
+                self.close()  # the next transaction opens the file that is there then
+            if steady() - self._logged > LOG_EVERY:
+                self._logged = steady()
+                logger.warning("the classroom's database failed: %s", _brief(error))
+            raise ClassroomUnavailable(_sentence(error)) from error
+
+
+def _configure_sqlite(connection: Any, _: object) -> None:
+    connection.isolation_level = None  # transactions begin where `_begin_sqlite` says
+    for pragma in ("journal_mode=WAL", "foreign_keys=ON", "secure_delete=ON", "journal_size_limit=4000000"):
+        connection.execute(f"PRAGMA {pragma}")
+
+
+def _begin_sqlite(connection: Connection) -> None:
+    # A reading transaction that begins to write could not wait for another writer.
+    writes = connection.get_execution_options().get("kinboard_write", False)
+    connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
+
+
+def _migrate(engine: Engine) -> None:
+    """Run the migrations that this database lacks, in one transaction; others wait."""
+    with engine.connect() as connection:
+        with connection.begin():
+            if _revision(connection) == REVISION:
+                return
+        connection.execution_options(kinboard_write=True)
+        with connection.begin():
+            if engine.dialect.name == "postgresql":
+                connection.execute(text(f"SELECT pg_advisory_xact_lock({_MIGRATION_LOCK})"))
+            if _revision(connection) != REVISION:
+                config = Config()
+                config.set_main_option("script_location", str(Path(__file__).parent / "migrations"))
+                config.attributes["connection"] = connection
+                command.upgrade(config, "head")
+
+
+def _revision(connection: Connection) -> str | None:
+    if not inspect(connection).has_table("alembic_version"):
+        return None
+    found = connection.scalar(text("SELECT version_num FROM alembic_version"))
+    return None if found is None else str(found)
+
+
+def _brief(error: Exception) -> str:
+    """The database's own words, without the statement and its values, which may be personal."""
+    return f"{type(error).__name__}: {getattr(error, 'orig', None) or error}"[:300].replace("\n", " ")
+
+
+def _sentence(error: Exception) -> str:
+    words = str(getattr(error, "orig", None) or error).lower()
+    if "locked" in words or "busy" in words:
+        return "The classroom's database is in use by something else for too long. Try again in a moment."
+    if "full" in words or "no space" in words or "i/o error" in words:
+        return "The disk of the classroom's database is full. Tell the operator of this service."
+    if "readonly" in words or "read-only" in words or "permission" in words:
+        return "The classroom's database cannot be written. Tell the operator of this service."
+    return "The classroom's database cannot be reached at present. It is tried again by itself."

@@ -1,0 +1,286 @@
+"""The live state of rooms in one process: what a page asks, tells and is news.
+
+One `Hub` per process; ``app.viewer`` has it in its `Services`. It costs nothing until a page with a ticket comes:
+no thread, no file, no import of SQLAlchemy. A page does::
+
+    ticket = hub.ticket(connection.room_token)         # None: the visitor is in no room
+    attendance = hub.attend(ticket, changed)           # `changed` is called, from any thread, after each change
+    view = attendance.room                             # a RoomView: immutable, the latest state that is known
+    if view.closed: ...                                # a sentence: the room has ended, or the seat was removed
+    if view.problem: ...                               # a sentence: the database is away; reports are kept
+    attendance.tell_page(state.encode(page))           # the teacher's page for all; a student's for the wall
+    confirmed = attendance.submit(NewAttempt(...))     # stored for good, or raises ClassroomUnavailable
+    attendance.leave()
+
+Two tabs of one seat are two attendances of one ticket; both see and tell the same seat. What one page tells,
+others in the same process see at once. Those in other processes, on this or another machine, see it through the
+database: a thread writes what was reported in one transaction per `TICK`, and reads the rooms whose version has
+changed. `changed` must return at once: post to the inbox of the page. All methods are thread-safe. Only `ticket`
+(once per process), `attend`, `submit`, `remove_seat`, `rename_seat` and `end_room` wait for the database; they
+belong in the worker of a page, never in the event loop.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import threading
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app.classroom.attendance import Attendance
+from app.classroom.clock import steady
+from app.classroom.live import ENDED, LiveRoom, Pending
+from app.classroom.views import ClassroomUnavailable, RoomView, Ticket
+from app.shared.settings import Settings
+
+if TYPE_CHECKING:
+    from app.classroom.database import Database
+    from app.classroom.rooms import Rooms
+
+logger = logging.getLogger("kinboard.classroom")
+
+TICK = 0.03  # seconds between two looks at the database
+BEAT = 2.0  # seconds between two signs that somebody is there
+SEAT_PAGE_EVERY = 0.2  # seconds between two states of one student's page
+RETRY = 0.5  # seconds after an error of the database
+LINGER = 5.0  # seconds that the thread waits for the next page after the last has left
+
+
+class Hub:
+    """All rooms that pages of this process attend.
+
+    Args:
+        folder: where SQLite's file is, or will be.
+        url: of another database.
+        most: how many rooms there may be at a time.
+    """
+
+    def __init__(self, folder: Path, url: str | None = None, most: int = 100) -> None:
+        self.folder = folder
+        self._source = folder, url
+        self._most = most
+        self._database: Database | None = None
+        self._rooms: Rooms | None = None
+        self._lock = threading.RLock()
+        self._lives: dict[str, LiveRoom] = {}
+        self._attendances: dict[str, list[Attendance]] = {}
+        self._thread: threading.Thread | None = None
+        self._stopping = threading.Event()
+        self._beat_at = 0.0
+
+    @classmethod
+    def of(cls, settings: Settings) -> Hub:
+        """The hub of a service."""
+        url = settings.database_url
+        return cls(settings.data_folder, None if url is None else url.get_secret_value(), settings.max_rooms)
+
+    @property
+    def rooms(self) -> Rooms:
+        """Opens, joins and ends rooms. The first use imports SQLAlchemy."""
+        with self._lock:
+            if self._rooms is None:
+                from app.classroom.database import Database
+                from app.classroom.rooms import Rooms
+
+                self._database = Database(*self._source)
+                self._rooms = Rooms(self._database, self._most)
+            return self._rooms
+
+    @property
+    def database(self) -> Database:
+        """For what has tables of its own."""
+        assert self.rooms is not None
+        assert self._database is not None
+        return self._database
+
+    def ticket(self, token: str) -> Ticket | None:
+        """The ticket of a token from a cookie or a link; None if there is none, or we did not sign it."""
+        return self.rooms.tokens.read(token) if token else None
+
+    def attend(self, ticket: Ticket, changed: Callable[[], None]) -> Attendance:
+        """Take part from now on; `changed` is called after each change, from any thread."""
+        attendance = Attendance(self, ticket, changed)
+        with self._lock:
+            live = self._lives.setdefault(ticket.room, LiveRoom(ticket.room))
+            self._attendances.setdefault(ticket.room, []).append(attendance)
+            live.here = self._here(ticket.room)
+            self._beat_at = 0.0
+            if self._thread is None and not self._stopping.is_set():
+                self._thread = threading.Thread(target=self._run, name="kinboard-classroom", daemon=True)
+                self._thread.start()
+            loaded = bool(live.row)
+        if not loaded or (ticket.seat and ticket.seat not in live.seats):
+            self._poll([ticket.room])
+        return attendance
+
+    def close(self) -> None:
+        """Store what is pending, and stop; returns soon even if the database does not answer."""
+        self._stopping.set()
+        thread = self._thread
+        if thread is not None:
+            thread.join(2.0)
+        if self._database is not None:
+            self._database.close()
+
+    # For attendances
+
+    def view(self, ticket: Ticket) -> RoomView:
+        """What a ticket's page may see."""
+        with self._lock:
+            return self._lives[ticket.room].view(ticket)
+
+    def tell(self, ticket: Ticket, change: Callable[[LiveRoom], None]) -> None:
+        """Change the live room, and let all pages in it know."""
+        with self._lock:
+            live = self._lives.get(ticket.room)
+            if live is None or live.closed or not live.row:
+                return
+            change(live)
+        self._notify([ticket.room])
+
+    def tell_later(self, ticket: Ticket, page: str) -> None:
+        """A student's page: the newest, not more often than `SEAT_PAGE_EVERY`."""
+        with self._lock:
+            live = self._lives.get(ticket.room)
+            if live is not None:
+                live.pages[ticket.seat] = page
+
+    def refresh(self, room: str) -> None:
+        """See now what has just been stored."""
+        self._poll([room])
+
+    def closed(self, room: str) -> None:
+        """A room has been ended by one of its pages."""
+        with self._lock:
+            if room in self._lives:
+                self._lives[room].closed = ENDED
+        self._notify([room])
+
+    def leave(self, page: Attendance) -> None:
+        """Forget an attendance; what it has reported is still stored."""
+        room = page.ticket.room
+        with self._lock, contextlib.suppress(ValueError):
+            self._attendances.get(room, []).remove(page)
+            self._lives[room].here = self._here(room)
+
+    def _here(self, room: str) -> set[str]:
+        return {each.ticket.seat for each in self._attendances.get(room, ())}
+
+    def _notify(self, rooms: Iterable[str]) -> None:
+        with self._lock:
+            callbacks = [each.changed for room in rooms for each in self._attendances.get(room, ())]
+        for changed in callbacks:
+            try:
+                changed()
+            except Exception:
+                logger.exception("a page could not be notified that its room has changed")
+
+    # The thread
+
+    def _run(self) -> None:
+        idle_since: float | None = None
+        while True:
+            stopping = self._stopping.wait(TICK)
+            try:
+                available = self._tick()
+            except Exception:
+                logger.exception("a tick of the classroom failed")
+                available = False
+            with self._lock:
+                if stopping:
+                    return
+                if self._attendances:
+                    idle_since = None
+                elif idle_since is None:
+                    idle_since = steady()
+                elif steady() - idle_since > LINGER:
+                    self._thread = None
+                    return
+            if not available:
+                self._stopping.wait(RETRY)
+
+    def _tick(self) -> bool:
+        """Write, read, notify; returns whether the database answered."""
+        beat = steady() - self._beat_at >= BEAT
+        if beat:
+            self._beat_at = steady()
+        with self._lock:
+            changed = [live.id for live in self._lives.values() if live.take_pages(SEAT_PAGE_EVERY)]
+        self._notify(changed)
+        if not self._flush(beat):
+            return False
+        with self._lock:
+            open_rooms = [live.id for live in self._lives.values() if not live.closed]
+        answered = self._poll(open_rooms)
+        with self._lock:
+            absent = [live.id for live in self._lives.values() if live.note_absence()]
+            for room in [room for room, pages in self._attendances.items() if not pages]:
+                if not self._lives[room].pending:
+                    del self._attendances[room], self._lives[room]
+        self._notify(absent)
+        return answered
+
+    def _flush(self, beat: bool) -> bool:
+        with self._lock:
+            news: dict[str, tuple[Pending, set[str]]] = {}
+            for room, live in sorted(self._lives.items()):  # sorted: two processes lock rooms in the same order
+                beats = live.here if beat and live.row else set()
+                if not live.closed and (live.pending or beats):
+                    news[room] = live.pending, set(beats)
+                    live.pending = Pending()
+        if not news:
+            return True
+        from app.classroom.ticks import store
+
+        try:
+            with self.database.write(durable=False) as connection:
+                versions = {room: store(connection, room, *each) for room, each in news.items()}
+        except ClassroomUnavailable as error:
+            with self._lock:
+                for room, (pending, _) in news.items():
+                    self._lives[room].pending.add_older(pending)
+            self._set_problem(news, str(error))
+            return False
+        with self._lock:
+            for room, version in versions.items():
+                live = self._lives[room]
+                if version == live.version + 1:  # nobody else has written: there is nothing to read
+                    live.row["version"] = version
+        return True
+
+    def _poll(self, rooms: Iterable[str]) -> bool:
+        with self._lock:
+            known = {room: self._lives[room].version for room in rooms if room in self._lives}
+        if not known:
+            return True
+        try:
+            database = self.database
+            from app.classroom.ticks import fetch
+
+            with database.read() as connection:
+                found = fetch(connection, known)
+        except ClassroomUnavailable as error:
+            self._set_problem(known, str(error))
+            return False
+        with self._lock:
+            for room, loaded in found.items():
+                live = self._lives.get(room)
+                if live is None:
+                    continue
+                if loaded is None:
+                    live.closed = ENDED
+                elif loaded[0]["version"] >= live.version:
+                    live.load(*loaded)
+        self._notify(found)
+        self._set_problem(known, "")
+        return True
+
+    def _set_problem(self, rooms: Iterable[str], problem: str) -> None:
+        with self._lock:
+            changed = [self._lives[room] for room in rooms if room in self._lives]
+            changed = [live for live in changed if live.problem != problem]
+            for live in changed:
+                live.problem = problem
+        self._notify([live.id for live in changed])

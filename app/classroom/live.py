@@ -1,0 +1,175 @@
+"""The live copy of a room in one process: what the database last said, and what it does not know yet.
+
+No locks and no threads here: `app.classroom.hub` sees to both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from app.classroom.clock import steady
+from app.classroom.views import Poll, RoomView, SeatView, Shown, Task, Ticket
+
+AWAY = 7.0  # seconds without a beat after which nobody is assumed to be there
+ENDED = "The room has ended. Everything in it was erased."
+REMOVED = "The teacher has removed you from the room."
+
+
+@dataclass
+class LiveSeat:
+    """One seat: the columns of its row, and when its beat was last seen to grow."""
+
+    row: dict[str, Any]
+    heard: float = field(default_factory=steady)
+
+
+@dataclass
+class Pending:
+    """What the database does not know yet."""
+
+    page: str | None = None
+    state: dict[str, Any] = field(default_factory=dict)
+    seats: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+    def __bool__(self) -> bool:
+        return self.page is not None or bool(self.state or self.seats)
+
+    def add_older(self, older: Pending) -> None:
+        """Put back what could not be stored."""
+        self.page = older.page if self.page is None else self.page
+        self.state = {**older.state, **self.state}
+        for seat, values in older.seats.items():
+            self.seats[seat] = {**values, **self.seats.get(seat, {})}
+
+
+class LiveRoom:
+    """The room's row, its seats, and what is pending."""
+
+    def __init__(self, room: str) -> None:
+        self.id = room
+        self.row: dict[str, Any] = {}
+        self.state: dict[str, Any] = {}
+        self.seats: dict[str, LiveSeat] = {}
+        self.pending = Pending()
+        self.pages: dict[str, str] = {}  # newest states of students' pages, for the next time they are due
+        self._paged: dict[str, float] = {}  # when each was last taken
+        self.heard = steady()  # when the teacher's beat was last seen to grow
+        self.here: set[str] = set()  # seats with a page in this process; the teacher's is ""
+        self.away: frozenset[str] = frozenset()
+        self.closed = ""
+        self.problem = ""
+
+    @property
+    def version(self) -> int:
+        """The version up to which everything is known; -1: nothing is."""
+        return int(self.row.get("version", -1))
+
+    def load(self, row: Mapping[str, Any], seats: list[dict[str, Any]]) -> None:
+        """Take over what the database says; what is pending is newer."""
+        if self.row and row["beat"] != self.row["beat"]:
+            self.heard = steady()
+        page = self.row.get("page", "") if self.pending.page is not None else row["page"]
+        self.row = {**row, "page": page}
+        self.state = {**row["state"], **self.pending.state}
+        for new in seats:
+            known = self.seats.get(new["id"])
+            pending = self.pending.seats.get(new["id"], {})
+            if known is None:
+                self.seats[new["id"]] = LiveSeat({**new, **pending})
+                continue
+            if new["beat"] != known.row["beat"]:
+                known.heard = steady()
+            known.row = {**new, **pending}
+
+    def tell_page(self, page: str) -> None:
+        """The teacher's page, shared with all."""
+        self.row["page"] = self.pending.page = page
+
+    def tell_state(self, values: dict[str, Any]) -> None:
+        """What the teacher has set."""
+        self.state.update(values)
+        self.pending.state.update(values)
+
+    def tell_seat(self, seat: str, values: dict[str, Any]) -> None:
+        """What a student did."""
+        if seat in self.seats and not self.seats[seat].row["removed"]:
+            self.seats[seat].row.update(values)
+            self.pending.seats.setdefault(seat, {}).update(values)
+
+    def take_pages(self, every: float) -> bool:
+        """Take the students' pages that are due; returns whether there were any."""
+        time = steady()
+        due = [seat for seat in self.pages if time - self._paged.get(seat, -every) >= every]
+        for seat in due:
+            self._paged[seat] = time
+            self.tell_seat(seat, {"page": self.pages.pop(seat)})
+        return bool(due)
+
+    def note_absence(self) -> bool:
+        """Find out who is away; returns whether that has changed."""
+        late = steady() - AWAY
+        away = {seat for seat, live in self.seats.items() if live.heard < late and seat not in self.here}
+        if self.heard < late and "" not in self.here:
+            away.add("")
+        changed = away != self.away
+        self.away = frozenset(away)
+        return changed
+
+    def view(self, ticket: Ticket) -> RoomView:
+        """What one page may see."""
+        if self.closed or not self.row:
+            return RoomView(self.id, closed=self.closed, problem=self.problem)
+        mine = self.seats.get(ticket.seat)
+        if ticket.seat and (mine is None or mine.row["removed"]):
+            return RoomView(self.id, closed=REMOVED)
+        present = sorted(
+            (live.row for live in self.seats.values() if not live.row["removed"]),
+            key=lambda row: (row["joined"], row["id"]),
+        )
+        seats = () if ticket.seat else tuple(self._seat(row) for row in present)
+        row, state = self.row, self.state
+        task = state.get("task")
+        return RoomView(
+            id=self.id,
+            code=row["code"],
+            title=row["title"],
+            created=row["created"],
+            ends=row["ends"],
+            page=row["page"],
+            follow=bool(state.get("follow")),
+            frozen=bool(state.get("frozen")),
+            task=None if task is None else Task(task["exercise"], task["at"]),
+            shown=self._shown(),
+            poll=self._poll(present, None if mine is None else mine.row),
+            course=state.get("course") or "",
+            teacher_away="" in self.away,
+            students=len(present),
+            seat=None if mine is None else self._seat(mine.row),
+            seats=seats,
+            problem=self.problem,
+        )
+
+    def _seat(self, row: Mapping[str, Any]) -> SeatView:
+        names = ("id", "alias", "hand", "task", "tries", "solved", "page")
+        return SeatView(**{name: row[name] for name in names}, away=row["id"] in self.away)
+
+    def _shown(self) -> Shown | None:
+        shown = self.state.get("shown")
+        seat = None if shown is None else self.seats.get(shown["seat"])
+        if shown is None or seat is None or seat.row["removed"]:
+            return None
+        return Shown(shown["seat"], seat.row["alias"] if shown["named"] else "", seat.row["page"])
+
+    def _poll(self, present: list[dict[str, Any]], mine: Mapping[str, Any] | None) -> Poll | None:
+        poll = self.state.get("poll")
+        if poll is None:
+            return None
+        choices = tuple(poll["choices"])
+        votes = [0] * len(choices)
+        for row in present:
+            if row["voted"] == poll["id"] and 0 <= row["vote"] < len(choices):
+                votes[row["vote"]] += 1
+        chosen = mine["vote"] if mine is not None and mine["voted"] == poll["id"] else None
+        return Poll(poll["id"], poll["question"], choices, poll["open"], tuple(votes), chosen)

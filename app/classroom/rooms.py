@@ -1,0 +1,220 @@
+"""Opening, joining and ending rooms. Each operation is one transaction."""
+
+from __future__ import annotations
+
+import secrets
+import unicodedata
+from dataclasses import dataclass, fields
+
+from sqlalchemy import Connection, delete, func, insert, select, update
+
+from app.classroom.clock import now
+from app.classroom.database import Database
+from app.classroom.tables import TOKEN_BYTES, Attempt, Room, Seat
+from app.classroom.tokens import Tokens, new_code, read_code
+from app.classroom.views import Confirmed, NewAttempt, RefusedError, Ticket, UnknownRoomError
+
+LONGEST_ALIAS, LONGEST_TITLE = 32, 80  # characters
+MIN_LIFE, MAX_LIFE = 60.0, 200 * 24 * 3600.0  # seconds: a term
+MAX_SEATS = 200
+_TRIES = 20  # of random codes
+
+
+@dataclass(frozen=True)
+class OpenRoom:
+    """A room as its teacher sees it.
+
+    Attributes:
+        token: the signed token of the teacher's link.
+    """
+
+    id: str
+    code: str
+    title: str
+    created: float
+    ends: float
+    token: str
+    students: int = 0
+
+
+class Rooms:
+    """All rooms of a database.
+
+    Args:
+        most: how many rooms there may be at a time.
+    """
+
+    def __init__(self, database: Database, most: int = 100) -> None:
+        self._database = database
+        self._most = most
+        self._tokens: Tokens | None = None
+
+    @property
+    def tokens(self) -> Tokens:
+        """Signs with the key of this database; raises `ClassroomUnavailable`."""
+        if self._tokens is None:
+            self._tokens = Tokens(self._database.key())
+        return self._tokens
+
+    def open(self, title: str, life: float) -> OpenRoom:
+        """Open a room that is erased after `life` seconds; raises `RefusedError`."""
+        title = clean_name(title, LONGEST_TITLE, "title") if title.strip() else "Class"
+        if not MIN_LIFE <= life <= MAX_LIFE:
+            raise RefusedError(f"A room may last from one minute to {MAX_LIFE / 86400:.0f} days.", "hours")
+        tokens = self.tokens
+        self.sweep()
+        begin, room = now(), secrets.token_hex(TOKEN_BYTES)
+        with self._database.write() as connection:
+            if (connection.scalar(select(func.count()).select_from(Room)) or 0) >= self._most:
+                raise RefusedError(
+                    "This service has as many rooms as it may. End one of them, or try again later."
+                )
+            code = _unused_code(connection)
+            connection.execute(
+                insert(Room).values(
+                    id=room, code=code, title=title, created=begin, ends=begin + life,
+                    version=1, state={}, page="", beat=0,
+                )
+            )  # fmt: skip
+        return OpenRoom(room, code, title, begin, begin + life, tokens.sign(Ticket(room)))
+
+    def join(self, code: str, alias: str, known: Ticket | None = None) -> Ticket:
+        """Take a seat; who has one in this room already (`known`) keeps it, under the new alias.
+
+        Raises:
+            UnknownRoomError: no room has this code.
+            RefusedError: the alias is invalid, or the room is full.
+        """
+        code = read_code(code)
+        with self._database.write() as connection:
+            query = select(Room.id).where(Room.code == code, Room.ends > now())
+            room = connection.scalar(query.with_for_update())
+            if room is None:
+                raise UnknownRoomError("No room has this code. Ask your teacher; rooms end after a while.", "code")
+            alias = clean_name(alias, LONGEST_ALIAS, "alias")
+            version = next_version(connection, room)
+            if known is not None and known.room == room and known.seat:
+                mine = update(Seat).where(Seat.id == known.seat, Seat.room_id == room, Seat.removed.is_(False))
+                if connection.execute(mine.values(alias=alias, version=version)).rowcount:
+                    return known
+            taken = select(func.count()).where(Seat.room_id == room, Seat.removed.is_(False))
+            if (connection.scalar(taken) or 0) >= MAX_SEATS:
+                raise RefusedError(f"All {MAX_SEATS} seats of this room are taken.", "code")
+            ticket = Ticket(room, secrets.token_hex(TOKEN_BYTES))
+            connection.execute(
+                insert(Seat).values(
+                    id=ticket.seat, room_id=room, alias=alias, joined=now(), hand=0.0, task="", tries=0,
+                    solved=False, voted="", vote=0, page="", beat=0, version=version, removed=False,
+                )
+            )  # fmt: skip
+        return ticket
+
+    def find(self, ticket: Ticket) -> OpenRoom | None:
+        """The room of a ticket; None if it has ended or the seat was removed."""
+        with self._database.read() as connection:
+            room = connection.execute(select(Room).where(Room.id == ticket.room, Room.ends > now())).one_or_none()
+            if room is None:
+                return None
+            seats = select(Seat.id).where(Seat.room_id == room.id, Seat.removed.is_(False))
+            ids = connection.scalars(seats).all()
+        if ticket.seat and ticket.seat not in ids:
+            return None
+        token = self.tokens.sign(Ticket(room.id))
+        return OpenRoom(
+            room.id, room.code, room.title, room.created, room.ends, "" if ticket.seat else token, len(ids)
+        )
+
+    def all(self) -> list[OpenRoom]:
+        """All rooms, the newest first."""
+        with self._database.read() as connection:
+            ids = connection.scalars(select(Room.id).order_by(Room.created.desc())).all()
+        return [room for room in (self.find(Ticket(each)) for each in ids) if room is not None]
+
+    def end(self, room: str) -> bool:
+        """Erase a room and everything in it; returns whether there was one."""
+        with self._database.write() as connection:
+            ended = connection.execute(delete(Room).where(Room.id == room)).rowcount > 0
+        if ended:
+            self._database.shrink()
+        return ended
+
+    def remove_seat(self, room: str, seat: str) -> None:
+        """Erase a seat: its alias, page and attempts."""
+        with self._database.write() as connection:
+            version = next_version(connection, room)
+            one = update(Seat).where(Seat.id == seat, Seat.room_id == room)
+            connection.execute(
+                one.values(removed=True, alias="", page="", hand=0.0, task="", voted="", version=version)
+            )
+            connection.execute(delete(Attempt).where(Attempt.seat_id == seat, Attempt.room_id == room))
+
+    def rename_seat(self, room: str, seat: str, alias: str) -> None:
+        """Give a seat another alias; raises `RefusedError`."""
+        alias = clean_name(alias, LONGEST_ALIAS, "alias")
+        with self._database.write() as connection:
+            version = next_version(connection, room)
+            one = update(Seat).where(Seat.id == seat, Seat.room_id == room, Seat.removed.is_(False))
+            connection.execute(one.values(alias=alias, version=version))
+
+    def submit(self, ticket: Ticket, attempt: NewAttempt) -> Confirmed:
+        """Store an attempt; the same attempt again is stored once. Raises `RefusedError` if the seat is gone."""
+        if not 0.0 <= attempt.score <= 1.0:
+            raise ValueError(f"score is {attempt.score}; it must be from 0 to 1")
+        with self._database.write() as connection:
+            version = next_version(connection, ticket.room)
+            mine = (Seat.id == ticket.seat, Seat.room_id == ticket.room, Seat.removed.is_(False))
+            seat = connection.execute(select(Seat.task, Seat.tries).where(*mine)).one_or_none()
+            if version is None or seat is None:
+                raise RefusedError("The room has ended, or the teacher has removed you. The answer is not stored.")
+            stored = connection.execute(
+                select(Attempt.at, Attempt.seat_id).where(Attempt.id == attempt.id)
+            ).one_or_none()
+            if stored is not None:
+                if stored.seat_id != ticket.seat:
+                    raise RefusedError("This attempt belongs to another seat.")
+                return Confirmed(attempt.id, stored.at)
+            at = now()
+            values = {field.name: getattr(attempt, field.name) for field in fields(attempt)}
+            connection.execute(insert(Attempt).values(room_id=ticket.room, seat_id=ticket.seat, at=at, **values))
+            tries = seat.tries + 1 if seat.task == attempt.exercise else 1
+            connection.execute(
+                update(Seat).where(*mine).values(
+                    task=attempt.exercise, tries=tries, solved=attempt.score >= 1.0, version=version
+                )
+            )  # fmt: skip
+        return Confirmed(attempt.id, at)
+
+    def sweep(self) -> int:
+        """Erase the rooms whose time is over; returns how many."""
+        with self._database.read() as connection:
+            over = connection.scalars(select(Room.id).where(Room.ends <= now())).all()
+        return sum(self.end(room) for room in over)
+
+
+def clean_name(text: str, longest: int, field: str) -> str:
+    """An alias or a title in one line, without control characters; raises `RefusedError`."""
+    text = unicodedata.normalize("NFC", text)
+    kept = "".join(letter if unicodedata.category(letter)[0] not in "CZ" else " " for letter in text)
+    kept = " ".join(kept.split())
+    if not kept:
+        raise RefusedError(f"The {field} is empty. Choose 1 to {longest} characters.", field)
+    if len(kept) > longest:
+        raise RefusedError(f"The {field} has {len(kept)} characters; at most {longest} are allowed.", field)
+    return kept
+
+
+def next_version(connection: Connection, room: str) -> int | None:
+    """Count a change of a room, in a writing transaction; None if it has ended.
+
+    The room's row stays locked until the transaction ends, so versions are stored in their order.
+    """
+    query = update(Room).where(Room.id == room).values(version=Room.version + 1).returning(Room.version)
+    return connection.scalar(query)
+
+
+def _unused_code(connection: Connection) -> str:
+    for _ in range(_TRIES):
+        code = new_code()
+        if connection.scalar(select(Room.id).where(Room.code == code)) is None:
+            return code
+    raise RefusedError("No join code is free. Try again.")

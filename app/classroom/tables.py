@@ -1,0 +1,98 @@
+"""The tables of the classroom. `REVISION` names the migration that makes them as they are here.
+
+A change of a table comes with a new file in ``migrations/versions`` and a new `REVISION`; a test compares what the
+migrations make with what is written here.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sqlalchemy import JSON, BigInteger, Double, ForeignKey, String, Text, false
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+
+REVISION = "0001"
+ID = String(32)
+TOKEN_BYTES = 8  # of random ids
+
+
+class Base(DeclarativeBase):
+    """All tables."""
+
+
+class Setting(Base):
+    """What all processes share, such as the key that signs links."""
+
+    __tablename__ = "setting"
+
+    name: Mapped[str] = mapped_column(String(64), primary_key=True)
+    value: Mapped[str] = mapped_column(Text)
+
+
+class Room(Base):
+    """One class. Everything else hangs on it and is deleted with it.
+
+    Attributes:
+        version: grows by one with each change of this row or of a seat.
+        state: what the teacher has set: follow, frozen, task, shown, poll, course.
+        page: the packed state of the teacher's page.
+        beat: grows every few seconds while a page of the teacher is connected.
+    """
+
+    __tablename__ = "room"
+
+    id: Mapped[str] = mapped_column(ID, primary_key=True)
+    code: Mapped[str] = mapped_column(String(16), unique=True)
+    title: Mapped[str] = mapped_column(String(200))
+    created: Mapped[float] = mapped_column(Double)
+    ends: Mapped[float] = mapped_column(Double, index=True)
+    version: Mapped[int] = mapped_column(BigInteger, default=0)
+    state: Mapped[dict[str, Any]] = mapped_column(JSON, default=dict)
+    page: Mapped[str] = mapped_column(Text, default="")
+    beat: Mapped[int] = mapped_column(BigInteger, default=0)
+
+
+class Seat(Base):
+    """One student, who has no other name than the alias.
+
+    Attributes:
+        hand: when it was raised; 0: it is down.
+        voted: id of the poll that `vote` belongs to.
+        beat: grows every few seconds while a page of this seat is connected.
+        version: that of the room when the seat last changed.
+        removed: by the teacher; alias, page and attempts are then erased.
+    """
+
+    __tablename__ = "seat"
+
+    id: Mapped[str] = mapped_column(ID, primary_key=True)
+    room_id: Mapped[str] = mapped_column(ForeignKey("room.id", ondelete="CASCADE"), index=True)
+    alias: Mapped[str] = mapped_column(String(64))
+    joined: Mapped[float] = mapped_column(Double)
+    hand: Mapped[float] = mapped_column(Double, default=0.0)
+    task: Mapped[str] = mapped_column(String(200), default="")
+    tries: Mapped[int] = mapped_column(default=0)
+    solved: Mapped[bool] = mapped_column(default=False)
+    voted: Mapped[str] = mapped_column(ID, default="")
+    vote: Mapped[int] = mapped_column(default=0)
+    page: Mapped[str] = mapped_column(Text, default="")
+    beat: Mapped[int] = mapped_column(BigInteger, default=0)
+    version: Mapped[int] = mapped_column(BigInteger, default=0)
+    removed: Mapped[bool] = mapped_column(default=False, server_default=false())
+
+
+class Attempt(Base):
+    """One answer to an exercise."""
+
+    __tablename__ = "attempt"
+
+    id: Mapped[str] = mapped_column(ID, primary_key=True)
+    room_id: Mapped[str] = mapped_column(ForeignKey("room.id", ondelete="CASCADE"), index=True)
+    seat_id: Mapped[str] = mapped_column(ForeignKey("seat.id", ondelete="CASCADE"), index=True)
+    exercise: Mapped[str] = mapped_column(String(200))
+    seed: Mapped[int] = mapped_column(BigInteger)
+    answer: Mapped[Any] = mapped_column(JSON)
+    verdict: Mapped[str] = mapped_column(Text)
+    score: Mapped[float] = mapped_column(Double)
+    started: Mapped[float] = mapped_column(Double)
+    at: Mapped[float] = mapped_column(Double)

@@ -1,0 +1,69 @@
+"""Join codes, and the signed tokens of teachers and students.
+
+A token is the id of a room, and of a seat if it is a student's, signed with a key that the database keeps: every
+process of every machine can check it. The teacher's link holds a token; a browser keeps one in the cookie
+`COOKIE`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import secrets
+
+from itsdangerous import BadSignature, URLSafeSerializer
+
+from app.classroom.views import Ticket
+
+COOKIE = "kinboard_room"
+# Without what looks alike: 0 O, 1 I L, 2 Z, 5 S, 8 B, U V.
+LETTERS = "ACDEFGHJKMNPQRTWXY34679"
+CODE_LENGTH = 7  # 23**7 = 3.4 thousand million
+_CODE_GROUP = 4
+LONGEST_TOKEN = 300
+
+
+def new_code() -> str:
+    """A random join code."""
+    return "".join(secrets.choice(LETTERS) for _ in range(CODE_LENGTH))
+
+
+def read_code(text: str) -> str:
+    """A join code as it is stored, from what a person typed."""
+    return "".join(text.split()).replace("-", "").upper()
+
+
+def show_code(code: str) -> str:
+    """A join code in groups, easier to copy."""
+    return f"{code[:_CODE_GROUP]}-{code[_CODE_GROUP:]}"
+
+
+class Tokens:
+    """Signs and reads tokens.
+
+    Args:
+        key: from the database.
+    """
+
+    def __init__(self, key: str) -> None:
+        self._key = key
+        self._serializer = self.serializer("ticket")
+
+    def serializer(self, purpose: str) -> URLSafeSerializer:
+        """Signs other data; what was signed for one purpose counts for no other."""
+        return URLSafeSerializer(
+            self._key, salt=f"kinboard.classroom.{purpose}", signer_kwargs={"digest_method": hashlib.sha256}
+        )
+
+    def sign(self, ticket: Ticket) -> str:
+        """The token of a ticket."""
+        return str(self._serializer.dumps([ticket.room, ticket.seat]))
+
+    def read(self, token: str) -> Ticket | None:
+        """The ticket of a token; None if we did not sign it."""
+        if not token or len(token) > LONGEST_TOKEN:
+            return None
+        try:
+            room, seat = self._serializer.loads(token)
+        except (BadSignature, ValueError, TypeError):
+            return None
+        return Ticket(str(room), str(seat))

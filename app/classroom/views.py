@@ -1,0 +1,181 @@
+"""What pages and programs see of a room. All of it is immutable and knows no database."""
+
+from __future__ import annotations
+
+import secrets
+from dataclasses import dataclass, field
+from enum import Enum
+
+
+class ClassroomUnavailable(Exception):  # noqa: N818 - a state of the service, not a mistake of the caller
+    """The classroom's database is gone, locked or full. The message is a sentence for the page."""
+
+
+class RefusedError(Exception):
+    """What was asked is not possible, such as joining with a wrong code; the message is a sentence for the page.
+
+    Attributes:
+        field: the name of the wrong field of a form, or empty.
+    """
+
+    def __init__(self, message: str, field: str = "") -> None:
+        super().__init__(message)
+        self.field = field
+
+
+class UnknownRoomError(RefusedError):
+    """There is no room with this code, or it has ended."""
+
+
+class Role(Enum):
+    """Whom a ticket admits."""
+
+    TEACHER = "teacher"
+    STUDENT = "student"
+
+
+@dataclass(frozen=True)
+class Ticket:
+    """Whom a verified token admits to which room: its teacher, or the student of one seat."""
+
+    room: str
+    seat: str = ""
+
+    @property
+    def role(self) -> Role:
+        """The teacher has no seat."""
+        return Role.STUDENT if self.seat else Role.TEACHER
+
+
+@dataclass(frozen=True)
+class SeatView:
+    """A student's seat.
+
+    Attributes:
+        hand: when the hand was raised, in seconds since 1970; 0: it is down.
+        task: the exercise that the student's page shows, or empty.
+        tries: attempts at this task.
+        solved: whether the last of them was right.
+        page: the packed state of the page (`app.viewer.session.state`), or empty.
+        away: whether no page of this seat is connected.
+    """
+
+    id: str
+    alias: str
+    hand: float = 0.0
+    task: str = ""
+    tries: int = 0
+    solved: bool = False
+    page: str = ""
+    away: bool = False
+
+
+@dataclass(frozen=True)
+class Task:
+    """What the teacher has set for all.
+
+    Attributes:
+        exercise: id of the exercise.
+        at: when, in seconds since 1970; the same exercise set again is another task.
+    """
+
+    exercise: str
+    at: float
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A student's arm that all see.
+
+    Attributes:
+        alias: empty if the teacher hides it.
+        page: packed state of the student's page.
+    """
+
+    seat: str
+    alias: str
+    page: str
+
+
+@dataclass(frozen=True)
+class Poll:
+    """An anonymous question to all.
+
+    Attributes:
+        votes: how many chose each of the choices.
+        chosen: the choice of the seat that looks, or None.
+    """
+
+    id: str
+    question: str
+    choices: tuple[str, ...]
+    open: bool
+    votes: tuple[int, ...]
+    chosen: int | None = None
+
+
+@dataclass(frozen=True)
+class RoomView:
+    """The latest known state of a room, as one page may see it.
+
+    Attributes:
+        ends: when everything in it is erased, in seconds since 1970.
+        page: the teacher's packed page state; empty before the teacher has shared one.
+        follow: whether pages follow the teacher.
+        frozen: whether students may not move their arms.
+        course: the packed course, or empty.
+        teacher_away: whether no page of the teacher is connected: the class is paused.
+        students: number of seats.
+        seat: the own seat; None for the teacher.
+        seats: all seats in the order of joining, for the teacher; empty for students.
+        closed: why the room is over for this page, as a sentence; empty while it is not.
+        problem: what is wrong with the database at present, as a sentence; empty if nothing is.
+    """
+
+    id: str
+    code: str = ""
+    title: str = ""
+    created: float = 0.0
+    ends: float = 0.0
+    page: str = ""
+    follow: bool = False
+    frozen: bool = False
+    task: Task | None = None
+    shown: Shown | None = None
+    poll: Poll | None = None
+    course: str = ""
+    teacher_away: bool = False
+    students: int = 0
+    seat: SeatView | None = None
+    seats: tuple[SeatView, ...] = ()
+    closed: str = ""
+    problem: str = ""
+
+
+@dataclass(frozen=True)
+class NewAttempt:
+    """An answer to an exercise that has been judged.
+
+    Attributes:
+        answer: plain data, as the page gave it.
+        verdict: the sentence the student saw.
+        score: 0 to 1.
+        started: when the student began, in seconds since 1970.
+        id: made once per attempt: storing it again, after an error, stores nothing twice.
+    """
+
+    exercise: str
+    seed: int
+    answer: object
+    verdict: str
+    score: float
+    started: float
+    id: str = field(default_factory=lambda: secrets.token_hex(8))
+
+
+@dataclass(frozen=True)
+class Confirmed:
+    """An attempt that is stored: neither a crash nor a power failure loses it."""
+
+    id: str
+    at: float
