@@ -18,8 +18,8 @@ from app.viewer.scene.motion import Pace
 
 @dataclass(frozen=True)
 class Services:
-    """The robots, the caches of expensive results, the readers of meshes, the frame rate, exercises, courses, and the
-    live state of classrooms."""
+    """The robots, the caches of expensive results, the readers of meshes, the frame rate, exercises, courses, and
+    the live state of classrooms."""
 
     store: Store
     clouds: Clouds

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from app.classroom import ClassroomUnavailable, Hub, NewAttempt, RefusedError, Ticket
+from app.classroom import Hub, NewAttempt
 
 SOON = 10.0  # seconds: far more than anything takes
 
@@ -19,7 +19,7 @@ def until(condition, what="the condition"):
         time.sleep(0.005)
 
 
-@pytest.fixture()
+@pytest.fixture
 def hubs(tmp_path):
     """Two hubs on one file, as two processes have them."""
     pair = Hub(tmp_path / "data"), Hub(tmp_path / "data")
