@@ -10,6 +10,7 @@
   ];
   const NARROW = 580; // pixels; below, one hint at a time
 
+  if (document.documentElement.dataset.kbEmbed) return; // another page explains
   let done = "";
   try { done = localStorage.getItem(STORE) ?? ""; } catch { return; } // cannot be remembered: no hints
   const open = new Map(HINTS.filter((hint) => !done.split(" ").includes(hint.key)).map((hint) => [hint.key, hint]));

@@ -28,6 +28,9 @@
   query.delete("websocket");
   query.delete("playbackPath");
   const page = location.pathname + (query.size ? `?${query}` : "");
+  // ?embed=1: the scene alone; ?embed=panel: with a small panel. Both have a link to the whole page.
+  const mode = { 1: "scene", panel: "panel" }[query.get("embed")] ?? "";
+  if (mode) document.documentElement.dataset.kbEmbed = mode;
   let at = history.state?.kinboard ?? 0; // the present entry
   const loaded = at;
   const trail = []; // the state of each entry, as far as known
@@ -41,7 +44,11 @@
     if (tab) parts.push(`tab=${encodeURIComponent(tab)}`);
     return parts.length ? `${page}#${parts.join("&")}` : page;
   }
-  const show = () => { trail[at] = state; replaceState({ kinboard: at }, "", address()); };
+  const show = () => { trail[at] = state; replaceState({ kinboard: at }, "", address()); aim(); };
+  function aim() {
+    const whole = document.getElementById("kb-open");
+    if (whole) whole.href = location.pathname + (state ? `#s=${state}` : "");
+  }
 
   function add() {
     if (embedded) { show(); return; }
@@ -81,7 +88,7 @@
     dispatchEvent(new Event("kinboard-connect"));
     const address = location.origin + location.pathname.replace(/viewer\/?$/, "");
     const text = document.documentElement.dataset.kbText;
-    return JSON.stringify({ address, state, text, dark: matchMedia("(prefers-color-scheme: dark)").matches });
+    return JSON.stringify({ address, state, text, embedded: mode, dark: matchMedia("(prefers-color-scheme: dark)").matches });
   };
   Storage.prototype.setItem = function (name, value) {
     if (![ITEM, REPLACE, RETURN].includes(name)) return setItem.call(this, name, value);
@@ -159,6 +166,12 @@
 
   let waiting = 0;
   addEventListener("DOMContentLoaded", () => {
+    if (mode) {
+      const whole = document.createElement("a");
+      Object.assign(whole, { id: "kb-open", target: "_blank", rel: "noopener", textContent: "Open in Kinboard ↗" });
+      document.body.append(whole);
+      aim();
+    }
     const changes = new MutationObserver(() => { waiting ||= setTimeout(() => { waiting = 0; complete(); }, 150); });
     changes.observe(document.body, { subtree: true, childList: true, attributes: true, attributeFilter: ["aria-hidden"] });
     // Arrow keys on a control must not rotate the view as well.

@@ -40,6 +40,7 @@ from app.service.handover import SUPPORTED, Member, Phase, Role, members
 from app.service.server import STOP_TIMEOUT, Greeting, Server, is_loopback, listen, url_of
 from app.service.startup import Startup
 from app.service.web.access import Access
+from app.service.web.embedding import embedding_routes
 from app.service.web.failures import Failures
 from app.service.web.hosts import LOCAL_NAMES, Hosts
 from app.service.web.observe import Observe, write_to_stderr
@@ -138,7 +139,7 @@ def create_app(
     state.update_gauges = partial(update_gauges, state, bridge)
     install_problem_handlers(app)
     complete_document(app, store, settings)
-    app.router.routes.extend([*api_routes(), *page_routes(), *bridge.routes()])
+    app.router.routes.extend([*api_routes(), *page_routes(), *embedding_routes(), *bridge.routes()])
     app.include_router(status.router)
     _add_middleware(app, settings)
     return app
@@ -152,6 +153,7 @@ def _add_middleware(app: FastAPI, settings: Settings) -> None:
         read_only=settings.read_only,
         rate=settings.rate_limit,
         login_page=static_folder() / "login.html",
+        framed=bool(settings.frame_ancestors),
     )
     if settings.cors_origins:
         app.add_middleware(
@@ -163,7 +165,7 @@ def _add_middleware(app: FastAPI, settings: Settings) -> None:
         )
     app.add_middleware(Failures)
     app.add_middleware(Hosts, allowed=settings.allowed_hosts, proxies=bool(settings.trusted_proxies))
-    app.add_middleware(SecurityHeaders)
+    app.add_middleware(SecurityHeaders, ancestors=settings.frame_ancestors)
     app.add_middleware(Observe, log=settings.access_log)
     app.add_middleware(PathPrefix, prefix=settings.root_path)
 

@@ -1,4 +1,4 @@
-"""What a client may cause, content security policies, and the check of a websocket's origin.
+"""What a client may cause, content security policies, cookies, and the check of a websocket's origin.
 
 `Rights` decides for every door, REST, the viewer's messages and what a link restores. Who has the access token, or
 everybody if there is none and the service is not read-only, may do everything. A read-only visitor may look: read
@@ -14,12 +14,16 @@ page is from.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from enum import Enum
+from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+if TYPE_CHECKING:
+    from starlette.responses import Response
 
 SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
 
@@ -66,8 +70,7 @@ class Rights(Enum):
 # Swagger UI sets inline styles and data: images; scripts come from our own files only.
 PAGE_POLICY = (
     "default-src 'self'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
-    "connect-src 'self'; frame-src 'self'; object-src 'none'; base-uri 'none'; form-action 'self'; "
-    "frame-ancestors 'self'"
+    "connect-src 'self'; frame-src 'self'; object-src 'none'; base-uri 'none'; form-action 'self'"
 )
 
 # viser's client is one self-unpacking file: inline scripts and styles, workers and images from blobs, WebAssembly
@@ -76,15 +79,54 @@ VIEWER_POLICY = (
     "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval'; "
     "style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self' data:; "
     "media-src 'self' data: blob:; worker-src 'self' blob:; connect-src 'self' data: blob:; "
-    "object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
+    "object-src 'none'; base-uri 'none'; form-action 'none'"
 )
+
+# An origin as `KINBOARD_FRAME_ANCESTORS` lists it: all of its ports, or all names below it, may be starred.
+_ANCESTOR = re.compile(r"https?://(\*\.)?[a-z0-9]([a-z0-9.-]*[a-z0-9])?(:(\d{1,5}|\*))?", re.ASCII)
+
+
+def frame_ancestor(origin: str) -> str:
+    """The origin in the form of a content security policy; ``*`` is any. Raises ValueError."""
+    cleaned = origin.strip().removesuffix("/").lower()
+    if cleaned != "*" and not _ANCESTOR.fullmatch(cleaned):
+        raise ValueError(f"{origin!r} is not an origin such as https://school.example or http://localhost:8888")
+    return cleaned
+
+
+def framing_policy(ancestors: Sequence[str]) -> str:
+    """The directive of a content security policy: our own pages, and these origins, may frame a page."""
+    return "frame-ancestors " + " ".join(("'self'", *ancestors))
+
+
+def set_cookie(response: Response, name: str, value: str, seconds: int, scope: Scope, framed: bool) -> None:
+    """Set a cookie that scripts cannot read, for the path of the service.
+
+    Args:
+        framed: whether pages of other sites may frame ours. Over HTTPS the browser then sends the cookie to a
+            framed page as well, but only below the site on which it was set (``Partitioned``).
+    """
+    secure = scope["scheme"] in ("https", "wss")
+    response.set_cookie(
+        name, value, seconds, path=scope.get("root_path", "") + "/", httponly=True,
+        samesite="none" if framed and secure else "lax", secure=secure,
+    )  # fmt: skip
+    if framed and secure:
+        name_, header = response.raw_headers.pop()
+        response.raw_headers.append((name_, header + b"; Partitioned"))  # Python < 3.14 cannot write it
 
 
 class SecurityHeaders:
-    """ASGI middleware: a content security policy unless the page has its own, and no content sniffing."""
+    """ASGI middleware: a content security policy unless the page has its own, and no content sniffing.
 
-    def __init__(self, app: ASGIApp) -> None:
+    Args:
+        ancestors: origins whose pages may frame ours, as `frame_ancestor` returns them.
+    """
+
+    def __init__(self, app: ASGIApp, ancestors: Sequence[str] = ()) -> None:
         self.app = app
+        self._framing = framing_policy(ancestors)
+        self._others = bool(ancestors)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
@@ -94,7 +136,10 @@ class SecurityHeaders:
         async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
-                headers.setdefault("content-security-policy", PAGE_POLICY)
+                policy = headers.get("content-security-policy", PAGE_POLICY)
+                headers["content-security-policy"] = f"{policy}; {self._framing}"
+                if not self._others:  # for old browsers; it cannot name other origins
+                    headers.setdefault("x-frame-options", "SAMEORIGIN")
                 headers.setdefault("x-content-type-options", "nosniff")
                 headers.setdefault("referrer-policy", "same-origin")
             await send(message)

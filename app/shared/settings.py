@@ -11,6 +11,7 @@ from pydantic import BeforeValidator, Field, SecretStr, field_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from app.shared.clients import Proxies
+from app.shared.security import frame_ancestor
 
 
 def _listed(value: object) -> object:
@@ -145,6 +146,11 @@ class Settings(BaseSettings):
         512 * 1024 * 1024, ge=0, description="Maximum size in bytes of the cache of workspace clouds."
     )
     allowed_origins: Names = Field((), description="Further origins whose pages may open the viewer's websocket.")
+    frame_ancestors: Names = Field(
+        (),
+        description="Origins whose pages may embed the viewer in a frame, e.g. https://moodle.school.example; "
+        "`*`: any. Unset: only pages of this service.",
+    )
     allowed_hosts: Names = Field(
         (),
         description="Host names of the service; `*`: any. IP addresses are always accepted. Unset: any, but on a "
@@ -155,6 +161,11 @@ class Settings(BaseSettings):
         description="Addresses and networks of the reverse proxies whose X-Forwarded-For and X-Forwarded-Proto "
         "are believed.",
     )
+
+    @field_validator("frame_ancestors")
+    @classmethod
+    def _are_origins(cls, values: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(frame_ancestor(value) for value in values)
 
     @field_validator("trusted_proxies")
     @classmethod

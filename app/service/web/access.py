@@ -23,6 +23,7 @@ from pathlib import Path
 from urllib.parse import parse_qs, quote
 
 from itsdangerous import BadSignature, TimestampSigner
+from starlette.datastructures import Headers
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
@@ -31,7 +32,7 @@ from starlette.websockets import WebSocket
 from app.api.problems import ProblemError, respond
 from app.service.web.rate_limit import TokenBucket
 from app.shared.clients import client_of
-from app.shared.security import SAFE_METHODS, Rights
+from app.shared.security import SAFE_METHODS, Rights, origin_allowed, set_cookie
 
 COOKIE = "kinboard"
 COOKIE_AGE = 30 * 24 * 3600  # seconds until a login ends
@@ -55,10 +56,14 @@ class Access:
         read_only: whether requests without the token are read-only.
         rate: requests per second of one client, in bursts of up to ten seconds' worth; 0: no limit.
         login_page: HTML with the placeholders ``{{message}}`` and ``{{next}}``.
+        framed: whether pages of other sites may frame ours.
     """
 
-    def __init__(self, app: ASGIApp, token: str | None, read_only: bool, rate: float, login_page: Path) -> None:
+    def __init__(
+        self, app: ASGIApp, token: str | None, read_only: bool, rate: float, login_page: Path, framed: bool = False
+    ) -> None:
         self.app = app
+        self._framed = framed
         self._token = token
         self._signer = None
         if token is not None:
@@ -118,6 +123,8 @@ class Access:
         if kind.lower() == b"bearer":
             await self._check(scope, given.strip())
             return True
+        if self._framed and not _asks_itself(scope):
+            return False
         return self._has_valid_cookie(headers.get(b"cookie", b"").decode("latin-1"))
 
     def _admit_anonymous(self, scope: Scope, path: str) -> None:
@@ -171,11 +178,8 @@ class Access:
             try:
                 await self._check(request.scope, form.get("token", "").encode())
                 answer = RedirectResponse("./" + place, 303)
-                answer.set_cookie(
-                    COOKIE, self._signer.sign(b"visitor").decode(), COOKIE_AGE,
-                    path=request.scope.get("root_path", "") + "/", httponly=True, samesite="lax",
-                    secure=request.url.scheme == "https",
-                )  # fmt: skip
+                cookie = self._signer.sign(b"visitor").decode()
+                set_cookie(answer, COOKIE, cookie, COOKIE_AGE, request.scope, self._framed)
                 return answer
             except ProblemError as error:
                 message, status = error.problem.detail, error.status_code
@@ -196,6 +200,11 @@ class Access:
         except (CookieError, BadSignature):
             return False
         return True
+
+
+def _asks_itself(scope: Scope) -> bool:
+    """Whether a request that changes something is from one of our pages: a framed page's cookie is not ``Lax``."""
+    return scope.get("method") in (None, *SAFE_METHODS) or origin_allowed(Headers(scope=scope), ())
 
 
 def _encodings(token: str | None) -> list[bytes]:

@@ -26,6 +26,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from app.classroom import COOKIE as ROOM_COOKIE
 from app.service.web.access import rights_of
+from app.service.web.embedding import discovery
 from app.service.web.inspection import MalformedMessageError, admitted
 from app.service.web.negotiation import accepts_gzip, is_current
 from app.shared.clients import client_of
@@ -52,6 +53,8 @@ _FULL_PAGE = _PAGE.format(
     title="Kinboard is full",
     words="All places in the viewer are taken. This page looks again every ten seconds.",
 )
+
+ADDRESSES = 8  # of the service, for which a page with an address of its own is kept
 
 # Codes that describe a lost connection and may not travel in a close frame (RFC 6455, 7.4.1).
 _UNSENDABLE = {1005: 1000, 1006: 1011, 1015: 1011}
@@ -83,7 +86,7 @@ class ViewerBridge:
         self.viewer: Viewer | None = None
         self.places = places or Places(200)
         self._allowed_origins = tuple(allowed_origins)
-        self._page: _Page | None = None
+        self._pages: dict[str, _Page] = {}  # by what depends on the service's address
 
     def routes(self) -> list[BaseRoute]:
         """The page and the websocket, each with and without the trailing slash."""
@@ -100,9 +103,12 @@ class ViewerBridge:
             return HTMLResponse(_WARMING_PAGE, status_code=503, headers={"retry-after": "1"})
         if not self.places.free(client_of(request.scope)):
             return HTMLResponse(_FULL_PAGE, status_code=503, headers={"retry-after": "10"})
-        if self._page is None:
-            self._page = _Page(self.viewer.page())
-        return self._page.response(request)
+        link = discovery(request)
+        if link not in self._pages and len(self._pages) >= ADDRESSES:
+            link = ""  # a page costs a compression, and names may be forged
+        if link not in self._pages:
+            self._pages[link] = _Page(self.viewer.page(), link)
+        return self._pages[link].response(request)
 
     async def websocket(self, visitor: WebSocket) -> None:
         """One visitor's connection, from the handshake to whichever side ends first."""
@@ -194,12 +200,12 @@ async def _add_slash(request: Request) -> Response:
 class _Page:
     """viser's single-file client with a script and a style sheet of ours in front, plain and compressed."""
 
-    def __init__(self, html: bytes) -> None:
+    def __init__(self, html: bytes, link: str) -> None:
         html = html.replace(b"<title>Viser</title>", b"<title>Kinboard viewer</title>", 1)
         # A menu that opens beside a phone's screen must not widen the page.
         html = html.replace(b"initial-scale=1", b"initial-scale=1, minimum-scale=1", 1)
         # Before viser's own script, for which it prepares the page.
-        self._html = html.replace(b"<head>", b"<head>" + _OURS, 1)
+        self._html = html.replace(b"<head>", b"<head>" + _OURS + link.encode(), 1)
         self._gzipped = gzip.compress(self._html, 6)
         self._headers = {
             "content-security-policy": VIEWER_POLICY,

@@ -21,6 +21,7 @@ from kin import Robot, fk
 from kin.units import Units
 
 PANEL_WIDTH = 344  # pixels; visitors change it at the panel's edge
+SMALL_WIDTH = 280  # of a small one
 
 
 class Panel:
@@ -79,3 +80,9 @@ class Panel:
             self.view = ViewOptions(gui, view, detailed, post)
             with gui.add_folder("Share"):
                 self.share = SharePanel(gui, post)
+
+    def shrink(self) -> None:
+        """Keep the tool's pose and the joints only, for a page within another page (``static/layout.css``)."""
+        self.robots.hide()
+        self.target.hide()
+        self.posture.visible = False

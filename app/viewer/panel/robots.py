@@ -23,6 +23,10 @@ class RobotMenu:
         self._menu = gui.add_dropdown("Robot", tuple(self._options), initial_value=self._name(robot))
         listen(self._menu, post, "robot")
 
+    def hide(self) -> None:
+        """Offer no other robot."""
+        self._menu.visible = False
+
     def show(self, robot: Robot, own: OwnArm | None) -> None:
         """Show this robot, and offer this arm of the visitor's own besides those of the service."""
         self._shown = robot

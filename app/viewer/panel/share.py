@@ -1,4 +1,4 @@
-"""What a visitor can share: a link to the page as it is, and the arm's state as code.
+"""What a visitor can share: a link to the page as it is, the arm's state as code, and a frame for other pages.
 
 Viser runs no script of ours when a button is clicked. So ``static/viewer.js`` watches buttons marked ``data-copy``
 and copies the ``code`` of their box. Without a clipboard, the text can still be selected.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import viser
 
 from app.exports.snippets import SNIPPETS, Moment
+from app.shared.answers.frames import MODES, frame
 from app.viewer.panel import Post, assign, listen, update_html
 from app.viewer.views.templates import render
 from kin import InputError
@@ -20,7 +21,7 @@ def box_html(text: str, label: str, wrap: bool = False) -> str:
 
 
 class SharePanel:
-    """The link, and a code snippet in a language of the visitor's choice. Posts ``"copy-as"``."""
+    """The link, a code snippet in a language of the visitor's choice, and frames. Posts ``"copy-as"``."""
 
     def __init__(self, gui: viser.GuiApi, post: Post) -> None:
         self._link = gui.add_html("")
@@ -29,6 +30,9 @@ class SharePanel:
         self._choice = gui.add_dropdown("Copy as", tuple(SNIPPETS), initial_value=self._name, hint=hint)
         listen(self._choice, post, "copy-as")
         self._code = gui.add_html("")
+        with gui.add_folder("Embed in a web page", expand_by_default=False):
+            gui.add_html(render("panel/embed_note"))
+            self._frames = {mode: gui.add_html("") for mode in MODES}
         gui.add_html(render("sheet/in_view"))
         self._moment: Moment | None = None
 
@@ -37,6 +41,9 @@ class SharePanel:
         self._moment = moment
         update_html(self._link, box_html(link, "Copy link", wrap=True))
         update_html(self._code, box_html(SNIPPETS[self._name](moment), "Copy code"))
+        for mode, element in self._frames.items():
+            code = frame(link.replace("viewer/#", f"viewer/?embed={mode}#", 1))
+            update_html(element, box_html(code, f"Copy frame: {MODES[mode]}", wrap=True))
 
     def choose(self, name: object) -> None:
         """Choose another language; raises `kin.InputError` for an unknown one."""

@@ -27,8 +27,12 @@ class TargetChoice:
         names = {value: name for name, value in TASKS.items()}
         self._choice = gui.add_dropdown("Target must match", tuple(TASKS), initial_value=names[task], hint=HINT)
         listen(self._choice, post, "task")
-        group = gui.add_button_group("Target", (RECALL,), hint="Moves the target to where the tool is")
-        listen_click(group, post, {RECALL: "recall"})
+        self._group = gui.add_button_group("Target", (RECALL,), hint="Moves the target to where the tool is")
+        listen_click(self._group, post, {RECALL: "recall"})
+
+    def hide(self) -> None:
+        """Offer neither."""
+        self._choice.visible = self._group.visible = False
 
     def show(self, task: Task) -> None:
         """Select a task."""

@@ -70,6 +70,7 @@ class Persistence:
     Attributes:
         system_dark: whether the visitor's system was dark when the page was opened.
         text_size: name of the text size with which it was opened.
+        embedded: how the page is embedded, as `StoredPage.embedded`.
         due: when the state is to be saved if nothing more happens (`time.perf_counter`'s); None: it is saved.
     """
 
@@ -83,6 +84,7 @@ class Persistence:
         self._address = LOCAL
         self.system_dark = False
         self.text_size = "Normal"
+        self.embedded = ""
         self._saved = ""
         self._state = PageState()
         self._share: SharePanel
@@ -97,7 +99,7 @@ class Persistence:
             log.debug("visitor %s has no stored state: %s", client.client_id, error)
             stored = StoredPage()
         self._address = stored.address or LOCAL
-        self.system_dark, self.text_size = stored.dark, stored.text_size
+        self.system_dark, self.text_size, self.embedded = stored.dark, stored.text_size, stored.embedded
         saved = decode(stored.state, self._page.store.robots)
         if self._rights.compute:
             return saved

@@ -42,6 +42,7 @@ DIGITS = 9
 CAMERA_DIGITS = 4  # of metres; finer differences are invisible
 CAMERA_RANGE = 100.0  # largest ratio of a camera's distance to the arm's reach, and the reverse
 
+EMBEDDED = ("scene", "panel")  # the scene alone, or with a small panel
 FRESH = ViewState()
 _ADDRESS = re.compile(r"https?://[A-Za-z0-9._:%\[\]-]+/[A-Za-z0-9._~%/-]*")
 
@@ -96,12 +97,14 @@ class StoredPage:
         state: the encoded state.
         dark: whether the visitor's system is dark.
         text_size: the name of the text size.
+        embedded: how the page is embedded in another: ``"scene"``, ``"panel"`` or not at all.
     """
 
     address: str = ""
     state: str = ""
     dark: bool = False
     text_size: str = "Normal"
+    embedded: str = ""
 
 
 def encode(state: PageState) -> str:
@@ -197,7 +200,8 @@ def read_stored_page(text: str | None) -> StoredPage:
     state = state if isinstance(state, str) else ""
     text_size = data.get("text")
     size = text_size if isinstance(text_size, str) and text_size in TEXT_SIZES else "Normal"
-    return StoredPage(str(address) if usable else "", state, data.get("dark") is True, size)
+    embedded = next((mode for mode in EMBEDDED if mode == data.get("embedded")), "")
+    return StoredPage(str(address) if usable else "", state, data.get("dark") is True, size, embedded)
 
 
 _TASKS: tuple[Task, ...] = get_args(Task)
