@@ -82,8 +82,20 @@
   history.replaceState = show;
   addEventListener("hashchange", () => { if (history.state?.kinboard === undefined) location.reload(); });
 
+  // A browser may forbid storage, most often to a page in a frame of another site: then items live as long as the page.
+  for (const name of ["localStorage", "sessionStorage"]) {
+    try { void window[name]; } catch {
+      const items = new Map();
+      const memory = Object.create(Storage.prototype, {
+        kept: { value: { getItem: (key) => items.get(key) ?? null, setItem: (key, value) => { items.set(key, String(value)); } } },
+        removeItem: { value: (key) => { items.delete(key); } },
+      });
+      Object.defineProperty(window, name, { value: memory });
+    }
+  }
+
   Storage.prototype.getItem = function (name) {
-    if (name !== ITEM) return getItem.call(this, name);
+    if (name !== ITEM) return this.kept ? this.kept.getItem(name) : getItem.call(this, name);
     openTab(performance.now() + 30000);
     dispatchEvent(new Event("kinboard-connect"));
     const address = location.origin + location.pathname.replace(/viewer\/?$/, "");
@@ -91,7 +103,7 @@
     return JSON.stringify({ address, state, text, embedded: mode, dark: matchMedia("(prefers-color-scheme: dark)").matches });
   };
   Storage.prototype.setItem = function (name, value) {
-    if (![ITEM, REPLACE, RETURN].includes(name)) return setItem.call(this, name, value);
+    if (![ITEM, REPLACE, RETURN].includes(name)) return this.kept ? this.kept.setItem(name, value) : setItem.call(this, name, value);
     state = value;
     keep(STATE, state);
     ({ [ITEM]: add, [REPLACE]: show, [RETURN]: goBack })[name]();
