@@ -81,8 +81,11 @@ class Panel:
             with gui.add_folder("Share"):
                 self.share = SharePanel(gui, post)
 
-    def shrink(self) -> None:
-        """Keep the tool's pose and the joints only, for a page within another page (``static/layout.css``)."""
-        self.robots.hide()
-        self.target.hide()
-        self.posture.visible = False
+    def fit(self, panel: viser.MainPanelHandle, embedded: str) -> None:
+        """Set the width; within another page, keep the tool's pose and the joints only (``static/layout.css``)."""
+        small = embedded == "panel"
+        panel.set_width(SMALL_WIDTH if small else PANEL_WIDTH)
+        if small:
+            self.robots.hide()
+            self.target.hide()
+            self.posture.visible = False

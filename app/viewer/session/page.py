@@ -25,7 +25,7 @@ from app.viewer.meshes.bodies import Bodies
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import update_html
 from app.viewer.panel.joints import JointSliders, lock_notice
-from app.viewer.panel.layout import PANEL_WIDTH, SMALL_WIDTH, Panel
+from app.viewer.panel.layout import Panel
 from app.viewer.panel.status import READY, Notice, StatusLine
 from app.viewer.panel.view import ViewState, configure_theme
 from app.viewer.scene.camera import Sphere, VisitorCamera
@@ -363,15 +363,12 @@ class VisitorPage(ShownArm, Worker):
             self.camera = VisitorCamera(self.client, self.post)
             self.numbers = Numbers(self, self._pace.reading)
             gui.main_panel.dock_right()
-            small = self._persistence.embedded == "panel"
-            gui.main_panel.set_width(SMALL_WIDTH if small else PANEL_WIDTH)
             titles = [tab.title for tab in TABS]
             self.panel = Panel(
                 gui, self.store.robots, self.own, robot, self.units, self.view, self.system_dark, self._welcome,
                 bool(LESSONS), titles, self._library.offered(self.store.robots), self.post,
             )  # fmt: skip
-            if small:
-                self.panel.shrink()
+            self.panel.fit(gui.main_panel, self._persistence.embedded)
             self.status = self.panel.status
             self.posture = PosturePanel(self, self.panel.posture, self.post)
             self._use_robot(robot, saved.q)
