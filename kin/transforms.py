@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from numbers import Real
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +18,7 @@ from kin.errors import InputError
 from kin.tolerances import TOLERANCES
 
 Array = NDArray[np.float64]
+_THREE = (float, float, float)
 
 
 def finite_array(field: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array:
@@ -190,10 +192,13 @@ def vector_angle(a: Array, b: Array) -> float:
 
 def frame_from_approach(approach: ArrayLike) -> Array:
     """A rotation ``(3, 3)`` with its z axis along `approach` ``(3,)`` and its x axis horizontal if possible."""
-    z = finite_array("approach", approach, (3,))
-    if z.ndim != 1:
-        raise InputError("approach", f"shape {z.shape}", "three numbers: the direction of the tool's z axis")
-    given = z.tolist()
+    given: Any = approach
+    # Checking an array would take longer than all the rest.
+    if not (type(given) is list and tuple(map(type, given)) == _THREE and all(map(math.isfinite, given))):
+        z = finite_array("approach", approach, (3,))
+        if z.ndim != 1:
+            raise InputError("approach", f"shape {z.shape}", "three numbers: the direction of the tool's z axis")
+        given = z.tolist()
     scale = max(map(abs, given))
     if not scale > 1e-12:
         raise InputError("approach", given, "a direction that is not zero")
@@ -205,4 +210,5 @@ def frame_from_approach(approach: ArrayLike) -> Array:
     xx, xy, xz = (-zy, zx, 0.0) if abs(zz) < 0.9 else (zz, 0.0, -zx)
     size = math.hypot(xx, xy, xz)
     xx, xy, xz = xx / size, xy / size, xz / size
-    return np.array([[xx, zy * xz - zz * xy, zx], [xy, zz * xx - zx * xz, zy], [xz, zx * xy - zy * xx, zz]])
+    rows = [xx, zy * xz - zz * xy, zx, xy, zz * xx - zx * xz, zy, xz, zx * xy - zy * xx, zz]
+    return np.array(rows).reshape(3, 3)

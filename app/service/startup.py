@@ -10,6 +10,7 @@ the others wait and load them.
 from __future__ import annotations
 
 import asyncio
+import importlib
 import logging
 import os
 import subprocess
@@ -144,6 +145,8 @@ class Startup:
             if not rest_compiled():
                 self._compile_apart(warm_up_rest)
             warm_up_rest(self._stopping.is_set)
+            if self._viewer is not None and not self._stopping.is_set():
+                importlib.import_module("trimesh.creation")  # before a visitor opens a lesson that draws a sphere
             self._complete = not self._stopping.is_set()
             self._report(Phase.COMPLETE)
         except Exception:

@@ -95,8 +95,12 @@ class Found:
     def details(self) -> Solved:
         """How many solutions there are, and what the task leaves free."""
         problem, names = self._problem, form_of(self._problem).branches
-        fixed = tuple([parameter.label for parameter in problem.requested])
         redundancy = self.redundancy
+        postures = len({names[row] for row in self._order})
+        if not redundancy and problem.options.redundancy is None:
+            chosen, complete = problem.chosen_branches, self._branches.complete
+            return Solved(len(self._order), False, chosen, complete, postures=postures)
+        fixed = tuple([parameter.label for parameter in problem.requested])
         free = tuple([r.label for r in redundancy if r.label not in fixed and _has_width(r)])
         movable = redundancy and {
             p.name for p in problem.redundancies if p.joint < 0 or not problem.locked[p.joint]
@@ -106,7 +110,7 @@ class Found:
             redundant=any(r.name in movable for r in redundancy),
             chosen_branches=problem.chosen_branches,
             infinite=bool(free),
-            postures=len({names[row] for row in self._order}),
+            postures=postures,
             free=free,
             fixed=fixed,
             complete=self._branches.complete,

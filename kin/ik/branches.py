@@ -75,7 +75,7 @@ def solve_branches(
         values = problem.values if code == problem.code else (math.nan,) * len(redundancies)
     seed = problem.seed if seed is None else seed
     roll = 0.0
-    if code == APPROACH and any(parameter.name == "roll" for parameter in redundancies):
+    if code == APPROACH and "roll" in [parameter.name for parameter in redundancies]:
         x = fk(problem.robot, seed)[:3, 0]
         roll = math.atan2(float(T[:3, 1] @ x), float(T[:3, 0] @ x))
     lower, upper = problem.lower, problem.upper

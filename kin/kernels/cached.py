@@ -11,6 +11,8 @@ from kin.kernels import compile as compiling
 def is_cached(kernel: Any) -> bool:
     """Whether the cache has machine code of a kernel as its text is today; True without a cache to write to."""
     cache = getattr(kernel, "_cache", None)
+    if isinstance(cache, compiling.LaterCache):
+        cache = cache.opened
     if not isinstance(cache, compiling._Cache) or not os.access(cache.cache_path, os.W_OK):
         return True
     file: Any = cache._cache_file

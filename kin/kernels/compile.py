@@ -15,17 +15,18 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import os
 import pickle
 import re
 import warnings
 import zlib
 from collections.abc import Callable
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from numba import config, njit, types
-from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 
 MODEL = "model"
 PLAIN = bool(vars(config)["DISABLE_JIT"])
@@ -33,12 +34,12 @@ _unliteral: Any = types.unliteral
 _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
 
 
-_ROOT = Path(__file__).parents[2]
+_ROOT = str(Path(__file__).parents[2])
 _IMPORT = re.compile(r"^from (kin[\w.]*) import (?:\(([^)]*)\)|([^(\n]*))", re.MULTILINE)
 
 
 @cache
-def fingerprint(file: Path) -> str:
+def fingerprint(file: str) -> str:
     """Hash of the text of a Python file and of all modules of the core that it imports, directly or not."""
     found, waiting = {file}, [file]
     while waiting:
@@ -49,16 +50,22 @@ def fingerprint(file: Path) -> str:
 
 
 @cache
-def _read(file: Path) -> tuple[bytes, frozenset[Path]]:
+def _read(file: str) -> tuple[bytes, frozenset[str]]:
     """Hash of the text of a file, and the files of the core that it imports at its top level."""
-    text = file.read_text(encoding="utf-8")
+    text = Path(file).read_text(encoding="utf-8")
     imports = set()
     for module, several, one in _IMPORT.findall(text):
-        place = _ROOT.joinpath(*module.split("."))
+        place = _file_of(module)
         names = [name.split()[0] for name in (several or one).split(",") if name.split()]
-        inside = [place / f"{name}.py" for name in names] + [place / name / "__init__.py" for name in names]
-        imports |= {each for each in (place.with_suffix(".py"), place / "__init__.py", *inside) if each.is_file()}
-    return hashlib.blake2b(text.encode(), digest_size=16).digest(), frozenset(imports)
+        imports |= {place, *(_file_of(f"{module}.{name}") for name in names)} - {None}
+    return hashlib.blake2b(text.encode(), digest_size=16).digest(), frozenset(map(str, imports))
+
+
+@cache
+def _file_of(module: str) -> str | None:
+    """The file of a module or package of the core; None for another name. Plain strings: `Path` takes longer."""
+    place = os.path.join(_ROOT, *module.split("."))  # noqa: PTH118
+    return next((file for file in (f"{place}.py", f"{place}/__init__.py") if os.path.isfile(file)), None)  # noqa: PTH113
 
 
 class DamagedFileError(Exception):
@@ -101,7 +108,7 @@ class _Cache(FunctionCache):
         super().__init__(function)
         file = self._cache_file
         base = file._index_name.removesuffix(".nbi")
-        self._cache_file = _CheckedFile(file._cache_path, base, fingerprint(Path(function.__code__.co_filename)))
+        self._cache_file = _CheckedFile(file._cache_path, base, fingerprint(function.__code__.co_filename))
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The cached machine code, or None if the kernel has to be compiled."""
@@ -123,6 +130,26 @@ class _Cache(FunctionCache):
             _warn(f"machine code cannot be written to {self.cache_path} ({error!r})")
 
 
+class LaterCache:
+    """The cache of a kernel, opened when the kernel is first used: a process uses few of them."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+
+    @cached_property
+    def opened(self) -> Any:
+        """The cache; one that is always empty if there is no place for it."""
+        try:
+            return _Cache(self._function)
+        except RuntimeError:  # numba found no writable folder
+            _warn("no cache folder for machine code is writable; set NUMBA_CACHE_DIR to one that is")
+            return NullCache()
+
+    def __getattr__(self, name: str) -> Any:
+        """What numba asks of a cache."""
+        return getattr(self.opened, name)
+
+
 def _warn(what: str) -> None:
     warnings.warn(f"{what}. Kernels are compiled on first use, which takes seconds.", stacklevel=2)
 
@@ -131,10 +158,8 @@ def _compiled(function: _Kernel, kept: bool = True, **options: Any) -> _Kernel:
     if PLAIN:
         return function
     kernel: Any = njit(nogil=True, error_model="numpy", **options)(function)
-    try:
-        kernel._cache = _Cache(function) if kept else kernel._cache
-    except RuntimeError:  # numba found no writable folder
-        _warn("no cache folder for machine code is writable; set NUMBA_CACHE_DIR to one that is")
+    if kept:
+        kernel._cache = LaterCache(function)
     template = kernel.get_call_template
 
     def plain(arguments: tuple[types.Type, ...], keywords: dict[str, types.Type]) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Literal, NotRequired, cast
 
 from typing_extensions import TypedDict
@@ -18,8 +19,11 @@ from app.shared.answers.details import (
 )
 from app.shared.answers.document import documented
 from kin import BlockedBranch, IKResult, IKSolution, PathResult, Status
+from kin.ik.details import Solved
+from kin.ik.messages import explain
 from kin.ik.results import Cause
 from kin.tolerances import TOLERANCES
+from kin.units import DEFAULT_UNITS
 
 TaskName = Literal["pose", "approach", "position", "mask"]
 EXACT = (TOLERANCES.closure_position, TOLERANCES.closure_rotation)
@@ -121,12 +125,16 @@ class IkAnswer(TypedDict):
 
 def ik_answer(result: IKResult) -> IkAnswer:
     """One result of `kin.solve_ik`."""
-    closest, oriented = result.closest, result.nearest_orientation
+    closest, oriented, found = result.closest, result.nearest_orientation, result.details
+    if isinstance(found, Solved) and not result.singularities and not result.target_error:
+        details, reason = _solved(found, result.task)
+    else:
+        details, reason = details_answer(found), result.reason
     answer: IkAnswer = {
         "status": result.status.value,
         "cause": result.cause,
-        "details": details_answer(result.details),
-        "reason": result.reason,
+        "details": details,
+        "reason": reason,
         "task": cast(TaskName, result.task),
         "complete": result.complete,
         "solver": result.solver,
@@ -144,6 +152,12 @@ def ik_answer(result: IKResult) -> IkAnswer:
     if tolerances is not None:
         answer["tolerances"] = tolerances
     return answer
+
+
+@lru_cache(maxsize=512)
+def _solved(details: Solved, task: str) -> tuple[IkDetails, str]:
+    """Details and reason of most answers: there are few different ones. Both are only read."""
+    return details_answer(details), explain(details, "", task, (), DEFAULT_UNITS).text
 
 
 def tolerances_answer(result: IKResult | PathResult) -> Tolerances | None:

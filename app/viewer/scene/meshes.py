@@ -18,12 +18,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-import trimesh
 
 from app.viewer.scene.bodies import drawing
 from app.viewer.scene.bodies.parts import Color, Part, joint_color
 from app.viewer.scene.chain import Chain, Link, chain, link_poses
-from app.viewer.scene.shapes import ball, box, cone, cylinder, merged, placed, tube
+from app.viewer.scene.shapes import Solid, ball, box, cone, cylinder, merged, placed, tube
 from kin import Robot, link_frames
 from kin.transforms import Array
 
@@ -196,7 +195,7 @@ def _slide(link: Link, r: float, color: Color, grip: float) -> list[Part]:
     ]
 
 
-def _axis(r: float, low: float, high: float, arrow: bool = True) -> trimesh.Trimesh:
+def _axis(r: float, low: float, high: float, arrow: bool = True) -> Solid:
     """A thin rod along z; its arrow head shows the positive direction."""
     rod = cylinder(0.13 * r, low, high)
     return merged([rod, cone(0.38 * r, high - 0.2 * r, high + 0.8 * r)]) if arrow else rod

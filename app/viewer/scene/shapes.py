@@ -12,7 +12,6 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-import trimesh
 from numpy.typing import ArrayLike, NDArray
 
 from kin.transforms import Array, frame_from_approach
@@ -21,13 +20,21 @@ Faces = NDArray[np.int64]
 SEGMENTS = 28
 MOST_POINTS = 100
 DIRECTIONS = 28  # corners of an outline
+# The corners of a unit box, and three of them for each of its triangles, counter-clockwise as seen from outside.
+_CORNERS = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+_SIDES = np.array(
+    [
+        [1, 3, 0], [4, 1, 0], [0, 3, 2], [2, 4, 0], [1, 7, 3], [5, 1, 4],
+        [5, 7, 1], [3, 7, 2], [6, 4, 2], [2, 7, 6], [6, 5, 4], [7, 5, 6],
+    ]
+)  # fmt: skip
 
 
 class Solid(NamedTuple):
-    """The triangles of a mesh as a browser gets them, in a quarter of the memory of a `trimesh.Trimesh`."""
+    """The triangles of a mesh: points ``(k, 3)``, and three rows of them for each triangle ``(m, 3)``."""
 
-    vertices: NDArray[np.float32]
-    faces: NDArray[np.uint32]
+    vertices: NDArray[np.floating]
+    faces: NDArray[np.integer]
 
     @property
     def bounds(self) -> Array:
@@ -35,18 +42,18 @@ class Solid(NamedTuple):
         return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)], dtype=float)
 
 
-def lathe(profile: ArrayLike) -> trimesh.Trimesh:
+def lathe(profile: ArrayLike) -> Solid:
     """The solid of revolution about z of a profile ``(k, 2)`` of (radius, z), bottom to top, with sharp edges."""
     angles = np.linspace(0.0, 2 * np.pi, SEGMENTS, endpoint=False)
     ring = np.column_stack([np.cos(angles), np.sin(angles)])
     return loft([np.column_stack([r * ring, np.full(SEGMENTS, z)]) for r, z in np.asarray(profile, dtype=float)])
 
 
-def loft(rings: Sequence[Array]) -> trimesh.Trimesh:
+def loft(rings: Sequence[Array]) -> Solid:
     """The surface through closed outlines ``(k, 3)`` of as many points each, with sharp edges at the outlines."""
     count = len(rings[0])
     faces = [_band(2 * i * count, (2 * i + 1) * count, count) for i in range(len(rings) - 1)]
-    return _mesh(np.vstack([ring for pair in pairwise(rings) for ring in pair]), np.vstack(faces))
+    return Solid(np.vstack([ring for pair in pairwise(rings) for ring in pair]), np.vstack(faces))
 
 
 def outline(discs: ArrayLike, inset: float = 0.0) -> Array:
@@ -63,7 +70,7 @@ def outline(discs: ArrayLike, inset: float = 0.0) -> Array:
     return points
 
 
-def cylinder(radius: float, low: float, high: float, bevel: float = 0.12) -> trimesh.Trimesh:
+def cylinder(radius: float, low: float, high: float, bevel: float = 0.12) -> Solid:
     """A cylinder about z between two heights, its rims bevelled by a fraction of the radius."""
     b = min(bevel * radius, 0.4 * (high - low))
     return lathe(
@@ -71,24 +78,24 @@ def cylinder(radius: float, low: float, high: float, bevel: float = 0.12) -> tri
     )
 
 
-def cone(radius: float, low: float, high: float) -> trimesh.Trimesh:
+def cone(radius: float, low: float, high: float) -> Solid:
     """A cone about z with its tip at `high`."""
     return lathe([(0, low), (radius, low), (0, high)])
 
 
-def ball(radius: float, center: ArrayLike = (0.0, 0.0, 0.0)) -> trimesh.Trimesh:
+def ball(radius: float, center: ArrayLike = (0.0, 0.0, 0.0)) -> Solid:
     """A sphere."""
     return tube(np.asarray([center]), radius)
 
 
-def box(low: ArrayLike, high: ArrayLike) -> trimesh.Trimesh:
+def box(low: ArrayLike, high: ArrayLike) -> Solid:
     """A box between two corners, with sharp edges."""
-    solid = trimesh.creation.box(bounds=np.array([low, high], dtype=float))
-    corners = solid.triangles.reshape(-1, 3)
-    return _mesh(corners, np.arange(len(corners), dtype=np.int64).reshape(-1, 3))
+    ends = np.array([low, high], dtype=float)
+    corners = ends[0] + _CORNERS * np.ptp(ends, axis=0)
+    return Solid(corners[_SIDES.ravel()], np.arange(_SIDES.size, dtype=np.int64).reshape(-1, 3))
 
 
-def tube(path: Array, radius: float) -> trimesh.Trimesh:
+def tube(path: Array, radius: float) -> Solid:
     """A round tube with hemispherical ends along a centre line ``(k, 3)``, its corners rounded.
 
     One point gives a sphere.
@@ -128,21 +135,21 @@ def tube(path: Array, radius: float) -> trimesh.Trimesh:
         rings.append(center + r * (np.outer(np.cos(angles), side) + np.outer(np.sin(angles), other)))
         if k:
             faces.append(_band((k - 1) * SEGMENTS, k * SEGMENTS))
-    return _mesh(np.vstack(rings), np.vstack(faces))
+    return Solid(np.vstack(rings), np.vstack(faces))
 
 
-def merged(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
+def merged(parts: list[Solid]) -> Solid:
     """Several solids as one mesh."""
     offsets = np.cumsum([0, *(len(p.vertices) for p in parts[:-1])])
-    return _mesh(
+    return Solid(
         np.vstack([p.vertices for p in parts]),
         np.vstack([p.faces + o for p, o in zip(parts, offsets, strict=True)]),
     )
 
 
-def placed(mesh: trimesh.Trimesh | Solid, T: Array) -> trimesh.Trimesh:
+def placed(mesh: Solid, T: Array) -> Solid:
     """A copy of the mesh moved by a transform ``(4, 4)``."""
-    return _mesh(mesh.vertices @ T[:3, :3].T + T[:3, 3], np.asarray(mesh.faces))
+    return Solid(mesh.vertices @ T[:3, :3].T + T[:3, 3], np.asarray(mesh.faces))
 
 
 def spaced(path: Array, step: float) -> Array:
@@ -174,7 +181,3 @@ def _rounded(path: Array, radius: float, steps: int = 7) -> Array:
         points += list((1 - t) ** 2 * p + 2 * t * (1 - t) * corner + t**2 * r)
     points.append(path[-1])
     return np.array(points)
-
-
-def _mesh(vertices: Array, faces: Faces) -> trimesh.Trimesh:
-    return trimesh.Trimesh(vertices, faces, process=False)

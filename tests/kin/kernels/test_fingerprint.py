@@ -16,23 +16,26 @@ FILES = {
 KERNEL = "kin/kernel.py"
 
 
+def forget() -> None:
+    for found in (compiling.fingerprint, compiling._read, compiling._file_of):
+        found.cache_clear()
+
+
 @pytest.fixture
 def changed(tmp_path, monkeypatch):
     """A function that writes `FILES` with one changed, and returns the fingerprint of the kernel's file."""
-    monkeypatch.setattr(compiling, "_ROOT", tmp_path)
+    monkeypatch.setattr(compiling, "_ROOT", str(tmp_path))
 
     def fingerprint(changed: str | None = None) -> str:
         for name, text in FILES.items():
             file = tmp_path / name
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(text + "# changed\n" * (name == changed))
-        compiling.fingerprint.cache_clear()
-        compiling._read.cache_clear()
-        return compiling.fingerprint(tmp_path / KERNEL)
+        forget()
+        return compiling.fingerprint(str(tmp_path / KERNEL))
 
     yield fingerprint
-    compiling.fingerprint.cache_clear()
-    compiling._read.cache_clear()
+    forget()
 
 
 @pytest.mark.parametrize("name", [KERNEL, "kin/solver/__init__.py", "kin/solver/steps.py", "kin/constants.py"])

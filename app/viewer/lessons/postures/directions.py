@@ -12,7 +12,6 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 import kin
@@ -36,7 +35,9 @@ class Sphere(NamedTuple):
 @lru_cache(maxsize=1)
 def sphere() -> Sphere:
     """An icosphere: about 2600 directions, 4° apart."""
-    ball = trimesh.creation.icosphere(subdivisions=SUBDIVISIONS)
+    from trimesh.creation import icosphere  # its import takes a quarter of a second
+
+    ball = icosphere(subdivisions=SUBDIVISIONS)
     directions = np.array(ball.vertices, dtype=float)
     frames = np.tile(np.eye(4), (len(directions), 1, 1))
     aside = np.where(np.abs(directions[:, 2:]) < 0.9, (0.0, 0.0, 1.0), (0.0, 1.0, 0.0))

@@ -9,7 +9,6 @@ import math
 from functools import lru_cache
 
 import numpy as np
-import trimesh
 import viser
 
 from app.viewer.labels import add_label
@@ -17,7 +16,7 @@ from app.viewer.lessons.figures import set_visible
 from app.viewer.lessons.velocity.rates import Ellipsoid
 from app.viewer.scene.arm import GIZMO
 from app.viewer.scene.meshes import body
-from app.viewer.scene.shapes import cone, merged, placed, tube
+from app.viewer.scene.shapes import Solid, cone, merged, placed, tube
 from kin import Robot
 from kin.transforms import Array, frame_from_approach, wxyz_from_rotation
 
@@ -50,7 +49,9 @@ class Drawing:
         self._R = np.eye(3)
         # All parts of the ellipsoid are children of its principal axes: rotating it is one message.
         self._body = scene.add_frame(f"{root}/body", show_axes=False, visible=False)
-        sphere = trimesh.creation.icosphere(subdivisions=3)
+        from trimesh.creation import icosphere  # its import takes a quarter of a second
+
+        sphere = icosphere(subdivisions=3)
         self._ellipsoid = scene.add_mesh_simple(
             f"{root}/body/ellipsoid",
             np.asarray(sphere.vertices),
@@ -231,7 +232,7 @@ def wxyz_along(direction: Array) -> tuple[float, float, float, float]:
 
 
 @lru_cache(maxsize=2)
-def ring_arrow(double: bool) -> trimesh.Trimesh:
+def ring_arrow(double: bool) -> Solid:
     """A circular arrow about z, counter-clockwise, of radius 1; with a head at each end if `double`."""
     first, last = math.radians(35.0 if double else 0.0), math.radians(290.0)
     angles = np.linspace(first, last, 40)

@@ -19,11 +19,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import trimesh
 
 from app.viewer.scene.bodies.parts import Color, Part, joint_color
 from app.viewer.scene.chain import link_poses
-from app.viewer.scene.shapes import DIRECTIONS, loft, merged, outline, placed, spaced
+from app.viewer.scene.shapes import DIRECTIONS, Solid, loft, merged, outline, placed, spaced
 from kin import Robot, builtin_robots
 from kin.axes import inverse
 from kin.transforms import Array
@@ -62,7 +61,7 @@ def drawing(robot: Robot) -> Drawing | None:
 def _drawn(robot: Robot, data: dict[str, Any]) -> Drawing:
     scale = np.where(robot.revolute, np.pi / 180.0, MM)
     poses = link_poses(robot, (np.array(data["pose"], dtype=float) * scale)[None])[0]
-    solids: list[dict[str, list[trimesh.Trimesh]]] = [{} for _ in poses]
+    solids: list[dict[str, list[Solid]]] = [{} for _ in poses]
     spheres: list[list[Array]] = [[np.empty((0, 4))] for _ in poses]
     for part in data["parts"]:
         solid = _loft(part)
@@ -83,14 +82,14 @@ def _drawn(robot: Robot, data: dict[str, Any]) -> Drawing:
 
 
 @dataclass(frozen=True, eq=False)
-class _Solid:
+class _Covered:
     """One part in coordinates of the base, with the spheres ``(k, 4)`` that cover it."""
 
-    mesh: trimesh.Trimesh
+    mesh: Solid
     spheres: Array
 
 
-def _loft(part: dict[str, Any]) -> _Solid:
+def _loft(part: dict[str, Any]) -> _Covered:
     start, end = MM * np.array(part["along"], dtype=float)
     length = float(np.linalg.norm(end - start))
     axis = (end - start) / length
@@ -113,7 +112,7 @@ def _loft(part: dict[str, Any]) -> _Solid:
             centres = spaced(line, max(inside, STEP))
             spheres.append(np.column_stack([centres, np.full(len(centres), inside)]))
     outward = np.cross(*across) @ axis > 0.0
-    return _Solid(loft(rings if outward else rings[::-1]), np.vstack(spheres))
+    return _Covered(loft(rings if outward else rings[::-1]), np.vstack(spheres))
 
 
 def _outermost(spheres: Array) -> Array:

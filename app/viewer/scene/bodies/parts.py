@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import trimesh
-
 from app.viewer.scene.shapes import Solid
 
 Color = tuple[int, int, int]
@@ -32,7 +30,7 @@ class Part:
     """
 
     name: str
-    mesh: trimesh.Trimesh | Solid
+    mesh: Solid
     color: Color
     fixed_to_parent: bool = False
     double_sided: bool = False

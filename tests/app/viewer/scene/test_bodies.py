@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import trimesh
 import viser
 from scipy.spatial import cKDTree
 
@@ -43,7 +44,7 @@ def test_a_body_holds_together_and_ends_at_the_tool(name: str) -> None:
     for link, parts in enumerate(found.parts):
         assert parts, f"link {link} is drawn"
         for part in parts:
-            assert part.mesh.volume > 0, "faces look outward"
+            assert trimesh.Trimesh(*part.mesh, process=False).volume > 0, "faces look outward"
     for q in (robot.q_home, *robot.random_q(np.random.default_rng(2), 6)):
         vertices = links(robot, q)
         for k, (lower, upper) in enumerate(pairwise(vertices)):

@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 import pytest
+import trimesh
 import viser
 
 import kin
@@ -18,7 +19,7 @@ from app.viewer.scene.bodies import drawing
 from app.viewer.scene.bodies.parts import joint_color
 from app.viewer.scene.chain import chain, link_poses
 from app.viewer.scene.meshes import body
-from app.viewer.scene.shapes import tube
+from app.viewer.scene.shapes import box, tube
 from kin.transforms import from_position_wxyz
 from kin.units import DEFAULT_UNITS, Units
 
@@ -131,7 +132,7 @@ def test_bodies_are_valid_and_above_the_floor(robot: kin.Robot) -> None:
     for part in [made.pedestal, *made.gripper, *(p for parts in made.parts for p in parts)]:
         assert np.isfinite(part.mesh.vertices).all(), part.name
         assert part.mesh.faces.max() < len(part.mesh.vertices)
-        assert part.mesh.area > 0
+        assert trimesh.Trimesh(*part.mesh, process=False).area > 0
     base = robot.T_world_base
     upright = base[2, 2] > 0.7
     q = robot.q_home[None] if upright else robot.random_q(np.random.default_rng(3), 4000)
@@ -241,8 +242,18 @@ def test_joints_at_one_point_look_different(robot: kin.Robot) -> None:
     assert len(set(colors)) == robot.n
 
 
+def test_a_box_is_closed_and_faces_outward() -> None:
+    solid = box((-0.1, 0.2, 0.0), (0.3, 0.5, 0.2))
+    mesh = trimesh.Trimesh(*solid)
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(0.4 * 0.3 * 0.2)
+    assert solid.bounds == pytest.approx(np.array([[-0.1, 0.2, 0.0], [0.3, 0.5, 0.2]]))
+    assert len(solid.vertices) == 36, "edges are sharp: no triangles share a vertex"
+
+
 def test_surfaces_of_tubes_face_outward() -> None:
-    mesh = tube(np.array([[0, 0, 0], [0, 0, 0.3], [0.2, 0, 0.3]], dtype=float), 0.02)
+    solid = tube(np.array([[0, 0, 0], [0, 0, 0.3], [0.2, 0, 0.3]], dtype=float), 0.02)
+    mesh = trimesh.Trimesh(*solid, process=False)
     assert mesh.is_winding_consistent
     assert mesh.volume == pytest.approx(math.pi * 0.02**2 * 0.47, rel=0.12)
     turning_back = tube(np.array([[0, 0, 0], [0, 0, 0.3], [0, 0, 0.1]], dtype=float), 0.02)
