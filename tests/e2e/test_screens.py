@@ -149,7 +149,8 @@ SCREENS: dict[str, Callable[[Tab], None]] = {
     "workspace-capability": capability,
     "view": view,
 }
-# Every screen is checked dark in desktop size and light in phone size; these the other way round as well.
+# Every screen is checked dark in desktop size and light in phone size; these the other way round as well, those in
+# desktop size among the slow tests.
 LIGHT_DESKTOP = (
     *("move", "learn-equations", "learn-postures", "learn-velocity", "robot"),
     *("program", "program-empty", "workspace-cloud"),
@@ -168,6 +169,7 @@ def walk(tab: Tab, names: tuple[str, ...], suffix: str) -> None:
     assert {name: sentences for name, sentences in found.items() if sentences} == {}
 
 
+@pytest.mark.slow
 def test_desktop_light(tab: Tab) -> None:
     walk(tab, LIGHT_DESKTOP, "light")
 
