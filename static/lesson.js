@@ -1,6 +1,6 @@
 "use strict";
-// Runs in viser's page: the steps of a lesson (app/viewer/lessons/guide) and the exercises (app/viewer/exercises).
-// It sends what is pressed and typed there.
+// Runs in viser's page: the steps of a lesson (app/viewer/lessons/guide), the exercises (app/viewer/exercises) and courses
+// (app/viewer/classroom/courses). It sends what is pressed and typed there.
 (() => {
   let serial = 0; // each press is a step of its own in the history
   // A block with data-feature belongs to that lesson, others to the block that all lessons have.
@@ -13,7 +13,7 @@
     const { guideDo: kind, questionKey: key, argument } = button.dataset;
     if (kind === "type") typed(document.querySelector(`input[data-guide-field="${key}"]`));
     else if (kind === "check") check(button);
-    else if (kind === "fields") send(button, kind, cells(button.closest("fieldset")));
+    else if (kind === "fields") send(button, kind, cells(button.closest("fieldset")), ...(key === undefined ? [] : [key]));
     else send(button, kind, argument === undefined ? null : Number(argument), ...(key === undefined ? [] : [key]));
   }
   // The typed cells of an exercise, row by row.
@@ -32,7 +32,22 @@
     const button = event.target instanceof Element ? event.target.closest("[data-guide-do]") : null;
     if (button) press(button);
   });
+  // Texts and choices that are sent when they have changed, and files.
+  addEventListener("change", (event) => {
+    const target = event.target;
+    if (target.matches?.("[data-guide-change]")) send(target, "set", target.value, target.dataset.guideChange);
+    if (target.matches?.("[data-guide-file]")) upload(target);
+  });
+  addEventListener("click", (event) => {
+    event.target.closest?.("[data-guide-open]")?.parentElement.querySelector("[data-guide-file]").click();
+  });
+  async function upload(input) {
+    const file = input.files[0];
+    input.value = "";
+    if (file) send(input, "upload", [file.name, file.size > Number(input.dataset.most) ? "" : await file.text()]);
+  }
   addEventListener("keydown", (event) => {
+    if (event.key === "Enter" && event.target.matches?.("input[data-guide-change]")) event.target.blur();
     if (event.key !== "Enter" || !event.target.matches?.("[data-guide-field], input[data-cell]")) return;
     event.preventDefault();
     event.stopImmediatePropagation();
@@ -41,11 +56,11 @@
   }, true);
 
   // Focus: kept when the server sends the block again; where its control is gone, the question or the block gets it.
-  const NAMES = ["data-guide-do", "data-guide-field", "data-question-key", "data-argument", "data-cell"];
+  const NAMES = ["data-guide-do", "data-guide-field", "data-question-key", "data-argument", "data-cell", "data-guide-change"];
   let focus = null; // selector of the control, and key of its question
   let gone = false; // the visitor has moved the focus away
   addEventListener("focusin", (event) => {
-    const node = event.target.closest?.(".kb-guide :is([data-guide-do], [data-guide-field], [data-cell])");
+    const node = event.target.closest?.(".kb-guide :is([data-guide-do], [data-guide-field], [data-cell], [data-guide-change])");
     gone = false;
     focus = node && {
       block: `[data-guide="${node.closest(".kb-guide").dataset.guide}"]`,

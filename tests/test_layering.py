@@ -43,6 +43,7 @@ RULES: dict[str, set[str]] = {
     "app/exercises": {"kin", "numpy", "app.exercises"},
     "app/classroom/courses": {"kin", "app.exercises", "app.classroom.courses"},
     "app/classroom": {"sqlalchemy", "alembic", "itsdangerous", "app.classroom", "app.shared"},
+    "app/classroom/results": {"kin", "sqlalchemy", "app.classroom"},
     "app/bench": {"kin", "numpy", "numba", "app.bench"},
     "app/bench/contestants": {
         *("kin", "numpy", "numba", "app.bench"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Hashable
+from typing import Protocol
 
 import numpy as np
 import viser
@@ -28,10 +29,27 @@ from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
 ROWS = 20  # of typed cells at most
 
 
+class Lead(Protocol):
+    """The course of the page, as far as exercises care."""
+
+    def reveals(self, exercise_id: str) -> bool:
+        """Whether the answer of an exercise may be shown to who has not found it."""
+
+    def leads(self, exercise_id: str) -> bool:
+        """Whether the course says what comes after an exercise."""
+
+    def refresh(self) -> None:
+        """The marks have changed."""
+
+
 class Practising(Feature):
     """A list by topic, or one exercise.
 
     It lives as long as the page; `show` and `hide` build and remove its HTML.
+
+    Attributes:
+        practice: what the student has done.
+        course: the course of the page.
     """
 
     key = "exercises"
@@ -44,7 +62,8 @@ class Practising(Feature):
     def __init__(self, stage: Stage, exercises: Exercises) -> None:
         super().__init__(stage)
         self._exercises = exercises
-        self._practice = Practice(exercises)
+        self.practice = Practice(exercises)
+        self.course: Lead | None = None
         self._sheet = Sheet()
         self._ghost: Array = np.eye(4)
         self._variant: Variant | None = None
@@ -64,8 +83,8 @@ class Practising(Feature):
             with gui.add_folder(None) as self._container:
                 pass
             self._blocks.append(gui.add_html(""))
-        if self._practice.at is not None:
-            self._begin(self._practice.at)
+        if self.practice.at is not None:
+            self._begin(self.practice.at)
         self._update()
 
     def hide(self) -> None:
@@ -92,28 +111,28 @@ class Practising(Feature):
             return
         match key:
             case ("list", int()):
-                self._practice.at = None
+                self.practice.at = None
                 self._undraw()
             case ("open", str(exercise_id), int()):
-                self._practice.open(exercise_id)
+                self.practice.open(exercise_id)
                 self._begin(self._now)
-            case _ if self._practice.at is not None:
+            case _ if self.practice.at is not None:
                 self._act(key, value)
         self._update()
 
     def _act(self, key: Hashable, value: object) -> None:
         """An event of the exercise on show."""
-        exercise, record = self._now, self._practice.record(self._now)
+        exercise, record = self._now, self.practice.record(self._now)
         match key:
             case ("hint", int()):
                 record.hints = min(record.hints + 1, len(exercise.hints))
             case ("reveal", int()):
-                if not record.closed:
+                if not record.closed and (self.course is None or self.course.reveals(exercise.id)):
                     record.mark = "shown"
                     self._sheet.verdict, self._sheet.error = None, ""
                     self._show_answer()
             case ("again", int()):
-                self._practice.again(exercise)
+                self.practice.again(exercise)
                 self._begin(exercise)
             case ("scene", int()):
                 self._set_scene(exercise)
@@ -137,16 +156,16 @@ class Practising(Feature):
         self._update()
 
     def state(self) -> dict[str, object]:
-        return self._practice.state()
+        return self.practice.state()
 
     def restore(self, state: dict[str, object]) -> None:
-        self._practice.restore(state)
+        self.practice.restore(state)
         if not self.shown:
             return
-        if self._practice.at is None:
+        if self.practice.at is None:
             self._undraw()
         else:
-            self._begin(self._practice.at, move=False)
+            self._begin(self.practice.at, move=False)
         self._update()
 
     def remove(self) -> None:
@@ -156,17 +175,17 @@ class Practising(Feature):
 
     @property
     def _now(self) -> Exercise:
-        if self._practice.at is None:
+        if self.practice.at is None:
             raise InputError("exercise", None, "an open exercise")
-        return self._practice.at
+        return self.practice.at
 
     def _begin(self, exercise: Exercise, move: bool = True) -> None:
         """Draw the numbers, and set the scene for an exercise."""
         self._sheet, self._ghost, self._since = Sheet(), np.eye(4), time.perf_counter()
         try:
-            self._variant = self._practice.variant(exercise)
+            self._variant = self.practice.variant(exercise)
         except VariantError as error:  # of an operator's file that was not checked
-            self._practice.at, self._variant = None, None
+            self.practice.at, self._variant = None, None
             self.stage.notify(Notice("error", f"{exercise.title} cannot be used", str(error)))
             return
         if move:
@@ -179,7 +198,7 @@ class Practising(Feature):
         assert variant is not None
         if stage.robot != exercise.robot:
             stage.change_robot(exercise.robot)
-        shows = exercise.kind.shows_posture or self._practice.record(exercise).closed
+        shows = exercise.kind.shows_posture or self.practice.record(exercise).closed
         q = variant.q if shows else exercise.robot.q_home
         stage.move_to(q, Notice("hand", exercise.title, "The arm is ready for the exercise."))
         self._draw(exercise)
@@ -191,7 +210,7 @@ class Practising(Feature):
         assert variant is not None
         reach, shown = exercise.robot.reach, []
         goal = asked.goal if asked.goal is not None else variant.target
-        closed = self._practice.record(exercise).closed
+        closed = self.practice.record(exercise).closed
         if goal is not None:
             shown.append(goal)
             self._drawing.goal(goal, reach, "target")
@@ -257,7 +276,7 @@ class Practising(Feature):
             return
         sheet.verdict = verdict
         now = time.perf_counter()
-        self._practice.take(exercise, verdict, now - self._since)
+        self.practice.take(exercise, verdict, now - self._since)
         self._since = now
         if verdict.right:
             self._show_answer()
@@ -289,7 +308,7 @@ class Practising(Feature):
         exercise, variant = self._now, self._variant
         assert variant is not None
         notice = Notice("hand", exercise.title, "The arm shows the answer.")
-        if self._asked.form == "posture" and self._practice.record(exercise).mark == "shown":
+        if self._asked.form == "posture" and self.practice.record(exercise).mark == "shown":
             self.stage.move_to(np.array(exercise.kind.answer(variant)), notice)
         elif exercise.q and not exercise.kind.shows_posture and self.stage.robot == exercise.robot:
             self.stage.move_to(variant.q, notice)
@@ -311,20 +330,24 @@ class Practising(Feature):
     def _update(self) -> None:
         if not self.shown:
             return
-        exercise, practice, units = self._practice.at, self._practice, self.stage.units
+        exercise, practice, units = self.practice.at, self.practice, self.stage.units
         if exercise is None or self._variant is None:
             contents = [views.list_html(self._exercises, practice), "", ""]
         else:
-            variant, record = self._variant, practice.record(exercise)
+            variant, record, course = self._variant, practice.record(exercise), self.course
+            following = None if course is not None and course.leads(exercise.id) else practice.after(exercise)
+            may_reveal = course is None or course.reveals(exercise.id)
             contents = [
                 views.task_html(exercise, variant, units, self.stage.robot == exercise.robot),
                 views.question_html(self._asked, self._sheet, record.closed),
-                views.foot_html(exercise, variant, units, record, self._sheet, practice.after(exercise)),
+                views.foot_html(exercise, variant, units, record, self._sheet, following, may_reveal),
             ]
         posture = exercise is not None and self._asked.form == "posture"
         self._show_joints(posture and exercise is not None and not practice.record(exercise).closed)
         for block, content in zip(self._blocks, contents, strict=True):
             update_html(block, content)
+        if self.course is not None:
+            self.course.refresh()
 
 
 def _cells(value: object) -> list[list[str]]:

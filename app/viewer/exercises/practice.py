@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hmac
+import json
 import random
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -44,6 +46,7 @@ class Practice:
     Attributes:
         seed: of this student; drawn once.
         at: the exercise on show; None: the list.
+        proven: whether everything in the records was judged by this service, as far as that is known.
     """
 
     def __init__(self, exercises: Exercises) -> None:
@@ -51,6 +54,23 @@ class Practice:
         self.seed = random.randrange(1, MOST)
         self.at: Exercise | None = None
         self.records: dict[str, Record] = {}
+        self.proven = True
+        self._key: bytes | None = None
+        self._claim: tuple[str, object] | None = None  # what was restored, with its proof, until there is a key
+
+    def use_key(self, key: bytes) -> None:
+        """Keep a proof with the state from now on, and check that of a state that was restored."""
+        self._key = key
+        if self._claim is not None:
+            claim, proof = self._claim
+            self.proven = isinstance(proof, str) and hmac.compare_digest(
+                proof.encode(), self._proof(claim).encode()
+            )
+            self._claim = None
+
+    def _proof(self, claim: str) -> str:
+        assert self._key is not None
+        return hmac.new(self._key, f"kinboard.practice:{claim}".encode(), "sha256").hexdigest()[:20]
 
     def record(self, exercise: Exercise) -> Record:
         """What is known of an exercise."""
@@ -96,7 +116,10 @@ class Practice:
         }
         if self.at is None and not done:
             return {}
-        return {"seed": self.seed, "at": "" if self.at is None else self.at.id, "done": done}
+        state: dict[str, object] = {"seed": self.seed, "at": "" if self.at is None else self.at.id, "done": done}
+        if self._key is not None and self.proven and done:
+            state["proof"] = self._proof(_claim(self.seed, done))
+        return state
 
     def restore(self, state: dict[str, object]) -> None:
         """Take what `state` returned; invalid entries are ignored."""
@@ -105,10 +128,20 @@ class Practice:
             self.seed = seed  # type: ignore[assignment]
         self.at = self._exercises.get(state.get("at"))
         self.records = {}
+        if done:
+            self._claim = _claim(seed, done), state.get("proof")
+            self.proven = False
+            if self._key is not None:
+                self.use_key(self._key)
         for key, entry in done.items() if isinstance(done, dict) else ():
             valid = isinstance(entry, list) and len(entry) == 6 and all(map(_is_count, entry))
             if self._exercises.get(key) is not None and valid and entry[0] < len(MARKS):
                 self.records[key] = Record(MARKS[entry[0]], *entry[1:])
+
+
+def _claim(seed: object, done: object) -> str:
+    """What a proof is about, as a text."""
+    return json.dumps([seed, done], sort_keys=True, separators=(",", ":"))
 
 
 def _is_count(value: object) -> bool:

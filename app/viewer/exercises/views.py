@@ -82,7 +82,13 @@ def question_html(asked: Asked, sheet: Sheet, closed: bool) -> str:
 
 
 def foot_html(
-    exercise: Exercise, variant: Variant, units: Units, record: Record, sheet: Sheet, following: Exercise | None
+    exercise: Exercise,
+    variant: Variant,
+    units: Units,
+    record: Record,
+    sheet: Sheet,
+    following: Exercise | None,
+    may_reveal: bool = True,
 ) -> str:
     """Verdict, hints, solution and what can be done next."""
     hints = [variant.text(hint, units) for hint in exercise.hints[: record.hints]]
@@ -102,7 +108,7 @@ def foot_html(
         credit=0 if verdict is None or verdict.right else round(100 * verdict.credit),
         more_hints=len(exercise.hints) - record.hints, record=record, time=_time(record.seconds),
         solution=exercise.solution(variant, units) if record.closed else "", following=following,
-        varies=bool(exercise.vary),
+        varies=bool(exercise.vary), may_reveal=may_reveal,
     )  # fmt: skip
 
 

@@ -1,19 +1,23 @@
 """The choice of a lesson: a dropdown, and below it the steps and questions of the lesson and its own controls.
 
-The exercises are one of the choices.
+The exercises and the courses are two of the choices.
 """
 
 from __future__ import annotations
 
+from functools import partial
+
 import viser
 
-from app.exercises import Exercises
+from app.classroom.results.keys import result_key
+from app.viewer.classroom.courses.feature import CourseFeature
 from app.viewer.exercises.feature import Practising
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.feature import Guide
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.panel import Post, assign, listen
+from app.viewer.session.services import Services
 from app.viewer.views.templates import render
 from app.viewer.worksheet import Worksheets
 from kin import InputError
@@ -30,18 +34,22 @@ class LessonChoice:
         shown: the open lesson.
         guide: its goal, steps and questions.
         sheets: the worksheet of the lesson, or of the arm; the exercises have none.
-        exercises: the exercises, which live as long as the page.
+        exercises, courses: which live as long as the page.
     """
 
     def __init__(
-        self, gui: viser.GuiApi, parent: viser.GuiTabHandle, stage: Stage, post: Post, exercises: Exercises
+        self, gui: viser.GuiApi, parent: viser.GuiTabHandle, stage: Stage, post: Post, services: Services
     ) -> None:
         self._gui = gui
         self._parent = parent
         self._stage = stage
-        self._titles = (NONE, *(lesson.title for lesson in LESSONS), Practising.title)
-        self.exercises = Practising(stage, exercises)
+        self._titles = (NONE, *(lesson.title for lesson in LESSONS), Practising.title, CourseFeature.title)
+        self.exercises = Practising(stage, services.exercises)
         with parent:
+            self.courses = CourseFeature(
+                stage, services.courses, self.exercises.practice, partial(result_key, services.classroom)
+            )
+            self.exercises.course = self.courses
             self._choice = gui.add_dropdown("Lesson", self._titles, initial_value=NONE, hint=HINT)
             self._overview: viser.GuiHtmlHandle | None = gui.add_html(_overview())
             self.sheets: Worksheets | None = Worksheets(stage, None)
@@ -58,10 +66,11 @@ class LessonChoice:
             raise InputError("lesson", title, "one of " + ", ".join(self._titles))
         assign(self._choice, title)
         self.remove()
-        if title == Practising.title:
-            with self._parent:
-                self.exercises.show()
-            return
+        for each in (self.exercises, self.courses):
+            if title == each.title:
+                with self._parent:
+                    each.show()
+                return
         chosen = next((lesson for lesson in LESSONS if lesson.title == title), None)
         if chosen is None:
             with self._parent:
@@ -82,25 +91,27 @@ class LessonChoice:
     @property
     def features(self) -> list[Feature]:
         """The open lesson, its guide and its worksheet, and the exercises."""
-        every = (self.guide, self.shown, self.sheets, self.exercises)
+        every = (self.guide, self.shown, self.sheets, self.exercises, self.courses)
         return [feature for feature in every if feature is not None]
 
     @property
     def key(self) -> str | None:
-        """Of the open lesson, or of the exercises if they are open."""
-        if self.exercises.shown:
-            return self.exercises.key
+        """Of the open lesson, or of the exercises or courses if they are open."""
+        for each in (self.exercises, self.courses):
+            if each.shown:
+                return each.key
         return None if self.shown is None else self.shown.key
 
     @property
     def _title(self) -> str:
-        if self.exercises.shown:
-            return self.exercises.title
+        for each in (self.exercises, self.courses):
+            if each.shown:
+                return each.title
         return NONE if self.shown is None else self.shown.title
 
     def open(self, key: str | None) -> None:
         """Open the lesson with this key, if there is one; None: close the open one."""
-        choices: tuple[type[Feature], ...] = (*LESSONS, Practising)
+        choices: tuple[type[Feature], ...] = (*LESSONS, Practising, CourseFeature)
         chosen = next((each for each in choices if each.key == key), None)
         if key is None or chosen is not None:
             self.choose(NONE if chosen is None else chosen.title)
@@ -111,6 +122,7 @@ class LessonChoice:
             self.sheets.remove()
             self.sheets = None
         self.exercises.hide()
+        self.courses.hide()
         if self.shown is not None and self.guide is not None:
             self._keep(self.shown.key, self.guide.state())
             self.shown.remove()
@@ -135,4 +147,4 @@ class LessonChoice:
 
 def _overview() -> str:
     """All lessons, with one sentence each."""
-    return render("panel/lessons", lessons=LESSONS, exercises=Practising)
+    return render("panel/lessons", lessons=LESSONS, more=(Practising, CourseFeature))

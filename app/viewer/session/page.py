@@ -79,7 +79,7 @@ class VisitorPage(ShownArm, Worker):
         self.summaries = services.summaries
         self.own: OwnArm | None = None
         self.meshes = services.meshes.of(address)
-        self._library, self._exercises = services.library, services.exercises
+        self._library, self._services = services.library, services
         self.bodies = Bodies(services.library, lambda why: self.post("body", why))
         self.frames = Frames()
         self.arm = ArmController(client, services.pace, self.post, self)
@@ -373,7 +373,7 @@ class VisitorPage(ShownArm, Worker):
             self.posture = PosturePanel(self, self.panel.posture, self.post)
             self._use_robot(robot, saved.q)
             if self.panel.learn is not None:
-                self.lessons = LessonChoice(gui, self.panel.learn, self, self.post, self._exercises)
+                self.lessons = LessonChoice(gui, self.panel.learn, self, self.post, self._services)
             for tab, container in zip(TABS, self.panel.tabs, strict=True):
                 with container:
                     self._tabs.append(tab(self))

@@ -133,6 +133,8 @@ class Persistence:
     def begin(self, share: SharePanel) -> str:
         """Take the present state as saved, and return it; from now on `share` offers the saved state."""
         self._share = share
+        if self._page.lessons is not None:
+            self._page.lessons.courses.link_of = self._link_of
         self._state = self.snapshot()
         self._saved = encode(self._state)
         self._update_share()
@@ -185,6 +187,10 @@ class Persistence:
             locks=tuple(i for i, lock in enumerate(page.arm.locks) if lock),
             camera=page.camera.chosen,
         )
+
+    def _link_of(self, features: dict[str, dict[str, object]], lesson: str) -> str:
+        """A link to a page with nothing but these states of features, at this lesson."""
+        return f"{self._address}viewer/#s={encode(PageState(lesson=lesson, features=features))}"
 
     def _update_share(self) -> None:
         page = self._page

@@ -1,0 +1,1 @@
+"""Courses in the tab Learn: chosen, followed, edited, shared; result codes made and checked."""

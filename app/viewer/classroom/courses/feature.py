@@ -1,0 +1,265 @@
+"""Courses in a visitor's page. ``static/lesson.js`` sends what is pressed and typed there."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Hashable
+from contextlib import suppress
+from dataclasses import replace
+
+import viser
+
+from app.classroom.courses import Course, Courses, Item, course_of, parse_course, parse_item, to_data, to_toml
+from app.classroom.courses.course import MOST_ITEMS
+from app.classroom.courses.files import MOST_IN_FILE
+from app.classroom.results import read_code
+from app.classroom.results.codes import clean_alias
+from app.exercises import ExerciseFileError
+from app.viewer.classroom.courses import views
+from app.viewer.classroom.courses.progress import Progress
+from app.viewer.classroom.courses.views import Desk
+from app.viewer.exercises.practice import Practice
+from app.viewer.feature import Feature, Stage
+from app.viewer.lessons import LESSONS
+from app.viewer.panel import update_html
+from app.viewer.panel.status import Notice
+from kin import InputError, KinematicsError
+
+LinkOf = Callable[[dict[str, dict[str, object]], str], str]  # states of features, open lesson → an address
+
+
+class CourseFeature(Feature):
+    """The courses of the service, or the open one: followed or edited.
+
+    Its bar is above whatever the tab Learn shows; `show` and `hide` build and remove the rest.
+
+    Attributes:
+        link_of: makes a link to a page with these states of features.
+    """
+
+    key = "course"
+    title = "Courses"
+    about = "Lessons and exercises in an order; make your own, and check results."
+    messages = frozenset(
+        {"pick", "new", "close", "upload", "edit", "done", "set", "up", "down", "delete", "answers", "go", "next",
+         "back", "list", "download", "link", "fields"}
+    )  # fmt: skip
+
+    def __init__(self, stage: Stage, courses: Courses, practice: Practice, key: Callable[[], bytes]) -> None:
+        super().__init__(stage)
+        self._courses, self._practice, self._secret = courses, practice, key
+        self._progress = Progress(courses, practice)
+        self._desk = Desk()
+        self._bar = stage.client.gui.add_html("")
+        self._page: viser.GuiHtmlHandle | None = None
+        self.link_of: LinkOf = lambda states, lesson: ""
+
+    def show(self) -> None:
+        """Build the HTML in the container that is open."""
+        self._page = self.stage.client.gui.add_html("")
+        self._progress.at = None
+        self._update()
+
+    def hide(self) -> None:
+        """Remove the HTML; the bar and the course stay."""
+        if self._page is not None:
+            self._page.remove()
+            self._page = None
+
+    @property
+    def shown(self) -> bool:
+        """Whether the HTML is built."""
+        return self._page is not None
+
+    def reveals(self, exercise_id: str) -> bool:
+        """Whether the answer of an exercise may be shown to who has not found it."""
+        course = self._progress.course
+        return course is None or course.answers or exercise_id not in course.exercises
+
+    def leads(self, exercise_id: str) -> bool:
+        """Whether the course says what comes after an exercise."""
+        item = self._progress.item
+        return item is not None and item.kind == "exercise" and item.key == exercise_id
+
+    # Events
+
+    def handle(self, key: Hashable, value: object) -> None:
+        if not isinstance(key, tuple):
+            raise InputError("course", key, "a control of the course")
+        name, *rest = key
+        if name in ("next", "back", "list"):
+            self._walk(name)
+        elif self.shown:
+            self._desk.error = ""
+            try:
+                self._act(name, rest, value)
+            except KinematicsError as error:
+                text = str(error)
+                self._desk.error, self._desk.errs = f"{text[:1].upper()}{text[1:]}.", self._desk.errs or "file"
+        if name != "set" or (rest and rest[0] == "add"):  # what was typed is on the screen already
+            self._update()
+
+    def _act(self, name: object, rest: list[object], value: object) -> None:
+        desk, progress = self._desk, self._progress
+        desk.errs = ""
+        match name, value:
+            case "pick", int() if 0 <= value < len(self._courses.all):
+                self._open(self._courses.all[value])
+            case "new", _:
+                self._open(Course("My course"))
+                desk.editing = True
+            case "close", _:
+                self._desk = Desk()
+                progress.course = progress.at = None
+            case "upload", [str(file), str(text)]:
+                if not text or len(text) > MOST_IN_FILE:
+                    raise InputError("file", file, f"a text file of 1 to {MOST_IN_FILE} bytes")
+                self._open(parse_course(text, self._courses.exercises, file[:80], self._courses.find))
+            case "edit" | "done", _:
+                desk.editing, desk.link, desk.code = name == "edit", "", ""
+            case "go", int():
+                self._go(progress.go(value))
+            case "fields", [[str(text)]]:
+                self._take(rest[0], text)
+            case (("set" | "up" | "down" | "delete" | "answers"), _) if desk.editing:
+                self._change(str(name), rest, value)
+            case "download", _:
+                self._download()
+            case "link", _:
+                desk.link = "" if desk.link else self._link()
+            case _:
+                raise InputError("course", name, "a control of the course")
+
+    def _open(self, course: Course) -> None:
+        self._desk = Desk()
+        self._progress.open(course)
+        self._sign()
+
+    def _sign(self) -> None:
+        """From now on the page's storage keeps the marks with a signature.
+
+        Without a place for the key there is none; who asks for a result code is told why.
+        """
+        with suppress(KinematicsError):
+            self._practice.use_key(self._secret())
+
+    def _walk(self, name: object) -> None:
+        progress = self._progress
+        if progress.course is None:
+            return
+        item = None
+        if name == "next":
+            item = progress.next()
+        elif name == "back" and progress.at:
+            item = progress.go(progress.at - 1)
+        if item is None:
+            self.stage.post("lesson", self.title)
+        else:
+            self._go(item)
+
+    def _go(self, item: Item) -> None:
+        """Show an item: its lesson or exercise opens after this event."""
+        stage = self.stage
+        if item.kind == "exercise":
+            stage.post("lesson", "Exercises")
+            stage.post(("feature", "exercises", ("open", item.key, 0)), None)
+            return
+        if item.robot and stage.robot.id != item.robot:
+            stage.change_robot(self._courses.find(item.robot))
+        stage.post("lesson", next(lesson.title for lesson in LESSONS if lesson.key == item.key))
+
+    def _take(self, field: object, text: str) -> None:
+        """A typed code is to be checked, or an alias gets a code."""
+        desk = self._desk
+        desk.errs = "alias" if field == "alias" else "check"
+        if field == "alias":
+            desk.code = ""
+            self._progress.alias = clean_alias(text)
+            desk.code = self._progress.code(self._secret)
+        else:
+            desk.checked, desk.typed = None, text[:500]
+            desk.checked = read_code(text, self._secret())
+
+    def _change(self, name: str, rest: list[object], value: object) -> None:
+        course = self._progress.course
+        if course is None:
+            return
+        match name, value:
+            case "set", str(text):
+                changed = self._set(course, str(rest[0]), " ".join(text.split()))
+            case "answers", _:
+                changed = replace(course, answers=not course.answers)
+            case "up" | "down" | "delete", int() if 0 <= value < len(course.items):
+                if name == "delete":
+                    changed = course.removed(value)
+                else:
+                    changed = course.moved(value, value - 1 if name == "up" else value + 1)
+            case _:
+                raise InputError("course", name, "a control of the editor")
+        data = to_data(changed)  # the same limits as a file's
+        self._progress.edit(course_of(data, self._courses.exercises, "course", self._courses.find))
+        self._desk.link = ""
+
+    def _set(self, course: Course, what: str, text: str) -> Course:
+        """A typed text, or one more item."""
+        if what == "title":
+            return replace(course, title=text or "My course")
+        if what == "about":
+            return replace(course, about=text)
+        if what == "add":
+            item = parse_item(text)
+            if item is None or len(course.items) >= MOST_ITEMS:
+                raise InputError("item", text, f"a lesson or an exercise; at most {MOST_ITEMS} in a course")
+            return course.added(item)
+        name, _, index = what.partition("-")
+        if not index.isdecimal() or int(index) >= len(course.items):
+            raise InputError("item", what, "the index of an item")
+        if name == "note":
+            return course.changed(int(index), note=text)
+        return course.changed(int(index), title=text)
+
+    def _download(self) -> None:
+        course = self._progress.course
+        if course is None:
+            return
+        stem = re.sub(r"[^a-z0-9]+", "-", course.title.lower()).strip("-") or "course"
+        self.stage.client.send_file_download(f"{stem}.toml", to_toml(course).encode(), save_immediately=True)
+        self.stage.notify(
+            Notice("hand", f"{stem}.toml is saved", "Your browser has put it where it puts downloads.")
+        )
+
+    def _link(self) -> str:
+        course = self._progress.course
+        return "" if course is None else self.link_of({self.key: {"course": to_data(course)}}, self.key)
+
+    # The page
+
+    def step_name(self, key: Hashable) -> str:
+        return "Course"
+
+    def state(self) -> dict[str, object]:
+        return self._progress.state()
+
+    def restore(self, state: dict[str, object]) -> None:
+        try:
+            self._progress.restore(state)
+        except ExerciseFileError as error:
+            self.stage.notify(Notice("error", "The course cannot be used", str(error)))
+        if self._progress.course is not None:
+            self._sign()
+        if self.shown:
+            self._progress.at = None
+        self._update()
+
+    def refresh(self) -> None:
+        """The exercises have changed their marks."""
+        self._update()
+
+    def _update(self) -> None:
+        update_html(self._bar, views.bar_html(self._progress))
+        if self._page is None:
+            return
+        if self._progress.course is None:
+            update_html(self._page, views.chooser_html(self._courses, self._desk))
+        else:
+            update_html(self._page, views.course_html(self._progress, self._desk))

@@ -1,0 +1,141 @@
+"""The course of a page: where the student is, what has been seen, and what the exercises gave."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import UTC, datetime
+
+from app.classroom.courses import Course, Courses, Item, course_of, to_data
+from app.classroom.courses.course import MOST_ITEMS
+from app.classroom.results import Outcome, write_code
+from app.exercises import Exercises
+from app.viewer.exercises.practice import Mark, Practice
+from app.viewer.lessons import LESSONS
+from kin import InputError
+
+
+class Progress:
+    """One page's course.
+
+    Attributes:
+        course: None: none is open.
+        at: the index of the item on show; None: the list.
+        seen: the indices of the lessons that were left with *Next*.
+        alias: the name in the result code.
+    """
+
+    def __init__(self, courses: Courses, practice: Practice) -> None:
+        self._courses = courses
+        self._practice = practice
+        self.course: Course | None = None
+        self.at: int | None = None
+        self.seen: set[int] = set()
+        self.alias = ""
+
+    def open(self, course: Course) -> None:
+        """Begin a course."""
+        self.course, self.at, self.seen = course, None, set()
+
+    def edit(self, course: Course) -> None:
+        """The course was changed: places and what was seen no longer fit."""
+        if course.items != self._now.items:
+            self.at, self.seen = None, set()
+        self.course = course
+
+    @property
+    def exercises(self) -> Exercises:
+        """Those of the service."""
+        return self._courses.exercises
+
+    @property
+    def item(self) -> Item | None:
+        """The item on show."""
+        return None if self.course is None or self.at is None else self.course.items[self.at]
+
+    def go(self, index: int) -> Item:
+        """Go to an item; raises `InputError`."""
+        if not 0 <= index < len(self._now.items):
+            raise InputError("item", index, f"0 to {len(self._now.items) - 1}")
+        self.at = index
+        return self._now.items[index]
+
+    def next(self) -> Item | None:
+        """Go on; None after the last item: back to the list."""
+        if self.at is None:
+            self.at = -1
+        elif self._now.items[self.at].kind == "lesson":
+            self.seen.add(self.at)
+        if self.at + 1 >= len(self._now.items):
+            self.at = None
+            return None
+        return self.go(self.at + 1)
+
+    def title(self, item: Item) -> str:
+        """What an item is called."""
+        if item.title:
+            return item.title
+        if item.kind == "lesson":
+            return next((lesson.title for lesson in LESSONS if lesson.key == item.key), item.key)
+        exercise = self._courses.exercises.get(item.key)
+        return item.key if exercise is None else exercise.title
+
+    def mark(self, index: int) -> Mark:
+        """What has become of an item."""
+        item = self._now.items[index]
+        if item.kind == "lesson":
+            return "right" if index in self.seen else "open"
+        record = self._practice.records.get(item.key)
+        return "open" if record is None else record.mark
+
+    def first_open(self) -> int:
+        """The first item that is not done; the first one if all are."""
+        marks = [self.mark(i) for i in range(len(self._now.items))]
+        return next((i for i, mark in enumerate(marks) if mark in ("open", "wrong")), 0)
+
+    def outcome(self) -> Outcome:
+        """What the exercises of the course gave."""
+        course, records = self._now, self._practice.records
+        done = [records[key] for key in course.exercises if key in records]
+        count = len(course.exercises)
+        return Outcome(
+            "course", course.fingerprint, course.title, self.alias,
+            score=round(sum(record.credit for record in done) / count) if count else 0,
+            solved=sum(record.mark == "right" for record in done), count=count,
+            tries=sum(record.attempts for record in done), day=datetime.now(UTC).date(),
+        )  # fmt: skip
+
+    def code(self, key: Callable[[], bytes]) -> str:
+        """The result code; raises `InputError` if the answers were not judged by this service."""
+        signed = key()
+        self._practice.use_key(signed)
+        if not self._practice.proven:
+            valid = "answers that this service has judged; those of this page are from a changed link"
+            raise InputError("progress", "unsigned", f"{valid}. Open the course anew")
+        return write_code(self.outcome(), signed)
+
+    def state(self) -> dict[str, object]:
+        """As JSON; empty without a course."""
+        if self.course is None:
+            return {}
+        at = -1 if self.at is None else self.at
+        return {"course": to_data(self.course), "at": at, "seen": sorted(self.seen), "alias": self.alias}
+
+    def restore(self, state: dict[str, object]) -> None:
+        """Take what `state` returned; raises `ExerciseFileError` for a course that is not valid here."""
+        self.course, self.at, self.seen = None, None, set()
+        if "course" not in state:
+            return
+        course = course_of(state["course"], self._courses.exercises, "link", self._courses.find)
+        at, seen, alias = state.get("at"), state.get("seen"), state.get("alias")
+        self.course = course
+        if type(at) is int and 0 <= at < len(course.items):
+            self.at = at
+        if isinstance(seen, list):
+            self.seen = {i for i in seen[:MOST_ITEMS] if type(i) is int and 0 <= i < len(course.items)}
+        self.alias = alias[:100] if isinstance(alias, str) else ""
+
+    @property
+    def _now(self) -> Course:
+        if self.course is None:
+            raise InputError("course", None, "an open course")
+        return self.course

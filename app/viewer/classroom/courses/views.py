@@ -1,0 +1,104 @@
+"""Courses as HTML: the bar above a lesson, the list of courses, one course, its editor, result codes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from markupsafe import Markup
+
+from app.classroom.courses import Courses
+from app.classroom.courses.course import LONGEST, MOST_ITEMS
+from app.classroom.courses.files import MOST_IN_FILE
+from app.classroom.results import Outcome
+from app.viewer.classroom.courses.progress import Progress
+from app.viewer.exercises.views import MARKS
+from app.viewer.lessons import LESSONS
+from app.viewer.panel.share import box_html
+from app.viewer.views.templates import render
+
+
+@dataclass
+class Desk:
+    """What a page shows of its course besides the course.
+
+    Attributes:
+        editing: whether the editor is open.
+        link: the link to the course, if it is shown.
+        code: the result code, if one was made.
+        checked: what a code says that was checked.
+        typed: that code.
+        error: why the last code, alias or file was refused.
+        errs: of what: `alias`, `check` or `file`.
+    """
+
+    editing: bool = False
+    link: str = ""
+    code: str = ""
+    checked: Outcome | None = None
+    typed: str = ""
+    error: str = ""
+    errs: str = ""
+
+
+def bar_html(progress: Progress) -> str:
+    """The bar above a lesson or exercise of a course; empty in the list."""
+    course, at, item = progress.course, progress.at, progress.item
+    if course is None or at is None or item is None:
+        return ""
+    return render(
+        "course/bar", course=course, number=at + 1, count=len(course.items), title=progress.title(item),
+        note=item.note, marks=_marks(progress), at=at,
+    )  # fmt: skip
+
+
+def chooser_html(courses: Courses, desk: Desk) -> str:
+    """All courses, and a field for a code."""
+    return render(
+        "course/choose", courses=courses.all, desk=desk, most=MOST_IN_FILE, said=said(desk.checked, courses),
+    )  # fmt: skip
+
+
+def course_html(progress: Progress, desk: Desk) -> str:
+    """The list of an open course, or its editor."""
+    course = progress.course
+    assert course is not None
+    rows = [
+        {"index": i, "kind": item.kind, "title": progress.title(item), "own": item.title, "note": item.note,
+         "mark": mark, "name": course.items[i].key}
+        for i, (item, mark) in enumerate(zip(course.items, _marks(progress), strict=True))
+    ]  # fmt: skip
+    done = sum(row["mark"]["color"] == "green" for row in rows)  # type: ignore[index]
+    link = Markup(box_html(desk.link, "Copy link", wrap=True)) if desk.link else ""
+    if desk.editing:
+        exercises = [
+            (topic, [(one.id, one.title) for one in members]) for topic, members in progress.exercises.topics()
+        ]
+        return render(
+            "course/edit", course=course, rows=rows, longest=LONGEST, full=len(rows) >= MOST_ITEMS, link=link,
+            lessons=[(lesson.key, lesson.title) for lesson in LESSONS], exercises=exercises, desk=desk,
+        )  # fmt: skip
+    code = Markup(box_html(desk.code, "Copy code", wrap=True)) if desk.code else ""
+    return render(
+        "course/follow", course=course, rows=rows, done=done, desk=desk, link=link, code=code,
+        alias=progress.alias, begun=any(row["mark"]["symbol"] for row in rows), outcome=progress.outcome(),  # type: ignore[index]
+    )  # fmt: skip
+
+
+def said(outcome: Outcome | None, courses: Courses) -> str:
+    """What a code says, as a sentence."""
+    if outcome is None:
+        return ""
+    known = next((course.title for course in courses.all if course.fingerprint == outcome.fingerprint), "")
+    title = known or f"{outcome.title}…"
+    tries = f"{outcome.tries} answers" if outcome.tries < 255 else "255 answers or more"
+    return (
+        f"{outcome.alias} · {title}: {outcome.score} %, {outcome.solved} of {outcome.count} exercises solved with "
+        f"{tries}, {outcome.day:%Y-%m-%d}."
+    )
+
+
+def _marks(progress: Progress) -> list[dict[str, str]]:
+    course = progress.course
+    assert course is not None
+    found = [MARKS[progress.mark(i)] for i in range(len(course.items))]
+    return [{"symbol": symbol, "words": words, "color": color} for symbol, words, color in found]

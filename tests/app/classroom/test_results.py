@@ -1,0 +1,170 @@
+"""Result codes: signed, legible, typing errors told from forgeries; the teacher's table; CSV without formulas."""
+
+from __future__ import annotations
+
+import csv
+import io
+from binascii import crc_hqx
+from datetime import date, timedelta
+
+import pytest
+from hypothesis import assume, example, given, settings
+from hypothesis import strategies as st
+
+from app.classroom.results import ForgedCodeError, MistypedCodeError, Outcome, codes, read_code, write_code
+from app.classroom.results.table import COLUMNS, STUCK_SECONDS, Attempt, rows, to_csv
+from kin import InputError
+
+KEY, OTHER = b"k" * 32, b"o" * 32
+ADA = Outcome("course", b"\x01\x02\x03\x04", "First steps", "Ada", 83, 9, 12, 14, date(2026, 11, 23))
+CODE = write_code(ADA, KEY)
+
+NAMES = st.text(st.characters(exclude_categories=("C", "Z")), min_size=1, max_size=32).filter(
+    lambda text: codes.unicodedata.is_normalized("NFC", text)
+)
+OUTCOMES = st.builds(
+    Outcome,
+    st.sampled_from(["exercise", "course"]),
+    st.binary(min_size=4, max_size=4),
+    st.text(st.characters(exclude_categories=("C",)), max_size=16),
+    NAMES,
+    st.integers(0, 100),
+    st.integers(0, 40),
+    st.integers(0, 40),
+    st.integers(0, 255),
+    st.integers(0, 60_000).map(lambda days: date(2026, 1, 1) + timedelta(days=days)),
+)
+PLACES = st.integers(0, len(CODE.replace("-", "")) - 1)
+
+
+@given(OUTCOMES)
+def test_a_code_says_what_was_reached(outcome: Outcome) -> None:
+    assert read_code(write_code(outcome, KEY), KEY) == outcome
+
+
+def test_a_code_is_short_and_forgiving() -> None:
+    assert len(CODE.replace("-", "")) <= 64
+    assert all(len(group) <= 5 for group in CODE.split("-"))
+    copies = (
+        CODE.lower(),
+        CODE.replace("-", " "),
+        f"  {CODE}\n",
+        CODE.replace("0", "o").replace("1", "l"),
+        CODE.replace("-", ""),
+    )
+    assert [read_code(copy, KEY) for copy in copies] == [ADA] * len(copies)
+
+
+@settings(max_examples=20)
+@given(PLACES, st.sampled_from(codes.LETTERS))
+def test_one_wrong_letter_is_a_typing_error_and_its_group_is_named(place: int, letter: str) -> None:
+    plain = CODE.replace("-", "")
+    assume(plain[place] != letter)
+    with pytest.raises(MistypedCodeError, match=f"group {place // 5 + 1}, "):
+        read_code(plain[:place] + letter + plain[place + 1 :], KEY)
+
+
+@settings(max_examples=20)
+@given(PLACES, st.sampled_from(["exchange", "drop", "double"]))
+def test_exchanged_missing_and_doubled_letters_are_typing_errors(place: int, how: str) -> None:
+    plain = CODE.replace("-", "")
+    a, b = plain[:place], plain[place:]
+    typed = {"exchange": a + b[1:2] + b[:1] + b[2:], "drop": a + b[1:], "double": a + b[:1] + b}[how]
+    assume(typed != plain)
+    with pytest.raises(MistypedCodeError, match="typing errors"):
+        read_code(typed, KEY)
+
+
+@given(st.integers(0, len(CODE) * 8))
+def test_a_changed_code_with_a_right_checksum_is_a_forgery(bit: int) -> None:
+    data = bytearray(codes._bytes(CODE.replace("-", "")) or b"")
+    place, mask = bit // 8 % (len(data) - 2), 1 << bit % 8
+    assume(place)  # the first byte says how to read the rest
+    data[place] ^= mask
+    data[-2:] = crc_hqx(bytes(data[:-2]), 0xFFFF).to_bytes(2)
+    with pytest.raises(ForgedCodeError, match="its checksum is right"):
+        read_code(codes._letters(bytes(data)), KEY)
+
+
+def test_another_services_code_is_not_ours() -> None:
+    with pytest.raises(ForgedCodeError, match="made by another service"):
+        read_code(CODE, OTHER)
+
+
+@given(st.text(max_size=500))
+@example("")
+@example("----")
+@example("UUUUU")
+@example("0" * 80)
+def test_any_other_text_is_refused_with_what_is_valid(text: str) -> None:
+    with pytest.raises(MistypedCodeError, match="code: got"):
+        read_code(text, KEY)
+
+
+@pytest.mark.parametrize("alias", ["", "  \n", "x" * 33])
+def test_an_alias_has_a_length(alias: str) -> None:
+    with pytest.raises(InputError, match="1 to 32 characters"):
+        codes.clean_alias(alias)
+
+
+def test_an_alias_is_one_line() -> None:
+    assert codes.clean_alias(" Ada\n\u202eL. ") == "Ada L."
+
+
+# The table
+
+
+def attempt(
+    seat: str, exercise: str, score: float, at: float, started: float = 0.0, answer: object = 1
+) -> Attempt:
+    return Attempt(seat, f"alias of {seat}", exercise, 7, answer, "Too large.", score, started, at)
+
+
+def test_who_is_stuck_comes_first() -> None:
+    attempts = [
+        attempt("fast", "a", 1.0, 10.0),
+        attempt("slow", "a", 0.0, 20.0),
+        attempt("busy", "a", 0.5, 20.0, started=STUCK_SECONDS - 50.0),
+        *(attempt("lost", "a", 0.0, float(at)) for at in range(4)),
+        attempt("late", "a", 0.0, 5.0),
+        attempt("late", "a", 1.0, 9.0),
+    ]
+    table = rows(attempts, now=STUCK_SECONDS)
+    assert [row.seat for row in table] == ["lost", "slow", "busy", "late", "fast"]
+    assert [row.stuck for row in table] == [True, True, False, False, False]
+    assert [(row.tries, row.score, row.solved) for row in table[-2:]] == [(2, 1.0, True), (1, 1.0, True)]
+    assert table[0].seconds == STUCK_SECONDS
+    assert table[-1].seconds == 10.0
+    assert table[2].score == 0.5
+
+
+@given(st.text(max_size=12), st.text(max_size=12))
+@example("=1+1", "-2")
+@example("@SUM(A1)", "\t=1")
+@example("\r=1", " =1")
+def test_no_cell_is_a_formula(alias: str, answer: str) -> None:
+    one = Attempt("s", alias, "two-elbows", 3, answer, alias, 0.5, 0.0, 61.0)
+    text = to_csv([one], {"two-elbows": answer})
+    (head, row) = csv.reader(io.StringIO(text, newline=""))
+    assert tuple(head) == COLUMNS
+    assert len(row) == len(COLUMNS)
+    for value in row:
+        assert not value.lstrip(" ")[:1] or value.lstrip(" ")[0] not in "=+-@\t\r"
+    assert row[0].removeprefix("'") == alias or row[0] == alias
+
+
+def test_each_attempt_is_a_row_in_the_order_of_time() -> None:
+    attempts = [
+        attempt("b", "x", 1.0, 30.0),
+        attempt("a", "x", 0.0, 10.0),
+        attempt("b", "x", 0.25, 20.0, 5.0, ["1 mm", "2"]),
+    ]
+    found = list(csv.DictReader(io.StringIO(to_csv(attempts, {"x": "An exercise"}))))
+    assert [(row["alias"], row["attempt"], row["score"]) for row in found] == [
+        ("alias of a", "1", "0.00"), ("alias of b", "1", "0.25"), ("alias of b", "2", "1.00"),
+    ]  # fmt: skip
+    assert found[1]["answer"] == '["1 mm","2"]'
+    assert (found[1]["started"], found[1]["answered"], found[1]["seconds"]) == (
+        "1970-01-01T00:00:05Z", "1970-01-01T00:00:20Z", "15",
+    )  # fmt: skip
+    assert found[0]["title"] == "An exercise"
