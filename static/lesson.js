@@ -82,7 +82,19 @@
       ?? block?.querySelector(".kb-guide-turn button:last-child") ?? block?.querySelector("[data-first]");
     node?.focus({ preventScroll: true });
   }
+  // What has just been opened is seen from its head: a course's bar, an exercise, the list of a course.
+  let open = "";
+  function reveal() {
+    const bar = document.querySelector("[data-course=bar]");
+    const head = bar ?? document.querySelector("[data-exercises=task], [data-course=follow], [data-course=choose]");
+    const now = [bar?.dataset.at, document.querySelector("[data-exercise]")?.dataset.exercise, head?.dataset.course].join(" ");
+    if (now === open) return;
+    const first = open === "";
+    open = now;
+    if (head && !first && head.getBoundingClientRect().height) requestAnimationFrame(() => head.scrollIntoView({ block: "start" }));
+  }
   addEventListener("DOMContentLoaded", () => {
+    new MutationObserver(reveal).observe(document.body, { subtree: true, childList: true });
     new MutationObserver(restore).observe(document.body, { subtree: true, childList: true });
   });
 })();

@@ -41,7 +41,9 @@ class Settings(BaseSettings):
     exercises: Path | None = Field(None, description="Folder with further exercises (*.toml).")
     courses: Path | None = Field(None, description="Folder with further courses (*.toml).")
     data: Path | None = Field(
-        None, description="Folder for the database of classrooms, made with the first room. Unset: the user's own."
+        None,
+        description="Folder for the database of classrooms, made when a room or course is opened. "
+        "Unset: the user's own.",
     )
     database_url: SecretStr | None = Field(
         None,

@@ -107,7 +107,7 @@ class CourseFeature(Feature):
                 self._open(self._courses.all[value])
             case "new", _:
                 self._open(Course("My course"))
-                desk.editing = True
+                self._desk.editing = True
             case "close", _:
                 self._desk = Desk()
                 progress.course = progress.at = None

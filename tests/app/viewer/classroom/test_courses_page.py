@@ -1,0 +1,229 @@
+"""Courses in a visitor's page: followed, edited, kept; result codes; what a link can do."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from fake_browser import FakeBrowser
+from live_server import serve_viewer
+
+from app.classroom.courses import Courses, parse_course, to_data, to_toml
+from app.classroom.hub import Hub
+from app.classroom.results import read_code
+from app.classroom.results.keys import result_key
+from app.exercises import Exercises
+from app.shared.clouds import Clouds
+from app.shared.settings import Settings
+from app.shared.store import Store
+from app.viewer.exercises.practice import Practice
+from app.viewer.server import ViewerServer
+from app.viewer.session.state import PageState, decode, encode
+from kin import builtin_robots, get_robot
+
+pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
+
+ALL = Exercises()
+COURSE = parse_course(
+    """
+title = "Week <1>"
+answers = false
+[[item]]
+lesson = "velocity"
+robot = "scara"
+note = "Read <this>."
+[[item]]
+exercise = "which-joint-goes-down"
+[[item]]
+exercise = "row-distance"
+""",
+    ALL,
+)
+SEED = 77
+
+
+@pytest.fixture(scope="module")
+def settings(tmp_path_factory: pytest.TempPathFactory) -> Settings:
+    return Settings(data=tmp_path_factory.mktemp("data"))
+
+
+@pytest.fixture(scope="module")
+def server(settings: Settings) -> Iterator[int]:
+    with serve_viewer(ViewerServer(Store(), settings, Clouds())) as port:
+        yield port
+
+
+def opened(features: dict[str, dict[str, object]], lesson: str = "course") -> str:
+    text = encode(PageState(lesson=lesson, features=features))
+    return json.dumps({"address": "http://127.0.0.1/", "state": text})
+
+
+def linked() -> str:
+    """A page that was opened with the link to the course, by a student with our seed."""
+    return opened({"course": {"course": to_data(COURSE)}, "exercises": {"seed": SEED, "at": "", "done": {}}})
+
+
+def press(tab: FakeBrowser, feature: str, key: list[object], value: object = None) -> None:
+    tab.say("feature", [feature, key, value])
+
+
+def shown(tab: FakeBrowser) -> str:
+    return html.unescape(tab.html)
+
+
+def block(tab: FakeBrowser, name: str) -> str:
+    """The HTML of a block of the course; empty if it is not there."""
+    return next(
+        (text for m in tab.gui.values() if f'data-course="{name}"' in (text := m["props"].get("content", ""))), ""
+    )
+
+
+def test_a_student_follows_a_course_to_a_result_code(server: int, settings: Settings) -> None:
+    with FakeBrowser(server, memory=linked()) as tab:
+        tab.wait(lambda: "0 of 3 done" in block(tab, "follow"))
+        assert "Week &lt;1&gt;" in block(tab, "follow")
+        press(tab, "course", ["next", 1])
+        tab.wait(lambda: "1 of 3" in block(tab, "bar") and "1. A column" in tab.html)
+        assert "Read &lt;this&gt;." in block(tab, "bar")
+        assert tab.value("Robot") == get_robot("scara").name
+        press(tab, "course", ["next", 2])
+        tab.wait(lambda: "2 of 3" in block(tab, "bar") and 'data-exercise="which-joint-goes-down"' in tab.html)
+        assert "Show the answer" not in tab.html
+        press(tab, "exercises", ["reveal", 3])
+        press(tab, "exercises", ["answer", 4], 2)
+        tab.wait(lambda: "✓ Right" in shown(tab))
+        assert "Next exercise" not in tab.html, "the course says what comes next"
+        press(tab, "course", ["back", 5])
+        tab.wait(lambda: "1 of 3" in block(tab, "bar") and "1. A column" in tab.html)
+        press(tab, "course", ["list", 6])
+        tab.wait(lambda: "2 of 3 done" in block(tab, "follow") and not block(tab, "bar"))
+        press(tab, "course", ["fields", "alias", 7], [["  "]])
+        tab.wait(lambda: "1 to 32 characters" in block(tab, "follow"))
+        press(tab, "course", ["fields", "alias", 8], [["Ada <b>"]])
+        tab.wait(lambda: "Copy code" in block(tab, "follow"))
+        found = re.search(r"\b(?:[0-9A-Z]{5}-){8,}[0-9A-Z]+", block(tab, "follow"))
+        assert found is not None
+        tab.wait(lambda: any('"alias"' in _decoded(text) for text in tab.kept[-1:]))
+        kept = tab.kept[-1]
+    outcome = read_code(found[0], result_key(Hub.of(settings)))
+    assert (outcome.alias, outcome.title, outcome.fingerprint) == ("Ada <b>", COURSE.title, COURSE.fingerprint)
+    assert (outcome.score, outcome.solved, outcome.count, outcome.tries) == (50, 1, 2, 1)
+
+    # A reload: the same place, and the marks still count. A teacher checks the code.
+    with FakeBrowser(server, memory=json.dumps({"address": "http://127.0.0.1/", "state": kept})) as tab:
+        tab.wait(lambda: "2 of 3 done" in block(tab, "follow"))
+        press(tab, "course", ["fields", "alias", 1], [["Ada"]])
+        tab.wait(lambda: "Copy code" in block(tab, "follow"))
+        press(tab, "course", ["close", 2])
+        tab.wait(lambda: bool(block(tab, "choose")))
+        press(tab, "course", ["fields", "check", 3], [[found[0].lower()]])
+        tab.wait(lambda: "Signed by this service" in block(tab, "choose"))
+        assert "Ada &lt;b&gt; · Week &lt;1&gt;…: 50 %, 1 of 2 exercises solved" in block(tab, "choose")
+        press(tab, "course", ["fields", "check", 4], [[found[0].replace("-", "")[:-1] + "A"]])
+        tab.wait(lambda: "Not accepted" in block(tab, "choose"))
+
+
+def _decoded(text: str) -> str:
+    return json.dumps(decode(text, builtin_list()).features)
+
+
+def builtin_list() -> list[object]:
+    return [get_robot(robot_id) for robot_id in builtin_robots()]
+
+
+def test_marks_that_were_written_into_a_link_give_no_code(server: int) -> None:
+    """A student edits the page's storage: the list shows it, but the service signs nothing."""
+    done = {"which-joint-goes-down": [2, 1, 0, 5, 100, 0], "row-distance": [2, 1, 0, 5, 100, 0]}
+    practice = {"seed": SEED, "at": "", "done": done, "proof": "0" * 20}
+    with FakeBrowser(server, memory=opened({"course": {"course": to_data(COURSE)}, "exercises": practice})) as tab:
+        tab.wait(lambda: "2 of 3 done" in block(tab, "follow"))
+        press(tab, "course", ["fields", "alias", 1], [["Ada"]])
+        tab.wait(lambda: "answers that this service has judged" in block(tab, "follow"))
+        assert "Copy code" not in block(tab, "follow")
+
+
+def test_a_proof_belongs_to_seed_and_records() -> None:
+    practice = Practice(ALL)
+    practice.use_key(b"k")
+    practice.records = {"row-distance": practice.record(ALL.all[0])}
+    practice.record(ALL.all[0]).attempts = 1
+    state = practice.state()
+    for change, proven in (
+        ({}, True),
+        ({"seed": 1}, False),
+        ({"proof": None}, False),
+        ({"done": {"a": 1}}, False),
+    ):
+        other = Practice(ALL)
+        other.use_key(b"k")
+        other.restore({**state, **change})
+        assert other.proven is proven, change
+        late = Practice(ALL)
+        late.restore({**state, **change})
+        assert not late.proven
+        late.use_key(b"k")
+        assert late.proven is proven, change
+        assert ("proof" in late.state()) is proven
+
+
+def test_a_teacher_makes_a_course(server: int) -> None:
+    with FakeBrowser(server, memory=opened({"course": {}})) as tab:
+        tab.wait(lambda: all(course.title in shown(tab) for course in Courses(ALL).all))
+        press(tab, "course", ["new", 1])
+        tab.wait(lambda: bool(block(tab, "edit")))
+        press(tab, "course", ["set", "title", 2], "Mine")
+        for serial, name in enumerate(("exercise:two-elbows", "lesson:dh", "exercise:row-distance"), 3):
+            press(tab, "course", ["set", "add", serial], name)
+        tab.wait(lambda: block(tab, "edit").count("data-course-row") == 3)
+        press(tab, "course", ["down", 6], 0)
+        press(tab, "course", ["delete", 7], 2)
+        press(tab, "course", ["set", "note-0", 8], "Read this")
+        press(tab, "course", ["set", "title-1", 9], "Both of them")
+        press(tab, "course", ["answers", 10])
+        press(tab, "course", ["set", "add", 11], "exercise:no-such")
+        tab.wait(lambda: "exercise: got 'no-such'" in shown(tab))
+        press(tab, "course", ["done", 12])
+        tab.wait(lambda: "0 of 2 done" in block(tab, "follow"))
+        assert "Answers are shown when you have found them" in block(tab, "follow")
+        press(tab, "course", ["link", 13])
+        tab.wait(lambda: "viewer/#s=" in block(tab, "follow"))
+        link = re.search(r"viewer/#s=([\w-]+)", block(tab, "follow"))
+        assert link is not None
+        press(tab, "course", ["download", 14])
+        tab.wait(lambda: "mine.toml is saved" in shown(tab))
+    made = parse_course(
+        'title = "Mine"\nanswers = false\n[[item]]\nlesson = "dh"\nnote = "Read this"\n'
+        '[[item]]\nexercise = "two-elbows"\ntitle = "Both of them"', ALL
+    )  # fmt: skip
+    assert decode(link[1], builtin_list()).features == {"course": {"course": to_data(made)}}
+    with FakeBrowser(server, memory=opened({"course": {}})) as tab:
+        tab.wait(lambda: bool(block(tab, "choose")))
+        press(tab, "course", ["upload", 1], ["bad.toml", "title = 3"])
+        tab.wait(lambda: "bad.toml: title: got 3, expected a text" in shown(tab).replace("Bad", "bad"))
+        press(tab, "course", ["upload", 2], ["mine.toml", to_toml(made)])
+        tab.wait(lambda: "0 of 2 done" in block(tab, "follow"))
+
+
+def test_a_link_with_an_unknown_exercise_says_so(server: int) -> None:
+    course = {"title": "Old", "item": [{"exercise": "gone"}]}
+    with FakeBrowser(server, memory=opened({"course": {"course": course}})) as tab:
+        tab.wait(
+            lambda: "The course cannot be used" in shown(tab) and "item[0].exercise: got 'gone'" in shown(tab)
+        )
+        tab.wait(lambda: bool(block(tab, "choose")))
+        press(tab, "course", ["go", 1], 99)
+        press(tab, "course", ["upload", 2], 7)
+        tab.wait(lambda: "a control of the course" in shown(tab))
+
+
+def test_courses_that_nobody_opens_make_no_database(tmp_path: Path) -> None:
+    with (
+        serve_viewer(ViewerServer(Store(), Settings(data=tmp_path), Clouds())) as port,
+        FakeBrowser(port, memory=opened({"course": {}})) as tab,
+    ):
+        tab.wait(lambda: bool(block(tab, "choose")))
+    assert not list(tmp_path.iterdir())
