@@ -1,4 +1,4 @@
-"""Result codes: signed, legible, typing errors told from forgeries; the teacher's table; CSV without formulas."""
+"""Result codes: signed, legible, typing errors against forgeries; the teacher's table; CSV without formulas."""
 
 from __future__ import annotations
 

@@ -138,7 +138,7 @@ class CourseFeature(Feature):
     def _sign(self) -> None:
         """From now on the page's storage keeps the marks with a signature.
 
-        Without a place for the key there is none; who asks for a result code is told why.
+        Without a place for the key there is none; a request for a result code then gets the reason.
         """
         with suppress(KinematicsError):
             self._practice.use_key(self._secret())
