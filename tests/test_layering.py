@@ -72,6 +72,10 @@ RULES: dict[str, set[str]] = {
         *("kin", "fastapi", "starlette", "pydantic", "pydantic_core", "uvicorn", "httptools", "websockets"),
         *("app.api", "app.classroom", "app.exercises", "app.service", "app.shared", "app.viewer"),
     },
+    "app/service/web/rooms": {
+        *("starlette", "jinja2", "segno", "app.api.problems", "app.classroom", "app.service.web.access"),
+        *("app.service.web.rate_limit", "app.service.web.rooms", "app.shared"),
+    },
     "app/service/web": {
         *("starlette", "msgspec", "itsdangerous", "kin"),
         *("app.api.problems", "app.classroom", "app.service.web", "app.shared"),

@@ -38,6 +38,7 @@ KINDS = {
     "not-found": "There is nothing at this address",
     "method-not-allowed": "The method is not allowed at this address",
     "unauthorized": "An access token is required",
+    "forbidden": "This is not allowed",
     "read-only": "The service is read-only",
     "too-many-requests": "Too many requests",
     "body-too-large": "The request body is too large",

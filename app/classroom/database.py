@@ -27,7 +27,6 @@ from app.classroom.views import ClassroomUnavailable
 
 logger = logging.getLogger("kinboard.classroom")
 
-FILE = "classroom.db"
 WAIT = 3.0  # seconds for a lock, or for a connection
 LOG_EVERY = 10.0  # seconds between two lines about errors
 _MIGRATION_LOCK = 0x6B696E  # of PostgreSQL
@@ -38,13 +37,13 @@ class Database:
     """Transactions on one database; thread-safe.
 
     Args:
-        folder: where SQLite's file is, or will be.
+        file: SQLite's, which need not exist.
         url: of another database, such as ``postgresql://user@host/name``.
     """
 
-    def __init__(self, folder: Path, url: str | None = None) -> None:
-        self._file = None if url else folder / FILE
-        self._url = make_url(url or f"sqlite:///{folder / FILE}")
+    def __init__(self, file: Path, url: str | None = None) -> None:
+        self._file = None if url else file
+        self._url = make_url(url or f"sqlite:///{file}")
         if self._url.drivername in ("postgresql", "postgres"):
             self._url = self._url.set(drivername="postgresql+psycopg")
         self._engine: Engine | None = None

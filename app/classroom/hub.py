@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger("kinboard.classroom")
 
+DATABASE_FILE = "classroom.db"
 TICK = 0.03  # seconds between two looks at the database
 BEAT = 2.0  # seconds between two signs that somebody is there
 SEAT_PAGE_EVERY = 0.2  # seconds between two states of one student's page
@@ -77,6 +78,12 @@ class Hub:
         return cls(settings.data_folder, None if url is None else url.get_secret_value(), settings.max_rooms)
 
     @property
+    def in_use(self) -> bool:
+        """Whether there is a database with rooms, perhaps of an earlier process."""
+        folder, url = self._source
+        return url is not None or (folder / DATABASE_FILE).exists()
+
+    @property
     def rooms(self) -> Rooms:
         """Opens, joins and ends rooms. The first use imports SQLAlchemy."""
         with self._lock:
@@ -84,7 +91,8 @@ class Hub:
                 from app.classroom.database import Database
                 from app.classroom.rooms import Rooms
 
-                self._database = Database(*self._source)
+                folder, url = self._source
+                self._database = Database(folder / DATABASE_FILE, url)
                 self._rooms = Rooms(self._database, self._most)
             return self._rooms
 

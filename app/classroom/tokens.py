@@ -34,7 +34,7 @@ def read_code(text: str) -> str:
 
 def show_code(code: str) -> str:
     """A join code in groups, easier to copy."""
-    return f"{code[:_CODE_GROUP]}-{code[_CODE_GROUP:]}"
+    return "-".join(filter(None, (code[:_CODE_GROUP], code[_CODE_GROUP:])))
 
 
 class Tokens:

@@ -46,6 +46,7 @@ from app.service.web.hosts import LOCAL_NAMES, Hosts
 from app.service.web.observe import Observe, write_to_stderr
 from app.service.web.pages import page_routes, static_folder
 from app.service.web.prefix import PathPrefix
+from app.service.web.rooms import room_routes, sweeping
 from app.service.web.viewer_proxy import ViewerBridge
 from app.service.workers import supervise
 from app.shared.clouds import Clouds
@@ -114,10 +115,11 @@ def create_app(
         startup.start()
         keeper = MemoryKeeper(idle, state.update_gauges)
         keeper.start()
-        yield
+        async with sweeping(classroom):
+            yield
         keeper.stop()
         work.close()  # computations still running have had their time to finish
-        for step in (startup.stop, classroom.close, clouds.close, maps.close, summaries.close):
+        for step in (startup.stop, clouds.close, maps.close, summaries.close):
             await run_in_threadpool(step)
 
     app = FastAPI(
@@ -139,7 +141,8 @@ def create_app(
     state.update_gauges = partial(update_gauges, state, bridge)
     install_problem_handlers(app)
     complete_document(app, store, settings)
-    app.router.routes.extend([*api_routes(), *page_routes(), *embedding_routes(), *bridge.routes()])
+    pages = (*page_routes(), *embedding_routes(), *room_routes(classroom, settings))
+    app.router.routes.extend([*api_routes(), *pages, *bridge.routes()])
     app.include_router(status.router)
     _add_middleware(app, settings)
     return app

@@ -6,7 +6,8 @@ and sets a signed cookie (itsdangerous). The cookie holds only the time of the l
 check it. In read-only mode visitors without the token may look but not move anything: pages, descriptions of
 robots, and a viewer whose arm takes no commands.
 
-Health checks and the files of the login page are always open.
+Health checks, the files of the login page, and the pages for joining a classroom are always open. Who has joined
+one gets a cookie that opens the viewer, and nothing else, until the room ends.
 """
 
 from __future__ import annotations
@@ -17,12 +18,13 @@ import hashlib
 import hmac
 import html
 import re
+import time
 from collections import Counter
 from http.cookies import CookieError, SimpleCookie
 from pathlib import Path
 from urllib.parse import parse_qs, quote
 
-from itsdangerous import BadSignature, TimestampSigner
+from itsdangerous import BadSignature, TimestampSigner, URLSafeSerializer
 from starlette.datastructures import Headers
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, RedirectResponse, Response
@@ -36,6 +38,9 @@ from app.shared.security import SAFE_METHODS, Rights, origin_allowed, set_cookie
 
 COOKIE = "kinboard"
 COOKIE_AGE = 30 * 24 * 3600  # seconds until a login ends
+GUEST_COOKIE = "kinboard_guest"  # of who has joined a classroom: opens the viewer until the room ends
+_GUESTS = "kinboard.guests"  # in the scope: what signs that cookie, or None
+_MAY_OPEN = "kinboard.may-open"  # in the scope of a page of classrooms: whether the client may open one
 _RIGHTS = "kinboard.rights"  # in the scope of a client that has not all of them
 OPEN = ("/livez", "/readyz", "/login", "/favicon.ico")
 HEALTH = OPEN[:2]
@@ -68,6 +73,11 @@ class Access:
         self._signer = None
         if token is not None:
             self._signer = TimestampSigner(token, salt="kinboard.login", digest_method=hashlib.sha256)
+        self._guests = None
+        if token is not None:
+            self._guests = URLSafeSerializer(
+                token, salt="kinboard.guest", signer_kwargs={"digest_method": hashlib.sha256}
+            )
         self._read_only = read_only
         self._requests = TokenBucket(rate, 10.0 * rate) if rate else None
         self._wrong_tokens = TokenBucket(1.0 / TRY_EVERY, TRIES)
@@ -87,8 +97,11 @@ class Access:
                 self._count(scope)
             if path == "/login" and request is not None:
                 answer = await self._login(request)
-            elif not (path in OPEN or path.startswith("/static/") or await self._authenticated(scope)):
-                self._admit_anonymous(scope, path)
+            elif not (path in OPEN or path.startswith("/static/")):
+                scope[_MAY_OPEN] = await self._authenticated(scope)
+                if not scope[_MAY_OPEN] and not self._is_guest(scope, path):
+                    self._admit_anonymous(scope, path)
+                scope[_GUESTS] = self._guests
         except ProblemError as error:
             answer = respond(error)
         except _LoginNeededError:
@@ -126,6 +139,19 @@ class Access:
         if self._framed and not _asks_itself(scope):
             return False
         return self._has_valid_cookie(headers.get(b"cookie", b"").decode("latin-1"))
+
+    def _is_guest(self, scope: Scope, path: str) -> bool:
+        """Whether the client may go there without the token: pages of rooms; with a seat, the viewer."""
+        if path.startswith("/room/") or (path == "/room" and scope.get("method") in SAFE_METHODS):
+            return True
+        if self._guests is None or path.rstrip("/") != "/viewer":
+            return False
+        try:
+            cookies = SimpleCookie(dict(scope["headers"]).get(b"cookie", b"").decode("latin-1"))
+            morsel = cookies.get(GUEST_COOKIE)
+            return float(self._guests.loads("" if morsel is None else morsel.value)) > time.time()
+        except (CookieError, BadSignature, TypeError, ValueError):
+            return False
 
     def _admit_anonymous(self, scope: Scope, path: str) -> None:
         """Admit a request without the token as read-only; else raise `_LoginNeededError`, 401 or 403."""
@@ -174,7 +200,7 @@ class Access:
         message = ""
         status = 200
         if request.method == "POST":
-            form = await _form(request)
+            form = await form_of(request)
             try:
                 await self._check(request.scope, form.get("token", "").encode())
                 answer = RedirectResponse("./" + place, 303)
@@ -217,6 +243,19 @@ def _encodings(token: str | None) -> list[bytes]:
     return sorted(encodings)
 
 
+def may_open(scope: Scope) -> bool:
+    """Whether the client of a page of classrooms may open one."""
+    return bool(scope.get(_MAY_OPEN, False))
+
+
+def pass_guest(request: Request, answer: Response, ends: float, framed: bool) -> None:
+    """Let who has joined a classroom use the viewer without the access token, until it ends."""
+    guests = request.scope.get(_GUESTS)
+    if guests is not None:
+        seconds = max(1, int(ends - time.time()))
+        set_cookie(answer, GUEST_COOKIE, guests.dumps(int(ends)), seconds, request.scope, framed)
+
+
 def rights_of(scope: Scope) -> Rights:
     """What the client of an admitted request may cause."""
     rights = scope.get(_RIGHTS, Rights.FULL)
@@ -242,7 +281,7 @@ def unauthorized(detail: str) -> ProblemError:
     return ProblemError(401, "unauthorized", detail, hint, headers={"WWW-Authenticate": 'Bearer realm="kinboard"'})
 
 
-async def _form(request: Request) -> dict[str, str]:
+async def form_of(request: Request) -> dict[str, str]:
     """The fields of a form; raises 413 if it is too large."""
     body = b""
     async for chunk in request.stream():

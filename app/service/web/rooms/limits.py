@@ -1,0 +1,74 @@
+"""How often a client may try join codes, and open rooms.
+
+A class comes through one address, so right codes always count, and wrong ones have a generous limit. Above it, and
+while wrong codes come in from everywhere, each try takes a second and only a few are made at a time: a class can
+still join, and a program that guesses needs centuries.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections import Counter
+from collections.abc import AsyncIterator
+
+from app.service.web.access import too_many
+from app.service.web.rate_limit import TokenBucket
+
+WRONG, WRONG_EVERY = 30, 6.0  # wrong codes of one client at once, then one in this many seconds
+WRONG_ALL, WRONG_ALL_EVERY = 300, 0.5  # of all clients of this process
+SLOW, SLOW_AT_ONCE = 1.0, 8  # seconds of a slow try, and how many of one client are under way
+ROOMS, ROOMS_EVERY = 10, 60.0
+SEATS, SEATS_EVERY = 300, 1.0
+_ALL = "all"
+
+
+class Limits:
+    """Counts by client; one per process. For one event loop."""
+
+    def __init__(self) -> None:
+        self._wrong = TokenBucket(1.0 / WRONG_EVERY, WRONG)
+        self._wrong_all = TokenBucket(1.0 / WRONG_ALL_EVERY, WRONG_ALL)
+        self._rooms = TokenBucket(1.0 / ROOMS_EVERY, ROOMS)
+        self._seats = TokenBucket(1.0 / SEATS_EVERY, SEATS)
+        self._slow: Counter[str] = Counter()
+
+    @contextlib.asynccontextmanager
+    async def trying(self, client: str) -> AsyncIterator[None]:
+        """One try of a join code, slow after many wrong ones; raises 429."""
+        wait = max(self._wrong.wait(client), self._wrong_all.wait(_ALL))
+        if wait <= 0.0:
+            yield
+            return
+        if self._slow[client] >= SLOW_AT_ONCE:
+            raise too_many("Too many wrong join codes from your address.", wait)
+        self._slow[client] += 1
+        try:
+            await asyncio.sleep(SLOW)
+            yield
+        finally:
+            self._slow[client] -= 1
+            if not self._slow[client]:
+                del self._slow[client]
+
+    def wrong(self, client: str) -> None:
+        """A code was wrong; raises 429 if there were too many."""
+        wait = max(self._wrong.wait(client), self._wrong_all.wait(_ALL))
+        if wait > 0.0:
+            raise too_many("Too many wrong join codes from your address.", wait)
+        self._wrong.take(client)
+        self._wrong_all.take(_ALL)
+
+    def opening(self, client: str) -> None:
+        """A room is opened; raises 429."""
+        self._take(self._rooms, client, "Too many rooms were opened from your address.")
+
+    def sitting(self, client: str) -> None:
+        """A seat is taken; raises 429."""
+        self._take(self._seats, client, "Too many seats were taken from your address.")
+
+    def _take(self, bucket: TokenBucket, client: str, detail: str) -> None:
+        wait = bucket.wait(client)
+        if wait > 0.0:
+            raise too_many(detail, wait)
+        bucket.take(client)

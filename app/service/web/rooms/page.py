@@ -1,0 +1,72 @@
+"""The page of a room: HTML from a template, and the QR code of the address for joining."""
+
+from __future__ import annotations
+
+import ipaddress
+import time
+from pathlib import Path
+
+import segno
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from starlette.requests import Request
+from starlette.responses import HTMLResponse
+
+_TEMPLATE = Environment(
+    loader=FileSystemLoader(Path(__file__).parent / "templates"),
+    autoescape=True,
+    undefined=StrictUndefined,
+    trim_blocks=True,
+    lstrip_blocks=True,
+    auto_reload=False,
+).get_template("room.html")
+
+LIVES = ((2, "2 hours"), (12, "12 hours"), (24 * 7, "a week"), (24 * 120, "a term (120 days)"))
+
+
+def room_page(request: Request, status: int = 200, **values: object) -> HTMLResponse:
+    """The page; values that are not given are empty."""
+    depth = request.scope["path"].removeprefix(request.scope.get("root_path", "")).count("/") - 1
+    known: dict[str, object] = dict.fromkeys(
+        ("room", "code", "alias", "title", "message", "field", "join", "teach"), ""
+    )
+    known |= {"hours": 12, "may_open": False, "teacher": False, "local": False, "ends": "", "ends_at": ""}
+    known |= {"lives": LIVES, "root": "../" * depth or "./"}
+    text = _TEMPLATE.render(**{**known, **values})
+    return HTMLResponse(text, status, headers={"cache-control": "no-store"})
+
+
+def ends_in_words(seconds: float) -> str:
+    """How long a room still lasts."""
+    minutes = max(0, round(seconds / 60))
+    if minutes < 120:
+        return f"{minutes} minutes"
+    hours = round(minutes / 60)
+    return f"{hours} hours" if hours < 48 else f"{round(hours / 24)} days"
+
+
+def ends_at(ends: float) -> str:
+    """When a room ends, in UTC; the page shows it in the reader's time."""
+    return time.strftime("%Y-%m-%dT%H:%MZ", time.gmtime(ends))
+
+
+def join_address(request: Request, code: str) -> str:
+    """The address for joining, as the client of this request may give it to others."""
+    root = str(request.base_url).rstrip("/")
+    return f"{root}/room?code={code}"
+
+
+def only_here(request: Request) -> bool:
+    """Whether the address of the request is one that other machines cannot use."""
+    host = request.url.hostname or ""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost" or host.endswith(".localhost")
+
+
+def qr_svg(address: str) -> bytes:
+    """An address as a QR code, dark on light in both colour schemes."""
+    text: str = segno.make(address, error="m", micro=False).svg_inline(
+        omitsize=True, border=2, dark="#000", light="#fff"
+    )
+    return text.replace("<svg ", '<svg xmlns="http://www.w3.org/2000/svg" ', 1).encode()

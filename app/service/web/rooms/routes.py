@@ -1,0 +1,210 @@
+"""The routes below ``/room``.
+
+Who has opened or joined a room gets a cookie with a signed token, which the viewer reads when it connects. The
+cookie is not sent with requests that other sites make, and forms are only accepted from our own pages.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import RedirectResponse, Response
+from starlette.routing import BaseRoute, Route
+
+from app.api.problems import ProblemError
+from app.classroom import COOKIE, ClassroomUnavailable, Hub, RefusedError, Role, Ticket, UnknownRoomError
+from app.classroom.clock import now
+from app.classroom.tokens import LONGEST_TOKEN, read_code, show_code
+from app.service.web.access import form_of, may_open, pass_guest
+from app.service.web.rooms.limits import Limits
+from app.service.web.rooms.page import ends_at, ends_in_words, join_address, only_here, qr_svg, room_page
+from app.shared.clients import client_of
+from app.shared.security import origin_allowed, set_cookie
+from app.shared.settings import Settings
+
+
+def room_routes(hub: Hub, settings: Settings) -> list[BaseRoute]:
+    """The pages of rooms."""
+    pages = _Pages(hub, settings.allowed_origins, bool(settings.frame_ancestors))
+    return [
+        Route("/room", pages.show, methods=["GET"], name="room"),
+        Route("/room", pages.open, methods=["POST"]),
+        Route("/room/join", pages.join, methods=["POST"]),
+        Route("/room/teach/{token}", pages.teach, methods=["GET"]),
+        Route("/room/qr.svg", pages.qr, methods=["GET"]),
+        Route("/room/leave", pages.leave, methods=["POST"]),
+        Route("/room/end", pages.end, methods=["POST"]),
+    ]
+
+
+class _Pages:
+    def __init__(self, hub: Hub, origins: tuple[str, ...], framed: bool) -> None:
+        self._hub = hub
+        self._framed = framed
+        self._origins = origins
+        self._limits = Limits()
+
+    async def show(self, request: Request) -> Response:
+        """The room of this browser; else the forms for joining and opening one."""
+        code = show_code(read_code(request.query_params.get("code", "")[:20]))
+        ticket, problem = await self._ticket(request)
+        if ticket is None or problem:
+            return room_page(
+                request, 503 if problem else 200, code=code, may_open=may_open(request.scope), message=problem
+            )
+        try:
+            room = await run_in_threadpool(self._hub.rooms.find, ticket)
+        except ClassroomUnavailable as error:
+            return room_page(request, 503, code=code, message=str(error))
+        if room is None:
+            words = "Your room has ended, or the teacher has removed you." if not code else ""
+            answer = room_page(request, code=code, may_open=may_open(request.scope), message=words)
+            self._forget(request, answer)
+            return answer
+        if code and read_code(code) != room.code:
+            return room_page(request, code=code, may_open=False)  # an invitation to another room
+        teacher = ticket.role is Role.TEACHER
+        return room_page(
+            request,
+            room=room,
+            code=show_code(room.code),
+            teacher=teacher,
+            join=join_address(request, room.code),
+            teach=f"{str(request.base_url).rstrip('/')}/room/teach/{room.token}" if teacher else "",
+            local=only_here(request),
+            ends=ends_in_words(room.ends - now()),
+            ends_at=ends_at(room.ends),
+        )
+
+    async def open(self, request: Request) -> Response:
+        """Open a room."""
+        form = await self._form(request)
+        title, hours = form.get("title", ""), form.get("hours", "12")
+        again = partial(room_page, request, title=title[:200], hours=hours, may_open=True)
+        try:
+            life = float(hours) * 3600.0
+        except ValueError:
+            return again(422, message=f"A room lasts {hours[:20]} hours: that is no number.", field="hours")
+        self._limits.opening(client_of(request.scope))
+        try:
+            room = await run_in_threadpool(self._hub.rooms.open, title, life)
+        except RefusedError as error:
+            return again(422, message=str(error), field=error.field)
+        except ClassroomUnavailable as error:
+            return again(503, message=str(error))
+        answer = RedirectResponse("room", 303)
+        await self._remember(request, answer, Ticket(room.id), room.ends)
+        return answer
+
+    async def join(self, request: Request) -> Response:
+        """Take a seat by code and alias."""
+        form, client = await self._form(request), client_of(request.scope)
+        code, alias = form.get("code", "")[:40], form.get("alias", "")[:200]
+        again = partial(room_page, request, code=code, alias=alias, may_open=False)
+        known, problem = await self._ticket(request)
+        if problem:
+            return again(503, message=problem)
+        try:
+            async with self._limits.trying(client):
+                self._limits.sitting(client)
+                try:
+                    ticket = await run_in_threadpool(self._hub.rooms.join, code, alias, known)
+                except UnknownRoomError:
+                    self._limits.wrong(client)
+                    raise
+            room = await run_in_threadpool(self._hub.rooms.find, ticket)
+        except RefusedError as error:
+            return again(
+                404 if isinstance(error, UnknownRoomError) else 422, message=str(error), field=error.field
+            )
+        except ProblemError as error:
+            return again(error.status_code, message=error.problem.detail)
+        except ClassroomUnavailable as error:
+            return again(503, message=str(error))
+        answer = RedirectResponse("../viewer/", 303)
+        await self._remember(request, answer, ticket, now() if room is None else room.ends)
+        return answer
+
+    async def teach(self, request: Request) -> Response:
+        """The teacher's link."""
+        try:
+            ticket = await run_in_threadpool(self._hub.ticket, request.path_params["token"][: LONGEST_TOKEN + 1])
+            valid = ticket is not None and ticket.role is Role.TEACHER
+            room = await run_in_threadpool(self._hub.rooms.find, ticket) if ticket and valid else None
+        except ClassroomUnavailable as error:
+            return room_page(request, 503, message=str(error))
+        if ticket is None or room is None:
+            words = "This link for a teacher is not valid: its room has ended, or the link is not complete."
+            return room_page(request, 404, message=words, may_open=may_open(request.scope))
+        answer = RedirectResponse("../../viewer/", 303)
+        await self._remember(request, answer, ticket, room.ends)
+        return answer
+
+    async def qr(self, request: Request) -> Response:
+        """The address for joining as a QR code, for who is in the room."""
+        try:
+            ticket, _ = await self._ticket(request)
+            room = None if ticket is None else await run_in_threadpool(self._hub.rooms.find, ticket)
+        except ClassroomUnavailable as error:
+            raise ProblemError(503, "busy", str(error)) from None
+        if room is None:
+            raise ProblemError(404, "not-found", "You are in no room.", "Open or join one at /room.")
+        picture = qr_svg(join_address(request, room.code))
+        return Response(picture, media_type="image/svg+xml", headers={"cache-control": "no-store"})
+
+    async def leave(self, request: Request) -> Response:
+        """Forget the room in this browser; the seat stays for who joins again from here until the room ends."""
+        await self._form(request)
+        answer = RedirectResponse("../room", 303)
+        self._forget(request, answer)
+        return answer
+
+    async def end(self, request: Request) -> Response:
+        """End the room and erase everything in it."""
+        await self._form(request)
+        ticket, problem = await self._ticket(request)
+        if problem:
+            return room_page(request, 503, message=problem)
+        if ticket is None or ticket.role is not Role.TEACHER:
+            raise ProblemError(403, "forbidden", "Only the teacher may end the room.", "Open the teacher's link.")
+        try:
+            await run_in_threadpool(self._hub.rooms.end, ticket.room)
+        except ClassroomUnavailable as error:
+            return room_page(request, 503, message=str(error))
+        answer = room_page(
+            request, message="The room has ended. Everything in it was erased.", may_open=may_open(request.scope)
+        )
+        self._forget(request, answer)
+        return answer
+
+    async def _form(self, request: Request) -> dict[str, str]:
+        if not origin_allowed(request.headers, self._origins):
+            raise ProblemError(
+                403, "forbidden", "This form was sent by a page of another site.", "Use our own page."
+            )
+        return await form_of(request)
+
+    async def _ticket(self, request: Request) -> tuple[Ticket | None, str]:
+        """The ticket in the cookie, and what is wrong with the database."""
+        token = request.cookies.get(COOKIE, "")
+        if not token:
+            return None, ""
+        try:
+            return await run_in_threadpool(self._hub.ticket, token), ""
+        except ClassroomUnavailable as error:
+            return None, str(error)
+
+    async def _remember(self, request: Request, answer: Response, ticket: Ticket, ends: float) -> None:
+        token = await run_in_threadpool(self._hub.rooms.tokens.sign, ticket)
+        set_cookie(answer, COOKIE, token, max(1, int(ends - now())), request.scope, self._framed)
+        answer.headers["cache-control"] = "no-store"
+        pass_guest(request, answer, ends, self._framed)
+
+    def _forget(self, request: Request, answer: Response) -> None:
+        answer.delete_cookie(COOKIE, path=_path(request), httponly=True, samesite="lax")
+
+
+def _path(request: Request) -> str:
+    return str(request.scope.get("root_path", "")) + "/"

@@ -1,0 +1,34 @@
+"""Erases rooms whose time is over, also if nobody comes any more."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator
+
+from starlette.concurrency import run_in_threadpool
+
+from app.classroom import ClassroomUnavailable, Hub
+
+SWEEP_EVERY = 60.0  # seconds
+
+
+@contextlib.asynccontextmanager
+async def sweeping(hub: Hub) -> AsyncIterator[None]:
+    """Erase what is over once a minute, while there is a database; makes none."""
+    task = asyncio.create_task(_sweep(hub))
+    try:
+        yield
+    finally:
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await task
+        await run_in_threadpool(hub.close)
+
+
+async def _sweep(hub: Hub) -> None:
+    while True:
+        await asyncio.sleep(SWEEP_EVERY)
+        if hub.in_use:
+            with contextlib.suppress(ClassroomUnavailable):  # it has been logged, and is tried again
+                await run_in_threadpool(lambda: hub.rooms.sweep())

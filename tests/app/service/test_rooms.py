@@ -1,0 +1,198 @@
+"""The pages of classrooms: what they admit, refuse and remember."""
+
+from __future__ import annotations
+
+import re
+import threading
+
+import pytest
+from fastapi.testclient import TestClient
+
+from app.classroom import COOKIE
+from app.service.main import create_app
+from app.service.web.rooms import limits
+from app.shared.settings import Settings
+from app.shared.store import Store
+
+STORE = Store()
+TOKEN = "a-long-enough-token"
+
+
+@pytest.fixture
+def make(tmp_path):
+    """Makes browsers of one service; each keeps its own cookies."""
+    apps = []
+
+    def browser(**settings):
+        if not apps:
+            apps.append(create_app(Settings(data=tmp_path / "data", **settings), STORE))
+        return TestClient(apps[0], follow_redirects=False, base_url="http://school.example")
+
+    yield browser
+    for app in apps:
+        app.state.classroom.close()
+
+
+def open_room(teacher, **form):
+    """Open a room; returns its code."""
+    answer = teacher.post("/room", data={"title": "Kinematics 1", "hours": "2", **form})
+    assert answer.status_code == 303, answer.text
+    return re.search(r'class="code">([^<]+)<', teacher.get("/room").text).group(1)
+
+
+def teacher_link(teacher):
+    """The path of the teacher's link."""
+    return re.search(r"http://school\.example(/room/teach/[^\"<]+)", teacher.get("/room").text).group(1)
+
+
+def join(student, code, alias="Ada"):
+    return student.post("/room/join", data={"code": code, "alias": alias})
+
+
+def test_looking_at_the_pages_makes_no_file_and_no_thread(make, tmp_path):
+    before = threading.active_count()
+    assert "Open a room" in make().get("/room").text
+    assert make().get("/room", params={"code": "ABC"}).status_code == 200
+    assert make().get("/room/qr.svg").status_code == 404
+    assert list(tmp_path.iterdir()) == []
+    assert not any(thread.name == "kinboard-classroom" for thread in threading.enumerate())
+    assert threading.active_count() <= before + 1  # the test client's own
+
+
+def test_a_class_joins_by_code_and_ends(make, tmp_path):
+    teacher, student = make(), make()
+    code = open_room(teacher)
+    answer = join(student, code.lower().replace("-", " "))
+    assert (answer.status_code, answer.headers["location"]) == (303, "../viewer/")
+    cookie = answer.headers["set-cookie"]
+    assert "HttpOnly" in cookie
+    assert "SameSite=lax" in cookie
+    assert "Secure" not in cookie
+    page = student.get("/room").text
+    assert "You have a seat" in page
+    assert "teach/" not in page
+    assert "1 student so far" in teacher.get("/room").text
+    assert teacher.get("/room/qr.svg").headers["content-type"] == "image/svg+xml"
+    assert student.post("/room/end").status_code == 403
+    assert "has ended" in teacher.post("/room/end").text
+    assert "has ended" in student.get("/room").text
+    assert COOKIE not in student.cookies
+    assert join(make(), code).status_code == 404
+    assert student.get("/room/qr.svg").status_code == 404
+    for file in (tmp_path / "data").iterdir():
+        assert b"Ada" not in file.read_bytes()
+        assert b"Kinematics" not in file.read_bytes()
+
+
+def test_the_teachers_link_teaches_on_another_device(make):
+    teacher, tablet, thief = make(), make(), make()
+    open_room(teacher)
+    link = teacher_link(teacher)
+    answer = tablet.get(link)
+    assert (answer.status_code, answer.headers["location"]) == (303, "../../viewer/")
+    assert "You teach this class" in tablet.get("/room").text
+    for forged in (
+        link[:-1] + ("A" if link[-1] != "A" else "B"),
+        link[:30],
+        "/room/teach/x",
+        "/room/teach/" + "y" * 5000,
+    ):
+        answer = thief.get(forged)
+        assert answer.status_code == 404
+        assert "set-cookie" not in answer.headers
+
+
+def test_a_students_token_is_no_teachers_link(make):
+    teacher, student = make(), make()
+    join(student, open_room(teacher))
+    assert student.get(f"/room/teach/{student.cookies[COOKIE]}").status_code == 404
+
+
+def test_joining_again_keeps_the_seat(make):
+    teacher, student = make(), make()
+    code = open_room(teacher)
+    join(student, code, "Ada")
+    first = student.cookies[COOKIE]
+    join(student, code, "Ada L.")
+    assert student.cookies[COOKIE] == first
+    join(make(), code, "Ada")
+    assert "2 students" in teacher.get("/room").text
+
+
+@pytest.mark.parametrize(
+    ("alias", "words"),
+    [("", "empty"), ("   ", "empty"), ("\u202e\u200b", "empty"), ("x" * 33, "33 characters")],
+)
+def test_invalid_aliases_are_named(make, alias, words):
+    code = open_room(make())
+    answer = join(make(), code, alias)
+    assert answer.status_code == 422
+    assert words in answer.text
+    assert code in answer.text  # what was typed stays
+
+
+def test_aliases_and_titles_are_escaped(make):
+    teacher, student = make(), make()
+    code = open_room(teacher, title="<script>alert(1)</script>")
+    assert "<script>alert" not in teacher.get("/room").text
+    answer = join(student, "<b>no", "<img src=x onerror=alert(1)>")
+    assert answer.status_code == 404
+    assert "<img src=x" not in answer.text
+    assert "<b>no" not in answer.text
+    assert join(student, code, "<img src=x>").status_code == 303
+
+
+def test_forms_of_other_sites_are_refused(make):
+    teacher = make()
+    code = open_room(teacher)
+    foreign = {"origin": "https://evil.example"}
+    for path in ("/room", "/room/join", "/room/leave", "/room/end"):
+        answer = teacher.post(path, data={"code": code, "alias": "x"}, headers=foreign)
+        assert answer.status_code == 403, path
+    assert teacher.post("/room/end", headers={"origin": "http://school.example"}).status_code == 200
+
+
+def test_guessing_codes_is_slow_and_does_not_keep_a_class_out(make, monkeypatch):
+    monkeypatch.setattr(limits, "SLOW", 0.05)
+    monkeypatch.setattr(limits, "WRONG", 5)
+    teacher = make()
+    code = open_room(teacher)
+    statuses = [join(make(), "AAAA-AAA").status_code for _ in range(8)]
+    assert statuses == [404] * 5 + [429] * 3
+    assert join(make(), code).status_code == 303
+
+
+def test_rooms_cannot_be_opened_without_end(make):
+    browser = make(max_rooms=2)
+    open_room(browser)
+    open_room(browser)
+    answer = browser.post("/room", data={"hours": "2"})
+    assert answer.status_code == 422
+    assert "as many rooms" in answer.text
+    many = make()
+    statuses = [many.post("/room", data={"hours": "2"}).status_code for _ in range(limits.ROOMS)]
+    assert statuses[-1] == 429
+
+
+@pytest.mark.parametrize("hours", ["x", "-1", "nan", "inf", "1e9"])
+def test_a_life_must_be_a_sensible_number(make, hours):
+    assert make().post("/room", data={"title": "", "hours": hours}).status_code == 422
+
+
+def test_with_a_token_students_join_but_do_not_open_rooms(make):
+    teacher, student, stranger = make(token=TOKEN), make(), make()
+    teacher.headers["authorization"] = f"Bearer {TOKEN}"
+    code = open_room(teacher)
+    assert "sign in" in student.get("/room", headers={"accept": "text/html"}).text
+    assert student.post("/room", data={"hours": "2"}).status_code == 401
+    assert student.get("/viewer/").status_code == 401
+    assert join(student, code).status_code == 303
+    assert student.get("/viewer/").status_code == 503  # admitted: the viewer has not been started here
+    for path in ("/api/v1/robots", "/metrics", "/docs"):
+        assert student.get(path).status_code == 401, path
+    assert student.post("/room", data={"hours": "2"}).status_code == 401
+    assert stranger.get("/viewer/").status_code == 401
+    guest = student.cookies["kinboard_guest"]
+    for cookie, status in ((guest, 503), (guest.replace(".", "x.", 1), 401), ("x.y", 401)):
+        headers = {"cookie": f"kinboard_guest={cookie}"}
+        assert make().get("/viewer/", headers=headers).status_code == status
