@@ -1,4 +1,4 @@
-# Kinboard: one port, no root, nothing written, nothing fetched at run time.
+# Kinboard: one port, no root, nothing written but classrooms in /data, nothing fetched at run time.
 #   docker build -t kinboard .
 #   docker run --rm -p 127.0.0.1:8000:8000 kinboard
 # scripts/image.sh builds it without Docker and checks what docs/running.md says about it.
@@ -55,11 +55,13 @@ ENV PATH=/opt/kinboard/bin:$PATH \
     NUMBA_CPU_NAME=$CPU_LEVEL \
     NUMBA_CPU_FEATURES="" \
     NUMBA_CACHE_DIR=/opt/kinboard/kernels \
+    KINBOARD_DATA=/data \
     KINBOARD_HOST=0.0.0.0 \
     KINBOARD_PORT=8000
 RUN groupadd --gid 10001 kinboard \
     && useradd --uid 10001 --gid 10001 --no-create-home --home-dir /nonexistent --shell /usr/sbin/nologin kinboard \
-    && python /opt/kinboard/image/prepare.py
+    && python /opt/kinboard/image/prepare.py \
+    && install --directory --owner=10001 --group=10001 --mode=700 /data
 # From here on all of this is only read; deploy/image/kernel_store.py tells how numba is content with that.
 ENV PYTHONDONTWRITEBYTECODE=1 \
     NUMBA_CACHE_LOCATOR_CLASSES=kernel_store.LinkedCacheLocator
@@ -67,6 +69,8 @@ ENV PYTHONDONTWRITEBYTECODE=1 \
 USER 10001:10001
 WORKDIR /
 EXPOSE 8000
+# The database of classrooms, made with the first room; all else is only read.
+VOLUME ["/data"]
 HEALTHCHECK --interval=15s --timeout=5s --start-period=30s --retries=3 \
     CMD ["python", "-ISc", "import http.client as h, os, sys; c = h.HTTPConnection('127.0.0.1', int(os.environ['KINBOARD_PORT']), timeout=4); c.request('GET', '/readyz'); sys.exit(c.getresponse().status != 200)"]
 CMD ["kinboard", "serve"]

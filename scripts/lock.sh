@@ -8,12 +8,12 @@ root=$(cd "$(dirname "$0")/.." && pwd)
 [ -x "$root/.venv/bin/python" ] || make_venv
 "$root/.venv/bin/python" -m pip install -q --disable-pip-version-check 'uv>=0.9'
 cd "$root"
-version=$(sed -n 's/^FROM python:\([0-9.]*\)-slim.*/\1/p' Dockerfile | head -n 1)
+version=$(sed -n 's/^ARG BASE=.*python:\([0-9.]*\)-slim.*/\1/p' Dockerfile | head -n 1)
 lock() { # $1: the list to write; on standard input: what is wanted
   "$root/.venv/bin/uv" pip compile -q --universal --python-version "$version" --generate-hashes --no-header \
     --no-annotate "$@"
 }
-lock pyproject.toml -o requirements.lock "$@"
+lock pyproject.toml --extra postgres -o requirements.lock "$@"
 "$root/.venv/bin/python" -c \
   "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['build-system']['requires'], sep='\n')" |
   lock - -o requirements-build.lock "$@"

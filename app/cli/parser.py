@@ -18,6 +18,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from app.cli import arguments as declare
+from app.cli.classroom.arguments import add_room
 from app.cli.startup import disable_compiler, no_collections
 
 DESCRIPTION = "Kinematics of robot arms: a dashboard in the browser, a REST interface, this command line."
@@ -187,6 +188,12 @@ def _load_capability() -> Run:
     return run
 
 
+def _load_room() -> Run:
+    from app.cli.classroom.room import run
+
+    return run
+
+
 COMMANDS = (
     Command(declare.add_serve, _load_serve),
     Command(declare.add_fk, _load_fk, interpreted=True),
@@ -194,6 +201,7 @@ COMMANDS = (
     Command(declare.add_move, _load_move),
     Command(declare.add_robots, _load_robots, interpreted=True),
     Command(declare.add_workspace, _load_workspace),
+    Command(add_room, _load_room),
     Command(declare.add_bench, _load_bench),
     Command(declare.add_check, _load_check, interpreted=True),
     Command(declare.add_capability, _load_capability),

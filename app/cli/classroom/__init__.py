@@ -1,1 +1,1 @@
-"""The commands of the classroom."""
+"""Commands of the classroom."""

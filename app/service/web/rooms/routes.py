@@ -64,7 +64,7 @@ class _Pages:
             self._forget(request, answer)
             return answer
         if code and read_code(code) != room.code:
-            return room_page(request, code=code, may_open=False)  # an invitation to another room
+            return room_page(request, code=code, may_open=may_open(request.scope))  # an invitation to another room
         teacher = ticket.role is Role.TEACHER
         return room_page(
             request,
@@ -102,7 +102,7 @@ class _Pages:
         """Take a seat by code and alias."""
         form, client = await self._form(request), client_of(request.scope)
         code, alias = form.get("code", "")[:40], form.get("alias", "")[:200]
-        again = partial(room_page, request, code=code, alias=alias, may_open=False)
+        again = partial(room_page, request, code=code, alias=alias, may_open=may_open(request.scope))
         known, problem = await self._ticket(request)
         if problem:
             return again(503, message=problem)

@@ -1,0 +1,36 @@
+"""Arguments of ``kinboard room``. Imports nothing heavy."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+
+def add_room(commands: Any, _: object) -> argparse.ArgumentParser:
+    """``kinboard room``."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "room",
+        help="open, list and end classrooms",
+        description="Open, list and end classrooms, in the database of the service: KINBOARD_DATA or "
+        "KINBOARD_DATABASE_URL must be as they are for it.",
+    )
+    actions = parser.add_subparsers(title="actions", metavar="ACTION", required=True, dest="action")
+    opening = actions.add_parser("open", help="open a room and print its code and links")
+    opening.add_argument(
+        "title", metavar="TITLE", nargs="?", default="", help="shown to students (default: Class)"
+    )
+    opening.add_argument(
+        "--hours", type=float, default=12.0, metavar="H", help="until everything is erased (default: 12)"
+    )
+    listing = actions.add_parser("list", help="list the rooms")
+    for action in (opening, listing):
+        action.add_argument(
+            "--url",
+            default="http://localhost:8000/",
+            metavar="URL",
+            help="address of the service (default: %(default)s)",
+        )
+        action.add_argument("--json", action="store_true", help="print JSON")
+    ending = actions.add_parser("end", help="end a room and erase everything in it")
+    ending.add_argument("code", metavar="CODE", help="the join code")
+    return parser
