@@ -6,6 +6,7 @@ import json
 import sys
 import time
 from argparse import Namespace
+from typing import Any
 
 from app.classroom import ClassroomUnavailable, Hub, RefusedError
 from app.classroom.rooms import OpenRoom
@@ -15,7 +16,8 @@ from app.shared.settings import Settings
 
 def run(arguments: Namespace) -> int:
     """Returns 2 for what is refused, 1 if the database cannot be used."""
-    hub = Hub.of(Settings())
+    flags: dict[str, Any] = {}  # all settings come from the environment
+    hub = Hub.of(Settings(**flags))
     try:
         match arguments.action:
             case "open":
