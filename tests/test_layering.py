@@ -93,7 +93,7 @@ RULES: dict[str, set[str]] = {
     },
     "app/cli/parser.py": {"kin", "app.bench.command", "app.cli"},
     "app/cli/arguments.py": set(),
-    "app/cli/classroom": {"app.classroom", "app.cli.classroom", "app.shared"},
+    "app/cli/classroom": {"kin", "app.classroom", "app.cli", "app.exercises", "app.shared"},
     "app/cli/xacro": {"kin", "app.cli.xacro"},
     "app/cli/xacro/expansion.py": {"xacro", "xacrodoc", "yaml", "app.cli.xacro"},
     "app/cli/xacro/expressions.py": {"xacro"},

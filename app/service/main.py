@@ -113,8 +113,7 @@ def create_app(
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         startup.start()
-        keeper = MemoryKeeper(idle, state.update_gauges)
-        keeper.start()
+        (keeper := MemoryKeeper(idle, state.update_gauges)).start()
         async with sweeping(classroom):
             yield
         keeper.stop()
@@ -141,8 +140,8 @@ def create_app(
     state.update_gauges = partial(update_gauges, state, bridge)
     install_problem_handlers(app)
     complete_document(app, store, settings)
-    pages = (*page_routes(), *embedding_routes(), *room_routes(classroom, settings))
-    app.router.routes.extend([*api_routes(), *pages, *bridge.routes()])
+    app.router.routes.extend([*api_routes(), *page_routes(), *embedding_routes(), *bridge.routes()])
+    app.router.routes.extend(room_routes(classroom, settings))
     app.include_router(status.router)
     _add_middleware(app, settings)
     return app

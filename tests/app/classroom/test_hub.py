@@ -2,11 +2,33 @@
 
 from __future__ import annotations
 
+import sqlite3
+import subprocess
+import sys
+import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
+from alembic.autogenerate import compare_metadata
+from alembic.migration import MigrationContext
+from sqlalchemy import event, func, select, update
 
-from app.classroom import Hub, NewAttempt
+from app.classroom import (
+    Attendance,
+    ClassroomUnavailable,
+    Hub,
+    NewAttempt,
+    RefusedError,
+    Ticket,
+    UnknownRoomError,
+    clock,
+)
+from app.classroom.tables import REVISION, Attempt, Base, Room, Seat
+from app.classroom.tokens import Tokens
+
+ROOT = Path(__file__).parents[3]
 
 SOON = 10.0  # seconds: far more than anything takes
 
@@ -69,3 +91,352 @@ def test_what_a_teacher_does_reaches_students_of_another_process(hubs):
     assert student.room.seats == ()
     student.leave()
     assert not student.room.closed
+
+
+def test_late_joiners_get_the_present_state(hubs):
+    here, there = hubs
+    room = here.rooms.open("Kinematics", 3600)
+    teacher = here.attend(here.ticket(room.token), nothing)
+    teacher.tell_page("now")
+    teacher.set_follow(True)
+    teacher.open_poll("Elbow?", ["up", "down"])
+    until(lambda: there.rooms.find(Ticket(room.id)) is not None)
+    until(lambda: there.attend(there.rooms.join(room.code, "Late"), nothing).room.page == "now")
+    late = there.attend(there.rooms.join(room.code, "Later"), nothing)
+    assert late.room.follow
+    assert late.room.poll.choices == ("up", "down")
+
+
+def test_two_tabs_are_one_seat(hubs):
+    here, there = hubs
+    room = here.rooms.open("Kinematics", 3600)
+    seat = here.rooms.join(room.code, "Ada")
+    tabs = [hub.attend(seat, nothing) for hub in (here, here, there)]
+    tabs[0].raise_hand(True)
+    until(lambda: all(tab.room.seat.hand > 0 for tab in tabs))
+    tabs[2].raise_hand(False)
+    until(lambda: all(tab.room.seat.hand == 0 for tab in tabs))
+    tabs[0].leave()
+    tabs[1].tell_page("second")
+    until(lambda: tabs[2].room.seat.page == "second")
+    assert tabs[2].room.students == 1
+
+
+def test_votes_are_counted_once_and_nobody_sees_whose(hubs):
+    here, _ = hubs
+    room = here.rooms.open("Kinematics", 3600)
+    teacher = here.attend(here.ticket(room.token), nothing)
+    students = [hub.attend(hub.rooms.join(room.code, name), nothing) for hub, name in zip(hubs, "AB", strict=True)]
+    with pytest.raises(RefusedError, match="closed"):
+        students[0].vote(0)
+    teacher.open_poll("Elbow?", ["up", "down"])
+    until(lambda: all(student.room.poll for student in students))
+    for choice in (0, 1, 1):
+        students[0].vote(choice)
+        students[1].vote(choice)
+    until(lambda: teacher.room.poll.votes == (0, 2))
+    assert students[0].room.poll.chosen == 1
+    assert not any("vot" in name for seat in teacher.room.seats for name in vars(seat))
+    with pytest.raises(RefusedError, match="no such choice"):
+        students[0].vote(2)
+    teacher.close_poll()
+    until(lambda: not students[1].room.poll.open)
+    with pytest.raises(RefusedError, match="closed"):
+        students[1].vote(0)
+    assert students[1].room.poll.votes == (0, 2)
+
+
+TEACHERS = {
+    "set_follow": (True,),
+    "set_frozen": (True,),
+    "send_task": ("swing",),
+    "set_course": ("c",),
+    "show_seat": ("x",),
+    "lower_hand": ("x",),
+    "open_poll": ("q", ["a", "b"]),
+    "close_poll": (),
+    "remove_poll": (),
+    "remove_seat": ("x",),
+    "rename_seat": ("x", "y"),
+    "end_room": (),
+    "teacher_token": (),
+}
+STUDENTS = {"raise_hand": (True,), "vote": (0,), "tell_task": ("swing",), "submit": (attempt(),)}
+BOTH = {"room", "leave", "tell_page", "ticket", "changed"}
+
+
+def test_a_seat_has_no_power_of_the_teacher_and_the_reverse(hubs):
+    hub, _ = hubs
+    room = hub.rooms.open("Kinematics", 3600)
+    teacher = hub.attend(hub.ticket(room.token), nothing)
+    student = hub.attend(hub.rooms.join(room.code, "Ada"), nothing)
+    before = teacher.room
+    for page, methods in ((student, TEACHERS), (teacher, STUDENTS)):
+        for name, arguments in methods.items():
+            with pytest.raises(PermissionError):
+                getattr(page, name)(*arguments)
+    assert teacher.room == before
+    public = {name for name in dir(Attendance) if not name.startswith("_")}
+    assert public - BOTH == {*TEACHERS, *STUDENTS} - BOTH  # a new method needs its row
+    student.tell_page("not the teacher's")
+    until(lambda: teacher.room.seats[0].page == "not the teacher's")
+    assert teacher.room.page == ""
+
+
+def test_a_teacher_has_no_power_over_another_room(hubs):
+    hub, _ = hubs
+    mine, other = hub.rooms.open("Mine", 3600), hub.rooms.open("Other", 3600)
+    theirs = hub.rooms.join(other.code, "Ada")
+    student = hub.attend(theirs, nothing)
+    assert student.submit(attempt()).at > 0
+    teacher = hub.attend(hub.ticket(mine.token), nothing)
+    teacher.remove_seat(theirs.seat)
+    teacher.rename_seat(theirs.seat, "Bob")
+    teacher.show_seat(theirs.seat)
+    teacher.lower_hand(theirs.seat)
+    assert teacher.room.shown is None
+    hub.refresh(other.id)
+    assert student.room.seat.alias == "Ada"
+    foreign = Ticket(mine.id, theirs.seat)  # no token says so
+    assert hub.attend(foreign, nothing).room.closed
+    with pytest.raises(RefusedError):
+        hub.rooms.submit(foreign, attempt())
+    with hub.database.read() as connection:
+        assert connection.scalar(select(func.count()).select_from(Attempt)) == 1
+
+
+def test_forged_tokens_open_nothing(hubs):
+    hub, other = hubs
+    room = hub.rooms.open("Kinematics", 3600)
+    seat = hub.rooms.join(room.code, "Ada")
+    token = hub.rooms.tokens.sign(seat)
+    assert other.ticket(token) == seat
+    teacher = Tokens("another key").sign(Ticket(room.id))
+    course = hub.rooms.tokens.serializer("course").dumps([room.id, ""])
+    for forged in (teacher, course, token[:-2], token.replace(".", "x."), "x" * 1000, "é.è", ".", ""):
+        assert hub.ticket(forged) is None
+
+
+def test_a_removed_seat_is_erased_and_closed(hubs):
+    here, there = hubs
+    room = here.rooms.open("Kinematics", 3600)
+    teacher = here.attend(here.ticket(room.token), nothing)
+    seat = there.rooms.join(room.code, "Unsuitable")
+    student = there.attend(seat, nothing)
+    student.submit(attempt())
+    student.tell_page("mine")
+    until(lambda: teacher.room.seats and teacher.room.seats[0].page == "mine")
+    teacher.rename_seat(seat.seat, "Fine")
+    until(lambda: student.room.seat.alias == "Fine")
+    teacher.remove_seat(seat.seat)
+    until(lambda: student.room.closed)
+    student.tell_page("again")
+    student.raise_hand(True)
+    with pytest.raises(RefusedError):
+        student.submit(attempt())
+    time.sleep(0.3)  # longer than what students report may wait
+    assert teacher.room.seats == ()
+    with here.database.read() as connection:
+        row = connection.execute(select(Seat.alias, Seat.page, Seat.hand)).one()
+        assert tuple(row) == ("", "", 0.0)
+        assert connection.scalar(select(func.count()).select_from(Attempt)) == 0
+
+
+def test_ending_erases_everything_for_all(hubs, tmp_path):
+    here, there = hubs
+    room = here.rooms.open("Secret title", 3600)
+    teacher = here.attend(here.ticket(room.token), nothing)
+    student = there.attend(there.rooms.join(room.code, "Secret alias"), nothing)
+    student.tell_page("Secret page")
+    student.submit(attempt(verdict="Secret verdict"))
+    until(lambda: teacher.room.seats[0].page == "Secret page")
+    teacher.end_room()
+    assert "ended" in teacher.room.closed
+    until(lambda: student.room.closed)
+    with pytest.raises(RefusedError):
+        student.submit(attempt())
+    until(lambda: not any(b"Secret" in file.read_bytes() for file in (tmp_path / "data").iterdir()))
+
+
+def test_time_ends_a_room_and_a_new_clock_does_not(hubs, monkeypatch):
+    hub, _ = hubs
+    room = hub.rooms.open("Kinematics", 3600)
+    teacher = hub.attend(hub.ticket(room.token), nothing)
+    monkeypatch.setattr(time, "time", lambda: 9e9)
+    hub.refresh(room.id)
+    assert hub.rooms.sweep() == 0
+    assert not teacher.room.closed
+    with hub.database.write() as connection:
+        connection.execute(update(Room).values(ends=clock.now() - 1))
+    until(lambda: teacher.room.closed)
+    assert hub.rooms.find(Ticket(room.id)) is None
+    with pytest.raises(UnknownRoomError):
+        hub.rooms.join(room.code, "Ada")
+    assert hub.rooms.sweep() == 1
+    assert hub.rooms.all() == []
+
+
+def test_who_is_away_is_seen_in_other_processes(hubs, monkeypatch):
+    monkeypatch.setattr("app.classroom.live.AWAY", 0.5)
+    monkeypatch.setattr("app.classroom.hub.BEAT", 0.1)
+    here, there = hubs
+    room = here.rooms.open("Kinematics", 3600)
+    teacher = here.attend(here.ticket(room.token), nothing)
+    seat = there.rooms.join(room.code, "Ada")
+    student = there.attend(seat, nothing)
+    until(lambda: not student.room.teacher_away and teacher.room.seats and not teacher.room.seats[0].away)
+    teacher.leave()
+    until(lambda: student.room.teacher_away)
+    assert not student.room.closed
+    teacher = here.attend(here.ticket(room.token), nothing)
+    until(lambda: not student.room.teacher_away)
+    student.leave()
+    until(lambda: teacher.room.seats[0].away)
+    there.attend(seat, nothing)
+    until(lambda: not teacher.room.seats[0].away)
+
+
+def test_a_locked_database_delays_and_loses_nothing(hubs, tmp_path, monkeypatch):
+    monkeypatch.setattr("app.classroom.database.WAIT", 0.2)
+    here, there = hubs
+    room = here.rooms.open("Kinematics", 3600)
+    teacher = here.attend(here.ticket(room.token), nothing)
+    student = here.attend(here.rooms.join(room.code, "Ada"), nothing)
+    far = there.attend(there.rooms.join(room.code, "Bob"), nothing)
+    teacher.set_follow(True)
+    until(lambda: far.room.follow)
+    first = student.submit(attempt())
+    lock = sqlite3.connect(tmp_path / "data" / "classroom.db", isolation_level=None)
+    lock.execute("BEGIN EXCLUSIVE")
+    new = attempt(exercise="other")
+    with pytest.raises(ClassroomUnavailable, match="in use"):
+        student.submit(new)
+    teacher.tell_page("while locked")
+    assert student.room.page == "while locked"  # in this process at once
+    until(lambda: "in use" in student.room.problem)
+    assert far.room.page == ""
+    lock.execute("ROLLBACK")
+    lock.close()
+    until(lambda: not student.room.problem)
+    until(lambda: far.room.page == "while locked")
+    second = student.submit(new)
+    assert student.submit(new) == second  # again after an unclear end: stored once
+    with here.database.read() as connection:
+        assert sorted(connection.scalars(select(Attempt.id))) == sorted([first.id, second.id])
+
+
+def test_a_full_database_is_said_and_keeps_what_was_confirmed(hubs):
+    hub, _ = hubs
+    room = hub.rooms.open("Kinematics", 3600)
+    student = hub.attend(hub.rooms.join(room.code, "Ada"), nothing)
+    first = student.submit(attempt())
+
+    def limit(connection, pages):
+        connection.execute(f"PRAGMA max_page_count={pages}")
+
+    def fill(connection, _record, _proxy):
+        limit(connection, 1)  # SQLite takes the present size: not one page more
+
+    event.listen(hub.database._ready(), "checkout", fill)
+    with pytest.raises(ClassroomUnavailable, match="full"):
+        student.submit(attempt(answer="x" * 50_000))
+    event.remove(hub.database._ready(), "checkout", fill)
+    with hub.database.read() as connection:
+        assert connection.scalars(select(Attempt.id)).all() == [first.id]
+    event.listen(hub.database._ready(), "checkout", lambda connection, *_: limit(connection, 1_000_000))
+    assert student.submit(attempt(answer="x" * 50_000)).at > 0
+
+
+def test_a_database_that_is_gone_comes_back(hubs, tmp_path):
+    hub, _ = hubs
+    room = hub.rooms.open("Kinematics", 3600)
+    student = hub.attend(hub.rooms.join(room.code, "Ada"), nothing)
+    first = student.submit(attempt())
+    (tmp_path / "data").rename(tmp_path / "away")
+    with pytest.raises(ClassroomUnavailable):
+        student.submit(attempt())
+    until(lambda: student.room.problem)
+    assert not student.room.closed
+    student.raise_hand(True)
+    assert not (tmp_path / "data").exists()  # no empty database in its place
+    (tmp_path / "away").rename(tmp_path / "data")
+    until(lambda: not student.room.problem)
+    second = student.submit(attempt())
+    with hub.database.read() as connection:
+        assert set(connection.scalars(select(Attempt.id))) == {first.id, second.id}
+    until(lambda: hub.rooms.find(student.ticket) is not None and student.room.seat.hand > 0)
+
+
+def test_a_page_can_come_while_the_database_is_away(hubs, tmp_path, monkeypatch):
+    hub, _ = hubs
+    room = hub.rooms.open("Kinematics", 3600)
+    seat = hub.rooms.join(room.code, "Ada")
+    (tmp_path / "data").rename(tmp_path / "away")
+    calls = []
+    student = hub.attend(seat, lambda: calls.append(student.room.seat is not None))
+    assert student.room.problem
+    student.raise_hand(True)
+    (tmp_path / "away").rename(tmp_path / "data")
+    until(lambda: student.room.seat is not None)
+    until(lambda: True in calls)
+
+
+def test_the_thread_ends_when_all_have_left(hubs, monkeypatch):
+    monkeypatch.setattr("app.classroom.hub.LINGER", 0.1)
+    hub, _ = hubs
+    room = hub.rooms.open("Kinematics", 3600)
+    assert threads() == 0
+    pages = [hub.attend(hub.ticket(room.token), nothing) for _ in range(3)]
+    assert threads() == 1
+    pages[0].set_frozen(True)
+    for page in pages:
+        page.leave()
+        page.leave()
+    until(lambda: threads() == 0)
+    again = hub.attend(hub.ticket(room.token), nothing)
+    assert again.room.frozen
+    assert threads() == 1
+
+
+def threads():
+    return sum(thread.name == "kinboard-classroom" for thread in threading.enumerate())
+
+
+def test_a_page_that_fails_stops_no_other(hubs, caplog):
+    hub, _ = hubs
+    room = hub.rooms.open("Kinematics", 3600)
+
+    def fail():
+        raise RuntimeError("this page is broken")
+
+    teacher = hub.attend(hub.ticket(room.token), fail)
+    seen = []
+    hub.attend(hub.rooms.join(room.code, "Ada"), lambda: seen.append(1))
+    teacher.set_frozen(True)
+    until(lambda: seen)
+    assert "could not be notified" in caplog.text
+
+
+def test_importing_the_classroom_imports_no_database():
+    code = "import sys, app.classroom.hub; print({'sqlalchemy', 'alembic'} & set(sys.modules) or 'none')"
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    assert out.stdout.strip() == "none"
+
+
+def test_migrations_make_the_tables_of_the_models(hubs):
+    hub, _ = hubs
+    hub.rooms.open("Kinematics", 3600)
+    with hub.database.read() as connection:
+        context = MigrationContext.configure(connection, opts={"compare_type": True})
+        assert compare_metadata(context, Base.metadata) == []
+        assert context.get_current_revision() == REVISION
+
+
+def test_processes_that_start_at_the_same_time_migrate_once(tmp_path):
+    hubs = [Hub(tmp_path / "data") for _ in range(6)]
+    with ThreadPoolExecutor(6) as pool:
+        codes = {room.code for room in pool.map(lambda hub: hub.rooms.open("Kinematics", 3600), hubs)}
+    assert len(codes) == 6
+    assert len({hub.rooms.tokens.sign(Ticket("x")) for hub in hubs}) == 1
+    for hub in hubs:
+        hub.close()
