@@ -15,7 +15,7 @@ import random
 import signal
 import sys
 from collections.abc import AsyncIterator, Callable, MutableSequence
-from contextlib import asynccontextmanager
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from functools import partial
 from typing import cast
 
@@ -121,17 +121,7 @@ def create_app(
         for step in (startup.stop, clouds.close, maps.close, summaries.close):
             await run_in_threadpool(step)
 
-    app = FastAPI(
-        title="Kinboard",
-        version=__version__,
-        summary="Kinematics of robot arms: forward, inverse, Jacobian.",
-        description=DESCRIPTION,
-        license_info={"name": "MIT", "identifier": "MIT"},
-        docs_url=None,  # our own page, with its files: it works without internet
-        redoc_url=None,
-        redirect_slashes=False,  # the redirect would name our own host instead of the proxy's
-        lifespan=lifespan,
-    )
+    app = _described(lifespan)
     state = app.state
     state.store, state.settings, state.startup, state.classroom = store, settings, startup, classroom
     state.clouds, state.maps, state.summaries = clouds, maps, summaries
@@ -145,6 +135,21 @@ def create_app(
     app.include_router(status.router)
     _add_middleware(app, settings)
     return app
+
+
+def _described(lifespan: Callable[[FastAPI], AbstractAsyncContextManager[None]]) -> FastAPI:
+    """An application with what its documentation says of it."""
+    return FastAPI(
+        title="Kinboard",
+        version=__version__,
+        summary="Kinematics of robot arms: forward, inverse, Jacobian.",
+        description=DESCRIPTION,
+        license_info={"name": "MIT", "identifier": "MIT"},
+        docs_url=None,  # our own page, with its files: it works without internet
+        redoc_url=None,
+        redirect_slashes=False,  # the redirect would name our own host instead of the proxy's
+        lifespan=lifespan,
+    )
 
 
 def _add_middleware(app: FastAPI, settings: Settings) -> None:
