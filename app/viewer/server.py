@@ -9,7 +9,7 @@ import time
 
 import viser
 
-from app.classroom import Hub
+from app.classroom import ClassroomUnavailable, Hub, Ticket
 from app.classroom.courses import Courses
 from app.exercises import Exercises
 from app.shared.clouds import Clouds
@@ -23,6 +23,7 @@ from app.viewer.meshes.library import Library
 from app.viewer.meshes.reader import MeshReader
 from app.viewer.panel.status import LOOKING, READY, Notice
 from app.viewer.panel.view import configure_theme
+from app.viewer.room.page import ClassroomPage
 from app.viewer.scene.lights import light_scene
 from app.viewer.scene.motion import Pace
 from app.viewer.session.page import VisitorPage
@@ -121,24 +122,39 @@ class ViewerServer:
         return len(self._pages)
 
     async def _connect(self, client: viser.ClientHandle) -> None:
-        self._start_page(client, READY, RESTARTS)
+        token, ticket, welcome = self._connections.room_tokens.get(client.client_id, ""), None, READY
+        if token:
+            try:
+                ticket = await asyncio.to_thread(self._ticket, token)
+            except ClassroomUnavailable as error:
+                welcome = Notice("error", "Your class is not available", str(error))
+        self._start_page(client, welcome, RESTARTS, ticket)
 
-    def _start_page(self, client: viser.ClientHandle, welcome: Notice, restarts: int) -> None:
+    def _ticket(self, token: str) -> Ticket | None:
+        """The ticket of a browser that is in a room which has not ended; raises `ClassroomUnavailable`."""
+        hub = self._services.classroom
+        ticket = hub.ticket(token)
+        return None if ticket is None or hub.rooms.find(ticket) is None else ticket
+
+    def _start_page(
+        self, client: viser.ClientHandle, welcome: Notice, restarts: int, ticket: Ticket | None
+    ) -> None:
         rights = self._connections.rights.get(client.client_id, Rights.LOOK)  # if absent, the visitor has left
-        page = VisitorPage(
+        arguments = (
             client,
             self._services,
             self._settings.token is not None,
             LOOKING if welcome is READY and rights is Rights.LOOK else welcome,
-            lambda: self._restart(client, restarts),
+            lambda: self._restart(client, restarts, ticket),
             rights,
             self._connections.clients.get(client.client_id, ""),
         )
+        page = VisitorPage(*arguments) if ticket is None else ClassroomPage(*arguments, ticket=ticket)
         with self._lock:
             self._pages[client.client_id] = page
         page.start()
 
-    def _restart(self, client: viser.ClientHandle, restarts: int) -> None:
+    def _restart(self, client: viser.ClientHandle, restarts: int, ticket: Ticket | None) -> None:
         """Restart the page of a visitor whose worker failed; called last by that worker."""
         with self._lock:
             left = self._pages.pop(client.client_id, None) is None
@@ -152,7 +168,7 @@ class ViewerServer:
         client.gui.reset()
         client.scene.reset()
         configure_theme(client.gui, dark=False)
-        self._start_page(client, RESTARTED, restarts - 1)
+        self._start_page(client, RESTARTED, restarts - 1, ticket)
 
     async def _disconnect(self, client: viser.ClientHandle) -> None:
         with self._lock:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Hashable
-from typing import Protocol
+from collections.abc import Callable, Hashable
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import viser
 
 import kin
-from app.exercises import Asked, Exercise, Exercises, Variant, VariantError
+from app.exercises import Asked, Exercise, Exercises, Variant, VariantError, Verdict
 from app.exercises.contract import LONGEST, LONGEST_PROGRAM
 from app.exercises.typed import EntryError
 from app.viewer.exercises import views
@@ -27,6 +27,16 @@ from kin import InputError
 from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
 
 ROWS = 20  # of typed cells at most
+
+
+class Judged(NamedTuple):
+    """An answer that was judged: the seed of its numbers, the answer as plain data, and how long (s) it took."""
+
+    exercise: Exercise
+    seed: int
+    answer: object
+    verdict: Verdict
+    seconds: float
 
 
 class Lead(Protocol):
@@ -50,6 +60,7 @@ class Practising(Feature):
     Attributes:
         practice: what the student has done.
         course: the course of the page.
+        judged: called with each answer that was judged while the right one was not on show.
     """
 
     key = "exercises"
@@ -68,6 +79,7 @@ class Practising(Feature):
         self._ghost: Array = np.eye(4)
         self._variant: Variant | None = None
         self._since = 0.0
+        self.judged: Callable[[Judged], None] | None = None
         self._box: viser.GuiFolderHandle | None = None
         self._blocks: list[viser.GuiHtmlHandle] = []
         self._container: viser.GuiFolderHandle
@@ -101,6 +113,27 @@ class Practising(Feature):
         """Whether the HTML is built."""
         return self._box is not None
 
+    @property
+    def at(self) -> Exercise | None:
+        """The exercise on show."""
+        return self.practice.at if self.shown else None
+
+    def is_closed(self, exercise: Exercise) -> bool:
+        """Whether the right answer of an exercise is known."""
+        return self.practice.record(exercise).closed
+
+    def open(self, exercise_id: object) -> None:
+        """Show an exercise; raises `kin.InputError` for one that does not exist."""
+        self.practice.open(exercise_id)
+        if self.shown:
+            self._begin(self._now)
+            self._update()
+
+    def note(self, text: str) -> None:
+        """Write a sentence below the verdict."""
+        self._sheet.note = text
+        self._update()
+
     # Events
 
     def handle(self, key: Hashable, value: object) -> None:
@@ -114,8 +147,7 @@ class Practising(Feature):
                 self.practice.at = None
                 self._undraw()
             case ("open", str(exercise_id), int()):
-                self.practice.open(exercise_id)
-                self._begin(self._now)
+                self.open(exercise_id)
             case _ if self.practice.at is not None:
                 self._act(key, value)
         self._update()
@@ -275,9 +307,10 @@ class Practising(Feature):
             sheet.error = f"{str(error)[:1].upper()}{str(error)[1:]}."
             return
         sheet.verdict = verdict
-        now = time.perf_counter()
-        self.practice.take(exercise, verdict, now - self._since)
-        self._since = now
+        seconds, self._since = time.perf_counter() - self._since, time.perf_counter()
+        self.practice.take(exercise, verdict, seconds)
+        if self.judged is not None:
+            self.judged(Judged(exercise, self.practice.seed_of(exercise), given, verdict, seconds))
         if verdict.right:
             self._show_answer()
 

@@ -91,7 +91,11 @@ class Practice:
 
     def variant(self, exercise: Exercise) -> Variant:
         """The student's numbers."""
-        return exercise.variant(self.seed + MOST * self.record(exercise).variant)
+        return exercise.variant(self.seed_of(exercise))
+
+    def seed_of(self, exercise: Exercise) -> int:
+        """The seed of the student's numbers."""
+        return self.seed + MOST * self.record(exercise).variant
 
     def take(self, exercise: Exercise, verdict: Verdict, seconds: float) -> None:
         """Keep a verdict, unless the answer is on show."""

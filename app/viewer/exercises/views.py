@@ -29,6 +29,7 @@ class Sheet:
         chosen: the option that was chosen last.
         verdict: on the last answer.
         error: why it could not be read.
+        note: a sentence below the verdict.
     """
 
     cells: list[list[str]] = field(default_factory=list)
@@ -36,6 +37,7 @@ class Sheet:
     chosen: int | None = None
     verdict: Verdict | None = None
     error: str = ""
+    note: str = ""
 
 
 def list_html(exercises: Exercises, practice: Practice) -> str:
@@ -108,7 +110,7 @@ def foot_html(
         credit=0 if verdict is None or verdict.right else round(100 * verdict.credit),
         more_hints=len(exercise.hints) - record.hints, record=record, time=_time(record.seconds),
         solution=exercise.solution(variant, units) if record.closed else "", following=following,
-        varies=bool(exercise.vary), may_reveal=may_reveal,
+        varies=bool(exercise.vary), may_reveal=may_reveal, note=sheet.note,
     )  # fmt: skip
 
 

@@ -91,13 +91,9 @@ class ArmScene:
         tool, color = self.body.chain.T_last_tool, self.body.gripper[0].color
         self._drawn = DrawnBody(self._add, self._nodes, f"{root}-target", tool, color)
         self._gap = scene.add_line_segments(
-            f"{root}-gap",
-            np.zeros((1, 2, 3), np.float32),
-            GAP_COLOR,
-            thickness=3.0,
-            thickness_units="screen",
+            f"{root}-gap", np.zeros((1, 2, 3), np.float32), GAP_COLOR, thickness=3.0, thickness_units="screen",
             visible=False,
-        )
+        )  # fmt: skip
         self._contact = scene.add_frame(f"{root}-contact", show_axes=False, visible=False)
         scene.add_icosphere(
             f"{root}-contact/mark",
@@ -282,6 +278,11 @@ class ArmScene:
         """Show or hide the joint axes; a body hides most of them, so only a skeleton shows any."""
         for node in self._axes:
             node.visible = visible and (self._bare or self._look == "both")
+
+    @property
+    def tops(self) -> tuple[viser.SceneNodeHandle, ...]:
+        """The nodes above all others of the arm."""
+        return tuple(self._top)
 
     def remove(self) -> None:
         """Remove everything from the scene."""

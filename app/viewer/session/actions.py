@@ -32,7 +32,7 @@ from kin.units import Units
 NO_STEP = frozenset(
     {
         *("camera", "fit-arm", "look-from", "looked", "resized", "system-dark", "grab", "copy-as"),
-        *("undo", "redo", "travel", "released", "snap", "text-size", "body"),
+        *("undo", "redo", "travel", "released", "snap", "text-size", "body", "news"),
     }
 )
 # Controls that send many values on the way to the one the visitor means: how long (s) a step may pause.
@@ -119,6 +119,7 @@ class Actions:
             "lock": self._on_lock,
             "branch": self._on_branch_choice,
             "feature": self._on_feature,
+            "news": self._on_feature,
             "lesson": lambda title: page.lessons.choose(title) if page.lessons is not None else None,
             "robot": self._on_robot_choice,
             "task": self._on_task,
@@ -170,8 +171,6 @@ class Actions:
         self._act(name, arguments, value)
 
     def _act(self, name: str, arguments: list[Any], value: object) -> None:
-        if name not in self._handlers:
-            raise KeyError(name)
         action = self._handlers[name]
         if name in NO_STEP:
             action(*arguments, value)
@@ -232,7 +231,7 @@ class Actions:
             self._page.status.show(Notice("hand", f"Nothing can be {verb.lower()}"))
         else:
             self._page.status.show(Notice("hand", f"{verb}: {step.label}", detail))
-            self._return_to(step.state)
+            self.show(step.state)
         self._show_history()
 
     def _travel(self, text: object) -> None:
@@ -243,14 +242,18 @@ class Actions:
             page.status.show(notice)
             return
         page.status.show(Notice("hand", "Back to this point of the browser's history"))
-        self._return_to(self._history.travel(state, page.snapshot()))
+        self.show(self._history.travel(state, page.snapshot()))
         self._show_history()
 
-    def _return_to(self, state: PageState) -> None:
+    def record(self, label: str, before: PageState) -> None:
+        """Let undo lead back to the state `before`."""
+        self._history.record(label, before)
+        self._show_history()
+
+    def show(self, state: PageState) -> None:
+        """Show another state, except for the viewpoint unless the robot is another one."""
         page = self._page
         self._gesture, self._returned = None, True
-        changed, page.own = state.own != page.own, state.own
-        robot = robot_of(page, state.robot)
         if state.units != page.units:
             page.panel.units.show(state.units)
             page.use_units(state.units)
@@ -258,13 +261,7 @@ class Actions:
             page.use_frames(state.frames)
         if state.view != page.view:
             page.use_view(replace(state.view))
-        if robot != page.robot:
-            page.change_robot(robot, state.q)
-            if state.camera is not None:
-                page.camera.restore(state.camera)
-        elif changed:
-            page.panel.robots.show(robot, page.own)
-        self._restore_arm(state)
+        self.adopt(state)
         if page.lessons is not None and state.lesson != page.lessons.key:
             page.lessons.open(state.lesson)
         for feature in page.features:
@@ -272,6 +269,19 @@ class Actions:
             if wanted != without_results(feature.state()):
                 feature.restore(wanted)
         page.for_features(lambda feature: feature.on_request())
+
+    def adopt(self, state: PageState) -> None:
+        """Show the arm of another state: robot, requests and configuration."""
+        page = self._page
+        changed, page.own = state.own != page.own, state.own
+        robot = robot_of(page, state.robot)
+        if robot != page.robot:
+            page.change_robot(robot, state.q)
+            if state.camera is not None:
+                page.camera.restore(state.camera)
+        elif changed:
+            page.panel.robots.show(robot, page.own)
+        self._restore_arm(state)
 
     def _restore_arm(self, state: PageState) -> None:
         page, arm = self._page, self._page.arm

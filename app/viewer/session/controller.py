@@ -178,6 +178,14 @@ class ArmController:
         self.target = None
         self._head_for(q)
 
+    def follow(self, q: Array, target: Array | None) -> None:
+        """Move to a configuration ``(n,)`` for a target ``(4, 4)`` that were solved in another page."""
+        self.target = target
+        if target is not None:
+            self._reached = bool(np.linalg.norm(kin.fk(self.robot, q)[:3, 3] - target[:3, 3]) <= _GAP)
+            self.scene.place_gizmo(target)
+        self._head_for(q)
+
     def recall_target(self) -> None:
         """Move the target back to the tool."""
         self.move_to(self.goal)

@@ -48,7 +48,7 @@ from kin.units import DEFAULT_UNITS, Units
 
 
 class VisitorPage(ShownArm, Worker):
-    """The page of one visitor.
+    """The page of one visitor; `offered` are its tabs between the arm's controls and the view's.
 
     The methods that `Worker` calls thread-safe may be called by any thread; everything else belongs to the worker.
     The page is the :class:`~app.viewer.feature.Stage` of its features, the listener of its arm's controller, the
@@ -73,25 +73,20 @@ class VisitorPage(ShownArm, Worker):
         address: str = "",
     ) -> None:
         super().__init__(client.client_id, failed)
-        self.store = services.store
-        self.clouds = services.clouds
-        self.maps = services.maps
-        self.summaries = services.summaries
+        self.store, self.clouds = services.store, services.clouds
+        self.maps, self.summaries = services.maps, services.summaries
         self.own: OwnArm | None = None
         self.meshes = services.meshes.of(address)
         self._library, self._services = services.library, services
         self.bodies = Bodies(services.library, lambda why: self.post("body", why))
         self.frames = Frames()
         self.arm = ArmController(client, services.pace, self.post, self)
-        self.view = ViewState()
-        self.system_dark = False
+        self.view, self.units, self.system_dark = ViewState(), DEFAULT_UNITS, False
         self.lessons: LessonChoice | None = None
-        self.client = client
-        self._pace = services.pace
-        self._welcome = welcome
+        self.client, self._pace = client, services.pace
+        self._welcome, self._looking = welcome, rights is Rights.LOOK
         self._persistence = Persistence(self, token, self._guard, rights)
-        self._looking = rights is Rights.LOOK
-        self.units = DEFAULT_UNITS
+        self.offered: tuple[type[Feature], ...] = TABS
         self._tabs: list[Feature] = []
         self._result: IKResult | None = None  # for the last target
         # Created by the worker when it builds the page.
@@ -319,7 +314,7 @@ class VisitorPage(ShownArm, Worker):
         with self.client.atomic():
             for key, value in batch:
                 # Guarded one by one, so that one bad value does not discard the others.
-                self._guard(lambda key=key, value=value: self._actions.handle(key, value))  # type: ignore[misc]
+                self._guard(lambda key=key, value=value: self._act(key, value))  # type: ignore[misc]
             self.arm.draw(fresh=bool(batch))
             if self.arm.target is None:
                 self.numbers.hide_target()
@@ -337,6 +332,10 @@ class VisitorPage(ShownArm, Worker):
         elif not (self.arm.moving or self.arm.dragging) and self._persistence.rested(now):
             self._guard(lambda: self._persistence.save(self._actions.take_returned()))
             self._show_hints()
+
+    def _act(self, key: Hashable, value: object) -> None:
+        """Process one event."""
+        self._actions.handle(key, value)
 
     def _show_hints(self) -> None:
         """Tell ``static/hints.js`` where the gizmo is in the picture, and how long its arrows are there.
@@ -363,7 +362,7 @@ class VisitorPage(ShownArm, Worker):
             self.camera = VisitorCamera(self.client, self.post)
             self.numbers = Numbers(self, self._pace.reading)
             gui.main_panel.dock_right()
-            titles = [tab.title for tab in TABS]
+            titles = [tab.title for tab in self.offered]
             self.panel = Panel(
                 gui, self.store.robots, self.own, robot, self.units, self.view, self.system_dark, self._welcome,
                 bool(LESSONS), titles, self._library.offered(self.store.robots), self.post,
@@ -374,7 +373,7 @@ class VisitorPage(ShownArm, Worker):
             self._use_robot(robot, saved.q)
             if self.panel.learn is not None:
                 self.lessons = LessonChoice(gui, self.panel.learn, self, self.post, self._services)
-            for tab, container in zip(TABS, self.panel.tabs, strict=True):
+            for tab, container in zip(self.offered, self.panel.tabs, strict=True):
                 with container:
                     self._tabs.append(tab(self))
             self._persistence.restore(saved)

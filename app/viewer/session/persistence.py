@@ -72,6 +72,7 @@ class Persistence:
         text_size: name of the text size with which it was opened.
         embedded: how the page is embedded, as `StoredPage.embedded`.
         due: when the state is to be saved if nothing more happens (`time.perf_counter`'s); None: it is saved.
+        led: whether another page leads this one, which adds no entries to the browser's history then.
     """
 
     def __init__(
@@ -89,6 +90,7 @@ class Persistence:
         self._state = PageState()
         self._share: SharePanel
         self.due: float | None = None
+        self.led = False
 
     def load(self) -> PageState:
         """Read the stored state from the browser. A page that does not answer starts fresh."""
@@ -162,7 +164,8 @@ class Persistence:
         state = self.snapshot()
         text = encode(state)
         if text != self._saved:
-            key = KEY_RETURN if returned else KEY_REPLACE if same(state, self._state) else KEY
+            replaces = self.led or (not returned and same(state, self._state))
+            key = KEY_REPLACE if replaces else KEY_RETURN if returned else KEY
             self._saved, self._state = text, state
             self._page.client.local_storage.set_item(key, text)
             self._update_share()

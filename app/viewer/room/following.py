@@ -1,0 +1,147 @@
+"""Shows the state of another member's page in this one, live: only what has changed.
+
+A teacher who drags sends up to twenty states a second. Of these, only the configuration and the target change,
+which costs this page as much as a drag of its own without the solving. The rest is what a link restores.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import lru_cache
+from typing import Protocol
+
+import numpy as np
+
+from app.viewer.own_arm import OwnArm
+from app.viewer.session.actions import ActionsPage
+from app.viewer.session.history import without_results
+from app.viewer.session.state import PageState, decode
+from kin import Robot
+from kin.transforms import Array
+
+# The features whose states are shown with the open lesson. Exercises are everybody's own.
+SHARED = ("guide", "program", "workspace")
+OWN_LESSON = "exercises"
+SAME_VIEW = 1e-3  # tolerance of viewpoints, metres
+
+
+class LedPage(ActionsPage, Protocol):
+    """What following may use of a page."""
+
+    def adopt(self, state: PageState) -> None:
+        """Show robot, requests and configuration of another state."""
+
+    def guard(self, action: Callable[[], None]) -> None:
+        """Run an action; an error is logged and shown."""
+
+
+@lru_cache(maxsize=128)
+def _decoded(text: str, robots: tuple[Robot, ...]) -> PageState:
+    """A state in a text; all pages of a process that show it share one object."""
+    return decode(text, robots)
+
+
+def decoded(text: str, robots: Sequence[Robot]) -> PageState:
+    """The state in a text, as far as it is valid for these robots."""
+    return _decoded(text, tuple(robots))
+
+
+def shared(state: PageState, lesson: str | None) -> PageState:
+    """What followers see of the leader's page."""
+    names = (lesson, *SHARED)
+    return replace(state, features={key: value for key, value in state.features.items() if key in names})
+
+
+class Follower:
+    """Lets one page show the states of another. Not thread-safe: the page's worker calls it.
+
+    Args:
+        compute: whether lessons and other features are shown too, which may compute.
+
+    Attributes:
+        turned: whether the visitor has moved the camera since; then the other's viewpoint is not shown.
+    """
+
+    def __init__(self, page: LedPage, compute: bool) -> None:
+        self._page = page
+        self._compute = compute
+        self._text = ""
+        self._shown: PageState | None = None
+        self._aimed: Array | None = None
+        self.turned = False
+
+    def begin(self) -> None:
+        """The next state is shown whole, with its viewpoint."""
+        self._text, self._shown, self.turned = "", None, False
+
+    def show(self, text: str) -> None:
+        """Show a packed state; a text that is not a state changes nothing."""
+        if text == self._text:
+            return
+        self._text = text
+        state = decoded(text, self._page.store.robots)
+        if state.unreadable or state.refused or state.q is None or state.robot is None:
+            return
+        last, self._shown = self._shown, state
+        if last is None or _differs(last, state, "robot", "own", "task", "branch", "locks"):
+            self._page.adopt(replace(state, own=self._own(state)))
+        elif not np.array_equal(state.q, self._page.goal) or not _equal(state.target, last.target):
+            self._page.arm.follow(state.q, state.target)
+        if self._compute:
+            self._show_view(state)
+            self._show_lesson(last, state)
+        self._show_camera(last, state)
+
+    def _own(self, state: PageState) -> OwnArm | None:
+        """The leader's own arm if it is on show; otherwise the visitor's stays."""
+        return state.own if state.own is not None and state.own.robot.id == state.robot else self._page.own
+
+    def _show_view(self, state: PageState) -> None:
+        page = self._page
+        view = replace(state.view, dark=page.view.dark, detailed=page.view.detailed)
+        if view != page.view:
+            page.use_view(view)
+        if state.frames != page.frames:
+            page.use_frames(state.frames)
+
+    def _show_lesson(self, last: PageState | None, state: PageState) -> None:
+        """Open the leader's lesson, and show the states of what the leader sees."""
+        page = self._page
+        lesson = None if state.lesson == OWN_LESSON else state.lesson
+        before = None if last is None or last.lesson == OWN_LESSON else last.lesson
+        lessons = page.lessons
+        if lessons is not None and lesson != before:
+            page.guard(lambda: lessons.open(lesson))
+        for feature in page.features:
+            if feature.key != lesson and feature.key not in SHARED:
+                continue
+            wanted = without_results(state.features.get(feature.key, {}))
+            had = {} if last is None else without_results(last.features.get(feature.key, {}))
+            if wanted != had:
+                page.guard(lambda feature=feature, wanted=wanted: feature.restore(wanted))  # type: ignore[misc]
+
+    def _show_camera(self, last: PageState | None, state: PageState) -> None:
+        camera = self._page.camera
+        camera.look()
+        if last is not None and not self.turned:
+            self.turned = not _close(camera.chosen, self._aimed)
+        if self.turned or (last is not None and _equal(state.camera, last.camera)):
+            return
+        self._aimed = state.camera
+        if state.camera is not None:
+            camera.restore(state.camera)
+        elif camera.chosen is not None:
+            camera.aim(self._page.arm.scene.body, glide=True)
+
+
+def _differs(a: PageState, b: PageState, *names: str) -> bool:
+    return any(getattr(a, name) != getattr(b, name) for name in names)
+
+
+def _equal(a: Array | None, b: Array | None) -> bool:
+    return (a is None) == (b is None) and (a is None or b is None or np.array_equal(a, b))
+
+
+def _close(a: Array | None, b: Array | None) -> bool:
+    return (a is None) == (b is None) and (a is None or b is None or bool(np.allclose(a, b, atol=SAME_VIEW)))

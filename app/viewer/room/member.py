@@ -1,0 +1,221 @@
+"""What all members of a room have in their pages: the tab *Class*, the bar over the scene, and who leads."""
+
+from __future__ import annotations
+
+import time
+from abc import abstractmethod
+from collections.abc import Callable, Hashable
+from typing import ClassVar, Protocol, cast
+
+import viser
+
+from app.classroom.attendance import Attendance
+from app.classroom.views import ClassroomUnavailable, RefusedError, RoomView
+from app.exercises import Exercises
+from app.viewer.feature import Feature, Stage
+from app.viewer.panel import update_html
+from app.viewer.panel.script import Reply
+from app.viewer.panel.status import Notice
+from app.viewer.room.following import Follower, LedPage
+from app.viewer.room.sharing import Sharing
+from app.viewer.session.state import PageState
+
+NEWS: Hashable = "room"
+REFRESH = 0.2  # s between two updates of the tab and of the wall
+IDLE = 60.0  # s
+AGAIN = 6.0  # s within which a button that needs two presses must be pressed again
+GRACE = 0.8  # s after the beginning of a lead in which a drag that is under way does not end it
+# Events by which a visitor moves the arm or opens something else.
+ACTS = frozenset(
+    {
+        *("gizmo", "grab", "joint", "redundancy", "lock", "branch", "lesson", "robot", "task", "home", "random"),
+        *("recall", "undo", "redo", "travel", "nudge", "field", "target", "feature"),
+    }
+)
+EXEMPT = ("class", "sheets")  # features whose controls are not acts in this sense
+
+
+class MemberPage(LedPage, Protocol):
+    """What the tab may use of its page."""
+
+    attendance: Attendance
+    exercises: Exercises
+
+    def snapshot(self) -> PageState:
+        """The present state."""
+
+    def record(self, label: str, before: PageState) -> None:
+        """Let undo lead back to the state `before`."""
+
+    def put_back(self) -> None:
+        """Show in all controls of the arm what is true."""
+
+    def be_led(self, led: bool) -> None:
+        """Another page leads this one, or none does."""
+
+    @property
+    def may_compute(self) -> bool:
+        """Whether the visitor may cause work."""
+
+
+def act_of(key: Hashable, value: object) -> str:
+    """The name of a visitor's act that changes the page; empty for other events."""
+    parts = key if isinstance(key, tuple) else (key,)
+    name = parts[1] if parts[0] == "message" and len(parts) > 1 else parts[0]
+    if name == "feature":
+        # Only what is pressed in our own HTML: features also post what they have computed.
+        pressed = parts[0] == "message" and isinstance(value, list) and value and value[0] not in EXEMPT
+        return "feature" if pressed else ""
+    return str(name) if name in ACTS else ""
+
+
+class Member(Feature):
+    """The tab *Class* of one page. Subclasses: teacher and student."""
+
+    key = "class"
+    title = "Class"
+    share_every: ClassVar[float]
+
+    def __init__(self, stage: Stage) -> None:
+        super().__init__(stage)
+        self.page = cast(MemberPage, stage)
+        self.attendance = self.page.attendance
+        self.room: RoomView = self.attendance.room
+        self.follower = Follower(self.page, self.page.may_compute)
+        self.leader = ""  # who leads this page: "teacher", or the id of a seat
+        self.due = 0.0
+        self._began = 0.0
+        self._dirty = True
+        self._next = 0.0
+        self._sharing = Sharing(self.shared_state, self.attendance.tell_page, self.share_every)
+        self._armed: tuple[Hashable, float] = "", 0.0
+        self._bar: viser.GuiHtmlHandle | None = None
+
+    def attach(self, bar: viser.GuiHtmlHandle) -> None:
+        """Use this element, outside of all tabs, for the bar over the scene."""
+        self._bar = bar
+        self.take_news()
+
+    # To be overridden
+
+    @abstractmethod
+    def take_news(self) -> None:
+        """The room has changed: do at once what concerns the arm."""
+
+    @abstractmethod
+    def refresh(self) -> None:
+        """Show the room in the tab."""
+
+    @abstractmethod
+    def bar(self) -> str:
+        """The HTML of the bar over the scene."""
+
+    @abstractmethod
+    def shared_state(self) -> PageState | None:
+        """What is sent to the room; None: nothing now."""
+
+    @abstractmethod
+    def press(self, kind: str, name: str, value: object) -> None:
+        """A control of the tab was pressed."""
+
+    @abstractmethod
+    def refusal(self, act: str) -> str:
+        """Why the visitor may not act now; empty if the act is allowed, which may end a lead."""
+
+    # Feature
+
+    def handle(self, key: Hashable, value: object) -> None:
+        self._dirty = True
+        match key:
+            case "room":
+                self.room = self.attendance.room
+                if self._bar is not None:
+                    self.take_news()
+            case (str(kind), int()):
+                self._press(kind, "", value)
+            case ("fields", str(name), int()):
+                self._press(name, "", value)
+            case (str(kind), str(name), int()):
+                self._press(kind, name, value)
+            case ("look", str(seat)):
+                self._press("look", seat, None)
+        self.due = 0.0
+
+    def tick(self, now: float) -> None:
+        again = self._sharing.tick(now)
+        if self._dirty and now >= self._next:
+            self._dirty, self._next = False, now + REFRESH
+            if self._bar is not None:
+                self.refresh()
+                update_html(self._bar, self.bar())
+        left = self._next - now if self._dirty else IDLE
+        if self._armed[0] and now >= self._armed[1]:
+            self._armed, self._dirty, left = ("", 0.0), True, 0.0
+        elif self._armed[0]:
+            left = min(left, self._armed[1] - now)
+        self.due = max(0.0, min(left, IDLE if again is None else again))
+
+    def on_style(self) -> None:
+        self._dirty = True
+
+    def on_leave(self) -> None:
+        self.attendance.leave()
+
+    def admit(self, key: Hashable, value: object) -> bool:
+        """Whether an event may act on the page."""
+        act = act_of(key, value)
+        if not act:
+            return True
+        if self.leader and time.perf_counter() - self._began < GRACE and act in ("gizmo", "grab", "joint"):
+            self.page.put_back()
+            return False
+        why = self.refusal(act)
+        if why:
+            self.page.put_back()
+            self.page.status.show(Notice("advice", "Not now", why))
+            if isinstance(key, tuple) and key[0] == "message":
+                self.page.panel.script.reply(Reply(int(key[2]), why))
+        self._dirty, self.due = True, 0.0
+        return not why
+
+    # For subclasses
+
+    def follow(self, leader: str, text: str, title: str = "") -> None:
+        """Show the state of another page from now on, or again; with a title, undo leads back."""
+        if leader != self.leader:
+            if not self.leader and title:
+                self.page.record(title, self.page.snapshot())
+            self.leader, self._began = leader, time.perf_counter()
+            self.page.be_led(True)
+            self.follower.begin()
+        self.follower.show(text)
+
+    def free(self) -> None:
+        """Nobody leads this page any more."""
+        if self.leader:
+            self.leader = ""
+            self.page.be_led(False)
+
+    def twice(self, what: Hashable) -> bool:
+        """Whether a button that needs two presses was pressed for the second time."""
+        now = time.perf_counter()
+        armed = self._armed[0] == what and now < self._armed[1]
+        self._armed = ("", 0.0) if armed else (what, now + AGAIN)
+        return armed
+
+    def is_armed(self, what: Hashable) -> bool:
+        """Whether such a button waits for the second press."""
+        return self._armed[0] == what
+
+    def try_to(self, action: Callable[[], None]) -> bool:
+        """Ask the room for something; says in the status line why it was refused."""
+        try:
+            action()
+        except (RefusedError, ClassroomUnavailable) as error:
+            self.page.status.show(Notice("error", "Not done", str(error)))
+            return False
+        return True
+
+    def _press(self, kind: str, name: str, value: object) -> None:
+        if not self.room.closed:
+            self.press(kind, name, value)

@@ -1,0 +1,209 @@
+"""The tab *Class* of a student: who leads, the task, the question, the raised hand, and what is stored."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from app.classroom.clock import now
+from app.classroom.views import NewAttempt
+from app.viewer.exercises.feature import Judged
+from app.viewer.feature import Stage
+from app.viewer.panel import update_html
+from app.viewer.panel.status import Notice
+from app.viewer.room import views
+from app.viewer.room.member import NEWS, Member
+from app.viewer.room.sharing import STUDENT_EVERY
+from app.viewer.room.submissions import Submissions
+from app.viewer.session.state import PageState
+
+TEACHER = "teacher"
+FROZEN = "The teacher has frozen the class: look at the teacher’s screen."
+
+
+class Lead(NamedTuple):
+    """Who leads, and the packed state of that page."""
+
+    leader: str
+    page: str
+
+
+class Student(Member):
+    """A student's page."""
+
+    messages = frozenset({"go", "back", "hand", "vote", "task"})
+    share_every = STUDENT_EVERY
+
+    def __init__(self, stage: Stage) -> None:
+        super().__init__(stage)
+        gui = stage.client.gui
+        self._head = gui.add_html("")
+        self._question = gui.add_html("")
+        self._stored = gui.add_html("")
+        self._gone = False  # whether the student has let go of who leads
+        self._task_at: float | None = None
+        self._first = True
+        self._open_tab = 0
+        self._submissions = Submissions(self.attendance.submit, lambda: stage.post(("news", self.key, NEWS)))
+
+    def take_news(self) -> None:
+        if self.page.lessons is not None:
+            self.page.lessons.exercises.judged = self._submit
+        self._set_task()
+        lead = self._lead
+        if lead is None:
+            if self.leader:
+                self.page.status.show(Notice("hand", "You work by yourself", "Nobody leads the class now."))
+            self.free()
+            self._leader_before, self._gone = "", False
+            return
+        if lead.leader != self._leader_before or self.frozen:
+            self._gone = False
+        self._leader_before = lead.leader
+        if not self._gone:
+            self.follow(lead.leader, lead.page, "What the class shows")
+
+    _leader_before = ""
+
+    @property
+    def _lead(self) -> Lead | None:
+        room = self.room
+        if room.closed or room.seat is None:
+            return None
+        if room.shown is not None:
+            mine = room.shown.seat == room.seat.id
+            return None if mine or not room.shown.page else Lead(room.shown.seat, room.shown.page)
+        return Lead(TEACHER, room.page) if room.follow and room.page else None
+
+    @property
+    def frozen(self) -> bool:
+        """Whether the student may not act: while the teacher is away, nobody is kept."""
+        return self.room.frozen and not self.room.teacher_away and not self.room.closed
+
+    def _set_task(self) -> None:
+        """Open a task that is new."""
+        task, lessons = self.room.task, self.page.lessons
+        at = None if task is None else task.at
+        first, self._first = self._first, False
+        if at == self._task_at or lessons is None:
+            return
+        self._task_at = at
+        exercise = None if task is None else self.page.exercises.get(task.exercise)
+        if exercise is None or (
+            first and (lessons.exercises.is_closed(exercise) or lessons.exercises.at == exercise)
+        ):
+            return
+        self.free()
+        self._gone = True
+        self._open_task()
+        self.page.status.show(Notice("hand", "A task from your teacher", exercise.title))
+
+    def _open_task(self) -> None:
+        task, lessons = self.room.task, self.page.lessons
+        if task is not None and lessons is not None:
+            if lessons.key != lessons.exercises.key:
+                lessons.open(lessons.exercises.key)
+            lessons.exercises.open(task.exercise)
+            self._open_tab += 1
+
+    def _submit(self, judged: Judged) -> None:
+        """Send an answer to the teacher."""
+        verdict = judged.verdict
+        self._submissions.add(
+            NewAttempt(
+                exercise=judged.exercise.id, seed=judged.seed, answer=judged.answer, verdict=verdict.reason,
+                score=1.0 if verdict.right else min(max(verdict.credit, 0.0), 1.0), started=now() - judged.seconds,
+            )
+        )  # fmt: skip
+        if self.page.lessons is not None:
+            self.page.lessons.exercises.note("Storing the answer …")
+
+    def _note(self) -> None:
+        """Say below the verdict whether the answers are stored."""
+        lessons, sent = self.page.lessons, self._submissions
+        if lessons is None or not (sent.stored or sent.waiting or sent.problem):
+            return
+        if sent.problem:
+            text = (
+                f"Not stored yet: {sent.problem} It is tried again."
+                if sent.waiting
+                else f"Not stored: {sent.problem}"
+            )
+        else:
+            text = "Storing the answer …" if sent.waiting else "✓ Stored for your teacher."
+        lessons.exercises.note(text)
+
+    # Member
+
+    def shared_state(self) -> PageState | None:
+        if self.room.closed:
+            return None
+        exercises = None if self.page.lessons is None else self.page.lessons.exercises
+        at = None if exercises is None else exercises.at
+        self.attendance.tell_task("" if at is None else at.id)
+        state = self.page.snapshot()
+        return PageState(
+            robot=state.robot,
+            own=state.own if state.own is not None and state.own.robot.id == state.robot else None,
+            q=state.q,
+            target=state.target,
+            task=state.task,
+            locks=state.locks,
+        )
+
+    def refusal(self, act: str) -> str:
+        if self.frozen:
+            return FROZEN
+        if self.leader:
+            self.free()
+            self._gone = True
+            self.page.status.show(Notice("hand", "You have let go", "Press Come back in the bar to follow again."))
+        return ""
+
+    def press(self, kind: str, name: str, value: object) -> None:
+        room = self.room
+        match kind:
+            case "go" if not self.frozen:
+                self.free()
+                self._gone = True
+            case "back":
+                self._gone = False
+                self.follower.begin()
+                self.take_news()
+            case "hand" if room.seat is not None:
+                self.try_to(lambda: self.attendance.raise_hand(not (room.seat and room.seat.hand)))
+            case "vote" if type(value) is int:
+                self.try_to(lambda: self.attendance.vote(value))
+            case "task" if not self.frozen:
+                self.free()
+                self._gone = True
+                self._open_task()
+
+    def refresh(self) -> None:
+        task = None if self.room.task is None else self.page.exercises.get(self.room.task.exercise)
+        update_html(self._head, views.student_html(self.room, self.mode, task, self._submissions))
+        update_html(self._question, views.poll_html(self.room.poll, teacher=False))
+        update_html(self._stored, views.stored_html(self.room, now()))
+        self._note()
+
+    def bar(self) -> str:
+        return views.student_bar(self.room, self.mode, self._open_tab)
+
+    @property
+    def mode(self) -> views.Mode:
+        """Who leads this page, for the words in tab and bar."""
+        room, lead = self.room, self._lead
+        if room.closed:
+            return "closed"
+        if room.teacher_away and (room.follow or room.shown is not None or room.frozen):
+            return "paused"
+        if room.shown is not None and room.seat is not None and room.shown.seat == room.seat.id:
+            return "shown"
+        if self.frozen and lead is None:
+            return "frozen"
+        if lead is None:
+            return "free"
+        return "gone" if self._gone else "led"
+
+    def on_leave(self) -> None:
+        self._submissions.close()
+        super().on_leave()

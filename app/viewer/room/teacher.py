@@ -1,0 +1,271 @@
+"""The tab *Class* of the teacher: join code, who leads, tasks, a question, the students, the wall."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import viser
+
+from app.classroom.clock import now
+from app.classroom.views import SeatView
+from app.viewer.feature import Stage
+from app.viewer.own_arm import OwnArm
+from app.viewer.panel import update_html
+from app.viewer.panel.status import Notice
+from app.viewer.room import views
+from app.viewer.room.following import decoded, shared
+from app.viewer.room.member import Member
+from app.viewer.room.sharing import LEADER_EVERY
+from app.viewer.room.wall import MOST, SmallArm, Wall
+from app.viewer.session.state import PageState
+from kin import InputError, Robot
+
+QUESTION = "Elbow up or down?"
+CHOICES = ("Elbow up", "Elbow down")
+
+
+class Teacher(Member):
+    """The teacher's page."""
+
+    messages = frozenset(
+        {
+            *("follow", "freeze", "fields", "untask", "close", "unask", "look", "return", "show", "hide", "pick"),
+            *("remove", "lower", "wall", "end"),
+        }
+    )
+    share_every = LEADER_EVERY
+
+    def __init__(self, stage: Stage) -> None:
+        super().__init__(stage)
+        gui = stage.client.gui
+        self._head = gui.add_html("")
+        with gui.add_folder("Join"):
+            self._join = gui.add_html("")
+        with gui.add_folder("Students"):
+            self._tools = gui.add_html("")
+            self._one = gui.add_html("")
+            self._list = gui.add_html("")
+        with gui.add_folder("Task"):
+            self._task = gui.add_html("")
+        with gui.add_folder("Question"):
+            self._ask = gui.add_html("")
+            self._tally = gui.add_html("")
+        self._end = gui.add_html("")
+        self._picked = ""  # the student whose details are open
+        self._wall: Wall | None = None
+        self._hidden: list[tuple[viser.SceneNodeHandle, bool]] = []
+        self._before: PageState | None = None  # the own page while a student's is on show, or the wall
+
+    def take_news(self) -> None:
+        room = self.room
+        shown = "" if room.shown is None else room.shown.seat
+        if self.leader and (room.closed or self._seat(self.leader) is None):
+            self._return()
+        if shown and shown != self.leader:
+            self._look(shown)
+        elif self.leader:
+            seat = self._seat(self.leader)
+            if seat is not None and seat.page:
+                self.follow(seat.id, seat.page)
+        if room.closed and self._wall is not None:
+            self._show_wall(False)
+
+    # Controls
+
+    def press(self, kind: str, name: str, value: object) -> None:
+        room, attendance = self.room, self.attendance
+        match kind:
+            case "follow":
+                attendance.set_follow(not room.follow)
+            case "freeze":
+                attendance.set_frozen(not room.frozen)
+            case "task":
+                self._send_task(_texts(value))
+            case "untask":
+                attendance.send_task(None)
+            case "ask":
+                question, *choices = _texts(value)
+                self.try_to(lambda: attendance.open_poll(question, [each for each in choices if each.strip()]))
+            case "close":
+                attendance.close_poll()
+            case "unask":
+                attendance.remove_poll()
+            case "wall":
+                self._show_wall(self._wall is None)
+            case "return":
+                if room.shown is not None:
+                    attendance.show_seat(None)
+                self._return()
+            case "end" if self.twice("end"):
+                self.try_to(attendance.end_room)
+            case "rename":
+                self._press_seat(kind, self._picked, value)
+            case _ if self._seat(name) is not None:
+                self._press_seat(kind, name, value)
+        self.room = attendance.room
+
+    def _press_seat(self, kind: str, seat: str, value: object) -> None:
+        """A control that concerns one student."""
+        attendance = self.attendance
+        match kind:
+            case "pick":
+                self._picked = "" if self._picked == seat else seat
+            case "look":
+                self._picked = seat
+                self._look(seat)
+            case "show":
+                attendance.show_seat(seat, named=bool(value))
+                self._look(seat)
+            case "hide":
+                attendance.show_seat(None)
+                self._return()
+            case "lower":
+                attendance.lower_hand(seat)
+            case "rename":
+                self.try_to(lambda: attendance.rename_seat(seat, _texts(value)[0]))
+            case "remove" if self.twice(("remove", seat)):
+                if self.try_to(lambda: attendance.remove_seat(seat)):
+                    self._picked = ""
+
+    def _send_task(self, texts: list[str]) -> None:
+        """Let all work on an exercise by themselves."""
+        exercise = self.page.exercises.get(texts[0])
+        if exercise is None:
+            raise InputError("task", texts[0], "the id of an exercise")
+        self.attendance.set_follow(False)
+        self.attendance.set_frozen(False)
+        self.attendance.send_task(exercise.id)
+        self.page.status.show(Notice("hand", f"Sent: {exercise.title}", "All work on it by themselves now."))
+
+    # A student's arm instead of the own one
+
+    def _seat(self, seat: str) -> SeatView | None:
+        return next((each for each in self.room.seats if each.id == seat), None)
+
+    def _look(self, seat_id: str) -> None:
+        """Show a student's arm."""
+        seat = self._seat(seat_id)
+        if seat is None or not seat.page:
+            self.page.status.show(
+                Notice("advice", "Nothing to see yet", "This student’s page has not sent its arm.")
+            )
+            return
+        if self._wall is not None:
+            self._show_wall(False)
+        if self._before is None:
+            self._before = self.page.snapshot()
+        self.follow(seat.id, seat.page)
+
+    def _return(self) -> None:
+        """Show the own arm again."""
+        self.free()
+        before, self._before = self._before, None
+        if before is None:
+            return
+        self.page.adopt(before)
+        if before.camera is not None:
+            self.page.camera.restore(before.camera)
+        elif self.page.camera.chosen is not None:
+            self.page.camera.aim(self.page.arm.scene.body, glide=True)
+
+    # The wall
+
+    def _show_wall(self, on: bool) -> None:
+        page, camera = self.page, self.page.camera
+        if on:
+            if self.leader:
+                self._return()
+            camera.look()
+            self._before = page.snapshot()
+            self._hidden = [(node, node.visible) for node in page.arm.scene.tops]
+            image = page.client.camera
+            aspect = image.image_width / max(image.image_height, 1) or 1.6
+            self._wall = Wall(
+                page.client.scene, page.arm.scene.body, aspect, lambda seat: self.post(("look", seat))
+            )
+        elif self._wall is not None:
+            self._wall.remove()
+            self._wall = None
+            camera.fit(())
+        for node, visible in self._hidden:
+            node.visible = visible and not on
+        if not on:
+            self._hidden = []
+            self._return()
+
+    def on_robot(self) -> None:
+        if self._wall is not None:  # the arm that was hidden is no longer there
+            self._hidden = []
+            self._before = None
+            self._show_wall(False)
+
+    def _draw_wall(self) -> None:
+        if self._wall is not None and self._wall.show(self._arms()):
+            camera = self.page.camera
+            camera.fit((), self._wall.corners if len(self._wall.corners) else None)
+            camera.aim(self.page.arm.scene.body, glide=True)
+
+    def _arms(self) -> list[SmallArm]:
+        arms = []
+        for seat in self.room.seats:
+            state = decoded(seat.page, self.page.store.robots) if seat.page else PageState()
+            robot = self._robot(state)
+            if robot is not None and state.q is not None:
+                arms.append(SmallArm(seat.id, seat.alias, robot, state.q, views.doing(seat, self.room)))
+        return arms[:MOST]
+
+    def _robot(self, state: PageState) -> Robot | None:
+        if state.own is not None and state.own.robot.id == state.robot:
+            return state.own.robot
+        return next((robot for robot in self.page.store.robots if robot.id == state.robot), None)
+
+    # Member
+
+    def shared_state(self) -> PageState | None:
+        if self.room.closed or self.leader or self._before is not None:
+            return None
+        self.page.camera.look()
+        return shared(replace(self.page.snapshot(), own=self._shown_own()), self._lesson)
+
+    @property
+    def _lesson(self) -> str | None:
+        return None if self.page.lessons is None else self.page.lessons.key
+
+    def _shown_own(self) -> OwnArm | None:
+        own = self.page.own
+        return own if own is not None and own.robot.id == self.page.robot.id else None
+
+    def refusal(self, act: str) -> str:
+        if self._wall is not None:
+            return "Close the wall first."
+        if self.leader:
+            return "This is a student’s arm. Press Back to my arm first."
+        return ""
+
+    def refresh(self) -> None:
+        room = self.room
+        exercises = self.page.exercises
+        task = None if room.task is None else exercises.get(room.task.exercise)
+        update_html(self._head, views.lead_html(room))
+        update_html(self._join, views.join_html(room, now()))
+        update_html(self._tools, views.tools_html(room, self._wall is not None))
+        seat = self._seat(self._picked)
+        update_html(self._one, views.seat_html(room, seat, self.leader, self.is_armed(("remove", self._picked))))
+        update_html(self._list, views.list_html(room, self._picked, exercises))
+        update_html(self._task, views.task_html(room, task, exercises))
+        update_html(self._ask, views.ask_html(room, QUESTION, CHOICES))
+        update_html(self._tally, views.poll_html(room.poll, teacher=True))
+        update_html(self._end, views.end_html(room, self.is_armed("end")))
+        self._draw_wall()
+
+    def bar(self) -> str:
+        return views.teacher_bar(self.room, self._seat(self.leader), self._wall is not None)
+
+
+def _texts(value: object) -> list[str]:
+    """The typed texts of a form, at least one."""
+    rows = value if isinstance(value, list) else []
+    texts = [text for row in rows[:12] if isinstance(row, list) for text in row[:2] if isinstance(text, str)]
+    if not texts:
+        raise InputError("form", value, "rows of texts")
+    return [text[:200] for text in texts]

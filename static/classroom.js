@@ -1,0 +1,27 @@
+"use strict";
+// Runs in viser's page of a member of a room (app/viewer/classroom): opens a tab of the panel when the server says so, and
+// writes this service's address below the join code.
+(() => {
+  let opened = "";
+  function follow() {
+    const bar = document.querySelector("[data-class-open]");
+    if (bar && bar.dataset.classSerial !== opened) {
+      const tab = [...document.querySelectorAll('[role="tab"]')].find((node) => node.textContent.trim() === bar.dataset.classOpen);
+      if (tab) {
+        opened = bar.dataset.classSerial;
+        if (tab.ariaSelected !== "true") {
+          tab.click();
+          tab.dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true })); // a docked panel ignores clicks
+        }
+      }
+    }
+    const address = document.querySelector("[data-class-address]");
+    const room = new URL("../room", location.href).href.replace(/^https?:\/\//, "");
+    if (address && address.textContent !== room) address.textContent = room;
+  }
+  // A new connection counts from the beginning.
+  addEventListener("kinboard-connect", () => { opened = ""; });
+  addEventListener("DOMContentLoaded", () => {
+    new MutationObserver(follow).observe(document.body, { subtree: true, childList: true });
+  });
+})();

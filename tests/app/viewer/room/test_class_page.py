@@ -1,0 +1,316 @@
+"""A class in visitors' pages: one teacher and students, each with a websocket of their own, and one database."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fake_browser import FakeBrowser
+from live_server import serve_viewer
+
+import kin
+from app.classroom import COOKIE, Hub, Ticket
+from app.shared.clouds import Clouds
+from app.shared.settings import Settings
+from app.shared.store import Store
+from app.viewer.server import ViewerServer
+
+pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
+
+ROBOT = kin.builtin_robots()["pioneer5"]
+EXERCISE = "which-joint-goes-down"
+
+
+class Class:
+    """A service with rooms, and browsers of their members."""
+
+    def __init__(self, port: int, hub: Hub) -> None:
+        self.port, self.hub = port, hub
+        self.room = hub.rooms.open("Robotics <i>2</i>", 3600.0)
+        self._open: list[FakeBrowser] = []
+
+    def browser(self, token: str) -> FakeBrowser:
+        headers = {"Cookie": f"{COOKIE}={token}"} if token else {}
+        browser = FakeBrowser(self.port, additional_headers=headers, close_timeout=0.1)
+        self._open.append(browser)
+        browser.__enter__()
+        return browser
+
+    def teacher(self) -> FakeBrowser:
+        browser = self.browser(self.room.token)
+        browser.wait(lambda: 'data-class-bar="teacher"' in browser.html)
+        return browser
+
+    def join(self, alias: str) -> tuple[FakeBrowser, Ticket]:
+        ticket = self.hub.rooms.join(self.room.code, alias)
+        return self.student(ticket), ticket
+
+    def student(self, ticket: Ticket) -> FakeBrowser:
+        browser = self.browser(self.hub.rooms.tokens.sign(ticket))
+        browser.wait(lambda: "data-class-bar" in browser.html)
+        return browser
+
+    def close(self) -> None:
+        for browser in self._open:
+            browser.close()
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[int, Hub]]:
+    data: Path = tmp_path_factory.mktemp("classpage")
+    kin.warm_up()
+    hub = Hub(data)
+    viewer = ViewerServer(Store(), Settings(data=data), Clouds(), classroom=hub)
+    with serve_viewer(viewer) as port:
+        yield port, hub
+    hub.close()
+
+
+@pytest.fixture
+def room(served: tuple[int, Hub]) -> Iterator[Class]:
+    found = Class(*served)
+    yield found
+    found.close()
+    found.hub.rooms.end(found.room.id)
+
+
+def press(browser: FakeBrowser, *key: str, value: object = None) -> None:
+    """Press a control of the tab Class, as static/lesson.js does."""
+    browser.say("feature", ["class", [*key, len(browser.log)], value])
+
+
+def bar(browser: FakeBrowser) -> str:
+    """The kind of the bar over the scene."""
+    return browser.html.split('data-class-bar="')[1].split('"')[0]
+
+
+def mode(browser: FakeBrowser, wanted: str) -> None:
+    browser.wait(lambda: bar(browser) == wanted)
+
+
+def at(browser: FakeBrowser, q: np.ndarray) -> None:
+    """Wait until the arm is at a configuration."""
+    wanted = kin.fk(ROBOT, q)
+    browser.wait(lambda: np.allclose(browser.tool_pose(), wanted, atol=1e-6))
+
+
+def lead(room: Class) -> tuple[FakeBrowser, FakeBrowser, Ticket, np.ndarray]:
+    """A teacher who leads a student, at a configuration other than home."""
+    teacher = room.teacher()
+    student, ticket = room.join("Ann")
+    q = ROBOT.q_home.copy()
+    q[0] = np.radians(30.0)
+    teacher.set("1 rotating base", 30.0)
+    press(teacher, "follow")
+    mode(student, "led")
+    at(student, q)
+    return teacher, student, ticket, q
+
+
+def test_a_page_without_a_room_has_nothing_of_it(room: Class) -> None:
+    plain = room.browser("")
+    plain.settle()
+    assert "data-class" not in plain.html
+    forged = room.browser("W10.forged")
+    forged.settle()
+    assert "data-class" not in forged.html
+    assert not any(thread.name == "kinboard-classroom" for thread in threading.enumerate())
+
+
+def test_students_see_what_the_teacher_does_until_they_let_go(room: Class) -> None:
+    teacher, student, _, q = lead(room)
+    q[1] = np.radians(60.0)
+    teacher.set("2 rotating elbow", 60.0)
+    at(student, q)
+    press(student, "go")
+    mode(student, "gone")
+    q_own = q.copy()
+    q_own[0] = np.radians(80.0)
+    student.set("1 rotating base", 80.0)
+    at(student, q_own)
+    teacher.set("2 rotating elbow", 40.0)
+    q[1] = np.radians(40.0)
+    at(teacher, q)
+    assert bar(student) == "gone"
+    press(student, "back")
+    mode(student, "led")
+    at(student, q)
+    late, _ = room.join("Late")
+    at(late, q)
+    press(teacher, "follow")
+    mode(student, "free")
+    assert student.script["undo"], "undo leads back to what the student had"
+
+
+def test_a_student_who_moves_the_arm_lets_go(room: Class) -> None:
+    _, student, _, q = lead(room)
+    student.settle(1.0)  # not within the grace of a new lead
+    student.set("1 rotating base", 120.0)
+    mode(student, "gone")
+    q[0] = np.radians(120.0)
+    at(student, q)
+
+
+def test_the_lesson_the_view_and_the_viewpoint_are_shown_too(room: Class) -> None:
+    teacher, student, _, _ = lead(room)
+    teacher.set("Lesson", "Screws")
+    student.wait(lambda: student.value("Lesson") == "Screws")
+    teacher.settle()
+    teacher.look()  # where the service has moved the camera
+    teacher.look(position=(1.0, 0.5, 0.6), look_at=(0.0, 0.0, 0.2))
+    student.wait(lambda: np.allclose(student.camera["position"], (1.0, 0.5, 0.6), atol=1e-3))
+
+
+def test_who_is_frozen_cannot_move(room: Class) -> None:
+    teacher, student, _, q = lead(room)
+    press(teacher, "freeze")
+    student.wait(lambda: "data-class-frozen" in student.html)
+    student.set("1 rotating base", 120.0)
+    student.wait(lambda: "has frozen the class" in student.html)
+    student.wait(lambda: student.value("1 rotating base") == 30.0)
+    number = student.say("field", ["nothing", "1"])
+    student.wait(lambda: student.script["reply"][0] >= number)
+    assert "frozen" in student.script["reply"][1]
+    press(student, "go")
+    press(teacher, "freeze")
+    student.wait(lambda: "data-class-frozen" not in student.html)
+    assert bar(student) == "led"
+    at(student, q)
+
+
+def test_a_task_opens_and_its_answers_are_stored(room: Class) -> None:
+    teacher, student, ticket, _ = lead(room)
+    press(teacher, "fields", "task", value=[[EXERCISE]])
+    student.wait(lambda: f'data-exercise="{EXERCISE}"' in student.html)
+    student.wait(lambda: 'data-class-open="Learn"' in student.html)
+    assert bar(student) == "free", "a task ends Follow me"
+    for option in (0, 2):
+        student.say("feature", ["exercises", ["answer", option + 1], option])
+        student.wait(lambda option=option: f'data-class-stored="{1 + option // 2}"' in student.html)
+    student.wait(lambda: "Stored for your teacher" in student.html)
+    teacher.wait(lambda: "1 of 1 solved" in teacher.html)
+    attendance = room.hub.attend(Ticket(ticket.room), lambda: None)
+    (seat,) = attendance.room.seats
+    attendance.leave()
+    assert (seat.task, seat.tries, seat.solved) == (EXERCISE, 2, True)
+
+
+def test_a_question_is_asked_and_counted(room: Class) -> None:
+    teacher = room.teacher()
+    ann, _ = room.join("Ann")
+    bob, _ = room.join("Bob")
+    press(teacher, "fields", "ask", value=[["Elbow <b>up</b>?"], ["Up"], ["Down"], [""]])
+    for student, choice in ((ann, 0), (bob, 1), (ann, 1)):
+        student.wait(lambda student=student: "Elbow &lt;b&gt;up" in student.html)
+        press(student, "vote", value=choice)
+        teacher.settle()
+    teacher.wait(lambda: "2 votes" in teacher.html)
+    assert "width: 100%" in teacher.html
+    assert "2 votes" not in ann.html
+    press(teacher, "close")
+    bob.wait(lambda: 'data-class-poll="closed"' in bob.html)
+    assert "width: 100%" in bob.html
+
+
+def test_a_students_arm_is_shown_to_all(room: Class) -> None:
+    teacher = room.teacher()
+    ann, ticket = room.join("Ann <u>")
+    bob, _ = room.join("Bob")
+    ann.set("1 rotating base", 55.0)
+    q = ROBOT.q_home.copy()
+    q[0] = np.radians(55.0)
+    at(ann, q)
+    teacher.wait(lambda: "Ann &lt;u&gt;" in teacher.html)
+    assert "<u>" not in teacher.html
+    press(teacher, "pick", ticket.seat)
+    ready = f'data-guide-do="show" data-question-key="{ticket.seat}" data-argument="1" class'
+    teacher.wait(lambda: ready in teacher.html)
+    press(teacher, "show", ticket.seat, value=0)
+    mode(ann, "shown")
+    at(bob, q)
+    at(teacher, q)
+    bob.wait(lambda: "a classmate’s arm" in bob.html)
+    assert "Ann" not in bob.html
+    press(teacher, "show", ticket.seat, value=1)
+    bob.wait(lambda: "the arm of Ann" in bob.html)
+    press(teacher, "return")
+    mode(bob, "free")
+    at(teacher, ROBOT.q_home)
+
+
+def test_the_wall_sends_one_list_of_poses_for_all(room: Class) -> None:
+    teacher = room.teacher()
+    students = [room.join(f"Student {i}") for i in range(3)]
+    teacher.wait(lambda: teacher.html.count('data-guide-do="pick"') == 3)
+    press(teacher, "wall")
+    teacher.wait(lambda: sum("/wall-" in name and name.endswith("/name/2") for name in teacher.nodes) == 1)
+    arm = next(name for name in teacher.nodes if name.endswith("/arms"))
+    teacher.settle(0.6)
+    assert teacher.visible[teacher.gizmo] is False
+    teacher.log.clear()
+    students[0][0].set("1 rotating base", 70.0)
+    students[1][0].set("2 rotating elbow", 70.0)
+    teacher.wait(lambda: any(m.get("name") == arm for m in teacher.log))
+    teacher.settle(0.5)
+    updates = [m["updates"].keys() for m in teacher.log if m.get("name") == arm]
+    assert 1 <= sum("batched_positions" in keys for keys in updates) <= 2
+    count = len(teacher.nodes[arm]["props"]["batched_positions"])
+    teacher.send(
+        "SceneNodeClickMessage", name=arm, instance_index=count // 3 - 1, ray_origin=(0, 0, 0),
+        ray_direction=(0, 0, 1), screen_pos=(0.5, 0.5), modifier=None, owner=teacher.nodes[arm]["owner"],
+    )  # fmt: skip
+    teacher.wait(lambda: 'The arm of <span dir="auto">Student 2</span>' in teacher.html)
+    teacher.wait(lambda: not any("/wall-" in name for name in teacher.nodes))
+    assert teacher.visible[teacher.gizmo] is True
+
+
+def test_hands_are_seen_and_lowered(room: Class) -> None:
+    teacher = room.teacher()
+    ann, ticket = room.join("Ann")
+    press(ann, "hand")
+    teacher.wait(lambda: "hand up" in teacher.html)
+    press(teacher, "lower", ticket.seat)
+    ann.wait(lambda: "Raise hand" in ann.html)
+
+
+def test_students_are_renamed_and_removed_and_the_room_ended_at_the_second_press(room: Class) -> None:
+    teacher = room.teacher()
+    ann, ticket = room.join("Rude")
+    bob, _ = room.join("Bob")
+    teacher.wait(lambda: "Rude" in teacher.html)
+    press(teacher, "pick", ticket.seat)
+    teacher.wait(lambda: "data-class-seat" in teacher.html)
+    press(teacher, "fields", "rename", value=[["Ann"]])
+    ann.wait(lambda: "you are Ann" in ann.html)
+    press(teacher, "remove", ticket.seat)
+    teacher.wait(lambda: "Press again: remove" in teacher.html)
+    press(teacher, "remove", ticket.seat)
+    mode(ann, "closed")
+    press(teacher, "end")
+    teacher.wait(lambda: "Press again: end" in teacher.html)
+    assert bar(bob) == "free"
+    press(teacher, "end")
+    mode(bob, "closed")
+
+
+def test_a_student_cannot_press_what_is_the_teachers(room: Class) -> None:
+    teacher, student, ticket, _ = lead(room)
+    for key in (("follow",), ("freeze",), ("end",), ("remove", ticket.seat)):
+        press(student, *key)
+        press(student, *key)
+    student.wait(lambda: "Invalid input" in student.html)
+    teacher.wait(lambda: 'data-class-lead="on"' in teacher.html)
+    mode(student, "led")
+
+
+def test_a_student_comes_back_to_the_seat(room: Class) -> None:
+    teacher, student, ticket, q = lead(room)
+    student.close()
+    again = room.student(ticket)
+    at(again, q)
+    assert "you are Ann" in again.html
+    teacher.settle()
+    assert teacher.html.count('data-guide-do="pick"') == 1
