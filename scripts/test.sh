@@ -19,6 +19,8 @@ PATH="$root/.venv/bin:$root/.venv/debian/usr/sbin:$root/.venv/debian/usr/bin:$PA
 for proxy in nginx caddy; do
   command -v $proxy >/dev/null || apt_unpack $proxy || fail "the tests of deploy/ need $proxy in the PATH"
 done
+command -v initdb >/dev/null || ls /usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1 || apt_install postgresql ||
+  fail "the tests of classrooms need PostgreSQL. On Debian: sudo apt-get install postgresql"
 cd "$root"
 if [ $# -gt 0 ]; then
   ruff check .

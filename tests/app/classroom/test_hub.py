@@ -33,11 +33,11 @@ ROOT = Path(__file__).parents[3]
 SOON = 10.0  # seconds: far more than anything takes
 
 
-def until(condition, what="the condition"):
+def until(condition, seconds=SOON):
     """Wait until a condition holds."""
-    deadline = time.monotonic() + SOON
+    deadline = time.monotonic() + seconds
     while not condition():
-        assert time.monotonic() < deadline, f"{what} did not come"
+        assert time.monotonic() < deadline, "the condition was not met in time"
         time.sleep(0.005)
 
 

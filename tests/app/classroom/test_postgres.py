@@ -1,0 +1,173 @@
+"""Rooms over PostgreSQL, as several machines share them: Debian's server, started for these tests."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+from alembic.autogenerate import compare_metadata
+from alembic.migration import MigrationContext
+from sqlalchemy import create_engine, select, text
+from test_hub import attempt, nothing, until
+
+from app.classroom import ClassroomUnavailable, Hub, Ticket
+from app.classroom.tables import Attempt, Base
+
+NOBODY = 65534  # PostgreSQL does not run as root
+
+
+class Postgres:
+    """A server on a free port, with its data in a folder of its own."""
+
+    def __init__(self, programs: Path, folder: Path) -> None:
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            self.port = free.getsockname()[1]
+        self._programs, self._folder = programs, folder
+        self._user = {"user": NOBODY, "group": NOBODY, "extra_groups": []} if os.geteuid() == 0 else {}
+        if self._user:
+            os.chown(folder, NOBODY, NOBODY)
+        self._run("initdb", "-D", folder / "data", "-U", "kinboard", "--auth=trust", "--no-sync", "-E", "UTF8")
+
+    def _run(self, program: str, *arguments: object) -> None:
+        command = [str(self._programs / program), *map(str, arguments)]
+        with (self._folder / "log").open("a") as log:
+            subprocess.run(
+                command, check=True, cwd=self._folder, stdin=subprocess.DEVNULL, stdout=log, stderr=log,
+                timeout=60, **self._user,
+            )  # fmt: skip
+
+    def start(self) -> None:
+        options = f"-p {self.port} -c listen_addresses=127.0.0.1 -c unix_socket_directories='' -c fsync=off"
+        self._run(
+            "pg_ctl", "-D", self._folder / "data", "-w", "-o", options, "-l", self._folder / "server", "start"
+        )
+
+    def stop(self) -> None:
+        """As a power failure would: without saying goodbye."""
+        self._run("pg_ctl", "-D", self._folder / "data", "-w", "-m", "immediate", "stop")
+
+    def url(self, name: str) -> str:
+        return f"postgresql://kinboard@127.0.0.1:{self.port}/{name}"
+
+
+def programs() -> Path:
+    """The folder of PostgreSQL's programs: in the PATH, or where Debian has them."""
+    found = shutil.which("initdb")
+    folders = [Path(found).parent] if found else sorted(Path("/usr/lib/postgresql").glob("*/bin"))
+    assert folders, "these tests need PostgreSQL: apt-get install postgresql"
+    return folders[-1]
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[Postgres]:
+    with tempfile.TemporaryDirectory(prefix="kinboard-postgres-") as folder:
+        server = Postgres(programs(), Path(folder))
+        server.start()
+        yield server
+        server.stop()
+
+
+@pytest.fixture
+def database(server, request) -> str:
+    """A new database's URL."""
+    name = f"t{abs(hash(request.node.name))}"
+    engine = create_engine(
+        server.url("postgres").replace("postgresql:", "postgresql+psycopg:"), isolation_level="AUTOCOMMIT"
+    )
+    with engine.connect() as connection:
+        connection.execute(text(f"CREATE DATABASE {name}"))
+    engine.dispose()
+    return server.url(name)
+
+
+@pytest.fixture
+def hubs(database, tmp_path):
+    """Two hubs, as two machines have them."""
+    pair = Hub(tmp_path, database), Hub(tmp_path, database)
+    yield pair
+    for hub in pair:
+        hub.close()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_class_on_two_machines(hubs):
+    here, there = hubs
+    room = here.rooms.open("Kinematics", 3600)
+    teacher = here.attend(there.ticket(room.token), nothing)
+    seat = there.rooms.join(room.code, "Ada")
+    student = there.attend(seat, nothing)
+    teacher.set_follow(True)
+    teacher.tell_page("live")
+    teacher.open_poll("Elbow?", ["up", "down"])
+    until(lambda: student.room.page == "live" and student.room.poll)
+    student.vote(1)
+    student.tell_page("mine")
+    confirmed = student.submit(attempt())
+    until(lambda: teacher.room.poll.votes == (0, 1) and teacher.room.seats[0].page == "mine")
+    assert teacher.room.seats[0].solved
+    assert there.rooms.find(seat).students == 1
+    with here.database.read() as connection:
+        assert connection.scalars(select(Attempt.id)).all() == [confirmed.id]
+    teacher.end_room()
+    until(lambda: student.room.closed)
+    with here.database.read() as connection:
+        for table in Base.metadata.sorted_tables:
+            rows = connection.execute(select(table)).all()
+            assert table.name == "setting" or rows == [], table.name
+
+
+def test_two_machines_that_write_at_the_same_time_lose_nothing(hubs):
+    here, there = hubs
+    room = here.rooms.open("Kinematics", 3600)
+    with ThreadPoolExecutor(8) as pool:
+        seats = list(pool.map(lambda k: hubs[k % 2].rooms.join(room.code, f"Student {k}"), range(30)))
+        pages = [hubs[k % 2].attend(seat, nothing) for k, seat in enumerate(seats)]
+        confirmed = list(pool.map(lambda k: pages[k % 30].submit(attempt(seed=k)), range(90)))
+    for k, page in enumerate(pages):
+        page.tell_page(f"page {k}")
+    teacher = here.attend(here.ticket(room.token), nothing)
+    until(lambda: [seat.page for seat in teacher.room.seats].count("") == 0)
+    assert {seat.page for seat in teacher.room.seats} == {f"page {k}" for k in range(30)}
+    assert {seat.tries for seat in teacher.room.seats} == {3}
+    with there.database.read() as connection:
+        assert set(connection.scalars(select(Attempt.id))) == {each.id for each in confirmed}
+
+
+def test_machines_that_start_at_the_same_time_migrate_once(database, tmp_path):
+    hubs = [Hub(tmp_path, database) for _ in range(6)]
+    with ThreadPoolExecutor(6) as pool:
+        rooms = list(pool.map(lambda hub: hub.rooms.open("Kinematics", 3600), hubs))
+    assert len({room.code for room in rooms}) == 6
+    assert len({hub.rooms.tokens.sign(Ticket("x")) for hub in hubs}) == 1
+    with hubs[0].database.read() as connection:
+        assert compare_metadata(MigrationContext.configure(connection), Base.metadata) == []
+    for hub in hubs:
+        hub.close()
+
+
+def test_a_server_that_dies_and_comes_back(hubs, server):
+    here, there = hubs
+    room = here.rooms.open("Kinematics", 3600)
+    teacher = here.attend(here.ticket(room.token), nothing)
+    student = there.attend(there.rooms.join(room.code, "Ada"), nothing)
+    first = student.submit(attempt())
+    server.stop()
+    try:
+        with pytest.raises(ClassroomUnavailable, match="cannot be reached"):
+            student.submit(attempt())
+        teacher.set_frozen(True)
+        until(lambda: teacher.room.problem and student.room.problem)
+        assert not student.room.closed
+    finally:
+        server.start()
+    until(lambda: student.room.frozen and not student.room.problem)
+    second = student.submit(attempt())
+    with here.database.read() as connection:
+        assert set(connection.scalars(select(Attempt.id))) == {first.id, second.id}
