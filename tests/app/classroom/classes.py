@@ -1,4 +1,4 @@
-"""What processes of a class do in tests, run as ``python classes.py ROLE FOLDER TOKEN …``; they print what happens."""
+"""What processes of a class do in tests: ``python classes.py ROLE FOLDER TOKEN …`` prints what happens."""
 
 from __future__ import annotations
 
