@@ -52,7 +52,7 @@ RULES: dict[str, set[str]] = {
     },
     "app/api": {
         *("fastapi", "starlette", "pydantic", "pydantic_core", "typing_extensions", "numpy", "kin"),
-        *("app.api", "app.equations", "app.exports", "app.shared"),
+        *("app.api", "app.classroom", "app.equations", "app.exports", "app.shared"),
     },
     "app/viewer": {
         *("viser", "trimesh", "numpy", "jinja2", "markupsafe", "kin"),
@@ -94,6 +94,7 @@ RULES: dict[str, set[str]] = {
     "app/cli/parser.py": {"kin", "app.bench.command", "app.cli"},
     "app/cli/arguments.py": set(),
     "app/cli/classroom": {"kin", "app.classroom", "app.cli", "app.exercises", "app.shared"},
+    "app/cli/classroom/arguments.py": set(),
     "app/cli/xacro": {"kin", "app.cli.xacro"},
     "app/cli/xacro/expansion.py": {"xacro", "xacrodoc", "yaml", "app.cli.xacro"},
     "app/cli/xacro/expressions.py": {"xacro"},

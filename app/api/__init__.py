@@ -2,12 +2,12 @@
 
 Routes share objects in ``app.state``: ``settings``, the robots in ``store``, the caches ``clouds``, ``maps`` and
 ``summaries``, the limit of concurrent ``streams``, the slots for computations in ``compute``, and the memory of
-request bodies in ``uploads``.
+request bodies in ``uploads``, and the ``classroom``.
 """
 
 from starlette.routing import BaseRoute
 
-from app.api import equations, fk, ik, jacobian, motion, path
+from app.api import equations, fk, ik, jacobian, motion, path, results
 from app.api.arms import files, robots
 from app.api.body import UploadMemory
 from app.api.document import complete_document
@@ -39,6 +39,7 @@ _MODULES = (
     summary,
     reachable,
     capability,
+    results,
 )
 
 

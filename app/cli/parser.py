@@ -18,7 +18,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from app.cli import arguments as declare
-from app.cli.classroom.arguments import add_room
+from app.cli.classroom.arguments import add_result, add_results, add_room
 from app.cli.startup import disable_compiler, no_collections
 
 DESCRIPTION = "Kinematics of robot arms: a dashboard in the browser, a REST interface, this command line."
@@ -194,6 +194,18 @@ def _load_room() -> Run:
     return run
 
 
+def _load_result() -> Run:
+    from app.cli.classroom.result import run_result
+
+    return run_result
+
+
+def _load_results() -> Run:
+    from app.cli.classroom.result import run_results
+
+    return run_results
+
+
 COMMANDS = (
     Command(declare.add_serve, _load_serve),
     Command(declare.add_fk, _load_fk, interpreted=True),
@@ -202,6 +214,8 @@ COMMANDS = (
     Command(declare.add_robots, _load_robots, interpreted=True),
     Command(declare.add_workspace, _load_workspace),
     Command(add_room, _load_room),
+    Command(add_result, _load_result, interpreted=True),
+    Command(add_results, _load_results, interpreted=True),
     Command(declare.add_bench, _load_bench),
     Command(declare.add_check, _load_check, interpreted=True),
     Command(declare.add_capability, _load_capability),

@@ -1,4 +1,4 @@
-"""Arguments of ``kinboard room``. Imports nothing heavy."""
+"""Arguments of the classroom's commands. Imports nothing heavy."""
 
 from __future__ import annotations
 
@@ -33,4 +33,30 @@ def add_room(commands: Any, _: object) -> argparse.ArgumentParser:
         action.add_argument("--json", action="store_true", help="print JSON")
     ending = actions.add_parser("end", help="end a room and erase everything in it")
     ending.add_argument("code", metavar="CODE", help="the join code")
+    return parser
+
+
+def add_result(commands: Any, _: object) -> argparse.ArgumentParser:
+    """``kinboard result``."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "result",
+        help="check the result code of a student",
+        description="Check a result code with the key of the service: KINBOARD_DATA or KINBOARD_DATABASE_URL must "
+        "be as they are for it. The exit code is 1 if this service has not signed it.",
+    )
+    parser.add_argument("code", metavar="CODE", nargs="+", help="case, spaces and hyphens do not matter")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    return parser
+
+
+def add_results(commands: Any, _: object) -> argparse.ArgumentParser:
+    """``kinboard results``."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "results",
+        help="the answers of a classroom as CSV, one row per attempt",
+        description="The answers given in a room as CSV, from the database of the service: KINBOARD_DATA or "
+        "KINBOARD_DATABASE_URL must be as they are for it.",
+    )
+    parser.add_argument("room", metavar="CODE", help="the join code of the room")
+    parser.add_argument("-o", "--output", metavar="FILE", help="write to this file (default: standard output)")
     return parser

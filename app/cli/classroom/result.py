@@ -1,0 +1,74 @@
+"""``kinboard result`` checks a result code; ``kinboard results`` writes the attempts of a room as CSV."""
+
+from __future__ import annotations
+
+import sys
+from argparse import Namespace
+from pathlib import Path
+from typing import Any
+
+from app.classroom import ClassroomUnavailable, Hub
+from app.classroom.results.check import check_code, facts
+from app.classroom.results.store import attempts_of
+from app.classroom.results.table import to_csv
+from app.classroom.tokens import read_code
+from app.cli.terminal import print_json
+from app.exercises import Exercises
+from app.shared.settings import Settings
+from app.shared.store import Store
+from kin import InputError, KinematicsError
+
+
+def run_result(arguments: Namespace) -> int:
+    """Print what a code says; returns 1 if this service has not signed it."""
+    hub = Hub.of(_settings())
+    try:
+        checked = check_code(" ".join(arguments.code), hub)
+    finally:
+        hub.close()
+    if arguments.json:
+        print_json(facts(checked))
+    elif checked.outcome is None:
+        print(f"{checked.status}: {checked.message}", file=sys.stderr)
+    else:
+        outcome = checked.outcome
+        print(f"signed      by this service, on {outcome.day}")
+        print(f"{outcome.kind:10}  {outcome.title} ({outcome.fingerprint.hex()})")
+        print(f"alias       {outcome.alias}")
+        print(
+            f"score       {outcome.score} %, {outcome.solved} of {outcome.count} solved, {outcome.tries} answers"
+        )
+    return 0 if checked.outcome is not None else 1
+
+
+def run_results(arguments: Namespace) -> int:
+    """Write the attempts of a room."""
+    settings = _settings()
+    hub = Hub.of(settings)
+    try:
+        wanted = read_code(arguments.room)
+        room = next((each for each in hub.rooms.all() if each.code == wanted), None) if hub.in_use else None
+        if room is None:
+            raise InputError("room", arguments.room, "the join code of a room; `kinboard room list` shows them")
+        attempts = attempts_of(hub.database, room.id)
+    except ClassroomUnavailable as error:
+        raise KinematicsError(str(error)) from None
+    finally:
+        hub.close()
+    exercises = Exercises(settings.exercises, Store(settings.robots).get)
+    text = to_csv(attempts, {one.id: one.title for one in exercises.all})
+    if arguments.output is None:
+        print(text, end="")
+        return 0
+    try:
+        Path(arguments.output).write_bytes(text.encode("utf-8-sig"))  # so that spreadsheets know the letters
+    except OSError as error:
+        raise InputError("--output", arguments.output, f"a file that can be written ({error.strerror})") from None
+    print(f"{arguments.output}: {len(attempts)} attempts")
+    return 0
+
+
+def _settings() -> Settings:
+    """From the environment."""
+    given: dict[str, Any] = {}
+    return Settings(**given)
