@@ -7,9 +7,10 @@ request bodies in ``uploads``, and the ``classroom``.
 
 from starlette.routing import BaseRoute
 
-from app.api import equations, fk, ik, jacobian, motion, path, results
+from app.api import equations, fk, ik, jacobian, motion, path
 from app.api.arms import files, robots
 from app.api.body import UploadMemory
+from app.api.classroom import results
 from app.api.document import complete_document
 from app.api.problems import install_problem_handlers
 from app.api.work import ComputeSlots

@@ -66,7 +66,7 @@ Code = Annotated[
     "/results/{code}", summary="Check a result code", response_model=CodeAnswer, responses=refusals(422, 500, 503)
 )
 async def check_result(request: Request, code: Code) -> Response:
-    """A typing error is told from a code that was changed. Only the service that made a code can check it."""
+    """Distinguishes a typing error from a code that was changed. Only its own service can check it."""
     hub = request.app.state.classroom
     assert isinstance(hub, Hub)
     try:
