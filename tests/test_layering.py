@@ -45,6 +45,8 @@ RULES: dict[str, set[str]] = {
     "app/classroom": {"sqlalchemy", "alembic", "itsdangerous", "app.classroom", "app.shared"},
     "app/classroom/results": {"kin", "sqlalchemy", "app.classroom"},
     "app/bench": {"kin", "numpy", "numba", "app.bench"},
+    # A page of a recorded run needs neither the core nor other libraries.
+    "app/bench/board": {"jinja2", "markupsafe", "app.bench.board"},
     "app/bench/contestants": {
         *("kin", "numpy", "numba", "app.bench"),
         *("eaik", "ik_geo", "ikpy", "pinocchio", "py_opw_kinematics", "roboticstoolbox", "ruckig", "scipy"),
@@ -78,7 +80,7 @@ RULES: dict[str, set[str]] = {
     },
     "app/service/web": {
         *("starlette", "msgspec", "itsdangerous", "kin"),
-        *("app.api.problems", "app.classroom", "app.service.web", "app.shared"),
+        *("app.api.problems", "app.bench.board", "app.classroom", "app.service.web", "app.shared"),
     },
     "app/cli": {
         "kin",

@@ -49,6 +49,8 @@ KINDS = {
     "request-timeout": "The request did not arrive in time",
     "head-too-large": "The head of the request is too large",
     "bad-range": "The requested range is invalid",
+    "not-allowed": "This is not allowed here",
+    "not-running": "Nothing is under way",
     "wrong-host": "The request is for another host",
     "busy": "The service is busy",
     "too-slow": "The computation takes too long",

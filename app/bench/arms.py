@@ -26,9 +26,15 @@ _NEAR = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Arm:
-    """Revolute joints about z between constant transforms ``(n + 1, 4, 4)``."""
+    """Joints about or along z between constant transforms ``(n + 1, 4, 4)``.
+
+    Attributes:
+        slides: indices of the prismatic joints. Only forward kinematics knows them: `lines` and what is made of it
+            are those of arms whose joints all turn.
+    """
 
     constants: Array
+    slides: frozenset[int] = frozenset()
 
     @property
     def n(self) -> int:
@@ -57,12 +63,15 @@ class Arm:
         T = np.broadcast_to(self.constants[0], (*q.shape[:-1], 4, 4))
         c, s = np.cos(q), np.sin(q)
         for i in range(self.n):
-            turn = np.zeros((*q.shape[:-1], 4, 4))
-            turn[..., 0, 0] = turn[..., 1, 1] = c[..., i]
-            turn[..., 1, 0] = s[..., i]
-            turn[..., 0, 1] = -s[..., i]
-            turn[..., 2, 2] = turn[..., 3, 3] = 1.0
-            T = T @ turn @ self.constants[i + 1]
+            moved = np.zeros((*q.shape[:-1], 4, 4))
+            moved[..., np.arange(4), np.arange(4)] = 1.0
+            if i in self.slides:
+                moved[..., 2, 3] = q[..., i]
+            else:
+                moved[..., 0, 0] = moved[..., 1, 1] = c[..., i]
+                moved[..., 1, 0] = s[..., i]
+                moved[..., 0, 1] = -s[..., i]
+            T = T @ moved @ self.constants[i + 1]
         return np.asarray(T)
 
     def lines(self, q: Array) -> tuple[Array, Array, Array]:
@@ -181,7 +190,7 @@ def ortho(arm: Arm) -> Ortho | None:
 
 
 def arm_of(robot: Robot) -> Arm:
-    """The constants of a robot whose joints are all revolute."""
+    """The constants of a robot, and which of its joints slide."""
     constants = [robot.T_world_base.copy()]
     for row in robot.rows:
         x = screw_x(row.a, row.alpha)
@@ -193,7 +202,7 @@ def arm_of(robot: Robot) -> Arm:
         if robot.convention == "standard":
             constants[-1] = constants[-1] @ x
     constants[-1] = constants[-1] @ robot.T_last_tool
-    return Arm(np.array(constants))
+    return Arm(np.array(constants), frozenset(np.flatnonzero(~robot.revolute).tolist()))
 
 
 def _parallel(u: Array, v: Array) -> bool:

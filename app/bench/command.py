@@ -1,4 +1,4 @@
-"""``kinboard bench``: runs the benchmark, prints tables, writes JSON and a bar chart."""
+"""``kinboard bench``: runs the benchmark, prints tables, writes JSON, a picture and a page."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ from pathlib import Path
 from typing import TextIO
 
 from app.bench import gate, report
+from app.bench.board.page import page
+from app.bench.board.picture import standalone
+from app.bench.board.views import Document
 from app.bench.contestants import PEERS, Peer
 from app.bench.rows import ROWS, Row
 from app.bench.run import Settings, run
@@ -31,7 +34,7 @@ def bench(arguments: Namespace) -> int:
         settings = settings.quick()
     if arguments.cpu_time:
         settings = replace(settings, clock=time.process_time_ns)
-    files = [_file(name, getattr(arguments, name)) for name in ("json", "picture")]
+    files = [_file(name, getattr(arguments, name)) for name in ("json", "picture", "html")]
     if not hasattr(fk_one, "py_func"):  # an attribute of compiled functions only
         return _refuse("NUMBA_DISABLE_JIT is set, so this would measure uncompiled code; unset it")
     missing = [peer.name for peer in settings.peers if not peer.installed]
@@ -54,18 +57,33 @@ def bench(arguments: Namespace) -> int:
     print("\n" + "\n".join(report.notes(found)))
     if verdicts:
         print("\ngate, fastest rounds:\n" + "\n".join(map(str, verdicts)))
-    json_file, picture_file = files
-    if json_file is not None:
-        json_file.write_text(
-            json.dumps(report.as_json(found, verdicts), indent=1, allow_nan=False) + "\n", "utf-8"
-        )
-    if picture_file is not None:
-        picture_file.write_text(report.picture(found), "utf-8")
+    _write(report.as_json(found, verdicts, words_of(arguments)), *files)
     for fault in found.faults:
         print(f"kinboard: {fault}", file=sys.stderr)
     if found.interrupted:
         return _INTERRUPTED
     return int(bool(found.faults))
+
+
+def _write(document: Document, json_file: Path | None, picture_file: Path | None, page_file: Path | None) -> None:
+    """Write the files that were asked for; the JSON of a page is beside it."""
+    if page_file is not None:
+        page_file.write_text(page(document), "utf-8")
+        json_file = json_file or page_file.with_suffix(".json")
+    if json_file is not None:
+        json_file.write_text(json.dumps(document, indent=1, allow_nan=False) + "\n", "utf-8")
+    if picture_file is not None:
+        picture_file.write_text(standalone(document), "utf-8")
+
+
+def words_of(arguments: Namespace) -> str:
+    """The command that repeats the run, without the files it writes."""
+    words = ["kinboard bench"]
+    words += ["--quick"] * arguments.quick + ["--cpu-time"] * arguments.cpu_time
+    for name in ("rows", "peers"):
+        if given := getattr(arguments, name):
+            words += [f"--{name}", *given]
+    return " ".join(words)
 
 
 def _rows(names: list[str] | None) -> tuple[Row, ...]:
@@ -108,7 +126,7 @@ class _Progress:
         self._stream = stream
         self._on_terminal = stream.isatty()
 
-    def say(self, words: str) -> None:
+    def say(self, words: str, share: float) -> None:
         self._stream.write(f"\r\033[K{words}…" if self._on_terminal else f"{words}…\n")
         self._stream.flush()
 

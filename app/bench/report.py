@@ -1,13 +1,12 @@
-"""A run as text tables, as JSON, and as a bar chart."""
+"""A run as text tables and as JSON."""
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Sequence
-from html import escape
 from typing import Any
 
+from app.bench.board.words import time_text
 from app.bench.contestants import OURS, SOLVE_IK
 from app.bench.gate import Verdict
 from app.bench.run import Entry, Report, RowReport, machine
@@ -22,7 +21,8 @@ branches        correct, distinct answers per target
 recall          share of targets whose generating configuration is among the answers
 wrong           answers per target with an error above 1e-6
 worst residual  of the correct answers, by our forward kinematics
-same set        share of targets with the same set of branches as ours"""
+same set        share of targets with the same set of branches as ours
+derivation      processor time to derive the solver, once per arm: not part of the time"""
 _HEAD = [
     "",
     "time",
@@ -35,8 +35,8 @@ _HEAD = [
     "wrong",
     "worst residual",
     "same set",
+    "derivation",
 ]
-_UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
 
 
 def table(report: Report) -> str:
@@ -66,9 +66,10 @@ def notes(report: Report) -> list[str]:
     return lines
 
 
-def as_json(report: Report, verdicts: Sequence[Verdict]) -> dict[str, Any]:
+def as_json(report: Report, verdicts: Sequence[Verdict], command: str) -> dict[str, Any]:
     """All measurements in seconds, metres and radians, with the times of every round."""
     return {
+        "command": command,
         "machine": machine(),
         "versions": report.versions,
         "not_installed": list(report.missing),
@@ -85,6 +86,10 @@ def as_json(report: Report, verdicts: Sequence[Verdict]) -> dict[str, Any]:
                 "id": row.task.row.id,
                 "title": row.task.row.title,
                 "robot": row.task.robot.id,
+                "robot_name": row.task.robot.name,
+                "kind": row.task.row.kind,
+                "batch": row.task.row.batch,
+                "reference": row.reference,
                 "contestants": [_entry_json(entry) for entry in _ordered(row)],
             }
             for row in report.rows
@@ -107,10 +112,18 @@ def _clock(report: Report) -> str:
     return "wall clock" if report.settings.clock is time.perf_counter_ns else "processor time"
 
 
+def _role(entry: Entry) -> str:
+    if entry.contestant.floor:
+        return "floor"
+    return "ours" if entry.contestant.name.startswith(OURS) else "peer"
+
+
 def _entry_json(entry: Entry) -> dict[str, Any]:
     check = entry.check
     found: dict[str, Any] = {
         "name": entry.contestant.name,
+        "role": _role(entry),
+        "derivation": entry.contestant.derivation,
         "median": entry.turns.median,
         "best": entry.turns.best,
         "noise": entry.turns.noise,
@@ -133,66 +146,6 @@ def _entry_json(entry: Entry) -> dict[str, Any]:
     return found
 
 
-def picture(report: Report) -> str:
-    """A bar chart on a logarithmic scale, one group per row, as SVG."""
-    rows = [(row, _ordered(row)) for row in report.rows]
-    times = [entry.turns.median for _, entries in rows for entry in entries]
-    if not times:
-        return '<svg xmlns="http://www.w3.org/2000/svg" width="10" height="10"/>\n'
-    low, high = math.floor(math.log10(min(times))), math.ceil(math.log10(max(times)) + 1e-9)
-    left, wide, bar, gap = 230, 620, 18, 46
-
-    def x(seconds: float) -> float:
-        return left + wide * (math.log10(seconds) - low) / max(high - low, 1)
-
-    height = sum(gap + bar * len(entries) for _, entries in rows) + 50
-    parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1000 {height}" '
-        'font-family="system-ui, sans-serif" font-size="12">',
-        '<rect width="100%" height="100%" fill="#ffffff"/>',
-    ]
-    for power in range(low, high + 1):
-        at = x(10.0**power)
-        parts.append(f'<path d="M{at:.1f} 20V{height - 26}" stroke="#d8dde3"/>')
-        parts.append(
-            f'<text x="{at:.1f}" y="{height - 10}" text-anchor="middle" fill="#5b6673">{_time(10.0**power)}</text>'
-        )
-    y = 0.0
-    for row, entries in rows:
-        y += gap - bar
-        title = escape(f"{row.task.row.title} ({row.task.robot.name})")
-        parts.append(f'<text x="12" y="{y + 6:.0f}" font-weight="600">{title}</text>')
-        y += bar
-        for entry in entries:
-            end = x(entry.turns.median)
-            name = escape(entry.contestant.name)
-            parts.append(f'<text x="{left - 8}" y="{y + 9:.0f}" text-anchor="end">{name}</text>')
-            parts.append(
-                f'<rect x="{left}" y="{y - 2:.0f}" width="{max(end - left, 1.0):.1f}" height="{bar - 5}" '
-                f'fill="{_colour(entry)}"/>'
-            )
-            parts.append(f'<text x="{end + 6:.1f}" y="{y + 9:.0f}" fill="#333b45">{escape(_label(entry))}</text>')
-            y += bar
-    parts.append("</svg>")
-    return "\n".join(parts) + "\n"
-
-
-def _colour(entry: Entry) -> str:
-    if entry.contestant.floor:
-        return "#b9c2cc"
-    return {OURS: "#1d6fd1", SOLVE_IK: "#6fa8e6"}.get(entry.contestant.name, "#e0913a")
-
-
-def _label(entry: Entry) -> str:
-    words = [_time(entry.turns.median)]
-    if entry.check is not None:
-        if entry.check.branches is not None:
-            words.append(f"{entry.check.branches:.1f} branches")
-        if entry.check.success < 1.0:
-            words.append(f"{entry.check.success:.0%} solved")
-    return ", ".join(words)
-
-
 def _ordered(row: RowReport) -> list[Entry]:
     """Floor, ours, then the peers by time."""
     rank = {OURS: 1, SOLVE_IK: 2}
@@ -206,12 +159,12 @@ def _cells(entry: Entry) -> list[str]:
     check = entry.check
     cells = [
         entry.contestant.name,
-        _time(entry.turns.median),
+        time_text(entry.turns.median),
         f"{entry.turns.noise:.0%}",
         *("" if value is None else f"{value:.3g}" for value in (entry.to_array, entry.to_solve)),
     ]
     if check is None:
-        return cells + [""] * 6
+        return cells + [""] * 7
     residual = f"{check.position_error:.0e} m"
     if entry.check is not None and check.rotation_error:
         residual += f", {check.rotation_error:.0e} rad"
@@ -223,14 +176,8 @@ def _cells(entry: Entry) -> list[str]:
         f"{check.wrong:.2g}",
         residual if check.success else "",
         "" if check.same is None else f"{check.same:.0%}",
+        "" if entry.contestant.derivation is None else time_text(entry.contestant.derivation),
     ]
-
-
-def _time(seconds: float) -> str:
-    for scale, unit in _UNITS:
-        if seconds >= scale * 0.9995:
-            return f"{seconds / scale:.3g} {unit}"
-    return f"{seconds * 1e9:.3g} ns"
 
 
 def _aligned(lines: list[list[str]]) -> str:

@@ -72,6 +72,7 @@ ROWS: tuple[Row, ...] = (
     Row("ik-ur5", "all branches, six joints, three parallel axes", "ur5", "branches"),
     Row("ik-ur5-batch", "all branches, six joints, three parallel axes, batch, per target", "ur5", "branches",
         batch=True),
+    Row("ik-stanford", "all branches, six joints of which one slides", "stanford", "branches"),
     Row("ik-iiwa14", "all branches of an S-R-S arm at one value of its freedom", "iiwa14", "branches",
         lock=2, value=0.3),
     Row("ik-panda", "all branches at one value of joint 7", "panda", "branches", lock=6, value=0.3),
@@ -99,7 +100,7 @@ class Task:
         q: ``(N, n)`` the configurations the targets were made from, inside the limits.
         T: ``(N, 4, 4)`` their poses, by plain matrix products, independent of our kernels.
         arm: the whole arm.
-        six: the arm with six joints, for solvers that need six; None if there is none.
+        six: the arm with six joints that turn, for solvers that need six; None if there is none.
     """
 
     row: Row
@@ -131,4 +132,5 @@ def prepare(row: Row, size: int, seed: int) -> Task | None:
         six = arm.with_turn()
     elif row.lock is not None:
         six = arm.locked(row.lock, row.value)
-    return Task(row, robot, q, np.ascontiguousarray(arm.fk(q)), arm, six if six.n == 6 else None)
+    whole = six.n == 6 and not arm.slides
+    return Task(row, robot, q, np.ascontiguousarray(arm.fk(q)), arm, six if whole else None)

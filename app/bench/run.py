@@ -22,7 +22,8 @@ from app.bench.rows import MOTIONS, ROWS, Row, Task, prepare
 from kin.solvers import closed_form_of
 from kin.transforms import Array
 
-Say = Callable[[str], None]
+Say = Callable[[str, float], None]  # words, and the share of the run that is done
+CHECKS = 0.6  # share of a run that prepares and checks, before the rounds
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +79,11 @@ class RowReport:
         return next((entry for entry in self.entries if entry.contestant.name == name), None)
 
     @property
+    def reference(self) -> str:
+        """Name of our call that the others are compared with: the array-level call, where the row has one."""
+        return OURS if self.named(OURS) is not None else SOLVE_IK
+
+    @property
     def floor(self) -> Entry:
         """The floor that the gate compares the row's times with."""
         return next(entry for entry in self.entries if entry.contestant.name.startswith("floor"))
@@ -122,14 +128,14 @@ class Report:
         return tuple(found)
 
 
-def run(settings: Settings, say: Say = lambda _: None) -> Report:
+def run(settings: Settings, say: Say = lambda words, share: None) -> Report:
     """Measure, with status messages to `say`. Ctrl-C ends the rounds; what was measured by then is returned."""
     installed = [peer for peer in settings.peers if peer.installed]
     refused: list[tuple[str, str, str]] = []
     prepared: list[tuple[Task, list[tuple[Contestant, Check | None]]]] = []
     skipped = []
-    for row in settings.rows:
-        say(f"checking {row.id}")
+    for done, row in enumerate(settings.rows):
+        say(f"checking {row.id}", CHECKS * done / len(settings.rows))
         task = prepare(row, settings.batch if row.batch else settings.targets, settings.seed)
         if task is None:
             skipped.append(row.id)
@@ -138,10 +144,12 @@ def run(settings: Settings, say: Say = lambda _: None) -> Report:
     turns = [Turns(contestant) for _, checked in prepared for contestant, _ in checked]
     interrupted = False
     try:
-        say("finding out how long a turn is")
+        say("finding out how long a turn is", CHECKS)
         measure(
             turns, settings.rounds, settings.turn, clock=settings.clock,
-            after_round=lambda done: say(f"round {done} of {settings.rounds}"),
+            after_round=lambda done: say(
+                f"round {done} of {settings.rounds}", CHECKS + (1.0 - CHECKS) * done / settings.rounds
+            ),
         )  # fmt: skip
     except KeyboardInterrupt:
         interrupted = True
@@ -190,6 +198,8 @@ def _checked(
                             ours = sets
                         if ours is not None and not contestant.one:
                             check = replace(check, same=share_of_same(ours, sets))
+                        if own and not _comparable(task):  # our parameter is not the joint that was locked
+                            check = replace(check, recall=None)
                         found.append((contestant, check))
         except Exception as error:
             # An error of another library is reported and affects only its own entry.
@@ -237,6 +247,7 @@ def machine() -> dict[str, str]:
         "time": time.strftime("%Y-%m-%d %H:%M:%S %z"),
         "processor": name,
         "cores": str(os.cpu_count()),
+        "load": f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "",
         "system": f"{platform.system()} {platform.release()}",
         "python": sys.version.split()[0],
         "numpy": np.__version__,

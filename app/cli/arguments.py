@@ -325,14 +325,15 @@ def add_bench(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         "compare the speed with other libraries; `pip install 'kinboard[bench]'` installs them",
         takes_robot=False,
     )
-    parser.add_argument("--quick", action="store_true", help="fewer targets and rounds: under two minutes")
+    parser.add_argument("--quick", action="store_true", help="fewer targets and rounds: some two minutes")
     parser.add_argument("--rows", nargs="+", metavar="ROW", help="only these rows, such as fk ik-pioneer5")
     parser.add_argument("--peers", nargs="+", metavar="PEER", help="only these libraries, or none")
     parser.add_argument(
         "--cpu-time", action="store_true", help="measure processor time instead of wall time, for a busy machine"
     )
     parser.add_argument("--json", metavar="FILE", help="write all measurements to this file")
-    parser.add_argument("--picture", metavar="FILE", help="write a bar chart to this file (SVG)")
+    parser.add_argument("--picture", metavar="FILE", help="write a picture of the ratios to this file (SVG)")
+    parser.add_argument("--html", metavar="FILE", help="write a page to this file, and its JSON beside it")
     return parser
 
 

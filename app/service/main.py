@@ -14,9 +14,11 @@ import os
 import random
 import signal
 import sys
+import tempfile
 from collections.abc import AsyncIterator, Callable, MutableSequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from functools import partial
+from pathlib import Path
 from typing import cast
 
 from fastapi import FastAPI
@@ -47,6 +49,7 @@ from app.service.web.observe import Observe, write_to_stderr
 from app.service.web.pages import page_routes, static_folder
 from app.service.web.prefix import PathPrefix
 from app.service.web.rooms import room_routes, sweeping
+from app.service.web.scoreboard import Scoreboard
 from app.service.web.viewer_proxy import ViewerBridge
 from app.service.workers import supervise
 from app.shared.clouds import Clouds
@@ -89,11 +92,13 @@ def create_app(
     store: Store | None = None,
     member: Member | None = None,
     on_ready: Callable[[], None] | None = None,
+    bench: Path | None = None,
 ) -> FastAPI:
     """The whole service as one ASGI application; `on_ready` is called when it has warmed up.
 
     Args:
         member: what its process is among those of the service.
+        bench: folder that these share for runs of the benchmark; None: one of its own.
 
     Raises:
         RobotFileError: a file in the operator's folder of robots is invalid.
@@ -104,6 +109,7 @@ def create_app(
     maps = Maps(settings.map_memory, seconds=settings.map_time)
     memory = AnswerMemory(settings.max_answer, settings.answer_memory)
     work = ComputeSlots(settings.max_requests, settings.time_budget, settings.client_share, memory)
+    scoreboard = Scoreboard(settings, bench)
     classroom = Hub.of(settings)
     startup = Startup(settings, store, clouds, maps, summaries, classroom, bridge, member, on_ready)
 
@@ -118,7 +124,7 @@ def create_app(
             yield
         keeper.stop()
         work.close()  # computations still running have had their time to finish
-        for step in (startup.stop, clouds.close, maps.close, summaries.close):
+        for step in (startup.stop, scoreboard.close, clouds.close, maps.close, summaries.close):
             await run_in_threadpool(step)
 
     app = _described(lifespan)
@@ -131,7 +137,7 @@ def create_app(
     install_problem_handlers(app)
     complete_document(app, store, settings)
     app.router.routes.extend([*api_routes(), *page_routes(), *embedding_routes(), *bridge.routes()])
-    app.router.routes.extend(room_routes(classroom, settings))
+    app.router.routes.extend([*room_routes(classroom, settings), *scoreboard.routes()])
     app.include_router(status.router)
     _add_middleware(app, settings)
     return app
@@ -212,11 +218,14 @@ def run(settings: Settings, open_browser: bool = False) -> int:
         for part in parts:
             for link in part.links.values():
                 stack.enter_context(link)
+        bench = None
+        if settings.bench and len(parts) > 1:
+            bench = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="kinboard-bench-")))
         if len(parts) == 1:
             return _serve(settings, parts[0], store=store, greeting=greeting)
         return supervise(
             # One reading of the robots for all processes, also for those that start later.
-            partial(_serve, settings, store=store, processor=random.randrange(1024)),
+            partial(_serve, settings, store=store, bench=bench, processor=random.randrange(1024)),
             parts,
             grace=settings.drain + STOP_TIMEOUT + 1.0,
             silence=settings.worker_timeout,
@@ -238,11 +247,13 @@ def _serve(
     store: Store | None = None,
     greeting: Greeting | None = None,
     processor: int = 0,
+    bench: Path | None = None,
 ) -> int:
     """Serve until a signal ends this process; returns 1 if it could not start.
 
     Args:
         alive: what this process calls once a second, if there are several.
+        bench: folder for runs of the benchmark, if there are several.
         processor: on which the first of several processes is kept, and the others on those that follow.
     """
     if settings.pin:
@@ -254,7 +265,7 @@ def _serve(
     sys.setswitchinterval(SWITCH_INTERVAL)
     gc.set_threshold(*COLLECTIONS)
     # Kernels and routes live as long as the process: one collection among them would stop all visitors for 50 ms.
-    server = Server(create_app(settings, store, member, gc.freeze), settings, member, greeting, alive)
+    server = Server(create_app(settings, store, member, gc.freeze, bench), settings, member, greeting, alive)
     # uvicorn shuts down in order and then raises the signal again, which is the expected end here.
     before = signal.signal(signal.SIGTERM, server.handle_exit)
     try:

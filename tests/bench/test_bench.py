@@ -286,7 +286,7 @@ def test_wrong_answers_of_kinboard_are_reported_as_faults(monkeypatch):
 
 
 def test_an_interrupted_run_reports_its_results_so_far():
-    def stop(words):
+    def stop(words, share):
         if words.startswith("round 2"):
             raise KeyboardInterrupt
 

@@ -200,7 +200,7 @@ def test_pages_without_a_viewer(browser: Browser, address: str, scheme: str) -> 
         .replace("{{message}}", "This is not the token.")
     )
     page.route("**/login", lambda route: route.fulfill(body=login, content_type="text/html"))
-    for name, path in (("landing", ""), ("login", "login")):
+    for name, path in (("landing", ""), ("login", "login"), ("scoreboard", "scoreboard")):
         page.goto(address + path)
         if name == "landing":
             expect(page.locator(".card h3 a")).to_have_count(len(kin.builtin_robots()))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import types
 from functools import lru_cache
 from typing import Any
@@ -12,8 +13,11 @@ from app.bench.arms import Arm, ortho
 from app.bench.contestants.contestant import Contestant, our_joints, with_tool_rotation, without_tool_rotation
 from app.bench.rows import Task
 from kin.dh import table_of_chain
-from kin.robot import Joint
+from kin.robot import Joint, Kind
 from kin.transforms import Array
+
+_DERIVED = ("puma560", "ur5")  # arms with a special geometry whose solver the toolbox is asked to derive
+_ANY = (-10.0, 10.0)  # metres; it demands limits of joints that slide, and then ignores them
 
 
 def eaik(task: Task) -> list[Contestant]:
@@ -90,7 +94,7 @@ def ssik(task: Task) -> list[Contestant]:
         H, P, tool = arm.screws
         robot = ssik.Manipulator.from_axes(H, P)
         return [Contestant("ssik", robot.fk, [(q,) for q in task.q], lambda T: [with_tool_rotation(T, tool)])]
-    solver, tool = _ssik_artifact(arm) if arm.family else _ssik_general(arm)
+    solver, tool, spent = _ssik_artifact(arm) if arm.family else _ssik_general(arm)
 
     def solve(T: Array) -> Any:
         return solver.solve(T, respect_limits=False, enumerate_windings=False)
@@ -98,60 +102,75 @@ def ssik(task: Task) -> list[Contestant]:
     def read(found: Any) -> list[Array]:
         return [our_joints(task, np.array([s.q for s in found]))]
 
-    return [Contestant("ssik", solve, [(without_tool_rotation(T, tool),) for T in task.T], read)]
+    targets = [(without_tool_rotation(T, tool),) for T in task.T]
+    return [Contestant("ssik", solve, targets, read, derivation=spent)]
 
 
 @lru_cache(maxsize=8)
-def _ssik_artifact(arm: Arm) -> tuple[Any, Array]:
+def _ssik_artifact(arm: Arm) -> tuple[Any, Array, float]:
     """The module that `ssik build` writes for an arm, with its native solvers: its fastest way."""
     import ssik
     from ssik.core.codegen import emit_artifact
 
     H, P, tool = arm.screws
+    began = time.process_time()
     robot = ssik.Manipulator.from_axes(H, P)
     source = emit_artifact(kb=robot.kinbody, plan=robot.dispatch_plan, module_name="bench_ik").source
     module = types.ModuleType("bench_ik")
     exec(compile(source, "bench_ik.py", "exec"), module.__dict__)
-    return module, tool
+    return module, tool, time.process_time() - began
 
 
 @lru_cache(maxsize=8)
-def _ssik_general(arm: Arm) -> tuple[Any, Array]:
+def _ssik_general(arm: Arm) -> tuple[Any, Array, float]:
     """The solver of an arm without a special geometry: its derivation takes up to a minute and is kept on disk."""
     import ssik
 
     H, P, tool = arm.screws
+    began = time.process_time()
     robot = ssik.Manipulator.from_axes(H, P)
     robot.prepare()
-    return robot, tool
+    return robot, tool, time.process_time() - began
 
 
 def toolbox_analytic(task: Task) -> list[Contestant]:
-    """The toolbox's symbolic solver of arms without a special geometry; deriving it takes some ten seconds.
+    """The toolbox's symbolic solver: of arms without a special geometry, and of three arms of the textbooks.
 
-    The derivation for the Panda with joint 7 locked gives up after two minutes.
+    Deriving it takes seconds; for the Panda with joint 7 locked it gives up after two minutes.
     """
-    from roboticstoolbox import DHRobot, RevoluteDH
+    from roboticstoolbox import DHRobot, PrismaticDH, RevoluteDH
     from spatialmath import SE3
 
-    six = task.six
-    if task.row.kind != "branches" or task.row.batch or six is None or six.family or task.robot.id == "panda":
+    six = task.arm if task.arm.slides else task.six
+    if task.row.kind != "branches" or task.row.batch or six is None or six.n != 6 or task.robot.id == "panda":
         return []
-    base, rows, tool = table_of_chain([Joint(f"joint {i + 1}") for i in range(6)], list(six.constants))
+    if not six.slides and six.family and task.robot.id not in _DERIVED:
+        return []
+    kinds: list[Kind] = ["prismatic" if i in six.slides else "revolute" for i in range(6)]
+    joints = [Joint(f"joint {i + 1}", kind=kind) for i, kind in enumerate(kinds)]
+    base, rows, tool = table_of_chain(joints, list(six.constants))
     if len(rows) != 6:
         return []
-    links = [RevoluteDH(d=row.d, a=row.a, alpha=row.alpha, offset=row.theta) for row in rows]
+    links = [
+        PrismaticDH(theta=row.theta, a=row.a, alpha=row.alpha, offset=row.d, qlim=_ANY)
+        if row.kind == "prismatic"
+        else RevoluteDH(d=row.d, a=row.a, alpha=row.alpha, offset=row.theta)
+        for row in rows
+    ]
     robot = DHRobot(links, base=SE3(np.array(base), check=False), tool=SE3(np.array(tool), check=False))
+    began = time.process_time()
     solver = robot.analytic_ik()
+    spent = time.process_time() - began
 
     def solve(T: Array) -> Any:
         return solver.solve(T, joint_limits=False)
 
     return [
         Contestant(
-            "roboticstoolbox analytic", solve, [(T,) for T in task.T], lambda found: [our_joints(task, found.q)]
+            "roboticstoolbox analytic", solve, [(T,) for T in task.T],
+            lambda found: [our_joints(task, found.q)], derivation=spent,
         )
-    ]
+    ]  # fmt: skip
 
 
 def opw(task: Task) -> list[Contestant]:

@@ -37,6 +37,8 @@ class Contestant:
         per_call: targets in a call.
         one: returns one solution instead of all.
         floor: does not solve the task; a lower bound for the others.
+        derivation: seconds of processor time to derive or generate the solver of this arm, once; None if it
+            derives nothing.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Contestant:
     per_call: int = 1
     one: bool = False
     floor: bool = False
+    derivation: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +117,8 @@ def search_range(task: Task, arm: Arm) -> tuple[Array, Array]:
         n = task.robot.n
         lower[:n] = np.where(np.isfinite(task.robot.lower), task.robot.lower, -math.pi)
         upper[:n] = np.where(np.isfinite(task.robot.upper), task.robot.upper, math.pi)
+    for i in arm.slides:
+        lower[i], upper[i] = task.robot.lower[i], task.robot.upper[i]
     return lower, upper
 
 

@@ -53,7 +53,8 @@ def toolbox(task: Task) -> list[Contestant]:
     parts = [ET.SE3(SE3(arm.constants[0], check=False))]
     for i in range(arm.n):
         limits = [float(lower[i]), float(upper[i])]
-        parts += [ET.Rz(jindex=i, qlim=limits), ET.SE3(SE3(arm.constants[i + 1], check=False))]
+        joint = ET.tz if i in arm.slides else ET.Rz
+        parts += [joint(jindex=i, qlim=limits), ET.SE3(SE3(arm.constants[i + 1], check=False))]
     chain = ETS(parts)
     name = "roboticstoolbox"
     if task.row.kind == "fk":
@@ -79,7 +80,7 @@ def ikpy(task: Task) -> list[Contestant]:
     from ikpy.link import OriginLink, URDFLink
     from scipy.spatial.transform import Rotation
 
-    if task.row.kind in MOTIONS:
+    if task.row.kind in MOTIONS or task.arm.slides:
         return []
     arm = task.arm
     lower, upper = search_range(task, arm)
