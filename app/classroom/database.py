@@ -146,6 +146,9 @@ class Database:
         """Turn errors of the database into `ClassroomUnavailable`."""
         try:
             yield
+        except ModuleNotFoundError as error:
+            logger.error("the database's driver is missing: install kinboard[postgres]")
+            raise ClassroomUnavailable(_sentence(error)) from error
         except (SQLAlchemyError, OSError) as error:
             if isinstance(error, OSError):
                 self.close()  # the next transaction opens the file that is there then

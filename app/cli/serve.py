@@ -14,7 +14,7 @@ from app.shared.settings import Settings
 
 FLAGS = ("host", "port", "root_path", "robots", "read_only", "workers", "pin")  # they override the environment
 
-SECRET = ("token",)  # logs keep what is printed
+SECRET = ("token", "database_url")  # logs keep what is printed
 
 
 def run(arguments: Namespace) -> int:

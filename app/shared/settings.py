@@ -174,6 +174,13 @@ class Settings(BaseSettings):
     def _are_origins(cls, values: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(frame_ancestor(value) for value in values)
 
+    @field_validator("database_url")
+    @classmethod
+    def _is_postgresql(cls, value: SecretStr | None) -> SecretStr | None:
+        if value is not None and not value.get_secret_value().startswith(("postgresql://", "postgres://")):
+            raise ValueError("must begin with postgresql://; for SQLite, set KINBOARD_DATA to a folder")
+        return value
+
     @field_validator("trusted_proxies")
     @classmethod
     def _are_networks(cls, values: tuple[str, ...]) -> tuple[str, ...]:

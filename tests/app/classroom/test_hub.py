@@ -27,6 +27,7 @@ from app.classroom import (
 )
 from app.classroom.tables import REVISION, Attempt, Base, Room, Seat
 from app.classroom.tokens import Tokens
+from app.cli.parser import main
 
 ROOT = Path(__file__).parents[3]
 
@@ -86,7 +87,7 @@ def test_what_a_teacher_does_reaches_students_of_another_process(hubs):
     student.tell_page("mine")
     teacher.show_seat(seat.seat, named=False)
     until(lambda: student.room.shown is not None and student.room.shown.page == "mine")
-    until(lambda: teacher.room.seats[0].hand > 0)
+    until(lambda: teacher.room.seats and teacher.room.seats[0].hand > 0)
     assert student.room.shown.alias == ""
     assert student.room.seats == ()
     student.leave()
@@ -179,7 +180,7 @@ def test_a_seat_has_no_power_of_the_teacher_and_the_reverse(hubs):
     public = {name for name in dir(Attendance) if not name.startswith("_")}
     assert public - BOTH == {*TEACHERS, *STUDENTS} - BOTH  # a new method needs its row
     student.tell_page("not the teacher's")
-    until(lambda: teacher.room.seats[0].page == "not the teacher's")
+    until(lambda: teacher.room.seats and teacher.room.seats[0].page == "not the teacher's")
     assert teacher.room.page == ""
 
 
@@ -249,7 +250,7 @@ def test_ending_erases_everything_for_all(hubs, tmp_path):
     student = there.attend(there.rooms.join(room.code, "Secret alias"), nothing)
     student.tell_page("Secret page")
     student.submit(attempt(verdict="Secret verdict"))
-    until(lambda: teacher.room.seats[0].page == "Secret page")
+    until(lambda: teacher.room.seats and teacher.room.seats[0].page == "Secret page")
     teacher.end_room()
     assert "ended" in teacher.room.closed
     until(lambda: student.room.closed)
@@ -291,7 +292,7 @@ def test_who_is_away_is_seen_in_other_processes(hubs, monkeypatch):
     teacher = here.attend(here.ticket(room.token), nothing)
     until(lambda: not student.room.teacher_away)
     student.leave()
-    until(lambda: teacher.room.seats[0].away)
+    until(lambda: teacher.room.seats and teacher.room.seats[0].away)
     there.attend(seat, nothing)
     until(lambda: not teacher.room.seats[0].away)
 
@@ -417,8 +418,9 @@ def test_a_page_that_fails_stops_no_other(hubs, caplog):
     assert "could not be notified" in caplog.text
 
 
-def test_importing_the_classroom_imports_no_database():
-    code = "import sys, app.classroom.hub; print({'sqlalchemy', 'alembic'} & set(sys.modules) or 'none')"
+def test_the_start_imports_no_database():
+    late = {"sqlalchemy", "alembic", "segno", "jinja2"}  # a service without classrooms does not wait for them
+    code = f"import sys, app.service.main; print({late} & set(sys.modules) or 'none')"
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
     assert out.stdout.strip() == "none"
 
@@ -440,3 +442,27 @@ def test_processes_that_start_at_the_same_time_migrate_once(tmp_path):
     assert len({hub.rooms.tokens.sign(Ticket("x")) for hub in hubs}) == 1
     for hub in hubs:
         hub.close()
+
+
+def test_a_missing_driver_is_said(tmp_path, monkeypatch, caplog):
+    monkeypatch.setitem(sys.modules, "psycopg", None)
+    with pytest.raises(ClassroomUnavailable, match="cannot be reached"):
+        Hub(tmp_path, "postgresql://nobody@127.0.0.1:9/none").rooms.open("Kinematics", 3600)
+    assert "kinboard[postgres]" in caplog.text
+
+
+def test_a_server_that_is_not_there_is_said_and_its_password_is_not_logged(tmp_path, caplog):
+    with pytest.raises(ClassroomUnavailable, match="cannot be reached"):
+        Hub(tmp_path, "postgresql://nobody:top-secret@127.0.0.1:9/none").rooms.open("Kinematics", 3600)
+    assert "database failed" in caplog.text
+    assert "top-secret" not in caplog.text
+
+
+@pytest.mark.parametrize("url", ["mysql://x/y", "sqlite:///x", "db.example"])
+def test_other_databases_are_refused_and_not_shown(url, monkeypatch, capsys):
+    monkeypatch.setenv("KINBOARD_DATABASE_URL", url)
+    assert main(["serve"]) == 2
+    printed = capsys.readouterr().err
+    assert "KINBOARD_DATABASE_URL" in printed
+    assert "postgresql://" in printed
+    assert url not in printed

@@ -110,7 +110,9 @@ def test_a_class_on_two_machines(hubs):
     student.vote(1)
     student.tell_page("mine")
     confirmed = student.submit(attempt())
-    until(lambda: teacher.room.poll.votes == (0, 1) and teacher.room.seats[0].page == "mine")
+    until(
+        lambda: teacher.room.poll.votes == (0, 1) and teacher.room.seats and teacher.room.seats[0].page == "mine"
+    )
     assert teacher.room.seats[0].solved
     assert there.rooms.find(seat).students == 1
     with here.database.read() as connection:

@@ -37,7 +37,9 @@ def test_a_killed_process_loses_no_confirmed_answer_and_its_seats_come_back(tmp_
     seat = hub.rooms.join(room.code, "Ada")
     with started("submits", tmp_path, hub.rooms.tokens.sign(seat)) as process:
         confirmed = [process.stdout.readline().strip() for _ in range(30)]
-        until(lambda: teacher.room.seats[0].page == "mine" and teacher.room.seats[0].hand > 0)
+        until(
+            lambda: teacher.room.seats and teacher.room.seats[0].page == "mine" and teacher.room.seats[0].hand > 0
+        )
         process.send_signal(signal.SIGKILL)
         confirmed += process.stdout.read().split()
     with hub.database.read() as connection:

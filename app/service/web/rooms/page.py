@@ -4,23 +4,35 @@ from __future__ import annotations
 
 import ipaddress
 import time
+from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import segno
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
-_TEMPLATE = Environment(
-    loader=FileSystemLoader(Path(__file__).parent / "templates"),
-    autoescape=True,
-    undefined=StrictUndefined,
-    trim_blocks=True,
-    lstrip_blocks=True,
-    auto_reload=False,
-).get_template("room.html")
+if TYPE_CHECKING:
+    from jinja2 import Template
 
 LIVES = ((2, "2 hours"), (12, "12 hours"), (24 * 7, "a week"), (24 * 120, "a term (120 days)"))
+
+
+@cache
+def _template() -> Template:
+    from jinja2 import (
+        Environment,
+        FileSystemLoader,
+        StrictUndefined,
+    )  # with the first page: the start need not wait
+
+    return Environment(
+        loader=FileSystemLoader(Path(__file__).parent / "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        auto_reload=False,
+    ).get_template("room.html")
 
 
 def room_page(request: Request, status: int = 200, **values: object) -> HTMLResponse:
@@ -31,7 +43,7 @@ def room_page(request: Request, status: int = 200, **values: object) -> HTMLResp
     )
     known |= {"hours": 12, "may_open": False, "teacher": False, "local": False, "ends": "", "ends_at": ""}
     known |= {"lives": LIVES, "root": "../" * depth or "./"}
-    text = _TEMPLATE.render(**{**known, **values})
+    text = _template().render(**{**known, **values})
     return HTMLResponse(text, status, headers={"cache-control": "no-store"})
 
 
@@ -66,6 +78,8 @@ def only_here(request: Request) -> bool:
 
 def qr_svg(address: str) -> bytes:
     """An address as a QR code, dark on light in both colour schemes."""
+    import segno
+
     text: str = segno.make(address, error="m", micro=False).svg_inline(
         omitsize=True, border=2, dark="#000", light="#fff"
     )
