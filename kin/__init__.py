@@ -55,6 +55,7 @@ from kin.motion import (
     program_from_dict,
     program_to_dict,
 )
+from kin.notebook import show
 from kin.path import PathGap, PathJump, PathResult, solve_path
 from kin.robot import Joint, Robot
 from kin.singularity import Singularity, singularities
@@ -174,6 +175,7 @@ __all__ = [
     "screws",
     "section",
     "self_distance",
+    "show",
     "singularities",
     "solve_ik",
     "solve_ik_many",

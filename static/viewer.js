@@ -100,7 +100,7 @@
     dispatchEvent(new Event("kinboard-connect"));
     const address = location.origin + location.pathname.replace(/viewer\/?$/, "");
     const text = document.documentElement.dataset.kbText;
-    return JSON.stringify({ address, state, text, embedded: mode, dark: matchMedia("(prefers-color-scheme: dark)").matches });
+    return JSON.stringify({ address, state, text, embedded: mode, shown: query.get("shown") ?? "", dark: matchMedia("(prefers-color-scheme: dark)").matches });
   };
   Storage.prototype.setItem = function (name, value) {
     if (![ITEM, REPLACE, RETURN].includes(name)) return this.kept ? this.kept.setItem(name, value) : setItem.call(this, name, value);

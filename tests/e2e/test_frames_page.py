@@ -12,6 +12,9 @@ import pytest
 from page import NO_HINTS, PLAIN, WAIT
 from playwright.sync_api import Browser, Page, expect
 
+import app.notebook as notebook
+import kin
+
 pytestmark = pytest.mark.browser
 
 SCHOOL, STRANGER = "school.localhost", "stranger.localhost"  # browsers take both for this machine
@@ -73,6 +76,21 @@ def test_the_scene_alone(page: Page, address: str) -> None:
     page.wait_for_function(
         "Math.abs(document.querySelector('canvas[data-engine]').getBoundingClientRect().width - innerWidth) < 2"
     )
+
+
+@pytest.mark.slow
+def test_a_notebook_moves_the_arm(page: Page) -> None:
+    robot = kin.get_robot("pioneer5")
+    view = kin.show(robot, q=robot.q_home)
+    try:
+        page.goto(view.url.replace("localhost", "127.0.0.1"))  # reloads until the service is warm
+        expect(page.locator("[data-status]")).to_be_visible(timeout=4 * WAIT)
+        view.q = q = robot.q_home + 0.1
+        expect(page.locator("[data-status]")).to_contain_text("moved by the notebook")
+        x = f"{1000 * kin.fk(robot, q)[0, 3]:.1f}".replace("-", "−")
+        expect(page.locator('table[aria-label="tool pose"] tr').first).to_contain_text(x)
+    finally:
+        notebook.running().close()
 
 
 def test_another_site_does_not(page: Page, outer: int) -> None:

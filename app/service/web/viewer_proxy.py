@@ -38,7 +38,9 @@ from app.shared.security import VIEWER_POLICY, origin_allowed
 logger = logging.getLogger("kinboard.bridge")
 
 _PAGE = (
-    '<!doctype html><html lang="en"><meta charset="utf-8"><meta http-equiv="refresh" content="{again}">'
+    '<!doctype html><html lang="en"><meta charset="utf-8">'
+    # A refresh would not load the page again where its address has a fragment, as links have.
+    '<script src="../static/again.js" data-after="{again}"></script>'
     '<meta name="viewport" content="width=device-width"><meta name="color-scheme" content="light dark">'
     "<title>{title}</title><style>body{{display:grid;place-items:center;min-height:90vh;margin:1rem;"
     "font:1.05rem/1.6 system-ui,sans-serif;text-align:center}}</style><p>{words}</p></html>"

@@ -32,7 +32,7 @@ from kin.units import Units
 NO_STEP = frozenset(
     {
         *("camera", "fit-arm", "look-from", "looked", "resized", "system-dark", "grab", "copy-as"),
-        *("undo", "redo", "travel", "released", "snap", "text-size", "body", "news"),
+        *("undo", "redo", "travel", "released", "snap", "text-size", "body", "shown", "news"),
     }
 )
 # Controls that send many values on the way to the one the visitor means: how long (s) a step may pause.
@@ -142,6 +142,7 @@ class Actions:
             "axes": self._typed.use_axes,
             "frame": lambda name: page.use_frames(page.frames.choose(name)),
             "text-size": lambda name: size_labels(page.client.scene, text_factor(name)),
+            "shown": lambda moved: page.move_to(moved[0], moved[1], True),
             # Messages of the page's own script
             "undo": self._undo,
             "redo": self._redo,

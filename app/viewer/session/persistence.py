@@ -33,6 +33,7 @@ from app.viewer.session.state import (
     encode,
     read_stored_page,
 )
+from app.viewer.shown import SHOWN
 
 log = logging.getLogger(__name__)
 
@@ -102,6 +103,8 @@ class Persistence:
             stored = StoredPage()
         self._address = stored.address or LOCAL
         self.system_dark, self.text_size, self.embedded = stored.dark, stored.text_size, stored.embedded
+        if stored.shown:
+            SHOWN.join(stored.shown, self._page.post)
         saved = decode(stored.state, self._page.store.robots)
         if self._rights.compute:
             return saved

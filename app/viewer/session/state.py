@@ -97,6 +97,7 @@ class StoredPage:
         state: the encoded state.
         dark: whether the visitor's system is dark.
         text_size: the name of the text size.
+        shown: key of an arm that is moved from outside of the page, as `app.viewer.shown` has it.
         embedded: how the page is embedded in another: ``"scene"``, ``"panel"`` or not at all.
     """
 
@@ -105,6 +106,7 @@ class StoredPage:
     dark: bool = False
     text_size: str = "Normal"
     embedded: str = ""
+    shown: str = ""
 
 
 def encode(state: PageState) -> str:
@@ -201,7 +203,9 @@ def read_stored_page(text: str | None) -> StoredPage:
     text_size = data.get("text")
     size = text_size if isinstance(text_size, str) and text_size in TEXT_SIZES else "Normal"
     embedded = next((mode for mode in EMBEDDED if mode == data.get("embedded")), "")
-    return StoredPage(str(address) if usable else "", state, data.get("dark") is True, size, embedded)
+    shown = data.get("shown")
+    shown = shown if isinstance(shown, str) else ""
+    return StoredPage(str(address) if usable else "", state, data.get("dark") is True, size, embedded, shown)
 
 
 _TASKS: tuple[Task, ...] = get_args(Task)

@@ -10,7 +10,6 @@ With O where chain axes 2 and 3 meet, W the wrist centre and y the vector from O
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -43,7 +42,7 @@ from kin.transforms import Array
 
 _REACH = TOLERANCES.closure_position * 0.1
 _SINGULAR = TOLERANCES.singular
-_LOW, _HIGH = np.full(7, -1e6), np.full(7, 1e6)  # rad; limits that never bind
+_FREE = 1e6  # rad; limits that never bind
 
 
 @jit
@@ -54,36 +53,9 @@ def chain_values(params: Array, q: Array, t: Array) -> None:
         t[i] = params[SIGN + i] * q[j] + params[OFFSET + i]
 
 
-class Work(NamedTuple):
-    """Memory that `all_branches` writes to.
-
-    Attributes:
-        rows: ``(8, 7)`` angles of each branch, undefined where it does not exist.
-        room: ``(8,)`` how far inside the arm's reach the branch is, as a share: negative where it does not exist,
-            0 where two branches merge.
-        spare: ``(8,)``, of :mod:`kin.solvers.offset7.ranges`.
-        t, M, R, pairs: ``(7,)``, ``(3, 4)``, ``(3, 3)`` and ``(2, 2)`` of intermediate results.
-    """
-
-    rows: Array
-    room: Array
-    spare: Array
-    t: Array
-    M: Array
-    R: Array
-    pairs: Array
-
-
 @jit
-def new_work() -> Work:
-    """Memory for `all_branches`."""
-    rows, room, spare = np.empty((8, 7)), np.empty(8), np.empty(8)
-    return Work(rows, room, spare, np.empty(7), np.empty((3, 4)), np.empty((3, 3)), np.empty((2, 2)))
-
-
-@jit
-def wrist_of(params: Array, T: Array) -> Array:
-    """The wrist ``(4, 4)`` of the target T ``(4, 4)``, whatever the angle of joint 1 is."""
+def seen(params: Array, T: Array, t1: float, M: Array) -> None:
+    """M ``(3, 4)`` ← the wrist of the target T ``(4, 4)`` as seen from O, z along axis 2, with joint 1 at t1."""
     p = params
     X, N = np.empty((4, 4)), np.empty((4, 4))
     if p[REVERSED] > 0.0:
@@ -96,13 +68,6 @@ def wrist_of(params: Array, T: Array) -> Array:
         canonical_pose(p, X, N)
     else:
         canonical_pose(p, T, N)
-    return N
-
-
-@jit
-def seen(params: Array, N: Array, t1: float, M: Array) -> None:
-    """M ``(3, 4)`` ← the wrist N, see `wrist_of`, as seen from O, z along axis 2, with joint 1 at t1."""
-    p = params
     c, s = math.cos(t1), math.sin(t1)
     for k in range(4):
         last = 1.0 if k == 3 else 0.0
@@ -153,35 +118,22 @@ def forearm(params: Array, t4: float) -> tuple[float, float, float]:
 
 
 @jit
-def bend(params: Array, M: Array, roots: Array) -> float:
-    """roots ``(2,)`` ← t4 of both elbows with the wrist at M; returns how far inside the reach, as `two_roots`."""
+def all_branches(params: Array, T: Array, near: Array, t: Array, only: int, rows: Array, room: Array) -> None:
+    """All branches with the first chain angle in t ``(7,)``, as chain angles; `near` ``(7,)`` decides what is
+    free. With `only` ≥ 0 the row of that branch alone is written.
+
+    rows ``(8, 7)`` ← angles, NaN where the branch does not exist; room ``(8,)`` ← how far inside the arm's reach
+    the branch is, as a share: negative where it does not exist, 0 where two branches merge.
+    """
+    p = params
+    M, R, roots, sides = np.empty((3, 4)), np.empty((3, 3)), np.empty(2), np.empty(2)
+    low, high = np.full(7, -_FREE), np.full(7, _FREE)
+    clear(rows)
+    seen(p, T, t[0], M)
     wx, wy, wz = M[0, 3], M[1, 3], M[2, 3]
     square = wx * wx + wy * wy + wz * wz
-    constant, a, b = distances(params)
-    return two_roots(a, b, 0.5 * (square - constant), _REACH * math.sqrt(square), roots)
-
-
-@jit
-def exists(params: Array, N: Array, t1: float, k: int, work: Work) -> bool:
-    """Whether branch k exists with joint 1 at t1: where its `room` is not negative."""
-    p, M, roots = params, work.M, work.pairs[0]
-    seen(p, N, t1, M)
-    if bend(p, M, roots) < 0.0:
-        return False
-    y0, y1, y2 = forearm(p, roots[k >> 2])
-    return two_roots(p[SIN2] * y1, p[SIN2] * y0, M[2, 3] - p[COS2] * y2, _REACH, work.pairs[1]) >= 0.0
-
-
-@jit
-def all_branches(params: Array, N: Array, near: Array, only: int, work: Work) -> None:
-    """All branches of the wrist N, see `wrist_of`, with the first chain angle in work.t ``(7,)``, into work.rows
-    and work.room; `near` ``(7,)`` decides what is free. With `only` ≥ 0 that branch's row alone is written.
-    """
-    p, t, M, rows, room = params, work.t, work.M, work.rows, work.room
-    roots, sides = work.pairs[0], work.pairs[1]
-    seen(p, N, t[0], M)
-    wx, wy, wz = M[0, 3], M[1, 3], M[2, 3]
-    bent = bend(p, M, roots)
+    constant, a, b = distances(p)
+    bent = two_roots(a, b, 0.5 * (square - constant), _REACH * math.sqrt(square), roots)
     for k in range(8):
         room[k] = bent
     if bent < 0.0:
@@ -200,11 +152,11 @@ def all_branches(params: Array, N: Array, near: Array, only: int, work: Work) ->
             if only >= 0 and (only >> 1) & 1 != side:
                 continue
             t[2] = near[2] if math.isnan(sides[side]) else sides[side]
-            _finish(p, M, (wx, wy), (y0, y1, y2), t, work.R)
+            _finish(p, M, (wx, wy), (y0, y1, y2), t, R)
             for wrist in range(2):
                 if only >= 0 and only & 1 != wrist:
                     continue
-                zyz(work.R, 1.0 - 2.0 * wrist, near, _LOW, _HIGH, 4, t)
+                zyz(R, 1.0 - 2.0 * wrist, near, low, high, 4, t)
                 row = 4 * elbow + 2 * side + wrist
                 for i in range(7):
                     rows[row, i] = t[i]
@@ -247,7 +199,7 @@ def gap_of(params: Array, T: Array, value: float) -> tuple[int, float, float]:
     """
     p = params
     M, roots, sides = np.empty((3, 4)), np.empty(2), np.empty(2)
-    seen(p, wrist_of(p, T), p[SIGN] * value + p[OFFSET], M)
+    seen(p, T, p[SIGN] * value + p[OFFSET], M)
     square = M[0, 3] * M[0, 3] + M[1, 3] * M[1, 3] + M[2, 3] * M[2, 3]
     constant, a, b = distances(p)
     far = math.sqrt(square)
@@ -286,9 +238,7 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
         for k in range(4):
             if not math.isfinite(T[r, k]):
                 return False
-    close, work = np.empty(7), new_work()
-    t, rows = work.t, work.rows
-    clear(rows)
+    t, close, rows, room = np.empty(7), np.empty(7), np.empty((8, 7)), np.empty(8)
     given = 6 if params[REVERSED] > 0.0 else 0
     if math.isnan(value):
         value = near[given]
@@ -296,7 +246,7 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
     for i in range(7):
         t[i] = close[i]
     t[0] = params[SIGN] * value + params[OFFSET]
-    all_branches(params, wrist_of(params, T), close, -1, work)
+    all_branches(params, T, close, t, -1, rows, room)
     joints_of(params, rows, value, out)
     return True
 

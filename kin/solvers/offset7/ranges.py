@@ -15,16 +15,7 @@ import numpy as np
 
 from kin.kernels.compile import jit
 from kin.solvers.common import HIGH, LOW, NEAR, wrap
-from kin.solvers.offset7.branches import (
-    Work,
-    all_branches,
-    distances,
-    exists,
-    new_work,
-    seen,
-    two_roots,
-    wrist_of,
-)
+from kin.solvers.offset7.branches import all_branches, distances, seen, two_roots
 from kin.solvers.offset7.geometry import OFFSET, SIGN
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -46,17 +37,16 @@ _FROM_EDGE = np.array([0.0, 1e-4, 1e-3, 0.01, 0.03, 0.08, 0.15, 0.25, 0.4, 0.6, 
 
 
 @jit
-def slack(params: Array, N: Array, value: float, box: Array, only: int, work: Work) -> None:
-    """work.spare ``(8,)`` ← how far each branch is from losing its feasibility at this value of the given joint.
+def slack(
+    params: Array, T: Array, value: float, box: Array, only: int, rows: Array, room: Array, spare: Array
+) -> None:
+    """spare ``(8,)`` ← how far each branch is from losing its feasibility at this value of the given joint.
 
-    N: as `wrist_of`. box ``(3, 7)``: seed and limits as chain angles. `only` and the rest of `work`: as
-    `all_branches`.
+    box ``(3, 7)``: seed and limits as chain angles. `only`, rows ``(8, 7)``, room ``(8,)`` ← as `all_branches`.
     """
-    rows, room, spare, t = work.rows, work.room, work.spare, work.t
-    for i in range(7):
-        t[i] = box[NEAR, i]
+    t = box[NEAR].copy()
     t[0] = params[SIGN] * value + params[OFFSET]
-    all_branches(params, N, box[NEAR], only, work)
+    all_branches(params, T, box[NEAR], t, only, rows, room)
     for k in range(8):
         if only >= 0 and k != only:
             continue
@@ -71,15 +61,16 @@ def slack(params: Array, N: Array, value: float, box: Array, only: int, work: Wo
 
 
 @jit
-def _at(params: Array, N: Array, value: float, box: Array, work: Work, k: int) -> float:
+def _at(params: Array, T: Array, value: float, box: Array, work: tuple[Array, Array, Array], k: int) -> float:
     """`slack` of branch k."""
-    slack(params, N, value, box, k, work)
-    return float(work.spare[k])
+    rows, room, spare = work
+    slack(params, T, value, box, k, rows, room, spare)
+    return float(spare[k])
 
 
 @jit
 def _zero(
-    params: Array, N: Array, box: Array, work: Work, k: int,
+    params: Array, T: Array, box: Array, work: tuple[Array, Array, Array], k: int,
     inside: tuple[float, float], outside: tuple[float, float],
 ) -> float:  # fmt: skip
     """The feasible side of the zero between two (value, slack) of branch k, by the Illinois method."""
@@ -91,7 +82,7 @@ def _zero(
         middle = (x * fy - y * fx) / (fy - fx) if step % 3 < 2 and fx > 0.0 else 0.5 * (x + y)
         if not min(x, y) < middle < max(x, y):
             middle = 0.5 * (x + y)
-        f = _at(params, N, middle, box, work, k)
+        f = _at(params, T, middle, box, work, k)
         if f >= 0.0:
             x, fx = middle, f
             fy *= 0.5
@@ -103,61 +94,62 @@ def _zero(
 
 @jit
 def _peak(
-    params: Array, N: Array, box: Array, work: Work, k: int, low: float, high: float,
+    params: Array, T: Array, box: Array, work: tuple[Array, Array, Array], k: int, low: float, high: float,
     sense: float,
 ) -> tuple[float, float]:  # fmt: skip
     """(value, slack) where the slack of branch k times `sense` is largest in [low, high], or passes zero."""
     x, y = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-    fx, fy = sense * _at(params, N, x, box, work, k), sense * _at(params, N, y, box, work, k)
+    fx, fy = sense * _at(params, T, x, box, work, k), sense * _at(params, T, y, box, work, k)
     for _ in range(_PEAK_STEPS):
         if max(fx, fy) > 0.0:
             break
         if fx > fy:
             high, y, fy = y, x, fx
             x = high - _GOLDEN * (high - low)
-            fx = sense * _at(params, N, x, box, work, k)
+            fx = sense * _at(params, T, x, box, work, k)
         else:
             low, x, fx = x, y, fy
             y = low + _GOLDEN * (high - low)
-            fy = sense * _at(params, N, y, box, work, k)
+            fy = sense * _at(params, T, y, box, work, k)
     return (x, sense * fx) if fx > fy else (y, sense * fy)
 
 
 @jit
 def _at_edge(
-    params: Array, N: Array, box: Array, k: int, inside: tuple[float, float], outside: float, arcs: Array,
+    params: Array, T: Array, box: Array, k: int, inside: tuple[float, float], outside: float, arcs: Array,
     found: int,
 ) -> int:  # fmt: skip
     """Append the interval of branch k, if any, that begins where the branch begins to exist.
 
     inside: (value, slack) where it exists outside the limits; outside: a value where it does not exist.
     """
-    work = new_work()
+    work = (np.empty((8, 7)), np.empty(8), np.empty(8))
     x, y = inside[0], outside
     for _ in range(_ZERO_STEPS):
         middle = 0.5 * (x + y)
-        if exists(params, N, params[SIGN] * middle + params[OFFSET], k, work):
+        _at(params, T, middle, box, work, k)
+        if work[1][k] >= 0.0:
             x = middle
         else:
             y = middle
-    f = _at(params, N, x, box, work, k)
+    f = _at(params, T, x, box, work, k)
     if f < 0.0 or found == arcs.shape[0]:
         return found
-    end = _zero(params, N, box, work, k, (x, f), inside)
+    end = _zero(params, T, box, work, k, (x, f), inside)
     arcs[found, 0], arcs[found, 1], arcs[found, 2] = k, min(x, end), max(x, end)
     return found + 1
 
 
 @jit
 def _ranges_of(
-    params: Array, N: Array, box: Array, k: int, marks: Array, curves: tuple[Array, Array], arcs: Array, found: int
+    params: Array, T: Array, box: Array, k: int, marks: Array, curves: tuple[Array, Array], arcs: Array, found: int
 ) -> int:
     """Append the feasible intervals of branch k to arcs.
 
     marks ``(n,)``: values; curves: the slack there ``(n,)``, and how far inside the arm's reach the branch is.
     """
     samples, there = curves
-    work = new_work()
+    work = (np.empty((8, 7)), np.empty(8), np.empty(8))
     n = marks.shape[0]
     start = math.nan
     if samples[0] >= 0.0:
@@ -171,29 +163,29 @@ def _ranges_of(
             dip = f >= 0.0 and before >= f and after > f and f < rise and before >= 0.0
             if hump or dip:
                 sense = 1.0 if hump else -1.0
-                x, fx = _peak(params, N, box, work, k, marks[i - 1], marks[i + 1], sense)
+                x, fx = _peak(params, T, box, work, k, marks[i - 1], marks[i + 1], sense)
                 if hump and fx >= 0.0 and found < arcs.shape[0]:
                     arcs[found, 0] = k
-                    arcs[found, 1] = _zero(params, N, box, work, k, (x, fx), (marks[i - 1], before))
-                    arcs[found, 2] = _zero(params, N, box, work, k, (x, fx), (marks[i + 1], after))
+                    arcs[found, 1] = _zero(params, T, box, work, k, (x, fx), (marks[i - 1], before))
+                    arcs[found, 2] = _zero(params, T, box, work, k, (x, fx), (marks[i + 1], after))
                     found += 1
                 if dip and fx < 0.0 and found < arcs.shape[0]:
                     arcs[found, 0], arcs[found, 1] = k, start
-                    arcs[found, 2] = _zero(params, N, box, work, k, (marks[i - 1], before), (x, fx))
+                    arcs[found, 2] = _zero(params, T, box, work, k, (marks[i - 1], before), (x, fx))
                     found += 1
-                    start = _zero(params, N, box, work, k, (marks[i + 1], after), (x, fx))
+                    start = _zero(params, T, box, work, k, (marks[i + 1], after), (x, fx))
         if i == n - 1:
             break
         after = samples[i + 1]
         if f < 0.0 and after < 0.0 and there[i] >= 0.0 > there[i + 1]:
-            found = _at_edge(params, N, box, k, (marks[i], f), marks[i + 1], arcs, found)
+            found = _at_edge(params, T, box, k, (marks[i], f), marks[i + 1], arcs, found)
         elif f < 0.0 and after < 0.0 and there[i + 1] >= 0.0 > there[i]:
-            found = _at_edge(params, N, box, k, (marks[i + 1], after), marks[i], arcs, found)
+            found = _at_edge(params, T, box, k, (marks[i + 1], after), marks[i], arcs, found)
         if f < 0.0 <= after:
-            start = _zero(params, N, box, work, k, (marks[i + 1], after), (marks[i], f))
+            start = _zero(params, T, box, work, k, (marks[i + 1], after), (marks[i], f))
         elif f >= 0.0 > after and found < arcs.shape[0]:
             arcs[found, 0], arcs[found, 1] = k, start
-            arcs[found, 2] = _zero(params, N, box, work, k, (marks[i], f), (marks[i + 1], after))
+            arcs[found, 2] = _zero(params, T, box, work, k, (marks[i], f), (marks[i + 1], after))
             found += 1
             start = math.nan
     if not math.isnan(start) and found < arcs.shape[0]:
@@ -203,7 +195,9 @@ def _ranges_of(
 
 
 @jit
-def _refine(params: Array, N: Array, box: Array, k: int, coarse: Array, fine: Array, work: Work) -> int:
+def _refine(
+    params: Array, T: Array, box: Array, k: int, coarse: Array, fine: Array, work: tuple[Array, Array, Array]
+) -> int:
     """fine ``(3, m)`` ← coarse ``(3, n)`` with more samples of branch k between them; returns their number.
 
     Rows: value, slack, and how far inside the arm's reach the branch is.
@@ -216,7 +210,7 @@ def _refine(params: Array, N: Array, box: Array, k: int, coarse: Array, fine: Ar
         if i == n - 1 or count + n - i + _FROM_EDGE.shape[0] > fine.shape[1]:
             continue
         if (coarse[2, i] < 0.0) != (coarse[2, i + 1] < 0.0):
-            count = _from_edge(params, N, box, k, coarse[:, i : i + 2], fine, count, work)
+            count = _from_edge(params, T, box, k, coarse[:, i : i + 2], fine, count, work)
             continue
         slope = 0.0
         for j in range(max(i - 1, 0), min(i + 2, n - 1)):
@@ -224,16 +218,16 @@ def _refine(params: Array, N: Array, box: Array, k: int, coarse: Array, fine: Ar
         if min(abs(coarse[1, i]), abs(coarse[1, i + 1])) < slope:
             for part in range(1, _PARTS):
                 x = coarse[0, i] + (coarse[0, i + 1] - coarse[0, i]) * part / _PARTS
-                fine[0, count], fine[1, count] = x, _at(params, N, x, box, work, k)
-                fine[2, count] = work.room[k]
+                fine[0, count], fine[1, count] = x, _at(params, T, x, box, work, k)
+                fine[2, count] = work[1][k]
                 count += 1
     return count
 
 
 @jit
 def _from_edge(
-    params: Array, N: Array, box: Array, k: int, ends: Array, fine: Array, count: int,
-    work: Work,
+    params: Array, T: Array, box: Array, k: int, ends: Array, fine: Array, count: int,
+    work: tuple[Array, Array, Array],
 ) -> int:  # fmt: skip
     """Append samples from where branch k begins to exist between two samples ``(3, 2)``; returns their number."""
     forward = ends[2, 0] < 0.0
@@ -241,7 +235,8 @@ def _from_edge(
     whole = x
     for _ in range(_EDGE_STEPS):
         middle = 0.5 * (x + y)
-        if exists(params, N, params[SIGN] * middle + params[OFFSET], k, work):
+        _at(params, T, middle, box, work, k)
+        if work[1][k] >= 0.0:
             x = middle
         else:
             y = middle
@@ -249,8 +244,8 @@ def _from_edge(
     for j in range(m):
         share = _FROM_EDGE[j] if forward else _FROM_EDGE[m - 1 - j]
         value = x + share * (whole - x)
-        fine[0, count], fine[1, count] = value, _at(params, N, value, box, work, k)
-        fine[2, count] = work.room[k]
+        fine[0, count], fine[1, count] = value, _at(params, T, value, box, work, k)
+        fine[2, count] = work[1][k]
         count += 1
     return count
 
@@ -266,7 +261,7 @@ def _insert(marks: Array, value: float) -> None:
 
 
 @jit
-def _insert_ends(params: Array, N: Array, span: tuple[float, float], marks: Array, n: int) -> int:
+def _insert_ends(params: Array, T: Array, span: tuple[float, float], marks: Array, n: int) -> int:
     """Insert values beside those where the wrist centre is as far or as near as it can be; returns the number.
 
     Its squared distance is a sinusoid of the given joint's angle.
@@ -274,7 +269,7 @@ def _insert_ends(params: Array, N: Array, span: tuple[float, float], marks: Arra
     low, high = span
     M, square, roots = np.empty((3, 4)), np.empty(3), np.empty(2)
     for i in range(3):
-        seen(params, N, 2.0 * math.pi * i / 3.0, M)
+        seen(params, T, 2.0 * math.pi * i / 3.0, M)
         square[i] = M[0, 3] * M[0, 3] + M[1, 3] * M[1, 3] + M[2, 3] * M[2, 3]
     mean = (square[0] + square[1] + square[2]) / 3.0
     cosine, sine = square[0] - mean, (square[1] - square[2]) / math.sqrt(3.0)
@@ -304,27 +299,28 @@ def feasible(
     """
     low, high = span
     n = max(8, math.ceil(SAMPLES * (high - low) / (2.0 * math.pi))) + 2 if high > low else 1
-    N, work = wrist_of(params, T), new_work()
+    rows, room, spare = np.empty((8, 7)), np.empty(8), np.empty(8)
     every = np.empty(n + _MOST_ENDS)
     for i in range(n):
         every[i] = low + (high - low) * i / (n - 2) if i < n - 1 and n > 1 else low
     if n > 1:
         _insert(every[:n], min(max(wanted, low), high))
-        n = _insert_ends(params, N, span, every, n)
+        n = _insert_ends(params, T, span, every, n)
     marks, samples, there = every[:n], np.empty((8, n)), np.empty((8, n))
     for i in range(n):
-        slack(params, N, marks[i], box, -1, work)
+        slack(params, T, marks[i], box, -1, rows, room, spare)
         for k in range(8):
-            samples[k, i], there[k, i] = work.spare[k], work.room[k]
+            samples[k, i], there[k, i] = spare[k], room[k]
     found = 0
+    work = (rows, room, spare)
     coarse, once, twice = np.empty((3, n)), np.empty((3, 4 * n + 64)), np.empty((3, 8 * n + 256))
     for k in range(8):
         first = found
         for i in range(n):
             coarse[0, i], coarse[1, i], coarse[2, i] = marks[i], samples[k, i], there[k, i]
-        m = _refine(params, N, box, k, coarse, once, work)
-        m = _refine(params, N, box, k, once[:, :m], twice, work)
-        found = _ranges_of(params, N, box, k, twice[0, :m], (twice[1, :m], twice[2, :m]), arcs, found)
+        m = _refine(params, T, box, k, coarse, once, work)
+        m = _refine(params, T, box, k, once[:, :m], twice, work)
+        found = _ranges_of(params, T, box, k, twice[0, :m], (twice[1, :m], twice[2, :m]), arcs, found)
         chosen[k] = _nearest(arcs, first, found, wanted)
         if first == found:
             best = -math.inf

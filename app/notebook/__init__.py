@@ -1,0 +1,138 @@
+"""An arm in the output of a notebook's cell: what `kin.show` returns, and the service that draws it.
+
+The kernel starts the service as a process of its own (:mod:`app.notebook.child`) and moves arms by lines of JSON
+in that process's standard input. Nobody else can write there, and the process ends when it is closed, however the
+kernel ends. A page belongs to an arm by a random key in its address.
+"""
+
+from __future__ import annotations
+
+import html
+import os
+import secrets
+import threading
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+import kin
+from app.notebook.process import ServiceProcess
+from app.viewer.own_arm import OwnArm, own_arm
+from app.viewer.session.state import PageState, encode
+from kin import InputError, Robot
+from kin.transforms import Array
+
+RATE = 30.0  # configurations of a path that are sent a second
+LONGEST = 3600.0  # s that a path may take
+HUB = "JUPYTERHUB_SERVICE_PREFIX"
+
+_service: ServiceProcess | None = None
+_lock = threading.Lock()
+
+
+def running() -> ServiceProcess:
+    """The service of this process, started when it is first asked for, and again if it has ended."""
+    global _service
+    with _lock:
+        if _service is None or not _service.alive:
+            _service = ServiceProcess()
+        return _service
+
+
+class ArmView:
+    """An arm on show. Notebooks show it as a frame."""
+
+    def __init__(self, robot: Robot, q: Array, size: tuple[int | str, int], panel: bool, address: str) -> None:
+        self.robot = robot
+        self._q = q
+        self._size = size
+        self._service = running()
+        self._key = secrets.token_urlsafe(16)
+        self._state = encode(_page(robot, q))
+        mode = "panel" if panel else "1"
+        base = address.replace("{port}", str(self._service.port))
+        self._send([q], 0.0)
+        self._address = f"{base.rstrip('/')}/viewer/?embed={mode}&shown={self._key}"
+
+    @property
+    def url(self) -> str:
+        """The address of the page."""
+        return f"{self._address}#s={self._state}"
+
+    @property
+    def q(self) -> Array:
+        """The configuration ``(n,)`` that was shown last; what is dragged in the page is not reported."""
+        return self._q.copy()
+
+    @q.setter
+    def q(self, value: ArrayLike) -> None:
+        self._q = _configuration(self.robot, value)
+        self._state = encode(_page(self.robot, self._q))
+        self._send([self._q], 0.0)
+
+    def play(self, path: ArrayLike, seconds: float = 4.0) -> None:
+        """Move through the configurations `path` ``(k, n)`` in this time, on all pages that show the arm."""
+        steps = _path(self.robot, path)
+        if not 0.0 < seconds <= LONGEST:
+            raise InputError("seconds", seconds, f"more than 0 and at most {LONGEST:g}")
+        count = max(2, int(np.ceil(seconds * RATE)))
+        at = np.linspace(0.0, len(steps) - 1.0, count)
+        smooth = np.stack([np.interp(at, np.arange(len(steps)), column) for column in steps.T], axis=1)
+        self._q = smooth[-1]
+        self._state = encode(_page(self.robot, smooth[0]))
+        self._send(list(smooth), seconds)
+
+    def _send(self, steps: list[Array], seconds: float) -> None:
+        self._service.send({"key": self._key, "path": [step.tolist() for step in steps], "seconds": seconds})
+
+    def _repr_html_(self) -> str:
+        width, height = (html.escape(str(value)) for value in self._size)
+        return (
+            f'<iframe src="{html.escape(self.url)}" width="{width}" height="{height}" style="border: 0" '
+            f'title="{html.escape(self.robot.name)}" allow="fullscreen; clipboard-write"></iframe>'
+        )
+
+
+def show(
+    robot: Robot | str,
+    q: ArrayLike | None,
+    path: Any,
+    seconds: float,
+    panel: bool,
+    width: int | str,
+    height: int,
+    address: str | None,
+) -> ArmView:
+    """As `kin.show`."""
+    robot = kin.get_robot(robot) if isinstance(robot, str) else robot
+    steps = None if path is None else _path(robot, path)
+    start = _configuration(robot, robot.q_home if q is None else q) if steps is None else steps[0]
+    if address is None:
+        prefix = os.environ.get(HUB)
+        address = f"{prefix}proxy/{{port}}/" if prefix else "http://localhost:{port}/"
+    view = ArmView(robot, start, (width, height), panel, address)
+    if steps is not None:
+        view.play(steps, seconds)
+    return view
+
+
+def _configuration(robot: Robot, value: ArrayLike) -> Array:
+    q = robot.check_q(value)
+    if not robot.in_limits(q, slack=1e-6):
+        raise InputError("q", np.asarray(value).tolist(), "a configuration within the limits of the joints")
+    return robot.clip(q)
+
+
+def _path(robot: Robot, value: Any) -> Array:
+    steps = [_configuration(robot, step) for step in value]
+    if len(steps) < 2:
+        raise InputError("path", f"{len(steps)} configurations", "at least 2")
+    return np.stack(steps)
+
+
+def _page(robot: Robot, q: Array) -> PageState:
+    if kin.builtin_robots().get(robot.id) == robot:
+        return PageState(robot=robot.id, q=q)
+    own: OwnArm = own_arm(kin.robot_to_dict(robot))
+    return PageState(robot=own.robot.id, own=own, q=q)

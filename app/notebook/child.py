@@ -1,0 +1,53 @@
+"""The process that serves a notebook: the service on a free port of this machine, moved by its standard input.
+
+Each line is JSON: ``key`` of the arm, ``path`` of configurations, ``seconds``. The process ends with its input.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterable
+from typing import Any
+
+from app.service.main import run
+from app.shared.settings import Settings
+from app.viewer.shown import SHOWN
+
+# Where notebooks are; `KINBOARD_FRAME_ANCESTORS` names others.
+NOTEBOOKS = ("http://localhost:*", "http://127.0.0.1:*")
+
+
+def follow(lines: Iterable[str]) -> None:
+    """Move arms as the lines say."""
+    for line in lines:
+        command = json.loads(line)
+        SHOWN.play(command["key"], command["path"], command["seconds"])
+
+
+def main() -> int:
+    """Serve until the input ends."""
+    environment: dict[str, Any] = {}
+    given = Settings(**environment)
+    settings = given.model_copy(
+        update={
+            "host": "127.0.0.1", "port": 0, "workers": 1, "rest_workers": 0, "token": None, "read_only": False,
+            "root_path": "", "frame_ancestors": (*NOTEBOOKS, *given.frame_ancestors),
+        }
+    )  # fmt: skip
+
+    def until_closed() -> None:
+        try:
+            follow(sys.stdin)
+        finally:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    threading.Thread(target=until_closed, daemon=True).start()
+    return run(settings)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
