@@ -32,6 +32,8 @@ RULES: dict[str, set[str]] = {
     "kin/collision": {"numpy", "kin.kernels", "kin.collision", *MODEL},
     "kin/path": {"numpy", "kin.kernels", "kin.solvers", "kin.ik", "kin.path", *MODEL},
     "kin/motion": {"numpy", "kin.files", "kin.kernels", "kin.solvers", "kin.ik", "kin.path", "kin.motion", *MODEL},
+    # It looks the service up by name when it is called.
+    "kin/notebook": {"numpy", "kin.errors", "kin.robot"},
     "kin/workspace": {"numpy", "kin.kernels", "kin.solvers", "kin.ik", "kin.workspace", *MODEL},
     "app": {"app", "kin"},
     "app/shared": {
@@ -43,6 +45,7 @@ RULES: dict[str, set[str]] = {
     "app/exercises": {"kin", "numpy", "app.exercises"},
     "app/classroom/courses": {"kin", "app.exercises", "app.classroom.courses"},
     "app/classroom": {"sqlalchemy", "alembic", "itsdangerous", "app.classroom", "app.shared"},
+    "app/classroom/lti": {"jwt", "cryptography", "sqlalchemy", "itsdangerous", "app.classroom"},
     "app/classroom/results": {"kin", "sqlalchemy", "app.classroom"},
     "app/bench": {"kin", "numpy", "numba", "app.bench"},
     # A page of a recorded run needs neither the core nor other libraries.
@@ -82,6 +85,10 @@ RULES: dict[str, set[str]] = {
         *("starlette", "msgspec", "itsdangerous", "kin"),
         *("app.api.problems", "app.bench.board", "app.classroom", "app.service.web", "app.shared"),
     },
+    "app/notebook": {
+        *("kin", "numpy", "app.notebook", "app.viewer.own_arm", "app.viewer.session.state"),
+    },
+    "app/notebook/child.py": {"app.service.main", "app.shared.settings", "app.viewer.shown"},
     "app/cli": {
         "kin",
         "numpy",

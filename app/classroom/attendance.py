@@ -33,6 +33,8 @@ class StoredRooms(Protocol):
 class LiveRooms(Protocol):
     """What `app.classroom.hub.Hub` does for a page."""
 
+    on_attempt: Callable[[str], None] | None
+
     @property
     def rooms(self) -> StoredRooms: ...
 
@@ -114,6 +116,8 @@ class Attendance:
         self._only_student()
         confirmed = self._hub.rooms.submit(self.ticket, attempt)
         self._hub.refresh(self.ticket.room)
+        if self._hub.on_attempt is not None:
+            self._hub.on_attempt(self.ticket.seat)
         return confirmed
 
     # The teacher

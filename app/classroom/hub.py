@@ -70,6 +70,7 @@ class Hub:
         self._thread: threading.Thread | None = None
         self._stopping = threading.Event()
         self._beat_at = 0.0
+        self.on_attempt: Callable[[str], None] | None = None  # called with the seat of each stored attempt
 
     @classmethod
     def of(cls, settings: Settings) -> Hub:

@@ -11,7 +11,7 @@ from typing import Any
 from sqlalchemy import JSON, BigInteger, Double, ForeignKey, String, Text, false
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
-REVISION = "0001"
+REVISION = "0002"
 ID = String(32)
 TOKEN_BYTES = 8  # of random ids
 
@@ -96,3 +96,41 @@ class Attempt(Base):
     score: Mapped[float] = mapped_column(Double)
     started: Mapped[float] = mapped_column(Double)
     at: Mapped[float] = mapped_column(Double)
+
+
+class LtiRoom(Base):
+    """The room of a link of a learning platform; `id` is a digest of platform, deployment and link."""
+
+    __tablename__ = "lti_room"
+
+    id: Mapped[str] = mapped_column(ID, primary_key=True)
+    room_id: Mapped[str] = mapped_column(ForeignKey("room.id", ondelete="CASCADE"), index=True)
+
+
+class LtiSeat(Base):
+    """The seat of a platform's user; `id` is a digest of the link and the user.
+
+    Attributes:
+        subject: the platform's opaque id of the user, by which it takes scores.
+        address: of the gradebook's column, or empty.
+        exercise: whose score goes there, or empty.
+    """
+
+    __tablename__ = "lti_seat"
+
+    id: Mapped[str] = mapped_column(ID, primary_key=True)
+    seat_id: Mapped[str] = mapped_column(ForeignKey("seat.id", ondelete="CASCADE"), index=True)
+    issuer: Mapped[str] = mapped_column(Text)
+    client_id: Mapped[str] = mapped_column(Text)
+    subject: Mapped[str] = mapped_column(String(255))
+    address: Mapped[str] = mapped_column(Text)
+    exercise: Mapped[str] = mapped_column(String(200))
+
+
+class LtiNonce(Base):
+    """A nonce of a launch that was used."""
+
+    __tablename__ = "lti_nonce"
+
+    id: Mapped[str] = mapped_column(String(64), primary_key=True)
+    expires: Mapped[float] = mapped_column(Double, index=True)

@@ -18,7 +18,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from app.cli import arguments as declare
-from app.cli.classroom.arguments import add_result, add_results, add_room
+from app.cli.classroom.arguments import add_lti, add_result, add_results, add_room
 from app.cli.startup import disable_compiler, no_collections
 
 DESCRIPTION = "Kinematics of robot arms: a dashboard in the browser, a REST interface, this command line."
@@ -206,6 +206,12 @@ def _load_results() -> Run:
     return run_results
 
 
+def _load_lti() -> Run:
+    from app.cli.classroom.lti import run
+
+    return run
+
+
 COMMANDS = (
     Command(declare.add_serve, _load_serve),
     Command(declare.add_fk, _load_fk, interpreted=True),
@@ -216,6 +222,7 @@ COMMANDS = (
     Command(add_room, _load_room),
     Command(add_result, _load_result, interpreted=True),
     Command(add_results, _load_results, interpreted=True),
+    Command(add_lti, _load_lti, interpreted=True),
     Command(declare.add_bench, _load_bench),
     Command(declare.add_check, _load_check, interpreted=True),
     Command(declare.add_capability, _load_capability),

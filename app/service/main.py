@@ -45,6 +45,7 @@ from app.service.web.access import Access
 from app.service.web.embedding import embedding_routes
 from app.service.web.failures import Failures
 from app.service.web.hosts import LOCAL_NAMES, Hosts
+from app.service.web.lti import lti_routes
 from app.service.web.observe import Observe, write_to_stderr
 from app.service.web.pages import page_routes, static_folder
 from app.service.web.prefix import PathPrefix
@@ -138,9 +139,15 @@ def create_app(
     complete_document(app, store, settings)
     app.router.routes.extend([*api_routes(), *page_routes(), *embedding_routes(), *bridge.routes()])
     app.router.routes.extend([*room_routes(classroom, settings), *scoreboard.routes()])
+    app.router.routes.extend(lti_routes(classroom, settings, partial(_exercises, settings, store)))
     app.include_router(status.router)
     _add_middleware(app, settings)
     return app
+
+
+def _exercises(settings: Settings, store: Store) -> list[tuple[str, str]]:
+    """Ids and titles of the exercises."""
+    return [(each.id, each.title) for each in Exercises(settings.exercises, store.get).all]
 
 
 def _described(lifespan: Callable[[FastAPI], AbstractAsyncContextManager[None]]) -> FastAPI:

@@ -50,6 +50,9 @@ class Settings(BaseSettings):
         description="Database of classrooms instead of a file, for several machines: "
         "postgresql://user:password@host/name.",
     )
+    lti: Path | None = Field(
+        None, description="File with the learning platforms that may launch Kinboard (*.toml), see LTI."
+    )
     max_rooms: int = Field(100, ge=0, description="Maximum number of classrooms at a time; 0: none may be opened.")
     max_batch: int = Field(10_000, ge=1, description="Maximum number of configurations or targets in a request.")
     max_path: int = Field(1000, ge=1, description="Maximum number of waypoints in a path.")

@@ -60,3 +60,21 @@ def add_results(commands: Any, _: object) -> argparse.ArgumentParser:
     parser.add_argument("room", metavar="CODE", help="the join code of the room")
     parser.add_argument("-o", "--output", metavar="FILE", help="write to this file (default: standard output)")
     return parser
+
+
+def add_lti(commands: Any, _: object) -> argparse.ArgumentParser:
+    """``kinboard lti``."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "lti",
+        help="what a learning platform's administrator must enter",
+        description="Print the addresses that the administrator of a learning platform (Moodle, Canvas) must "
+        "enter for LTI 1.3; check the file of platforms, and make our private key beside it if there is none.",
+    )
+    parser.add_argument("file", metavar="FILE", nargs="?", default=None, help="the file of KINBOARD_LTI (*.toml)")
+    parser.add_argument(
+        "--url",
+        default="https://kinboard.example/",
+        metavar="URL",
+        help="address of the service (default: %(default)s)",
+    )
+    return parser

@@ -42,7 +42,7 @@ GUEST_COOKIE = "kinboard_guest"  # of who has joined a classroom: opens the view
 _GUESTS = "kinboard.guests"  # in the scope: what signs that cookie, or None
 _MAY_OPEN = "kinboard.may-open"  # in the scope of a page of classrooms: whether the client may open one
 _RIGHTS = "kinboard.rights"  # in the scope of a client that has not all of them
-OPEN = ("/livez", "/readyz", "/login", "/favicon.ico")
+OPEN = ("/livez", "/readyz", "/login", "/favicon.ico", "/lti/login", "/lti/launch", "/lti/keys", "/lti/choose")
 HEALTH = OPEN[:2]
 TRIES, TRY_EVERY = 5, 10.0  # wrong tokens allowed at once per client, then one in this many seconds
 # A client above that rate may be many behind one address: the right token goes on being accepted, but each check

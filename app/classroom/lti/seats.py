@@ -1,0 +1,121 @@
+"""Who sits where on behalf of which platform: rooms of resource links, seats of users, nonces that were used."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from dataclasses import dataclass
+
+from sqlalchemy import delete, func, insert, select, update
+from sqlalchemy.exc import IntegrityError
+
+from app.classroom.database import Database
+from app.classroom.lti.launches import Launch
+from app.classroom.rooms import Rooms, clean_name
+from app.classroom.tables import Attempt, LtiNonce, LtiRoom, LtiSeat, Room, Seat
+from app.classroom.views import Ticket
+
+LIFE = 120 * 24 * 3600.0  # s: a term
+LONGEST_ALIAS = 32
+
+
+@dataclass(frozen=True)
+class Column:
+    """Where the score of a seat goes."""
+
+    issuer: str
+    client_id: str
+    address: str
+    user: str
+    exercise: str
+    best: float
+
+
+class LtiSeats:
+    """Rooms and seats of launches, in the classroom's database."""
+
+    def __init__(self, database: Database, rooms: Rooms) -> None:
+        self._database = database
+        self._rooms = rooms
+
+    def use_nonce(self, nonce: str, expires: float) -> bool:
+        """Use up a nonce; False if it was used before, by whichever process."""
+        with self._database.write() as connection:
+            connection.execute(delete(LtiNonce).where(LtiNonce.expires < time.time()))
+            try:
+                with connection.begin_nested():
+                    connection.execute(insert(LtiNonce).values(id=nonce, expires=expires))
+            except IntegrityError:
+                return False
+        return True
+
+    def take(self, launch: Launch) -> Ticket:
+        """The room of the launch's link for a teacher, a seat in it for anybody else; raises `RefusedError`."""
+        platform = launch.platform
+        parts = (platform.issuer, platform.client_id, launch.deployment, launch.resource)
+        link = _digest(*parts)
+        room, code = self._room(link, launch)
+        if launch.teacher:
+            return Ticket(room)
+        user = _digest(link, launch.user)
+        with self._database.read() as connection:
+            query = select(LtiSeat.seat_id).join(Seat, Seat.id == LtiSeat.seat_id)
+            known = connection.scalar(query.where(LtiSeat.id == user, Seat.removed.is_(False)))
+        ticket = self._rooms.join(
+            code,
+            clean_name(launch.alias, LONGEST_ALIAS, "alias"),
+            None if known is None else Ticket(room, known),
+        )
+        values = {
+            "issuer": platform.issuer,
+            "client_id": platform.client_id,
+            "subject": launch.user,
+            "address": launch.grades,
+            "exercise": launch.exercise,
+            "seat_id": ticket.seat,
+        }
+        with self._database.write() as connection:
+            changed = connection.execute(update(LtiSeat).where(LtiSeat.id == user).values(**values))
+            if not changed.rowcount:
+                connection.execute(insert(LtiSeat).values(id=user, **values))
+        return ticket
+
+    def column(self, seat: str) -> Column | None:
+        """Where the score of this seat goes, with its best attempt at the link's exercise; None: nowhere."""
+        with self._database.read() as connection:
+            row = connection.execute(select(LtiSeat).where(LtiSeat.seat_id == seat)).one_or_none()
+            if row is None or not row.address or not row.exercise:
+                return None
+            tries = select(func.max(Attempt.score)).where(
+                Attempt.seat_id == seat, Attempt.exercise == row.exercise
+            )
+            best = connection.scalar(tries)
+        if best is None:
+            return None
+        return Column(row.issuer, row.client_id, row.address, row.subject, row.exercise, best)
+
+    def _room(self, link: str, launch: Launch) -> tuple[str, str]:
+        query = (
+            select(Room.id, Room.code)
+            .join(LtiRoom, LtiRoom.room_id == Room.id)
+            .where(LtiRoom.id == link, Room.ends > time.time())
+        )
+        with self._database.read() as connection:
+            found = connection.execute(query).one_or_none()
+        if found is not None:
+            return found.id, found.code
+        made = self._rooms.open(launch.title, LIFE)
+        state = {"task": {"exercise": launch.exercise, "at": made.created}} if launch.exercise else {}
+        with self._database.write() as connection:
+            found = connection.execute(query).one_or_none()  # another launch may have been faster
+            if found is None:
+                connection.execute(delete(LtiRoom).where(LtiRoom.id == link))
+                connection.execute(insert(LtiRoom).values(id=link, room_id=made.id))
+                connection.execute(update(Room).where(Room.id == made.id).values(state=state))
+                return made.id, made.code
+        self._rooms.end(made.id)
+        return found.id, found.code
+
+
+def _digest(*parts: str) -> str:
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]

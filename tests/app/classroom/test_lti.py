@@ -1,0 +1,342 @@
+"""LTI 1.3 against a platform double that signs, checks signatures, and is asked over real HTTP."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+import threading
+import time
+from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from urllib.parse import parse_qs, urlsplit
+
+import jwt
+import pytest
+from cryptography.hazmat.primitives.asymmetric import rsa
+from fastapi.testclient import TestClient
+from jwt.algorithms import RSAAlgorithm
+from live_server import wait_for
+
+from app.classroom import COOKIE, Hub, NewAttempt
+from app.classroom.lti import passback as passback_module
+from app.classroom.lti.launches import CLAIM, GRADES, LEARN, LINK, LINKING, SCORE_SCOPE
+from app.classroom.lti.platforms import PlatformFileError, key_file, load_platforms, make_key
+from app.service.main import create_app
+from app.service.web.lti import STATE_COOKIE
+from app.shared.settings import Settings
+
+CLIENT = "kinboard-at-school"
+MEMBER = "http://purl.imsglobal.org/vocab/lis/v2/membership"
+TOOL = "https://testserver"
+
+
+def new_key() -> rsa.RSAPrivateKey:
+    return rsa.generate_private_key(65537, 2048)
+
+
+def key_set(key: rsa.RSAPrivateKey) -> dict:
+    return {
+        "keys": [{**json.loads(RSAAlgorithm.to_jwk(key.public_key())), "kid": "p1", "alg": "RS256", "use": "sig"}]
+    }
+
+
+class Platform:
+    """A learning platform: publishes its key, gives access tokens to who signs for them, keeps scores."""
+
+    def __init__(self) -> None:
+        self.key = new_key()
+        self.tool_keys: dict = {}
+        self.scores: list[tuple[str, dict]] = []
+        self.refusals = 0  # answers 500 to so many scores
+        platform = self
+
+        class Handler(BaseHTTPRequestHandler):
+            def do_GET(self) -> None:
+                self.answer(200, key_set(platform.key) if self.path == "/keys" else {})
+
+            def do_POST(self) -> None:
+                body = self.rfile.read(int(self.headers["content-length"]))
+                if self.path == "/token":
+                    self.answer(*platform.grant(parse_qs(body.decode())))
+                elif self.headers["authorization"] != "Bearer open-sesame":
+                    self.answer(401, {})
+                elif platform.refusals:
+                    platform.refusals -= 1
+                    self.answer(500, {})
+                else:
+                    platform.scores.append((self.path, json.loads(body)))
+                    self.answer(200, {})
+
+            def answer(self, status: int, body: dict) -> None:
+                self.send_response(status)
+                self.end_headers()
+                self.wfile.write(json.dumps(body).encode())
+
+            def log_message(self, *_: object) -> None:
+                pass
+
+        self.server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+        self.issuer = f"http://127.0.0.1:{self.server.server_address[1]}"
+        self.thread = threading.Thread(target=self.server.serve_forever)
+        self.thread.start()
+
+    def grant(self, form: dict[str, list[str]]) -> tuple[int, dict]:
+        key = jwt.PyJWKSet.from_dict(self.tool_keys).keys[0].key
+        claims = jwt.decode(form["client_assertion"][0], key, ["RS256"], audience=f"{self.issuer}/token")
+        good = claims["iss"] == claims["sub"] == CLIENT and form["scope"] == [SCORE_SCOPE] and "jti" in claims
+        return (200, {"access_token": "open-sesame"}) if good else (400, {})
+
+    def token(self, nonce: str, key: rsa.RSAPrivateKey | None = None, **changes: object) -> str:
+        now = int(time.time())
+        claims = {
+            "iss": self.issuer, "aud": CLIENT, "sub": "user-7", "iat": now, "exp": now + 60, "nonce": nonce,
+            "given_name": "Ada", "email": "ada@school.example", "name": "Ada Lovelace",
+            CLAIM + "version": "1.3.0", CLAIM + "message_type": LEARN, CLAIM + "deployment_id": "1",
+            CLAIM + "resource_link": {"id": "link-1", "title": "Week 3"}, CLAIM + "roles": [f"{MEMBER}#Learner"],
+            CLAIM + "custom": {"exercise": "two-elbows"},
+            GRADES: {"scope": [SCORE_SCOPE], "lineitem": f"{self.issuer}/columns/5?type=x"},
+        } | changes  # fmt: skip
+        return jwt.encode(
+            {k: v for k, v in claims.items() if v is not None}, key or self.key, "RS256", {"kid": "p1"}
+        )
+
+    def close(self) -> None:
+        self.server.shutdown()
+        self.thread.join()
+        self.server.server_close()
+
+
+@pytest.fixture(scope="module")
+def platform() -> Iterator[Platform]:
+    double = Platform()
+    yield double
+    double.close()
+
+
+@pytest.fixture(scope="module")
+def application(platform: Platform, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("lti")
+    file = folder / "platforms.toml"
+    file.write_text(
+        f'[[platform]]\nissuer = "{platform.issuer}"\nclient_id = "{CLIENT}"\ndeployments = ["1", "2"]\n'
+        f'login_url = "{platform.issuer}/auth"\ntoken_url = "{platform.issuer}/token"\n'
+        f'keys_url = "{platform.issuer}/keys"\n'
+    )
+    assert make_key(key_file(file, {}))
+    application = create_app(Settings(lti=file, data=folder / "data", frame_ancestors=platform.issuer))  # type: ignore[arg-type]
+    platform.tool_keys = load_platforms(file).key_set()
+    yield application
+    hub_of(application).close()
+
+
+def hub_of(application) -> Hub:
+    hub = application.state.classroom
+    assert isinstance(hub, Hub)
+    return hub
+
+
+@pytest.fixture
+def browser(application) -> TestClient:
+    return TestClient(application, base_url=TOOL, follow_redirects=False)
+
+
+def login(browser: TestClient, platform: Platform) -> dict[str, str]:
+    """The query with which the browser arrives at the platform."""
+    answer = browser.get("/lti/login", params={"iss": platform.issuer, "client_id": CLIENT, "login_hint": "7"})
+    assert answer.status_code == 303
+    place = urlsplit(answer.headers["location"])
+    assert f"{place.scheme}://{place.netloc}{place.path}" == f"{platform.issuer}/auth"
+    return {name: values[0] for name, values in parse_qs(place.query).items()}
+
+
+def launch(browser: TestClient, platform: Platform, **changes: object):
+    asked = login(browser, platform)
+    token = platform.token(asked["nonce"], **changes)  # type: ignore[arg-type]
+    return browser.post("/lti/launch", data={"id_token": token, "state": asked["state"]})
+
+
+def test_our_keys_are_public(browser: TestClient) -> None:
+    (key,) = browser.get("/lti/keys").json()["keys"]
+    assert set(key) == {"kty", "n", "e", "kid", "alg", "use"}, "nothing private"
+
+
+def test_a_login_asks_the_platform(browser: TestClient, platform: Platform) -> None:
+    answer = browser.post("/lti/login", data={"iss": platform.issuer, "login_hint": "7", "lti_message_hint": "m"})
+    asked = parse_qs(urlsplit(answer.headers["location"]).query)
+    assert asked["redirect_uri"] == [f"{TOOL}/lti/launch"]
+    assert (asked["response_mode"], asked["prompt"], asked["lti_message_hint"]) == (["form_post"], ["none"], ["m"])
+    cookie = answer.headers["set-cookie"]
+    assert all(part in cookie for part in ("HttpOnly", "Secure", "SameSite=none", "Partitioned"))
+    unknown = browser.get("/lti/login", params={"iss": "https://evil.example", "login_hint": "7"})
+    assert unknown.status_code == 400
+    assert "is not registered here" in unknown.text
+
+
+def test_a_student_gets_a_seat(browser: TestClient, platform: Platform, application) -> None:
+    answer = launch(browser, platform)
+    assert (answer.status_code, answer.headers["location"]) == (303, "../viewer/")
+    hub = hub_of(application)
+    ticket = hub.ticket(browser.cookies[COOKIE])
+    assert ticket.seat
+    attendance = hub.attend(ticket, lambda: None)
+    assert attendance.room.title == "Week 3"
+    assert attendance.room.task.exercise == "two-elbows"
+    attendance.leave()
+    launch(browser, platform)
+    assert hub.ticket(browser.cookies[COOKIE]) == ticket, "the same seat again"
+    other = TestClient(application, base_url=TOOL, follow_redirects=False)
+    launch(other, platform, sub="user-8")
+    seat = hub.ticket(other.cookies[COOKIE])
+    assert (seat.room, seat.seat != ticket.seat) == (ticket.room, True)
+    stored = b"".join(path.read_bytes() for path in hub.folder.rglob("*") if path.is_file())
+    assert b"Ada" in stored
+    assert b"Lovelace" not in stored
+    assert b"ada@school" not in stored
+
+
+def test_a_teacher_gets_the_room(browser: TestClient, platform: Platform, application) -> None:
+    launch(browser, platform, **{CLAIM + "roles": [f"{MEMBER}#Instructor"]})
+    ticket = hub_of(application).ticket(browser.cookies[COOKIE])
+    assert not ticket.seat
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"key": new_key()}, "signature of the launch is not the platform"),
+        ({"exp": int(time.time()) - 300}, "has expired"),
+        ({"aud": "another tool"}, "client id is not ours"),
+        ({"aud": [CLIENT, "other"], "azp": "other"}, "authorized party is not us"),
+        ({"iss": "https://evil.example"}, "of another platform than its login"),
+        ({"nonce": "guessed"}, "nonce of the launch is not the one of its login"),
+        ({"nonce": None}, "nonce"),
+        ({"sub": None}, "sub"),
+        ({CLAIM + "deployment_id": "3"}, "deployment &#x27;3&#x27; of the platform is not registered"),
+        ({CLAIM + "version": "1.1"}, "not of LTI version 1.3.0"),
+        ({CLAIM + "message_type": "Other"}, "are not understood"),
+        ({CLAIM + "resource_link": None}, "names no resource link"),
+    ],
+)
+def test_a_wrong_launch_is_refused_in_words(browser: TestClient, platform: Platform, changes, words) -> None:
+    asked = login(browser, platform)
+    nonce = changes.get("nonce", asked["nonce"])
+    rest = {name: value for name, value in changes.items() if name != "nonce"}
+    token = platform.token(nonce, **rest)
+    answer = browser.post("/lti/launch", data={"id_token": token, "state": asked["state"]})
+    assert answer.status_code == 403
+    assert words in answer.text
+    assert COOKIE not in browser.cookies
+
+
+def test_an_unsigned_token_is_refused(browser: TestClient, platform: Platform) -> None:
+    asked = login(browser, platform)
+    claims = jwt.decode(platform.token(asked["nonce"]), options={"verify_signature": False})
+    for forged in (
+        jwt.encode(claims, None, "none", {"kid": "p1"}),
+        jwt.encode(claims, "x" * 64, "HS256", {"kid": "p1"}),
+        "",
+        "a.b.c",
+    ):
+        answer = browser.post("/lti/launch", data={"id_token": forged, "state": asked["state"]})
+        assert answer.status_code == 403
+        assert COOKIE not in browser.cookies
+
+
+def test_a_launch_counts_once(browser: TestClient, platform: Platform) -> None:
+    asked = login(browser, platform)
+    cookie = browser.cookies[STATE_COOKIE]
+    sent = {"id_token": platform.token(asked["nonce"]), "state": asked["state"]}
+    assert browser.post("/lti/launch", data=sent).status_code == 303
+    browser.cookies.set(STATE_COOKIE, cookie)
+    again = browser.post("/lti/launch", data=sent)
+    assert again.status_code == 403
+    assert "was used before" in again.text
+
+
+def test_a_launch_belongs_to_the_browser_of_its_login(
+    browser: TestClient, platform: Platform, application
+) -> None:
+    asked = login(browser, platform)
+    victim = TestClient(application, base_url=TOOL, follow_redirects=False)
+    sent = {"id_token": platform.token(asked["nonce"]), "state": asked["state"]}
+    assert "cookie is missing" in victim.post("/lti/launch", data=sent).text
+    victim.cookies.set(STATE_COOKIE, "forged")
+    answer = victim.post("/lti/launch", data={**sent, "state": "forged"})
+    assert "is not one of ours" in answer.text
+
+
+def test_a_score_goes_back(browser: TestClient, platform: Platform, application, monkeypatch) -> None:
+    monkeypatch.setattr(passback_module, "PAUSES", (0.0, 0.0))
+    launch(browser, platform, sub="user-9")
+    hub = hub_of(application)
+    attendance = hub.attend(hub.ticket(browser.cookies[COOKIE]), lambda: None)
+    platform.scores.clear()
+    for score, exercise in ((0.5, "two-elbows"), (0.25, "two-elbows"), (1.0, "swing")):
+        attendance.submit(NewAttempt(exercise=exercise, seed=1, answer={}, verdict="", score=score, started=0.0))
+        wait_for(lambda: bool(platform.scores))
+    attendance.leave()
+    path, sent = platform.scores[-1]
+    assert path == "/columns/5/scores?type=x"
+    assert (sent["userId"], sent["scoreGiven"], sent["scoreMaximum"]) == ("user-9", 0.5, 1)
+    assert "comment" not in sent
+
+
+def test_deep_linking(browser: TestClient, platform: Platform) -> None:
+    settings = {"deep_link_return_url": f"{platform.issuer}/back", "data": "opaque", "accept_multiple": True}
+    page = launch(browser, platform, **{CLAIM + "message_type": LINK, LINKING: settings})
+    assert page.status_code == 200
+    about = html.unescape(re.search('name="about" value="([^"]*)"', page.text)[1])
+    assert 'value="two-elbows"' in page.text
+    form = {"about": about, "exercise": ["two-elbows", "swing", "no-such"]}
+    done = browser.post("/lti/choose", data=form)
+    assert f"form-action {platform.issuer}" in done.headers["content-security-policy"]
+    assert f'action="{platform.issuer}/back"' in done.text
+    token = html.unescape(re.search('name="JWT" value="([^"]*)"', done.text)[1])
+    key = jwt.PyJWKSet.from_dict(browser.get("/lti/keys").json()).keys[0].key
+    claims = jwt.decode(token, key, ["RS256"], audience=platform.issuer, issuer=CLIENT)
+    base = "https://purl.imsglobal.org/spec/lti-dl/claim/"
+    assert claims[base + "data"] == "opaque"
+    items = claims[base + "content_items"]
+    assert [item["custom"]["exercise"] for item in items] == ["two-elbows", "swing"]
+    assert items[0]["url"] == f"{TOOL}/lti/launch"
+    forged = browser.post("/lti/choose", data={**form, "about": about[:-2] + "xx"})
+    assert forged.status_code == 403
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("issuer = 5", "issuer: got 5; it must be a text"),
+        ("deployments = []", "deployments: got []; it must be a list"),
+        (
+            'keys_url = "http://school.example/keys"',
+            "keys_url: got 'http://school.example/keys'; it must be an address",
+        ),
+        ('colour = "red"', "colour: the fields are"),
+    ],
+)
+def test_a_wrong_file_is_refused_in_words(tmp_path, line: str, words: str) -> None:
+    rows = {
+        "issuer": '"https://a.example"', "client_id": '"c"', "deployments": '["1"]',
+        **dict.fromkeys(("login_url", "token_url", "keys_url"), '"https://a.example/x"'),
+    }  # fmt: skip
+    name, _, value = line.partition(" = ")
+    file = tmp_path / "platforms.toml"
+    file.write_text("[[platform]]\n" + "\n".join(f"{k} = {v}" for k, v in {**rows, name: value}.items()))
+    with pytest.raises(PlatformFileError, match=re.escape(words)):
+        load_platforms(file)
+
+
+def test_the_key_is_made_once_and_is_secret(tmp_path) -> None:
+    file = tmp_path / "platforms.toml"
+    file.write_text("")
+    with pytest.raises(PlatformFileError, match="there is no private key"):
+        load_platforms(file)
+    key = key_file(file, {})
+    assert make_key(key)
+    assert key.stat().st_mode & 0o077 == 0
+    before = key.read_bytes()
+    assert not make_key(key)
+    assert key.read_bytes() == before
+    assert load_platforms(file).all == ()
