@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Connection, Engine, create_engine, event, insert, inspect, select, text
+from sqlalchemy import URL, Connection, Engine, create_engine, event, insert, inspect, select, text
 from sqlalchemy.engine import make_url
 from sqlalchemy.exc import SQLAlchemyError
 
@@ -41,7 +41,7 @@ class Database:
 
     def __init__(self, file: Path, url: str | None = None) -> None:
         self._file = None if url else file
-        self._url = make_url(url or f"sqlite:///{file}")
+        self._url = make_url(url) if url else URL.create("sqlite", database=str(file))
         if self._url.drivername in ("postgresql", "postgres"):
             self._url = self._url.set(drivername="postgresql+psycopg")
         self._engine: Engine | None = None
@@ -185,7 +185,8 @@ def _migrate(engine: Engine) -> None:
                 from alembic.config import Config
 
                 config = Config()
-                config.set_main_option("script_location", str(Path(__file__).parent / "migrations"))
+                folder = str(Path(__file__).parent / "migrations")
+                config.set_main_option("script_location", folder.replace("%", "%%"))
                 config.attributes["connection"] = connection
                 command.upgrade(config, "head")
 

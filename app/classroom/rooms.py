@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import secrets
 import unicodedata
 from dataclasses import dataclass, fields
@@ -17,6 +18,8 @@ from app.classroom.views import Confirmed, NewAttempt, RefusedError, Ticket, Unk
 LONGEST_ALIAS, LONGEST_TITLE = 32, 80  # characters
 MIN_LIFE, MAX_LIFE = 60.0, 200 * 24 * 3600.0  # seconds: a term
 MAX_SEATS = 200
+MAX_ATTEMPTS = 2000  # of one seat
+LONGEST_ANSWER = 20_000  # characters, as JSON
 _TRIES = 20  # of random codes
 
 
@@ -160,6 +163,8 @@ class Rooms:
         """Store an attempt; the same attempt again is stored once. Raises `RefusedError` if the seat is gone."""
         if not 0.0 <= attempt.score <= 1.0:
             raise ValueError(f"score is {attempt.score}; it must be from 0 to 1")
+        if len(json.dumps(attempt.answer)) > LONGEST_ANSWER:
+            raise RefusedError(f"The answer is longer than {LONGEST_ANSWER} characters. It is not stored.")
         with self._database.write() as connection:
             version = next_version(connection, ticket.room)
             mine = (Seat.id == ticket.seat, Seat.room_id == ticket.room, Seat.removed.is_(False))
@@ -173,6 +178,9 @@ class Rooms:
                 if stored.seat_id != ticket.seat:
                     raise RefusedError("This attempt belongs to another seat.")
                 return Confirmed(attempt.id, stored.at)
+            made = connection.scalar(select(func.count()).where(Attempt.seat_id == ticket.seat)) or 0
+            if made >= MAX_ATTEMPTS:
+                raise RefusedError(f"You have made {MAX_ATTEMPTS} attempts in this room; no more are stored.")
             at = now()
             values = {field.name: getattr(attempt, field.name) for field in fields(attempt)}
             connection.execute(insert(Attempt).values(room_id=ticket.room, seat_id=ticket.seat, at=at, **values))

@@ -33,7 +33,7 @@ from app.api import (
     complete_document,
     install_problem_handlers,
 )
-from app.classroom import Hub
+from app.classroom import Hub, clock
 from app.classroom.courses import Courses
 from app.exercises import ExerciseFileError, Exercises
 from app.service import status
@@ -217,6 +217,7 @@ def run(settings: Settings, open_browser: bool = False) -> int:
                 print(OPEN_TO_ALL, file=sys.stderr, flush=True)
             elif not settings.allowed_hosts:
                 settings = settings.model_copy(update={"allowed_hosts": (*LOCAL_NAMES, settings.host)})
+        clock.now()  # processes that start later, after the clock was set, count from here too
         greeting = Greeting(url_of(settings, listeners[0].getsockname()[1]), open_browser)
         partners = settings.rest_workers if SUPPORTED else 0
         parts = members(

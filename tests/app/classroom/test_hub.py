@@ -340,12 +340,12 @@ def test_a_full_database_is_said_and_keeps_what_was_confirmed(hubs):
 
     event.listen(hub.database._ready(), "checkout", fill)
     with pytest.raises(ClassroomUnavailable, match="full"):
-        student.submit(attempt(answer="x" * 50_000))
+        student.submit(attempt(answer="x" * 19_000))
     event.remove(hub.database._ready(), "checkout", fill)
     with hub.database.read() as connection:
         assert connection.scalars(select(Attempt.id)).all() == [first.id]
     event.listen(hub.database._ready(), "checkout", lambda connection, *_: limit(connection, 1_000_000))
-    assert student.submit(attempt(answer="x" * 50_000)).at > 0
+    assert student.submit(attempt(answer="x" * 19_000)).at > 0
 
 
 def test_a_database_that_is_gone_comes_back(hubs, tmp_path):
@@ -466,3 +466,39 @@ def test_other_databases_are_refused_and_not_shown(url, monkeypatch, capsys):
     assert "KINBOARD_DATABASE_URL" in printed
     assert "postgresql://" in printed
     assert url not in printed
+
+
+def test_attempts_are_bounded(hubs, monkeypatch):
+    monkeypatch.setattr("app.classroom.rooms.MAX_ATTEMPTS", 2)
+    hub, _ = hubs
+    room = hub.rooms.open("Kinematics", 3600)
+    student = hub.attend(hub.rooms.join(room.code, "Ada"), nothing)
+    with pytest.raises(RefusedError, match="longer than"):
+        student.submit(attempt(answer="x" * 20_000))
+    with pytest.raises(ValueError, match="score is 2"):
+        student.submit(attempt(score=2))
+    last = attempt()
+    student.submit(attempt())
+    confirmed = student.submit(last)
+    with pytest.raises(RefusedError, match="no more"):
+        student.submit(attempt())
+    assert student.submit(last) == confirmed
+
+
+def test_seats_and_pages_are_bounded(hubs, monkeypatch):
+    monkeypatch.setattr("app.classroom.rooms.MAX_SEATS", 1)
+    hub, _ = hubs
+    room = hub.rooms.open("Kinematics", 3600)
+    student = hub.attend(hub.rooms.join(room.code, "Ada"), nothing)
+    with pytest.raises(RefusedError, match="seats"):
+        hub.rooms.join(room.code, "Bob")
+    with pytest.raises(ValueError, match="16001"):
+        student.tell_page("x" * 16_001)
+
+
+@pytest.mark.parametrize("name", ["a b", "50%", "a?b#c", "ä", "a'b"])
+def test_a_folder_may_have_any_name(tmp_path, name):
+    hub = Hub(tmp_path / name)
+    hub.rooms.open("Kinematics", 3600)
+    hub.close()
+    assert (tmp_path / name / "classroom.db").exists()
