@@ -45,7 +45,7 @@ from app.service.web.access import Access
 from app.service.web.embedding import embedding_routes
 from app.service.web.failures import Failures
 from app.service.web.hosts import LOCAL_NAMES, Hosts
-from app.service.web.lti import lti_routes
+from app.service.web.lti import PlatformsRefused, check_platforms, lti_routes
 from app.service.web.observe import Observe, write_to_stderr
 from app.service.web.pages import page_routes, static_folder
 from app.service.web.prefix import PathPrefix
@@ -209,7 +209,8 @@ def run(settings: Settings, open_browser: bool = False) -> int:
             store = Store(settings.robots)
             exercises = Exercises(settings.exercises, store.get)  # each process reads them again; errors show here
             _ = Courses(exercises, settings.courses, store.get).all
-        except (RobotFileError, ExerciseFileError) as error:
+            check_platforms(settings)
+        except (RobotFileError, ExerciseFileError, PlatformsRefused) as error:
             print(f"kinboard: {error}", file=sys.stderr)
             return 1
         if settings.token is None and not settings.read_only:

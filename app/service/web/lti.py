@@ -66,6 +66,24 @@ def lti_routes(hub: Hub, settings: Settings, titles: Titles) -> list[BaseRoute]:
     ]
 
 
+class PlatformsRefused(Exception):  # noqa: N818 - a finding, with a sentence for the operator
+    """The file of platforms is invalid, or the extra is not installed."""
+
+
+def check_platforms(settings: Settings) -> None:
+    """Raises `PlatformsRefused` if the service cannot start with these settings."""
+    if settings.lti is None:
+        return
+    try:
+        from app.classroom.lti.platforms import PlatformFileError, load_platforms
+    except ImportError:
+        raise PlatformsRefused("KINBOARD_LTI needs an extra: pip install 'kinboard[lti]'") from None
+    try:
+        load_platforms(settings.lti)
+    except PlatformFileError as error:
+        raise PlatformsRefused(f"KINBOARD_LTI: {error}") from None
+
+
 class _Pages:
     def __init__(self, hub: Hub, platforms: Platforms, titles: Titles) -> None:
         self._hub = hub

@@ -22,7 +22,8 @@ from app.classroom import COOKIE, Hub, NewAttempt
 from app.classroom.lti import passback as passback_module
 from app.classroom.lti.launches import CLAIM, GRADES, LEARN, LINK, LINKING, SCORE_SCOPE
 from app.classroom.lti.platforms import PlatformFileError, key_file, load_platforms, make_key
-from app.service.main import create_app
+from app.cli.parser import main
+from app.service.main import create_app, run
 from app.service.web.lti import STATE_COOKIE
 from app.shared.settings import Settings
 
@@ -340,3 +341,27 @@ def test_the_key_is_made_once_and_is_secret(tmp_path) -> None:
     assert not make_key(key)
     assert key.read_bytes() == before
     assert load_platforms(file).all == ()
+
+
+def test_the_service_does_not_start_with_a_wrong_file(tmp_path, capsys) -> None:
+    file = tmp_path / "platforms.toml"
+    file.write_text("colour = 1")
+    assert run(Settings(port=0, lti=file)) == 1  # type: ignore[arg-type]
+    assert f"kinboard: KINBOARD_LTI: {file}: colour" in capsys.readouterr().err
+
+
+def test_the_command_prints_what_to_enter(tmp_path, platform: Platform, capsys) -> None:
+    assert main(["lti", "--url", "https://kin.example/arm"]) == 0
+    shown = capsys.readouterr().out
+    for path in ("login", "launch", "keys"):
+        assert f"https://kin.example/arm/lti/{path}" in shown
+    example = shown[shown.index("[[platform]]") :]
+    file = tmp_path / "platforms.toml"
+    file.write_text(example)
+    assert main(["lti", str(file)]) == 0, "the example is a valid file"
+    shown = capsys.readouterr().out
+    assert "A private key was written to" in shown
+    assert "Moodle of the school: https://moodle.school.example" in shown
+    file.write_text(example.replace("https://moodle.school.example/mod/lti/token.php", "ftp://x"))
+    assert main(["lti", str(file)]) == 2
+    assert "token_url: got 'ftp://x'" in capsys.readouterr().err
