@@ -7,7 +7,18 @@
 """
 
 from kin._version import __version__
-from kin.collision import Capsule, NearestLinks, capsules, nearest_links, self_distance
+from kin.collision import (
+    Capsule,
+    Contact,
+    NearestLinks,
+    Obstacle,
+    capsules,
+    clearance,
+    nearest_contact,
+    nearest_links,
+    obstacle_from_dict,
+    self_distance,
+)
 from kin.dh import Screws, convert, exp_screw, robot_from_screws, screws
 from kin.errors import InputError, KinematicsError, RobotFileError, UnknownRobotError
 from kin.files import (
@@ -89,6 +100,7 @@ __all__ = [
     "CapabilityMap",
     "Capsule",
     "Circ",
+    "Contact",
     "Dwell",
     "Estimate",
     "Extreme",
@@ -107,6 +119,7 @@ __all__ = [
     "MotionLimits",
     "MotionSample",
     "NearestLinks",
+    "Obstacle",
     "PathGap",
     "PathJump",
     "PathResult",
@@ -141,6 +154,7 @@ __all__ = [
     "capability_join",
     "capability_map",
     "capsules",
+    "clearance",
     "configuration_at",
     "convert",
     "exp_screw",
@@ -158,7 +172,9 @@ __all__ = [
     "load_robot",
     "load_urdf",
     "manipulability",
+    "nearest_contact",
     "nearest_links",
+    "obstacle_from_dict",
     "parse_program",
     "parse_robot",
     "plan_motion",

@@ -98,6 +98,24 @@ class Joint:
         object.__setattr__(self, "limits", (lower, upper))
 
 
+@dataclass(frozen=True, slots=True)
+class Capsule:
+    """A part of a link's body: all points within `radius` of a segment that moves with the link.
+
+    Attributes:
+        link: 0 for the base, k for the link that joint k moves.
+        row: index of the DH row in whose frame the points are; −1 for the frame before the first row.
+        start, end: ends of the segment (m) in that frame; a ball if they are the same.
+        radius: m.
+    """
+
+    link: int
+    row: int
+    start: tuple[float, float, float]
+    end: tuple[float, float, float]
+    radius: float
+
+
 @dataclass(frozen=True)
 class Robot:
     """A serial arm: immutable, hashable, compared by value. Derived arrays are cached and read-only.
@@ -108,6 +126,8 @@ class Robot:
         home: one value per moving joint, inside the limits.
         base, tool: constant transforms before the first and after the last row, as nested tuples.
         units: the length unit of the robot file ("mm", "cm" or "m"), used when the table is displayed.
+        capsules: the bodies of the links as its file states them, none where they are not known.
+        capsules_source: where they are from.
 
     Raises:
         InputError: an unknown convention or unit, no moving joint, a home of another length, or a base or tool
@@ -124,6 +144,8 @@ class Robot:
     units: str = "m"
     base: Matrix = field(default=IDENTITY, repr=False)
     tool: Matrix = field(default=IDENTITY, repr=False)
+    capsules: tuple[Capsule, ...] = field(default=(), repr=False)
+    capsules_source: str = field(default="", repr=False)
 
     def __post_init__(self) -> None:
         """Check the fields; lists become tuples, and arrays become nested tuples."""

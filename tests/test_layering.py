@@ -28,10 +28,13 @@ RULES: dict[str, set[str]] = {
     "kin/kernels": {"numpy", "numba", "kin.kernels", "kin.tolerances", "kin.transforms"},
     "kin/files": {"numpy", "kin.dh", "kin.files", *MODEL},
     "kin/solvers": {"numpy", "kin.dh", "kin.kernels", "kin.solvers", *MODEL - {"kin.singularity"}},
-    "kin/ik": {"numpy", "kin.kernels", "kin.solvers", "kin.ik", *MODEL},
-    "kin/collision": {"numpy", "kin.kernels", "kin.collision", *MODEL},
-    "kin/path": {"numpy", "kin.kernels", "kin.solvers", "kin.ik", "kin.path", *MODEL},
-    "kin/motion": {"numpy", "kin.files", "kin.kernels", "kin.solvers", "kin.ik", "kin.path", "kin.motion", *MODEL},
+    "kin/ik": {"numpy", "kin.collision", "kin.kernels", "kin.solvers", "kin.ik", *MODEL},
+    "kin/collision": {"numpy", "kin.frames", "kin.kernels", "kin.collision", *MODEL},
+    "kin/path": {"numpy", "kin.collision", "kin.kernels", "kin.solvers", "kin.ik", "kin.path", *MODEL},
+    "kin/motion": {
+        *("numpy", "kin.collision", "kin.files", "kin.kernels", "kin.solvers", "kin.ik", "kin.path", "kin.motion"),
+        *MODEL,
+    },
     # It looks the service up by name when it is called.
     "kin/notebook": {"numpy", "kin.errors", "kin.robot"},
     "kin/workspace": {"numpy", "kin.kernels", "kin.solvers", "kin.ik", "kin.workspace", *MODEL},

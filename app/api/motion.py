@@ -11,10 +11,10 @@ from fastapi import Request, Response
 from pydantic import Field, WithJsonSchema
 
 from app.api import schemas
-from app.api.arms.frames import FramesBody
 from app.api.arms.operation import operation
 from app.api.batches import Batch, one_or_all
 from app.api.body import versioned
+from app.api.options import AvoidingBody
 from app.api.problems import FieldError, from_input_error, invalid
 from app.api.schemas import POST_REFUSALS, Configuration, example, reply, settings_of
 from app.api.work import Deadline, computed
@@ -112,7 +112,7 @@ EXAMPLES = {
 }
 
 
-class MotionRequest(FramesBody):
+class MotionRequest(AvoidingBody):
     """What the arm should do, and how the motion is answered."""
 
     program: Annotated[dict[str, Any], WithJsonSchema(_PROGRAM)] = Field(
@@ -185,7 +185,15 @@ def _planned(robot: Robot, body: MotionRequest, settings: Settings, deadline: De
     if body.q_start is not None:
         q_start = schemas.as_configurations(robot, body.q_start, settings, "q_start")[0][0]
     try:
-        found = plan_motion(robot, program_from_dict(body.program, robot), q_start, stop=deadline.check)
+        program = program_from_dict(body.program, robot)
+        found = plan_motion(
+            robot,
+            program,
+            q_start,
+            avoid_self_collision=body.avoid_self_collision,
+            obstacles=body.solids,
+            stop=deadline.check,
+        )
     except InputError as error:
         prefix = "" if error.field.partition("[")[0] in ("program", "q_start") else "program."
         raise invalid(from_input_error(error, prefix)) from None

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import cycle
 from typing import Annotated, Literal
 
@@ -16,12 +17,13 @@ import numpy as np
 from pydantic import Discriminator, Field, Tag
 
 from app.api import schemas
-from app.api.arms.frames import FrameName, WorkpiecesBody
+from app.api.arms.frames import FrameName, FramesBody, WorkpiecesBody
 from app.api.problems import FieldError, from_input_error, invalid
 from app.api.schemas import Number, Vector3, Vector4, numbers
 from app.shared.settings import Settings
 from app.shared.threads.turns import offer
-from kin import IKOptions, InputError, JointConstraints, Robot, Task
+from kin import IKOptions, InputError, JointConstraints, Obstacle, Robot, Task
+from kin.collision.obstacles import LONGEST_NAME, MOST_OBSTACLES, checked_obstacles
 from kin.frames import WORLD
 from kin.ik.options import LEAST_TOLERANCE, MOST_METRES, MOST_RADIANS
 from kin.ik.problem import read_pose
@@ -152,8 +154,45 @@ class Goal:
     rounding: float = 0.0
 
 
-class OptionsBody(WorkpiecesBody):
-    """Task, joint constraints, branch."""
+class ObstacleBody(schemas.Body):
+    """A body at rest in the world frame."""
+
+    shape: Literal["box", "sphere", "cylinder", "table"] = Field(
+        description="cylinder: its axis is z. table: a box whose place is the middle of its top; everything under "
+        "the top counts as solid."
+    )
+    xyz: Vector3 = Field([0.0, 0.0, 0.0], description="Its centre in metres; of a table, the middle of its top.")
+    rpy: Vector3 = Field([0.0, 0.0, 0.0], description="Roll, pitch, yaw in radians: Rz(yaw) Ry(pitch) Rx(roll).")
+    size: Vector3 | None = Field(None, description="Of a box or table: sides along x, y and z in metres.")
+    radius: Number | None = Field(None, description="Of a sphere or cylinder, in metres.")
+    height: Number | None = Field(None, description="Of a cylinder, in metres.")
+    name: str = Field("", max_length=LONGEST_NAME, description="For people.")
+
+
+class AvoidingBody(FramesBody):
+    """What the arm must not touch."""
+
+    avoid_self_collision: bool = Field(
+        False,
+        strict=True,
+        description="Whether configurations are left out in which links of the arm touch each other, judged by "
+        "the capsules of the arm.",
+    )
+    obstacles: Annotated[list[ObstacleBody], Field(max_length=MOST_OBSTACLES)] = Field(
+        [], description="Bodies in the world frame that the arm must not touch."
+    )
+
+    @cached_property
+    def solids(self) -> tuple[Obstacle, ...]:
+        """The obstacles; raises 422 naming ``obstacles[i]``."""
+        try:
+            return checked_obstacles([each.model_dump(exclude_none=True) for each in self.obstacles])
+        except InputError as error:
+            raise invalid(from_input_error(error)) from None
+
+
+class OptionsBody(AvoidingBody, WorkpiecesBody):
+    """Task, joint constraints, branch, what is avoided."""
 
     task: Task | None = Field(
         None,
@@ -193,6 +232,8 @@ class OptionsBody(WorkpiecesBody):
             mask_frame=self.mask_frame,
             constraints=JointConstraints(self.limits, self.locked),
             branch=self.branch,
+            avoid_self_collision=self.avoid_self_collision,
+            obstacles=self.solids,
         )
 
     def resolve_all(

@@ -8,7 +8,16 @@ from argparse import Namespace
 
 import numpy as np
 
-from app.cli.terminal import Notation, configuration, frame_of, joint_constraints, print_json, robot_of, table
+from app.cli.terminal import (
+    Notation,
+    configuration,
+    frame_of,
+    joint_constraints,
+    obstacles_of,
+    print_json,
+    robot_of,
+    table,
+)
 from app.shared.answers.ik import Blocked, IkAnswer, Solution, ik_answer
 from kin import IKOptions, InputError, Task
 from kin.frames import TOOL
@@ -44,6 +53,8 @@ def run(arguments: Namespace) -> int:
         solver=arguments.solver,
         position_tolerance=_scaled(arguments.position_tolerance, length),
         rotation_tolerance=_scaled(arguments.rotation_tolerance, angle),
+        avoid_self_collision=arguments.avoid_self_collision,
+        obstacles=obstacles_of(arguments),
     )
     result = solve(robot, T, options, q_seed)
     answer = ik_answer(result)

@@ -7,7 +7,7 @@ from argparse import Namespace
 from contextlib import closing
 from pathlib import Path
 
-from app.cli.terminal import Notation, clean, configuration, print_json, robot_of, table
+from app.cli.terminal import Notation, clean, configuration, obstacles_of, print_json, robot_of, table
 from app.exports.motion import FORMATS, MotionFormat
 from app.exports.motion_plot import motion_plot
 from app.exports.save import opened
@@ -30,7 +30,13 @@ def run(arguments: Namespace) -> int:
         raise InputError("--picture", arguments.picture, "a name that ends in .svg")
     start = arguments.start
     q_start = None if start is None else configuration(robot, start, "--start", arguments.rad)
-    motion = plan_motion(robot, parse_program(_text(arguments.program), robot), q_start)
+    motion = plan_motion(
+        robot,
+        parse_program(_text(arguments.program), robot),
+        q_start,
+        avoid_self_collision=arguments.avoid_self_collision,
+        obstacles=obstacles_of(arguments),
+    )
     if arguments.json:
         print_json(motion_answer(motion))
     elif arguments.output != "-":

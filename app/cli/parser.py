@@ -212,11 +212,33 @@ def _load_lti() -> Run:
     return run
 
 
+def _add_ik(commands: Any, parents: declare.Parents) -> argparse.ArgumentParser:
+    return _avoiding(declare.add_ik(commands, parents))
+
+
+def _add_move(commands: Any, parents: declare.Parents) -> argparse.ArgumentParser:
+    return _avoiding(declare.add_move(commands, parents))
+
+
+def _avoiding(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
+    """The arguments that say what the arm must not touch."""
+    parser.add_argument(
+        "--avoid-self-collision",
+        action="store_true",
+        help="leave out what makes links of the arm touch each other",
+    )
+    parser.add_argument(
+        "--obstacles", metavar="FILE",
+        help="bodies that the arm must not touch: a TOML file of [[obstacles]], in metres and radians",
+    )  # fmt: skip
+    return parser
+
+
 COMMANDS = (
     Command(declare.add_serve, _load_serve),
     Command(declare.add_fk, _load_fk, interpreted=True),
-    Command(declare.add_ik, _load_ik),
-    Command(declare.add_move, _load_move),
+    Command(_add_ik, _load_ik),
+    Command(_add_move, _load_move),
     Command(declare.add_robots, _load_robots, interpreted=True),
     Command(declare.add_workspace, _load_workspace),
     Command(add_room, _load_room),

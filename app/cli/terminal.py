@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import tomllib
 from argparse import Namespace
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from app.shared.store import Store
-from kin import InputError, JointConstraints, Robot, frame_pose, from_xyz_rpy, load_robot, load_urdf
+from kin import InputError, JointConstraints, Obstacle, Robot, frame_pose, from_xyz_rpy, load_robot, load_urdf
+from kin.collision.obstacles import checked_obstacles
 from kin.frames import FRAMES
 from kin.transforms import Array
 
@@ -70,6 +72,19 @@ def configuration(robot: Robot, values: list[float], field: str, rad: bool) -> A
         raise InputError(field, f"{len(values)} values", f"{robot.n}, one for each of: {joints}")
     scale = np.where(robot.revolute, math.pi / 180, 1e-3)
     return robot.check_q(np.array(values) * (1.0 if rad else scale), field)
+
+
+def obstacles_of(arguments: Namespace) -> tuple[Obstacle, ...]:
+    """The bodies in the file of ``--obstacles``."""
+    if arguments.obstacles is None:
+        return ()
+    try:
+        data = tomllib.loads(Path(arguments.obstacles).read_text(encoding="utf-8-sig"))
+    except (OSError, ValueError) as error:
+        raise InputError("--obstacles", arguments.obstacles, f"a readable TOML file ({error})") from None
+    if set(data) != {"obstacles"}:
+        raise InputError("--obstacles", sorted(data), "tables [[obstacles]] and nothing else")
+    return checked_obstacles(data["obstacles"])
 
 
 def frame_of(robot: Robot, arguments: Namespace, q: Array | None = None) -> Array:

@@ -48,10 +48,13 @@ class OwnArm:
 def own_arm(data: Mapping[str, Any], start: str = "") -> OwnArm:
     """An arm described by the fields of a robot file; its id is replaced.
 
+    Capsules are left out: a table that can be edited outdates them, and links have no room. They are assumed.
+
     Raises:
         kin.KinematicsError: naming the field, the value and what would be valid.
     """
-    fields = {**data, "id": KEY, "source": clean(data.get("source"), SOURCE) or "a visitor's table"}
+    fields = {key: value for key, value in data.items() if not key.startswith("capsules")}
+    fields |= {"id": KEY, "source": clean(data.get("source"), SOURCE) or "a visitor's table"}
     fields["name"] = clean(data.get("name"), NAME) or MY_ARM
     fields["description"] = clean(data.get("description", ""), DESCRIPTION)
     rows = data.get("rows")

@@ -1,27 +1,42 @@
-"""Whether an arm touches itself: distances between capsules that stand for its links.
+"""Whether an arm touches itself or obstacles: distances of capsules that stand for its links.
 
 `self_distance` is the number for any batch of configurations; `nearest_links` says which two links, and where.
-Distances are between capsules, which are assumed from the DH table (`kin.collision.bodies`): they warn early or
-late by the difference to the real bodies.
+`clearance` and `nearest_contact` are the same with obstacles (`kin.collision.obstacles`). Distances are those of
+capsules, which robot files state or which are assumed from the DH table (`kin.collision.bodies`): they warn early
+or late by the difference to the real bodies.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kin.collision.bodies import Capsule, bodies_of, capsules
+from kin.collision.bodies import bodies_of, capsules
+from kin.collision.contacts import Contact, surroundings
 from kin.collision.kernels import least_distance, least_distances
+from kin.collision.obstacles import Obstacle, checked_obstacles, obstacle_from_dict
 from kin.errors import InputError
 from kin.named import robot_of
-from kin.robot import Robot
+from kin.robot import Capsule, Robot
 from kin.transforms import Array
 
 CROSSING = 1e-9  # m between two axes: below this it has no direction
 
-__all__ = ["Capsule", "NearestLinks", "capsules", "nearest_links", "self_distance"]
+__all__ = [
+    "Capsule",
+    "Contact",
+    "NearestLinks",
+    "Obstacle",
+    "capsules",
+    "clearance",
+    "nearest_contact",
+    "nearest_links",
+    "obstacle_from_dict",
+    "self_distance",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,3 +91,27 @@ def nearest_links(robot: Robot | str, q: ArrayLike) -> NearestLinks | None:
         way = (points[1] - points[0]) / apart
         points = points + np.outer([first.radius, -second.radius], way)
     return NearestLinks(float(found[0]), (first.link, second.link), points)
+
+
+def clearance(robot: Robot | str, q: ArrayLike, obstacles: Sequence[Obstacle] = ()) -> Array:
+    """Least distance of an arm to itself and to obstacles ``(...)`` in metres, for configurations ``(..., n)``.
+
+    Negative where something touches; infinite if there is nothing to touch.
+    """
+    robot = robot_of(robot)
+    q = robot.check_q(q)
+    out, _ = surroundings(robot, checked_obstacles(obstacles)).distances(q.reshape(-1, robot.n))
+    return out.reshape(q.shape[:-1])
+
+
+def nearest_contact(robot: Robot | str, q: ArrayLike, obstacles: Sequence[Obstacle] = ()) -> Contact | None:
+    """What that distance is between, at one configuration ``(n,)``; None if there is nothing to touch.
+
+    Raises:
+        InputError: q is not one configuration, or an obstacle is malformed (named ``obstacles[i]``).
+    """
+    robot = robot_of(robot)
+    q = robot.check_q(q)
+    if q.ndim != 1:
+        raise InputError("q", f"shape {q.shape}", f"one configuration of {robot.n} values")
+    return surroundings(robot, checked_obstacles(obstacles)).nearest(q)

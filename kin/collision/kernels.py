@@ -106,6 +106,16 @@ def distances_of_pairs(model: Array, rows: Ints, shape: Array, pairs: Ints, q: A
     return out
 
 
+@inlined
+def beyond(A: Array, shape: Array, i: int, j: int, least: float) -> bool:
+    """Whether the balls around capsules i and j are farther apart than `least`."""
+    x = 0.5 * (A[i, 0] + A[i, 3] - A[j, 0] - A[j, 3])
+    y = 0.5 * (A[i, 1] + A[i, 4] - A[j, 1] - A[j, 4])
+    z = 0.5 * (A[i, 2] + A[i, 5] - A[j, 2] - A[j, 5])
+    most = least + shape[i, 7] + shape[j, 7]
+    return bool(most < 0.0 or x * x + y * y + z * z > most * most)
+
+
 @jit
 def least_distance(model: Array, rows: Ints, shape: Array, pairs: Ints, q: Array, ends: Array, out: Array) -> int:
     """Index of the pair with the least distance at q ``(n,)``, −1 without pairs.
@@ -119,6 +129,8 @@ def least_distance(model: Array, rows: Ints, shape: Array, pairs: Ints, q: Array
     at, by = 0.0, 0.0
     for p in range(pairs.shape[0]):
         first, second = pairs[p, 0], pairs[p, 1]
+        if beyond(ends, shape, first, second, least):
+            continue
         apart, s, t = segment_distance(ends, first, ends, second)
         apart -= shape[first, 6] + shape[second, 6]
         if apart < least:

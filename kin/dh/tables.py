@@ -20,11 +20,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.axes import screw_x
+from kin.axes import inverse, screw_x
 from kin.errors import InputError
 from kin.fk import fk
 from kin.named import robot_of
-from kin.robot import CONVENTIONS, IDENTITY, Convention, Joint, Matrix, Robot
+from kin.robot import CONVENTIONS, IDENTITY, Capsule, Convention, Joint, Matrix, Robot
 from kin.transforms import Array
 
 ALMOST = 0.05  # sine of an angle below which two axes count as almost parallel
@@ -53,8 +53,20 @@ def convert(robot: Robot | str, convention: Convention) -> Robot:
         shifted = [*offsets[1:], (0.0, 0.0)]
         base = _product(robot.base, screw_x(*offsets[0])) if any(offsets[0]) else robot.base
         tool = robot.tool
+    moved = tuple(_in_shifted_frame(each, offsets, convention) for each in robot.capsules)
     rows = tuple(replace(row, a=a, alpha=alpha) for row, (a, alpha) in zip(robot.rows, shifted, strict=True))
-    return replace(robot, convention=convention, rows=rows, base=base, tool=tool)
+    return replace(robot, convention=convention, rows=rows, base=base, tool=tool, capsules=moved)
+
+
+def _in_shifted_frame(capsule: Capsule, offsets: list[tuple[float, float]], to: Convention) -> Capsule:
+    """A capsule in the frame that its row has in the other convention: before or behind the next Tx(a) Rx(α)."""
+    if to == "modified":
+        T = np.array(screw_x(*offsets[capsule.row])) if capsule.row >= 0 else np.eye(4)
+    else:
+        shift = [*offsets, (0.0, 0.0)][capsule.row + 1]
+        T = inverse(np.array(screw_x(*shift)))
+    start, end = (tuple((T[:3, :3] @ p + T[:3, 3]).tolist()) for p in (capsule.start, capsule.end))
+    return replace(capsule, start=start, end=end)
 
 
 def largest_difference(one: Robot, other: Robot, samples: int = SAMPLES) -> float:

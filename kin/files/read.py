@@ -22,6 +22,7 @@ from kin.robot import (
     KIND_CODES,
     LENGTHS,
     PEAK_FIELDS,
+    Capsule,
     Joint,
     Matrix,
     Robot,
@@ -30,9 +31,13 @@ from kin.robot import (
 from kin.transforms import as_transform
 
 ANGLES = {"deg": math.pi / 180, "rad": 1.0}
-MAX_ROWS = 32
+MAX_ROWS, MAX_CAPSULES = 32, 64
 MAX_REACH = 1e5  # metres; targets may have coordinates up to 1e6 m
-_TOP = {"id", "name", "source", "description", "convention", "units", "rows", "home", "base", "tool"}
+_TOP = {
+    *("id", "name", "source", "description", "convention", "units", "rows", "home", "base", "tool"),
+    *("capsules", "capsules_source"),
+}
+_CAPSULE = {"row", "start", "end", "radius"}
 _ROW = {"name", "kind", "theta", "d", "a", "alpha", "limits", *PEAK_FIELDS}
 _QUANTITY = re.compile(rf"\s*({NUMBER})\s*(rad|deg|°|m|cm|mm)(/s[23²³]?)?\s*")
 PER = {"velocity": "/s", "acceleration": "/s2", "jerk": "/s3"}
@@ -135,6 +140,8 @@ class Reader:
             units=length,
             base=self.transform(data, "base"),
             tool=self.transform(data, "tool"),
+            capsules=self.capsules(data, rows),
+            capsules_source=self.text(data, "capsules_source", ""),
         )
         if robot.reach + float(np.linalg.norm(robot.T_world_base[:3, 3])) > MAX_REACH:
             raise self.refuse(
@@ -207,6 +214,37 @@ class Reader:
                 raise self.refuse(f"home.q[{k}]", raw, f"a value inside the limits of {joint.name}")
             values.append(value)
         return tuple(values)
+
+    def capsules(self, data: dict[str, Any], rows: Sequence[Joint]) -> tuple[Capsule, ...]:
+        """The bodies of the links, base first."""
+        given = data.get("capsules", [])
+        if not isinstance(given, list) or len(given) > MAX_CAPSULES:
+            shown = f"{len(given)} tables" if isinstance(given, list) else given
+            raise self.refuse("capsules", shown, f"at most {MAX_CAPSULES} [[capsules]] tables")
+        names = [row.name for row in rows]
+        found = []
+        for i, each in enumerate(given):
+            where = f"capsules[{i}]"
+            if not isinstance(each, dict):
+                raise self.refuse(where, each, "a table with row, start, end and radius")
+            self.only_known_fields(where + ".", each, _CAPSULE)
+            name = each.get("row")
+            if name is not None and name not in names:
+                valid = "the name of a row, or none for what stands still: " + ", ".join(names)
+                raise self.refuse(where + ".row", name, valid)
+            row = -1 if name is None else names.index(name)
+            start = self.point(each.get("start"), where + ".start")
+            end = self.point(each["end"], where + ".end") if "end" in each else start
+            radius = self.length_of(where + ".radius", each.get("radius"))
+            if not radius > 0.0:
+                raise self.refuse(where + ".radius", each.get("radius"), "a positive number")
+            link = sum(joint.kind != "fixed" for joint in rows[: row + 1])
+            found.append(Capsule(link, row, start, end, radius))
+        return tuple(sorted(found, key=lambda capsule: capsule.row))
+
+    def point(self, value: object, where: str) -> tuple[float, float, float]:
+        x, y, z = (self.length_of(f"{where}[{k}]", v) for k, v in enumerate(self.items(value, where, 3)))
+        return x, y, z
 
     def transform(self, data: dict[str, Any], key: str) -> Matrix:
         if key not in data:

@@ -19,7 +19,7 @@ from kin.errors import InputError
 from kin.files.numbers import scaled
 from kin.files.read import ANGLES, PER, UNLIMITED, Reader, matrix_of
 from kin.named import robot_of
-from kin.robot import IDENTITY, LENGTHS, Joint, Matrix, Robot, exact_cos_sin
+from kin.robot import IDENTITY, LENGTHS, Capsule, Joint, Matrix, Robot, exact_cos_sin
 from kin.transforms import Array
 from kin.units import Length
 
@@ -56,11 +56,15 @@ def robot_to_toml(robot: Robot | str, length: Length | None = None, angle: Angle
         in_degrees, in_radians = (robot_to_toml(robot, length, unit) for unit in get_args(Angle))
         return in_degrees if len(in_degrees) <= len(in_radians) else in_radians
     data = robot_to_dict(robot, length, angle)
-    rows, home = data.pop("rows"), data.pop("home")
+    home = data.pop("home")
+    tables = {key: data.pop(key, []) for key in ("rows", "capsules")}
     lines = [f"{key} = {_toml(value)}" for key, value in data.items()]
-    for row in rows:
-        lines += ["", "[[rows]]", *(f"{key} = {_toml(value)}" for key, value in row.items())]
-    return "\n".join([*lines, "", "[home]", f"q = {_toml(home['q'])}", ""])
+    for table, items in tables.items():
+        for item in items:
+            lines += ["", f"[[{table}]]", *(f"{key} = {_toml(value)}" for key, value in item.items())]
+        if table == "rows":
+            lines += ["", "[home]", f"q = {_toml(home['q'])}"]
+    return "\n".join([*lines, ""])
 
 
 def save_robot(robot: Robot | str, path: Path | str) -> None:
@@ -98,7 +102,19 @@ class _Writer:
         data["rows"] = [self.row(row) for row in robot.rows]
         pairs = zip(robot.joints, robot.home, strict=True)
         data["home"] = {"q": [self.value(value, joint.kind == "prismatic") for joint, value in pairs]}
+        if robot.capsules:
+            if robot.capsules_source:
+                data["capsules_source"] = robot.capsules_source
+            data["capsules"] = [self.capsule(robot, each) for each in robot.capsules]
         return data
+
+    def capsule(self, robot: Robot, capsule: Capsule) -> dict[str, Any]:
+        """The row is left out for what stands still, the end of a ball, too."""
+        data: dict[str, Any] = {} if capsule.row < 0 else {"row": robot.rows[capsule.row].name}
+        data["start"] = [self.value(x, True) for x in capsule.start]
+        if capsule.end != capsule.start:
+            data["end"] = [self.value(x, True) for x in capsule.end]
+        return data | {"radius": self.value(capsule.radius, True)}
 
     def row(self, row: Joint) -> dict[str, Any]:
         """Fields that are zero or the default are left out."""

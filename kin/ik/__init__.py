@@ -14,10 +14,12 @@ configuration to a target that cannot be reached, and solve tasks and arms witho
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 from numpy.typing import ArrayLike
 
+from kin.collision import Obstacle
 from kin.errors import InputError
 from kin.ik.answers import answer
 from kin.ik.options import (
@@ -68,6 +70,8 @@ def solve_ik(
     solver: Solver = "auto",
     position_tolerance: float | None = None,
     rotation_tolerance: float | None = None,
+    avoid_self_collision: bool = False,
+    obstacles: Sequence[Obstacle] = (),
 ) -> IKResult:
     """All configurations that bring the tool to `target`, or why there are none.
 
@@ -80,7 +84,7 @@ def solve_ik(
         limits: n pairs (lower, upper) inside the robot's own limits, None for a joint that keeps its own.
         locked: n joint values, None for a joint that may move.
         task, mask, mask_frame, respect_limits, branch, images, prefer, redundancy, max_solutions, solver,
-            position_tolerance, rotation_tolerance: as in `kin.IKOptions`.
+            position_tolerance, rotation_tolerance, avoid_self_collision, obstacles: as in `kin.IKOptions`.
 
     Raises:
         InputError: a malformed target, seed or option. An unreachable target is not an error.
@@ -96,6 +100,8 @@ def solve_ik(
             options = _options(*plain)
     else:
         options = _options(*plain, mask, JointConstraints(limits, locked), branch, redundancy)
+    if avoid_self_collision or obstacles:
+        options = replace(options, avoid_self_collision=avoid_self_collision, obstacles=obstacles)
     return solve(robot, target, options, q_seed)
 
 

@@ -11,12 +11,11 @@ import numpy as np
 
 from kin.axes import size
 from kin.fk import fk
-from kin.ik import failures, nearest, preferences
-from kin.ik.assembly import Found, by_key, leaves_motion, make_result
+from kin.ik import avoidance, failures, nearest, preferences
+from kin.ik.assembly import Found, by_key, leaves_motion, make_result, with_images
 from kin.ik.branches import Branches, Flags, is_closed, measure, solution, solve_branches
 from kin.ik.candidates import DISTANCE, OVERRUN
 from kin.ik.details import NotOnBranch, Solved
-from kin.ik.images import with_images
 from kin.ik.problem import IKProblem
 from kin.ik.results import IKResult, Status
 from kin.solvers.contract import APPROACH, POSE, POSITION
@@ -27,6 +26,13 @@ _SUSPICIOUS = 1e3  # times the rounding: where the formulas of a rounded table m
 
 def answer(problem: IKProblem) -> IKResult:
     """The answer to a checked problem."""
+    if not problem.options.avoids:
+        return _answer(problem)
+    most = problem.options.max_solutions
+    return avoidance.checked(problem, _answer(avoidance.with_all_solutions(problem)), most)
+
+
+def _answer(problem: IKProblem) -> IKResult:
     branches = solve_branches(problem, problem.T, problem.code)
     if branches is None:
         return _numeric(problem)
@@ -53,8 +59,25 @@ def answer(problem: IKProblem) -> IKResult:
 
 def _solved(problem: IKProblem, branches: Branches, good: Flags) -> IKResult:
     """The rows in `good` ``(k,)`` are the solutions."""
+    touching = 0
+    if problem.options.avoids:
+        if problem.options.prefer != "nearest":
+            preferences.improve(problem, branches, good)
+        free = avoidance.free_rows(problem, branches, good)
+        if not free.any():
+            return avoidance.all_touch(
+                problem, branches.q[good], np.flatnonzero(good), bool(branches.redundancies)
+            )
+        touching, good = int((good & ~free).sum()), free
+    result = _ordered(problem, branches, good)
+    return result if touching == 0 else avoidance.with_count(result, touching)
+
+
+def _ordered(problem: IKProblem, branches: Branches, good: Flags) -> IKResult:
+    """The rows in `good` ``(k,)`` as solutions, in the preferred order."""
     if problem.options.prefer != "nearest":
-        preferences.improve(problem, branches, good)
+        if not problem.options.avoids:
+            preferences.improve(problem, branches, good)
         order = by_key(branches.q, good, preferences.ranks(problem, branches.q, branches.stats[:, DISTANCE]))
     elif good is branches.good:
         order = branches.order
@@ -102,7 +125,8 @@ def _by_descents(problem: IKProblem) -> IKResult | None:
     Where the arm has a closed form for whole poses, it adds the other branches of the poses found.
     """
     prefer = problem.options.prefer
-    if problem.branches is None and prefer == "nearest":
+    avoids = problem.options.avoids
+    if problem.branches is None and prefer == "nearest" and not avoids:
         pool = nearest.solve_numerically(problem).q[None]
     else:
         starts = nearest.starting_points(problem, count=4 * nearest.STARTS)
@@ -118,12 +142,19 @@ def _by_descents(problem: IKProblem) -> IKResult | None:
     else:
         q, stats = preferences.centred(problem, q)
         key = preferences.ranks(problem, q, stats[:, DISTANCE])
+    clear = avoidance.is_free(problem, q) if avoids else np.ones(len(q), bool)
+    touching: list[int] = []
     # The best one of each branch: several descents may end on the same branch.
     best: dict[int, int] = {}
     for i in np.argsort(key, kind="stable").tolist():
         branch = problem.branch_of(q[i])
         if problem.allows(branch) and len(_usable(problem, q[i : i + 1], stats[i : i + 1])[0]):
-            best.setdefault(branch, i)
+            if clear[i]:
+                best.setdefault(branch, i)
+            else:
+                touching.append(i)
+    if touching and not best:
+        return avoidance.all_touch(problem, q[touching], None, leaves_motion(problem))
     if not best:
         details = NotOnBranch(len({problem.branch_of(row) for row in q}), 0)
         closest = nearest.closest(problem, None)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
+from kin.collision import Contact
 from kin.solvers.contract import Obstacle
 
 JointKind = Literal["revolute", "prismatic"]
@@ -59,6 +60,7 @@ class Solved(NamedTuple):
         postures: on how many branches the configurations are.
         free: labels of the redundancy parameters that may have other values.
         fixed: labels of those whose values were requested.
+        touching: how many configurations were left out because something touches.
     """
 
     configurations: int
@@ -69,6 +71,7 @@ class Solved(NamedTuple):
     postures: int = 1
     free: tuple[str, ...] = ()
     fixed: tuple[str, ...] = ()
+    touching: int = 0
 
 
 class Restriction(NamedTuple):
@@ -129,6 +132,22 @@ class OutsideLimits(NamedTuple):
     elsewhere: int
 
 
+class Touching(NamedTuple):
+    """Configurations exist, but in all of them the arm touches itself or an obstacle.
+
+    Attributes:
+        branch: the posture in which bodies overlap least.
+        contact: what touches there; `distance` is negative.
+        postures: how many postures were looked at, this one included.
+        searched: labels of the redundancy parameters that were searched.
+    """
+
+    branch: str
+    contact: Contact
+    postures: int
+    searched: tuple[str, ...] = ()
+
+
 class NotOnBranch(NamedTuple):
     """The requested branch does not exist at the target.
 
@@ -185,5 +204,13 @@ class OrientationNotMet(NamedTuple):
 
 
 Details = (
-    Solved | RollError | RotationError | OutsideLimits | NotOnBranch | MaskNotMet | OutOfReach | OrientationNotMet
+    Solved
+    | RollError
+    | RotationError
+    | OutsideLimits
+    | Touching
+    | NotOnBranch
+    | MaskNotMet
+    | OutOfReach
+    | OrientationNotMet
 )

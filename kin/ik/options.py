@@ -16,6 +16,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kin.collision.obstacles import Obstacle, checked_obstacles
 from kin.errors import InputError
 from kin.robot import Robot
 from kin.solvers.contract import APPROACH, MASK, POSE, POSITION, TASK_CODES
@@ -154,6 +155,9 @@ class IKOptions:
         solver: ``"numeric"`` ignores the arm's closed form.
         position_tolerance, rotation_tolerance: errors of a solution that count as none, metres and radians. None
             stands for 1e-9, or for the digits of a target whose rotation had to be made one.
+        avoid_self_collision: leave out configurations in which links of the arm touch each other, judged by
+            `kin.capsules`; redundancy parameters are searched for values without a touch.
+        obstacles: leave out configurations in which the arm touches one of these.
 
     Raises:
         InputError: an option that is malformed whatever the arm.
@@ -172,6 +176,8 @@ class IKOptions:
     solver: Solver = "auto"
     position_tolerance: float | None = None
     rotation_tolerance: float | None = None
+    avoid_self_collision: bool = False
+    obstacles: Sequence[Obstacle] = ()
 
     def __post_init__(self) -> None:
         _check_choice("task", self.task, TASKS)
@@ -189,6 +195,8 @@ class IKOptions:
             ("max_solutions", None if self.max_solutions is None else _whole_number(self.max_solutions)),
             ("position_tolerance", _tolerance("position_tolerance", self.position_tolerance, "m", MOST_METRES)),
             ("rotation_tolerance", _tolerance("rotation_tolerance", self.rotation_tolerance, "rad", MOST_RADIANS)),
+            ("avoid_self_collision", bool(self.avoid_self_collision)),
+            ("obstacles", checked_obstacles(self.obstacles) if self.obstacles != () else ()),
         ):
             object.__setattr__(self, name, value)
 
@@ -204,8 +212,13 @@ class IKOptions:
         return hash((
             self.task, self.mask, self.mask_frame, self.constraints, self.respect_limits, self.branch, self.images,
             self.prefer, self.redundancy, self.max_solutions, self.solver, self.position_tolerance,
-            self.rotation_tolerance,
+            self.rotation_tolerance, self.avoid_self_collision, self.obstacles,
         ))  # fmt: skip
+
+    @cached_property
+    def avoids(self) -> bool:
+        """Whether configurations are left out because something touches."""
+        return self.avoid_self_collision or bool(self.obstacles)
 
     @cached_property
     def coordinates(self) -> Coordinates:

@@ -24,6 +24,8 @@ Cause = Literal[
     "around the axis",
     "outside",
     "branch",
+    "self-collision",
+    "obstacle",
 ]
 
 
@@ -32,7 +34,8 @@ class Status(StrEnum):
 
     ``solved``: exact solutions. ``approximate``: an arm of few joints meets a part of the task. ``limits``:
     postures exist, all of them outside the joint limits. ``orientation``: the point can be reached, but not with
-    this orientation. ``unreachable``: the point cannot be reached, or not on the requested branch.
+    this orientation. ``unreachable``: the point cannot be reached, or not on the requested branch. ``collision``:
+    postures exist, in all of them the arm touches itself or an obstacle that was to be avoided.
     """
 
     SOLVED = "solved"
@@ -40,6 +43,7 @@ class Status(StrEnum):
     LIMITS = "limits"
     ORIENTATION = "orientation"
     UNREACHABLE = "unreachable"
+    COLLISION = "collision"
 
 
 class Deferred:
@@ -127,7 +131,8 @@ class IKResult(Deferred):
         status, cause: the kind of answer and its cause, as codes.
         details: the numbers behind them; see :mod:`kin.ik.details`.
         solutions: in the requested order (compromises: by their error); empty unless solved or approximate.
-        closest: without an exact solution, the configuration inside the limits with the smallest
+        closest: without a solution, the configuration (status ``collision``: the exact one in which bodies overlap
+            least) inside the limits with the smallest
             ``√(|Δp|² + (0.1 m · angle)²)`` found on the requested branches, else None.
         nearest_orientation: the configuration with the exact point and the smallest rotation error (status
             ``orientation``), None if none was found.

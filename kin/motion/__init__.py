@@ -18,10 +18,14 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from kin.collision import Obstacle
+from kin.collision.contacts import surroundings
+from kin.collision.obstacles import checked_obstacles
 from kin.errors import InputError
 from kin.ik.problem import never_cancel
 from kin.motion.limits import MotionLimits, limits_of
 from kin.motion.planner import planned
+from kin.motion.planning.collisions import checked
 from kin.motion.program import Circ, Dwell, JointTarget, Lin, PoseTarget, Program, Ptp, Spline
 from kin.motion.reading import parse_program, program_from_dict, program_to_dict
 from kin.motion.results import Motion, MotionSample, Peak, Refusal, SegmentTimes
@@ -57,6 +61,8 @@ def plan_motion(
     q_start: ArrayLike | None = None,
     *,
     limits: MotionLimits | None = None,
+    avoid_self_collision: bool = False,
+    obstacles: Sequence[Obstacle] = (),
     stop: Callable[[], None] = never_cancel,
 ) -> Motion:
     """The motion of a program, with every limit kept, or why it cannot be driven.
@@ -66,6 +72,8 @@ def plan_motion(
         program: a `Program`, its segments, or plain data as in `program_from_dict`.
         q_start: ``(n,)`` where the arm is; the home pose by default.
         limits: other limits than those of `limits_of`.
+        avoid_self_collision, obstacles: the motion is checked, and refused at the first place where the arm
+            touches itself or an obstacle. It is not led around them.
         stop: called now and then; cancels the computation by raising.
 
     Raises:
@@ -85,4 +93,7 @@ def plan_motion(
         limits = limits_of(robot)
     elif not isinstance(limits, MotionLimits) or len(limits.velocity) != robot.n:
         raise InputError("limits", limits, f"MotionLimits of {robot.n} joints")
-    return planned(robot, program, limits, q.copy(), stop)
+    found = planned(robot, program, limits, q.copy(), stop)
+    if avoid_self_collision or obstacles:
+        return checked(found, surroundings(robot, checked_obstacles(obstacles), avoid_self_collision), stop)
+    return found

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
+from kin.collision import Contact
 from kin.ik.details import Details, LimitViolation
 from kin.path.details import JointMove
 from kin.solvers.singular import Singularity
 
-Cause = Literal["start", "target", "unreachable", "limits", "singularity", "branch", "circle", "task"]
+Cause = Literal["start", "target", "unreachable", "limits", "singularity", "branch", "circle", "task", "collision"]
 HelpCode = Literal["ptp", "posture", "via", "start", "closer", "task"]
 
 
@@ -90,8 +91,28 @@ class NotKept(NamedTuple):
     rotation: float
 
 
+class Collides(NamedTuple):
+    """Cause ``collision``: the arm would touch itself or an obstacle that is to be avoided.
+
+    Attributes:
+        time: seconds from the start of the motion to the first contact.
+        contact: what touches.
+    """
+
+    time: float
+    contact: Contact
+
+
 RefusalDetails = (
-    StartOutside | TargetOutside | NotReached | LimitMet | SingularityMet | BranchNeeded | NoCircle | NotKept
+    StartOutside
+    | TargetOutside
+    | NotReached
+    | LimitMet
+    | SingularityMet
+    | BranchNeeded
+    | NoCircle
+    | NotKept
+    | Collides
 )
 
 

@@ -12,6 +12,7 @@ from kin.motion.details import (
     BlendLeftOut,
     BlendShortened,
     BranchNeeded,
+    Collides,
     Help,
     JerkCost,
     LimitMet,
@@ -91,6 +92,8 @@ def _why(details: RefusalDetails, units: Units) -> str:
         case NotKept(joints, position, rotation):
             off = f"{units.lengths.value(position)} and {units.angles.value(rotation)}"
             return f"{joints} joints cannot keep the path: it would be missed by {off}"
+        case Collides(time, contact):
+            return f"{contact.text} after {time:.2f} s"
 
 
 def note(fact: Note, units: Units) -> str:

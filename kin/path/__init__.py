@@ -28,6 +28,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kin.collision import Obstacle
 from kin.errors import InputError
 from kin.ik.options import Frame, IKOptions, JointConstraints, Limits, Locks, Task, finite_number
 from kin.ik.problem import IKProblem, listed, never_cancel, read_poses
@@ -60,6 +61,8 @@ def solve_path(
     branch: str | Sequence[str] | None = None,
     position_tolerance: float | None = None,
     rotation_tolerance: float | None = None,
+    avoid_self_collision: bool = False,
+    obstacles: Sequence[Obstacle] = (),
     max_step: float = MAX_STEP,
     stop: Callable[[], None] = never_cancel,
 ) -> PathResult:
@@ -70,8 +73,9 @@ def solve_path(
     Args:
         robot: the arm, or the id of a built-in one.
         targets: T_base_tool ``(k, 4, 4)``, k ≥ 1; for ``task="position"`` also points ``(k, 3)`` in metres.
-        task, mask, mask_frame, limits, locked, branch, position_tolerance, rotation_tolerance: as in
-            `kin.solve_ik`, for every waypoint; the branch ``"seed"`` is that of `q_start`.
+        task, mask, mask_frame, limits, locked, branch, position_tolerance, rotation_tolerance,
+            avoid_self_collision, obstacles: as in `kin.solve_ik`, for every waypoint; the branch ``"seed"`` is
+            that of `q_start`.
         q_start: ``(n,)`` where the arm is. The way from there to the first waypoint counts as motion, but never as
             a jump: the path begins at its first waypoint. Without it the path may start anywhere; of equally good
             paths, the one that starts nearest to the home pose is taken.
@@ -89,6 +93,8 @@ def solve_path(
         branch=branch,
         position_tolerance=position_tolerance,
         rotation_tolerance=rotation_tolerance,
+        avoid_self_collision=avoid_self_collision,
+        obstacles=obstacles,
     )
     return solve(robot, targets, options, q_start, max_step, stop)
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from kin.fk import jacobian
 from kin.ik import nearest
+from kin.ik.avoidance import is_free
 from kin.ik.branches import Branches, Flags, is_closed, measure, solve_branches
 from kin.ik.candidates import OVERRUN, POSITION_ERROR, ROLL, ROTATION_ERROR, select
 from kin.ik.problem import IKProblem
@@ -54,7 +55,12 @@ def meeting(problem: IKProblem, relaxed: bool, q: Array, near: Array) -> Array:
     if relaxed and good.any():
         roll = np.abs(stats[:, ROLL])
         good &= alike(roll, float(roll[good].min()))
-    return np.asarray(q[good])
+    return _free(problem, np.asarray(q[good]))
+
+
+def _free(problem: IKProblem, q: Array) -> Array:
+    """The configurations ``(m, n)`` that touch nothing that is to be avoided."""
+    return q[is_free(problem, q)] if problem.options.avoids and len(q) else q
 
 
 def _meets(problem: IKProblem, stats: Array) -> Flags:
@@ -78,6 +84,7 @@ def descended(problem: IKProblem, starts: Array) -> Array:
     q = q[_meets(problem, stats)]
     if problem.branches is not None:
         q = q[[problem.allows(problem.branch_of(row)) for row in q]]
+    q = _free(problem, q)
     return distinct(q, problem.seed)[:POOL]
 
 

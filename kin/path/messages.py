@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from kin.collision.contacts import Touch
 from kin.ik.messages.singularity import short
 from kin.ik.messages.values import count, joint, joint_value
 from kin.path.details import (
@@ -56,6 +57,20 @@ def summary(
         which = ", ".join(map(str, gaps[:_MOST_GAPS])) + (", …" if len(gaps) > _MOST_GAPS else "")
         text += f" No exact solution at {len(gaps)} of {number}: {which}."
     return text
+
+
+def contacts(found: Sequence[Touch], units: Units) -> str:
+    """Where the arm touches something."""
+    parts = []
+    for touch in found[:_MOST_JUMPS]:
+        place = (
+            f"at waypoint {touch.waypoint}"
+            if touch.share == 1.0
+            else f"between waypoints {touch.waypoint - 1} and {touch.waypoint}"
+        )
+        parts.append(f"{place} {touch.contact.text} by {units.lengths.value(-touch.contact.distance)}")
+    more = f", and in {len(found) - _MOST_JUMPS} more places" if len(found) > _MOST_JUMPS else ""
+    return f"Collisions: {'; '.join(parts)}{more}."
 
 
 def _where(place: Place) -> str:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from kin.collision.contacts import Touch, touches_along
+from kin.ik.avoidance import around
 from kin.ik.branches import measure
 from kin.ik.candidates import POSITION_ERROR, ROTATION_ERROR
 from kin.ik.details import RollError
@@ -14,6 +16,8 @@ from kin.path.results import PathGap, PathResult
 from kin.path.search import DeadEnd
 from kin.path.waypoints import LayerSequence, PathSettings, Waypoint, has_closed_form
 from kin.transforms import Array
+
+TOUCH_STEP = 0.02  # rad or m, between the configurations of a motion that are checked for contacts
 
 
 def report(sequence: LayerSequence, waypoints: list[Waypoint], q: Array, ends: list[DeadEnd]) -> PathResult:
@@ -38,6 +42,9 @@ def report(sequence: LayerSequence, waypoints: list[Waypoint], q: Array, ends: l
     closed_form = settings.problem.closed_form
     required = [waypoint.requested.requirement for waypoint in waypoints]
     position, rotation = stats[:, POSITION_ERROR].copy(), stats[:, ROTATION_ERROR].copy()
+    contacts: tuple[Touch, ...] = ()
+    if settings.problem.options.avoids:
+        contacts = touches_along(around(settings.problem), q, TOUCH_STEP, steps)
     for array in (q, position, rotation):
         array.flags.writeable = False
     return PathResult(
@@ -51,6 +58,8 @@ def report(sequence: LayerSequence, waypoints: list[Waypoint], q: Array, ends: l
         largest_step=_largest_step(settings, q),
         tolerances=(max(r.position for r in required), max(r.rotation for r in required)),
         target_error=max(waypoint.requested.target_error for waypoint in waypoints),
+        contacts=contacts,
+        avoids=settings.problem.options.avoids,
     )
 
 

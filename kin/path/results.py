@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from kin.collision.contacts import Touch
 from kin.ik.details import Details
 from kin.ik.messages import explain, rounded_target
 from kin.ik.results import Cause, Status
@@ -100,6 +101,9 @@ class PathResult:
         largest_step: the largest motion of a joint between neighbours; None for a single waypoint.
         tolerances: errors that count as none, metres and radians; the largest of all waypoints.
         target_error: how rounded the most rounded target is, as in `kin.IKResult`; 0 if none is.
+        contacts: if collisions are avoided, the motions between waypoints, and the gaps, at which the arm still
+            touches something; a jump is looked at only where it ends.
+        avoids: whether they are.
     """
 
     q: Array
@@ -112,6 +116,8 @@ class PathResult:
     largest_step: JointMove | None
     tolerances: tuple[float, float] = (TOLERANCES.closure_position, TOLERANCES.closure_rotation)
     target_error: float = 0.0
+    contacts: tuple[Touch, ...] = ()
+    avoids: bool = False
 
     def __repr__(self) -> str:
         """Number of waypoints, jumps and gaps, solver and reason: arrays are in the attributes."""
@@ -129,6 +135,8 @@ class PathResult:
         jumps = [(jump.index, jump.cause) for jump in self.jumps]
         gaps = [gap.index for gap in self.gaps]
         text = messages.summary(len(self.q), self.largest_step, jumps, gaps, units)
+        if self.contacts:
+            text += f" {messages.contacts(self.contacts, units)}"
         if not self.target_error:
             return text
         return f"{text} {rounded_target(self.target_error, self.tolerances, units, path=True)}"

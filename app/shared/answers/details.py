@@ -7,7 +7,7 @@ from typing import Any, Literal, cast
 from typing_extensions import TypedDict
 
 from app.shared.answers.document import documented
-from kin import LimitViolation, Redundancy, Singularity
+from kin import Contact, LimitViolation, Redundancy, Singularity
 from kin.ik.details import (
     Details,
     MaskNotMet,
@@ -17,6 +17,7 @@ from kin.ik.details import (
     Restriction,
     RotationError,
     Solved,
+    Touching,
 )
 from kin.ik.messages import singularity
 from kin.path import PathJump
@@ -113,6 +114,23 @@ class RestrictionAnswer(TypedDict):
 
 
 @documented
+class ContactAnswer(TypedDict):
+    """Two bodies that touch, or the two that are nearest to each other."""
+
+    distance: float
+    """Metres between them; negative where they overlap. How far a link is inside a box or cylinder counts up to
+    the axis of its capsule."""
+    link: int
+    """The link that joint `link` moves, from 1."""
+    other_link: int | None
+    """The other link, 0 for the base; null for an obstacle."""
+    obstacle: int | None
+    """Index into `obstacles`; null for a link."""
+    text: str
+    """Both in words."""
+
+
+@documented
 class IkDetails(TypedDict, total=False):
     """The numbers behind `cause`; which fields there are depends on it. Metres and radians."""
 
@@ -146,7 +164,8 @@ class IkDetails(TypedDict, total=False):
     violation: Violation | None
     """Cause "rotation": the limit that keeps the arm from the approach direction; null if no limit does."""
     branch: str
-    """Cause "joint limits": the posture that is closest to the limits."""
+    """Cause "joint limits": the posture that is closest to the limits. Causes "self-collision" and "obstacle": the
+    one in which bodies overlap least."""
     violations: list[Violation]
     """Cause "joint limits": its joint values outside the limits."""
     branches: int
@@ -155,6 +174,12 @@ class IkDetails(TypedDict, total=False):
     """Cause "joint limits": the requested redundancy parameters, with the values that satisfy the limits."""
     elsewhere: int
     """Causes "joint limits" and "branch": how many solutions there are on branches that were not requested."""
+    contact: ContactAnswer
+    """Causes "self-collision" and "obstacle": what touches in the posture `branch`, in which it overlaps least."""
+    searched: list[str]
+    """Causes "self-collision" and "obstacle": labels of the redundancy parameters that were searched."""
+    touching: int
+    """Cause "" (solved): how many configurations were left out because something touches; absent if none were."""
     outside_limits: int
     """Cause "branch": how many other branches exist, but outside the limits."""
     distance: float
@@ -208,6 +233,10 @@ def details_answer(details: Details) -> IkDetails:
             fields["violation"] = None if details.violation is None else violation_answer(details.violation)
         case Solved():
             fields["free"], fields["fixed"] = list(details.free), list(details.fixed)
+            if not details.touching:
+                del fields["touching"]
+        case Touching():
+            fields["contact"], fields["searched"] = contact_answer(details.contact), list(details.searched)
         case OrientationNotMet():
             found = details.obstacle
             if found is not None:
@@ -244,6 +273,17 @@ def jump_details_answer(jump: PathJump) -> JumpDetailsAnswer:
             answer["max_step"], answer["step_joint"] = max_step.motion, max_step.joint
             answer["distance"], answer["rotation"] = distance, rotation
     return answer
+
+
+def contact_answer(contact: Contact) -> ContactAnswer:
+    """What touches."""
+    return {
+        "distance": contact.distance,
+        "link": contact.link,
+        "other_link": contact.other,
+        "obstacle": contact.obstacle,
+        "text": contact.text,
+    }
 
 
 def violation_answer(violation: LimitViolation) -> Violation:

@@ -81,11 +81,12 @@ class Tolerances(TypedDict):
 class IkAnswer(TypedDict):
     """Inverse kinematics of one target. A target out of reach is an answer too: read `status`."""
 
-    status: Literal["solved", "approximate", "limits", "orientation", "unreachable"]
+    status: Literal["solved", "approximate", "limits", "orientation", "unreachable", "collision"]
     """"solved": at least one exact answer. "approximate": the arm meets only a part of the task; `solutions` are
     the best compromises. "limits": postures exist, all of them outside the joint limits, see `blocked`.
     "orientation": the point can be reached, but not with this orientation; see `nearest_orientation`.
-    "unreachable": the point is `distance` metres out of reach, or the requested branch does not exist there."""
+    "unreachable": the point is `distance` metres out of reach, or the requested branch does not exist there.
+    "collision": postures exist, in all of them something touches that was to be avoided."""
     cause: Cause
     """Why it is not solved, as a code; empty when it is solved. "too far", "too near", "around the axis" and
     "outside" say where a point out of reach is."""
@@ -106,7 +107,8 @@ class IkAnswer(TypedDict):
     """Nearest to the seed first, or in the order of `prefer`; empty unless "solved" or "approximate"."""
     closest: Solution | None
     """When there is no exact answer, the configuration inside the limits with the least
-    √(|Δp|² + (0.1 m · angle)²) on the requested branches; null when solved."""
+    √(|Δp|² + (0.1 m · angle)²) on the requested branches; null when solved. For "collision": the exact one in
+    which bodies overlap least."""
     nearest_orientation: Solution | None
     """For "orientation": the exact point with the least rotation error; null otherwise."""
     blocked: list[Blocked]
@@ -195,7 +197,7 @@ class ReachableAnswer(TypedDict):
 
     reachable: bool
     """Whether it meets the whole task exactly."""
-    status: Literal["solved", "approximate", "limits", "orientation", "unreachable"]
+    status: Literal["solved", "approximate", "limits", "orientation", "unreachable", "collision"]
     """What kind of answer `ik` gives: "solved" if it is reachable."""
     cause: Cause
     """What is in the way, as a code; empty when it is reachable."""

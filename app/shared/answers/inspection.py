@@ -15,6 +15,7 @@ from app.shared.answers.document import documented
 from app.shared.answers.robots import RobotAnswer, robot_answer
 from kin import Robot, jacobian
 from kin.axes import Pair, generic_q, pairs, parallel_groups, size, spherical_groups
+from kin.collision.bodies import bodies_of
 from kin.files.home import candidates, margins
 from kin.solvers import closed_form_of
 
@@ -36,6 +37,37 @@ class PairAnswer(TypedDict):
     """Kind of the angle; "same line" for coincident axes."""
     intersect: bool
     """Whether the axes intersect."""
+
+
+@documented
+class CapsuleAnswer(TypedDict):
+    """A part of a link's body: all points within `radius` of a segment."""
+
+    link: int
+    """0 for the base, k for the link that joint k moves."""
+    row: int
+    """Index of the DH row in whose frame the points are; -1 for the frame before the first row."""
+    start: list[float]
+    """One end of the segment, in metres."""
+    end: list[float]
+    """The other end."""
+    radius: float
+    """In metres."""
+
+
+@documented
+class BodiesAnswer(TypedDict):
+    """The bodies of the links, and which of them are compared."""
+
+    assumed: bool
+    """Whether they are assumed along the lengths of the table, because the arm's file states none."""
+    source: str
+    """Where they are from; empty if that is not stated."""
+    capsules: list[CapsuleAnswer]
+    """Base first."""
+    compared: list[list[int]]
+    """Pairs of links that are compared: not those that share a joint, touch at home or nearly always, or have one
+    link between them and hardly touch."""
 
 
 @documented
@@ -65,6 +97,8 @@ class InspectionAnswer(TypedDict):
     """Why this solver was chosen."""
     warnings: list[str]
     """Likely mistakes in the table, one sentence each."""
+    bodies: BodiesAnswer
+    """What self-collisions are judged by."""
 
 
 def inspect(robot: Robot, taken: bool = False) -> InspectionAnswer:
@@ -83,6 +117,21 @@ def inspect(robot: Robot, taken: bool = False) -> InspectionAnswer:
         "solver": "numeric" if match is None else match.name,
         "reason": "none of Kinboard's closed forms fits this arm's axes" if match is None else match.reason,
         "warnings": [*_odd_table(robot, taken), *_odd_axes(robot, between), *_odd_motion(robot, count, margin)],
+        "bodies": _bodies(robot),
+    }
+
+
+def _bodies(robot: Robot) -> BodiesAnswer:
+    found = bodies_of(robot)
+    links = np.array([each.link for each in found.capsules], np.int64)
+    return {
+        "assumed": not robot.capsules,
+        "source": robot.capsules_source,
+        "capsules": [
+            {"link": c.link, "row": c.row, "start": list(c.start), "end": list(c.end), "radius": c.radius}
+            for c in found.capsules
+        ],
+        "compared": sorted({(int(a), int(b)): [int(a), int(b)] for a, b in links[found.pairs]}.values()),
     }
 
 

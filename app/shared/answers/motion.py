@@ -9,16 +9,18 @@ import numpy as np
 from typing_extensions import TypedDict
 
 from app.shared.answers.details import (
+    ContactAnswer,
     IkDetails,
     SingularityAnswer,
     Violation,
+    contact_answer,
     details_answer,
     singularity_answer,
     violation_answer,
 )
 from app.shared.answers.document import documented
 from app.shared.answers.fk import Matrix
-from kin import Motion
+from kin import Contact, Motion
 from kin.ik.details import LimitViolation
 from kin.ik.results import Cause as IkCause
 from kin.motion import MotionLimits, MotionSample, Peak, Refusal, messages
@@ -110,6 +112,10 @@ class RefusalDetailsAnswer(TypedDict, total=False):
     """Cause "task": by how much the path is missed."""
     rotation: float
     """Cause "task": by how much the orientations on the path are missed."""
+    time: float
+    """Cause "collision": seconds from the start to the first contact."""
+    contact: ContactAnswer
+    """Cause "collision": what touches."""
 
 
 @documented
@@ -326,6 +332,8 @@ def _field(value: object) -> object:
     match value:
         case LimitViolation():
             return violation_answer(value)
+        case Contact():
+            return contact_answer(value)
         case Singularity():
             return singularity_answer(value)
         case JointMove():

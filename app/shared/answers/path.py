@@ -6,12 +6,21 @@ from typing import Literal, NotRequired, cast
 
 from typing_extensions import TypedDict
 
-from app.shared.answers.details import IkDetails, JumpDetailsAnswer, details_answer, jump_details_answer
+from app.shared.answers.details import (
+    ContactAnswer,
+    IkDetails,
+    JumpDetailsAnswer,
+    contact_answer,
+    details_answer,
+    jump_details_answer,
+)
 from app.shared.answers.document import documented
 from app.shared.answers.fk import Matrix
 from app.shared.answers.ik import Tolerances, tolerances_answer
 from kin import PathResult
 from kin.ik.results import Cause
+
+GapStatus = Literal["approximate", "limits", "orientation", "unreachable", "collision"]
 
 
 @documented
@@ -40,7 +49,7 @@ class GapAnswer(TypedDict):
 
     index: int
     """Which waypoint, counted from 0."""
-    status: Literal["approximate", "limits", "orientation", "unreachable"]
+    status: GapStatus
     """The kind of answer that `ik` gives there."""
     cause: Cause
     """Its cause, as in the answers of `ik`."""
@@ -50,6 +59,18 @@ class GapAnswer(TypedDict):
     """Its sentence for people."""
     distance: float
     """How far out of reach it is, in metres; 0 within reach."""
+
+
+@documented
+class TouchAnswer(TypedDict):
+    """Where a path still touches something."""
+
+    index: int
+    """It is on the way from waypoint index − 1 to waypoint index, counted from 0."""
+    share: float
+    """The share of this way at which the first touch was found, 0 to 1; 1 at the waypoint itself."""
+    contact: ContactAnswer
+    """The deepest contact on this way."""
 
 
 @documented
@@ -72,6 +93,8 @@ class PathAnswer(TypedDict):
     """Name of the method that answered."""
     reason: str
     """The whole in a sentence for people."""
+    contacts: NotRequired[list[TouchAnswer]]
+    """If collisions are avoided: where the path still touches something, at gaps or between waypoints."""
     tolerances: NotRequired[Tolerances]
     """The errors that count as none, if they are not 1e-9; the largest ones of all waypoints."""
 
@@ -95,7 +118,7 @@ def path_answer(result: PathResult) -> PathAnswer:
         "gaps": [
             {
                 "index": gap.index,
-                "status": cast(Literal["approximate", "limits", "orientation", "unreachable"], gap.status.value),
+                "status": cast(GapStatus, gap.status.value),
                 "cause": gap.cause,
                 "details": details_answer(gap.details),
                 "reason": gap.reason,
@@ -108,6 +131,11 @@ def path_answer(result: PathResult) -> PathAnswer:
         "solver": result.solver,
         "reason": result.reason,
     }
+    if result.avoids:
+        answer["contacts"] = [
+            {"index": touch.waypoint, "share": touch.share, "contact": contact_answer(touch.contact)}
+            for touch in result.contacts
+        ]
     tolerances = tolerances_answer(result)
     if tolerances is not None:
         answer["tolerances"] = tolerances

@@ -12,10 +12,12 @@ import viser
 from app.viewer.panel.posture import short
 from app.viewer.views.templates import render
 from kin import IKResult, IKSolution, Robot
-from kin.ik.details import OrientationNotMet, OutOfReach, OutsideLimits, RollError, RotationError, Solved
+from kin.ik.details import OrientationNotMet, OutOfReach, OutsideLimits, RollError, RotationError, Solved, Touching
 from kin.units import Units
 
-Kind = Literal["reached", "compromise", "limits", "orientation", "unreachable", "hand", "advice", "error"]
+Kind = Literal[
+    "reached", "compromise", "limits", "orientation", "unreachable", "hand", "advice", "error", "collision"
+]
 # s: news such as "Undone: Home" are shown this long, then again what is true now.
 NEWS = 10.0
 UNSEEN = 1.0  # s: news are shown at least this long, whatever else happens
@@ -30,6 +32,7 @@ LOOKS: dict[Kind, tuple[str, str]] = {
     "hand": ("↻", "kb-blue"),
     "advice": ("i", "kb-amber"),
     "error": ("?", "kb-violet"),
+    "collision": ("⊗", "kb-crimson"),
 }
 
 
@@ -51,7 +54,7 @@ def notice(result: IKResult, units: Units) -> Notice:
     """The result for a target as a message."""
     explanation = result.explain(units)
     detail = explanation.detail
-    if isinstance(result.details, OutsideLimits):
+    if isinstance(result.details, OutsideLimits | Touching):
         detail = detail.replace(result.details.branch, short(result.details.branch))
     off = _farther_off(result, units)
     if off:
@@ -73,6 +76,8 @@ def key_number(result: IKResult, units: Units) -> str:
                 if off
                 else f"{units.distance(distance)} {_OUT_OF_REACH.get(result.cause, 'out of reach')}"
             )
+        case Touching(_, contact):
+            return contact.text
         case RollError(_, error):
             return f"roll {units.angle(error)} off"
         case RotationError(_, error):
@@ -117,6 +122,8 @@ def _kind(result: IKResult) -> Kind:
             return "limits"
         case OrientationNotMet():
             return "orientation"
+        case Touching():
+            return "collision"
     return "unreachable"
 
 

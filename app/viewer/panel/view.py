@@ -44,6 +44,7 @@ class ViewState:
         base_axes: whether the gizmo is aligned with the base instead of the tool.
         look: how an arm is drawn of which there is a body.
         detailed: whether the body is that of an installed package, for arms of which there is one.
+        avoid: whether the arm is moved to targets without touching itself.
     """
 
     frames: bool = False
@@ -53,6 +54,7 @@ class ViewState:
     base_axes: bool = False
     look: Look = "body"
     detailed: bool = False
+    avoid: bool = False
 
 
 class UnitChoice:
@@ -105,6 +107,11 @@ class ViewOptions:
                 "axes",
                 "Joint axes",
                 "The axis of each joint of a skeleton; its arrow shows the positive turn",
+            ),
+            (
+                "avoid",
+                "Avoid self-collision",
+                "While you drag the target: only postures in which no two links touch. Links that touch are red.",
             ),
         ):
             self._add_box(name, text, hint, state, post)

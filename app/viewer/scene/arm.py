@@ -15,7 +15,7 @@ import viser
 from app.viewer.labels import add_label
 from app.viewer.panel.view import Look
 from app.viewer.scene.bodies import Drawing, drawing
-from app.viewer.scene.bodies.nodes import GHOST, DrawnBody
+from app.viewer.scene.bodies.nodes import GHOST, DrawnBody, LinkColors
 from app.viewer.scene.bodies.parts import Part
 from app.viewer.scene.chain import turn
 from app.viewer.scene.clearance import Contact, clearance_of
@@ -54,6 +54,7 @@ class ArmScene:
     Attributes:
         gizmo: the transform controls; the visitor drags them, `place_gizmo` moves them. If some rotations are not
             available, the gizmo has only arrows, and each available ring is a child node (`set_gizmo_axes`).
+        colors: paints links that touch each other.
         gizmo_in_base: whether `place_gizmo` aligns the gizmo with the base instead of the tool.
     """
 
@@ -75,6 +76,7 @@ class ArmScene:
         self._frames: list[viser.SceneNodeHandle] = []
         self._labels: list[viser.SceneNodeHandle] = []
         self._bodies: list[viser.MeshHandle] = []
+        self.colors = LinkColors()
         self._nodes: list[str] = []  # names of the nodes of the links, base first
         self._axes: list[viser.MeshHandle] = []
         self._through = False
@@ -236,7 +238,7 @@ class ArmScene:
 
     def use_drawing(self, drawn: Drawing | None) -> None:
         """Draw the body that looks like the real arm in this way; None: there is none."""
-        self._drawn.use(drawn)
+        self._drawn.use(drawn, self.colors)
         self._skeleton_clear = clearance_of(self.robot, None)
         self._clear = clearance_of(self.robot, drawn)
         turned = self._ghost.wxyz
@@ -321,6 +323,8 @@ class ArmScene:
                     else self._add(name, part)
                 )
                 (self._axes if part.name == "axis" else self._bodies).append(node)
+                if part.name != "axis":
+                    self.colors.add(link.index + (not part.fixed_to_parent), node, part.color)
             self._nodes.append(name)
             for row, T in link.frames:
                 self._add_frame(name, row, T)
@@ -388,13 +392,6 @@ class ArmScene:
         # At the tip of z, each further out than the last: the frames of one wrist share their origin.
         origins = np.vstack([self.robot.T_world_base[None, :3, 3], self._home_frames[:, :3, 3]])
         crowd = int((np.linalg.norm(origins[: row + 1] - origins[row + 1], axis=1) < 1e-6).sum())
-        self._labels.append(
-            add_label(
-                self._scene,
-                f"{name}/label",
-                text,
-                position=(0.0, 0.0, (1.15 + 0.6 * crowd) * length),
-                anchor="center-center",
-                visible=True,
-            )
-        )
+        place = (0.0, 0.0, (1.15 + 0.6 * crowd) * length)
+        label = add_label(self._scene, f"{name}/label", text, position=place, anchor="center-center", visible=True)
+        self._labels.append(label)

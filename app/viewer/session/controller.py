@@ -32,6 +32,7 @@ from app.viewer.scene.bodies import Drawing
 from app.viewer.scene.gizmo_axes import gizmo_axes
 from app.viewer.scene.motion import Motion, Pace
 from kin import IKOptions, IKResult, JointConstraints, Robot, Task
+from kin.collision.contacts import surroundings
 from kin.ik import solve
 from kin.transforms import Array, rotation_from_wxyz
 
@@ -79,6 +80,7 @@ class ArmController:
         dragging: whether the visitor holds the gizmo.
         playing: whether a feature moves the arm frame by frame.
         snap: whether the gizmo is dragged in fixed steps.
+        avoid: whether targets are solved without self-collision.
         scene: the arm's nodes.
     """
 
@@ -101,6 +103,7 @@ class ArmController:
         self.dragging = False
         self.playing = False
         self.snap = False
+        self.avoid = False
         self._in_base = False
         self._drag_start: tuple[Array, Array] = np.eye(4), np.eye(3)  # target pose, gizmo orientation
 
@@ -145,7 +148,26 @@ class ArmController:
         locked = None
         if any(self.locks):
             locked = tuple(x if lock else None for x, lock in zip(self.goal.tolist(), self.locks, strict=True))
-        return IKOptions(task=self.task, constraints=JointConstraints(locked=locked), branch=self.branch)
+        constraints = JointConstraints(locked=locked)
+        return IKOptions(
+            task=self.task, constraints=constraints, branch=self.branch, avoid_self_collision=self.avoid
+        )
+
+    @property
+    def self_contact(self) -> kin.Contact | None:
+        """The two links that touch at the configuration shown.
+
+        Bodies that are only assumed are judged on request: they may be far from those that are drawn.
+        """
+        judged = self.avoid or self.robot.capsules
+        return surroundings(self.robot).touching(self.q) if judged else None
+
+    def avoid_self_collision(self, avoid: bool) -> None:
+        """Solve targets with or without regard to self-collisions."""
+        if avoid != self.avoid:
+            self.avoid = avoid
+            self._request_changed()
+            self._listener.on_pose(kin.fk(self.robot, self.q))
 
     # Motions
 

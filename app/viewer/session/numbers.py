@@ -100,7 +100,9 @@ class Numbers:
             if self._pose_due:
                 self._pose_due = False
                 target = None if arm.open_target is None else arm.open_target[:3, 3]
-                page.status.warn(arm.scene.show_contact(arm.scene.contact_at(arm.q), target))
+                passes = arm.scene.show_contact(arm.scene.contact_at(arm.q), target)
+                touches = arm.scene.colors.show(arm.self_contact)
+                page.status.warn(" ".join(filter(None, (touches, passes))))
                 self._show_pose(kin.fk(arm.robot, arm.q), arm.open_target)
             if self._sliders_due:
                 self._sliders_due = False

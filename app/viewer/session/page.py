@@ -1,8 +1,7 @@
 """One visitor's page: panel, status line, features, camera and saved state, driven by one worker thread.
 
 Browser callbacks post events into the inbox and return. The worker takes all new events, processes them, and sends
-one consistent update. While the arm is moving it also wakes up for the next frame; otherwise it sleeps. Nothing
-here is locked, because nothing here is shared.
+one consistent update. While the arm moves it also wakes up for each frame. Nothing is shared or locked here.
 
 The arm itself belongs to the :class:`~app.viewer.session.controller.ArmController`.
 """
@@ -252,6 +251,7 @@ class VisitorPage(ShownArm, Worker):
 
     def _apply_view(self) -> None:
         scene = self.arm.scene
+        self.arm.avoid_self_collision(self.view.avoid)
         scene.show_as(self.view.look)
         scene.show_frames(self.view.frames)
         scene.show_labels(self.view.labels)

@@ -20,6 +20,7 @@ from kin.ik.details import (
     RollError,
     RotationError,
     Solved,
+    Touching,
 )
 from kin.ik.messages.obstacle import clause_of
 from kin.ik.messages.singularity import short
@@ -138,6 +139,8 @@ def _outcome(details: Details, cause: str, task: str, units: Units) -> tuple[str
             return f"Point reached, orientation off by {angle(error)}", why
         case OutsideLimits():
             return "Outside the limits", _outside(details, units)
+        case Touching():
+            return "No posture without a collision", _touching(details, units)
         case NotOnBranch(elsewhere, outside):
             why = f"{count(outside, 'other posture exists', 'other postures exist')}, outside the joint limits"
             if elsewhere:
@@ -160,7 +163,27 @@ def _outcome(details: Details, cause: str, task: str, units: Units) -> tuple[str
             return held, "; ".join(filter(None, parts))
 
 
+def _touching(details: Touching, units: Units) -> str:
+    """What touches what in the posture in which it overlaps least."""
+    contact, name = details.contact, f" ({details.branch})" if details.branch != "numeric" else ""
+    text = f"{contact.text} by {units.lengths.value(-contact.distance)}"
+    if details.searched:
+        text += f" at best, whatever the value of {listed(details.searched)}"
+    if details.postures == 1:
+        return f"{text}{name}"
+    others = count(details.postures - 1, "other posture overlaps", "other postures overlap")
+    return f"{text} in the posture that overlaps least{name}; {others} more"
+
+
 def _solved(details: Solved, task: str) -> str:
+    """How many configurations there are, and whether these are all."""
+    text = _counted(details, task)
+    if not details.touching:
+        return text
+    return f"{text}; {count(details.touching, 'other one collides', 'others collide')}"
+
+
+def _counted(details: Solved, task: str) -> str:
     """How many configurations there are, and whether these are all."""
     chosen = details.chosen_branches
     inside = "" if chosen is None else f" in the chosen posture{'s' * (chosen != 1)}"

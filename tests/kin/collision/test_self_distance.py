@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -62,7 +63,8 @@ def test_no_two_points_of_the_segments_are_nearer(A, B):
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.id)
 def test_the_capsules_follow_the_arm(robot):
-    """The capsules of a link begin where it is joined to the link before, and the last ends at the tool."""
+    """Assumed capsules of a link begin where it is joined to the link before, and the last ends at the tool."""
+    robot = replace(robot, capsules=())
     q = robot.random_q(np.random.default_rng(3))
     found = kin.capsules(robot)
     assert [c.link for c in found] == sorted(c.link for c in found)
@@ -76,6 +78,28 @@ def test_the_capsules_follow_the_arm(robot):
     for first, second in pairwise(found):
         if first.link == second.link:
             assert np.linalg.norm(ends(first, robot, q)[1] - ends(second, robot, q)[0]) < 1e-12
+
+
+@pytest.mark.parametrize("robot", [robot for robot in ROBOTS if robot.capsules], ids=lambda robot: robot.id)
+def test_stated_capsules_reach_every_link_and_the_tool(robot):
+    """Every link has a body, home is clear, and the last one ends at the tool point."""
+    found = kin.capsules(robot)
+    assert {c.link for c in found} == set(range(robot.n + 1))
+    assert kin.self_distance(robot, robot.q_home) > 0.0
+    tool, far = kin.fk(robot, robot.q_home)[:3, 3], []
+    for c in found:
+        if c.link == robot.n:
+            start, end = ends(c, robot, robot.q_home)
+            points = start + np.linspace(0.0, 1.0, 50)[:, None] * (end - start)
+            far.append(np.linalg.norm(points - tool, axis=1).min() - c.radius)
+    assert min(far) < 0.02
+
+
+def test_a_longer_tool_gets_a_body():
+    arm = kin.get_robot("ur5").with_tool(kin.from_xyz_rpy((0.0, 0.0, 0.4)))
+    last = kin.capsules(arm)[-1]
+    assert (last.link, last.end) == (6, (0.0, 0.0, 0.4))
+    assert len(kin.capsules(arm)) == len(arm.capsules) + 1
 
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.id)

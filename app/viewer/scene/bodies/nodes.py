@@ -9,10 +9,46 @@ import viser
 from app.viewer.scene.bodies import Drawing
 from app.viewer.scene.bodies.parts import Color, Part
 from app.viewer.scene.shapes import merged, placed
+from kin import Contact
 from kin.axes import inverse
 from kin.transforms import Array
 
 GHOST = 0.35  # opacity of the hand at a target
+
+TOUCHING: Color = (204, 20, 60)
+
+
+class LinkColors:
+    """Paints links that touch something. Nothing is sent while the same links touch."""
+
+    def __init__(self) -> None:
+        self._parts: dict[str, tuple[viser.MeshHandle, int, Color]] = {}
+        self._marked: frozenset[int] = frozenset()
+
+    def add(self, link: int, node: viser.MeshHandle, color: Color) -> None:
+        """A mesh of a link, 0 for the base."""
+        self._parts[node.name] = node, link, color
+        if link in self._marked:
+            node.color = TOUCHING
+
+    def forget(self, nodes: Sequence[viser.MeshHandle]) -> None:
+        """These meshes have been removed."""
+        for node in nodes:
+            self._parts.pop(node.name, None)
+
+    def show(self, contact: Contact | None) -> str:
+        """Paint the links that touch; returns the sentence about them, or ""."""
+        links = () if contact is None else (contact.link, contact.other)
+        self._mark(frozenset(link for link in links if link is not None))
+        return "" if contact is None else f"{contact.text[0].upper()}{contact.text[1:]}."
+
+    def _mark(self, links: frozenset[int]) -> None:
+        changed, self._marked = links ^ self._marked, links
+        if not changed:
+            return
+        for node, link, color in self._parts.values():
+            if link in changed:
+                node.color = TOUCHING if link in links else color
 
 
 class DrawnBody:
@@ -47,8 +83,9 @@ class DrawnBody:
         self.nodes: list[viser.MeshHandle] = []
         self.hand: list[viser.MeshHandle] = []
 
-    def use(self, drawing: Drawing | None) -> None:
+    def use(self, drawing: Drawing | None, colors: LinkColors) -> None:
         """Replace the body; the new one is visible, its ghost is not."""
+        colors.forget(self.nodes)
         for node in (*self.nodes, *self.hand):
             node.remove()
         self._count += 1
@@ -56,7 +93,9 @@ class DrawnBody:
         if drawing is None:
             return
         for k, (parent, parts) in enumerate(zip(self._links, drawing.parts, strict=True)):
-            self.nodes += [self._add(parent, part, name=f"{part.name}-{k}-{self._count}") for part in parts]
+            for part in parts:
+                self.nodes.append(self._add(parent, part, name=f"{part.name}-{k}-{self._count}"))
+                colors.add(k, self.nodes[-1], part.color)
         if drawing.parts[-1]:
             hand = merged([placed(part.mesh, self._T_tool_last) for part in drawing.parts[-1]])
             ghost = Part(f"hand-{self._count}", hand, self._color)

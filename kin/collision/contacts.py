@@ -1,0 +1,125 @@
+"""What an arm touches: itself, or obstacles around it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kin.collision.bodies import Bodies, bodies_of
+from kin.collision.obstacles import Obstacle
+from kin.collision.solids import COLUMNS, least_clearances
+from kin.robot import Robot
+from kin.transforms import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """The smallest distance of an arm to itself and to obstacles, and what it is between.
+
+    Attributes:
+        distance: m; negative where the bodies overlap. How far a link is inside a box or a cylinder is counted up
+            to the axis of its capsule.
+        link: k for the link that joint k moves; of two links, the one farther from the base.
+        other: the other link, 0 for the base; None if the other is an obstacle.
+        obstacle: which of the obstacles; None if the other is a link.
+        name: of the obstacle, or its shape.
+    """
+
+    distance: float
+    link: int
+    other: int | None
+    obstacle: int | None = None
+    name: str = ""
+
+    @property
+    def text(self) -> str:
+        """The two in a clause: ``"link 6 touches link 2"``."""
+        if self.other is None:
+            return f"link {self.link} touches {self.name}"
+        return f"link {self.link} touches {f'link {self.other}' if self.other else 'the base'}"
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """What the configurations of an arm are checked against: arrays for the kernels."""
+
+    robot: Robot
+    bodies: Bodies
+    pairs: NDArray[np.int64]
+    obstacles: tuple[Obstacle, ...]
+    solids: Array
+
+    def distances(self, q: Array) -> tuple[Array, NDArray[np.int64]]:
+        """The least distance at configurations ``(k, n)``, and a number that says between what, for `contact`."""
+        body, out, which = self.bodies, np.empty(len(q)), np.empty(len(q), np.int64)
+        least_clearances(
+            *(self.robot.model, body.rows, body.shape, self.pairs, self.solids, body.moving),
+            *(np.ascontiguousarray(q), out, which),
+        )
+        return out, which
+
+    def contact(self, distance: float, which: int) -> Contact | None:
+        """What a distance is between; None if there is nothing to be apart from."""
+        if which < 0:
+            return None
+        links, count = self.bodies.capsules, len(self.pairs)
+        if which < count:
+            first, second = self.pairs[which].tolist()
+            return Contact(distance, links[second].link, links[first].link)
+        row, k = divmod(which - count, len(self.obstacles))
+        return Contact(distance, links[self.bodies.moving[row]].link, None, k, self.obstacles[k].label)
+
+    def nearest(self, q: Array) -> Contact | None:
+        """The least distance at one configuration ``(n,)``."""
+        out, which = self.distances(q[None])
+        return self.contact(float(out[0]), int(which[0]))
+
+    def touching(self, q: Array) -> Contact | None:
+        """The deepest contact at one configuration ``(n,)``; None if nothing touches."""
+        found = self.nearest(q)
+        return None if found is None or found.distance >= 0.0 else found
+
+
+@lru_cache(maxsize=256)
+def surroundings(robot: Robot, obstacles: tuple[Obstacle, ...] = (), links: bool = True) -> Surroundings:
+    """What an arm may touch: its own links, if `links`, and obstacles."""
+    body = bodies_of(robot)
+    rows = [each.row for each in obstacles]
+    solids = np.array(rows).reshape(-1, COLUMNS)
+    return Surroundings(robot, body, body.pairs if links else body.pairs[:0], obstacles, solids)
+
+
+class Touch(NamedTuple):
+    """Where a path touches something: at a share from 0 to 1 of the way from row `waypoint` − 1 to it."""
+
+    waypoint: int
+    share: float
+    contact: Contact
+
+
+def touches_along(near: Surroundings, path: Array, step: float, jumps: Collection[int] = ()) -> tuple[Touch, ...]:
+    """Where the straight joint motions between neighbours of a path ``(k, n)`` touch something.
+
+    Of each motion the first touch that is found, at steps of at most `step` (rad or m) of the joint that moves
+    most, with the deepest contact of that motion. Of `jumps`, by the row they lead to, only that row is looked at.
+    """
+    found = []
+    for i in range(len(path)):
+        still = i == 0 or i in jumps
+        way = path[i] - path[max(i - 1, 0)]
+        count = 1 if still else math.ceil(float(np.abs(way).max()) / step) or 1
+        shares = np.linspace(1.0, 0.0, count, endpoint=False)[::-1]
+        out, which = near.distances(path[i] - (1.0 - shares[:, None]) * way)
+        touching = np.flatnonzero(out < 0.0)
+        if len(touching):
+            deepest = int(out.argmin())
+            contact = near.contact(float(out[deepest]), int(which[deepest]))
+            assert contact is not None
+            found.append(Touch(i, float(shares[touching[0]]), contact))
+    return tuple(found)

@@ -1,0 +1,167 @@
+"""Obstacles: boxes, spheres, cylinders and tables around an arm."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from kin.collision.solids import BOX, COLUMNS, CYLINDER, SPHERE
+from kin.errors import InputError
+from kin.frames import from_xyz_rpy
+from kin.transforms import Array
+
+Shape = Literal["box", "sphere", "cylinder", "table"]
+SHAPES: tuple[Shape, ...] = get_args(Shape)
+MOST_OBSTACLES = 32
+SMALLEST, LARGEST = 1e-4, 100.0  # m, of a size
+FARTHEST = 1e4  # m, of a place
+LONGEST_NAME = 60
+Triple = tuple[float, float, float]
+_NEEDED: dict[Shape, tuple[str, ...]] = {
+    "box": ("size",),
+    "table": ("size",),
+    "sphere": ("radius",),
+    "cylinder": ("radius", "height"),
+}
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """A body that the arm must not touch, at rest in the frame of the targets.
+
+    Attributes:
+        shape: ``"box"``, ``"sphere"``, ``"cylinder"`` (its axis is z) or ``"table"``: a box whose place is the
+            middle of its top. Everything under the top counts as solid.
+        xyz: m, the centre; of a table, the middle of its top.
+        rpy: rad, roll, pitch and yaw: ``Rz(yaw) Ry(pitch) Rx(roll)``.
+        size: m along x, y and z, of a box or table.
+        radius: m, of a sphere or cylinder.
+        height: m, of a cylinder.
+        name: for people; by default its shape.
+
+    Raises:
+        InputError: naming the field.
+    """
+
+    shape: Shape
+    xyz: Sequence[float] = (0.0, 0.0, 0.0)
+    rpy: Sequence[float] = (0.0, 0.0, 0.0)
+    size: Sequence[float] | None = None
+    radius: float | None = None
+    height: float | None = None
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        """Check the fields; lists become tuples."""
+        if self.shape not in SHAPES:
+            raise InputError("shape", self.shape, "one of " + ", ".join(f'"{each}"' for each in SHAPES))
+        for key, most in (("xyz", FARTHEST), ("rpy", 1e6)):
+            object.__setattr__(self, key, _triple(key, getattr(self, key), -most, most))
+        needed = _NEEDED[self.shape]
+        for key in ("size", "radius", "height"):
+            value = getattr(self, key)
+            if key not in needed:
+                if value is not None:
+                    raise InputError(key, value, f"none: a {self.shape} has {' and '.join(needed)}")
+            elif key == "size":
+                object.__setattr__(self, key, _triple(key, value, SMALLEST, LARGEST))
+            else:
+                object.__setattr__(self, key, _number(key, value, SMALLEST, LARGEST))
+        if not isinstance(self.name, str) or len(self.name) > LONGEST_NAME or not self.name.isprintable():
+            raise InputError("name", self.name, f"a text of at most {LONGEST_NAME} printable characters")
+
+    @property
+    def label(self) -> str:
+        """Its name, or its shape."""
+        return self.name or self.shape
+
+    @cached_property
+    def T(self) -> Array:
+        """Pose of its centre ``(4, 4)``."""
+        T = from_xyz_rpy(self.xyz, self.rpy)
+        if self.shape == "table":
+            T[:3, 3] -= 0.5 * self._sides[2] * T[:3, 2]
+        return T
+
+    @cached_property
+    def row(self) -> Array:
+        """For the kernels ``(17,)``, as in :mod:`kin.collision.solids`."""
+        out = np.empty(COLUMNS)
+        radius = self.radius or 0.0
+        if self.shape == "sphere":
+            out[:4] = SPHERE, radius, radius, radius
+        elif self.shape == "cylinder":
+            out[:4] = CYLINDER, radius, radius, 0.5 * (self.height or 0.0)
+        else:
+            out[:4] = BOX, *(0.5 * side for side in self._sides)
+        out[4:13], out[13:16] = self.T[:3, :3].ravel(), self.T[:3, 3]
+        half = out[1:4]
+        out[16] = (
+            half[0]
+            if self.shape == "sphere"
+            else np.linalg.norm(half[[0, 2]] if self.shape == "cylinder" else half)
+        )
+        return out
+
+    @property
+    def _sides(self) -> Sequence[float]:
+        assert self.size is not None
+        return self.size
+
+    def as_dict(self) -> dict[str, Any]:
+        """Its fields as plain data, without those that do not apply; `obstacle_from_dict` reads them."""
+        found: dict[str, Any] = {"shape": self.shape, "xyz": list(self.xyz), "rpy": list(self.rpy)}
+        for key in _NEEDED[self.shape]:
+            value = getattr(self, key)
+            found[key] = list(value) if key == "size" else value
+        if self.name:
+            found["name"] = self.name
+        return found
+
+
+def obstacle_from_dict(data: object) -> Obstacle:
+    """An obstacle from plain data with the fields of `Obstacle`; raises `InputError` naming the field."""
+    known = [each.name for each in fields(Obstacle)]
+    if not isinstance(data, Mapping):
+        raise InputError("obstacle", data, "a table with the fields " + ", ".join(known))
+    for key in data:
+        if key not in known:
+            raise InputError(str(key), data[key], "only the fields " + ", ".join(known))
+    if "shape" not in data:
+        raise InputError("shape", None, "one of " + ", ".join(f'"{each}"' for each in SHAPES))
+    return Obstacle(**data)
+
+
+def checked_obstacles(obstacles: object) -> tuple[Obstacle, ...]:
+    """A sequence of obstacles, or of their fields as plain data; an `InputError` names ``obstacles[i]``."""
+    if not isinstance(obstacles, Sequence) or isinstance(obstacles, str | bytes):
+        raise InputError("obstacles", obstacles, "a list of obstacles")
+    if len(obstacles) > MOST_OBSTACLES:
+        raise InputError("obstacles", f"{len(obstacles)} obstacles", f"at most {MOST_OBSTACLES}")
+    found = []
+    for i, each in enumerate(obstacles):
+        try:
+            found.append(each if isinstance(each, Obstacle) else obstacle_from_dict(each))
+        except InputError as error:
+            where = f"obstacles[{i}]" if error.field == "obstacle" else f"obstacles[{i}].{error.field}"
+            raise InputError(where, error.value, error.expected) from None
+    return tuple(found)
+
+
+def _triple(field: str, value: object, least: float, most: float) -> Triple:
+    expected = f"three numbers from {least:g} to {most:g}"
+    items = value.tolist() if isinstance(value, np.ndarray) else value
+    if not isinstance(items, Sequence) or isinstance(items, str) or len(items) != 3:
+        raise InputError(field, value, expected)
+    x, y, z = (_number(f"{field}[{i}]", each, least, most) for i, each in enumerate(items))
+    return x, y, z
+
+
+def _number(field: str, value: object, least: float, most: float) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value <= most:
+        raise InputError(field, value, f"a number from {least:g} to {most:g}")
+    return float(value)

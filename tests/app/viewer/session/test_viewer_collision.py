@@ -1,0 +1,87 @@
+"""Links that touch each other are red and named, and the drag avoids them on request."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from fake_browser import FakeBrowser
+from live_server import serve_viewer
+
+import kin
+from app.shared.clouds import Clouds
+from app.shared.settings import Settings
+from app.shared.store import Store
+from app.viewer.panel.joints import label
+from app.viewer.scene.bodies.nodes import TOUCHING
+from app.viewer.server import ViewerServer
+
+UR5 = kin.get_robot("ur5")
+FOLDED = 168.5  # degrees of the elbow: the wrist is in the upper arm
+AVOID = "Avoid self-collision"
+
+
+@pytest.fixture(scope="module")
+def port() -> Iterator[int]:
+    kin.warm_up()
+    with serve_viewer(ViewerServer(Store(), Settings(), Clouds())) as port:
+        yield port
+
+
+def red(tab: FakeBrowser) -> set[str]:
+    """The nodes of links that are painted."""
+    return {
+        name
+        for name, m in tab.nodes.items()
+        if m["type"] == "MeshMessage"
+        and tuple(m["props"].get("color") or ()) == TOUCHING
+        and "contact" not in name
+    }
+
+
+def test_links_that_touch_are_red_and_named(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.choose("UR5")
+        tab.settle()
+        assert not red(tab)
+        tab.set(label(UR5, 2), FOLDED)
+        tab.wait(lambda: "Link 4 touches link 2." in tab.html)
+        tab.settle()
+        depths = {name.count("/") for name in red(tab)}
+        assert len(depths) == 2  # links are nested: two of them
+        before = len(tab.log)
+        tab.set(label(UR5, 2), FOLDED + 0.5)
+        tab.settle()
+        painted = [
+            m for m in tab.log[before:] if m["type"] == "SceneNodeUpdateMessage" and "color" in m["updates"]
+        ]
+        assert not painted  # the same two still touch
+        tab.set("Go to", "Home")
+        tab.wait(lambda: "touches" not in tab.html)
+        tab.settle()
+        assert not red(tab)
+
+
+def test_dragging_avoids_self_collision_on_request(port: int) -> None:
+    q = UR5.q_home.copy()
+    q[2] = np.radians(FOLDED)
+    T = kin.fk(UR5, q)
+    with FakeBrowser(port) as tab:
+        tab.choose("UR5")
+        tab.settle()
+        tab.set(AVOID, True)
+        tab.set(label(UR5, 2), FOLDED - 20.0)
+        tab.settle()
+        tab.grab()
+        tab.drag(T)
+        tab.settle()
+        shown = np.radians([tab.value(label(UR5, i)) for i in range(6)])
+        result = kin.solve_ik(UR5, T, avoid_self_collision=True)
+        if result.status == "solved":
+            assert kin.self_distance(UR5, shown) >= -1e-6
+        else:
+            assert "No posture without a collision" in tab.html
+        tab.release()
+        tab.set(AVOID, False)
+        tab.settle()
