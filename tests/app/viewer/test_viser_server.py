@@ -46,6 +46,7 @@ class Visit:
         self.subprotocol = subprotocol
         self.rights = Rights.FULL
         self.client = "10.0.0.1"
+        self.room_token = ""
         self.sent = 0
         self._messages = list(messages)
         self._stays = stays
