@@ -82,7 +82,7 @@ RULES: dict[str, set[str]] = {
     },
     "app/service/web/rooms": {
         *("starlette", "jinja2", "segno", "app.api.problems", "app.classroom", "app.service.web.access"),
-        *("app.service.web.rate_limit", "app.service.web.rooms", "app.shared"),
+        *("app.exercises", "app.service.web.rate_limit", "app.service.web.rooms", "app.shared"),
     },
     "app/service/web": {
         *("starlette", "msgspec", "itsdangerous", "kin"),

@@ -138,7 +138,7 @@ def create_app(
     install_problem_handlers(app)
     complete_document(app, store, settings)
     app.router.routes.extend([*api_routes(), *page_routes(), *embedding_routes(), *bridge.routes()])
-    app.router.routes.extend([*room_routes(classroom, settings), *scoreboard.routes()])
+    app.router.routes.extend([*room_routes(classroom, settings, store), *scoreboard.routes()])
     app.router.routes.extend(lti_routes(classroom, settings, partial(_exercises, settings, store)))
     app.include_router(status.router)
     _add_middleware(app, settings)

@@ -18,12 +18,9 @@ LIVES = ((2, "2 hours"), (12, "12 hours"), (24 * 7, "a week"), (24 * 120, "a ter
 
 
 @cache
-def _template() -> Template:
-    from jinja2 import (
-        Environment,
-        FileSystemLoader,
-        StrictUndefined,
-    )  # with the first page: the start need not wait
+def _template(name: str) -> Template:
+    # Imported with the first page: the start need not wait.
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     return Environment(
         loader=FileSystemLoader(Path(__file__).parent / "templates"),
@@ -32,7 +29,7 @@ def _template() -> Template:
         trim_blocks=True,
         lstrip_blocks=True,
         auto_reload=False,
-    ).get_template("room.html")
+    ).get_template(name)
 
 
 def room_page(request: Request, status: int = 200, **values: object) -> HTMLResponse:
@@ -43,7 +40,14 @@ def room_page(request: Request, status: int = 200, **values: object) -> HTMLResp
     )
     known |= {"hours": 12, "may_open": False, "teacher": False, "local": False, "ends": "", "ends_at": ""}
     known |= {"lives": LIVES, "root": "../" * depth or "./"}
-    text = _template().render(**{**known, **values})
+    text = _template("room.html").render(**{**known, **values})
+    return HTMLResponse(text, status, headers={"cache-control": "no-store"})
+
+
+def results_page(request: Request, status: int = 200, **values: object) -> HTMLResponse:
+    """The teacher's page of results; values that are not given are empty."""
+    known: dict[str, object] = {"room": None, "rows": (), "counts": {}, "more": 0, "attempts": 0, "problem": ""}
+    text = _template("results.html").render(**{**known, **values, "root": "../"})
     return HTMLResponse(text, status, headers={"cache-control": "no-store"})
 
 

@@ -20,13 +20,16 @@ from app.classroom.tokens import LONGEST_TOKEN, read_code, show_code
 from app.service.web.access import form_of, may_open, pass_guest
 from app.service.web.rooms.limits import Limits
 from app.service.web.rooms.page import ends_at, ends_in_words, join_address, only_here, qr_svg, room_page
+from app.service.web.rooms.results import Results
 from app.shared.clients import client_of
 from app.shared.security import origin_allowed, set_cookie
 from app.shared.settings import Settings
+from app.shared.store import Store
 
 
-def room_routes(hub: Hub, settings: Settings) -> list[BaseRoute]:
+def room_routes(hub: Hub, settings: Settings, store: Store) -> list[BaseRoute]:
     """The pages of rooms."""
+    results = Results(hub, settings, store)
     pages = _Pages(hub, settings.allowed_origins, bool(settings.frame_ancestors))
     return [
         Route("/room", pages.show, methods=["GET"], name="room"),
@@ -34,6 +37,8 @@ def room_routes(hub: Hub, settings: Settings) -> list[BaseRoute]:
         Route("/room/join", pages.join, methods=["POST"]),
         Route("/room/teach/{token}", pages.teach, methods=["GET"]),
         Route("/room/qr.svg", pages.qr, methods=["GET"]),
+        Route("/room/results", results.show, methods=["GET"]),
+        Route("/room/results.csv", results.download, methods=["GET"]),
         Route("/room/leave", pages.leave, methods=["POST"]),
         Route("/room/end", pages.end, methods=["POST"]),
     ]

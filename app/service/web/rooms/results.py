@@ -1,0 +1,84 @@
+"""The teacher's page of results: a live table, who is stuck first, and all attempts as CSV."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import Response
+
+from app.api.problems import ProblemError
+from app.classroom import COOKIE, ClassroomUnavailable, Hub, Role
+from app.classroom.clock import now
+from app.classroom.results.table import Attempt, rows, to_csv
+from app.service.web.rooms.page import results_page
+from app.shared.settings import Settings
+from app.shared.store import Store
+
+if TYPE_CHECKING:
+    from app.classroom.rooms import OpenRoom
+
+MOST = 400  # rows on the screen; the file has all attempts
+
+
+class Results:
+    """The pages of the attempts of a room; only for its teacher."""
+
+    def __init__(self, hub: Hub, settings: Settings, store: Store) -> None:
+        self._hub, self._settings, self._store = hub, settings, store
+
+    async def show(self, request: Request) -> Response:
+        """The table; its script asks for this page again and again."""
+        try:
+            room, attempts = await run_in_threadpool(self._read, request.cookies.get(COOKIE, ""))
+        except ClassroomUnavailable as error:
+            return results_page(request, 503, problem=str(error))
+        titles = await run_in_threadpool(lambda: self._titles)
+        table = rows(attempts, now())
+        shown = [
+            {
+                "alias": row.alias, "title": titles.get(row.exercise, row.exercise), "tries": row.tries,
+                "score": round(100 * row.score), "time": f"{int(row.seconds) // 60}:{int(row.seconds) % 60:02}",
+                "verdict": row.verdict, "state": "solved" if row.solved else "stuck" if row.stuck else "at work",
+            }
+            for row in table[:MOST]
+        ]  # fmt: skip
+        counts = {state: sum(row["state"] == state for row in shown) for state in ("stuck", "at work", "solved")}
+        return results_page(
+            request, room=room, rows=shown, counts=counts, more=len(table) - len(shown), attempts=len(attempts)
+        )
+
+    async def download(self, request: Request) -> Response:
+        """One row per attempt."""
+        try:
+            room, attempts = await run_in_threadpool(self._read, request.cookies.get(COOKIE, ""))
+        except ClassroomUnavailable as error:
+            raise ProblemError(503, "busy", str(error)) from None
+        text = to_csv(attempts, await run_in_threadpool(lambda: self._titles))
+        headers = {
+            "content-disposition": f'attachment; filename="results-{room.code.lower()}.csv"',
+            "cache-control": "no-store",
+        }
+        # The mark at the beginning tells spreadsheets which letters these are.
+        return Response(text.encode("utf-8-sig"), media_type="text/csv; charset=utf-8", headers=headers)
+
+    def _read(self, token: str) -> tuple[OpenRoom, list[Attempt]]:
+        """The room of the teacher's cookie and its attempts; raises 403."""
+        from app.classroom.results.store import attempts_of  # imports SQLAlchemy
+
+        ticket = self._hub.ticket(token) if token and self._hub.in_use else None
+        room = self._hub.rooms.find(ticket) if ticket is not None and ticket.role is Role.TEACHER else None
+        if room is None:
+            raise ProblemError(
+                403, "forbidden", "Only the teacher may see the results.", "Open the teacher's link."
+            )
+        return room, attempts_of(self._hub.database, room.id)
+
+    @cached_property
+    def _titles(self) -> dict[str, str]:
+        from app.exercises import Exercises  # with the first page: the start need not wait
+
+        exercises = Exercises(self._settings.exercises, self._store.get)
+        return {one.id: one.title for one in exercises.all}
