@@ -54,7 +54,7 @@ def judge(question: Question, given: float) -> Verdict:
             return Verdict(False, mistake.reason)
     if _near(question, -given, question.answer):
         return Verdict(False, f"The size is right, the sign is not. {question.method}")
-    if question.whole_turns:
+    if question.whole_turns or not question.ordered:
         return Verdict(False, question.method)
     return Verdict(False, f"Too {'large' if given > question.answer else 'small'}. {question.method}")
 

@@ -66,6 +66,7 @@ class Number:
         whole_turns: whether values that differ by whole turns are equal.
         ways: further right values.
         named: a sentence that tells `answer` from the other ways.
+        ordered: whether it helps to know that an answer is too large: not if it is the number of a joint.
     """
 
     prompt: str
@@ -77,6 +78,7 @@ class Number:
     whole_turns: bool = False
     ways: tuple[Way, ...] = ()
     named: str = ""
+    ordered: bool = True
 
 
 PLAIN = Unit("", 1.0, 2)  # of counts and ratios

@@ -15,9 +15,9 @@ from app.exercises.variant import Variant
 from kin.units import DEGREES, RADIANS, Unit, Units
 
 # Units of a file, and what one of them is in radians, metres or SI.
-SCALES = {"deg": math.pi / 180, "rad": 1.0, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "": 1.0, "count": 1.0}
+SCALES = {"deg": math.pi / 180, "rad": 1.0, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "": 1.0, "count": 1.0, "joint": 1.0}
 MEASURES = {"deg": "angle", "rad": "angle", "mm": "length", "cm": "length", "m": "length"}
-OTHER = ("m/s", "rad/s", "N", "N·m", "s", "kg", "J")
+OTHER = ("m/s", "m/rad", "rad/s", "N", "N·m", "s", "kg", "J")
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,9 @@ class NumberKind(Kind):
         labels = fields.texts("labels") or ("",) * len(values)
         if len(labels) != len(values):
             raise fields.refuse("labels", list(labels), f"as many labels as values: {len(values)}")
-        tolerance = WHOLE if unit == "count" else fields.number("tolerance", above=0.0) * SCALES.get(unit, 1.0)
+        tolerance = (
+            WHOLE if unit in ("count", "joint") else fields.number("tolerance", above=0.0) * SCALES.get(unit, 1.0)
+        )
         mistakes = []
         for item in fields.tables("mistakes"):
             wrong = item.expressions("value", 1)
@@ -69,6 +71,7 @@ class NumberKind(Kind):
             Number(
                 label or "Your answer", variant.number(value), unit, self.tolerance, method,
                 tuple(Mistake(float(values[i]), reason) for values, reason in wrong), self.whole_turns,
+                ordered=self.unit != "joint",
             )
             for i, (value, label) in enumerate(zip(self.values, self.labels, strict=True))
         ]  # fmt: skip

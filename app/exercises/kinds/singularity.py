@@ -13,9 +13,9 @@ from app.exercises.contract import Asked, Kind, index, texts
 from app.exercises.fields import Fields
 from app.exercises.judging import Verdict
 from app.exercises.questions import PLAIN, Number
-from app.exercises.typed import read_number
+from app.exercises.typed import EntryError, read_number
 from app.exercises.variant import Variant
-from kin import InputError, Singularity
+from kin import Singularity
 from kin.ik.messages.singularity import CONDITIONS, LOSSES, short
 from kin.transforms import Array
 from kin.units import Units
@@ -82,7 +82,9 @@ class SingularityKind(Kind):
         values = np.array([read_number(text, question.unit) for text in texts(given, 3, "x, y and z")])
         length = float(np.linalg.norm(values))
         if not 1e-6 < length < 1e6:
-            raise InputError("answer", given, "a direction that is not zero, such as 0 0 1")
+            raise EntryError(
+                "The answer was not read", "A direction needs a length that is not zero, such as 0, 0, 1."
+            )
         u, lost = values / length, self._lost(variant)
         angle = math.acos(min(1.0, abs(float(u @ lost))))
         if angle <= self.tolerance:

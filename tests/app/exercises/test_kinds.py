@@ -245,8 +245,16 @@ def test_a_direction_may_have_any_length_and_sign() -> None:
         verdict.reason
         == "The tool point can move in this direction: joint 3, sliding at 1 m/s, moves it by 1 m/s."
     )
-    with pytest.raises(InputError, match="not zero"):
+    with pytest.raises(EntryError, match="not zero"):
         judged(lost, ["0", "0", "0"])
+
+
+def test_the_number_of_a_joint_is_neither_too_large_nor_too_small() -> None:
+    text = 'q = ["0", "0", "0"]\n[answer]\nvalue = "2"\nunit = "%s"\nmethod = "Compare the distances."'
+    joint, count = (made("planar3r", "number", text % unit) for unit in ("joint", "count"))
+    assert judged(joint, ["2"]).right
+    assert judged(joint, ["3"]).reason == "Compare the distances."
+    assert judged(count, ["3"]).reason == "Too large. Compare the distances."
 
 
 def test_a_wrong_singularity_is_given_its_distance() -> None:
