@@ -16,6 +16,7 @@ MODES = {
     "rest": "requests a second beside an empty endpoint",
     "drag": "until the picture answers a drag, for 1, 10, 30 and 100 visitors",
     "play": "pictures of 1, 10 and 30 visitors who play a program, beside as many who drag",
+    "lesson": "a teacher who drags until 30 students' pictures answer, and a wall of their arms",
     "storm": "200 visitors at once",
     "cloud": "points a second: kernel and its steps, generator, REST, viewer",
     "soak": "visitors who come, drag, draw and go, over and over",

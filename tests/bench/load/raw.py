@@ -91,13 +91,14 @@ def request(method: str, path: str, body: bytes | None = None, token: str = "") 
     return f"{head}Content-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n".encode() + body
 
 
-def handshake(path: str, subprotocol: str = "", token: str = "") -> bytes:
+def handshake(path: str, subprotocol: str = "", token: str = "", cookie: str = "") -> bytes:
     """The request that opens a websocket."""
     key = base64.b64encode(os.urandom(16)).decode()
+    kept = f"Cookie: {cookie}\r\n" if cookie else ""
     offer = f"Sec-WebSocket-Protocol: {subprotocol}\r\n" if subprotocol else ""
     return (
         f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-        f"Sec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\n{offer}{_bearer(token)}\r\n"
+        f"Sec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\n{offer}{kept}{_bearer(token)}\r\n"
     ).encode()
 
 
@@ -135,11 +136,14 @@ class Socket(asyncio.Protocol):
     @classmethod
     async def open(
         cls, port: int, path: str, subprotocol: str, heard: Callable[[bytes], None], token: str = "",
-        source: str = "127.0.0.1",
+        source: str = "127.0.0.1", cookie: str = "",
     ) -> Socket:  # fmt: skip
         """A websocket that has shaken hands; raises `ConnectionError` if it was refused."""
         _, protocol = await asyncio.get_running_loop().create_connection(
-            lambda: cls(handshake(path, subprotocol, token), heard), "127.0.0.1", port, local_addr=(source, 0)
+            lambda: cls(handshake(path, subprotocol, token, cookie), heard),
+            "127.0.0.1",
+            port,
+            local_addr=(source, 0),
         )
         await protocol.opened
         return protocol

@@ -34,8 +34,8 @@ class Visitor:
     drawn for the last one. Pictures of the easing towards an earlier target do not count.
     """
 
-    def __init__(self, token: str = "", source: str = "127.0.0.1") -> None:
-        self._token = token
+    def __init__(self, token: str = "", source: str = "127.0.0.1", cookie: str = "") -> None:
+        self._token, self._cookie = token, cookie
         self._source = source
         self._socket: Socket
         self.began = time.perf_counter()
@@ -60,7 +60,9 @@ class Visitor:
         """Connect and wait until the arm is there."""
         self.began = time.perf_counter()
         async with asyncio.timeout(timeout):
-            self._socket = await Socket.open(port, "/viewer", SUBPROTOCOL, self._heard, self._token, self._source)
+            self._socket = await Socket.open(
+                port, "/viewer", SUBPROTOCOL, self._heard, self._token, self._source, self._cookie
+            )
             self.send(
                 "ViewerCameraMessage", wxyz=(1, 0, 0, 0), position=(3, 3, 3), fov=1.3, near=0.01, far=1000,
                 image_height=720, image_width=1280, look_at=(0, 0, 0), up_direction=(0, 0, 1),
@@ -118,6 +120,12 @@ class Visitor:
             position=(c * x - s * y, s * x + c * y, z), wxyz=_product(turn, self._wxyz),
         )  # fmt: skip
         return True
+
+    def watch(self, leader: Visitor) -> None:
+        """Expect a picture for the event that another visitor has just sent, whose arm this page shows."""
+        if self._home is None:
+            self._home = leader._home
+        self._waiting.append(leader._waiting[-1])
 
     def release(self) -> None:
         """Let the gizmo go."""

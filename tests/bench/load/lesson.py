@@ -1,0 +1,144 @@
+"""A class: how long until the students' pictures show a teacher's drag, and what a wall of their arms costs."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from app.classroom import COOKIE, Hub
+from load import percentile, table
+from load.drag import HZ
+from load.play import JOINT, MESSAGES
+from load.service import Service, serve
+from load.visitor import Visitor
+
+WALL_HZ = 5.0
+_UP = 2.0  # s until a page has taken what was pressed
+_PATIENCE = 3.0  # s for the last pictures
+
+
+@contextmanager
+def served(workers: int) -> Iterator[tuple[Service, Hub]]:
+    """A service with an empty database of rooms, and our own door to that database."""
+    with tempfile.TemporaryDirectory(prefix="kinboard-lesson-") as data, serve(workers, data=data) as service:
+        hub = Hub(Path(data))
+        try:
+            yield service, hub
+        finally:
+            hub.close()
+
+
+async def members(service: Service, hub: Hub, count: int) -> list[Visitor]:
+    """A teacher, who is the first, and so many students of a new room, with whole pages."""
+    room = hub.rooms.open("Load", 3600.0)
+    seats = [hub.rooms.tokens.sign(hub.rooms.join(room.code, f"Student {i + 1}")) for i in range(count)]
+    visitors = [Visitor(cookie=f"{COOKIE}={token}") for token in (room.token, *seats)]
+    for visitor in visitors:
+        await visitor.connect(service.port)
+    for visitor in visitors:
+        await visitor.quiet(timeout=10.0)
+    return visitors
+
+
+async def press(visitor: Visitor, number: int, name: str) -> None:
+    """Press a button of the tab Class."""
+    visitor.set(MESSAGES, json.dumps([[number, "feature", ["class", [name, number], None]]]))
+    await asyncio.sleep(_UP)
+
+
+async def follow(service: Service, hub: Hub, count: int, seconds: float) -> dict[str, Any]:
+    """A teacher drags for so long, and so many students watch."""
+    teacher, *students = await members(service, hub, count)
+    await press(teacher, 1, "follow")
+    before = service.seconds()
+    began, spent = time.perf_counter(), time.process_time()
+    teacher.grab()
+    for k in range(round(seconds * HZ)):
+        await asyncio.sleep(max(0.0, began + k / HZ - time.perf_counter()))
+        if teacher.drag():
+            for student in students:
+                student.watch(teacher)
+    wall, own = time.perf_counter() - began, time.process_time() - spent
+    used = service.seconds() - before
+    end = time.perf_counter() + _PATIENCE
+    while any(student.unanswered for student in students) and time.perf_counter() < end:
+        await asyncio.sleep(0.02)
+    teacher.release()
+    for visitor in (teacher, *students):
+        visitor.close()
+    latencies = [x for student in students for x in student.latencies]
+    return {
+        "students": count,
+        "pictures": len(latencies),
+        "p50 ms": 1e3 * percentile(latencies, 50),
+        "p95 ms": 1e3 * percentile(latencies, 95),
+        "p99 ms": 1e3 * percentile(latencies, 99),
+        "teacher's p95 ms": 1e3 * percentile(teacher.latencies, 95),
+        "unanswered": sum(student.unanswered for student in students),
+        "service CPU %": 100 * used / wall,
+        "client CPU %": 100 * own / wall,
+    }
+
+
+async def _move(visitors: list[Visitor], seconds: float) -> None:
+    """Each moves a joint at `WALL_HZ`, evenly out of step."""
+
+    async def one(k: int, visitor: Visitor, begin: float) -> None:
+        for i in range(round(seconds * WALL_HZ)):
+            due = begin + (i + k / len(visitors)) / WALL_HZ
+            await asyncio.sleep(max(0.0, due - time.perf_counter()))
+            visitor.set(JOINT, 90.0 + 40.0 * math.sin(0.3 * i + k))
+
+    begin = time.perf_counter()
+    await asyncio.gather(*(one(k, visitor, begin) for k, visitor in enumerate(visitors)))
+
+
+async def wall(service: Service, hub: Hub, count: int, seconds: float) -> list[dict[str, Any]]:
+    """What so many students cost who move at 5 Hz: outside of a room, in one, and on the teacher's wall."""
+    rows = []
+    for name in ("no room", "in a room", "on the wall"):
+        if name == "no room":
+            teacher, students = Visitor(), [Visitor() for _ in range(count)]
+            for visitor in (teacher, *students):
+                await visitor.connect(service.port)
+                await visitor.quiet(timeout=10.0)
+        elif name == "in a room":
+            teacher, *students = await members(service, hub, count)
+        else:
+            await press(teacher, 1, "wall")
+        await asyncio.sleep(_UP)
+        before, received, began = service.seconds(), teacher.bytes, time.perf_counter()
+        await _move(students, seconds)
+        spent = time.perf_counter() - began
+        rows.append(
+            {
+                "students": name,
+                "service CPU %": 100 * (service.seconds() - before) / spent,
+                "kB/s to the teacher": (teacher.bytes - received) / spent / 1e3,
+            }
+        )
+        if name != "in a room":
+            for visitor in (teacher, *students):
+                visitor.close()
+            await asyncio.sleep(_UP)
+    rows.append({"students": "the wall alone", **{k: rows[2][k] - rows[1][k] for k in list(rows[0])[1:]}})
+    return rows
+
+
+def run(quick: bool, workers: int, counts: list[int] | None = None) -> dict[str, Any]:
+    """The tables on stdout, and what is in them."""
+    count, seconds = (counts or [5 if quick else 30])[0], 3.0 if quick else 15.0
+    with served(workers) as (service, hub):
+        row = asyncio.run(follow(service, hub, count, seconds))
+        print(table(f"lesson: a teacher drags at {HZ:g} events/s for {seconds:g} s, {workers} worker(s)", [row]))
+    with served(workers) as (service, hub):
+        rows = asyncio.run(wall(service, hub, count, seconds))
+        print(table(f"lesson: {count} students move at {WALL_HZ:g} Hz for {seconds:g} s", rows))
+    return {"follow": row, "wall": rows}
