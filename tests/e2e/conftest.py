@@ -33,9 +33,16 @@ def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
-def address() -> Iterator[str]:
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder for the service's database of rooms."""
+    return tmp_path_factory.mktemp("data")
+
+
+@pytest.fixture(scope="session")
+def address(data: Path) -> Iterator[str]:
     """The service as a user starts it, on a free port."""
-    env = {**os.environ, "PYTHONPATH": str(ROOT), "KINBOARD_FRAME_ANCESTORS": "http://school.localhost:*"}
+    env = {**os.environ, "PYTHONPATH": str(ROOT), "KINBOARD_DATA": str(data)}
+    env["KINBOARD_FRAME_ANCESTORS"] = "http://school.localhost:*"
     command = [sys.executable, "-m", "app.cli", "serve", "--port", "0"]
     with subprocess.Popen(
         command, cwd=ROOT, env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
