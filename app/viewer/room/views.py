@@ -56,7 +56,7 @@ def _mode(room: RoomView, mode: Mode) -> dict[str, str]:
         title = f"You see the arm of {room.shown.alias}" if room.shown.alias else "You see a classmate’s arm"
         detail = "The teacher shows it to all. Move the arm to let go."
     if mode == "led" and room.frozen:
-        detail = "The teacher has frozen the class: your arm moves with the teacher’s."
+        title, detail = f"Frozen. {title}", "Your arm moves with it until the teacher goes on."
     return {
         "symbol": symbol,
         "title": title,
