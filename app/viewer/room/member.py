@@ -122,6 +122,11 @@ class Member(Feature):
     def refusal(self, act: str) -> str:
         """Why the visitor may not act now; empty if the act is allowed, which may end a lead."""
 
+    @property
+    def frozen(self) -> bool:
+        """Whether the visitor may not act."""
+        return False
+
     # Feature
 
     def handle(self, key: Hashable, value: object) -> None:
@@ -166,7 +171,8 @@ class Member(Feature):
         act = act_of(key, value)
         if not act:
             return True
-        if self.leader and time.perf_counter() - self._began < GRACE and act in ("gizmo", "grab", "joint"):
+        fresh = self.leader and time.perf_counter() - self._began < GRACE
+        if fresh and not self.frozen and act in ("gizmo", "grab", "joint"):
             self.page.put_back()
             return False
         why = self.refusal(act)
