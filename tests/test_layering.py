@@ -111,7 +111,7 @@ RULES: dict[str, set[str]] = {
     "app/cli/xacro/expansion.py": {"xacro", "xacrodoc", "yaml", "app.cli.xacro"},
     "app/cli/xacro/expressions.py": {"xacro"},
     "app/cli/startup.py": set(),
-    "app/cli/serve.py": {"pydantic", "app.cli.startup", "app.service.main", "app.shared"},
+    "app/cli/serve.py": {"numba", "pydantic", "app.cli.startup", "app.service.main", "app.shared"},
 }
 
 MODULES = sorted(

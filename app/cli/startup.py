@@ -25,6 +25,19 @@ def no_collections() -> Iterator[None]:
 
 
 @contextmanager
+def hidden(package: str) -> Iterator[None]:
+    """Lets imports go on as where `package` is not installed, unless it has been imported; for a single thread."""
+    if package in sys.modules:
+        yield
+        return
+    sys.modules[package] = None  # type: ignore[assignment]
+    try:
+        yield
+    finally:
+        del sys.modules[package]
+
+
+@contextmanager
 def shared_metrics() -> Iterator[None]:
     """A folder through which the processes of a service count together: known before the metrics are imported.
 
