@@ -7,6 +7,9 @@ on it. That comparison (`np.allclose`) takes most of their time, and a moving ar
 frame: with thirty visitors it was a fifth of all processor time. `assign` sends the setter's message through the
 same queue.
 
+Values: viser's setter of an input element's value starts a task of the event loop for each callback, for each
+slider that follows the arm. `show_value` starts none.
+
 Pages: viser evaluates the type hints of a class for each of its objects, a quarter of the cost of a page.
 `cache_type_hints` caches them.
 
@@ -22,6 +25,7 @@ from __future__ import annotations
 import asyncio
 import functools
 import threading
+import time
 import typing
 from collections.abc import Sequence
 from typing import Any
@@ -56,6 +60,24 @@ def assign(
         state.wxyz[:] = turn
         w, x, y, z = turn
         state.api._queue_scene_message(messages.SetOrientationMessage(state.name, (w, x, y, z)))
+
+
+def show_value(handle: Any, value: object) -> None:
+    """Show another value in an input element; an unchanged value is not sent.
+
+    viser's own setter also calls the element's callbacks, each as a task of the event loop, which it wakes for it.
+
+    Raises:
+        RuntimeError: the element has been removed.
+    """
+    state = handle._impl
+    if state.removed:
+        raise RuntimeError(f"a {type(handle).__name__} was removed and cannot be set")
+    value = type(state.value)(value)
+    if value != state.value:
+        state.gui_api._websock_interface.queue_message(messages.GuiUpdateMessage(state.uuid, {"value": value}))
+        state.value = value
+        state.update_timestamp = time.time()
 
 
 def is_removed(node: viser.SceneNodeHandle) -> bool:

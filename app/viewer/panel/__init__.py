@@ -1,9 +1,9 @@
 """The control panel: one group of controls per module.
 
 Every group is built from a visitor's own `viser.GuiApi` and a `post` function. Its callbacks only post into the
-visitor's inbox; its `show…` methods are called by the visitor's worker. Assigning a value here makes viser call
-the callbacks too, with ``event.client is None``. Those calls are ignored; otherwise moving the gizmo would move
-the sliders, which would move the gizmo.
+visitor's inbox; its `show…` methods are called by the visitor's worker. `assign` calls no callbacks. Assigning a
+value in viser's own way does, with ``event.client is None``. Those calls are ignored; otherwise moving the gizmo
+would move the sliders, which would move the gizmo.
 
 A control that shows a value in a unit is replaced when the unit changes, and its key contains the `Units` it was
 created with. So an event that was already on its way is not mistaken for one of its successor.
@@ -15,6 +15,8 @@ from collections.abc import Callable, Hashable
 from typing import Any
 
 import viser
+
+from app.viewer.viser_patches import show_value
 
 Post = Callable[[Hashable, object], None]
 
@@ -29,8 +31,8 @@ def listen(handle: Any, post: Post, key: Hashable) -> None:
 
 
 def assign(handle: Any, value: object) -> None:
-    """Show another value in an input element. (The type stubs declare `value` read-only.)"""
-    handle.value = value
+    """Show another value in an input element."""
+    show_value(handle, value)
 
 
 def update_html(element: viser.GuiHtmlHandle, content: str) -> None:

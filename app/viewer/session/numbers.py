@@ -16,6 +16,7 @@ from app.viewer.panel.joints import JointSliders
 from app.viewer.panel.layout import Panel
 from app.viewer.panel.status import StatusLine, key_number
 from app.viewer.scene.key_number import KeyNumber
+from app.viewer.scene.motion import Pace
 from app.viewer.session.controller import ArmController
 from app.viewer.session.posture import PosturePanel
 from kin import IKResult
@@ -44,12 +45,12 @@ class Numbers:
     """The numbers of one page. Not thread-safe: the visitor's worker calls it.
 
     Args:
-        interval: seconds between two updates.
+        pace: says how many seconds there are between two updates.
     """
 
-    def __init__(self, page: NumbersPage, interval: float) -> None:
+    def __init__(self, page: NumbersPage, pace: Pace) -> None:
         self._page = page
-        self._interval = interval
+        self._pace = pace
         self._pose_due = self._sliders_due = False
         self._updated_at = 0.0
         self._dragged: int | None = None  # the joint whose slider the visitor holds
@@ -88,7 +89,7 @@ class Numbers:
         """Seconds until the next update; None if no number is out of date."""
         if not (self._pose_due or self._sliders_due):
             return None
-        return max(0.0, self._updated_at + self._interval - time.perf_counter())
+        return max(0.0, self._updated_at + self._pace.reading - time.perf_counter())
 
     def update(self) -> None:
         """Update the numbers that are out of date, if it is time."""

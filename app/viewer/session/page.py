@@ -360,7 +360,7 @@ class VisitorPage(ShownArm, Worker):
             if self.dark:
                 configure_theme(gui, True)
             self.camera = VisitorCamera(self.client, self.post)
-            self.numbers = Numbers(self, self._pace.reading)
+            self.numbers = Numbers(self, self._pace)
             gui.main_panel.dock_right()
             titles = [tab.title for tab in self.offered]
             self.panel = Panel(

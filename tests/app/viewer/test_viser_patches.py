@@ -15,7 +15,7 @@ from viser import _assignable_props_api as props
 from viser._messages import SetPositionMessage, TransformControlsUpdateMessage
 from viser.infra import _async_message_buffer as buffers
 
-from app.viewer.viser_patches import assign, cache_type_hints, keep_private, set_events_in_their_loop
+from app.viewer.viser_patches import assign, cache_type_hints, keep_private, set_events_in_their_loop, show_value
 
 PLACE, TURN = (0.1, -0.2, 0.3), (0.5, -0.5, 0.5, 0.5)
 
@@ -107,6 +107,30 @@ def test_a_private_gizmo_repeats_nothing_and_is_heard_all_the_same(wire):
         asyncio.run(scene._handle_transform_controls_updates(7, moved))
         assert [m["type"] for m in messages] == expected
     assert heard == 2 * [("update", list(PLACE))]
+
+
+def test_a_value_is_sent_as_the_setter_sends_it_and_no_callback_is_called(wire, monkeypatch):
+    _, scene = wire
+    gui, messages, called = scene._owner.gui, [], []
+    monkeypatch.setattr(gui._websock_interface, "queue_message", messages.append)
+    for value, given in ((1.5, np.float64(2.5)), (1.5, 2), (True, False), ("a", "b")):
+        shown = []
+        for show in (lambda handle, value: setattr(handle, "value", value), show_value):
+            kind = {float: gui.add_number, bool: gui.add_checkbox, str: gui.add_text}[type(value)]
+            handle = kind("label", value)
+            messages.clear()
+            show(handle, given)
+            show(handle, given)
+            (message,) = messages
+            shown.append((type(message), message.updates, type(message.updates["value"]), handle.value))
+            assert message.uuid == handle._impl.uuid
+            handle.on_update(lambda _: called.append("callback"))
+        assert shown[0] == shown[1]
+        show_value(handle, value)
+    handle.remove()
+    with pytest.raises(RuntimeError, match="GuiTextHandle was removed"):
+        show_value(handle, "c")
+    assert called == []
 
 
 def test_hints_are_looked_up_once_and_are_the_same(wire, monkeypatch):
