@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 import time
@@ -44,19 +45,28 @@ def address(data: Path) -> Iterator[str]:
     env = {**os.environ, "PYTHONPATH": str(ROOT), "KINBOARD_DATA": str(data)}
     env["KINBOARD_FRAME_ANCESTORS"] = "http://school.localhost:*"
     command = [sys.executable, "-m", "app.cli", "serve", "--port", "0"]
-    with subprocess.Popen(
-        command, cwd=ROOT, env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-    ) as process:
+    log = data / "service.log"
+    with (
+        log.open("w") as output,
+        subprocess.Popen(command, cwd=ROOT, env=env, stdout=output, stderr=subprocess.STDOUT) as process,
+    ):
         try:
-            assert process.stdout is not None
-            line = process.stdout.readline()
-            assert "http://" in line, f"the service did not start: {line}{process.stdout.read()}"
-            url = "http://" + line.split("http://")[1].split()[0]
+            url = announced(log, process)
             wait_until_ready(url)
             yield url
         finally:
             process.terminate()
             process.wait(20)
+
+
+def announced(log: Path, process: subprocess.Popen[bytes], seconds: float = 60.0) -> str:
+    """The address that a service has written into its log."""
+    end = time.monotonic() + seconds
+    while (found := re.search(r"http://\S+", text := log.read_text())) is None:
+        assert process.poll() is None, f"the service did not start: {text}"
+        assert time.monotonic() < end, f"the service says no address: {text}"
+        time.sleep(0.05)
+    return found[0]
 
 
 def wait_until_ready(url: str, seconds: float = 180.0) -> None:
