@@ -1,5 +1,5 @@
 "use strict";
-// Runs in viser's page of a member of a room (app/viewer/classroom): opens a tab of the panel when the server says so, and
+// Runs in viser's page of a member of a room (app/viewer/room): opens a tab of the panel when the server says so, and
 // writes this service's address below the join code.
 (() => {
   let opened = "";

@@ -1,6 +1,6 @@
 "use strict";
 // Runs in viser's page: the steps of a lesson (app/viewer/lessons/guide), the exercises (app/viewer/exercises) and courses
-// (app/viewer/classroom/courses). It sends what is pressed and typed there.
+// (app/viewer/courses). It sends what is pressed and typed there.
 (() => {
   let serial = 0; // each press is a step of its own in the history
   // A block with data-feature belongs to that lesson, others to the block that all lessons have.

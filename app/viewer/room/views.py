@@ -73,7 +73,7 @@ def student_html(room: RoomView, mode: Mode, task: Exercise | None, sent: Submis
     if mine and seat.tries and not seat.solved:
         mark = (f"{seat.tries} attempt{'s' if seat.tries > 1 else ''}, not right yet", "amber")
     return render(
-        "classroom/student", room=room, seat=seat, mode=mode, lead=_mode(room, mode), task=task, mark=mark,
+        "room/student", room=room, seat=seat, mode=mode, lead=_mode(room, mode), task=task, mark=mark,
         sent=sent,
     )  # fmt: skip
 
@@ -83,7 +83,7 @@ def student_bar(room: RoomView, mode: Mode, open_tab: int) -> str:
     poll = room.poll if room.poll is not None and room.poll.open and room.poll.chosen is None else None
     quiet = mode == "free" and poll is None and not room.problem
     return render(
-        "classroom/student_bar", room=room, mode=mode, lead=_mode(room, mode), poll=poll, quiet=quiet,
+        "room/student_bar", room=room, mode=mode, lead=_mode(room, mode), poll=poll, quiet=quiet,
         open_tab=open_tab, hand=bool(room.seat and room.seat.hand),
     )  # fmt: skip
 
@@ -102,31 +102,29 @@ def poll_html(poll: Poll | None, teacher: bool) -> str:
         }
         for i, (text, votes) in enumerate(zip(poll.choices, poll.votes, strict=True))
     ]
-    return render("classroom/poll", poll=poll, rows=rows, total=total, teacher=teacher)
+    return render("room/poll", poll=poll, rows=rows, total=total, teacher=teacher)
 
 
 def stored_html(room: RoomView, now: float) -> str:
     """What is stored of a student, in plain words."""
-    return render("classroom/stored", room=room, left=_left(room, now))
+    return render("room/stored", room=room, left=_left(room, now))
 
 
 def lead_html(room: RoomView) -> str:
     """Follow me and Freeze."""
-    return render("classroom/lead", room=room, count=students(room.students))
+    return render("room/lead", room=room, count=students(room.students))
 
 
 def join_html(room: RoomView, now: float) -> str:
     """Code, QR code, and when the room ends."""
-    return render(
-        "classroom/join", room=room, code=show_code(room.code) if room.code else "", left=_left(room, now)
-    )
+    return render("room/join", room=room, code=show_code(room.code) if room.code else "", left=_left(room, now))
 
 
 def tools_html(room: RoomView, wall: bool) -> str:
     """The wall's button, and how the students are doing."""
     counts = [doing(seat, room) for seat in room.seats]
     facts = [(DOING[s], counts.count(s)) for s in ("hand", "stuck", "solved", "away") if s in counts]
-    return render("classroom/tools", room=room, wall=wall, count=students(len(counts)), facts=facts)
+    return render("room/tools", room=room, wall=wall, count=students(len(counts)), facts=facts)
 
 
 def seat_html(room: RoomView, seat: SeatView | None, looked: str, armed: bool) -> str:
@@ -135,7 +133,7 @@ def seat_html(room: RoomView, seat: SeatView | None, looked: str, armed: bool) -
         return ""
     shown = room.shown is not None and room.shown.seat == seat.id
     return render(
-        "classroom/seat", room=room, seat=seat, looked=looked == seat.id, shown=shown, armed=armed,
+        "room/seat", room=room, seat=seat, looked=looked == seat.id, shown=shown, armed=armed,
         named=bool(shown and room.shown and room.shown.alias),
     )  # fmt: skip
 
@@ -149,7 +147,7 @@ def list_html(room: RoomView, picked: str, exercises: Exercises) -> str:
         rows.append(
             {"seat": seat, "symbol": symbol, "color": color, "words": _where(seat, room, state, words, exercises)}
         )
-    return render("classroom/students", rows=rows, picked=picked)
+    return render("room/students", rows=rows, picked=picked)
 
 
 def _where(seat: SeatView, room: RoomView, state: State, words: str, exercises: Exercises) -> str:
@@ -169,7 +167,7 @@ def task_html(room: RoomView, task: Exercise | None, exercises: Exercises) -> st
     """The form to send an exercise, and how the present one goes."""
     at = [seat for seat in room.seats if room.task is not None and seat.task == room.task.exercise]
     return render(
-        "classroom/task", room=room, task=task, topics=exercises.topics(), solved=sum(seat.solved for seat in at),
+        "room/task", room=room, task=task, topics=exercises.topics(), solved=sum(seat.solved for seat in at),
         count=len(room.seats),
     )  # fmt: skip
 
@@ -178,19 +176,19 @@ def ask_html(room: RoomView, question: str, choices: tuple[str, ...]) -> str:
     """The form to ask a question."""
     if room.poll is not None:
         return ""
-    return render("classroom/ask", question=question, choices=[*choices, "", ""][:4])
+    return render("room/ask", question=question, choices=[*choices, "", ""][:4])
 
 
 def end_html(room: RoomView, armed: bool) -> str:
     """The button that ends the room."""
-    return render("classroom/end", room=room, armed=armed)
+    return render("room/end", room=room, armed=armed)
 
 
 def teacher_bar(room: RoomView, looked: SeatView | None, wall: bool) -> str:
     """What the teacher must see whatever tab is open."""
     hands = sorted((seat for seat in room.seats if seat.hand), key=lambda seat: seat.hand)
     return render(
-        "classroom/teacher_bar", room=room, looked=looked, wall=wall, hands=hands, count=students(room.students),
+        "room/teacher_bar", room=room, looked=looked, wall=wall, hands=hands, count=students(room.students),
     )  # fmt: skip
 
 

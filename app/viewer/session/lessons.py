@@ -10,7 +10,7 @@ from functools import partial
 import viser
 
 from app.classroom.results.keys import result_key
-from app.viewer.classroom.courses.feature import CourseFeature
+from app.viewer.courses.feature import CourseFeature
 from app.viewer.exercises.feature import Practising
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons import LESSONS

@@ -15,9 +15,9 @@ from app.classroom.courses.files import MOST_IN_FILE
 from app.classroom.results import read_code
 from app.classroom.results.codes import clean_alias
 from app.exercises import ExerciseFileError
-from app.viewer.classroom.courses import views
-from app.viewer.classroom.courses.progress import Progress
-from app.viewer.classroom.courses.views import Desk
+from app.viewer.courses import views
+from app.viewer.courses.progress import Progress
+from app.viewer.courses.views import Desk
 from app.viewer.exercises.practice import Practice
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons import LESSONS

@@ -10,7 +10,7 @@ from app.classroom.courses import Courses
 from app.classroom.courses.course import LONGEST, MOST_ITEMS
 from app.classroom.courses.files import MOST_IN_FILE
 from app.classroom.results import Outcome
-from app.viewer.classroom.courses.progress import Progress
+from app.viewer.courses.progress import Progress
 from app.viewer.exercises.views import MARKS
 from app.viewer.lessons import LESSONS
 from app.viewer.panel.share import box_html

@@ -1,1 +1,0 @@
-"""The classroom in the page."""
