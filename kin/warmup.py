@@ -17,6 +17,7 @@ from functools import partial
 import numpy as np
 from numba.core.event import install_recorder
 
+from kin.collision import Obstacle, clearance, nearest_links, self_distance
 from kin.files import builtin_robots
 from kin.fk import fk, fk_positions, jacobian, link_frames, manipulability
 from kin.ik import solve_ik
@@ -136,6 +137,14 @@ def _call_all(robot: Robot) -> None:
     solve_path(robot, fk(robot, pair))
 
 
+def _collide(robot: Robot) -> None:
+    """Distances to other links and to obstacles, which the viewer asks for at each pose of some arms."""
+    q = robot.q_home
+    nearest_links(robot, q)
+    self_distance(robot, q)
+    clearance(robot, q, [Obstacle("box", size=(1.0, 1.0, 1.0))])
+
+
 def _plan(robot: Robot) -> None:
     """A motion with lines and a corner of joint moves, from the home pose and back."""
     T = fk(robot, robot.q_home)
@@ -156,6 +165,7 @@ def _solve_generally(robot: Robot) -> None:
 
 
 def _rest() -> Iterator[Callable[[], object]]:
+    yield partial(_collide, _first())
     yield partial(_call_all, _first())
     robots = one_of_each_family()
     for act in (_move, _call_all):

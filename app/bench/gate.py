@@ -56,6 +56,7 @@ GATES: tuple[Gate, ...] = (
     Gate("ik-srs-batch", OURS, 2.5),
     Gate("ik-puma560-batch", OURS, 3.0),
     Gate("ik-ur5-batch", OURS, 3.0),
+    Gate("collision", OURS, 22.0),
     Gate("solve-redundant7-craig", SOLVE_IK, 360.0),
 )
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import kin
+from app.bench.capsules import distances
 from app.bench.rows import Task
 from kin.transforms import Array
 
@@ -55,6 +56,14 @@ def judge_poses(task: Task, poses: list[Array]) -> Check:
             position, rotation = max(position, p), max(rotation, r)
     count = len(task.T)
     return Check(right / count, None, position, rotation, (count - right) / count, None)
+
+
+def judge_distances(task: Task, answers: list[Array]) -> Check:
+    """Distances between links, one per configuration, against plain numpy."""
+    error = np.abs(np.array(answers) - distances(task.robot, task.q))
+    right, count = error <= ACCURACY, len(task.q)
+    success = float(right.mean())
+    return Check(success, None, float(error[right].max(initial=0.0)), 0.0, float((~right).sum()) / count, None)
 
 
 def judge_motions(task: Task, motions: list[Array], limits: Array) -> Check:

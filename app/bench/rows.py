@@ -15,7 +15,7 @@ from kin.robot import Robot
 from kin.solvers import closed_form_of
 from kin.transforms import Array
 
-Kind = Literal["fk", "branches", "answer", "cloud", "ptp", "points", "pace", "line"]
+Kind = Literal["fk", "branches", "answer", "cloud", "collision", "ptp", "points", "pace", "line"]
 MOTIONS: tuple[Kind, ...] = ("ptp", "points", "pace", "line")
 
 
@@ -28,8 +28,9 @@ class Row:
         robot: id of the arm, see :mod:`app.bench.robots`.
         kind: ``"fk"``; ``"branches"``, all configurations, ignoring limits; ``"answer"``, at least one inside the
             limits, verified; ``"cloud"``, tool points of configurations that the contestant samples itself;
-            ``"ptp"``, a motion from home to a configuration; ``"points"``, points of one; ``"pace"``, the fastest
-            motion along a given path of the joints; ``"line"``, points of a line of the tool from home.
+            ``"collision"``, the least distance between links; ``"ptp"``, a motion from home to a configuration;
+            ``"points"``, points of one; ``"pace"``, the fastest motion along a given path of the joints;
+            ``"line"``, points of a line of the tool from home.
         batch: all targets in one call.
         approach: point and approach direction only; the roll about the tool axis does not matter.
         lock: for a redundant arm, the joint that solvers for six joints lock at `value`.
@@ -85,6 +86,7 @@ ROWS: tuple[Row, ...] = (
     Row("solve-redundant7", "an answer inside the limits, verified", "redundant7", "answer"),
     Row("solve-redundant7-craig", "an answer inside the limits, verified", "redundant7-craig", "answer"),
     Row("solve-panda", "an answer inside the limits, verified", "panda", "answer"),
+    Row("collision", "distance of the nearest links, batch, per configuration", "panda", "collision", batch=True),
     Row("motion-ptp", "a motion of the joints with limits of jerk", "panda", "ptp"),
     Row("motion-points", "100 points of a motion of the joints", "panda", "points"),
     Row("motion-pace", "the fastest pace on a path, limits of velocity and acceleration", "panda", "pace"),

@@ -16,7 +16,7 @@ import numpy as np
 import kin
 from app.bench.contestants import FLOOR, KINBOARD, OURS, PEERS, SOLVE_IK, Contestant, Peer, quiet
 from app.bench.contestants.motions import limits_of
-from app.bench.judge import Check, judge_motions, judge_poses, right_sets, share_of_same
+from app.bench.judge import Check, judge_distances, judge_motions, judge_poses, right_sets, share_of_same
 from app.bench.measure import Clock, Turns, measure, ratio
 from app.bench.rows import MOTIONS, ROWS, Row, Task, prepare
 from kin.solvers import closed_form_of
@@ -190,6 +190,8 @@ def _checked(
                         found.append((contestant, None))
                     elif task.row.kind in ("fk", "cloud", "line"):
                         found.append((contestant, judge_poses(task, answers)))
+                    elif task.row.kind == "collision":
+                        found.append((contestant, judge_distances(task, answers)))
                     elif task.row.kind in MOTIONS:
                         found.append((contestant, judge_motions(task, answers, limits_of(task))))
                     else:

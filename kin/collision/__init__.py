@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from kin.collision.bodies import bodies_of, capsules
 from kin.collision.contacts import Contact, surroundings
-from kin.collision.kernels import least_distance, least_distances
+from kin.collision.kernels import least_distance
 from kin.collision.obstacles import Obstacle, checked_obstacles, obstacle_from_dict
 from kin.errors import InputError
 from kin.named import robot_of
@@ -60,12 +60,7 @@ def self_distance(robot: Robot | str, q: ArrayLike) -> Array:
 
     Negative where capsules overlap; infinite for an arm of which no two links could meet.
     """
-    robot = robot_of(robot)
-    q = np.ascontiguousarray(robot.check_q(q))
-    body = bodies_of(robot)
-    out = np.empty(q.shape[:-1])
-    least_distances(robot.model, body.rows, body.shape, body.pairs, q.reshape(-1, robot.n), out.reshape(-1))
-    return out
+    return clearance(robot, q)
 
 
 def nearest_links(robot: Robot | str, q: ArrayLike) -> NearestLinks | None:
@@ -81,7 +76,7 @@ def nearest_links(robot: Robot | str, q: ArrayLike) -> NearestLinks | None:
     body = bodies_of(robot)
     found = np.empty(7)
     ends = np.empty((len(body.rows), 6))
-    pair = least_distance(robot.model, body.rows, body.shape, body.pairs, np.ascontiguousarray(q), ends, found)
+    pair = least_distance(robot.model, body.rows, body.shape, body.pairs, q.copy(), ends, found)
     if pair < 0:
         return None
     first, second = (body.capsules[k] for k in body.pairs[pair].tolist())

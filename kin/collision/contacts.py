@@ -60,7 +60,7 @@ class Surroundings:
         body, out, which = self.bodies, np.empty(len(q)), np.empty(len(q), np.int64)
         least_clearances(
             *(self.robot.model, body.rows, body.shape, self.pairs, self.solids, body.moving),
-            *(np.ascontiguousarray(q), out, which),
+            *(q.copy(), out, which),  # of an array that can be written: for others the kernel is compiled again
         )
         return out, which
 

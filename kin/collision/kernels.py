@@ -142,13 +142,3 @@ def least_distance(model: Array, rows: Ints, shape: Array, pairs: Ints, q: Array
             out[1 + r] = ends[first, r] + at * (ends[first, 3 + r] - ends[first, r])
             out[4 + r] = ends[second, r] + by * (ends[second, 3 + r] - ends[second, r])
     return nearest
-
-
-@jit
-def least_distances(model: Array, rows: Ints, shape: Array, pairs: Ints, q: Array, out: Array) -> None:
-    """out ← the least distance ``(k,)`` of each configuration ``(k, n)``."""
-    ends = np.empty((rows.shape[0], 6))
-    found = np.empty(7)
-    for j in range(q.shape[0]):
-        least_distance(model, rows, shape, pairs, q[j], ends, found)
-        out[j] = found[0]

@@ -133,7 +133,7 @@ class OutsideLimits(NamedTuple):
 
 
 class Touching(NamedTuple):
-    """Configurations exist, but in all of them the arm touches itself or an obstacle.
+    """Configurations exist, but in all that were looked at the arm touches itself or an obstacle.
 
     Attributes:
         branch: the posture in which bodies overlap least.

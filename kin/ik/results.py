@@ -35,7 +35,7 @@ class Status(StrEnum):
     ``solved``: exact solutions. ``approximate``: an arm of few joints meets a part of the task. ``limits``:
     postures exist, all of them outside the joint limits. ``orientation``: the point can be reached, but not with
     this orientation. ``unreachable``: the point cannot be reached, or not on the requested branch. ``collision``:
-    postures exist, in all of them the arm touches itself or an obstacle that was to be avoided.
+    postures exist, but none was found in which the arm touches neither itself nor an obstacle, as was asked.
     """
 
     SOLVED = "solved"
@@ -131,9 +131,9 @@ class IKResult(Deferred):
         status, cause: the kind of answer and its cause, as codes.
         details: the numbers behind them; see :mod:`kin.ik.details`.
         solutions: in the requested order (compromises: by their error); empty unless solved or approximate.
-        closest: without a solution, the configuration (status ``collision``: the exact one in which bodies overlap
-            least) inside the limits with the smallest
-            ``√(|Δp|² + (0.1 m · angle)²)`` found on the requested branches, else None.
+        closest: without a solution, the configuration inside the limits with the smallest
+            ``√(|Δp|² + (0.1 m · angle)²)`` found on the requested branches, else None. Status ``collision``:
+            of the solutions without regard to collisions, the one in which bodies overlap least.
         nearest_orientation: the configuration with the exact point and the smallest rotation error (status
             ``orientation``), None if none was found.
         blocked: every posture that is outside the limits, the closest to them first (status ``limits``).

@@ -180,6 +180,15 @@ def test_a_motion_that_exceeds_a_limit_or_misses_its_end_is_detected():
     assert judge.judge_motions(task, [m[:, :-5] for m in ours], limits).success == 0.0
 
 
+def test_distances_between_links_are_compared_with_plain_numpy():
+    task = prepare(ROWS_BY_ID["collision"], 64, 1)
+    ours = answers_of(task)
+    check = judge.judge_distances(task, ours)
+    assert (check.success, check.wrong) == (1.0, 0.0)
+    assert check.position_error < 1e-12
+    assert judge.judge_distances(task, [ours[0] + 1e-3, *ours[1:]]).wrong == 1 / 64
+
+
 @pytest.mark.parametrize("name", ["motion-points", "motion-pace"])
 def test_motions_of_all_rows_keep_the_limits(name):
     task = prepare(ROWS_BY_ID[name], 4, 1)
@@ -411,6 +420,6 @@ def test_every_row_has_a_floor_and_kinboard():
     for row in ROWS:
         task = prepare(row, 2, 1)
         if task is not None:
-            # Clouds have two rows: computing and writing.
+            # Clouds have two floors: computing and writing.
             assert [c.floor for c in FLOOR.enter(task)] == [True] * (2 if row.kind == "cloud" else 1)
             assert KINBOARD.enter(task)

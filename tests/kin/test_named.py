@@ -60,7 +60,8 @@ def test_the_table_names_every_function_that_takes_a_robot():
     functions = {name: value for name, value in vars(kin).items() if inspect.isfunction(value)}
     first = {name: next(iter(inspect.signature(value).parameters), "") for name, value in functions.items()}
     taking = {name for name, parameter in first.items() if parameter == "robot"}
-    assert taking & set(kin.__all__) == set(CALLS)
+    # `show` starts a service, which finds the robot.
+    assert taking & set(kin.__all__) == {*CALLS, "show"}
 
 
 def found(name, robot, tmp_path):

@@ -43,6 +43,21 @@ for robot in random_arms(24):
         kin.solve_ik(robot, T, task=task)
     kin.solve_ik(robot, T, q_seed=robot.home)
     kin.solve_path(robot, [T, T])
+obstacles = [
+    kin.Obstacle("sphere", (0.4, 0.0, 0.2), radius=0.1),
+    kin.Obstacle("cylinder", (-0.5, 0.3, 0.2), radius=0.1, height=0.4),
+    kin.Obstacle("table", (0.0, 0.0, -0.3), size=(1.0, 1.0, 0.05)),
+]
+for robot in (*kin.builtin_robots().values(), *random_arms(8)):
+    for q in (robot.q_home, robot.q_home + 0.01, [robot.home] * 3):
+        kin.self_distance(robot, q)
+        kin.clearance(robot, q, obstacles)
+    kin.nearest_links(robot, robot.q_home)
+    kin.nearest_contact(robot, robot.home, obstacles)
+    T = kin.fk(robot, robot.home)
+    kin.solve_ik(robot, T, avoid_self_collision=True, obstacles=obstacles[:2])
+    kin.solve_path(robot, [T, T], avoid_self_collision=True)
+    kin.plan_motion(robot, [kin.Ptp(kin.JointTarget(robot.home))], obstacles=obstacles)
 arm = kin.get_robot("pioneer5")
 locked = [None, None, None, 0.3, 0.3]
 for strategy in ("uniform", "quasi", "boundary", "volume"):

@@ -29,6 +29,7 @@ _SECTIONS = {
     "cloud": "Workspace",
     "branches": "All solutions of inverse kinematics",
     "answer": "One verified solution inside the limits",
+    "collision": "Self-collision",
     "ptp": "Motions",
     "points": "Motions",
     "pace": "Motions",

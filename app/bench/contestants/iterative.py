@@ -80,7 +80,7 @@ def ikpy(task: Task) -> list[Contestant]:
     from ikpy.link import OriginLink, URDFLink
     from scipy.spatial.transform import Rotation
 
-    if task.row.kind in MOTIONS or task.arm.slides:
+    if task.row.kind in (*MOTIONS, "collision") or task.arm.slides:
         return []
     arm = task.arm
     lower, upper = search_range(task, arm)

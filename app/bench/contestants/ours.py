@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 import kin
-from app.bench import floors
+from app.bench import capsules, floors
 from app.bench.contestants import motions
 from app.bench.contestants.contestant import FLOORS, OURS, SOLVE_IK, Contestant, no_answers, one_answer
 from app.bench.rows import MOTIONS, Task
@@ -37,6 +37,13 @@ def ours(task: Task) -> list[Contestant]:
         return _cloud(task)
     if row.kind in MOTIONS:
         return motions.ours(task)
+    if row.kind == "collision":
+        return [
+            Contestant(OURS, kin.self_distance, [(robot, task.q)], list, len(task.q)),
+            Contestant(
+                f"{OURS}, kinematics only", kin.link_frames, [(robot, task.q)], no_answers, len(task.q), floor=True
+            ),
+        ]
     if row.kind == "fk" and row.batch:
         return [Contestant(OURS, kin.fk_positions, [(robot, task.q)], list, len(task.q))]
     if row.kind == "fk":
@@ -104,6 +111,8 @@ def plain_numpy(task: Task) -> list[Contestant]:
     """Plain matrix products. For a cloud, sampling the joint values is not timed."""
     if task.row.kind == "cloud":
         return [Contestant("numpy", lambda q: task.arm.fk(q)[:, :3, 3], [(task.q,)], list, len(task.q))]
+    if task.row.kind == "collision":
+        return [Contestant("numpy", capsules.distances, [(task.robot, task.q)], list, len(task.q))]
     if task.row.kind != "fk":
         return []
     if task.row.batch:

@@ -86,7 +86,7 @@ class IkAnswer(TypedDict):
     the best compromises. "limits": postures exist, all of them outside the joint limits, see `blocked`.
     "orientation": the point can be reached, but not with this orientation; see `nearest_orientation`.
     "unreachable": the point is `distance` metres out of reach, or the requested branch does not exist there.
-    "collision": postures exist, in all of them something touches that was to be avoided."""
+    "collision": postures exist, but none was found in which nothing touches that was to be avoided."""
     cause: Cause
     """Why it is not solved, as a code; empty when it is solved. "too far", "too near", "around the axis" and
     "outside" say where a point out of reach is."""
@@ -107,8 +107,8 @@ class IkAnswer(TypedDict):
     """Nearest to the seed first, or in the order of `prefer`; empty unless "solved" or "approximate"."""
     closest: Solution | None
     """When there is no exact answer, the configuration inside the limits with the least
-    √(|Δp|² + (0.1 m · angle)²) on the requested branches; null when solved. For "collision": the exact one in
-    which bodies overlap least."""
+    √(|Δp|² + (0.1 m · angle)²) on the requested branches; null when solved. For "collision": of the
+    solutions without regard to collisions, the one in which bodies overlap least."""
     nearest_orientation: Solution | None
     """For "orientation": the exact point with the least rotation error; null otherwise."""
     blocked: list[Blocked]

@@ -140,7 +140,7 @@ def _outcome(details: Details, cause: str, task: str, units: Units) -> tuple[str
         case OutsideLimits():
             return "Outside the limits", _outside(details, units)
         case Touching():
-            return "No posture without a collision", _touching(details, units)
+            return "No collision-free posture found", _touching(details, units)
         case NotOnBranch(elsewhere, outside):
             why = f"{count(outside, 'other posture exists', 'other postures exist')}, outside the joint limits"
             if elsewhere:
@@ -164,15 +164,17 @@ def _outcome(details: Details, cause: str, task: str, units: Units) -> tuple[str
 
 
 def _touching(details: Touching, units: Units) -> str:
-    """What touches what in the posture in which it overlaps least."""
+    """What touches what in the posture that overlaps least, before redundancy parameters were searched."""
     contact, name = details.contact, f" ({details.branch})" if details.branch != "numeric" else ""
     text = f"{contact.text} by {units.lengths.value(-contact.distance)}"
-    if details.searched:
-        text += f" at best, whatever the value of {listed(details.searched)}"
     if details.postures == 1:
-        return f"{text}{name}"
-    others = count(details.postures - 1, "other posture overlaps", "other postures overlap")
-    return f"{text} in the posture that overlaps least{name}; {others} more"
+        text += name
+    else:
+        others = count(details.postures - 1, "other posture overlaps", "other postures overlap")
+        text += f" in the posture that overlaps least{name}; {others} more"
+    if details.searched:
+        text += f"; a search over {listed(details.searched)} found nothing free"
+    return text
 
 
 def _solved(details: Solved, task: str) -> str:

@@ -81,7 +81,7 @@ def test_dragging_avoids_self_collision_on_request(port: int) -> None:
         if result.status == "solved":
             assert kin.self_distance(UR5, shown) >= -1e-6
         else:
-            assert "No posture without a collision" in tab.html
+            assert "No collision-free posture found" in tab.html
         tab.release()
         tab.set(AVOID, False)
         tab.settle()
