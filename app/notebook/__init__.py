@@ -21,6 +21,7 @@ from app.notebook.process import ServiceProcess
 from app.viewer.own_arm import OwnArm, own_arm
 from app.viewer.session.state import PageState, encode
 from kin import InputError, Robot
+from kin.named import robot_of
 from kin.transforms import Array
 
 RATE = 30.0  # configurations of a path that are sent a second
@@ -105,7 +106,7 @@ def show(
     address: str | None,
 ) -> ArmView:
     """As `kin.show`."""
-    robot = kin.get_robot(robot) if isinstance(robot, str) else robot
+    robot = robot_of(robot)
     steps = None if path is None else _path(robot, path)
     start = _configuration(robot, robot.q_home if q is None else q) if steps is None else steps[0]
     if address is None:

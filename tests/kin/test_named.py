@@ -74,6 +74,13 @@ def found(name, robot, tmp_path):
     return repr(list(result) if name == "sample_workspace" else result)
 
 
+def test_show_refuses_what_is_no_robot_before_it_starts_a_service():
+    with pytest.raises(UnknownRobotError, match="ur6"):
+        kin.show("ur6")
+    with pytest.raises(InputError, match=r"^robot: got 5, expected a Robot"):
+        kin.show(5)
+
+
 @pytest.mark.parametrize("name", CALLS)
 def test_the_id_of_a_robot_is_as_good_as_the_robot(name, tmp_path):
     assert found(name, "ur5", tmp_path) == found(name, UR5, tmp_path)
