@@ -10,10 +10,7 @@ from numba.core.event import trigger_event
 import kin
 from kin import warmup
 
-
-def test_after_warm_up_rest_no_call_compiles_a_kernel():
-    """In a separate process, in which nothing else has loaded kernels."""
-    program = """
+PROGRAM = """
 import sys
 sys.path.insert(0, "tests")
 import kin
@@ -74,7 +71,11 @@ for robot in kin.builtin_robots().values():
 after = compilations()
 assert after == before, {k: n for k, n in after.items() if before.get(k) != n}
 """
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+
+
+def test_after_warm_up_rest_no_call_compiles_a_kernel():
+    """In a separate process, in which nothing else has loaded kernels."""
+    done = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
 
 
