@@ -47,6 +47,14 @@ def skeleton(robot: Robot) -> Skeleton:
             links.append(k)
             poses.append(T)
             scales.append((1.5 * thick, 1.5 * thick, 2.6 * thick))
+        if link.joint is not None and link.joint.kind == "prismatic" and link.joint.limits is not None:
+            # The rod that slides: it reaches back to the link before in every position.
+            stroke = max(link.joint.limits, key=abs)
+            T = np.eye(4)
+            T[2, 3] = -max(stroke, 0.0)
+            links.append(k)
+            poses.append(T)
+            scales.append((thick, thick, abs(stroke)))
         for low, high in zip(link.path[:-1], link.path[1:], strict=True):
             length = float(np.linalg.norm(high - low))
             if length > _SHORT and k:

@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from app.viewer.own_arm import OwnArm
+from app.viewer.panel.status import READY
 from app.viewer.session.actions import ActionsPage
 from app.viewer.session.history import without_results
 from app.viewer.session.state import PageState, decode
@@ -60,6 +61,7 @@ class Follower:
         compute: whether lessons and other features are shown too, which may compute.
 
     Attributes:
+        moving: whether the target has moved since it was last solved here.
         turned: whether the visitor has moved the camera since; then the other's viewpoint is not shown.
     """
 
@@ -69,11 +71,17 @@ class Follower:
         self._text = ""
         self._shown: PageState | None = None
         self._aimed: Array | None = None
-        self.turned = False
+        self.moving = self.turned = False
 
     def begin(self) -> None:
         """The next state is shown whole, with its viewpoint."""
-        self._text, self._shown, self.turned = "", None, False
+        self._text, self._shown, self.moving, self.turned = "", None, False, False
+
+    def settle(self) -> None:
+        """The other arm rests: solve its target here too, so that this page's words and numbers are about it."""
+        state, self.moving = self._shown, False
+        if self._compute and state is not None and state.target is not None:
+            self._page.arm.restore_target(state.target, state.q)
 
     def show(self, text: str) -> None:
         """Show a packed state; a text that is not a state changes nothing."""
@@ -88,6 +96,9 @@ class Follower:
             self._page.adopt(replace(state, own=self._own(state)))
         elif not np.array_equal(state.q, self._page.goal) or not _equal(state.target, last.target):
             self._page.arm.follow(state.q, state.target)
+            self.moving = True
+        if state.target is None and (last is None or last.target is not None):
+            self._page.status.show(READY)  # what it said was about another target
         if self._compute:
             self._show_view(state)
             self._show_lesson(last, state)

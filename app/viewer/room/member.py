@@ -18,12 +18,14 @@ from app.viewer.panel.script import Reply
 from app.viewer.panel.status import Notice
 from app.viewer.room.following import Follower, LedPage
 from app.viewer.room.sharing import Sharing
+from app.viewer.session.numbers import Numbers
 from app.viewer.session.state import PageState
 
 NEWS: Hashable = "room"
 REFRESH = 0.2  # s between two updates of the tab and of the wall
 IDLE = 60.0  # s
 AGAIN = 6.0  # s within which a button that needs two presses must be pressed again
+SETTLED = 0.5  # s without news of who leads after which the target is solved in this page too
 GRACE = 0.8  # s after the beginning of a lead in which a drag that is under way does not end it
 # Events by which a visitor moves the arm or opens something else.
 ACTS = frozenset(
@@ -40,6 +42,7 @@ class MemberPage(LedPage, Protocol):
 
     attendance: Attendance
     exercises: Exercises
+    numbers: Numbers
 
     def snapshot(self) -> PageState:
         """The present state."""
@@ -86,6 +89,7 @@ class Member(Feature):
         self.due = 0.0
         self._began = 0.0
         self._dirty = True
+        self._settles: float | None = None  # when the arm of who leads has rested long enough
         self._next = 0.0
         self._sharing = Sharing(self.shared_state, self.attendance.tell_page, self.share_every)
         self._armed: tuple[Hashable, float] = "", 0.0
@@ -148,6 +152,9 @@ class Member(Feature):
 
     def tick(self, now: float) -> None:
         again = self._sharing.tick(now)
+        if self._settles is not None and now >= self._settles:
+            self._settles = None
+            self.follower.settle()
         if self._dirty and now >= self._next:
             self._dirty, self._next = False, now + REFRESH
             if self._bar is not None:
@@ -158,6 +165,8 @@ class Member(Feature):
             self._armed, self._dirty, left = ("", 0.0), True, 0.0
         elif self._armed[0]:
             left = min(left, self._armed[1] - now)
+        if self._settles is not None:
+            left = min(left, self._settles - now)
         self.due = max(0.0, min(left, IDLE if again is None else again))
 
     def on_style(self) -> None:
@@ -195,11 +204,13 @@ class Member(Feature):
             self.page.be_led(True)
             self.follower.begin()
         self.follower.show(text)
+        if self.follower.moving:
+            self._settles = time.perf_counter() + SETTLED
 
     def free(self) -> None:
         """Nobody leads this page any more."""
         if self.leader:
-            self.leader = ""
+            self.leader, self._settles = "", None
             self.page.be_led(False)
 
     def twice(self, what: Hashable) -> bool:

@@ -176,6 +176,7 @@ class Teacher(Member):
             if self.leader:
                 self._return()
             camera.look()
+            page.numbers.hide_target()
             self._before = page.snapshot()
             self._hidden = [(node, node.visible) for node in page.arm.scene.tops]
             image = page.client.camera

@@ -21,7 +21,7 @@ MODES: dict[Mode, tuple[str, str, str, str]] = {
     "shown": ("★", "Your arm is shown to all", "What you do now, everybody in the room sees.", "mauve"),
     "frozen": ("❄", "Frozen", "The teacher has stopped all arms for a moment.", "violet"),
     "paused": ("‖", "Paused", "The teacher’s connection is lost. You can go on by yourself.", "amber"),
-    "closed": ("■", "The room is closed", "", "crimson"),
+    "closed": ("■", "You are no longer in the room", "", "crimson"),
 }  # fmt: skip
 # Symbol, words and colour of how a student is doing.
 DOING: dict[State, tuple[str, str, str]] = {
@@ -57,6 +57,7 @@ def _mode(room: RoomView, mode: Mode) -> dict[str, str]:
         detail = "The teacher shows it to all. Move the arm to let go."
     if mode == "led" and room.frozen:
         title, detail = f"Frozen. {title}", "Your arm moves with it until the teacher goes on."
+        symbol, color = MODES["frozen"][0], MODES["frozen"][3]
     return {
         "symbol": symbol,
         "title": title,

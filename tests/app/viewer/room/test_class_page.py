@@ -145,6 +145,17 @@ def test_students_see_what_the_teacher_does_until_they_let_go(room: Class) -> No
     assert student.script["undo"], "undo leads back to what the student had"
 
 
+def test_who_follows_reads_what_is_true_of_the_arm_on_show(room: Class) -> None:
+    teacher, student, _, _ = lead(room)
+    far = kin.fk(ROBOT, ROBOT.q_home)
+    for step in (0.4, 0.5, 0.6):
+        far[0, 3] = step
+        teacher.drag(far)
+    student.wait(lambda: 'data-status="unreachable"' in student.html)
+    teacher.set("2 rotating elbow", 40.0)
+    student.wait(lambda: 'data-status="hand"' in student.html)
+
+
 def test_a_student_who_moves_the_arm_lets_go(room: Class) -> None:
     _, student, _, q = lead(room)
     student.settle(1.0)  # not within the grace of a new lead
