@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import secrets
+import sqlite3
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -115,13 +116,16 @@ class Database:
                 self._url,
                 pool_pre_ping=True,
                 pool_timeout=WAIT,
+                hide_parameters=True,
                 connect_args={"connect_timeout": max(2, int(WAIT))},
             )
         else:
             if self._inode is not None and not self._file.exists():
                 raise FileNotFoundError(f"{self._file} has disappeared")  # an empty one would end all rooms
             self._file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            engine = create_engine(self._url, pool_timeout=WAIT, connect_args={"timeout": WAIT})
+            engine = create_engine(
+                self._url, pool_timeout=WAIT, hide_parameters=True, connect_args={"timeout": WAIT}
+            )
             event.listen(engine, "connect", _configure_sqlite)
             event.listen(engine, "begin", _begin_sqlite)
         try:
@@ -149,7 +153,7 @@ class Database:
         except ModuleNotFoundError as error:
             logger.error("the database's driver is missing: install kinboard[postgres]")
             raise ClassroomUnavailable(_sentence(error)) from error
-        except (SQLAlchemyError, OSError) as error:
+        except (SQLAlchemyError, sqlite3.Error, OSError) as error:
             if isinstance(error, OSError):
                 self.close()  # the next transaction opens the file that is there then
             if steady() - self._logged > LOG_EVERY:
@@ -199,8 +203,9 @@ def _revision(connection: Connection) -> str | None:
 
 
 def _brief(error: Exception) -> str:
-    """The database's own words, without the statement and its values, which may be personal."""
-    return f"{type(error).__name__}: {getattr(error, 'orig', None) or error}"[:300].replace("\n", " ")
+    """The first line of the database's own words: a statement and values, which may be personal, come after it."""
+    words = str(getattr(error, "orig", None) or error).partition("\n")[0]
+    return f"{type(error).__name__}: {words}"[:300]
 
 
 def _sentence(error: Exception) -> str:

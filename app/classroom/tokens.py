@@ -17,7 +17,7 @@ from app.classroom.views import Ticket
 COOKIE = "kinboard_room"
 # Without what looks alike: 0 O, 1 I L, 2 Z, 5 S, 8 B, U V.
 LETTERS = "ACDEFGHJKMNPQRTWXY34679"
-CODE_LENGTH = 7  # 23**7 = 3.4 thousand million
+CODE_LENGTH = 8  # 23**8 = 78 thousand million
 _CODE_GROUP = 4
 LONGEST_TOKEN = 300
 

@@ -25,6 +25,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 if TYPE_CHECKING:
     from starlette.responses import Response
 
+_TEACHER = "kinboard.teacher"  # in the scope: whether the answer is a teacher's page
 SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
 
 # What a camera reports, and what the page remembers, when viser asks for it: a link says what to look at.
@@ -116,6 +117,11 @@ def set_cookie(response: Response, name: str, value: str, seconds: int, scope: S
         response.raw_headers.append((name_, header + b"; Partitioned"))  # Python < 3.14 cannot write it
 
 
+def guard_teacher(scope: Scope) -> None:
+    """Let no page of any site frame the answer: only ours, and those of the sites that the operator names."""
+    scope[_TEACHER] = True
+
+
 class SecurityHeaders:
     """ASGI middleware: a content security policy unless the page has its own, and no content sniffing.
 
@@ -126,6 +132,7 @@ class SecurityHeaders:
     def __init__(self, app: ASGIApp, ancestors: Sequence[str] = ()) -> None:
         self.app = app
         self._framing = framing_policy(ancestors)
+        self._named = framing_policy([each for each in ancestors if each != "*"])
         self._others = bool(ancestors)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -137,7 +144,8 @@ class SecurityHeaders:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
                 policy = headers.get("content-security-policy", PAGE_POLICY)
-                headers["content-security-policy"] = f"{policy}; {self._framing}"
+                framing = self._named if scope.get(_TEACHER) else self._framing
+                headers["content-security-policy"] = f"{policy}; {framing}"
                 if not self._others:  # for old browsers; it cannot name other origins
                     headers.setdefault("x-frame-options", "SAMEORIGIN")
                 headers.setdefault("x-content-type-options", "nosniff")

@@ -65,12 +65,20 @@ class Passback:
                     self._changed.wait(wait)
                     continue
                 del self._due[seat]
-            again = self._send(seat)
+            again = self._tried(seat)
             if again and tried + 1 < len(self._pauses):
                 with self._changed:
                     self._due.setdefault(seat, (time.monotonic() + self._pauses[tried + 1], tried + 1))
             elif again:
                 logger.error("the score of a seat was not sent: the platform refused it %s times", tried + 1)
+
+    def _tried(self, seat: str) -> bool:
+        """As `_send`; no error ends the thread, which has the scores of others to send."""
+        try:
+            return self._send(seat)
+        except Exception:
+            logger.exception("a score could not be sent")
+            return True
 
     def _send(self, seat: str) -> bool:
         """Send the present score; True: try again."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from sqlalchemy import delete, func, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
+from app.classroom.clock import now
 from app.classroom.database import Database
 from app.classroom.lti.launches import Launch
 from app.classroom.rooms import Rooms, clean_name
@@ -98,7 +99,7 @@ class LtiSeats:
         query = (
             select(Room.id, Room.code)
             .join(LtiRoom, LtiRoom.room_id == Room.id)
-            .where(LtiRoom.id == link, Room.ends > time.time())
+            .where(LtiRoom.id == link, Room.ends > now())
         )
         with self._database.read() as connection:
             found = connection.execute(query).one_or_none()

@@ -8,6 +8,7 @@ import time
 import urllib.request
 from collections.abc import Sequence
 from datetime import UTC, datetime
+from http.client import HTTPException
 from typing import Any
 from urllib.error import HTTPError, URLError
 from urllib.parse import urlencode, urlsplit, urlunsplit
@@ -111,5 +112,5 @@ def _send(address: str, body: bytes, kind: str, access: str = "") -> bytes:
         raise GradeRefused(
             f"the platform answered {status}", final=400 <= status < 500 and status != 429
         ) from None
-    except (URLError, OSError) as error:
+    except (URLError, HTTPException, OSError) as error:
         raise GradeRefused(f"the platform cannot be reached: {error}", final=False) from None

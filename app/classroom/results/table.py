@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -12,6 +13,7 @@ from itertools import groupby
 
 STUCK_TRIES, STUCK_SECONDS = 3, 300.0  # without a right answer
 FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
+_SEPARATED = re.compile(r"([;\t]\s*)(?=[=+\-@＝＋－＠])")
 COLUMNS = (
     "alias", "exercise", "title", "attempt", "variant", "answer", "verdict", "score", "started",
     "answered", "seconds",
@@ -103,11 +105,15 @@ def to_csv(attempts: Sequence[Attempt], titles: Mapping[str, str]) -> str:
             [alias, exercise, title, number, one.seed, answer, verdict, f"{one.score:.2f}", _time(one.started),
              _time(one.at), f"{max(0.0, one.at - one.started):.0f}"]
         )  # fmt: skip
-    return text.getvalue()
+    return text.getvalue().encode("utf-8", "replace").decode()  # half a letter is none
 
 
 def cell(text: str) -> str:
-    """A text that no spreadsheet takes for a formula: an apostrophe is put before what begins like one."""
+    """A text that no spreadsheet takes for a formula: an apostrophe is put before what begins like one.
+
+    Where a comma separates decimals, spreadsheets separate cells at semicolons, so what follows one counts too.
+    """
+    text = _SEPARATED.sub(r"\1'", text)
     return f"'{text}" if text.lstrip(" ").startswith(FORMULA) else text
 
 

@@ -95,13 +95,13 @@ class Access:
         try:
             if path not in HEALTH:
                 self._count(scope)
+            scope[_GUESTS] = self._guests
             if path == "/login" and request is not None:
                 answer = await self._login(request)
             elif not (path in OPEN or path.startswith("/static/")):
                 scope[_MAY_OPEN] = await self._authenticated(scope)
                 if not scope[_MAY_OPEN] and not self._is_guest(scope, path):
                     self._admit_anonymous(scope, path)
-                scope[_GUESTS] = self._guests
         except ProblemError as error:
             answer = respond(error)
         except _LoginNeededError:
@@ -254,6 +254,12 @@ def pass_guest(request: Request, answer: Response, ends: float, framed: bool) ->
     if guests is not None:
         seconds = max(1, int(ends - time.time()))
         set_cookie(answer, GUEST_COOKIE, guests.dumps(int(ends)), seconds, request.scope, framed)
+
+
+def forget_guest(request: Request, answer: Response, framed: bool) -> None:
+    """Take that back from who has left the classroom."""
+    if GUEST_COOKIE in request.cookies:
+        set_cookie(answer, GUEST_COOKIE, "", 0, request.scope, framed)
 
 
 def rights_of(scope: Scope) -> Rights:

@@ -8,6 +8,7 @@ from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from app.api.problems import internal_error, respond
+from app.service.web.observe import logged_path
 
 logger = logging.getLogger("kinboard.errors")
 
@@ -28,7 +29,10 @@ class Failures:
             return  # during an upload: nobody is there to be answered
         except Exception:
             logger.exception(
-                "request %s failed: %s %s", scope["kinboard.request_id"], scope["method"], scope["path"]
+                "request %s failed: %s %s",
+                scope["kinboard.request_id"],
+                scope["method"],
+                logged_path(scope["path"]),
             )
             if scope["kinboard.started"]:
                 raise  # the server cuts the answer off, so that the client sees that it is incomplete

@@ -20,6 +20,7 @@ from starlette.routing import BaseRoute, Route
 
 from app.api.problems import ProblemError
 from app.classroom import COOKIE, ClassroomUnavailable, Hub, RefusedError
+from app.service.web.access import pass_guest
 from app.shared.security import PAGE_POLICY, set_cookie
 from app.shared.settings import Settings
 
@@ -162,7 +163,8 @@ class _Pages:
         answer = RedirectResponse("../viewer/", 303, headers={"cache-control": "no-store"})
         token = self._hub.rooms.tokens.sign(ticket)
         set_cookie(answer, COOKIE, token, int(room.ends - room.created), request.scope, framed=True)
-        answer.delete_cookie(STATE_COOKIE, path=request.scope.get("root_path", "") + "/")
+        pass_guest(request, answer, room.ends, framed=True)
+        set_cookie(answer, STATE_COOKIE, "", 0, request.scope, framed=True)
         return answer
 
     def _choices(self, launch: Launch) -> Response:

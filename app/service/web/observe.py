@@ -21,6 +21,7 @@ from app.shared.metrics import REQUEST_SECONDS, REQUESTS
 logger = logging.getLogger("kinboard.access")
 
 _VALID_ID = re.compile(rb"[\w.:/+=-]{1,128}", re.ASCII)
+_SECRET = re.compile(r"/room/teach/.*", re.DOTALL)  # who has this path may teach the class
 CLIENT_LEFT = 499  # the status counted for a client that left before it was answered, as nginx does
 _METHODS = frozenset(("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"))
 
@@ -85,7 +86,7 @@ class Observe:
                 "id": scope["kinboard.request_id"],
                 "client": client_of(scope),
                 "method": method,
-                "path": path,
+                "path": logged_path(path),
                 "route": route,
                 "status": status,
                 "bytes": sent,
@@ -103,11 +104,16 @@ def write_to_stderr() -> None:
     logger.propagate = False
 
 
+def logged_path(path: str) -> str:
+    """A path as it may be written to a log: without the secret of a teacher's link."""
+    return _SECRET.sub("/room/teach/{token}", path)
+
+
 def _route_of(scope: Scope, path: str) -> str:
     """Pattern of the matched route, so that the number of time series is bounded by the number of routes."""
     if "endpoint" not in scope:
         return "none"
     if path.startswith("/static/"):
         return "/static"
-    pattern: str = getattr(scope.get("route"), "path", path)
+    pattern: str = getattr(scope.get("route"), "path", logged_path(path))
     return pattern

@@ -21,6 +21,10 @@ AT_ONCE = 32  # messages in the field; more are ignored
 MAX_NUMBER = 2**53
 
 
+def _refuse(number: str) -> object:
+    raise ValueError(f"{number} is no number of JSON")
+
+
 class Reply(NamedTuple):
     """The answer to a message: its number, and what is wrong with it (empty: nothing)."""
 
@@ -50,7 +54,8 @@ class PageScript:
     def read(self, text: str) -> list[tuple[int, str, object]]:
         """The messages in `text` that have not been read yet, as number, name and argument, in order."""
         try:
-            items = json.loads(text)
+            items = json.loads(text, parse_constant=_refuse)
+            json.dumps(items, ensure_ascii=False).encode()  # half a letter could be shown and stored nowhere
         except (ValueError, RecursionError):
             return []
         found = []

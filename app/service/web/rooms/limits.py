@@ -61,14 +61,18 @@ class Limits:
 
     def opening(self, client: str) -> None:
         """A room is opened; raises 429."""
-        self._take(self._rooms, client, "Too many rooms were opened from your address.")
+        self._ask(self._rooms, client, "Too many rooms were opened from your address.")
+        self._rooms.take(client)
 
     def sitting(self, client: str) -> None:
-        """A seat is taken; raises 429."""
-        self._take(self._seats, client, "Too many seats were taken from your address.")
+        """Somebody asks for a seat; raises 429."""
+        self._ask(self._seats, client, "Too many seats were taken from your address.")
 
-    def _take(self, bucket: TokenBucket, client: str, detail: str) -> None:
+    def sat(self, client: str) -> None:
+        """A seat was taken. Wrong codes take none: who guesses must not keep the class at the same address out."""
+        self._seats.take(client)
+
+    def _ask(self, bucket: TokenBucket, client: str, detail: str) -> None:
         wait = bucket.wait(client)
         if wait > 0.0:
             raise too_many(detail, wait)
-        bucket.take(client)

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
+from app.shared.security import guard_teacher
+
 if TYPE_CHECKING:
     from jinja2 import Template
 
@@ -40,6 +42,8 @@ def room_page(request: Request, status: int = 200, **values: object) -> HTMLResp
     )
     known |= {"hours": 12, "may_open": False, "teacher": False, "local": False, "ends": "", "ends_at": ""}
     known |= {"lives": LIVES, "root": "../" * depth or "./"}
+    if values.get("teacher"):
+        guard_teacher(request.scope)
     text = _template("room.html").render(**{**known, **values})
     return HTMLResponse(text, status, headers={"cache-control": "no-store"})
 
@@ -47,6 +51,7 @@ def room_page(request: Request, status: int = 200, **values: object) -> HTMLResp
 def results_page(request: Request, status: int = 200, **values: object) -> HTMLResponse:
     """The teacher's page of results; values that are not given are empty."""
     known: dict[str, object] = {"room": None, "rows": (), "counts": {}, "more": 0, "attempts": 0, "problem": ""}
+    guard_teacher(request.scope)
     text = _template("results.html").render(**{**known, **values, "root": "../"})
     return HTMLResponse(text, status, headers={"cache-control": "no-store"})
 

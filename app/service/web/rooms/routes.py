@@ -17,7 +17,7 @@ from app.api.problems import ProblemError
 from app.classroom import COOKIE, ClassroomUnavailable, Hub, RefusedError, Role, Ticket, UnknownRoomError
 from app.classroom.clock import now
 from app.classroom.tokens import LONGEST_TOKEN, read_code, show_code
-from app.service.web.access import form_of, may_open, pass_guest
+from app.service.web.access import forget_guest, form_of, may_open, pass_guest
 from app.service.web.rooms.limits import Limits
 from app.service.web.rooms.page import ends_at, ends_in_words, join_address, only_here, qr_svg, room_page
 from app.service.web.rooms.results import Results
@@ -119,6 +119,7 @@ class _Pages:
                 except UnknownRoomError:
                     self._limits.wrong(client)
                     raise
+                self._limits.sat(client)
             room = await run_in_threadpool(self._hub.rooms.find, ticket)
         except RefusedError as error:
             return again(
@@ -208,8 +209,5 @@ class _Pages:
         pass_guest(request, answer, ends, self._framed)
 
     def _forget(self, request: Request, answer: Response) -> None:
-        answer.delete_cookie(COOKIE, path=_path(request), httponly=True, samesite="lax")
-
-
-def _path(request: Request) -> str:
-    return str(request.scope.get("root_path", "")) + "/"
+        set_cookie(answer, COOKIE, "", 0, request.scope, self._framed)
+        forget_guest(request, answer, self._framed)

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 from collections.abc import AsyncIterator
 
 from starlette.concurrency import run_in_threadpool
 
 from app.classroom import ClassroomUnavailable, Hub
+
+logger = logging.getLogger("kinboard.classroom")
 
 SWEEP_EVERY = 60.0  # seconds
 
@@ -30,5 +33,9 @@ async def _sweep(hub: Hub) -> None:
     while True:
         await asyncio.sleep(SWEEP_EVERY)
         if hub.in_use:
-            with contextlib.suppress(ClassroomUnavailable):  # it has been logged, and is tried again
+            try:
                 await run_in_threadpool(lambda: hub.rooms.sweep())
+            except ClassroomUnavailable:
+                continue  # it has been logged, and is tried again
+            except Exception:
+                logger.exception("rooms whose time is over could not be erased; it is tried again")
