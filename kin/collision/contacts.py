@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
@@ -95,6 +95,9 @@ def surroundings(robot: Robot, obstacles: tuple[Obstacle, ...] = (), links: bool
     return Surroundings(robot, body, body.pairs if links else body.pairs[:0], obstacles, solids)
 
 
+MOST_CHECKS = 4096  # of one motion between neighbours of a path
+
+
 class Touch(NamedTuple):
     """Where a path touches something: at a share from 0 to 1 of the way from row `waypoint` − 1 to it."""
 
@@ -103,17 +106,21 @@ class Touch(NamedTuple):
     contact: Contact
 
 
-def touches_along(near: Surroundings, path: Array, step: float, jumps: Collection[int] = ()) -> tuple[Touch, ...]:
+def touches_along(
+    near: Surroundings, path: Array, step: float, jumps: Collection[int], stop: Callable[[], None]
+) -> tuple[Touch, ...]:
     """Where the straight joint motions between neighbours of a path ``(k, n)`` touch something.
 
     Of each motion the first touch that is found, at steps of at most `step` (rad or m) of the joint that moves
-    most, with the deepest contact of that motion. Of `jumps`, by the row they lead to, only that row is looked at.
+    most (of a very long motion, 4096 steps), with the deepest contact of that motion. Of `jumps`, by the row they
+    lead to, only that row is looked at. `stop` cancels by raising.
     """
     found = []
     for i in range(len(path)):
+        stop()
         still = i == 0 or i in jumps
         way = path[i] - path[max(i - 1, 0)]
-        count = 1 if still else math.ceil(float(np.abs(way).max()) / step) or 1
+        count = 1 if still else min(math.ceil(float(np.abs(way).max()) / step) or 1, MOST_CHECKS)
         shares = np.linspace(1.0, 0.0, count, endpoint=False)[::-1]
         out, which = near.distances(path[i] - (1.0 - shares[:, None]) * way)
         touching = np.flatnonzero(out < 0.0)
