@@ -173,7 +173,7 @@ def _touching(details: Touching, units: Units) -> str:
         others = count(details.postures - 1, "other posture overlaps", "other postures overlap")
         text += f" in the posture that overlaps least{name}; {others} more"
     if details.searched:
-        text += f"; a search over {listed(details.searched)} found nothing free"
+        text += f"; a search over {listed(details.searched)} found no value without a collision"
     return text
 
 
