@@ -17,6 +17,7 @@ from cryptography.hazmat.primitives.asymmetric import rsa
 from fastapi.testclient import TestClient
 from jwt.algorithms import RSAAlgorithm
 from live_server import wait_for
+from pydantic import SecretStr
 
 from app.classroom import COOKIE, Hub, NewAttempt
 from app.classroom.lti import passback as passback_module
@@ -116,7 +117,7 @@ def platform() -> Iterator[Platform]:
 
 
 @pytest.fixture(scope="module")
-def application(platform: Platform, tmp_path_factory):
+def settings(platform: Platform, tmp_path_factory) -> Settings:
     folder = tmp_path_factory.mktemp("lti")
     file = folder / "platforms.toml"
     file.write_text(
@@ -125,8 +126,13 @@ def application(platform: Platform, tmp_path_factory):
         f'keys_url = "{platform.issuer}/keys"\n'
     )
     assert make_key(key_file(file, {}))
-    application = create_app(Settings(lti=file, data=folder / "data", frame_ancestors=platform.issuer))  # type: ignore[arg-type]
     platform.tool_keys = load_platforms(file).key_set()
+    return Settings(lti=file, data=folder / "data", frame_ancestors=platform.issuer)  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="module")
+def application(settings: Settings):
+    application = create_app(settings)
     yield application
     hub_of(application).close()
 
@@ -194,6 +200,17 @@ def test_a_student_gets_a_seat(browser: TestClient, platform: Platform, applicat
     assert b"Ada" in stored
     assert b"Lovelace" not in stored
     assert b"ada@school" not in stored
+
+
+def test_a_launch_opens_the_viewer_of_a_service_with_an_access_token(platform: Platform, settings) -> None:
+    guarded = create_app(settings.model_copy(update={"token": SecretStr("a-long-enough-token")}))
+    browser = TestClient(guarded, base_url=TOOL, follow_redirects=False)
+    assert browser.get("/viewer/").status_code == 401
+    assert launch(browser, platform, sub="user-10").status_code == 303
+    assert STATE_COOKIE not in browser.cookies
+    assert browser.get("/viewer/").status_code == 503, "admitted; the viewer is not started in this test"
+    assert browser.get("/api/v1/robots").status_code == 401
+    hub_of(guarded).close()
 
 
 def test_a_teacher_gets_the_room(browser: TestClient, platform: Platform, application) -> None:
