@@ -211,9 +211,9 @@ def _brief(error: Exception) -> str:
 def _sentence(error: Exception) -> str:
     words = str(getattr(error, "orig", None) or error).lower()
     if "locked" in words or "busy" in words:
-        return "The classroom's database is in use by something else for too long. Try again in a moment."
+        return "Another program has locked the classroom's database for too long. Try again in a moment."
     if "full" in words or "no space" in words or "i/o error" in words:
         return "The disk of the classroom's database is full. Tell the operator of this service."
     if "readonly" in words or "read-only" in words or "permission" in words:
         return "The classroom's database cannot be written. Tell the operator of this service."
-    return "The classroom's database cannot be reached at present. It is tried again by itself."
+    return "The classroom's database cannot be reached at present. Kinboard keeps trying."

@@ -102,7 +102,7 @@ class Rooms:
                     return known
             taken = select(func.count()).where(Seat.room_id == room, Seat.removed.is_(False))
             if (connection.scalar(taken) or 0) >= MAX_SEATS:
-                raise RefusedError(f"All {MAX_SEATS} seats of this room are taken.", "code")
+                raise RefusedError(f"This room is full ({MAX_SEATS} of {MAX_SEATS} students).", "code")
             ticket = Ticket(room, secrets.token_hex(TOKEN_BYTES))
             connection.execute(
                 insert(Seat).values(
@@ -176,7 +176,7 @@ class Rooms:
             ).one_or_none()
             if stored is not None:
                 if stored.seat_id != ticket.seat:
-                    raise RefusedError("This attempt belongs to another seat.")
+                    raise RefusedError("This attempt belongs to another student.")
                 return Confirmed(attempt.id, stored.at)
             made = connection.scalar(select(func.count()).where(Attempt.seat_id == ticket.seat)) or 0
             if made >= MAX_ATTEMPTS:

@@ -42,8 +42,8 @@ class Settings(BaseSettings):
     courses: Path | None = Field(None, description="Folder with further courses (*.toml).")
     data: Path | None = Field(
         None,
-        description="Folder for the database of classrooms, made when a room or course is opened. "
-        "Unset: the user's own.",
+        description="Folder for the database of classrooms, created when needed. "
+        "Unset: the user's own data folder.",
     )
     database_url: SecretStr | None = Field(
         None,

@@ -39,7 +39,7 @@ class Student(Member):
         self._head = gui.add_html("")
         self._question = gui.add_html("")
         self._stored = gui.add_html("")
-        self._gone = False  # whether the student has let go of who leads
+        self._gone = False  # whether the student has stopped following
         self._task_at: float | None = None
         self._first = True
         self._open_tab = 0
@@ -124,7 +124,7 @@ class Student(Member):
             return
         if sent.problem:
             text = (
-                f"Not stored yet: {sent.problem} It is tried again."
+                f"Not stored yet: {sent.problem} Kinboard tries again."
                 if sent.waiting
                 else f"Not stored: {sent.problem}"
             )
@@ -156,7 +156,9 @@ class Student(Member):
         if self.leader:
             self.free()
             self._gone = True
-            self.page.status.show(Notice("hand", "You have let go", "Press Come back in the bar to follow again."))
+            self.page.status.show(
+                Notice("hand", "You stopped following", "Press Follow again to return to the teacher.")
+            )
         return ""
 
     def press(self, kind: str, name: str, value: object) -> None:

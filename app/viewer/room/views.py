@@ -16,9 +16,9 @@ STUCK = 3  # attempts that were not right
 # Symbol, headline, sentence and colour of who leads a student's page.
 MODES: dict[Mode, tuple[str, str, str, str]] = {
     "free": ("✎", "You work by yourself", "Move the arm, open a lesson, try an exercise.", "blue"),
-    "led": ("▶", "You follow the teacher", "Your arm moves with the teacher’s. Move it to let go.", "green"),
-    "gone": ("✎", "You have let go", "The teacher still leads the class. Come back when you like.", "amber"),
-    "shown": ("★", "Your arm is shown to all", "What you do now, everybody in the room sees.", "mauve"),
+    "led": ("▶", "You follow the teacher", "The teacher moves your arm. Move it to stop following.", "green"),
+    "gone": ("✎", "You stopped following", "The teacher still leads the class. You can follow again.", "amber"),
+    "shown": ("★", "Your arm is shown to all", "Everybody in the room sees what you do now.", "mauve"),
     "frozen": ("❄", "Frozen", "The teacher has stopped all arms for a moment.", "violet"),
     "paused": ("‖", "Paused", "The teacher’s connection is lost. You can go on by yourself.", "amber"),
     "closed": ("■", "You are no longer in the room", "", "crimson"),
@@ -54,9 +54,9 @@ def _mode(room: RoomView, mode: Mode) -> dict[str, str]:
     symbol, title, detail, color = MODES[mode]
     if mode == "led" and room.shown is not None:
         title = f"You see the arm of {room.shown.alias}" if room.shown.alias else "You see a classmate’s arm"
-        detail = "The teacher shows it to all. Move the arm to let go."
+        detail = "The teacher shows it to all. Move your arm to stop following."
     if mode == "led" and room.frozen:
-        title, detail = f"Frozen. {title}", "Your arm moves with it until the teacher goes on."
+        title, detail = f"Frozen. {title}", "Your arm moves with it until the teacher ends the freeze."
         symbol, color = MODES["frozen"][0], MODES["frozen"][3]
     return {
         "symbol": symbol,

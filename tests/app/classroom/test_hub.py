@@ -310,11 +310,11 @@ def test_a_locked_database_delays_and_loses_nothing(hubs, tmp_path, monkeypatch)
     lock = sqlite3.connect(tmp_path / "data" / "classroom.db", isolation_level=None)
     lock.execute("BEGIN EXCLUSIVE")
     new = attempt(exercise="other")
-    with pytest.raises(ClassroomUnavailable, match="in use"):
+    with pytest.raises(ClassroomUnavailable, match="has locked"):
         student.submit(new)
     teacher.tell_page("while locked")
     assert student.room.page == "while locked"  # in this process at once
-    until(lambda: "in use" in student.room.problem)
+    until(lambda: "has locked" in student.room.problem)
     assert far.room.page == ""
     lock.execute("ROLLBACK")
     lock.close()
@@ -490,7 +490,7 @@ def test_seats_and_pages_are_bounded(hubs, monkeypatch):
     hub, _ = hubs
     room = hub.rooms.open("Kinematics", 3600)
     student = hub.attend(hub.rooms.join(room.code, "Ada"), nothing)
-    with pytest.raises(RefusedError, match="seats"):
+    with pytest.raises(RefusedError, match="room is full"):
         hub.rooms.join(room.code, "Bob")
     with pytest.raises(ValueError, match="16001"):
         student.tell_page("x" * 16_001)

@@ -140,7 +140,7 @@ def test_sixty_join_in_five_seconds_and_stay_when_processes_are_killed(tmp_path)
             for _, cookies in joined:
                 code_, text = status(port, "/room", cookies)
                 assert code_ == 200
-                assert "You have a seat" in text
+                assert "You are in this room as a student" in text
         finally:
             service.terminate()
             service.wait(20)

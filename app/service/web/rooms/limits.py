@@ -66,7 +66,7 @@ class Limits:
 
     def sitting(self, client: str) -> None:
         """Somebody asks for a seat; raises 429."""
-        self._ask(self._seats, client, "Too many seats were taken from your address.")
+        self._ask(self._seats, client, "Too many students joined from your address.")
 
     def sat(self, client: str) -> None:
         """A seat was taken. Wrong codes take none: who guesses must not keep the class at the same address out."""

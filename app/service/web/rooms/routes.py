@@ -91,7 +91,7 @@ class _Pages:
         try:
             life = float(hours) * 3600.0
         except ValueError:
-            return again(422, message=f"A room lasts {hours[:20]} hours: that is no number.", field="hours")
+            return again(422, message=f"The duration {hours[:20]!r} is not a number of hours.", field="hours")
         self._limits.opening(client_of(request.scope))
         try:
             room = await run_in_threadpool(self._hub.rooms.open, title, life)
@@ -156,7 +156,7 @@ class _Pages:
         except ClassroomUnavailable as error:
             raise ProblemError(503, "busy", str(error)) from None
         if room is None:
-            raise ProblemError(404, "not-found", "You are in no room.", "Open or join one at /room.")
+            raise ProblemError(404, "not-found", "You are not in a room.", "Open or join one at /room.")
         picture = qr_svg(join_address(request, room.code))
         return Response(picture, media_type="image/svg+xml", headers={"cache-control": "no-store"})
 
