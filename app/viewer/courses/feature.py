@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Hashable
 from contextlib import suppress
@@ -80,6 +81,23 @@ class CourseFeature(Feature):
         """Whether the course says what comes after an exercise."""
         item = self._progress.item
         return item is not None and item.kind == "exercise" and item.key == exercise_id
+
+    # In a room
+
+    @property
+    def offered(self) -> tuple[Course, ...]:
+        """What a teacher may send: the open course, and those of the service."""
+        mine = self._progress.course
+        return tuple(dict.fromkeys(([mine] if mine is not None and mine.items else []) + [*self._courses.all]))
+
+    def receive(self, packed: str) -> str:
+        """Open a course that was sent, as JSON; returns its title, or nothing if it was open already."""
+        course = course_of(json.loads(packed), self._courses.exercises, "course", self._courses.find)
+        if course == self._progress.course:
+            return ""
+        self._open(course)
+        self._update()
+        return course.title
 
     # Events
 

@@ -42,12 +42,14 @@ class Student(Member):
         self._gone = False  # whether the student has stopped following
         self._task_at: float | None = None
         self._first = True
+        self._course = ""
         self._open_tab = 0
         self._submissions = Submissions(self.attendance.submit, lambda: stage.post(("news", self.key, NEWS)))
 
     def take_news(self) -> None:
         if self.page.lessons is not None:
             self.page.lessons.exercises.judged = self._submit
+        self._set_course()
         self._set_task()
         lead = self._lead
         if lead is None:
@@ -96,6 +98,20 @@ class Student(Member):
         self._gone = True
         self._open_task()
         self.page.status.show(Notice("hand", "A task from your teacher", exercise.title))
+
+    def _set_course(self) -> None:
+        """Open a course that is new."""
+        packed, lessons = self.room.course, self.page.lessons
+        if packed == self._course or lessons is None:
+            return
+        self._course = packed
+        title = lessons.courses.receive(packed) if packed else ""
+        if title:
+            self.free()
+            self._gone = True
+            lessons.open(lessons.courses.key)
+            self._open_tab += 1
+            self.page.status.show(Notice("hand", "A course from your teacher", title))
 
     def _open_task(self) -> None:
         task, lessons = self.room.task, self.page.lessons

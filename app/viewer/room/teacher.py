@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import viser
 
 from app.classroom.clock import now
+from app.classroom.courses import Course, to_data
 from app.classroom.views import SeatView
 from app.viewer.feature import Stage
 from app.viewer.own_arm import OwnArm
@@ -29,7 +31,20 @@ class Teacher(Member):
 
     messages = frozenset(
         {
-            *("follow", "freeze", "fields", "untask", "close", "unask", "look", "return", "show", "hide", "pick"),
+            *(
+                "follow",
+                "freeze",
+                "fields",
+                "untask",
+                "uncourse",
+                "close",
+                "unask",
+                "look",
+                "return",
+                "show",
+                "hide",
+                "pick",
+            ),
             *("remove", "lower", "wall", "end"),
         }
     )
@@ -47,6 +62,7 @@ class Teacher(Member):
             self._list = gui.add_html("")
         with gui.add_folder("Task"):
             self._task = gui.add_html("")
+            self._course = gui.add_html("")
         with gui.add_folder("Question"):
             self._ask = gui.add_html("")
             self._tally = gui.add_html("")
@@ -83,6 +99,10 @@ class Teacher(Member):
                 self._send_task(_texts(value))
             case "untask":
                 attendance.send_task(None)
+            case "course":
+                self._send_course(_texts(value)[0])
+            case "uncourse":
+                attendance.set_course("")
             case "ask":
                 question, *choices = _texts(value)
                 self.try_to(lambda: attendance.open_poll(question, [each for each in choices if each.strip()]))
@@ -136,6 +156,21 @@ class Teacher(Member):
         self.attendance.set_frozen(False)
         self.attendance.send_task(exercise.id)
         self.page.status.show(Notice("hand", f"Sent: {exercise.title}", "All work on it by themselves now."))
+
+    def _send_course(self, index: str) -> None:
+        """Let all follow a course, each at an own pace."""
+        offered = self._offered
+        if not index.isdecimal() or int(index) >= len(offered):
+            raise InputError("course", index, f"0 to {len(offered) - 1}")
+        course = offered[int(index)]
+        self.attendance.set_follow(False)
+        self.attendance.set_frozen(False)
+        self.attendance.set_course(json.dumps(to_data(course)))
+        self.page.status.show(Notice("hand", f"Sent: {course.title}", "All follow it by themselves now."))
+
+    @property
+    def _offered(self) -> tuple[Course, ...]:
+        return () if self.page.lessons is None else self.page.lessons.courses.offered
 
     # A student's arm instead of the own one
 
@@ -254,6 +289,7 @@ class Teacher(Member):
         update_html(self._one, views.seat_html(room, seat, self.leader, self.is_armed(("remove", self._picked))))
         update_html(self._list, views.list_html(room, self._picked, exercises))
         update_html(self._task, views.task_html(room, task, exercises))
+        update_html(self._course, views.course_html(room, self._offered))
         update_html(self._ask, views.ask_html(room, QUESTION, CHOICES))
         update_html(self._tally, views.poll_html(room.poll, teacher=True))
         update_html(self._end, views.end_html(room, self.is_armed("end")))

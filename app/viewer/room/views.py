@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
 from typing import Literal
 
+from app.classroom.courses import Course
 from app.classroom.tokens import show_code
 from app.classroom.views import Poll, RoomView, SeatView
 from app.exercises import Exercise, Exercises
@@ -171,6 +174,12 @@ def task_html(room: RoomView, task: Exercise | None, exercises: Exercises) -> st
         "room/task", room=room, task=task, topics=exercises.topics(), solved=sum(seat.solved for seat in at),
         count=len(room.seats),
     )  # fmt: skip
+
+
+def course_html(room: RoomView, courses: Sequence[Course]) -> str:
+    """The form to send a course, and which one was sent."""
+    title = json.loads(room.course)["title"] if room.course else ""
+    return render("room/course", room=room, title=title, courses=courses)
 
 
 def ask_html(room: RoomView, question: str, choices: tuple[str, ...]) -> str:

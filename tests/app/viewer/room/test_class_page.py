@@ -209,6 +209,19 @@ def test_a_task_opens_and_its_answers_are_stored(room: Class) -> None:
     assert (seat.task, seat.tries, seat.solved) == (EXERCISE, 2, True)
 
 
+def test_a_course_opens_on_every_page(room: Class) -> None:
+    teacher, student, _, _ = lead(room)
+    press(teacher, "fields", "course", value=[["0"]])
+    student.wait(lambda: 'data-class-open="Learn"' in student.html)
+    student.wait(lambda: student.value("Lesson") == "Courses")
+    teacher.wait(lambda: "data-class-course" in teacher.html)
+    mode(student, "free")
+    title = teacher.html.split("data-class-course>Course: <b>")[1].split("<")[0]
+    student.wait(lambda: title in student.html)
+    press(teacher, "uncourse")
+    teacher.wait(lambda: "data-class-course" not in teacher.html)
+
+
 def test_a_question_is_asked_and_counted(room: Class) -> None:
     teacher = room.teacher()
     ann, _ = room.join("Ann")
