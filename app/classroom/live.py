@@ -76,6 +76,9 @@ class LiveRoom:
         for new in seats:
             known = self.seats.get(new["id"])
             pending = self.pending.seats.get(new["id"], {})
+            if pending.get("task") == new["task"]:  # what is stored has counted its answers
+                for name in ("task", "tries", "solved"):
+                    del pending[name]
             if known is None:
                 self.seats[new["id"]] = LiveSeat({**new, **pending})
                 continue

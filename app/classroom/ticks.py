@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Set
 from typing import Any
 
-from sqlalchemy import Connection, select, update
+from sqlalchemy import Connection, case, select, update
 
 from app.classroom.clock import now
 from app.classroom.live import Pending
 from app.classroom.rooms import next_version
 from app.classroom.tables import Room, Seat
 
+COUNTED = {"tries": Seat.tries, "solved": Seat.solved}  # of the task that is open
 Loaded = tuple[dict[str, Any], list[dict[str, Any]]]
 
 
@@ -31,6 +32,9 @@ def store(connection: Connection, room: str, pending: Pending, beats: Set[str]) 
         connection.execute(update(Room).where(Room.id == room).values(values))
     there = (Seat.room_id == room, Seat.removed.is_(False))
     for seat, columns in pending.seats.items():
+        if "task" in columns:  # an answer to this task may have been stored before the news that it is open
+            known = Seat.task == columns["task"]
+            columns |= {name: case((known, column), else_=columns[name]) for name, column in COUNTED.items()}
         connection.execute(update(Seat).where(*there, Seat.id == seat).values(version=version, **columns))
     if students := beats - {""}:
         present = update(Seat).where(*there, Seat.id.in_(students))

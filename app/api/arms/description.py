@@ -10,7 +10,7 @@ from pydantic import ConfigDict, Field, RootModel
 from app.api.problems import FieldError, ProblemError, invalid
 from kin import Robot, RobotFileError, robot_from_dict
 from kin.files.numbers import LARGEST
-from kin.files.read import ANGLES, MAX_ROWS
+from kin.files.read import ANGLES, MAX_CAPSULES, MAX_ROWS
 from kin.robot import LENGTHS
 
 # What a file must state and an arm in a request need not.
@@ -96,6 +96,18 @@ _ROW: dict[str, Any] = {
         "effort": {"description": "Largest torque or force in N·m or N.", **_number(["m"]), "exclusiveMinimum": 0},
     },
 }
+_POINT = _items(_quantity(_LENGTH, "A length."), 3, "A point in the frame of the row, in the length unit.")
+_CAPSULE: dict[str, Any] = {
+    "type": "object",
+    "additionalProperties": False,
+    "required": ["start", "radius"],
+    "properties": {
+        "row": {"type": "string", "maxLength": 4000, "description": "Name of the row; none: what stands still."},
+        "start": {**_POINT, "description": "Start of the axis, in the frame of the row."},
+        "end": {**_POINT, "description": "End of the axis; without it the body is a sphere."},
+        "radius": _quantity(_LENGTH, "Radius, positive."),
+    },
+}
 EXAMPLE: dict[str, Any] = {  # the table of pioneer5, so that the examples for it work here too
     "convention": "standard",
     "units": {"length": "mm", "angle": "deg"},
@@ -148,6 +160,13 @@ _SCHEMA: dict[str, Any] = {
             "properties": {"q": {"type": "array", "items": _ANY, "description": "One value per moving joint."}},
             "description": "The home configuration, inside the limits; chosen by the service if it is missing.",
         },
+        "capsules": {
+            "type": "array",
+            "maxItems": MAX_CAPSULES,
+            "items": _CAPSULE,
+            "description": "Bodies of the links, for collisions; without any, bodies are assumed from the table.",
+        },
+        "capsules_source": {**_TEXT, "description": "Source of the bodies."},
         "base": {**_TRANSFORM, "description": "Constant transform before the first row."},
         "tool": {**_TRANSFORM, "description": "Constant transform after the last row."},
     },

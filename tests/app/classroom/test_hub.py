@@ -468,6 +468,26 @@ def test_other_databases_are_refused_and_not_shown(url, monkeypatch, capsys):
     assert url not in printed
 
 
+@pytest.mark.parametrize("of_another", [False, True])
+def test_an_answer_given_at_once_counts_for_the_task_that_has_just_opened(hubs, monkeypatch, of_another):
+    monkeypatch.setattr("app.classroom.hub.TICK", 0.2)
+    hub, other = hubs
+    room = hub.rooms.open("Kinematics", 3600)
+    seat = hub.rooms.join(room.code, "Ada")
+    student, teacher = hub.attend(seat, nothing), hub.attend(hub.ticket(room.token), nothing)
+    first = attempt()
+    student.tell_task(first.exercise)
+    if of_another:
+        other.rooms.submit(seat, first)
+    else:
+        student.submit(first)
+    until(lambda: teacher.room.seats[0].tries == 1)
+    student.raise_hand(True)
+    until(lambda: not hub._lives[seat.room].pending)
+    time.sleep(0.5)
+    assert (teacher.room.seats[0].tries, teacher.room.seats[0].solved) == (1, True)
+
+
 def test_attempts_are_bounded(hubs, monkeypatch):
     monkeypatch.setattr("app.classroom.rooms.MAX_ATTEMPTS", 2)
     hub, _ = hubs
