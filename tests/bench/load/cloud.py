@@ -159,6 +159,7 @@ async def _of_size(service: Service, n: int, runs: int) -> list[dict[str, Any]]:
     if n <= _MOST_IN_A_PAGE:
         visitor = Visitor()
         await visitor.connect(service.port)
+        await visitor.offers("Points")
         visitor.set("Points", n)
         await visitor.quiet()
         await timed("viewer", lambda: page(visitor, n))

@@ -75,6 +75,12 @@ class Visitor:
         while (left := self.last + seconds - time.perf_counter()) > 0.0 and time.perf_counter() < end:
             await asyncio.sleep(left)
 
+    async def offers(self, label: str, timeout: float = 60.0) -> None:
+        """Wait until there is a control with this label: the tabs come after the arm."""
+        async with asyncio.timeout(timeout):
+            while label not in self.elements:
+                await asyncio.sleep(0.02)
+
     def stop_reading(self) -> None:
         """Read nothing more of what the service sends."""
         self._socket.stop_reading()
