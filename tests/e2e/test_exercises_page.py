@@ -29,7 +29,7 @@ def test_exercises_by_keyboard_and_mouse(tab: Tab) -> None:
     page = tab.page
     tab.open("Learn")
     tab.choose("Lesson", "None")
-    page.locator(".kb-practise button").click()
+    page.locator(".kb-practise").get_by_role("button", name="Exercises").click()
     expect(block(tab, "list")).to_contain_text("solved")
 
     # By keyboard: a choice, wrong first; the focus stays where it was.

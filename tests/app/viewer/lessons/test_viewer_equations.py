@@ -130,8 +130,14 @@ def test_a_failed_check_is_said_instead_of_shown(tab: FakeBrowser, monkeypatch: 
     assert "data-equation" not in tab.html
 
 
+def mocked_stage(robot: kin.Robot) -> MagicMock:
+    stage = MagicMock(robot=robot, q=robot.q_home, units=DEFAULT_UNITS)
+    stage.client.gui.add_dropdown.return_value._impl.removed = False
+    return stage
+
+
 def test_what_was_chosen_can_be_restored() -> None:
-    stage = MagicMock(robot=PIONEER, q=PIONEER.q_home, units=DEFAULT_UNITS)
+    stage = mocked_stage(PIONEER)
     book(PIONEER)
     chosen = EquationsLesson(stage)
     chosen.handle("equation", "(13) x of a ✕ misprinted")
@@ -154,7 +160,7 @@ def test_only_the_last_of_many_edits_is_derived(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(books, "derive", counted)
     cache = ComputationCache(ThreadPoolExecutor(1), 4)
     monkeypatch.setattr(books, "_BOOKS", cache)
-    stage = MagicMock(robot=PIONEER, q=PIONEER.q_home, units=DEFAULT_UNITS)
+    stage = mocked_stage(PIONEER)
     lesson = EquationsLesson(stage)
     for d in (0.1, 0.2, 0.3):
         stage.robot = replace(PUMA, rows=(replace(PUMA.rows[0], d=d), *PUMA.rows[1:]))
@@ -178,7 +184,7 @@ def test_a_lesson_that_is_closed_or_left_waits_no_more(monkeypatch: pytest.Monke
     monkeypatch.setattr(books, "derive", lambda robot: released.wait(30) and derive(robot))
     cache = ComputationCache(ThreadPoolExecutor(1), 4)
     monkeypatch.setattr(books, "_BOOKS", cache)
-    stage = MagicMock(robot=PUMA, q=PUMA.q_home, units=DEFAULT_UNITS)
+    stage = mocked_stage(PUMA)
     for end in (EquationsLesson.remove, EquationsLesson.on_leave):
         lesson = EquationsLesson(stage)
         assert PUMA in cache

@@ -233,7 +233,9 @@ def test_the_menu_offers_every_robot_whatever_its_name():
         replace(robot, name=name) for robot, name in zip(ROBOTS, ("My arm", "My arm", "Other"), strict=False)
     ]
     own = own_arm(PRESETS["one-joint"])
-    menu = RobotMenu(MagicMock(), robots, own, robots[1], MagicMock())
+    gui = MagicMock()
+    gui.add_dropdown.return_value._impl.removed = False
+    menu = RobotMenu(gui, robots, own, robots[1], MagicMock())
     options = [f"My arm{end}" for end in ("", f" ({robots[1].id})")] + ["Other", f"My arm ({own.robot.id})"]
     for name, robot in zip(options, (*robots, own.robot), strict=True):
         assert menu.read(name) == robot
