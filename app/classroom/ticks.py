@@ -34,7 +34,8 @@ def store(connection: Connection, room: str, pending: Pending, beats: Set[str]) 
     for seat, columns in pending.seats.items():
         if "task" in columns:  # an answer to this task may have been stored before the news that it is open
             known = Seat.task == columns["task"]
-            columns |= {name: case((known, column), else_=columns[name]) for name, column in COUNTED.items()}
+            counted = {name: case((known, column), else_=columns[name]) for name, column in COUNTED.items()}
+            columns = {**columns, **counted}  # what is pending is shown, and kept if this is not stored
         connection.execute(update(Seat).where(*there, Seat.id == seat).values(version=version, **columns))
     if students := beats - {""}:
         present = update(Seat).where(*there, Seat.id.in_(students))

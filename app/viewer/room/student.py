@@ -40,6 +40,7 @@ class Student(Member):
         self._question = gui.add_html("")
         self._stored = gui.add_html("")
         self._gone = False  # whether the student has stopped following
+        self._leader_before = ""
         self._task_at: float | None = None
         self._first = True
         self._course = ""
@@ -63,8 +64,6 @@ class Student(Member):
         self._leader_before = lead.leader
         if not self._gone:
             self.follow(lead.leader, lead.page, "What the class shows")
-
-    _leader_before = ""
 
     @property
     def _lead(self) -> Lead | None:

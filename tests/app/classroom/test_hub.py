@@ -25,7 +25,9 @@ from app.classroom import (
     UnknownRoomError,
     clock,
 )
+from app.classroom.live import Pending
 from app.classroom.tables import REVISION, Attempt, Base, Room, Seat
+from app.classroom.ticks import store
 from app.classroom.tokens import Tokens
 from app.cli.parser import main
 
@@ -486,6 +488,19 @@ def test_an_answer_given_at_once_counts_for_the_task_that_has_just_opened(hubs, 
     until(lambda: not hub._lives[seat.room].pending)
     time.sleep(0.5)
     assert (teacher.room.seats[0].tries, teacher.room.seats[0].solved) == (1, True)
+
+
+def test_storing_leaves_what_is_pending_as_it_is(hubs):
+    hub, _ = hubs
+    room = hub.rooms.open("Kinematics", 3600)
+    seat = hub.rooms.join(room.code, "Ada")
+    opened = {"task": "swing", "tries": 0, "solved": False}
+    pending = Pending(seats={seat.seat: dict(opened)})
+    with hub.database.write() as connection:
+        assert store(connection, seat.room, pending, set()) is not None
+    assert {name: type(value) for name, value in pending.seats[seat.seat].items()} == {
+        name: type(value) for name, value in opened.items()
+    }
 
 
 def test_attempts_are_bounded(hubs, monkeypatch):
