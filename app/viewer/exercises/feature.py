@@ -11,22 +11,17 @@ import viser
 
 import kin
 from app.exercises import Asked, Exercise, Exercises, Variant, VariantError, Verdict
-from app.exercises.contract import LONGEST, LONGEST_PROGRAM
 from app.exercises.typed import EntryError
 from app.viewer.exercises import views
 from app.viewer.exercises.drawing import GHOST, SIZE, Drawing
 from app.viewer.exercises.practice import Practice
-from app.viewer.exercises.views import Sheet
+from app.viewer.exercises.sheet import Sheet
 from app.viewer.feature import Feature, Stage
 from app.viewer.panel import update_html
-from app.viewer.panel.entry import read_pose
-from app.viewer.panel.readout import roll_pitch_yaw
 from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import round_points
 from kin import InputError
-from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
-
-ROWS = 20  # of typed cells at most
+from kin.transforms import Array, from_position_wxyz
 
 
 class Judged(NamedTuple):
@@ -76,7 +71,6 @@ class Practising(Feature):
         self.practice = Practice(exercises)
         self.course: Lead | None = None
         self._sheet = Sheet()
-        self._ghost: Array = np.eye(4)
         self._variant: Variant | None = None
         self._since = 0.0
         self.judged: Callable[[Judged], None] | None = None
@@ -169,7 +163,7 @@ class Practising(Feature):
             case ("scene", int()):
                 self._set_scene(exercise)
             case ("pick", int()) if not record.closed:
-                self._pick(value)
+                self._sheet.pick(value, len(self._asked.labels))
             case ("answer" | "fields" | "posture" | "place", int()) if not record.closed:
                 self._answer(str(key[0]), value)
             case (str(), int()) if record.closed:
@@ -213,7 +207,7 @@ class Practising(Feature):
 
     def _begin(self, exercise: Exercise, move: bool = True) -> None:
         """Draw the numbers, and set the scene for an exercise."""
-        self._sheet, self._ghost, self._since = Sheet(), np.eye(4), time.perf_counter()
+        self._sheet, self._since = Sheet(), time.perf_counter()
         try:
             self._variant = self.practice.variant(exercise)
         except VariantError as error:  # of an operator's file that was not checked
@@ -251,7 +245,7 @@ class Practising(Feature):
                 shown.append(right := _pose(exercise.kind.answer(variant)))
                 self._drawing.goal(right, reach, "right place")
             else:
-                self._drawing.ghost(self._ghost, reach)
+                self._drawing.ghost(self._sheet.ghost, reach)
         room = [(T[:3, 3], SIZE * reach) for T in shown]
         if exercise.q and (closed or exercise.kind.shows_posture):
             room.append(round_points(kin.link_frames(exercise.robot, variant.q)[:, :3, 3]))
@@ -270,25 +264,8 @@ class Practising(Feature):
         """The ghost was dragged."""
         match value:
             case (list(position), list(wxyz)):
-                self._ghost = from_position_wxyz(position, np.array(wxyz))
-                self._sheet.cells = [[self._ghost_text()]]
+                self._sheet.drag(from_position_wxyz(position, np.array(wxyz)), self.stage.units)
                 self._update()
-
-    def _ghost_text(self) -> str:
-        units, T = self.stage.units, self._ghost
-        point = [units.lengths.number(float(x), 0) for x in T[:3, 3]]
-        return " ".join([*point, *(units.angles.number(float(a), 0) for a in roll_pitch_yaw(T[:3, :3]))])
-
-    def _pick(self, option: object) -> None:
-        """Take a motion as the next one, or take it and those after it back."""
-        picked = self._sheet.picked
-        if type(option) is not int or not 0 <= option < len(self._asked.labels):
-            raise InputError("motion", option, "the index of a motion")
-        if option in picked:
-            del picked[picked.index(option) :]
-        else:
-            picked.append(option)
-        self._sheet.verdict = None
 
     def _answer(self, how: str, value: object) -> None:
         """Judge an answer."""
@@ -296,9 +273,11 @@ class Practising(Feature):
         assert variant is not None
         sheet.error, sheet.verdict = "", None
         if how == "fields":
-            sheet.cells = _cells(value)
+            sheet.fill(value)
         try:
-            given = self._given(form, value)
+            given = self.stage.goal.tolist() if form == "posture" else sheet.given(form, value, self.stage.units)
+            if form == "frame":
+                self._drawing.place(sheet.ghost)
             verdict = exercise.judge(variant, given, self.stage.units)
         except EntryError as error:
             sheet.error = error.detail if error.title == "The answer was not read" else str(error)
@@ -313,28 +292,6 @@ class Practising(Feature):
             self.judged(Judged(exercise, self.practice.seed_of(exercise), given, verdict, seconds))
         if verdict.right:
             self._show_answer()
-
-    def _given(self, form: str, value: object) -> object:
-        """The answer in the form that the kind takes."""
-        cells = self._sheet.cells
-        match form:
-            case "options":
-                self._sheet.chosen = value if type(value) is int else None
-                return value
-            case "order":
-                return list(self._sheet.picked)
-            case "posture":
-                return self.stage.goal.tolist()
-            case "frame":
-                if cells and cells[0]:
-                    self._ghost, _ = read_pose("pose", cells[0][0], self.stage.units, self._ghost)
-                    self._drawing.place(self._ghost)
-                return [*self._ghost[:3, 3].tolist(), *wxyz_from_rotation(self._ghost[:3, :3]).tolist()]
-            case "program":
-                return cells[0][0] if cells and cells[0] else ""
-            case "fields":
-                return cells[0] if cells else []
-        return cells
 
     def _show_answer(self) -> None:
         """Let the scene show it."""
@@ -381,16 +338,6 @@ class Practising(Feature):
             update_html(block, content)
         if self.course is not None:
             self.course.refresh()
-
-
-def _cells(value: object) -> list[list[str]]:
-    """Typed cells, cut to what an answer can need."""
-    rows = value if isinstance(value, list) else []
-    if not all(isinstance(row, list) and all(isinstance(text, str) for text in row) for row in rows[:ROWS]):
-        raise InputError("cells", value, "rows of texts")
-    return [
-        [text[: LONGEST_PROGRAM + 1 if len(row) == 1 else LONGEST] for text in row[:ROWS]] for row in rows[:ROWS]
-    ]
 
 
 def _pose(numbers: object) -> Array:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
-from app.exercises import Asked, Exercise, Exercises, Variant, Verdict
+from app.exercises import Asked, Exercise, Exercises, Variant
 from app.viewer.exercises.practice import Mark, Practice, Record
+from app.viewer.exercises.sheet import Sheet
 from app.viewer.views.templates import render
 from kin.units import Units
 
@@ -17,27 +16,6 @@ MARKS: dict[Mark, tuple[str, str, str]] = {
     "shown": ("●", "answer shown", "blue"),
 }
 LEVELS = ("", "easy", "medium", "hard")
-
-
-@dataclass
-class Sheet:
-    """What the student has entered, and what was said about it.
-
-    Attributes:
-        cells: rows of typed texts.
-        picked: indices of the motions that were put in order so far.
-        chosen: the option that was chosen last.
-        verdict: on the last answer.
-        error: why it could not be read.
-        note: a sentence below the verdict.
-    """
-
-    cells: list[list[str]] = field(default_factory=list)
-    picked: list[int] = field(default_factory=list)
-    chosen: int | None = None
-    verdict: Verdict | None = None
-    error: str = ""
-    note: str = ""
 
 
 def list_html(exercises: Exercises, practice: Practice) -> str:
