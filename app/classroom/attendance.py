@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Hashable, Iterable
 from typing import Protocol
 
 from app.classroom.clock import now
@@ -57,6 +57,7 @@ class Attendance:
     def __init__(self, hub: LiveRooms, ticket: Ticket, changed: Callable[[], None]) -> None:
         self.ticket = ticket
         self.changed = changed
+        self.stamp: Hashable = None  # of what the page was last notified of
         self._hub = hub
         self._page = ""  # the teacher's, also while nobody follows
         self._last: RoomView | None = None

@@ -14,10 +14,11 @@ no thread, no file, no import of SQLAlchemy. A page does::
 
 Two tabs of one seat are two attendances of one ticket; both see and tell the same seat. What one page tells,
 others in the same process see at once. Those in other processes, on this or another machine, see it through the
-database: a thread writes what was reported in one transaction per `TICK`, and reads the rooms whose version has
-changed. `changed` must return at once: post to the inbox of the page. All methods are thread-safe. Only `ticket`
-(once per process), `attend`, `submit`, `remove_seat`, `rename_seat` and `end_room` wait for the database; they
-belong in the worker of a page, never in the event loop.
+database: a thread writes what was reported in one transaction, at once when a page has set something, and every
+`TICK` reads the rooms whose version has changed. Pages are notified only of what they can see. `changed` must
+return at once: post to the inbox of the page. All methods are thread-safe. Only `ticket` (once per process),
+`attend`, `submit`, `remove_seat`, `rename_seat` and `end_room` wait for the database; they belong in the worker of
+a page, never in the event loop.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ logger = logging.getLogger("kinboard.classroom")
 DATABASE_FILE = "classroom.db"
 TICK = 0.03  # seconds between two looks at the database
 BEAT = 2.0  # seconds between two signs that somebody is there
-SEAT_PAGE_EVERY = 0.2  # seconds between two states of one student's page
+SEAT_PAGE_EVERY = 0.2  # seconds between two states of the students' pages
 RETRY = 0.5  # seconds after an error of the database
 LINGER = 5.0  # seconds that the thread waits for the next page after the last has left
 
@@ -68,7 +69,7 @@ class Hub:
         self._lives: dict[str, LiveRoom] = {}
         self._attendances: dict[str, list[Attendance]] = {}
         self._thread: threading.Thread | None = None
-        self._stopping = threading.Event()
+        self._stopping, self._wake = threading.Event(), threading.Event()
         self._beat_at = 0.0
         self.on_attempt: Callable[[str], None] | None = None  # called with the seat of each stored attempt
 
@@ -127,6 +128,7 @@ class Hub:
     def close(self) -> None:
         """Store what is pending, and stop; returns soon even if the database does not answer."""
         self._stopping.set()
+        self._wake.set()
         thread = self._thread
         if thread is not None:
             thread.join(2.0)
@@ -148,13 +150,18 @@ class Hub:
                 return
             change(live)
         self._notify([ticket.room])
+        self._wake.set()
 
     def tell_later(self, ticket: Ticket, page: str) -> None:
-        """A student's page: the newest, not more often than `SEAT_PAGE_EVERY`."""
+        """A student's page: at once if all see it, otherwise with the others' every `SEAT_PAGE_EVERY` seconds."""
         with self._lock:
             live = self._lives.get(ticket.room)
-            if live is not None:
+            if live is None:
+                return
+            if not live.is_shown(ticket.seat):
                 live.pages[ticket.seat] = page
+                return
+        self.tell(ticket, lambda live: live.tell_seat(ticket.seat, {"page": page}))
 
     def refresh(self, room: str) -> None:
         """See now what has just been stored."""
@@ -178,8 +185,15 @@ class Hub:
         return {each.ticket.seat for each in self._attendances.get(room, ())}
 
     def _notify(self, rooms: Iterable[str]) -> None:
+        """Let those pages know for whom something has changed."""
+        callbacks = []
         with self._lock:
-            callbacks = [each.changed for room in rooms for each in self._attendances.get(room, ())]
+            for room in rooms:
+                for each in self._attendances.get(room, ()):
+                    stamp = self._lives[room].stamp(each.ticket)
+                    if stamp != each.stamp:
+                        each.stamp = stamp
+                        callbacks.append(each.changed)
         for changed in callbacks:
             try:
                 changed()
@@ -191,7 +205,9 @@ class Hub:
     def _run(self) -> None:
         idle_since: float | None = None
         while True:
-            stopping = self._stopping.wait(TICK)
+            self._wake.wait(TICK)
+            self._wake.clear()
+            stopping = self._stopping.is_set()
             try:
                 available = self._tick()
             except Exception:

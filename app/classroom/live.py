@@ -5,7 +5,8 @@ No locks and no threads here: `app.classroom.hub` sees to both.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Hashable, Mapping, Set
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,6 +16,8 @@ from app.classroom.views import Poll, RoomView, SeatView, Shown, Task, Ticket
 AWAY = 7.0  # seconds without a beat after which nobody is assumed to be there
 ENDED = "The room has ended. Everything in it was erased."
 REMOVED = "The teacher has removed you from the room."
+_UNSEEN = {"beat", "version"}  # columns that no page shows
+_PAGE = {"page"}
 
 
 @dataclass
@@ -54,7 +57,8 @@ class LiveRoom:
         self.seats: dict[str, LiveSeat] = {}
         self.pending = Pending()
         self.pages: dict[str, str] = {}  # newest states of students' pages, for the next time they are due
-        self._paged: dict[str, float] = {}  # when each was last taken
+        self._paged = -math.inf  # when they were last taken
+        self._seen_by_all = self._seen_by_teacher = 0  # counts of changes
         self.heard = steady()  # when the teacher's beat was last seen to grow
         self.here: set[str] = set()  # seats with a page in this process; the teacher's is ""
         self.away: frozenset[str] = frozenset()
@@ -66,13 +70,35 @@ class LiveRoom:
         """The version up to which everything is known; -1: nothing is."""
         return int(self.row.get("version", -1))
 
+    def stamp(self, ticket: Ticket) -> Hashable:
+        """Another one whenever what `view` returns has changed, but for the own page of a seat.
+
+        Most changes in a class are arms that move, which concern the teacher's page alone.
+        """
+        return self._seen_by_all, self.closed, self.problem, 0 if ticket.seat else self._seen_by_teacher
+
+    def is_shown(self, seat: str) -> bool:
+        """Whether the teacher shows the arm of this seat to all."""
+        shown = self.state.get("shown")
+        return shown is not None and shown["seat"] == seat
+
+    def _note(self, seat: str, columns: Set[str]) -> None:
+        """Count a change of these columns of a seat. The page of a seat is for the teacher to see."""
+        if columns - _PAGE or (columns and self.is_shown(seat)):
+            self._seen_by_all += 1
+        elif columns:
+            self._seen_by_teacher += 1
+
     def load(self, row: Mapping[str, Any], seats: list[dict[str, Any]]) -> None:
         """Take over what the database says; what is pending is newer."""
         if self.row and row["beat"] != self.row["beat"]:
             self.heard = steady()
         page = self.row.get("page", "") if self.pending.page is not None else row["page"]
+        before = self.row, self.state
         self.row = {**row, "page": page}
         self.state = {**row["state"], **self.pending.state}
+        if self.state != before[1] or _changed(before[0], self.row) - {"state"}:
+            self._seen_by_all += 1
         for new in seats:
             known = self.seats.get(new["id"])
             pending = self.pending.seats.get(new["id"], {})
@@ -81,34 +107,41 @@ class LiveRoom:
                     del pending[name]
             if known is None:
                 self.seats[new["id"]] = LiveSeat({**new, **pending})
+                self._seen_by_all += 1
                 continue
             if new["beat"] != known.row["beat"]:
                 known.heard = steady()
-            known.row = {**new, **pending}
+            before_seat, known.row = known.row, {**new, **pending}
+            self._note(new["id"], _changed(before_seat, known.row))
 
     def tell_page(self, page: str) -> None:
         """The teacher's page, shared with all."""
         self.row["page"] = self.pending.page = page
+        self._seen_by_all += 1
 
     def tell_state(self, values: dict[str, Any]) -> None:
         """What the teacher has set."""
         self.state.update(values)
         self.pending.state.update(values)
+        self._seen_by_all += 1
 
     def tell_seat(self, seat: str, values: dict[str, Any]) -> None:
         """What a student did."""
         if seat in self.seats and not self.seats[seat].row["removed"]:
             self.seats[seat].row.update(values)
             self.pending.seats.setdefault(seat, {}).update(values)
+            self._note(seat, set(values))
 
     def take_pages(self, every: float) -> bool:
-        """Take the students' pages that are due; returns whether there were any."""
+        """Take the students' pages if it is time, all together; returns whether there were any."""
         time = steady()
-        due = [seat for seat in self.pages if time - self._paged.get(seat, -every) >= every]
-        for seat in due:
-            self._paged[seat] = time
-            self.tell_seat(seat, {"page": self.pages.pop(seat)})
-        return bool(due)
+        if not self.pages or time - self._paged < every:
+            return False
+        self._paged = time
+        pages, self.pages = self.pages, {}
+        for seat, page in pages.items():
+            self.tell_seat(seat, {"page": page})
+        return True
 
     def note_absence(self) -> bool:
         """Find out who is away; returns whether that has changed."""
@@ -118,6 +151,7 @@ class LiveRoom:
             away.add("")
         changed = away != self.away
         self.away = frozenset(away)
+        self._seen_by_all += changed
         return changed
 
     def view(self, ticket: Ticket) -> RoomView:
@@ -127,11 +161,11 @@ class LiveRoom:
         mine = self.seats.get(ticket.seat)
         if ticket.seat and (mine is None or mine.row["removed"]):
             return RoomView(self.id, closed=REMOVED)
-        present = sorted(
-            (live.row for live in self.seats.values() if not live.row["removed"]),
-            key=lambda row: (row["joined"], row["id"]),
-        )
-        seats = () if ticket.seat else tuple(self._seat(row) for row in present)
+        present = [live.row for live in self.seats.values() if not live.row["removed"]]
+        seats: tuple[SeatView, ...] = ()
+        if not ticket.seat:
+            present.sort(key=lambda row: (row["joined"], row["id"]))
+            seats = tuple(self._seat(row) for row in present)
         row, state = self.row, self.state
         task = state.get("task")
         return RoomView(
@@ -176,3 +210,8 @@ class LiveRoom:
                 votes[row["vote"]] += 1
         chosen = mine["vote"] if mine is not None and mine["voted"] == poll["id"] else None
         return Poll(poll["id"], poll["question"], choices, poll["open"], tuple(votes), chosen)
+
+
+def _changed(before: Mapping[str, Any], after: Mapping[str, Any]) -> set[str]:
+    """The columns that pages show and that are not as they were."""
+    return {name for name, value in after.items() if name not in _UNSEEN and before.get(name) != value}

@@ -3,16 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Set
-from typing import Any
+from functools import cache
+from typing import Any, cast
 
-from sqlalchemy import Connection, case, select, update
+from sqlalchemy import Connection, Table, Update, bindparam, case, select, update
 
 from app.classroom.clock import now
 from app.classroom.live import Pending
 from app.classroom.rooms import next_version
 from app.classroom.tables import Room, Seat
 
-COUNTED = {"tries": Seat.tries, "solved": Seat.solved}  # of the task that is open
+COUNTED = ("tries", "solved")  # of the task that is open
+_ROOM, _SEAT = cast(Table, Room.__table__), cast(Table, Seat.__table__)
+# Statements are built once: a process asks the first of them thirty times a second.
+_VERSIONS = select(_ROOM.c.id, _ROOM.c.version).where(
+    _ROOM.c.id.in_(bindparam("rooms", expanding=True)), _ROOM.c.ends > bindparam("now")
+)
+_ROW = select(_ROOM).where(_ROOM.c.id == bindparam("room"))
+_CHANGED = select(_SEAT).where(_SEAT.c.room_id == bindparam("room"), _SEAT.c.version > bindparam("known"))
+_THERE = (_SEAT.c.room_id == bindparam("in_room"), _SEAT.c.removed.is_(False))
+_PRESENT = (
+    update(_SEAT)
+    .where(*_THERE, _SEAT.c.id.in_(bindparam("of_seats", expanding=True)))
+    .values(beat=_SEAT.c.beat + 1, version=bindparam("new_version"))
+)
 Loaded = tuple[dict[str, Any], list[dict[str, Any]]]
 
 
@@ -30,28 +44,37 @@ def store(connection: Connection, room: str, pending: Pending, beats: Set[str]) 
         values["beat"] = Room.beat + 1
     if values:
         connection.execute(update(Room).where(Room.id == room).values(values))
-    there = (Seat.room_id == room, Seat.removed.is_(False))
+    alike: dict[tuple[str, ...], list[dict[str, Any]]] = {}
     for seat, columns in pending.seats.items():
-        if "task" in columns:  # an answer to this task may have been stored before the news that it is open
-            known = Seat.task == columns["task"]
-            counted = {name: case((known, column), else_=columns[name]) for name, column in COUNTED.items()}
-            columns = {**columns, **counted}  # what is pending is shown, and kept if this is not stored
-        connection.execute(update(Seat).where(*there, Seat.id == seat).values(version=version, **columns))
+        row = {"in_room": room, "of_seat": seat, "new_version": version}
+        alike.setdefault(tuple(sorted(columns)), []).append(row | {f"new_{k}": v for k, v in columns.items()})
+    for names, rows in alike.items():
+        connection.execute(_update_seats(names), rows)
     if students := beats - {""}:
-        present = update(Seat).where(*there, Seat.id.in_(students))
-        connection.execute(present.values(beat=Seat.beat + 1, version=version))
+        connection.execute(_PRESENT, {"in_room": room, "of_seats": sorted(students), "new_version": version})
     return version
+
+
+@cache
+def _update_seats(names: tuple[str, ...]) -> Update:
+    """Sets these columns of seats: one statement for all of a class that have the same news."""
+    columns: dict[str, Any] = {name: bindparam(f"new_{name}") for name in names}
+    if "task" in names:  # an answer to this task may have been stored before the news that it is open
+        known = _SEAT.c.task == columns["task"]
+        for name in COUNTED:  # what is pending is shown, and kept if this is not stored
+            columns[name] = case((known, _SEAT.c[name]), else_=columns[name])
+    one = (*_THERE, _SEAT.c.id == bindparam("of_seat"))
+    return update(_SEAT).where(*one).values(version=bindparam("new_version"), **columns)
 
 
 def fetch(connection: Connection, known: Mapping[str, int]) -> dict[str, Loaded | None]:
     """The rooms that have changed since the known versions, with the seats that have; None: the room has ended."""
-    query = select(Room.id, Room.version).where(Room.id.in_(known), Room.ends > now())
-    versions = {row.id: row.version for row in connection.execute(query)}
+    versions = {row.id: row.version for row in connection.execute(_VERSIONS, {"rooms": list(known), "now": now()})}
     found: dict[str, Loaded | None] = {room: None for room in known if room not in versions}
     for room, version in versions.items():
         if version != known[room]:
-            row = connection.execute(select(Room.__table__).where(Room.id == room)).mappings().one_or_none()
-            changed = select(Seat.__table__).where(Seat.room_id == room, Seat.version > known[room])
-            seats = [dict(seat) for seat in connection.execute(changed).mappings()]
+            row = connection.execute(_ROW, {"room": room}).mappings().one_or_none()
+            changed = connection.execute(_CHANGED, {"room": room, "known": known[room]})
+            seats = [dict(seat) for seat in changed.mappings()]
             found[room] = None if row is None else (dict(row), seats)
     return found

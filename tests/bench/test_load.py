@@ -6,16 +6,21 @@ import asyncio
 from math import cos, isnan, sin
 
 import pytest
-from load import attackers, attacks, cloud, drag, play, rest, siege, soak, storm
+from load import attackers, attacks, cloud, drag, lesson, play, rest, siege, soak, storm
 from load.raw import Socket
-from load.service import Usage, serve
+from load.service import Usage
 from load.visitor import STEP, SWING, Visitor
 
 
 @pytest.fixture(scope="module")
-def service():
-    with serve() as running:
+def served():
+    with lesson.served(1) as running:
         yield running
+
+
+@pytest.fixture
+def service(served):
+    return served[0]
 
 
 def test_each_request_is_answered_and_counted(service):
@@ -62,10 +67,54 @@ def test_a_picture_on_the_way_to_an_earlier_target_answers_nothing():
     assert visitor.unanswered == 0
 
 
+def test_a_picture_that_has_passed_the_turning_point_unseen_answers_what_it_can():
+    """A student's page shows the newest state of the teacher's: it may turn back before the end of the swing."""
+    teacher, student = Visitor(), Visitor()
+    teacher._home = [1.0, 0.0, 0.0, 0.0]
+    teacher._position, teacher._wxyz = [1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
+    teacher.gizmo = {"name": "/arm-1-target", "owner": ""}
+    teacher.send = lambda *_, **__: None
+
+    def both(events):
+        for _ in range(events):
+            assert teacher.drag()
+            student.watch(teacher)
+
+    def shown(visitor, steps):
+        visitor._shown([float(x) for x in (cos(steps * STEP / 2), 0, 0, sin(steps * STEP / 2))], 1e9)
+
+    turn = round(SWING / STEP)
+    both(turn)
+    shown(teacher, turn)
+    shown(student, turn - 1)
+    assert (teacher.unanswered, student.unanswered) == (0, 1)
+    both(4)
+    shown(student, turn - 2.5)  # back already: on the way to the third of the four
+    assert student.unanswered == 1
+    shown(student, turn - 2.6)
+    assert student.unanswered == 1
+    shown(student, turn - 3.5)
+    assert student.unanswered == 0
+    both(1)
+    shown(student, turn - 3.4)  # cannot be: it has been farther
+    assert student.unanswered == 1
+
+
 def test_all_who_come_at_once_get_their_page(service):
     row = asyncio.run(storm.measure(service, 6))
     assert row["failed"] == 0
     assert 0 < row["arm p50 s"] <= row["all pages s"]
+
+
+def test_a_lesson_measures_its_pictures_and_its_wall(served, monkeypatch):
+    monkeypatch.setattr(lesson, "UP", 0.5)
+    row = asyncio.run(lesson.follow(*served, 2, 1.5))
+    assert row["unanswered"] == 0
+    assert row["pictures"] == 2 * round(1.5 * drag.HZ)
+    assert 0 < row["p50 ms"] <= row["p95 ms"] < 1e3 * lesson.PATIENCE
+    rows = {row["students"]: row for row in asyncio.run(lesson.wall(*served, 2, 1.0))}
+    assert set(rows) == {"no room", "in a room", "on the wall", "the wall alone"}
+    assert rows["on the wall"]["kB/s to the teacher"] > 2 * rows["in a room"]["kB/s to the teacher"]
 
 
 def test_every_point_arrives_by_every_way(service):

@@ -5,7 +5,8 @@ from __future__ import annotations
 import time
 from abc import abstractmethod
 from collections.abc import Callable, Hashable
-from typing import ClassVar, Protocol, cast
+from dataclasses import replace
+from typing import Protocol, cast
 
 import viser
 
@@ -35,6 +36,11 @@ ACTS = frozenset(
     }
 )
 EXEMPT = ("class", "sheets")  # features whose controls are not acts in this sense
+
+
+def _any(text: str) -> str:
+    """Whether there is a text, as a text."""
+    return "…" if text else ""
 
 
 class MemberPage(LedPage, Protocol):
@@ -77,7 +83,6 @@ class Member(Feature):
 
     key = "class"
     title = "Class"
-    share_every: ClassVar[float]
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
@@ -91,7 +96,7 @@ class Member(Feature):
         self._dirty = True
         self._settles: float | None = None  # when the arm of who leads has rested long enough
         self._next = 0.0
-        self._sharing = Sharing(self.shared_state, self.attendance.tell_page, self.share_every)
+        self._sharing = Sharing(self.shared_state, self.attendance.tell_page, lambda: self.share_every)
         self._armed: tuple[Hashable, float] = "", 0.0
         self._bar: viser.GuiHtmlHandle | None = None
 
@@ -127,19 +132,33 @@ class Member(Feature):
         """Why the visitor may not act now; empty if the act is allowed, which may end a lead."""
 
     @property
+    @abstractmethod
+    def share_every(self) -> float:
+        """Seconds between two states that are sent."""
+
+    @property
     def frozen(self) -> bool:
         """Whether the visitor may not act."""
         return False
 
+    def words(self, room: RoomView) -> RoomView:
+        """The room as far as the tab shows it: not the arms, which move all the time."""
+        return replace(
+            room,
+            page=_any(room.page),
+            shown=room.shown and replace(room.shown, page=_any(room.shown.page)),
+            seat=room.seat and replace(room.seat, page=""),
+            seats=tuple(replace(seat, page=_any(seat.page)) for seat in room.seats),
+        )
+
     # Feature
 
     def handle(self, key: Hashable, value: object) -> None:
-        self._dirty = True
+        if key == NEWS:
+            self._take_room()
+        else:
+            self._dirty = True
         match key:
-            case "room":
-                self.room = self.attendance.room
-                if self._bar is not None:
-                    self.take_news()
             case (str(kind), int()):
                 self._press(kind, "", value)
             case ("fields", str(name), int()):
@@ -149,6 +168,13 @@ class Member(Feature):
             case ("look", str(seat)):
                 self._press("look", seat, None)
         self.due = 0.0
+
+    def _take_room(self) -> None:
+        before, leader = self.room, self.leader
+        self.room = self.attendance.room
+        if self._bar is not None:
+            self.take_news()
+        self._dirty |= self.leader != leader or self.words(before) != self.words(self.room)
 
     def tick(self, now: float) -> None:
         again = self._sharing.tick(now)
@@ -184,13 +210,14 @@ class Member(Feature):
         if fresh and not self.frozen and act in ("gizmo", "grab", "joint"):
             self.page.put_back()
             return False
-        why = self.refusal(act)
+        leader, why = self.leader, self.refusal(act)
         if why:
             self.page.put_back()
             self.page.status.show(Notice("advice", "Not now", why))
             if isinstance(key, tuple) and key[0] == "message":
                 self.page.panel.script.reply(Reply(int(key[2]), why))
-        self._dirty, self.due = True, 0.0
+        self._dirty |= self.leader != leader
+        self.due = 0.0
         return not why
 
     # For subclasses

@@ -12,7 +12,7 @@ from app.viewer.panel import update_html
 from app.viewer.panel.status import Notice
 from app.viewer.room import views
 from app.viewer.room.member import NEWS, Member
-from app.viewer.room.sharing import STUDENT_EVERY
+from app.viewer.room.sharing import LED_EVERY, STUDENT_EVERY
 from app.viewer.room.submissions import Submissions
 from app.viewer.session.state import PageState
 
@@ -31,7 +31,6 @@ class Student(Member):
     """A student's page."""
 
     messages = frozenset({"go", "back", "hand", "vote", "task"})
-    share_every = STUDENT_EVERY
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
@@ -148,6 +147,10 @@ class Student(Member):
         lessons.exercises.note(text)
 
     # Member
+
+    @property
+    def share_every(self) -> float:
+        return LED_EVERY if self.leader else STUDENT_EVERY
 
     def shared_state(self) -> PageState | None:
         if self.room.closed:

@@ -9,7 +9,7 @@ import viser
 
 from app.classroom.clock import now
 from app.classroom.courses import Course, to_data
-from app.classroom.views import SeatView
+from app.classroom.views import RoomView, SeatView
 from app.viewer.feature import Stage
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import update_html
@@ -48,7 +48,6 @@ class Teacher(Member):
             *("remove", "lower", "wall", "end"),
         }
     )
-    share_every = LEADER_EVERY
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
@@ -256,6 +255,13 @@ class Teacher(Member):
         return next((robot for robot in self.page.store.robots if robot.id == state.robot), None)
 
     # Member
+
+    @property
+    def share_every(self) -> float:
+        return LEADER_EVERY
+
+    def words(self, room: RoomView) -> RoomView:
+        return super().words(room) if self._wall is None else room
 
     def shared_state(self) -> PageState | None:
         if self.room.closed or self.leader or self._before is not None:

@@ -96,6 +96,38 @@ def test_what_a_teacher_does_reaches_students_of_another_process(hubs):
     assert not student.room.closed
 
 
+def test_a_page_is_notified_only_of_what_it_can_see(hubs, monkeypatch):
+    """Thirty students who move must not wake each other's pages."""
+    monkeypatch.setattr("app.classroom.hub.BEAT", 0.1)
+    here, there = hubs
+    room = here.rooms.open("Kinematics", 3600)
+    heard = dict.fromkeys(("teacher", "mover", "near", "far"), 0)
+
+    def page(hub, ticket, name):
+        def changed():
+            heard[name] += 1
+
+        return hub.attend(ticket, changed)
+
+    seats = [here.rooms.join(room.code, name) for name in ("Ada", "Emmy", "Alan")]
+    teacher = page(here, here.ticket(room.token), "teacher")
+    mover, near = page(here, seats[0], "mover"), page(here, seats[1], "near")
+    far = page(there, seats[2], "far")
+    until(lambda: all(each.room.students == 3 for each in (teacher, mover, near, far)))
+    time.sleep(0.3)  # beats of all of them
+    before = dict(heard)
+    for move in ("one", "two"):
+        mover.tell_page(move)
+        until(lambda move=move: teacher.room.seats[0].page == move)
+        until(lambda move=move: there._lives[room.id].seats[seats[0].seat].row["page"] == move)
+    assert heard["teacher"] >= before["teacher"] + 2
+    assert (heard["near"], heard["far"]) == (before["near"], before["far"])
+    teacher.show_seat(seats[0].seat)
+    mover.tell_page("three")
+    until(lambda: all(each.room.shown and each.room.shown.page == "three" for each in (near, far)))
+    assert heard["near"] > before["near"] < heard["far"] > before["far"]
+
+
 def test_late_joiners_get_the_present_state(hubs):
     here, there = hubs
     room = here.rooms.open("Kinematics", 3600)

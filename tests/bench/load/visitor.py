@@ -21,17 +21,19 @@ _BASE_JOINT = re.compile(r"/arm-\d+/\d+")
 _unpack = zstandard.ZstdDecompressor().decompress
 _decode = msgspec.msgpack.Decoder().decode
 _encode = msgspec.msgpack.Encoder().encode
-_CLOSE = 1e-6  # radians
 SWING = 0.5  # radians to either side
 STEP = 0.02  # radians from one event to the next: 0.4 rad/s
+_TURN = round(SWING / STEP)  # steps from the middle to a turning point
+_CLOSE = 1e-4  # steps
 
 
 class Visitor:
     """One tab.
 
-    A drag turns the gizmo about the line of joint 1, ever farther in one direction and then back. The angle of
-    joint 1 in the picture then tells which event it answers: one beyond the target before last can only have been
-    drawn for the last one. Pictures of the easing towards an earlier target do not count.
+    A drag turns the gizmo about the line of joint 1 to and fro. Event k is k steps along this way, so the angle of
+    joint 1 tells how far along the picture is, as it never goes back: one beyond event k − 1 can only have been
+    drawn for event k or a later one. Pictures of the easing towards an earlier target do not count, and a picture
+    need not have shown the turning point: a page that follows another shows the newest state, not every one.
     """
 
     def __init__(self, token: str = "", source: str = "127.0.0.1", cookie: str = "") -> None:
@@ -51,10 +53,9 @@ class Visitor:
         self._joint = ""
         self._home: Any = None
         self._there = asyncio.Event()
-        self._target = 0.0
-        self._sense = 1.0
-        # Sense, angle to be passed, time of sending.
-        self._waiting: deque[tuple[float, float, float]] = deque()
+        self._sent = 0  # events since the first grab
+        self._along = 0.0  # how far the picture is, in steps
+        self._waiting: deque[tuple[int, float]] = deque()  # number and time of events not answered
 
     async def connect(self, port: int, timeout: float = 60.0) -> None:
         """Connect and wait until the arm is there."""
@@ -110,17 +111,14 @@ class Visitor:
 
     def drag(self) -> bool:
         """One event farther; False at a turning point, where the hand rests until all is answered."""
-        if self._sense * self._target >= SWING:
-            if self._waiting:
-                return False
-            self._sense = -self._sense
-        before, self._target = self._target, self._target + self._sense * STEP
-        half = 0.5 * self._target
+        if self._waiting and self._sent % (2 * _TURN) == _TURN:
+            return False
+        self._sent += 1
+        half = 0.5 * STEP * _swung(self._sent)
         c, s = math.cos(2 * half), math.sin(2 * half)
         x, y, z = self._position
         turn = (math.cos(half), 0.0, 0.0, math.sin(half))
-        now = time.perf_counter()
-        self._waiting.append((self._sense, before, now))
+        self._waiting.append((self._sent, time.perf_counter()))
         self.send(
             "TransformControlsUpdateMessage", name=self.gizmo["name"], owner=self.gizmo["owner"],
             position=(c * x - s * y, s * x + c * y, z), wxyz=_product(turn, self._wxyz),
@@ -131,6 +129,7 @@ class Visitor:
         """Expect a picture for the event that another visitor has just sent, whose arm this page shows."""
         if self._home is None:
             self._home = leader._home
+        self._sent = leader._sent
         self._waiting.append(leader._waiting[-1])
 
     def release(self) -> None:
@@ -154,13 +153,13 @@ class Visitor:
         if not self._waiting:
             return
         w, _, _, z = _product((self._home[0], *(-x for x in self._home[1:])), wxyz)
-        angle = math.remainder(2.0 * math.atan2(z, w), 2.0 * math.pi)
-        while self._waiting:
-            sense, before, sent = self._waiting[0]
-            if sense * (angle - before) < _CLOSE:
-                return
-            self._waiting.popleft()
-            self.latencies.append(now - sent)
+        angle = math.remainder(2.0 * math.atan2(z, w), 2.0 * math.pi) / STEP
+        along = _next(self._along, angle)
+        if along > self._sent + _CLOSE:  # not on the way: rounding, or the arm has yet to come to the first event
+            return
+        self._along = along
+        while self._waiting and self._waiting[0][0] - 1 < along - _CLOSE:
+            self.latencies.append(now - self._waiting.popleft()[1])
 
     # Messages
 
@@ -198,6 +197,20 @@ class Visitor:
 
     def _pose(self, name: str) -> dict[str, Any]:
         return self._poses.setdefault(name, {"position": (0.0, 0.0, 0.0), "wxyz": (1.0, 0.0, 0.0, 0.0)})
+
+
+def _swung(along: float) -> float:
+    """How many steps to the side the hand is after so many along its way: up, down past the middle, up again."""
+    return _TURN - abs((along + _TURN) % (4 * _TURN) - 2 * _TURN)
+
+
+def _next(along: float, angle: float) -> float:
+    """The first place on the way, not before `along`, where the hand is so many steps to the side."""
+    if abs(_swung(along) - angle) < _CLOSE:
+        return along
+    up = along + (angle - along) % (4 * _TURN)
+    down = along + (2 * _TURN - angle - along) % (4 * _TURN)
+    return min(up, down)
 
 
 def _product(a: Any, b: Any) -> tuple[float, float, float, float]:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +18,9 @@ from app.classroom import COOKIE, Hub, Ticket
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
+from app.viewer.room.member import Member
+from app.viewer.room.student import Student
+from app.viewer.room.teacher import Teacher
 from app.viewer.server import ViewerServer
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -163,6 +168,29 @@ def test_a_student_who_moves_the_arm_lets_go(room: Class) -> None:
     mode(student, "gone")
     q[0] = np.radians(120.0)
     at(student, q)
+
+
+def test_an_arm_that_moves_does_not_render_the_tab_again(room: Class, monkeypatch: pytest.MonkeyPatch) -> None:
+    teacher, student, _, q = lead(room)
+    student.settle(1.0)
+    rendered: list[str] = []
+    for kind in (Teacher, Student):
+        refresh = kind.refresh
+
+        def counted(self: Member, refresh: Callable[[Any], None] = refresh) -> None:
+            rendered.append(type(self).__name__)
+            refresh(self)
+
+        monkeypatch.setattr(kind, "refresh", counted)
+    for angle in range(20, 60, 4):
+        teacher.set("2 rotating elbow", float(angle))
+        time.sleep(0.1)
+    q[1] = np.radians(56.0)
+    at(student, q)
+    assert len(rendered) <= 2, rendered
+    press(student, "hand")
+    teacher.wait(lambda: "hand up" in teacher.html)
+    assert {"Teacher", "Student"} <= set(rendered)
 
 
 def test_the_lesson_the_view_and_the_viewpoint_are_shown_too(room: Class) -> None:

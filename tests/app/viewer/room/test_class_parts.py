@@ -35,7 +35,7 @@ def test_cells_are_apart_and_face_the_default_view(count: int, aspect: float, pi
 def test_a_state_is_sent_at_most_so_often_and_only_if_it_changed() -> None:
     sent: list[str] = []
     states = [PageState(robot="a")]
-    sharing = Sharing(lambda: states[0], sent.append, 0.2)
+    sharing = Sharing(lambda: states[0], sent.append, lambda: 0.2)
     assert sharing.tick(1.0) == 0.2
     states[0] = PageState(robot="b")
     assert sharing.tick(1.1) == pytest.approx(0.1), "too soon"

@@ -20,8 +20,8 @@ from load.service import Service, serve
 from load.visitor import Visitor
 
 WALL_HZ = 5.0
-_UP = 2.0  # s until a page has taken what was pressed
-_PATIENCE = 3.0  # s for the last pictures
+UP = 2.0  # s until a page has taken what was pressed
+PATIENCE = 3.0  # s for the last pictures
 
 
 @contextmanager
@@ -50,14 +50,14 @@ async def members(service: Service, hub: Hub, count: int) -> list[Visitor]:
 async def press(visitor: Visitor, number: int, name: str) -> None:
     """Press a button of the tab Class."""
     visitor.set(MESSAGES, json.dumps([[number, "feature", ["class", [name, number], None]]]))
-    await asyncio.sleep(_UP)
+    await asyncio.sleep(UP)
 
 
 async def follow(service: Service, hub: Hub, count: int, seconds: float) -> dict[str, Any]:
     """A teacher drags for so long, and so many students watch."""
     teacher, *students = await members(service, hub, count)
     await press(teacher, 1, "follow")
-    before = service.seconds()
+    before, shown = service.seconds(), sum(student.pictures for student in students)
     began, spent = time.perf_counter(), time.process_time()
     teacher.grab()
     for k in range(round(seconds * HZ)):
@@ -66,8 +66,8 @@ async def follow(service: Service, hub: Hub, count: int, seconds: float) -> dict
             for student in students:
                 student.watch(teacher)
     wall, own = time.perf_counter() - began, time.process_time() - spent
-    used = service.seconds() - before
-    end = time.perf_counter() + _PATIENCE
+    used, shown = service.seconds() - before, sum(student.pictures for student in students) - shown
+    end = time.perf_counter() + PATIENCE
     while any(student.unanswered for student in students) and time.perf_counter() < end:
         await asyncio.sleep(0.02)
     teacher.release()
@@ -83,6 +83,7 @@ async def follow(service: Service, hub: Hub, count: int, seconds: float) -> dict
         "teacher's p95 ms": 1e3 * percentile(teacher.latencies, 95),
         "unanswered": sum(student.unanswered for student in students),
         "service CPU %": 100 * used / wall,
+        "CPU ms a picture": 1e3 * used / max(shown, 1),
         "client CPU %": 100 * own / wall,
     }
 
@@ -113,7 +114,7 @@ async def wall(service: Service, hub: Hub, count: int, seconds: float) -> list[d
             teacher, *students = await members(service, hub, count)
         else:
             await press(teacher, 1, "wall")
-        await asyncio.sleep(_UP)
+        await asyncio.sleep(UP)
         before, received, began = service.seconds(), teacher.bytes, time.perf_counter()
         await _move(students, seconds)
         spent = time.perf_counter() - began
@@ -127,7 +128,7 @@ async def wall(service: Service, hub: Hub, count: int, seconds: float) -> list[d
         if name != "in a room":
             for visitor in (teacher, *students):
                 visitor.close()
-            await asyncio.sleep(_UP)
+            await asyncio.sleep(UP)
     rows.append({"students": "the wall alone", **{k: rows[2][k] - rows[1][k] for k in list(rows[0])[1:]}})
     return rows
 
