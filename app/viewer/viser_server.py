@@ -34,6 +34,8 @@ from viser.infra._async_message_buffer import AsyncMessageBuffer
 from app.shared.connection import Connection, ConnectionEnded
 from app.shared.notes import Notes
 from app.shared.security import Rights
+from app.viewer import viser_outbox
+from app.viewer.viser_outbox import Bell, Outbox, Packer
 
 log = logging.getLogger(__name__)
 
@@ -61,6 +63,7 @@ class PortlessServer(infra.WebsockServer):
         self.room_tokens: dict[int, str] = {}  # of classrooms, not verified, by client id
         self._open = 0  # connections
         self._notes = Notes(log)
+        self._bell, self._packer = Bell(loop), Packer()
         self._stopping: asyncio.Future[None]
         self._all_ended: asyncio.Event
 
@@ -102,7 +105,7 @@ class PortlessServer(infra.WebsockServer):
 
     async def _visit(self, connection: Connection) -> ConnectionEnded:
         number = infra.ClientId(next(self._ids))
-        buffer = AsyncMessageBuffer(self._loop, persistent_messages=False)
+        buffer = Outbox(number, self._bell, self._packer)
         client = infra.WebsockClientConnection(number, _infra._ClientHandleState(buffer, self._loop))
         self._client_state_from_id[number] = client._state
         self.rights[number], self.clients[number] = connection.rights, connection.client
@@ -114,7 +117,7 @@ class PortlessServer(infra.WebsockServer):
             flows = [
                 self._loop.create_task(flow)
                 for flow in (
-                    _infra._message_producer(visitor, buffer, number),
+                    buffer.send_to(connection),
                     _infra._message_producer(visitor, self._broadcast_buffer, number, self._backlog_done_message),
                     self._consume(connection, client),
                 )
@@ -246,7 +249,7 @@ def missing_names() -> list[str]:
     found += [f"WebsockServer.{name}" for name in attributes if not hasattr(server, name)]
     fields = AsyncMessageBuffer.__dataclass_fields__
     found += [f"AsyncMessageBuffer.{name}" for name in ("generator_cursors", "done") if name not in fields]
-    return found
+    return found + viser_outbox.missing_names()
 
 
 def _parameters(function: Any) -> tuple[str, ...]:

@@ -41,6 +41,7 @@ from app.viewer.session.typed import BY_HAND
 from app.viewer.session.worker import Worker
 from app.viewer.tabs import TABS
 from app.viewer.views.templates import render
+from app.viewer.viser_outbox import in_one_frame
 from kin import IKResult, Robot, Task
 from kin.transforms import Array
 from kin.units import DEFAULT_UNITS, Units
@@ -190,7 +191,7 @@ class VisitorPage(ShownArm, Worker):
         self.arm.branch = branch
         self.posture.choose(branch)
 
-    # ActionsPage: what actions may use besides
+    # ActionsPage
 
     def change_robot(self, robot: Robot, q: Array | None = None, glide: bool = False) -> None:
         """Replace the robot, at its home configuration or at `q` ``(n,)``, in a fitting view."""
@@ -287,8 +288,6 @@ class VisitorPage(ShownArm, Worker):
     def on_branch(self, branch: str | None) -> None:
         self.posture.choose(branch)
 
-    # Worker
-
     @property
     def _timeout(self) -> float | None:
         times = [feature.due for feature in self.features if feature.due is not None]
@@ -311,22 +310,23 @@ class VisitorPage(ShownArm, Worker):
         self.for_features(lambda feature: feature.on_leave())
 
     def _step(self, batch: list[tuple[Hashable, object]]) -> None:
-        with self.client.atomic():
-            for key, value in batch:
-                # Guarded one by one, so that one bad value does not discard the others.
-                self._guard(lambda key=key, value=value: self._act(key, value))  # type: ignore[misc]
-            self.arm.draw(fresh=bool(batch))
-            if self.arm.target is None:
-                self.numbers.hide_target()
-            now = time.perf_counter()
-            if self.status.due(now) == 0.0:
-                self.settle_status()
-            self.camera.tick(now)
-            for feature in self.features:
-                if feature.due is not None:
-                    self._guard(lambda feature=feature: feature.tick(now))  # type: ignore[misc]
-        self.client.flush()
-        self.numbers.update()
+        with in_one_frame(self.client):
+            with self.client.atomic():
+                for key, value in batch:
+                    # Guarded one by one, so that one bad value does not discard the others.
+                    self._guard(lambda key=key, value=value: self._act(key, value))  # type: ignore[misc]
+                self.arm.draw(fresh=bool(batch))
+                if self.arm.target is None:
+                    self.numbers.hide_target()
+                now = time.perf_counter()
+                if self.status.due(now) == 0.0:
+                    self.settle_status()
+                self.camera.tick(now)
+                for feature in self.features:
+                    if feature.due is not None:
+                        self._guard(lambda feature=feature: feature.tick(now))  # type: ignore[misc]
+            self.client.flush()
+            self.numbers.update()
         if batch:
             self._persistence.postpone(now)
         elif not (self.arm.moving or self.arm.dragging) and self._persistence.rested(now):
@@ -334,7 +334,6 @@ class VisitorPage(ShownArm, Worker):
             self._show_hints()
 
     def _act(self, key: Hashable, value: object) -> None:
-        """Process one event."""
         self._actions.handle(key, value)
 
     def _show_hints(self) -> None:
@@ -346,8 +345,6 @@ class VisitorPage(ShownArm, Worker):
         x, y, length = self.camera.place(gizmo.position, gizmo.scale)
         place = "" if self._looking else f"{x:.3f} {y:.3f} {length:.3f}"
         update_html(self.panel.hints, render("panel/hints", place=place))
-
-    # Building
 
     def _build(self) -> None:
         gui = self.client.gui
@@ -362,10 +359,10 @@ class VisitorPage(ShownArm, Worker):
             self.camera = VisitorCamera(self.client, self.post)
             self.numbers = Numbers(self, self._pace)
             gui.main_panel.dock_right()
-            titles = [tab.title for tab in self.offered]
             self.panel = Panel(
                 gui, self.store.robots, self.own, robot, self.units, self.view, self.system_dark, self._welcome,
-                bool(LESSONS), titles, self._library.offered(self.store.robots), self.post,
+                bool(LESSONS), [tab.title for tab in self.offered],
+                self._library.offered(self.store.robots), self.post,
             )  # fmt: skip
             self.panel.fit(gui.main_panel, self._persistence.embedded)
             self.status = self.panel.status

@@ -1,0 +1,244 @@
+"""The messages of one visitor on their way out: one wake-up of the event loop and one frame for each step.
+
+viser wakes the event loop once for each message outside of an atomic block, at the end of each block and for each
+flush. A generator, a timer and two tasks then wait for the next message. That cost more than posing the arm. An
+`Outbox` keeps viser's buffer, its culling of superseded messages and its format, and replaces how it is read: what
+is pushed within `in_one_frame` leaves in one frame, for which the loop is woken once; a `Bell` wakes it once for
+all visitors who are waiting.
+
+It relies on private names of viser, which `missing_names` lists; `app.viewer.viser_server.start_viser` refuses a
+version that lacks one. Tests compare the bytes with those of viser's own `_message_producer`. Upstream offers no
+way to replace its producer yet; https://github.com/viser-project/viser/issues is the place to ask for one.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import itertools
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import msgspec
+import viser
+import zstandard
+from viser import _messages as messages
+from viser.infra import Message, _infra
+from viser.infra._async_message_buffer import AsyncMessageBuffer
+
+from app.shared.connection import Connection
+
+_encode = msgspec.msgpack.Encoder().encode
+
+
+class Bell:
+    """Calls functions in the thread of an event loop, which is woken once for all calls that wait.
+
+    Args:
+        loop: the event loop.
+    """
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        self.loop = loop
+        self._waiting: deque[Callable[[], None]] = deque()
+        self._rung = False
+
+    def ring(self, call: Callable[[], None]) -> None:
+        """Have this called. Any thread may ring; nothing happens if the loop is closed."""
+        # A call is appended before the flag is read, and the flag is cleared before calls are taken: none is lost.
+        self._waiting.append(call)
+        if not self._rung:
+            self._rung = True
+            with contextlib.suppress(RuntimeError):  # closed: there is no visitor left
+                self.loop.call_soon_threadsafe(self._answer)
+
+    def _answer(self) -> None:
+        self._rung = False
+        while self._waiting:
+            self._waiting.popleft()()
+
+
+class _Signal:
+    """Stands in for an `asyncio.Event` of viser's buffer: to set it is a call."""
+
+    def __init__(self, call: Callable[[], None]) -> None:
+        self.set = call
+
+
+class _Direct:
+    """Stands in for the event loop of viser's buffer, whose only use is to set events."""
+
+    @staticmethod
+    def call_soon_threadsafe(call: Callable[[], None]) -> None:
+        call()
+
+
+class Outbox(AsyncMessageBuffer):
+    """viser's buffer of one connection, read by `send_to` instead of viser's producer.
+
+    As in viser, messages that are not flushed wait for a sixtieth of a second, and a frame has at most
+    `max_window_size` of them.
+
+    Args:
+        visitor: viser's number of the connection.
+    """
+
+    def __init__(self, visitor: int, bell: Bell, packer: Packer) -> None:
+        super().__init__(bell.loop, persistent_messages=False)
+        # viser sets its events in the pushing thread, and asks the loop to set them: both are calls here.
+        self.message_event: Any = _Signal(self._pushed)
+        self.flush_event: Any = _Signal(self._flushed)
+        self.event_loop: Any = _Direct()
+        self._visitor = visitor
+        self._bell = bell
+        self._packer = packer
+        self._holding = threading.Lock()
+        self._holds = 0
+        self._asked: Callable[[], None] | None = None  # while it is held: what to ring for at the end
+        self._waiter: asyncio.Future[None] | None = None
+        self._timer: asyncio.TimerHandle | None = None
+
+    # Any thread
+
+    def _pushed(self) -> None:
+        if self.done or (self.message_from_id and not self.atomic_counter):
+            self._ask(self._send_soon)
+
+    def _flushed(self) -> None:
+        if self.done or self.message_from_id:
+            self._ask(self._send)
+
+    def _ask(self, call: Callable[[], None]) -> None:
+        with self._holding:
+            if self._holds and not self.done:
+                if self._asked != self._send:
+                    self._asked = call
+                return
+        self._bell.ring(call)
+
+    @contextlib.contextmanager
+    def hold(self) -> Iterator[None]:
+        """Wake the loop for all that is pushed and flushed within this context once, at its end."""
+        with self._holding:
+            self._holds += 1
+        try:
+            yield
+        finally:
+            with self._holding:
+                self._holds -= 1
+                call, self._asked = (None, self._asked) if self._holds else (self._asked, None)
+            if call is not None:
+                self._bell.ring(call)
+
+    # The event loop's thread
+
+    def _send(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if self._waiter is not None and not self._waiter.done():
+            self._waiter.set_result(None)
+
+    def _send_soon(self) -> None:
+        if self.done:
+            self._send()
+        elif self._timer is None:
+            self._timer = self._bell.loop.call_later(self.window_duration_sec, self._send)
+
+    async def send_to(self, connection: Connection) -> None:
+        """Send what is pushed, until the buffer is done or the connection ends; raises `ConnectionEnded`."""
+        try:
+            while not self.done:
+                if window := self._take():
+                    await connection.send(self._packer.pack(window))
+                else:
+                    self._waiter = self._bell.loop.create_future()
+                    await self._waiter
+        finally:
+            if self._timer is not None:
+                self._timer.cancel()
+
+    def _take(self) -> list[Message]:
+        """The oldest messages, removed from the buffer; none within an atomic block."""
+        window: list[Message] = []
+        if self.atomic_counter:
+            return window
+        with self.buffer_lock:
+            for number in list(itertools.islice(self.message_from_id, self.max_window_size)):
+                message = self.pop_message_locked(number)
+                if message is not None and message.excluded_self_client != self._visitor:
+                    window.append(message)
+        return window
+
+
+class Packer:
+    """Messages as bytes on the wire, as viser's producer makes them. Only the event loop's thread uses it."""
+
+    def __init__(self) -> None:
+        self._compress = zstandard.ZstdCompressor(level=1).compress  # half a megabyte of memory
+
+    def pack(self, window: Sequence[Message]) -> bytes:
+        """One frame; viser's `_message_producer` describes its layout."""
+        binary: list[memoryview] = []
+        inner = _encode(
+            {
+                "messages": [fields_of(message, binary) for message in window],
+                "timestampSec": time.perf_counter(),
+                "binaryBufferLengths": [buffer.nbytes for buffer in binary],
+            }
+        )
+        packed = self._compress(inner)
+        parts: list[bytes | memoryview] = [
+            len(inner).to_bytes(8, "little"),
+            len(packed).to_bytes(8, "little"),
+            packed,
+        ]
+        _infra._append_aligned_buffers(parts, binary, 16 + len(packed))
+        return b"".join(parts)
+
+
+def fields_of(message: Message, binary: list[memoryview]) -> dict[str, Any]:
+    """A message as viser's `as_serializable_dict` has it; poses, most of a drag, without its type checks.
+
+    `app.viewer.viser_patches.assign` makes them, of Python's own numbers.
+    """
+    if type(message) is messages.SetOrientationMessage:
+        name, owner = message.name, message.owner
+        return {"name": name, "wxyz": message.wxyz, "owner": owner, "type": "SetOrientationMessage"}
+    if type(message) is messages.SetPositionMessage:
+        name, owner = message.name, message.owner
+        return {"name": name, "position": message.position, "owner": owner, "type": "SetPositionMessage"}
+    return message.as_serializable_dict(binary)
+
+
+@contextlib.contextmanager
+def in_one_frame(client: viser.ClientHandle) -> Iterator[None]:
+    """Send all that is pushed and flushed for a visitor within this context together, at its end."""
+    buffer = client._websock_connection.get_message_buffer()
+    if isinstance(buffer, Outbox):
+        with buffer.hold():
+            yield
+    else:  # a viser server with a port of its own
+        yield
+
+
+def missing_names() -> list[str]:
+    """What an `Outbox` uses of viser and the installed version does not have, or not in this form."""
+    fields = AsyncMessageBuffer.__dataclass_fields__
+    wanted = (
+        *("event_loop", "message_event", "flush_event", "message_from_id", "buffer_lock", "atomic_counter"),
+        *("max_window_size", "window_duration_sec", "done"),
+    )
+    found = [f"AsyncMessageBuffer.{name}" for name in wanted if name not in fields]
+    methods = ("push", "atomic_start", "atomic_end", "flush", "set_done", "pop_message_locked")
+    found += [f"AsyncMessageBuffer.{name}" for name in methods if not hasattr(AsyncMessageBuffer, name)]
+    if not hasattr(_infra, "_append_aligned_buffers"):
+        found.append("_infra._append_aligned_buffers")
+    poses = ((messages.SetOrientationMessage, "wxyz"), (messages.SetPositionMessage, "position"))
+    for kind, value in poses:
+        if tuple(kind.__dataclass_fields__) != ("name", value, "owner"):
+            found.append(f"{kind.__name__}(name, {value}, owner)")
+    return found
