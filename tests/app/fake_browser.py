@@ -16,6 +16,7 @@ import zstandard
 from websockets.sync.client import connect
 
 from app.viewer.panel.script import LABEL
+from app.viewer.session.worker import Worker
 from app.viewer.session.worker.inbox import Inbox
 from kin.transforms import from_position_wxyz, wxyz_from_rotation
 
@@ -23,10 +24,10 @@ ANSWER = 1.5  # s until a message is answered on a busy machine
 PATIENCE = 30.0  # s until something that must happen has happened, on a machine that does much else
 WORK = 10.0  # s for which `settle` waits for a worker that has something to do
 
-# Inboxes of this process, and those whose workers act on what they have taken.
+# Inboxes of this process, and workers that act.
 _inboxes: weakref.WeakSet[Inbox] = weakref.WeakSet()
-_acting: weakref.WeakSet[Inbox] = weakref.WeakSet()
-_post, _take = Inbox.post, Inbox.take
+_acting: weakref.WeakSet[Worker] = weakref.WeakSet()
+_post, _act = Inbox.post, Worker._act_once
 
 
 def _watched_post(self: Inbox, key: Hashable, value: object = None) -> None:
@@ -34,20 +35,20 @@ def _watched_post(self: Inbox, key: Hashable, value: object = None) -> None:
     _post(self, key, value)
 
 
-def _watched_take(self: Inbox, timeout: float | None = None) -> list[tuple[Hashable, object]] | None:
-    _acting.discard(self)
-    taken = _take(self, timeout)
-    if taken:
-        _acting.add(self)
-    return taken
+def _watched_act(self: Worker) -> float | None:
+    _acting.add(self)
+    try:
+        return _act(self)
+    finally:
+        _acting.discard(self)
 
 
-Inbox.post, Inbox.take = _watched_post, _watched_take  # type: ignore[method-assign]
+Inbox.post, Worker._act_once = _watched_post, _watched_act  # type: ignore[method-assign]
 
 
 def _working() -> bool:
     """Whether a viewer in this process has something to do that was posted: a page is not at rest then."""
-    return any(not each.closed and (each in _acting or each._values) for each in list(_inboxes))
+    return bool(list(_acting)) or any(not each.closed and each.waits for each in list(_inboxes))
 
 
 class FakeBrowser:

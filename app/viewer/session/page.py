@@ -346,9 +346,12 @@ class VisitorPage(ShownArm, Worker):
         place = "" if self._looking else f"{x:.3f} {y:.3f} {length:.3f}"
         update_html(self.panel.hints, render("panel/hints", place=place))
 
+    def _prepare(self) -> None:
+        self._persistence.load()
+
     def _build(self) -> None:
         gui = self.client.gui
-        saved = self._persistence.load()
+        saved = self._persistence.stored
         self.units, self.view, self.system_dark = saved.units, saved.view, self._persistence.system_dark
         size_labels(self.client.scene, text_factor(self._persistence.text_size))
         self.own, self.frames = saved.own, saved.frames

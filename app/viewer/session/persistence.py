@@ -69,6 +69,7 @@ class Persistence:
         rights: what the visitor may cause: some may be shown a stored state only as far as nothing is computed.
 
     Attributes:
+        stored: what `load` has read.
         system_dark: whether the visitor's system was dark when the page was opened.
         text_size: name of the text size with which it was opened.
         embedded: how the page is embedded, as `StoredPage.embedded`.
@@ -84,6 +85,7 @@ class Persistence:
         self._guard = guard
         self._rights = rights
         self._address = LOCAL
+        self.stored = PageState()
         self.system_dark = False
         self.text_size = "Normal"
         self.embedded = ""
@@ -93,8 +95,8 @@ class Persistence:
         self.due: float | None = None
         self.led = False
 
-    def load(self) -> PageState:
-        """Read the stored state from the browser. A page that does not answer starts fresh."""
+    def load(self) -> None:
+        """Read the stored state from the browser, and wait for it. A page that does not answer starts fresh."""
         client = self._page.client
         try:
             stored = read_stored_page(client.local_storage.get_item(KEY, timeout=ANSWER_WITHIN))
@@ -107,9 +109,10 @@ class Persistence:
             SHOWN.join(stored.shown, self._page.post)
         saved = decode(stored.state, self._page.store.robots)
         if self._rights.compute:
-            return saved
+            self.stored = saved
+            return
         lesson = saved.lesson if saved.lesson is not None and self._rights.allow_lesson(saved.lesson) else None
-        return replace(saved, target=None, lesson=lesson, features={})
+        self.stored = replace(saved, target=None, lesson=lesson, features={})
 
     def restore(self, saved: PageState) -> None:
         """Apply the rest of a state to a page that shows its robot; what cannot be applied is reported."""

@@ -1,7 +1,8 @@
-"""A worker thread and its inbox.
+"""A visitor's worker and its inbox.
 
-Browser callbacks post events and return. The worker takes all new events and processes them in one step; it sleeps
-while there is nothing to do. State that only the worker touches needs no lock.
+Browser callbacks post events and return. The worker takes all new events and processes them in one step. Its steps
+are called by the threads of a :class:`~app.viewer.session.worker.crew.Crew`, one at a time: state that only the
+worker touches needs no lock.
 """
 
 from __future__ import annotations
@@ -13,13 +14,14 @@ from collections.abc import Callable, Hashable
 import kin
 from app.shared.threads.turns import urgent
 from app.viewer.panel.status import Notice
+from app.viewer.session.worker.crew import CREW, Place
 from app.viewer.session.worker.inbox import Inbox
 
 log = logging.getLogger(__name__)
 
 
 class Worker:
-    """The thread of one visitor. `start`, `post`, `end` and `join` are thread-safe.
+    """Answers one visitor. `start`, `post`, `end` and `join` are thread-safe.
 
     Args:
         visitor: the visitor's number, for the log.
@@ -30,29 +32,39 @@ class Worker:
         self._visitor = visitor
         self._failed = failed
         self._inbox = Inbox()
-        self._thread = threading.Thread(target=self._run, name=f"visitor-{visitor}", daemon=True)
+        self._place = Place(CREW, self._act_once)
+        self._built = False
+        self._ended = threading.Event()
+        self._ended.set()  # until it is started
 
     def start(self) -> None:
         """Build the visitor's page and start processing events."""
-        self._thread.start()
+        self._ended.clear()
+        threading.Thread(target=self._open, name=f"visitor-{self._visitor}", daemon=True).start()
 
     def post(self, key: Hashable, value: object = None) -> None:
         """Queue an event; a newer value replaces a queued one of the same key."""
         self._inbox.post(key, value)
+        if self._built:
+            self._place.call()
 
     def end(self) -> None:
         """Tell the worker to finish."""
         self._inbox.close()
+        if self._built:
+            self._place.call()
 
     def join(self, timeout: float | None = None) -> bool:
         """Wait for the worker to finish; returns whether it has."""
-        self._thread.join(timeout)
-        return not self._thread.is_alive()
+        return self._ended.wait(timeout)
 
     # To be overridden
 
+    def _prepare(self) -> None:
+        """Runs first, in a thread of its own: wait for what the page needs."""
+
     def _build(self) -> None:
-        """Runs first: build the page."""
+        """Runs next: build the page."""
         raise NotImplementedError
 
     def _step(self, batch: list[tuple[Hashable, object]]) -> None:
@@ -72,22 +84,56 @@ class Worker:
         """Runs last: the page no longer exists."""
         raise NotImplementedError
 
-    # The thread
+    # What the crew calls
 
-    def _run(self) -> None:
+    def _open(self) -> None:
         try:
-            self._build()
-            while (batch := self._inbox.take(self._timeout)) is not None:
+            self._prepare()
+        except BaseException:  # noqa: BLE001 - logged there
+            self._fail()
+        else:
+            self._place.call(build=True)
+
+    def _act_once(self) -> float | None:
+        """Build the page, process one batch, or finish; returns seconds until the next call."""
+        if self._ended.is_set():
+            return None
+        try:
+            if not self._built and self._inbox.closed:  # left before there was a page
+                self._finish()
+                return None
+            if not self._built:
+                self._build()
+                self._built = True
+                if self._inbox.waits:  # what was posted until now called nobody
+                    return 0.0
+            elif (batch := self._inbox.take()) is None:
+                self._finish()
+                return None
+            else:
                 with urgent:
-                    self._guard(lambda batch=batch: self._step(batch))  # type: ignore[misc]
-        except BaseException:
-            gone = self._inbox.closed
-            self._inbox.close()
-            log.log(logging.DEBUG if gone else logging.ERROR, "a visitor's worker failed", exc_info=True)
+                    self._guard(lambda: self._step(batch))
+            return self._timeout
+        except BaseException:  # noqa: BLE001 - logged there
+            self._fail()
+            return None
+
+    def _fail(self) -> None:
+        """End a worker that cannot continue."""
+        gone = self._inbox.closed
+        self._inbox.close()
+        log.log(logging.DEBUG if gone else logging.ERROR, "a visitor's worker failed", exc_info=True)
+        try:
             if self._failed is not None and not gone:
                 self._failed()
         finally:
+            self._finish()
+
+    def _finish(self) -> None:
+        try:
             self._leave()
+        finally:
+            self._ended.set()
 
     def _guard(self, action: Callable[[], None]) -> None:
         """Run an action; an error is logged and shown, and the worker continues."""

@@ -1,4 +1,4 @@
-"""An inbox that keeps only the newest value of each key: callbacks post, one worker takes.
+"""An inbox that keeps only the newest value of each key: callbacks post, the visitor's worker takes.
 
 A browser sends up to twenty drag events a second, and a solve may take longer than the gap between two of them.
 With a queue the arm would fall further and further behind the pointer. Here, posting a key again replaces its
@@ -13,10 +13,10 @@ from collections.abc import Hashable
 
 
 class Inbox:
-    """Any thread may post; one thread takes. Waiting blocks, so an idle visitor costs no processor time."""
+    """Any thread may post; one thread at a time takes. Nothing here waits."""
 
     def __init__(self) -> None:
-        self._changed = threading.Condition()
+        self._lock = threading.Lock()
         self._values: dict[Hashable, object] = {}
         self._closed = False
 
@@ -25,31 +25,31 @@ class Inbox:
         """Whether `close` was called."""
         return self._closed
 
+    @property
+    def waits(self) -> bool:
+        """Whether the worker has something to do: values, or the end."""
+        return bool(self._values) or self._closed
+
     def post(self, key: Hashable, value: object = None) -> None:
         """Make `value` the newest one of `key`. Ignored once the inbox is closed."""
-        with self._changed:
-            if self._closed:
-                return
-            self._values.pop(key, None)
-            self._values[key] = value
-            self._changed.notify()
+        with self._lock:
+            if not self._closed:
+                self._values.pop(key, None)
+                self._values[key] = value
 
-    def take(self, timeout: float | None = None) -> list[tuple[Hashable, object]] | None:
+    def take(self) -> list[tuple[Hashable, object]] | None:
         """All values posted since the last call, ordered by their last post.
 
-        Waits until there is one. Returns an empty list after `timeout` seconds, and None once the inbox is closed,
-        even if values are left: a disconnected visitor needs no answer.
+        None once the inbox is closed, even if values are left: a disconnected visitor needs no answer.
         """
-        with self._changed:
-            self._changed.wait_for(lambda: self._values or self._closed, timeout)
+        with self._lock:
             if self._closed:
                 return None
             taken, self._values = self._values, {}
         return list(taken.items())
 
     def close(self) -> None:
-        """Discard all values and wake the worker for the last time."""
-        with self._changed:
+        """Discard all values; no further ones are taken."""
+        with self._lock:
             self._closed = True
             self._values.clear()
-            self._changed.notify_all()

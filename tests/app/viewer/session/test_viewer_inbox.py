@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 
 import numpy as np
 import pytest
@@ -16,45 +15,21 @@ def test_the_newest_value_of_a_key_wins_and_order_is_that_of_the_last_touch() ->
     inbox = Inbox()
     for key, value in [("gizmo", 1), ("slider", 2), ("gizmo", 3)]:
         inbox.post(key, value)
+    assert inbox.waits
     assert inbox.take() == [("slider", 2), ("gizmo", 3)]
-    assert inbox.take(timeout=0.0) == []
+    assert inbox.take() == []
+    assert not inbox.waits
 
 
-def test_taking_sleeps_until_something_is_posted() -> None:
+def test_a_closed_inbox_gives_nothing_and_takes_nothing() -> None:
     inbox = Inbox()
-    taken: list[object] = []
-    worker = threading.Thread(target=lambda: taken.append(inbox.take()))
-    worker.start()
-    time.sleep(0.2)
-    assert worker.is_alive()
-    assert worker.ident is not None
-    spent = time.clock_gettime(time.pthread_getcpuclockid(worker.ident))
-    assert spent < 0.05, "waiting must not be a busy loop"
-    inbox.post("home")
-    worker.join(2.0)
-    assert taken == [[("home", None)]]
-
-
-def test_a_timeout_gives_an_empty_batch_and_closing_ends_everything() -> None:
-    inbox = Inbox()
-    begin = time.monotonic()
-    assert inbox.take(timeout=0.05) == []
-    assert time.monotonic() - begin >= 0.045
     inbox.post("late", 1)
     inbox.close()
+    assert inbox.waits
     assert inbox.take() is None
     inbox.post("later", 2)
     assert inbox.take() is None
     assert inbox.closed
-
-
-def test_closing_wakes_a_sleeping_worker() -> None:
-    inbox = Inbox()
-    worker = threading.Thread(target=inbox.take)
-    worker.start()
-    inbox.close()
-    worker.join(2.0)
-    assert not worker.is_alive()
 
 
 def test_many_posters_lose_nothing_newest() -> None:
@@ -69,8 +44,8 @@ def test_many_posters_lose_nothing_newest() -> None:
         poster.start()
     newest: dict[object, object] = {}
     while any(p.is_alive() for p in posters):
-        newest.update(inbox.take(timeout=0.01) or [])
-    newest.update(inbox.take(timeout=0.01) or [])
+        newest.update(inbox.take() or [])
+    newest.update(inbox.take() or [])
     assert newest == dict.fromkeys(range(4), 499)
 
 

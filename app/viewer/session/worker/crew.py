@@ -1,0 +1,206 @@
+"""The threads that answer visitors: one acts for all of them, and another goes on where a step takes long.
+
+A step takes half a millisecond, nearly all of it in Python, of which only one thread at a time runs. With a thread
+for each visitor, thirty who drag cost a dozen switches of threads per event and gain nothing. So one thread leads:
+it takes the visitors in turn, each for one step. A second one watches. If a step lasts longer than `PATIENCE`, the
+watcher leads, and the thread of that step only ends it: a visitor whose step blocks holds up the others that long.
+
+Pages that are built come behind the steps of visitors who are there: of two hundred who come at once, each needs
+some ten milliseconds, which nobody who drags waits for more than once.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+
+log = logging.getLogger(__name__)
+
+PATIENCE = 0.02  # s without a new step, after which another thread leads
+KEEP = 2.0  # s without work, after which the threads end
+IN_A_ROW = 10  # steps, after which a page is built that waits
+BUILDS = 4  # pages built at a time: more than one where the first take long
+
+
+class Place:
+    """What one visitor has in a `Crew`.
+
+    Args:
+        act: does what there is to do; returns seconds until it is called again, None: only after `call`.
+    """
+
+    def __init__(self, crew: Crew, act: Callable[[], float | None]) -> None:
+        self._crew = crew
+        self.act = act
+        self.waits = self.acts = self.again = self.builds = False
+        self.due: float | None = None  # of `time.monotonic`
+
+    def call(self, build: bool = False) -> None:
+        """Have `act` called soon, once for all calls before it begins; any thread may call.
+
+        Args:
+            build: whether it is a page that is built, which may wait longer.
+        """
+        self._crew.call(self, build)
+
+
+class Crew:
+    """The threads of one process. They start with the first call and end after `KEEP` seconds without one."""
+
+    def __init__(self, patience: float = PATIENCE, keep: float = KEEP) -> None:
+        self._patience, self._keep = patience, keep
+        self._lock = threading.Lock()
+        self._work = threading.Condition(self._lock)  # what the leader waits for
+        self._watch = threading.Condition(self._lock)  # what the watcher waits for
+        self._ready: deque[Place] = deque()
+        self._builds: deque[Place] = deque()
+        self._building = 0
+        self._row = 0  # steps since a page was built
+        self._due: list[tuple[float, int, Place]] = []
+        self._order = itertools.count()
+        self._numbers = itertools.count(1)
+        self._leader: threading.Thread | None = None
+        self._watcher: threading.Thread | None = None
+        self._step = 0  # number of the leader's step; odd while it lasts
+        self._watches = False  # whether the watcher looks at the leader again and again
+
+    def call(self, place: Place, build: bool) -> None:
+        """See `Place.call`."""
+        with self._lock:
+            if place.acts:
+                place.again = True
+            elif not place.waits:
+                self._queue(place, build)
+                if self._leader is None:
+                    self._leader = self._start(True)
+                elif not self._step & 1:
+                    self._work.notify()
+
+    def _start(self, leads: bool) -> threading.Thread:
+        thread = threading.Thread(
+            target=self._run, args=(leads,), name=f"visitors-{next(self._numbers)}", daemon=True
+        )
+        thread.start()
+        return thread
+
+    def _run(self, leads: bool) -> None:
+        while leads or self._take_over():
+            leads = False
+            if not self._lead():
+                return
+
+    def _queue(self, place: Place, build: bool) -> None:
+        place.waits, place.due, place.builds = True, None, build
+        (self._builds if build else self._ready).append(place)
+
+    # The leader
+
+    def _lead(self) -> bool:
+        """Take the visitors in turn. True: another thread leads now; False: there was nothing to do for long."""
+        me = threading.current_thread()
+        place: Place | None = None
+        again: float | None = None
+        while True:
+            with self._lock:
+                if place is not None:
+                    self._end_step(place, again)
+                if self._leader is not me:
+                    return True
+                self._step += self._step & 1
+                place = self._next()
+                if place is None:
+                    self._leader = None
+                    self._watch.notify()
+                    return False
+                self._begin_step(place)
+            try:
+                again = place.act()
+            except BaseException:
+                log.exception("a visitor's step failed")
+                again = None
+
+    def _next(self) -> Place | None:
+        """The next visitor, for whom the leader waits; None: there was none for long."""
+        while True:
+            now = time.monotonic()
+            while self._due:
+                at, _, place = self._due[0]
+                called = place.due != at  # before it was due
+                if not called and at > now:
+                    break
+                heapq.heappop(self._due)
+                if not called:
+                    self._queue(place, False)
+            builds = self._builds and self._building < BUILDS
+            if self._ready and not (builds and self._row >= IN_A_ROW):
+                self._row += 1
+                return self._ready.popleft()
+            if builds:
+                self._row = 0
+                return self._builds.popleft()
+            wait = self._due[0][0] - now if self._due else self._keep
+            if not self._work.wait(wait) and not (self._ready or self._builds or self._due):
+                return None
+
+    def _begin_step(self, place: Place) -> None:
+        place.waits, place.acts, place.again = False, True, False
+        self._building += place.builds
+        self._step += 1
+        if self._watcher is None:
+            self._watches = True
+            self._watcher = self._start(False)
+        elif not self._watches:
+            self._watches = True
+            self._watch.notify()
+
+    def _end_step(self, place: Place, again: float | None) -> None:
+        place.acts = False
+        self._building -= place.builds
+        if place.again:
+            self._queue(place, False)
+        elif again is not None:
+            place.due = time.monotonic() + again
+            heapq.heappush(self._due, (place.due, next(self._order), place))
+        if self._leader is None and (self._ready or self._due):
+            self._leader = self._start(True)
+        elif self._leader is not threading.current_thread() and not self._step & 1:
+            self._work.notify()  # it sleeps, and did not know of this
+
+    # The watcher
+
+    def _take_over(self) -> bool:
+        """Watch, and lead as soon as a step takes too long. False: this thread is not needed."""
+        me = threading.current_thread()
+        with self._lock:
+            if self._watcher not in (None, me):
+                return False  # another thread does
+            self._watcher = me
+            late = self._watch_leader()
+            self._watcher = None
+            if late:
+                self._leader = me
+                self._step += 1  # of the thread that led, and only ends its step
+            return late
+
+    def _watch_leader(self) -> bool:
+        """Wait; True: a step takes too long, False: there is no leader any more."""
+        idle, seen = 0, 0
+        while self._leader is not None:
+            if self._step & 1:
+                if self._step == seen:
+                    return True
+                idle = 0
+            else:
+                idle += 1
+            seen = self._step
+            self._watches = idle * self._patience < 1.0
+            self._watch.wait(self._patience if self._watches else None)
+        return False
+
+
+CREW = Crew()
