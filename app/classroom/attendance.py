@@ -107,6 +107,11 @@ class Attendance:
         if seat is not None and seat.task != exercise:
             self._tell_seat(task=exercise[:200], tries=0, solved=False)
 
+    def secret(self) -> bytes:
+        """A secret of the seat, from which the numbers of its exercises follow; raises `ClassroomUnavailable`."""
+        self._only_student()
+        return self._hub.rooms.tokens.secret(self.ticket)
+
     def submit(self, attempt: NewAttempt) -> Confirmed:
         """Store an attempt; returns when it is stored for good.
 

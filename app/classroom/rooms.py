@@ -13,7 +13,7 @@ from app.classroom.clock import now
 from app.classroom.database import Database
 from app.classroom.tables import TOKEN_BYTES, Attempt, Room, Seat
 from app.classroom.tokens import Tokens, new_code, read_code
-from app.classroom.views import Confirmed, NewAttempt, RefusedError, Ticket, UnknownRoomError
+from app.classroom.views import ANSWER_SHOWN, Confirmed, NewAttempt, RefusedError, Ticket, UnknownRoomError
 
 LONGEST_ALIAS, LONGEST_TITLE = 32, 80  # characters
 MIN_LIFE, MAX_LIFE = 60.0, 200 * 24 * 3600.0  # seconds: a term
@@ -181,10 +181,12 @@ class Rooms:
             made = connection.scalar(select(func.count()).where(Attempt.seat_id == ticket.seat)) or 0
             if made >= MAX_ATTEMPTS:
                 raise RefusedError(f"You have made {MAX_ATTEMPTS} attempts in this room; no more are stored.")
+            if not attempt.gave_up and _was_shown(connection, ticket.seat, attempt):
+                raise RefusedError("You have seen the answer to this task. Answers to other numbers count.")
             at = now()
             values = {field.name: getattr(attempt, field.name) for field in fields(attempt)}
             connection.execute(insert(Attempt).values(room_id=ticket.room, seat_id=ticket.seat, at=at, **values))
-            tries = seat.tries + 1 if seat.task == attempt.exercise else 1
+            tries = (seat.tries if seat.task == attempt.exercise else 0) + (not attempt.gave_up)
             connection.execute(
                 update(Seat).where(*mine).values(
                     task=attempt.exercise, tries=tries, solved=attempt.score >= 1.0, version=version
@@ -218,6 +220,12 @@ def next_version(connection: Connection, room: str) -> int | None:
     """
     query = update(Room).where(Room.id == room).values(version=Room.version + 1).returning(Room.version)
     return connection.scalar(query)
+
+
+def _was_shown(connection: Connection, seat: str, attempt: NewAttempt) -> bool:
+    """Whether the seat has seen the answer to these numbers, on whichever of its pages."""
+    same = (Attempt.seat_id == seat, Attempt.exercise == attempt.exercise, Attempt.seed == attempt.seed)
+    return connection.scalar(select(Attempt.id).where(*same, Attempt.verdict == ANSWER_SHOWN).limit(1)) is not None
 
 
 def _unused_code(connection: Connection) -> str:

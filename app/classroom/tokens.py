@@ -8,6 +8,7 @@ process of every machine can check it. The teacher's link holds a token; a brows
 from __future__ import annotations
 
 import hashlib
+import hmac
 import secrets
 
 from itsdangerous import BadSignature, URLSafeSerializer
@@ -53,6 +54,11 @@ class Tokens:
         return URLSafeSerializer(
             self._key, salt=f"kinboard.classroom.{purpose}", signer_kwargs={"digest_method": hashlib.sha256}
         )
+
+    def secret(self, ticket: Ticket) -> bytes:
+        """A secret of a seat: the same in all processes, and never sent to anybody."""
+        text = f"kinboard.classroom.secret:{ticket.room}:{ticket.seat}"
+        return hmac.digest(self._key.encode(), text.encode(), "sha256")
 
     def sign(self, ticket: Ticket) -> str:
         """The token of a ticket."""

@@ -152,9 +152,12 @@ class RoomView:
     problem: str = ""
 
 
+ANSWER_SHOWN = "The answer was shown."
+
+
 @dataclass(frozen=True)
 class NewAttempt:
-    """An answer to an exercise that has been judged.
+    """An answer to an exercise that has been judged, or a request for the right answer (`gave_up`).
 
     Attributes:
         answer: plain data, as the page gave it.
@@ -171,6 +174,16 @@ class NewAttempt:
     score: float
     started: float
     id: str = field(default_factory=lambda: secrets.token_hex(8))
+
+    @property
+    def gave_up(self) -> bool:
+        """Whether the answer is shown instead: later answers to these numbers do not count."""
+        return self.verdict == ANSWER_SHOWN
+
+    @classmethod
+    def given_up(cls, exercise: str, seed: int, started: float) -> NewAttempt:
+        """The answer is to be shown."""
+        return cls(exercise, seed, None, ANSWER_SHOWN, 0.0, started)
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import groupby
 
+from app.classroom.views import ANSWER_SHOWN
+
 STUCK_TRIES, STUCK_SECONDS = 3, 300.0  # without a right answer
 FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
 _SEPARATED = re.compile(r"([;\t]\s*)(?=[=+\-@＝＋－＠])")
@@ -47,7 +49,7 @@ class Row:
     """One student's work on one exercise.
 
     Attributes:
-        tries: answers so far.
+        tries: answers so far; a request for the right one is none.
         score: of the best, 0 to 1.
         seconds: since the student began; until the right answer, if there is one.
         solved: whether an answer was right.
@@ -77,9 +79,10 @@ def rows(attempts: Iterable[Attempt], now: float) -> list[Row]:
         tries = list(group)
         right = next((one.at for one in tries if one.score >= 1.0), None)
         begin = min(one.started for one in tries)
+        count = sum(one.verdict != ANSWER_SHOWN for one in tries)
         found.append(
             Row(
-                seat, tries[-1].alias, exercise, len(tries), max(one.score for one in tries),
+                seat, tries[-1].alias, exercise, count, max(one.score for one in tries),
                 max(0.0, (now if right is None else right) - begin), right is not None, tries[-1].verdict,
             )
         )  # fmt: skip

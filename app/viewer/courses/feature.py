@@ -53,7 +53,9 @@ class CourseFeature(Feature):
         self._desk = Desk()
         self._bar = stage.client.gui.add_html("")
         self._page: viser.GuiHtmlHandle | None = None
+        self._sent: Course | None = None  # by the teacher of the room
         self.link_of: LinkOf = lambda states, lesson: ""
+        self.entered: Callable[[], None] = lambda: None  # called when exercises may have other numbers
 
     def show(self) -> None:
         """Build the HTML in the container that is open."""
@@ -74,8 +76,8 @@ class CourseFeature(Feature):
 
     def reveals(self, exercise_id: str) -> bool:
         """Whether the answer of an exercise may be shown to who has not found it."""
-        course = self._progress.course
-        return course is None or course.answers or exercise_id not in course.exercises
+        courses = filter(None, (self._progress.course, self._sent))
+        return all(course.answers or exercise_id not in course.exercises for course in courses)
 
     def leads(self, exercise_id: str) -> bool:
         """Whether the course says what comes after an exercise."""
@@ -91,8 +93,15 @@ class CourseFeature(Feature):
         return tuple(dict.fromkeys(([mine] if mine is not None and mine.items else []) + [*self._courses.all]))
 
     def receive(self, packed: str) -> str:
-        """Open a course that was sent, as JSON; returns its title, or nothing if it was open already."""
+        """Open a course that was sent, as JSON; returns its title, or nothing if it was open already.
+
+        An empty text: the course of the room is over, and stays open.
+        """
+        if not packed:
+            self._sent = None
+            return ""
         course = course_of(json.loads(packed), self._courses.exercises, "course", self._courses.find)
+        self._sent = course
         if course == self._progress.course:
             return ""
         self._open(course)
@@ -129,6 +138,7 @@ class CourseFeature(Feature):
             case "close", _:
                 self._desk = Desk()
                 progress.course = progress.at = None
+                self._enter()
             case "upload", [str(file), str(text)]:
                 if not text or len(text) > MOST_IN_FILE:
                     raise InputError("file", file, f"a text file of 1 to {MOST_IN_FILE} bytes")
@@ -151,15 +161,19 @@ class CourseFeature(Feature):
     def _open(self, course: Course) -> None:
         self._desk = Desk()
         self._progress.open(course)
-        self._sign()
+        self._enter()
 
-    def _sign(self) -> None:
-        """From now on the page's storage keeps the marks with a signature.
+    def _enter(self) -> None:
+        """Exercises of a course have numbers and marks of their own, with a secret of this service.
 
-        Without a place for the key there is none; a request for a result code then gets the reason.
+        Where there is no place for the secret, they are as without a course; a request for a result code then gets
+        the reason.
         """
+        place = None
         with suppress(KinematicsError):
-            self._practice.use_key(self._secret())
+            place = self._progress.place(self._secret)
+        self._practice.enter(place)
+        self.entered()
 
     def _walk(self, name: object) -> None:
         progress = self._progress
@@ -216,6 +230,7 @@ class CourseFeature(Feature):
                 raise InputError("course", name, "a control of the editor")
         data = to_data(changed)  # the same limits as a file's
         self._progress.edit(course_of(data, self._courses.exercises, "course", self._courses.find))
+        self._enter()
         self._desk.link = ""
 
     def _set(self, course: Course, what: str, text: str) -> Course:
@@ -263,8 +278,7 @@ class CourseFeature(Feature):
             self._progress.restore(state)
         except ExerciseFileError as error:
             self.stage.notify(Notice("error", "The course cannot be used", str(error)))
-        if self._progress.course is not None:
-            self._sign()
+        self._enter()
         if self.shown:
             self._progress.at = None
         self._update()

@@ -9,6 +9,7 @@ from app.classroom.courses import Course, Courses, Item, course_of, to_data
 from app.classroom.courses.course import MOST_ITEMS
 from app.classroom.results import Outcome, write_code
 from app.exercises import Exercises
+from app.viewer.exercises.places import Place
 from app.viewer.exercises.practice import Mark, Practice
 from app.viewer.lessons import LESSONS
 from kin import InputError
@@ -104,14 +105,23 @@ class Progress:
             tries=sum(record.attempts for record in done), day=datetime.now(UTC).date(),
         )  # fmt: skip
 
+    def place(self, key: Callable[[], bytes]) -> Place | None:
+        """Where its exercises are done; None: no course is open. Raises what `key` raises."""
+        course = self.course
+        if course is None:
+            return None
+        answers = (
+            "with" if course.answers else "without"
+        )  # else a course with answers would show those of one without
+        return Place(f"course {course.fingerprint.hex()} {answers} answers", key())
+
     def code(self, key: Callable[[], bytes]) -> str:
         """The result code; raises `InputError` if the answers were not judged by this service."""
-        signed = key()
-        self._practice.use_key(signed)
-        if not self._practice.proven:
-            valid = "answers that this service has judged; those of this page are from a changed link"
+        place = self.place(key)
+        if place is None or not self._practice.is_in(place):
+            valid = "answers that this service has judged; it could not sign when the course was opened"
             raise InputError("progress", "unsigned", f"{valid}. Open the course anew")
-        return write_code(self.outcome(), signed)
+        return write_code(self.outcome(), place.key)
 
     def state(self) -> dict[str, object]:
         """As JSON; empty without a course."""

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Hashable
-from typing import NamedTuple, Protocol
 
 import numpy as np
 import viser
 
 import kin
-from app.exercises import Asked, Exercise, Exercises, Variant, VariantError, Verdict
+from app.exercises import Asked, Exercise, Exercises, Variant, VariantError
 from app.exercises.typed import EntryError
 from app.viewer.exercises import views
 from app.viewer.exercises.drawing import GHOST, SIZE, Drawing
 from app.viewer.exercises.practice import Practice
+from app.viewer.exercises.reports import GivenUp, Judged, Lead
 from app.viewer.exercises.sheet import Sheet
 from app.viewer.feature import Feature, Stage
 from app.viewer.panel import update_html
@@ -22,29 +22,6 @@ from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import round_points
 from kin import InputError
 from kin.transforms import Array, from_position_wxyz
-
-
-class Judged(NamedTuple):
-    """An answer that was judged: the seed of its numbers, the answer as plain data, and how long (s) it took."""
-
-    exercise: Exercise
-    seed: int
-    answer: object
-    verdict: Verdict
-    seconds: float
-
-
-class Lead(Protocol):
-    """The course of the page, as far as exercises care."""
-
-    def reveals(self, exercise_id: str) -> bool:
-        """Whether the answer of an exercise may be shown to who has not found it."""
-
-    def leads(self, exercise_id: str) -> bool:
-        """Whether the course says what comes after an exercise."""
-
-    def refresh(self) -> None:
-        """The marks have changed."""
 
 
 class Practising(Feature):
@@ -56,6 +33,7 @@ class Practising(Feature):
         practice: what the student has done.
         course: the course of the page.
         judged: called with each answer that was judged while the right one was not on show.
+        giving_up: called before the answer is shown to who has not found it; False: it is not shown now.
     """
 
     key = "exercises"
@@ -74,6 +52,7 @@ class Practising(Feature):
         self._variant: Variant | None = None
         self._since = 0.0
         self.judged: Callable[[Judged], None] | None = None
+        self.giving_up: Callable[[GivenUp], bool] | None = None
         self._box: viser.GuiFolderHandle | None = None
         self._blocks: list[viser.GuiHtmlHandle] = []
         self._container: viser.GuiFolderHandle
@@ -123,6 +102,12 @@ class Practising(Feature):
             self._begin(self._now)
             self._update()
 
+    def begin_anew(self) -> None:
+        """The numbers have changed, because another place was entered."""
+        if self.shown and self.practice.at is not None:
+            self._begin(self.practice.at, move=False)
+            self._update()
+
     def note(self, text: str) -> None:
         """Write a sentence below the verdict."""
         self._sheet.note = text
@@ -153,8 +138,8 @@ class Practising(Feature):
             case ("hint", int()):
                 record.hints = min(record.hints + 1, len(exercise.hints))
             case ("reveal", int()):
-                if not record.closed and (self.course is None or self.course.reveals(exercise.id)):
-                    record.mark = "shown"
+                if not record.closed and self._reveals(exercise) and self._may_give_up(exercise):
+                    self.practice.give_up(exercise)
                     self._sheet.verdict, self._sheet.error = None, ""
                     self._show_answer()
             case ("again", int()):
@@ -170,6 +155,17 @@ class Practising(Feature):
                 pass  # a late click
             case _:
                 raise InputError("exercise", key, "a control of the exercise")
+
+    def _reveals(self, exercise: Exercise) -> bool:
+        """Whether who has not found the answer may see it."""
+        return self.course is None or self.course.reveals(exercise.id)
+
+    def _may_give_up(self, exercise: Exercise) -> bool:
+        """Whether the answer may be shown now: in a room, only when it is stored that it was."""
+        if self.giving_up is None:
+            return True
+        seconds = time.perf_counter() - self._since
+        return self.giving_up(GivenUp(exercise, self.practice.seed_of(exercise), seconds))
 
     def step_name(self, key: Hashable) -> str:
         names = {"open": "Exercise", "list": "List of exercises", "hint": "Hint", "again": "New numbers"}
@@ -326,7 +322,7 @@ class Practising(Feature):
         else:
             variant, record, course = self._variant, practice.record(exercise), self.course
             following = None if course is not None and course.leads(exercise.id) else practice.after(exercise)
-            may_reveal = course is None or course.reveals(exercise.id)
+            may_reveal = self._reveals(exercise)
             contents = [
                 views.task_html(exercise, variant, units, self.stage.robot == exercise.robot),
                 views.question_html(self._asked, self._sheet, record.closed),

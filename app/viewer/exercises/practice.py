@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import hmac
 import json
 import random
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 from app.exercises import Exercise, Exercises, Variant, Verdict
+from app.viewer.exercises.places import LABEL, Place
 from kin import InputError
 
 Mark = Literal["open", "wrong", "right", "shown"]
@@ -40,13 +40,26 @@ class Record:
         return self.mark in ("right", "shown")
 
 
+class Claim(NamedTuple):
+    """Restored records, the text that their proof is about, and that proof."""
+
+    text: str
+    proof: object
+    records: dict[str, Record]
+
+
 class Practice:
     """A student's way through the exercises.
+
+    Alone, the numbers follow from the seed in the page's state, and all that is in the state counts. In a place,
+    which is a course or a seat in a room, they follow from a secret of the service as well: nobody can open them
+    elsewhere to look at the answer. Marks belong to their place, and count there only with a proof that this
+    service has given them.
 
     Attributes:
         seed: of this student; drawn once.
         at: the exercise on show; None: the list.
-        proven: whether everything in the records was judged by this service, as far as that is known.
+        records: what is known of exercises, by id, in the present place.
     """
 
     def __init__(self, exercises: Exercises) -> None:
@@ -54,23 +67,33 @@ class Practice:
         self.seed = random.randrange(1, MOST)
         self.at: Exercise | None = None
         self.records: dict[str, Record] = {}
-        self.proven = True
-        self._key: bytes | None = None
-        self._claim: tuple[str, object] | None = None  # what was restored, with its proof, until there is a key
+        self._place: Place | None = None
+        self._elsewhere: dict[str, dict[str, Record]] = {}  # records of this page in other places, by label
+        self._claims: dict[str, Claim] = {}  # what was restored for other places
+        self._settled: dict[tuple[str, int], Record] = {}  # answers that this page has shown, by id and seed
 
-    def use_key(self, key: bytes) -> None:
-        """Keep a proof with the state from now on, and check that of a state that was restored."""
-        self._key = key
-        if self._claim is not None:
-            claim, proof = self._claim
-            self.proven = isinstance(proof, str) and hmac.compare_digest(
-                proof.encode(), self._proof(claim).encode()
-            )
-            self._claim = None
+    def enter(self, place: Place | None) -> None:
+        """Work in this place from now on; None: alone. A seat is not left for a course."""
+        if self.seated or place == self._place:
+            return
+        self._elsewhere[self._label] = self.records
+        self._place = place
+        self.records = self._elsewhere.pop(self._label, {})
+        if (claim := self._claims.pop(self._label, None)) is not None:
+            self._take(claim)
 
-    def _proof(self, claim: str) -> str:
-        assert self._key is not None
-        return hmac.new(self._key, f"kinboard.practice:{claim}".encode(), "sha256").hexdigest()[:20]
+    @property
+    def seated(self) -> bool:
+        """Whether this is a student's page in a room."""
+        return self._place is not None and self._place.seat
+
+    def is_in(self, place: Place) -> bool:
+        """Whether what is known was judged in this place."""
+        return self.seated or self._place == place
+
+    @property
+    def _label(self) -> str:
+        return "" if self._place is None else self._place.label
 
     def record(self, exercise: Exercise) -> Record:
         """What is known of an exercise."""
@@ -95,7 +118,12 @@ class Practice:
 
     def seed_of(self, exercise: Exercise) -> int:
         """The seed of the student's numbers."""
-        return self.seed + MOST * self.record(exercise).variant
+        variant = self.record(exercise).variant
+        if self._place is None:
+            return self.seed + MOST * variant
+        if self._place.seat:  # the same in all pages of the seat, and one only where no numbers are drawn
+            return self._place.seed(exercise.id, variant if exercise.vary else 0)
+        return self._place.seed(exercise.id, self.seed, variant)
 
     def take(self, exercise: Exercise, verdict: Verdict, seconds: float) -> None:
         """Keep a verdict, unless the answer is on show."""
@@ -106,6 +134,16 @@ class Practice:
         record.seconds = min(record.seconds + round(seconds), MOST)
         record.credit = max(record.credit, round(100 * verdict.credit))
         record.mark = "right" if verdict.right else "wrong"
+        if record.closed:
+            self._settle(exercise)
+
+    def give_up(self, exercise: Exercise) -> None:
+        """The answer is shown to who has not found it."""
+        self.record(exercise).mark = "shown"
+        self._settle(exercise)
+
+    def _settle(self, exercise: Exercise) -> None:
+        self._settled[exercise.id, self.seed_of(exercise)] = self.record(exercise)
 
     def again(self, exercise: Exercise) -> None:
         """Begin anew, with other numbers."""
@@ -121,26 +159,37 @@ class Practice:
         if self.at is None and not done:
             return {}
         state: dict[str, object] = {"seed": self.seed, "at": "" if self.at is None else self.at.id, "done": done}
-        if self._key is not None and self.proven and done:
-            state["proof"] = self._proof(_claim(self.seed, done))
+        if self._place is not None:
+            state["in"] = self._place.label
+            if done:
+                state["proof"] = self._place.proof(_claim(self.seed, done))
         return state
 
     def restore(self, state: dict[str, object]) -> None:
-        """Take what `state` returned; invalid entries are ignored."""
-        seed, done = state.get("seed"), state.get("done")
+        """Take what `state` returned; invalid entries, and what is not proven in this place, are ignored."""
+        seed, done, label = state.get("seed"), state.get("done"), state.get("in", "")
         if _is_count(seed):
             self.seed = seed  # type: ignore[assignment]
         self.at = self._exercises.get(state.get("at"))
-        self.records = {}
-        if done:
-            self._claim = _claim(seed, done), state.get("proof")
-            self.proven = False
-            if self._key is not None:
-                self.use_key(self._key)
+        records: dict[str, Record] = {}
         for key, entry in done.items() if isinstance(done, dict) else ():
             valid = isinstance(entry, list) and len(entry) == 6 and all(map(_is_count, entry))
             if self._exercises.get(key) is not None and valid and entry[0] < len(MARKS):
-                self.records[key] = Record(MARKS[entry[0]], *entry[1:])
+                records[key] = Record(MARKS[entry[0]], *entry[1:])
+        claim = Claim(_claim(seed, done), state.get("proof"), records)
+        if label == self._label:
+            self._take(claim)
+        elif isinstance(label, str):
+            self._claims = {label[:LABEL]: claim}
+
+    def _take(self, claim: Claim) -> None:
+        """Take restored records as far as they are proven; an answer that this page has shown stays shown."""
+        proven = self._place is None or not claim.records or self._place.has_proven(claim.text, claim.proof)
+        self.records = claim.records if proven else {}
+        for (exercise_id, seed), record in self._settled.items():
+            exercise = self._exercises.get(exercise_id)
+            if exercise is not None and self.seed_of(exercise) == seed:
+                self.records[exercise_id] = record
 
 
 def _claim(seed: object, done: object) -> str:

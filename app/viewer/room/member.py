@@ -251,7 +251,7 @@ class Member(Feature):
         """Whether such a button waits for the second press."""
         return self._armed[0] == what
 
-    def try_to(self, action: Callable[[], None]) -> bool:
+    def try_to(self, action: Callable[[], object]) -> bool:
         """Ask the room for something; says in the status line why it was refused."""
         try:
             action()

@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 from app.classroom.clock import now
 from app.classroom.views import NewAttempt
-from app.viewer.exercises.feature import Judged
+from app.viewer.exercises.places import Place
+from app.viewer.exercises.reports import GivenUp, Judged
 from app.viewer.feature import Stage
 from app.viewer.panel import update_html
 from app.viewer.panel.status import Notice
@@ -45,10 +46,14 @@ class Student(Member):
         self._course = ""
         self._open_tab = 0
         self._submissions = Submissions(self.attendance.submit, lambda: stage.post(("news", self.key, NEWS)))
+        if self.page.lessons is not None:  # before what is stored of them in the browser is restored
+            exercises, ticket = self.page.lessons.exercises, self.attendance.ticket
+            exercises.practice.enter(
+                Place(f"seat {ticket.room} {ticket.seat}", self.attendance.secret(), seat=True)
+            )
+            exercises.judged, exercises.giving_up = self._submit, self._give_up
 
     def take_news(self) -> None:
-        if self.page.lessons is not None:
-            self.page.lessons.exercises.judged = self._submit
         self._set_course()
         self._set_task()
         lead = self._lead
@@ -103,7 +108,7 @@ class Student(Member):
         if packed == self._course or lessons is None:
             return
         self._course = packed
-        title = lessons.courses.receive(packed) if packed else ""
+        title = lessons.courses.receive(packed)
         if title:
             self.free()
             self._gone = True
@@ -130,6 +135,13 @@ class Student(Member):
         )  # fmt: skip
         if self.page.lessons is not None:
             self.page.lessons.exercises.note("Storing the answer …")
+
+    def _give_up(self, one: GivenUp) -> bool:
+        """Store that an answer is to be shown: from now on no other page of this seat can give it."""
+        if self.room.closed:
+            return True
+        attempt = NewAttempt.given_up(one.exercise.id, one.seed, now() - one.seconds)
+        return self.try_to(lambda: self.attendance.submit(attempt))
 
     def _note(self) -> None:
         """Say below the verdict whether the answers are stored."""

@@ -50,6 +50,7 @@ class LessonChoice:
                 stage, services.courses, self.exercises.practice, partial(result_key, services.classroom)
             )
             self.exercises.course = self.courses
+            self.courses.entered = self.exercises.begin_anew
             self._choice = gui.add_dropdown("Lesson", self._titles, initial_value=NONE, hint=HINT)
             self._overview: viser.GuiHtmlHandle | None = gui.add_html(_overview())
             self.sheets: Worksheets | None = Worksheets(stage, None)

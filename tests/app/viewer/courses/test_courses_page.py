@@ -16,10 +16,11 @@ from app.classroom.courses import Courses, parse_course, to_data, to_toml
 from app.classroom.hub import Hub
 from app.classroom.results import read_code
 from app.classroom.results.keys import result_key
-from app.exercises import Exercises
+from app.exercises import Exercises, Verdict
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
+from app.viewer.exercises.places import Place
 from app.viewer.exercises.practice import Practice
 from app.viewer.server import ViewerServer
 from app.viewer.session.state import PageState, decode, encode
@@ -137,39 +138,95 @@ def builtin_list() -> list[object]:
     return [get_robot(robot_id) for robot_id in builtin_robots()]
 
 
-def test_marks_that_were_written_into_a_link_give_no_code(server: int) -> None:
-    """A student edits the page's storage: the list shows it, but the service signs nothing."""
-    done = {"which-joint-goes-down": [2, 1, 0, 5, 100, 0], "row-distance": [2, 1, 0, 5, 100, 0]}
-    practice = {"seed": SEED, "at": "", "done": done, "proof": "0" * 20}
-    with FakeBrowser(server, memory=opened({"course": {"course": to_data(COURSE)}, "exercises": practice})) as tab:
-        tab.wait(lambda: "2 of 3 done" in block(tab, "follow"))
-        press(tab, "course", ["fields", "alias", 1], [["Ada"]])
-        tab.wait(lambda: "answers that this service has judged" in block(tab, "follow"))
-        assert "Copy code" not in block(tab, "follow")
+def test_marks_that_were_written_into_a_link_do_not_count(server: int) -> None:
+    """A student edits the page's storage: neither the marks nor the answers they would open are shown."""
+    done = {"which-joint-goes-down": [2, 1, 0, 5, 100, 0], "row-distance": [3, 1, 0, 5, 100, 0]}
+    label = Place(f"course {COURSE.fingerprint.hex()} without answers", b"of nobody").label
+    for place in ({}, {"in": label}):
+        practice = {"seed": SEED, "at": "", "done": done, "proof": "0" * 20, **place}
+        memory = opened({"course": {"course": to_data(COURSE)}, "exercises": practice})
+        with FakeBrowser(server, memory=memory) as tab:
+            tab.wait(lambda: "0 of 3 done" in block(tab, "follow"))
+            press(tab, "course", ["go", 1], 2)
+            tab.wait(lambda: 'data-exercise="row-distance"' in tab.html)
+            assert "data-exercises-solution" not in tab.html
 
 
-def test_a_proof_belongs_to_seed_and_records() -> None:
+def test_a_proof_belongs_to_place_seed_and_records() -> None:
+    here, there = Place("course a", b"k"), Place("course b", b"k")
     practice = Practice(ALL)
-    practice.use_key(b"k")
-    practice.records = {"row-distance": practice.record(ALL.all[0])}
-    practice.record(ALL.all[0]).attempts = 1
+    practice.enter(here)
+    one = ALL.all[0]
+    practice.take(one, Verdict(True, "Yes."), 1.0)
     state = practice.state()
     for change, proven in (
         ({}, True),
         ({"seed": 1}, False),
         ({"proof": None}, False),
-        ({"done": {"a": 1}}, False),
+        ({"in": there.label}, False),
+        ({"in": ""}, False),
+        ({"done": {one.id: [2, 2, 0, 1, 100, 0]}}, False),
     ):
         other = Practice(ALL)
-        other.use_key(b"k")
+        other.enter(here)
         other.restore({**state, **change})
-        assert other.proven is proven, change
+        assert other.record(one).closed is proven, change
         late = Practice(ALL)
         late.restore({**state, **change})
-        assert not late.proven
-        late.use_key(b"k")
-        assert late.proven is proven, change
-        assert ("proof" in late.state()) is proven
+        late.enter(here)
+        assert late.record(one).closed is proven, change
+        assert (late.state().get("done") == state["done"]) is proven
+
+
+def test_each_place_has_its_own_numbers_and_marks() -> None:
+    practice, one = Practice(ALL), ALL.get("two-elbows")
+    assert one is not None
+    seeds = [practice.seed_of(one)]
+    for name, key in (("course a", b"k"), ("course b", b"k"), ("course a", b"other")):
+        practice.enter(Place(name, key))
+        seeds.append(practice.seed_of(one))
+        assert not practice.record(one).closed
+        practice.take(one, Verdict(True, "Yes."), 1.0)
+    assert len(set(seeds)) == 4
+    practice.enter(None)
+    assert not practice.record(one).closed
+    practice.enter(Place("course a", b"k"))
+    assert practice.record(one).closed, "a course that is opened again"
+
+
+def test_an_answer_that_was_shown_stays_shown_when_undo_leads_back() -> None:
+    practice, one = Practice(ALL), ALL.get("two-elbows")
+    assert one is not None
+    practice.enter(Place("course a", b"k"))
+    practice.open(one.id)
+    before = practice.state()
+    practice.give_up(one)
+    practice.restore(before)
+    practice.take(one, Verdict(True, "Yes."), 1.0)
+    assert practice.record(one).mark == "shown"
+    practice.again(one)
+    practice.take(one, Verdict(True, "Yes."), 1.0)
+    practice.restore(before)
+    assert practice.record(one).mark == "shown"
+
+
+def test_a_seat_is_not_left_for_a_course() -> None:
+    practice, one = Practice(ALL), ALL.get("two-elbows")
+    assert one is not None
+    seat = Place("seat r s", b"k", seat=True)
+    practice.enter(seat)
+    other = Practice(ALL)
+    other.enter(seat)
+    assert practice.seed != other.seed
+    assert practice.seed_of(one) == other.seed_of(one), "two pages of one seat have the same numbers"
+    practice.enter(Place("course a", b"k"))
+    practice.enter(None)
+    assert practice.seed_of(one) == other.seed_of(one)
+    fixed = ALL.get("five-joints")
+    assert fixed is not None
+    seed = practice.seed_of(fixed)
+    practice.again(fixed)
+    assert practice.seed_of(fixed) == seed, "where nothing is drawn, other numbers are no other task"
 
 
 def test_a_teacher_makes_a_course(server: int) -> None:
