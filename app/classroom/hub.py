@@ -57,12 +57,13 @@ class Hub:
         folder: where SQLite's file is, or will be.
         url: of another database.
         most: how many rooms there may be at a time.
+        share: of these, for one client.
     """
 
-    def __init__(self, folder: Path, url: str | None = None, most: int = 100) -> None:
+    def __init__(self, folder: Path, url: str | None = None, most: int = 100, share: float = 1.0) -> None:
         self.folder = folder
         self._source = folder, url
-        self._most = most
+        self._most, self._share = most, share
         self._database: Database | None = None
         self._rooms: Rooms | None = None
         self._lock = threading.RLock()
@@ -77,7 +78,8 @@ class Hub:
     def of(cls, settings: Settings) -> Hub:
         """The hub of a service."""
         url = settings.database_url
-        return cls(settings.data_folder, None if url is None else url.get_secret_value(), settings.max_rooms)
+        address = None if url is None else url.get_secret_value()
+        return cls(settings.data_folder, address, settings.max_rooms, settings.client_share)
 
     @property
     def in_use(self) -> bool:
@@ -95,7 +97,7 @@ class Hub:
 
                 folder, url = self._source
                 self._database = Database(folder / DATABASE_FILE, url)
-                self._rooms = Rooms(self._database, self._most)
+                self._rooms = Rooms(self._database, self._most, self._share)
             return self._rooms
 
     @property

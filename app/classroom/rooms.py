@@ -14,6 +14,7 @@ from app.classroom.database import Database
 from app.classroom.tables import TOKEN_BYTES, Attempt, Room, Seat
 from app.classroom.tokens import Tokens, new_code, read_code
 from app.classroom.views import ANSWER_SHOWN, Confirmed, NewAttempt, RefusedError, Ticket, UnknownRoomError
+from app.shared.clients import share_of
 
 LONGEST_ALIAS, LONGEST_TITLE = 32, 80  # characters
 MIN_LIFE, MAX_LIFE = 60.0, 200 * 24 * 3600.0  # seconds: a term
@@ -45,11 +46,13 @@ class Rooms:
 
     Args:
         most: how many rooms there may be at a time.
+        share: of these, for one client.
     """
 
-    def __init__(self, database: Database, most: int = 100) -> None:
+    def __init__(self, database: Database, most: int = 100, share: float = 1.0) -> None:
         self._database = database
         self._most = most
+        self._most_of_one = share_of(most, share)
         self._tokens: Tokens | None = None
 
     @property
@@ -59,8 +62,13 @@ class Rooms:
             self._tokens = Tokens(self._database.key())
         return self._tokens
 
-    def open(self, title: str, life: float) -> OpenRoom:
-        """Open a room that is erased after `life` seconds; raises `RefusedError`."""
+    def open(self, title: str, life: float, client: str = "") -> OpenRoom:
+        """Open a room that is erased after `life` seconds; raises `RefusedError`.
+
+        Args:
+            client: who opens it, as `app.shared.clients` has it: one may open a share of all rooms. Empty: the
+                operator or a learning platform, without a share.
+        """
         title = clean_name(title, LONGEST_TITLE, "title") if title.strip() else "Class"
         if not MIN_LIFE <= life <= MAX_LIFE:
             raise RefusedError(f"A room may last from one minute to {MAX_LIFE / 86400:.0f} days.", "hours")
@@ -72,11 +80,18 @@ class Rooms:
                 raise RefusedError(
                     "This service has as many rooms as it may. End one of them, or try again later."
                 )
+            opener = tokens.bucket(client) if client else 0
+            mine = select(func.count()).where(Room.opener == opener)
+            if opener and (connection.scalar(mine) or 0) >= self._most_of_one:
+                raise RefusedError(
+                    f"{self._most_of_one} rooms were opened from your address; it may have no more at a time. "
+                    "End one of them, or try again later."
+                )
             code = _unused_code(connection)
             connection.execute(
                 insert(Room).values(
                     id=room, code=code, title=title, created=begin, ends=begin + life,
-                    version=1, state={}, page="", beat=0,
+                    version=1, state={}, page="", beat=0, opener=opener,
                 )
             )  # fmt: skip
         return OpenRoom(room, code, title, begin, begin + life, tokens.sign(Ticket(room)))
@@ -126,6 +141,16 @@ class Rooms:
         return OpenRoom(
             room.id, room.code, room.title, room.created, room.ends, "" if ticket.seat else token, len(ids)
         )
+
+    def is_open(self, ticket: Ticket) -> bool:
+        """Whether the room of a ticket goes on, and its seat was not removed."""
+        query = select(Room.id).where(Room.id == ticket.room, Room.ends > now())
+        if ticket.seat:
+            query = query.join(Seat, Seat.room_id == Room.id).where(
+                Seat.id == ticket.seat, Seat.removed.is_(False)
+            )
+        with self._database.read() as connection:
+            return connection.scalar(query) is not None
 
     def all(self) -> list[OpenRoom]:
         """All rooms, the newest first."""

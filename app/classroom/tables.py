@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from sqlalchemy import JSON, BigInteger, Double, ForeignKey, String, Text, false
+from sqlalchemy import JSON, BigInteger, Double, ForeignKey, String, Text, false, text
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
-REVISION = "0002"
+REVISION = "0003"
 ID = String(32)
 TOKEN_BYTES = 8  # of random ids
 
@@ -37,6 +37,7 @@ class Room(Base):
         state: what the teacher has set: follow, frozen, task, shown, poll, course.
         page: the packed state of the teacher's page.
         beat: grows every few seconds while a page of the teacher is connected.
+        opener: a number from 1 to 1000 that the address which opened the room shares with many others; 0: none.
     """
 
     __tablename__ = "room"
@@ -50,6 +51,7 @@ class Room(Base):
     state: Mapped[dict[str, Any]] = mapped_column(JSON, default=dict)
     page: Mapped[str] = mapped_column(Text, default="")
     beat: Mapped[int] = mapped_column(BigInteger, default=0)
+    opener: Mapped[int] = mapped_column(default=0, server_default=text("0"))
 
 
 class Seat(Base):

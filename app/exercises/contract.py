@@ -60,11 +60,13 @@ class Kind(ABC):
         name: as in files.
         about: one sentence for the documentation.
         shows_posture: whether the arm may stand at the exercise's configuration before the answer.
+        withholds: what no tab shows while the question is open, because it is the answer: "table", or nothing.
     """
 
     name: ClassVar[str]
     about: ClassVar[str]
     shows_posture: ClassVar[bool] = False
+    withholds: ClassVar[str] = ""
 
     @classmethod
     @abstractmethod

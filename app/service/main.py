@@ -50,6 +50,7 @@ from app.service.web.observe import Observe, write_to_stderr
 from app.service.web.pages import page_routes, static_folder
 from app.service.web.prefix import PathPrefix
 from app.service.web.rooms import room_routes, sweeping
+from app.service.web.rooms.guests import Guests
 from app.service.web.scoreboard import Scoreboard
 from app.service.web.viewer_proxy import ViewerBridge
 from app.service.workers import supervise
@@ -141,7 +142,7 @@ def create_app(
     app.router.routes.extend([*room_routes(classroom, settings, store), *scoreboard.routes()])
     app.router.routes.extend(lti_routes(classroom, settings, partial(_exercises, settings, store)))
     app.include_router(status.router)
-    _add_middleware(app, settings)
+    _add_middleware(app, settings, Guests(classroom))
     return app
 
 
@@ -165,7 +166,7 @@ def _described(lifespan: Callable[[FastAPI], AbstractAsyncContextManager[None]])
     )
 
 
-def _add_middleware(app: FastAPI, settings: Settings) -> None:
+def _add_middleware(app: FastAPI, settings: Settings, guests: Guests) -> None:
     """Access control innermost, the path prefix outermost."""
     app.add_middleware(
         Access,
@@ -174,6 +175,7 @@ def _add_middleware(app: FastAPI, settings: Settings) -> None:
         rate=settings.rate_limit,
         login_page=static_folder() / "login.html",
         framed=bool(settings.frame_ancestors),
+        admits=guests.admits,
     )
     if settings.cors_origins:
         app.add_middleware(

@@ -80,6 +80,13 @@ class Stage(Protocol):
         """The units in which angles and lengths are shown."""
 
     @property
+    def withheld(self) -> str:
+        """What no tab shows now, because an open exercise asks for it: "table", or nothing."""
+
+    def withhold(self, what: str) -> None:
+        """Show this in no tab from now on; empty: everything is shown again."""
+
+    @property
     def dark(self) -> bool:
         """Whether the page is dark."""
 
@@ -203,7 +210,7 @@ class Feature:
         """The task, the requested branch, or the locked joints changed."""
 
     def on_style(self) -> None:
-        """The units, or the colours of the page, changed."""
+        """The units, the colours of the page, or what is withheld, changed."""
 
     def tick(self, now: float) -> None:
         """Continue long work, for at most ten milliseconds: frames wait. `now` is `time.perf_counter`'s."""

@@ -12,6 +12,7 @@ import secrets
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from http.client import HTTPException
 from typing import Any
 from urllib.parse import urlencode
 
@@ -155,6 +156,11 @@ class Logins:
             raise LaunchRefused("The signature of the launch is not the platform's.") from None
         except jwt.PyJWKClientConnectionError:
             raise LaunchRefused(f"The platform's keys at {platform.keys_url} cannot be fetched.") from None
+        except (jwt.PyJWKSetError, jwt.InvalidKeyError, ValueError, TypeError, AttributeError, HTTPException):
+            # PyJWT takes the answer as it is: text, a list, or keys without the fields of a key.
+            raise LaunchRefused(
+                f"What the platform has at {platform.keys_url} is not a set of public keys (JSON Web Key Set)."
+            ) from None
         except jwt.PyJWKClientError:
             raise LaunchRefused("The launch is signed with a key that the platform does not publish.") from None
         except jwt.PyJWTError as error:

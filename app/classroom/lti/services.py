@@ -25,6 +25,16 @@ _DL = "https://purl.imsglobal.org/spec/lti-dl/claim/"
 _ASSERTION = "urn:ietf:params:oauth:client-assertion-type:jwt-bearer"
 
 
+class _NoRedirects(urllib.request.HTTPRedirectHandler):
+    """What is sent is secret: it goes to the address that the operator or the platform gave, and nowhere else."""
+
+    def redirect_request(self, *_: object) -> None:
+        return None
+
+
+_OPENER = urllib.request.build_opener(_NoRedirects)
+
+
 class GradeRefused(Exception):  # noqa: N818 - a finding, with a sentence for the log
     """The platform did not take a score; `final` says whether trying again is useless."""
 
@@ -103,12 +113,14 @@ def _send(address: str, body: bytes, kind: str, access: str = "") -> bytes:
         headers["Authorization"] = f"Bearer {access}"
     request = urllib.request.Request(address, body, headers, method="POST")
     try:
-        with urllib.request.urlopen(request, timeout=PATIENCE) as answer:
+        with _OPENER.open(request, timeout=PATIENCE) as answer:
             found: bytes = answer.read(MAX_ANSWER)
             return found
     except HTTPError as error:
         with error:
             status = error.code
+        if 300 <= status < 400:
+            raise GradeRefused(f"the platform answered {status}: redirects are not followed", final=True) from None
         raise GradeRefused(
             f"the platform answered {status}", final=400 <= status < 500 and status != 429
         ) from None

@@ -40,6 +40,7 @@ class DHKind(Kind):
     name: ClassVar[str] = "dh"
     about: ClassVar[str] = "Rows of a DH table are filled in; any legitimate choice of frames is right."
     shows_posture: ClassVar[bool] = True
+    withholds: ClassVar[str] = "table"
 
     first: int
     last: int
@@ -68,7 +69,7 @@ class DHKind(Kind):
         note = (
             f"In {_WORDS[arm.convention]}, with the values of the exercise’s posture. "
             f"± {units.angles.brief(ALIGNED)}, ± {units.lengths.brief(CLOSE)}. "
-            "The tab Robot shows the arm’s whole table: answer first, then compare."
+            "The tab Robot shows the arm’s table when the answer is known."
         )
         return Asked("table", NAMES, names, note, self.last - self.first + 1, self.first + 1)
 

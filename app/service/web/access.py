@@ -18,8 +18,8 @@ import hashlib
 import hmac
 import html
 import re
-import time
 from collections import Counter
+from collections.abc import Awaitable, Callable
 from http.cookies import CookieError, SimpleCookie
 from pathlib import Path
 from urllib.parse import parse_qs, quote
@@ -38,7 +38,7 @@ from app.shared.security import SAFE_METHODS, Rights, origin_allowed, set_cookie
 
 COOKIE = "kinboard"
 COOKIE_AGE = 30 * 24 * 3600  # seconds until a login ends
-GUEST_COOKIE = "kinboard_guest"  # of who has joined a classroom: opens the viewer until the room ends
+GUEST_COOKIE = "kinboard_guest"  # of who has joined a classroom: opens the viewer while the seat is there
 _GUESTS = "kinboard.guests"  # in the scope: what signs that cookie, or None
 _MAY_OPEN = "kinboard.may-open"  # in the scope of a page of classrooms: whether the client may open one
 _RIGHTS = "kinboard.rights"  # in the scope of a client that has not all of them
@@ -53,6 +53,10 @@ MAX_FORM = 4096  # bytes
 _PLACE = re.compile(r"(?!/)(?:[\w.~?=&%+-]|/(?!/))*", re.ASCII)
 
 
+async def _nobody(room: str, seat: str) -> bool:
+    return False
+
+
 class Access:
     """ASGI middleware that admits a request, redirects it to the login page, or rejects it.
 
@@ -62,13 +66,22 @@ class Access:
         rate: requests per second of one client, in bursts of up to ten seconds' worth; 0: no limit.
         login_page: HTML with the placeholders ``{{message}}`` and ``{{next}}``.
         framed: whether pages of other sites may frame ours.
+        admits: whether a room, and a seat in it, are still there.
     """
 
     def __init__(
-        self, app: ASGIApp, token: str | None, read_only: bool, rate: float, login_page: Path, framed: bool = False
+        self,
+        app: ASGIApp,
+        token: str | None,
+        read_only: bool,
+        rate: float,
+        login_page: Path,
+        framed: bool = False,
+        admits: Callable[[str, str], Awaitable[bool]] = _nobody,
     ) -> None:
         self.app = app
         self._framed = framed
+        self._admits = admits
         self._token = token
         self._signer = None
         if token is not None:
@@ -100,7 +113,7 @@ class Access:
                 answer = await self._login(request)
             elif not (path in OPEN or path.startswith("/static/")):
                 scope[_MAY_OPEN] = await self._authenticated(scope)
-                if not scope[_MAY_OPEN] and not self._is_guest(scope, path):
+                if not scope[_MAY_OPEN] and not await self._is_guest(scope, path):
                     self._admit_anonymous(scope, path)
         except ProblemError as error:
             answer = respond(error)
@@ -140,7 +153,7 @@ class Access:
             return False
         return self._has_valid_cookie(headers.get(b"cookie", b"").decode("latin-1"))
 
-    def _is_guest(self, scope: Scope, path: str) -> bool:
+    async def _is_guest(self, scope: Scope, path: str) -> bool:
         """Whether the client may go there without the token: pages of rooms; with a seat, the viewer."""
         if path.startswith("/room/") or (path == "/room" and scope.get("method") in SAFE_METHODS):
             return True
@@ -149,9 +162,10 @@ class Access:
         try:
             cookies = SimpleCookie(dict(scope["headers"]).get(b"cookie", b"").decode("latin-1"))
             morsel = cookies.get(GUEST_COOKIE)
-            return float(self._guests.loads("" if morsel is None else morsel.value)) > time.time()
+            room, seat = self._guests.loads("" if morsel is None else morsel.value)
         except (CookieError, BadSignature, TypeError, ValueError):
             return False
+        return await self._admits(str(room), str(seat))
 
     def _admit_anonymous(self, scope: Scope, path: str) -> None:
         """Admit a request without the token as read-only; else raise `_LoginNeededError`, 401 or 403."""
@@ -248,12 +262,16 @@ def may_open(scope: Scope) -> bool:
     return bool(scope.get(_MAY_OPEN, False))
 
 
-def pass_guest(request: Request, answer: Response, ends: float, framed: bool) -> None:
-    """Let who has joined a classroom use the viewer without the access token, until it ends."""
+def pass_guest(request: Request, answer: Response, place: tuple[str, str], seconds: float, framed: bool) -> None:
+    """Let who has joined a classroom use the viewer without the access token.
+
+    Args:
+        place: the ids of the room and of the seat; when one of them is gone, so is the access.
+        seconds: how long the browser keeps it at most.
+    """
     guests = request.scope.get(_GUESTS)
     if guests is not None:
-        seconds = max(1, int(ends - time.time()))
-        set_cookie(answer, GUEST_COOKIE, guests.dumps(int(ends)), seconds, request.scope, framed)
+        set_cookie(answer, GUEST_COOKIE, guests.dumps(place), max(1, int(seconds)), request.scope, framed)
 
 
 def forget_guest(request: Request, answer: Response, framed: bool) -> None:

@@ -20,6 +20,7 @@ from starlette.routing import BaseRoute, Route
 
 from app.api.problems import ProblemError
 from app.classroom import COOKIE, ClassroomUnavailable, Hub, RefusedError
+from app.classroom.clock import now
 from app.service.web.access import pass_guest
 from app.shared.security import PAGE_POLICY, set_cookie
 from app.shared.settings import Settings
@@ -163,7 +164,7 @@ class _Pages:
         answer = RedirectResponse("../viewer/", 303, headers={"cache-control": "no-store"})
         token = self._hub.rooms.tokens.sign(ticket)
         set_cookie(answer, COOKIE, token, int(room.ends - room.created), request.scope, framed=True)
-        pass_guest(request, answer, room.ends, framed=True)
+        pass_guest(request, answer, (ticket.room, ticket.seat), room.ends - now(), framed=True)
         set_cookie(answer, STATE_COOKIE, "", 0, request.scope, framed=True)
         return answer
 

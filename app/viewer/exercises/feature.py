@@ -80,6 +80,7 @@ class Practising(Feature):
         self._show_joints(False)
         self._box.remove()
         self._box, self._blocks = None, []
+        self.stage.withhold("")
 
     @property
     def shown(self) -> bool:
@@ -332,6 +333,8 @@ class Practising(Feature):
         self._show_joints(posture and exercise is not None and not practice.record(exercise).closed)
         for block, content in zip(self._blocks, contents, strict=True):
             update_html(block, content)
+        is_open = exercise is not None and not practice.record(exercise).closed
+        self.stage.withhold(exercise.kind.withholds if exercise is not None and is_open else "")
         if self.course is not None:
             self.course.refresh()
 

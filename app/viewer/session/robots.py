@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
+from app.viewer.feature import Feature
 from app.viewer.meshes.bodies import Bodies
 from app.viewer.own_arm import OwnArm
 from app.viewer.session.controller import ArmController
@@ -12,10 +14,25 @@ from kin import IKOptions, Robot, Task
 from kin.transforms import Array
 
 
+class Withholding(Protocol):
+    """A page with features that may withhold something."""
+
+    withheld: str
+
+    def for_features(self, action: Callable[[Feature], None]) -> None:
+        """Call every feature."""
+
+
 class ShownArm:
     """What features may read of the arm on show; see `app.viewer.feature.Stage`."""
 
     arm: ArmController
+    withheld = ""
+
+    def withhold(self: Withholding, what: str) -> None:
+        if what != self.withheld:
+            self.withheld = what
+            self.for_features(lambda feature: feature.on_style())
 
     @property
     def robot(self) -> Robot:

@@ -23,6 +23,7 @@ from app.classroom import COOKIE, Hub, NewAttempt
 from app.classroom.lti import passback as passback_module
 from app.classroom.lti.launches import CLAIM, GRADES, LEARN, LINK, LINKING, SCORE_SCOPE
 from app.classroom.lti.platforms import PlatformFileError, key_file, load_platforms, make_key
+from app.classroom.lti.services import GradeRefused, post_score
 from app.cli.parser import main
 from app.service.main import create_app, run
 from app.service.web.lti import STATE_COOKIE
@@ -51,16 +52,33 @@ class Platform:
         self.tool_keys: dict = {}
         self.scores: list[tuple[str, dict]] = []
         self.refusals = 0  # answers 500 to so many scores
+        self.redirects = 307  # of what is sent to /moved
+        self.followed: list[str] = []  # what came after such a redirect
+        self.published: str | None = None  # instead of the keys
         platform = self
 
         class Handler(BaseHTTPRequestHandler):
             def do_GET(self) -> None:
+                if self.path.startswith("/elsewhere"):
+                    platform.followed.append(self.headers.get("authorization", ""))
+                if self.path == "/keys" and platform.published is not None:
+                    self.send_response(200)
+                    self.end_headers()
+                    self.wfile.write(platform.published.encode())
+                    return
                 self.answer(200, key_set(platform.key) if self.path == "/keys" else {})
 
             def do_POST(self) -> None:
                 body = self.rfile.read(int(self.headers["content-length"]))
                 if self.path == "/token":
                     self.answer(*platform.grant(parse_qs(body.decode())))
+                elif self.path.startswith("/moved"):
+                    self.send_response(platform.redirects)
+                    self.send_header("Location", f"{platform.issuer}/elsewhere")
+                    self.end_headers()
+                elif self.path.startswith("/elsewhere"):
+                    platform.followed.append(self.headers.get("authorization", ""))
+                    self.answer(200, {})
                 elif self.headers["authorization"] != "Bearer open-sesame":
                     self.answer(401, {})
                 elif platform.refusals:
@@ -298,6 +316,36 @@ def test_a_score_goes_back(browser: TestClient, platform: Platform, application,
     assert path == "/columns/5/scores?type=x"
     assert (sent["userId"], sent["scoreGiven"], sent["scoreMaximum"]) == ("user-9", 0.5, 1)
     assert "comment" not in sent
+
+
+def test_a_score_and_its_token_go_to_no_other_address(browser: TestClient, platform: Platform, settings) -> None:
+    """A column that answers with a redirect gets no second request: it would carry the access token."""
+    platforms = load_platforms(settings.lti)
+    (registered,) = platforms.all
+    platform.scores.clear()
+    for status in (301, 302, 303, 307, 308):
+        platform.redirects = status
+        with pytest.raises(GradeRefused, match=f"answered {status}: redirects are not followed") as refused:
+            post_score(platforms, registered, f"{platform.issuer}/moved", "user-9", 1.0)
+        assert refused.value.final
+    assert platform.scores == []
+    assert platform.followed == []
+
+
+@pytest.mark.parametrize(
+    "published", ["<html>Login</html>", "[]", '"x"', "{}", '{"keys": 5}', '{"keys": [{"kty": "RSA"}]}', ""]
+)
+def test_keys_that_are_none_are_said(browser: TestClient, platform: Platform, application, published: str) -> None:
+    for route in application.routes:
+        if getattr(route, "path", "") == "/lti/login":
+            route.endpoint.__self__._logins = None  # no keys are known from before
+    platform.published = published
+    try:
+        answer = launch(browser, platform)
+    finally:
+        platform.published = None
+    assert answer.status_code == 403
+    assert "is not a set of public keys" in answer.text or "does not publish" in answer.text
 
 
 def test_deep_linking(browser: TestClient, platform: Platform) -> None:

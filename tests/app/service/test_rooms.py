@@ -8,9 +8,10 @@ import threading
 import pytest
 from fastapi.testclient import TestClient
 
-from app.classroom import COOKIE
+from app.classroom import COOKIE, ClassroomUnavailable, RefusedError, clock
+from app.classroom.tokens import CODE_LENGTH, LETTERS
 from app.service.main import create_app
-from app.service.web.rooms import limits
+from app.service.web.rooms import guests, limits
 from app.shared.settings import Settings
 from app.shared.store import Store
 
@@ -162,6 +163,20 @@ def test_guessing_codes_is_slow_and_does_not_keep_a_class_out(make, monkeypatch)
     assert join(make(), code).status_code == 303
 
 
+def test_one_address_cannot_take_all_rooms(make):
+    browser = make(max_rooms=8)
+    for _ in range(6):  # three quarters
+        open_room(browser)
+    answer = browser.post("/room", data={"hours": "2"})
+    assert answer.status_code == 422
+    assert "6 rooms were opened from your address" in answer.text
+    hub = browser.app.state.classroom
+    assert hub.rooms.open("of another", 3600.0, "192.0.2.7")
+    assert hub.rooms.open("of the operator", 3600.0)
+    with pytest.raises(RefusedError, match="as many rooms as it may"):
+        hub.rooms.open("one too many", 3600.0, "192.0.2.8")
+
+
 def test_rooms_cannot_be_opened_without_end(make):
     browser = make(max_rooms=2)
     open_room(browser)
@@ -196,3 +211,57 @@ def test_with_a_token_students_join_but_do_not_open_rooms(make):
     for cookie, status in ((guest, 503), (guest.replace(".", "x.", 1), 401), ("x.y", 401)):
         headers = {"cookie": f"kinboard_guest={cookie}"}
         assert make().get("/viewer/", headers=headers).status_code == status
+
+
+@pytest.mark.parametrize("how", ["removed", "ended", "over"])
+def test_a_guest_loses_the_viewer_with_the_seat_in_every_process(make, tmp_path, monkeypatch, how):
+    teacher, student, other = make(token=TOKEN), make(), make()
+    teacher.headers["authorization"] = f"Bearer {TOKEN}"
+    code = open_room(teacher)
+    for each in (student, other):
+        join(each, code)
+    elsewhere = create_app(Settings(data=tmp_path / "data", token=TOKEN), STORE)  # another worker
+    hub = elsewhere.state.classroom
+    ticket = hub.ticket(student.cookies[COOKIE])
+    pages = [student, TestClient(elsewhere, base_url="http://school.example", cookies=student.cookies)]
+    assert [page.get("/viewer/").status_code for page in pages] == [503, 503]
+    asked = []
+    find = hub.rooms.is_open
+    monkeypatch.setattr(hub.rooms, "is_open", lambda each: asked.append(each) or find(each))
+    if how == "removed":
+        hub.rooms.remove_seat(ticket.room, ticket.seat)
+    elif how == "ended":
+        hub.rooms.end(ticket.room)
+    else:
+        began = clock.now()
+        monkeypatch.setattr("app.classroom.rooms.now", lambda: began + 7300.0)
+    assert [page.get("/viewer/").status_code for page in pages] == [503, 503], "asked a moment ago"
+    assert asked == []
+    monkeypatch.setattr(guests, "FRESH", 0.0)
+    assert [page.get("/viewer/").status_code for page in pages] == [401, 401]
+    assert len(asked) == 1
+    assert other.get("/viewer/").status_code == (503 if how == "removed" else 401)
+    hub.close()
+
+
+def test_guests_are_admitted_while_the_database_is_away(make, monkeypatch):
+    teacher, student = make(token=TOKEN), make()
+    teacher.headers["authorization"] = f"Bearer {TOKEN}"
+    join(student, open_room(teacher))
+    rooms = student.app.state.classroom.rooms
+
+    def away(_):
+        raise ClassroomUnavailable("locked")
+
+    monkeypatch.setattr(rooms, "is_open", away)
+    assert student.get("/viewer/").status_code == 503
+    assert make().get("/viewer/").status_code == 401
+
+
+def test_codes_cannot_be_guessed_in_the_life_of_a_room():
+    """The figures of docs/security.md: 16 processes, as fast as the limits let one address."""
+    per_second = 16 * limits.SLOW_AT_ONCE / limits.SLOW
+    codes = len(LETTERS) ** CODE_LENGTH
+    day = 16 * limits.WRONG_ALL + 24 * 3600 * per_second
+    assert day / codes < 1 / 5000  # chance to find a certain room
+    assert codes / per_second / (365 * 24 * 3600) > 15  # years to try all

@@ -92,9 +92,10 @@ class _Pages:
             life = float(hours) * 3600.0
         except ValueError:
             return again(422, message=f"The duration {hours[:20]!r} is not a number of hours.", field="hours")
-        self._limits.opening(client_of(request.scope))
+        client = client_of(request.scope)
+        self._limits.opening(client)
         try:
-            room = await run_in_threadpool(self._hub.rooms.open, title, life)
+            room = await run_in_threadpool(self._hub.rooms.open, title, life, client)
         except RefusedError as error:
             return again(422, message=str(error), field=error.field)
         except ClassroomUnavailable as error:
@@ -206,7 +207,7 @@ class _Pages:
         token = await run_in_threadpool(self._hub.rooms.tokens.sign, ticket)
         set_cookie(answer, COOKIE, token, max(1, int(ends - now())), request.scope, self._framed)
         answer.headers["cache-control"] = "no-store"
-        pass_guest(request, answer, ends, self._framed)
+        pass_guest(request, answer, (ticket.room, ticket.seat), ends - now(), self._framed)
 
     def _forget(self, request: Request, answer: Response) -> None:
         set_cookie(answer, COOKIE, "", 0, request.scope, self._framed)

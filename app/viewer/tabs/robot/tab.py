@@ -140,7 +140,7 @@ class RobotTab(Feature):
         self._wrong = {cell: why for cell, why in self._wrong.items() if edits.part_of(cell) == self._editing}
         if self._editing != "table":
             self._revision += 1
-            self._show("table", views.table(robot, units, self._revision, self._texts))
+            self._show("table", self._table())
         if self._editing != "frames":
             self._show("frames", views.frames(robot, units, self.stage.frames, self._texts))
         if self._editing != "start":
@@ -153,6 +153,11 @@ class RobotTab(Feature):
         self._show_files()
         self._show_wrong()
 
+    def _table(self) -> str:
+        if self.stage.withheld == "table":
+            return views.withheld()
+        return views.table(self.stage.robot, self.stage.units, self._revision, self._texts)
+
     def _show(self, name: str, html: str) -> None:
         update_html(self._html[name], html)
 
@@ -163,6 +168,9 @@ class RobotTab(Feature):
 
     def _show_conversion(self) -> None:
         robot = self.stage.robot
+        if self.stage.withheld == "table":
+            self._show("convert", "")
+            return
         other = kin.convert(robot, OTHER[robot.convention]) if self._converting else None
         self._show("convert", views.conversion(robot, other, self.stage.units))
 
@@ -321,6 +329,10 @@ class RobotTab(Feature):
     # Files
 
     def _download(self, kind: object) -> None:
+        if self.stage.withheld == "table":
+            words = "The file would contain the table that the open exercise asks for."
+            self.stage.notify(Notice("advice", "Not now", words))
+            return
         robot = self.stage.robot if self._own is None else named(self.stage.robot)
         name, text = text_of(robot, kind)
         self.stage.client.send_file_download(name, text.encode(), save_immediately=True)

@@ -71,6 +71,11 @@ def table(robot: Robot, units: Units, revision: int, texts: Texts) -> str:
     return render("robot/table", heads=heads, rows=rows, revision=revision, convention=robot.convention)
 
 
+def withheld() -> str:
+    """Why there is no table."""
+    return render("robot/withheld")
+
+
 def _cell(index: int, row: Joint, column: str, units: Units, texts: Texts) -> dict[str, Any]:
     cell: dict[str, Any] = {"key": f"{index} {column}", "label": name_of((index, column)), "value": "", "hint": ""}
     cell |= {"variable": False, "options": None, "none": False, "text": column == "name"}

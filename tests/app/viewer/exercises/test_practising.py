@@ -205,6 +205,31 @@ def test_motions_are_put_in_order_and_frames_placed(server: int) -> None:
         tab.wait(lambda: "✓ Right" in shown(tab))
 
 
+@pytest.mark.parametrize("one", [each for each in ALL.all if each.kind.withholds], ids=lambda one: one.id)
+def test_no_tab_shows_the_table_that_an_exercise_asks_for(server: int, one: Exercise) -> None:
+    with FakeBrowser(server, memory=begun()) as tab:
+        tab.settle()
+        assert 'data-arm="table"' in tab.html
+        press(tab, ["open", one.id, 1])
+        tab.wait(lambda: 'data-arm="withheld"' in tab.html)
+        assert "asks for this table" in shown(tab)
+        assert 'data-arm="table"' not in tab.html
+        assert 'data-arm="convert"' not in tab.html
+        tab.say("feature", ["robot", ["download"], "toml"])
+        tab.wait(lambda: "would contain the table" in shown(tab))
+        assert not any("FileTransfer" in message["type"] for message in tab.log)
+        press(tab, ["list", 2])
+        tab.wait(lambda: 'data-arm="table"' in tab.html)
+        press(tab, ["open", one.id, 3])
+        tab.wait(lambda: 'data-arm="withheld"' in tab.html)
+        tab.set("Lesson", "None")
+        tab.wait(lambda: 'data-arm="table"' in tab.html)
+        tab.set("Lesson", "Exercises")
+        tab.wait(lambda: 'data-arm="withheld"' in tab.html)
+        press(tab, ["reveal", 4])
+        tab.wait(lambda: 'data-arm="table"' in tab.html and 'data-arm="convert"' in tab.html)
+
+
 def test_messages_that_no_control_sends_are_refused(server: int) -> None:
     with FakeBrowser(server, memory=begun()) as tab:
         tab.settle()
