@@ -70,12 +70,12 @@ _SCRIPTS = (
     b"program",
     b"lesson",
     b"sheets",
-    b"classroom",
+    b"class_tab",
     b"layout",
     b"page",
     b"hints",
 )
-_STYLES = (b"viewer", b"robot", b"program", b"classroom", b"layout", b"hints")
+_STYLES = (b"viewer", b"robot", b"program", b"class_tab", b"layout", b"hints")
 _OURS = b"".join(
     [b'<link rel="stylesheet" href="../static/%s.css">' % name for name in _STYLES]
     + [b'<script src="../static/%s.js"></script>' % name for name in _SCRIPTS]
