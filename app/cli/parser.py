@@ -225,7 +225,7 @@ def _avoiding(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
     parser.add_argument(
         "--avoid-self-collision",
         action="store_true",
-        help="leave out what makes links of the arm touch each other",
+        help="leave out configurations in which links of the arm touch each other",
     )
     parser.add_argument(
         "--obstacles", metavar="FILE",

@@ -5,14 +5,16 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+# A command finds the same database as the service only with the same settings.
+_SAME = "If the service was started with KINBOARD_DATA or KINBOARD_DATABASE_URL, set them to the same values here."
+
 
 def add_room(commands: Any, _: object) -> argparse.ArgumentParser:
     """``kinboard room``."""
     parser: argparse.ArgumentParser = commands.add_parser(
         "room",
         help="open, list and end classrooms",
-        description="Open, list and end classrooms, in the database of the service: KINBOARD_DATA or "
-        "KINBOARD_DATABASE_URL must be as they are for it.",
+        description=f"Open, list and end classrooms in the database of the service. {_SAME}",
     )
     actions = parser.add_subparsers(title="actions", metavar="ACTION", required=True, dest="action")
     opening = actions.add_parser("open", help="open a room and print its code and links")
@@ -20,7 +22,11 @@ def add_room(commands: Any, _: object) -> argparse.ArgumentParser:
         "title", metavar="TITLE", nargs="?", default="", help="shown to students (default: Class)"
     )
     opening.add_argument(
-        "--hours", type=float, default=12.0, metavar="H", help="until everything is erased (default: 12)"
+        "--hours",
+        type=float,
+        default=12.0,
+        metavar="H",
+        help="hours until all of it is erased (default: 12)",
     )
     listing = actions.add_parser("list", help="list the rooms")
     for action in (opening, listing):
@@ -41,8 +47,8 @@ def add_result(commands: Any, _: object) -> argparse.ArgumentParser:
     parser: argparse.ArgumentParser = commands.add_parser(
         "result",
         help="check the result code of a student",
-        description="Check a result code with the key of the service: KINBOARD_DATA or KINBOARD_DATABASE_URL must "
-        "be as they are for it. The exit code is 1 if this service has not signed it.",
+        description="Check a result code with the key of the service. The exit code is 1 if this service has not "
+        f"signed it. {_SAME}",
     )
     parser.add_argument("code", metavar="CODE", nargs="+", help="case, spaces and hyphens do not matter")
     parser.add_argument("--json", action="store_true", help="print JSON")
@@ -54,8 +60,7 @@ def add_results(commands: Any, _: object) -> argparse.ArgumentParser:
     parser: argparse.ArgumentParser = commands.add_parser(
         "results",
         help="the answers of a classroom as CSV, one row per attempt",
-        description="The answers given in a room as CSV, from the database of the service: KINBOARD_DATA or "
-        "KINBOARD_DATABASE_URL must be as they are for it.",
+        description=f"The answers given in a room as CSV, from the database of the service. {_SAME}",
     )
     parser.add_argument("room", metavar="CODE", help="the join code of the room")
     parser.add_argument("-o", "--output", metavar="FILE", help="write to this file (default: standard output)")
@@ -68,7 +73,8 @@ def add_lti(commands: Any, _: object) -> argparse.ArgumentParser:
         "lti",
         help="what a learning platform's administrator must enter",
         description="Print the addresses that the administrator of a learning platform (Moodle, Canvas) must "
-        "enter for LTI 1.3; check the file of platforms, and make our private key beside it if there is none.",
+        "enter for LTI 1.3; check the file of platforms, and create the service's private key beside it if there "
+        "is none.",
     )
     parser.add_argument("file", metavar="FILE", nargs="?", default=None, help="the file of KINBOARD_LTI (*.toml)")
     parser.add_argument(
