@@ -48,9 +48,10 @@ from app.service.web.hosts import LOCAL_NAMES, Hosts
 from app.service.web.lti import PlatformsRefused, check_platforms, lti_routes
 from app.service.web.observe import Observe, write_to_stderr
 from app.service.web.pages import page_routes, static_folder
-from app.service.web.prefix import PathPrefix
+from app.service.web.prefix import PathPrefix, clean_prefix
 from app.service.web.rooms import room_routes, sweeping
 from app.service.web.rooms.guests import Guests
+from app.service.web.rooms.network import url_for_others
 from app.service.web.scoreboard import Scoreboard
 from app.service.web.viewer_proxy import ViewerBridge
 from app.service.workers import supervise
@@ -221,7 +222,9 @@ def run(settings: Settings, open_browser: bool = False) -> int:
             elif not settings.allowed_hosts:
                 settings = settings.model_copy(update={"allowed_hosts": (*LOCAL_NAMES, settings.host)})
         clock.now()  # processes that start later, after the clock was set, count from here too
-        greeting = Greeting(url_of(settings, listeners[0].getsockname()[1]), open_browser)
+        port = listeners[0].getsockname()[1]
+        others = url_for_others(settings.host, port, clean_prefix(settings.root_path))
+        greeting = Greeting(url_of(settings, port), open_browser, others)
         partners = settings.rest_workers if SUPPORTED else 0
         parts = members(
             listeners, partners, lambda size: cast("MutableSequence[int]", multiprocessing.RawArray("B", size))

@@ -173,15 +173,18 @@ class Server(uvicorn.Server):
 
 
 class Greeting:
-    """Prints the address, and opens it in the browser if requested."""
+    """Prints the address, and that for other machines if there is one; opens it in the browser if requested."""
 
-    def __init__(self, url: str, open_browser: bool) -> None:
+    def __init__(self, url: str, open_browser: bool, others: str | None = None) -> None:
         self._url = url
+        self._others = others
         self._open_browser = open_browser
         self._out = sys.stdout  # now, because starting viser redirects sys.stdout for a moment in another thread
 
     def show(self) -> None:
         print(f"Kinboard {__version__} is at {self._url}  (Ctrl-C to stop)", file=self._out, flush=True)
+        if self._others is not None:
+            print(f"Other machines on this network open {self._others}", file=self._out, flush=True)
         if self._open_browser:
             # A browser in a terminal returns only when it is closed.
             threading.Thread(target=self._open, name="kinboard-browser", daemon=True).start()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ipaddress
 import re
 import threading
 
@@ -11,7 +12,7 @@ from fastapi.testclient import TestClient
 from app.classroom import COOKIE, ClassroomUnavailable, RefusedError, clock
 from app.classroom.tokens import CODE_LENGTH, LETTERS
 from app.service.main import create_app
-from app.service.web.rooms import guests, limits
+from app.service.web.rooms import guests, limits, network
 from app.shared.settings import Settings
 from app.shared.store import Store
 
@@ -83,6 +84,45 @@ def test_a_class_joins_by_code_and_ends(make, tmp_path):
     for file in (tmp_path / "data").iterdir():
         assert b"Ada" not in file.read_bytes()
         assert b"Kinematics" not in file.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("host", "here", "opened", "words", "missing"),
+    [
+        ("0.0.0.0", "192.168.1.20", "localhost:8000", 'href="http://192.168.1.20:8000/', "Ctrl-C"),
+        ("0.0.0.0", None, "localhost:8000", "--host 0.0.0.0", "192.168"),
+        ("127.0.0.1", "192.168.1.20", "127.0.0.1:8000", "--host 0.0.0.0", "192.168"),
+        ("0.0.0.0", "192.168.1.20", "school.example", "Open a room", "Only this machine"),
+    ],
+)
+def test_a_teacher_at_an_address_that_students_cannot_open_reads_where_to_go(
+    tmp_path, monkeypatch, host, here, opened, words, missing
+):
+    monkeypatch.setattr(network, "address_here", lambda: here)
+    app = create_app(Settings(data=tmp_path / "data", host=host), STORE)
+    teacher = TestClient(app, follow_redirects=False, base_url=f"http://{opened}")
+    before = teacher.get("/room").text
+    teacher.post("/room", data={"title": "Kinematics 1", "hours": "2"})
+    after = teacher.get("/room").text
+    app.state.classroom.close()
+    for page in (before, after.replace("Start teaching", "Open a room")):
+        assert words in page
+        assert missing not in page
+    if "href" in words:
+        assert f"{words}room#open" in before
+        token = re.search(r"/room/teach/([^\"<]+)", after).group(1)
+        assert f"{words}room/teach/{token}" in after
+
+
+def test_the_address_here_is_none_in_a_container_or_without_a_network(tmp_path, monkeypatch):
+    monkeypatch.setattr(network, "CONTAINERS", ())
+    found = network.address_here()
+    assert found is None or not ipaddress.ip_address(found).is_loopback
+    monkeypatch.setattr(network, "_OUTSIDE", ("127.0.0.1", 9))
+    assert network.address_here() is None
+    monkeypatch.setattr(network, "_OUTSIDE", ("192.0.2.1", 9))
+    monkeypatch.setattr(network, "CONTAINERS", (tmp_path,))
+    assert network.address_here() is None
 
 
 def test_the_teachers_link_teaches_on_another_device(make):

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
+from app.service.web.rooms.network import url_for_others
 from app.shared.security import guard_teacher
 
 if TYPE_CHECKING:
@@ -40,7 +41,8 @@ def room_page(request: Request, status: int = 200, **values: object) -> HTMLResp
     known: dict[str, object] = dict.fromkeys(
         ("room", "code", "alias", "title", "message", "field", "join", "teach"), ""
     )
-    known |= {"hours": 12, "may_open": False, "teacher": False, "local": False, "ends": "", "ends_at": ""}
+    known |= {"hours": 12, "may_open": False, "teacher": False, "ends": "", "ends_at": ""}
+    known |= _for_others(request)
     known |= {"lives": LIVES, "root": "../" * depth or "./"}
     if values.get("teacher"):
         guard_teacher(request.scope)
@@ -74,6 +76,15 @@ def join_address(request: Request, code: str) -> str:
     """The address for joining, as the client of this request may give it to others."""
     root = str(request.base_url).rstrip("/")
     return f"{root}/room?code={code}"
+
+
+def _for_others(request: Request) -> dict[str, object]:
+    """Whether other machines cannot open the address of the request, and which one they can, if that is known."""
+    local, (_, port) = only_here(request), request.scope.get("server") or ("", None)
+    others = None
+    if local and port is not None:
+        others = url_for_others(request.app.state.settings.host, port, request.scope.get("root_path", ""))
+    return {"local": local, "others": others or ""}
 
 
 def only_here(request: Request) -> bool:

@@ -19,7 +19,7 @@ from app.classroom.clock import now
 from app.classroom.tokens import LONGEST_TOKEN, read_code, show_code
 from app.service.web.access import forget_guest, form_of, may_open, pass_guest
 from app.service.web.rooms.limits import Limits
-from app.service.web.rooms.page import ends_at, ends_in_words, join_address, only_here, qr_svg, room_page
+from app.service.web.rooms.page import ends_at, ends_in_words, join_address, qr_svg, room_page
 from app.service.web.rooms.results import Results
 from app.shared.clients import client_of
 from app.shared.security import origin_allowed, set_cookie
@@ -78,7 +78,6 @@ class _Pages:
             teacher=teacher,
             join=join_address(request, room.code),
             teach=f"{str(request.base_url).rstrip('/')}/room/teach/{room.token}" if teacher else "",
-            local=only_here(request),
             ends=ends_in_words(room.ends - now()),
             ends_at=ends_at(room.ends),
         )
