@@ -29,6 +29,8 @@ class StoredRooms(Protocol):
 
     def end(self, room: str) -> bool: ...
 
+    def count_solved(self, room: str, exercise: str) -> int: ...
+
 
 class LiveRooms(Protocol):
     """What `app.classroom.hub.Hub` does for a page."""
@@ -197,6 +199,11 @@ class Attendance:
         self._only_teacher()
         self._hub.rooms.rename_seat(self.ticket.room, seat, alias)
         self._hub.refresh(self.ticket.room)
+
+    def count_solved(self, exercise: str) -> int:
+        """How many students have solved an exercise; raises `ClassroomUnavailable`."""
+        self._only_teacher()
+        return self._hub.rooms.count_solved(self.ticket.room, exercise)
 
     def end_room(self) -> None:
         """End the room for all and erase everything in it; raises `ClassroomUnavailable`."""

@@ -219,6 +219,12 @@ class Rooms:
             )  # fmt: skip
         return Confirmed(attempt.id, at)
 
+    def count_solved(self, room: str, exercise: str) -> int:
+        """How many students have given a right answer to an exercise."""
+        right = (Attempt.room_id == room, Attempt.exercise == exercise, Attempt.score >= 1.0)
+        with self._database.read() as connection:
+            return connection.scalar(select(func.count(Attempt.seat_id.distinct())).where(*right)) or 0
+
     def sweep(self) -> int:
         """Erase the rooms whose time is over; returns how many."""
         with self._database.read() as connection:

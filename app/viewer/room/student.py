@@ -59,7 +59,9 @@ class Student(Member):
         lead = self._lead
         if lead is None:
             if self.leader:
-                self.page.status.show(Notice("hand", "You work by yourself", "Nobody leads the class now."))
+                frozen = Notice("advice", "Frozen", FROZEN)
+                alone = Notice("hand", "You work by yourself", "Nobody leads the class now.")
+                self.page.status.show(frozen if self.frozen else alone)
             self.free()
             self._leader_before, self._gone = "", False
             return

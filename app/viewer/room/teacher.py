@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from dataclasses import replace
 
@@ -9,7 +10,7 @@ import viser
 
 from app.classroom.clock import now
 from app.classroom.courses import Course, to_data
-from app.classroom.views import RoomView, SeatView
+from app.classroom.views import ClassroomUnavailable, RoomView, SeatView
 from app.viewer.feature import Stage
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import update_html
@@ -31,21 +32,8 @@ class Teacher(Member):
 
     messages = frozenset(
         {
-            *(
-                "follow",
-                "freeze",
-                "fields",
-                "untask",
-                "uncourse",
-                "close",
-                "unask",
-                "look",
-                "return",
-                "show",
-                "hide",
-                "pick",
-            ),
-            *("remove", "lower", "wall", "end"),
+            *("follow", "freeze", "fields", "untask", "uncourse", "close", "unask", "look", "return", "show"),
+            *("hide", "pick", "remove", "lower", "wall", "end"),
         }
     )
 
@@ -53,20 +41,24 @@ class Teacher(Member):
         super().__init__(stage)
         gui = stage.client.gui
         self._head = gui.add_html("")
-        with gui.add_folder("Join"):
+        self._folders = [gui.add_folder(title) for title in ("Join", "Students", "Task", "Question")]
+        join, students, task, question = self._folders
+        with join:
             self._join = gui.add_html("")
-        with gui.add_folder("Students"):
+        with students:
             self._tools = gui.add_html("")
             self._one = gui.add_html("")
             self._list = gui.add_html("")
-        with gui.add_folder("Task"):
+        with task:
             self._task = gui.add_html("")
             self._course = gui.add_html("")
-        with gui.add_folder("Question"):
+        with question:
             self._ask = gui.add_html("")
             self._tally = gui.add_html("")
         self._end = gui.add_html("")
         self._picked = ""  # the student whose details are open
+        self._solved = 0  # how many have solved the task
+        self._counted: tuple[object, ...] = ()  # what the count is of
         self._wall: Wall | None = None
         self._hidden: list[tuple[viser.SceneNodeHandle, bool]] = []
         self._before: PageState | None = None  # the own page while a student's is on show, or the wall
@@ -289,17 +281,31 @@ class Teacher(Member):
         exercises = self.page.exercises
         task = None if room.task is None else exercises.get(room.task.exercise)
         update_html(self._head, views.lead_html(room))
+        if room.closed:
+            for folder in self._folders:
+                folder.visible = False
         update_html(self._join, views.join_html(room, now()))
         update_html(self._tools, views.tools_html(room, self._wall is not None))
         seat = self._seat(self._picked)
         update_html(self._one, views.seat_html(room, seat, self.leader, self.is_armed(("remove", self._picked))))
         update_html(self._list, views.list_html(room, self._picked, exercises))
-        update_html(self._task, views.task_html(room, task, exercises))
+        self._count_solved()
+        update_html(self._task, views.task_html(room, task, self._solved, exercises))
         update_html(self._course, views.course_html(room, self._offered))
         update_html(self._ask, views.ask_html(room, QUESTION, CHOICES))
         update_html(self._tally, views.poll_html(room.poll, teacher=True))
         update_html(self._end, views.end_html(room, self.is_armed("end")))
         self._draw_wall()
+
+    def _count_solved(self) -> None:
+        """Count again who has solved the task if a student has answered, or gone to another exercise."""
+        room = self.room
+        state = (room.task, *((seat.id, seat.task, seat.tries, seat.solved) for seat in room.seats))
+        if room.task is None or room.closed or state == self._counted:
+            return
+        with contextlib.suppress(ClassroomUnavailable):  # the page says so; the count is of before
+            self._solved = self.attendance.count_solved(room.task.exercise)
+            self._counted = state
 
     def bar(self) -> str:
         return views.teacher_bar(self.room, self._seat(self.leader), self._wall is not None)

@@ -159,20 +159,20 @@ def _where(seat: SeatView, room: RoomView, state: State, words: str, exercises: 
         return words
     exercise = exercises.get(seat.task) if seat.task else None
     on_task = room.task is not None and seat.task == room.task.exercise
-    place = "at the task" if on_task else exercise.title if exercise is not None else "at the arm"
+    place = ["at the task" if on_task else exercise.title if exercise is not None else "at the arm"]
     if seat.tries and not seat.solved:
-        place += f", {seat.tries} attempt{'s' if seat.tries > 1 else ''}"
+        place.append(f"{seat.tries} attempt{'s' if seat.tries > 1 else ''}")
     if seat.solved and state != "solved":
-        place += ", solved"
-    return place if state == "working" else f"{words} · {place}"
+        place.append("solved")
+    if on_task and (len(place) > 1 or state == "solved"):
+        place = place[1:]  # who has answered is at the task
+    return " · ".join(place if state == "working" else [words, *place])
 
 
-def task_html(room: RoomView, task: Exercise | None, exercises: Exercises) -> str:
-    """The form to send an exercise, and how the present one goes."""
-    at = [seat for seat in room.seats if room.task is not None and seat.task == room.task.exercise]
+def task_html(room: RoomView, task: Exercise | None, solved: int, exercises: Exercises) -> str:
+    """The form to send an exercise, and how many have solved the present one."""
     return render(
-        "room/task", room=room, task=task, topics=exercises.topics(), solved=sum(seat.solved for seat in at),
-        count=len(room.seats),
+        "room/task", room=room, task=task, topics=exercises.topics(), solved=solved, count=len(room.seats)
     )  # fmt: skip
 
 

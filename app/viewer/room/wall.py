@@ -37,6 +37,7 @@ MOST = 40  # arms on the wall
 WIDTH = 4.4  # of the wall, in radii of the sphere around the arm on show
 SIZE = 0.42  # radius of a small arm, in distances between two of them
 LABEL = 0.46  # height of a name below the middle of its arm, in the same
+ROOM = 0.52  # room above and below the middle of an arm, in the same
 PAD = (0.26, 0.03)  # radius and thickness of a pad, in the same
 COLUMN = 0.05  # radius of the column below a base, in the same
 _WALLS = itertools.count(1)
@@ -60,15 +61,20 @@ def columns_of(count: int, aspect: float) -> int:
 
 def cells(count: int, columns: int, pitch: float, center: Array) -> Array:
     """Middles ``(count, 3)`` of the cells, row by row from the top left. They face the default view."""
-    out = DIRECTION / np.linalg.norm(DIRECTION)
-    right = np.cross([0.0, 0.0, 1.0], out)
-    right /= np.linalg.norm(right)
-    up = np.cross(out, right)
+    right, up, _ = _plane()
     rows = math.ceil(count / columns)
     places = np.arange(count)
     x, y = places % columns - (columns - 1) / 2, (rows - 1) / 2 - places // columns
     found: Array = center + pitch * (x[:, None] * right + y[:, None] * up)
     return found
+
+
+def _plane() -> Array:
+    """Unit vectors ``(3, 3)``, by rows: to the right and up in the plane of the wall, and out of it."""
+    out = DIRECTION / np.linalg.norm(DIRECTION)
+    right = np.cross([0.0, 0.0, 1.0], out)
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(out, right), out])
 
 
 class Wall:
@@ -126,9 +132,9 @@ class Wall:
         columns = columns_of(count, self._aspect)
         self._pitch = WIDTH * self._around.radius / max(columns, 2)
         self._cells = cells(count, columns, self._pitch, self._around.center)
-        margin = 0.55 * self._pitch
+        room = self._pitch * np.array([SIZE, ROOM, SIZE])
         self.corners = np.vstack(
-            [self._cells + margin * np.array(d) for d in itertools.product((-1, 1), repeat=3)]
+            [self._cells + (room * signs) @ _plane() for signs in itertools.product((-1, 1), repeat=3)]
         )
         bones = [skeleton(arm.robot) for arm in arms]
         scales = [self._scale(arm.robot) * bone.scales for arm, bone in zip(arms, bones, strict=True)]

@@ -236,6 +236,12 @@ def test_a_task_opens_and_its_answers_are_stored(room: Class) -> None:
     attendance.leave()
     assert (seat.task, seat.tries, seat.solved) == (EXERCISE, 2, True)
 
+    # Who goes on to something else has still solved it.
+    press(teacher, "fields", "course", value=[["0"]])
+    student.wait(lambda: student.value("Lesson") == "Courses")
+    teacher.wait(lambda: ">at the arm</span>" in teacher.html)
+    assert "1 of 1 solved" in teacher.html
+
 
 def test_a_course_opens_on_every_page(room: Class) -> None:
     teacher, student, _, _ = lead(room)
