@@ -61,9 +61,13 @@ class Tab:
         self.errors: list[str] = []
         self.spoilt = False  # a test failed here: nobody knows in which state it left the page
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
-        self.page.goto(self._address + "viewer/")
+        self._arrive()
         expect(self.status).to_have_attribute("data-status", "hand")
         self.dismiss_notice()
+
+    def _arrive(self) -> None:
+        """Go to the viewer."""
+        self.page.goto(self._address + "viewer/")
 
     def reopen(self) -> None:
         """Open a new page, with nothing in its storage."""

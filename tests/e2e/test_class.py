@@ -1,123 +1,182 @@
-"""A class in browsers: a teacher and two students, from the join code through a task to the CSV."""
+"""A class in browsers: one teacher and three students, from the landing page through a task to the CSV."""
 
 from __future__ import annotations
 
+import csv
+import io
 import time
 from collections.abc import Iterator
-from pathlib import Path
 
+import numpy as np
 import pytest
-from page import NO_HINTS, PLAIN, WAIT, save_picture
-from playwright.sync_api import Browser, Locator, Page, expect
+from page import WAIT, Tab, save_picture
+from PIL import Image
+from playwright.sync_api import Browser, Page, expect
+from test_screens import problems
 
-from app.classroom import COOKIE, Hub
-from app.classroom.results.store import attempts_of
-from app.classroom.results.table import to_csv
+import kin
 
 pytestmark = pytest.mark.browser
 
 EXERCISE = "which-joint-goes-down"
+RIGHT, WRONG = 2, 0  # choices of this exercise
+ROBOT = kin.get_robot("pioneer5")
 
 
-class Class:
-    """Pages of one room, each in a browser of its own."""
+class Member(Tab):
+    """A tab of the teacher, or of a student who has joined by code and alias."""
 
-    def __init__(self, browser: Browser, address: str) -> None:
-        self._browser, self._address = browser, address
-        self._pages: list[Page] = []
+    def __init__(
+        self, browser: Browser, address: str, code: str = "", alias: str = "", phone: bool = False
+    ) -> None:
+        self._code, self._alias = code, alias
+        self.code = ""
+        super().__init__(browser, address, *((390, 844) if phone else (1280, 720)), touch=phone)
 
-    def page(self, door: str, form: dict[str, str], narrow: bool = False) -> Page:
-        size = {"width": 390, "height": 844} if narrow else {"width": 1280, "height": 720}
-        page = self._browser.new_context(viewport=size, has_touch=narrow).new_page()  # type: ignore[arg-type]
-        page.add_init_script(PLAIN + NO_HINTS)
-        page.set_default_timeout(WAIT)
-        answer = page.request.post(self._address + door, form=form)
-        assert answer.ok, answer.text()
-        page.goto(self._address + "viewer/")
-        expect(page.locator("[data-class-bar]")).to_be_visible(timeout=WAIT)
-        notice = page.locator("#webgl-software-rendering button")
-        expect(notice).to_have_count(1, timeout=WAIT)
-        notice.dispatch_event("click")
-        self._pages.append(page)
-        return page
+    def _arrive(self) -> None:
+        """Go from the landing page to the viewer, as the page leads."""
+        page = self.page
+        page.goto(self._address)
+        if self._code:
+            page.get_by_label("In a class?").fill(self._code)
+            page.get_by_role("button", name="Join").click()
+            page.get_by_label("Alias").fill(self._alias)
+            page.get_by_role("button", name="Join").click()
+        else:
+            page.get_by_role("link", name="Open a room").click()
+            page.get_by_label("Title").fill("Robotics <i>")
+            page.get_by_role("button", name="Open a room").click()
+            self.code = page.locator(".code").inner_text()
+            page.get_by_role("link", name="Start teaching").click()
+        page.wait_for_url("**/viewer/")
 
-    def close(self) -> None:
-        for page in self._pages:
-            page.context.close()
+    def do(self, kind: str) -> None:
+        """Press a control of the bar or of the tab Class."""
+        self.page.locator(f"[data-guide-do={kind}]:visible").first.click()
 
+    def shows(self, bar: str) -> None:
+        """Wait until the bar over the scene says who leads this page."""
+        expect(self.page.locator(f"[data-class-bar]{bar}")).to_be_visible()
 
-def same_text(one: Locator, other: Locator) -> None:
-    """Wait until both show the same."""
-    end = time.monotonic() + WAIT / 1000
-    while one.inner_text() != other.inner_text():
-        assert time.monotonic() < end, f"{one.inner_text()} is not {other.inner_text()}"
-        one.page.wait_for_timeout(100)
+    def answer(self, choice: int) -> None:
+        """Choose an answer of the task, and wait until it is stored."""
+        self.page.locator("[data-exercises=question] [data-guide-do=answer]").nth(choice).click()
+        expect(self.page.locator("[data-exercises-note]")).to_contain_text("Stored for your teacher")
+
+    def follows(self, other: Tab) -> None:
+        """Wait until the tool is where the other page has it."""
+        end = time.monotonic() + WAIT / 1000
+        while np.abs(np.array(self.tool()) - other.tool()).max() > 0.15:  # both round
+            assert time.monotonic() < end, f"the tool is at {self.tool()}, the other page's at {other.tool()}"
+            self.page.wait_for_timeout(50)
 
 
 @pytest.fixture
-def room(browser: Browser, address: str) -> Iterator[Class]:
-    found = Class(browser, address)
-    expect.set_options(timeout=WAIT)
-    yield found
-    found.close()
+def members(browser: Browser, address: str) -> Iterator[list[Member]]:
+    """The teacher, Ann and Bob at desktops, Eve with a phone."""
+    found = [Member(browser, address)]
+    try:
+        for alias, phone in (("Ann <b>", False), ("=Bob", False), ("Eve", True)):
+            found.append(Member(browser, address, found[0].code.lower(), alias, phone))
+        yield found
+    finally:
+        for member in found:
+            member.close()
 
 
-@pytest.mark.slow
-def test_a_class_from_the_join_code_to_the_csv(room: Class, data: Path) -> None:
-    teacher = room.page("room", {"title": "Robotics", "hours": "1"})
-    teacher.get_by_role("tab", name="Class").click(force=True)
-    code = teacher.locator("[data-class-code]").inner_text()
-    expect(teacher.locator(".kb-class-join img")).to_have_js_property("complete", True)
-    assert teacher.locator(".kb-class-join img").evaluate("image => image.naturalWidth") > 0
-    ann = room.page("room/join", {"code": code, "alias": "Ann <b>"})
-    bob = room.page("room/join", {"code": code, "alias": "=Bob"}, narrow=True)
-    expect(teacher.locator("[data-question-key][data-guide-do=pick] .kb-class-alias")).to_have_text(
-        ["Ann <b>", "=Bob"]
-    )
+def pads(page: Page) -> int:
+    """How many pixels of the scene have the green of a solved task, which nothing but the wall's pads has."""
+    page.mouse.move(400, 300)  # a page that rests is not drawn again
+    page.mouse.move(410, 300)
+    r, g, b = np.moveaxis(np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB")).astype(int), 2, 0)
+    return int(((g > r + 60) & (g > b + 15))[60:640, 80:900].sum())
 
-    # Follow me: the students' read-outs show the teacher's pose.
-    teacher.locator("[data-guide-do=follow]").click()
-    for student in (ann, bob):
-        expect(student.locator("[data-class-bar=led]")).to_be_visible()
-    teacher.get_by_role("tab", name="Move").click(force=True)
-    pose = teacher.locator('table[aria-label="tool pose"]')
-    before = pose.inner_text()
-    teacher.get_by_role("button", name="Random").click()
-    expect(pose).not_to_have_text(before)
-    for student in (ann, bob):
-        same_text(student.locator('table[aria-label="tool pose"]'), pose)
 
-    # One lets go and is called back by the freeze.
-    ann.locator("[data-class-bar] [data-guide-do=go]").click()
-    expect(ann.locator("[data-class-bar=gone]")).to_be_visible()
-    teacher.get_by_role("tab", name="Class").click(force=True)
-    teacher.locator("[data-guide-do=freeze]").click()
-    expect(ann.locator("[data-class-bar=led][data-class-frozen]")).to_be_visible()
-    save_picture(ann, "class-student")
-    save_picture(bob, "class-student-phone")
-    save_picture(teacher, "class-teacher")
+def lead(teacher: Member, students: list[Member]) -> None:
+    """Follow me, by a drag of the teacher's target; one lets go by dragging and comes back; freeze."""
+    home = kin.fk(ROBOT, ROBOT.q_home)
+    ann, bob, eve = students
+    teacher.do("follow")
+    for student in students:
+        student.shows("[data-class-bar=led]")
+    before = teacher.tool()
+    teacher.drag_arrow(ROBOT, home, axis=0, lengths=0.6)
+    assert np.abs(np.array(teacher.tool()) - before).max() > 5, "the drag has moved the teacher's arm"
+    for student in students:
+        student.follows(teacher)
 
-    # A task opens on every page; the answers reach the teacher and the CSV.
-    teacher.locator("[data-guide=class-task] select").select_option(EXERCISE)
-    teacher.locator("[data-guide=class-task] [data-guide-do=fields]").click()
-    options = "[data-exercises=question] [data-guide-do=answer]"
-    for student, choices in ((ann, (0, 2)), (bob, (2,))):
-        expect(student.locator(f"[data-exercise={EXERCISE}]")).to_be_visible()
+    teacher.open("Move")
+    teacher.page.get_by_role("button", name="Home").click()
+    teacher.wait_for_tool(home[:3, 3], within=0.06)
+    ann.follows(teacher)
+    ann.drag_arrow(ROBOT, home, axis=0, lengths=0.6)
+    ann.shows("[data-class-bar=gone]")
+    assert np.abs(np.array(ann.tool()) - teacher.tool()).max() > 5, "the drag has moved Ann's arm"
+    bob.follows(teacher)
+    ann.do("back")
+    ann.shows("[data-class-bar=led]")
+    ann.follows(teacher)
+
+    for member, name in ((teacher, "teacher"), (ann, "student"), (eve, "phone")):
+        member.open("Class")
+        save_picture(member.page, f"class-{name}")
+        assert problems(member.page) == [], name
+    teacher.do("freeze")
+    for student in (ann, eve):
+        student.shows("[data-class-bar=led][data-class-frozen]")
+    expect(ann.page.locator("[data-class-bar] [data-guide-do=go]")).to_have_count(0)
+
+
+def test_a_class_from_the_landing_page_to_the_csv(members: list[Member], address: str) -> None:
+    teacher, ann, bob, eve = members
+    shown = teacher.page.locator("[data-class-code]")  # the tab Class has opened by itself
+    expect(shown).to_have_text(teacher.code)
+    assert shown.evaluate("code => code.scrollWidth <= code.clientWidth"), "the join code is cut off"
+    assert teacher.page.locator(".kb-class-join img").evaluate("image => image.naturalWidth") > 0
+    expect(teacher.page.locator("[data-guide-do=pick] .kb-class-alias")).to_have_text(["Ann <b>", "=Bob", "Eve"])
+
+    lead(teacher, members[1:])
+
+    # A task opens on every page, and ends Follow me and Freeze. Answers reach the teacher.
+    teacher.page.locator("[data-guide=class-task] select").select_option(EXERCISE)
+    teacher.page.locator("[data-guide=class-task] [data-guide-do=fields]").click()
+    for student in members[1:]:
+        expect(student.page.locator(f"[data-exercise={EXERCISE}]")).to_be_visible()
+        student.shows("[data-class-bar=free]")
+    with teacher.page.expect_popup() as popup:
+        teacher.page.get_by_role("link", name="Results and CSV").click()
+    results = popup.value
+    expect(results.get_by_text("No answers yet")).to_be_visible()
+    for student, choices in ((ann, (WRONG, RIGHT)), (bob, (WRONG,)), (eve, (RIGHT,))):
         for choice in choices:
-            student.locator(options).nth(choice).click()
-            expect(student.locator("[data-exercises-note]")).to_contain_text("Stored for your teacher")
-    expect(teacher.locator("[data-class-solved]")).to_have_text("2 of 2 solved it")
-    hub = Hub(data)
-    ticket = hub.ticket(next(c["value"] for c in teacher.context.cookies() if c["name"] == COOKIE))
-    assert ticket is not None
-    rows = to_csv(attempts_of(hub.database, ticket.room), {}).splitlines()
-    hub.close()
-    assert len(rows) == 4, rows
-    assert sum("'=Bob" in row for row in rows) == 1
+            student.answer(choice)
+    expect(teacher.page.locator("[data-class-solved]")).to_have_text("2 of 3 solved it")
+
+    teacher.do("wall")
+    teacher.shows("[data-class-wall]")
+    for _ in range(int(WAIT / 500)):
+        if pads(teacher.page) > 100:
+            break
+        teacher.page.wait_for_timeout(500)
+    assert pads(teacher.page) > 100, "the pads of those who have solved the task are green"
+    save_picture(teacher.page, "class-wall")
+    teacher.do("wall")
+
+    # The table has renewed itself; the file has one row per attempt, and no formula.
+    expect(results.locator("tbody tr")).to_have_count(3)
+    expect(results.locator("tbody tr").first).to_contain_text("=Bob")
+    save_picture(results, "class-results")
+    answer = results.request.get(address + "room/results.csv")
+    rows = list(csv.DictReader(io.StringIO(answer.body().decode("utf-8-sig"))))
+    assert [(row["alias"], row["exercise"], float(row["score"])) for row in rows] == [
+        *(("Ann <b>", EXERCISE, 0.0), ("Ann <b>", EXERCISE, 1.0)),
+        *(("'=Bob", EXERCISE, 0.0), ("Eve", EXERCISE, 1.0)),
+    ]
 
     # The end needs two presses.
-    end = teacher.locator("[data-guide=class-end] button")
+    end = teacher.page.locator("[data-guide=class-end] button")
     end.click()
     expect(end).to_contain_text("Press again")
     end.click()
-    expect(ann.locator("[data-class-bar=closed]")).to_be_visible()
+    ann.shows("[data-class-bar=closed]")
+    assert results.request.get(address + "room/results.csv").status == 403
