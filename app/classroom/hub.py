@@ -17,8 +17,8 @@ others in the same process see at once. Those in other processes, on this or ano
 database: a thread writes what was reported in one transaction, at once when a page has set something, and every
 `TICK` reads the rooms whose version has changed. Pages are notified only of what they can see. `changed` must
 return at once: post to the inbox of the page. All methods are thread-safe. Only `ticket` (once per process),
-`attend`, `submit`, `remove_seat`, `rename_seat`, `count_solved` and `end_room` wait for the database; they belong in
-the worker of a page, never in the event loop.
+`attend`, `submit`, `remove_seat`, `rename_seat`, `count_solved` and `end_room` wait for the database; they belong
+in the worker of a page, never in the event loop.
 """
 
 from __future__ import annotations

@@ -193,6 +193,7 @@ TEACHERS = {
     "remove_poll": (),
     "remove_seat": ("x",),
     "rename_seat": ("x", "y"),
+    "count_solved": ("swing",),
     "end_room": (),
     "teacher_token": (),
 }
