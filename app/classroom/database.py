@@ -214,6 +214,6 @@ def _sentence(error: Exception) -> str:
         return "Another program has locked the classroom's database for too long. Try again in a moment."
     if "full" in words or "no space" in words or "i/o error" in words:
         return "The disk of the classroom's database is full. Tell the operator of this service."
-    if "readonly" in words or "read-only" in words or "permission" in words:
+    if any(part in words for part in ("readonly", "read-only", "permission", "unable to open", "not a directory")):
         return "The classroom's database cannot be written. Tell the operator of this service."
     return "The classroom's database cannot be reached at present. Kinboard keeps trying."

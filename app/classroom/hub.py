@@ -25,6 +25,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import os
 import threading
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -86,6 +87,18 @@ class Hub:
         """Whether there is a database with rooms, perhaps of an earlier process."""
         folder, url = self._source
         return url is not None or (folder / DATABASE_FILE).exists()
+
+    @property
+    def writable(self) -> bool:
+        """Whether the database's file can be written or made; True for another database, which is not asked."""
+        folder, url = self._source
+        if url is not None:
+            return True
+        file = folder / DATABASE_FILE
+        if file.exists() and not os.access(file, os.W_OK):
+            return False
+        there = next(each for each in (folder, *folder.absolute().parents) if each.exists())
+        return there.is_dir() and os.access(there, os.W_OK | os.X_OK)
 
     @property
     def rooms(self) -> Rooms:

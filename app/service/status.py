@@ -29,6 +29,10 @@ class Readiness(BaseModel):
     complete: bool = Field(
         description="Whether all kernels are compiled. Until then, first uses may take seconds."
     )
+    classrooms: Literal["ready", "off", "read-only"] = Field(
+        description="Whether rooms can be opened: not if KINBOARD_MAX_ROOMS is 0 (off), and not if the folder "
+        "KINBOARD_DATA cannot be written (read-only). The service is ready all the same."
+    )
 
 
 @router.get("/metrics", summary="Metrics, for Prometheus", response_class=PlainTextResponse)
@@ -52,4 +56,11 @@ async def readyz(request: Request, response: Response) -> Readiness:
     status: Status = startup.readiness
     response.headers["cache-control"] = "no-store"
     response.status_code = 200 if status == "ready" else 503
-    return Readiness(status=status, complete=startup.complete)
+    return Readiness(status=status, complete=startup.complete, classrooms=_classrooms(request))
+
+
+def _classrooms(request: Request) -> Literal["ready", "off", "read-only"]:
+    state = request.app.state
+    if state.settings.max_rooms == 0:
+        return "off"
+    return "ready" if state.classroom.writable else "read-only"

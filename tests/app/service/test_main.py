@@ -46,11 +46,16 @@ def client() -> Iterator[TestClient]:
         yield client
 
 
+def readiness(status: str, complete: bool) -> dict:
+    """What /readyz answers where rooms can be opened."""
+    return {"status": status, "complete": complete, "classrooms": "ready"}
+
+
 def test_livez_and_readyz(client):
     alive = client.get("/livez")
     assert (alive.status_code, alive.json()) == (200, {"status": "alive", "pid": os.getpid()})
     ready = client.get("/readyz")
-    assert (ready.status_code, ready.json()) == (200, {"status": "ready", "complete": ready.json()["complete"]})
+    assert (ready.status_code, ready.json()) == (200, readiness("ready", ready.json()["complete"]))
     assert ready.headers["cache-control"] == "no-store"
 
 
@@ -61,7 +66,7 @@ def test_during_warm_up_pages_are_served_and_readyz_reports_warming(monkeypatch)
     with TestClient(create_app(Settings(), on_ready=lambda: events.append("ready"))) as client:
         for _ in range(3):
             answer = client.get("/readyz")
-            assert (answer.status_code, answer.json()) == (503, {"status": "warming", "complete": False})
+            assert (answer.status_code, answer.json()) == (503, readiness("warming", False))
             assert client.get("/livez").status_code == 200
             assert client.get("/").status_code == 200
             assert client.get("/api/v1/robots").status_code == 200
@@ -101,7 +106,7 @@ def test_rest_is_served_when_the_viewer_fails(monkeypatch, caplog):
 
     monkeypatch.setattr(ViewerServer, "start", fail)
     with TestClient(create_app(Settings())) as client:
-        wait_for(lambda: client.get("/readyz").json() == {"status": "failed", "complete": False})
+        wait_for(lambda: client.get("/readyz").json() == readiness("failed", False))
         assert client.get("/readyz").status_code == 503
         assert client.get("/viewer/").status_code == 503
         assert client.get("/api/v1/robots").status_code == 200
@@ -133,7 +138,7 @@ def test_rare_kernels_are_compiled_when_ready_until_the_service_stops(monkeypatc
     monkeypatch.setattr(app.service.startup, "warm_up_rest", rest)
     with TestClient(create_app(Settings())) as client:
         assert begun.wait(30)
-        assert client.get("/readyz").json() == {"status": "ready", "complete": False}
+        assert client.get("/readyz").json() == readiness("ready", False)
         assert not ended.is_set()
     assert ended.wait(10)
 
@@ -143,9 +148,9 @@ def test_readyz_is_complete_when_the_last_kernel_is_compiled(monkeypatch):
     monkeypatch.setattr(app.service.startup, "warm_up_first", lambda: None)
     monkeypatch.setattr(app.service.startup, "warm_up_rest", lambda stop: rest.wait(60))
     with TestClient(create_app(Settings())) as client:
-        wait_for(lambda: client.get("/readyz").json() == {"status": "ready", "complete": False})
+        wait_for(lambda: client.get("/readyz").json() == readiness("ready", False))
         rest.set()
-        wait_for(lambda: client.get("/readyz").json() == {"status": "ready", "complete": True})
+        wait_for(lambda: client.get("/readyz").json() == readiness("ready", True))
 
 
 def test_a_failure_to_compile_ahead_is_logged_and_the_service_stays_ready(monkeypatch, caplog):

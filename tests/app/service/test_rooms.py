@@ -90,7 +90,7 @@ def test_a_class_joins_by_code_and_ends(make, tmp_path):
     ("host", "here", "opened", "words", "missing"),
     [
         ("0.0.0.0", "192.168.1.20", "localhost:8000", 'href="http://192.168.1.20:8000/', "Ctrl-C"),
-        ("0.0.0.0", None, "localhost:8000", "--host 0.0.0.0", "192.168"),
+        ("0.0.0.0", None, "localhost:8000", "name or address in the network", "--host"),
         ("127.0.0.1", "192.168.1.20", "127.0.0.1:8000", "--host 0.0.0.0", "192.168"),
         ("0.0.0.0", "192.168.1.20", "school.example", "Open a room", "Only this machine"),
     ],
@@ -112,6 +112,18 @@ def test_a_teacher_at_an_address_that_students_cannot_open_reads_where_to_go(
         assert f"{words}room#open" in before
         token = re.search(r"/room/teach/([^\"<]+)", after).group(1)
         assert f"{words}room/teach/{token}" in after
+
+
+def test_a_data_folder_that_cannot_be_written_is_named(tmp_path):
+    (tmp_path / "file").write_text("")
+    for data, rooms, said in (("file/data", 9, "read-only"), ("new/data", 9, "ready"), ("new/data", 0, "off")):
+        app = create_app(Settings(data=tmp_path / data, max_rooms=rooms), STORE)
+        teacher = TestClient(app, follow_redirects=False, base_url="http://school.example")
+        assert teacher.get("/readyz").json()["classrooms"] == said
+        answer = teacher.post("/room", data={"title": "Kinematics 1", "hours": "2"})
+        app.state.classroom.close()
+        assert answer.status_code == {"read-only": 503, "ready": 303, "off": 422}[said]
+        assert ("cannot be written" in answer.text) == (said == "read-only")
 
 
 def test_the_address_here_is_none_in_a_container_or_without_a_network(tmp_path, monkeypatch):

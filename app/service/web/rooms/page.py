@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
-from app.service.web.rooms.network import url_for_others
+from app.service.web.rooms.network import ANY, url_for_others
 from app.shared.security import guard_teacher
 
 if TYPE_CHECKING:
@@ -79,12 +79,12 @@ def join_address(request: Request, code: str) -> str:
 
 
 def _for_others(request: Request) -> dict[str, object]:
-    """Whether other machines cannot open the address of the request, and which one they can, if that is known."""
+    """Whether other machines cannot open the address of the request, or any, and which one they can, if known."""
     local, (_, port) = only_here(request), request.scope.get("server") or ("", None)
-    others = None
+    host, others = request.app.state.settings.host, None
     if local and port is not None:
-        others = url_for_others(request.app.state.settings.host, port, request.scope.get("root_path", ""))
-    return {"local": local, "others": others or ""}
+        others = url_for_others(host, port, request.scope.get("root_path", ""))
+    return {"local": local, "alone": host not in ANY, "others": others or ""}
 
 
 def only_here(request: Request) -> bool:
