@@ -18,16 +18,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 from PIL import Image
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from playwright.sync_api import Page, expect, sync_playwright
 
 from app.viewer.own_arm import KEY, own_arm, pack
 from app.viewer.tabs.robot.presets import PRESETS
 
 FOLDER = Path(__file__).parents[1] / "docs" / "images"
 SIZE = {"width": 1280, "height": 720}
-SMALL = {"width": 800, "height": 480}  # of pages that are not photographed
 WAIT = 60_000  # ms; software rendering is slow
-NO_HINTS = 'localStorage.setItem("kinboard-hints", "drag joint learn")'
 
 
 class Shot(NamedTuple):
@@ -61,19 +59,11 @@ SHOTS = (
     Shot("workspace", "Workspace", {"robot": "irb120", "features": {"workspace": CLOUD}}, 25.0),
 )
 
-STUDENTS = {
-    "Ada": ("puma560", PUMA),
-    "Ben": ("ur5", UR5),
-    "Chiara": ("scara", [0.5, 0.9, 0.1, 0.0]),
-    "Dmitri": ("iiwa14", [0.4, 0.6, 0.2, -1.3, 0.1, 0.9, 0.0]),
-    "Emre": ("pioneer5", [1.2, 0.7, 1.2, 0.5, 0.5]),
-    "Fumiko": ("irb120", [0.3, 0.4, 0.2, 0.1, 0.6, 0.0]),
-}
-
 
 def take(page: Page, address: str, shot: Shot) -> Image.Image:
     """Open the view, wait until it stands still, and photograph it."""
-    page.goto(f"{address}viewer/{arm(**shot.state)}")
+    text = json.dumps({"v": 1, **shot.state}, separators=(",", ":")).encode()
+    page.goto(f"{address}viewer/#s={base64.urlsafe_b64encode(text).decode().rstrip('=')}")
     expect(page.locator("[data-status]").first).to_be_visible()
     notice = page.locator("#webgl-software-rendering button")
     if notice.count():
@@ -84,50 +74,6 @@ def take(page: Page, address: str, shot: Shot) -> Image.Image:
     return Image.open(io.BytesIO(page.screenshot(timeout=WAIT)))
 
 
-def arm(**state: object) -> str:
-    """The part of a link that restores this state."""
-    text = json.dumps({"v": 1, **state}, separators=(",", ":")).encode()
-    return f"#s={base64.urlsafe_b64encode(text).decode().rstrip('=')}"
-
-
-def enter(browser: Browser, address: str, door: str, form: dict[str, str], link: str = "") -> Page:
-    """The page of a member of a room who has come in by a form."""
-    page = browser.new_page(viewport=SIZE if door == "room" else SMALL, color_scheme="light")
-    page.add_init_script(NO_HINTS)
-    assert page.request.post(address + door, form=form).ok
-    page.goto(f"{address}viewer/{link}")
-    expect(page.locator("[data-class-bar]")).to_be_visible()
-    return page
-
-
-def take_class(browser: Browser, address: str) -> Image.Image:
-    """The wall of a class: students with an arm each, of whom one raises a hand."""
-    teacher = enter(browser, address, "room", {"title": "Kinematics 1", "hours": "2"})
-    code = teacher.locator("[data-class-code]").inner_text()
-    students = [
-        enter(browser, address, "room/join", {"code": code, "alias": alias}, arm(robot=robot, q=q))
-        for alias, (robot, q) in STUDENTS.items()
-    ]
-    students[1].locator("[data-class-bar] [data-guide-do=hand]").click()
-    teacher.locator("#webgl-software-rendering button").click()
-    expect(teacher.locator("[data-guide-do=pick]")).to_have_count(len(students))
-    expect(teacher.locator(".kb-class-hands")).to_be_visible()
-    teacher.locator("[data-guide-do=wall]").first.click()
-    teacher.wait_for_timeout(8000)
-    teacher.mouse.move(5, 5)
-    picture = Image.open(io.BytesIO(teacher.screenshot(timeout=WAIT)))
-    for page in (teacher, *students):
-        page.context.close()
-    return picture
-
-
-def save(picture: Image.Image, name: str) -> None:
-    """Save a picture in `FOLDER`."""
-    file = FOLDER / f"{name}.webp"
-    picture.convert("RGB").save(file, quality=86, method=6)
-    print(f"{file.name}: {file.stat().st_size} bytes", flush=True)
-
-
 def main(address: str) -> None:
     """Take all pictures of the service at `address`."""
     chromium = os.environ.get("KINBOARD_TEST_CHROMIUM", "/usr/bin/chromium")
@@ -136,10 +82,11 @@ def main(address: str) -> None:
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         for shot in SHOTS:
             page = browser.new_page(viewport=SIZE, color_scheme="light")  # a new visitor for each picture
-            page.add_init_script(NO_HINTS)
-            save(take(page, address, shot), shot.name)
+            page.add_init_script('localStorage.setItem("kinboard-hints", "drag joint learn")')
+            file = FOLDER / f"{shot.name}.webp"
+            take(page, address, shot).convert("RGB").save(file, quality=86, method=6)
             page.close()
-        save(take_class(browser, address), "class")
+            print(f"{file.name}: {file.stat().st_size} bytes", flush=True)
         browser.close()
 
 
