@@ -66,6 +66,7 @@ RULES: dict[str, set[str]] = {
         *("viser", "trimesh", "numpy", "jinja2", "markupsafe", "kin"),
         *("app.viewer", "app.classroom", "app.equations", "app.exercises", "app.exports", "app.shared"),
     },
+    "app/viewer/viser_patches.py": {"msgspec", "numpy", "viser", "kin.transforms"},
     "app/viewer/viser_outbox.py": {"msgspec", "viser", "zstandard", "app.shared.connection"},
     "app/viewer/meshes": {
         *("fast_simplification", "trimesh", "numpy", "kin", "app.shared", "app.viewer.meshes", "app.viewer.scene"),

@@ -98,19 +98,24 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
         return message
 
     def _parse_more(self) -> None:
-        """Parse what has arrived: until there is a message, or the budget is spent."""
+        """Parse what has arrived: until there is a message, or the budget is spent.
+
+        uvicorn stops reading the socket at each message and starts again when it has been taken: two calls to the
+        system for each. Here reading goes on until something has arrived that may not be parsed yet.
+        """
+        paused, self.read_paused = self.read_paused, True  # uvicorn leaves the transport as it is then
         while self._unread and self._is_reading():
             piece = bytes(self._unread[:PIECE])
             del self._unread[:PIECE]
             super().data_received(piece)
             if self.conn.handshake_exc is not None and not self.handshake_initiated:
                 self._reject("This is not a valid websocket handshake.")
+        self.read_paused = paused
         if self.transport.is_closing():
             return
-        paused = bool(self._unread) or not self._is_reading()
-        if paused != self.read_paused:
-            self.read_paused = paused
-            (self.transport.pause_reading if paused else self.transport.resume_reading)()
+        if bool(self._unread) != paused:
+            self.read_paused = not paused
+            (self.transport.resume_reading if paused else self.transport.pause_reading)()
 
     def _is_reading(self) -> bool:
         """Whether another piece may be parsed now. After our close frame messages are dropped, unread."""

@@ -8,7 +8,11 @@ frame: with thirty visitors it was a fifth of all processor time. `assign` sends
 same queue.
 
 Values: viser's setter of an input element's value starts a task of the event loop for each callback, for each
-slider that follows the arm. `show_value` starts none.
+slider that follows the arm. `show_value` starts none. `show_content` sets the HTML of an element without a look at
+the type of that property.
+
+Drags: viser converts each field of an event by its type hints and passes it through six coroutines, of the shared
+scene and of the visitor's own. `drag_gizmo` does the same for a gizmo of the visitor alone, in one.
 
 Pages: viser evaluates the type hints of a class for each of its objects, a quarter of the cost of a page.
 `cache_type_hints` caches them.
@@ -24,16 +28,19 @@ from __future__ import annotations
 
 import asyncio
 import functools
+import inspect
 import threading
 import time
 import typing
 from collections.abc import Sequence
 from typing import Any
 
+import msgspec
 import numpy as np
 import viser
 from viser import _assignable_props_api as props
 from viser import _messages as messages
+from viser.infra import ClientId
 from viser.infra import _async_message_buffer as buffers
 
 from kin.transforms import Array
@@ -80,6 +87,21 @@ def show_value(handle: Any, value: object) -> None:
         state.update_timestamp = time.time()
 
 
+def show_content(element: viser.GuiHtmlHandle, content: str) -> None:
+    """Show other HTML in an element; unchanged HTML is not sent.
+
+    Raises:
+        RuntimeError: the element has been removed.
+    """
+    state = element._impl
+    if state.removed:
+        raise RuntimeError("a GuiHtmlHandle was removed and cannot be set")
+    props: Any = state.props
+    if content != props.content:
+        state.gui_api._websock_interface.queue_message(messages.GuiUpdateMessage(state.uuid, {"content": content}))
+        props.content = content
+
+
 def is_removed(node: viser.SceneNodeHandle) -> bool:
     """Whether a node is no longer in the scene, so that its properties cannot be set."""
     return bool(node._impl.removed)
@@ -88,6 +110,44 @@ def is_removed(node: viser.SceneNodeHandle) -> bool:
 def uuid_of(handle: Any) -> str:
     """The id of a control: of its message, and of its element in the page."""
     return str(handle._impl.uuid)
+
+
+class _Drag(msgspec.Struct, tag_field="type", tag="TransformControlsUpdateMessage"):
+    """An event of a drag; lists of other lengths, and anything but numbers, are refused."""
+
+    name: str
+    owner: str
+    position: tuple[float, float, float]
+    wxyz: tuple[float, float, float, float]
+
+
+_DRAG = _Drag.__struct_config__.tag.encode()  # type: ignore[union-attr]
+_read_drag = msgspec.msgpack.Decoder(_Drag).decode
+
+
+async def drag_gizmo(client: viser.ClientHandle, data: bytes) -> bool:
+    """Handle a message if it is an event of a drag of the visitor's own gizmo; False: viser must handle it."""
+    if _DRAG not in data:
+        return False
+    try:
+        drag = _read_drag(data)
+    except msgspec.MsgspecError:
+        return False
+    scene, number = client.scene, ClientId(client.client_id)
+    # While it is dragged, a gizmo that is removed keeps its callbacks.
+    gizmo = scene._active_transform_drag_handles.get((number, drag.name))
+    gizmo = gizmo or scene._handle_from_transform_controls_name.get(drag.name)
+    if gizmo is None or drag.owner != scene._owner_id or gizmo._impl_aux.sync_cb is not None:
+        return False
+    calls: list[Any] = gizmo._impl_aux.update_cb
+    if not all(inspect.iscoroutinefunction(call) for call in calls):
+        return False
+    gizmo._impl.position, gizmo._impl.wxyz = np.array(drag.position), np.array(drag.wxyz)
+    gizmo._impl_aux.last_updated = time.time()
+    event: Any = viser.TransformControlsEvent(client=client, client_id=number, target=gizmo, phase="update")
+    for call in calls:
+        await call(event)
+    return True
 
 
 def keep_private(gizmo: viser.TransformControlsHandle) -> None:

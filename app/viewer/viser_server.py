@@ -36,6 +36,7 @@ from app.shared.notes import Notes
 from app.shared.security import Rights
 from app.viewer import viser_outbox
 from app.viewer.viser_outbox import Bell, Outbox, Packer
+from app.viewer.viser_patches import drag_gizmo
 
 log = logging.getLogger(__name__)
 
@@ -61,6 +62,7 @@ class PortlessServer(infra.WebsockServer):
         self.rights: dict[int, Rights] = {}  # of connected visitors, by client id
         self.clients: dict[int, str] = {}  # their names in limits per client, by client id
         self.room_tokens: dict[int, str] = {}  # of classrooms, not verified, by client id
+        self.visitors: dict[int, viser.ClientHandle] = {}  # viser's own, by client id
         self._open = 0  # connections
         self._notes = Notes(log)
         self._bell, self._packer = Bell(loop), Packer()
@@ -137,16 +139,27 @@ class PortlessServer(infra.WebsockServer):
             await _call(self._client_disconnect_cb, client)
 
     async def _consume(self, connection: Connection, client: infra.WebsockClientConnection) -> None:
+        number = infra.ClientId(client.client_id)
         while True:
             data = await connection.receive()
-            try:
-                message = self._message_class.deserialize(data)
-            except Exception as error:  # fields are converted without checks
-                raise ConnectionEnded(1007, f"not a message of the viewer: {error!r:.80}") from error
-            for handler in (self, client):
-                if type(message) in handler._incoming_handlers:
-                    await self._handle(handler, infra.ClientId(client.client_id), message)
+            if not await self._drag(number, data):
+                try:
+                    message = self._message_class.deserialize(data)
+                except Exception as error:  # fields are converted without checks
+                    raise ConnectionEnded(1007, f"not a message of the viewer: {error!r:.80}") from error
+                for handler in (self, client):
+                    if type(message) in handler._incoming_handlers:
+                        await self._handle(handler, number, message)
             await asyncio.sleep(0)  # others come between the messages of a burst
+
+    async def _drag(self, number: infra.ClientId, data: bytes) -> bool:
+        """Whether a message was an event of a drag, and has been handled."""
+        visitor = self.visitors.get(number)
+        try:
+            return visitor is not None and await drag_gizmo(visitor, data)
+        except Exception as error:  # noqa: BLE001 - of a callback
+            self._note(error)
+            return True
 
     async def _handle(
         self, handler: infra.WebsockMessageHandler, number: infra.ClientId, message: infra.Message
@@ -158,7 +171,10 @@ class PortlessServer(infra.WebsockServer):
         try:
             await handler._handle_incoming_message(number, message)
         except Exception as error:  # noqa: BLE001 - fields are converted without checks
-            self._notes.note("unhandled", f"a message of a visitor could not be handled: {error!r:.200}")
+            self._note(error)
+
+    def _note(self, error: Exception) -> None:
+        self._notes.note("unhandled", f"a message of a visitor could not be handled: {error!r:.200}")
 
 
 async def _call(callbacks: _Callbacks, client: infra.WebsockClientConnection) -> None:
@@ -197,6 +213,7 @@ def start_viser(loop: asyncio.AbstractEventLoop, label: str) -> tuple[viser.Vise
     if not isinstance(portless, PortlessServer):
         server.stop()
         raise RuntimeError(f"viser {viser.__version__} listens on a port; install viser>=1.1,<1.2")
+    portless.visitors = server._connected_clients
     # Visitors leave while something is drawn for them or asked of their page.
     warnings.filterwarnings("ignore", r"Queued a \w+ on a closed connection", UserWarning)
     # A visitor could ask viser for a public tunnel to this service.
@@ -249,6 +266,8 @@ def missing_names() -> list[str]:
     found += [f"WebsockServer.{name}" for name in attributes if not hasattr(server, name)]
     fields = AsyncMessageBuffer.__dataclass_fields__
     found += [f"AsyncMessageBuffer.{name}" for name in ("generator_cursors", "done") if name not in fields]
+    drags = ("_handle_transform_controls_updates", "_fire_transform_controls_callbacks")  # see `drag_gizmo`
+    found += [f"SceneApi.{name}" for name in drags if not hasattr(viser.SceneApi, name)]
     return found + viser_outbox.missing_names()
 
 

@@ -10,6 +10,7 @@ import viser
 from app.viewer.frames import TITLES, Frames
 from app.viewer.panel import update_html
 from app.viewer.views.templates import render
+from app.viewer.viser_patches import show_content
 from kin.frames import WORLD
 from kin.transforms import Array, wxyz_from_rotation
 from kin.units import Units
@@ -82,4 +83,4 @@ class PoseReadout:
 
     def show(self, T: Array, units: Units, target: Array | None = None, frame: str = WORLD) -> None:
         """Replace the numbers; see `html`."""
-        self._html.content = html(T, units, target, frame)
+        show_content(self._html, html(T, units, target, frame))

@@ -11,6 +11,7 @@ import viser
 
 from app.viewer.panel.posture import short
 from app.viewer.views.templates import render
+from app.viewer.viser_patches import show_content
 from kin import IKResult, IKSolution, Robot
 from kin.ik.details import OrientationNotMet, OutOfReach, OutsideLimits, RollError, RotationError, Solved, Touching
 from kin.units import Units
@@ -169,7 +170,7 @@ class StatusLine:
         shown = self._shown
         if self._warning:
             shown = replace(shown, detail=f"{shown.detail} \N{WARNING SIGN} {self._warning}".lstrip())
-        self._html.content = html(shown)
+        show_content(self._html, html(shown))
 
     def show_result(self, result: IKResult, units: Units) -> None:
         """Show the result for a target."""

@@ -15,7 +15,14 @@ from viser import _assignable_props_api as props
 from viser._messages import SetPositionMessage, TransformControlsUpdateMessage
 from viser.infra import _async_message_buffer as buffers
 
-from app.viewer.viser_patches import assign, cache_type_hints, keep_private, set_events_in_their_loop, show_value
+from app.viewer.viser_patches import (
+    assign,
+    cache_type_hints,
+    keep_private,
+    set_events_in_their_loop,
+    show_content,
+    show_value,
+)
 
 PLACE, TURN = (0.1, -0.2, 0.3), (0.5, -0.5, 0.5, 0.5)
 
@@ -131,6 +138,25 @@ def test_a_value_is_sent_as_the_setter_sends_it_and_no_callback_is_called(wire, 
     with pytest.raises(RuntimeError, match="GuiTextHandle was removed"):
         show_value(handle, "c")
     assert called == []
+
+
+def test_html_is_sent_as_the_setter_sends_it_and_unchanged_html_is_not(wire, monkeypatch):
+    _, scene = wire
+    gui, messages = scene._owner.gui, []
+    monkeypatch.setattr(gui._websock_interface, "queue_message", messages.append)
+    shown = []
+    for show in (lambda handle, value: setattr(handle, "content", value), show_content):
+        handle = gui.add_html("<b>old</b>")
+        messages.clear()
+        show(handle, "<b>new</b>")
+        show(handle, "<b>new</b>")
+        (message,) = messages
+        assert message.uuid == handle._impl.uuid
+        shown.append((type(message), message.updates, handle.content))
+    assert shown[0] == shown[1]
+    handle.remove()
+    with pytest.raises(RuntimeError, match="GuiHtmlHandle was removed"):
+        show_content(handle, "late")
 
 
 def test_hints_are_looked_up_once_and_are_the_same(wire, monkeypatch):

@@ -21,11 +21,14 @@ from viser.infra import _infra
 
 from app.shared.connection import ConnectionEnded
 from app.shared.security import Rights
+from app.viewer.viser_patches import drag_gizmo, keep_private
 from app.viewer.viser_server import PROTOCOL, PortlessServer, missing_names, start_viser
 
 # The text of the method that `PortlessServer` replaces. If viser changes it, read what has changed, and whether
 # `PortlessServer` must follow; then write the new digest here.
 REPLACED = "59b19aac01fb31a3"
+# The same for what `drag_gizmo` does in one function.
+DRAGS = "a1ef4593d2067090"
 CAMERA = {
     "wxyz": (1, 0, 0, 0),
     "position": (3, 3, 3),
@@ -262,3 +265,82 @@ def test_a_version_of_viser_that_listens_all_the_same_is_refused(loop, monkeypat
 def test_the_method_that_is_replaced_is_the_one_we_know():
     text = inspect.getsource(infra.WebsockServer._background_worker)
     assert hashlib.sha256(text.encode()).hexdigest()[:16] == REPLACED, "see REPLACED"
+
+
+def test_the_ways_of_a_drag_are_those_we_know():
+    scene = viser.SceneApi
+    known = (scene._handle_transform_controls_updates, scene._fire_transform_controls_callbacks)
+    text = "".join(
+        map(inspect.getsource, (*known, scene._dispatch_callback, scene._register_owner_scoped_handler))
+    )
+    assert hashlib.sha256(text.encode()).hexdigest()[:16] == DRAGS, "see DRAGS"
+
+
+def gizmo(client: viser.ClientHandle, seen: list[Any], private: bool = True) -> viser.TransformControlsHandle:
+    handle = client.scene.add_transform_controls("/target")
+    if private:
+        keep_private(handle)
+
+    @handle.on_update
+    async def _(event: viser.TransformControlsEvent) -> None:
+        seen.append((event.phase, event.client is client, event.client_id, event.target.position.tolist()))
+        seen.append(event.target.wxyz.tolist())
+
+    return handle
+
+
+def drag(owner: str, **fields: Any) -> dict[str, Any]:
+    moved = {"name": "/target", "position": (1, 2.5, 3), "wxyz": (0, 1, 0, 0), "owner": owner}
+    return {"type": "TransformControlsUpdateMessage"} | moved | fields
+
+
+@pytest.mark.parametrize("fast", [True, False])
+def test_a_drag_has_the_same_effect_as_viser_s_own_way(server, serve, fast):
+    seen: list[Any] = []
+    visits: list[Visit] = []
+
+    @server[0].on_client_connect
+    async def _(client: viser.ClientHandle) -> None:
+        gizmo(client, seen, private=fast)  # viser handles one that it copies to others
+        owner = client.scene._owner_id
+        visits[0]._messages += [
+            drag(owner),
+            drag("another"),
+            drag(owner, name="/other"),
+            drag(owner, position=(4, 5, 6)),
+        ]
+
+    visits.append(Visit(CAMERA | {"type": "ViewerCameraMessage"}))
+    assert serve(visits[0]) == (1001, "left")
+    assert seen == [
+        ("update", True, 0, [1.0, 2.5, 3.0]),
+        [0.0, 1.0, 0.0, 0.0],
+        ("update", True, 0, [4.0, 5.0, 6.0]),
+        [0.0, 1.0, 0.0, 0.0],
+    ]
+
+
+@pytest.mark.parametrize("position", [(1, 2), "abc", (1, 2, "x"), None, (1, 2, 3, 4)])
+def test_a_drag_of_another_shape_is_left_to_viser(position):
+    data = msgspec.msgpack.encode(drag("", position=position))
+    nobody: Any = object()  # it is not looked at
+    assert not asyncio.run(drag_gizmo(nobody, data))
+
+
+def test_an_error_in_a_callback_of_a_drag_ends_nothing(server, serve, caplog):
+    seen: list[Any] = []
+    visits: list[Visit] = []
+
+    @server[0].on_client_connect
+    async def _(client: viser.ClientHandle) -> None:
+        @gizmo(client, seen).on_update
+        async def _(event: viser.TransformControlsEvent) -> None:
+            raise ValueError("in a callback")
+
+        visits[0]._messages += 2 * [drag(client.scene._owner_id)]
+
+    visits.append(Visit(CAMERA | {"type": "ViewerCameraMessage"}))
+    with caplog.at_level(logging.WARNING):
+        assert serve(visits[0]) == (1001, "left")
+    assert len(seen) == 4
+    assert "in a callback" in caplog.text

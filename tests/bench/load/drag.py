@@ -64,6 +64,7 @@ async def measure(service: Service, count: int, seconds: float, hz: float = HZ) 
         "unanswered": sum(visitor.unanswered for visitor in visitors),
         "pictures/s each": sum(visitor.pictures for visitor in visitors) / wall / count,
         "service CPU %": 100 * service_spent / wall,
+        "CPU µs an event": 1e6 * service_spent / max(1, len(latencies)),
         "client CPU %": 100 * own / wall,
         "client late ms": 1e3 * max(hands),
         "MB a visitor": (full.memory - empty.memory) / count / 1e6,
