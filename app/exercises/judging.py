@@ -43,15 +43,15 @@ def judge(question: Question, given: float) -> Verdict:
         option = question.options[int(given)]
         return Verdict(option.right, option.reason)
     if _near(question, given, question.answer):
-        return Verdict(
-            True, " ".join(filter(None, (f"The exact value is {value_text(question)}.", question.named)))
-        )
+        return Verdict(True, " ".join(filter(None, (_confirmed(question), question.named))))
     for way in question.ways:
         if _near(question, given, way.value):
             return Verdict(True, way.reason)
     for mistake in question.mistakes:
         if _near(question, given, mistake.value):
             return Verdict(False, mistake.reason)
+    if (_is_count(question) or not question.ordered) and (given < 0.0 or abs(given - round(given)) > WHOLE):
+        return Verdict(False, f"The answer is a whole number, and not negative. {question.method}")
     if _near(question, -given, question.answer):
         return Verdict(False, f"The size is right, the sign is not. {question.method}")
     if question.whole_turns or not question.ordered:
@@ -93,8 +93,21 @@ def number_text(value: float, question: Number) -> str:
     """A value in the question's unit."""
     if _is_count(question):
         return f"{value:.0f}"
-    decimals = max(0, -math.floor(math.log10(question.tolerance * question.unit.scale)))
-    return question.unit.text(value, decimals - question.unit.finer).rstrip()
+    return question.unit.text(value, _decimals(question) - question.unit.finer).rstrip()
+
+
+def _decimals(question: Number) -> int:
+    """Of the question's unit, as the tolerance leaves them meaningful."""
+    return max(0, -math.floor(math.log10(question.tolerance * question.unit.scale)))
+
+
+def _confirmed(question: Number) -> str:
+    """The right value, and whether it is rounded."""
+    if _is_count(question):
+        return f"The value is {value_text(question)}."
+    shown = question.answer * question.unit.scale
+    exact = math.isclose(shown, round(shown, _decimals(question)), rel_tol=1e-9, abs_tol=1e-9)
+    return f"The exact value is {value_text(question)}." if exact else f"Rounded, it is {value_text(question)}."
 
 
 def tolerance_text(question: Number) -> str:

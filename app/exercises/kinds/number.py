@@ -142,7 +142,7 @@ def _swapped(questions: list[Number], values: list[float], labels: tuple[str, ..
 
     n = len(questions)
     if all(fits(question, -value) for question, value in zip(questions, values, strict=True)):
-        return "This is the opposite vector: all signs are the other way round."
+        return "All signs are the other way round."
     for i in range(n):
         for j in range(i + 1, n):
             order = list(values)

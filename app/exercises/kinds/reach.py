@@ -19,6 +19,7 @@ from kin.ik.options import TASKS
 from kin.transforms import Array, rotation_angle, vector_angle
 from kin.units import Units
 
+FAR = 3.0  # position tolerances that a negated joint must have moved the tool by
 LOCKED = (math.radians(0.5), 5e-4)  # rad, m: a locked joint may be off by this
 
 
@@ -117,9 +118,11 @@ class ReachKind(Kind):
         for i in range(variant.robot.n):
             flipped = q.copy()
             flipped[i] = -flipped[i]
-            point = kin.fk(variant.robot, flipped)[:3, 3]
-            if abs(q[i]) > 1e-3 and np.linalg.norm(point - variant.pose[:3, 3]) <= self.position_tolerance:
-                return f" This is the posture with joint {i + 1} negated."
+            point, now = kin.fk(variant.robot, flipped)[:3, 3], kin.fk(variant.robot, q)[:3, 3]
+            there = np.linalg.norm(point - variant.pose[:3, 3]) <= self.position_tolerance
+            # A small joint value brings the tool there by chance, when another joint is a little wrong.
+            if there and np.linalg.norm(point - now) > FAR * self.position_tolerance:
+                return f" With the other sign of joint {i + 1} it would be there."
         return ""
 
     def _in_margin(self, robot: Robot, q: Array, units: Units) -> tuple[bool, str]:

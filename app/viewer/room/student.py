@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from typing import NamedTuple
 
 from app.classroom.clock import now
@@ -12,12 +13,13 @@ from app.viewer.feature import Stage
 from app.viewer.panel import update_html
 from app.viewer.panel.status import Notice
 from app.viewer.room import views
-from app.viewer.room.member import NEWS, Member
+from app.viewer.room.member import Member
 from app.viewer.room.sharing import LED_EVERY, STUDENT_EVERY
 from app.viewer.room.submissions import Submissions
 from app.viewer.session.state import PageState
 
 TEACHER = "teacher"
+STORED: Hashable = "stored"  # an answer is stored, or is not: the room may be as it was
 FROZEN = "The teacher has frozen the class: look at the teacher’s screen."
 
 
@@ -45,7 +47,7 @@ class Student(Member):
         self._first = True
         self._course = ""
         self._open_tab = 0
-        self._submissions = Submissions(self.attendance.submit, lambda: stage.post(("news", self.key, NEWS)))
+        self._submissions = Submissions(self.attendance.submit, lambda: stage.post(("news", self.key, STORED)))
         if self.page.lessons is not None:  # before what is stored of them in the browser is restored
             exercises, ticket = self.page.lessons.exercises, self.attendance.ticket
             exercises.practice.enter(

@@ -12,12 +12,14 @@ from hypothesis import strategies as st
 
 import kin
 from app.exercises import Exercise, Variant, Verdict, parse_exercise
+from app.exercises.judging import judge
 from app.exercises.kinds import KINDS
+from app.exercises.questions import PLAIN, Number, count
 from app.exercises.typed import EntryError
 from app.viewer.exercises.views import Sheet, question_html
 from kin import InputError
 from kin.dh import convert
-from kin.units import Units
+from kin.units import Unit, Units
 
 UNITS, RADIANS = Units(), Units(degrees=False, length="m")
 HEAD = 'id = "x"\ntitle = "X"\ntopic = "Velocity"\ntext = "?"\n'
@@ -64,8 +66,28 @@ def test_vectors_get_credit_for_each_component() -> None:
     verdict = judged(POINT, ["200", "-100", "200"])
     assert (verdict.right, round(verdict.credit, 3)) == (False, 0.667)
     assert "x and y are exchanged" in judged(POINT, ["-100", "200", "300"]).reason
-    assert "opposite vector" in judged(POINT, ["-200", "100", "-300"]).reason
+    assert "All signs are the other way round" in judged(POINT, ["-200", "100", "-300"]).reason
     assert judged(POINT, ["200", "100", "300"]).reason == "y: The size is right, the sign is not. Add."
+
+
+def test_the_value_is_called_exact_only_if_it_is() -> None:
+    def number(answer: float, tolerance: float, unit: Unit = UNITS.lengths) -> Number:
+        return Number("", answer, unit, tolerance, "Add.")
+
+    assert judge(number(0.135, 0.002), 0.1351).reason == "The exact value is 135 mm."
+    assert judge(number(0.134536, 0.002), 0.1351).reason == "Rounded, it is 135 mm."
+    assert (
+        judge(number(math.radians(-50.0), 0.02, UNITS.angles), math.radians(-50.1)).reason
+        == "The exact value is −50°."
+    )
+    assert judge(count("", 2, "Add."), 2.0).reason == "The value is 2."
+
+
+@pytest.mark.parametrize("typed", [-2.0, 2.5, 0.35])
+def test_a_count_is_whole_and_not_negative(typed: float) -> None:
+    for question in (count("", 2, "Look."), Number("", 2.0, PLAIN, 0.1, "Look.", ordered=False)):
+        assert judge(question, typed).reason == "The answer is a whole number, and not negative. Look."
+    assert judge(count("", 2, "Look."), 3.0).reason == "Too large. Look."
 
 
 @pytest.mark.parametrize("answer", [None, 3, ["1", "2"], [3.0], "30"])
@@ -194,7 +216,7 @@ def test_a_negated_joint_is_recognised() -> None:
     q = np.array(REACH[0].kind.answer(REACH[1]))
     wrong = q.copy()
     wrong[0] = -wrong[0]
-    assert judged(REACH, wrong.tolist()).reason.endswith("This is the posture with joint 1 negated.")
+    assert judged(REACH, wrong.tolist()).reason.endswith("With the other sign of joint 1 it would be there.")
     for given_ in ([0.0] * 5, [math.nan] * 6, "home", [True] * 6):
         with pytest.raises(InputError):
             judged(REACH, given_)
