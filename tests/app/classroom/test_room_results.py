@@ -13,6 +13,7 @@ from fastapi.testclient import TestClient
 from app.classroom import COOKIE, NewAttempt, Ticket
 from app.classroom.rooms import OpenRoom, Rooms
 from app.service.main import create_app
+from app.service.web.rooms import results
 from app.shared.settings import Settings
 
 
@@ -61,6 +62,19 @@ def test_the_teacher_sees_who_is_stuck_first(school: Class) -> None:
     rows = list(csv.DictReader(io.StringIO(answer.content.decode("utf-8-sig"))))
     assert [row["alias"] for row in rows] == ["Ada", "'=<b>Eve", "'=<b>Eve", "'=<b>Eve"]
     assert "Results" in teacher.get("/room").text
+
+
+def test_the_page_does_not_read_the_answers(school: Class, monkeypatch: pytest.MonkeyPatch) -> None:
+    ada = school.rooms.join(school.room.code, "Ada")
+    school.answer(ada, 0.5)
+    read: list[object] = []
+    rows = results.rows
+    monkeypatch.setattr(
+        results, "rows", lambda found, now: read.extend(one.answer for one in found) or rows(found, now)
+    )
+    assert "Ada" in school.browser(Ticket(school.room.id)).get("/room/results").text
+    assert read == [None]
+    assert '"[""30""]"' in school.browser(Ticket(school.room.id)).get("/room/results.csv").text
 
 
 def test_nobody_else_does(school: Class) -> None:

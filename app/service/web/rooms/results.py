@@ -32,7 +32,7 @@ class Results:
     async def show(self, request: Request) -> Response:
         """The table; its script asks for this page again and again."""
         try:
-            room, attempts = await run_in_threadpool(self._read, request.cookies.get(COOKIE, ""))
+            room, attempts = await run_in_threadpool(self._read, request.cookies.get(COOKIE, ""), answers=False)
         except ClassroomUnavailable as error:
             return results_page(request, 503, problem=str(error))
         titles = await run_in_threadpool(lambda: self._titles)
@@ -64,7 +64,7 @@ class Results:
         # The mark at the beginning tells spreadsheets which letters these are.
         return Response(text.encode("utf-8-sig"), media_type="text/csv; charset=utf-8", headers=headers)
 
-    def _read(self, token: str) -> tuple[OpenRoom, list[Attempt]]:
+    def _read(self, token: str, answers: bool = True) -> tuple[OpenRoom, list[Attempt]]:
         """The room of the teacher's cookie and its attempts; raises 403."""
         from app.classroom.results.store import attempts_of  # imports SQLAlchemy
 
@@ -74,7 +74,7 @@ class Results:
             raise ProblemError(
                 403, "forbidden", "Only the teacher may see the results.", "Open the teacher's link."
             )
-        return room, attempts_of(self._hub.database, room.id)
+        return room, attempts_of(self._hub.database, room.id, answers)
 
     @cached_property
     def _titles(self) -> dict[str, str]:
