@@ -2,89 +2,30 @@
 
 from __future__ import annotations
 
-import os
-import shutil
-import socket
-import subprocess
-import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
-from sqlalchemy import create_engine, select, text
+from postgres_server import Postgres, running
+from sqlalchemy import select
 from test_hub import attempt, nothing, until
 
 from app.classroom import ClassroomUnavailable, Hub, Ticket
 from app.classroom.tables import Attempt, Base
 
-NOBODY = 65534  # PostgreSQL does not run as root
-
-
-class Postgres:
-    """A server on a free port, with its data in a folder of its own."""
-
-    def __init__(self, programs: Path, folder: Path) -> None:
-        with socket.create_server(("127.0.0.1", 0)) as free:
-            self.port = free.getsockname()[1]
-        self._programs, self._folder = programs, folder
-        self._user = {"user": NOBODY, "group": NOBODY, "extra_groups": []} if os.geteuid() == 0 else {}
-        if self._user:
-            os.chown(folder, NOBODY, NOBODY)
-        self._run("initdb", "-D", folder / "data", "-U", "kinboard", "--auth=trust", "--no-sync", "-E", "UTF8")
-
-    def _run(self, program: str, *arguments: object) -> None:
-        command = [str(self._programs / program), *map(str, arguments)]
-        with (self._folder / "log").open("a") as log:
-            subprocess.run(
-                command, check=True, cwd=self._folder, stdin=subprocess.DEVNULL, stdout=log, stderr=log,
-                timeout=60, **self._user,
-            )  # fmt: skip
-
-    def start(self) -> None:
-        options = f"-p {self.port} -c listen_addresses=127.0.0.1 -c unix_socket_directories='' -c fsync=off"
-        self._run(
-            "pg_ctl", "-D", self._folder / "data", "-w", "-o", options, "-l", self._folder / "server", "start"
-        )
-
-    def stop(self) -> None:
-        """As a power failure would: without saying goodbye."""
-        self._run("pg_ctl", "-D", self._folder / "data", "-w", "-m", "immediate", "stop")
-
-    def url(self, name: str) -> str:
-        return f"postgresql://kinboard@127.0.0.1:{self.port}/{name}"
-
-
-def programs() -> Path:
-    """The folder of PostgreSQL's programs: in the PATH, or where Debian has them."""
-    found = shutil.which("initdb")
-    folders = [Path(found).parent] if found else sorted(Path("/usr/lib/postgresql").glob("*/bin"))
-    assert folders, "these tests need PostgreSQL: apt-get install postgresql"
-    return folders[-1]
-
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[Postgres]:
-    with tempfile.TemporaryDirectory(prefix="kinboard-postgres-") as folder:
-        server = Postgres(programs(), Path(folder))
-        server.start()
+    with running() as server:
         yield server
-        server.stop()
 
 
 @pytest.fixture
 def database(server, request) -> str:
     """A new database's URL."""
-    name = f"t{abs(hash(request.node.name))}"
-    engine = create_engine(
-        server.url("postgres").replace("postgresql:", "postgresql+psycopg:"), isolation_level="AUTOCOMMIT"
-    )
-    with engine.connect() as connection:
-        connection.execute(text(f"CREATE DATABASE {name}"))
-    engine.dispose()
-    return server.url(name)
+    return server.create(f"t{abs(hash(request.node.name))}")
 
 
 @pytest.fixture
@@ -110,10 +51,8 @@ def test_a_class_on_two_machines(hubs):
     student.vote(1)
     student.tell_page("mine")
     confirmed = student.submit(attempt())
-    until(
-        lambda: teacher.room.poll.votes == (0, 1) and teacher.room.seats and teacher.room.seats[0].page == "mine"
-    )
-    assert teacher.room.seats[0].solved
+    until(lambda: teacher.room.poll.votes == (0, 1) and teacher.room.seats)
+    until(lambda: teacher.room.seats[0].page == "mine" and teacher.room.seats[0].solved)
     assert there.rooms.find(seat).students == 1
     with here.database.read() as connection:
         assert connection.scalars(select(Attempt.id)).all() == [confirmed.id]

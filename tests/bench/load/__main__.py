@@ -8,7 +8,8 @@ import json
 import sys
 from pathlib import Path
 
-sys.path[:0] = [str(Path(__file__).parents[3]), str(Path(__file__).parents[1])]
+ROOT = Path(__file__).parents[3]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests" / "bench")]
 
 from app.bench.run import machine  # noqa: E402
 
@@ -16,7 +17,7 @@ MODES = {
     "rest": "requests a second beside an empty endpoint",
     "drag": "until the picture answers a drag, for 1, 10, 30 and 100 visitors",
     "play": "pictures of 1, 10 and 30 visitors who play a program, beside as many who drag",
-    "lesson": "a teacher who drags until 30 students' pictures answer, and a wall of their arms",
+    "lesson": "a teacher whom 30 students follow, a wall of their arms, 60 who join, databases of rooms",
     "storm": "200 visitors at once",
     "cloud": "points a second: kernel and its steps, generator, REST, viewer",
     "soak": "visitors who come, drag, draw and go, over and over",

@@ -45,7 +45,7 @@ class Service:
 
     def usage(self) -> Usage:
         """Everything at this moment."""
-        found = [_usage(process) for process in _family(self.pid)]
+        found = [_usage(process) for process in family(self.pid)]
         return Usage(
             sum(u.seconds for u in found),
             sum(u.memory for u in found),
@@ -55,7 +55,7 @@ class Service:
 
     def resident(self) -> int:
         """Resident bytes of all processes: cheaper to find out than `usage`."""
-        return sum(process.memory_info().rss for process in _family(self.pid))
+        return sum(process.memory_info().rss for process in family(self.pid))
 
     def loop_seconds(self) -> float:
         """Processor time that the event loop has spent that serves visitors; of one worker."""
@@ -66,7 +66,7 @@ class Service:
 
     def seconds(self) -> float:
         """Processor time spent so far: cheaper to find out than `usage`."""
-        return sum(_seconds(process) for process in _family(self.pid))
+        return sum(seconds_of(process) for process in family(self.pid))
 
 
 @contextmanager
@@ -126,16 +126,17 @@ def _wait_until_idle(service: Service) -> None:
 _direct = urllib.request.build_opener(urllib.request.ProxyHandler({}))
 
 
-def _family(pid: int) -> list[psutil.Process]:
+def family(pid: int) -> list[psutil.Process]:
     """A process and all below it."""
     parent = psutil.Process(pid)
     return [parent, *parent.children(recursive=True)]
 
 
-def _seconds(process: psutil.Process) -> float:
+def seconds_of(process: psutil.Process) -> float:
+    """Processor time that a process has spent."""
     times = process.cpu_times()
     return float(times.user + times.system)
 
 
 def _usage(process: psutil.Process) -> Usage:
-    return Usage(_seconds(process), process.memory_full_info().pss, process.num_threads(), process.num_fds())
+    return Usage(seconds_of(process), process.memory_full_info().pss, process.num_threads(), process.num_fds())

@@ -1,4 +1,4 @@
-"""A class: how long until the students' pictures show a teacher's drag, and what a wall of their arms costs."""
+"""A class: until the students' pictures show a teacher's drag, a wall of their arms, joining, and databases."""
 
 from __future__ import annotations
 
@@ -12,27 +12,34 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from postgres_server import running as running_postgres
+
 from app.classroom import COOKIE, Hub
 from load import percentile, table
 from load.drag import HZ
+from load.lesson import databases
+from load.lesson.joining import join
 from load.play import JOINT, MESSAGES
 from load.service import Service, serve
 from load.visitor import Visitor
 
+JOINING = 5.0  # s in which all come
 WALL_HZ = 5.0
 UP = 2.0  # s until a page has taken what was pressed
 PATIENCE = 3.0  # s for the last pictures
 
 
 @contextmanager
-def served(workers: int) -> Iterator[tuple[Service, Hub]]:
-    """A service with an empty database of rooms, and our own door to that database."""
-    with tempfile.TemporaryDirectory(prefix="kinboard-lesson-") as data, serve(workers, data=data) as service:
-        hub = Hub(Path(data))
-        try:
-            yield service, hub
-        finally:
-            hub.close()
+def served(workers: int, url: str | None = None) -> Iterator[tuple[Service, Hub]]:
+    """A service with an empty database of rooms, SQLite or the one of this URL, and our own door to it."""
+    with tempfile.TemporaryDirectory(prefix="kinboard-lesson-") as data:
+        settings = {"data": data} if url is None else {"data": data, "database_url": url}
+        with serve(workers, **settings) as service:
+            hub = Hub(Path(data), url)
+            try:
+                yield service, hub
+            finally:
+                hub.close()
 
 
 async def members(service: Service, hub: Hub, count: int) -> list[Visitor]:
@@ -136,10 +143,21 @@ async def wall(service: Service, hub: Hub, count: int, seconds: float) -> list[d
 def run(quick: bool, workers: int, counts: list[int] | None = None) -> dict[str, Any]:
     """The tables on stdout, and what is in them."""
     count, seconds = (counts or [5 if quick else 30])[0], 3.0 if quick else 15.0
-    with served(workers) as (service, hub):
-        row = asyncio.run(follow(service, hub, count, seconds))
-        print(table(f"lesson: a teacher drags at {HZ:g} events/s for {seconds:g} s, {workers} worker(s)", [row]))
-    with served(workers) as (service, hub):
-        rows = asyncio.run(wall(service, hub, count, seconds))
-        print(table(f"lesson: {count} students move at {WALL_HZ:g} Hz for {seconds:g} s", rows))
-    return {"follow": row, "wall": rows}
+    found: dict[str, Any] = {}
+    drags = f"lesson: a teacher drags at {HZ:g} events/s for {seconds:g} s, {workers} worker(s)"
+    with served(workers) as running:
+        found["follow"] = asyncio.run(follow(*running, count, seconds))
+        print(table(drags, [found["follow"]]))
+    with served(workers) as running:
+        found["wall"] = asyncio.run(wall(*running, count, seconds))
+        print(table(f"lesson: {count} students move at {WALL_HZ:g} Hz for {seconds:g} s", found["wall"]))
+    with served(workers) as running:
+        found["join"] = asyncio.run(join(*running, 2 * count, JOINING))
+        print(table(f"lesson: students join within {JOINING:g} s", [found["join"]]))
+    with running_postgres() as server:
+        found["databases"] = databases.compare(server, seconds)
+        print(table(f"lesson: a page sent {HZ:g} times a second, from process to process", found["databases"]))
+        with served(workers, server.create("lesson")) as running:
+            found["follow, PostgreSQL"] = asyncio.run(follow(*running, count, seconds))
+            print(table(f"{drags}, PostgreSQL", [found["follow, PostgreSQL"]]))
+    return found
