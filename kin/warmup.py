@@ -22,7 +22,7 @@ from kin.files import builtin_robots
 from kin.fk import fk, fk_positions, jacobian, link_frames, manipulability
 from kin.ik import solve_ik
 from kin.ik.options import Task
-from kin.kernels.cached import is_cached
+from kin.kernels.cache import is_cached
 from kin.kernels.fk import fk_one
 from kin.motion import JointTarget, Lin, PoseTarget, Ptp, plan_motion
 from kin.path import solve_path

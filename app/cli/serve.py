@@ -9,7 +9,7 @@ from argparse import Namespace
 
 from pydantic import ValidationError
 
-from app.cli.startup import hidden, no_collections, shared_metrics
+from app.cli.startup import import_service, shared_metrics
 from app.shared.settings import Settings
 
 FLAGS = ("host", "port", "root_path", "robots", "read_only", "workers", "pin")  # they override the environment
@@ -31,14 +31,8 @@ def run(arguments: Namespace) -> int:
             print(f"kinboard: {where}: got {got}: {item['msg']}", file=sys.stderr)
         return 2
     with shared_metrics() if settings.workers + settings.rest_workers > 1 else contextlib.nullcontext():
-        with no_collections():
-            import app.service.main as service
-
-            with hidden("scipy"):  # numba would import its linear algebra, which no kernel calls, in each process
-                import numba.np.arraymath  # noqa: F401
-
-            gc.freeze()  # later collections skip what has been imported
+        run_service = import_service()
         try:
-            return service.run(settings, open_browser=arguments.open)
+            return run_service(settings, open_browser=arguments.open)
         finally:
             gc.unfreeze()

@@ -366,8 +366,8 @@ def test_damaged_machine_code_is_discarded(tmp_path, ending):
 def test_machine_code_of_another_version_is_replaced_without_a_word(tmp_path):
     assert twice(tmp_path)["hits"] == 0
     earlier = """
-        import kin.kernels.compile as compile
-        compile.fingerprint = lambda file: "another"
+        import kin.kernels.cache as cache
+        cache.fingerprint = lambda file: "another"
     """
     found = twice(tmp_path, textwrap.dedent(earlier).replace("\n", "\n        "))
     assert found == {"result": 3.0, "hits": 0, "warnings": []}

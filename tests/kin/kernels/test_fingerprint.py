@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from kin.kernels import compile as compiling
+from kin.kernels import cache as compiling
 
 FILES = {
     "kin/kernel.py": "from kin.solver import solve\nfrom kin import constants\n",

@@ -16,7 +16,7 @@ def test_kernels_are_compiled_again_when_a_kernel_they_call_has_changed(tmp_path
     package = tmp_path / "kin"
     shutil.copytree(Path(kin.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
     program = (
-        "import numpy as np; from kin.ik.candidates import select; from kin.kernels.cached import is_cached; "
+        "import numpy as np; from kin.ik.candidates import select; from kin.kernels.cache import is_cached; "
         "before = is_cached(select); "
         "rows, count = select(np.array([[0.0], [1e-3]]), np.array([1.0, 2.0])); "
         "print(count, sum(select.stats.cache_hits.values()), before, is_cached(select))"
