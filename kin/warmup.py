@@ -21,6 +21,7 @@ from kin.collision import Obstacle, clearance, nearest_links, self_distance
 from kin.files import builtin_robots
 from kin.fk import fk, fk_positions, jacobian, link_frames, manipulability
 from kin.ik import solve_ik
+from kin.ik.candidates import unchecked
 from kin.ik.options import Task
 from kin.kernels.cache import is_cached
 from kin.kernels.fk import fk_one
@@ -43,9 +44,14 @@ from kin.workspace.capability.kernels import raise_best
 TASKS: tuple[Task, ...] = ("pose", "approach")
 
 
-def warm_up_first() -> None:
-    """Load or compile what moves the first arm."""
-    _move(_first())
+def warm_up_first(*, backwards: bool = False) -> None:
+    """Load or compile what moves the first arm.
+
+    A second process that goes backwards compiles the solver meanwhile, which takes as long as all else.
+    """
+    steps = _moves(_first())
+    for step in reversed(steps) if backwards else steps:
+        step()
 
 
 def warm_up() -> None:
@@ -111,13 +117,19 @@ def _first() -> Robot:
 
 def _move(robot: Robot) -> None:
     """The calls behind dragging a slider or the target."""
+    for step in _moves(robot):
+        step()
+
+
+def _moves(robot: Robot) -> list[Callable[[], object]]:
     q = robot.q_home.copy()
-    T = fk(robot, q)
-    link_frames(robot, q)
-    jacobian(robot, q)
-    manipulability(robot, q)
-    for task in TASKS:
-        _ = solve_ik(robot, T, task=task).redundancy  # made when it is read
+
+    def solve(task: Task) -> None:
+        _ = solve_ik(robot, fk(robot, q), task=task).redundancy  # made when it is read
+
+    steps: list[Callable[[], object]] = [partial(each, robot, q) for each in (fk, link_frames, jacobian)]
+    steps += [partial(manipulability, robot, q), unchecked]
+    return [*steps, *(partial(solve, task) for task in TASKS)]
 
 
 def _call_all(robot: Robot) -> None:

@@ -6,10 +6,11 @@ import contextlib
 import gc
 import sys
 from argparse import Namespace
+from collections.abc import Callable
 
 from pydantic import ValidationError
 
-from app.cli.startup import import_service, shared_metrics
+from app.cli.startup import hidden, no_collections, shared_metrics
 from app.shared.settings import Settings
 
 FLAGS = ("host", "port", "root_path", "robots", "read_only", "workers", "pin")  # they override the environment
@@ -36,3 +37,15 @@ def run(arguments: Namespace) -> int:
             return run_service(settings, open_browser=arguments.open)
         finally:
             gc.unfreeze()
+
+
+def import_service() -> Callable[..., int]:
+    """What runs the service (:func:`app.service.main.run`); later collections skip what it has imported.
+
+    numba imports SciPy to look at its version. No kernel calls it.
+    """
+    with no_collections(), hidden("scipy"):
+        from app.service.main import run
+
+        gc.freeze()
+    return run

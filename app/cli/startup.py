@@ -1,4 +1,4 @@
-"""What makes commands and the service start fast. Imports nothing heavy at first."""
+"""What makes a short command start fast. Imports nothing heavy."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import gc
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 FOLDER_OF_COUNTS = "PROMETHEUS_MULTIPROC_DIR"  # read by prometheus_client when it is imported
@@ -35,18 +35,6 @@ def hidden(package: str) -> Iterator[None]:
         yield
     finally:
         del sys.modules[package]
-
-
-def import_service() -> Callable[..., int]:
-    """What runs the service (:func:`app.service.main.run`); later collections skip what it has imported.
-
-    numba imports SciPy to look at its version. No kernel calls it.
-    """
-    with no_collections(), hidden("scipy"):
-        from app.service.main import run
-
-        gc.freeze()
-    return run
 
 
 @contextmanager

@@ -4,7 +4,7 @@ The landing page is served at once and shows "warming up" until ``/readyz`` repo
 numba's cache in milliseconds, or are compiled, which takes seconds. The service is ready when those of the first
 arm are; all others are compiled after that. A compiler keeps a gigabyte of memory as long as its process lives:
 another process compiles, and ends. Of several processes of a service the first one has the kernels compiled, and
-the others wait and load them.
+the others wait and load them. Those of the first arm are compiled by two such processes at once.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from app.shared.maps import Maps
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.shared.summaries import Summaries
-from app.shared.threads import lower_priority
+from app.shared.threads import lower_priority, processors, unpin
 from kin.warmup import compiled, rest_compiled, warm_up_first, warm_up_rest
 
 if TYPE_CHECKING:
@@ -113,7 +113,9 @@ class Startup:
             self._start_viewer()
             self._wait_for_first(Phase.READY)
             if not compiled():
-                self._compile_apart(warm_up_first)
+                unpin()  # also what this thread starts
+                second = ["warm_up_first(backwards=True)"] if processors() > 1 else []
+                self._compile_apart("warm_up_first()", *second)
             if not self._stopping.is_set():
                 warm_up_first()
                 if self._on_ready is not None:
@@ -143,7 +145,7 @@ class Startup:
         self._wait_for_first(Phase.COMPLETE)
         try:
             if not rest_compiled():
-                self._compile_apart(warm_up_rest)
+                self._compile_apart("warm_up_rest()")  # one: a compiler of all kernels needs a gigabyte
             warm_up_rest(self._stopping.is_set)
             if self._viewer is not None and not self._stopping.is_set():
                 importlib.import_module("trimesh.creation")  # before a visitor opens a lesson that draws a sphere
@@ -153,24 +155,16 @@ class Startup:
             # Requests that need this kernel fail; everything else works.
             logger.exception("a kernel could not be compiled ahead of its use")
 
-    def _compile_apart(self, step: Callable[[], None]) -> None:
-        """Let another process fill the cache; what it leaves out, for whatever reason, this one compiles."""
-        program = f"from {step.__module__} import {step.__name__} as step; step()"
-        # In a session of its own it gets no Ctrl-C.
-        child = subprocess.Popen(
-            [sys.executable, "-c", program],
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        )
+    def _compile_apart(self, *calls: str) -> None:
+        """Let other processes, one per call, fill the cache; what they leave out this one compiles."""
+        children = [_start(f"from kin import warmup; warmup.{call}") for call in calls]
         try:
-            while child.poll() is None and not self._stopping.wait(STEP):
+            while any(child.poll() is None for child in children) and not self._stopping.wait(STEP):
                 pass
         finally:
-            child.kill()
-            child.wait()
+            for child in children:
+                child.kill()
+                child.wait()
 
     def _start_viewer(self) -> None:
         if self._member is not None and self._member.role is Role.REST:
@@ -186,3 +180,15 @@ class Startup:
             self._viewer = self._bridge.viewer = viewer
         finally:
             self._viewer_settled.set()
+
+
+def _start(program: str) -> subprocess.Popen[bytes]:
+    """A Python process in a session of its own, so that it gets no Ctrl-C."""
+    return subprocess.Popen(
+        [sys.executable, "-c", program],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )

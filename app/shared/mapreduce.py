@@ -11,13 +11,13 @@ clusters and networks that you trust.
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from functools import partial
 from typing import Any
 
+from app.shared.threads import processors
 from kin import CapabilityBlock, CapabilityGrid, InputError, capability_block
 
 _CONNECT = 10.0  # s to find the scheduler
@@ -34,7 +34,7 @@ def run_local(
         threads: how many; by default one per available processor.
         begin: called by each thread first, for instance to lower its priority.
     """
-    pool = ThreadPoolExecutor(threads or _processors(), thread_name_prefix="capability", initializer=begin)
+    pool = ThreadPoolExecutor(threads or processors(), thread_name_prefix="capability", initializer=begin)
     try:
         futures = [pool.submit(capability_block, grid, number) for number in range(len(grid.blocks))]
         for future in as_completed(futures):
@@ -82,11 +82,3 @@ def run_dask(grid: CapabilityGrid, address: str) -> Iterator[CapabilityBlock]:
             raise InputError("dask", address, f"workers that have Kinboard and stay alive ({error})") from None
         finally:
             client.cancel(futures)
-
-
-def _processors() -> int:
-    """Number of processors that this process may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not on Linux
-        return os.cpu_count() or 1

@@ -90,6 +90,22 @@ def test_warm_up_rest_can_be_cancelled_between_kernels(monkeypatch):
     assert steps[12:] == list(range(9))[::-1]
 
 
+def test_two_processes_share_the_kernels_of_the_first_arm():
+    """One ends with the solver, the other begins with it."""
+    program = (
+        "import sys; from kin import warmup\n"
+        "from kin.ik.candidates import measure_and_sort; from kin.solvers.wrist5.branches import solve\n"
+        "done = []; step = lambda number, act: (act(), done.append((number, len(solve.overloads) > 0)))\n"
+        "moves = warmup._moves\n"
+        "warmup._moves = lambda robot: [lambda i=i, act=act: step(i, act) for i, act in enumerate(moves(robot))]\n"
+        "warmup.warm_up_first(backwards=sys.argv[1] == 'backwards')\n"
+        "print(*(number for number, solved in done if not solved), len(measure_and_sort.overloads))"
+    )
+    for way, before_solver in (("forwards", "0 1 2 3 4 1"), ("backwards", "1")):
+        done = subprocess.run([sys.executable, "-c", program, way], capture_output=True, text=True, check=True)
+        assert done.stdout.strip() == before_solver
+
+
 def test_kernels_of_all_arms_are_compiled_before_the_service_is_ready(monkeypatch):
     asked: list[tuple[str, str]] = []
     arms = [robot.id for robot in warmup.one_of_each_family()]

@@ -71,6 +71,14 @@ def end_process(code: int) -> NoReturn:
     os._exit(code)
 
 
+def processors() -> int:
+    """Number of processors that this thread may use: one where it is pinned."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # not on Linux
+        return os.cpu_count() or 1
+
+
 def background_threads() -> int:
     """How many threads a background computation uses: all processors but one."""
     return max(1, (os.cpu_count() or 2) - 1)

@@ -29,7 +29,7 @@ def test_a_service_moves_its_first_arm_without_what_it_does_not_need() -> None:
     warm_up_first()  # what is not in the cache yet is compiled here
     unneeded = {"scipy", "trimesh", "cffi", "numba.np.arraymath", "numba.cpython.unicode", "numba.typed.typedlist"}
     program = (
-        "import sys; from app.cli.startup import import_service; import_service()\n"
+        "import sys; from app.cli.serve import import_service; import_service()\n"
         "import app.viewer.server; from kin.warmup import warm_up_first; warm_up_first()\n"
         f"print(sorted({unneeded} & set(sys.modules)))"
     )

@@ -77,27 +77,28 @@ def test_during_warm_up_pages_are_served_and_readyz_reports_warming(monkeypatch)
         assert client.get("/readyz").status_code == 200
 
 
-def test_missing_kernels_are_compiled_by_another_process_which_a_stop_ends(monkeypatch):
+@pytest.mark.parametrize("processors", [1, 2])
+def test_missing_kernels_are_compiled_by_other_processes_which_a_stop_ends(monkeypatch, processors):
     popen = subprocess.Popen
     started: list[subprocess.Popen] = []
     steps: list[str] = []
 
     def start(command, **options):
-        started.append(popen(["sleep", "300"] if len(started) else ["true"], **options))
+        started.append(popen(["sleep", "300"] if "rest" in command[-1] else ["true"], **options))
         steps.append(command[-1])
         return started[-1]
 
     monkeypatch.setattr(app.service.startup.subprocess, "Popen", start)
     monkeypatch.setattr(app.service.startup, "compiled", lambda: False)
     monkeypatch.setattr(app.service.startup, "rest_compiled", lambda: False)
+    monkeypatch.setattr(app.service.startup, "processors", lambda: processors)
     with TestClient(create_app(Settings())) as client:
         wait_for(lambda: client.get("/readyz").status_code == 200, 120)
-        wait_for(lambda: len(started) == 2)
-        assert started[1].poll() is None
-    assert steps == [
-        f"from kin.warmup import {name} as step; step()" for name in ("warm_up_first", "warm_up_rest")
-    ]
-    wait_for(lambda: started[1].poll() is not None)
+        wait_for(lambda: steps[-1:] == ["from kin import warmup; warmup.warm_up_rest()"])
+        assert started[-1].poll() is None
+    first = ["warm_up_first()", "warm_up_first(backwards=True)"][:processors]
+    assert steps[:-1] == [f"from kin import warmup; warmup.{call}" for call in first]
+    wait_for(lambda: started[-1].poll() is not None)
 
 
 def test_rest_is_served_when_the_viewer_fails(monkeypatch, caplog):
