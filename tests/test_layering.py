@@ -25,7 +25,7 @@ MODEL = {
 }
 RULES: dict[str, set[str]] = {
     "kin": {"kin", "numpy", "numba"},
-    "kin/kernels": {"numpy", "numba", "kin.kernels", "kin.tolerances", "kin.transforms"},
+    "kin/kernels": {"numpy", "numba", "llvmlite", "kin.kernels", "kin.tolerances", "kin.transforms"},
     "kin/files": {"numpy", "kin.dh", "kin.files", *MODEL},
     "kin/solvers": {"numpy", "kin.dh", "kin.kernels", "kin.solvers", *MODEL - {"kin.singularity"}},
     "kin/ik": {"numpy", "kin.collision", "kin.kernels", "kin.solvers", "kin.ik", *MODEL},
@@ -113,7 +113,7 @@ RULES: dict[str, set[str]] = {
     "app/cli/xacro/expansion.py": {"xacro", "xacrodoc", "yaml", "app.cli.xacro"},
     "app/cli/xacro/expressions.py": {"xacro"},
     "app/cli/startup.py": set(),
-    "app/cli/serve.py": {"numba", "pydantic", "app.cli.startup", "app.service.main", "app.shared"},
+    "app/cli/serve.py": {"pydantic", "app.cli.startup", "app.service.main", "app.shared"},
 }
 
 MODULES = sorted(
