@@ -11,6 +11,7 @@ from kin.fk import jacobian
 from kin.robot import Robot
 from kin.solvers import rolled
 from kin.solvers.canonical import at_every_turn, signed_box, turn_around
+from kin.solvers.common import NEAR
 from kin.solvers.contract import (
     APPROACH,
     POSE,
@@ -25,7 +26,8 @@ from kin.solvers.contract import (
 from kin.solvers.names import Names, Part, bent, eight, flipped, front_or_back, names_of, stance_of
 from kin.solvers.offset7.branches import branches_many, branches_one, chain_values, forearm, gap_of
 from kin.solvers.offset7.geometry import SIN2, Geometry, geometry_of
-from kin.solvers.offset7.ranges import SAMPLES, feasible
+from kin.solvers.offset7.places import SAMPLES
+from kin.solvers.offset7.ranges import feasible, rows_at
 from kin.solvers.singular import Singularity, by_jacobian, those_within
 from kin.transforms import Array
 
@@ -100,15 +102,12 @@ class Offset7(ClosedForm):
         if math.isnan(requested) or p.respect_limits:
             count = feasible(params, p.T, box, span, min(max(wanted, span[0]), span[1]), arcs, chosen)
         out, values = np.full((8, 7), math.nan), np.full((8, 1), math.nan)
-        rows = np.empty((8, 7))
         if not math.isnan(requested):
             branches_one(params, p.T, requested, p.seed, out)
             values[~np.isnan(out[:, 0]), 0] = requested
         else:
-            for k, value in enumerate(chosen.tolist()):
-                if not math.isnan(value):
-                    branches_one(params, p.T, value, p.seed, rows)
-                    out[k], values[k, 0] = rows[k], value
+            rows_at(params, p.T, box[NEAR], chosen, out)
+            values[:, 0] = chosen
         found = at_every_turn(arcs[:count], low, high)
         gap, obstacle = 0.0, None
         if np.isnan(out[:, 0]).all():

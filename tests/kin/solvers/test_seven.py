@@ -165,6 +165,46 @@ def test_ranges_agree_with_a_dense_sampling(robot):
             assert (listed == inside[:, k])[~near].all()
 
 
+def agrees_with_samples(robot: Robot, T, low: float, high: float, count: int = 4001) -> int:
+    """How many samples in [low, high] have another feasibility than the arcs say, those beside an end aside."""
+    values = np.linspace(low, high, count)
+    arcs = candidates(robot, T, robot.q_home).arcs[0]
+    rows = kin.ik_branches(robot, np.broadcast_to(T, (count, 4, 4)), values)
+    inside = (robot.lower + (rows - robot.lower) % (2 * PI) <= robot.upper + 1e-9).all(axis=2)
+    wrong = 0
+    for k in range(8):
+        own = arcs[arcs[:, 0] == k][:, 1:]
+        listed = ((values[:, None] >= own[:, 0]) & (values[:, None] <= own[:, 1])).any(axis=1)
+        near = (np.abs(values[:, None] - own.reshape(1, -1)) < 1e-6).any(axis=1)
+        wrong += int((listed != inside[:, k])[~near].sum())
+    return wrong
+
+
+@pytest.mark.parametrize(
+    "q",
+    [
+        # Joint 3 swings past its limit and back within 0.7°, near a singularity of the wrist.
+        (1.7433, -0.1791, 1.3295, -3.0052, 0.0422, -3.0468, -0.0408),
+        (-2.2914, -0.357, 1.6404, -2.132, 0.3279, 0.1056, -2.1715),
+        (1.6057, -1.6426, -2.6017, -3.0676, 1.6966, 1.0596, -2.0583),
+        (0.3625, -0.1892, 1.5119, -0.7032, 0.4127, 2.2902, 0.0994),
+    ],
+)
+def test_narrow_gaps_between_ranges_are_found(q):
+    assert agrees_with_samples(PANDA, kin.fk(PANDA, np.array(q)), PANDA.lower[6], PANDA.upper[6], 20001) == 0
+
+
+@named
+def test_ranges_agree_with_samples_near_singular_wrists(robot):
+    rng = np.random.default_rng(11)
+    given = closed_form_of(robot).given
+    low, high = max(robot.lower[given], -PI), min(robot.upper[given], PI)
+    for size in (0.0, 1e-3, 1e-2, 0.1):
+        q = robot.random_q(rng)
+        q[1 if given == 6 else 5] = size  # the middle joint of the spherical end
+        assert agrees_with_samples(robot, kin.fk(robot, q), low, high) == 0, size
+
+
 def test_a_self_motion_ends_at_a_limit_or_where_it_turns_back():
     rng = np.random.default_rng(5)
     ended = set()

@@ -1,0 +1,131 @@
+"""Kernels for the values of the given joint at which branches are sampled, and for where branches exist.
+
+How far inside the arm's reach a branch is, its *room*, depends on the elbow alone and costs little.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kin.kernels.compile import jit
+from kin.solvers.offset7.branches import distances, seen, two_roots
+from kin.solvers.offset7.geometry import OFFSET, SIGN
+from kin.solvers.offset7.lanes import rooms
+from kin.solvers.offset7.search import EITHER, LEVEL, Target, Whole, edge, peak, turns
+from kin.transforms import Array
+
+SAMPLES = 96  # of a whole turn
+# How far from an end of the reach branches are looked at, and the most places where.
+_BESIDE = (1e-9, -1e-9, 1e-5, -1e-5, 1e-4, -1e-4, 1e-3, -1e-3, 4e-3, -4e-3, 0.015, -0.015)
+_MOST_ENDS = 64
+_MOST_TURNS = 64  # peaks and dips of the room
+# Places for all of these; if rounding makes up edges, the last ones have no places beside them.
+_RESERVED = 512
+# Shares of an interval between samples, from where a branch begins to exist.
+_FROM_EDGE = np.array([1e-4, 1e-3, 0.01, 0.03, 0.08, 0.15, 0.25, 0.4, 0.6, 0.8])
+
+
+@jit
+def marks_of(params: Array, T: Array, span: tuple[float, float], wanted: float) -> Array:
+    """Values over the range of the given joint, the wanted one, and those beside ends of the reach; sorted."""
+    low, high = span
+    n = max(8, math.ceil(SAMPLES * (high - low) / (2.0 * math.pi))) + 1 if high > low else 1
+    every = np.empty(n + 1 + _MOST_ENDS)
+    for i in range(n):
+        every[i] = low + (high - low) * i / (n - 1) if n > 1 else low
+    if n > 1:
+        n = _insert(every, n, min(max(wanted, low), high))
+        n = _insert_ends(params, T, span, every, n)
+    return every[:n]
+
+
+@jit
+def _insert(marks: Array, n: int, value: float) -> int:
+    """Insert a value into the n sorted marks, if it is not there and there is room; returns their number."""
+    i = n
+    while i > 0 and marks[i - 1] > value:
+        i -= 1
+    if n == marks.shape[0] or (i > 0 and marks[i - 1] == value):
+        return n
+    for j in range(n, i, -1):
+        marks[j] = marks[j - 1]
+    marks[i] = value
+    return n + 1
+
+
+@jit
+def _insert_ends(params: Array, T: Array, span: tuple[float, float], marks: Array, n: int) -> int:
+    """Insert values beside those where the wrist centre is as far or as near as it can be; returns the number.
+
+    Its squared distance is a sinusoid of the given joint's angle.
+    """
+    low, high = span
+    M, square, roots = np.empty((3, 4)), np.empty(3), np.empty(2)
+    for i in range(3):
+        seen(params, T, 2.0 * math.pi * i / 3.0, M)
+        square[i] = M[0, 3] * M[0, 3] + M[1, 3] * M[1, 3] + M[2, 3] * M[2, 3]
+    mean = (square[0] + square[1] + square[2]) / 3.0
+    cosine, sine = square[0] - mean, (square[1] - square[2]) / math.sqrt(3.0)
+    constant, a, b = distances(params)
+    for end in range(2):
+        bound = constant + (2.0 - 4.0 * end) * math.sqrt(a * a + b * b)
+        if two_roots(cosine, sine, bound - mean, 0.0, roots) < 0.0 or math.isnan(roots[0]):
+            continue
+        for i in range(2):
+            first = params[SIGN] * (roots[i] - params[OFFSET])
+            first += 2.0 * math.pi * math.ceil((low - first) / (2.0 * math.pi))
+            for beside in _BESIDE:
+                if low <= first + beside <= high:
+                    n = _insert(marks, n, first + beside)
+    return n
+
+
+@jit
+def places_of(target: Target, elbow: float, marks: Array, out: Array, coarse: Whole) -> int:
+    """out ``(2, m)`` ← values at which branches are sampled, and the room there; returns their number.
+
+    Those are the marks ``(n,)``, and values beside where the branches of the elbow begin to exist.
+    coarse ``(n,)`` ← the places of the marks.
+    """
+    n = marks.shape[0]
+    every, room, level = np.empty(n + _MOST_TURNS), np.empty(n + _MOST_TURNS), np.empty(n + _MOST_TURNS)
+    for i in range(n):
+        every[i] = marks[i]
+    rooms(target[3], every[:n], elbow, room, level)
+    count = n
+    for i in range(1, n - 1):
+        for what in (LEVEL, EITHER):
+            f = level if what == LEVEL else room
+            sense = turns(marks, f, i)
+            if sense != 0.0:
+                x, top = peak(target, what, elbow, marks[i - 1], marks[i + 1], sense)
+                if (top >= 0.0) != (f[i] >= 0.0):
+                    count = _insert(every, count, x)
+    rooms(target[3], every[:count], elbow, room, level)
+    m = j = 0
+    for i in range(count):
+        m = _append(target, elbow, every[i], room[i], out, m, level)
+        if j < n and every[i] == marks[j]:
+            coarse[j] = m - 1
+            j += 1
+    return m
+
+
+@jit
+def _append(target: Target, elbow: float, value: float, room: float, out: Array, m: int, scratch: Array) -> int:
+    """Append a value and its room to the places ``(2, m)``, after those of an edge between it and the last."""
+    if m > 0 and (out[1, m - 1] >= 0.0) != (room >= 0.0) and m < out.shape[1] - _RESERVED:
+        last, this = (out[0, m - 1], out[1, m - 1]), (value, room)
+        inside, outside = (last, this) if room < 0.0 else (this, last)
+        x, y = edge(target, elbow, inside, outside)
+        count = _FROM_EDGE.shape[0]
+        for j in range(count):
+            out[0, m + (count - 1 - j if room < 0.0 else j + 2)] = x + _FROM_EDGE[j] * (inside[0] - x)
+        out[0, m + (count if room < 0.0 else 1)] = x
+        out[0, m + (count + 1 if room < 0.0 else 0)] = y
+        rooms(target[3], out[0, m : m + count + 2], elbow, out[1, m:], scratch)
+        m += count + 2
+    out[0, m], out[1, m] = value, room
+    return m + 1
