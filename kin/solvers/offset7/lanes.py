@@ -114,12 +114,13 @@ def _lane(
     c2, s2 = cosine / (far + _TINY), sine / (far + _TINY)
     level = level if wide >= _SINGULAR else (1.0 if abs(wz - C2 * y2) <= _REACH else -1.0)
     # The rotation left for the wrist, its columns 0 to 2; of its last row the last entry only.
+    twists, turned = (C1, S1, C2, S2, C3, S3, C4, S4), (c2, s2, c3, s3, c4, s4)
     x, y, z = c * n[0] + s * n[4], c * n[4] - s * n[0], n[8]
-    r00, r10, _ = _wrist(x, y, z, (C1, S1, C2, S2, C3, S3, C4, S4), c2, s2, c3, s3, c4, s4)
+    r00, r10, _ = _wrist(x, y, z, twists, turned)
     x, y, z = c * n[1] + s * n[5], c * n[5] - s * n[1], n[9]
-    r01, r11, _ = _wrist(x, y, z, (C1, S1, C2, S2, C3, S3, C4, S4), c2, s2, c3, s3, c4, s4)
+    r01, r11, _ = _wrist(x, y, z, twists, turned)
     x, y, z = c * n[2] + s * n[6], c * n[6] - s * n[2], n[10]
-    r02, r12, r22 = _wrist(x, y, z, (C1, S1, C2, S2, C3, S3, C4, S4), c2, s2, c3, s3, c4, s4)
+    r02, r12, r22 = _wrist(x, y, z, twists, turned)
     across = math.sqrt(r02 * r02 + r12 * r12)
     t6 = atan2(across, r22)
     angles = (
@@ -151,10 +152,11 @@ def _least(x: Angles) -> float:
 @inlined
 def _wrist(
     x: float, y: float, z: float, twists: tuple[float, float, float, float, float, float, float, float],
-    c2: float, s2: float, c3: float, s3: float, c4: float, s4: float,
+    turned: Angles,
 ) -> tuple[float, float, float]:  # fmt: skip
-    """A vector of the target, seen from O with joint 1 turned, in the frame of the wrist."""
+    """A vector of the target, seen from O with joint 1 turned, in the wrist's frame; turned: cosines and sines."""
     C1, S1, C2, S2, C3, S3, C4, S4 = twists
+    c2, s2, c3, s3, c4, s4 = turned
     y, z = C1 * y + S1 * z, C1 * z - S1 * y
     x, y = c2 * x + s2 * y, c2 * y - s2 * x
     y, z = C2 * y + S2 * z, C2 * z - S2 * y
