@@ -23,7 +23,7 @@ from app.viewer.meshes.reader import ClientMeshes
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import Sphere
-from kin import IKOptions, IKResult, InputError, Robot, Task
+from kin import Contact, IKOptions, IKResult, InputError, Obstacle, Robot, Task
 from kin.transforms import Array
 from kin.units import Units
 
@@ -94,6 +94,17 @@ class Stage(Protocol):
     def frame(self) -> float:
         """Seconds between two frames of a moving arm, which depend on how many visitors' arms move."""
 
+    @property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """The obstacles that the visitor has placed."""
+
+    @property
+    def avoid(self) -> bool:
+        """Whether the arm is to touch neither itself nor an obstacle."""
+
+    def contacts_at(self, q: Array) -> tuple[Contact, ...]:
+        """What the arm touches at a configuration ``(n,)``, the deepest first."""
+
     def post(self, key: Hashable, value: object = None) -> None:
         """Queue an event for the worker; thread-safe. A newer value replaces a queued one of the same key."""
 
@@ -124,6 +135,9 @@ class Stage(Protocol):
 
     def use_frames(self, frames: Frames) -> None:
         """Take these frames."""
+
+    def use_obstacles(self, obstacles: tuple[Obstacle, ...]) -> None:
+        """Take these obstacles."""
 
     def change_robot(self, robot: Robot) -> None:
         """Show a robot of the service, at its home configuration."""
@@ -208,6 +222,12 @@ class Feature:
 
     def on_request(self) -> None:
         """The task, the requested branch, or the locked joints changed."""
+
+    def on_obstacles(self) -> None:
+        """There are other obstacles, or the arm avoids them from now on, or no longer."""
+
+    def on_contacts(self, contacts: Sequence[Contact]) -> None:
+        """What the arm touches has changed; the deepest contact first."""
 
     def on_style(self) -> None:
         """The units, the colours of the page, or what is withheld, changed."""

@@ -12,10 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kin.collision.bodies import Bodies, bodies_of
-from kin.collision.obstacles import Obstacle
-from kin.collision.solids import COLUMNS, least_clearances
+from kin.collision.kernels import distances_of_pairs
+from kin.collision.obstacles import SHAPES, Obstacle
+from kin.collision.solids import COLUMNS, distances_to_each, least_clearances
 from kin.robot import Robot
 from kin.transforms import Array
+
+_AXIS = 1e-9  # m
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +32,7 @@ class Contact:
         other: the other link, 0 for the base; None if the other is an obstacle.
         obstacle: which of the obstacles; None if the other is a link.
         name: of the obstacle, or its shape.
+        axis_inside: whether the axis of the link's capsule is inside the obstacle, which hides how deep it is.
     """
 
     distance: float
@@ -36,12 +40,13 @@ class Contact:
     other: int | None
     obstacle: int | None = None
     name: str = ""
+    axis_inside: bool = False
 
     @property
     def text(self) -> str:
-        """The two in a clause: ``"link 6 touches link 2"``."""
+        """The two in a clause: ``"link 6 touches link 2"``, ``"link 4 touches the table"``."""
         if self.other is None:
-            return f"link {self.link} touches {self.name}"
+            return f"link {self.link} touches {'the ' * (self.name in SHAPES)}{self.name}"
         return f"link {self.link} touches {f'link {self.other}' if self.other else 'the base'}"
 
 
@@ -73,7 +78,9 @@ class Surroundings:
             first, second = self.pairs[which].tolist()
             return Contact(distance, links[second].link, links[first].link)
         row, k = divmod(which - count, len(self.obstacles))
-        return Contact(distance, links[self.bodies.moving[row]].link, None, k, self.obstacles[k].label)
+        link, obstacle = links[self.bodies.moving[row]], self.obstacles[k]
+        inside = obstacle.shape != "sphere" and distance <= -link.radius + _AXIS
+        return Contact(distance, link.link, None, k, obstacle.label, inside)
 
     def nearest(self, q: Array) -> Contact | None:
         """The least distance at one configuration ``(n,)``."""
@@ -84,6 +91,25 @@ class Surroundings:
         """The deepest contact at one configuration ``(n,)``; None if nothing touches."""
         found = self.nearest(q)
         return None if found is None or found.distance >= 0.0 else found
+
+    def touches(self, q: Array) -> tuple[Contact, ...]:
+        """All that touches at one configuration ``(n,)``, the deepest first.
+
+        Each pair of links, and each link with an obstacle, comes once: with its deepest capsules.
+        """
+        body, q = self.bodies, q.copy()
+        apart = np.empty((len(body.moving), len(self.obstacles)))
+        distances_to_each(self.robot.model, body.rows, body.shape, self.solids, body.moving, q, apart)
+        between = distances_of_pairs(self.robot.model, body.rows, body.shape, self.pairs, q[None])[0]
+        every = np.concatenate([between, apart.ravel()])
+        found: dict[tuple[int, int | None, int | None], Contact] = {}
+        for which in np.argsort(every, kind="stable").tolist():
+            if every[which] >= 0.0:
+                break
+            contact = self.contact(float(every[which]), which)
+            assert contact is not None
+            found.setdefault((contact.link, contact.other, contact.obstacle), contact)
+        return tuple(found.values())
 
 
 @lru_cache(maxsize=256)

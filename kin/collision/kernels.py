@@ -66,7 +66,7 @@ def _put(shape: Array, k: int, r: int, x: float, y: float, z: float, p: float, o
 
 
 @jit
-def _place(model: Array, rows: Ints, shape: Array, q: Array, out: Array) -> None:
+def place(model: Array, rows: Ints, shape: Array, q: Array, out: Array) -> None:
     """out ← starts and ends ``(m, 6)`` of the capsules at q; `rows` ascends."""
     k = 0
     x0, y0, z0, p0 = model[3], model[4], model[5], model[6]
@@ -98,7 +98,7 @@ def distances_of_pairs(model: Array, rows: Ints, shape: Array, pairs: Ints, q: A
     out = np.empty((q.shape[0], pairs.shape[0]))
     ends = np.empty((rows.shape[0], 6))
     for j in range(q.shape[0]):
-        _place(model, rows, shape, q[j], ends)
+        place(model, rows, shape, q[j], ends)
         for p in range(pairs.shape[0]):
             first, second = pairs[p, 0], pairs[p, 1]
             apart, _, _ = segment_distance(ends, first, ends, second)
@@ -123,7 +123,7 @@ def least_distance(model: Array, rows: Ints, shape: Array, pairs: Ints, q: Array
     `ends` ``(m, 6)`` is overwritten with the ends of the capsules. out ``(7,)`` ← that distance, and the points of
     the two axes where it is.
     """
-    _place(model, rows, shape, q, ends)
+    place(model, rows, shape, q, ends)
     nearest = -1
     least = math.inf
     at, by = 0.0, 0.0

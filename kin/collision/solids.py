@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from kin.collision.kernels import Ints, least_distance
+from kin.collision.kernels import Ints, least_distance, place
 from kin.kernels.compile import inlined, jit
 from kin.transforms import Array
 
@@ -168,3 +168,16 @@ def least_clearances(
     for j in range(q.shape[0]):
         which[j] = least_clearance(model, rows, shape, pairs, solids, watched, q[j], ends, found)
         out[j] = found[0]
+
+
+@jit
+def distances_to_each(
+    model: Array, rows: Ints, shape: Array, solids: Array, watched: Ints, q: Array, out: Array
+) -> None:
+    """out ← the distance of each watched capsule from each obstacle ``(w, k)`` at one configuration ``(n,)``."""
+    ends = np.empty((rows.shape[0], 6))
+    a = np.empty(6)
+    place(model, rows, shape, q, ends)
+    for w in range(watched.shape[0]):
+        for k in range(solids.shape[0]):
+            out[w, k] = nearest_on(ends, watched[w], solids, k, a)[0] - shape[watched[w], 6]

@@ -15,7 +15,7 @@ from app.viewer.panel.script import PageScript
 from app.viewer.panel.share import SharePanel
 from app.viewer.panel.status import Notice, StatusLine
 from app.viewer.panel.target import DEFAULT_TASK, TargetChoice
-from app.viewer.panel.view import ColourChoice, UnitChoice, ViewOptions, ViewState
+from app.viewer.panel.view import AVOID_HINT, ColourChoice, UnitChoice, ViewOptions, ViewState
 from app.viewer.views.templates import render
 from kin import Robot, fk
 from kin.units import Units
@@ -37,6 +37,7 @@ class Panel:
     Attributes:
         script: the connection to the page's own script.
         joints, posture: folders that are filled for each robot.
+        obstacles: the folder of the obstacles.
         learn: the tab for lessons.
         tabs: the features' tabs.
         legend: what a lesson draws in the scene; below the tabs, so that it stays when another tab is opened.
@@ -70,6 +71,7 @@ class Panel:
             go_to_buttons(gui, post)
             self.target = TargetChoice(gui, DEFAULT_TASK, post)
             self.posture = gui.add_folder("Posture and redundancy")
+            self.obstacles = gui.add_folder("Obstacles")
         self.legend = gui.add_html("")
         self.hints = gui.add_html("")
         self.learn = group.add_tab("Learn") if learn else None
@@ -80,6 +82,8 @@ class Panel:
             self.view = ViewOptions(gui, view, detailed, post)
             with gui.add_folder("Share"):
                 self.share = SharePanel(gui, post)
+        with self.obstacles:
+            self.view.add_box("avoid", "Avoid collisions", AVOID_HINT, view, post)
 
     def fit(self, panel: viser.MainPanelHandle, embedded: str) -> None:
         """Set the width; within another page, keep the tool's pose and the joints only (``static/layout.css``)."""
@@ -88,4 +92,4 @@ class Panel:
         if small:
             self.robots.hide()
             self.target.hide()
-            self.posture.visible = False
+            self.posture.visible = self.obstacles.visible = False

@@ -28,6 +28,10 @@ LOOK_HINT = (
     "Body: as the real arm looks. Skeleton: its joints and links, in the colours of the sliders. "
     "Both: the skeleton in a translucent body. Arms without a drawn body are always a skeleton."
 )
+AVOID_HINT = (
+    "Targets are reached only in postures in which the arm touches neither itself nor an obstacle, and programs "
+    "that touch something are refused. What touches is red in any case."
+)
 AXES = ("Tool axes", "Base axes")
 AXES_HINT = (
     "The directions of the coloured arrows and rings, and of the keys that move the target: those of the tool, or "
@@ -44,7 +48,7 @@ class ViewState:
         base_axes: whether the gizmo is aligned with the base instead of the tool.
         look: how an arm is drawn of which there is a body.
         detailed: whether the body is that of an installed package, for arms of which there is one.
-        avoid: whether the arm is moved to targets without touching itself.
+        avoid: whether the arm is moved to targets without touching itself or an obstacle.
     """
 
     frames: bool = False
@@ -99,7 +103,7 @@ class ViewOptions:
         listen(self._look, post, "look")
         self._boxes: dict[str, viser.GuiCheckboxHandle] = {}
         if detailed:
-            self._add_box("detailed", "Real shape", _about_detailed(detailed), state, post)
+            self.add_box("detailed", "Real shape", _about_detailed(detailed), state, post)
         for name, text, hint in (
             ("frames", "Link frames", "The frame of every DH row: x red, y green, z blue"),
             ("labels", "Frame labels", "The name of each frame, at the tip of its z axis"),
@@ -108,13 +112,8 @@ class ViewOptions:
                 "Joint axes",
                 "The axis of each joint of a skeleton; its arrow shows the positive turn",
             ),
-            (
-                "avoid",
-                "Avoid self-collision",
-                "While you drag the target: only postures in which no two links touch. Links that touch are red.",
-            ),
         ):
-            self._add_box(name, text, hint, state, post)
+            self.add_box(name, text, hint, state, post)
         initial = AXES[state.base_axes]
         self._axes = gui.add_dropdown("Arrows along", AXES, initial_value=initial, hint=AXES_HINT)
         listen(self._axes, post, "axes")
@@ -124,7 +123,8 @@ class ViewOptions:
         sides = gui.add_button_group("View from", SIDES)
         listen_click(sides, post, {side: ("look-from", side) for side in SIDES})
 
-    def _add_box(self, name: str, text: str, hint: str, state: ViewState, post: Post) -> None:
+    def add_box(self, name: str, text: str, hint: str, state: ViewState, post: Post) -> None:
+        """Add a check box for a choice of this name to the container that is open."""
         self._boxes[name] = self._gui.add_checkbox(text, getattr(state, name), hint=hint)
         listen(self._boxes[name], post, ("view", name))
 

@@ -92,6 +92,7 @@ class Follower:
         if state.unreadable or state.refused or state.q is None or state.robot is None:
             return
         last, self._shown = self._shown, state
+        self._page.use_obstacles(state.obstacles)
         if last is None or _differs(last, state, "robot", "own", "task", "branch", "locks"):
             self._page.adopt(replace(state, own=self._own(state)))
         elif not np.array_equal(state.q, self._page.goal) or not _equal(state.target, last.target):

@@ -260,6 +260,7 @@ class Actions:
             page.use_units(state.units)
         if state.frames != page.frames:
             page.use_frames(state.frames)
+        page.use_obstacles(state.obstacles)
         if state.view != page.view:
             page.use_view(replace(state.view))
         self.adopt(state)
@@ -355,8 +356,7 @@ class Actions:
 
     def _on_robot_choice(self, value: object) -> None:
         page = self._page
-        robot = page.panel.robots.read(value)
-        if robot == page.robot:
+        if (robot := page.panel.robots.read(value)) == page.robot:
             return
         # The visitor's own arm has another id after every change; only the present one can be shown again.
         own = None if page.own is None else page.own.robot.id

@@ -31,7 +31,7 @@ from app.viewer.scene.arm import ArmScene
 from app.viewer.scene.bodies import Drawing
 from app.viewer.scene.gizmo_axes import gizmo_axes
 from app.viewer.scene.motion import Motion, Pace
-from kin import IKOptions, IKResult, JointConstraints, Robot, Task
+from kin import Contact, IKOptions, IKResult, JointConstraints, Obstacle, Robot, Task
 from kin.collision.contacts import surroundings
 from kin.ik import solve
 from kin.transforms import Array, rotation_from_wxyz
@@ -64,6 +64,9 @@ class ArmListener(Protocol):
     def on_branch(self, branch: str | None) -> None:
         """The requested branch was changed by something other than the visitor's choice in the panel."""
 
+    def on_obstacles(self) -> None:
+        """There are other obstacles, or another choice whether the arm avoids them."""
+
 
 class ArmController:
     """The arm of one visitor. Not thread-safe: the visitor's worker calls it.
@@ -80,7 +83,8 @@ class ArmController:
         dragging: whether the visitor holds the gizmo.
         playing: whether a feature moves the arm frame by frame.
         snap: whether the gizmo is dragged in fixed steps.
-        avoid: whether targets are solved without self-collision.
+        avoid: whether targets are solved so that the arm touches neither itself nor an obstacle.
+        obstacles: those that the visitor has placed.
         scene: the arm's nodes.
     """
 
@@ -104,6 +108,7 @@ class ArmController:
         self.playing = False
         self.snap = False
         self.avoid = False
+        self.obstacles: tuple[Obstacle, ...] = ()
         self._in_base = False
         self._drag_start: tuple[Array, Array] = np.eye(4), np.eye(3)  # target pose, gizmo orientation
 
@@ -150,24 +155,35 @@ class ArmController:
             locked = tuple(x if lock else None for x, lock in zip(self.goal.tolist(), self.locks, strict=True))
         constraints = JointConstraints(locked=locked)
         return IKOptions(
-            task=self.task, constraints=constraints, branch=self.branch, avoid_self_collision=self.avoid
-        )
+            task=self.task, constraints=constraints, branch=self.branch, avoid_self_collision=self.avoid,
+            obstacles=self.obstacles if self.avoid else (),
+        )  # fmt: skip
 
-    @property
-    def self_contact(self) -> kin.Contact | None:
-        """The two links that touch at the configuration shown.
+    def contacts_at(self, q: Array) -> tuple[Contact, ...]:
+        """What the arm touches at a configuration ``(n,)``, the deepest contact first.
 
-        Bodies that are only assumed are judged on request: they may be far from those that are drawn.
+        Links that are only assumed are compared with each other on request: they may be far from those drawn.
         """
-        judged = self.avoid or self.robot.capsules
-        return surroundings(self.robot).touching(self.q) if judged else None
+        links = self.avoid or bool(self.robot.capsules)
+        return surroundings(self.robot, self.obstacles, links).touches(q) if links or self.obstacles else ()
 
-    def avoid_self_collision(self, avoid: bool) -> None:
-        """Solve targets with or without regard to self-collisions."""
+    def use_obstacles(self, obstacles: tuple[Obstacle, ...]) -> None:
+        """Take these obstacles. An arm that is at rest stays, whatever it touches."""
+        if obstacles != self.obstacles:
+            self.obstacles = obstacles
+            self._surroundings_changed(self.avoid)
+
+    def avoid_collisions(self, avoid: bool) -> None:
+        """Solve targets with or without regard to self-collisions and obstacles."""
         if avoid != self.avoid:
             self.avoid = avoid
+            self._surroundings_changed(True)
+
+    def _surroundings_changed(self, solve_again: bool) -> None:
+        if solve_again:
             self._request_changed()
-            self._listener.on_pose(kin.fk(self.robot, self.q))
+        self._listener.on_obstacles()
+        self._listener.on_pose(kin.fk(self.robot, self.q))
 
     # Motions
 

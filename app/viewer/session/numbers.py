@@ -6,12 +6,15 @@ They are updated after the scene, and at most once per interval, because that ta
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from typing import Protocol
 
 import viser
 
 import kin
+from app.viewer.feature import Feature
 from app.viewer.frames import FrameAxes, Frames
+from app.viewer.obstacles.words import sentence
 from app.viewer.panel.joints import JointSliders
 from app.viewer.panel.layout import Panel
 from app.viewer.panel.status import StatusLine, key_number
@@ -19,7 +22,7 @@ from app.viewer.scene.key_number import KeyNumber
 from app.viewer.scene.motion import Pace
 from app.viewer.session.controller import ArmController
 from app.viewer.session.posture import PosturePanel
-from kin import IKResult
+from kin import Contact, IKResult
 from kin.axes import inverse
 from kin.frames import WORLD
 from kin.transforms import Array
@@ -40,6 +43,9 @@ class NumbersPage(Protocol):
     units: Units
     frames: Frames
 
+    def for_features(self, action: Callable[[Feature], None]) -> None:
+        """Call every feature."""
+
 
 class Numbers:
     """The numbers of one page. Not thread-safe: the visitor's worker calls it.
@@ -56,6 +62,7 @@ class Numbers:
         self._dragged: int | None = None  # the joint whose slider the visitor holds
         self._beside_target = KeyNumber(page.client.scene)
         self._axes = FrameAxes(page.client.scene)
+        self._contacts: tuple[Contact, ...] = ()
 
     def use_frames(self) -> None:
         """The page has other frames, or another arm."""
@@ -102,13 +109,21 @@ class Numbers:
                 self._pose_due = False
                 target = None if arm.open_target is None else arm.open_target[:3, 3]
                 passes = arm.scene.show_contact(arm.scene.contact_at(arm.q), target)
-                touches = arm.scene.colors.show(arm.self_contact)
-                page.status.warn(" ".join(filter(None, (touches, passes))))
+                page.status.warn(" ".join(filter(None, (self._show_contacts(), passes))))
                 self._show_pose(kin.fk(arm.robot, arm.q), arm.open_target)
             if self._sliders_due:
                 self._sliders_due = False
                 page.sliders.show(arm.goal, self._dragged)
                 page.posture.show()
+
+    def _show_contacts(self) -> str:
+        """Paint what touches; returns the sentence about it, or ""."""
+        page, contacts = self._page, self._page.arm.contacts_at(self._page.arm.q)
+        page.arm.scene.colors.show(contacts)
+        if contacts != self._contacts:
+            self._contacts = contacts
+            page.for_features(lambda feature: feature.on_contacts(contacts))
+        return sentence(contacts, page.units)
 
     def _show_pose(self, tool: Array, target: Array | None) -> None:
         """Show the pose of the tool, and of a target that it has missed, in the frame of the read-out."""

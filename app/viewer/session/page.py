@@ -21,6 +21,7 @@ from app.viewer.frames import Frames
 from app.viewer.labels import size_labels, text_factor
 from app.viewer.lessons import LESSONS
 from app.viewer.meshes.bodies import Bodies
+from app.viewer.obstacles.feature import ObstaclesFeature
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import update_html
 from app.viewer.panel.joints import JointSliders, lock_notice
@@ -109,9 +110,6 @@ class VisitorPage(ShownArm, Worker):
     def frame(self) -> float:
         return self._pace.interval
 
-    def play(self, on: bool) -> None:
-        self.arm.playing = on
-
     def move_to(self, q: Array, notice: Notice | None = None, at_once: bool = False) -> None:
         self.arm.move_to(q, ease=not at_once)
         self.status.show(notice or BY_HAND)
@@ -144,9 +142,6 @@ class VisitorPage(ShownArm, Worker):
             detail = f"{why} The simple drawing stays."
             self.notify(Notice("error", f"The real shape of {self.robot.name} cannot be shown", detail))
 
-    def set_target(self, T_base_tool: Array) -> None:
-        self.arm.set_target(T_base_tool)
-
     def set_task(self, task: Task) -> None:
         self.panel.target.show(task)
         self.arm.set_task(task)
@@ -154,14 +149,8 @@ class VisitorPage(ShownArm, Worker):
     def unlock(self, joint: int | None = None) -> None:
         self.change_lock(joint, False)
 
-    def allow_any_branch(self) -> None:
-        self.arm.allow_any_branch()
-
     def notify(self, notice: Notice) -> None:
         self.status.show(notice)
-
-    def see_through(self, on: bool, gizmo: bool = False) -> None:
-        self.arm.scene.see_through(on, gizmo)
 
     def show_legend(self, html: str) -> None:
         update_html(self.panel.legend, html)
@@ -252,7 +241,7 @@ class VisitorPage(ShownArm, Worker):
 
     def _apply_view(self) -> None:
         scene = self.arm.scene
-        self.arm.avoid_self_collision(self.view.avoid)
+        self.arm.avoid_collisions(self.view.avoid)
         scene.show_as(self.view.look)
         scene.show_frames(self.view.frames)
         scene.show_labels(self.view.labels)
@@ -287,6 +276,9 @@ class VisitorPage(ShownArm, Worker):
 
     def on_branch(self, branch: str | None) -> None:
         self.posture.choose(branch)
+
+    def on_obstacles(self) -> None:
+        self.for_features(lambda feature: feature.on_obstacles())
 
     @property
     def _timeout(self) -> float | None:
@@ -373,7 +365,9 @@ class VisitorPage(ShownArm, Worker):
             self._use_robot(robot, saved.q)
             if self.panel.learn is not None:
                 self.lessons = LessonChoice(gui, self.panel.learn, self, self.post, self._services)
-            for tab, container in zip(self.offered, self.panel.tabs, strict=True):
+            containers: list[viser.GuiFolderHandle | viser.GuiTabHandle] = [self.panel.obstacles, *self.panel.tabs]
+            features: tuple[type[Feature], ...] = (ObstaclesFeature, *self.offered)
+            for tab, container in zip(features, containers, strict=True):
                 with container:
                     self._tabs.append(tab(self))
             self._persistence.restore(saved)

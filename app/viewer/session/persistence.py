@@ -117,6 +117,7 @@ class Persistence:
     def restore(self, saved: PageState) -> None:
         """Apply the rest of a state to a page that shows its robot; what cannot be applied is reported."""
         page = self._page
+        page.use_obstacles(saved.obstacles)
         if saved.locks:
             page.set_locks([i in saved.locks for i in range(page.robot.n)])
         if saved.task not in (None, page.task):
@@ -185,6 +186,7 @@ class Persistence:
             robot=page.robot.id,
             own=page.own,
             frames=page.frames,
+            obstacles=page.obstacles,
             q=page.goal,
             target=page.arm.open_target,
             task=page.task,

@@ -10,7 +10,7 @@ from app.viewer.meshes.bodies import Bodies
 from app.viewer.own_arm import OwnArm
 from app.viewer.session.controller import ArmController
 from app.viewer.session.persistence import SavedPage
-from kin import IKOptions, Robot, Task
+from kin import Contact, IKOptions, Obstacle, Robot, Task
 from kin.transforms import Array
 
 
@@ -24,7 +24,7 @@ class Withholding(Protocol):
 
 
 class ShownArm:
-    """What features may read of the arm on show; see `app.viewer.feature.Stage`."""
+    """What features may read of the arm on show, and do with it; see `app.viewer.feature.Stage`."""
 
     arm: ArmController
     withheld = ""
@@ -61,6 +61,32 @@ class ShownArm:
     @property
     def branch(self) -> str | None:
         return self.arm.branch
+
+    @property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        return self.arm.obstacles
+
+    @property
+    def avoid(self) -> bool:
+        return self.arm.avoid
+
+    def play(self, on: bool) -> None:
+        self.arm.playing = on
+
+    def set_target(self, T_base_tool: Array) -> None:
+        self.arm.set_target(T_base_tool)
+
+    def allow_any_branch(self) -> None:
+        self.arm.allow_any_branch()
+
+    def see_through(self, on: bool, gizmo: bool = False) -> None:
+        self.arm.scene.see_through(on, gizmo)
+
+    def contacts_at(self, q: Array) -> tuple[Contact, ...]:
+        return self.arm.contacts_at(q)
+
+    def use_obstacles(self, obstacles: tuple[Obstacle, ...]) -> None:
+        self.arm.use_obstacles(obstacles)
 
 
 class RobotPage(SavedPage, Protocol):

@@ -24,6 +24,8 @@ import numpy as np
 from app.viewer import frames, own_arm
 from app.viewer.frames import Frames
 from app.viewer.labels import TEXT_SIZES
+from app.viewer.obstacles import placed
+from app.viewer.obstacles.placed import Obstacles
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel.entry import FARTHEST
 from app.viewer.panel.view import LOOKS, ViewState
@@ -63,6 +65,7 @@ class PageState:
         camera: viewpoint ``(3, 3)`` as `VisitorCamera.chosen`; None: the default view.
         own: the visitor's own arm, whether or not it is on show.
         frames: the workpieces, and the frame in which poses are shown.
+        obstacles: bodies around the arm.
         missing: the requested robot's id, if this service does not have that robot.
         unreadable: whether there was a text that is not a state.
         ignored: names of entries that were invalid.
@@ -82,6 +85,7 @@ class PageState:
     camera: Array | None = None
     own: OwnArm | None = None
     frames: Frames = field(default_factory=Frames)
+    obstacles: Obstacles = ()
     missing: str = ""
     unreadable: bool = False
     ignored: tuple[str, ...] = ()
@@ -112,7 +116,7 @@ class StoredPage:
 def encode(state: PageState) -> str:
     """The state as a text of letters, digits, ``-`` and ``_``.
 
-    The states of the features are left out if the text would be longer than `decode` accepts.
+    The states of the features, then the obstacles, are left out if the text would be longer than `decode` accepts.
     """
     data: dict[str, Any] = {"v": VERSION}
     if state.own is not None:
@@ -134,6 +138,8 @@ def encode(state: PageState) -> str:
         data["camera"] = position + look_at + (up if up != UP.tolist() else [])
     if state.frames != Frames():
         data["frames"] = frames.pack(state.frames)
+    if state.obstacles:
+        data["obstacles"] = placed.pack(state.obstacles)
     if not state.units.degrees:
         data["units"] = "rad"
     if state.units.length != DEFAULT_UNITS.length:
@@ -144,9 +150,10 @@ def encode(state: PageState) -> str:
     if state.features:
         data["features"] = state.features
     text = _pack(data)
-    if len(text) > MAX_TEXT:
-        data.pop("features", None)
-        text = _pack(data)
+    for key in ("features", "obstacles"):
+        if len(text) > MAX_TEXT:
+            data.pop(key, None)
+            text = _pack(data)
     return text
 
 
@@ -175,6 +182,7 @@ def decode(text: str, robots: Sequence[Robot]) -> PageState:
         "own": own,
         "refused": refused,
         "frames": frames.unpack(data.get("frames")),
+        "obstacles": placed.unpack(data.get("obstacles")),
     }
     if robot is None:
         return PageState(missing=requested[:80] if isinstance(requested, str) else "", **common)

@@ -122,6 +122,9 @@ class Postures(Lesson):
         self._key = ()
         self._wake()
 
+    def on_obstacles(self) -> None:
+        self.on_request()
+
     def on_style(self) -> None:
         self._key = ()
         if self.stage.units != self._units:
@@ -270,12 +273,12 @@ class Postures(Lesson):
         stage, T = self.stage, self._target
         options = stage.options
         key: tuple[object, ...] = (
-            T.tobytes(), stage.goal.tobytes(), options.task, options.constraints, stage.units,
+            T.tobytes(), stage.goal.tobytes(), options.task, options.constraints, stage.units, stage.obstacles,
         )  # fmt: skip
         if key == self._key:
             return
         self._key, self._surveyed = key, now
-        self._postures = survey(stage.robot, T, options, stage.goal, stage.units)
+        self._postures = survey(stage.robot, T, options, stage.goal, stage.units, stage.contacts_at)
         self._show()
 
     def _show(self) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import viser
 
 from app.viewer.labels import add_label
-from app.viewer.lessons.postures.survey import BLOCKED_COLOR, COLORS, Posture
+from app.viewer.lessons.postures.survey import COLORS, Posture, color_of
 from app.viewer.scene.meshes import body
 from app.viewer.skeleton import cylinder, places, skeleton
 from kin import Robot
@@ -33,6 +33,7 @@ class Ghosts:
         self._robot = robot
         self._size = body(robot).size
         self._shown: list[tuple[object, ...]] = [()] * count
+        self._colors = [COLORS[i % len(COLORS)] for i in range(count)]
         vertices, faces = cylinder()
         bones = skeleton(robot)
         still = np.zeros((len(bones.links), 3)), np.tile([1.0, 0.0, 0.0, 0.0], (len(bones.links), 1))
@@ -82,7 +83,8 @@ class Ghosts:
 
     def _pose(self, i: int, posture: Posture, positions: Array, wxyz: Array) -> None:
         assert posture.q is not None
-        key = (posture.available, posture.q.tobytes())
+        color = color_of(i, posture)
+        key = (color, posture.available, posture.q.tobytes())
         if key == self._shown[i]:
             return
         self._shown[i] = key
@@ -92,7 +94,8 @@ class Ghosts:
         opacity = OPACITY if posture.available else FAINT
         if node.opacity != opacity:
             node.opacity = opacity
-            color = COLORS[i % len(COLORS)] if posture.available else BLOCKED_COLOR
+        if color != self._colors[i]:
+            self._colors[i] = color
             node.batched_colors = np.array(color, dtype=np.uint8)
 
 

@@ -7,6 +7,7 @@ limit, which is reported with the joint and the excess, or have no real solution
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
@@ -15,9 +16,10 @@ import numpy as np
 
 import kin
 from app.viewer.panel.posture import parts, short
+from app.viewer.scene.bodies.nodes import TOUCHING
 from app.viewer.scene.bodies.parts import JOINT_COLORS, Color
 from app.viewer.views.templates import render
-from kin import IKOptions, IKSolution, LimitViolation, Robot
+from kin import Contact, IKOptions, IKSolution, LimitViolation, Robot
 from kin.ik import solve
 from kin.ik.branches import is_closed, solve_branches, violations_of
 from kin.ik.candidates import OVERRUN
@@ -49,6 +51,7 @@ class Posture:
         joint: index of the joint nearest to its limit, −1 without limits.
         manipulability: Yoshikawa's measure.
         share: the same, relative to the arm's best.
+        touches: what the arm touches there, in a few words; empty if nothing.
     """
 
     name: str
@@ -59,6 +62,7 @@ class Posture:
     joint: int = -1
     manipulability: float = 0.0
     share: float = 0.0
+    touches: str = ""
 
     @property
     def available(self) -> bool:
@@ -67,14 +71,36 @@ class Posture:
 
 
 def survey(
-    robot: Robot, T: Array, options: IKOptions, q: Array, units: Units = DEFAULT_UNITS
+    robot: Robot,
+    T: Array,
+    options: IKOptions,
+    q: Array,
+    units: Units = DEFAULT_UNITS,
+    contacts_at: Callable[[Array], Sequence[Contact]] = lambda q: (),
 ) -> tuple[Posture, ...]:
     """All branches for the target `T` ``(4, 4)``, with the seed `q` ``(n,)``, in the order of `kin.branch_names`.
 
-    Of the options, task and constraints hold, not the branch. An arm whose branches have no names has one posture:
+    Of the options, task and constraints hold, not the branch; postures that touch something are in the list, with
+    what `contacts_at` says of them. An arm whose branches have no names has one posture:
     the closest one found, if any.
     """
-    options = replace(options, branch=None)
+    options = replace(options, branch=None, avoid_self_collision=False, obstacles=())
+    found = _survey(robot, T, options, q, units)
+    return tuple(
+        each if each.q is None or not each.available else replace(each, touches=_touches(contacts_at(each.q)))
+        for each in found
+    )
+
+
+def _touches(contacts: Sequence[Contact]) -> str:
+    """``touches the table``; between links, which ones."""
+    if not contacts:
+        return ""
+    first = contacts[0]
+    return first.text if first.obstacle is None else first.text.partition(" ")[2].partition(" ")[2]
+
+
+def _survey(robot: Robot, T: Array, options: IKOptions, q: Array, units: Units) -> tuple[Posture, ...]:
     result = solve(robot, T[:3, 3] if options.task == "position" else T, options, q)
     solutions: dict[str, IKSolution] = {}
     for found in result.solutions:
@@ -167,9 +193,16 @@ def html(robot: Robot, postures: tuple[Posture, ...], present: str, shown: froze
     return render("postures/list", parts=parts(robot), rows=rows)
 
 
+def color_of(index: int, posture: Posture) -> Color:
+    """The colour of a posture in the list and of its ghost: red if it touches something."""
+    if not posture.available:
+        return BLOCKED_COLOR
+    return TOUCHING if posture.touches else COLORS[index % len(COLORS)]
+
+
 def _row(robot: Robot, index: int, posture: Posture, here: bool, shown: bool, units: Units) -> dict[str, object]:
     """The values of one row of the template."""
-    r, g, b = COLORS[index % len(COLORS)] if posture.available else BLOCKED_COLOR
+    r, g, b = color_of(index, posture)
     status = "outside limits" if posture.state == "blocked" else posture.words
     detail = posture.words if posture.state == "blocked" else ""
     if posture.available:
@@ -179,6 +212,8 @@ def _row(robot: Robot, index: int, posture: Posture, here: bool, shown: bool, un
             detail = f"{margin} to limit of joint {posture.joint + 1}"
         if posture.state == "compromise":
             status, detail = "", f"{posture.words} · {detail}"
+        if posture.touches:
+            status = f"⊗ {posture.touches}"
     return {
         "name": posture.name,
         "title": short(posture.name),

@@ -36,13 +36,9 @@ class LinkColors:
         for node in nodes:
             self._parts.pop(node.name, None)
 
-    def show(self, contact: Contact | None) -> str:
-        """Paint the links that touch; returns the sentence about them, or ""."""
-        links = () if contact is None else (contact.link, contact.other)
-        self._mark(frozenset(link for link in links if link is not None))
-        return "" if contact is None else f"{contact.text[0].upper()}{contact.text[1:]}."
-
-    def _mark(self, links: frozenset[int]) -> None:
+    def show(self, contacts: Sequence[Contact]) -> None:
+        """Paint the links that touch each other or an obstacle."""
+        links = frozenset(link for each in contacts for link in (each.link, each.other) if link is not None)
         changed, self._marked = links ^ self._marked, links
         if not changed:
             return

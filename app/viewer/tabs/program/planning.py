@@ -28,10 +28,13 @@ from app.viewer.tabs.program.items import (
     start_of,
     waypoint,
 )
-from kin import InputError, Robot
+from kin import InputError, Obstacle, Robot
+from kin.collision.contacts import surroundings
 from kin.motion import Circ, Dwell, JointTarget, Lin, Motion, PoseTarget, Program, Ptp, Spline
-from kin.motion.details import JerkCost, Note
+from kin.motion.details import Collides, JerkCost, Note
+from kin.motion.planning.collisions import checked
 from kin.motion.program import Segment, Target, kind_of
+from kin.motion.results import Refusal
 from kin.transforms import Array
 from kin.units import Units
 
@@ -46,11 +49,13 @@ class Plan:
         items: the list, with at least one waypoint.
         motion: it may be refused.
         segments: index of the segment of each item.
+        touch: where the motion touches something although it can be driven; None: nowhere, or it is not known.
     """
 
     items: Items
     motion: Motion
     segments: tuple[int, ...]
+    touch: Refusal | None = None
 
     @property
     def motion_or_none(self) -> Motion | None:
@@ -60,6 +65,16 @@ class Plan:
     def item_of(self, segment: int) -> int:
         """Index of the item at which a segment ends; that of the way back is the number of items."""
         return max((i for i, each in enumerate(self.segments) if each == segment), default=len(self.items))
+
+    def touches(self) -> str:
+        """Where the motion touches something, with the number of the list; "" if nowhere is known."""
+        if self.touch is None or not isinstance(self.touch.details, Collides):
+            return ""
+        index, contact = self.item_of(self.touch.segment), self.touch.details.contact
+        where = (
+            "Back to the start" if index >= len(self.items) else f"{index + 1} ({self.items[index].kind.upper()})"
+        )
+        return f"{where}: {contact.text} after {self.touch.details.time:.2f} s."
 
     @cached_property
     def ends(self) -> tuple[float, ...]:
@@ -100,13 +115,26 @@ class Plan:
         return note._replace(segment=self.item_of(note.segment))
 
 
-def plan(items: Items, robot: Robot, loop: bool) -> Plan | None:
-    """The motion of a list; None: it has no waypoint. `loop`: it returns to the first one."""
+def plan(
+    items: Items, robot: Robot, loop: bool, avoid: bool = False, obstacles: tuple[Obstacle, ...] = ()
+) -> Plan | None:
+    """The motion of a list; None: it has no waypoint.
+
+    Args:
+        loop: whether it returns to the first one.
+        avoid: whether a motion that touches something is refused; otherwise `Plan.touch` says where it does.
+    """
     first = start_of(items)
     if first is None:
         return None
-    motion = kin.plan_motion(robot, program_of(items, robot, loop), first.q)
-    return Plan(items, motion, segments_of(items))
+    program = program_of(items, robot, loop)
+    motion = kin.plan_motion(
+        robot, program, first.q, avoid_self_collision=avoid, obstacles=obstacles if avoid else ()
+    )
+    touch = None
+    if not avoid and (obstacles or robot.capsules):
+        touch = checked(motion, surroundings(robot, obstacles, bool(robot.capsules)), lambda: None).refusal
+    return Plan(items, motion, segments_of(items), touch if motion.planned else None)
 
 
 def segments_of(items: Items) -> tuple[int, ...]:

@@ -7,6 +7,7 @@ visitor moves the arm. ``static/program.js`` sends what is pressed and typed.
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable, Hashable
 from dataclasses import replace
 
@@ -32,6 +33,7 @@ from app.viewer.tabs.program.views import KINDS
 from kin import InputError, KinematicsError
 from kin.motion import Motion
 
+REPLAN = 0.2  # s without a change of the obstacles until the motion is planned again
 LINK = 7000  # bytes of all programs in a link
 _LABELS = {
     "record": "Record a pose", "pause": "Add a pause", "set": "Set to this pose", "duplicate": "Duplicate",
@@ -56,6 +58,7 @@ class ProgramTab(Feature):
         self._fault: Fault | None = None
         self._compared: Choice | None = None
         self._zone = ZONE
+        self._stale: float | None = None  # when the motion is planned again, after the obstacles have changed
         self._other: Motion | None = None
         self._screen = Screen(stage)
         self._refresh()
@@ -88,8 +91,16 @@ class ProgramTab(Feature):
     def on_style(self) -> None:
         self._refresh()
 
+    def on_obstacles(self) -> None:
+        if self._items:
+            self._stale, self.due = time.perf_counter() + REPLAN, REPLAN
+
     def tick(self, now: float) -> None:
+        if self._stale is not None and now >= self._stale:
+            self._refresh()
         self.due = self._playback.tick(now)
+        if self._stale is not None:
+            self.due = min(self.due or REPLAN, REPLAN)
 
     def state(self) -> dict[str, object]:
         found: dict[str, object] = {"programs": {key: pack(items) for key, items in self._programs.items()}}
@@ -159,7 +170,7 @@ class ProgramTab(Feature):
     def _refresh(self, anew: bool = False) -> None:
         """Plan the motion, and show everything; `anew`: what was typed into the fields is replaced."""
         items, stage, loop = self._items, self.stage, self._player.loop
-        self._plan = plan(items, stage.robot, loop)
+        self._plan, self._stale = plan(items, stage.robot, loop, stage.avoid, stage.obstacles), None
         self._fault = find_fault(self._plan, stage)
         self._playback.use(self._plan if self._plan is not None and self._plan.motion.planned else None)
         self._other = None

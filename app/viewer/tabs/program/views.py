@@ -139,6 +139,7 @@ def summary(plan: Plan, robot: Robot, own: bool, units: Units) -> str:
         "program/summary",
         words=_busiest(motion),
         notes=plan.explain(units) if motion.notes else "",
+        touches=plan.touches(),
         assumed=assumption(limits, own, units),
         heads=list(zip(QUANTITIES, heads, strict=True)),
         rows=rows,

@@ -16,10 +16,11 @@ from app.shared.store import Store
 from app.viewer.panel.joints import label
 from app.viewer.scene.bodies.nodes import TOUCHING
 from app.viewer.server import ViewerServer
+from kin.collision.contacts import surroundings
 
 UR5 = kin.get_robot("ur5")
 FOLDED = 168.5  # degrees of the elbow: the wrist is in the upper arm
-AVOID = "Avoid self-collision"
+AVOID = "Avoid collisions"
 
 
 @pytest.fixture(scope="module")
@@ -46,19 +47,24 @@ def test_links_that_touch_are_red_and_named(port: int) -> None:
         tab.settle()
         assert not red(tab)
         tab.set(label(UR5, 2), FOLDED)
-        tab.wait(lambda: "Link 4 touches link 2." in tab.html)
+        tab.wait(lambda: "Link 4 touches link 2, " in tab.html)
         tab.settle()
         depths = {name.count("/") for name in red(tab)}
-        assert len(depths) == 2  # links are nested: two of them
+        folded = UR5.q_home.copy()
+        folded[2] = np.radians(FOLDED)
+        contacts = surroundings(UR5).touches(folded)
+        assert len(depths) == len(
+            {link for each in contacts for link in (each.link, each.other)}
+        )  # links are nested
         before = len(tab.log)
         tab.set(label(UR5, 2), FOLDED + 0.5)
         tab.settle()
         painted = [
             m for m in tab.log[before:] if m["type"] == "SceneNodeUpdateMessage" and "color" in m["updates"]
         ]
-        assert not painted  # the same two still touch
+        assert not painted  # the same ones still touch
         tab.set("Go to", "Home")
-        tab.wait(lambda: "touches" not in tab.html)
+        tab.wait(lambda: "touches link" not in tab.html)
         tab.settle()
         assert not red(tab)
 

@@ -1,0 +1,150 @@
+"""The obstacles in a visitor's scene: neutral bodies, red if the arm touches them, and a gizmo for one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection
+from itertools import count
+
+import viser
+
+from app.viewer.labels import add_label
+from app.viewer.obstacles.placed import Obstacles, pose, sizes
+from app.viewer.panel import Post
+from app.viewer.scene import gizmo
+from app.viewer.scene.bodies.nodes import TOUCHING
+from app.viewer.viser_patches import assign, keep_private
+from kin import Obstacle
+from kin.transforms import Array, wxyz_from_rotation
+
+Color = tuple[int, int, int]
+Mesh = viser.BoxHandle | viser.IcosphereHandle | viser.CylinderHandle
+COLOR: Color = (158, 162, 168)
+BELOW: Color = (122, 126, 133)  # of a table, under its top
+TOP, INSET = 0.06, 0.94  # thickness of a table's top in lengths, and how far what is under it stands back
+GIZMO, LINE = 0.2, 4.0  # length of the arrows in radii of the sphere around the arm, their thickness in pixels
+_NUMBERS = count(1)  # a node name is never used twice: browsers keep the poses of removed nodes
+
+
+class _Node:
+    """One obstacle in the scene."""
+
+    def __init__(self, scene: viser.SceneApi, each: Obstacle, clicked: Callable[[], None]) -> None:
+        self.root = f"/obstacle-{next(_NUMBERS)}"
+        self._frame = scene.add_frame(self.root, show_axes=False)
+        self._red = False
+        self._parts = [(node, node.color) for node in _meshes(scene, self.root, each)]
+        self._label = add_label(
+            scene, f"{self.root}/name", each.label, scale=0.9, position=(0.0, 0.0, _above(each)),
+            anchor="bottom-center", visible=False,
+        )  # fmt: skip
+        for node, _ in self._parts:
+            _listen(node, clicked)
+
+    def place(self, T: Array) -> None:
+        assign(self._frame, T[:3, 3], wxyz_from_rotation(T[:3, :3]))
+
+    def show(self, red: bool, named: bool) -> None:
+        if red != self._red:
+            self._red = red
+            for node, color in self._parts:
+                node.color = TOUCHING if red else color
+        if self._label.visible != named:
+            self._label.visible = named
+
+    def remove(self) -> None:
+        self._frame.remove()
+
+
+def _meshes(scene: viser.SceneApi, root: str, each: Obstacle) -> list[Mesh]:
+    # A body that casts a shadow and receives it is striped by its own.
+    if each.shape == "sphere":
+        ball = each.radius or 0.0
+        return [scene.add_icosphere(f"{root}/ball", ball, COLOR, subdivisions=4, receive_shadow=False)]
+    if each.shape == "cylinder":
+        radius, height = sizes(each)
+        return [scene.add_cylinder(f"{root}/can", radius, height, COLOR, radial_segments=48, receive_shadow=False)]
+    length, width, height = sizes(each)
+    if each.shape == "box":
+        return [scene.add_box(f"{root}/box", COLOR, (length, width, height), receive_shadow=False)]
+    top = min(TOP * min(length, width), height)
+    slab, place = (length, width, top), (0.0, 0.0, -0.5 * top)
+    found: list[Mesh] = [scene.add_box(f"{root}/top", COLOR, slab, position=place, cast_shadow=False)]
+    if height > top:
+        block, place = (INSET * length, INSET * width, height - top), (0.0, 0.0, -0.5 * (height + top))
+        found.append(scene.add_box(f"{root}/below", BELOW, block, position=place, receive_shadow=False))
+    return found
+
+
+def _above(each: Obstacle) -> float:
+    """Height of its label over its place."""
+    return {"table": 0.0, "sphere": each.radius or 0.0}.get(each.shape, 0.5 * sizes(each)[-1]) + 0.01
+
+
+def _listen(node: Mesh, clicked: Callable[[], None]) -> None:
+    @node.on_click  # type: ignore[untyped-decorator]
+    async def _(event: object) -> None:
+        clicked()
+
+
+class ObstacleNodes:
+    """The nodes of one page. The visitor's worker calls it.
+
+    Args:
+        post: takes ``"choose"`` with the number of an obstacle that was clicked, and the events of the gizmo.
+    """
+
+    def __init__(self, scene: viser.SceneApi, post: Post) -> None:
+        self._scene, self._post = scene, post
+        self._nodes: list[_Node] = []
+        self._drawn: list[tuple[object, ...]] = []
+        self._gizmo: viser.TransformControlsHandle | None = None
+
+    def show(self, items: Obstacles) -> None:
+        """Draw these; those whose shape and sizes are as before are only moved."""
+        wanted = [(each.shape, each.label, *sizes(each)) for each in items]
+        for i, (key, each) in enumerate(zip(wanted, items, strict=True)):
+            if i < len(self._drawn) and self._drawn[i] == key:
+                continue
+            node = _Node(self._scene, each, lambda i=i: self._post("choose", i))  # type: ignore[misc]
+            if i < len(self._nodes):
+                self._nodes[i].remove()
+                self._nodes[i] = node
+            else:
+                self._nodes.append(node)
+        for node in self._nodes[len(items) :]:
+            node.remove()
+        del self._nodes[len(items) :]
+        self._drawn = wanted
+        for node, each in zip(self._nodes, items, strict=True):
+            node.place(pose(each))
+
+    def mark(self, touched: Collection[int], chosen: int | None) -> None:
+        """Paint those that the arm touches; name these and the one that is chosen."""
+        for i, node in enumerate(self._nodes):
+            node.show(i in touched, i in touched or i == chosen)
+
+    def place_gizmo(self, T: Array | None, radius: float) -> None:
+        """Put the gizmo at a pose ``(4, 4)``, never while it is held; None: no gizmo.
+
+        `radius`: of the sphere around the arm.
+        """
+        if T is None:
+            if self._gizmo is not None:
+                self._gizmo.remove()
+                self._gizmo = None
+            return
+        scale = GIZMO * radius
+        if self._gizmo is None or not math.isclose(self._gizmo.scale, scale):
+            self.place_gizmo(None, radius)
+            self._gizmo = self._scene.add_transform_controls(
+                f"/obstacle-gizmo-{next(_NUMBERS)}", scale=scale, line_width=LINE, depth_test=False, opacity=0.95
+            )
+            keep_private(self._gizmo)
+            gizmo.listen(self._gizmo, ring=False, post=self._post)
+        assign(self._gizmo, T[:3, 3], wxyz_from_rotation(T[:3, :3]))
+
+    def remove(self) -> None:
+        """Remove everything from the scene."""
+        self.show(())
+        self.place_gizmo(None, 1.0)
