@@ -18,6 +18,8 @@ import numpy as np
 from numba.core.event import install_recorder
 
 from kin.collision import Obstacle, clearance, nearest_links, self_distance
+from kin.collision.contacts import surroundings
+from kin.collision.sweep import touches_along
 from kin.files import builtin_robots
 from kin.fk import fk, fk_positions, jacobian, link_frames, manipulability
 from kin.ik import solve_ik
@@ -154,7 +156,11 @@ def _collide(robot: Robot) -> None:
     q = robot.q_home
     nearest_links(robot, q)
     self_distance(robot, q)
-    clearance(robot, q, [Obstacle("box", size=(1.0, 1.0, 1.0))])
+    box = Obstacle("box", size=(1.0, 1.0, 1.0))
+    clearance(robot, q, [box])
+    near = surroundings(robot, (box,))
+    near.touches(q)
+    touches_along(near, q[None], (), lambda: None)
 
 
 def _plan(robot: Robot) -> None:

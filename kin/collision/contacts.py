@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,40 +116,3 @@ def surroundings(robot: Robot, obstacles: tuple[Obstacle, ...] = (), links: bool
     rows = [each.row for each in obstacles]
     solids = np.array(rows).reshape(-1, COLUMNS)
     return Surroundings(robot, body, body.pairs if links else body.pairs[:0], obstacles, solids)
-
-
-MOST_CHECKS = 4096  # of one motion between neighbours of a path
-
-
-class Touch(NamedTuple):
-    """Where a path touches something: at a share from 0 to 1 of the way from row `waypoint` − 1 to it."""
-
-    waypoint: int
-    share: float
-    contact: Contact
-
-
-def touches_along(
-    near: Surroundings, path: Array, step: float, jumps: Collection[int], stop: Callable[[], None]
-) -> tuple[Touch, ...]:
-    """Where the straight joint motions between neighbours of a path ``(k, n)`` touch something.
-
-    Of each motion the first touch that is found, at steps of at most `step` (rad or m) of the joint that moves
-    most (of a very long motion, 4096 steps), with the deepest contact of that motion. Of `jumps`, by the row they
-    lead to, only that row is looked at. `stop` cancels by raising.
-    """
-    found = []
-    for i in range(len(path)):
-        stop()
-        still = i == 0 or i in jumps
-        way = path[i] - path[max(i - 1, 0)]
-        count = 1 if still else min(math.ceil(float(np.abs(way).max()) / step) or 1, MOST_CHECKS)
-        shares = np.linspace(1.0, 0.0, count, endpoint=False)[::-1]
-        out, which = near.distances(path[i] - (1.0 - shares[:, None]) * way)
-        touching = np.flatnonzero(out < 0.0)
-        if len(touching):
-            deepest = int(out.argmin())
-            contact = near.contact(float(out[deepest]), int(which[deepest]))
-            assert contact is not None
-            found.append(Touch(i, float(shares[touching[0]]), contact))
-    return tuple(found)

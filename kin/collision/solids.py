@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from kin.collision.kernels import Ints, least_distance, place
+from kin.collision.kernels import Ints, beyond, least_distance, place, segment_distance
 from kin.kernels.compile import inlined, jit
 from kin.transforms import Array
 
@@ -181,3 +181,38 @@ def distances_to_each(
     for w in range(watched.shape[0]):
         for k in range(solids.shape[0]):
             out[w, k] = nearest_on(ends, watched[w], solids, k, a)[0] - shape[watched[w], 6]
+
+
+@jit
+def margins(
+    model: Array, rows: Ints, shape: Array, pairs: Ints, solids: Array, watched: Ints, q: Array, which: Ints,
+    half: Array, toward: Array, paces: Array, least: Array, room: Array,
+) -> None:  # fmt: skip
+    """Whether anything can touch around configurations ``(k, n)``.
+
+    Two capsules come nearer by at most `toward` ``(r, p)`` times `half` ``(k,)``, a capsule and any obstacle by at
+    most `paces` ``(r, w)`` times `half`; `which` ``(k,)`` is the row. least ``(k,)`` ← the smallest distance of
+    what is as near as that, infinite if nothing is; room ``(k,)`` ← the smallest distance less what can be lost.
+    """
+    ends = np.empty((rows.shape[0], 6))
+    a = np.empty(6)
+    for j in range(q.shape[0]):
+        place(model, rows, shape, q[j], ends)
+        r = which[j]
+        least[j], room[j] = math.inf, math.inf
+        for p in range(pairs.shape[0]):
+            first, second = pairs[p, 0], pairs[p, 1]
+            lost = toward[r, p] * half[j]
+            if beyond(ends, shape, first, second, lost):
+                continue
+            apart, _, _ = segment_distance(ends, first, ends, second)
+            apart -= shape[first, 6] + shape[second, 6]
+            least[j], room[j] = min(least[j], apart), min(room[j], apart - lost)
+        for w in range(watched.shape[0]):
+            i = watched[w]
+            lost = paces[r, w] * half[j]
+            for k in range(solids.shape[0]):
+                if _beyond_ball(ends, shape, i, solids, k, lost):
+                    continue
+                apart = nearest_on(ends, i, solids, k, a)[0] - shape[i, 6]
+                least[j], room[j] = min(least[j], apart), min(room[j], apart - lost)

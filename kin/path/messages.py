@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from kin.collision.contacts import Touch
+from kin.collision.sweep import Touch
 from kin.ik.messages.singularity import short
 from kin.ik.messages.values import count, joint, joint_value
 from kin.path.details import (

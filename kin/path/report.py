@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kin.collision.contacts import Touch, touches_along
+from kin.collision.sweep import Touch, touches_along
 from kin.ik.avoidance import around
 from kin.ik.branches import measure
 from kin.ik.candidates import POSITION_ERROR, ROTATION_ERROR
@@ -16,8 +16,6 @@ from kin.path.results import PathGap, PathResult
 from kin.path.search import DeadEnd
 from kin.path.waypoints import LayerSequence, PathSettings, Waypoint, has_closed_form
 from kin.transforms import Array
-
-TOUCH_STEP = 0.02  # rad or m, between the configurations of a motion that are checked for contacts
 
 
 def report(sequence: LayerSequence, waypoints: list[Waypoint], q: Array, ends: list[DeadEnd]) -> PathResult:
@@ -44,7 +42,7 @@ def report(sequence: LayerSequence, waypoints: list[Waypoint], q: Array, ends: l
     position, rotation = stats[:, POSITION_ERROR].copy(), stats[:, ROTATION_ERROR].copy()
     contacts: tuple[Touch, ...] = ()
     if settings.problem.options.avoids:
-        contacts = touches_along(around(settings.problem), q, TOUCH_STEP, steps, settings.problem.stop)
+        contacts = touches_along(around(settings.problem), q, steps, settings.problem.stop)
     for array in (q, position, rotation):
         array.flags.writeable = False
     return PathResult(

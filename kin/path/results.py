@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from kin.collision.contacts import Touch
+from kin.collision.sweep import Touch
 from kin.ik.details import Details
 from kin.ik.messages import explain, rounded_target
 from kin.ik.results import Cause, Status
@@ -102,7 +102,8 @@ class PathResult:
         tolerances: errors that count as none, metres and radians; the largest of all waypoints.
         target_error: how rounded the most rounded target is, as in `kin.IKResult`; 0 if none is.
         contacts: if collisions are avoided, the motions between waypoints, and the gaps, at which the arm still
-            touches something; a jump is looked at only where it ends.
+            touches something, or comes closer than 0.01 mm; the others are proven free, also between
+            waypoints. A jump is looked at only where it ends.
         avoids: whether they are.
     """
 
