@@ -46,17 +46,9 @@ def first_touches(
         farthest: the largest absolute joint values ``(n,)`` of all motions.
         stop: cancels by raising.
     """
-    body = near.bodies
-    lever = levers(near, farthest)
-    first, second = near.pairs.T
-    between = np.where(lever[first] > 0.0, 0.0, lever[second])
-    toward, paces = moves @ between.T, moves @ lever[body.moving].T
-    solids = near.solids
-    if not len(solids):
-        paces = np.empty((len(moves), 0))
+    toward, paces = _paces(near, moves, farthest)
     top = np.maximum(toward.max(axis=1, initial=0.0), paces.max(axis=1, initial=0.0))
     hit, close = np.full(len(moves), math.inf), np.full(len(moves), math.inf)
-    watched = body.moving if len(solids) else body.moving[:0]
 
     def look(rows: Rows, shares: Array, half: Array) -> tuple[Array, Array]:
         """The smallest distances, and what is left of them."""
@@ -65,10 +57,7 @@ def first_touches(
             stop()
             part = slice(start, start + CHUNK)
             q = np.ascontiguousarray(at(rows[part], shares[part]))
-            margins(
-                *(near.robot.model, body.rows, body.shape, near.pairs, solids, watched, q),
-                *(rows[part].copy(), half[part].copy(), toward, paces, least[part], room[part]),
-            )
+            _look(near, q, rows[part].copy(), half[part].copy(), toward, paces, least[part], room[part])
         return least, room
 
     rows: Rows = np.arange(len(moves))
@@ -96,6 +85,26 @@ def first_touches(
         before = low < hit[rows]
         rows, low, high = rows[before], low[before], high[before]
     return np.where(np.isfinite(hit), hit, close)
+
+
+def _paces(near: Surroundings, moves: Array, farthest: Array) -> tuple[Array, Array]:
+    """How far each pair of capsules ``(k, p)``, and a capsule and any obstacle ``(k, w)``, can come nearer."""
+    lever, (first, second) = levers(near, farthest), near.pairs.T
+    between = np.where(lever[first] > 0.0, 0.0, lever[second])
+    watched = near.bodies.moving if len(near.solids) else near.bodies.moving[:0]
+    return moves @ between.T, np.ascontiguousarray(moves @ lever[watched].T)
+
+
+def _look(
+    near: Surroundings, q: Array, rows: Rows, half: Array, toward: Array, paces: Array, least: Array, room: Array
+) -> None:
+    """`margins` around configurations of the motions `rows`."""
+    body = near.bodies
+    watched = body.moving if len(near.solids) else body.moving[:0]
+    margins(
+        *(near.robot.model, body.rows, body.shape, near.pairs, near.solids, watched, q, rows, half),
+        *(toward, paces, least, room),
+    )
 
 
 def levers(near: Surroundings, farthest: Array) -> Array:

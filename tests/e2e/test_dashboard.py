@@ -221,3 +221,24 @@ def test_three_poses_are_recorded_played_scrubbed_and_kept(tab: Tab) -> None:
     expect(rows).to_have_count(3)
     page.locator("[data-program-do=clear]").click()
     expect(rows).to_have_count(0)
+
+
+def test_an_arm_that_touches_a_table_says_so(tab: Tab) -> None:
+    arm = kin.get_robot("pioneer5")
+    (table,) = placed.added((), "table", arm, arm.q_home)
+    top = next(
+        z for z in np.arange(table.xyz[2], 1.0, 0.01).tolist()
+        if kin.clearance(arm, arm.q_home, placed.changed((table,), 0, "z", z)) < -0.005
+    )  # fmt: skip
+    tab.page.get_by_role("button", name="Add a table").click()
+    expect(tab.status).to_contain_text("Added: table")
+    field = tab.page.locator("#kb-obstacle-z")
+    field.fill(f"{1000 * top:.0f}")
+    field.press("Enter")
+    expect(tab.status).to_contain_text("touches the table")
+    expect(tab.status).to_contain_text("deep.")
+    expect(tab.page.get_by_role("button", name="table ⊗ touched")).to_be_visible()
+    tab.screenshot("obstacles")
+    tab.page.get_by_role("button", name="Remove table").click()
+    expect(tab.status).not_to_contain_text("touches")
+    expect(tab.page.get_by_role("button", name="Remove table")).to_have_count(0)

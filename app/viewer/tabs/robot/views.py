@@ -133,6 +133,7 @@ def about(found: InspectionAnswer, robot: Robot, units: Units) -> str:
         _solver(found),
         _fact("Reach", f"at most {units.distance(robot.reach)}"),
         _home(found),
+        _bodies(found),
     ]
     near = "The home configuration is near a singularity"  # said by the row above
     warnings = [text for text in found["warnings"] if not text.startswith(near)]
@@ -188,6 +189,14 @@ def _home(found: InspectionAnswer) -> dict[str, str]:
     if found["home_margin"] < 0.1:
         return _fact("Home", "some tool motions there need fast joints", "near a singularity:", "kb-amber")
     return _fact("Home", "every possible motion of the tool starts freely", "not singular:")
+
+
+def _bodies(found: InspectionAnswer) -> dict[str, str]:
+    """What collisions are judged by: a copy of a built-in arm has lost the capsules that were fitted to it."""
+    if found["bodies"]["assumed"]:
+        words = "tubes along the lengths of the table; the real bodies are not known, and may be thicker"
+        return _fact("Collisions", words, "assumed:", "kb-amber")
+    return _fact("Collisions", "capsules fitted to the bodies of the links", "known:")
 
 
 def frames(robot: Robot, units: Units, page: Frames, texts: Texts) -> str:
