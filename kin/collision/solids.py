@@ -185,34 +185,34 @@ def distances_to_each(
 
 @jit
 def margins(
-    model: Array, rows: Ints, shape: Array, pairs: Ints, solids: Array, watched: Ints, q: Array, which: Ints,
-    half: Array, toward: Array, paces: Array, least: Array, room: Array,
+    model: Array, rows: Ints, shape: Array, couples: Ints, solids: Array, q: Array, parts: Array, paces: Array,
+    out: Array,
 ) -> None:  # fmt: skip
     """Whether anything can touch around configurations ``(k, n)``.
 
-    Two capsules come nearer by at most `toward` ``(r, p)`` times `half` ``(k,)``, a capsule and any obstacle by at
-    most `paces` ``(r, w)`` times `half`; `which` ``(k,)`` is the row. least ``(k,)`` ← the smallest distance of
-    what is as near as that, infinite if nothing is; room ``(k,)`` ← the smallest distance less what can be lost.
+    `couples` ``(c, 2)``: two capsules, or a capsule and −1 for all obstacles. They come nearer by at most `paces`
+    ``(r, c)`` times a factor; `parts` ``(k, 2)`` has the row and the factor of each configuration. out ``(k, 2)``
+    ← the smallest distance of what is as near as that, infinite if nothing is, and the smallest distance less what
+    can be lost.
     """
     ends = np.empty((rows.shape[0], 6))
     a = np.empty(6)
     for j in range(q.shape[0]):
         place(model, rows, shape, q[j], ends)
-        r = which[j]
-        least[j], room[j] = math.inf, math.inf
-        for p in range(pairs.shape[0]):
-            first, second = pairs[p, 0], pairs[p, 1]
-            lost = toward[r, p] * half[j]
-            if beyond(ends, shape, first, second, lost):
-                continue
-            apart, _, _ = segment_distance(ends, first, ends, second)
-            apart -= shape[first, 6] + shape[second, 6]
-            least[j], room[j] = min(least[j], apart), min(room[j], apart - lost)
-        for w in range(watched.shape[0]):
-            i = watched[w]
-            lost = paces[r, w] * half[j]
-            for k in range(solids.shape[0]):
-                if _beyond_ball(ends, shape, i, solids, k, lost):
+        r = int(parts[j, 0])
+        out[j, 0], out[j, 1] = math.inf, math.inf
+        for c in range(couples.shape[0]):
+            first, second = couples[c, 0], couples[c, 1]
+            lost = paces[r, c] * parts[j, 1]
+            if second >= 0:
+                if beyond(ends, shape, first, second, lost):
                     continue
-                apart = nearest_on(ends, i, solids, k, a)[0] - shape[i, 6]
-                least[j], room[j] = min(least[j], apart), min(room[j], apart - lost)
+                apart, _, _ = segment_distance(ends, first, ends, second)
+                apart -= shape[first, 6] + shape[second, 6]
+                out[j, 0], out[j, 1] = min(out[j, 0], apart), min(out[j, 1], apart - lost)
+                continue
+            for k in range(solids.shape[0]):
+                if _beyond_ball(ends, shape, first, solids, k, lost):
+                    continue
+                apart = nearest_on(ends, first, solids, k, a)[0] - shape[first, 6]
+                out[j, 0], out[j, 1] = min(out[j, 0], apart), min(out[j, 1], apart - lost)

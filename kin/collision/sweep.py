@@ -46,23 +46,25 @@ def first_touches(
         farthest: the largest absolute joint values ``(n,)`` of all motions.
         stop: cancels by raising.
     """
-    toward, paces = _paces(near, moves, farthest)
-    top = np.maximum(toward.max(axis=1, initial=0.0), paces.max(axis=1, initial=0.0))
+    body = near.bodies
+    couples, paces = _paces(near, moves, farthest)
+    top = paces.max(axis=1, initial=0.0)
     hit, close = np.full(len(moves), math.inf), np.full(len(moves), math.inf)
 
-    def look(rows: Rows, shares: Array, half: Array) -> tuple[Array, Array]:
-        """The smallest distances, and what is left of them."""
-        least, room = np.empty(len(rows)), np.empty(len(rows))
+    def look(rows: Rows, shares: Array, half: Array) -> Array:
+        """The smallest distances, and what is left of them ``(c, 2)``."""
+        out = np.empty((len(rows), 2))
         for start in range(0, len(rows), CHUNK):
             stop()
             part = slice(start, start + CHUNK)
             q = np.ascontiguousarray(at(rows[part], shares[part]))
-            _look(near, q, rows[part].copy(), half[part].copy(), toward, paces, least[part], room[part])
-        return least, room
+            parts = np.column_stack([rows[part].astype(float), half[part]])
+            margins(near.robot.model, body.rows, body.shape, couples, near.solids, q, parts, paces, out[part])
+        return out
 
     rows: Rows = np.arange(len(moves))
     low, high = np.zeros(len(moves)), np.ones(len(moves))
-    hit[look(rows, low, low)[0] < 0.0] = 0.0
+    hit[look(rows, low, low)[:, 0] < 0.0] = 0.0
     seen = 0
     while len(rows):
         if seen > MOST:
@@ -70,7 +72,7 @@ def first_touches(
             break
         seen += len(rows)
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
-        least, room = look(rows, middle, half)
+        least, room = look(rows, middle, half).T
         touching = least < 0.0
         fine = top[rows] * half <= CLOSE
         np.minimum.at(hit, rows[touching], middle[touching])
@@ -87,24 +89,13 @@ def first_touches(
     return np.where(np.isfinite(hit), hit, close)
 
 
-def _paces(near: Surroundings, moves: Array, farthest: Array) -> tuple[Array, Array]:
-    """How far each pair of capsules ``(k, p)``, and a capsule and any obstacle ``(k, w)``, can come nearer."""
+def _paces(near: Surroundings, moves: Array, farthest: Array) -> tuple[Rows, Array]:
+    """What is compared ``(c, 2)``, as `margins` takes it, and how far each can come nearer ``(k, c)``."""
     lever, (first, second) = levers(near, farthest), near.pairs.T
     between = np.where(lever[first] > 0.0, 0.0, lever[second])
     watched = near.bodies.moving if len(near.solids) else near.bodies.moving[:0]
-    return moves @ between.T, np.ascontiguousarray(moves @ lever[watched].T)
-
-
-def _look(
-    near: Surroundings, q: Array, rows: Rows, half: Array, toward: Array, paces: Array, least: Array, room: Array
-) -> None:
-    """`margins` around configurations of the motions `rows`."""
-    body = near.bodies
-    watched = body.moving if len(near.solids) else body.moving[:0]
-    margins(
-        *(near.robot.model, body.rows, body.shape, near.pairs, near.solids, watched, q, rows, half),
-        *(toward, paces, least, room),
-    )
+    couples = np.concatenate([near.pairs, np.column_stack([watched, np.full_like(watched, -1)])])
+    return couples, np.ascontiguousarray(moves @ np.concatenate([between, lever[watched]]).T)
 
 
 def levers(near: Surroundings, farthest: Array) -> Array:

@@ -11,6 +11,7 @@ from page import Tab
 from playwright.sync_api import expect
 
 import kin
+from app.viewer.obstacles import placed
 from tests.app.zips import TWO_JOINTS, packed, robot_files
 
 pytestmark = pytest.mark.browser

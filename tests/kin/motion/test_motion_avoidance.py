@@ -30,7 +30,7 @@ def test_a_motion_is_refused_at_its_first_touch():
 def test_slow_motions_and_pauses_take_no_more_checks_than_fast_ones(monkeypatch, speed):
     checks = []
     margins = sweep.margins
-    monkeypatch.setattr(sweep, "margins", lambda *args: checks.append(len(args[6])) or margins(*args))
+    monkeypatch.setattr(sweep, "margins", lambda *args: checks.append(len(args[5])) or margins(*args))
     moves = [kin.Ptp(kin.JointTarget(AWAY), speed=speed), *[kin.Dwell(3600.0)] * 100]
     far = kin.Obstacle("sphere", (9.0, 0.0, 0.0), radius=0.1)
     assert kin.plan_motion(UR5, moves, obstacles=[far]).planned
