@@ -74,7 +74,7 @@ RULES: dict[str, set[str]] = {
     },
     # The process that parses meshes starts without the core, which would take it a second.
     "app/viewer/meshes/archive.py": set(),
-    "app/viewer/meshes/child.py": {"app.viewer.meshes"},
+    "app/viewer/meshes/child.py": {"app.shared.threads.confined", "app.viewer.meshes"},
     "app/viewer/meshes/loading.py": {"fast_simplification", "trimesh", "numpy", "app.viewer.meshes"},
     "app/viewer/meshes/placing.py": {"numpy", "app.viewer.meshes"},
     "app/viewer/meshes/surface.py": {"numpy"},
@@ -110,7 +110,7 @@ RULES: dict[str, set[str]] = {
     "app/cli/classroom": {"kin", "app.classroom", "app.cli", "app.exercises", "app.shared"},
     "app/cli/classroom/arguments.py": set(),
     "app/cli/xacro": {"kin", "app.cli.xacro"},
-    "app/cli/xacro/expansion.py": {"xacro", "xacrodoc", "yaml", "app.cli.xacro"},
+    "app/cli/xacro/expansion.py": {"xacro", "xacrodoc", "yaml", "app.shared.threads.confined", "app.cli.xacro"},
     "app/cli/xacro/expressions.py": {"xacro"},
     "app/cli/startup.py": set(),
     "app/cli/serve.py": {"pydantic", "app.cli.startup", "app.service.main", "app.shared"},

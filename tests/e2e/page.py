@@ -20,17 +20,38 @@ from app.viewer.scene.meshes import body
 ARTIFACTS = Path(__file__).parents[1] / "artifacts"
 PICTURES = "KINBOARD_TEST_PICTURES" in os.environ  # save pictures of the screens: a second or two each
 WAIT = 45_000  # ms; software rendering on a busy machine is slow
-# Smoothing edges is a third of the work of software rendering, and a coarser picture saves half of the rest.
-PLAIN = """
-const { getContext } = HTMLCanvasElement.prototype;
-HTMLCanvasElement.prototype.getContext = function (kind, options) {
-  return getContext.call(this, kind, kind.startsWith("webgl") ? { ...options, antialias: false } : options);
-};
-Object.defineProperty(window, "devicePixelRatio", { get: () => 0.5 });
-// viser draws an idle page once a second, which takes a quarter of a processor here.
-const { setInterval } = window;
-window.setInterval = (act, ms, ...rest) => setInterval(act, ms === 1000 ? 20000 : ms, ...rest);
+# viser draws an idle page once a second, which takes a quarter of a processor here.
+QUIET = """
+{
+  const { setInterval } = window;
+  window.setInterval = (act, ms, ...rest) => setInterval(act, ms === 1000 ? 20000 : ms, ...rest);
+}
 """
+# Half of the work of a page is drawing the scene in software, and no test looks at the picture: its edges are not
+# smoothed, and after a frame the next ones are left out for a while. Pictures that are saved have all of it.
+ROUGH = """
+{
+  const { getContext } = HTMLCanvasElement.prototype, gl = WebGL2RenderingContext.prototype;
+  HTMLCanvasElement.prototype.getContext = function (kind, options) {
+    return getContext.call(this, kind, kind.startsWith("webgl") ? { ...options, antialias: false } : options);
+  };
+  let leftOut = false, drawn = -Infinity, now = 0;
+  for (const name of ["drawElements", "drawArrays", "drawElementsInstanced", "drawArraysInstanced"]) {
+    const draw = gl[name];
+    gl[name] = function (...what) { if (!leftOut) draw.apply(this, what); };
+  }
+  const { requestAnimationFrame } = window;
+  window.requestAnimationFrame = (act) => requestAnimationFrame((time) => {
+    if (time !== now) {
+      now = time;
+      leftOut = time - drawn < 500;
+      if (!leftOut) drawn = time;
+    }
+    act(time);
+  });
+}
+"""
+PLAIN = QUIET if PICTURES else QUIET + ROUGH
 # As after the first minute: the hints are closed.
 NO_HINTS = 'localStorage.setItem("kinboard-hints", "drag joint learn");'
 

@@ -1,4 +1,4 @@
-"""The tab *Program* in a browser: record three poses, play, scrub, read the plot, save the program."""
+"""The tab *Program* in a browser: record three poses, play, scrub, read the plot, save, rename, reload."""
 
 from __future__ import annotations
 
@@ -67,7 +67,33 @@ def test_the_table_of_peaks_stays_open_while_the_page_updates(program: Tab) -> N
     expect(table).to_be_hidden()
 
 
-def test_three_poses_are_recorded_played_and_saved(program: Tab, tmp_path: Path) -> None:
+def is_kept(program: Tab) -> None:
+    """A name that is given to a pose, and where the arm is, stay when the page is loaded again; so does undo."""
+    page = program.page
+    rows = page.locator("[data-program-item]")
+    rows.nth(1).locator("[data-program-do=choose]").click()
+    name = page.locator("[data-program-field=name]")
+    name.fill("above the part")
+    name.press("Enter")
+    expect(rows.nth(1)).to_contain_text("above the part")
+    page.wait_for_function("() => location.hash.includes('s=')")
+    before = page.url
+    page.locator("[data-program-do=go]").click()
+    program.wait_for_tool(at(ANGLES[1]), within=0.06)
+    page.wait_for_function("before => location.href !== before", arg=before)
+
+    page.reload()
+    expect(rows).to_have_count(3)
+    expect(rows.nth(1)).to_contain_text("above the part")
+    program.wait_for_tool(at(ANGLES[1]), within=0.06)
+    program.dismiss_notice()
+    page.locator("[data-program-do=clear]").click()
+    expect(rows).to_have_count(0)
+    page.get_by_role("button", name="Undo").click()
+    expect(rows).to_have_count(3)
+
+
+def test_three_poses_are_recorded_played_saved_and_kept(program: Tab, tmp_path: Path) -> None:
     page = program.page
     for i, angle in enumerate(ANGLES):
         program.open("Move")
@@ -79,13 +105,19 @@ def test_three_poses_are_recorded_played_and_saved(program: Tab, tmp_path: Path)
     now = page.locator("[data-program-now]")
     duration = float(re.findall(r"/ ([\d.]+) s", now.inner_text())[0])
 
+    clock = page.locator("[data-program=clock]")
     page.get_by_role("button", name="Play").click()
+    expect(page.get_by_role("button", name="Pause", exact=True)).to_be_visible()
     expect(now).to_have_text(f"{duration:.2f} / {duration:.2f} s")
+    expect(clock).to_have_attribute("data-playing", "0")
     program.wait_for_tool(at(ANGLES[-1]), within=0.06)
+    assert clock.get_attribute("data-time") == clock.get_attribute("data-duration")
 
     slider = page.get_by_role("slider", name="Time in the program")
-    slider.fill("0")
+    slider.press("Home")
     program.wait_for_tool(at(ANGLES[0]), within=0.06)
+    slider.fill("0.5")
+    expect(now).to_contain_text("0.50 /")
 
     plot = page.locator("[data-program-plot]")
     plot.scroll_into_view_if_needed()
@@ -108,3 +140,4 @@ def test_three_poses_are_recorded_played_and_saved(program: Tab, tmp_path: Path)
     assert [round(np.degrees(segment["q"][0])) for segment in segments] == list(ANGLES)
     page.locator("[data-program-choice=language]").select_option("URScript")
     expect(page.locator("[data-program=files] code")).to_contain_text("six revolute joints")
+    is_kept(program)

@@ -18,6 +18,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from app.shared.threads.confined import limit_this_process
+
 MEMORY = 1024 * 1024 * 1024  # bytes
 SECONDS = 30  # of processor time
 DEEPEST = 6  # folders below the given one in which packages are looked for
@@ -48,7 +50,7 @@ def main() -> None:
     """Expand the file that standard input names, and print the URDF."""
     request = json.loads(sys.stdin.buffer.read())
     file, folder = Path(request["file"]), Path(request["folder"])
-    _limit()
+    limit_this_process(MEMORY, SECONDS, alone=True)
     import encodings.ascii
     import encodings.cp1252
     import encodings.latin_1
@@ -87,19 +89,6 @@ def _packages(folder: Path) -> dict[str, str]:
         if "package.xml" in files:
             found.setdefault(Path(parent).name, parent)
     return found
-
-
-def _limit() -> None:
-    if sys.platform == "win32":
-        return
-    import resource
-
-    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 1))
-    resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    if sys.platform == "linux":
-        resource.setrlimit(resource.RLIMIT_NPROC, (0, 0))  # new ones; does not bind root
-        resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
 
 
 def _confine(folder: str, refused: type[Exception]) -> None:

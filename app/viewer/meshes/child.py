@@ -20,6 +20,7 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from app.shared.threads.confined import limit_this_process
 from app.viewer.meshes.archive import Archive, MeshError, TooLargeError
 
 MEMORY = 640 * 1024 * 1024  # bytes
@@ -30,7 +31,7 @@ ALL = 1_500_000  # triangles of all files, before they are simplified
 
 def main() -> None:
     """Answer one request."""
-    _limit()
+    limit_this_process(MEMORY, SECONDS)
     # trimesh reads files without SciPy, whose import would take as long as reading a mesh.
     sys.modules["scipy"] = None  # type: ignore[assignment]
     line = sys.stdin.buffer.readline()
@@ -49,19 +50,6 @@ def main() -> None:
     except MemoryError:
         words = ["meshes", "more memory than they may take", "fewer or simpler meshes"]
         answer.write(b"L" + json.dumps(words).encode())
-
-
-def _limit() -> None:
-    """Bound memory, processor time and files of this process, where the system can."""
-    if sys.platform == "win32":
-        return
-    import resource
-
-    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 1))
-    resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    if sys.platform == "linux":
-        resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
 
 
 def answer_to(request: dict[str, Any], data: bytes, report: Callable[[int, int], None] = lambda *_: None) -> bytes:

@@ -7,7 +7,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from kin import Robot, link_frames
+from app.viewer.lessons.axes import axes_at
+from kin import Robot
 from kin.axes import NEARLY, cross
 from kin.transforms import Array
 
@@ -68,10 +69,7 @@ def common_normal(first: Line, second: Line, near: float, through: Array | None 
 
 def axis_lines(robot: Robot, q: Array) -> tuple[Line, ...]:
     """The axes of all joints at a configuration ``(n,)``, in the positive direction of each joint."""
-    frames = np.concatenate([robot.T_world_base[None], link_frames(robot, q)])
-    # In a standard table a joint turns about z of the frame before its row.
-    shift = 0 if robot.convention == "standard" else 1
-    return tuple(Line(frames[row + shift, :3, 3], frames[row + shift, :3, 2]) for row in robot.joint_rows)
+    return tuple(map(Line, *axes_at(robot, q)))
 
 
 def angle_about(axis: Array, start: Array, end: Array) -> float:

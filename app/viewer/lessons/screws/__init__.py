@@ -15,10 +15,11 @@ import viser
 
 import kin
 from app.viewer.feature import Stage
+from app.viewer.lessons.axes import axes_at
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.screws import views
 from app.viewer.lessons.screws.drawing import Drawing
-from app.viewer.lessons.screws.product import Form, axes_at, origin_of, partial, seen
+from app.viewer.lessons.screws.product import Form, origin_of, partial, seen
 from app.viewer.lessons.screws.questions import far_joint, outline
 from app.viewer.panel import assign, listen, update_html
 from app.viewer.scene.camera import round_points

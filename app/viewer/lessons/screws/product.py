@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from kin import Robot, Screws, exp_screw, link_frames
+from kin import Screws, exp_screw
 from kin.transforms import Array
 
 Form = Literal["space", "body"]
@@ -20,14 +20,6 @@ def seen(found: Screws, form: Form) -> Array:
 def origin_of(found: Screws, form: Form) -> Array:
     """The frame ``(4, 4)`` in which the screws of a form are given."""
     return np.eye(4) if form == "space" else found.M
-
-
-def axes_at(robot: Robot, q: Array) -> tuple[Array, Array]:
-    """A point of each joint's axis, where the joint is, and the axis' direction, ``(n, 3)`` each."""
-    frames = np.concatenate([robot.T_world_base[None], link_frames(robot, q)])
-    # In the standard convention a joint turns about z of the frame before its row, in the modified one of its own.
-    rows = np.array(robot.joint_rows) + (robot.convention == "modified")
-    return frames[rows, :3, 3], frames[rows, :3, 2]
 
 
 def foot(S: Array) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from app.viewer.lessons.axes import axes_at
 from app.viewer.lessons.guide.outline import (
     LEAST,
     PLAIN,
@@ -18,7 +19,7 @@ from app.viewer.lessons.guide.outline import (
     two_percent,
 )
 from app.viewer.lessons.guide.poses import as_configuration
-from app.viewer.lessons.screws.product import axes_at, foot
+from app.viewer.lessons.screws.product import foot
 from kin import Robot, screws
 from kin.transforms import Array
 from kin.units import Units

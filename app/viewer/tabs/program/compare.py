@@ -31,6 +31,8 @@ CHOICES: dict[Choice, str] = {
 }
 ZONE = 0.05  # m, of the other zones at first
 _SAME = 1e-9  # s
+_BESIDE = 1e-9  # of the duration: where the acceleration is compared on both sides of an instant
+_JUMP = 1e-6  # of the largest acceleration: a difference beyond rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,6 +57,14 @@ class Straight:
     def grid(self) -> Array:
         """Times at which to look for peaks."""
         return look_between(np.unique(self.profile.breaks))
+
+    def jumps(self) -> bool:
+        """Whether the acceleration jumps: between two polynomials, or from and to the rest at the ends."""
+        breaks = self.profile.breaks
+        before, after = (self.profile.sample(breaks + sign * _BESIDE * self.duration)[2] for sign in (-1.0, 1.0))
+        before[0] = after[-1] = 0.0
+        largest = np.abs(self.profile.sample(self.grid())[2]).max()
+        return bool(np.abs(after - before).max() > _JUMP * largest)
 
 
 def other_motion(items: Items, robot: Robot, loop: bool, choice: Choice, zone: float) -> Motion:
@@ -126,6 +136,11 @@ _ABOUT: dict[Choice, str] = {
     "s_curve": "Acceleration is continuous, jerk keeps its limit.",
     "fastest": "Acceleration may jump where the path is LIN, CIRC or a spline: jerk is not limited there.",
 }
+
+
+def jerk_is_infinite(motion: Motion) -> bool:
+    """Whether a profile of `with_profile` makes the acceleration jump; peaks only have the jerk between jumps."""
+    return any(isinstance(piece, Straight) and piece.jumps() for piece in motion.pieces)
 
 
 def about(choice: Choice, motion: Motion) -> str:

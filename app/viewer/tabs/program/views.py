@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from app.viewer.tabs.program.compare import CHOICES, Choice, about
+from app.viewer.tabs.program.compare import CHOICES, Choice, about, jerk_is_infinite
 from app.viewer.tabs.program.drawing import Shown
 from app.viewer.tabs.program.faults import Fault
 from app.viewer.tabs.program.items import MOST, Item, Items, Kind, passed_through, start_of
@@ -159,6 +159,9 @@ def _share(ratio: float) -> tuple[str, str]:
     )
 
 
+_INFINITE = ("∞, exceeded", "kb-vermilion")  # where the acceleration jumps
+
+
 def _cell(peak: Peak, scale: float) -> dict[str, object]:
     """A peak beside its limit: numbers, a word, and the colour of its state."""
     ratio = peak.ratio or 0.0
@@ -181,7 +184,10 @@ def comparison(
     rows = [("duration", [(f"{each.duration:.2f} s", "") for each in both])]
     for quantity in QUANTITIES:
         ratios = [max(peak.ratio or 0.0 for peak in each.peaks if peak.quantity == quantity) for each in both]
-        rows.append((quantity, [_share(ratio) for ratio in ratios]))
+        cells = [_share(ratio) for ratio in ratios]
+        if quantity == "jerk":
+            cells = [_INFINITE if jerk_is_infinite(each) else cell for each, cell in zip(both, cells, strict=True)]
+        rows.append((quantity, cells))
     speeds = [max(peak.peak for peak in each.peaks if peak.quantity == "tool_speed") for each in both]
     rows.append(("tool", [(f"{lengths.number(speed, 0)} {lengths.name}/s", "") for speed in speeds]))
     return render(

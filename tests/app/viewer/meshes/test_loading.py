@@ -322,8 +322,9 @@ def test_the_process_has_bounds_and_does_not_see_the_token(monkeypatch: pytest.M
     monkeypatch.setenv("KINBOARD_TOKEN", "a secret token")
     script = """
 import os, resource
-from app.viewer.meshes.child import MEMORY, SECONDS, _limit
-_limit()
+from app.shared.threads.confined import limit_this_process
+from app.viewer.meshes.child import MEMORY, SECONDS
+limit_this_process(MEMORY, SECONDS)
 assert resource.getrlimit(resource.RLIMIT_CPU)[0] == SECONDS
 assert not [name for name in os.environ if name.startswith("KINBOARD")]
 try:

@@ -14,14 +14,14 @@ import kin
 from app.exercises.typed import EntryError
 from app.viewer.own_arm import clean
 from app.viewer.tabs.program import items as lists
-from app.viewer.tabs.program.compare import CHOICES, Choice, other_motion
+from app.viewer.tabs.program.compare import CHOICES, Choice, jerk_is_infinite, other_motion
 from app.viewer.tabs.program.files import toml_of
 from app.viewer.tabs.program.items import Item
 from app.viewer.tabs.program.links import pack, unpack
 from app.viewer.tabs.program.planning import halfway, items_of, plan, program_of
 from app.viewer.tabs.program.playback import Player
 from app.viewer.tabs.program.typed import Fields
-from app.viewer.tabs.program.views import QUANTITIES, assumption
+from app.viewer.tabs.program.views import QUANTITIES, assumption, comparison
 from kin import InputError
 from kin.motion import limits_of
 from kin.units import DEFAULT_UNITS
@@ -225,8 +225,16 @@ def test_motions_of_the_same_waypoints_can_be_compared(choice: Choice) -> None:
     peaks = {quantity: max(p.ratio or 0 for p in other.peaks if p.quantity == quantity) for quantity in QUANTITIES}
     assert peaks["velocity"] <= 1 + 1e-9
     assert peaks["acceleration"] <= 1 + 1e-9
-    if choice not in ("cubic", "trapezoidal"):
+    html = comparison(own.motion, other, choice, 0.05, Fields(UR5, DEFAULT_UNITS, np.eye(4), "pose"), "")
+    assert not jerk_is_infinite(own.motion)
+    if choice in ("cubic", "trapezoidal"):
+        assert jerk_is_infinite(other)
+        assert "its jerk there is infinite" in html
+        assert html.count("∞, exceeded") == 1
+    else:
         assert peaks["jerk"] <= 1 + 1e-9
+        assert not jerk_is_infinite(other)
+        assert "∞" not in html
     if choice in ("cubic", "quintic"):
         assert max(peaks.values()) > 0.99, "it is as fast as the limits allow"
     if choice == "quintic":
