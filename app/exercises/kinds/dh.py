@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass, replace
 from typing import ClassVar, Self
 
 import numpy as np
@@ -13,20 +13,18 @@ import kin
 from app.exercises.contract import LONGEST, Asked, Kind, typed
 from app.exercises.fields import Fields
 from app.exercises.judging import Verdict
+from app.exercises.rows import FACTORS, Accepted, Line, Row, angle_between, turns
 from app.exercises.typed import EntryError, read_number
 from app.exercises.variant import Variant
 from kin import InputError, Robot
-from kin.axes import screw_x, screw_z
 from kin.robot import CONVENTIONS, Convention
 from kin.transforms import Array
 from kin.units import DEGREES, Units
 
 NAMES = ("θ", "d", "a", "α")
-ANGULAR = (True, False, False, True)
-CLOSE, ALIGNED = 2e-3, math.radians(1.0)  # m, rad
+ANGULAR = tuple(map(turns, FACTORS))
+ACCEPTED = Accepted(math.radians(1.0), 2e-3)
 _WORDS: dict[Convention, str] = {"standard": "the standard convention", "modified": "Craig’s convention"}
-
-Row = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -68,7 +66,7 @@ class DHKind(Kind):
         names = tuple(units.of(angular).name for angular in ANGULAR)
         note = (
             f"In {_WORDS[arm.convention]}, with the values of the exercise’s posture. "
-            f"± {units.angles.brief(ALIGNED)}, ± {units.lengths.brief(CLOSE)}. "
+            f"± {units.angles.brief(ACCEPTED.angle)}, ± {units.lengths.brief(ACCEPTED.length)}. "
             "The tab Robot shows the arm’s table when the answer is known."
         )
         return Asked("table", NAMES, names, note, self.last - self.first + 1, self.first + 1)
@@ -98,7 +96,7 @@ class DHKind(Kind):
         T = frames[self.first]
         for i, row in enumerate(rows):
             k = self.first + i
-            T = T @ _matrix(row, arm.convention)
+            T = T @ row.matrix(arm.convention)
             fault = _fault(arm, k, T, frames[k + 1])
             found.append(fault)
             if fault:
@@ -109,7 +107,7 @@ class DHKind(Kind):
         """Whether these are the arm's own rows, or another choice."""
         own = _rows_at(arm, variant.q)[self.first : self.last + 1]
         same = all(
-            np.allclose(_matrix(a, arm.convention), _matrix(b, arm.convention), atol=CLOSE)
+            np.allclose(a.matrix(arm.convention), b.matrix(arm.convention), atol=ACCEPTED.length)
             for a, b in zip(rows, own, strict=True)
         )
         if same:
@@ -118,20 +116,21 @@ class DHKind(Kind):
 
     def _unit_slip(self, arm: Robot, q: Array, rows: Sequence[Row], units: Units) -> str:
         if units.degrees:
-            turned = [(row[0] * DEGREES.scale, row[1], row[2], row[3] * DEGREES.scale) for row in rows]
+            turned = [
+                replace(row, theta=row.theta * DEGREES.scale, alpha=row.alpha * DEGREES.scale) for row in rows
+            ]
             if not any(self._faults(arm, q, turned)):
                 return "The angles are in radians; the unit is degrees. Type rad after a number to give radians."
         for scale, words in ((units.lengths.scale, "metres"), (1e-3 * units.lengths.scale, "millimetres")):
-            longer = [(row[0], row[1] * scale, row[2] * scale, row[3]) for row in rows]
+            longer = [replace(row, d=row.d * scale, a=row.a * scale) for row in rows]
             if abs(scale - 1.0) > 1e-9 and not any(self._faults(arm, q, longer)):
                 return f"The lengths are in {words}; the unit is {units.lengths.name}."
         return ""
 
     def _sign_slip(self, arm: Robot, q: Array, rows: Sequence[Row], place: int) -> str:
-        for j, name in enumerate(NAMES):
-            values = list(rows[place])
-            values[j] = -values[j]
-            tried = [*rows[:place], (values[0], values[1], values[2], values[3]), *rows[place + 1 :]]
+        for name, factor in zip(NAMES, FACTORS, strict=True):
+            other = replace(rows[place], **{factor: -getattr(rows[place], factor)})
+            tried = [*rows[:place], other, *rows[place + 1 :]]
             if not self._faults(arm, q, tried)[place]:
                 return f"Row {self.first + place + 1} is right but for the sign of {name}."
         return ""
@@ -140,7 +139,8 @@ class DHKind(Kind):
         units = Units()
         rows = _rows_at(self._arm(variant), variant.q)[self.first : self.last + 1]
         return [
-            [typed(value, units.of(angular)) for value, angular in zip(row, ANGULAR, strict=True)] for row in rows
+            [typed(value, units.of(angular)) for value, angular in zip(astuple(row), ANGULAR, strict=True)]
+            for row in rows
         ]
 
     def solution(self, variant: Variant, units: Units) -> str:
@@ -149,7 +149,7 @@ class DHKind(Kind):
             f"Row {self.first + i + 1}: "
             + ", ".join(
                 f"{name} = {units.of(angular).text(value, 1)}"
-                for name, value, angular in zip(NAMES, row, ANGULAR, strict=True)
+                for name, value, angular in zip(NAMES, astuple(row), ANGULAR, strict=True)
             )
             for i, row in enumerate(rows)
         ]
@@ -169,7 +169,7 @@ def _read(given: object, count: int, first: int, units: Units) -> list[Row]:
                 values.append(read_number(text[:LONGEST], units.of(angular)))
             except EntryError as error:
                 raise EntryError(f"{name} of row {first + i + 1} was not read", error.detail) from None
-        rows.append((values[0], values[1], values[2], values[3]))
+        rows.append(Row(*values))
     return rows
 
 
@@ -181,20 +181,14 @@ def _rows_at(arm: Robot, q: Array) -> list[Row]:
         value = values.get(i, 0.0)
         turns = row.kind == "revolute"
         theta, d = row.theta + (value if turns else 0.0), row.d + (0.0 if turns else value)
-        found.append((theta, d, row.a, row.alpha))
+        found.append(Row(theta, d, row.a, row.alpha))
     return found
-
-
-def _matrix(row: Row, convention: Convention) -> Array:
-    theta, d, a, alpha = row
-    first, second = screw_z(theta, d), screw_x(a, alpha)
-    return np.asarray(first @ second if convention == "standard" else second @ first)
 
 
 def _chain(base: Array, rows: Sequence[Row], convention: Convention) -> list[Array]:
     frames, T = [], base
     for row in rows:
-        T = T @ _matrix(row, convention)
+        T = T @ row.matrix(convention)
         frames.append(T)
     return frames
 
@@ -204,23 +198,18 @@ def _fault(arm: Robot, k: int, T: Array, right: Array) -> str:
     joint_row = k + 1 if arm.convention == "standard" else k
     last = k == len(arm.rows) - 1
     kind = arm.rows[joint_row].kind if joint_row < len(arm.rows) else "fixed"
-    offset, angle = T[:3, 3] - right[:3, 3], _between(T[:3, 2], right[:3, 2])
     if kind == "fixed" or last:
-        if float(np.linalg.norm(offset)) > CLOSE:
-            return f"the frame after it is {1e3 * float(np.linalg.norm(offset)):.0f} mm from its place."
-        if angle > ALIGNED:
+        distance, angle = float(np.linalg.norm(T[:3, 3] - right[:3, 3])), angle_between(T[:3, 2], right[:3, 2])
+        if distance > ACCEPTED.length:
+            return f"the frame after it is {1e3 * distance:.0f} mm from its place."
+        if angle > ACCEPTED.angle:
             return f"the z axis after it is off by {math.degrees(angle):.0f}°."
         return ""
     number = 1 + arm.joint_rows.index(joint_row)
-    off = min(angle, math.pi - angle)
-    if off > ALIGNED:
-        return f"the axis of joint {number} points elsewhere, off by {math.degrees(off):.0f}°."
-    z = right[:3, 2]
-    away = float(np.linalg.norm(offset - (offset @ z) * z))
-    if kind == "revolute" and away > CLOSE:
-        return f"the axis of joint {number} has the right direction, but it is {1e3 * away:.0f} mm from its place."
+    miss = Line(right[:3, 3], right[:3, 2]).missed_by(T)
+    if miss.angle > ACCEPTED.angle:
+        return f"the axis of joint {number} points elsewhere, off by {math.degrees(miss.angle):.0f}°."
+    if kind == "revolute" and miss.distance > ACCEPTED.length:
+        away = f"{1e3 * miss.distance:.0f} mm from its place."
+        return f"the axis of joint {number} has the right direction, but it is {away}"
     return ""
-
-
-def _between(a: Array, b: Array) -> float:
-    return math.atan2(float(np.linalg.norm(np.cross(a, b))), float(a @ b))

@@ -11,13 +11,14 @@ from typing import ClassVar
 import numpy as np
 import viser
 
+from app.exercises.rows import Factor, turns
 from app.viewer.feature import Stage
 from app.viewer.lessons.dh import choices, views
 from app.viewer.lessons.dh.assignment import Assignment, read_row
 from app.viewer.lessons.dh.attempt import Attempt, error_of, table_robot
 from app.viewer.lessons.dh.axes_drawing import AxesDrawing, axis_names
 from app.viewer.lessons.dh.drawing import PLACED, moving_frame, pose, triad_colors, triads
-from app.viewer.lessons.dh.steps import ORDERS, Factor, elementary, low, turns
+from app.viewer.lessons.dh.steps import ORDERS, elementary, low
 from app.viewer.lessons.figures import AMBER, BLUE, VERMILION, Angle, Dimension, Figure, clear_of
 from app.viewer.panel import update_html
 from app.viewer.scene.meshes import body

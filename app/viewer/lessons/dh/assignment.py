@@ -14,43 +14,15 @@ from functools import cached_property
 
 import numpy as np
 
-from app.viewer.lessons.dh.normals import Line, angle_about, axis_lines, common_normal
-from app.viewer.lessons.dh.steps import MOVED, ORDERS, Factor, elementary, turns
+from app.exercises.rows import Accepted, Factor, Line, Row
+from app.viewer.lessons.dh.normals import angle_about, axis_lines, common_normal
+from app.viewer.lessons.dh.steps import MOVED
 from kin import Robot, fk
 from kin.axes import NEARLY, frame_of, inverse, size
 from kin.robot import Convention
 from kin.transforms import Array
 
-ANGLE, LENGTH = math.radians(0.3), 5e-4  # largest accepted errors of typed values
-FACTORS: tuple[Factor, ...] = ("theta", "d", "a", "alpha")
-
-
-@dataclass(frozen=True)
-class Row:
-    """The constants of a row (rad, m): the joint's value is added to θ, or to d."""
-
-    theta: float
-    d: float
-    a: float
-    alpha: float
-
-    def matrix(self, convention: Convention) -> Array:
-        """Its product of four motions ``(4, 4)``."""
-        T = np.eye(4)
-        for factor in ORDERS[convention]:
-            T = T @ elementary(factor, getattr(self, factor))
-        return T
-
-    def differing(self, other: Row) -> tuple[Factor, ...]:
-        """The parameters in which two rows differ by more than the accepted errors."""
-        return tuple(f for f in FACTORS if not is_near(f, getattr(self, f), getattr(other, f)))
-
-
-def is_near(factor: Factor, one: float, other: float) -> bool:
-    """Whether two values of a parameter are equal within the accepted error, angles up to whole turns."""
-    if turns(factor):
-        return abs(math.remainder(one - other, math.tau)) <= ANGLE
-    return abs(one - other) <= LENGTH
+ACCEPTED = Accepted(math.radians(0.3), 5e-4)  # of typed values
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,12 +223,12 @@ def judge(work: Assignment, chosen: Array, typed: Row, others: Sequence[Array] =
     """
     rows = family(work, chosen, typed)
     # The chosen direction of x counts, unless more of what was typed is right for the other one.
-    row = min(rows, key=lambda each: len(typed.differing(each)))
-    if typed.differing(row):
+    row = min(rows, key=lambda each: len(typed.differing(each, ACCEPTED)))
+    if typed.differing(row, ACCEPTED):
         more = (each for other in others if is_reachable(work, other) for each in family(work, other, typed))
-        row = next((each for each in more if not typed.differing(each)), row)
+        row = next((each for each in more if not typed.differing(each, ACCEPTED)), row)
     exact = read_row(work.convention, work.frames[-1], chosen)
-    return Verdict(typed.differing(row), row, not row.differing(exact))
+    return Verdict(typed.differing(row, ACCEPTED), row, not row.differing(exact, ACCEPTED))
 
 
 def is_reachable(work: Assignment, frame: Array) -> bool:

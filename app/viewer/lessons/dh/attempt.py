@@ -11,20 +11,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from app.exercises.rows import FACTORS, Factor, Row, turns
 from app.exercises.typed import EntryError, read_number
 from app.viewer.lessons.dh import choices
-from app.viewer.lessons.dh.assignment import (
-    FACTORS,
-    Assignment,
-    Row,
-    Verdict,
-    is_near,
-    judge,
-    opposite_x,
-    read_row,
-)
+from app.viewer.lessons.dh.assignment import ACCEPTED, Assignment, Verdict, judge, opposite_x, read_row
 from app.viewer.lessons.dh.choices import PARTS, Choice, Part
-from app.viewer.lessons.dh.steps import MOVED, ORDERS, Factor, low, turns
+from app.viewer.lessons.dh.steps import MOVED, ORDERS, low
 from kin import InputError, Robot
 from kin.transforms import Array, as_transform
 from kin.units import Units
@@ -202,16 +194,16 @@ class Attempt:
         meaning = f"the {'angle' if turns(factor) else 'distance'} {self.meaning(factor)}"
         own = self.own_value(q) if factor == self.variable() else 0.0
         given, right = (getattr(row, factor) + own for row in (typed, verdict.row))
-        if own and is_near(factor, given, right - own):
+        if own and ACCEPTED.is_near(factor, given, right - own):
             joint = self.number
             return f"{name} is measured at the pose on show: what you typed is its value with joint {joint} at 0."
-        if not is_near(factor, given, 0.0) and is_near(factor, given, -right):
+        if not ACCEPTED.is_near(factor, given, 0.0) and ACCEPTED.is_near(factor, given, -right):
             rule = "Turn as a right-handed screw would." if turns(factor) else "Count along the arrow of the axis."
             return f"The size of {name} is right, its sign is not. It is {meaning}. {rule}"
-        if turns(factor) and is_near(factor, given, right + math.pi):
+        if turns(factor) and ACCEPTED.is_near(factor, given, right + math.pi):
             return f"{name} is half a turn off. It is {meaning}."
         swapped = {"d": "a", "a": "d"}.get(factor)
-        if swapped and is_near(factor, given, getattr(verdict.row, swapped)):
+        if swapped and ACCEPTED.is_near(factor, given, getattr(verdict.row, swapped)):
             return f"{name} is {meaning}. You typed the other length."
         return f"{name} is {meaning}."
 
@@ -220,7 +212,7 @@ class Attempt:
         exact = read_row(self.work.convention, self.work.frames[-1], self.chosen)
         sentences = [f"Row {number} leads to frame {number}."]
         if not verdict.as_chosen:
-            reverse = not verdict.row.differing(opposite_x(exact, self.work.convention))
+            reverse = not verdict.row.differing(opposite_x(exact, self.work.convention), ACCEPTED)
             sentences = [
                 f"Your numbers lead to another frame {number} than the one you chose, and to the same arm: "
                 + (f"x{low(number)} points the other way." if reverse else "this place or direction is free.")

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
-from app.viewer.lessons.dh.normals import Line, Normal, axis_lines, common_normal
+from app.exercises.rows import Line
+from app.viewer.lessons.dh.normals import Normal, axis_lines, common_normal
 from app.viewer.lessons.dh.steps import low
 from app.viewer.lessons.figures import AMBER, PURPLE, Figure
 from app.viewer.scene.camera import Sphere

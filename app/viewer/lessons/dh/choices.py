@@ -11,8 +11,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from app.exercises.rows import Line
 from app.viewer.lessons.dh.assignment import Assignment
-from app.viewer.lessons.dh.normals import Line, Normal, common_normal
+from app.viewer.lessons.dh.normals import Normal, common_normal
 from app.viewer.lessons.dh.steps import low
 from kin import fk, link_frames
 from kin.axes import cross, frame_of, perpendicular_to

@@ -14,10 +14,10 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
+from app.exercises.rows import Factor
 from app.viewer.labels import add_label
 from app.viewer.lessons.dh.steps import (
     ORDERS,
-    Factor,
     Place,
     amount,
     axis,

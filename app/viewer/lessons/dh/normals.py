@@ -7,23 +7,13 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from app.exercises.rows import Line
 from app.viewer.lessons.axes import axes_at
 from kin import Robot
 from kin.axes import NEARLY, cross
 from kin.transforms import Array
 
 Relation = Literal["skew", "meet", "parallel", "one"]
-
-
-class Line(NamedTuple):
-    """A point ``(3,)`` and the unit vector ``(3,)`` of a line."""
-
-    point: Array
-    z: Array
-
-    def nearest(self, point: Array) -> Array:
-        """The point of the line that is nearest to another one."""
-        return np.asarray(self.point + ((point - self.point) @ self.z) * self.z)
 
 
 class Normal(NamedTuple):

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from app.viewer.lessons.dh.steps import MOVED, ORDERS, amount, axis_name, expression, low, symbol, turns, value
+from app.exercises.rows import turns
+from app.viewer.lessons.dh.steps import MOVED, ORDERS, amount, axis_name, expression, low, symbol, value
 from app.viewer.lessons.guide.outline import (
     Choice,
     Mistake,

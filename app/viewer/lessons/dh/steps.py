@@ -10,10 +10,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Literal
 
 import numpy as np
 
+from app.exercises.rows import Factor, turns
 from app.viewer.scene.chain import rotation, translation
 from kin import Robot, link_frames
 from kin.axes import joint_axes, pairs
@@ -21,7 +21,6 @@ from kin.robot import Convention, exact_cos_sin
 from kin.transforms import Array
 from kin.units import Units
 
-Factor = Literal["theta", "d", "a", "alpha"]
 ORDERS: dict[Convention, tuple[Factor, ...]] = {
     "standard": ("theta", "d", "a", "alpha"),
     "modified": ("alpha", "a", "theta", "d"),
@@ -72,11 +71,6 @@ def reread(robot: Robot) -> Robot:
 def length(robot: Robot) -> int:
     """Number of motions of the whole walk."""
     return MOTIONS * len(robot.rows)
-
-
-def turns(factor: Factor) -> bool:
-    """Whether a motion is a rotation, else a translation."""
-    return factor in ("theta", "alpha")
 
 
 def axis(factor: Factor) -> int:

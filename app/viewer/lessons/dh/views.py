@@ -10,12 +10,12 @@ from collections.abc import Sequence
 
 from markupsafe import Markup
 
+from app.exercises.rows import Factor, turns
 from app.viewer.lessons.dh.nine_steps import CRAIG_NOTE, NINE_STEPS
 from app.viewer.lessons.dh.steps import (
     LETTERS,
     MOVED,
     ORDERS,
-    Factor,
     Place,
     amount,
     axis,
@@ -24,7 +24,6 @@ from app.viewer.lessons.dh.steps import (
     index,
     low,
     symbolic,
-    turns,
     verdict,
 )
 from app.viewer.views import mathml as m

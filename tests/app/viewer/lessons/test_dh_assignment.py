@@ -12,13 +12,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import kin
+from app.exercises.kinds.dh import DHKind
+from app.exercises.rows import FACTORS, Factor, Line, Row, turns
+from app.exercises.variant import Variant
 from app.viewer.lessons.dh import choices
-from app.viewer.lessons.dh.assignment import FACTORS, Assignment, Row, family, free_factors, judge, read_row
-from app.viewer.lessons.dh.normals import Line, axis_lines, common_normal
-from app.viewer.lessons.dh.steps import OTHER, Factor, turns
+from app.viewer.lessons.dh.assignment import ACCEPTED, Assignment, family, free_factors, judge, read_row
+from app.viewer.lessons.dh.normals import axis_lines, common_normal
+from app.viewer.lessons.dh.steps import OTHER
 from kin.axes import pairs, size
 from kin.dh.tables import convert
 from kin.transforms import Array
+from kin.units import Units
 
 BUILT_IN = [*kin.builtin_robots().values()]
 ARMS = [arm for robot in BUILT_IN for arm in (robot, convert(robot, OTHER[robot.convention]))]
@@ -63,7 +67,7 @@ def test_the_published_table_is_accepted(robot: kin.Robot) -> None:
         chosen = default_frame(work)
         verdict = judge(work, chosen, typed, [there])
         assert verdict.wrong == ()
-        assert not verdict.row.differing(typed)
+        assert not verdict.row.differing(typed, ACCEPTED)
         work = work.with_row(verdict.row)
         assert work.frames[-1] == pytest.approx(there, abs=1e-9)
     assert work.complete
@@ -134,7 +138,7 @@ def test_each_wrong_entry_is_named(robot: kin.Robot) -> None:
             value = getattr(row, factor)
             flipped = replace(row, **{factor: -value})
             reversed_x = robot.convention == "modified" and factor == "theta"  # −90° for 90° is the opposite x
-            if factor not in free and row.differing(flipped) and not reversed_x:
+            if factor not in free and row.differing(flipped, ACCEPTED) and not reversed_x:
                 assert judge(work, chosen, flipped).wrong == (factor,)
         work = work.with_row(row)
 
@@ -265,4 +269,27 @@ def test_a_common_normal_is_perpendicular_to_both_lines(
 def test_whole_turns_do_not_matter_and_lengths_do(factor: Factor) -> None:
     row = Row(0.1, 0.2, 0.3, 0.4)
     moved = replace(row, **{factor: getattr(row, factor) + math.tau})
-    assert row.differing(moved) == (() if turns(factor) else (factor,))
+    assert row.differing(moved, ACCEPTED) == (() if turns(factor) else (factor,))
+
+
+@arms
+def test_the_lesson_and_an_exercise_judge_rows_alike(robot: kin.Robot) -> None:
+    """Rows that the lesson accepts are right in an exercise, and those that it refuses are wrong there."""
+    count = robot.n - 1  # rows that end at a joint's axis
+    kind = DHKind(0, count - 1, robot.convention)
+    variant = Variant("x", robot, np.zeros(robot.n))
+    # In Craig's convention a wrong θ or d is seen at the axis after.
+    judged = range(count if robot.convention == "standard" else count - 1)
+    for joint, factor in itertools.product(judged, FACTORS):
+        work = starts(robot)
+        accepted = True
+        while len(work.rows) < count:
+            chosen = default_frame(work)
+            row = judge(work, chosen, read_row(work.convention, work.frames[-1], chosen)).row
+            if len(work.rows) == joint:
+                row = replace(row, **{factor: getattr(row, factor) + WRONG[factor]})
+                accepted = not judge(work, chosen, row).wrong
+            work = work.with_row(row)
+        units = Units()
+        typed = [[units.of(turns(f)).scale * getattr(row, f) for f in FACTORS] for row in work.rows]
+        assert kind.judge(variant, [list(map(repr, map(float, row))) for row in typed], units).right == accepted

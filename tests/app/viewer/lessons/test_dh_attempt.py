@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 import kin
+from app.exercises.rows import FACTORS, Factor, turns
 from app.viewer.lessons.dh import choices
 from app.viewer.lessons.dh.assign import assign_html, rows_html
-from app.viewer.lessons.dh.assignment import FACTORS, Assignment, read_row
+from app.viewer.lessons.dh.assignment import Assignment, read_row
 from app.viewer.lessons.dh.attempt import Attempt, error_of
-from app.viewer.lessons.dh.steps import OTHER, Factor, turns
+from app.viewer.lessons.dh.steps import OTHER
 from kin.dh.tables import convert
 from kin.units import DEFAULT_UNITS, Units
 

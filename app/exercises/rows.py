@@ -1,0 +1,86 @@
+"""Rows of a DH table that somebody has typed, and how far the frames they lead to are from the arm's joint axes.
+
+The exercises and the lesson on DH judge rows with it. A row that puts z on the axis of the next joint is right,
+wherever on the axis its origin is; the lesson asks besides for what the student has chosen there.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from kin.axes import screw_x, screw_z
+from kin.robot import Convention
+from kin.transforms import Array
+
+Factor = Literal["theta", "d", "a", "alpha"]
+FACTORS: tuple[Factor, ...] = ("theta", "d", "a", "alpha")
+
+
+def turns(factor: Factor) -> bool:
+    """Whether a parameter is an angle, else a length."""
+    return factor in ("theta", "alpha")
+
+
+class Accepted(NamedTuple):
+    """Largest accepted errors: of angles (rad) and lengths (m)."""
+
+    angle: float
+    length: float
+
+    def is_near(self, factor: Factor, one: float, other: float) -> bool:
+        """Whether two values of a parameter are equal within these errors, angles up to whole turns."""
+        if turns(factor):
+            return abs(math.remainder(one - other, math.tau)) <= self.angle
+        return abs(one - other) <= self.length
+
+
+@dataclass(frozen=True)
+class Row:
+    """The values of a row (rad, m): its constants, or with the joint's value added to θ or d."""
+
+    theta: float
+    d: float
+    a: float
+    alpha: float
+
+    def matrix(self, convention: Convention) -> Array:
+        """Its product of four motions ``(4, 4)``."""
+        first, second = screw_z(self.theta, self.d), screw_x(self.a, self.alpha)
+        return np.asarray(first @ second if convention == "standard" else second @ first)
+
+    def differing(self, other: Row, accepted: Accepted) -> tuple[Factor, ...]:
+        """The parameters in which two rows differ by more than the accepted errors."""
+        return tuple(f for f in FACTORS if not accepted.is_near(f, getattr(self, f), getattr(other, f)))
+
+
+class Line(NamedTuple):
+    """A point ``(3,)`` and the unit vector ``(3,)`` of a line."""
+
+    point: Array
+    z: Array
+
+    def nearest(self, point: Array) -> Array:
+        """The point of the line that is nearest to another one."""
+        return np.asarray(self.point + ((point - self.point) @ self.z) * self.z)
+
+    def missed_by(self, frame: Array) -> Miss:
+        """How far z of a frame ``(4, 4)`` is from this line, which it may follow in either direction."""
+        angle = angle_between(frame[:3, 2], self.z)
+        distance = float(np.linalg.norm(frame[:3, 3] - self.nearest(frame[:3, 3])))
+        return Miss(min(angle, math.pi - angle), distance)
+
+
+class Miss(NamedTuple):
+    """How far a frame is from where it belongs: angle of z (rad), distance of the origin (m)."""
+
+    angle: float
+    distance: float
+
+
+def angle_between(one: Array, other: Array) -> float:
+    """The angle between two directions ``(3,)``, 0 to π."""
+    return math.atan2(float(np.linalg.norm(np.cross(one, other))), float(one @ other))
