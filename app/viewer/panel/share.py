@@ -35,12 +35,17 @@ class SharePanel:
             self._frames = {mode: gui.add_html("") for mode in MODES}
         gui.add_html(render("sheet/in_view"))
         self._moment: Moment | None = None
+        self._withheld = False
 
-    def show(self, link: str, moment: Moment) -> None:
-        """Show this link, and the code for this moment."""
-        self._moment = moment
+    def show(self, link: str, moment: Moment, withheld: bool = False) -> None:
+        """Show this link, and the code for this moment.
+
+        Args:
+            withheld: whether an open exercise asks for the arm's table, which most languages write out.
+        """
+        self._moment, self._withheld = moment, withheld
         update_html(self._link, box_html(link, "Copy link", wrap=True))
-        update_html(self._code, box_html(SNIPPETS[self._name](moment), "Copy code"))
+        self._show_code(moment)
         for mode, element in self._frames.items():
             code = frame(link.replace("viewer/#", f"viewer/?embed={mode}#", 1))
             update_html(element, box_html(code, f"Copy frame: {MODES[mode]}", wrap=True))
@@ -52,4 +57,8 @@ class SharePanel:
             raise InputError("language", name, "one of " + ", ".join(SNIPPETS))
         self._name = str(name)
         if self._moment is not None:
-            update_html(self._code, box_html(SNIPPETS[self._name](self._moment), "Copy code"))
+            self._show_code(self._moment)
+
+    def _show_code(self, moment: Moment) -> None:
+        code = box_html(SNIPPETS[self._name](moment), "Copy code")
+        update_html(self._code, render("panel/code_withheld") if self._withheld else code)

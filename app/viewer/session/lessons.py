@@ -33,7 +33,7 @@ class LessonChoice:
     Attributes:
         shown: the open lesson.
         guide: its goal, steps and questions.
-        sheets: the worksheet of the lesson, or of the arm; the exercises have none.
+        sheets: the worksheet of the lesson, or of the arm.
         exercises, courses: which live as long as the page.
     """
 
@@ -71,6 +71,7 @@ class LessonChoice:
             if title == each.title:
                 with self._parent:
                     each.show()
+                    self.sheets = Worksheets(self._stage, None, folder=False)
                 return
         chosen = next((lesson for lesson in LESSONS if lesson.title == title), None)
         if chosen is None:

@@ -208,7 +208,7 @@ class Persistence:
         target = kin.fk(page.robot, page.goal) if page.target is None else page.target
         own = page.own is not None and page.own.robot == page.robot
         moment = Moment(page.robot, page.goal, target, page.task, self._address, self._token, own)
-        self._share.show(f"{self._address}viewer/#s={self._saved}", moment)
+        self._share.show(f"{self._address}viewer/#s={self._saved}", moment, page.withheld == "table")
 
 
 def link_notice(saved: PageState) -> Notice | None:

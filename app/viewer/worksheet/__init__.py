@@ -6,7 +6,10 @@ the panel, so the service keeps nothing, and it works for an arm of the visitor'
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Hashable
+
+import viser
 
 from app.exercises.judging import solution_text
 from app.exports.snippets import named
@@ -15,6 +18,7 @@ from app.viewer.feature import Feature, Stage
 from app.viewer.lessons.guide import outline as guide
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.panel import update_html
+from app.viewer.panel.status import Notice
 from app.viewer.views.templates import render
 from app.viewer.worksheet.views import page_html
 from kin import InputError
@@ -32,25 +36,31 @@ class Worksheets(Feature):
 
     Args:
         lesson: the lesson on show, if there is one.
+        folder: whether there are buttons in the tab *Learn*; otherwise only those in the tab *View*.
     """
 
     key = "sheet"
     title = "Worksheet"
     messages = frozenset({"page", *FILES})
 
-    def __init__(self, stage: Stage, lesson: Lesson | None) -> None:
+    def __init__(self, stage: Stage, lesson: Lesson | None, folder: bool = True) -> None:
         super().__init__(stage)
         self._lesson = lesson
-        self._folder = stage.client.gui.add_folder("Worksheet", expand_by_default=lesson is not None)
-        with self._folder:
-            self._html = stage.client.gui.add_html(
-                render("sheet/buttons", lesson=lesson is not None, page="", serial=0)
-            )
+        gui = stage.client.gui
+        self._folder: viser.GuiFolderHandle | None = None
+        if folder:
+            self._folder = gui.add_folder("Worksheet", expand_by_default=lesson is not None)
+        with self._folder or contextlib.nullcontext():
+            self._html = gui.add_html(self._block())
 
     def handle(self, key: Hashable, value: object) -> None:
         match key:
             case ("page", int(serial)):
-                update_html(self._html, self._buttons(page_html(self.sheet()), serial))
+                page = render("sheet/withheld") if self._withheld else page_html(self.sheet())
+                update_html(self._html, self._block(page, serial))
+            case (str(name), int()) if name in FILES and self._withheld:
+                words = "The worksheet would contain the table that the open exercise asks for."
+                self.stage.notify(Notice("advice", "Not now", words))
             case (str(name), int()) if name in FILES:
                 sheet = self.sheet()
                 suffix, write = FILES[name]
@@ -60,8 +70,14 @@ class Worksheets(Feature):
             case _:
                 raise InputError("worksheet", key, "one of page, " + ", ".join(FILES))
 
-    def _buttons(self, page: str = "", serial: int = 0) -> str:
-        return render("sheet/buttons", lesson=self._lesson is not None, page=page, serial=serial)
+    @property
+    def _withheld(self) -> bool:
+        return self.stage.withheld == "table"
+
+    def _block(self, page: str = "", serial: int = 0) -> str:
+        """The buttons, if they are here, and the page to print (HTML), which is not shown."""
+        lesson, buttons = self._lesson is not None, self._folder is not None
+        return render("sheet/buttons", lesson=lesson, buttons=buttons, page=page, serial=serial)
 
     def sheet(self) -> Sheet:
         """The worksheet for the arm as it is."""
@@ -75,7 +91,10 @@ class Worksheets(Feature):
         )  # fmt: skip
 
     def remove(self) -> None:
-        self._folder.remove()
+        if self._folder is None:
+            self._html.remove()
+        else:
+            self._folder.remove()
 
 
 def parts_of(outline: guide.Outline) -> tuple[Part, ...]:

@@ -16,6 +16,7 @@ from live_server import serve_viewer
 import kin
 from app.exercises import Exercise, Exercises, Variant, Verdict
 from app.exercises.files import LESSONS as KEYS
+from app.exports.snippets import SNIPPETS
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
@@ -23,6 +24,7 @@ from app.viewer.exercises.practice import Practice, Record
 from app.viewer.lessons import LESSONS
 from app.viewer.server import ViewerServer
 from app.viewer.session.state import PageState, decode, encode
+from app.viewer.worksheet import FILES
 from kin import InputError
 from kin.units import Units
 
@@ -217,8 +219,21 @@ def test_no_tab_shows_the_table_that_an_exercise_asks_for(server: int, one: Exer
         assert 'data-arm="convert"' not in tab.html
         tab.say("feature", ["robot", ["download"], "toml"])
         tab.wait(lambda: "would contain the table" in shown(tab))
+        for serial, form in enumerate(FILES, 1):
+            tab.say("feature", ["sheet", [form, serial], None])
+        tab.wait(lambda: "The worksheet would contain the table" in shown(tab))
+        tab.say("feature", ["sheet", ["page", 9], None])
+        tab.wait(lambda: 'data-sheet="9"' in tab.html)
         assert not any("FileTransfer" in message["type"] for message in tab.log)
+        assert "asks for the table of this arm, which the worksheet contains" in shown(tab)
+        assert 'aria-label="DH table"' not in tab.html
+        for language in SNIPPETS:
+            tab.set("Copy as", language)
+        tab.wait(lambda: 'data-code="withheld"' in tab.html)
         press(tab, ["list", 2])
+        tab.say("feature", ["sheet", ["page", 10], None])
+        tab.wait(lambda: 'data-sheet="10"' in tab.html and 'aria-label="DH table"' in tab.html)
+        tab.wait(lambda: 'data-code="withheld"' not in tab.html)
         tab.wait(lambda: 'data-arm="table"' in tab.html)
         press(tab, ["open", one.id, 3])
         tab.wait(lambda: 'data-arm="withheld"' in tab.html)
