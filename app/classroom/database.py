@@ -20,6 +20,7 @@ from sqlalchemy import URL, Connection, Engine, create_engine, event, insert, in
 from sqlalchemy.engine import make_url
 from sqlalchemy.exc import SQLAlchemyError
 
+from app.classroom import marks
 from app.classroom.clock import steady
 from app.classroom.tables import REVISION, Setting
 from app.classroom.views import ClassroomUnavailable
@@ -88,6 +89,11 @@ class Database:
         with self.read() as connection:  # another process may have been the first
             return str(connection.execute(query).scalar_one())
 
+    def resume_time(self) -> None:
+        """Count the time of rooms on from the stored mark; raises `ClassroomUnavailable`."""
+        with self._words():
+            _resume_time(self._ready())
+
     def shrink(self) -> None:
         """Erase what was deleted from SQLite's files; elsewhere the database does so."""
         if self._file is not None:
@@ -130,6 +136,7 @@ class Database:
             event.listen(engine, "begin", _begin_sqlite)
         try:
             _migrate(engine)
+            _resume_time(engine)
         except BaseException:
             engine.dispose()
             raise
@@ -193,6 +200,16 @@ def _migrate(engine: Engine) -> None:
                 config.set_main_option("script_location", folder.replace("%", "%%"))
                 config.attributes["connection"] = connection
                 command.upgrade(config, "head")
+
+
+def _resume_time(engine: Engine) -> None:
+    with engine.connect() as connection:
+        with connection.begin():
+            if not marks.resume(connection):
+                return
+        connection.execution_options(kinboard_write=True)
+        with connection.begin():
+            marks.resume_and_keep(connection)
 
 
 def _revision(connection: Connection) -> str | None:

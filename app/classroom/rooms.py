@@ -9,6 +9,7 @@ from dataclasses import dataclass, fields
 
 from sqlalchemy import Connection, delete, func, insert, select, update
 
+from app.classroom import marks
 from app.classroom.clock import now
 from app.classroom.database import Database
 from app.classroom.tables import TOKEN_BYTES, Attempt, Room, Seat
@@ -76,7 +77,8 @@ class Rooms:
         self.sweep()
         begin, room = now(), secrets.token_hex(TOKEN_BYTES)
         with self._database.write() as connection:
-            if (connection.scalar(select(func.count()).select_from(Room)) or 0) >= self._most:
+            count = connection.scalar(select(func.count()).select_from(Room)) or 0
+            if count >= self._most:
                 raise RefusedError(
                     "This service has as many rooms as it may. End one of them, or try again later."
                 )
@@ -88,6 +90,7 @@ class Rooms:
                     "End one of them, or try again later."
                 )
             code = _unused_code(connection)
+            marks.keep(connection, anew=count == 0)
             connection.execute(
                 insert(Room).values(
                     id=room, code=code, title=title, created=begin, ends=begin + life,
@@ -144,12 +147,13 @@ class Rooms:
 
     def is_open(self, ticket: Ticket) -> bool:
         """Whether the room of a ticket goes on, and its seat was not removed."""
-        query = select(Room.id).where(Room.id == ticket.room, Room.ends > now())
+        query = select(Room.id).where(Room.id == ticket.room)
         if ticket.seat:
             query = query.join(Seat, Seat.room_id == Room.id).where(
                 Seat.id == ticket.seat, Seat.removed.is_(False)
             )
         with self._database.read() as connection:
+            query = query.where(Room.ends > now())  # not earlier: the first transaction may change how it counts
             return connection.scalar(query) is not None
 
     def all(self) -> list[OpenRoom]:
@@ -226,9 +230,14 @@ class Rooms:
             return connection.scalar(select(func.count(Attempt.seat_id.distinct())).where(*right)) or 0
 
     def sweep(self) -> int:
-        """Erase the rooms whose time is over; returns how many."""
+        """Erase the rooms whose time is over; returns how many. For those that go on, store what the time is."""
+        self._database.resume_time()
         with self._database.read() as connection:
             over = connection.scalars(select(Room.id).where(Room.ends <= now())).all()
+            going_on = connection.scalar(select(Room.id).where(Room.ends > now()).limit(1)) is not None
+        if going_on:
+            with self._database.write(durable=False) as connection:
+                marks.keep(connection)
         return sum(self.end(room) for room in over)
 
 

@@ -96,13 +96,9 @@ class LtiSeats:
         return Column(row.issuer, row.client_id, row.address, row.subject, row.exercise, best)
 
     def _room(self, link: str, launch: Launch) -> tuple[str, str]:
-        query = (
-            select(Room.id, Room.code)
-            .join(LtiRoom, LtiRoom.room_id == Room.id)
-            .where(LtiRoom.id == link, Room.ends > now())
-        )
+        query = select(Room.id, Room.code).join(LtiRoom, LtiRoom.room_id == Room.id).where(LtiRoom.id == link)
         with self._database.read() as connection:
-            found = connection.execute(query).one_or_none()
+            found = connection.execute(query.where(Room.ends > now())).one_or_none()
         if found is not None:
             return found.id, found.code
         made = self._rooms.open(launch.title, LIFE)
