@@ -197,7 +197,7 @@ TEACHERS = {
     "end_room": (),
     "teacher_token": (),
 }
-STUDENTS = {"raise_hand": (True,), "vote": (0,), "tell_task": ("swing",), "submit": (attempt(),)}
+STUDENTS = {"secret": (), "raise_hand": (True,), "vote": (0,), "tell_task": ("swing",), "submit": (attempt(),)}
 BOTH = {"room", "leave", "tell_page", "ticket", "changed"}
 
 
