@@ -42,6 +42,7 @@ class Panel:
         tabs: the features' tabs.
         legend: what a lesson draws in the scene; below the tabs, so that it stays when another tab is opened.
         hints: where the hints of the first minute are shown in the scene.
+        sheet: the page to print of a worksheet, hidden.
     """
 
     def __init__(
@@ -74,6 +75,7 @@ class Panel:
             self.obstacles = gui.add_folder("Obstacles")
         self.legend = gui.add_html("")
         self.hints = gui.add_html("")
+        self.sheet = gui.add_html("")
         self.learn = group.add_tab("Learn") if learn else None
         self.tabs = [group.add_tab(title) for title in tabs]
         with group.add_tab("View"):

@@ -30,6 +30,9 @@ HINT = "The drawings of a lesson stay in the scene while other tabs are open."
 class LessonChoice:
     """Holds the open lesson, in a tab of its own. Posts ``"lesson"``.
 
+    Args:
+        page: holds the page to print of a worksheet, hidden.
+
     Attributes:
         shown: the open lesson.
         guide: its goal, steps and questions.
@@ -38,9 +41,16 @@ class LessonChoice:
     """
 
     def __init__(
-        self, gui: viser.GuiApi, parent: viser.GuiTabHandle, stage: Stage, post: Post, services: Services
+        self,
+        gui: viser.GuiApi,
+        parent: viser.GuiTabHandle,
+        page: viser.GuiHtmlHandle,
+        stage: Stage,
+        post: Post,
+        services: Services,
     ) -> None:
         self._gui = gui
+        self._page = page
         self._parent = parent
         self._stage = stage
         self._titles = (NONE, *(lesson.title for lesson in LESSONS), Practising.title, CourseFeature.title)
@@ -53,7 +63,7 @@ class LessonChoice:
             self.courses.entered = self.exercises.begin_anew
             self._choice = gui.add_dropdown("Lesson", self._titles, initial_value=NONE, hint=HINT)
             self._overview: viser.GuiHtmlHandle | None = gui.add_html(_overview())
-            self.sheets: Worksheets | None = Worksheets(stage, None)
+            self.sheets: Worksheets | None = Worksheets(stage, None, page)
         listen(self._choice, post, "lesson")
         self._box: viser.GuiFolderHandle | None = None
         self.shown: Lesson | None = None
@@ -71,13 +81,13 @@ class LessonChoice:
             if title == each.title:
                 with self._parent:
                     each.show()
-                    self.sheets = Worksheets(self._stage, None, folder=False)
+                    self.sheets = Worksheets(self._stage, None, self._page, folder=False)
                 return
         chosen = next((lesson for lesson in LESSONS if lesson.title == title), None)
         if chosen is None:
             with self._parent:
                 self._overview = self._gui.add_html(_overview())
-                self.sheets = Worksheets(self._stage, None)
+                self.sheets = Worksheets(self._stage, None, self._page)
             return
         with self._parent:
             self._box = self._gui.add_folder(None)
@@ -88,7 +98,7 @@ class LessonChoice:
             self.shown = chosen(self._stage)
             self.guide.attach(self.shown)
         with self._parent:
-            self.sheets = Worksheets(self._stage, self.shown)
+            self.sheets = Worksheets(self._stage, self.shown, self._page)
 
     @property
     def features(self) -> list[Feature]:

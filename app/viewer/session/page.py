@@ -364,7 +364,9 @@ class VisitorPage(ShownArm, Worker):
             self.posture = PosturePanel(self, self.panel.posture, self.post)
             self._use_robot(robot, saved.q)
             if self.panel.learn is not None:
-                self.lessons = LessonChoice(gui, self.panel.learn, self, self.post, self._services)
+                self.lessons = LessonChoice(
+                    gui, self.panel.learn, self.panel.sheet, self, self.post, self._services
+                )
             containers: list[viser.GuiFolderHandle | viser.GuiTabHandle] = [self.panel.obstacles, *self.panel.tabs]
             features: tuple[type[Feature], ...] = (ObstaclesFeature, *self.offered)
             for tab, container in zip(features, containers, strict=True):

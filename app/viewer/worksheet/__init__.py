@@ -6,7 +6,6 @@ the panel, so the service keeps nothing, and it works for an arm of the visitor'
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Hashable
 
 import viser
@@ -36,6 +35,7 @@ class Worksheets(Feature):
 
     Args:
         lesson: the lesson on show, if there is one.
+        page: holds the page to print, hidden. Not in a tab: what is in a closed tab reaches the browser late.
         folder: whether there are buttons in the tab *Learn*; otherwise only those in the tab *View*.
     """
 
@@ -43,21 +43,23 @@ class Worksheets(Feature):
     title = "Worksheet"
     messages = frozenset({"page", *FILES})
 
-    def __init__(self, stage: Stage, lesson: Lesson | None, folder: bool = True) -> None:
+    def __init__(
+        self, stage: Stage, lesson: Lesson | None, page: viser.GuiHtmlHandle, folder: bool = True
+    ) -> None:
         super().__init__(stage)
         self._lesson = lesson
-        gui = stage.client.gui
+        self._page = page
         self._folder: viser.GuiFolderHandle | None = None
         if folder:
-            self._folder = gui.add_folder("Worksheet", expand_by_default=lesson is not None)
-        with self._folder or contextlib.nullcontext():
-            self._html = gui.add_html(self._block())
+            self._folder = stage.client.gui.add_folder("Worksheet", expand_by_default=lesson is not None)
+            with self._folder:
+                stage.client.gui.add_html(render("sheet/buttons", lesson=lesson is not None))
 
     def handle(self, key: Hashable, value: object) -> None:
         match key:
             case ("page", int(serial)):
                 page = render("sheet/withheld") if self._withheld else page_html(self.sheet())
-                update_html(self._html, self._block(page, serial))
+                update_html(self._page, render("sheet/handed", page=page, serial=serial))
             case (str(name), int()) if name in FILES and self._withheld:
                 words = "The worksheet would contain the table that the open exercise asks for."
                 self.stage.notify(Notice("advice", "Not now", words))
@@ -74,11 +76,6 @@ class Worksheets(Feature):
     def _withheld(self) -> bool:
         return self.stage.withheld == "table"
 
-    def _block(self, page: str = "", serial: int = 0) -> str:
-        """The buttons, if they are here, and the page to print (HTML), which is not shown."""
-        lesson, buttons = self._lesson is not None, self._folder is not None
-        return render("sheet/buttons", lesson=lesson, buttons=buttons, page=page, serial=serial)
-
     def sheet(self) -> Sheet:
         """The worksheet for the arm as it is."""
         stage, lesson = self.stage, self._lesson
@@ -91,9 +88,8 @@ class Worksheets(Feature):
         )  # fmt: skip
 
     def remove(self) -> None:
-        if self._folder is None:
-            self._html.remove()
-        else:
+        update_html(self._page, "")
+        if self._folder is not None:
             self._folder.remove()
 
 

@@ -74,14 +74,14 @@ def test_equations_are_on_the_sheet_with_their_corrections_among_the_solutions()
 def worksheets():
     stage = MagicMock(robot=PIONEER, goal=PIONEER.q_home, units=DEFAULT_UNITS)
     lesson = SimpleNamespace(key="dh", formulas=tuple)
-    made = Worksheets(stage, lesson)
+    made = Worksheets(stage, lesson, MagicMock())
     made.sheet = lambda: Sheet("An arm", PIONEER, np.array(PIONEER.q_home), DEFAULT_UNITS)
     return made
 
 
 def test_the_page_is_handed_to_the_script_that_asked(worksheets):
     worksheets.handle(("page", 7), None)
-    content = worksheets._html.content
+    content = worksheets._page.content
     assert 'data-sheet="7"' in content
     assert "<template data-sheet-page>" in content
     assert "An arm</h1>" in content

@@ -11,7 +11,7 @@ pytestmark = pytest.mark.browser
 
 def test_the_worksheet_of_a_lesson_is_printed_and_saved(tab: Tab) -> None:
     tab.choose_lesson("DH table step by step")
-    row = tab.page.locator("[data-sheet] .kb-sheet")
+    row = tab.page.locator("[data-sheet-buttons] .kb-sheet")
     expect(row).to_be_visible()
     with tab.page.context.expect_page() as opened:
         row.get_by_role("button", name="Print").click()
@@ -24,6 +24,13 @@ def test_the_worksheet_of_a_lesson_is_printed_and_saved(tab: Tab) -> None:
     sheet.emulate_media(media="print")
     expect(sheet.get_by_role("button")).to_be_hidden()
     sheet.close()
+    tab.open("View")
+    with tab.page.context.expect_page() as opened:
+        tab.page.locator(".kb-sheet:visible").get_by_role("button", name="Print").click()
+    expect(opened.value.locator("body")).to_have_attribute("data-ready", "1")
+    expect(opened.value.locator("article")).to_have_count(2)
+    opened.value.close()
+    tab.open("Learn")
     with tab.page.expect_download() as saved:
         row.get_by_role("button", name="CSV").click()
     assert saved.value.suggested_filename == "pioneer-arm-dh.csv"
