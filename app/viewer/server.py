@@ -151,6 +151,8 @@ class ViewerServer:
         )
         page = VisitorPage(*arguments) if ticket is None else ClassroomPage(*arguments, ticket=ticket)
         with self._lock:
+            if client.client_id not in self._connections.rights:
+                return  # the visitor has left: nobody would end the page
             self._pages[client.client_id] = page
         page.start()
 

@@ -141,7 +141,7 @@ async def _serve(visitor: WebSocket, viewer: Viewer) -> None:
         end = ConnectionEnded(1011, "internal error")
     if end.code == 1007:
         DROPPED.labels("malformed").inc()
-    if visitor.client_state is WebSocketState.CONNECTED:
+    if visitor.client_state is WebSocketState.CONNECTED and connection.is_open:
         # A visitor who has just left cannot receive the close frame.
         with contextlib.suppress(WebSocketDisconnect):
             await visitor.close(end.code, end.reason)
@@ -157,6 +157,11 @@ class VisitorConnection:
         self.client = client_of(visitor.scope)
         self.room_token: str = visitor.cookies.get(ROOM_COOKIE, "")
         self._streamed = STREAMED.labels("viewer")
+
+    @property
+    def is_open(self) -> bool:
+        """Whether nothing has failed to be sent: after that Starlette takes no more, not even the close frame."""
+        return self._visitor.application_state is WebSocketState.CONNECTED
 
     async def receive(self) -> bytes:
         """The visitor's next message that is passed on; raises `ConnectionEnded`."""
@@ -177,6 +182,8 @@ class VisitorConnection:
 
     async def send(self, data: bytes) -> None:
         """Send a message of the viewer; raises `ConnectionEnded`."""
+        if not self.is_open:
+            raise ConnectionEnded(1001)
         try:
             await self._visitor.send({"type": "websocket.send", "bytes": data})
         except WebSocketDisconnect:

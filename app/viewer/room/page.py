@@ -77,8 +77,12 @@ class ClassroomPage(VisitorPage):
 
     # Worker
 
-    def _build(self) -> None:
+    def _prepare(self) -> None:
+        super()._prepare()
+        # Not while the page is built: a database that does not answer would hold up the pages of everybody.
         self.attendance = self._hub.attend(self._ticket, lambda: self.post(("news", Member.key, NEWS)))
+
+    def _build(self) -> None:
         super()._build()
         (self._member,) = (tab for tab in self._tabs if isinstance(tab, Member))
         with self.client.atomic():

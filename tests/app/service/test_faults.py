@@ -242,6 +242,35 @@ def test_a_worker_that_dies_is_replaced_and_the_visitor_informed(port, monkeypat
     assert "a visitor's worker failed" in caplog.text
 
 
+def test_a_visitor_who_leaves_while_the_page_restarts_leaves_no_page_behind(monkeypatch):
+    viewer = ViewerServer(Store(), Settings(), Clouds())
+    draw, reset = ArmController.draw, viser.GuiApi.reset
+    restarts, gone = threading.Event(), threading.Event()
+
+    def dies(self: ArmController, fresh: bool) -> None:
+        if fresh:
+            raise SystemExit
+        draw(self, fresh)
+
+    def slow(gui: viser.GuiApi) -> None:
+        restarts.set()
+        gone.wait(10)
+        reset(gui)
+
+    with serve_viewer(viewer) as port:
+        with FakeBrowser(port) as tab:
+            tab.settle()
+            (page,) = viewer._pages.values()
+            monkeypatch.setattr(ArmController, "draw", dies)
+            monkeypatch.setattr(viser.GuiApi, "reset", slow)
+            tab.set("1 rotating base", 10.0)
+            assert restarts.wait(10)
+        wait_for(lambda: not viewer._connections.rights)
+        gone.set()
+        assert page.join(10)
+        assert viewer.visitors == 0
+
+
 def test_a_worker_that_never_starts_is_not_replaced_forever(port, monkeypatch, caplog):
     with FakeBrowser(port) as tab:
         tab.settle()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import socket
 import threading
@@ -13,12 +14,14 @@ import msgspec
 import pytest
 from fastapi import FastAPI
 from live_server import serve, wait_for
+from starlette.types import Message
+from starlette.websockets import WebSocket
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from app.service.web.inspection import BURST, RATE, MessageLimit
 from app.service.web.negotiation import accepts_gzip, is_current
-from app.service.web.viewer_proxy import ViewerBridge
+from app.service.web.viewer_proxy import ViewerBridge, VisitorConnection, _serve
 from app.shared.connection import Connection, ConnectionEnded
 from app.shared.places import Places
 from app.shared.settings import Settings
@@ -452,3 +455,32 @@ def test_the_address_without_a_slash_redirects_to_the_page(port):
     answer = httpx2.get(f"http://127.0.0.1:{port}/viewer?a=b", trust_env=False)
     assert answer.status_code == 307
     assert answer.headers["location"] == "viewer/?a=b"
+
+
+def test_a_visitor_whose_connection_breaks_while_something_is_sent_leaves_no_error(viser):
+    sent: list[str] = []
+
+    async def send(message: Message) -> None:
+        sent.append(message["type"])
+        if message["type"] == "websocket.send":
+            raise OSError("broken pipe")
+
+    asked = iter([{"type": "websocket.connect"}, {"type": "websocket.receive", "bytes": HELLO}])
+
+    async def receive() -> Message:
+        return next(asked)
+
+    scope = {
+        "type": "websocket",
+        "path": "/viewer",
+        "headers": [],
+        "subprotocols": [PROTOCOL],
+        "client": ("::1", 5),
+    }
+    visitor = WebSocket(scope, receive, send)
+    asyncio.run(_serve(visitor, viser))
+    assert viser.endings == [1001]
+    assert sent == ["websocket.accept", "websocket.send"]
+    late = VisitorConnection(visitor)
+    with pytest.raises(ConnectionEnded):  # of another message that was on its way
+        asyncio.run(late.send(HELLO))

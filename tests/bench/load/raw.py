@@ -145,7 +145,11 @@ class Socket(asyncio.Protocol):
             port,
             local_addr=(source, 0),
         )
-        await protocol.opened
+        try:
+            await protocol.opened
+        except BaseException:  # refused, or nobody waits any longer
+            protocol._transport.abort()
+            raise
         return protocol
 
     def send(self, data: bytes) -> None:
@@ -177,6 +181,8 @@ class Socket(asyncio.Protocol):
                 return
             status = bytes(self._buffer[9:12])
             del self._buffer[: end + 4]
+            if self.opened.done():  # nobody waits any longer
+                return
             if status != b"101":
                 self.opened.set_exception(ConnectionError(f"refused with {status.decode()}"))
                 self._transport.abort()

@@ -58,17 +58,21 @@ class Visitor:
         self._waiting: deque[tuple[int, float]] = deque()  # number and time of events not answered
 
     async def connect(self, port: int, timeout: float = 60.0) -> None:
-        """Connect and wait until the arm is there."""
+        """Connect and wait until the arm is there. Who gives up hangs up, and leaves no page to the next round."""
         self.began = time.perf_counter()
         async with asyncio.timeout(timeout):
             self._socket = await Socket.open(
                 port, "/viewer", SUBPROTOCOL, self._heard, self._token, self._source, self._cookie
             )
-            self.send(
-                "ViewerCameraMessage", wxyz=(1, 0, 0, 0), position=(3, 3, 3), fov=1.3, near=0.01, far=1000,
-                image_height=720, image_width=1280, look_at=(0, 0, 0), up_direction=(0, 0, 1),
-            )  # fmt: skip
-            await self._there.wait()
+            try:
+                self.send(
+                    "ViewerCameraMessage", wxyz=(1, 0, 0, 0), position=(3, 3, 3), fov=1.3, near=0.01, far=1000,
+                    image_height=720, image_width=1280, look_at=(0, 0, 0), up_direction=(0, 0, 1),
+                )  # fmt: skip
+                await self._there.wait()
+            except BaseException:
+                self.close()
+                raise
 
     async def quiet(self, seconds: float = 0.3, timeout: float = 60.0) -> None:
         """Wait until nothing has come for a while."""

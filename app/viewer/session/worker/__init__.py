@@ -40,7 +40,10 @@ class Worker:
     def start(self) -> None:
         """Build the visitor's page and start processing events."""
         self._ended.clear()
-        threading.Thread(target=self._open, name=f"visitor-{self._visitor}", daemon=True).start()
+        try:
+            threading.Thread(target=self._open, name=f"visitor-{self._visitor}", daemon=True).start()
+        except RuntimeError:  # the system has no thread left
+            self._fail()
 
     def post(self, key: Hashable, value: object = None) -> None:
         """Queue an event; a newer value replaces a queued one of the same key."""

@@ -25,6 +25,7 @@ PATIENCE = 0.02  # s without a new step, after which another thread leads
 KEEP = 2.0  # s without work, after which the threads end
 IN_A_ROW = 10  # steps, after which a page is built that waits
 BUILDS = 4  # pages built at a time: more than one where the first take long
+LOG_EVERY = 10.0  # s between two log lines about threads that could not be started
 
 
 class Place:
@@ -67,6 +68,7 @@ class Crew:
         self._leader: threading.Thread | None = None
         self._watcher: threading.Thread | None = None
         self._step = 0  # number of the leader's step; odd while it lasts
+        self._log_at = 0.0  # when a thread that could not be started is logged again
         self._watches = False  # whether the watcher looks at the leader again and again
 
     def call(self, place: Place, build: bool) -> None:
@@ -74,18 +76,26 @@ class Crew:
         with self._lock:
             if place.acts:
                 place.again = True
-            elif not place.waits:
+                return
+            if not place.waits:
                 self._queue(place, build)
-                if self._leader is None:
-                    self._leader = self._start(True)
-                elif not self._step & 1:
-                    self._work.notify()
+            if self._leader is None:
+                self._leader = self._start(True)
+            elif not self._step & 1:
+                self._work.notify()
 
-    def _start(self, leads: bool) -> threading.Thread:
+    def _start(self, leads: bool) -> threading.Thread | None:
+        """A new thread; None if the system has none left: the next call or step tries again."""
         thread = threading.Thread(
             target=self._run, args=(leads,), name=f"visitors-{next(self._numbers)}", daemon=True
         )
-        thread.start()
+        try:
+            thread.start()
+        except RuntimeError as error:
+            if time.monotonic() >= self._log_at:
+                self._log_at = time.monotonic() + LOG_EVERY
+                log.error("a thread for visitors could not be started: %s", error)
+            return None
         return thread
 
     def _run(self, leads: bool) -> None:

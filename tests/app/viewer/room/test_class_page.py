@@ -22,6 +22,7 @@ from app.viewer.room.member import Member
 from app.viewer.room.student import Student
 from app.viewer.room.teacher import Teacher
 from app.viewer.server import ViewerServer
+from app.viewer.session.worker.crew import BUILDS
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -372,3 +373,31 @@ def test_a_student_comes_back_to_the_seat(room: Class) -> None:
     assert "you are Ann" in again.html
     teacher.settle()
     assert teacher.html.count('data-guide-do="pick"') == 1
+
+
+def test_a_database_that_does_not_answer_holds_up_no_page_outside_of_the_room(room, monkeypatch):
+    attend, waits, answers = room.hub.attend, threading.Semaphore(0), threading.Event()
+
+    def slow(*arguments: Any) -> Any:
+        waits.release()
+        answers.wait(40)
+        return attend(*arguments)
+
+    monkeypatch.setattr(room.hub, "attend", slow)
+    seats = [room.hub.rooms.join(room.room.code, f"S{k}") for k in range(BUILDS)]
+    students = [
+        threading.Thread(target=lambda seat=seat: room.browser(room.hub.rooms.tokens.sign(seat))) for seat in seats
+    ]
+    for student in students:
+        student.start()
+    try:
+        for _ in students:
+            assert waits.acquire(timeout=10), "all of them wait for the database"
+        room.browser("")  # returns when there is a page
+        assert not answers.is_set()
+    finally:
+        answers.set()
+        for student in students:
+            student.join(20)
+    for browser in room._open[:BUILDS]:
+        browser.wait(lambda browser=browser: "data-class-bar" in browser.html)

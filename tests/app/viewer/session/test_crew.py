@@ -191,6 +191,27 @@ def test_pages_whose_building_blocks_take_no_more_threads_than_allowed(crew):
     wait_for(lambda: all(visitor.steps for visitor in builds))
 
 
+def test_threads_that_cannot_be_started_are_tried_again(crew, monkeypatch, caplog):
+    start = threading.Thread.start
+    refused = [True, False, True, True]  # the one that leads, once; the one that watches, twice
+
+    def starts(thread: threading.Thread) -> None:
+        if thread.name.startswith("visitors-") and refused and refused.pop(0):
+            raise RuntimeError("can't start new thread")
+        start(thread)
+
+    monkeypatch.setattr(threading.Thread, "start", starts)
+    visitor, other = Visitor(crew), Visitor(crew)
+    visitor.place.call()
+    assert not threads()
+    visitor.place.call()
+    wait_for(lambda: visitor.steps == 1)
+    for k in range(1, 5):
+        wait_for(lambda k=k: other.place.call() or other.steps >= k)
+    assert not refused
+    assert "could not be started: can't start new thread" in caplog.text
+
+
 def test_a_step_that_raises_ends_no_thread(crew, caplog):
     def fails() -> float | None:
         raise SystemExit
@@ -311,6 +332,19 @@ def test_a_worker_that_cannot_go_on_says_so_once(caplog):
     assert page.join(WAIT)
     assert (failures, page.did[-1]) == ([1], "leave")
     assert "a visitor's worker failed" in caplog.text
+
+
+def test_a_page_for_which_there_is_no_thread_ends_and_says_so(monkeypatch, caplog):
+    def starts(_: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    failures: list[int] = []
+    page = Page(lambda: failures.append(1))
+    monkeypatch.setattr(threading.Thread, "start", starts)
+    page.start()
+    assert page.join(0.0)
+    assert (failures, page.did) == ([1], ["leave"])
+    assert "can't start new thread" in caplog.text
 
 
 def test_a_visitor_who_leaves_in_the_middle_of_a_step_is_left_after_it():
