@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 
+import viser
+
 from app.viewer.feature import Feature, Stage
 from app.viewer.obstacles import placed
 from app.viewer.obstacles.nodes import ObstacleNodes
@@ -68,7 +70,7 @@ class ObstaclesFeature(Feature):
                 return "Remove an obstacle"
             case "grab" | "gizmo":
                 return "Drag of an obstacle"
-        return "Obstacle"
+        return "Change of an obstacle"
 
     # Reports of the session
 
@@ -89,6 +91,10 @@ class ObstaclesFeature(Feature):
 
     def on_style(self) -> None:
         self._show_panel()
+
+    @property
+    def tops(self) -> tuple[viser.SceneNodeHandle, ...]:
+        return self._nodes.tops
 
     def remove(self) -> None:
         self._nodes.remove()

@@ -31,7 +31,7 @@ class _Node:
 
     def __init__(self, scene: viser.SceneApi, each: Obstacle, clicked: Callable[[], None]) -> None:
         self.root = f"/obstacle-{next(_NUMBERS)}"
-        self._frame = scene.add_frame(self.root, show_axes=False)
+        self.frame = scene.add_frame(self.root, show_axes=False)
         self._red = False
         self._parts = [(node, node.color) for node in _meshes(scene, self.root, each)]
         self._label = add_label(
@@ -42,7 +42,7 @@ class _Node:
             _listen(node, clicked)
 
     def place(self, T: Array) -> None:
-        assign(self._frame, T[:3, 3], wxyz_from_rotation(T[:3, :3]))
+        assign(self.frame, T[:3, 3], wxyz_from_rotation(T[:3, :3]))
 
     def show(self, red: bool, named: bool) -> None:
         if red != self._red:
@@ -53,7 +53,7 @@ class _Node:
             self._label.visible = named
 
     def remove(self) -> None:
-        self._frame.remove()
+        self.frame.remove()
 
 
 def _meshes(scene: viser.SceneApi, root: str, each: Obstacle) -> list[Mesh]:
@@ -99,6 +99,12 @@ class ObstacleNodes:
         self._nodes: list[_Node] = []
         self._drawn: list[tuple[object, ...]] = []
         self._gizmo: viser.TransformControlsHandle | None = None
+
+    @property
+    def tops(self) -> tuple[viser.SceneNodeHandle, ...]:
+        """The nodes above all others."""
+        frames = tuple(node.frame for node in self._nodes)
+        return frames if self._gizmo is None else (*frames, self._gizmo)
 
     def show(self, items: Obstacles) -> None:
         """Draw these; those whose shape and sizes are as before are only moved."""

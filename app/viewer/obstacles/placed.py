@@ -182,7 +182,7 @@ def changed(items: Obstacles, index: int, field: str, value: float) -> Obstacles
         new = replace(each, rpy=_with(each.rpy, TURN.index(field), value))
     elif field in SIZES[each.shape]:
         if not SMALLEST <= value <= LARGEST:
-            raise InputError(field, f"{value:g} m", f"{SMALLEST:g} to {LARGEST:g} m")
+            raise InputError(field, f"{value:g} m", f"{1000 * SMALLEST:g} mm to {LARGEST:g} m")
         values = _with(sizes(each), SIZES[each.shape].index(field), value)
         new = replace(each, **of_sizes(each.shape, values))
     else:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import viser
@@ -128,10 +128,10 @@ def _kind(result: IKResult) -> Kind:
     return "unreachable"
 
 
-def html(shown: Notice) -> str:
-    """The notice as a card, which ``static/layout.css`` places over the scene."""
+def html(shown: Notice, warning: str = "") -> str:
+    """The notice as a card, which ``static/layout.css`` places over the scene, with a warning after it."""
     symbol, color = LOOKS[shown.kind]
-    return render("panel/status", notice=shown, symbol=symbol, color=color)
+    return render("panel/status", notice=shown, warning=warning, symbol=symbol, color=color)
 
 
 class StatusLine:
@@ -147,6 +147,7 @@ class StatusLine:
         self.count = 0
         self._result: IKResult | None = None
         self._news_since: float | None = None
+        self._over = False  # the visitor did something else, before the notice could be seen
         self._shown = first
         self._warning = ""
         self._html = gui.add_html(html(first))
@@ -155,6 +156,7 @@ class StatusLine:
         """Replace the notice."""
         self.count += 1
         self._result = None
+        self._over = False
         self._news_since = time.perf_counter()
         if shown != self._shown:
             self._shown = shown
@@ -167,10 +169,7 @@ class StatusLine:
             self._write()
 
     def _write(self) -> None:
-        shown = self._shown
-        if self._warning:
-            shown = replace(shown, detail=f"{shown.detail} \N{WARNING SIGN} {self._warning}".lstrip())
-        show_content(self._html, html(shown))
+        show_content(self._html, html(self._shown, self._warning))
 
     def show_result(self, result: IKResult, units: Units) -> None:
         """Show the result for a target."""
@@ -179,13 +178,19 @@ class StatusLine:
 
     def due(self, now: float) -> float | None:
         """Seconds until the notice is no longer news; None: it does not end by itself."""
-        if self._news_since is None or self._shown.kind not in ("hand", "reached"):
+        if self._news_since is None or not (self._over or self._shown.kind in ("hand", "reached")):
             return None
-        return max(0.0, self._news_since + NEWS - now)
+        return max(0.0, self._news_since + (UNSEEN if self._over else NEWS) - now)
 
     def settle(self, result: IKResult | None, units: Units) -> None:
-        """End the news: show the result for the open target, or that the arm is ready if there is none."""
-        if self._news_since is None or time.perf_counter() - self._news_since < UNSEEN:
+        """End the news: show the result for the open target, or that the arm is ready if there is none.
+
+        News that could not be seen yet end as soon as they could: see `due`.
+        """
+        if self._news_since is None:
+            return
+        if time.perf_counter() - self._news_since < UNSEEN:
+            self._over = True
             return
         self._news_since = None
         if result is None:

@@ -47,6 +47,7 @@ class Student(Member):
         self._first = True
         self._course = ""
         self._open_tab = 0
+        self._answered: tuple[str, int] | None = None  # exercise and seed of the last answer
         self._submissions = Submissions(self.attendance.submit, lambda: stage.post(("news", self.key, STORED)))
         if self.page.lessons is not None:  # before what is stored of them in the browser is restored
             exercises, ticket = self.page.lessons.exercises, self.attendance.ticket
@@ -131,6 +132,7 @@ class Student(Member):
     def _submit(self, judged: Judged) -> None:
         """Send an answer to the teacher."""
         verdict = judged.verdict
+        self._answered = judged.exercise.id, judged.seed
         self._submissions.add(
             NewAttempt(
                 exercise=judged.exercise.id, seed=judged.seed, answer=judged.answer, verdict=verdict.reason,
@@ -148,7 +150,7 @@ class Student(Member):
         return self.try_to(lambda: self.attendance.submit(attempt))
 
     def _note(self) -> None:
-        """Say below the verdict whether the answers are stored."""
+        """Say below the verdict whether the answers are stored; of another exercise only what is not."""
         lessons, sent = self.page.lessons, self._submissions
         if lessons is None or not (sent.stored or sent.waiting or sent.problem):
             return
@@ -158,8 +160,12 @@ class Student(Member):
                 if sent.waiting
                 else f"Not stored: {sent.problem}"
             )
+        elif sent.waiting:
+            text = "Storing the answer …"
         else:
-            text = "Storing the answer …" if sent.waiting else "✓ Stored for your teacher."
+            at, practice = lessons.exercises.at, lessons.exercises.practice
+            here = at is not None and (at.id, practice.seed_of(at)) == self._answered
+            text = "✓ Stored for your teacher." if here else ""
         lessons.exercises.note(text)
 
     # Member

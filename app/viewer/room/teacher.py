@@ -21,6 +21,7 @@ from app.viewer.room.member import Member
 from app.viewer.room.sharing import LEADER_EVERY
 from app.viewer.room.wall import MOST, SmallArm, Wall
 from app.viewer.session.state import PageState
+from app.viewer.viser_patches import is_removed
 from kin import InputError, Robot
 
 QUESTION = "Elbow up or down?"
@@ -204,7 +205,8 @@ class Teacher(Member):
             camera.look()
             page.numbers.hide_target()
             self._before = page.snapshot()
-            self._hidden = [(node, node.visible) for node in page.arm.scene.tops]
+            tops = (*page.arm.scene.tops, *(node for each in page.features for node in each.tops))
+            self._hidden = [(node, node.visible) for node in tops]
             image = page.client.camera
             aspect = image.image_width / max(image.image_height, 1) or 1.6
             self._wall = Wall(
@@ -215,7 +217,8 @@ class Teacher(Member):
             self._wall = None
             camera.fit(())
         for node, visible in self._hidden:
-            node.visible = visible and not on
+            if not is_removed(node):
+                node.visible = visible and not on
         if not on:
             self._hidden = []
             self._return()

@@ -60,7 +60,7 @@ def test_a_table_is_added_typed_and_taken_back(port: int) -> None:
         say(tab, "set", "z", value="0.35 m")
         tab.wait(lambda: bool(kept(tab).obstacles) and kept(tab).obstacles[0].xyz[2] == 0.35)
         say(tab, "set", "width", value="-5")
-        assert "valid: 0.0001 to 100 m" in tab.html
+        assert "valid: 0.1 mm to 100 m" in tab.html
         assert 'aria-invalid="true"' in tab.html
         say(tab, "set", "width", value="2*400")
         assert 'aria-invalid="true"' not in tab.html

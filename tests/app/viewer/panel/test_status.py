@@ -12,7 +12,7 @@ import kin
 from app.viewer.lessons.postures import Postures
 from app.viewer.lessons.velocity import VelocityLesson
 from app.viewer.panel import status as module
-from app.viewer.panel.status import NEWS, READY, Notice, StatusLine
+from app.viewer.panel.status import NEWS, READY, Kind, Notice, StatusLine
 from kin.units import DEFAULT_UNITS
 
 UNDONE = Notice("hand", "Undone: Home")
@@ -20,8 +20,9 @@ UNDONE = Notice("hand", "Undone: Home")
 
 @pytest.fixture(autouse=True)
 def seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    """News may end at once."""
+    """News may end at once; the element is no control of viser."""
     monkeypatch.setattr(module, "UNSEEN", 0.0)
+    monkeypatch.setattr(module, "show_content", lambda element, content: setattr(element, "content", content))
 
 
 def line(first: Notice = READY) -> tuple[StatusLine, Any]:
@@ -54,6 +55,36 @@ def test_news_are_shown_for_a_moment_whatever_else_happens(monkeypatch: pytest.M
     status.show(UNDONE)
     status.settle(None, DEFAULT_UNITS)
     assert "Undone: Home" in element.content
+
+
+def test_a_warning_stands_apart_from_the_advice_which_a_led_page_hides() -> None:
+    status, element = line()
+    status.warn("Link 4 touches the <table>.")
+    assert f'<span class="kb-status-advice">{READY.detail} </span>⚠ Link 4 touches the &lt;table&gt;.' in element.content
+    status.show(Notice("hand", "Home"))
+    assert "kb-status-advice" not in element.content
+    assert "⚠ Link 4" in element.content
+    status.warn("")
+    assert "kb-callout-detail" not in element.content
+
+
+@pytest.mark.parametrize("kind", ["hand", "error"])
+def test_news_that_the_next_action_came_too_soon_for_end_after_that_moment(
+    monkeypatch: pytest.MonkeyPatch, kind: Kind
+) -> None:
+    monkeypatch.setattr(module, "UNSEEN", 60.0)
+    status, element = line()
+    status.show(Notice(kind, "Joint 1 was not changed"))
+    status.settle(None, DEFAULT_UNITS)
+    due = status.due(time.perf_counter())
+    assert due is not None
+    assert 0.0 < due <= 60.0
+    monkeypatch.setattr(module, "UNSEEN", 0.0)
+    assert status.due(time.perf_counter()) == 0.0
+    status.settle(None, DEFAULT_UNITS)
+    assert "was not changed" not in element.content
+    status.show(Notice("error", "Joint 2 was not changed"))
+    assert status.due(time.perf_counter()) is None, "the next error is not over"
 
 
 def test_the_result_for_an_open_target_comes_back_after_news() -> None:

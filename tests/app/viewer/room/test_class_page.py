@@ -237,6 +237,11 @@ def test_a_task_opens_and_its_answers_are_stored(room: Class) -> None:
     attendance.leave()
     assert (seat.task, seat.tries, seat.solved) == (EXERCISE, 2, True)
 
+    # The words below an answer do not stay below the next exercise.
+    student.say("feature", ["exercises", ["open", "which-joint-moved", 1], None])
+    student.wait(lambda: 'data-exercise="which-joint-moved"' in student.html)
+    student.wait(lambda: "Stored for your teacher" not in student.html)
+
     # Who goes on to something else has still solved it.
     press(teacher, "fields", "course", value=[["0"]])
     student.wait(lambda: student.value("Lesson") == "Courses")
@@ -304,11 +309,21 @@ def test_the_wall_sends_one_list_of_poses_for_all(room: Class) -> None:
     teacher = room.teacher()
     students = [room.join(f"Student {i}") for i in range(3)]
     teacher.wait(lambda: teacher.html.count('data-guide-do="pick"') == 3)
+    teacher.say("feature", ["obstacles", ["add", "table", 1], None])
+    teacher.wait(lambda: "Added: table" in teacher.html)
+    tops = [name for name in teacher.nodes if name.startswith("/obstacle-") and name.count("/") == 1]
+    assert len(tops) == 2, "the table and its arrows"
     press(teacher, "wall")
     teacher.wait(lambda: sum("/wall-" in name and name.endswith("/name/2") for name in teacher.nodes) == 1)
+    hidden = (teacher.gizmo, *tops)
+    assert [teacher.visible[name] for name in hidden] == [False] * 3
+    press(teacher, "wall")
+    teacher.wait(lambda: [teacher.visible[name] for name in hidden] == [True] * 3)
+    press(teacher, "wall")
+    teacher.wait(lambda: [teacher.visible[name] for name in hidden] == [False] * 3)
+    teacher.wait(lambda: any(name.endswith("/arms") for name in teacher.nodes))
     arm = next(name for name in teacher.nodes if name.endswith("/arms"))
     teacher.settle(0.6)
-    assert teacher.visible[teacher.gizmo] is False
     teacher.log.clear()
     students[0][0].set("1 rotating base", 70.0)
     students[1][0].set("2 rotating elbow", 70.0)
