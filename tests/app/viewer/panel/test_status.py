@@ -60,7 +60,8 @@ def test_news_are_shown_for_a_moment_whatever_else_happens(monkeypatch: pytest.M
 def test_a_warning_stands_apart_from_the_advice_which_a_led_page_hides() -> None:
     status, element = line()
     status.warn("Link 4 touches the <table>.")
-    assert f'<span class="kb-status-advice">{READY.detail} </span>⚠ Link 4 touches the &lt;table&gt;.' in element.content
+    advice = f'<span class="kb-status-advice">{READY.detail} </span>'
+    assert f"{advice}⚠ Link 4 touches the &lt;table&gt;." in element.content
     status.show(Notice("hand", "Home"))
     assert "kb-status-advice" not in element.content
     assert "⚠ Link 4" in element.content
