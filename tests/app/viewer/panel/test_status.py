@@ -27,6 +27,8 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def line(first: Notice = READY) -> tuple[StatusLine, Any]:
     element = SimpleNamespace(content="")
+    outbox = SimpleNamespace(_websock_interface=SimpleNamespace(queue_message=lambda _: None))
+    element._impl = SimpleNamespace(removed=False, uuid="status", props=element, gui_api=outbox)
 
     def add_html(content: str) -> Any:
         element.content = content
