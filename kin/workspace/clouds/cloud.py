@@ -55,7 +55,7 @@ def sample_workspace(
         strategy: ``"uniform"``: each joint evenly between its limits, pseudo-random; ``"quasi"``: the same, spread
             more evenly by an additive recurrence; ``"volume"``: evenly over the workspace itself; ``"boundary"``:
             on its envelope. The last two descend towards random points, which takes some ten and a few hundred
-            microseconds per point, and a few seconds once per arm and limits; :mod:`kin.workspace.clouds.targets`
+            microseconds per point, and half a second once per arm and limits; :mod:`kin.workspace.clouds.targets`
             describes their accuracy.
         limits, locked: as in `kin.solve_ik`, respected exactly. A joint without limits is sampled from ±π.
         constraints: both as one value, instead of `limits` and `locked`.

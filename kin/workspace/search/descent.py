@@ -23,7 +23,6 @@ from typing import NamedTuple
 import numpy as np
 
 from kin.kernels.compile import jit
-from kin.kernels.fk import fk_into
 from kin.kernels.jacobian import jacobian_into
 from kin.transforms import Array
 from kin.workspace.region import BoundedArm
@@ -191,10 +190,11 @@ def _newton_step(shift: float, work: Scratch) -> bool:
 @jit
 def _descend_once(
     arm: BoundedArm, f: Array, grain: float, height: float, scale: float, shift: float, q: Array, work: Scratch
-) -> tuple[bool, bool, float]:
+) -> tuple[bool, bool, float, float]:
     """work.trial ← a configuration where f is less than `height`, with growing shifts until there is one.
 
-    Returns whether there is one, whether the descent ends with it, and the shift that was needed.
+    Returns whether there is one, whether the descent ends with it, the shift that was needed, and f there. Nearly
+    every trial is accepted, so each computes the Jacobian that the next step needs, too (work.J, work.T, work.w).
     """
     step, trial, slope = work.step, work.trial, work.slope
     for _ in range(_TRIALS):
@@ -211,14 +211,14 @@ def _descend_once(
             shorter = min(1.0, _LONGEST / longest) if longest > 0.0 else 1.0
             for j in range(q.shape[0]):
                 trial[j] = min(max(q[j] + shorter * step[j], arm.lower[j]), arm.upper[j])
-            fk_into(arm.model, trial, work.T)
+            jacobian_into(arm.model, trial, work.J, work.T, work.axes)
             lower = _evaluate(work.T, f, work.w)
             if lower < height or (last and lower <= height + _DIGITS * scale):
-                return True, last, shift
+                return True, last, shift, lower
             if last:
-                return False, True, shift
+                return False, True, shift, height
         shift = max(8.0 * shift, _LEAST_SHIFT * scale, 1e-15)
-    return False, False, shift
+    return False, False, shift, height
 
 
 @jit
@@ -245,13 +245,11 @@ def minimise(arm: BoundedArm, f: Array, enough: float, grain: float, q: Array, w
         scale = _hessian(f, work)
         if steepest <= _FLAT * scale or steepest == 0.0:
             break
-        improved, last, shift = _descend_once(arm, f, grain, height, scale, shift, q, work)
+        improved, last, shift, height = _descend_once(arm, f, grain, height, scale, shift, q, work)
         if not improved:
             break
         for j in range(q.shape[0]):
             q[j] = work.trial[j]
-        jacobian_into(arm.model, q, work.J, work.T, work.axes)
-        height = _evaluate(work.T, f, work.w)
         if last:
             break
         shift = 0.0 if shift < 10.0 * _LEAST_SHIFT * scale else 0.1 * shift

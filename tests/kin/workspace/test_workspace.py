@@ -17,7 +17,7 @@ from kin.robot import Joint, Robot
 from kin.workspace import MEASURES, STRATEGIES
 from kin.workspace.region import Region
 from kin.workspace.search.cells import cell_map
-from kin.workspace.search.probes import sampling_probes
+from kin.workspace.search.probes import ALIKE, TRIES, probe_cells
 from kin.workspace.volume import from_probes
 
 ALL = tuple(kin.builtin_robots())
@@ -226,7 +226,7 @@ def halfway(curve):
 def test_volume_samples_are_even_in_space(robot_id):
     robot = kin.get_robot(robot_id)
     found = cell_map(Region.of(robot))
-    full = (sampling_probes(found.region).distance < 1e-3 * found.size).all(axis=1)
+    full = (probe_cells(found.region, TRIES, ALIKE).distance < 1e-3 * found.size).all(axis=1)
 
     def variation(strategy):
         rows = found.rows(cloud(robot, 6000, strategy=strategy).astype(float))
