@@ -106,6 +106,8 @@ def _lane(
     a, b = S2 * y1, S2 * y0
     wide = math.sqrt(a * a + b * b)
     level, cosine, sine = _root(wz - C2 * y2, wide, _REACH, side)
+    # A share of the arm's size: a share of `wide` would have poles beside narrow gaps, where it is small.
+    level *= (wide + _TINY) / math.sqrt(size)
     scale = 1.0 / (wide + _TINY)
     c3, s3 = (a * cosine - b * sine) * scale, (b * cosine + a * sine) * scale
     x, y = c3 * y0 - s3 * y1, C2 * (s3 * y0 + c3 * y1) - S2 * y2

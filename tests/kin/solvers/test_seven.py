@@ -205,6 +205,21 @@ def test_ranges_agree_with_samples_near_singular_wrists(robot):
         assert agrees_with_samples(robot, kin.fk(robot, q), low, high) == 0, size
 
 
+def test_a_branch_that_exists_in_less_than_a_thousandth_of_a_radian_is_found():
+    """The wrist centre is near axis 3: as a share of that distance, what is missing grows towards the gap."""
+    own = ((0.2128685, 1.08, 4.06), (0, -2.059, 2.0944), (0.3120079, -6.28, 6.28), (0, -0.19198, 3.927))
+    own = (*own, (0.356081, -1.94, 3.508), (0, -1.692, PI), (0.064244, -6.28, 6.28))
+    rows = tuple(replace(row, d=d, limits=(a, b)) for row, (d, a, b) in zip(XARM7.rows, own, strict=True))
+    robot = replace(XARM7, id="narrow", rows=rows, home=(2.0, *XARM7.home[1:]))
+    q = np.array([2.8033294514978637, 1.8453646597645297, -2.9523109701268355, 1.5654086570889072])
+    T = kin.fk(robot, np.array([*q, 1.3408083197292018, 0.3851070522497897, -1.1356612606113172]))
+    arcs = candidates(robot, T, robot.q_home).arcs[0]
+    narrow = arcs[(arcs[:, 0] == 7) & (arcs[:, 1] > 0.0)]
+    assert len(narrow) == 1
+    assert 1e-4 < narrow[0, 2] - narrow[0, 1] < 1e-3
+    assert agrees_with_samples(robot, T, narrow[0, 1] - 0.01, narrow[0, 2] + 0.01) == 0
+
+
 def test_a_self_motion_ends_at_a_limit_or_where_it_turns_back():
     rng = np.random.default_rng(5)
     ended = set()
