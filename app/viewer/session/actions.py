@@ -99,14 +99,13 @@ class ActionsPage(TypedPage, RobotPage, Protocol):
 
 
 class Actions:
-    """Handles the events of one page."""
+    """Handles the events of one page, and keeps its `history`."""
 
     def __init__(self, page: ActionsPage) -> None:
         self._page = page
-        self._history = History()
+        self.history = History()
         self._gesture: tuple[object, ...] | None = None  # the control of the last step, while it may go on
         self._changed_at = 0.0
-        self._returned = False
         self._left: dict[str, PageState] = {}  # the state in which each robot was left
         self._typed = TypedInput(page)
         arm = page.arm
@@ -189,7 +188,7 @@ class Actions:
                 self._page.settle_status()
         finally:
             if not same(before, self._page.snapshot()):
-                self._history.record(_label(gesture, self._page.features), before)
+                self.history.record(_label(gesture, self._page.features), before)
                 self._gesture, self._changed_at = gesture, now
                 self._show_history()
 
@@ -205,11 +204,6 @@ class Actions:
             raise kin.InputError("look-from", side, "one of " + ", ".join(SIDES))
         self._page.camera.look_from(side, self._frames())
 
-    def take_returned(self) -> bool:
-        """Whether the visitor returned to an earlier state since the last call."""
-        returned, self._returned = self._returned, False
-        return returned
-
     def _continues(self, gesture: tuple[object, ...], value: object, now: float) -> bool:
         """Whether an event belongs to the same step as the one before."""
         name = str(gesture[0])
@@ -217,15 +211,16 @@ class Actions:
         if gesture != self._gesture or longest == 0.0 or now - self._changed_at > longest:
             return False
         self._changed_at = now
+        self.history.proceed()
         return True
 
     # History
 
     def _undo(self, _: object) -> None:
-        self._take("Undone", "Redo brings it back.", self._history.undo(self._page.snapshot()))
+        self._take("Undone", "Redo brings it back.", self.history.undo(self._page.snapshot()))
 
     def _redo(self, _: object) -> None:
-        self._take("Redone", "Undo takes it back again.", self._history.redo(self._page.snapshot()))
+        self._take("Redone", "Undo takes it back again.", self.history.redo(self._page.snapshot()))
 
     def _take(self, verb: str, detail: str, step: Step | None) -> None:
         if step is None:
@@ -243,18 +238,19 @@ class Actions:
             page.status.show(notice)
             return
         page.status.show(Notice("hand", "Back to this point of the browser's history"))
-        self.show(self._history.travel(state, page.snapshot()))
+        self.show(self.history.travel(state, page.snapshot()))
         self._show_history()
 
     def record(self, label: str, before: PageState) -> None:
         """Let undo lead back to the state `before`."""
-        self._history.record(label, before)
+        self.history.record(label, before)
         self._show_history()
 
     def show(self, state: PageState) -> None:
         """Show another state, except for the viewpoint unless the robot is another one."""
         page = self._page
-        self._gesture, self._returned = None, True
+        self._gesture = None
+        self.history.arrive()
         if state.units != page.units:
             page.panel.units.show(state.units)
             page.use_units(state.units)
@@ -295,7 +291,7 @@ class Actions:
         arm.restore(q, state.target, task, state.branch, locks)
 
     def _show_history(self) -> None:
-        self._page.panel.script.show_history(*self._history.labels)
+        self._page.panel.script.show_history(*self.history.labels)
 
     def _on_release(self, _: object) -> None:
         """The visitor has released a control: what follows is another step."""

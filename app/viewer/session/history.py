@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from app.viewer.session.state import PageState, encode
+from app.viewer.session.state import KEY, KEY_REPLACE, KEY_RETURN, PageState, encode
 
 LIMIT = 100  # steps; older ones are forgotten
 # s: further changes by the same control within this time belong to the same step. The page reports when a slider
@@ -28,6 +28,7 @@ class History:
     def __init__(self) -> None:
         self._past: list[Step] = []
         self._future: list[Step] = []
+        self._news: set[str] = set()  # since `take_key`
 
     @property
     def labels(self) -> tuple[str, str]:
@@ -38,6 +39,23 @@ class History:
         """Add a step that led away from the state `before`; what was undone can no longer be redone."""
         self._past = [*self._past[1 - LIMIT :], Step(label, before)]
         self._future.clear()
+        self._news.add(KEY)
+
+    def proceed(self) -> None:
+        """The last step goes on."""
+        self._news.add(KEY_REPLACE)
+
+    def arrive(self) -> None:
+        """Another state of the history is shown."""
+        self._news.add(KEY_RETURN)
+
+    def take_key(self) -> str:
+        """The key under which the page is stored after what has happened since the last call.
+
+        A step that only went on replaces its entry in the browser's history, which has the same steps as undo.
+        """
+        news, self._news = self._news, set()
+        return next((key for key in (KEY_RETURN, KEY, KEY_REPLACE) if key in news), KEY)
 
     def undo(self, present: PageState) -> Step | None:
         """Go back one step from the present state; None: there is none that changes anything."""

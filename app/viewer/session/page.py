@@ -322,7 +322,7 @@ class VisitorPage(ShownArm, Worker):
         if batch:
             self._persistence.postpone(now)
         elif not (self.arm.moving or self.arm.dragging) and self._persistence.rested(now):
-            self._guard(lambda: self._persistence.save(self._actions.take_returned()))
+            self._guard(lambda: self._persistence.save(self._actions.history.take_key()))
             self._show_hints()
 
     def _act(self, key: Hashable, value: object) -> None:

@@ -160,21 +160,20 @@ class Persistence:
         self.due = None
         return True
 
-    def save(self, returned: bool = False) -> None:
+    def save(self, key: str) -> None:
         """Store the present state in the browser, unless it is stored already.
 
         Args:
-            returned: whether the visitor returned to an earlier state.
+            key: where to, as `History.take_key`; another viewpoint alone always replaces the present entry.
         """
         self._page.camera.look()
         self._page.camera.lead_back()
         state = self.snapshot()
         text = encode(state)
         if text != self._saved:
-            replaces = self.led or (not returned and same(state, self._state))
-            key = KEY_REPLACE if replaces else KEY_RETURN if returned else KEY
+            replaces = self.led or (key != KEY_RETURN and same(state, self._state))
             self._saved, self._state = text, state
-            self._page.client.local_storage.set_item(key, text)
+            self._page.client.local_storage.set_item(KEY_REPLACE if replaces else key, text)
             self._update_share()
             self._page.client.flush()
 

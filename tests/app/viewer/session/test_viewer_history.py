@@ -261,6 +261,21 @@ def test_a_return_and_a_viewpoint_are_stored_as_what_they_are(port: int) -> None
         assert math.isclose(tab.value(BASE), 90)
 
 
+def test_a_step_that_goes_on_after_a_rest_replaces_its_entry(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        for count, degrees in enumerate((40, 45, 50), start=1):
+            tab.set(BASE, degrees)
+            tab.wait(lambda count=count: len(tab.kept) == count)
+        tab.set(ELBOW, 20)
+        tab.wait(lambda: len(tab.kept) == 4)
+        keys = [m["key"] for m in tab.log if m["type"] == "LocalStorageSetItemMessage"]
+        assert keys == [KEY, KEY_REPLACE, KEY_REPLACE, KEY]
+        tab.say("undo")
+        tab.say("undo")
+        tab.wait(lambda: tab.value(BASE) == 90)
+
+
 @pytest.mark.parametrize(
     "text", ["", "x", "[", "[[1]]", '[["a", "undo", null]]', "[" * 5000, '[[1, "none such", 0]]']
 )
