@@ -37,7 +37,7 @@ class Panel:
     Attributes:
         script: the connection to the page's own script.
         joints, posture: folders that are filled for each robot.
-        obstacles: the folder of the obstacles.
+        obstacles: the folder of the obstacles, closed, so that the rest fits a small window.
         learn: the tab for lessons.
         tabs: the features' tabs.
         legend: what a lesson draws in the scene; below the tabs, so that it stays when another tab is opened.
@@ -72,7 +72,7 @@ class Panel:
             go_to_buttons(gui, post)
             self.target = TargetChoice(gui, DEFAULT_TASK, post)
             self.posture = gui.add_folder("Posture and redundancy")
-            self.obstacles = gui.add_folder("Obstacles")
+            self.obstacles = gui.add_folder("Obstacles", expand_by_default=False)
         self.legend = gui.add_html("")
         self.hints = gui.add_html("")
         self.sheet = gui.add_html("")

@@ -360,6 +360,7 @@ class VisitorPage(ShownArm, Worker):
                 self._library.offered(self.store.robots), self.post,
             )  # fmt: skip
             self.panel.fit(gui.main_panel, self._persistence.embedded)
+            self.panel.obstacles.expand_by_default = bool(saved.obstacles)
             self.status = self.panel.status
             self.posture = PosturePanel(self, self.panel.posture, self.post)
             self._use_robot(robot, saved.q)
