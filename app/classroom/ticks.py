@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Set
-from functools import cache
+from functools import lru_cache
 from typing import Any, cast
 
 from sqlalchemy import Connection, Table, Update, bindparam, case, select, update
@@ -55,7 +55,7 @@ def store(connection: Connection, room: str, pending: Pending, beats: Set[str]) 
     return version
 
 
-@cache
+@lru_cache(maxsize=64)
 def _update_seats(names: tuple[str, ...]) -> Update:
     """Sets these columns of seats: one statement for all of a class that have the same news."""
     columns: dict[str, Any] = {name: bindparam(f"new_{name}") for name in names}

@@ -95,6 +95,7 @@ def test_both_ways_are_drawn_and_removed(port: int) -> None:
         tab.settle()
         tab.set("Lesson", "Trajectories")
         tab.wait(lambda: "data-guide" in tab.html)
+        tab.settle()
         assert "kb-chart" not in tab.html, "a plot is shown after its prediction"
         tab.set("Both ways in the scene", True)
         tab.wait(lambda: sum(name.startswith("/trajectories-") for name in tab.nodes) == 3)
