@@ -139,6 +139,9 @@ class Stage(Protocol):
     def use_obstacles(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take these obstacles."""
 
+    def solve_again(self) -> None:
+        """The visitor changed what the arm avoids: it makes way, and an answer that is on show is renewed."""
+
     def change_robot(self, robot: Robot) -> None:
         """Show a robot of the service, at its home configuration."""
 

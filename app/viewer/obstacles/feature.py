@@ -21,7 +21,7 @@ from app.viewer.scene.meshes import body
 from app.viewer.tabs.robot.expression import ExpressionError, cut, read
 from app.viewer.tabs.robot.views import text_of
 from app.viewer.views.templates import render
-from kin import Contact, InputError
+from kin import Contact, InputError, Obstacle
 from kin.collision.obstacles import MOST_OBSTACLES, Shape
 from kin.transforms import from_position_wxyz
 
@@ -109,9 +109,9 @@ class ObstaclesFeature(Feature):
             return
         items = placed.added(stage.obstacles, shape, stage.robot, stage.goal)
         self._choose(len(items) - 1, False)
-        stage.use_obstacles(items)
         detail = "Drag its arrows, or type its place and size in the tab Move."
         stage.notify(Notice("hand", f"Added: {items[-1].label}", detail))
+        self._use(items)
 
     def _choose(self, index: int | None, show: bool = True) -> None:
         if index is not None and not 0 <= index < len(self.stage.obstacles) + (not show):
@@ -127,18 +127,18 @@ class ObstaclesFeature(Feature):
             return
         gone = self.stage.obstacles[index].label
         self._choose(None, False)
-        self.stage.use_obstacles(placed.removed(self.stage.obstacles, index))
         self.stage.notify(Notice("hand", f"Removed: {gone}", "Undo brings it back."))
+        self._use(placed.removed(self.stage.obstacles, index))
 
     def _pull(self, pull: Pull) -> None:
-        """One event of the gizmo. Obstacles do not avoid the arm: what touches is red."""
+        """One event of the gizmo. Obstacles do not avoid the arm: it may avoid them. What touches is red."""
         if self._chosen is None:
             return
         self._held = pull.phase != "end"
         if pull.phase != "start":
             T = from_position_wxyz(pull.position, pull.wxyz)
             self._wrong = None
-            self.stage.use_obstacles(placed.moved(self.stage.obstacles, self._chosen, T))
+            self._use(placed.moved(self.stage.obstacles, self._chosen, T))
         if not self._held:
             self._show()
 
@@ -157,8 +157,15 @@ class ObstaclesFeature(Feature):
             self._refuse(field, text, f"“{cut(text)}” is not valid; valid: {error.expected}")
         else:
             self._wrong = None
-            self.stage.use_obstacles(items)
+            self._use(items)
             self._show()
+
+    def _use(self, items: tuple[Obstacle, ...]) -> None:
+        """Take what the visitor has made of the obstacles; an arm that avoids them is solved again."""
+        before = self.stage.obstacles
+        self.stage.use_obstacles(items)
+        if self.stage.avoid and items != before:
+            self.stage.solve_again()
 
     def _refuse(self, field: str, text: str, why: str) -> None:
         self._wrong = field, text[:60], f"{field.capitalize()}: {why}."

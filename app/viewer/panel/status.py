@@ -152,6 +152,11 @@ class StatusLine:
         self._warning = ""
         self._html = gui.add_html(html(first))
 
+    @property
+    def shows_result(self) -> bool:
+        """Whether the notice is the result for a target."""
+        return self._result is not None
+
     def show(self, shown: Notice) -> None:
         """Replace the notice."""
         self.count += 1

@@ -18,7 +18,7 @@ from app.viewer.panel.status import READY
 from app.viewer.session.actions import ActionsPage
 from app.viewer.session.history import without_results
 from app.viewer.session.state import PageState, decode
-from kin import Robot
+from kin import Obstacle, Robot
 from kin.transforms import Array
 
 # The features whose states are shown with the open lesson. Exercises are everybody's own.
@@ -71,6 +71,8 @@ class Follower:
         self._text = ""
         self._shown: PageState | None = None
         self._aimed: Array | None = None
+        self._obstacles: tuple[Obstacle, ...] | None = None  # those of who was followed last
+        self._own_obstacles: tuple[Obstacle, ...] = ()
         self.moving = self.turned = False
 
     def begin(self) -> None:
@@ -92,6 +94,9 @@ class Follower:
         if state.unreadable or state.refused or state.q is None or state.robot is None:
             return
         last, self._shown = self._shown, state
+        if self._page.obstacles != self._obstacles:
+            self._own_obstacles = self._page.obstacles
+        self._obstacles = state.obstacles
         self._page.use_obstacles(state.obstacles)
         if last is None or _differs(last, state, "robot", "own", "task", "branch", "locks"):
             self._page.adopt(replace(state, own=self._own(state)))
@@ -104,6 +109,11 @@ class Follower:
             self._show_view(state)
             self._show_lesson(last, state)
         self._show_camera(last, state)
+
+    def drop_obstacles(self) -> None:
+        """Return to the visitor's own obstacles, unless the visitor has changed those that were shown."""
+        if self._page.obstacles == self._obstacles:
+            self._page.use_obstacles(self._own_obstacles)
 
     def _own(self, state: PageState) -> OwnArm | None:
         """The leader's own arm if it is on show; otherwise the visitor's stays."""

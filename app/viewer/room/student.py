@@ -126,7 +126,10 @@ class Student(Member):
         if task is not None and lessons is not None:
             if lessons.key != lessons.exercises.key:
                 lessons.open(lessons.exercises.key)
+            before = self.page.robot.id, self.page.goal.tobytes()
             lessons.exercises.open(task.exercise)
+            if (self.page.robot.id, self.page.goal.tobytes()) != before:
+                self.follower.drop_obstacles()
             self._open_tab += 1
 
     def _submit(self, judged: Judged) -> None:

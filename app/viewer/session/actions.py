@@ -36,9 +36,7 @@ NO_STEP = frozenset(
     }
 )
 # Controls that send many values on the way to the one the visitor means: how long (s) a step may pause.
-GRADUAL = {
-    "gizmo": math.inf, "joint": LONG_PAUSE, "redundancy": LONG_PAUSE, "nudge": SHORT_PAUSE,
-}  # fmt: skip
+GRADUAL = {"gizmo": math.inf, "joint": LONG_PAUSE, "redundancy": LONG_PAUSE, "nudge": SHORT_PAUSE}
 MESSAGES = (
     "undo", "redo", "travel", "released", "snap", "nudge", "axes", "field", "target", "fit-arm", "look-from",
     "lesson", "feature", "text-size", "frame",
@@ -384,6 +382,8 @@ class Actions:
         view = replace(self._page.view)
         setattr(view, name, bool(value))
         self._page.use_view(view)
+        if name == "avoid":
+            self._page.solve_again()
 
 
 def _label(gesture: tuple[object, ...], features: Sequence[Feature]) -> str:

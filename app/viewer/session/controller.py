@@ -168,7 +168,7 @@ class ArmController:
         return surroundings(self.robot, self.obstacles, links).touches(q) if links or self.obstacles else ()
 
     def use_obstacles(self, obstacles: tuple[Obstacle, ...]) -> None:
-        """Take these obstacles. An arm that is at rest stays, whatever it touches."""
+        """Take these obstacles. An arm that is at rest stays, whatever it touches: see `solve_again`."""
         if obstacles != self.obstacles:
             self.obstacles = obstacles
             self._surroundings_changed(self.avoid)
@@ -178,6 +178,17 @@ class ArmController:
         if avoid != self.avoid:
             self.avoid = avoid
             self._surroundings_changed(True)
+
+    def solve_again(self, renew: bool) -> None:
+        """The visitor changed what is to be avoided: solve at the tool's pose if the arm touches something there.
+
+        `renew`: solve in any case, because the page shows an answer of before. A target that is still open has
+        been solved already, and an arm that a feature moves is left alone.
+        """
+        if self.target is not None or self.dragging or self.playing:
+            return
+        if renew or (self.avoid and self.contacts_at(self.goal)):
+            self._solve(kin.fk(self.robot, self.goal))
 
     def _surroundings_changed(self, solve_again: bool) -> None:
         if solve_again:

@@ -8,6 +8,7 @@ from typing import Protocol
 from app.viewer.feature import Feature
 from app.viewer.meshes.bodies import Bodies
 from app.viewer.own_arm import OwnArm
+from app.viewer.panel.status import StatusLine
 from app.viewer.session.controller import ArmController
 from app.viewer.session.persistence import SavedPage
 from kin import Contact, IKOptions, Obstacle, Robot, Task
@@ -27,6 +28,7 @@ class ShownArm:
     """What features may read of the arm on show, and do with it; see `app.viewer.feature.Stage`."""
 
     arm: ArmController
+    status: StatusLine
     withheld = ""
 
     def withhold(self: Withholding, what: str) -> None:
@@ -87,6 +89,9 @@ class ShownArm:
 
     def use_obstacles(self, obstacles: tuple[Obstacle, ...]) -> None:
         self.arm.use_obstacles(obstacles)
+
+    def solve_again(self) -> None:
+        self.arm.solve_again(self.status.shows_result)
 
 
 class RobotPage(SavedPage, Protocol):

@@ -10,6 +10,12 @@ pytestmark = pytest.mark.browser
 
 
 def test_the_worksheet_of_a_lesson_is_printed_and_saved(tab: Tab) -> None:
+    tab.open("View")
+    with tab.page.context.expect_page() as opened:
+        tab.page.locator(".kb-sheet:visible").get_by_role("button", name="Print").click()
+    expect(opened.value.locator("article")).to_have_count(1)
+    expect(opened.value.get_by_text("Two parts:")).to_be_hidden()
+    opened.value.close()
     tab.choose_lesson("DH table step by step")
     row = tab.page.locator("[data-sheet-buttons] .kb-sheet")
     expect(row).to_be_visible()
@@ -21,6 +27,7 @@ def test_the_worksheet_of_a_lesson_is_printed_and_saved(tab: Tab) -> None:
     expect(sheet.locator("article")).to_have_count(2)
     expect(sheet.locator("article").first.locator("figure svg")).to_be_visible()
     expect(sheet.locator("[data-solutions] .dh")).to_contain_text("θ₃ − 90.0")
+    expect(sheet.get_by_text("Two parts:")).to_be_visible()
     sheet.emulate_media(media="print")
     expect(sheet.get_by_role("button")).to_be_hidden()
     sheet.close()

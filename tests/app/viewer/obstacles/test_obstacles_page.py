@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,9 +12,12 @@ from fake_browser import FakeBrowser
 import kin
 from app.shared.store import Store
 from app.viewer.obstacles.feature import ObstaclesFeature
+from app.viewer.panel.entry import read_pose
 from app.viewer.panel.joints import label
+from app.viewer.panel.view import ViewState
 from app.viewer.scene.bodies.nodes import TOUCHING
 from app.viewer.session.state import PageState, decode, encode
+from kin.units import DEFAULT_UNITS
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -140,3 +144,75 @@ def test_messages_that_no_control_sends_change_nothing(port: int, key: tuple[obj
         assert "data-obstacles" not in tab.html or ObstaclesFeature.key in tab.html
         say(tab, "set", "x", value="10")
         tab.wait(lambda: bool(kept(tab).obstacles) and kept(tab).obstacles[0].xyz[0] == pytest.approx(0.01))
+
+
+BELOW = "600 200 -60 180 0 -90"  # mm, degrees: the tool points down, below the plane of the base
+POSTURES = [x.q for x in kin.solve_ik(UR5, read_pose("pose", BELOW, DEFAULT_UNITS, np.eye(4))[0]).solutions]
+
+
+def bench(top: float) -> kin.Obstacle:
+    """A table in front of the arm, with its top at this height (m)."""
+    return kin.Obstacle("table", (0.6, 0.2, top), size=(0.6, 0.6, 0.7), name="bench")
+
+
+def wait_for(tab: FakeBrowser, kind: str, words: str) -> None:
+    """Until the status line shows a notice of this kind with these words."""
+
+    def shown() -> bool:
+        place = tab.html.find(f'data-status="{kind}"')
+        return place >= 0 and words in tab.html[place : tab.html.index("</div>", place)]
+
+    tab.wait(shown)
+
+
+def reach(tab: FakeBrowser) -> None:
+    """Type the target, and wait until the arm has arrived."""
+    tab.say("target", ["pose", BELOW])
+    wait_for(tab, "reached", "configurations for this pose")
+    tab.settle(0.4)
+
+
+def test_the_answer_is_about_the_present_choice_of_avoiding(port: int) -> None:
+    with FakeBrowser(port, memory=opened(PageState("ur5", obstacles=(bench(0.0),)))) as tab:
+        tab.settle()
+        reach(tab)
+        wait_for(tab, "reached", "touches bench")
+        tab.set(AVOID, True)
+        wait_for(tab, "collision", "No collision-free posture found")
+        tab.set(AVOID, False)
+        wait_for(tab, "reached", "8 configurations for this pose.")
+
+
+def test_a_table_that_is_raised_or_lowered_is_avoided_at_a_target_that_was_reached(port: int) -> None:
+    with FakeBrowser(port, memory=opened(PageState("ur5", obstacles=(bench(-0.1),)))) as tab:
+        tab.settle()
+        tab.set(AVOID, True)
+        reach(tab)
+        wait_for(tab, "reached", "4 others collide")
+        say(tab, "choose", value=0)
+        say(tab, "set", "z", value="0")
+        wait_for(tab, "collision", "No collision-free posture found")
+        say(tab, "set", "z", value="-300 mm")
+        wait_for(tab, "reached", "2 others collide")
+        tab.settle(0.4)
+        tab.set(AVOID, False)
+        wait_for(tab, "reached", "8 configurations for this pose.")
+
+
+def test_an_arm_that_touches_moves_to_a_free_posture_only_when_that_is_switched_on(port: int) -> None:
+    touching = next(q for q in POSTURES if kin.clearance(UR5, q, [bench(-0.1)]) < -0.01)
+    before = PageState("ur5", touching, obstacles=(bench(-0.1),))
+    saved = replace(before, view=ViewState(avoid=True))
+    with FakeBrowser(port, memory=opened(saved)) as tab:
+        tab.settle()
+        tab.wait(lambda: "touches bench" in tab.html)
+    with FakeBrowser(port, memory=opened(before)) as tab:
+        tab.settle()
+        tab.wait(lambda: "touches bench" in tab.html)
+        tab.set(AVOID, True)
+        wait_for(tab, "reached", "4 others collide")
+        tab.wait(lambda: "touches bench" not in tab.html)
+        tab.wait(lambda: kin.clearance(UR5, kept(tab).q, [bench(-0.1)]) > 0.0)
+        assert kin.fk(UR5, kept(tab).q) == pytest.approx(kin.fk(UR5, touching), abs=1e-6)
+        tab.say("undo")
+        tab.wait(lambda: "touches bench" in tab.html)

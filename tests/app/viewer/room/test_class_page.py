@@ -249,6 +249,26 @@ def test_a_task_opens_and_its_answers_are_stored(room: Class) -> None:
     assert "1 of 1 solved" in teacher.html
 
 
+def test_a_task_ends_the_obstacles_of_who_was_followed(room: Class) -> None:
+    def shown(tab: FakeBrowser, shape: str) -> bool:
+        return f'dir="auto">{shape}' in tab.html
+
+    teacher = room.teacher()
+    ann, bob = room.join("Ann")[0], room.join("Bob")[0]
+    bob.say("feature", ["obstacles", ["add", "sphere", 1], None])
+    bob.wait(lambda: shown(bob, "sphere"))
+    teacher.say("feature", ["obstacles", ["add", "table", 1], None])
+    teacher.set("1 rotating base", 30.0)
+    press(teacher, "follow")
+    for tab in (ann, bob):
+        tab.wait(lambda tab=tab: shown(tab, "table") and not shown(tab, "sphere"))
+    press(teacher, "fields", "task", value=[[EXERCISE]])
+    for tab in (ann, bob):
+        tab.wait(lambda tab=tab: f'data-exercise="{EXERCISE}"' in tab.html)
+        tab.wait(lambda tab=tab: not shown(tab, "table"))
+    bob.wait(lambda: shown(bob, "sphere"))
+
+
 def test_a_course_opens_on_every_page(room: Class) -> None:
     teacher, student, _, _ = lead(room)
     press(teacher, "fields", "course", value=[["0"]])
