@@ -19,7 +19,7 @@ from app.viewer.server import ViewerServer
 
 @pytest.fixture(scope="module")
 def rooms_served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[int, Hub]]:
-    data: Path = tmp_path_factory.mktemp("secrets")
+    data: Path = tmp_path_factory.mktemp("rooms")
     kin.warm_up()
     hub = Hub(data)
     viewer = ViewerServer(Store(), Settings(data=data), Clouds(), classroom=hub)

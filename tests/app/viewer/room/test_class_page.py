@@ -5,23 +5,17 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
-from live_server import serve_viewer
 
 import kin
 from app.classroom import COOKIE, Hub, Ticket
-from app.shared.clouds import Clouds
-from app.shared.settings import Settings
-from app.shared.store import Store
 from app.viewer.room.member import Member
 from app.viewer.room.student import Student
 from app.viewer.room.teacher import Teacher
-from app.viewer.server import ViewerServer
 from app.viewer.session.worker.crew import BUILDS
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -64,20 +58,9 @@ class Class:
             browser.close()
 
 
-@pytest.fixture(scope="module")
-def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[int, Hub]]:
-    data: Path = tmp_path_factory.mktemp("classpage")
-    kin.warm_up()
-    hub = Hub(data)
-    viewer = ViewerServer(Store(), Settings(data=data), Clouds(), classroom=hub)
-    with serve_viewer(viewer) as port:
-        yield port, hub
-    hub.close()
-
-
 @pytest.fixture
-def room(served: tuple[int, Hub]) -> Iterator[Class]:
-    found = Class(*served)
+def room(rooms_served: tuple[int, Hub]) -> Iterator[Class]:
+    found = Class(*rooms_served)
     yield found
     found.close()
     found.hub.rooms.end(found.room.id)
