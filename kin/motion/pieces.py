@@ -11,7 +11,6 @@ from kin.motion import scurve
 from kin.transforms import Array
 
 # Where peaks are looked for between two breaks: close to both ends, where an acceleration may jump, and between.
-SHORTEST = 1e-9  # part of a motion in which its acceleration may rise
 LOOK = np.array([1e-9, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0 - 1e-9])
 
 
@@ -59,16 +58,7 @@ class JointMotion:
 
     @classmethod
     def between(cls, start: Array, end: Array, limits: Array) -> JointMotion:
-        """The fastest motion from rest to rest, all joints together; limits ``(n, 3)``.
-
-        Jerk is limited further where the acceleration would rise in less than `SHORTEST` of the time: the rounding
-        of such a short phase would exceed the limit of acceleration.
-        """
-        velocity, acceleration = limits[:, 0], limits[:, 1]
-        way = np.abs(end - start)
-        least = np.maximum(np.sqrt(way / acceleration), way / velocity)
-        slowest = np.divide(acceleration, SHORTEST * least, out=np.full_like(way, np.inf), where=way > 0.0)
-        limits = np.column_stack([velocity, acceleration, np.minimum(limits[:, 2], slowest)])
+        """The fastest motion from rest to rest, all joints together: ``(n,)`` each, limits ``(n, 3)``."""
         breaks, pieces = np.empty((len(start), scurve.PHASES + 1)), np.empty((len(start), scurve.PHASES, 4))
         scurve.synchronised(start, end, limits, breaks, pieces)
         return cls(breaks, pieces)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from kin.errors import InputError
 from kin.ik.options import finite_number
-from kin.motion.scurve import PHASES, fill, shortest_time
+from kin.motion.scurve import PHASES, fill, phase_times, whole
 from kin.transforms import Array, finite_array
 
 
@@ -119,7 +119,8 @@ def s_curve(start: float, end: float, velocity: float, acceleration: float, jerk
     q0, q1 = _finite(start=start, end=end)
     limits = [_positive("velocity", velocity), _positive("acceleration", acceleration), _positive("jerk", jerk)]
     breaks, pieces = np.empty(PHASES + 1), np.empty((PHASES, 4))
-    fill(q0, q1, np.array(limits), shortest_time(abs(q1 - q0), *limits), breaks, pieces)
+    phases = phase_times(abs(q1 - q0), *limits)
+    fill(q0, q1, phases, whole(phases), breaks, pieces)
     return Profile(breaks, np.concatenate([pieces, np.zeros((PHASES, 2))], axis=1))
 
 

@@ -3,6 +3,9 @@
 It has seven phases of constant jerk: the acceleration rises, stays and falls; the speed stays; and the first three
 in reverse (Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots, 2008, section 3.4).
 Phases may be empty. Each phase is a cubic polynomial of the time since its beginning.
+
+The limit of jerk is lowered where the acceleration would rise in less than `SHORTEST` of the time: the rounding of
+such a short phase would exceed the limit of acceleration.
 """
 
 from __future__ import annotations
@@ -15,13 +18,21 @@ from kin.kernels.compile import jit
 from kin.transforms import Array
 
 PHASES = 7
+SHORTEST = 1e-9  # part of a motion in which its acceleration may rise
+
+
+Phases = tuple[float, float, float]
 
 
 @jit
-def phase_times(distance: float, v: float, a: float, j: float) -> tuple[float, float, float]:
-    """Seconds of rising acceleration, of steady acceleration and of steady speed, for a distance ≥ 0."""
+def phase_times(distance: float, v: float, a: float, j: float) -> Phases:
+    """Seconds of rising acceleration, of steady acceleration and of steady speed, for a distance ≥ 0.
+
+    v, a, j: the limits of velocity, acceleration and jerk.
+    """
     if distance <= 0.0:
         return 0.0, 0.0, 0.0
+    j = min(j, a / (SHORTEST * max(math.sqrt(distance / a), distance / v)))
     if v * j <= a * a:
         rise, steady = math.sqrt(v / j), 0.0
     else:
@@ -37,26 +48,31 @@ def phase_times(distance: float, v: float, a: float, j: float) -> tuple[float, f
 
 
 @jit
-def shortest_time(distance: float, v: float, a: float, j: float) -> float:
-    """Seconds from rest to rest over a distance ≥ 0."""
-    rise, steady, cruise = phase_times(distance, v, a, j)
+def whole(phases: Phases) -> float:
+    """Seconds of all seven phases."""
+    rise, steady, cruise = phases
     return 2.0 * (2.0 * rise + steady) + cruise
 
 
 @jit
-def fill(start: float, end: float, limits: Array, total: float, breaks: Array, pieces: Array) -> None:
+def shortest_time(distance: float, v: float, a: float, j: float) -> float:
+    """Seconds from rest to rest over a distance ≥ 0."""
+    return whole(phase_times(distance, v, a, j))
+
+
+@jit
+def fill(start: float, end: float, phases: Phases, total: float, breaks: Array, pieces: Array) -> None:
     """The motion of one joint, stretched to `total` seconds.
 
     Args:
         start, end: where it begins and ends.
-        limits: largest velocity, acceleration and jerk ``(3,)``.
-        total: seconds, not less than `shortest_time`.
+        phases: its `phase_times`.
+        total: seconds, not less than those.
         breaks: ← when each phase begins, and the end ``(8,)``.
         pieces: ← coefficients of each phase, the constant one first ``(7, 4)``.
     """
-    distance = abs(end - start)
-    rise, steady, cruise = phase_times(distance, limits[0], limits[1], limits[2])
-    own = 2.0 * (2.0 * rise + steady) + cruise
+    rise, steady, cruise = phases
+    own = whole(phases)
     if own == 0.0:
         for k in range(PHASES):
             breaks[k] = 0.0
@@ -65,7 +81,7 @@ def fill(start: float, end: float, limits: Array, total: float, breaks: Array, p
         breaks[PHASES] = total
         return
     # The jerk follows from the distance, so that the end is met to the last digits.
-    jerk = distance / (rise * (rise + steady) * (2.0 * rise + steady + cruise))
+    jerk = abs(end - start) / (rise * (rise + steady) * (2.0 * rise + steady + cruise))
     scale = total / own
     rise *= scale
     steady *= scale
@@ -100,9 +116,11 @@ def synchronised(start: Array, end: Array, limits: Array, breaks: Array, pieces:
     """
     total = 0.0
     for i in range(start.shape[0]):
-        total = max(total, shortest_time(abs(end[i] - start[i]), limits[i, 0], limits[i, 1], limits[i, 2]))
+        phases = phase_times(abs(end[i] - start[i]), limits[i, 0], limits[i, 1], limits[i, 2])
+        breaks[i, 0], breaks[i, 1], breaks[i, 2] = phases
+        total = max(total, whole(phases))
     for i in range(start.shape[0]):
-        fill(start[i], end[i], limits[i], total, breaks[i], pieces[i])
+        fill(start[i], end[i], (breaks[i, 0], breaks[i, 1], breaks[i, 2]), total, breaks[i], pieces[i])
     return total
 
 
