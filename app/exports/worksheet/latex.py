@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from itertools import count
+
 from app.exports.worksheet.drawing import draw
-from app.exports.worksheet.sheet import Sheet
+from app.exports.worksheet.sheet import Question, Sheet
 from app.exports.worksheet.words import to_latex
 from kin.transforms import Array
 
@@ -13,6 +15,8 @@ HEAD = r"""\documentclass[11pt,a4paper]{article}
 \usepackage{amsmath,amssymb,array,tikz}
 \setlength{\parindent}{0pt}
 \setlength{\parskip}{6pt}
+\renewcommand{\arraystretch}{1.15}
+\newenvironment{together}{\begin{minipage}{\textwidth}\setlength{\parskip}{6pt}}{\end{minipage}\par\medskip}
 \begin{document}
 """
 LINES = 3  # room for an answer
@@ -33,19 +37,12 @@ def latex(sheet: Sheet) -> str:
     if not sheet.blank:
         out.append(_matrices(sheet))
     out += [_formula(f.title, f.latex) for f in sheet.formulas if not f.solution]
-    number = 0
+    numbers = count(1)
     for part in sheet.parts:
         out.append(rf"\subsection*{{{to_latex(part.title)}}}")
         if part.text:
             out.append(to_latex(part.text))
-        for question in part.questions:
-            number += 1
-            out.append(rf"\textbf{{{number}.}} {to_latex(question.prompt)}")
-            if question.options:
-                out += [rf"$\square$ {to_latex(option)}" for option in question.options]
-            else:
-                out += [r"\rule{0pt}{8mm}\dotfill"] * (LINES - 1)
-                out.append(rf"\rule{{0pt}}{{8mm}}Answer: \rule{{4cm}}{{0.4pt}} {to_latex(question.unit)}")
+        out += [_question(next(numbers), question) for question in part.questions]
     if sheet.has_solutions:
         out += [r"\newpage", rf"{{\Large\bfseries {title}: solutions}}"]
         if sheet.blank:
@@ -54,6 +51,17 @@ def latex(sheet: Sheet) -> str:
         for number, question in enumerate(sheet.questions, 1):
             out.append(rf"\textbf{{{number}.}} {to_latex(question.solution)}")
     return "\n\n".join([*out, r"\end{document}"]) + "\n"
+
+
+def _question(number: int, question: Question) -> str:
+    """A question with room to answer, not divided between two pages."""
+    out = [r"\begin{together}", rf"\textbf{{{number}.}} {to_latex(question.prompt)}"]
+    if question.options:
+        out += [rf"$\square$ {to_latex(option)}" for option in question.options]
+    else:
+        out += [r"\rule{0pt}{8mm}\dotfill"] * (LINES - 1)
+        out.append(rf"\rule{{0pt}}{{8mm}}Answer: \rule{{4cm}}{{0.4pt}} {to_latex(question.unit)}")
+    return "\n\n".join([*out, r"\end{together}"])
 
 
 def _table(sheet: Sheet, blank: bool) -> str:

@@ -13,25 +13,26 @@ _SPECIAL = {
 _MATH = {
     "−": "-", "×": r"\times", "·": r"\cdot", "⋅": r"\cdot", "°": r"^\circ", "±": r"\pm", "√": r"\surd",
     "≤": r"\le", "≥": r"\ge", "≠": r"\ne", "≈": r"\approx", "→": r"\to", "∞": r"\infty", "′": "'", "∈": r"\in",
-    "⊥": r"\perp", "∥": r"\parallel", "ᵀ": "^{T}", "⁺": "^{+}", "⁻": "^{-}", "¹": "^{1}", "²": "^{2}", "³": "^{3}",
-    "⁴": "^{4}", "ᵢ": "_{i}", "ₙ": "_{n}", "₋": "_{-}", "₊": "_{+}", "∑": r"\sum", "∂": r"\partial",
+    "⊥": r"\perp", "∥": r"\parallel", "∑": r"\sum", "∂": r"\partial",
     "∠": r"\angle", "½": r"\frac12",
 }  # fmt: skip
 _TEXT = {
     "…": r"\dots{}", "–": "--", "—": "---", "’": "'", "‘": "`", "“": "``", "”": "''", "\u00a0": "~",
     "\u202f": r"\,", "\u2009": r"\,", "✓": "", "✕": "", "ü": r'\"u', "ö": r'\"o', "ä": r'\"a',
 }  # fmt: skip
-_INDICES = re.compile("([₀-₉ᵢₙ₋₊]+)")
-_DIGITS = str.maketrans("₀₁₂₃₄₅₆₇₈₉ᵢₙ₋₊", "0123456789in-+")
+_INDICES = "₀₁₂₃₄₅₆₇₈₉ᵢₙ₋₊", "0123456789in-+"
+_EXPONENTS = "⁰¹²³⁴⁵⁶⁷⁸⁹ᵀ⁻⁺", "0123456789T-+"
+_RAISED = re.compile(f"([{_INDICES[0]}]+|[{_EXPONENTS[0]}]+)")
+_PLAIN = str.maketrans(_INDICES[0] + _EXPONENTS[0], _INDICES[1] + _EXPONENTS[1])
 
 
 def to_latex(text: str) -> str:
     """A sentence for a LaTeX document. Characters that LaTeX knows by itself stay."""
     text = unicodedata.normalize("NFC", text)
     out = []
-    for piece in _INDICES.split(text):
-        if _INDICES.fullmatch(piece):
-            out.append(f"$_{{{piece.translate(_DIGITS)}}}$")
+    for piece in _RAISED.split(text):
+        if _RAISED.fullmatch(piece):
+            out.append(f"${'_' if piece[0] in _INDICES[0] else '^'}{{{piece.translate(_PLAIN)}}}$")
             continue
         for k, character in enumerate(piece):
             dotted = piece[k + 1 : k + 2] == "\u0307"

@@ -134,5 +134,6 @@ def test_text_becomes_latex():
     assert to_latex("θ₁₂ − 90° & 5 % of x²") == r"$\theta$$_{12}$ $-$ 90$^\circ$ \& 5 \% of x$^{2}$"
     assert to_latex("q̇ and ẋ") == r"$\dot{q}$ and $\dot{x}$"
     assert to_latex("a_b{c}\\") == r"a\_b\{c\}\textbackslash{}"
+    assert to_latex("10⁻¹⁶") == "10$^{-16}$"
     assert to_latex("xₖ") == "x$_{k}$"
     assert to_latex("“R” = RᵀR ≤ λ") == r"``R'' = R$^{T}$R $\le$ $\lambda$"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import xml.etree.ElementTree as ET
 from types import SimpleNamespace
 from unittest.mock import MagicMock
@@ -44,6 +45,9 @@ def test_every_question_is_asked_and_solved(lesson, robot):
         assert " ".join(question.prompt.split()) in asked
         assert " ".join(question.solution.split()) in solved
         assert " ".join(question.solution.split()) not in asked
+        assert not re.search(r"<\w", question.solution), "text for a page, not for paper"
+    for step in outline.steps:
+        assert not step.practice or step.practice not in solved
     left = {character for character in latex(sheet) if not character.isascii()}
     assert not left, "app/exports/worksheet/words.py says what they are in LaTeX"
     cells = [cell.text for cell in articles[0].iter("td")]

@@ -34,8 +34,9 @@ def outline(robot: Robot, units: Units) -> Outline:
             "Four columns",
             "The pose is a matrix of four columns, n, o, a and p: the tool’s axes x, y and z, and the tool point.",
             _approach(T),
-            "The menu Equation lists the twelve entries. Each is a formula of the joint values.",
+            "Each of the twelve entries is a formula of the joint values.",
             start=home,
+            practice="The menu Equation lists them.",
         ),
         Step(
             "The tool point",

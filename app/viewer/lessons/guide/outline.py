@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from markupsafe import Markup
+
 from app.exercises.questions import (
     LEAST,
     PLAIN,
@@ -54,9 +56,11 @@ class Step:
     Attributes:
         text: what to do or to know.
         question: the prediction that is asked before `shown`.
-        shown: what is revealed after a right answer, or on request.
+        shown: what is revealed after a right answer, or on request; on paper too, among the solutions.
         start: the configuration that the step is about; a button moves the arm there.
         end: the configuration to which the arm moves when the answer is revealed.
+        practice: what to see or to do on the page then, in words that follow `shown`.
+        figure: a figure that belongs to `shown`.
     """
 
     title: str
@@ -65,6 +69,8 @@ class Step:
     shown: str = ""
     start: Configuration | None = None
     end: Configuration | None = None
+    practice: str = ""
+    figure: Markup | None = None
 
 
 @dataclass(frozen=True)

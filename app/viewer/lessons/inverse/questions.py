@@ -72,7 +72,7 @@ def _step(given: Exercise, key: StepKey, units: Units) -> Step:
             else None
         )
         shown = f"The numbers below lead to the branch {given.followed.name}. Choose another one with Follow."
-        return Step(words.title(arm, key), text, _limits(given), shown, start, end)
+        return Step(words.title(arm, key), text, _limits(given), "", start, end, shown)
     if found is None:
         failed = given.followed.derivation.failed
         where = "" if failed is None else f" It ends at the step “{words.title(given.arm, failed.key)}”."
@@ -84,8 +84,8 @@ def _step(given: Exercise, key: StepKey, units: Units) -> Step:
         words.title(arm, key),
         f"{text} {special}".rstrip(),
         _question(given, found, units),
-        _shown(given, found),
-        start,
+        start=start,
+        practice=_shown(given, found),
     )
 
 
@@ -329,7 +329,7 @@ def _others(robot: Robot) -> Outline:
     text = (
         f"{robot.name} is none of the arms of this lesson. It derives planar arms with two or three joints, elbow "
         "arms with a wrist of two axes (Pioneer arm) or of three axes that meet (PUMA, IRB 120), and arms with a "
-        "spherical shoulder and wrist (S-R-S, iiwa). Choose one below."
+        "spherical shoulder and wrist (S-R-S, iiwa)."
     )
     check = one_right(
         "A cosine of an angle is known. How many angles are there between −180° and 180°?",
@@ -349,7 +349,7 @@ def _others(robot: Robot) -> Outline:
         ],
         1,
     )
-    first = Step("Which arms", text, meet, "Choose an arm below to derive its angles.")
+    first = Step("Which arms", text, meet, practice="Choose one below to derive its angles.")
     rest = (
         "Arms without such a point are solved by elimination or by numeric steps. Postures shows their solutions."
     )

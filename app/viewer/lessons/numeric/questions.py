@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from markupsafe import Markup
 
 from app.viewer.lessons.guide.outline import (
     PLAIN,
@@ -76,8 +75,9 @@ def _missing(known: Example, units: Units) -> Step:
                 (Mistake(float(np.abs(there - here).sum()), "Add the squares, not the absolute values."),),
             )
         ),
-        "An iteration makes e smaller step by step. “Target here” and a moved arm below make any error you like.",
+        "An iteration makes e smaller step by step.",
         start=as_configuration(known.start),
+        practice="“Target here” and a moved arm below make any error you like.",
     )
 
 
@@ -141,8 +141,8 @@ def _newton(known: Example, units: Units) -> Step:
             ),
             1,
         ),
-        Markup(f"{run.count} iterations to {power(float(run.errors[-1]))}. ")
-        + error_chart(known.problem, [("newton", run)], units),
+        f"{run.count} iterations to {power(float(run.errors[-1]))}.",
+        figure=error_chart(known.problem, [("newton", run)], units),
         start=as_configuration(known.start),
     )
 
@@ -173,8 +173,8 @@ def _transpose(known: Example, units: Units) -> Step:
             ),
             0,
         ),
-        Markup(f"{words}, Newton {newton.count}. Directions with a small σ die out slowly. ")
-        + error_chart(known.problem, [("newton", newton), ("transpose", run)], units),
+        f"{words}; Newton needs {newton.count}. Directions with a small σ die out slowly.",
+        figure=error_chart(known.problem, [("newton", newton), ("transpose", run)], units),
         start=as_configuration(known.start),
     )
 
@@ -208,11 +208,9 @@ def _damping(known: Example, units: Units) -> Step:
             ),
             1e-3,
         ),
-        Markup(
-            f"A share of {1.0 - answer:.3f} remains after each step: linear convergence. λ = 0 would be Newton, a "
-            "large λ the transpose with a small gain. "
-        )
-        + error_chart(known.problem, [("newton", known.newton), ("damped", run)], units),
+        f"A share of {1.0 - answer:.3f} remains after each step: linear convergence. λ = 0 would be Newton, a "
+        "large λ the transpose with a small gain.",
+        figure=error_chart(known.problem, [("newton", known.newton), ("damped", run)], units),
         start=as_configuration(known.start),
     )
 
@@ -265,10 +263,8 @@ def _singular(units: Units) -> Step:
                 Mistake(ERROR * DAMPING, "A small λ allows long steps: divide by it."),
             ),
         ),
-        Markup(
-            "Newton’s step grows as 1/σ, to many turns; damping bounds it. At σ = 0 Newton has no step at all. "
-        )
-        + chart(
+        "Newton’s step grows as 1/σ, to many turns; damping bounds it. At σ = 0 Newton has no step at all.",
+        figure=chart(
             (Row(f"Length of the first step, {unit.name}", log=True),),
             curves,
             "First step of Newton and of damped least squares near the straight arm",
@@ -280,7 +276,7 @@ def _singular(units: Units) -> Step:
 def _limits() -> Step:
     return Step(
         "Joint limits",
-        "With “Joint limits” below, each joint is kept within its limits after each step.",
+        "Each joint is kept within its limits after each step.",
         one_right(
             "Joint 2 is at its limit, and all steps push it further. What happens?",
             (
@@ -301,6 +297,7 @@ def _limits() -> Step:
         ),
         "That is why numeric solvers start from several configurations. Without the limits, an iteration may end "
         "outside them, or whole turns away.",
+        practice="“Joint limits” below does it.",
     )
 
 
@@ -320,7 +317,7 @@ def _basins() -> Step:
             ),
             1,
         ),
-        "Open Basins below: compare Newton with damped least squares, and move λ and the step limit.",
+        practice="Open Basins below: compare Newton with damped least squares, and move λ and the step limit.",
     )
 
 

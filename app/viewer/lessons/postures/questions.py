@@ -82,28 +82,30 @@ def outline(robot: Robot, units: Units) -> Outline:
             "Signs",
             "Each square root and arc cosine of the derivation has two values. A posture is one choice of signs.",
             _branches(known),
-            "The list below has one line for each of them." if known.names else "The list shows the closest one.",
+            practice="The list below has one line for each of them."
+            if known.names
+            else "The list shows the closest one.",
         ),
         Step(
             "The posture of the arm",
             "Look at the arm at home: at its shoulder, its elbow and its wrist.",
             _posture(known),
-            "The list below marks the posture of the arm on show.",
             start=home,
+            practice="The list below marks the posture of the arm on show.",
         ),
         Step(
             "Within the limits",
             f"The target is the pose that the tool has at home. {_many(robot)}",
             _solutions(known),
-            "The arm has changed its posture, if it has another one there. The tool is where it was.",
             start=home,
             end=known.other,
+            practice="The arm has changed its posture, if it has another one there. The tool is where it was.",
         ),
         Step(
             "Out of reach",
             f"The target moves straight away from the base, to {BEYOND:g} times the arm’s reach.",
             _missed(),
-            "Drag the target away from the arm: above the list it says why it is missed, and what helps.",
+            practice="Drag the target away from the arm: above the list it says why it is missed, and what helps.",
         ),
     )
     by_hand = planar.steps(robot, units) if planar.is_planar(robot) else ()
@@ -123,12 +125,16 @@ def _branches(known: Facts) -> Number | Choice:
             "Does this arm have a closed form, with named postures?",
             (
                 Option("No", "Its axes belong to no family with names: solutions are found, but not named.", True),
-                Option("Yes", "The list below would name them then."),
+                Option("Yes", "A closed form would name them."),
             ),
         )
     signs = number.bit_length() - 1
     exact = 2**signs == number
-    method = f"{signs} × a choice of two: 2 to the power {signs}." if exact else "Count the list below."
+    method = (
+        f"{signs} × a choice of two: 2 to the power {signs}."
+        if exact
+        else "Each choice of signs that leads to a solution is one."
+    )
     mistakes = [(1, "One pose, but several ways to hold it: think of the elbow.")]
     if exact and signs > 2:
         mistakes.append((2 * signs, "The choices are independent: multiply, do not add."))
@@ -160,7 +166,7 @@ def _solutions(known: Facts) -> Number:
     return count(
         "How many postures reach this target within the joint limits?",
         known.found,
-        "Count the lines of the list that are neither outside limits nor without a real solution.",
+        "Those count that are neither outside limits nor without a real solution.",
         [(len(known.names), "That many postures exist, but joint limits exclude some of them here.")],
     )
 

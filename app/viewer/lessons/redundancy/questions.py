@@ -36,7 +36,7 @@ def outline(robot: Robot, units: Units) -> Outline:
             "Joints and conditions",
             f"The arm has {robot.n} joints. A tool at rest is six conditions on the joint speeds: J q̇ = 0.",
             _dimension(robot, free),
-            "One such motion is a slider below."
+            practice="One such motion is a slider below."
             if free
             else "Choose an arm of seven joints to see a self-motion.",
         ),
@@ -44,8 +44,8 @@ def outline(robot: Robot, units: Units) -> Outline:
             "Only the point",
             "Now the tool may turn, and only its point has to stay.",
             _point(robot),
-            "For a task of fewer conditions an arm of six joints is redundant too: choose Point only (tab Move, "
-            "Target must match), and a joint leads below.",
+            "For a task of fewer conditions an arm of six joints is redundant too.",
+            practice="Choose Point only (tab Move, Target must match), and a joint leads below.",
         ),
     ]
     if np.any(z):
@@ -54,8 +54,8 @@ def outline(robot: Robot, units: Units) -> Outline:
                 "Who moves",
                 "At home, the null space of J gives the joint speeds of the self-motion: " + _speeds(z) + ".",
                 _mover(robot, z),
-                "Sweep the redundancy parameter: the joints move in this proportion at first.",
                 start=home,
+                practice="Sweep the redundancy parameter: the joints move in this proportion at first.",
             )
         )
     return Outline(GOAL, tuple(steps), _check(robot, free))

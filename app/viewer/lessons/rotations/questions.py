@@ -84,8 +84,9 @@ def _columns(T: Array, start: tuple[float, ...]) -> Step:
             ),
             ENTRY / 2.0,
         ),
-        "Each entry of R is such a cosine. “From tool” below shows the tool’s frame beside the arm.",
+        "Each entry of R is such a cosine.",
         start=start,
+        practice="“From tool” below shows the tool’s frame beside the arm.",
     )
 
 
@@ -147,9 +148,8 @@ def _order() -> Step:
             ),
             1,
         ),
-        "About the fixed x axis, the second turn multiplies from the left, and z ends elsewhere. "
-        "Build both chains "
-        "below, with own and with fixed axes.",
+        "About the fixed x axis, the second turn multiplies from the left, and z ends elsewhere.",
+        practice="Build both chains below, with own and with fixed axes.",
     )
 
 
@@ -169,7 +169,7 @@ def _same() -> Step:
             ),
             0,
         ),
-        "So 24 conventions make 12 pairs. Roll pitch yaw is such a name: on this page it is X-Y-Z "
+        "So 24 conventions make 12 pairs. Roll pitch yaw is such a name: in Kinboard it is X-Y-Z "
         f"fixed, {ANGLES}.",
     )
 
@@ -179,7 +179,7 @@ def _pitch(T: Array, start: tuple[float, ...], units: Units) -> Step:
     _, pitch, _ = PAGE.angles(R)
     return Step(
         "Roll pitch yaw",
-        f"In the page’s convention, {ANGLES}, the entry r₃₁ is −sin(pitch). For the tool, r₃₁ = "
+        f"In Kinboard’s convention, {ANGLES}, the entry r₃₁ is −sin(pitch). For the tool, r₃₁ = "
         f"{fixed(float(R[2, 0]))}.",
         apart(
             Number(
@@ -195,8 +195,9 @@ def _pitch(T: Array, start: tuple[float, ...], units: Units) -> Step:
             ),
             ANGLE / 2.0,
         ),
-        "roll = atan2(r₃₂, r₃₃) and yaw = atan2(r₂₁, r₁₁): the read-out above the tabs shows them.",
+        "roll = atan2(r₃₂, r₃₃) and yaw = atan2(r₂₁, r₁₁).",
         start=start,
+        practice="The read-out above the tabs shows them.",
     )
 
 
@@ -217,9 +218,9 @@ def _other(T: Array, start: tuple[float, ...], units: Units) -> Step:
             ),
             ANGLE / 2.0,
         ),
-        "The same rotation has other numbers in each convention: always say which one it is. Try all "
-        "of them below.",
+        "The same rotation has other numbers in each convention: always say which one it is.",
         start=start,
+        practice="Try all of them below.",
     )
 
 
@@ -246,8 +247,9 @@ def _axis(T: Array, start: tuple[float, ...], units: Units) -> Step:
             ),
             ANGLE / 2.0,
         ),
-        "“From tool” below draws the axis: the one direction that R leaves as it is.",
+        "The axis is the one direction that R leaves as it is.",
         start=start,
+        practice="“From tool” below draws it.",
     )
 
 
@@ -282,7 +284,7 @@ def _lock(units: Units) -> Step:
     quarter_turn = units.angles.brief(math.pi / 2)
     return Step(
         "Gimbal lock",
-        f"In the page’s convention, set the pitch to {quarter_turn} below: the 1st and the 3rd axis coincide.",
+        f"In Kinboard’s convention, {ANGLES}, the 1st and the 3rd axis coincide at a pitch of {quarter_turn}.",
         one_right(
             "What is lost there?",
             (
@@ -349,7 +351,6 @@ def _chain() -> Step:
             ),
             0,
         ),
-        "Choose Chain of frames below, and add motions: about own axes they multiply from the right, "
-        "about fixed axes "
-        "from the left.",
+        "Motions about own axes multiply from the right, those about fixed axes from the left.",
+        practice="Choose Chain of frames below, and add motions of both kinds.",
     )

@@ -38,13 +38,13 @@ def outline(robot: Robot, units: Units) -> Outline:
             "All joints are at zero. A screw is (ω, v): ω is the direction of the axis, and v = −ω × p, with any "
             "point p of the axis, is the velocity at the origin while the joint turns at 1 rad/s.",
             _direction(robot, found.S),
-            "The table shows the screws of all joints; each line in the scene is one of them.",
+            practice="The table shows the screws of all joints; each line in the scene is one of them.",
         ),
         Step(
             "How far the axis is",
             "p may be any point of the axis: along the axis, ω × p does not change. So v depends on the line.",
             _distance(robot, units, found.S),
-            "The dimension |v| in the scene is this distance, the red arrow the direction of v.",
+            practice="The dimension |v| in the scene is this distance, the red arrow the direction of v.",
         ),
         Step(
             "A joint that slides",
@@ -57,14 +57,15 @@ def outline(robot: Robot, units: Units) -> Outline:
             "T = exp([S₁] θ₁) … exp([Sₙ] θₙ) M, with the screws and the pose M of the tool at zero. The screws "
             "stay as they are while the arm moves.",
             _order(robot),
-            "Move the slider Factors: the ghost shows what the factors give. At the end it is the arm.",
             start=home,
+            practice="Move the slider Factors: the ghost shows what the factors give. At the end it is the arm.",
         ),
         Step(
             "Body form",
             "T = M exp([B₁] θ₁) … exp([Bₙ] θₙ): the same axes, seen from the tool at zero.",
             _body(robot, units, found.B),
-            "Choose the form Body. The product is the same to the last digit shown.",
+            "The product is the same.",
+            practice="Choose the form Body to see it, to the last digit shown.",
         ),
     ]
     return Outline(GOAL, tuple(steps), _check(robot, units, found.S))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from markupsafe import Markup
 
 from app.viewer.lessons.guide.outline import PLAIN, Choice, Mistake, Number, Outline, Step, one_right
 from app.viewer.lessons.trajectories.chart import Curve, Row, chart
@@ -80,10 +79,8 @@ def _boundary(robot: Robot, units: Units) -> Step:
             ),
             1,
         ),
-        Markup(
-            "Acceleration falls on a line from +a to −a; at both ends it jumps, and the jerk there is infinite. "
-        )
-        + chart(_rows(unit, (0, 1, 2)), (Curve("cubic", times, values[:3]),), "A cubic from rest to rest"),
+        "Acceleration falls on a line from +a to −a; at both ends it jumps, and the jerk there is infinite.",
+        figure=chart(_rows(unit, (0, 1, 2)), (Curve("cubic", times, values[:3]),), "A cubic from rest to rest"),
     )
 
 
@@ -119,12 +116,10 @@ def _side_by_side(robot: Robot, units: Units) -> Step:
                 Mistake(1.0, "Then it would be constant, and jump at both ends."),
             ),
         ),
-        Markup(
-            "1.5 for the cubic, 1.875 for the quintic; a trapezoidal profile stays at the limit and is the "
-            "fastest. It "
-            "and the cubic jump in acceleration; quintic and S-curve do not. "
-        )
-        + chart(_rows(unit, (0, 1, 2), limits), tuple(curves), "Four profiles of the same way"),
+        "1.5 for the cubic, 1.875 for the quintic; a trapezoidal profile stays at the limit and is the "
+        "fastest. It "
+        "and the cubic jump in acceleration; quintic and S-curve do not.",
+        figure=chart(_rows(unit, (0, 1, 2), limits), tuple(curves), "Four profiles of the same way"),
     )
 
 
@@ -157,11 +152,8 @@ def _velocities(robot: Robot, units: Units) -> Step:
             ),
             2,
         ),
-        Markup(
-            "Boundary conditions shape the whole curve: it may overshoot between two points that are both "
-            "allowed. "
-        )
-        + chart(_rows(unit, (0, 1)), tuple(curves), "Three cubics with different velocities at the end"),
+        "Boundary conditions shape the whole curve: it may overshoot between two points that are both allowed.",
+        figure=chart(_rows(unit, (0, 1)), tuple(curves), "Three cubics with different velocities at the end"),
     )
 
 
@@ -198,15 +190,13 @@ def _two_ways(found: Ways, units: Units) -> Step:
             ),
             0,
         ),
-        Markup(
-            f"The tool leaves the line by up to {lengths.value(float(off.max()))}. PTP takes "
-            f"{found.ptp.duration:.2f} s, LIN "
-            f"{found.lin.duration:.2f} s: PTP is never slower between two given configurations, LIN goes where "
-            f"you expect. "
-        )
-        + chart(rows, curves, "PTP and LIN between the same two configurations"),
-        start,
-        end,
+        f"The tool leaves the line by up to {lengths.value(float(off.max()))}. PTP takes "
+        f"{found.ptp.duration:.2f} s, LIN "
+        f"{found.lin.duration:.2f} s: PTP is never slower between two given configurations, LIN goes where "
+        f"you expect.",
+        figure=chart(rows, curves, "PTP and LIN between the same two configurations"),
+        start=start,
+        end=end,
     )
 
 
@@ -241,14 +231,12 @@ def _singularity(robot: Robot, units: Units) -> Step:
                 ),
             ),
         ),
-        Markup(
-            f"Half the distance needs twice the rate: {rates} at {', '.join(map(lengths.brief, OFFSETS))}. No "
-            f"joint can "
-            "do that on the axis. A planner slows down near it, or refuses the line; a PTP, whose joints never "
-            "hurry, is "
-            "possible. "
-        )
-        + chart(
+        f"Half the distance needs twice the rate: {rates} at {', '.join(map(lengths.brief, OFFSETS))}. No "
+        f"joint can "
+        "do that on the axis. A planner slows down near it, or refuses the line; a PTP, whose joints never "
+        "hurry, is "
+        "possible.",
+        figure=chart(
             (Row(f"Rate of the joint, {angles.name}/s"),),
             tuple(curves),
             "Rate of the joint along three lines",
@@ -266,8 +254,13 @@ def _jerk(robot: Robot, units: Units) -> Step:
         curves.append(Curve(name, times, (push * unit.scale, x * unit.scale)))
     rows = (Row(f"Acceleration, {unit.name}/s²"), Row(f"Swing of the load, {unit.name}"))
     ratio = residual(found["trapezoidal"], hertz) / max(residual(found["S-curve"], hertz), 1e-12)
-    much = f"{ratio:.0f} times as far" if ratio > 1.5 else "about as far: the ramps are short beside its period"
     cost = found["S-curve"].duration - found["trapezoidal"].duration
+    swings = (
+        f"After the stop, the load swings {ratio:.0f} times as far with the trapezoidal profile as with the "
+        f"S-curve, which takes {cost:.2g} s more."
+        if ratio > 1.5
+        else "Here the load swings about as far with both: the ramps of the S-curve are short beside its period."
+    )
     return Step(
         "Why jerk matters",
         f"A load hangs on the joint like on a spring; left alone it swings {hertz:.3g} times a second. The "
@@ -285,12 +278,8 @@ def _jerk(robot: Robot, units: Units) -> Step:
             ),
             1,
         ),
-        Markup(
-            f"After the stop the load swings {much} with the trapezoidal profile. The S-curve takes {cost:.2f} "
-            f"s more. A "
-            "ramp that lasts as long as one swing leaves the load at rest. "
-        )
-        + chart(rows, tuple(curves), "A swinging load behind two profiles"),
+        f"{swings} A ramp that lasts as long as one swing leaves the load at rest.",
+        figure=chart(rows, tuple(curves), "A swinging load behind two profiles"),
     )
 
 

@@ -42,8 +42,8 @@ def outline(robot: Robot, units: Units) -> Outline:
             "A column",
             "Column i of the Jacobian is the velocity of the tool if only joint i moves, at 1 rad/s or 1 m/s.",
             _column(robot, J),
-            "Press 1 under Column: the straight arrow is v, the round one ω.",
             start=home,
+            practice="Press 1 under Column: the straight arrow is v, the round one ω.",
         ),
         Step(
             "Turning",
@@ -67,9 +67,9 @@ def outline(robot: Robot, units: Units) -> Outline:
                 "A singular configuration",
                 f"From home, the arm moves to a singularity: {short(near, units)}.",
                 _rank(robot, q),
-                "The ellipsoid is flat now, and the warning above names the motion that is lost.",
                 start=home,
                 end=as_configuration(q),
+                practice="The ellipsoid is flat now, and the warning above names the motion that is lost.",
             )
         )
     return Outline(GOAL, tuple(steps), _check(robot, J))
