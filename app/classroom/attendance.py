@@ -146,12 +146,18 @@ class Attendance:
         self._tell_state(frozen=on)
 
     def send_task(self, exercise: str | None) -> None:
-        """Set an exercise for all, or none."""
-        self._tell_state(task=None if exercise is None else {"exercise": exercise[:200], "at": now()})
+        """Set an exercise for all, which ends following and freezing; None: there is none any more."""
+        if exercise is None:
+            self._tell_state(task=None)
+        else:
+            self._tell_state(task={"exercise": exercise[:200], "at": now()}, follow=False, frozen=False)
 
-    def set_course(self, packed: str) -> None:
-        """The course of the room, packed, or empty."""
-        self._tell_state(course=packed)
+    def send_course(self, packed: str) -> None:
+        """Set a packed course for all, which ends the task, following and freezing; empty: there is none."""
+        if packed:
+            self._tell_state(course=packed, course_at=now(), task=None, follow=False, frozen=False)
+        else:
+            self._tell_state(course="")
 
     def show_seat(self, seat: str | None, named: bool = True) -> None:
         """Show a student's arm to all, with the alias or without; None: nobody's."""

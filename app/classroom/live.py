@@ -181,6 +181,7 @@ class LiveRoom:
             shown=self._shown(),
             poll=self._poll(present, None if mine is None else mine.row),
             course=state.get("course") or "",
+            course_at=float(state.get("course_at") or 0.0),
             teacher_away="" in self.away,
             students=len(present),
             seat=None if mine is None else self._seat(mine.row),

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from sqlalchemy import JSON, BigInteger, Double, ForeignKey, String, Text, false, text
+from sqlalchemy import JSON, BigInteger, Double, ForeignKey, Index, String, Text, false, text
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
-REVISION = "0003"
+REVISION = "0004"
 ID = String(32)
 TOKEN_BYTES = 8  # of random ids
 
@@ -34,7 +34,7 @@ class Room(Base):
 
     Attributes:
         version: grows by one with each change of this row or of a seat.
-        state: what the teacher has set: follow, frozen, task, shown, poll, course.
+        state: what the teacher has set: follow, frozen, task, shown, poll, course, course_at.
         page: the packed state of the teacher's page.
         beat: grows every few seconds while a page of the teacher is connected.
         opener: a number from 1 to 1000 that the address which opened the room shares with many others; 0: none.
@@ -87,9 +87,10 @@ class Attempt(Base):
     """One answer to an exercise."""
 
     __tablename__ = "attempt"
+    __table_args__ = (Index("ix_attempt_room_id_at", "room_id", "at", "id"),)  # results are read in this order
 
     id: Mapped[str] = mapped_column(ID, primary_key=True)
-    room_id: Mapped[str] = mapped_column(ForeignKey("room.id", ondelete="CASCADE"), index=True)
+    room_id: Mapped[str] = mapped_column(ForeignKey("room.id", ondelete="CASCADE"))
     seat_id: Mapped[str] = mapped_column(ForeignKey("seat.id", ondelete="CASCADE"), index=True)
     exercise: Mapped[str] = mapped_column(String(200))
     seed: Mapped[int] = mapped_column(BigInteger)
@@ -116,6 +117,7 @@ class LtiSeat(Base):
         subject: the platform's opaque id of the user, by which it takes scores.
         address: of the gradebook's column, or empty.
         exercise: whose score goes there, or empty.
+        course: ids of exercises, of which the number that is solved goes there instead; empty: none.
     """
 
     __tablename__ = "lti_seat"
@@ -127,6 +129,7 @@ class LtiSeat(Base):
     subject: Mapped[str] = mapped_column(String(255))
     address: Mapped[str] = mapped_column(Text)
     exercise: Mapped[str] = mapped_column(String(200))
+    course: Mapped[list[str]] = mapped_column(JSON, default=list, server_default=text("'[]'"))
 
 
 class LtiNonce(Base):

@@ -124,6 +124,7 @@ class RoomView:
         follow: whether pages follow the teacher.
         frozen: whether students may not move their arms.
         course: the packed course, or empty.
+        course_at: when it was sent, in seconds since 1970; the same course sent again opens again.
         teacher_away: whether no page of the teacher is connected: the class is paused.
         students: number of seats.
         seat: the own seat; None for the teacher.
@@ -144,6 +145,7 @@ class RoomView:
     shown: Shown | None = None
     poll: Poll | None = None
     course: str = ""
+    course_at: float = 0.0
     teacher_away: bool = False
     students: int = 0
     seat: SeatView | None = None

@@ -238,11 +238,6 @@ class Feature:
     def tick(self, now: float) -> None:
         """Continue long work, for at most ten milliseconds: frames wait. `now` is `time.perf_counter`'s."""
 
-    @property
-    def tops(self) -> tuple[viser.SceneNodeHandle, ...]:
-        """The nodes of what the feature leaves in the scene on every tab, for who hides the arm."""
-        return ()
-
     def state(self) -> dict[str, object]:
         """The visitor's settings as JSON; a shared URL restores them."""
         return {}

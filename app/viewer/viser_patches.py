@@ -17,6 +17,9 @@ scene and of the visitor's own. `drag_gizmo` does the same for a gizmo of the vi
 Pages: viser evaluates the type hints of a class for each of its objects, a quarter of the cost of a page.
 `cache_type_hints` caches them.
 
+Curtains: viser can hide one node or all of them. A `Curtain` hides all but some, also what is added meanwhile, and
+knows what to show again.
+
 Wake-ups: messages from other threads than the event loop's wake their reader in an unsafe way; now and then a
 visitor's connection was lost. `set_events_in_their_loop` fixes that.
 
@@ -105,6 +108,51 @@ def show_content(element: viser.GuiHtmlHandle, content: str) -> None:
 def is_removed(node: viser.SceneNodeHandle) -> bool:
     """Whether a node is no longer in the scene, so that its properties cannot be set."""
     return bool(node._impl.removed)
+
+
+class Curtain:
+    """Hides all nodes of a visitor's scene but lights and some others, until it is opened.
+
+    What the nodes say of themselves (`visible`) goes on as if they were seen: what is added, shown or hidden
+    meanwhile is as its owner left it when the curtain opens.
+
+    Args:
+        kept: what the names of those begin with that stay, such as ``"/wall-"``.
+    """
+
+    def __init__(self, scene: viser.SceneApi, kept: str) -> None:
+        self._scene = typing.cast(Any, scene)
+        self._kept = kept
+        self._send = self._scene._queue_scene_message
+        for node in self._hidden():
+            self._send(messages.SetSceneNodeVisibilityMessage(node.name, False))
+        self._scene._queue_scene_message = self._queue
+
+    def open(self) -> None:
+        """Show again what is visible."""
+        self._scene._queue_scene_message = self._send
+        for node in self._hidden():
+            self._send(messages.SetSceneNodeVisibilityMessage(node.name, node.visible))
+
+    def _hides(self, name: str) -> bool:
+        """Whether this is the name of a node at the top, below which all others are, that must not be seen."""
+        node = self._scene._handle_from_node_name.get(name)
+        return name.count("/") == 1 and not name.startswith(self._kept) and not isinstance(node, _LIGHTS)
+
+    def _hidden(self) -> list[viser.SceneNodeHandle]:
+        nodes = list(self._scene._handle_from_node_name.values())
+        return [node for node in nodes if self._hides(node.name)]
+
+    def _queue(self, message: Any) -> None:
+        if isinstance(message, messages.SetSceneNodeVisibilityMessage) and self._hides(message.name):
+            message = messages.SetSceneNodeVisibilityMessage(message.name, False)
+        self._send(message)
+
+
+_LIGHTS = (
+    viser.AmbientLightHandle, viser.DirectionalLightHandle, viser.HemisphereLightHandle, viser.PointLightHandle,
+    viser.RectAreaLightHandle, viser.SpotLightHandle,
+)  # fmt: skip
 
 
 def uuid_of(handle: Any) -> str:

@@ -268,6 +268,8 @@ def missing_names() -> list[str]:
     found += [f"AsyncMessageBuffer.{name}" for name in ("generator_cursors", "done") if name not in fields]
     drags = ("_handle_transform_controls_updates", "_fire_transform_controls_callbacks")  # see `drag_gizmo`
     found += [f"SceneApi.{name}" for name in drags if not hasattr(viser.SceneApi, name)]
+    if not hasattr(viser.SceneApi, "_queue_scene_message"):  # see `Curtain`
+        found.append("SceneApi._queue_scene_message")
     return found + viser_outbox.missing_names()
 
 

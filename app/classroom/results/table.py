@@ -6,7 +6,8 @@ import csv
 import io
 import json
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import groupby
@@ -89,25 +90,31 @@ def rows(attempts: Iterable[Attempt], now: float) -> list[Row]:
     return sorted(found, key=lambda row: (row.solved, not row.stuck, -row.tries, -row.seconds, row.alias))
 
 
-def to_csv(attempts: Sequence[Attempt], titles: Mapping[str, str]) -> str:
-    """One row per attempt, in the order of time.
+def csv_of(pages: Iterable[Iterable[Attempt]], titles: Mapping[str, str]) -> Iterator[str]:
+    """One row per attempt, in the given order, which is that of time: first the head, then a text for each page.
 
     Args:
         titles: of the exercises, by id.
     """
+    yield _lines([COLUMNS])
+    counts: Counter[tuple[str, str]] = Counter()
+    for page in pages:
+        rows: list[list[object]] = []
+        for one in page:
+            counts[one.seat, one.exercise] += 1
+            answer = json.dumps(one.answer, ensure_ascii=False, separators=(",", ":"))
+            words = [one.alias, one.exercise, titles.get(one.exercise, ""), answer, one.verdict]
+            alias, exercise, title, answer, verdict = map(cell, words)
+            rows.append(
+                [alias, exercise, title, counts[one.seat, one.exercise], one.seed, answer, verdict,
+                 f"{one.score:.2f}", _time(one.started), _time(one.at), f"{max(0.0, one.at - one.started):.0f}"]
+            )  # fmt: skip
+        yield _lines(rows)
+
+
+def _lines(rows: Iterable[Iterable[object]]) -> str:
     text = io.StringIO()
-    writer = csv.writer(text)
-    writer.writerow(COLUMNS)
-    counts: dict[tuple[str, str], int] = {}
-    for one in sorted(attempts, key=lambda one: (one.at, one.seat)):
-        number = counts[one.seat, one.exercise] = counts.get((one.seat, one.exercise), 0) + 1
-        answer = json.dumps(one.answer, ensure_ascii=False, separators=(",", ":"))
-        words = [one.alias, one.exercise, titles.get(one.exercise, ""), answer, one.verdict]
-        alias, exercise, title, answer, verdict = map(cell, words)
-        writer.writerow(
-            [alias, exercise, title, number, one.seed, answer, verdict, f"{one.score:.2f}", _time(one.started),
-             _time(one.at), f"{max(0.0, one.at - one.started):.0f}"]
-        )  # fmt: skip
+    csv.writer(text).writerows(rows)
     return text.getvalue().encode("utf-8", "replace").decode()  # half a letter is none
 
 

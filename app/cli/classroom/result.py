@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from app.classroom import ClassroomUnavailable, Hub
 from app.classroom.results.check import check_code, facts
-from app.classroom.results.store import attempts_of
-from app.classroom.results.table import to_csv
+from app.classroom.results.store import pages_of
+from app.classroom.results.table import Attempt, csv_of
 from app.classroom.tokens import read_code
 from app.cli.terminal import print_json
 from app.exercises import Exercises
@@ -50,22 +51,36 @@ def run_results(arguments: Namespace) -> int:
         room = next((each for each in hub.rooms.all() if each.code == wanted), None) if hub.in_use else None
         if room is None:
             raise InputError("room", arguments.room, "the join code of a room; `kinboard room list` shows them")
-        attempts = attempts_of(hub.database, room.id)
+        exercises = Exercises(settings.exercises, Store(settings.robots).get)
+        pages, titles = pages_of(hub.database, room.id), {one.id: one.title for one in exercises.all}
+        if arguments.output is None:
+            for text in csv_of(pages, titles):
+                print(text, end="")
+        else:
+            print(f"{arguments.output}: {_write(arguments.output, pages, titles)} attempts")
     except ClassroomUnavailable as error:
         raise KinematicsError(str(error)) from None
     finally:
         hub.close()
-    exercises = Exercises(settings.exercises, Store(settings.robots).get)
-    text = to_csv(attempts, {one.id: one.title for one in exercises.all})
-    if arguments.output is None:
-        print(text, end="")
-        return 0
-    try:
-        Path(arguments.output).write_bytes(text.encode("utf-8-sig"))  # so that spreadsheets know the letters
-    except OSError as error:
-        raise InputError("--output", arguments.output, f"a file that can be written ({error.strerror})") from None
-    print(f"{arguments.output}: {len(attempts)} attempts")
     return 0
+
+
+def _write(path: str, pages: Iterable[Sequence[Attempt]], titles: Mapping[str, str]) -> int:
+    """Write the file; returns how many attempts are in it."""
+    count = 0
+
+    def counted() -> Iterator[Sequence[Attempt]]:
+        nonlocal count
+        for page in pages:
+            count += len(page)
+            yield page
+
+    try:
+        with Path(path).open("w", encoding="utf-8-sig", newline="") as file:  # spreadsheets know the letters then
+            file.writelines(csv_of(counted(), titles))
+    except OSError as error:
+        raise InputError("--output", path, f"a file that can be written ({error.strerror})") from None
+    return count
 
 
 def _settings() -> Settings:

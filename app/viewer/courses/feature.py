@@ -92,21 +92,26 @@ class CourseFeature(Feature):
         mine = self._progress.course
         return tuple(dict.fromkeys(([mine] if mine is not None and mine.items else []) + [*self._courses.all]))
 
-    def receive(self, packed: str) -> str:
-        """Open a course that was sent, as JSON; returns its title, or nothing if it was open already.
+    def receive(self, packed: str) -> bool:
+        """Open a course that was sent, as JSON; returns whether it was not open already.
 
         An empty text: the course of the room is over, and stays open.
         """
         if not packed:
             self._sent = None
-            return ""
+            return False
         course = course_of(json.loads(packed), self._courses.exercises, "course", self._courses.find)
         self._sent = course
         if course == self._progress.course:
-            return ""
+            return False
         self._open(course)
         self._update()
-        return course.title
+        return True
+
+    def step_aside(self) -> None:
+        """Something else is opened above which the bar must not stand; the course stays open."""
+        self._progress.at = None
+        self._update()
 
     # Events
 

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 
-import viser
-
 from app.viewer.feature import Feature, Stage
 from app.viewer.obstacles import placed
 from app.viewer.obstacles.nodes import ObstacleNodes
@@ -91,10 +89,6 @@ class ObstaclesFeature(Feature):
 
     def on_style(self) -> None:
         self._show_panel()
-
-    @property
-    def tops(self) -> tuple[viser.SceneNodeHandle, ...]:
-        return self._nodes.tops
 
     def remove(self) -> None:
         self._nodes.remove()

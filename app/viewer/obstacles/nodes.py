@@ -100,12 +100,6 @@ class ObstacleNodes:
         self._drawn: list[tuple[object, ...]] = []
         self._gizmo: viser.TransformControlsHandle | None = None
 
-    @property
-    def tops(self) -> tuple[viser.SceneNodeHandle, ...]:
-        """The nodes above all others."""
-        frames = tuple(node.frame for node in self._nodes)
-        return frames if self._gizmo is None else (*frames, self._gizmo)
-
     def show(self, items: Obstacles) -> None:
         """Draw these; those whose shape and sizes are as before are only moved."""
         wanted = [(each.shape, each.label, *sizes(each)) for each in items]

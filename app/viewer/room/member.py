@@ -49,6 +49,7 @@ class MemberPage(LedPage, Protocol):
     attendance: Attendance
     exercises: Exercises
     numbers: Numbers
+    guest: bool  # whether only the seat lets this page use the service
 
     def snapshot(self) -> PageState:
         """The present state."""

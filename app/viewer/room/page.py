@@ -32,12 +32,13 @@ class ClassroomPage(VisitorPage):
         self,
         client: viser.ClientHandle,
         services: Services,
+        token: bool = False,
         *arguments: Any,
         ticket: Ticket,
         **options: Any,
     ) -> None:
-        super().__init__(client, services, *arguments, **options)
-        self.exercises = services.exercises
+        super().__init__(client, services, token, *arguments, **options)
+        self.exercises, self.guest = services.exercises, token
         self._hub, self._ticket = services.classroom, ticket
         self.offered = (*self.offered, Teacher if ticket.role is Role.TEACHER else Student)
         self._member: Member | None = None
@@ -79,12 +80,17 @@ class ClassroomPage(VisitorPage):
 
     def _prepare(self) -> None:
         super()._prepare()
+        if self._persistence.embedded:  # a figure in another page: neither led nor frozen, and no arm of the wall
+            self.offered = tuple(tab for tab in self.offered if not issubclass(tab, Member))
+            return
         # Not while the page is built: a database that does not answer would hold up the pages of everybody.
         self.attendance = self._hub.attend(self._ticket, lambda: self.post(("news", Member.key, NEWS)))
 
     def _build(self) -> None:
         super()._build()
-        (self._member,) = (tab for tab in self._tabs if isinstance(tab, Member))
+        self._member = next((tab for tab in self._tabs if isinstance(tab, Member)), None)
+        if self._member is None:
+            return
         with self.client.atomic():
             self._member.attach(self.client.gui.add_html(""))
         self.client.flush()

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from app.classroom.clock import now
 from app.classroom.views import NewAttempt
+from app.exercises import Exercise
 from app.viewer.exercises.places import Place
 from app.viewer.exercises.reports import GivenUp, Judged
 from app.viewer.feature import Stage
@@ -20,6 +21,7 @@ from app.viewer.session.state import PageState
 
 TEACHER = "teacher"
 STORED: Hashable = "stored"  # an answer is stored, or is not: the room may be as it was
+JOIN_AGAIN = " Join a room to go on; the link of this page keeps what you have done."
 FROZEN = "The teacher has frozen the class: look at the teacher’s screen."
 
 
@@ -43,9 +45,11 @@ class Student(Member):
         self._stored = gui.add_html("")
         self._gone = False  # whether the student has stopped following
         self._leader_before = ""
+        self._task: Exercise | None = None
         self._task_at: float | None = None
+        self._over = False  # it was said that this page is no longer in the room
         self._first = True
-        self._course = ""
+        self._course: tuple[str, float] | None = None  # the room's, and when it was sent; None: not known yet
         self._open_tab = 0
         self._answered: tuple[str, int] | None = None  # exercise and seed of the last answer
         self._submissions = Submissions(self.attendance.submit, lambda: stage.post(("news", self.key, STORED)))
@@ -57,7 +61,12 @@ class Student(Member):
             exercises.judged, exercises.giving_up = self._submit, self._give_up
 
     def take_news(self) -> None:
-        self._set_course()
+        if self.room.closed:
+            self._end()
+            return
+        task = self._task
+        self._task = None if self.room.task is None else self.page.exercises.get(self.room.task.exercise)
+        self._set_course(task if self.room.task is None else None)
         self._set_task()
         lead = self._lead
         if lead is None:
@@ -74,10 +83,17 @@ class Student(Member):
         if not self._gone:
             self.follow(lead.leader, lead.page, "What the class shows")
 
+    def _end(self) -> None:
+        """The seat was removed, or the room has ended: nobody leads this page, and its work stays."""
+        self.free()
+        if not self._over:
+            self._over = True
+            self.page.status.show(Notice("advice", views.MODES["closed"][1], self.room.closed))
+
     @property
     def _lead(self) -> Lead | None:
         room = self.room
-        if room.closed or room.seat is None:
+        if room.seat is None:
             return None
         if room.shown is not None:
             mine = room.shown.seat == room.seat.id
@@ -91,13 +107,12 @@ class Student(Member):
 
     def _set_task(self) -> None:
         """Open a task that is new."""
-        task, lessons = self.room.task, self.page.lessons
+        task, exercise, lessons = self.room.task, self._task, self.page.lessons
         at = None if task is None else task.at
         first, self._first = self._first, False
         if at == self._task_at or lessons is None:
             return
         self._task_at = at
-        exercise = None if task is None else self.page.exercises.get(task.exercise)
         if exercise is None or (
             first and (lessons.exercises.is_closed(exercise) or lessons.exercises.at == exercise)
         ):
@@ -107,25 +122,33 @@ class Student(Member):
         self._open_task()
         self.page.status.show(Notice("hand", "A task from your teacher", exercise.title))
 
-    def _set_course(self) -> None:
-        """Open a course that is new."""
-        packed, lessons = self.room.course, self.page.lessons
-        if packed == self._course or lessons is None:
+    def _set_course(self, replaced: Exercise | None) -> None:
+        """Open a course that is new.
+
+        Args:
+            replaced: the exercise of the task that it has ended.
+        """
+        packed, lessons, first = self.room.course, self.page.lessons, self._course is None
+        course = packed, self.room.course_at
+        if course == self._course or lessons is None:
             return
-        self._course = packed
-        title = lessons.courses.receive(packed)
-        if title:
-            self.free()
-            self._gone = True
-            lessons.open(lessons.courses.key)
-            self._open_tab += 1
-            self.page.status.show(Notice("hand", "A course from your teacher", title))
+        self._course = course
+        fresh = lessons.courses.receive(packed)
+        if not packed or (first and not fresh):
+            return
+        self.free()
+        self._gone = True
+        lessons.open(lessons.courses.key)
+        self._open_tab += 1
+        over = "" if replaced is None else f". The task “{replaced.title}” is over; your answers stay stored."
+        self.page.status.show(Notice("hand", "A course from your teacher", views.course_title(self.room) + over))
 
     def _open_task(self) -> None:
         task, lessons = self.room.task, self.page.lessons
         if task is not None and lessons is not None:
             if lessons.key != lessons.exercises.key:
                 lessons.open(lessons.exercises.key)
+            lessons.courses.step_aside()
             before = self.page.robot.id, self.page.goal.tobytes()
             lessons.exercises.open(task.exercise)
             if (self.page.robot.id, self.page.goal.tobytes()) != before:
@@ -194,6 +217,8 @@ class Student(Member):
         )
 
     def refusal(self, act: str) -> str:
+        if self.room.closed and self.page.guest:
+            return self.room.closed + JOIN_AGAIN
         if self.frozen:
             return FROZEN
         if self.leader:
@@ -224,14 +249,14 @@ class Student(Member):
                 self._open_task()
 
     def refresh(self) -> None:
-        task = None if self.room.task is None else self.page.exercises.get(self.room.task.exercise)
-        update_html(self._head, views.student_html(self.room, self.mode, task, self._submissions))
+        guest = self.page.guest
+        update_html(self._head, views.student_html(self.room, self.mode, self._task, self._submissions, guest))
         update_html(self._question, views.poll_html(self.room.poll, teacher=False))
         update_html(self._stored, views.stored_html(self.room, now()))
         self._note()
 
     def bar(self) -> str:
-        return views.student_bar(self.room, self.mode, self._open_tab)
+        return views.student_bar(self.room, self.mode, self._open_tab, self.page.guest)
 
     @property
     def mode(self) -> views.Mode:

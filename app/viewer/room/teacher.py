@@ -6,8 +6,6 @@ import contextlib
 import json
 from dataclasses import replace
 
-import viser
-
 from app.classroom.clock import now
 from app.classroom.courses import Course, to_data
 from app.classroom.views import ClassroomUnavailable, RoomView, SeatView
@@ -20,8 +18,9 @@ from app.viewer.room.following import decoded, shared
 from app.viewer.room.member import Member
 from app.viewer.room.sharing import LEADER_EVERY
 from app.viewer.room.wall import MOST, SmallArm, Wall
+from app.viewer.room.wall import NAME as WALL
 from app.viewer.session.state import PageState
-from app.viewer.viser_patches import is_removed
+from app.viewer.viser_patches import Curtain
 from kin import InputError, Robot
 
 QUESTION = "Elbow up or down?"
@@ -61,7 +60,7 @@ class Teacher(Member):
         self._solved = 0  # how many have solved the task
         self._counted: tuple[object, ...] = ()  # what the count is of
         self._wall: Wall | None = None
-        self._hidden: list[tuple[viser.SceneNodeHandle, bool]] = []
+        self._curtain: Curtain | None = None  # before all but the wall
         self._before: PageState | None = None  # the own page while a student's is on show, or the wall
 
     def take_news(self) -> None:
@@ -94,7 +93,7 @@ class Teacher(Member):
             case "course":
                 self._send_course(_texts(value)[0])
             case "uncourse":
-                attendance.set_course("")
+                attendance.send_course("")
             case "ask":
                 question, *choices = _texts(value)
                 self.try_to(lambda: attendance.open_poll(question, [each for each in choices if each.strip()]))
@@ -144,8 +143,6 @@ class Teacher(Member):
         exercise = self.page.exercises.get(texts[0])
         if exercise is None:
             raise InputError("task", texts[0], "the id of an exercise")
-        self.attendance.set_follow(False)
-        self.attendance.set_frozen(False)
         self.attendance.send_task(exercise.id)
         self.page.status.show(Notice("hand", f"Sent: {exercise.title}", "All work on it by themselves now."))
 
@@ -155,9 +152,7 @@ class Teacher(Member):
         if not index.isdecimal() or int(index) >= len(offered):
             raise InputError("course", index, f"0 to {len(offered) - 1}")
         course = offered[int(index)]
-        self.attendance.set_follow(False)
-        self.attendance.set_frozen(False)
-        self.attendance.set_course(json.dumps(to_data(course)))
+        self.attendance.send_course(json.dumps(to_data(course)))
         self.page.status.show(Notice("hand", f"Sent: {course.title}", "All follow it by themselves now."))
 
     @property
@@ -205,8 +200,7 @@ class Teacher(Member):
             camera.look()
             page.numbers.hide_target()
             self._before = page.snapshot()
-            tops = (*page.arm.scene.tops, *(node for each in page.features for node in each.tops))
-            self._hidden = [(node, node.visible) for node in tops]
+            self._curtain = Curtain(page.client.scene, WALL)
             image = page.client.camera
             aspect = image.image_width / max(image.image_height, 1) or 1.6
             self._wall = Wall(
@@ -216,16 +210,14 @@ class Teacher(Member):
             self._wall.remove()
             self._wall = None
             camera.fit(())
-        for node, visible in self._hidden:
-            if not is_removed(node):
-                node.visible = visible and not on
         if not on:
-            self._hidden = []
+            if self._curtain is not None:
+                self._curtain.open()
+                self._curtain = None
             self._return()
 
     def on_robot(self) -> None:
-        if self._wall is not None:  # the arm that was hidden is no longer there
-            self._hidden = []
+        if self._wall is not None:  # another arm is on show than the one to return to
             self._before = None
             self._show_wall(False)
 
@@ -294,7 +286,7 @@ class Teacher(Member):
         update_html(self._list, views.list_html(room, self._picked, exercises))
         self._count_solved()
         update_html(self._task, views.task_html(room, task, self._solved, exercises))
-        update_html(self._course, views.course_html(room, self._offered))
+        update_html(self._course, views.course_html(room, self._offered, task))
         update_html(self._ask, views.ask_html(room, QUESTION, CHOICES))
         update_html(self._tally, views.poll_html(room.poll, teacher=True))
         update_html(self._end, views.end_html(room, self.is_armed("end")))

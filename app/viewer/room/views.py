@@ -26,6 +26,8 @@ MODES: dict[Mode, tuple[str, str, str, str]] = {
     "paused": ("‖", "Paused", "The teacher’s connection is lost. You can go on by yourself.", "amber"),
     "closed": ("■", "You are no longer in the room", "", "crimson"),
 }  # fmt: skip
+STAYS = "What you have done stays on this page, and in its link."
+GO_ON = "You can go on by yourself, or join a room."  # where no access token is needed
 # Symbol, words and colour of how a student is doing.
 DOING: dict[State, tuple[str, str, str]] = {
     "working": ("", "here", ""),
@@ -53,7 +55,7 @@ def students(count: int) -> str:
     return f"{count} student{'s' if count != 1 else ''}"
 
 
-def _mode(room: RoomView, mode: Mode) -> dict[str, str]:
+def _mode(room: RoomView, mode: Mode, guest: bool) -> dict[str, str]:
     symbol, title, detail, color = MODES[mode]
     if mode == "led" and room.shown is not None:
         title = f"You see the arm of {room.shown.alias}" if room.shown.alias else "You see a classmate’s arm"
@@ -61,33 +63,39 @@ def _mode(room: RoomView, mode: Mode) -> dict[str, str]:
     if mode == "led" and room.frozen:
         title, detail = f"Frozen. {title}", "Your arm moves with it until the teacher ends the freeze."
         symbol, color = MODES["frozen"][0], MODES["frozen"][3]
-    return {
-        "symbol": symbol,
-        "title": title,
-        "detail": room.closed if mode == "closed" else detail,
-        "color": color,
-    }
+    if mode == "closed":
+        detail = f"{room.closed} {STAYS}" + ("" if guest else f" {GO_ON}")
+    return {"symbol": symbol, "title": title, "detail": detail, "color": color}
 
 
-def student_html(room: RoomView, mode: Mode, task: Exercise | None, sent: Submissions) -> str:
-    """Who leads, the task, and the raised hand."""
+def student_html(room: RoomView, mode: Mode, task: Exercise | None, sent: Submissions, guest: bool) -> str:
+    """Who leads, the task, and the raised hand.
+
+    Args:
+        guest: whether the page may be used no longer than the seat is there.
+    """
     seat = room.seat or SeatView("", "")
     mine = room.task is not None and seat.task == room.task.exercise
     mark = ("solved", "green") if mine and seat.solved else ("", "")
     if mine and seat.tries and not seat.solved:
         mark = (f"{seat.tries} attempt{'s' if seat.tries > 1 else ''}, not right yet", "amber")
     return render(
-        "room/student", room=room, seat=seat, mode=mode, lead=_mode(room, mode), task=task, mark=mark,
+        "room/student", room=room, seat=seat, mode=mode, lead=_mode(room, mode, guest), task=task, mark=mark,
         sent=sent,
     )  # fmt: skip
 
 
-def student_bar(room: RoomView, mode: Mode, open_tab: int) -> str:
-    """What a student must see whatever tab is open; `open_tab` grows when the tab Learn is to be opened."""
+def student_bar(room: RoomView, mode: Mode, open_tab: int, guest: bool) -> str:
+    """What a student must see whatever tab is open.
+
+    Args:
+        open_tab: grows when the tab Learn is to be opened.
+        guest: as for `student_html`.
+    """
     poll = room.poll if room.poll is not None and room.poll.open and room.poll.chosen is None else None
     quiet = mode == "free" and poll is None and not room.problem
     return render(
-        "room/student_bar", room=room, mode=mode, lead=_mode(room, mode), poll=poll, quiet=quiet,
+        "room/student_bar", room=room, mode=mode, lead=_mode(room, mode, guest), poll=poll, quiet=quiet,
         open_tab=open_tab, hand=bool(room.seat and room.seat.hand),
     )  # fmt: skip
 
@@ -176,10 +184,14 @@ def task_html(room: RoomView, task: Exercise | None, solved: int, exercises: Exe
     )  # fmt: skip
 
 
-def course_html(room: RoomView, courses: Sequence[Course]) -> str:
-    """The form to send a course, and which one was sent."""
-    title = json.loads(room.course)["title"] if room.course else ""
-    return render("room/course", room=room, title=title, courses=courses)
+def course_title(room: RoomView) -> str:
+    """The title of the course that was sent; empty: there is none."""
+    return str(json.loads(room.course)["title"]) if room.course else ""
+
+
+def course_html(room: RoomView, courses: Sequence[Course], task: Exercise | None) -> str:
+    """The form to send a course, which one was sent, and which task the next one ends."""
+    return render("room/course", room=room, title=course_title(room), courses=courses, task=task)
 
 
 def ask_html(room: RoomView, question: str, choices: tuple[str, ...]) -> str:

@@ -40,6 +40,7 @@ LABEL = 0.46  # height of a name below the middle of its arm, in the same
 ROOM = 0.52  # room above and below the middle of an arm, in the same
 PAD = (0.26, 0.03)  # radius and thickness of a pad, in the same
 COLUMN = 0.05  # radius of the column below a base, in the same
+NAME = "/wall-"  # what the names of the nodes begin with
 _WALLS = itertools.count(1)
 
 
@@ -138,7 +139,7 @@ class Wall:
         )
         bones = [skeleton(arm.robot) for arm in arms]
         scales = [self._scale(arm.robot) * bone.scales for arm, bone in zip(arms, bones, strict=True)]
-        root = f"/wall-{next(_WALLS)}"
+        root = f"{NAME}{next(_WALLS)}"
         self._root = self._scene.add_frame(root, show_axes=False)
         self._owners = [[i for i, bone in enumerate(bones) for _ in bone.links], [*range(count)] * 2]
         pads, feet = self._pads(arms)

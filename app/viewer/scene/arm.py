@@ -281,11 +281,6 @@ class ArmScene:
         for node in self._axes:
             node.visible = visible and (self._bare or self._look == "both")
 
-    @property
-    def tops(self) -> tuple[viser.SceneNodeHandle, ...]:
-        """The nodes above all others of the arm."""
-        return tuple(self._top)
-
     def remove(self) -> None:
         """Remove everything from the scene."""
         for node in self._top:

@@ -81,10 +81,20 @@ def test_what_a_teacher_does_reaches_students_of_another_process(hubs):
     teacher.set_follow(True)
     until(lambda: student.room.page == "before")
     teacher.tell_page("after")
+    until(lambda: student.room.page == "after")
     teacher.set_frozen(True)
+    until(lambda: student.room.frozen)
     teacher.send_task("swing")
-    until(lambda: student.room.page == "after" and student.room.task is not None)
-    assert student.room.frozen
+    until(lambda: student.room.task is not None)
+    assert not student.room.frozen
+    assert not student.room.follow
+    teacher.send_course('{"title": "Week 1"}')
+    until(lambda: student.room.course)
+    assert student.room.task is None
+    teacher.send_task("swing")
+    until(lambda: student.room.task is not None)
+    assert student.room.course, "a task leaves the course"
+    teacher.set_follow(True)
     student.raise_hand(True)
     student.tell_page("mine")
     teacher.show_seat(seat.seat, named=False)
@@ -185,7 +195,7 @@ TEACHERS = {
     "set_follow": (True,),
     "set_frozen": (True,),
     "send_task": ("swing",),
-    "set_course": ("c",),
+    "send_course": ("c",),
     "show_seat": ("x",),
     "lower_hand": ("x",),
     "open_poll": ("q", ["a", "b"]),

@@ -12,7 +12,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from app.classroom.results import ForgedCodeError, MistypedCodeError, Outcome, codes, read_code, write_code
-from app.classroom.results.table import COLUMNS, STUCK_SECONDS, Attempt, rows, to_csv
+from app.classroom.results.table import COLUMNS, STUCK_SECONDS, Attempt, csv_of, rows
 from kin import InputError
 
 KEY, OTHER = b"k" * 32, b"o" * 32
@@ -144,7 +144,7 @@ def test_who_is_stuck_comes_first() -> None:
 @example("\r=1", " =1")
 def test_no_cell_is_a_formula(alias: str, answer: str) -> None:
     one = Attempt("s", alias, "two-elbows", 3, answer, alias, 0.5, 0.0, 61.0)
-    text = to_csv([one], {"two-elbows": answer})
+    text = "".join(csv_of([[one]], {"two-elbows": answer}))
     (head, row) = csv.reader(io.StringIO(text, newline=""))
     assert tuple(head) == COLUMNS
     assert len(row) == len(COLUMNS)
@@ -153,13 +153,14 @@ def test_no_cell_is_a_formula(alias: str, answer: str) -> None:
     assert row[0].removeprefix("'") == alias or row[0] == alias
 
 
-def test_each_attempt_is_a_row_in_the_order_of_time() -> None:
-    attempts = [
-        attempt("b", "x", 1.0, 30.0),
-        attempt("a", "x", 0.0, 10.0),
-        attempt("b", "x", 0.25, 20.0, 5.0, ["1 mm", "2"]),
+def test_each_attempt_is_a_row_and_each_page_a_text() -> None:
+    pages = [
+        [attempt("a", "x", 0.0, 10.0), attempt("b", "x", 0.25, 20.0, 5.0, ["1 mm", "2"])],
+        [attempt("b", "x", 1.0, 30.0)],
     ]
-    found = list(csv.DictReader(io.StringIO(to_csv(attempts, {"x": "An exercise"}))))
+    texts = list(csv_of(pages, {"x": "An exercise"}))
+    assert [text.count("\r\n") for text in texts] == [1, 2, 1]
+    found = list(csv.DictReader(io.StringIO("".join(texts))))
     assert [(row["alias"], row["attempt"], row["score"]) for row in found] == [
         ("alias of a", "1", "0.00"), ("alias of b", "1", "0.25"), ("alias of b", "2", "1.00"),
     ]  # fmt: skip

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import asyncio
 import csv
 import io
-from collections.abc import Iterator
+import tracemalloc
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
+from sqlalchemy import insert
 
-from app.classroom import COOKIE, NewAttempt, Ticket
+from app.classroom import COOKIE, ClassroomUnavailable, NewAttempt, Ticket, tables
+from app.classroom.results import store
+from app.classroom.results.table import Attempt
 from app.classroom.rooms import OpenRoom, Rooms
 from app.service.main import create_app
 from app.service.web.rooms import results
@@ -102,3 +108,93 @@ def test_a_lost_database_is_said(school: Class, tmp_path: Path) -> None:
     assert answer.status_code == 503
     assert "The classroom" in answer.text
     assert teacher.get("/room/results.csv").status_code == 503
+
+
+def download(school: Class, body: Callable[[bytes], None]) -> bool:
+    """Send the teacher's file part by part to `body`; returns whether its end was sent."""
+    ended = False
+
+    async def send(message: dict[str, Any]) -> None:
+        nonlocal ended
+        body(message.get("body", b""))
+        ended = message["type"] == "http.response.body" and not message.get("more_body")
+
+    async def receive() -> dict[str, Any]:
+        await asyncio.sleep(60)
+        return {"type": "http.disconnect"}
+
+    token = school.rooms.tokens.sign(Ticket(school.room.id))
+    scope = {
+        "type": "http", "http_version": "1.1", "method": "GET", "scheme": "http", "path": "/room/results.csv",
+        "raw_path": b"/room/results.csv", "query_string": b"", "root_path": "", "client": ("127.0.0.1", 1),
+        "server": ("school.example", 80),
+        "headers": [(b"host", b"school.example"), (b"cookie", f"{COOKIE}={token}".encode())],
+    }  # fmt: skip
+    asyncio.run(school.app(scope, receive, send))
+    return ended
+
+
+def answer_much(school: Class, each: int) -> None:
+    """30 students with so many long answers each."""
+    seats = [school.rooms.join(school.room.code, f"Student {i}").seat for i in range(30)]
+    attempts = [
+        {
+            "id": f"{i}", "room_id": school.room.id, "seat_id": seats[i % 30], "exercise": "two-elbows", "seed": i,
+            "answer": ["9" * 2000], "verdict": "Too large.", "score": 0.5, "started": 0.0, "at": float(i // 7),
+        }
+        for i in range(30 * each)
+    ]  # fmt: skip
+    with school.app.state.classroom.database.write(durable=False) as connection:
+        connection.execute(insert(tables.Attempt), attempts)
+
+
+@pytest.mark.parametrize("each", [50, pytest.param(1000, marks=pytest.mark.slow)])
+def test_the_file_is_sent_while_it_is_read(school: Class, each: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first rows leave after one page is read, and memory does not grow with the file."""
+    school.answer(school.rooms.join(school.room.code, "Ada"), 1.0)
+    assert download(school, lambda _: None), "what is imported with the first file does not count"
+    answer_much(school, each)
+    database = school.app.state.classroom.database
+    read, reads, rows = database.read, 0, 0
+    first = -1  # reads of the database before the first row was sent
+
+    def counted() -> object:
+        nonlocal reads
+        reads += 1
+        return read()
+
+    def took(body: bytes) -> None:
+        nonlocal first, rows
+        rows += body.count(b"\r\n")
+        if rows > 1 and first < 0:
+            first = reads
+
+    monkeypatch.setattr(database, "read", counted)
+    tracemalloc.start()
+    try:
+        assert download(school, took)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert rows == 2 + 30 * each
+    assert first <= reads - 30 * each // store.PAGE, "the first rows leave before the second page is read"
+    assert peak < 4e6, f"{peak / 1e6:.1f} MB at a time"
+
+
+def test_a_file_is_cut_off_when_the_database_is_lost(
+    school: Class, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ada = school.rooms.join(school.room.code, "Ada")
+    for _ in range(3):
+        school.answer(ada, 0.5)
+    pages_of = store.pages_of
+
+    def lost(*arguments: Any) -> Iterator[list[Attempt]]:
+        yield next(pages_of(*arguments, size=2))
+        raise ClassroomUnavailable("The disk is full.")
+
+    monkeypatch.setattr(store, "pages_of", lost)
+    parts: list[bytes] = []
+    assert not download(school, parts.append), "a browser says that the file is not complete"
+    assert b"".join(parts).count(b"Ada") == 2
+    assert "a file of results was cut off: The disk is full." in caplog.text

@@ -16,6 +16,7 @@ from viser._messages import SetPositionMessage, TransformControlsUpdateMessage
 from viser.infra import _async_message_buffer as buffers
 
 from app.viewer.viser_patches import (
+    Curtain,
     assign,
     cache_type_hints,
     keep_private,
@@ -202,3 +203,37 @@ def test_messages_of_other_threads_wake_the_reader_in_its_own(monkeypatch):
 
     asyncio.run(asyncio.wait_for(read(), 20))
     assert set(woken) == {threading.get_ident()}
+
+
+def test_behind_a_curtain_nothing_is_seen_and_all_is_as_its_owner_left_it(wire):
+    messages, scene = wire
+    shown, hidden, gone = (
+        scene.add_frame("/shown"),
+        scene.add_frame("/hidden", visible=False),
+        scene.add_frame("/x"),
+    )
+    child = scene.add_frame("/shown/child")
+    scene.add_light_directional("/lamp")
+
+    def seen() -> dict[str, bool]:
+        """What the messages make visible of the nodes at the top."""
+        found = [m for m in messages if m["type"] == "SetSceneNodeVisibilityMessage" and m["name"] != "/WorldAxes"]
+        return {m["name"]: m["visible"] for m in found if m["name"].count("/") == 1}
+
+    assert seen() == {"/shown": True, "/hidden": False, "/x": True, "/lamp": True}
+    curtain = Curtain(scene, "/wall-")
+    assert seen() == {"/shown": False, "/hidden": False, "/x": False, "/lamp": True}
+    assert shown.visible
+    gone.remove()
+    late = scene.add_frame("/late")
+    scene.add_frame("/wall-1")
+    hidden.visible, shown.visible, child.visible = True, False, False
+    assert seen() == {
+        **dict.fromkeys(("/shown", "/hidden", "/x", "/late"), False), "/lamp": True, "/wall-1": True,
+    }  # fmt: skip
+    late.visible = False
+    messages.clear()
+    curtain.open()
+    assert seen() == {"/shown": False, "/hidden": True, "/late": False}
+    late.visible = True
+    assert seen()["/late"] is True

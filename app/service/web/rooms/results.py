@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+import codecs
+import logging
+from collections.abc import Iterable, Iterator
 from functools import cached_property
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
-from starlette.responses import Response
+from starlette.responses import Response, StreamingResponse
+from starlette.types import Send
 
 from app.api.problems import ProblemError
 from app.classroom import COOKIE, ClassroomUnavailable, Hub, Role
 from app.classroom.clock import now
-from app.classroom.results.table import Attempt, rows, to_csv
+from app.classroom.results.table import Attempt, csv_of, rows
 from app.service.web.rooms.page import results_page
 from app.shared.settings import Settings
 from app.shared.store import Store
 
 if TYPE_CHECKING:
     from app.classroom.rooms import OpenRoom
+
+logger = logging.getLogger("kinboard.classroom")
 
 MOST = 400  # rows on the screen; the file has all attempts
 
@@ -32,7 +39,7 @@ class Results:
     async def show(self, request: Request) -> Response:
         """The table; its script asks for this page again and again."""
         try:
-            room, attempts = await run_in_threadpool(self._read, request.cookies.get(COOKIE, ""), answers=False)
+            room, attempts = await run_in_threadpool(self._read, request.cookies.get(COOKIE, ""))
         except ClassroomUnavailable as error:
             return results_page(request, 503, problem=str(error))
         titles = await run_in_threadpool(lambda: self._titles)
@@ -51,30 +58,39 @@ class Results:
         )
 
     async def download(self, request: Request) -> Response:
-        """One row per attempt."""
+        """One row per attempt; what has been read is sent before more is."""
+        from app.classroom.results.store import pages_of
+
         try:
-            room, attempts = await run_in_threadpool(self._read, request.cookies.get(COOKIE, ""))
+            room = await run_in_threadpool(self._room, request.cookies.get(COOKIE, ""))
+            pages = pages_of(self._hub.database, room.id)
+            first: list[Attempt] = await run_in_threadpool(next, pages, [])
         except ClassroomUnavailable as error:
             raise ProblemError(503, "busy", str(error)) from None
-        text = to_csv(attempts, await run_in_threadpool(lambda: self._titles))
+        titles = await run_in_threadpool(lambda: self._titles)
         headers = {
             "content-disposition": f'attachment; filename="results-{room.code.lower()}.csv"',
             "cache-control": "no-store",
         }
-        # The mark at the beginning tells spreadsheets which letters these are.
-        return Response(text.encode("utf-8-sig"), media_type="text/csv; charset=utf-8", headers=headers)
+        texts = csv_of(chain([first], pages), titles)
+        return _Download(_encoded(texts), media_type="text/csv; charset=utf-8", headers=headers)
 
-    def _read(self, token: str, answers: bool = True) -> tuple[OpenRoom, list[Attempt]]:
-        """The room of the teacher's cookie and its attempts; raises 403."""
+    def _read(self, token: str) -> tuple[OpenRoom, list[Attempt]]:
+        """The room of the teacher's cookie and its attempts without the answers; raises 403."""
         from app.classroom.results.store import attempts_of  # imports SQLAlchemy
 
+        room = self._room(token)
+        return room, attempts_of(self._hub.database, room.id, answers=False)
+
+    def _room(self, token: str) -> OpenRoom:
+        """The room of the teacher's cookie; raises 403."""
         ticket = self._hub.ticket(token) if token and self._hub.in_use else None
         room = self._hub.rooms.find(ticket) if ticket is not None and ticket.role is Role.TEACHER else None
         if room is None:
             raise ProblemError(
                 403, "forbidden", "Only the teacher may see the results.", "Open the teacher's link."
             )
-        return room, attempts_of(self._hub.database, room.id, answers)
+        return room
 
     @cached_property
     def _titles(self) -> dict[str, str]:
@@ -82,3 +98,19 @@ class Results:
 
         exercises = Exercises(self._settings.exercises, self._store.get)
         return {one.id: one.title for one in exercises.all}
+
+
+class _Download(StreamingResponse):
+    """A file that is cut off if the database is lost meanwhile: its end is not sent, so the browser says so."""
+
+    async def stream_response(self, send: Send) -> None:
+        try:
+            await super().stream_response(send)
+        except ClassroomUnavailable as error:
+            logger.warning("a file of results was cut off: %s", error)
+
+
+def _encoded(texts: Iterable[str]) -> Iterator[bytes]:
+    yield codecs.BOM_UTF8  # tells spreadsheets which letters these are
+    for text in texts:
+        yield text.encode()

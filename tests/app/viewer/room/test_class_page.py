@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+import json
 import threading
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
+from live_server import serve_viewer
+from pydantic import SecretStr
 
 import kin
 from app.classroom import COOKIE, Hub, Ticket
+from app.shared.clouds import Clouds
+from app.shared.settings import Settings
+from app.shared.store import Store
+from app.viewer.room.following import decoded
 from app.viewer.room.member import Member
 from app.viewer.room.student import Student
 from app.viewer.room.teacher import Teacher
+from app.viewer.server import ViewerServer
 from app.viewer.session.worker.crew import BUILDS
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -32,9 +41,10 @@ class Class:
         self.room = hub.rooms.open("Robotics <i>2</i>", 3600.0)
         self._open: list[FakeBrowser] = []
 
-    def browser(self, token: str) -> FakeBrowser:
+    def browser(self, token: str, embedded: str = "") -> FakeBrowser:
         headers = {"Cookie": f"{COOKIE}={token}"} if token else {}
-        browser = FakeBrowser(self.port, additional_headers=headers, close_timeout=0.1)
+        memory = json.dumps({"address": "http://127.0.0.1/", "embedded": embedded})
+        browser = FakeBrowser(self.port, memory=memory, additional_headers=headers, close_timeout=0.1)
         self._open.append(browser)
         browser.__enter__()
         return browser
@@ -226,8 +236,7 @@ def test_a_task_opens_and_its_answers_are_stored(room: Class) -> None:
     student.wait(lambda: "Stored for your teacher" not in student.html)
 
     # Who goes on to something else has still solved it.
-    press(teacher, "fields", "course", value=[["0"]])
-    student.wait(lambda: student.value("Lesson") == "Courses")
+    student.set("Lesson", "Screws")
     teacher.wait(lambda: ">at the arm</span>" in teacher.html)
     assert "1 of 1 solved" in teacher.html
 
@@ -263,6 +272,37 @@ def test_a_course_opens_on_every_page(room: Class) -> None:
     student.wait(lambda: title in student.html)
     press(teacher, "uncourse")
     teacher.wait(lambda: "data-class-course" not in teacher.html)
+
+
+def test_a_course_replaces_the_task_and_says_so(room: Class) -> None:
+    teacher, student, _, _ = lead(room)
+    press(teacher, "fields", "task", value=[[EXERCISE]])
+    student.wait(lambda: f'data-exercise="{EXERCISE}"' in student.html)
+    teacher.wait(lambda: "data-class-replaces>It replaces the task <b>Which joint" in teacher.html)
+    student.say("feature", ["exercises", ["answer", 1], 0])
+    student.wait(lambda: "data-class-stored" in student.html)
+    press(teacher, "follow")
+    press(teacher, "fields", "course", value=[["0"]])
+    student.wait(lambda: "is over; your answers stay stored" in student.html)
+    student.wait(lambda: student.value("Lesson") == "Courses")
+    student.wait(lambda: "data-class-task" not in student.html)
+    teacher.wait(lambda: "data-class-course" in teacher.html and "data-class-task" not in teacher.html)
+    assert "data-class-replaces" not in teacher.html
+    assert bar(student) == "free"
+    late, _ = room.join("Late")
+    late.wait(lambda: late.value("Lesson") == "Courses")
+    assert "data-class-task" not in late.html
+
+    # The same course again opens again; another task may be sent while one runs, and the course stays open.
+    press(teacher, "fields", "task", value=[[EXERCISE]])
+    student.wait(lambda: f'data-exercise="{EXERCISE}"' in student.html)
+    press(teacher, "fields", "task", value=[["which-joint-moved"]])
+    student.wait(lambda: 'data-exercise="which-joint-moved"' in student.html)
+    assert "data-class-course" in teacher.html
+    press(teacher, "fields", "course", value=[["0"]])
+    press(teacher, "uncourse")
+    press(teacher, "fields", "course", value=[["0"]])
+    student.wait(lambda: student.value("Lesson") == "Courses")
 
 
 def test_a_question_is_asked_and_counted(room: Class) -> None:
@@ -344,6 +384,27 @@ def test_the_wall_sends_one_list_of_poses_for_all(room: Class) -> None:
     assert teacher.visible[teacher.gizmo] is True
 
 
+def test_the_wall_shows_arms_only(room: Class) -> None:
+    def seen() -> set[str]:
+        """What is visible at the top of the scene, but lights."""
+        lights = {name for name, node in teacher.nodes.items() if "Light" in node["type"]}
+        return {name for name in teacher.nodes if name.count("/") == 1 and teacher.visible[name]} - lights
+
+    teacher = room.teacher()
+    plain = seen()
+    room.join("Ann")
+    teacher.wait(lambda: "1 student" in teacher.html)
+    teacher.set("Lesson", "Velocity")
+    teacher.wait(lambda: seen() > plain)
+    lesson = seen()
+    press(teacher, "wall")
+    teacher.wait(lambda: any(name.startswith("/wall-") for name in teacher.nodes))
+    teacher.settle(0.5)
+    assert {name.partition("-")[0] for name in seen()} == {"/wall"}
+    press(teacher, "wall")
+    teacher.wait(lambda: seen() == lesson)
+
+
 def test_hands_are_seen_and_lowered(room: Class) -> None:
     teacher = room.teacher()
     ann, ticket = room.join("Ann")
@@ -371,6 +432,66 @@ def test_students_are_renamed_and_removed_and_the_room_ended_at_the_second_press
     assert bar(bob) == "free"
     press(teacher, "end")
     mode(bob, "closed")
+
+
+def test_a_removed_student_reads_so_at_once_and_keeps_the_work(room: Class) -> None:
+    teacher, student, ticket, q = lead(room)
+    room.hub.rooms.remove_seat(ticket.room, ticket.seat)  # as another process does
+    mode(student, "closed")
+    bar_html = student.html[student.html.index('data-class-bar="closed"') :]
+    assert "You are no longer in the room</b>. The teacher has removed you. What you have done stays" in bar_html
+    assert "You can go on by yourself" in bar_html
+    assert 'href="../room" data-class-join' in bar_html
+    assert "data-class-here>Copy link" in bar_html
+    student.wait(lambda: 'data-status="advice"' in student.html)
+    teacher.set("2 rotating elbow", 70.0)
+    teacher.settle()
+    at(student, q)
+    student.set("1 rotating base", 80.0)
+    q[0] = np.radians(80.0)
+    at(student, q)
+
+
+def test_where_a_token_is_needed_who_was_removed_can_only_look(tmp_path: Path) -> None:
+    hub = Hub(tmp_path)
+    settings = Settings(data=tmp_path, token=SecretStr("a-long-enough-token"))
+    viewer = ViewerServer(Store(), settings, Clouds(), classroom=hub)
+    with serve_viewer(viewer) as port:
+        guarded = Class(port, hub)
+        student, ticket = guarded.join("Ann")
+        student.set("1 rotating base", 55.0)
+        q = ROBOT.q_home.copy()
+        q[0] = np.radians(55.0)
+        at(student, q)
+        hub.rooms.end(ticket.room)
+        mode(student, "closed")
+        assert "The room has ended." in student.html
+        assert "go on by yourself" not in student.html
+        student.set("1 rotating base", 80.0)
+        student.wait(lambda: "Join a room to go on" in student.html)
+        student.wait(lambda: student.value("1 rotating base") == 55.0)
+        at(student, q)
+        guarded.close()
+    hub.close()
+
+
+@pytest.mark.parametrize("embedded", ["scene", "panel"])
+def test_a_figure_in_another_page_takes_no_part(room: Class, embedded: str) -> None:
+    teacher, _, ticket, q = lead(room)
+    press(teacher, "freeze")
+    figure = room.browser(room.hub.rooms.tokens.sign(ticket), embedded=embedded)
+    figure.wait(lambda: "data-status" in figure.html)
+    figure.set("1 rotating base", 80.0)
+    own = ROBOT.q_home.copy()
+    own[0] = np.radians(80.0)
+    at(figure, own)
+    assert "data-class" not in figure.html
+    attendance = room.hub.attend(Ticket(ticket.room), lambda: None)
+    figure.settle(0.5)
+    (seat,) = attendance.room.seats
+    attendance.leave()
+    shown = decoded(seat.page, [ROBOT])
+    assert np.allclose(shown.q, q), "the figure's arm is not the student's on the wall"
 
 
 def test_a_student_cannot_press_what_is_the_teachers(room: Class) -> None:

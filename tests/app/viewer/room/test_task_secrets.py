@@ -70,7 +70,7 @@ def test_an_answer_is_not_shown_while_that_cannot_be_stored(
 def test_a_course_without_answers_shows_none_when_it_is_closed(students: Room) -> None:
     course = {"title": "Test", "answers": False, "item": [{"exercise": VARIED}]}
     teacher = students.hub.attend(Ticket(students.room.id), lambda: None)
-    teacher.set_course(json.dumps(course))
+    teacher.send_course(json.dumps(course))
     tab = students.student(students.join("Ann"))
     tab.wait(lambda: "Test" in tab.html)
     tab.wait(lambda: 'data-course="follow"' in tab.html)
@@ -84,7 +84,7 @@ def test_a_course_without_answers_shows_none_when_it_is_closed(students: Room) -
     press(tab, "hint")
     tab.wait(lambda: "Hint 1." in tab.html)
     assert "data-exercises-solution" not in tab.html
-    teacher.set_course("")
+    teacher.send_course("")
     tab.settle()
     press(tab, "hint")
     tab.wait(lambda: "Show the answer" in tab.html)
