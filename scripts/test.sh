@@ -6,47 +6,67 @@ root=$(cd "$(dirname "$0")/.." && pwd)
 . "$root/scripts/venv.sh"
 unset PYTHONDONTWRITEBYTECODE # hundreds of processes are started, each of which would compile all it imports
 chromium=${KINBOARD_TEST_CHROMIUM:-/usr/bin/chromium}
-[ -x "$root/.venv/bin/python" ] || make_venv
-installing=
-if [ ! -x "$chromium" ]; then
-  apt_install chromium & # while pip downloads
-  installing=$!
-fi
-install_kinboard "[test]"
-[ -z "$installing" ] || wait "$installing" ||
-  fail "the browser tests need Chromium. On Debian: sudo apt-get install chromium"
-PATH="$root/.venv/bin:$root/.venv/debian/usr/sbin:$root/.venv/debian/usr/bin:$PATH:/usr/sbin"
-for proxy in nginx caddy; do
-  command -v $proxy >/dev/null || apt_unpack $proxy || fail "the tests of deploy/ need $proxy in the PATH"
-done
-command -v initdb >/dev/null || ls /usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1 || apt_install postgresql ||
-  fail "the tests of classrooms need PostgreSQL. On Debian: sudo apt-get install postgresql"
+
+# Chromium, PostgreSQL and the two proxies, if they are missing.
+install_programs() {
+  missing=
+  [ -x "$chromium" ] || missing=chromium
+  command -v initdb >/dev/null || ls /usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1 || \
+    missing="${missing:+$missing }postgresql"
+  # shellcheck disable=SC2086 # several words
+  [ -z "$missing" ] || apt_install $missing || fail "the tests of pages and classrooms need a browser and a database:" \
+    "Chromium and PostgreSQL. On Debian: sudo apt-get install $missing"
+  for proxy in nginx caddy; do
+    command -v $proxy >/dev/null || apt_unpack $proxy || fail "the tests of deploy/ need $proxy in the PATH"
+  done
+}
+
+compile_kernels() {
+  python -c 'import kin; kin.warm_up(); kin.warm_up_rest()'
+}
+
 cd "$root"
+[ -x .venv/bin/python ] || make_venv
+PATH="$root/.venv/bin:$root/.venv/debian/usr/sbin:$root/.venv/debian/usr/bin:$PATH:/usr/sbin"
+install_programs & # while pip downloads
+programs=$!
 if [ $# -gt 0 ]; then
+  install_kinboard "[test]"
+  wait $programs
   ruff check .
   ruff format --check .
   mypy
   exec pytest "$@"
 fi
 # Kernels are compiled before any test, by two processes from both ends: two runs would both compile the same ones.
-python -c 'import kin; kin.warm_up(); kin.warm_up_rest()' &
+# They need no more than Kinboard itself does; what the tests need is downloaded meanwhile.
+install_kinboard ""
+compile_kernels &
 compiling=$!
-python -c 'import kin; kin.warm_up_rest(backwards=True)'
+python -c 'import kin; kin.warm_up_rest(backwards=True)' &
+backwards=$!
+install_kinboard "[test]"
 ruff check .
 ruff format --check .
 mypy
-wait $compiling
+wait $programs
+# If the second installation replaced a library in use, a compiling process may have failed: once more then.
+wait $compiling && wait $backwards || compile_kernels
 # Browsers and processes that start on a loaded machine can be late: a failure counts if it comes twice. The summary
 # names what was run again ("rerun"), which is a fault of the test or of the code all the same.
 twice="--reruns 1 -r R"
+# The files with tests of a marker: collecting all others takes longer than some of these run.
+files_of() {
+  grep -rl "pytest\.mark\.$1\b" tests --include="test_*.py"
+}
 # The browser tests draw on one core and often wait: the other tests run beside them. What measures time runs alone.
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
-pytest $twice -m "not slow and browser" >"$log" 2>&1 &
+pytest $twice -m "not slow and browser" $(files_of browser) >"$log" 2>&1 &
 browsing=$!
 failed=0
 pytest $twice -n 3 --dist loadfile -m "not slow and not browser and not bench" || failed=1
 wait $browsing || failed=1
 cat "$log"
-pytest $twice -m "not slow and bench" || failed=1
+pytest $twice -m "not slow and bench" $(files_of bench) || failed=1
 exit $failed

@@ -2,11 +2,17 @@
 
 fail() { echo "kinboard: $*" >&2; exit 1; }
 
+# Once per run.
+apt_update() {
+  [ -n "${apt_updated:-}" ] || apt-get update -qq || return 1
+  apt_updated=yes
+}
+
 # Debian packages may only be installed by root; anybody else is told what to ask for.
 apt_install() {
   if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
     echo "Installing $* with apt…"
-    apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null
+    apt_update && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null
   else
     return 1
   fi
@@ -16,9 +22,9 @@ apt_install() {
 apt_unpack() {
   command -v apt-get >/dev/null || return 1
   echo "Unpacking $1 from Debian into .venv…"
+  [ "$(id -u)" != 0 ] || apt_update || return 1
   mkdir -p "$root/.venv/debian" && (
     cd "$root/.venv/debian" &&
-      { [ "$(id -u)" != 0 ] || apt-get update -qq; } &&
       apt-get download -qq -o APT::Sandbox::User=root "$1" &&
       dpkg -x "$1"_*.deb . && rm "$1"_*.deb
   )
