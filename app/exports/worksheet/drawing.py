@@ -15,6 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from app.exports.svg import joint_colour
+from app.exports.worksheet.labels import BASE, LETTER, Label, along, around, covered, placed
 from app.exports.worksheet.sheet import SUBSCRIPTS, Sheet
 from app.exports.worksheet.words import to_latex
 from kin import Robot
@@ -142,9 +143,14 @@ def draw(sheet: Sheet) -> Drawing:
         for a, b in pairwise(points):
             if np.linalg.norm(b - a) > SAME:
                 out.lines.append(Line(to_page(np.array([a, b])), "#aab3bd", 7.0))
-    _add_lengths(out, sheet, path, to_page)
     _add_axes(out, axes, 0.22 * reach, to_page)
-    _add_frames(out, sheet.robot, frames, 0.11 * reach, to_page)
+    labels = _add_frames(out, sheet.robot, frames, 0.11 * reach, to_page) + _lengths(sheet, path, to_page)
+    dots = np.array([[*dot.at, 2.0 * dot.radius, 2.0 * dot.radius] for dot in out.dots])
+    lines = [covered(line.points, line.width) for line in out.lines if not line.dashed]
+    middles = placed(labels, np.concatenate([dots, *lines]), np.array([WIDTH, HEIGHT]))
+    for label, middle in zip(labels, middles, strict=True):
+        at = middle + np.array([-0.5 * label.room[0], BASE * label.size])
+        out.words.append(Word(at, label.text, label.colour, label.size))
     return out
 
 
@@ -200,15 +206,19 @@ def _projection(points: Array) -> Projection:
     return to_page
 
 
-def _add_lengths(out: Drawing, sheet: Sheet, path: Path, to_page: Projection) -> None:
+def _lengths(sheet: Sheet, path: Path, to_page: Projection) -> list[Label]:
+    """The lengths of the table, beside their lines."""
+    out = []
     unit = sheet.units.lengths
     first = "d" if sheet.robot.convention == "standard" else "a"
     for points, (d, a) in path:
         sizes = {"d": d, "a": a}
         for size, ends in ((sizes[first], points[:2]), (sizes["a" if first == "d" else "d"], points[1:])):
             if abs(size) > SAME:
-                middle = to_page(ends).mean(axis=0) + np.array([7.0, -3.0])
-                out.words.append(Word(middle, unit.brief(abs(size)), SOFT, 10.5))
+                text = unit.brief(abs(size))
+                start, end = to_page(ends)
+                out.append(Label(text, along(start, end, 0.5 * LETTER * 10.5 * len(text), 8.0), SOFT, 10.5))
+    return out
 
 
 def _add_axes(out: Drawing, axes: list[tuple[Array, Array]], length: float, to_page: Projection) -> None:
@@ -223,29 +233,37 @@ def _add_axes(out: Drawing, axes: list[tuple[Array, Array]], length: float, to_p
         placed.append(at)
 
 
-def _add_frames(out: Drawing, robot: Robot, frames: list[Array], length: float, to_page: Projection) -> None:
-    """x red and z blue at the base, after every row, and at the tool; frames at one place share their label."""
+def _add_frames(
+    out: Drawing, robot: Robot, frames: list[Array], length: float, to_page: Projection
+) -> list[Label]:
+    """x red and z blue at the base, after every row, and at the tool; returns their names.
+
+    Arrows that end at one place share their name.
+    """
     tool = frames[-1] @ robot.T_last_tool
     names = [str(i) for i in range(len(frames))]
     if not np.array_equal(robot.T_last_tool, np.eye(4)):
         frames, names = [*frames, tool], [*names, "t"]
-    spots: list[tuple[Array, list[str]]] = []
+    spots: list[tuple[Array, list[str]]] = []  # arrows ``(2, 2)`` and their names
     for frame, name in zip(frames, names, strict=True):
         origin = frame[:3, 3]
         for axis, letter, colour in ((0, "x", RED), (2, "z", BLUE)):
             tip = origin + length * frame[:3, axis]
             ends = to_page(np.array([origin, tip]))
             out.lines.append(Line(ends, colour, 1.6, arrow=True))
-            where = ends[1] + 9.0 * _unit(ends[1] - ends[0]) + np.array([-4.0, 4.0])
-            known = next((names for at, names in spots if np.linalg.norm(at - where) < 9.0), None)
+            near = (
+                names for at, names in spots if np.linalg.norm(at[1] - ends[1]) < 9.0 and names[0][0] == letter
+            )
+            known = next(near, None)
             label = letter + name.translate(SUBSCRIPTS)
             if known is None:
-                spots.append((where, [label]))
+                spots.append((ends, [label]))
             else:
                 known.append(label)
-    for where, labels in spots:
-        colour = RED if labels[0].startswith("x") else BLUE
-        out.words.append(Word(where, " ".join(labels), colour, 11.0))
+    return [
+        Label(" ".join(shared), around(ends[0], ends[1], 10.0), RED if shared[0].startswith("x") else BLUE, 11.0)
+        for ends, shared in spots
+    ]
 
 
 def _unit(v: Array) -> Array:

@@ -7,12 +7,14 @@ import io
 import re
 import xml.etree.ElementTree as ET
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
 
 import kin
 from app.exports.worksheet import Formula, Part, Question, Sheet, csv_text, draw, latex
+from app.exports.worksheet.labels import BASE, Label
 from app.exports.worksheet.words import to_latex
 from kin.units import Units
 
@@ -84,6 +86,16 @@ def test_the_drawing_is_svg_and_inside_its_box(robot):
     labels = " ".join(texts).split()
     subscript = str(len(robot.rows)).translate(str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉"))
     assert {"z₀", f"z{subscript}", f"x{subscript}"} <= set(labels)
+
+
+@each_robot
+def test_words_of_the_drawing_stand_apart(robot):
+    boxes = []
+    for word in draw(Sheet("A title", robot, robot.q_home, Units())).words:
+        room = Label(word.text, np.zeros((1, 2)), word.colour, word.size).room
+        boxes.append((word.at + np.array([0.5 * room[0], -BASE * word.size]), room, word.text))
+    for (a, room, one), (b, other, two) in combinations(boxes, 2):
+        assert (np.abs(a - b) >= 0.5 * (room + other)).any(), (one, two)
 
 
 def balanced(text):
