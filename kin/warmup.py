@@ -2,7 +2,8 @@
 
 Loading a kernel takes hundredths of a second, compiling one takes seconds, and all of them minutes. A service is
 ready once the arm that a page shows first can be moved (`warm_up_first`). The remaining kernels are loaded or
-compiled while the first visitors are served, those of that arm first (`warm_up_rest`).
+compiled while the first visitors are served, those of that arm first (`warm_up_rest`). They come in named `parts`,
+which can be taken in any order, each in small steps.
 
 The array-level call (:mod:`kin.ik.batch`) is not part of a service: its kernels are compiled on first use. Kernels
 belong to solver families, not to arms, so one arm of each family is enough.
@@ -11,8 +12,9 @@ belong to solver families, not to arms, so one arm of each family is enough.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache, partial
+from types import MappingProxyType
 
 import numpy as np
 from numba.core.event import install_recorder
@@ -32,6 +34,7 @@ from kin.path import solve_path
 from kin.robot import Robot
 from kin.solvers import closed_form_of, general6, general7
 from kin.solvers.contract import POSE, ClosedForm, SolverInput
+from kin.transforms import Array
 from kin.workspace import (
     MEASURES,
     STRATEGIES,
@@ -44,6 +47,12 @@ from kin.workspace import (
 from kin.workspace.capability.kernels import raise_best
 
 TASKS: tuple[Task, ...] = ("pose", "approach")
+NUMERIC = "numeric"  # the family of arms without a closed form
+# Parts that do not belong to a family of arms.
+COLLISIONS, MOTIONS, CLOUDS, CAPABILITY = "collisions", "motions", "clouds", "capability"
+ALL = "all"
+
+Step = Callable[[], object]
 
 
 def warm_up_first(*, backwards: bool = False) -> None:
@@ -68,7 +77,8 @@ def warm_up() -> None:
         for robot in others:
             _move(robot)
         for robot in (first, *others):
-            _call_all(robot)
+            for step in _calls(robot):
+                step()
 
 
 def warm_up_rest(stop: Callable[[], bool] = lambda: False, *, backwards: bool = False) -> None:
@@ -76,7 +86,7 @@ def warm_up_rest(stop: Callable[[], bool] = lambda: False, *, backwards: bool = 
 
     Two processes that begin at opposite ends compile different kernels and load the others from the cache.
     """
-    steps = list(_rest())
+    steps = [step for part in parts().values() for step in part]
     for step in reversed(steps) if backwards else steps:
         if stop():
             return
@@ -93,12 +103,40 @@ def rest_compiled() -> bool:
     return is_cached(raise_best)
 
 
+@cache
+def parts() -> Mapping[str, tuple[Step, ...]]:
+    """The kernels of `warm_up_rest` by name, in its order: the steps that load or compile them.
+
+    The part with the name of a family moves its arms, which the first arm's has no need of; `all_of` the family is
+    needed for everything else they do.
+    """
+    found: dict[str, list[Step]] = {}
+    for name, step in _rest():
+        found.setdefault(name, []).append(step)
+    return MappingProxyType({name: tuple(steps) for name, steps in found.items()})
+
+
+def family_of(robot: Robot) -> str:
+    """The name of the family of a robot, which may be one that `parts` does not have."""
+    form = closed_form_of(robot)
+    return NUMERIC if form is None else form.name
+
+
+def first_family() -> str:
+    """The family of the first arm, which `warm_up_first` moves."""
+    return family_of(_first())
+
+
+def all_of(family: str) -> str:
+    """The name of the part for what arms of a family do besides being moved: other tasks, preferences, paths."""
+    return f"{family}-{ALL}"
+
+
 def one_of_each_family() -> tuple[Robot, ...]:
     """The first built-in arm of each closed form, and the first without one."""
     families: dict[str, Robot] = {}
     for robot in builtin_robots().values():
-        match = closed_form_of(robot)
-        families.setdefault("" if match is None else match.name, robot)
+        families.setdefault(family_of(robot), robot)
     return tuple(families.values())
 
 
@@ -123,44 +161,52 @@ def _move(robot: Robot) -> None:
         step()
 
 
-def _moves(robot: Robot) -> list[Callable[[], object]]:
+def _moves(robot: Robot) -> list[Step]:
     q = robot.q_home.copy()
 
     def solve(task: Task) -> None:
         _ = solve_ik(robot, fk(robot, q), task=task).redundancy  # made when it is read
 
-    steps: list[Callable[[], object]] = [partial(each, robot, q) for each in (fk, link_frames, jacobian)]
+    steps: list[Step] = [partial(each, robot, q) for each in (fk, link_frames, jacobian)]
     steps += [partial(manipulability, robot, q), unchecked]
+    steps += [partial(jacobian, robot, np.stack([q, q]))]  # the gizmo's arrows come from many poses
     return [*steps, *(partial(solve, task) for task in TASKS)]
 
 
-def _call_all(robot: Robot) -> None:
+def _calls(robot: Robot) -> list[Step]:
     """The public functions, once along each path that has its own kernel."""
     q = robot.q_home.copy()
-    T, pair = fk(robot, q), np.stack([q, q])
-    fk(robot, pair)
-    fk_positions(robot, q)
-    jacobian(robot, pair)
-    far = T.copy()
-    far[:3, 3] *= 10.0
-    _ = solve_ik(robot, T, task="position").redundancy
-    solve_ik(robot, T, task="position", prefer="limits")
-    solve_ik(robot, far, task="pose")
-    solve_ik(robot, T, mask=(True, True, False, False, False, False))
-    solve_ik(robot, T, task="pose", prefer="manipulability")
-    solve_path(robot, fk(robot, pair))
+    pair = np.stack([q, q])
+
+    def target(scale: float = 1.0) -> Array:
+        T = fk(robot, q)
+        T[:3, 3] *= scale
+        return T
+
+    def positions() -> None:
+        fk_positions(robot, q)
+        _ = solve_ik(robot, target(), task="position").redundancy
+
+    return [
+        lambda: solve_ik(robot, target(10.0), task="pose"),  # the first visitor may well drag it out of reach
+        positions,
+        lambda: solve_ik(robot, target(), task="position", prefer="limits"),
+        lambda: solve_ik(robot, target(), mask=(True, True, False, False, False, False)),
+        lambda: solve_ik(robot, target(), task="pose", prefer="manipulability"),
+        lambda: solve_path(robot, fk(robot, pair)),
+    ]
 
 
-def _collide(robot: Robot) -> None:
+def _collisions(robot: Robot) -> list[Step]:
     """Distances to other links and to obstacles, which the viewer asks for at each pose of some arms."""
-    q = robot.q_home
-    nearest_links(robot, q)
-    self_distance(robot, q)
-    box = Obstacle("box", size=(1.0, 1.0, 1.0))
-    clearance(robot, q, [box])
-    near = surroundings(robot, (box,))
-    near.touches(q)
-    touches_along(near, q[None], (), lambda: None)
+    q, box = robot.q_home, Obstacle("box", size=(1.0, 1.0, 1.0))
+    return [
+        partial(nearest_links, robot, q),
+        partial(self_distance, robot, q),
+        partial(clearance, robot, q, [box]),
+        lambda: surroundings(robot, (box,)).touches(q),
+        lambda: touches_along(surroundings(robot, (box,)), q[None], (), lambda: None),
+    ]
 
 
 def _plan(robot: Robot) -> None:
@@ -182,26 +228,30 @@ def _solve_generally(robot: Robot) -> None:
         form.solve(SolverInput(T, POSE, values, True, robot.q_home.copy(), robot.lower.copy(), robot.upper.copy()))
 
 
-def _rest() -> Iterator[Callable[[], object]]:
-    yield partial(_collide, _first())
-    yield partial(_call_all, _first())
+def _rest() -> Iterator[tuple[str, Step]]:
+    """Names of parts, and their steps."""
     robots = one_of_each_family()
-    for act in (_move, _call_all):
-        for robot in (*robots, *made_up_arms()):
-            yield partial(act, robot)
+    first, arms = robots[0], (*robots, *made_up_arms())
+    for step in _calls(first):
+        yield all_of(family_of(first)), step
+    for step in _collisions(first):
+        yield COLLISIONS, step
+    for robot in arms[1:]:
+        yield from ((family_of(robot), step) for step in _moves(robot))
+    for robot in arms[1:]:
+        yield from ((all_of(family_of(robot)), step) for step in _calls(robot))
     # No built-in arm needs the general solvers, but for locked joints.
     for joints in (6, 7):
         robot = next(robot for robot in robots if robot.n == joints and robot.revolute.all())
-        yield partial(_solve_generally, robot)
-        yield partial(_plan, robot)
-    robot = robots[0]
+        yield f"general{joints}", partial(_solve_generally, robot)
+        yield MOTIONS, partial(_plan, robot)
     # Two moving joints call the same kernels and take the least time.
-    locked = [None, None, *robot.q_home[2:].tolist()]
+    locked = [None, None, *first.q_home[2:].tolist()]
     for strategy in STRATEGIES:
-        yield partial(workspace_slice, robot, 2, 0, 2, strategy=strategy, measure=MEASURES, locked=locked)
-    yield partial(configuration_at, robot, 0, locked=locked)
-    yield partial(section, robot, resolution=8, locked=locked)
-    yield partial(workspace_facts, robot, effort=2, locked=locked)
+        yield CLOUDS, partial(workspace_slice, first, 2, 0, 2, strategy=strategy, measure=MEASURES, locked=locked)
+    yield CLOUDS, partial(configuration_at, first, 0, locked=locked)
+    yield CLOUDS, partial(section, first, resolution=8, locked=locked)
+    yield CLOUDS, partial(workspace_facts, first, effort=2, locked=locked)
     for robot in robots:
         locked = [None, None, *robot.q_home[2:].tolist()]
-        yield partial(capability_map, robot, resolution=2, directions=12, locked=locked)
+        yield CAPABILITY, partial(capability_map, robot, resolution=2, directions=12, locked=locked)

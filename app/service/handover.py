@@ -25,6 +25,8 @@ from dataclasses import dataclass
 from enum import Enum, IntEnum
 from typing import Final
 
+from app.shared.preparation import SIZE
+
 logger = logging.getLogger("kinboard.connections")
 
 SUPPORTED: Final = sys.platform == "linux"  # what follows needs SO_REUSEPORT and Unix sockets that keep messages
@@ -70,6 +72,7 @@ class Member:
         number: index among all processes of the service.
         listener: the socket of this and its partners.
         phases: of all processes, in memory that they share.
+        kernels: memory of `app.shared.preparation`, which they share.
         group: numbers of this and its partners, the process of the viewer first.
         links: sockets to the partners, by their numbers.
     """
@@ -78,6 +81,7 @@ class Member:
     number: int
     listener: socket.socket
     phases: MutableSequence[int]
+    kernels: MutableSequence[int]
     group: Sequence[int]
     links: dict[int, socket.socket]
 
@@ -104,7 +108,7 @@ def members(
         shared: makes an array of bytes in shared memory.
     """
     size = 1 + partners
-    phases = shared(size * len(listeners))
+    phases, kernels = shared(size * len(listeners)), shared(SIZE)
     found = []
     for first, listener in zip(range(0, size * len(listeners), size), listeners, strict=True):
         group = range(first, first + size)
@@ -113,9 +117,9 @@ def members(
         }
         ours = {number: pair[0] for number, pair in pairs.items()}
         role = Role.VIEWER if pairs else Role.ALL
-        found.append(Member(role, first, listener, phases, group, ours))
+        found.append(Member(role, first, listener, phases, kernels, group, ours))
         for number, pair in pairs.items():
-            found.append(Member(Role.REST, number, listener, phases, group, {first: pair[1]}))
+            found.append(Member(Role.REST, number, listener, phases, kernels, group, {first: pair[1]}))
     return found
 
 

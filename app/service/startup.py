@@ -2,8 +2,8 @@
 
 The landing page is served at once and shows "warming up" until ``/readyz`` reports ready. Kernels are loaded from
 numba's cache in milliseconds, or are compiled, which takes seconds. The service is ready when those of the first
-arm are; all others are compiled after that. A compiler keeps a gigabyte of memory as long as its process lives:
-another process compiles, and ends. Of several processes of a service the first one has the kernels compiled, and
+arm are; all others are compiled after that, part by part (:mod:`app.shared.preparation`), by another process
+(:mod:`app.service.compiler`). Of several processes of a service the first one has the kernels compiled, and
 the others wait and load them. Those of the first arm are compiled by two such processes at once.
 """
 
@@ -12,18 +12,17 @@ from __future__ import annotations
 import asyncio
 import importlib
 import logging
-import os
-import subprocess
-import sys
 import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal
 
 from app.classroom import Hub
+from app.service.compiler import STEP, PartsCompiler, compile_first
 from app.service.handover import Member, Phase, Role
 from app.service.web.viewer_proxy import ViewerBridge
 from app.shared.clouds import Clouds
 from app.shared.maps import Maps
+from app.shared.preparation import Preparation
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.shared.summaries import Summaries
@@ -36,7 +35,6 @@ if TYPE_CHECKING:
 logger = logging.getLogger("kinboard.startup")
 
 Status = Literal["warming", "ready", "failed"]
-STEP = 0.02  # seconds between two looks at the first process
 
 
 class Startup:
@@ -45,6 +43,9 @@ class Startup:
     Args:
         member: what this process is among those of the service.
         on_ready: called by that thread when everything is ready, just before `status` says so.
+
+    Attributes:
+        preparation: which kernels are compiled, for all processes of the service.
     """
 
     def __init__(
@@ -72,6 +73,8 @@ class Startup:
         self._on_ready = on_ready
         self._viewer: ViewerServer | None = None
         self._loop: asyncio.AbstractEventLoop
+        self.preparation = Preparation(None if member is None else member.kernels)
+        self._compiler = PartsCompiler(self.preparation)
         self._stopping = threading.Event()
         self._viewer_settled = threading.Event()
         # A daemon, so that Ctrl-C need not wait for the end of a compilation.
@@ -103,6 +106,7 @@ class Startup:
     def stop(self) -> None:
         """Stop the viewer, and start no further kernel. One that is being compiled ends with the process."""
         self._stopping.set()
+        self._compiler.stop()
         self._viewer_settled.wait(timeout=5.0)
         self._bridge.viewer = None
         if self._viewer is not None:
@@ -115,9 +119,11 @@ class Startup:
             if not compiled():
                 unpin()  # also what this thread starts
                 second = ["warm_up_first(backwards=True)"] if processors() > 1 else []
-                self._compile_apart("warm_up_first()", *second)
+                compile_first("warm_up_first()", *second, stopping=self._stopping)
             if not self._stopping.is_set():
                 warm_up_first()
+                if self._compiles and rest_compiled():
+                    self.preparation.finish()
                 if self._on_ready is not None:
                     self._on_ready()
                 self.status = "ready"
@@ -133,10 +139,15 @@ class Startup:
         if self._member is not None and not self._stopping.is_set():
             self._member.report(phase)
 
+    @property
+    def _compiles(self) -> bool:
+        """Whether this process has the kernels compiled."""
+        return self._member is None or self._member.number == 0
+
     def _wait_for_first(self, phase: Phase) -> None:
-        """Wait until the first process of the service, which compiles the kernels, is so far."""
+        """Wait until the first process of the service, which has the kernels compiled, is so far."""
         member = self._member
-        while member is not None and member.number and member.phases[0] < phase:
+        while member is not None and not self._compiles and member.phases[0] < phase:
             if self._stopping.wait(STEP):
                 return
 
@@ -144,8 +155,10 @@ class Startup:
         lower_priority()
         self._wait_for_first(Phase.COMPLETE)
         try:
-            if not rest_compiled():
-                self._compile_apart("warm_up_rest()")  # one: a compiler of all kernels needs a gigabyte
+            if self._compiles and not self.preparation.complete:
+                if not self._compiler.run() and not self._stopping.is_set():
+                    logger.warning("the compiling process ended early: kernels are compiled where they are used")
+                self.preparation.finish()
             warm_up_rest(self._stopping.is_set)
             if self._viewer is not None and not self._stopping.is_set():
                 importlib.import_module("trimesh.creation")  # before a visitor opens a lesson that draws a sphere
@@ -154,17 +167,6 @@ class Startup:
         except Exception:
             # Requests that need this kernel fail; everything else works.
             logger.exception("a kernel could not be compiled ahead of its use")
-
-    def _compile_apart(self, *calls: str) -> None:
-        """Let other processes, one per call, fill the cache; what they leave out this one compiles."""
-        children = [_start(f"from kin import warmup; warmup.{call}") for call in calls]
-        try:
-            while any(child.poll() is None for child in children) and not self._stopping.wait(STEP):
-                pass
-        finally:
-            for child in children:
-                child.kill()
-                child.wait()
 
     def _start_viewer(self) -> None:
         if self._member is not None and self._member.role is Role.REST:
@@ -175,20 +177,8 @@ class Startup:
             from app.viewer.server import ViewerServer
 
             caches = self._clouds, self._maps, self._summaries
-            viewer = ViewerServer(self._store, self._settings, *caches, self._classroom)
+            viewer = ViewerServer(self._store, self._settings, *caches, self._classroom, self.preparation)
             viewer.start(self._loop)
             self._viewer = self._bridge.viewer = viewer
         finally:
             self._viewer_settled.set()
-
-
-def _start(program: str) -> subprocess.Popen[bytes]:
-    """A Python process in a session of its own, so that it gets no Ctrl-C."""
-    return subprocess.Popen(
-        [sys.executable, "-c", program],
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )

@@ -11,6 +11,7 @@ from starlette.responses import PlainTextResponse
 
 from app.service.startup import Status
 from app.shared.metrics import CONTENT_TYPE, exposition
+from app.shared.preparation import Preparation
 
 router = APIRouter(tags=["service"])
 
@@ -22,12 +23,24 @@ class Alive(BaseModel):
     pid: int = Field(description="Process id; with several workers each answers for itself.")
 
 
+class Kernels(BaseModel):
+    """The parts of the compiled core: families of arms as `closed_form` names them, with "-all" what they do
+    besides being moved, and what belongs to no family."""
+
+    ready: list[str]
+    preparing: str | None = Field(description="The part that is being compiled.")
+    waiting: list[str] = Field(description="Those after it; what a visitor waits for comes first.")
+
+
 class Readiness(BaseModel):
     """Whether the kernels that move the first arm are compiled and the viewer listens."""
 
     status: Status
     complete: bool = Field(
         description="Whether all kernels are compiled. Until then, first uses may take seconds."
+    )
+    kernels: Kernels | None = Field(
+        description="Those besides the first arm's, while they are compiled; null before that, and when all are."
     )
     classrooms: Literal["ready", "off", "read-only"] = Field(
         description="Whether rooms can be opened: not if KINBOARD_MAX_ROOMS is 0 (off), and not if the folder "
@@ -56,7 +69,19 @@ async def readyz(request: Request, response: Response) -> Readiness:
     status: Status = startup.readiness
     response.headers["cache-control"] = "no-store"
     response.status_code = 200 if status == "ready" else 503
-    return Readiness(status=status, complete=startup.complete, classrooms=_classrooms(request))
+    return Readiness(
+        status=status,
+        complete=startup.complete,
+        kernels=_kernels(startup.preparation) if status == "ready" else None,
+        classrooms=_classrooms(request),
+    )
+
+
+def _kernels(preparation: Preparation) -> Kernels | None:
+    if preparation.complete:
+        return None
+    ready, preparing, waiting = preparation.state
+    return Kernels(ready=ready, preparing=preparing, waiting=waiting)
 
 
 def _classrooms(request: Request) -> Literal["ready", "off", "read-only"]:

@@ -188,6 +188,8 @@ class Feature:
         key: short name, used in events and in the shared URL.
         title: name shown to the visitor.
         about: one-sentence description, for the list of lessons.
+        kernels: names of the parts of the core (`kin.warmup.parts`) that it needs, beside what moves the robot. On
+            a new machine the visitor waits for them. `ALL`: what else arms of the robot's family do.
         messages: the events that the page's own script may send, by the first part of their key.
         due: the worker sleeps at most this many seconds and then calls `tick`; it also does so after every other
             event. None: no ticks.
@@ -196,11 +198,17 @@ class Feature:
     key: ClassVar[str]
     title: ClassVar[str]
     about: ClassVar[str] = ""
+    kernels: ClassVar[tuple[str, ...]] = ()
     messages: ClassVar[frozenset[str]] = frozenset()
 
     def __init__(self, stage: Stage) -> None:
         self.stage = stage
         self.due: float | None = None
+
+    @classmethod
+    def kernels_of(cls, key: Hashable) -> tuple[str, ...]:
+        """The `kernels` for an event with this key."""
+        return cls.kernels
 
     def post(self, key: Hashable, value: object = None) -> None:
         """Queue an event for this feature's `handle`; thread-safe. Pass it to controls (`panel.listen`)."""

@@ -15,6 +15,7 @@ from app.exercises import Exercises
 from app.shared.clouds import Clouds
 from app.shared.connection import Connection, ConnectionEnded
 from app.shared.maps import Maps
+from app.shared.preparation import Preparation
 from app.shared.security import Rights
 from app.shared.settings import Settings
 from app.shared.store import Store
@@ -47,6 +48,7 @@ class ViewerServer:
 
     Args:
         maps, summaries, classroom: shared with REST; None: the viewer creates and closes its own.
+        preparation: which kernels are compiled; None: all are.
     """
 
     def __init__(
@@ -57,13 +59,16 @@ class ViewerServer:
         maps: Maps | None = None,
         summaries: Summaries | None = None,
         classroom: Hub | None = None,
+        preparation: Preparation | None = None,
     ) -> None:
         exercises = Exercises(settings.exercises, store.get)
         courses = Courses(exercises, settings.courses, store.get)
         meshes = MeshReader(settings.mesh_memory, settings.client_share, settings.receive_timeout)
         hub = classroom or Hub.of(settings)
         caches = clouds, maps or Maps(), summaries or Summaries()
-        self._services = Services(store, *caches, meshes, Library(meshes), Pace(), exercises, courses, hub)
+        readers = meshes, Library(meshes)
+        kernels = preparation or Preparation.finished()
+        self._services = Services(store, *caches, *readers, Pace(), exercises, courses, hub, kernels)
         self._owns_maps = maps is None
         self._owns_summaries = summaries is None
         self._owns_classroom = classroom is None

@@ -81,7 +81,8 @@ def test_after_warm_up_rest_no_call_compiles_a_kernel():
 
 def test_warm_up_rest_can_be_cancelled_between_kernels(monkeypatch):
     steps: list[int] = []
-    monkeypatch.setattr(warmup, "_rest", lambda: (lambda i=i: steps.append(i) for i in range(9)))
+    made = [lambda i=i: steps.append(i) for i in range(9)]
+    monkeypatch.setattr(warmup, "parts", lambda: {"one": tuple(made[:4]), "two": tuple(made[4:])})
     kin.warm_up_rest(lambda: len(steps) == 3)
     assert steps == [0, 1, 2]
     kin.warm_up_rest()
@@ -101,7 +102,7 @@ def test_two_processes_share_the_kernels_of_the_first_arm():
         "warmup.warm_up_first(backwards=sys.argv[1] == 'backwards')\n"
         "print(*(number for number, solved in done if not solved), len(measure_and_sort.overloads))"
     )
-    for way, before_solver in (("forwards", "0 1 2 3 4 1"), ("backwards", "1")):
+    for way, before_solver in (("forwards", "0 1 2 3 4 5 1"), ("backwards", "1")):
         done = subprocess.run([sys.executable, "-c", program, way], capture_output=True, text=True, check=True)
         assert done.stdout.strip() == before_solver
 
@@ -118,7 +119,7 @@ def test_kernels_of_all_arms_are_compiled_before_the_service_is_ready(monkeypatc
                 pass
 
     monkeypatch.setattr(warmup, "_move", move)
-    monkeypatch.setattr(warmup, "_call_all", lambda robot: asked.append(("all", robot.id)))
+    monkeypatch.setattr(warmup, "_calls", lambda robot: [lambda: asked.append(("all", robot.id))])
     cold = False
     kin.warm_up()
     assert asked == [("move", arms[0])], "a warm cache: what is left loads in milliseconds"

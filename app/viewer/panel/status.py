@@ -128,14 +128,14 @@ def _kind(result: IKResult) -> Kind:
     return "unreachable"
 
 
-def html(shown: Notice, warning: str = "") -> str:
-    """The notice as a card, which ``static/layout.css`` places over the scene, with a warning after it."""
+def html(shown: Notice, warning: str = "", waiting: str = "") -> str:
+    """The notice as a card, which ``static/layout.css`` places over the scene, with what is added to it."""
     symbol, color = LOOKS[shown.kind]
-    return render("panel/status", notice=shown, warning=warning, symbol=symbol, color=color)
+    return render("panel/status", notice=shown, warning=warning, waiting=waiting, symbol=symbol, color=color)
 
 
 class StatusLine:
-    """Shows one notice at a time, and with it a warning about the configuration of the arm.
+    """Shows one notice at a time, and with it a warning about the configuration of the arm and what is waited for.
 
     A notice is news until the visitor does something else; one without advice ends by itself, too.
 
@@ -149,7 +149,7 @@ class StatusLine:
         self._news_since: float | None = None
         self._over = False  # the visitor did something else, before the notice could be seen
         self._shown = first
-        self._warning = ""
+        self._warning = self._waiting = ""
         self._html = gui.add_html(html(first))
 
     @property
@@ -173,8 +173,14 @@ class StatusLine:
             self._warning = warning
             self._write()
 
+    def wait(self, waiting: str) -> None:
+        """Show what the visitor waits for, until the next call; nothing if it is empty."""
+        if waiting != self._waiting:
+            self._waiting = waiting
+            self._write()
+
     def _write(self) -> None:
-        show_content(self._html, html(self._shown, self._warning))
+        show_content(self._html, html(self._shown, self._warning, self._waiting))
 
     def show_result(self, result: IKResult, units: Units) -> None:
         """Show the result for a target."""

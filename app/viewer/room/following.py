@@ -123,7 +123,7 @@ class Follower:
         page = self._page
         view = replace(state.view, dark=page.view.dark, detailed=page.view.detailed)
         if view != page.view:
-            page.use_view(view)
+            page.looks.use_view(view)
         if state.frames != page.frames:
             page.use_frames(state.frames)
 

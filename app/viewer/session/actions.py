@@ -17,9 +17,10 @@ from app.viewer.labels import size_labels, text_factor
 from app.viewer.panel.script import Reply
 from app.viewer.panel.status import Notice, introduction
 from app.viewer.panel.target import DEFAULT_TASK, TASKS
-from app.viewer.panel.view import SIDES, ViewState
+from app.viewer.panel.view import SIDES
 from app.viewer.scene.gizmo import Pull
 from app.viewer.session.history import LONG_PAUSE, SHORT_PAUSE, History, Step, pause_within, same, without_results
+from app.viewer.session.looks import Looks
 from app.viewer.session.persistence import link_notice
 from app.viewer.session.robots import RobotPage, robot_of
 from app.viewer.session.state import PageState, decode
@@ -70,18 +71,7 @@ class ActionsPage(TypedPage, RobotPage, Protocol):
     """What actions may use of a page, in addition to what is saved of it and to its panel."""
 
     system_dark: bool
-
-    def use_colours(self, dark: bool | None, system_dark: bool) -> None:
-        """Make the page dark or light; None: as the visitor's system is."""
-
-    def use_units(self, units: Units) -> None:
-        """Show all numbers in these units."""
-
-    def use_view(self, view: ViewState) -> None:
-        """Show the page and the scene as `view` says."""
-
-    def use_library(self, why: str) -> None:
-        """A detailed body was read, or could not be, for this reason."""
+    looks: Looks
 
     def snapshot(self) -> PageState:
         """The present state."""
@@ -120,17 +110,17 @@ class Actions:
             "lesson": lambda title: page.lessons.choose(title) if page.lessons is not None else None,
             "robot": self._on_robot_choice,
             "task": self._on_task,
-            "radians": lambda radians: page.use_units(replace(page.units, degrees=not radians)),
-            "lengths": lambda name: page.use_units(page.panel.units.with_length(page.units, name)),
+            "radians": lambda radians: page.looks.use_units(replace(page.units, degrees=not radians)),
+            "lengths": lambda name: page.looks.use_units(page.panel.units.with_length(page.units, name)),
             "home": lambda _: self._move_into_view(arm.move_home, "Home configuration"),
             "random": lambda _: self._move_into_view(arm.move_to_random, "Random configuration"),
             "recall": lambda _: self._move(arm.recall_target, "The target is at the tool"),
             "copy-as": lambda name: page.panel.share.choose(name),
             "view": self._on_view,
             "look": self._on_drawn_as,
-            "body": page.use_library,
+            "body": page.looks.use_library,
             "colours": self._on_colours,
-            "system-dark": lambda dark: page.use_colours(page.view.dark, bool(dark)),
+            "system-dark": lambda dark: page.looks.use_colours(page.view.dark, bool(dark)),
             "camera": lambda _: page.camera.aim(arm.scene.body, self._frames(), glide=True),
             "fit-arm": lambda _: page.camera.look_at_arm(self._frames()),
             "look-from": self._look_from,
@@ -251,12 +241,12 @@ class Actions:
         self.history.arrive()
         if state.units != page.units:
             page.panel.units.show(state.units)
-            page.use_units(state.units)
+            page.looks.use_units(state.units)
         if state.frames != page.frames:
             page.use_frames(state.frames)
         page.use_obstacles(state.obstacles)
         if state.view != page.view:
-            page.use_view(replace(state.view))
+            page.looks.use_view(replace(state.view))
         self.adopt(state)
         if page.lessons is not None and state.lesson != page.lessons.key:
             page.lessons.open(state.lesson)
@@ -372,16 +362,16 @@ class Actions:
 
     def _on_colours(self, name: object) -> None:
         page = self._page
-        page.use_colours(page.panel.colours.read(name, page.view.dark), page.system_dark)
+        page.looks.use_colours(page.panel.colours.read(name, page.view.dark), page.system_dark)
 
     def _on_drawn_as(self, name: object) -> None:
         page = self._page
-        page.use_view(replace(page.view, look=page.panel.view.read_look(name, page.view.look)))
+        page.looks.use_view(replace(page.view, look=page.panel.view.read_look(name, page.view.look)))
 
     def _on_view(self, name: str, value: object) -> None:
         view = replace(self._page.view)
         setattr(view, name, bool(value))
-        self._page.use_view(view)
+        self._page.looks.use_view(view)
         if name == "avoid":
             self._page.solve_again()
 

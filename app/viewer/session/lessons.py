@@ -83,7 +83,7 @@ class LessonChoice:
                     each.show()
                     self.sheets = Worksheets(self._stage, None, self._page, folder=False)
                 return
-        chosen = next((lesson for lesson in LESSONS if lesson.title == title), None)
+        chosen = lesson_titled(title)
         if chosen is None:
             with self._parent:
                 self._overview = self._gui.add_html(_overview())
@@ -155,6 +155,16 @@ class LessonChoice:
         self._left[key] = progress
         while len(self._left) > KEPT:
             del self._left[next(iter(self._left))]
+
+
+def lesson_titled(title: object) -> type[Lesson] | None:
+    """The lesson with this title; None if there is none."""
+    return next((lesson for lesson in LESSONS if lesson.title == title), None)
+
+
+def lesson_with_key(key: str | None) -> type[Lesson] | None:
+    """The lesson with this key; None if there is none."""
+    return next((lesson for lesson in LESSONS if lesson.key == key), None)
 
 
 def _overview() -> str:

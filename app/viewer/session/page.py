@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import replace
 
 import viser
 
@@ -32,12 +31,14 @@ from app.viewer.scene.camera import Sphere, VisitorCamera
 from app.viewer.session.actions import Actions
 from app.viewer.session.controller import ArmController
 from app.viewer.session.lessons import LessonChoice
+from app.viewer.session.looks import Looks
 from app.viewer.session.numbers import Numbers
 from app.viewer.session.persistence import Persistence
 from app.viewer.session.posture import PosturePanel
+from app.viewer.session.preparing import LINK, Preparing
 from app.viewer.session.robots import ShownArm, discard_own, edit, robot_of
 from app.viewer.session.services import Services
-from app.viewer.session.state import PageState
+from app.viewer.session.state import PageState, without_arm
 from app.viewer.session.typed import BY_HAND
 from app.viewer.session.worker import Worker
 from app.viewer.tabs import TABS
@@ -45,7 +46,7 @@ from app.viewer.views.templates import render
 from app.viewer.viser_outbox import in_one_frame
 from kin import IKResult, Robot, Task
 from kin.transforms import Array
-from kin.units import DEFAULT_UNITS, Units
+from kin.units import DEFAULT_UNITS
 
 
 class VisitorPage(ShownArm, Worker):
@@ -98,7 +99,9 @@ class VisitorPage(ShownArm, Worker):
         self.sliders: JointSliders
         self._more_joints: viser.GuiFolderHandle | None = None
         self.numbers: Numbers
+        self.looks = Looks(self)
         self._actions = Actions(self)
+        self._preparing = Preparing(self, services.preparation)
 
     # Stage: what features may use
 
@@ -125,22 +128,12 @@ class VisitorPage(ShownArm, Worker):
         return discard_own(self)
 
     def redraw_body(self) -> None:
-        self.arm.scene.use_drawing(self.bodies.of(self.robot, self.own))
-        self._apply_view()
+        self.looks.redraw_body()
 
     def use_frames(self, frames: Frames) -> None:
         self.frames = frames
         self.numbers.use_frames()
         self.for_features(lambda feature: feature.on_style())
-
-    def use_library(self, why: str) -> None:
-        """A detailed body was read, or could not be, for this reason: then our own drawing stays."""
-        if not why:
-            self.redraw_body()
-        elif self.bodies.detailed and why != self.bodies.last_refusal:
-            self.bodies.last_refusal = why
-            detail = f"{why} The simple drawing stays."
-            self.notify(Notice("error", f"The real shape of {self.robot.name} cannot be shown", detail))
 
     def set_task(self, task: Task) -> None:
         self.panel.target.show(task)
@@ -157,8 +150,7 @@ class VisitorPage(ShownArm, Worker):
 
     def show_joints(self, folder: viser.GuiFolderHandle | None) -> None:
         self._more_joints = folder
-        self.sliders.remove()
-        self.sliders = self._make_sliders()
+        self.renew_sliders()
 
     def fit_view(self, spheres: Sequence[Sphere], points: Array | None = None) -> None:
         self.camera.fit(spheres, points)
@@ -197,39 +189,10 @@ class VisitorPage(ShownArm, Worker):
         self.status.show(lock_notice(locks))
         self.set_locks(locks)
 
-    def use_units(self, units: Units) -> None:
-        """Show all numbers in these units."""
-        self.units = units
-        self.status.use(units)
+    def renew_sliders(self) -> None:
+        """Make the sliders of the joints anew."""
         self.sliders.remove()
         self.sliders = self._make_sliders()
-        self.posture.show()
-        self.arm.scene.floor.use_units(units)
-        self.numbers.use_pose()
-        self.for_features(lambda feature: feature.on_style())
-
-    def use_colours(self, dark: bool | None, system_dark: bool) -> None:
-        """Make the page dark or light; None: as the visitor's system is."""
-        before = self.dark
-        self.view.dark, self.system_dark = dark, system_dark
-        if self.dark != before:
-            configure_theme(self.client.gui, self.dark)
-            self.for_features(lambda feature: feature.on_style())
-            self._apply_view()
-
-    def use_view(self, view: ViewState) -> None:
-        """Show the page and the scene as `view` says."""
-        before, self.view = self.view, replace(view, dark=self.view.dark)
-        self.panel.view.show(view)
-        if view.base_axes != before.base_axes:
-            self.arm.use_base_axes(view.base_axes)
-        if view.dark != before.dark:
-            self.panel.colours.show(view.dark)
-            self.use_colours(view.dark, self.system_dark)
-        if view.detailed != self.bodies.detailed:
-            self.bodies.detailed, self.bodies.last_refusal = view.detailed, ""
-            self.redraw_body()
-        self._apply_view()
 
     def settle_status(self) -> None:
         """End the news in the status: show what is true now."""
@@ -238,16 +201,6 @@ class VisitorPage(ShownArm, Worker):
     def snapshot(self) -> PageState:
         """The present state."""
         return self._persistence.snapshot()
-
-    def _apply_view(self) -> None:
-        scene = self.arm.scene
-        self.arm.avoid_collisions(self.view.avoid)
-        scene.show_as(self.view.look)
-        scene.show_frames(self.view.frames)
-        scene.show_labels(self.view.labels)
-        scene.show_axes(self.view.axes)
-        scene.floor.use_dark(self.dark)
-        scene.floor.use_units(self.units)
 
     def for_features(self, action: Callable[[Feature], None]) -> None:
         """Call every feature; an error of one does not stop the others."""
@@ -283,6 +236,8 @@ class VisitorPage(ShownArm, Worker):
     @property
     def _timeout(self) -> float | None:
         times = [feature.due for feature in self.features if feature.due is not None]
+        if self._preparing.due is not None:
+            times.append(self._preparing.due)
         if self.arm.moving or (hasattr(self, "camera") and self.camera.gliding):
             times.append(self._pace.interval)
         elif self._persistence.due is not None and not self.arm.dragging:
@@ -311,6 +266,8 @@ class VisitorPage(ShownArm, Worker):
                 if self.arm.target is None:
                     self.numbers.hide_target()
                 now = time.perf_counter()
+                if self._preparing.due is not None:
+                    self._preparing.tick()
                 if self.status.due(now) == 0.0:
                     self.settle_status()
                 self.camera.tick(now)
@@ -326,7 +283,13 @@ class VisitorPage(ShownArm, Worker):
             self._show_hints()
 
     def _act(self, key: Hashable, value: object) -> None:
-        self._actions.handle(key, value)
+        if not self._preparing.admits(key, value):
+            return
+        if key == LINK and isinstance(value, PageState):
+            self._actions.adopt(value)
+            self._persistence.restore(value)
+        else:
+            self._actions.handle(key, value)
 
     def _show_hints(self) -> None:
         """Tell ``static/hints.js`` where the gizmo is in the picture, and how long its arrows are there.
@@ -348,6 +311,9 @@ class VisitorPage(ShownArm, Worker):
         size_labels(self.client.scene, text_factor(self._persistence.text_size))
         self.own, self.frames = saved.own, saved.frames
         robot = robot_of(self, saved.robot)
+        later = self._preparing.lacks(saved, robot, self.offered)
+        if later:
+            saved, robot = without_arm(saved), self.store.robots[0]
         with self.client.atomic():
             if self.dark:
                 configure_theme(gui, True)
@@ -376,6 +342,9 @@ class VisitorPage(ShownArm, Worker):
             self._persistence.restore(saved)
             self.arm.draw(fresh=False)
             self._show_hints()
+            if later:
+                stored = self._persistence.stored
+                self._preparing.hold_state(stored, robot_of(self, stored.robot), self.offered)
             self.panel.script.show_start(self._persistence.begin(self.panel.share))
         self.client.flush()
 
@@ -387,7 +356,7 @@ class VisitorPage(ShownArm, Worker):
         self.panel.target.show(self.task)
         self.sliders = self._make_sliders()
         self.posture.use_robot()
-        self._apply_view()
+        self.looks.apply()
         self.arm.scene.size_gizmo(self.camera.small)
         self.camera.aim(self.arm.scene.body, kin.link_frames(robot, self.goal)[:, :3, 3], glide)
 

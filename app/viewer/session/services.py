@@ -9,6 +9,7 @@ from app.classroom.courses import Courses
 from app.exercises import Exercises
 from app.shared.clouds import Clouds
 from app.shared.maps import Maps
+from app.shared.preparation import Preparation
 from app.shared.store import Store
 from app.shared.summaries import Summaries
 from app.viewer.meshes.library import Library
@@ -18,8 +19,8 @@ from app.viewer.scene.motion import Pace
 
 @dataclass(frozen=True)
 class Services:
-    """The robots, the caches of expensive results, the readers of meshes, the frame rate, exercises, courses, and
-    the live state of classrooms."""
+    """The robots, the caches of expensive results, the readers of meshes, the frame rate, exercises, courses,
+    the live state of classrooms, and which kernels are compiled."""
 
     store: Store
     clouds: Clouds
@@ -31,3 +32,4 @@ class Services:
     exercises: Exercises
     courses: Courses
     classroom: Hub
+    preparation: Preparation

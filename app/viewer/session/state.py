@@ -113,6 +113,14 @@ class StoredPage:
     shown: str = ""
 
 
+def without_arm(state: PageState) -> PageState:
+    """A state as far as it does not depend on the robot on show."""
+    return PageState(
+        units=state.units, view=state.view, own=state.own, frames=state.frames, missing=state.missing,
+        unreadable=state.unreadable, ignored=state.ignored, refused=state.refused,
+    )  # fmt: skip
+
+
 def encode(state: PageState) -> str:
     """The state as a text of letters, digits, ``-`` and ``_``.
 

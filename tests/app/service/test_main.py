@@ -22,12 +22,14 @@ from live_server import serve, wait_for
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
+import app.service.compiler
 import app.service.startup
 from app.service.main import create_app, run
 from app.service.web.pages import static_folder
 from app.shared.settings import Settings
 from app.viewer.server import ViewerServer
 from kin import builtin_robots
+from kin.warmup import first_family, parts
 
 ROOT = Path(__file__).parents[3]
 PROTOCOL = f"viser-v{viser.__version__}"
@@ -47,8 +49,8 @@ def client() -> Iterator[TestClient]:
 
 
 def readiness(status: str, complete: bool) -> dict:
-    """What /readyz answers where rooms can be opened."""
-    return {"status": status, "complete": complete, "classrooms": "ready"}
+    """What /readyz answers where rooms can be opened and no kernel has to be compiled."""
+    return {"status": status, "complete": complete, "kernels": None, "classrooms": "ready"}
 
 
 def test_livez_and_readyz(client):
@@ -84,18 +86,21 @@ def test_missing_kernels_are_compiled_by_other_processes_which_a_stop_ends(monke
     steps: list[str] = []
 
     def start(command, **options):
-        started.append(popen(["sleep", "300"] if "rest" in command[-1] else ["true"], **options))
+        started.append(popen(["true"] if "first" in command[-1] else ["sleep", "300"], **options))
         steps.append(command[-1])
         return started[-1]
 
-    monkeypatch.setattr(app.service.startup.subprocess, "Popen", start)
+    monkeypatch.setattr(app.service.compiler.subprocess, "Popen", start)
     monkeypatch.setattr(app.service.startup, "compiled", lambda: False)
     monkeypatch.setattr(app.service.startup, "rest_compiled", lambda: False)
     monkeypatch.setattr(app.service.startup, "processors", lambda: processors)
     with TestClient(create_app(Settings())) as client:
         wait_for(lambda: client.get("/readyz").status_code == 200, 120)
-        wait_for(lambda: steps[-1:] == ["from kin import warmup; warmup.warm_up_rest()"])
+        wait_for(lambda: "warmup.parts()" in steps[-1])
         assert started[-1].poll() is None
+        kernels = client.get("/readyz").json()["kernels"]
+        assert kernels["ready"] == [first_family()]
+        assert [kernels["preparing"], *kernels["waiting"]] == list(parts())
     first = ["warm_up_first()", "warm_up_first(backwards=True)"][:processors]
     assert steps[:-1] == [f"from kin import warmup; warmup.{call}" for call in first]
     wait_for(lambda: started[-1].poll() is not None)

@@ -30,6 +30,7 @@ from app.viewer.panel.status import Notice
 from kin import InputError
 from kin.transforms import Array
 from kin.units import Units
+from kin.warmup import ALL
 
 INTERVAL = 0.08  # s between two starts of a moving arm
 PACE = 0.35  # s between two iterates that are played
@@ -56,6 +57,7 @@ class NumericLesson(Lesson):
 
     key = "numeric"
     title = "Numeric IK"
+    kernels = (ALL,)
     about = "Newton, transpose and damping from a start that you drag: iterates, failures, basins."
     outline = staticmethod(outline)
 

@@ -34,6 +34,7 @@ from app.viewer.scene.meshes import body
 from app.viewer.views.templates import render
 from kin import IKResult, InputError
 from kin.transforms import Array
+from kin.warmup import ALL
 
 SURVEY_INTERVAL = 0.1
 CONE_INTERVAL = 0.2
@@ -55,6 +56,7 @@ class Postures(Lesson):
 
     key = "postures"
     title = "Postures"
+    kernels = (ALL,)
     about = "All ways to reach a target, and the reason if there is none."
     outline = staticmethod(outline)
 

@@ -34,6 +34,7 @@ from app.viewer.self_motion import INSET, SMOOTH, End, ends, range_of, redundanc
 from kin import IKResult, InputError, Redundancy
 from kin.transforms import Array
 from kin.units import Units
+from kin.warmup import ALL
 
 FRAME = 1 / 30
 READ_INTERVAL = 0.05
@@ -55,6 +56,7 @@ class RedundancyLesson(Lesson):
 
     key = "redundancy"
     title = "Redundancy"
+    kernels = (ALL,)
     about = "How seven joints move while the tool stays where it is."
     outline = staticmethod(outline)
 

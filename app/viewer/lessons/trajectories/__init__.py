@@ -19,6 +19,7 @@ from app.viewer.lessons.trajectories.questions import outline
 from app.viewer.panel import assign, listen
 from app.viewer.scene.meshes import body
 from kin import InputError
+from kin.warmup import MOTIONS
 
 PATHS_HINT = "PTP in blue, LIN in orange: the two ways between the poses of the step Joints or tool"
 COLOURS = {"ptp": (0, 114, 178), "lin": (213, 94, 0)}
@@ -30,6 +31,7 @@ class TrajectoriesLesson(Lesson):
 
     key = "trajectories"
     title = "Trajectories"
+    kernels = (MOTIONS,)
     about = "How a motion becomes a function of time: profiles, PTP and LIN, singularities, jerk."
     outline = staticmethod(outline)
 

@@ -32,6 +32,7 @@ from app.viewer.tabs.program.screen import Screen
 from app.viewer.tabs.program.views import KINDS
 from kin import InputError, KinematicsError
 from kin.motion import Motion
+from kin.warmup import MOTIONS
 
 REPLAN = 0.2  # s without a change of the obstacles until the motion is planned again
 LINK = 7000  # bytes of all programs in a link
@@ -48,6 +49,7 @@ class ProgramTab(Feature):
 
     key = "program"
     title = "Program"
+    kernels = (MOTIONS,)
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)

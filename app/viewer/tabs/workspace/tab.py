@@ -25,6 +25,7 @@ from app.viewer.tabs.workspace.sizes import Sizes
 from kin import Robot, Section
 from kin.transforms import Array
 from kin.units import Units
+from kin.warmup import CAPABILITY, CLOUDS
 
 REDRAW = 1.0  # s between two updates of the section plot with more points
 DOT = 0.05  # s between two updates of the tool in the section plot
@@ -37,6 +38,7 @@ class Workspace(Feature):
 
     key: ClassVar[str] = "workspace"
     title: ClassVar[str] = "Workspace"
+    kernels = (CLOUDS,)
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
@@ -99,6 +101,10 @@ class Workspace(Feature):
         else:
             raise KeyError(key)
         self.due = 0.0  # the next tick determines when to wake up
+
+    @classmethod
+    def kernels_of(cls, key: Hashable) -> tuple[str, ...]:
+        return (CAPABILITY,) if isinstance(key, tuple) and key[0] == "capability" else cls.kernels
 
     def on_robot(self) -> None:
         self._clear()

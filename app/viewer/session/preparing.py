@@ -1,0 +1,160 @@
+"""Events that wait until the kernels they need are compiled, which happens on a new machine only.
+
+Compiling takes seconds. If an event were handled before that, the page would stand still without a reason. So it
+is held, the status card says what is being prepared, and the page can be used meanwhile.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+from app.shared.preparation import Preparation
+from app.viewer.feature import Feature, message_of
+from app.viewer.panel.layout import Panel
+from app.viewer.panel.status import StatusLine
+from app.viewer.session.lessons import LessonChoice, lesson_titled, lesson_with_key
+from app.viewer.session.state import PageState
+from kin import InputError, Robot
+from kin.warmup import ALL, COLLISIONS, all_of, family_of
+
+LOOK_AGAIN: Final = 0.2  # s
+HELD: Final = 64  # events of one page; the oldest are dropped
+LINK: Final = "link"  # event of a stored state that waits
+# Events after which nobody waits for another robot, or for a stored state.
+_REPLACING: Final = frozenset({"robot", "undo", "redo", "travel", LINK})
+
+
+class WaitingPage(Protocol):
+    """What may be used of a page."""
+
+    panel: Panel
+    status: StatusLine
+    lessons: LessonChoice | None
+
+    @property
+    def robot(self) -> Robot:
+        """The selected robot."""
+
+    @property
+    def features(self) -> list[Feature]:
+        """The tabs, and the open lesson with its steps."""
+
+    def post(self, key: Hashable, value: object = None) -> None:
+        """Queue an event."""
+
+
+@dataclass(frozen=True)
+class _Held:
+    key: Hashable
+    value: object
+    parts: tuple[str, ...]
+    what: str
+
+
+class Preparing:
+    """Holds the events of one page. Not thread-safe: the visitor's worker calls it."""
+
+    def __init__(self, page: WaitingPage, preparation: Preparation) -> None:
+        self._page = page
+        self._preparation = preparation
+        self._held: dict[Hashable, _Held] = {}
+
+    @property
+    def due(self) -> float | None:
+        """Seconds until `tick`; None: nothing is held."""
+        return LOOK_AGAIN if self._held else None
+
+    def admits(self, key: Hashable, value: object) -> bool:
+        """Whether an event can be handled now. Otherwise it is held, and posted again when it can."""
+        if self._preparation.complete and not self._held:
+            return True
+        event = key[1] if isinstance(key, tuple) and key[0] == "message" else key
+        if event in _REPLACING:
+            for name in _REPLACING:
+                self._held.pop(name, None)
+        try:
+            parts, what = self._needs(event, value)
+        except InputError:  # who handles it says what is wrong
+            return True
+        if self._preparation.ready(parts):
+            self._show()
+            return True
+        self._hold(event, _Held(key, value, parts, what))
+        return False
+
+    def lacks(self, state: PageState, robot: Robot, tabs: Sequence[type[Feature]]) -> bool:
+        """Whether a stored state of this robot cannot be shown yet."""
+        return not (self._preparation.complete or self._preparation.ready(_parts_of(state, robot, tabs)))
+
+    def hold_state(self, state: PageState, robot: Robot, tabs: Sequence[type[Feature]]) -> None:
+        """Post a stored state as `LINK` when it can be shown."""
+        self._hold(LINK, _Held(LINK, state, _parts_of(state, robot, tabs), f"the {robot.name}"))
+
+    def tick(self) -> None:
+        """Post the events that can be handled by now, and show how far the others are."""
+        for name, held in list(self._held.items()):
+            if self._preparation.ready(held.parts):
+                del self._held[name]
+                self._page.post(held.key, held.value)
+        self._show()
+
+    def _hold(self, event: Hashable, held: _Held) -> None:
+        self._held.pop(event, None)
+        self._held[event] = held
+        while len(self._held) > HELD:
+            del self._held[next(iter(self._held))]
+        self._preparation.want(held.parts)
+        self._show()
+
+    def _show(self) -> None:
+        """Say in the status card what the visitor has asked for last, and how far it is."""
+        if not self._held:
+            self._page.status.wait("")
+            return
+        held = list(self._held.values())[-1]
+        done, of = self._preparation.steps(held.parts)
+        step = f"step {min(done + 1, of)} of {of}"
+        self._page.status.wait(
+            f"Preparing {held.what} for the first time on this machine: {step}. This continues by itself."
+        )
+
+    def _needs(self, event: Hashable, value: object) -> tuple[tuple[str, ...], str]:
+        """The parts of the core that an event needs, and what they are for."""
+        page = self._page
+        match event:
+            case "robot":
+                robot = page.panel.robots.read(value)
+                lesson = None if page.lessons is None else page.lessons.shown
+                return (_parts(robot, lesson) if robot != page.robot else ()), f"the {robot.name}"
+            case "lesson":
+                chosen = lesson_titled(value)
+                if chosen is None:
+                    return (), ""
+                return _parts_for(page.robot, chosen.kernels), f"the lesson “{chosen.title}”"
+            case "feature":
+                name, key, _ = message_of(page.features, value)
+            case ("feature", str(name), key):
+                pass
+            case _:
+                return (), ""
+        feature = next((each for each in page.features if each.key == name), None)
+        if feature is None:
+            return (), ""
+        return _parts_for(page.robot, feature.kernels_of(key)), f"“{feature.title}”"
+
+
+def _parts(robot: Robot, *shown: Feature | type[Feature] | None) -> tuple[str, ...]:
+    """What moves a robot, with what these features need of it."""
+    collisions = (COLLISIONS,) if robot.capsules else ()
+    needs = [name for each in shown if each is not None for name in each.kernels]
+    return (family_of(robot), *collisions, *_parts_for(robot, needs))
+
+
+def _parts_for(robot: Robot, kernels: Sequence[str]) -> tuple[str, ...]:
+    return tuple(all_of(family_of(robot)) if name == ALL else name for name in kernels)
+
+
+def _parts_of(state: PageState, robot: Robot, tabs: Sequence[type[Feature]]) -> tuple[str, ...]:
+    return _parts(robot, lesson_with_key(state.lesson), *(tab for tab in tabs if tab.key in state.features))

@@ -1,0 +1,77 @@
+"""Which kernels are compiled: the order, what is wanted first, and what several processes see."""
+
+from __future__ import annotations
+
+from app.shared.preparation import ROOM, SIZE, Preparation
+from kin import builtin_robots
+from kin.warmup import MOTIONS, NUMERIC, all_of, family_of, first_family, parts
+
+
+def finish_part(preparation: Preparation, name: str) -> None:
+    while not preparation.ready((name,)):
+        preparation.done(name)
+
+
+def test_every_family_has_its_parts_and_all_fit_into_the_memory():
+    for robot in builtin_robots().values():
+        assert (family_of(robot) in parts()) == (family_of(robot) != first_family())
+        assert all_of(family_of(robot)) in parts()
+    assert len(parts()) <= ROOM
+    assert all(steps for steps in parts().values())
+
+
+def test_parts_come_in_their_order_and_are_ready_with_their_last_step():
+    preparation, seen = Preparation(), []
+    while (task := preparation.next()) is not None:
+        name, step = task
+        assert not preparation.ready((name,))
+        assert preparation.steps((name,)) == (step, len(parts()[name]))
+        assert preparation.state[1] == name
+        preparation.done(name)
+        seen.append(task)
+    assert seen == [(name, step) for name, steps in parts().items() for step in range(len(steps))]
+    assert preparation.ready(parts())
+    assert preparation.state == ([first_family(), *parts()], None, [])
+    assert not preparation.complete
+    preparation.finish()
+    assert preparation.complete
+
+
+def test_what_is_wanted_comes_next_even_within_another_part():
+    preparation = Preparation()
+    first, *others = parts()
+    preparation.done(first)
+    preparation.want((others[4], "no part", others[2]))
+    assert preparation.next() == (others[2], 0)
+    assert preparation.state[2] == [name for name in parts() if name != others[2]]
+    finish_part(preparation, others[2])
+    assert preparation.next() == (others[4], 0)
+    finish_part(preparation, others[4])
+    assert preparation.next() == (first, 1)
+    assert not preparation.ready((others[2], first))
+    assert preparation.ready((others[2], others[4]))
+
+
+def test_other_names_are_never_waited_for():
+    preparation = Preparation()
+    assert preparation.ready((first_family(), NUMERIC, "no part"))
+    assert preparation.ready(())
+    assert preparation.steps(("no part",)) == (0, 0)
+
+
+def test_processes_with_the_same_memory_see_the_same():
+    memory = bytearray(SIZE)
+    compiling, viewer = Preparation(memory), Preparation(memory)
+    viewer.want((MOTIONS,))
+    assert compiling.next() == (MOTIONS, 0)
+    finish_part(compiling, MOTIONS)
+    assert viewer.ready((MOTIONS,))
+    compiling.finish()
+    assert viewer.complete
+    assert viewer.steps((MOTIONS,)) == (len(parts()[MOTIONS]),) * 2
+
+
+def test_nothing_is_waited_for_once_all_is_compiled():
+    preparation = Preparation.finished()
+    assert preparation.ready(parts())
+    assert preparation.next() is None

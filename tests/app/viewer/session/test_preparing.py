@@ -1,0 +1,162 @@
+"""A page on a new machine: events wait for their kernels, and the page says so."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Iterator
+
+import numpy as np
+import pytest
+from fake_browser import FakeBrowser
+from live_server import serve_viewer
+
+import kin
+from app.shared.clouds import Clouds
+from app.shared.preparation import Preparation
+from app.shared.settings import Settings
+from app.shared.store import Store
+from app.viewer.server import ViewerServer
+from app.viewer.session.preparing import HELD, Preparing
+from app.viewer.session.state import PageState, encode
+from kin.warmup import COLLISIONS, MOTIONS, all_of, family_of, parts
+
+STORE = Store()
+PIONEER, UR5, PLANAR = STORE.get("pioneer5"), STORE.get("ur5"), STORE.get("planar3r")
+
+
+@pytest.fixture
+def preparation() -> Preparation:
+    kin.warm_up()
+    return Preparation()
+
+
+@pytest.fixture
+def port(preparation: Preparation) -> Iterator[int]:
+    with serve_viewer(ViewerServer(STORE, Settings(), Clouds(), preparation=preparation)) as port:
+        yield port
+
+
+def compile_parts(preparation: Preparation, names: Collection[str]) -> None:
+    for name in names:
+        while not preparation.ready((name,)):
+            preparation.done(name)
+
+
+def waits_for(tab: FakeBrowser, what: str) -> None:
+    tab.wait(lambda: f"Preparing {what} for the first time on this machine" in tab.html)
+
+
+def test_an_arm_opens_by_itself_when_it_is_compiled_and_the_page_can_be_used_meanwhile(port, preparation):
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        assert "Preparing" not in tab.html
+        tab.set("Robot", UR5.name)
+        of = len(parts()[family_of(UR5)]) + len(parts()[COLLISIONS])
+        waits_for(tab, "the UR5")
+        tab.wait(lambda: f"step 1 of {of}" in tab.html)
+        assert preparation.next() == (COLLISIONS, 0), "both parts are wanted, this one comes first"
+        preparation.done(COLLISIONS)
+        tab.wait(lambda: f"step 2 of {of}" in tab.html)
+        tab.set("1 rotating base", 37.25)
+        q = PIONEER.q_home.copy()
+        q[0] = np.radians(37.25)
+        tab.wait(lambda: np.allclose(tab.tool_pose(), kin.fk(PIONEER, q)))
+        assert "Preparing the UR5" in tab.html, "it does not end with other news"
+        compile_parts(preparation, (COLLISIONS, family_of(UR5)))
+        tab.wait(lambda: "Preparing" not in tab.html)
+        tab.settle()
+        assert np.allclose(tab.tool_pose(), kin.fk(UR5, UR5.q_home))
+
+
+def test_the_last_choice_counts_and_the_arm_on_show_ends_the_waiting(port, preparation):
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.set("Robot", UR5.name)
+        waits_for(tab, "the UR5")
+        tab.set("Robot", PLANAR.name)
+        waits_for(tab, f"the {PLANAR.name}")
+        tab.set("Robot", PIONEER.name)
+        tab.wait(lambda: "Preparing" not in tab.html)
+        compile_parts(preparation, parts())
+        tab.settle()
+        assert tab.value("Robot") == PIONEER.name
+        assert np.allclose(tab.tool_pose(), kin.fk(PIONEER, PIONEER.q_home))
+
+
+def test_a_lesson_waits_for_what_it_calls_and_others_open_at_once(port, preparation):
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.set("Lesson", "Redundancy")
+        waits_for(tab, "the lesson “Redundancy”")
+        tab.set("Lesson", "Screws")
+        tab.settle()
+        assert "Preparing" in tab.html
+        compile_parts(preparation, (all_of(family_of(PIONEER)),))
+        tab.wait(lambda: "Preparing" not in tab.html)
+        tab.settle()
+        assert tab.value("Lesson") == "Redundancy"
+
+
+def test_events_of_a_tab_wait(port, preparation):
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.say("feature", ["program", ["record"], None])
+        waits_for(tab, "“Program”")
+        assert preparation.next() == (MOTIONS, 0)
+        compile_parts(preparation, (MOTIONS,))
+        tab.wait(lambda: "Preparing" not in tab.html)
+
+
+def test_a_link_opens_when_its_arm_is_compiled(port, preparation):
+    q = UR5.q_home + 0.1
+    link = encode(PageState(robot="ur5", q=q, lesson="redundancy"))
+    with FakeBrowser(port, memory=json.dumps({"state": link})) as tab:
+        waits_for(tab, "the UR5")
+        assert tab.value("Robot") == PIONEER.name
+        compile_parts(preparation, (COLLISIONS, family_of(UR5)))
+        tab.settle()
+        assert tab.value("Robot") == PIONEER.name, "its lesson needs more"
+        compile_parts(preparation, (all_of(family_of(UR5)),))
+        tab.wait(lambda: "Preparing" not in tab.html)
+        tab.settle()
+        assert np.allclose(tab.tool_pose(), kin.fk(UR5, q))
+        assert tab.value("Lesson") == "Redundancy"
+
+
+def test_a_link_to_what_is_compiled_opens_at_once(port):
+    with FakeBrowser(port, memory=json.dumps({"state": encode(PageState(lesson="screws"))})) as tab:
+        tab.settle()
+        assert tab.value("Lesson") == "Screws"
+        assert "Preparing" not in tab.html
+
+
+def test_an_impatient_visitor_fills_no_memory(preparation):
+    class Page:
+        """Has one tab that needs kernels."""
+
+        lessons = None
+        robot = PIONEER
+        status = type("Status", (), {"wait": lambda self, words: None})()
+        posted: list[object]
+
+        class _Tab:
+            key, title = "program", "Program"
+
+            @staticmethod
+            def kernels_of(key):
+                return (MOTIONS,)
+
+        features = (_Tab,)
+
+        def post(self, key, value=None):
+            self.posted.append(key)
+
+    page = Page()
+    page.posted = []
+    held = Preparing(page, preparation)
+    for number in range(3 * HELD):
+        assert not held.admits(("feature", "program", number), None)
+    compile_parts(preparation, (MOTIONS,))
+    held.tick()
+    assert page.posted == [("feature", "program", number) for number in range(2 * HELD, 3 * HELD)]
+    assert held.due is None
