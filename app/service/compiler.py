@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 
-from app.shared.preparation import Preparation
+from kin.warmup.preparation import Preparation
 
 STEP = 0.02  # s between two looks at the processes
 

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 from enum import Enum, IntEnum
 from typing import Final
 
-from app.shared.preparation import SIZE
+from kin.warmup.preparation import SIZE
 
 logger = logging.getLogger("kinboard.connections")
 
@@ -72,7 +72,7 @@ class Member:
         number: index among all processes of the service.
         listener: the socket of this and its partners.
         phases: of all processes, in memory that they share.
-        kernels: memory of `app.shared.preparation`, which they share.
+        kernels: memory of `kin.warmup.preparation`, which they share.
         group: numbers of this and its partners, the process of the viewer first.
         links: sockets to the partners, by their numbers.
     """

@@ -2,7 +2,7 @@
 
 The landing page is served at once and shows "warming up" until ``/readyz`` reports ready. Kernels are loaded from
 numba's cache in milliseconds, or are compiled, which takes seconds. The service is ready when those of the first
-arm are; all others are compiled after that, part by part (:mod:`app.shared.preparation`), by another process
+arm are; all others are compiled after that, part by part (:mod:`kin.warmup.preparation`), by another process
 (:mod:`app.service.compiler`). Of several processes of a service the first one has the kernels compiled, and
 the others wait and load them. Those of the first arm are compiled by two such processes at once.
 """
@@ -22,12 +22,12 @@ from app.service.handover import Member, Phase, Role
 from app.service.web.viewer_proxy import ViewerBridge
 from app.shared.clouds import Clouds
 from app.shared.maps import Maps
-from app.shared.preparation import Preparation
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.shared.summaries import Summaries
 from app.shared.threads import lower_priority, processors, unpin
 from kin.warmup import compiled, rest_compiled, warm_up_first, warm_up_rest
+from kin.warmup.preparation import Preparation
 
 if TYPE_CHECKING:
     from app.viewer.server import ViewerServer

@@ -11,7 +11,7 @@ from starlette.responses import PlainTextResponse
 
 from app.service.startup import Status
 from app.shared.metrics import CONTENT_TYPE, exposition
-from app.shared.preparation import Preparation
+from kin.warmup.preparation import Preparation
 
 router = APIRouter(tags=["service"])
 

@@ -15,7 +15,6 @@ from app.exercises import Exercises
 from app.shared.clouds import Clouds
 from app.shared.connection import Connection, ConnectionEnded
 from app.shared.maps import Maps
-from app.shared.preparation import Preparation
 from app.shared.security import Rights
 from app.shared.settings import Settings
 from app.shared.store import Store
@@ -31,6 +30,7 @@ from app.viewer.session.page import VisitorPage
 from app.viewer.session.services import Services
 from app.viewer.viser_patches import cache_type_hints, set_events_in_their_loop
 from app.viewer.viser_server import PortlessServer, client_page, start_viser
+from kin.warmup.preparation import Preparation
 
 log = logging.getLogger(__name__)
 

@@ -10,7 +10,6 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
 
-from app.shared.preparation import Preparation
 from app.viewer.feature import Feature, message_of
 from app.viewer.panel.layout import Panel
 from app.viewer.panel.status import StatusLine
@@ -18,6 +17,7 @@ from app.viewer.session.lessons import LessonChoice, lesson_titled, lesson_with_
 from app.viewer.session.state import PageState
 from kin import InputError, Robot
 from kin.warmup import ALL, COLLISIONS, all_of, family_of
+from kin.warmup.preparation import Preparation
 
 LOOK_AGAIN: Final = 0.2  # s
 HELD: Final = 64  # events of one page; the oldest are dropped

@@ -12,13 +12,13 @@ from live_server import serve_viewer
 
 import kin
 from app.shared.clouds import Clouds
-from app.shared.preparation import Preparation
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.server import ViewerServer
 from app.viewer.session.preparing import HELD, Preparing
 from app.viewer.session.state import PageState, encode
 from kin.warmup import COLLISIONS, MOTIONS, all_of, family_of, parts
+from kin.warmup.preparation import Preparation
 
 STORE = Store()
 PIONEER, UR5, PLANAR = STORE.get("pioneer5"), STORE.get("ur5"), STORE.get("planar3r")

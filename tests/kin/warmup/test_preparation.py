@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from app.shared.preparation import ROOM, SIZE, Preparation
 from kin import builtin_robots
 from kin.warmup import MOTIONS, NUMERIC, all_of, family_of, first_family, parts
+from kin.warmup.preparation import ROOM, SIZE, Preparation
 
 
 def finish_part(preparation: Preparation, name: str) -> None:

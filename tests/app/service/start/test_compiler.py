@@ -9,8 +9,8 @@ from live_server import wait_for
 
 from app.service import compiler
 from app.service.compiler import PartsCompiler
-from app.shared.preparation import Preparation
 from kin.warmup import COLLISIONS, parts
+from kin.warmup.preparation import Preparation
 
 
 @pytest.fixture

@@ -1,7 +1,7 @@
-"""Which kernels of the service are compiled: on a new machine the parts of the core are, one after the other.
+"""Which kernels are compiled by now: on a new machine the parts of the core are, one after the other.
 
-One process has them compiled (:mod:`app.service.compiler`). All processes of the service see in shared memory how
-far it is, and may ask for a part before its turn.
+One process has them compiled. All processes that share the memory see how far it is, and may ask for a part before
+its turn.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Preparation:
 
     @classmethod
     def finished(cls) -> Preparation:
-        """Of a service whose kernels are compiled."""
+        """All kernels are compiled."""
         made = cls()
         made.finish()
         return made
