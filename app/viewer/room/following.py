@@ -15,7 +15,7 @@ import numpy as np
 
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel.status import READY
-from app.viewer.session.actions import ActionsPage
+from app.viewer.session.actions.page import ActionsPage
 from app.viewer.session.history import without_results
 from app.viewer.session.state import PageState, decode
 from kin import Obstacle, Robot

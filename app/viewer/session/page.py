@@ -29,6 +29,7 @@ from app.viewer.panel.status import READY, Notice, StatusLine
 from app.viewer.panel.view import ViewState, configure_theme
 from app.viewer.scene.camera import Sphere, VisitorCamera
 from app.viewer.session.actions import Actions
+from app.viewer.session.actions.typed import BY_HAND
 from app.viewer.session.controller import ArmController
 from app.viewer.session.lessons import LessonChoice
 from app.viewer.session.looks import Looks
@@ -39,7 +40,6 @@ from app.viewer.session.preparing import LINK, Preparing
 from app.viewer.session.robots import ShownArm, discard_own, edit, robot_of
 from app.viewer.session.services import Services
 from app.viewer.session.state import PageState, without_arm
-from app.viewer.session.typed import BY_HAND
 from app.viewer.session.worker import Worker
 from app.viewer.tabs import TABS
 from app.viewer.views.templates import render
@@ -55,7 +55,7 @@ class VisitorPage(ShownArm, Worker):
     The methods that `Worker` calls thread-safe may be called by any thread; everything else belongs to the worker.
     The page is the :class:`~app.viewer.feature.Stage` of its features, the listener of its arm's controller, the
     :class:`~app.viewer.session.persistence.SavedPage` of its persistence, and the
-    :class:`~app.viewer.session.actions.ActionsPage` of the visitor's actions.
+    :class:`~app.viewer.session.actions.page.ActionsPage` of the visitor's actions.
 
     Args:
         token: whether programs must send an access token.

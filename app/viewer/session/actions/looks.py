@@ -1,0 +1,74 @@
+"""The visitor's actions on the looks of the page and on the view of the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import kin
+from app.viewer.labels import size_labels, text_factor
+from app.viewer.panel.view import SIDES
+from app.viewer.session.actions.page import ActionsPage
+from kin.transforms import Array
+
+
+class LookControls:
+    """Changes the looks of one page.
+
+    Attributes:
+        handlers: by the first part of an event's key; each takes the other parts, and the value.
+    """
+
+    def __init__(self, page: ActionsPage) -> None:
+        self._page = page
+        arm, looks = page.arm, page.looks
+        self.handlers: dict[str, Callable[..., Any]] = {
+            "radians": lambda radians: looks.use_units(replace(page.units, degrees=not radians)),
+            "lengths": lambda name: looks.use_units(page.panel.units.with_length(page.units, name)),
+            "copy-as": lambda name: page.panel.share.choose(name),
+            "view": self._on_view,
+            "look": self._on_drawn_as,
+            "body": looks.use_library,
+            "colours": self._on_colours,
+            "system-dark": lambda dark: looks.use_colours(page.view.dark, bool(dark)),
+            "camera": lambda _: page.camera.aim(arm.scene.body, self._frames(), glide=True),
+            "fit-arm": lambda _: page.camera.look_at_arm(self._frames()),
+            "look-from": self._look_from,
+            "resized": self._on_resize,
+            "looked": self._on_look,  # the viewpoint is read when the camera rests
+            "frame": lambda name: page.use_frames(page.frames.choose(name)),
+            "text-size": lambda name: size_labels(page.client.scene, text_factor(name)),
+        }
+
+    def _on_resize(self, _: object) -> None:
+        self._page.camera.refit()
+        self._on_look(None)
+
+    def _on_look(self, _: object) -> None:
+        self._page.arm.scene.size_gizmo(self._page.camera.small)
+
+    def _look_from(self, side: object, _: object = None) -> None:
+        if side not in SIDES:
+            raise kin.InputError("look-from", side, "one of " + ", ".join(SIDES))
+        self._page.camera.look_from(side, self._frames())
+
+    def _frames(self) -> Array:
+        """Origins ``(n, 3)`` of the frames of the arm where it is heading."""
+        frames: Array = kin.link_frames(self._page.robot, self._page.goal)[:, :3, 3]
+        return frames
+
+    def _on_colours(self, name: object) -> None:
+        page = self._page
+        page.looks.use_colours(page.panel.colours.read(name, page.view.dark), page.system_dark)
+
+    def _on_drawn_as(self, name: object) -> None:
+        page = self._page
+        page.looks.use_view(replace(page.view, look=page.panel.view.read_look(name, page.view.look)))
+
+    def _on_view(self, name: str, value: object) -> None:
+        view = replace(self._page.view)
+        setattr(view, name, bool(value))
+        self._page.looks.use_view(view)
+        if name == "avoid":
+            self._page.solve_again()
