@@ -141,15 +141,15 @@ def create_app(
     complete_document(app, store, settings)
     app.router.routes.extend([*api_routes(), *page_routes(), *embedding_routes(), *bridge.routes()])
     app.router.routes.extend([*room_routes(classroom, settings, store), *scoreboard.routes()])
-    app.router.routes.extend(lti_routes(classroom, settings, partial(_exercises, settings, store)))
+    app.router.routes.extend(lti_routes(classroom, settings, partial(_courses, settings, store)))
     app.include_router(status.router)
     _add_middleware(app, settings, Guests(classroom))
     return app
 
 
-def _exercises(settings: Settings, store: Store) -> list[tuple[str, str]]:
-    """Ids and titles of the exercises."""
-    return [(each.id, each.title) for each in Exercises(settings.exercises, store.get).all]
+def _courses(settings: Settings, store: Store) -> Courses:
+    """The courses and exercises that a learning platform may link to."""
+    return Courses(Exercises(settings.exercises, store.get), settings.courses, store.get)
 
 
 def _described(lifespan: Callable[[FastAPI], AbstractAsyncContextManager[None]]) -> FastAPI:

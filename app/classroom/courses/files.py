@@ -7,6 +7,7 @@ what is valid.
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from collections.abc import Callable
 from difflib import get_close_matches
@@ -121,14 +122,26 @@ class Courses:
     @cached_property
     def all(self) -> tuple[Course, ...]:
         """In the order of the files' names; raises `ExerciseFileError`."""
-        found: list[Course] = []
+        return tuple(course for _, course in self._files)
+
+    @cached_property
+    def named(self) -> dict[str, Course]:
+        """By the file's name without its ending and a number before it: ``1-first-steps.toml`` is *first-steps*.
+
+        Of two files with the same name, the operator's counts. Raises `ExerciseFileError`.
+        """
+        return {re.sub(r"^\d+-", "", path.stem): course for path, course in self._files}
+
+    @cached_property
+    def _files(self) -> list[tuple[Path, Course]]:
+        found: list[tuple[Path, Course]] = []
         for folder in self._folders:
             try:
                 paths = sorted(path for path in folder.iterdir() if path.suffix == ".toml")
             except OSError as error:
                 raise ExerciseFileError(str(folder), "folder", str(error), "a folder that can be read") from error
-            found += [load_course(path, self.exercises, self.find) for path in paths]
-        return tuple(found)
+            found += [(path, load_course(path, self.exercises, self.find)) for path in paths]
+        return found
 
 
 def _item(fields: Fields, exercises: Exercises, find: Find) -> Item:

@@ -48,7 +48,7 @@ class Launch:
         alias: a first name if the platform tells it, else "Student" or "Teacher".
         teacher: whether the user teaches here.
         resource: id of the link within the deployment, and its title.
-        exercise: id of the exercise that the link is for; empty: none.
+        exercise, course: what the link names, not checked; empty: nothing.
         grades: the address of the column for scores, if we may write there; empty: none.
         linking: settings of a deep linking request.
     """
@@ -62,6 +62,7 @@ class Launch:
     resource: str
     title: str
     exercise: str
+    course: str
     grades: str
     linking: Mapping[str, Any]
 
@@ -190,7 +191,10 @@ def _launch(claims: Mapping[str, Any], platform: Platform) -> Launch:
     column = grades.get("lineitem") if SCORE_SCOPE in (grades.get("scope") or ()) else ""
     alias = claims.get("given_name")
     alias = alias if isinstance(alias, str) and alias.strip() else "Teacher" if teacher else "Student"
-    exercise = _table(claims, CLAIM + "custom").get("exercise")
+    custom = _table(claims, CLAIM + "custom")
+    exercise, course = (
+        text if isinstance(text := custom.get(name), str) else "" for name in ("exercise", "course")
+    )
     return Launch(
         platform=platform,
         kind=kind,
@@ -200,7 +204,8 @@ def _launch(claims: Mapping[str, Any], platform: Platform) -> Launch:
         teacher=teacher,
         resource=str(resource.get("id", ""))[:255],
         title=str(resource.get("title") or "Class")[:80],
-        exercise=exercise if isinstance(exercise, str) else "",
+        exercise=exercise,
+        course=course,
         grades=column if isinstance(column, str) else "",
         linking=_table(claims, LINKING),
     )

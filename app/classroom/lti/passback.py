@@ -89,7 +89,8 @@ class Passback:
             platform = self._platforms.find(column.issuer, column.client_id)
             if platform is None:
                 return False
-            post_score(self._platforms, platform, column.address, column.user, column.best)
+            where = column.address, column.user
+            post_score(self._platforms, platform, *where, column.score, column.most, column.done)
         except ClassroomUnavailable:
             return True
         except GradeRefused as error:

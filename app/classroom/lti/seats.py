@@ -11,6 +11,7 @@ from sqlalchemy.exc import IntegrityError
 
 from app.classroom.clock import now
 from app.classroom.database import Database
+from app.classroom.lti.contents import Content
 from app.classroom.lti.launches import Launch
 from app.classroom.rooms import Rooms, clean_name
 from app.classroom.tables import Attempt, LtiNonce, LtiRoom, LtiSeat, Room, Seat
@@ -22,14 +23,20 @@ LONGEST_ALIAS = 32
 
 @dataclass(frozen=True)
 class Column:
-    """Where the score of a seat goes."""
+    """Where the score of a seat goes.
+
+    Attributes:
+        score: 0 to `most`.
+        done: whether nothing is left to do.
+    """
 
     issuer: str
     client_id: str
     address: str
     user: str
-    exercise: str
-    best: float
+    score: float
+    most: int
+    done: bool
 
 
 class LtiSeats:
@@ -50,12 +57,16 @@ class LtiSeats:
                 return False
         return True
 
-    def take(self, launch: Launch) -> Ticket:
-        """The room of the launch's link for a teacher, a seat in it for anybody else; raises `RefusedError`."""
+    def take(self, launch: Launch, content: Content | None) -> Ticket:
+        """The room of the launch's link for a teacher, a seat in it for anybody else; raises `RefusedError`.
+
+        Args:
+            content: what the link opens, whose score goes to the platform.
+        """
         platform = launch.platform
         parts = (platform.issuer, platform.client_id, launch.deployment, launch.resource)
         link = _digest(*parts)
-        room, code = self._room(link, launch)
+        room, code = self._room(link, launch, content)
         if launch.teacher:
             return Ticket(room)
         user = _digest(link, launch.user)
@@ -72,7 +83,8 @@ class LtiSeats:
             "client_id": platform.client_id,
             "subject": launch.user,
             "address": launch.grades,
-            "exercise": launch.exercise,
+            "exercise": content.key if content is not None and content.kind == "exercise" else "",
+            "course": [] if content is None else [*content.exercises],
             "seat_id": ticket.seat,
         }
         with self._database.write() as connection:
@@ -82,27 +94,32 @@ class LtiSeats:
         return ticket
 
     def column(self, seat: str) -> Column | None:
-        """Where the score of this seat goes, with its best attempt at the link's exercise; None: nowhere."""
+        """Where the score of this seat goes; None: nowhere, or there is none yet.
+
+        The score is that of the best attempt at the link's exercise, or how many exercises of the link's course
+        are solved.
+        """
         with self._database.read() as connection:
             row = connection.execute(select(LtiSeat).where(LtiSeat.seat_id == seat)).one_or_none()
-            if row is None or not row.address or not row.exercise:
+            if row is None or not row.address:
                 return None
-            tries = select(func.max(Attempt.score)).where(
-                Attempt.seat_id == seat, Attempt.exercise == row.exercise
-            )
-            best = connection.scalar(tries)
-        if best is None:
+            asked = row.course or [row.exercise]
+            best = select(func.max(Attempt.score)).where(Attempt.seat_id == seat, Attempt.exercise.in_(asked))
+            scores = connection.scalars(best.group_by(Attempt.exercise)).all()
+        if not scores:
             return None
-        return Column(row.issuer, row.client_id, row.address, row.subject, row.exercise, best)
+        score, most = (sum(each >= 1.0 for each in scores), len(asked)) if row.course else (scores[0], 1)
+        done = not row.course or score == most
+        return Column(row.issuer, row.client_id, row.address, row.subject, score, most, done)
 
-    def _room(self, link: str, launch: Launch) -> tuple[str, str]:
+    def _room(self, link: str, launch: Launch, content: Content | None) -> tuple[str, str]:
         query = select(Room.id, Room.code).join(LtiRoom, LtiRoom.room_id == Room.id).where(LtiRoom.id == link)
         with self._database.read() as connection:
             found = connection.execute(query.where(Room.ends > now())).one_or_none()
         if found is not None:
             return found.id, found.code
         made = self._rooms.open(launch.title, LIFE)
-        state = {"task": {"exercise": launch.exercise, "at": made.created}} if launch.exercise else {}
+        state = {} if content is None else content.state(made.created)
         with self._database.write() as connection:
             found = connection.execute(query).one_or_none()  # another launch may have been faster
             if found is None:

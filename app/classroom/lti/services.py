@@ -15,6 +15,7 @@ from urllib.parse import urlencode, urlsplit, urlunsplit
 
 import jwt
 
+from app.classroom.lti.contents import Content
 from app.classroom.lti.launches import CLAIM, SCORE_SCOPE, Launch
 from app.classroom.lti.platforms import Platform, Platforms, is_safe
 
@@ -43,22 +44,9 @@ class GradeRefused(Exception):  # noqa: N818 - a finding, with a sentence for th
         self.final = final
 
 
-def link_answer(platforms: Platforms, launch: Launch, items: Sequence[tuple[str, str]], launch_url: str) -> str:
-    """The signed answer to a deep linking request.
-
-    Args:
-        items: id and title of each exercise that was chosen.
-    """
-    content = [
-        {
-            "type": "ltiResourceLink",
-            "title": title,
-            "url": launch_url,
-            "custom": {"exercise": exercise},
-            "lineItem": {"label": title, "scoreMaximum": 1, "resourceId": exercise},
-        }
-        for exercise, title in items
-    ]
+def link_answer(platforms: Platforms, launch: Launch, chosen: Sequence[Content], launch_url: str) -> str:
+    """The signed answer to a deep linking request."""
+    content = [each.item(launch_url) for each in chosen]
     claims: dict[str, Any] = {
         CLAIM + "message_type": "LtiDeepLinkingResponse",
         CLAIM + "version": "1.3.0",
@@ -70,8 +58,20 @@ def link_answer(platforms: Platforms, launch: Launch, items: Sequence[tuple[str,
     return _sign(platforms, launch.platform.client_id, launch.platform.issuer, claims)
 
 
-def post_score(platforms: Platforms, platform: Platform, column: str, user: str, score: float) -> None:
-    """Write a user's score, 0 to 1, into a column of the gradebook; raises `GradeRefused`."""
+def post_score(
+    platforms: Platforms,
+    platform: Platform,
+    column: str,
+    user: str,
+    score: float,
+    most: int = 1,
+    done: bool = True,
+) -> None:
+    """Write a user's score, 0 to `most`, into a column of the gradebook; raises `GradeRefused`.
+
+    Args:
+        done: whether the user has come to the end; the score counts in any case.
+    """
     if not is_safe(column):
         raise GradeRefused("the address of the column is not HTTPS", final=True)
     assertion = _sign(platforms, platform.client_id, platform.token_url, {"sub": platform.client_id})
@@ -91,9 +91,9 @@ def post_score(platforms: Platforms, platform: Platform, column: str, user: str,
     body = {
         "userId": user,
         "scoreGiven": score,
-        "scoreMaximum": 1,
+        "scoreMaximum": most,
         "timestamp": datetime.now(UTC).isoformat(),
-        "activityProgress": "Completed",
+        "activityProgress": "Completed" if done else "InProgress",
         "gradingProgress": "FullyGraded",
     }
     _send(address, json.dumps(body).encode(), "application/vnd.ims.lis.v1.score+json", str(access))

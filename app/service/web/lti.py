@@ -1,4 +1,4 @@
-"""The routes below ``/lti``: login, launch, our public keys, and the choice of exercises for a course.
+"""The routes below ``/lti``: login, launch, our public keys, and the choice of exercises and courses.
 
 A platform's page may show them in a frame. Their forms carry what a platform or we have signed, so they need no
 cookie of ours except the one that ties a launch to the browser of its login.
@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import html
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -21,31 +22,31 @@ from starlette.routing import BaseRoute, Route
 from app.api.problems import ProblemError
 from app.classroom import COOKIE, ClassroomUnavailable, Hub, RefusedError
 from app.classroom.clock import now
+from app.classroom.courses import Courses
 from app.service.web.access import pass_guest
 from app.shared.security import PAGE_POLICY, set_cookie
 from app.shared.settings import Settings
 
 if TYPE_CHECKING:
+    from app.classroom.lti.contents import Content
     from app.classroom.lti.launches import Launch, Logins
     from app.classroom.lti.platforms import Platforms
     from app.classroom.lti.seats import LtiSeats
 
 STATE_COOKIE = "kinboard_lti"
-CHOICE_TIME = 3600  # seconds for choosing exercises
+CHOICE_TIME = 3600  # seconds for choosing
 MAX_FORM = 80_000  # bytes; tokens have up to 64 KiB
 _PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
 <meta name="color-scheme" content="light dark"><title>{title}</title>
 <link rel="stylesheet" href="../static/lti.css">
 <main><h1>{title}</h1>{body}</main></html>"""
 
-Titles = Callable[[], Sequence[tuple[str, str]]]
 
-
-def lti_routes(hub: Hub, settings: Settings, titles: Titles) -> list[BaseRoute]:
+def lti_routes(hub: Hub, settings: Settings, courses: Callable[[], Courses]) -> list[BaseRoute]:
     """The routes, if the operator has a file of platforms; scores of attempts are then sent to them.
 
     Args:
-        titles: ids and titles of the exercises.
+        courses: reads the courses and exercises that may be linked to.
 
     Raises:
         ImportError: the extra ``lti`` is not installed.
@@ -57,7 +58,7 @@ def lti_routes(hub: Hub, settings: Settings, titles: Titles) -> list[BaseRoute]:
     from app.classroom.lti.platforms import load_platforms
 
     platforms = load_platforms(settings.lti)
-    pages = _Pages(hub, platforms, titles)
+    pages = _Pages(hub, platforms, courses)
     passback = Passback(platforms, lambda seat: pages.seats.column(seat))
     hub.on_attempt = passback.attempted
     return [
@@ -87,10 +88,10 @@ def check_platforms(settings: Settings) -> None:
 
 
 class _Pages:
-    def __init__(self, hub: Hub, platforms: Platforms, titles: Titles) -> None:
+    def __init__(self, hub: Hub, platforms: Platforms, courses: Callable[[], Courses]) -> None:
         self._hub = hub
         self._platforms = platforms
-        self._titles = titles
+        self._courses = courses
         self._seats: LtiSeats | None = None
         self._logins: Logins | None = None
 
@@ -103,6 +104,13 @@ class _Pages:
             rooms = self._hub.rooms
             self._seats = LtiSeats(self._hub.database, rooms)
         return self._seats
+
+    @cached_property
+    def _contents(self) -> list[Content]:
+        """What links may open; read when it is first asked for."""
+        from app.classroom.lti.contents import contents_of
+
+        return contents_of(self._courses())
 
     def _key(self) -> str:
         seats = self.seats
@@ -139,7 +147,8 @@ class _Pages:
         return answer
 
     async def launch(self, request: Request) -> Response:
-        """Verify a launch, and take the user to the room of its link, or to the choice of exercises."""
+        """Verify a launch, and take the user to the room of its link, or to the choice of contents."""
+        from app.classroom.lti.contents import content_of
         from app.classroom.lti.launches import LINK, LaunchRefused
 
         form = {name: values[0] for name, values in (await _form(request)).items()}
@@ -151,9 +160,10 @@ class _Pages:
             launch = await run_in_threadpool(
                 logins.finish, form.get("id_token", ""), form.get("state", ""), cookie
             )
+            contents = await run_in_threadpool(lambda: self._contents)
             if launch.kind == LINK:
                 return self._choices(launch)
-            ticket = await run_in_threadpool(self.seats.take, launch)
+            ticket = await run_in_threadpool(self.seats.take, launch, content_of(launch, contents))
             room = await run_in_threadpool(self._hub.rooms.find, ticket)
         except (LaunchRefused, RefusedError) as error:
             return refused(str(error), 403)
@@ -184,19 +194,25 @@ class _Pages:
         ]
         signed = self._signer().dumps(about)
         kind = "checkbox" if many else "radio"
-        rows = "".join(
-            f'<label><input type="{kind}" name="exercise" value="{html.escape(key)}"> {html.escape(title)}</label>'
-            for key, title in self._titles()
-        )
+
+        def rows(what: str) -> str:
+            return "".join(
+                f'<label><input type="{kind}" name="content" value="{html.escape(each.name)}"> '
+                f"<span>{html.escape(each.title)}{_extent(each)}</span></label>"
+                for each in self._contents
+                if each.kind == what
+            )
+
         body = (
             f'<form method="post" action="choose"><input type="hidden" name="about" value="{html.escape(signed)}">'
-            f"<fieldset><legend>Which exercises?</legend>{rows}</fieldset>"
+            f"<fieldset><legend>Whole courses</legend>{rows('course')}</fieldset>"
+            f"<fieldset><legend>Single exercises</legend>{rows('exercise')}</fieldset>"
             "<button>Add to the course</button></form>"
         )
-        return HTMLResponse(_PAGE.format(title="Exercises for your course", body=body))
+        return HTMLResponse(_PAGE.format(title="Kinboard for your course", body=body))
 
     async def choose(self, request: Request) -> Response:
-        """The signed answer with the chosen exercises, which the browser takes back to the platform."""
+        """The signed answer with what was chosen, which the browser takes back to the platform."""
         from app.classroom.lti.launches import LINK, Launch
         from app.classroom.lti.services import link_answer
 
@@ -209,10 +225,10 @@ class _Pages:
         platform = self._platforms.find(issuer, client_id)
         if platform is None:
             return refused("The platform is no longer registered here.", 403)
-        titles = dict(self._titles())
-        chosen = [(key, titles[key]) for key in form.get("exercise", []) if key in titles]
+        known = {each.name: each for each in await run_in_threadpool(lambda: self._contents)}
+        chosen = [known[name] for name in dict.fromkeys(form.get("content", [])) if name in known]
         linking: dict[str, Any] = {} if data is None else {"data": data}
-        launch = Launch(platform, LINK, deployment, "", "", True, "", "", "", "", linking)
+        launch = Launch(platform, LINK, deployment, "", "", True, "", "", "", "", "", linking)
         answer = link_answer(self._platforms, launch, chosen, f"{request.base_url}lti/launch")
         body_html = (
             f'<p>{len(chosen)} chosen.</p><form method="post" action="{html.escape(back)}">'
@@ -221,11 +237,19 @@ class _Pages:
         )
         parts = urlsplit(back)
         policy = PAGE_POLICY.replace("form-action 'self'", f"form-action {parts.scheme}://{parts.netloc}")
-        page = _PAGE.format(title="Exercises for your course", body=body_html)
+        page = _PAGE.format(title="Kinboard for your course", body=body_html)
         return HTMLResponse(page, headers={"content-security-policy": policy, "cache-control": "no-store"})
 
     def _signer(self) -> URLSafeTimedSerializer:
         return URLSafeTimedSerializer(self._key(), salt="kinboard.lti.choice")
+
+
+def _extent(content: Content) -> str:
+    """How many points a course gives; nothing for an exercise."""
+    if content.kind == "exercise":
+        return ""
+    many = content.most
+    return f" <small>{many} exercise{'s' if many != 1 else ''}{'' if many else ', no score'}</small>"
 
 
 async def _form(request: Request) -> dict[str, list[str]]:

@@ -148,6 +148,10 @@ def test_names_of_items() -> None:
 def test_the_operators_folder_comes_last(tmp_path: Path) -> None:
     (tmp_path / "week1.toml").write_text(FILE, encoding="utf-8")
     assert [course.title for course in Courses(ALL, tmp_path).all][-1] == "Week 1"
+    named = Courses(ALL, tmp_path).named
+    assert {"first-steps", "joint-angles", "speeds-and-motions"} < set(named)
+    (tmp_path / "07-first-steps.toml").write_text(FILE)
+    assert Courses(ALL, tmp_path).named["first-steps"].title == "Week 1", "the operator's counts"
     assert load_course(tmp_path / "week1.toml", ALL) == parse_course(FILE, ALL)
     with pytest.raises(ExerciseFileError, match="a folder that can be read"):
         _ = Courses(ALL, tmp_path / "none").all

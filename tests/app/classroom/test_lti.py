@@ -20,11 +20,13 @@ from live_server import wait_for
 from pydantic import SecretStr
 
 from app.classroom import COOKIE, Hub, NewAttempt
+from app.classroom.courses import Courses, course_of
 from app.classroom.lti import passback as passback_module
 from app.classroom.lti.launches import CLAIM, GRADES, LEARN, LINK, LINKING, SCORE_SCOPE
 from app.classroom.lti.platforms import PlatformFileError, key_file, load_platforms, make_key
 from app.classroom.lti.services import GradeRefused, post_score
 from app.cli.parser import main
+from app.exercises import Exercises
 from app.service.main import create_app, run
 from app.service.web.lti import STATE_COOKIE
 from app.shared.settings import Settings
@@ -318,6 +320,59 @@ def test_a_score_goes_back(browser: TestClient, platform: Platform, application,
     assert "comment" not in sent
 
 
+def test_a_course_opens_in_the_room_and_its_score_is_the_share_that_is_solved(
+    browser: TestClient, platform: Platform, application, monkeypatch
+) -> None:
+    monkeypatch.setattr(passback_module, "PAUSES", (0.0, 0.0))
+    course = Courses(Exercises()).named["first-steps"]
+    link = {CLAIM + "custom": {"course": "first-steps"}, CLAIM + "resource_link": {"id": "link-2"}}
+    assert launch(browser, platform, sub="user-11", **link).status_code == 303
+    hub = hub_of(application)
+    attendance = hub.attend(hub.ticket(browser.cookies[COOKIE]), lambda: None)
+    assert attendance.room.task is None
+    assert attendance.room.course_at > 0
+    assert course_of(json.loads(attendance.room.course), Exercises()) == course
+    first, second, *rest = course.exercises
+    outside = next(one.id for one in Exercises().all if one.id not in course.exercises)
+    expected = []
+    for exercise, score, solved in (
+        *((outside, 1.0, None), (first, 0.5, 0), (first, 1.0, 1), (first, 1.0, 1), (first, 0.0, 1)),
+        *((outside, 1.0, 1), (second, 1.0, 2), *((each, 1.0, 3 + i) for i, each in enumerate(rest))),
+    ):
+        platform.scores.clear()
+        attendance.submit(NewAttempt(exercise=exercise, seed=1, answer={}, verdict="", score=score, started=0.0))
+        if solved is None:
+            continue
+        wait_for(lambda: bool(platform.scores))
+        path, sent = platform.scores[-1]
+        assert path == "/columns/5/scores?type=x"
+        expected.append(solved)
+        assert (sent["userId"], sent["scoreGiven"], sent["scoreMaximum"]) == (
+            "user-11", solved, len(course.exercises),
+        )  # fmt: skip
+        done = solved == len(course.exercises)
+        assert sent["activityProgress"] == ("Completed" if done else "InProgress")
+        assert sent["gradingProgress"] == "FullyGraded"
+    assert expected[-1] == len(course.exercises)
+    attendance.leave()
+
+
+@pytest.mark.parametrize(
+    ("custom", "words"),
+    [
+        ({"course": "first-step"}, "names the course &#x27;first-step&#x27;, which this service does not have"),
+        ({"course": "first-step"}, "course may be, for example, first-steps"),
+        ({"exercise": "<b>"}, "names the exercise &#x27;&lt;b&gt;&#x27;, which this service does not have"),
+        ({"exercise": "swing", "course": "first-steps"}, "it may have one of them"),
+    ],
+)
+def test_a_link_to_what_is_not_there_is_refused_in_words(browser, platform: Platform, custom, words) -> None:
+    answer = launch(browser, platform, **{CLAIM + "custom": custom})
+    assert answer.status_code == 403
+    assert words in answer.text
+    assert COOKIE not in browser.cookies
+
+
 def test_a_score_and_its_token_go_to_no_other_address(browser: TestClient, platform: Platform, settings) -> None:
     """A column that answers with a redirect gets no second request: it would carry the access token."""
     platforms = load_platforms(settings.lti)
@@ -351,8 +406,12 @@ def test_deep_linking(browser: TestClient, platform: Platform) -> None:
     page = launch(browser, platform, **{CLAIM + "message_type": LINK, LINKING: settings})
     assert page.status_code == 200
     about = html.unescape(re.search('name="about" value="([^"]*)"', page.text)[1])
-    assert 'value="two-elbows"' in page.text
-    form = {"about": about, "exercise": ["two-elbows", "swing", "no-such"]}
+    for name in ("exercise:two-elbows", "course:first-steps"):
+        assert f'type="checkbox" name="content" value="{name}"' in page.text
+    course = Courses(Exercises()).named["first-steps"]
+    assert f"{course.title} <small>{len(course.exercises)} exercises</small>" in page.text
+    chosen = ["exercise:two-elbows", "course:first-steps", "exercise:swing", "exercise:no-such"]
+    form = {"about": about, "content": chosen}
     done = browser.post("/lti/choose", data=form)
     assert f"form-action {platform.issuer}" in done.headers["content-security-policy"]
     assert f'action="{platform.issuer}/back"' in done.text
@@ -362,7 +421,11 @@ def test_deep_linking(browser: TestClient, platform: Platform) -> None:
     base = "https://purl.imsglobal.org/spec/lti-dl/claim/"
     assert claims[base + "data"] == "opaque"
     items = claims[base + "content_items"]
-    assert [item["custom"]["exercise"] for item in items] == ["two-elbows", "swing"]
+    assert [item["custom"] for item in items] == [
+        {"exercise": "two-elbows"}, {"course": "first-steps"}, {"exercise": "swing"},
+    ]  # fmt: skip
+    columns = [(item["lineItem"]["scoreMaximum"], item["lineItem"]["resourceId"]) for item in items]
+    assert columns == [(1, "two-elbows"), (len(course.exercises), "course:first-steps"), (1, "swing")]
     assert items[0]["url"] == f"{TOOL}/lti/launch"
     forged = browser.post("/lti/choose", data={**form, "about": about[:-2] + "xx"})
     assert forged.status_code == 403
