@@ -1,10 +1,10 @@
 """Screenshots of the dashboard for README.md and docs/, ``docs/images/*.webp``.
 
     kinboard serve --port 8765 &
-    python scripts/screenshots.py http://127.0.0.1:8765/
+    python scripts/screenshots.py http://127.0.0.1:8765/ [NAME …]
 
-Each picture is a link that restores a view, and the tab of the panel to open. Needs what the browser tests need:
-playwright, Chromium (KINBOARD_TEST_CHROMIUM) and pillow.
+Each picture is a link that restores a view, and the tab of the panel to open; *wall* is a class, which is opened and
+ended. Needs what the browser tests need: playwright, Chromium (KINBOARD_TEST_CHROMIUM) and pillow.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from PIL import Image
-from playwright.sync_api import Page, expect, sync_playwright
+from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from app.viewer.own_arm import KEY, own_arm, pack
 from app.viewer.tabs.robot.presets import PRESETS
@@ -60,35 +60,116 @@ SHOTS = (
 )
 
 
-def take(page: Page, address: str, shot: Shot) -> Image.Image:
-    """Open the view, wait until it stands still, and photograph it."""
-    text = json.dumps({"v": 1, **shot.state}, separators=(",", ":")).encode()
-    page.goto(f"{address}viewer/#s={base64.urlsafe_b64encode(text).decode().rstrip('=')}")
+WALL = "wall"
+TASK = "which-joint-goes-down"
+RIGHT, WRONG = 2, 0  # of its choices
+# Alias, configuration, choices, and whether the hand is raised.
+CLASS: tuple[tuple[str, list[float], tuple[int, ...], bool], ...] = (
+    ("Ada", [0.35, 0.75, -2.9, 0.3, 0.7, 0.2], (RIGHT,), False),
+    ("Emmy", [-0.6, 1.2, -2.6, 0.0, 0.9, 0.0], (), False),
+    ("George", [1.2, 0.4, -2.2, 0.6, -0.5, 0.0], (WRONG,) * 3, False),
+    ("Grace", [0.0, 1.57, -3.1, 0.0, 0.0, 0.0], (RIGHT,), False),
+    ("Isaac", [-1.3, 0.9, -3.3, 1.0, 0.6, 0.0], (), True),
+    ("Jacques", [2.2, 0.6, -2.4, 0.0, 1.1, 0.0], (WRONG,), False),
+    ("Katherine", [0.9, 1.0, -2.0, 0.0, -0.8, 0.0], (RIGHT,), False),
+    ("Sofia", [-2.4, 0.5, -2.8, 0.4, 0.8, 0.0], (), False),
+)
+
+
+def link(address: str, state: dict[str, object]) -> str:
+    """The link that restores this state."""
+    text = json.dumps({"v": 1, **state}, separators=(",", ":")).encode()
+    return f"{address}viewer/#s={base64.urlsafe_b64encode(text).decode().rstrip('=')}"
+
+
+def arrive(page: Page) -> None:
+    """Wait for the page, and close viser's notice about software rendering."""
     expect(page.locator("[data-status]").first).to_be_visible()
     notice = page.locator("#webgl-software-rendering button")
-    if notice.count():
+    if notice.count() and notice.is_visible():
         notice.click()
+
+
+def join(page: Page, address: str, code: str, alias: str, q: list[float]) -> None:
+    """Join a room, with an arm at a configuration and the task open."""
+    page.set_default_timeout(WAIT)
+    page.goto(f"{address}room?code={code}")
+    page.get_by_label("Alias").fill(alias)
+    page.get_by_role("button", name="Join").click()
+    page.wait_for_url("**/viewer/**")
+    features = {"exercises": {"seed": 1, "at": TASK, "done": {}}}
+    page.goto("about:blank")
+    page.goto(link(address, {"robot": "puma560", "q": q, "lesson": "exercises", "features": features}))
+    arrive(page)
+    page.get_by_role("tab", name="Learn").click(force=True)
+
+
+def take_wall(browser: Browser, address: str) -> Image.Image:
+    """Open a room with a class that works on a task, and photograph the wall."""
+    teacher = browser.new_page(viewport=SIZE, color_scheme="light")
+    teacher.set_default_timeout(WAIT)
+    teacher.goto(f"{address}room")
+    teacher.get_by_label("Title").fill("Robotics 2")
+    teacher.get_by_role("button", name="Open a room").click()
+    code = teacher.locator(".code").inner_text()
+    teacher.get_by_role("link", name="Start teaching").click()
+    arrive(teacher)
+    teacher.get_by_role("tab", name="Class").click(force=True)
+    teacher.locator("[data-guide=class-task] select").select_option(TASK)
+    teacher.locator("[data-guide=class-task] [data-guide-do=fields]").click()
+    for alias, q, choices, hand in CLASS:
+        student = browser.new_page(viewport={"width": 480, "height": 600})
+        join(student, address, code, alias, q)
+        for choice in choices:
+            student.locator("[data-exercises=question] [data-guide-do=answer]").nth(choice).click()
+            student.wait_for_timeout(500)
+        if hand:
+            student.locator("[data-class-bar] [data-guide-do=hand]").click()
+    teacher.locator("[data-class-code]").scroll_into_view_if_needed()
+    teacher.locator("[data-guide-do=wall]:visible").first.click()
+    teacher.mouse.move(5, 5)
+    teacher.wait_for_timeout(8000)
+    image = Image.open(io.BytesIO(teacher.screenshot(timeout=WAIT)))
+    end = teacher.locator("[data-guide=class-end] button")
+    end.click()
+    teacher.wait_for_timeout(1500)  # a double click is no second press
+    end.click()
+    for page in [page for context in browser.contexts for page in context.pages]:
+        page.close()
+    return image
+
+
+def take(page: Page, address: str, shot: Shot) -> Image.Image:
+    """Open the view, wait until it stands still, and photograph it."""
+    page.goto(link(address, shot.state))
+    arrive(page)
     page.get_by_role("tab", name=shot.tab).click(force=True)
     page.mouse.move(5, 5)
     page.wait_for_timeout(1000 * shot.seconds)
     return Image.open(io.BytesIO(page.screenshot(timeout=WAIT)))
 
 
-def main(address: str) -> None:
-    """Take all pictures of the service at `address`."""
+def main(address: str, names: list[str]) -> None:
+    """Take these pictures of the service at `address`; none named: all."""
     chromium = os.environ.get("KINBOARD_TEST_CHROMIUM", "/usr/bin/chromium")
     expect.set_options(timeout=WAIT)
+
+    def save(image: Image.Image, name: str) -> None:
+        file = FOLDER / f"{name}.webp"
+        image.convert("RGB").save(file, quality=86, method=6)
+        print(f"{file.name}: {file.stat().st_size} bytes", flush=True)
+
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
-        for shot in SHOTS:
+        for shot in (shot for shot in SHOTS if not names or shot.name in names):
             page = browser.new_page(viewport=SIZE, color_scheme="light")  # a new visitor for each picture
             page.add_init_script('localStorage.setItem("kinboard-hints", "drag joint learn")')
-            file = FOLDER / f"{shot.name}.webp"
-            take(page, address, shot).convert("RGB").save(file, quality=86, method=6)
+            save(take(page, address, shot), shot.name)
             page.close()
-            print(f"{file.name}: {file.stat().st_size} bytes", flush=True)
+        if not names or WALL in names:
+            save(take_wall(browser, address), WALL)
         browser.close()
 
 
 if __name__ == "__main__":
-    main(sys.argv[1].rstrip("/") + "/")
+    main(sys.argv[1].rstrip("/") + "/", sys.argv[2:])

@@ -111,7 +111,7 @@ def is_removed(node: viser.SceneNodeHandle) -> bool:
 
 
 class Curtain:
-    """Hides all nodes of a visitor's scene but lights and some others, until it is opened.
+    """Hides all nodes of a visitor's scene but some, and lights without a place, until it is opened.
 
     What the nodes say of themselves (`visible`) goes on as if they were seen: what is added, shown or hidden
     meanwhile is as its owner left it when the curtain opens.
@@ -149,10 +149,7 @@ class Curtain:
         self._send(message)
 
 
-_LIGHTS = (
-    viser.AmbientLightHandle, viser.DirectionalLightHandle, viser.HemisphereLightHandle, viser.PointLightHandle,
-    viser.RectAreaLightHandle, viser.SpotLightHandle,
-)  # fmt: skip
+_LIGHTS = viser.AmbientLightHandle, viser.DirectionalLightHandle, viser.HemisphereLightHandle
 
 
 def uuid_of(handle: Any) -> str:

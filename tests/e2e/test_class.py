@@ -15,6 +15,7 @@ from playwright.sync_api import Browser, Page, expect
 from test_screens import problems
 
 import kin
+from app.viewer.room.member import SURE
 
 pytestmark = pytest.mark.browser
 
@@ -177,6 +178,7 @@ def test_a_class_from_the_landing_page_to_the_csv(members: list[Member], address
     end = teacher.page.locator("[data-guide=class-end] button")
     end.click()
     expect(end).to_contain_text("Press again")
+    teacher.page.wait_for_timeout(1000 * SURE)  # a double click is no second press
     end.click()
     ann.shows("[data-class-bar=closed]")
     assert results.request.get(address + "room/results.csv").status == 403

@@ -26,6 +26,7 @@ NEWS: Hashable = "room"
 REFRESH = 0.2  # s between two updates of the tab and of the wall
 IDLE = 60.0  # s
 AGAIN = 6.0  # s within which a button that needs two presses must be pressed again
+SURE = 0.5  # s from the first press to the second; earlier ones are of a double click
 SETTLED = 0.5  # s without news of who leads after which the target is solved in this page too
 GRACE = 0.8  # s after the beginning of a lead in which a drag that is under way does not end it
 # Events by which a visitor moves the arm or opens something else.
@@ -66,6 +67,11 @@ class MemberPage(LedPage, Protocol):
     @property
     def may_compute(self) -> bool:
         """Whether the visitor may cause work."""
+
+
+def wanted(value: object, now: bool) -> bool:
+    """The state that a button brings about, which it names: the second click of a double click changes nothing."""
+    return bool(value) if type(value) is int else not now
 
 
 def act_of(key: Hashable, value: object) -> str:
@@ -243,10 +249,11 @@ class Member(Feature):
 
     def twice(self, what: Hashable) -> bool:
         """Whether a button that needs two presses was pressed for the second time."""
-        now = time.perf_counter()
-        armed = self._armed[0] == what and now < self._armed[1]
-        self._armed = ("", 0.0) if armed else (what, now + AGAIN)
-        return armed
+        left = self._armed[1] - time.perf_counter() if self._armed[0] == what else 0.0
+        if left > AGAIN - SURE:
+            return False
+        self._armed = ("", 0.0) if left > 0.0 else (what, time.perf_counter() + AGAIN)
+        return left > 0.0
 
     def is_armed(self, what: Hashable) -> bool:
         """Whether such a button waits for the second press."""

@@ -14,7 +14,7 @@ from app.viewer.feature import Stage
 from app.viewer.panel import update_html
 from app.viewer.panel.status import Notice
 from app.viewer.room import views
-from app.viewer.room.member import Member
+from app.viewer.room.member import Member, wanted
 from app.viewer.room.sharing import LED_EVERY, STUDENT_EVERY
 from app.viewer.room.submissions import Submissions
 from app.viewer.session.state import PageState
@@ -240,7 +240,7 @@ class Student(Member):
                 self.follower.begin()
                 self.take_news()
             case "hand" if room.seat is not None:
-                self.try_to(lambda: self.attendance.raise_hand(not (room.seat and room.seat.hand)))
+                self.try_to(lambda: self.attendance.raise_hand(wanted(value, bool(room.seat and room.seat.hand))))
             case "vote" if type(value) is int:
                 self.try_to(lambda: self.attendance.vote(value))
             case "task" if not self.frozen:
@@ -256,7 +256,9 @@ class Student(Member):
         self._note()
 
     def bar(self) -> str:
-        return views.student_bar(self.room, self.mode, self._open_tab, self.page.guest)
+        lessons = self.page.lessons
+        away = self._task is not None and lessons is not None and lessons.exercises.at != self._task
+        return views.student_bar(self.room, self.mode, self._open_tab, away)
 
     @property
     def mode(self) -> views.Mode:

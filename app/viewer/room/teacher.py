@@ -15,7 +15,7 @@ from app.viewer.panel import update_html
 from app.viewer.panel.status import Notice
 from app.viewer.room import views
 from app.viewer.room.following import decoded, shared
-from app.viewer.room.member import Member
+from app.viewer.room.member import Member, wanted
 from app.viewer.room.sharing import LEADER_EVERY
 from app.viewer.room.wall import MOST, SmallArm, Wall
 from app.viewer.room.wall import NAME as WALL
@@ -83,9 +83,9 @@ class Teacher(Member):
         room, attendance = self.room, self.attendance
         match kind:
             case "follow":
-                attendance.set_follow(not room.follow)
+                attendance.set_follow(wanted(value, room.follow))
             case "freeze":
-                attendance.set_frozen(not room.frozen)
+                attendance.set_frozen(wanted(value, room.frozen))
             case "task":
                 self._send_task(_texts(value))
             case "untask":
@@ -102,7 +102,7 @@ class Teacher(Member):
             case "unask":
                 attendance.remove_poll()
             case "wall":
-                self._show_wall(self._wall is None)
+                self._show_wall(wanted(value, self._wall is not None))
             case "return":
                 if room.shown is not None:
                     attendance.show_seat(None)
@@ -194,6 +194,8 @@ class Teacher(Member):
 
     def _show_wall(self, on: bool) -> None:
         page, camera = self.page, self.page.camera
+        if on == (self._wall is not None):
+            return
         if on:
             if self.leader:
                 self._return()

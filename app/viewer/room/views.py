@@ -26,7 +26,7 @@ MODES: dict[Mode, tuple[str, str, str, str]] = {
     "paused": ("‖", "Paused", "The teacher’s connection is lost. You can go on by yourself.", "amber"),
     "closed": ("■", "You are no longer in the room", "", "crimson"),
 }  # fmt: skip
-STAYS = "What you have done stays on this page, and in its link."
+STAYS = "What you have done stays on this page and in its link."
 GO_ON = "You can go on by yourself, or join a room."  # where no access token is needed
 # Symbol, words and colour of how a student is doing.
 DOING: dict[State, tuple[str, str, str]] = {
@@ -85,18 +85,19 @@ def student_html(room: RoomView, mode: Mode, task: Exercise | None, sent: Submis
     )  # fmt: skip
 
 
-def student_bar(room: RoomView, mode: Mode, open_tab: int, guest: bool) -> str:
+def student_bar(room: RoomView, mode: Mode, open_tab: int, away: bool) -> str:
     """What a student must see whatever tab is open.
 
     Args:
         open_tab: grows when the tab Learn is to be opened.
-        guest: as for `student_html`.
+        away: whether the page shows something else than the task that was set.
     """
     poll = room.poll if room.poll is not None and room.poll.open and room.poll.chosen is None else None
     quiet = mode == "free" and poll is None and not room.problem
     return render(
-        "room/student_bar", room=room, mode=mode, lead=_mode(room, mode, guest), poll=poll, quiet=quiet,
-        open_tab=open_tab, hand=bool(room.seat and room.seat.hand),
+        "room/student_bar", room=room, mode=mode, lead=_mode(room, mode, guest=True), poll=poll, quiet=quiet,
+        stays=STAYS,
+        open_tab=open_tab, away=away and mode == "free", hand=bool(room.seat and room.seat.hand),
     )  # fmt: skip
 
 

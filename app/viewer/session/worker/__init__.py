@@ -139,14 +139,17 @@ class Worker:
             self._ended.set()
 
     def _guard(self, action: Callable[[], None]) -> None:
-        """Run an action; an error is logged and shown, and the worker continues."""
+        """Run an action; an error is shown, and logged unless the input was invalid; the worker continues."""
         try:
             action()
         except Exception as error:
             if self._inbox.closed:
                 log.debug("visitor %s disconnected during a step: %s", self._visitor, error)
                 return
-            log.exception("visitor %s", self._visitor)
+            if isinstance(error, kin.KinematicsError):  # visitors must neither fill the log nor write into it
+                log.debug("visitor %s: %s", self._visitor, type(error).__name__)
+            else:
+                log.exception("visitor %s", self._visitor)
             self._show_error(error)
 
     def _show_error(self, error: Exception) -> None:

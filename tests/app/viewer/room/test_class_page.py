@@ -21,7 +21,7 @@ from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.room.following import decoded
-from app.viewer.room.member import Member
+from app.viewer.room.member import SURE, Member
 from app.viewer.room.student import Student
 from app.viewer.room.teacher import Teacher
 from app.viewer.server import ViewerServer
@@ -230,10 +230,15 @@ def test_a_task_opens_and_its_answers_are_stored(room: Class) -> None:
     attendance.leave()
     assert (seat.task, seat.tries, seat.solved) == (EXERCISE, 2, True)
 
-    # The words below an answer do not stay below the next exercise.
+    # The words below an answer do not stay below the next exercise, from which the bar leads back.
+    assert "Open the task</button>" not in student.html.partition("data-class-bar")[2]
     student.say("feature", ["exercises", ["open", "which-joint-moved", 1], None])
     student.wait(lambda: 'data-exercise="which-joint-moved"' in student.html)
     student.wait(lambda: "Stored for your teacher" not in student.html)
+    student.wait(lambda: "Open the task</button>" in student.html.partition("data-class-bar")[2])
+    press(student, "task")
+    student.wait(lambda: f'data-exercise="{EXERCISE}"' in student.html)
+    student.wait(lambda: "Open the task</button>" not in student.html.partition("data-class-bar")[2])
 
     # Who goes on to something else has still solved it.
     student.set("Lesson", "Screws")
@@ -278,7 +283,7 @@ def test_a_course_replaces_the_task_and_says_so(room: Class) -> None:
     teacher, student, _, _ = lead(room)
     press(teacher, "fields", "task", value=[[EXERCISE]])
     student.wait(lambda: f'data-exercise="{EXERCISE}"' in student.html)
-    teacher.wait(lambda: "data-class-replaces>It replaces the task <b>Which joint" in teacher.html)
+    teacher.wait(lambda: "data-class-replaces>It ends the task “<b>Which joint" in teacher.html)
     student.say("feature", ["exercises", ["answer", 1], 0])
     student.wait(lambda: "data-class-stored" in student.html)
     press(teacher, "follow")
@@ -424,11 +429,16 @@ def test_students_are_renamed_and_removed_and_the_room_ended_at_the_second_press
     press(teacher, "fields", "rename", value=[["Ann"]])
     ann.wait(lambda: "you are Ann" in ann.html)
     press(teacher, "remove", ticket.seat)
+    press(teacher, "remove", ticket.seat)  # of a double click
     teacher.wait(lambda: "Press again: remove" in teacher.html)
+    teacher.settle(SURE)
+    assert bar(ann) == "free"
     press(teacher, "remove", ticket.seat)
     mode(ann, "closed")
     press(teacher, "end")
+    press(teacher, "end")
     teacher.wait(lambda: "Press again: end" in teacher.html)
+    teacher.settle(SURE)
     assert bar(bob) == "free"
     press(teacher, "end")
     mode(bob, "closed")
@@ -439,8 +449,8 @@ def test_a_removed_student_reads_so_at_once_and_keeps_the_work(room: Class) -> N
     room.hub.rooms.remove_seat(ticket.room, ticket.seat)  # as another process does
     mode(student, "closed")
     bar_html = student.html[student.html.index('data-class-bar="closed"') :]
-    assert "You are no longer in the room</b>. The teacher has removed you. What you have done stays" in bar_html
-    assert "You can go on by yourself" in bar_html
+    assert "<b>The teacher has removed you.</b> What you have done stays on this page" in bar_html
+    student.wait(lambda: "You can go on by yourself" in student.html)
     assert 'href="../room" data-class-join' in bar_html
     assert "data-class-here>Copy link" in bar_html
     student.wait(lambda: 'data-status="advice"' in student.html)
@@ -492,6 +502,30 @@ def test_a_figure_in_another_page_takes_no_part(room: Class, embedded: str) -> N
     attendance.leave()
     shown = decoded(seat.page, [ROBOT])
     assert np.allclose(shown.q, q), "the figure's arm is not the student's on the wall"
+
+
+def test_a_double_click_is_one(room: Class) -> None:
+    teacher = room.teacher()
+    ann, _ = room.join("Ann")
+    teacher.wait(lambda: 'data-guide-do="pick"' in teacher.html)
+
+    def twice(browser: FakeBrowser, kind: str) -> None:
+        """Two clicks on a button before it has changed."""
+        button = browser.html.partition(f'data-guide-do="{kind}"')[2].partition(">")[0]
+        value = int(button.partition('data-argument="')[2].partition('"')[0])
+        for _ in range(2):
+            press(browser, kind, value=value)
+
+    for browser, kind, sign in (
+        *((teacher, "follow", "You lead"), (teacher, "freeze", "Frozen"), (ann, "hand", "Lower hand")),
+        (teacher, "wall", "data-class-wall"),
+    ):
+        twice(browser, kind)
+        browser.settle(0.5)
+        browser.wait(lambda browser=browser, sign=sign: sign in browser.html)
+        twice(browser, kind)
+        browser.settle(0.5)
+        browser.wait(lambda browser=browser, sign=sign: sign not in browser.html)
 
 
 def test_a_student_cannot_press_what_is_the_teachers(room: Class) -> None:
