@@ -3,8 +3,8 @@
     kinboard serve --port 8765 &
     python scripts/screenshots.py http://127.0.0.1:8765/ [NAME …]
 
-Each picture is a link that restores a view, and the tab of the panel to open; *wall* is a class, which is opened and
-ended. Needs what the browser tests need: playwright, Chromium (KINBOARD_TEST_CHROMIUM) and pillow.
+Each picture is a link that restores a view, and the tab of the panel to open; *wall* is a class, which is opened
+and ended. Needs what the browser tests need: playwright, Chromium (KINBOARD_TEST_CHROMIUM) and pillow.
 """
 
 from __future__ import annotations
@@ -74,6 +74,11 @@ CLASS: tuple[tuple[str, list[float], tuple[int, ...], bool], ...] = (
     ("Katherine", [0.9, 1.0, -2.0, 0.0, -0.8, 0.0], (RIGHT,), False),
     ("Sofia", [-2.4, 0.5, -2.8, 0.4, 0.8, 0.0], (), False),
 )
+# The students' pages are drawn seldom: nobody looks at them.
+SELDOM = """{
+  const { requestAnimationFrame } = window;
+  window.requestAnimationFrame = (act) => setTimeout(() => requestAnimationFrame(act), 1500);
+}"""
 
 
 def link(address: str, state: dict[str, object]) -> str:
@@ -93,6 +98,7 @@ def arrive(page: Page) -> None:
 def join(page: Page, address: str, code: str, alias: str, q: list[float]) -> None:
     """Join a room, with an arm at a configuration and the task open."""
     page.set_default_timeout(WAIT)
+    page.add_init_script(SELDOM)
     page.goto(f"{address}room?code={code}")
     page.get_by_label("Alias").fill(alias)
     page.get_by_role("button", name="Join").click()
@@ -118,7 +124,7 @@ def take_wall(browser: Browser, address: str) -> Image.Image:
     teacher.locator("[data-guide=class-task] select").select_option(TASK)
     teacher.locator("[data-guide=class-task] [data-guide-do=fields]").click()
     for alias, q, choices, hand in CLASS:
-        student = browser.new_page(viewport={"width": 480, "height": 600})
+        student = browser.new_page(viewport={"width": 480, "height": 400})
         join(student, address, code, alias, q)
         for choice in choices:
             student.locator("[data-exercises=question] [data-guide-do=answer]").nth(choice).click()

@@ -25,6 +25,8 @@ class StoredRooms(Protocol):
 
     def remove_seat(self, room: str, seat: str) -> None: ...
 
+    def remove_unseen(self, room: str) -> int: ...
+
     def rename_seat(self, room: str, seat: str, alias: str) -> None: ...
 
     def end(self, room: str) -> bool: ...
@@ -199,6 +201,13 @@ class Attendance:
         self._only_teacher()
         self._hub.rooms.remove_seat(self.ticket.room, seat)
         self._hub.refresh(self.ticket.room)
+
+    def remove_unseen(self) -> int:
+        """Remove who has joined a while ago without ever opening a page; returns how many."""
+        self._only_teacher()
+        count = self._hub.rooms.remove_unseen(self.ticket.room)
+        self._hub.refresh(self.ticket.room)
+        return count
 
     def rename_seat(self, seat: str, alias: str) -> None:
         """Give a student another alias; raises `RefusedError` or `ClassroomUnavailable`."""

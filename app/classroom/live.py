@@ -191,7 +191,8 @@ class LiveRoom:
 
     def _seat(self, row: Mapping[str, Any]) -> SeatView:
         names = ("id", "alias", "hand", "task", "tries", "solved", "page")
-        return SeatView(**{name: row[name] for name in names}, away=row["id"] in self.away)
+        seen = row["beat"] > 0 or row["id"] in self.here
+        return SeatView(**{name: row[name] for name in names}, away=row["id"] in self.away, seen=seen)
 
     def _shown(self) -> Shown | None:
         shown = self.state.get("shown")

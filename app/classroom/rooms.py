@@ -21,6 +21,7 @@ LONGEST_ALIAS, LONGEST_TITLE = 32, 80  # characters
 MIN_LIFE, MAX_LIFE = 60.0, 200 * 24 * 3600.0  # seconds: a term
 MAX_SEATS = 200
 MAX_ATTEMPTS = 2000  # of one seat
+UNSEEN = 60.0  # seconds after which a seat whose page has never come may be given to somebody else
 LONGEST_ANSWER = 20_000  # characters, as JSON
 _TRIES = 20  # of random codes
 
@@ -119,7 +120,8 @@ class Rooms:
                 if connection.execute(mine.values(alias=alias, version=version)).rowcount:
                     return known
             taken = select(func.count()).where(Seat.room_id == room, Seat.removed.is_(False))
-            if (connection.scalar(taken) or 0) >= MAX_SEATS:
+            full = (connection.scalar(taken) or 0) >= MAX_SEATS
+            if full and not _remove_unseen(connection, room, version):
                 raise RefusedError(f"This room is full ({MAX_SEATS} of {MAX_SEATS} students).", "code")
             ticket = Ticket(room, secrets.token_hex(TOKEN_BYTES))
             connection.execute(
@@ -175,10 +177,13 @@ class Rooms:
         with self._database.write() as connection:
             version = next_version(connection, room)
             one = update(Seat).where(Seat.id == seat, Seat.room_id == room)
-            connection.execute(
-                one.values(removed=True, alias="", page="", hand=0.0, task="", voted="", version=version)
-            )
+            connection.execute(one.values(**_ERASED, version=version))
             connection.execute(delete(Attempt).where(Attempt.seat_id == seat, Attempt.room_id == room))
+
+    def remove_unseen(self, room: str) -> int:
+        """Remove who has joined a while ago and whose page has never come; returns how many."""
+        with self._database.write() as connection:
+            return _remove_unseen(connection, room, next_version(connection, room))
 
     def rename_seat(self, room: str, seat: str, alias: str) -> None:
         """Give a seat another alias; raises `RefusedError`."""
@@ -239,6 +244,21 @@ class Rooms:
             with self._database.write(durable=False) as connection:
                 marks.keep(connection)
         return sum(self.end(room) for room in over)
+
+
+_ERASED: dict[str, object] = {
+    "removed": True, "alias": "", "page": "", "hand": 0.0, "task": "", "voted": "",
+}  # fmt: skip
+
+
+def _remove_unseen(connection: Connection, room: str, version: int | None) -> int:
+    """As `Rooms.remove_unseen`, in a writing transaction."""
+    answered = select(Attempt.seat_id).where(Attempt.room_id == room)
+    unseen = update(Seat).where(
+        Seat.room_id == room, Seat.removed.is_(False), Seat.beat == 0, Seat.joined < now() - UNSEEN,
+        Seat.id.not_in(answered),
+    )  # fmt: skip
+    return connection.execute(unseen.values(**_ERASED, version=version)).rowcount
 
 
 def clean_name(text: str, longest: int, field: str) -> str:

@@ -58,6 +58,7 @@ class SeatView:
         solved: whether the last of them was right.
         page: the packed state of the page (`app.viewer.session.state`), or empty.
         away: whether no page of this seat is connected.
+        seen: whether one ever was.
     """
 
     id: str
@@ -68,6 +69,7 @@ class SeatView:
     solved: bool = False
     page: str = ""
     away: bool = False
+    seen: bool = True
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ class Teacher(Member):
     messages = frozenset(
         {
             *("follow", "freeze", "fields", "untask", "uncourse", "close", "unask", "look", "return", "show"),
-            *("hide", "pick", "remove", "lower", "wall", "end"),
+            *("hide", "pick", "remove", "sweep", "lower", "wall", "end"),
         }
     )
 
@@ -107,6 +107,8 @@ class Teacher(Member):
                 if room.shown is not None:
                     attendance.show_seat(None)
                 self._return()
+            case "sweep" if self.twice("sweep"):
+                self.try_to(attendance.remove_unseen)
             case "end" if self.twice("end"):
                 self.try_to(attendance.end_room)
             case "rename":
@@ -282,7 +284,7 @@ class Teacher(Member):
             for folder in self._folders:
                 folder.visible = False
         update_html(self._join, views.join_html(room, now()))
-        update_html(self._tools, views.tools_html(room, self._wall is not None))
+        update_html(self._tools, views.tools_html(room, self._wall is not None, self.is_armed("sweep")))
         seat = self._seat(self._picked)
         update_html(self._one, views.seat_html(room, seat, self.leader, self.is_armed(("remove", self._picked))))
         update_html(self._list, views.list_html(room, self._picked, exercises))

@@ -16,6 +16,7 @@ from app.viewer.views.templates import render
 
 Mode = Literal["free", "led", "gone", "shown", "frozen", "paused", "closed"]
 STUCK = 3  # attempts that were not right
+MANY = 3  # students who have never come, from which on they can be removed together
 # Symbol, headline, sentence and colour of who leads a student's page.
 MODES: dict[Mode, tuple[str, str, str, str]] = {
     "free": ("✎", "You work by yourself", "Move the arm, open a lesson, try an exercise.", "blue"),
@@ -133,11 +134,19 @@ def join_html(room: RoomView, now: float) -> str:
     return render("room/join", room=room, code=show_code(room.code) if room.code else "", left=_left(room, now))
 
 
-def tools_html(room: RoomView, wall: bool) -> str:
-    """The wall's button, and how the students are doing."""
+def tools_html(room: RoomView, wall: bool, armed: bool) -> str:
+    """The wall's button, how the students are doing, and a way to clear the list of those who have never come.
+
+    Args:
+        armed: whether that button was pressed once.
+    """
     counts = [doing(seat, room) for seat in room.seats]
+    unseen = sum(seat.away and not seat.seen for seat in room.seats)
     facts = [(DOING[s], counts.count(s)) for s in ("hand", "stuck", "solved", "away") if s in counts]
-    return render("room/tools", room=room, wall=wall, count=students(len(counts)), facts=facts)
+    return render(
+        "room/tools", room=room, wall=wall, count=students(len(counts)), facts=facts, armed=armed,
+        unseen=unseen if unseen >= MANY else 0,
+    )  # fmt: skip
 
 
 def seat_html(room: RoomView, seat: SeatView | None, looked: str, armed: bool) -> str:
@@ -165,7 +174,7 @@ def list_html(room: RoomView, picked: str, exercises: Exercises) -> str:
 
 def _where(seat: SeatView, room: RoomView, state: State, words: str, exercises: Exercises) -> str:
     if state == "away":
-        return words
+        return words if seat.seen else "has not come"
     exercise = exercises.get(seat.task) if seat.task else None
     on_task = room.task is not None and seat.task == room.task.exercise
     place = ["at the task" if on_task else exercise.title if exercise is not None else "at the arm"]

@@ -202,6 +202,7 @@ TEACHERS = {
     "close_poll": (),
     "remove_poll": (),
     "remove_seat": ("x",),
+    "remove_unseen": (),
     "rename_seat": ("x", "y"),
     "count_solved": ("swing",),
     "end_room": (),
@@ -572,6 +573,32 @@ def test_seats_and_pages_are_bounded(hubs, monkeypatch):
         hub.rooms.join(room.code, "Bob")
     with pytest.raises(ValueError, match="16001"):
         student.tell_page("x" * 16_001)
+
+
+def test_seats_that_nobody_takes_keep_no_student_out(hubs, monkeypatch):
+    """Somebody joins again and again without ever opening a page."""
+    monkeypatch.setattr("app.classroom.rooms.MAX_SEATS", 4)
+    hub, _ = hubs
+    room = hub.rooms.open("Kinematics", 3600)
+    ada = hub.rooms.join(room.code, "Ada")
+    page = hub.attend(ada, nothing)
+    until(lambda: beats(hub, ada) > 0)
+    page.leave()
+    eve = hub.rooms.join(room.code, "Eve")  # has answered: her page was there
+    hub.rooms.submit(eve, attempt())
+    ghosts = [hub.rooms.join(room.code, f"Ghost {i}") for i in range(2)]
+    with pytest.raises(RefusedError, match="room is full"):
+        hub.rooms.join(room.code, "Bob")
+    monkeypatch.setattr("app.classroom.rooms.UNSEEN", 0.0)
+    bob = hub.rooms.join(room.code, "Bob")
+    assert [hub.rooms.is_open(seat) for seat in (ada, eve, *ghosts, bob)] == [True, True, False, False, True]
+    assert hub.rooms.remove_unseen(room.id) == 1
+    assert [hub.rooms.is_open(seat) for seat in (ada, eve, bob)] == [True, True, False]
+
+
+def beats(hub, ticket):
+    with hub.database.read() as connection:
+        return connection.scalar(select(Seat.beat).where(Seat.id == ticket.seat))
 
 
 @pytest.mark.parametrize("name", ["a b", "50%", "a?b#c", "ä", "a'b"])

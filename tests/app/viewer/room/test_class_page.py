@@ -504,6 +504,23 @@ def test_a_figure_in_another_page_takes_no_part(room: Class, embedded: str) -> N
     assert np.allclose(shown.q, q), "the figure's arm is not the student's on the wall"
 
 
+def test_who_has_never_come_is_removed_together(room: Class, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.classroom.live.AWAY", 0.2)
+    monkeypatch.setattr("app.classroom.rooms.UNSEEN", 0.2)
+    for i in range(3):
+        room.hub.rooms.join(room.room.code, f"Ghost {i}")
+    teacher = room.teacher()
+    ann, _ = room.join("Ann")
+    teacher.wait(lambda: "Remove 3 who have never come" in teacher.html)
+    assert teacher.html.count("has not come") == 3
+    press(teacher, "sweep")
+    teacher.wait(lambda: "Press again: remove 3" in teacher.html)
+    teacher.settle(SURE)
+    press(teacher, "sweep")
+    teacher.wait(lambda: "Ghost" not in teacher.html)
+    assert bar(ann) == "free"
+
+
 def test_a_double_click_is_one(room: Class) -> None:
     teacher = room.teacher()
     ann, _ = room.join("Ann")
