@@ -3,8 +3,8 @@
 Each function takes a robot, or the id of a built-in one, and one configuration ``(n,)`` or any batch ``(..., n)``;
 it returns the same leading axes.
 
-For a single configuration, checking the argument takes longer than the kinematics. A contiguous float64 array is
-therefore checked once and passed directly to a compiled function (:func:`kin.kernels.compile.direct`); any other
+For a single configuration, checking the argument in Python takes longer than the kinematics. An array with one
+axis is therefore passed to a compiled function, which checks it (:func:`kin.kernels.compile.direct`); any other
 argument is validated and converted first.
 """
 
@@ -23,13 +23,11 @@ from kin.kernels import jacobian as jacobian_kernels
 from kin.kernels.compile import MODEL, direct
 from kin.named import robot_of
 from kin.robot import Robot
-from kin.transforms import Array
+from kin.transforms import Array, is_plain
 
 Part = Literal["all", "linear", "angular"]
 _PARTS: dict[str, tuple[int, int]] = {"all": (0, 6), "linear": (0, 3), "angular": (3, 6)}
-_FLOAT = np.dtype(np.float64)
 _POSE = (4, 4)
-_DENSE = (8,)
 _empty, _ndarray = np.empty, np.ndarray
 
 
@@ -38,19 +36,19 @@ class _Compiled:
 
     @cached_property
     def fk_one(self) -> Callable[[Array, Array, Array], bool]:
-        return direct(fk_kernels.fk_one, MODEL, 1, 2)
+        return direct(fk_kernels.fk_one, MODEL, 1, (4, 4))
 
     @cached_property
     def fk_many(self) -> Callable[[Array, Array, Array], bool]:
-        return direct(fk_kernels.fk_many, MODEL, 2, 3)
+        return direct(fk_kernels.fk_many, MODEL, 2, (None, 4, 4))
 
     @cached_property
     def positions_many(self) -> Callable[[Array, Array, Array], bool]:
-        return direct(fk_kernels.positions_many, MODEL, 2, 2)
+        return direct(fk_kernels.positions_many, MODEL, 2, (None, 3))
 
     @cached_property
     def jacobian_one(self) -> Callable[[Array, Array, Array], bool]:
-        return direct(jacobian_kernels.jacobian_one, MODEL, 1, 2)
+        return direct(jacobian_kernels.jacobian_one, MODEL, 1, (6, None))
 
 
 _compiled = _Compiled()
@@ -63,11 +61,13 @@ def fk(robot: Robot | str, q: ArrayLike) -> Array:
     """
     if not isinstance(robot, Robot):
         robot = robot_of(robot)
-    # Strides of (8,): one axis, contiguous.
-    if type(q) is _ndarray and q.strides == _DENSE and q.dtype is _FLOAT:
-        T = _empty(_POSE)
-        if _compiled.fk_one(robot.model, q, T):
-            return T
+    if type(q) is _ndarray and q.ndim == 1:
+        try:
+            T = _empty(_POSE)
+            if _compiled.fk_one(robot.model, q, T):
+                return T
+        except TypeError:  # not float64, or not contiguous
+            pass
     q = _batch(robot, q)
     out = np.empty((*q.shape[:-1], 4, 4))
     if not _compiled.fk_many(robot.model, q.reshape(-1, robot.n), out.reshape(-1, 4, 4)):
@@ -105,10 +105,13 @@ def jacobian(robot: Robot | str, q: ArrayLike, frame: Literal["base", "tool"] = 
     if not isinstance(robot, Robot):
         robot = robot_of(robot)
     if frame == "base":
-        if type(q) is _ndarray and q.strides == _DENSE and q.dtype is _FLOAT:
-            J = _empty((6, len(q)))
-            if _compiled.jacobian_one(robot.model, q, J):
-                return J
+        if type(q) is _ndarray and q.ndim == 1:
+            try:
+                J = _empty((6, len(q)))
+                if _compiled.jacobian_one(robot.model, q, J):
+                    return J
+            except TypeError:  # as in `fk`
+                pass
     elif frame != "tool":
         raise InputError("frame", frame, 'one of "base", "tool"')
     q = _writable(robot.check_q(q))
@@ -135,8 +138,8 @@ def manipulability(robot: Robot | str, q: ArrayLike, part: Part = "all") -> Arra
 
 
 def _batch(robot: Robot, q: ArrayLike) -> Array:
-    """`q` as a C-contiguous float64 array ``(..., n)``; one that is already is returned as it is."""
-    if type(q) is np.ndarray and q.dtype is _FLOAT and q.flags.c_contiguous and q.shape[-1:] == robot.q_shape:
+    """`q` as a plain array ``(..., n)``; one that is already is returned as it is."""
+    if is_plain(q) and q.shape[-1:] == robot.q_shape:
         return q
     return robot.check_q(q)
 

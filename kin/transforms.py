@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from numbers import Real
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,11 +18,17 @@ from kin.errors import InputError
 from kin.tolerances import TOLERANCES
 
 Array = NDArray[np.float64]
+_FLOAT = np.dtype(np.float64)
 _THREE = (float, float, float)
 
 
+def is_plain(value: object) -> TypeGuard[Array]:
+    """Whether compiled functions take it: an array of numpy's own class, float64, C-contiguous and aligned."""
+    return type(value) is np.ndarray and value.dtype is _FLOAT and value.flags.c_contiguous and value.flags.aligned
+
+
 def finite_array(field: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array:
-    """`value` as a finite, C-contiguous float64 array whose trailing axes match `shape` (None: any length).
+    """`value` as a finite array (`is_plain`) whose trailing axes match `shape` (None: any length).
 
     Raises:
         InputError: naming `field`, for anything that is not numbers of that shape, NaN and infinity included.
@@ -34,6 +40,8 @@ def finite_array(field: str, value: ArrayLike, shape: tuple[int | None, ...]) ->
         if raw.dtype.kind not in "biuf":
             raw = _numbers(field, value, expected)
         array = np.ascontiguousarray(raw, dtype=np.float64)
+        if not is_plain(array):  # numpy keeps an unaligned array, and a data type with metadata
+            array = np.array(array, dtype=_FLOAT)
     except (TypeError, ValueError, OverflowError, RecursionError) as error:
         if isinstance(error, InputError):
             raise

@@ -46,13 +46,13 @@ class Verdict:
 
 
 GATES: tuple[Gate, ...] = (
-    Gate("fk", OURS, 10.0),
+    Gate("fk", OURS, 6.0),
     Gate("fk-batch", OURS, 1.5),
     Gate("workspace", OURS, 0.5),
-    Gate("ik-pioneer5", OURS, 15.0),
+    Gate("ik-pioneer5", OURS, 10.0),
     Gate("ik-pioneer5", SOLVE_IK, 260.0),
     Gate("ik-pioneer5-batch", OURS, 4.0),
-    Gate("ik-srs", OURS, 15.0),
+    Gate("ik-srs", OURS, 10.0),
     Gate("ik-srs-batch", OURS, 2.5),
     Gate("ik-puma560-batch", OURS, 3.0),
     Gate("ik-ur5-batch", OURS, 3.0),

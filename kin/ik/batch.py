@@ -26,9 +26,8 @@ from kin.named import robot_of
 from kin.robot import Robot
 from kin.solvers import closed_form_of
 from kin.solvers.contract import Many, One
-from kin.transforms import Array, finite_array
+from kin.transforms import Array, finite_array, is_plain
 
-_FLOAT = np.dtype(np.float64)
 _POSE = (4, 4)
 _CACHE = "_batch"
 _empty, _isinf, _ndarray = np.empty, math.isinf, np.ndarray
@@ -145,14 +144,14 @@ def ik_branches(robot: Robot | str, target: ArrayLike, redundancy: ArrayLike = m
     if not isinstance(robot, Robot):
         robot = robot_of(robot)
     prepared = robot.__dict__.get(_CACHE) or _prepare(robot)
-    if type(target) is _ndarray and target.dtype is _FLOAT and target.flags.c_contiguous:
-        T = target
-        if T.shape == _POSE and type(redundancy) is float and not _isinf(redundancy):
+    if type(target) is _ndarray and target.shape == _POSE and type(redundancy) is float and not _isinf(redundancy):
+        try:
             out = _empty(prepared.shape)
-            if prepared.one(prepared.params, T, redundancy, prepared.near, out):
+            if prepared.one(prepared.params, target, redundancy, prepared.near, out):
                 return out
-    else:
-        T = finite_array("target", target, _POSE)
+        except TypeError:  # not float64, or not contiguous
+            pass
+    T = target if is_plain(target) else finite_array("target", target, _POSE)
     if T.shape[-2:] != _POSE or not _finite(T.reshape(-1)):
         finite_array("target", target, _POSE)
     value = _redundancy(redundancy, T.shape[:-2])

@@ -265,4 +265,4 @@ def unchecked() -> Callable[[Requirement, Array, Array, Array, Rows], int]:
     """`measure_and_sort` without type dispatch: arrays must be C-contiguous and of the types given in `Rows`."""
     requirement = record(Requirement, MODEL, 1, 1, 1, 1, int, bool, float, float)
     rows = record(Rows, 2, 2, row_of(bool), row_of(bool), row_of(int))
-    return direct(measure_and_sort, requirement, 2, 1, 1, rows)
+    return direct(measure_and_sort, requirement, (4, 4), 1, 1, rows)

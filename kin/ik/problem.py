@@ -250,7 +250,7 @@ def read_pose(target: ArrayLike, code: int, field: str = "target", always: bool 
 @cache
 def _straighten() -> Callable[[Array, float, Array], float]:
     """`straighten` without type dispatch."""
-    return direct(straighten, 2, float, 2)
+    return direct(straighten, _POSE, float, _POSE)
 
 
 def listed(targets: object) -> list[ArrayLike]:
