@@ -106,8 +106,7 @@ def join(page: Page, address: str, code: str, alias: str, q: list[float]) -> Non
     features = {"exercises": {"seed": 1, "at": TASK, "done": {}}}
     page.goto("about:blank")
     page.goto(link(address, {"robot": "puma560", "q": q, "lesson": "exercises", "features": features}))
-    arrive(page)
-    page.get_by_role("tab", name="Learn").click(force=True)
+    expect(page.locator("[data-exercises=question] [data-guide-do=answer]").first).to_be_attached()
 
 
 def take_wall(browser: Browser, address: str) -> Image.Image:
@@ -127,10 +126,10 @@ def take_wall(browser: Browser, address: str) -> Image.Image:
         student = browser.new_page(viewport={"width": 480, "height": 400})
         join(student, address, code, alias, q)
         for choice in choices:
-            student.locator("[data-exercises=question] [data-guide-do=answer]").nth(choice).click()
-            student.wait_for_timeout(500)
+            student.locator("[data-exercises=question] [data-guide-do=answer]").nth(choice).dispatch_event("click")
+            student.wait_for_timeout(1000)
         if hand:
-            student.locator("[data-class-bar] [data-guide-do=hand]").click()
+            student.locator("[data-class-bar] [data-guide-do=hand]").dispatch_event("click")
     teacher.locator("[data-class-code]").scroll_into_view_if_needed()
     teacher.locator("[data-guide-do=wall]:visible").first.click()
     teacher.mouse.move(5, 5)

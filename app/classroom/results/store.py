@@ -13,11 +13,12 @@ from app.classroom.tables import Attempt as Stored
 from app.classroom.tables import Seat
 
 PAGE = 100  # attempts that are read at a time; each has up to 20 000 characters of an answer
+SHORT_PAGE = 5000  # the same without answers
 
 
 def attempts_of(database: Database, room: str, answers: bool = True) -> list[Attempt]:
     """All attempts of a room at once, as `pages_of` has them."""
-    return list(chain.from_iterable(pages_of(database, room, answers)))
+    return list(chain.from_iterable(pages_of(database, room, answers, PAGE if answers else SHORT_PAGE)))
 
 
 def pages_of(database: Database, room: str, answers: bool = True, size: int = PAGE) -> Iterator[list[Attempt]]:
