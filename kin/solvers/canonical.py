@@ -143,6 +143,7 @@ def free_last(problem: SolverInput, out: Array) -> Array:
     return np.array([(i, low, high) for i in np.flatnonzero(there)], dtype=np.float64).reshape(-1, 3)
 
 
+@jit
 def turn_around(low: float, high: float, wanted: float) -> tuple[float, float]:
     """The range of a joint with these limits, at most one turn around `wanted`."""
     if high - low < TURN:
@@ -153,12 +154,18 @@ def turn_around(low: float, high: float, wanted: float) -> tuple[float, float]:
     return wanted - math.pi, wanted + math.pi
 
 
+@jit
 def at_every_turn(arcs: Array, low: float, high: float) -> Array:
-    """Intervals ``(k, 3)`` of one turn at all whole turns inside the limits of a joint."""
+    """Intervals ``(k, 3)`` of one turn at all whole turns inside the limits of a joint, copied."""
     if not TURN < high - low < UNBOUNDED:
-        return arcs
+        return arcs.copy()
     most = math.ceil((high - low) / TURN)
-    shifts = TURN * np.arange(-most, most + 1.0)
-    rows = np.array([(b, max(x + s, low), min(y + s, high)) for s in shifts for b, x, y in arcs.tolist()])
-    rows = rows.reshape(-1, 3)
-    return rows[rows[:, 1] <= rows[:, 2]]
+    out = np.empty(((2 * most + 1) * arcs.shape[0], 3))
+    n = 0
+    for turn in range(-most, most + 1):
+        for i in range(arcs.shape[0]):
+            first, last = max(arcs[i, 1] + TURN * turn, low), min(arcs[i, 2] + TURN * turn, high)
+            if first <= last:
+                out[n, 0], out[n, 1], out[n, 2] = arcs[i, 0], first, last
+                n += 1
+    return out[:n].copy()

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 
 from kin.axes import inverse
 from kin.fk import jacobian
+from kin.kernels.compile import direct
 from kin.robot import Robot
 from kin.solvers import rolled
-from kin.solvers.canonical import at_every_turn, signed_box, turn_around
-from kin.solvers.common import NEAR
+from kin.solvers.canonical import turn_around
 from kin.solvers.contract import (
     APPROACH,
     POSE,
@@ -24,21 +26,26 @@ from kin.solvers.contract import (
     SolverInput,
 )
 from kin.solvers.names import Names, Part, bent, eight, flipped, front_or_back, names_of, stance_of
+from kin.solvers.offset7.answers import answer
 from kin.solvers.offset7.branches import branches_many, branches_one, chain_values, forearm, gap_of
 from kin.solvers.offset7.geometry import SIN2, Geometry, geometry_of
 from kin.solvers.offset7.places import SAMPLES
-from kin.solvers.offset7.ranges import feasible, rows_at
 from kin.solvers.singular import Singularity, by_jacobian, those_within
 from kin.transforms import Array
 
 NAME = "offset7"
 TITLE = "closed form, seven joints of which one is given"
-_INTERVALS = 256
 _OBSTACLES: dict[int, ObstacleCode] = {
     1: "wrist centre too far from the shoulder",
     2: "wrist centre too near to the shoulder",
     3: "wrist centre beyond the elbow's reach",
 }
+
+
+@cache
+def _answer() -> Callable[[Array, Array, Array, Array, Array, float, bool, Array, Array], Array]:
+    """`answer` without type dispatch."""
+    return direct(answer, 1, 2, 1, 1, 1, float, bool, 2, 2)
 
 
 def match(robot: Robot) -> Offset7 | None:
@@ -91,29 +98,19 @@ class Offset7(ClosedForm):
         """All branches, each at the feasible value of the given joint nearest to the seed's, or as requested."""
         if problem.task == APPROACH:
             return rolled.solve_approach(self, problem, self._roll)
-        p, params, i = problem, self.kernels.params, self.given
-        requested, wanted = p.values[0], float(p.seed[i])
-        box, arcs, chosen = np.empty((3, 7)), np.empty((_INTERVALS, 3)), np.empty(8)
-        order = slice(None, None, -1) if self.geometry.reversed else slice(None)
-        seed, lower, upper = (np.ascontiguousarray(x[order]) for x in (p.seed, p.lower, p.upper))
-        signed_box(seed, lower, upper, self.geometry.sign, self.geometry.offset, box)
-        low, high = float(p.lower[i]), float(p.upper[i])
-        span, count = turn_around(low, high, wanted), 0
-        if math.isnan(requested) or p.respect_limits:
-            count = feasible(params, p.T, box, span, min(max(wanted, span[0]), span[1]), arcs, chosen)
-        out, values = np.full((8, 7), math.nan), np.full((8, 1), math.nan)
-        if not math.isnan(requested):
-            branches_one(params, p.T, requested, p.seed, out)
-            values[~np.isnan(out[:, 0]), 0] = requested
-        else:
-            rows_at(params, p.T, box[NEAR], chosen, out)
-            values[:, 0] = chosen
-        found = at_every_turn(arcs[:count], low, high)
+        p, requested, i = problem, problem.values[0], self.given
+        q, values = np.empty((8, 7)), np.empty((8, 1))
+        arcs = _answer()(
+            self.kernels.params, p.T, p.seed, p.lower, p.upper, requested, p.respect_limits, q, values
+        )
         gap, obstacle = 0.0, None
-        if np.isnan(out[:, 0]).all():
-            values_tried = np.linspace(*span, SAMPLES) if math.isnan(requested) else np.array([requested])
-            gap, obstacle = self._obstacle(p.T, values_tried.tolist())
-        return Candidates(out, values, (found,), gap, obstacle)
+        if all(map(math.isnan, q[:, 0].tolist())):
+            tried = [requested]
+            if math.isnan(requested):
+                span = turn_around(float(p.lower[i]), float(p.upper[i]), float(p.seed[i]))
+                tried = np.linspace(*span, SAMPLES).tolist()
+            gap, obstacle = self._obstacle(p.T, tried)
+        return Candidates(q, values, (arcs,), gap, obstacle)
 
     def _obstacle(self, T: Array, values: list[float]) -> tuple[float, Obstacle | None]:
         """Why no branch exists at any of these values of the given joint: the smallest gap, and what it is."""

@@ -22,13 +22,16 @@ from kin.solvers.offset7.geometry import D1, OFFSET, REVERSED, SIGN, Y4
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
-MOST = 512  # lanes at a time
-# Offsets of the columns of lanes, MOST values each: value, sign of the elbow and of the side; then the slack of
-# both branches, how far inside the arm's reach they are, 1.0 where an angle is free, and the angles of joints 2,
-# 3, 4, 5, 7 of the first branch from the middles of their limits, and of joint 6 from 0.
-VALUE, ELBOW, SIDE, FIRST, SECOND, ROOM, MARK, ANGLES = range(0, 8 * MOST, MOST)
-TURNED = 5  # of those angles, before that of joint 6
-SPACE = ANGLES + (TURNED + 1) * MOST
+MOST = 1024  # lanes at a time
+_WIDE = 8  # lanes are computed in groups of so many: those left over, one by one, would cost as much as a group
+# Columns are that far apart. At a multiple of 512 their entries would compete for the same lines of the cache.
+STRIDE = MOST + _WIDE
+# Offsets of the columns of lanes: value, sign of the elbow and of the side; then the slack of both branches, how
+# far inside the arm's reach they are, 1.0 where an angle is free, and the angles of joints 2, 3, 4, 5, 7 of the
+# first branch from the middles of their limits, and of joint 6 from 0.
+VALUE, ELBOW, SIDE, FIRST, SECOND, ROOM, MARK, ANGLES = range(0, 8 * STRIDE, STRIDE)
+JOINTS = 6
+SPACE = ANGLES + JOINTS * STRIDE
 # Layout of the setup of a target: the canonical pose; the chain's lengths and twists, and more of them with what
 # `distances` gives and the first joint; middles and halves of the limits of joints 2 to 7.
 _SHAPE, _DISTANCES, _LIMITS, _HALVES, SETUP = 12, 24, 36, 48, 60
@@ -185,17 +188,20 @@ def _read(setup: Array) -> tuple[Entries, Entries, Entries, Entries, Entries]:
 
 @jit
 def lanes(params: Array, T: Array, box: Array, setup: Array, L: Array, count: int) -> None:
-    """Columns FIRST to ANGLES of `count` lanes L ``(SPACE,)`` ← from their values, elbows and sides (±1.0)."""
+    """Columns FIRST to ANGLES of `count` lanes L ``(≥ SPACE,)`` ← from their values, elbows and sides (±1.0)."""
     widest()
     n, p, d, m, h = _read(setup)
-    for b in range(count):
+    padded = count + (-count) % _WIDE
+    for b in range(count, padded):
+        L[VALUE + b], L[ELBOW + b], L[SIDE + b] = L[VALUE], L[ELBOW], L[SIDE]
+    for b in range(padded):
         bent, level, free, angles = _lane(L[VALUE + b], L[ELBOW + b], L[SIDE + b], n, p, d, m, h)
         room = min(bent, level)
         L[ROOM + b], L[MARK + b] = room, 1.0 if free & (room >= 0.0) else 0.0
         L[FIRST + b], L[SECOND + b] = _least(insides(angles, False, h)), _least(insides(angles, True, h))
         a2, a3, a4, a5, a7, t6 = angles
-        L[ANGLES + b], L[ANGLES + MOST + b], L[ANGLES + 2 * MOST + b] = a2, a3, a4
-        L[ANGLES + 3 * MOST + b], L[ANGLES + 4 * MOST + b], L[ANGLES + 5 * MOST + b] = a5, a7, t6
+        L[ANGLES + b], L[ANGLES + STRIDE + b], L[ANGLES + 2 * STRIDE + b] = a2, a3, a4
+        L[ANGLES + 3 * STRIDE + b], L[ANGLES + 4 * STRIDE + b], L[ANGLES + 5 * STRIDE + b] = a5, a7, t6
     marked = 0.0
     for b in range(count):
         marked += L[MARK + b]

@@ -22,7 +22,7 @@ _BESIDE = (1e-9, -1e-9, 1e-5, -1e-5, 1e-4, -1e-4, 1e-3, -1e-3, 4e-3, -4e-3, 0.01
 _MOST_ENDS = 64
 _MOST_TURNS = 64  # peaks and dips of the room
 # Places for all of these; if rounding makes up edges, the last ones have no places beside them.
-_RESERVED = 512
+_RESERVED = 256
 # Shares of an interval between samples, from where a branch begins to exist.
 _FROM_EDGE = np.array([1e-4, 1e-3, 0.01, 0.03, 0.08, 0.15, 0.25, 0.4, 0.6, 0.8])
 
@@ -90,42 +90,56 @@ def places_of(target: Target, elbow: float, marks: Array, out: Array, coarse: Wh
     coarse ``(n,)`` ← the places of the marks.
     """
     n = marks.shape[0]
-    every, room, level = np.empty(n + _MOST_TURNS), np.empty(n + _MOST_TURNS), np.empty(n + _MOST_TURNS)
+    every, room, level = np.empty(n + _MOST_TURNS), np.empty(n + _MOST_TURNS), np.empty(out.shape[1])
     for i in range(n):
         every[i] = marks[i]
-    rooms(target[3], every[:n], elbow, room, level)
-    count = n
-    for i in range(1, n - 1):
-        for what in (LEVEL, EITHER):
-            f = level if what == LEVEL else room
-            sense = turns(marks, f, i)
-            if sense != 0.0:
-                x, top = peak(target, what, elbow, marks[i - 1], marks[i + 1], sense)
-                if (top >= 0.0) != (f[i] >= 0.0):
-                    count = _insert(every, count, x)
-    rooms(target[3], every[:count], elbow, room, level)
+    rooms(target[3], marks, elbow, room, level)
+    count = _insert_turns(target, LEVEL, elbow, marks, level, every, n)
+    count = _insert_turns(target, EITHER, elbow, marks, room, every, count)
+    if count > n:
+        rooms(target[3], every[:count], elbow, room, level)
     m = j = 0
     for i in range(count):
-        m = _append(target, elbow, every[i], room[i], out, m, level)
+        if i > 0 and (room[i - 1] >= 0.0) != (room[i] >= 0.0) and m < out.shape[1] - _RESERVED:
+            m = _append_edge(target[3], elbow, every[:count], room, i, out, m)
+        out[0, m] = every[i]
         if j < n and every[i] == marks[j]:
-            coarse[j] = m - 1
+            coarse[j] = m
             j += 1
+        m += 1
+    rooms(target[3], out[0, :m], elbow, out[1], level)
     return m
 
 
 @jit
-def _append(target: Target, elbow: float, value: float, room: float, out: Array, m: int, scratch: Array) -> int:
-    """Append a value and its room to the places ``(2, m)``, after those of an edge between it and the last."""
-    if m > 0 and (out[1, m - 1] >= 0.0) != (room >= 0.0) and m < out.shape[1] - _RESERVED:
-        last, this = (out[0, m - 1], out[1, m - 1]), (value, room)
-        inside, outside = (last, this) if room < 0.0 else (this, last)
-        x, y = edge(target, elbow, inside, outside)
-        count = _FROM_EDGE.shape[0]
-        for j in range(count):
-            out[0, m + (count - 1 - j if room < 0.0 else j + 2)] = x + _FROM_EDGE[j] * (inside[0] - x)
-        out[0, m + (count if room < 0.0 else 1)] = x
-        out[0, m + (count + 1 if room < 0.0 else 0)] = y
-        rooms(target[3], out[0, m : m + count + 2], elbow, out[1, m:], scratch)
-        m += count + 2
-    out[0, m], out[1, m] = value, room
-    return m + 1
+def _insert_turns(
+    target: Target, what: int, elbow: float, marks: Array, f: Array, every: Array, count: int
+) -> int:
+    """Insert the peaks and dips of f, `room_at` or `level_at` at the marks ``(n,)``, that pass zero between these.
+
+    every ``(≥ count,)``: the sorted marks, with those inserted before; returns the new count.
+    """
+    n = marks.shape[0]
+    sense = np.empty(n)
+    turns(marks, f, sense)
+    for i in range(1, n - 1):
+        if sense[i] != 0.0:
+            x, top = peak(target, what, elbow, marks[i - 1], marks[i + 1], sense[i])
+            if (top >= 0.0) != (f[i] >= 0.0):
+                count = _insert(every, count, x)
+    return count
+
+
+@jit
+def _append_edge(setup: Array, elbow: float, values: Array, room: Array, i: int, out: Array, m: int) -> int:
+    """Append to the m values those of the edge between values i − 1 and i, and beside it; returns their number."""
+    opens = room[i] >= 0.0
+    a, b = (i, i - 1) if opens else (i - 1, i)
+    c = min(max(2 * a - b, 0), values.shape[0] - 1)  # the value behind the one inside
+    x, y = edge(setup, elbow, (values[a], room[a], values[b], room[b], values[c], room[c]))
+    count = len(_FROM_EDGE)
+    for j in range(count):
+        out[0, m + (j + 2 if opens else count - 1 - j)] = x + _FROM_EDGE[j] * (values[a] - x)
+    out[0, m + (1 if opens else count)] = x
+    out[0, m + (0 if opens else count + 1)] = y
+    return m + count + 2

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kin.kernels.compile import inlined, jit
+from kin.kernels.simd import widest
 from kin.solvers.offset7.lanes import level_at, room_at, slack_at
 from kin.transforms import Array
 
@@ -37,13 +38,14 @@ def next_in(bracket: Bracket, width: float) -> float:
     """The next value at which to look for a zero: by inverse quadratic interpolation if that is safe, or halfway.
 
     T. R. Chandrupatla, Advances in Engineering Software 28(3), 1997. It stays a share of `width` away from both
-    ends, so that the zero is soon between two values as close as that.
+    ends, so that the zero is soon between two values as close as that; beside an end that is a zero itself, too.
     """
     a, fa, b, fb, c, fc = bracket
-    share = 0.5
     along, up = (a - b) / (c - b), (fa - fb) / (fc - fb)
-    if fa != 0.0 and fb != 0.0 and up * up < along and (1.0 - up) * (1.0 - up) < 1.0 - along:
-        share = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
+    safe = (up * up < along) & ((1.0 - up) * (1.0 - up) < 1.0 - along)
+    share = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
+    share = share if safe else 0.5
+    share = 0.0 if fa == 0.0 else (1.0 if fb == 0.0 else share)
     least = min(0.4 * width / abs(b - a), 0.5)
     return a + min(max(share, least), 1.0 - least) * (b - a)
 
@@ -52,23 +54,19 @@ def next_in(bracket: Bracket, width: float) -> float:
 def narrowed(bracket: Bracket, value: float, f: float) -> Bracket:
     """The bracket once the function is known at a value inside it."""
     a, fa, b, fb, _, _ = bracket
-    if (f >= 0.0) == (fa >= 0.0):
-        return value, f, b, fb, a, fa
-    return value, f, a, fa, b, fb
+    same = (f >= 0.0) == (fa >= 0.0)
+    return value, f, b if same else a, fb if same else fa, a if same else b, fa if same else fb
 
 
 @jit
-def edge(
-    target: Target, elbow: float, inside: tuple[float, float], outside: tuple[float, float]
-) -> tuple[float, float]:
-    """Where the branches of an elbow begin to exist between two (value, room): neighbours on both sides of it."""
-    x: Bracket = (inside[0], inside[1], outside[0], outside[1], inside[0], inside[1])
-    middle = 0.5 * (inside[0] + outside[0])
+def edge(setup: Array, elbow: float, bracket: Bracket) -> tuple[float, float]:
+    """Where the branches of an elbow begin to exist, in a bracket of `room_at`: neighbours on both sides of it."""
+    x = bracket
     for _ in range(STEPS):
-        x = narrowed(x, middle, room_at(target[3], middle, elbow))
         if abs(x[2] - x[0]) < _EDGE_WIDTH:
             break
-        middle = next_in(x, _EDGE_WIDTH)
+        value = next_in(x, _EDGE_WIDTH)
+        x = narrowed(x, value, room_at(setup, value, elbow))
     return (x[0], x[2]) if x[1] >= 0.0 else (x[2], x[0])
 
 
@@ -92,17 +90,20 @@ def peak(target: Target, k: int, elbow: float, low: float, high: float, sense: f
 
 
 @jit
-def turns(x: Array, f: Array, i: int) -> float:
-    """1.0 if a peak of f ``(n,)`` around value x[i] could be above zero, −1.0 if a dip could be below, else 0.0.
+def turns(x: Array, f: Array, out: Array) -> None:
+    """out ``(n,)`` ← 1.0 if a peak of f ``(n,)`` around value x[i] could be above zero, −1.0 if a dip could be
+    below, else 0.0.
 
     It could if the steeper of the two slopes, over the wider interval, leads as far as zero.
     """
-    left, right = x[i] - x[i - 1], x[i + 1] - x[i]
-    before, here, after = f[i - 1], f[i], f[i + 1]
-    peaks, dips = here < 0.0 and before <= here and after < here, here >= 0.0 and before >= here and after > here
-    if not (peaks or dips) or left <= 0.0 or right <= 0.0:
-        return 0.0
-    rise = max(abs(here - before) / left, abs(after - here) / right) * max(left, right)
-    if not abs(here) < rise:
-        return 0.0
-    return 1.0 if peaks else -1.0
+    widest()
+    n = out.shape[0]
+    out[0] = out[n - 1] = 0.0
+    for i in range(1, n - 1):
+        left, right = x[i] - x[i - 1], x[i + 1] - x[i]
+        before, here, after = f[i - 1], f[i], f[i + 1]
+        peaks = (here < 0.0) & (before <= here) & (after < here)
+        dips = (here >= 0.0) & (before >= here) & (after > here)
+        rise = max(abs(here - before) / left, abs(after - here) / right) * max(left, right)
+        turning = (left > 0.0) & (right > 0.0) & (abs(here) < rise)
+        out[i] = 1.0 if turning & peaks else (-1.0 if turning & dips else 0.0)

@@ -1,0 +1,71 @@
+"""The kernel that computes all that the solver says of one target, so that Python makes a single call."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kin.kernels.compile import jit
+from kin.solvers.canonical import at_every_turn, signed_box, turn_around
+from kin.solvers.common import NEAR
+from kin.solvers.offset7.branches import all_branches, branches_one, joints_of
+from kin.solvers.offset7.geometry import OFFSET, REVERSED, SIGN
+from kin.solvers.offset7.ranges import INTERVALS, feasible
+from kin.transforms import Array
+
+
+@jit
+def answer(
+    params: Array, T: Array, seed: Array, lower: Array, upper: Array, requested: float, limited: bool, q: Array,
+    values: Array,
+) -> Array:  # fmt: skip
+    """q ``(8, 7)``, values ``(8, 1)`` ← each branch at the requested value of the given joint, or, if that is NaN,
+    at the feasible one nearest to the seed's. NaN where a branch does not exist.
+
+    Returns the feasible intervals ``(k, 3)``, rows (branch, low, high); none if a value is requested and limits do
+    not matter. seed, lower, upper ``(7,)``: joint values of the arm.
+    """
+    back = params[REVERSED] > 0.0
+    given = 6 if back else 0
+    box, arcs, chosen = np.empty((3, 7)), np.empty((INTERVALS, 3)), np.empty(8)
+    order = -1 if back else 1
+    signed_box(
+        seed[::order], lower[::order], upper[::order], params[SIGN : SIGN + 7], params[OFFSET : OFFSET + 7], box
+    )
+    low, high = lower[given], upper[given]
+    count = 0
+    if math.isnan(requested) or limited:
+        span = turn_around(low, high, seed[given])
+        count = feasible(params, T, box, span, min(max(seed[given], span[0]), span[1]), arcs, chosen)
+    if math.isnan(requested):
+        _rows_at(params, T, box[NEAR], chosen, q)
+        for k in range(8):
+            values[k, 0] = chosen[k]
+    else:
+        branches_one(params, T, requested, seed, q)
+        for k in range(8):
+            values[k, 0] = math.nan if math.isnan(q[k, 0]) else requested
+    return at_every_turn(arcs[:count], low, high)
+
+
+@jit
+def _rows_at(params: Array, T: Array, near: Array, chosen: Array, out: Array) -> None:
+    """out ``(8, 7)`` ← joint values of each branch at its value of the given joint, chosen ``(8,)``.
+
+    NaN where a branch has none. near ``(7,)``: chain angles that decide what is free.
+    """
+    rows, room, t, joints = np.empty((8, 7)), np.empty(8), near.copy(), np.empty((8, 7))
+    last = math.nan
+    for k in range(8):
+        for i in range(7):
+            out[k, i] = math.nan
+        if math.isnan(chosen[k]):
+            continue
+        if chosen[k] != last:
+            last = chosen[k]
+            t[0] = params[SIGN] * last + params[OFFSET]
+            all_branches(params, T, near, t, -1, rows, room)
+            joints_of(params, rows, last, joints)
+        for i in range(7):
+            out[k, i] = joints[k, i]
