@@ -122,8 +122,6 @@ class Startup:
                 compile_first("warm_up_first()", *second, stopping=self._stopping)
             if not self._stopping.is_set():
                 warm_up_first()
-                if self._compiles and rest_compiled():
-                    self.preparation.finish()
                 if self._on_ready is not None:
                     self._on_ready()
                 self.status = "ready"
@@ -155,9 +153,11 @@ class Startup:
         lower_priority()
         self._wait_for_first(Phase.COMPLETE)
         try:
-            if self._compiles and not self.preparation.complete:
+            if self._compiles and not rest_compiled():
+                self.preparation.begin()
                 if not self._compiler.run() and not self._stopping.is_set():
                     logger.warning("the compiling process ended early: kernels are compiled where they are used")
+            if self._compiles:
                 self.preparation.finish()
             warm_up_rest(self._stopping.is_set)
             if self._viewer is not None and not self._stopping.is_set():

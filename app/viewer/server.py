@@ -67,7 +67,7 @@ class ViewerServer:
         hub = classroom or Hub.of(settings)
         caches = clouds, maps or Maps(), summaries or Summaries()
         readers = meshes, Library(meshes)
-        kernels = preparation or Preparation.finished()
+        kernels = preparation or Preparation()
         self._services = Services(store, *caches, *readers, Pace(), exercises, courses, hub, kernels)
         self._owns_maps = maps is None
         self._owns_summaries = summaries is None

@@ -25,23 +25,16 @@ class Preparation:
     """
 
     def __init__(self, memory: MutableSequence[int] | None = None) -> None:
-        # Bytes: whether all is done; 1 + the number of the part that is compiled; of each part the steps that are
-        # done; of each part whether it is wanted.
+        # Bytes: whether parts are compiled; 1 + the number of the one that is; of each part, the steps that are
+        # done; of each part, whether it is wanted.
         self._memory = bytearray(SIZE) if memory is None else memory
-
-    @classmethod
-    def finished(cls) -> Preparation:
-        """All kernels are compiled."""
-        made = cls()
-        made.finish()
-        return made
 
     # Any process
 
     @property
     def complete(self) -> bool:
-        """Whether all kernels are compiled, or will be compiled only when they are used."""
-        return self._memory[0] != 0
+        """Whether nothing is compiled ahead: before `begin`, and after `finish`."""
+        return self._memory[0] == 0
 
     def ready(self, names: Collection[str]) -> bool:
         """Whether these parts are compiled. Those with other names than `parts` has are not compiled ahead."""
@@ -74,10 +67,14 @@ class Preparation:
 
     # The process that has them compiled
 
+    def begin(self) -> None:
+        """Kernels are missing: they are compiled from now on."""
+        self._memory[0] = 1
+
     def next(self) -> tuple[str, int] | None:
         """The part to go on with, what is wanted first, and the number of its next step; None: all are done."""
         waiting = [name for name in parts() if not self.ready((name,))]
-        if self.complete or not waiting:
+        if not waiting:
             self._memory[1] = 0
             return None
         wanted = [name for name in waiting if self._memory[2 + ROOM + _number(name)]]
@@ -91,8 +88,7 @@ class Preparation:
 
     def finish(self) -> None:
         """Nothing is compiled ahead any more."""
-        self._memory[1] = 0
-        self._memory[0] = 1
+        self._memory[0] = self._memory[1] = 0
 
 
 def _number(name: str) -> int:

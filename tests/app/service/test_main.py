@@ -97,6 +97,7 @@ def test_missing_kernels_are_compiled_by_other_processes_which_a_stop_ends(monke
     with TestClient(create_app(Settings())) as client:
         wait_for(lambda: client.get("/readyz").status_code == 200, 120)
         wait_for(lambda: "warmup.parts()" in steps[-1])
+        wait_for(lambda: client.get("/readyz").json()["kernels"]["preparing"] is not None)
         assert started[-1].poll() is None
         kernels = client.get("/readyz").json()["kernels"]
         assert kernels["ready"] == [first_family()]

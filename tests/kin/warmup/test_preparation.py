@@ -7,6 +7,12 @@ from kin.warmup import MOTIONS, NUMERIC, all_of, family_of, first_family, parts
 from kin.warmup.preparation import ROOM, SIZE, Preparation
 
 
+def begun() -> Preparation:
+    made = Preparation()
+    made.begin()
+    return made
+
+
 def finish_part(preparation: Preparation, name: str) -> None:
     while not preparation.ready((name,)):
         preparation.done(name)
@@ -21,7 +27,7 @@ def test_every_family_has_its_parts_and_all_fit_into_the_memory():
 
 
 def test_parts_come_in_their_order_and_are_ready_with_their_last_step():
-    preparation, seen = Preparation(), []
+    preparation, seen = begun(), []
     while (task := preparation.next()) is not None:
         name, step = task
         assert not preparation.ready((name,))
@@ -38,7 +44,7 @@ def test_parts_come_in_their_order_and_are_ready_with_their_last_step():
 
 
 def test_what_is_wanted_comes_next_even_within_another_part():
-    preparation = Preparation()
+    preparation = begun()
     first, *others = parts()
     preparation.done(first)
     preparation.want((others[4], "no part", others[2]))
@@ -53,7 +59,7 @@ def test_what_is_wanted_comes_next_even_within_another_part():
 
 
 def test_other_names_are_never_waited_for():
-    preparation = Preparation()
+    preparation = begun()
     assert preparation.ready((first_family(), NUMERIC, "no part"))
     assert preparation.ready(())
     assert preparation.steps(("no part",)) == (0, 0)
@@ -62,6 +68,9 @@ def test_other_names_are_never_waited_for():
 def test_processes_with_the_same_memory_see_the_same():
     memory = bytearray(SIZE)
     compiling, viewer = Preparation(memory), Preparation(memory)
+    assert viewer.complete
+    compiling.begin()
+    assert not viewer.complete
     viewer.want((MOTIONS,))
     assert compiling.next() == (MOTIONS, 0)
     finish_part(compiling, MOTIONS)
@@ -71,7 +80,10 @@ def test_processes_with_the_same_memory_see_the_same():
     assert viewer.steps((MOTIONS,)) == (len(parts()[MOTIONS]),) * 2
 
 
-def test_nothing_is_waited_for_once_all_is_compiled():
-    preparation = Preparation.finished()
+def test_nothing_is_waited_for_before_the_begin_and_after_the_end():
+    preparation = Preparation()
     assert preparation.ready(parts())
-    assert preparation.next() is None
+    preparation.begin()
+    assert not preparation.ready(parts())
+    preparation.finish()
+    assert preparation.ready(parts())

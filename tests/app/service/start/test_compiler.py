@@ -17,6 +17,7 @@ from kin.warmup.preparation import Preparation
 def preparation() -> Preparation:
     """Only the collisions are left to compile."""
     made = Preparation()
+    made.begin()
     for name in parts():
         while name != COLLISIONS and not made.ready((name,)):
             made.done(name)

@@ -27,7 +27,9 @@ PIONEER, UR5, PLANAR = STORE.get("pioneer5"), STORE.get("ur5"), STORE.get("plana
 @pytest.fixture
 def preparation() -> Preparation:
     kin.warm_up()
-    return Preparation()
+    made = Preparation()
+    made.begin()
+    return made
 
 
 @pytest.fixture
