@@ -106,7 +106,7 @@ RULES: dict[str, set[str]] = {
         "app.shared",
     },
     "app/cli/parser.py": {"kin", "app.bench.command", "app.cli"},
-    "app/cli/arguments.py": set(),
+    "app/cli/arguments": {"app.cli.arguments"},
     "app/cli/classroom": {"kin", "app.classroom", "app.cli", "app.exercises", "app.shared"},
     "app/cli/classroom/arguments.py": set(),
     "app/cli/xacro": {"kin", "app.cli.xacro"},

@@ -18,6 +18,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from app.cli import arguments as declare
+from app.cli.arguments.shared import Parents
 from app.cli.classroom.arguments import add_lti, add_result, add_results, add_room
 from app.cli.startup import disable_compiler, no_collections
 
@@ -44,7 +45,7 @@ class Command(NamedTuple):
             numba needs half a second to load compiled code.
     """
 
-    declare: Callable[[Any, declare.Parents], argparse.ArgumentParser]
+    declare: Callable[[Any, Parents], argparse.ArgumentParser]
     load: Callable[[], Run]
     interpreted: bool = False
 
@@ -94,7 +95,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    parents = declare.Parents()
+    parents = Parents()
     for command in COMMANDS:
         command.declare(subparsers, parents).set_defaults(command=command)
     return parser
@@ -212,11 +213,11 @@ def _load_lti() -> Run:
     return run
 
 
-def _add_ik(commands: Any, parents: declare.Parents) -> argparse.ArgumentParser:
+def _add_ik(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     return _avoiding(declare.add_ik(commands, parents))
 
 
-def _add_move(commands: Any, parents: declare.Parents) -> argparse.ArgumentParser:
+def _add_move(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     return _avoiding(declare.add_move(commands, parents))
 
 

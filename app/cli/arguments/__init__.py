@@ -5,97 +5,11 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-UNITS_NOTE = "degrees and millimetres, or radians and metres with --rad"
+from app.cli.arguments.shared import UNITS_NOTE, Parents
+from app.cli.arguments.values import count, named_number, number, whole_number
+
 ROBOT_HELP = "id of the robot (`kinboard robots` lists them), or a robot file (*.toml, *.urdf)"
 XYZ = ("X", "Y", "Z")
-
-
-def number(text: str) -> float:
-    """A finite number; the minus sign may be the typographic one."""
-    value = float(text.replace("−", "-"))
-    if not abs(value) <= 1e6:
-        raise argparse.ArgumentTypeError(f"{text.strip()!r} is not a number between -1e6 and 1e6")
-    return value
-
-
-def whole_number(text: str) -> int:
-    """A whole number in digits."""
-    return int(text.replace("−", "-"))
-
-
-def count(text: str) -> int:
-    """A whole number, which may be written as 1e6."""
-    value = float(text)
-    if not value.is_integer():
-        raise ValueError
-    return int(value)
-
-
-def named_number(text: str) -> tuple[str, float]:
-    """``NAME=VALUE``, or a bare value with an empty name."""
-    name, _, value = text.rpartition("=")
-    return name.strip(), number(value)
-
-
-def named_numbers(text: str) -> tuple[str, list[float]]:
-    """``NAME=VALUE:VALUE…``."""
-    name, _, values = text.rpartition("=")
-    return name.strip(), [number(value) for value in values.split(":")]
-
-
-def workpiece(text: str) -> tuple[str, list[float]]:
-    """``NAME=X:Y:Z`` or ``NAME=X:Y:Z:ROLL:PITCH:YAW``."""
-    name, values = named_numbers(text)
-    if not name or len(values) not in (3, 6):
-        raise argparse.ArgumentTypeError(f"{text!r} is not NAME=X:Y:Z or NAME=X:Y:Z:ROLL:PITCH:YAW")
-    return name, [*values, 0.0, 0.0, 0.0][:6]
-
-
-# argparse reports "invalid <name> value".
-whole_number.__name__ = count.__name__ = "whole number"
-named_number.__name__ = named_numbers.__name__ = "value"
-
-
-class Parents:
-    """Arguments that several commands share, as parent parsers.
-
-    Attributes:
-        robots: ``--robots``, the folder of further robot files.
-        output: ``--json`` and the units.
-        joints: ``--lock`` and ``--limit``.
-        frames: ``--workpiece``.
-    """
-
-    def __init__(self) -> None:
-        self.robots = argparse.ArgumentParser(add_help=False)
-        self.robots.add_argument("--robots", metavar="FOLDER", help="folder with further robot files (*.toml)")
-        self.output = argparse.ArgumentParser(add_help=False)
-        self.output.add_argument(
-            "--json", action="store_true", help="print the result as JSON, in radians and metres"
-        )
-        unit = self.output.add_mutually_exclusive_group()
-        unit.add_argument(
-            "--deg", dest="rad", action="store_false", default=False, help="degrees and millimetres (default)"
-        )
-        unit.add_argument(
-            "--rad", dest="rad", action="store_true", default=False,
-            help="read and print radians and metres",
-        )  # fmt: skip
-        self.joints = argparse.ArgumentParser(add_help=False)
-        self.joints.add_argument(
-            "--lock", type=named_numbers, action="append", metavar="JOINT=VALUE",
-            help=f"lock a joint (counted from 1) at a value; {UNITS_NOTE}; may be repeated",
-        )  # fmt: skip
-        self.joints.add_argument(
-            "--limit", type=named_numbers, action="append", metavar="JOINT=LOWER:UPPER",
-            help=f"narrow the limits of a joint (counted from 1); {UNITS_NOTE}; may be repeated",
-        )  # fmt: skip
-        self.frames = argparse.ArgumentParser(add_help=False)
-        self.frames.add_argument(
-            "--workpiece", type=workpiece, action="append", metavar="NAME=X:Y:Z[:ROLL:PITCH:YAW]", default=[],
-            help="a frame of your own, such as a table, with its pose in the world frame; --frame may name it; "
-            f"{UNITS_NOTE}; may be repeated",
-        )  # fmt: skip
 
 
 def _command(

@@ -1,0 +1,51 @@
+"""Arguments that several commands share."""
+
+from __future__ import annotations
+
+import argparse
+
+from app.cli.arguments.values import named_numbers, workpiece
+
+UNITS_NOTE = "degrees and millimetres, or radians and metres with --rad"
+
+
+class Parents:
+    """Arguments that several commands share, as parent parsers.
+
+    Attributes:
+        robots: ``--robots``, the folder of further robot files.
+        output: ``--json`` and the units.
+        joints: ``--lock`` and ``--limit``.
+        frames: ``--workpiece``.
+    """
+
+    def __init__(self) -> None:
+        self.robots = argparse.ArgumentParser(add_help=False)
+        self.robots.add_argument("--robots", metavar="FOLDER", help="folder with further robot files (*.toml)")
+        self.output = argparse.ArgumentParser(add_help=False)
+        self.output.add_argument(
+            "--json", action="store_true", help="print the result as JSON, in radians and metres"
+        )
+        unit = self.output.add_mutually_exclusive_group()
+        unit.add_argument(
+            "--deg", dest="rad", action="store_false", default=False, help="degrees and millimetres (default)"
+        )
+        unit.add_argument(
+            "--rad", dest="rad", action="store_true", default=False,
+            help="read and print radians and metres",
+        )  # fmt: skip
+        self.joints = argparse.ArgumentParser(add_help=False)
+        self.joints.add_argument(
+            "--lock", type=named_numbers, action="append", metavar="JOINT=VALUE",
+            help=f"lock a joint (counted from 1) at a value; {UNITS_NOTE}; may be repeated",
+        )  # fmt: skip
+        self.joints.add_argument(
+            "--limit", type=named_numbers, action="append", metavar="JOINT=LOWER:UPPER",
+            help=f"narrow the limits of a joint (counted from 1); {UNITS_NOTE}; may be repeated",
+        )  # fmt: skip
+        self.frames = argparse.ArgumentParser(add_help=False)
+        self.frames.add_argument(
+            "--workpiece", type=workpiece, action="append", metavar="NAME=X:Y:Z[:ROLL:PITCH:YAW]", default=[],
+            help="a frame of your own, such as a table, with its pose in the world frame; --frame may name it; "
+            f"{UNITS_NOTE}; may be repeated",
+        )  # fmt: skip
