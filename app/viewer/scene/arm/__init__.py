@@ -12,8 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 import viser
 
-from app.viewer.labels import add_label
 from app.viewer.panel.view import Look
+from app.viewer.scene.arm.contact import ContactMark
+from app.viewer.scene.arm.frames import ArmFrames
 from app.viewer.scene.bodies import Drawing, drawing
 from app.viewer.scene.bodies.nodes import GHOST, DrawnBody, LinkColors
 from app.viewer.scene.bodies.parts import Part
@@ -21,11 +22,10 @@ from app.viewer.scene.chain import turn
 from app.viewer.scene.clearance import Contact, clearance_of
 from app.viewer.scene.floor import Floor
 from app.viewer.scene.gizmo_axes import GizmoAxes
-from app.viewer.scene.key_number import place_beside
 from app.viewer.scene.lights import add_lamp
 from app.viewer.scene.meshes import body
 from app.viewer.viser_patches import assign, keep_private
-from kin import Robot, fk, link_frames
+from kin import Robot, fk
 from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
 
 # Parts without shadows: these would cost as much as the shadows of the bodies, and are not visible.
@@ -36,9 +36,7 @@ GIZMO = 0.26  # length of the gizmo's arrows, in radii of the sphere around the 
 LINE = 4.0  # their thickness, pixels
 FOR_FINGERS = 1.6  # how much larger and thicker they are in the small picture of a phone
 THROUGH = 0.4  # opacity of the bodies while drawings inside them are shown
-BASE_AXES = 5.0  # length of the axes at the base, in thicknesses of the arm: beyond the pedestal's flange
 GAP_COLOR = (213, 94, 0)
-CONTACT_COLOR = (204, 20, 60)
 
 
 class ArmScene:
@@ -71,10 +69,7 @@ class ArmScene:
         self.body = body(robot)
         self._look: Look = "body"
         self._scene = scene
-        self._home_frames = link_frames(robot, robot.q_home)
         self._joints: list[viser.SceneNodeHandle] = []
-        self._frames: list[viser.SceneNodeHandle] = []
-        self._labels: list[viser.SceneNodeHandle] = []
         self._bodies: list[viser.MeshHandle] = []
         self.colors = LinkColors()
         self._nodes: list[str] = []  # names of the nodes of the links, base first
@@ -96,18 +91,8 @@ class ArmScene:
             f"{root}-gap", np.zeros((1, 2, 3), np.float32), GAP_COLOR, thickness=3.0, thickness_units="screen",
             visible=False,
         )  # fmt: skip
-        self._contact = scene.add_frame(f"{root}-contact", show_axes=False, visible=False)
-        scene.add_icosphere(
-            f"{root}-contact/mark",
-            2.4 * self.body.size,
-            CONTACT_COLOR,
-            subdivisions=2,
-            opacity=0.5,
-            cast_shadow=False,
-            receive_shadow=False,
-        )
-        self._contact_label = add_label(scene, f"{root}-contact/text", "", anchor="bottom-center")
-        self._top += [self.gizmo, self._gap, self._contact]
+        self._contact = ContactMark(scene, f"{root}-contact", self.body)
+        self._top += [self.gizmo, self._gap, self._contact.node]
         self._rings: list[viser.TransformControlsHandle] = []
         self._ring_sets = 0
         self.gizmo_in_base = False
@@ -216,18 +201,7 @@ class ArmScene:
 
         `target`: a missed target ``(3,)``, whose number the sentence must not cover.
         """
-        self._contact.visible = contact is not None
-        if contact is None:
-            return ""
-        assign(self._contact, contact.point)
-        height, anchor = place_beside(contact.point, 3.6 * self.body.size, target, self.body.radius)
-        assign(self._contact_label, (0.0, 0.0, height))
-        if anchor != self._contact_label.anchor:
-            self._contact_label.anchor = anchor
-        text = contact.text(self.robot)
-        if text != self._contact_label.text:
-            self._contact_label.text = text
-        return text
+        return self._contact.show(contact, self.robot, target)
 
     def see_through(self, on: bool, gizmo: bool = False) -> None:
         """Make way for drawings inside the arm: translucent links, no axes at the base, no gizmo unless kept."""
@@ -253,7 +227,7 @@ class ArmScene:
             node.visible = self._bare or look == "both"
         for node in self._drawn.nodes:
             node.visible = not self._bare
-        self._base_up.visible = self._bare or look == "both"  # the arrow is inside the body's foot
+        self._frames.base_up.visible = self._bare or look == "both"  # the arrow is inside the body's foot
         self._show_ghost()
         self._set_opacity()
 
@@ -264,17 +238,15 @@ class ArmScene:
 
     def show_base_axes(self, visible: bool) -> None:
         """Show or hide the axes of the base frame."""
-        self._base.visible = visible
+        self._frames.base.visible = visible
 
     def show_frames(self, visible: bool) -> None:
         """Show or hide the frame of every DH row."""
-        for node in self._frames:
-            node.visible = visible
+        self._frames.show(visible)
 
     def show_labels(self, visible: bool) -> None:
         """Show or hide the frames' names."""
-        for node in self._labels:
-            node.visible = visible
+        self._frames.show_labels(visible)
 
     def show_axes(self, visible: bool) -> None:
         """Show or hide the joint axes; a body hides most of them, so only a skeleton shows any."""
@@ -301,8 +273,8 @@ class ArmScene:
         root = self._scene.add_frame(self._root, show_axes=False)
         self._top.append(root)
         self._add(self._root, self.body.pedestal)
-        self._add_base_axes()
-        self._add_frame(self._root, -1, self.robot.T_world_base)
+        self._frames = ArmFrames(self._scene, self._root, self.robot, self.body, 0.5 * GIZMO * self.body.radius)
+        self._frames.add(self._root, -1, self.robot.T_world_base)
         name = self._root
         for link, parts, q in zip(self.body.chain.links, self.body.parts, (0.0, *self.robot.home), strict=True):
             parent = name
@@ -322,7 +294,7 @@ class ArmScene:
                     self.colors.add(link.index + (not part.fixed_to_parent), node, part.color)
             self._nodes.append(name)
             for row, T in link.frames:
-                self._add_frame(name, row, T)
+                self._frames.add(name, row, T)
         tool = self.body.chain.T_last_tool
         gripper, approach = self.body.gripper
         self._bodies.append(self._add(name, gripper, tool))
@@ -351,42 +323,3 @@ class ArmScene:
             cast_shadow=opacity is None and part.name not in NO_SHADOW,
             receive_shadow=False,  # round parts would shade themselves in stripes
         )
-
-    def _add_base_axes(self) -> None:
-        """The axes of the base frame."""
-        T, length = self.robot.T_world_base, BASE_AXES * self.body.size
-        self._base = self._scene.add_frame(
-            f"{self._root}/base",
-            axes_length=length,
-            axes_radius=0.07 * self.body.size,
-            position=T[:3, 3],
-            wxyz=wxyz_from_rotation(T[:3, :3]),
-        )
-        for tip, letter in zip(1.15 * length * np.eye(3), "xyz", strict=True):
-            name = f"{self._base.name}/{letter}"
-            self._base_up = add_label(self._scene, name, letter, position=tip, anchor="center-center")
-
-    def _add_frame(self, parent: str, row: int, T: Array) -> None:
-        """The frame of a DH row; row −1 is the base frame."""
-        rows = len(self.robot.rows)
-        length = 4.0 * self.body.size
-        if row + 1 == rows:
-            length = min(length, 0.5 * GIZMO * self.body.radius)  # the gizmo's arrows are on top of it
-        name = f"{parent}/frame-{row + 1}"
-        self._frames.append(
-            self._scene.add_frame(
-                name,
-                axes_length=length,
-                axes_radius=0.09 * self.body.size,
-                position=T[:3, 3],
-                wxyz=wxyz_from_rotation(T[:3, :3]),
-                visible=False,
-            )
-        )
-        text = "base" if row < 0 else "tool" if row + 1 == rows else f"frame {row + 1}"
-        # At the tip of z, each further out than the last: the frames of one wrist share their origin.
-        origins = np.vstack([self.robot.T_world_base[None, :3, 3], self._home_frames[:, :3, 3]])
-        crowd = int((np.linalg.norm(origins[: row + 1] - origins[row + 1], axis=1) < 1e-6).sum())
-        place = (0.0, 0.0, (1.15 + 0.6 * crowd) * length)
-        label = add_label(self._scene, f"{name}/label", text, position=place, anchor="center-center", visible=True)
-        self._labels.append(label)
