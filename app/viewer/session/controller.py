@@ -1,7 +1,7 @@
 """The controller of one visitor's arm: robot, configuration, target, task, locked joints, and inverse kinematics.
 
 The controller owns the arm in the scene and the gizmo. It knows neither the panel nor the status line; what the
-rest of the page must know, it reports to an :class:`ArmListener`.
+rest of the page must know, it reports to an :class:`~app.viewer.session.listener.ArmListener`.
 
 Two configurations are kept apart. `goal` is where the arm is heading: every answer of inverse kinematics and every
 slider sets it at once, and it is the seed of the next solve. `q` is what the scene shows: it eases towards the
@@ -17,7 +17,6 @@ import itertools
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 import viser
@@ -31,7 +30,8 @@ from app.viewer.scene.arm import ArmScene
 from app.viewer.scene.bodies import Drawing
 from app.viewer.scene.gizmo_axes import gizmo_axes
 from app.viewer.scene.motion import Motion, Pace
-from kin import Contact, IKOptions, IKResult, JointConstraints, Obstacle, Robot, Task
+from app.viewer.session.listener import ArmListener
+from kin import Contact, IKOptions, JointConstraints, Obstacle, Robot, Task
 from kin.collision.contacts import surroundings
 from kin.ik import solve
 from kin.transforms import Array, rotation_from_wxyz
@@ -44,28 +44,6 @@ PRISMATIC_WEIGHT = 4.0
 RANDOM_DRAWS = 50
 # A target closer to the tool than this (m) gets no connecting line.
 _GAP = 5e-4
-
-
-class ArmListener(Protocol):
-    """Receives the controller's reports, on the worker's thread."""
-
-    def on_pose(self, T_base_tool: Array) -> None:
-        """The scene shows another configuration, with the tool at this pose ``(4, 4)``."""
-
-    def on_goal(self, dragged: int | None) -> None:
-        """The arm is heading elsewhere; `dragged` is the index of the joint whose slider the visitor holds."""
-
-    def on_result(self, result: IKResult) -> None:
-        """Inverse kinematics was solved for a target."""
-
-    def on_request(self) -> None:
-        """The task, the requested branch, or the locked joints changed."""
-
-    def on_branch(self, branch: str | None) -> None:
-        """The requested branch was changed by something other than the visitor's choice in the panel."""
-
-    def on_obstacles(self) -> None:
-        """There are other obstacles, or another choice whether the arm avoids them."""
 
 
 class ArmController:

@@ -2,7 +2,7 @@
 
 A large frame moves from the base to the tool, one elementary motion of the table after another, on the arm in its
 present configuration. `steps` computes the walk, `views` the HTML of the panel, and `drawing` draws it in the
-scene. This module has the player and its controls.
+scene, `player` advances it. This module has the controls.
 """
 
 from __future__ import annotations
@@ -19,8 +19,9 @@ from app.viewer.lessons.dh import views
 from app.viewer.lessons.dh.assign import Assigning
 from app.viewer.lessons.dh.axes_drawing import AxesDrawing, axis_names, room
 from app.viewer.lessons.dh.drawing import OtherDrawing, WalkDrawing, aside
+from app.viewer.lessons.dh.player import SPEEDS, Player
 from app.viewer.lessons.dh.questions import outline
-from app.viewer.lessons.dh.steps import MOTIONS, ORDERS, length, place, value
+from app.viewer.lessons.dh.steps import length, place
 from app.viewer.lessons.figures import Figure
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.panel import assign, listen, update_html
@@ -31,9 +32,6 @@ from kin.transforms import Array
 
 FRAME = 1 / 30  # s between frames while playing
 READ = 0.1  # s between updates of the texts
-MOTION_TIME = 1.3  # s for one motion at speed 1
-REST = 0.5  # s of rest after each motion; a motion by zero takes only this time
-SPEEDS = {"Half": 0.5, "Normal": 1.0, "Double": 2.0}
 ASSIGN_HINT = "Choose the frames of this arm, fill in its table, and see what a wrong entry would mean"
 LINES_HINT = "Joint axes z, and the common normals of neighbours with their feet"
 BUTTONS, WHILE_PLAYING = ("Back", "Play", "Next"), ("Back", "Pause", "Next")
@@ -53,13 +51,11 @@ class DHLesson(Lesson):
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
-        self._at = 0.0
-        self._playing = False
-        self._last = self._rest_until = self._read_at = 0.0
+        self._player = Player(stage.robot)
+        self._read_at = 0.0
         self._stale = False
         self._symbols = False
         self._compare = False
-        self._speed = "Normal"
         self._drawing: WalkDrawing | None = None
         self._other: OtherDrawing | None = None
         self._view: tuple[Array, Array, Array] | None = None  # camera before the comparison, and where that put it
@@ -95,7 +91,7 @@ class DHLesson(Lesson):
         )
         listen(self._compare_box, self.post, "compare")
         self._comparison = gui.add_html("", visible=False)
-        self._speed_choice = gui.add_dropdown("Speed", tuple(SPEEDS), initial_value=self._speed)
+        self._speed_choice = gui.add_dropdown("Speed", tuple(SPEEDS), initial_value=self._player.speed)
         listen(self._speed_choice, self.post, "speed")
         self._lines_box = gui.add_checkbox("Axes and normals", True, hint=LINES_HINT)
         listen(self._lines_box, self.post, "lines")
@@ -105,7 +101,7 @@ class DHLesson(Lesson):
     def handle(self, key: object, value: object) -> None:
         match key:
             case "at":
-                self._at = self._motions(value)
+                self._player.go_to_rows(value)
                 self._pause()
                 self._draw()
                 self._write()
@@ -113,9 +109,9 @@ class DHLesson(Lesson):
                 self._press(value)
             case "speed":
                 if value not in SPEEDS:
-                    assign(self._speed_choice, self._speed)
+                    assign(self._speed_choice, self._player.speed)
                     raise InputError("speed", value, "one of " + ", ".join(SPEEDS))
-                self._speed = str(value)
+                self._player.speed = str(value)
             case "symbols":
                 self._symbols = bool(value)
                 self._write()
@@ -135,7 +131,7 @@ class DHLesson(Lesson):
 
     def on_robot(self) -> None:
         self._pause()
-        self._at = 0.0
+        self._player.robot, self._player.at = self.stage.robot, 0.0
         self._remove_drawings()
         self._view = None  # the page has moved the camera already
         self._start()
@@ -158,22 +154,22 @@ class DHLesson(Lesson):
         self._write()
 
     def tick(self, now: float) -> None:
-        read = (self._stale or self._playing) and now - self._read_at >= READ
-        if self._playing:
-            self._advance(now)
-        if self._playing or read:
+        read = (self._stale or self._player.playing) and now - self._read_at >= READ
+        if self._player.playing and self._player.advance(now, self.stage.q):
+            self._pause()
+        if self._player.playing or read:
             self._draw(names=read)
         if read:
             self._write()
-            if self._playing:
-                assign(self._slider, self._at / MOTIONS)
-        if not self._playing and not self._stale:
+            if self._player.playing:
+                assign(self._slider, self._player.rows)
+        if not self._player.playing and not self._stale:
             self.due = None
 
     def state(self) -> dict[str, object]:
         own = None if self._assigning is None else self._assigning.attempt.state()
         return {
-            "at": self._at, "symbols": self._symbols, "compare": self._compare, "speed": self._speed,
+            "at": self._player.at, "symbols": self._symbols, "compare": self._compare, "speed": self._player.speed,
             "lines": self._lines, "assign": own,
         }  # fmt: skip
 
@@ -187,15 +183,15 @@ class DHLesson(Lesson):
             assign(self._compare_box, compare)
             self._show_other()
         if isinstance(speed, str) and speed in SPEEDS:
-            self._speed = speed
+            self._player.speed = speed
             assign(self._speed_choice, speed)
         if isinstance(at, int | float) and not isinstance(at, bool) and 0.0 <= at <= length(self.stage.robot):
-            self._at = float(at)
+            self._player.at = float(at)
         if isinstance(lines := state.get("lines"), bool):
             self._lines = lines
             assign(self._lines_box, lines)
         self._pause()
-        self._go(self._at)
+        self._go(self._player.at)
         if "assign" in state:
             own = state["assign"]
             self._assign(isinstance(own, dict))
@@ -225,59 +221,29 @@ class DHLesson(Lesson):
         self._pause()
         match button:
             case "Back":
-                self._go(math.ceil(self._at) - 1)
+                self._go(math.ceil(self._player.at) - 1)
             case "Next":
-                self._go(math.floor(self._at) + 1)
+                self._go(math.floor(self._player.at) + 1)
             case "Play":
                 self._play()
 
-    def _motions(self, rows: object) -> float:
-        """The slider's rows in motions; raises `kin.InputError` for anything but a number."""
-        if not isinstance(rows, int | float) or not math.isfinite(rows):
-            raise InputError("row", rows, "a finite number")
-        # Rounded, so that 1.25 rows are not slightly more than five motions.
-        return self._inside(round(float(rows) * MOTIONS, 6))
-
-    def _inside(self, at: float) -> float:
-        return min(max(float(at), 0.0), float(length(self.stage.robot)))
-
     def _go(self, at: float) -> None:
-        self._at = self._inside(at)
-        assign(self._slider, self._at / MOTIONS)
+        self._player.go(at)
+        assign(self._slider, self._player.rows)
         self._draw()
         self._write()
 
     def _play(self) -> None:
-        if self._at >= length(self.stage.robot):
-            self._at = 0.0
-        self._playing = True
-        self._last = self._rest_until = time.perf_counter()
+        self._player.play(time.perf_counter())
         self.due = FRAME
         self._buttons.options = WHILE_PLAYING
 
     def _pause(self) -> None:
-        if self._playing:
-            self._playing = False
+        if self._player.playing:
+            self._player.playing = False
             self._stale = True
             self._buttons.options = BUTTONS
-            assign(self._slider, self._at / MOTIONS)
-
-    def _advance(self, now: float) -> None:
-        """Advance by the time since the last frame; rest at the end of each motion, to let it be read."""
-        # After a long pause it continues where it was, without a jump.
-        passed = min(now - self._last, 0.1)
-        self._last = now
-        if now < self._rest_until:
-            return
-        robot, speed = self.stage.robot, SPEEDS[self._speed]
-        number = math.floor(self._at)
-        row, motion = divmod(number, MOTIONS)
-        nothing = value(robot, row, ORDERS[robot.convention][motion], self.stage.q) == 0.0
-        self._at = number + 1.0 if nothing else min(self._at + passed * speed / MOTION_TIME, number + 1.0)
-        if self._at == number + 1.0:
-            self._rest_until = now + REST / speed
-        if self._at >= length(robot):
-            self._pause()
+            assign(self._slider, self._player.rows)
 
     # Scene and panel
 
@@ -285,7 +251,7 @@ class DHLesson(Lesson):
         """Show the walk on the selected robot."""
         robot = self.stage.robot
         self._slider.max = float(len(robot.rows))
-        assign(self._slider, self._at / MOTIONS)
+        assign(self._slider, self._player.rows)
         self._nine.content = views.nine_steps_html(robot.convention)
         self.stage.see_through(True)
         self.stage.fit_view(room(robot))
@@ -351,10 +317,10 @@ class DHLesson(Lesson):
         elif self._axes is not None:
             self._axes.hide()
         frames = link_frames(robot, q)
-        self._drawing.show(place(robot, q, self._at, frames), frames, self.stage.units, names)
+        self._drawing.show(place(robot, q, self._player.at, frames), frames, self.stage.units, names)
         if self._other is not None:
             others = link_frames(self._other.robot, q)
-            self._other.show(place(self._other.robot, q, self._at, others), frames, others, names)
+            self._other.show(place(self._other.robot, q, self._player.at, others), frames, others, names)
 
     def _write(self) -> None:
         """Update the texts."""
@@ -364,7 +330,7 @@ class DHLesson(Lesson):
         if self._assigning is not None:
             self._assigning.write()
             return
-        at = place(robot, q, self._at)
+        at = place(robot, q, self._player.at)
         update_html(self._caption, views.caption_html(robot, at, units))
         update_html(self._table, views.table_html(robot, q, at, units))
         update_html(self._matrices, views.matrices_html(robot, at, self._symbols, units))
@@ -372,7 +338,7 @@ class DHLesson(Lesson):
             other = self._other.robot
             tools = [link_frames(reading, q)[-1, :3, 3] for reading in (robot, other)]
             distance = float(np.linalg.norm(tools[0] - tools[1]))
-            there = place(other, q, self._at)
+            there = place(other, q, self._player.at)
             update_html(self._comparison, views.compare_html(robot, other, q, there, distance, units))
 
     def _show_both(self) -> None:

@@ -402,8 +402,8 @@ def test_next_and_back_go_to_the_ends_of_motions(tab: FakeBrowser) -> None:
 
 
 def test_playing_goes_to_the_end_and_stops(tab: FakeBrowser, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(dh, "MOTION_TIME", 0.05)
-    monkeypatch.setattr(dh, "REST", 0.01)
+    monkeypatch.setattr(dh.player, "MOTION_TIME", 0.05)
+    monkeypatch.setattr(dh.player, "REST", 0.01)
     tab.set("Motion", "Play")
     tab.wait(lambda: "Pause" in tab.gui[tab.element("Motion")]["props"]["options"])
     tab.wait(lambda: tab.value("Row") == 6.0)
@@ -411,7 +411,7 @@ def test_playing_goes_to_the_end_and_stops(tab: FakeBrowser, monkeypatch: pytest
     tab.wait(lambda: "Frame 6 (tool) is placed" in tab.html)
     tab.settle()
     assert "Play" in tab.gui[tab.element("Motion")]["props"]["options"]
-    monkeypatch.setattr(dh, "MOTION_TIME", 5.0)
+    monkeypatch.setattr(dh.player, "MOTION_TIME", 5.0)
     tab.set("Motion", "Play")
     tab.wait(lambda: 0.0 < tab.value("Row") < 1.0)
     tab.set("Motion", "Pause")

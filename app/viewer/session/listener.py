@@ -1,0 +1,30 @@
+"""What the controller of an arm reports."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from kin import IKResult
+from kin.transforms import Array
+
+
+class ArmListener(Protocol):
+    """Receives the controller's reports, on the worker's thread."""
+
+    def on_pose(self, T_base_tool: Array) -> None:
+        """The scene shows another configuration, with the tool at this pose ``(4, 4)``."""
+
+    def on_goal(self, dragged: int | None) -> None:
+        """The arm is heading elsewhere; `dragged` is the index of the joint whose slider the visitor holds."""
+
+    def on_result(self, result: IKResult) -> None:
+        """Inverse kinematics was solved for a target."""
+
+    def on_request(self) -> None:
+        """The task, the requested branch, or the locked joints changed."""
+
+    def on_branch(self, branch: str | None) -> None:
+        """The requested branch was changed by something other than the visitor's choice in the panel."""
+
+    def on_obstacles(self) -> None:
+        """There are other obstacles, or another choice whether the arm avoids them."""
