@@ -94,6 +94,13 @@ def tick_labels(low: float, high: float, unit: float) -> list[tuple[float, str]]
     return [(value, f"{round(unit * value, decimals) + 0.0:.{decimals}f}".replace("-", "−")) for value in values]
 
 
+def few(labels: list[tuple[float, str]], most: int) -> list[tuple[float, str]]:
+    """About `most` of these labels, evenly spread; zero stays."""
+    every = math.ceil(len(labels) / most)
+    step = labels[1][0] - labels[0][0] if len(labels) > 1 else 1.0
+    return [label for label in labels if round(label[0] / step) % every == 0]
+
+
 def axes(plot: Plot, titles: tuple[str, str], unit: float, style: AxisStyle) -> str:
     """The horizontal and the vertical axis; an axis whose range is empty is left out.
 

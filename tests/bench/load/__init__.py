@@ -18,6 +18,11 @@ def percentile(seconds: Sequence[float], percent: float) -> float:
     return float(np.percentile(seconds, percent)) if len(seconds) else float("nan")
 
 
+def latencies(seconds: Sequence[float]) -> dict[str, float]:
+    """The row's columns of times that visitors waited."""
+    return {f"p{percent} ms": 1e3 * percentile(seconds, percent) for percent in (50, 95, 99)}
+
+
 def table(title: str, rows: Sequence[dict[str, Any]]) -> str:
     """The rows, which have the same keys, as columns under their names."""
     lines = [list(rows[0]), *([_text(value) for value in row.values()] for row in rows)]

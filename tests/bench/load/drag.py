@@ -6,7 +6,7 @@ import asyncio
 import time
 from typing import Any
 
-from load import percentile, table
+from load import latencies, table
 from load.service import Service, serve
 from load.visitor import Visitor
 
@@ -54,17 +54,15 @@ async def measure(service: Service, count: int, seconds: float, hz: float = HZ) 
     service_spent = service.seconds() - full.seconds
     for visitor in visitors:
         visitor.close()
-    latencies = [x for visitor in visitors for x in visitor.latencies]
+    waited = [x for visitor in visitors for x in visitor.latencies]
     return {
         "visitors": count,
-        "events": len(latencies),
-        "p50 ms": 1e3 * percentile(latencies, 50),
-        "p95 ms": 1e3 * percentile(latencies, 95),
-        "p99 ms": 1e3 * percentile(latencies, 99),
+        "events": len(waited),
+        **latencies(waited),
         "unanswered": sum(visitor.unanswered for visitor in visitors),
         "pictures/s each": sum(visitor.pictures for visitor in visitors) / wall / count,
         "service CPU %": 100 * service_spent / wall,
-        "CPU µs an event": 1e6 * service_spent / max(1, len(latencies)),
+        "CPU µs an event": 1e6 * service_spent / max(1, len(waited)),
         "client CPU %": 100 * own / wall,
         "client late ms": 1e3 * max(hands),
         "MB a visitor": (full.memory - empty.memory) / count / 1e6,

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from markupsafe import Markup, escape
 
-from app.exports.svg import joint_colour, tick_labels
+from app.exports.svg import few, joint_colour, tick_labels
 from kin.transforms import Array
 
 WIDTH, LEFT, RIGHT, HIGH, GAP, TOP, BOTTOM = 320.0, 44.0, 8.0, 62.0, 22.0, 16.0, 18.0
@@ -56,7 +56,7 @@ def chart(rows: tuple[Row, ...], curves: tuple[Curve, ...], label: str, axis: st
     for k, row in enumerate(rows):
         parts += _row(row, k, curves, (start, end))
     bottom = TOP + len(rows) * HIGH + (len(rows) - 1) * GAP
-    marks = _thin([mark for mark in tick_labels(start, end, 1.0) if not whole or mark[0] % 1.0 == 0.0], 7)
+    marks = few([mark for mark in tick_labels(start, end, 1.0) if not whole or mark[0] % 1.0 == 0.0], 7)
     free = WIDTH  # right end of the room for the next number; the last one, with the unit, has priority
     for value, text in reversed(marks):
         words = f"{text} {axis}" if value == marks[-1][0] else text
@@ -95,7 +95,7 @@ def _row(row: Row, k: int, curves: tuple[Curve, ...], ends: tuple[float, float])
 
     parts = [f'<text x="{LEFT}" y="{top - 5:.1f}" class="kb-axis kb-motion-title">{escape(row.title)}</text>']
     marks = _powers(low, high) if row.log else tick_labels(low, high, 1.0)
-    for value, text in _thin(marks, FEW):
+    for value, text in few(marks, FEW):
         parts.append(
             f'<path d="M{LEFT} {y(value):.1f}H{right:.1f}" stroke="currentColor" stroke-opacity=".16"/>'
             f'<text x="{LEFT - 5:.1f}" y="{y(value) + 3.4:.1f}" text-anchor="end" class="kb-axis">{text}</text>'
@@ -122,8 +122,3 @@ def _powers(low: float, high: float) -> list[tuple[float, str]]:
     if len(whole) < 2:
         return [(value, f"{10.0**value:.2g}") for value in (low, high)]
     return [(float(power), "10" + str(power).translate(_RAISED)) for power in whole]
-
-
-def _thin(labels: list[tuple[float, str]], most: int) -> list[tuple[float, str]]:
-    """At most `most` of evenly spread labels."""
-    return labels[:: -(-len(labels) // most)]

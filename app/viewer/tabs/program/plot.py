@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from markupsafe import Markup
 
-from app.exports.svg import joint_colour, tick_labels
+from app.exports.svg import few, joint_colour, tick_labels
 from app.viewer.views.templates import render
 from kin import Robot
 from kin.motion import Dwell, Motion
@@ -161,7 +161,7 @@ def _panel(panel: Panel, courses: list[Course], index: int, span: float, top: fl
                 f'<rect class="kb-motion-band" x="{LEFT}" y="{y(a):.1f}" width="{right - LEFT:.1f}" '
                 f'height="{y(b) - y(a):.1f}"/><path class="kb-motion-limit" d="M{LEFT} {line:.1f}H{right:.1f}"/>'
             )
-    for value, text in _few(tick_labels(panel.low, panel.high, 1.0), 4):
+    for value, text in few(tick_labels(panel.low, panel.high, 1.0), 4):
         at = y(value)
         parts.append(
             f'<path d="M{LEFT} {at:.1f}H{right:.1f}" stroke="currentColor" stroke-opacity=".16"/>'
@@ -190,7 +190,7 @@ def _panel(panel: Panel, courses: list[Course], index: int, span: float, top: fl
 
 def _time_axis(duration: float, bottom: float) -> str:
     right = WIDTH - RIGHT
-    marks = _few(tick_labels(0.0, duration, 1.0), 7)
+    marks = few(tick_labels(0.0, duration, 1.0), 7)
     parts = []
     for value, text in marks:
         x = LEFT + value / duration * (right - LEFT)
@@ -200,10 +200,3 @@ def _time_axis(duration: float, bottom: float) -> str:
             f"{text}{unit}</text>"
         )
     return "".join(parts)
-
-
-def _few(labels: list[tuple[float, str]], most: int) -> list[tuple[float, str]]:
-    """At most about `most` of evenly spread labels; zero stays."""
-    every = math.ceil(len(labels) / most)
-    step = labels[1][0] - labels[0][0] if len(labels) > 1 else 1.0
-    return [label for label in labels if round(label[0] / step) % every == 0]

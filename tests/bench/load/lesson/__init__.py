@@ -15,7 +15,7 @@ from typing import Any
 from postgres_server import running as running_postgres
 
 from app.classroom import COOKIE, Hub
-from load import percentile, table
+from load import latencies, percentile, table
 from load.drag import HZ
 from load.lesson import databases
 from load.lesson.joining import join
@@ -80,13 +80,11 @@ async def follow(service: Service, hub: Hub, count: int, seconds: float) -> dict
     teacher.release()
     for visitor in (teacher, *students):
         visitor.close()
-    latencies = [x for student in students for x in student.latencies]
+    waited = [x for student in students for x in student.latencies]
     return {
         "students": count,
-        "pictures": len(latencies),
-        "p50 ms": 1e3 * percentile(latencies, 50),
-        "p95 ms": 1e3 * percentile(latencies, 95),
-        "p99 ms": 1e3 * percentile(latencies, 99),
+        "pictures": len(waited),
+        **latencies(waited),
         "teacher's p95 ms": 1e3 * percentile(teacher.latencies, 95),
         "unanswered": sum(student.unanswered for student in students),
         "service CPU %": 100 * used / wall,
