@@ -6,6 +6,7 @@
     const { kinboardSheet: html, title } = event.data ?? {};
     if (typeof html !== "string") return;
     document.querySelector("main").innerHTML = html;
+    document.querySelector("nav").hidden = Boolean(document.querySelector("[data-withheld]")); // there is nothing to print
     document.querySelector("nav span").hidden = !document.querySelector("[data-solutions]");
     if (title) document.title = title;
     document.body.dataset.ready = "1";

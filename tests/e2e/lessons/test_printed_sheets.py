@@ -6,6 +6,8 @@ import pytest
 from page import Tab
 from playwright.sync_api import expect
 
+from app.viewer.views.templates import render
+
 pytestmark = pytest.mark.browser
 
 
@@ -41,3 +43,16 @@ def test_the_worksheet_of_a_lesson_is_printed_and_saved(tab: Tab) -> None:
     with tab.page.expect_download() as saved:
         row.get_by_role("button", name="CSV").click()
     assert saved.value.suggested_filename == "pioneer-arm-dh.csv"
+
+
+def test_a_sheet_that_says_not_now_offers_no_print(tab: Tab) -> None:
+    with tab.page.context.expect_page() as opened:
+        tab.page.evaluate("() => { window.kbSheet = window.open('../static/sheet.html'); }")
+    sheet = opened.value
+    expect(sheet.get_by_role("button", name="Print")).to_be_visible()
+    send = "(page) => window.kbSheet.postMessage({ kinboardSheet: page, title: 'Sheet' }, location.origin)"
+    for page, count in ((render("sheet/withheld"), 0), ("<article></article>", 1)):
+        tab.page.evaluate(send, page)
+        expect(sheet.locator("article")).to_have_count(1)
+        expect(sheet.get_by_role("button", name="Print")).to_have_count(count)
+    sheet.close()
