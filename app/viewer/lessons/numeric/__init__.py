@@ -261,6 +261,7 @@ class NumericLesson(Lesson):
 
     def remove(self) -> None:
         self._drawing.remove()
+        self.stage.fit_view(())
 
     def _wake(self, seconds: float = 0.0) -> None:
         self.due = seconds if self.due is None else min(self.due, seconds)
@@ -272,7 +273,7 @@ class NumericLesson(Lesson):
         self._drawing = Drawing(self.stage.client.scene, robot, f"/numeric-{next(_NUMBERS)}")
         self._match = usual_match(robot)
         self._start = self.stage.q.copy()
-        self._at, self._plays = None, False
+        self._at, self._plays, self._in_view = None, False, False
         self._aim(example(robot).problem.T)
         self._again()
 
@@ -355,6 +356,9 @@ class NumericLesson(Lesson):
             return
         at = run.count if self._at is None else min(self._at, run.count)
         self._drawing.show(self._problem.T, run.q[: at + 1])
+        if not self._in_view:  # once for each arm: the view does not follow the iterates
+            self._in_view = True
+            self.stage.fit_view((), kin.link_frames(self.stage.robot, run.q)[..., :3, 3].reshape(-1, 3))
         update_html(self._outcome, views.outcome_html(self._problem, run, self._solutions, units))
         update_html(self._chart, views.chart_html(self._problem, list(self._runs.items()), units))
         update_html(self._table, views.table_html(self._problem, run, at, units))

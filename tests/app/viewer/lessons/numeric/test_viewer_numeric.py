@@ -377,6 +377,19 @@ def test_a_visitor_watches_an_iteration(server: int) -> None:
         tab.settle()
 
 
+def test_all_iterates_are_in_view_until_the_lesson_is_closed(server: int) -> None:
+    def distance() -> float:
+        return float(np.linalg.norm(np.subtract(tab.camera["position"], tab.camera["look_at"])))
+
+    with FakeBrowser(server) as tab:
+        tab.settle()
+        before = distance()
+        tab.set("Lesson", "Numeric IK")
+        tab.wait(lambda: "Converged in" in tab.html and distance() > 1.1 * before)
+        tab.set("Lesson", "None")
+        tab.wait(lambda: abs(distance() - before) < 1e-6)
+
+
 def press(tab: FakeBrowser, group: str, button: str) -> None:
     uuid = tab.element(group)
     tab.send("GuiUpdateMessage", uuid=uuid, updates={"value": button})
