@@ -42,6 +42,17 @@ async () => {
     if (right > panel.left && left < panel.right && bottom > panel.top && top < panel.bottom) problems.push("the status covers the panel");
   }
 
+  // No word in the name of a control is broken.
+  const range = document.createRange();
+  for (const { firstChild: text } of area?.querySelectorAll(".mantine-Text-root > label") ?? []) {
+    for (const { 0: word, index } of text?.data?.matchAll(/\S+/g) ?? []) {
+      range.setStart(text, index);
+      range.setEnd(text, index + word.length);
+      const lines = new Set([...range.getClientRects()].map(({ top }) => Math.round(top)));
+      if (lines.size > 1) problems.push(`“${word}” is broken in the name “${text.data}”`);
+    }
+  }
+
   // Controls and their labels do not overlap.
   const controls = [...(area ?? document).querySelectorAll(
     'input:not([type="hidden"]), textarea, button, a, summary, label, table, math, [role="slider"], [role="tab"], [role="button"]',

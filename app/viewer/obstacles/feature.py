@@ -169,12 +169,12 @@ class ObstaclesFeature(Feature):
     # Drawing
 
     def _show(self) -> None:
-        items = self.stage.obstacles
-        self._nodes.show(items)
+        items, radius = self.stage.obstacles, body(self.stage.robot).radius
+        self._nodes.show(items, radius)
         self._nodes.mark(self._touched, self._chosen)
         if not self._held:
             T = None if self._chosen is None else placed.pose(items[self._chosen])
-            self._nodes.place_gizmo(T, body(self.stage.robot).radius)
+            self._nodes.place_gizmo(T, radius)
         self._show_panel()
 
     def _show_panel(self) -> None:

@@ -22,6 +22,9 @@ Mesh = viser.BoxHandle | viser.IcosphereHandle | viser.CylinderHandle
 COLOR: Color = (158, 162, 168)
 BELOW: Color = (122, 126, 133)  # of a table, under its top
 TOP, INSET = 0.06, 0.94  # thickness of a table's top in lengths, and how far what is under it stands back
+# What casts the shadow of a table is inside it, and so deep (radii of the sphere around the arm) that its soft
+# shadow does not show on the top in dots.
+CORE, DEEP = 0.93, 0.25
 GIZMO, LINE = 0.2, 4.0  # length of the arrows in radii of the sphere around the arm, their thickness in pixels
 _NUMBERS = count(1)  # a node name is never used twice: browsers keep the poses of removed nodes
 
@@ -29,11 +32,11 @@ _NUMBERS = count(1)  # a node name is never used twice: browsers keep the poses 
 class _Node:
     """One obstacle in the scene."""
 
-    def __init__(self, scene: viser.SceneApi, each: Obstacle, clicked: Callable[[], None]) -> None:
+    def __init__(self, scene: viser.SceneApi, each: Obstacle, deep: float, clicked: Callable[[], None]) -> None:
         self.root = f"/obstacle-{next(_NUMBERS)}"
         self.frame = scene.add_frame(self.root, show_axes=False)
         self._red = False
-        self._parts = [(node, node.color) for node in _meshes(scene, self.root, each)]
+        self._parts = [(node, node.color) for node in _meshes(scene, self.root, each, deep)]
         self._label = add_label(
             scene, f"{self.root}/name", each.label, scale=0.9, position=(0.0, 0.0, _above(each)),
             anchor="bottom-center", visible=False,
@@ -56,7 +59,8 @@ class _Node:
         self.frame.remove()
 
 
-def _meshes(scene: viser.SceneApi, root: str, each: Obstacle) -> list[Mesh]:
+def _meshes(scene: viser.SceneApi, root: str, each: Obstacle, deep: float) -> list[Mesh]:
+    """`deep`: how far (m) under the top of a table a body may begin that casts a shadow."""
     # A body that casts a shadow and receives it is striped by its own.
     if each.shape == "sphere":
         ball = each.radius or 0.0
@@ -72,7 +76,12 @@ def _meshes(scene: viser.SceneApi, root: str, each: Obstacle) -> list[Mesh]:
     found: list[Mesh] = [scene.add_box(f"{root}/top", COLOR, slab, position=place, cast_shadow=False)]
     if height > top:
         block, place = (INSET * length, INSET * width, height - top), (0.0, 0.0, -0.5 * (height + top))
-        found.append(scene.add_box(f"{root}/below", BELOW, block, position=place, receive_shadow=False))
+        found.append(
+            scene.add_box(f"{root}/below", BELOW, block, position=place, cast_shadow=False, receive_shadow=False)
+        )
+    if height > max(deep, top):
+        size, place = (CORE * length, CORE * width, height - deep), (0.0, 0.0, -0.5 * (height + deep))
+        found.append(scene.add_box(f"{root}/core", BELOW, size, position=place, receive_shadow=False))
     return found
 
 
@@ -100,13 +109,16 @@ class ObstacleNodes:
         self._drawn: list[tuple[object, ...]] = []
         self._gizmo: viser.TransformControlsHandle | None = None
 
-    def show(self, items: Obstacles) -> None:
-        """Draw these; those whose shape and sizes are as before are only moved."""
-        wanted = [(each.shape, each.label, *sizes(each)) for each in items]
+    def show(self, items: Obstacles, radius: float) -> None:
+        """Draw these; those whose shape and sizes are as before are only moved.
+
+        `radius`: of the sphere around the arm, whose lamp casts their shadows.
+        """
+        wanted = [(each.shape, each.label, *sizes(each), radius) for each in items]
         for i, (key, each) in enumerate(zip(wanted, items, strict=True)):
             if i < len(self._drawn) and self._drawn[i] == key:
                 continue
-            node = _Node(self._scene, each, lambda i=i: self._post("choose", i))  # type: ignore[misc]
+            node = _Node(self._scene, each, DEEP * radius, lambda i=i: self._post("choose", i))  # type: ignore[misc]
             if i < len(self._nodes):
                 self._nodes[i].remove()
                 self._nodes[i] = node
@@ -146,5 +158,5 @@ class ObstacleNodes:
 
     def remove(self) -> None:
         """Remove everything from the scene."""
-        self.show(())
+        self.show((), 1.0)
         self.place_gizmo(None, 1.0)

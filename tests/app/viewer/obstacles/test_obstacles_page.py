@@ -16,6 +16,7 @@ from app.viewer.panel.entry import read_pose
 from app.viewer.panel.joints import label
 from app.viewer.panel.view import ViewState
 from app.viewer.scene.bodies.nodes import TOUCHING
+from app.viewer.scene.meshes import body
 from app.viewer.session.state import PageState, decode, encode
 from kin.units import DEFAULT_UNITS
 
@@ -59,7 +60,7 @@ def test_a_table_is_added_typed_and_taken_back(port: int) -> None:
         tab.settle()
         say(tab, "add", "table")
         assert "Added: table" in tab.html
-        assert len(bodies(tab)) == 2
+        assert len(bodies(tab)) == 3
         assert any("obstacle-gizmo" in name for name in tab.nodes)
         say(tab, "set", "z", value="0.35 m")
         tab.wait(lambda: bool(kept(tab).obstacles) and kept(tab).obstacles[0].xyz[2] == 0.35)
@@ -78,7 +79,23 @@ def test_a_table_is_added_typed_and_taken_back(port: int) -> None:
         tab.wait(lambda: not kept(tab).obstacles)
         tab.say("redo")
         tab.settle()
-        assert len(bodies(tab)) == 2
+        assert len(bodies(tab)) == 3
+
+
+@pytest.mark.parametrize(("height", "casts"), [(0.1, set()), (0.4, {"core"})])
+def test_no_shadow_of_a_table_shows_on_its_own_top(port: int, height: float, casts: set[str]) -> None:
+    """What casts it is far below the top, which receives the shadow of the arm; a thin table casts none."""
+    table = kin.Obstacle("table", (0.6, 0.0, 0.4), size=(0.8, 0.6, height))
+    with FakeBrowser(port, memory=opened(PageState("ur5", obstacles=(table,)))) as tab:
+        tab.settle()
+        parts = {name.rpartition("/")[2]: tab.nodes[name]["props"] for name in bodies(tab)}
+        assert {name for name, props in parts.items() if props["cast_shadow"]} == casts
+        assert {name for name, props in parts.items() if props["receive_shadow"]} == {"top"}
+        for name in casts:
+            node = next(each for each in bodies(tab) if each.endswith(name))
+            below = tab.poses[node]["position"][2] + 0.5 * parts[name]["dimensions"][2]
+            assert below == pytest.approx(-0.25 * body(UR5).radius)
+            assert tab.poses[node]["position"][2] - 0.5 * parts[name]["dimensions"][2] == pytest.approx(-height)
 
 
 def test_what_touches_is_red_and_named(port: int) -> None:
