@@ -6,20 +6,31 @@ the base frame, that of the first DH row.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kin.errors import InputError
-from kin.files.read import matrix_of
 from kin.fk import fk
 from kin.named import robot_of
-from kin.robot import Robot
+from kin.robot import Matrix, Robot, exact_cos_sin
 from kin.transforms import Array, as_transform, finite_array
 
 WORLD, BASE, TOOL = "world", "base", "tool"
 FRAMES = (WORLD, BASE, TOOL)
+
+
+def matrix_of(xyz: Sequence[float], rpy: Sequence[float]) -> Matrix:
+    """The transform ``Trans(x, y, z) Rz(yaw) Ry(pitch) Rx(roll)``, metres and radians."""
+    (cr, sr), (cp, sp), (cy, sy) = map(exact_cos_sin, rpy)
+    x, y, z = xyz
+    return (
+        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr, x),
+        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr, y),
+        (-sp, cp * sr, cp * cr, z),
+        (0.0, 0.0, 0.0, 1.0),
+    )
 
 
 def from_xyz_rpy(xyz: ArrayLike, rpy: ArrayLike = (0.0, 0.0, 0.0)) -> Array:

@@ -107,6 +107,7 @@ class Capsule:
         row: index of the DH row in whose frame the points are; −1 for the frame before the first row.
         start, end: ends of the segment (m) in that frame; a ball if they are the same.
         radius: m.
+        assumed: whether the real body is not known.
     """
 
     link: int
@@ -114,6 +115,7 @@ class Capsule:
     start: tuple[float, float, float]
     end: tuple[float, float, float]
     radius: float
+    assumed: bool = False
 
 
 @dataclass(frozen=True)

@@ -26,10 +26,11 @@ MODEL = {
 RULES: dict[str, set[str]] = {
     "kin": {"kin", "numpy", "numba"},
     "kin/kernels": {"numpy", "numba", "llvmlite", "kin.kernels", "kin.tolerances", "kin.transforms"},
-    "kin/files": {"numpy", "kin.dh", "kin.files", *MODEL},
+    "kin/files": {"numpy", "kin.collision", "kin.dh", "kin.files", "kin.fitting", "kin.frames", *MODEL},
+    "kin/fitting": {"numpy", "kin.fitting", "kin.robot", "kin.transforms"},
     "kin/solvers": {"numpy", "kin.dh", "kin.kernels", "kin.solvers", *MODEL - {"kin.singularity"}},
     "kin/ik": {"numpy", "kin.collision", "kin.kernels", "kin.solvers", "kin.ik", *MODEL},
-    "kin/collision": {"numpy", "kin.frames", "kin.kernels", "kin.collision", *MODEL},
+    "kin/collision": {"numpy", "kin.fitting", "kin.frames", "kin.kernels", "kin.collision", *MODEL},
     "kin/path": {"numpy", "kin.collision", "kin.kernels", "kin.solvers", "kin.ik", "kin.path", *MODEL},
     "kin/motion": {
         *("numpy", "kin.collision", "kin.files", "kin.kernels", "kin.solvers", "kin.ik", "kin.path", "kin.motion"),
@@ -107,6 +108,7 @@ RULES: dict[str, set[str]] = {
     },
     "app/cli/parser.py": {"kin", "app.bench.command", "app.cli"},
     "app/cli/arguments": {"app.cli.arguments"},
+    "app/cli/bodies": {"kin", "app.viewer.meshes"},
     "app/cli/classroom": {"kin", "app.classroom", "app.cli", "app.exercises", "app.shared"},
     "app/cli/classroom/arguments.py": set(),
     "app/cli/xacro": {"kin", "app.cli.xacro"},

@@ -10,6 +10,7 @@ import tomllib
 from argparse import Namespace
 from pathlib import Path
 
+from app.cli.bodies import MeshesBeside
 from app.cli.classroom.courses import check_course
 from app.cli.terminal import Notation, print_json, robot_of, table
 from app.cli.xacro import expanded, is_xacro
@@ -43,11 +44,12 @@ def _read(arguments: Namespace) -> UrdfRobot:
     """The arm of a URDF, or of a xacro file."""
     path, base, tip = Path(arguments.file), arguments.base, arguments.tip
     if is_xacro(path):
-        return read_urdf(expanded(path, arguments.arg, arguments.folder), base, tip, file=str(path))
+        text = expanded(path, arguments.arg, arguments.folder)
+        return read_urdf(text, base, tip, file=str(path), fit=MeshesBeside(path))
     for option, given in (("--arg", arguments.arg), ("--folder", arguments.folder)):
         if given:
             raise InputError(option, given, "nothing: only xacro (*.xacro) is expanded")
-    return read_urdf(path, base, tip)
+    return read_urdf(path, base, tip, fit=MeshesBeside(path))
 
 
 def run_export(arguments: Namespace) -> int:
@@ -74,7 +76,7 @@ def report_lines(report: UrdfReport) -> list[str]:
         lines.append(f"left out    {', '.join(report.ignored)}")
     if report.tilts:
         lines.append(f"fixed rows  {', '.join(report.tilts)}: between almost parallel axes")
-    return [*lines, *(f"note: {note}" for note in report.notes)]
+    return [*lines, f"bodies      {report.about_bodies}", *(f"note: {note}" for note in report.notes)]
 
 
 def _write(path: str, text: str) -> None:

@@ -23,7 +23,7 @@ from kin.files.read import MAX_ROWS
 
 KEY = "own"  # stands for the arm in a link, and begins its id
 MY_ARM = "My arm"
-NAME, ROW_NAME, SOURCE, DESCRIPTION = 60, 40, 200, 400  # characters
+NAME, ROW_NAME, SOURCE, DESCRIPTION, CAPSULES_SOURCE = 60, 40, 200, 400, 400  # characters
 SMALLEST, LARGEST = 1e-3, 1000.0  # m: reach of an arm that can be shown
 LONGEST = 10_000  # characters of the compact form; a link holds 12 000 in all
 _KINDS = {"revolute": "", "prismatic": "p", "fixed": "f"}
@@ -48,18 +48,21 @@ class OwnArm:
 def own_arm(data: Mapping[str, Any], start: str = "") -> OwnArm:
     """An arm described by the fields of a robot file; its id is replaced.
 
-    Capsules are left out: a table that can be edited outdates them, and links have no room. They are assumed.
+    Capsules are left out if the arm is too long with them; its bodies are then assumed.
 
     Raises:
         kin.KinematicsError: naming the field, the value and what would be valid.
     """
-    fields = {key: value for key, value in data.items() if not key.startswith("capsules")}
-    fields |= {"id": KEY, "source": clean(data.get("source"), SOURCE) or "a visitor's table"}
+    fields = {**data, "id": KEY, "source": clean(data.get("source"), SOURCE) or "a visitor's table"}
     fields["name"] = clean(data.get("name"), NAME) or MY_ARM
     fields["description"] = clean(data.get("description", ""), DESCRIPTION)
+    if "capsules_source" in fields:
+        fields["capsules_source"] = clean(fields["capsules_source"], CAPSULES_SOURCE)
     rows = data.get("rows")
     if isinstance(rows, Sequence) and not isinstance(rows, str):
         fields["rows"] = _named(rows)
+        if isinstance(capsules := data.get("capsules"), Sequence):
+            fields["capsules"] = [_of_row(each, rows, fields["rows"]) for each in capsules]
     robot = kin.robot_from_dict(fields, "your arm")
     if not SMALLEST <= robot.reach <= LARGEST:
         limits = f"lengths a and d (or a tool) that reach {SMALLEST * 1000:g} mm to {LARGEST:g} m"
@@ -67,6 +70,8 @@ def own_arm(data: Mapping[str, Any], start: str = "") -> OwnArm:
     away = float(np.abs(robot.T_world_base[:3, 3]).max())
     if away > LARGEST:
         raise InputError("base.xyz", f"{away:g} m", f"a base at most {LARGEST:g} m from the origin")
+    if robot.capsules and len(_text(robot)) > LONGEST:
+        robot = replace(robot, capsules=(), capsules_source="")
     text = _text(robot)
     if len(text) > LONGEST:
         raise InputError("rows", f"{len(text)} characters", f"names and numbers that take at most {LONGEST}")
@@ -90,6 +95,19 @@ def _named(rows: Sequence[Any]) -> list[Any]:
             row = {**row, "name": name}
         named.append(row)
     return named
+
+
+def _of_row(capsule: Any, before: Sequence[Any], rows: Sequence[Any]) -> Any:
+    """A capsule with the name that its row has now; the row may be given by its index."""
+    if not isinstance(capsule, Mapping) or (row := capsule.get("row")) is None:
+        return capsule
+    if isinstance(row, str):
+        row = next(
+            (i for i, each in enumerate(before) if isinstance(each, Mapping) and each.get("name") == row), -1
+        )
+    if isinstance(row, bool) or not isinstance(row, int) or not 0 <= row < len(rows):
+        return capsule  # what is no row is refused elsewhere
+    return {**capsule, "row": rows[row].get("name") if isinstance(rows[row], Mapping) else row}
 
 
 def _unused(name: str, taken: Set[Any]) -> str:
@@ -139,6 +157,9 @@ def unpack(value: object) -> OwnArm:
     data["rows"] = [_row(i, row) for i, row in enumerate(rows)] if isinstance(rows, list) else rows
     if "h" in value:
         data["home"] = {"q": value["h"]}
+    if isinstance(capsules := value.get("k"), list):
+        data["capsules"] = [_capsule(i, each) for i, each in enumerate(capsules)]
+        data["capsules_source"] = value.get("ks", "")
     start = value.get("from", "")
     return own_arm(data, start if isinstance(start, str) else "")
 
@@ -154,6 +175,14 @@ def _row(index: int, row: object) -> dict[str, Any]:
     return given
 
 
+def _capsule(index: int, given: object) -> dict[str, Any]:
+    if not isinstance(given, list) or len(given) not in (8, 9):
+        raise InputError(f"capsules[{index}]", given, "a list of row, start, end, radius, and 1 if it is assumed")
+    row, x, y, z, u, v, w, radius = given[:8]
+    found = {"start": [x, y, z], "end": [u, v, w], "radius": radius, "assumed": given[8:] == [1]}
+    return found if row == -1 else {**found, "row": row}
+
+
 @lru_cache(maxsize=128)
 def _text(robot: Robot) -> str:
     """The compact form as JSON, without what Reset returns to."""
@@ -167,6 +196,13 @@ def _text(robot: Robot) -> str:
         packed["u"] = data["units"]["length"]
     packed["r"] = [_packed_row(row) for row in data["rows"]]
     packed["h"] = data["home"]["q"]
+    if robot.capsules:
+        stated = zip(robot.capsules, data["capsules"], strict=True)
+        packed["k"] = [
+            [each.row, *item["start"], *item.get("end", item["start"]), item["radius"], *[1] * each.assumed]
+            for each, item in stated
+        ]
+        packed["ks"] = robot.capsules_source
     return json.dumps(packed, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
 
 

@@ -30,13 +30,18 @@ _MOST_CONSIDERED = 8  # further joints stay in their middle: eight joints alread
 
 def default_home(robot: Robot) -> tuple[float, ...]:
     """One value per moving joint: the middle of its limits, or a bent configuration that is less singular."""
+    return tuple(homes(robot)[0].tolist())
+
+
+def homes(robot: Robot) -> Array:
+    """The candidates for a home configuration ``(k, n)``, the best one first."""
     q, bent = candidates(robot)
     margin = margins(robot, q)
     good = margin >= _ENOUGH * margin.max()
     lowest = link_frames(robot, q)[:, :, 2, 3].min(axis=1)
     step = 1e-6 * (robot.reach if math.isfinite(robot.reach) else 1.0)  # rounding errors must not decide a tie
     order = np.lexsort((-np.round(margin, 6), -np.round(lowest / (step or 1.0)), bent, ~good))
-    return tuple(q[order[0]].tolist())
+    return q[order]
 
 
 def candidates(robot: Robot) -> tuple[Array, Array]:

@@ -15,6 +15,7 @@ import numpy as np
 from kin.errors import InputError, KinematicsError, RobotFileError, shorten
 from kin.files.home import default_home
 from kin.files.numbers import LARGEST, NUMBER, scaled
+from kin.frames import matrix_of
 from kin.robot import (
     CONVENTIONS,
     DEFAULT_LIMITS,
@@ -26,7 +27,6 @@ from kin.robot import (
     Joint,
     Matrix,
     Robot,
-    exact_cos_sin,
 )
 from kin.transforms import as_transform
 
@@ -37,7 +37,7 @@ _TOP = {
     *("id", "name", "source", "description", "convention", "units", "rows", "home", "base", "tool"),
     *("capsules", "capsules_source"),
 }
-_CAPSULE = {"row", "start", "end", "radius"}
+_CAPSULE = {"row", "start", "end", "radius", "assumed"}
 _ROW = {"name", "kind", "theta", "d", "a", "alpha", "limits", *PEAK_FIELDS}
 _QUANTITY = re.compile(rf"\s*({NUMBER})\s*(rad|deg|°|m|cm|mm)(/s[23²³]?)?\s*")
 PER = {"velocity": "/s", "acceleration": "/s2", "jerk": "/s3"}
@@ -238,8 +238,11 @@ class Reader:
             radius = self.length_of(where + ".radius", each.get("radius"))
             if not radius > 0.0:
                 raise self.refuse(where + ".radius", each.get("radius"), "a positive number")
+            assumed = each.get("assumed", False)
+            if not isinstance(assumed, bool):
+                raise self.refuse(where + ".assumed", assumed, "true or false")
             link = sum(joint.kind != "fixed" for joint in rows[: row + 1])
-            found.append(Capsule(link, row, start, end, radius))
+            found.append(Capsule(link, row, start, end, radius, assumed))
         return tuple(sorted(found, key=lambda capsule: capsule.row))
 
     def point(self, value: object, where: str) -> tuple[float, float, float]:
@@ -333,15 +336,3 @@ class Reader:
             if key not in fields:
                 name = key if isinstance(key, str) and key.isprintable() and len(key) <= 80 else shorten(key)
                 raise self.refuse(where + name, data[key], "only the fields " + ", ".join(sorted(fields)))
-
-
-def matrix_of(xyz: Sequence[float], rpy: Sequence[float]) -> Matrix:
-    """The transform ``Trans(x, y, z) Rz(yaw) Ry(pitch) Rx(roll)``, metres and radians."""
-    (cr, sr), (cp, sp), (cy, sy) = map(exact_cos_sin, rpy)
-    x, y, z = xyz
-    return (
-        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr, x),
-        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr, y),
-        (-sp, cp * sr, cp * cr, z),
-        (0.0, 0.0, 0.0, 1.0),
-    )

@@ -17,7 +17,8 @@ import numpy as np
 
 from kin.errors import InputError
 from kin.files.numbers import scaled
-from kin.files.read import ANGLES, PER, UNLIMITED, Reader, matrix_of
+from kin.files.read import ANGLES, PER, UNLIMITED, Reader
+from kin.frames import matrix_of
 from kin.named import robot_of
 from kin.robot import IDENTITY, LENGTHS, Capsule, Joint, Matrix, Robot, exact_cos_sin
 from kin.transforms import Array
@@ -114,7 +115,8 @@ class _Writer:
         data["start"] = [self.value(x, True) for x in capsule.start]
         if capsule.end != capsule.start:
             data["end"] = [self.value(x, True) for x in capsule.end]
-        return data | {"radius": self.value(capsule.radius, True)}
+        data["radius"] = self.value(capsule.radius, True)
+        return data | {"assumed": True} if capsule.assumed else data
 
     def row(self, row: Joint) -> dict[str, Any]:
         """Fields that are zero or the default are left out."""
@@ -185,6 +187,8 @@ def _plain(value: float) -> int | float:
 
 def _toml(value: Any) -> str:
     """A number, text, list or flat table as TOML."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007F")
     if isinstance(value, list):

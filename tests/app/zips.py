@@ -25,6 +25,23 @@ TWO_JOINTS = """<robot name="two">
 </robot>"""
 
 
+def _with_body(urdf: str, link: str, shape: str, xyz: str = "0 0 0", rpy: str = "0 0 0") -> str:
+    """A URDF with a collision body in a link."""
+    body = f'<collision><origin xyz="{xyz}" rpy="{rpy}"/><geometry>{shape}</geometry></collision>'
+    return urdf.replace(f'<link name="{link}">', f'<link name="{link}">{body}')
+
+
+UPPER = '<mesh filename="package://two_description/meshes/upper.stl" scale="0.001 0.001 0.001"/>'
+# The meshes of two links, or of one, as collision bodies too.
+MESH_AND_BOX = _with_body(
+    _with_body(TWO_JOINTS, "upper", UPPER, "0 0 0.2"), "fore", '<box size="0.06 0.06 0.3"/>', "0 0 0.15"
+)
+COLLISIONS = _with_body(
+    _with_body(_with_body(TWO_JOINTS, "upper", UPPER, "0 0 0.2"), "base", '<sphere radius="0.1"/>'),
+    *("fore", '<mesh filename="../meshes/fore.obj"/>', "0 0 0.15", "0 1.5708 0"),
+)
+
+
 def stl() -> bytes:
     """A box of 80 × 80 × 400 mm."""
     return bytes(trimesh.creation.box((80.0, 80.0, 400.0)).export(file_type="stl"))

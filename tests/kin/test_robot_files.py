@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 import kin
 from kin import InputError, Joint, Robot, RobotFileError, UnknownRobotError
 from kin.files.builtin import BUILTIN
-from kin.files.read import matrix_of
 from kin.files.write import rpy_of
+from kin.frames import matrix_of
 
 GOOD = """
 id = "bench"

@@ -106,6 +106,7 @@ _CAPSULE: dict[str, Any] = {
         "start": {**_POINT, "description": "Start of the axis, in the frame of the row."},
         "end": {**_POINT, "description": "End of the axis; without it the body is a sphere."},
         "radius": _quantity(_LENGTH, "Radius, positive."),
+        "assumed": {"type": "boolean", "description": "Whether the real body is not known."},
     },
 }
 EXAMPLE: dict[str, Any] = {  # the table of pioneer5, so that the examples for it work here too

@@ -12,8 +12,7 @@ from app.api import schemas
 from app.api.problems import FieldError, from_input_error, invalid, show
 from app.api.schemas import Vector3, Vector4, numbers
 from kin import InputError, Robot, frame_pose
-from kin.files.read import matrix_of
-from kin.frames import BASE, FRAMES, TOOL
+from kin.frames import BASE, FRAMES, TOOL, matrix_of
 from kin.ik.options import MOST_METRES
 from kin.ik.problem import read_pose
 from kin.solvers.contract import POSE

@@ -40,6 +40,22 @@ class TipAnswer(TypedDict):
 
 
 @documented
+class UrdfBodyAnswer(TypedDict):
+    """What stands for a link of the arm in collisions."""
+
+    link: int
+    """0 for the base, k for the link that joint k moves."""
+    names: list[str]
+    """The URDF links whose collision bodies it has."""
+    capsules: int
+    """Number of capsules around what the file states."""
+    missing: list[str]
+    """What could not be used of it, and why."""
+    assumed: bool
+    """Whether a tube is assumed, because something is missing or nothing is stated."""
+
+
+@documented
 class UrdfReportAnswer(TypedDict):
     """What became of a URDF."""
 
@@ -64,6 +80,11 @@ class UrdfReportAnswer(TypedDict):
     configurations."""
     samples: int
     """Number of these configurations."""
+    bodies: list[UrdfBodyAnswer]
+    """What stands for each link in collisions, base first. Meshes are not sent along: for links with one a tube is
+    assumed."""
+    about_bodies: str
+    """The same in words: the rest of a sentence that begins "Collisions: "."""
 
 
 @documented
@@ -110,5 +131,16 @@ def import_answer(found: UrdfRobot) -> ImportAnswer:
             "notes": list(report.notes),
             "difference": report.difference,
             "samples": report.samples,
+            "bodies": [
+                {
+                    "link": body.link,
+                    "names": list(body.names),
+                    "capsules": body.capsules,
+                    "missing": list(body.missing),
+                    "assumed": body.assumed,
+                }
+                for body in report.bodies
+            ],
+            "about_bodies": report.about_bodies,
         },
     }

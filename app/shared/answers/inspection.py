@@ -53,6 +53,8 @@ class CapsuleAnswer(TypedDict):
     """The other end."""
     radius: float
     """In metres."""
+    assumed: bool
+    """Whether the real body is not known."""
 
 
 @documented
@@ -128,7 +130,14 @@ def _bodies(robot: Robot) -> BodiesAnswer:
         "assumed": not robot.capsules,
         "source": robot.capsules_source,
         "capsules": [
-            {"link": c.link, "row": c.row, "start": list(c.start), "end": list(c.end), "radius": c.radius}
+            {
+                "link": c.link,
+                "row": c.row,
+                "start": list(c.start),
+                "end": list(c.end),
+                "radius": c.radius,
+                "assumed": c.assumed,
+            }
             for c in found.capsules
         ],
         "compared": sorted({(int(a), int(b)): [int(a), int(b)] for a, b in links[found.pairs]}.values()),

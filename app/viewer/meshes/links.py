@@ -3,25 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from app.viewer.meshes.fitting import bodies_of
 from app.viewer.meshes.placing import PLAIN, Piece, Shapes, placed
 from app.viewer.meshes.surface import LinkBody, Surface
 from app.viewer.scene.bodies import Drawing
 from app.viewer.scene.bodies.parts import Part
 from app.viewer.scene.chain import link_poses
 from app.viewer.scene.shapes import Solid, ball, box, cylinder
-from kin import Robot
+from kin import Capsule, Robot, link_frames
 from kin.axes import inverse
+from kin.files.urdf.collisions import LinkPieces
 from kin.files.urdf.visuals import Box, Cylinder, MeshFile, Sphere, Visual
 from kin.transforms import Array
 
+CARRIED = 6  # decimals of metres of capsules in the frames of another table
 SAME = 1e-7  # of the reach, or rad: differences of two tables that describe one arm
 
 
-def shapes_of(robot: Robot, visuals: Sequence[Visual]) -> Shapes:
-    """The visible bodies of a robot that was read from a URDF, where they are in its links."""
+def shapes_of(robot: Robot, visuals: Sequence[Visual], links: Sequence[LinkPieces] = ()) -> Shapes:
+    """The visible bodies of a robot that was read from a URDF, where they are in its links.
+
+    Args:
+        links: its collision bodies.
+    """
     poses = [inverse(T) for T in link_poses(robot, np.zeros((1, robot.n)))[0]]
     pieces: list[Piece] = []
     solids: list[Surface] = []
@@ -34,7 +42,7 @@ def shapes_of(robot: Robot, visuals: Sequence[Visual]) -> Shapes:
         else:
             pieces.append(Piece(len(solids), visual.carrier, pose, color=color, link=visual.link))
             solids.append(_solid(visual.shape))
-    return Shapes(pieces, solids, len(poses), robot.reach)
+    return Shapes(pieces, solids, len(poses), robot.reach, bodies_of(links))
 
 
 def drawing_without_meshes(shapes: Shapes) -> Drawing:
@@ -79,6 +87,46 @@ def carried_over(drawing: Drawing, before: Robot, robot: Robot) -> Drawing | Non
     Names, limits, tool and base may differ, and the convention, as long as every joint turns or slides the same
     link about the same line by the same amount.
     """
+    shifts = _shifts(before, robot)
+    if shifts is None:
+        return None
+    if all(np.abs(shift - np.eye(4)).max() < 1e-12 for shift in shifts):
+        return drawing
+    parts = tuple(
+        tuple(_moved(part, shift) for part in link) for link, shift in zip(drawing.parts, shifts, strict=True)
+    )
+    spheres = tuple(
+        np.column_stack([cover[:, :3] @ shift[:3, :3].T + shift[:3, 3], cover[:, 3]])
+        for cover, shift in zip(drawing.spheres, shifts, strict=True)
+    )
+    return Drawing(parts, spheres)
+
+
+def capsules_for(before: Robot, robot: Robot) -> Robot:
+    """A robot with the capsules of another table of the same arm, as `carried_over`; without, if it is another."""
+    bare = replace(robot, capsules=(), capsules_source="")
+    if not before.capsules or _shifts(before, robot) is None:
+        return bare
+    zeros = [np.zeros(each.n) for each in (before, robot)]
+    old, new = (link_frames(each, q) for each, q in zip((before, robot), zeros, strict=True))
+    move = robot.T_world_base @ inverse(before.T_world_base)
+    found = []
+    for each in before.capsules:
+        row = robot.joint_rows[each.link - 1] if each.link else -1
+        there = old[each.row] if each.row >= 0 else before.T_world_base
+        T = inverse(new[row] if each.link else robot.T_world_base) @ move @ there
+        if np.abs(T - np.eye(4)).max() < 1e-12:
+            found.append(replace(each, row=row))
+            continue
+        points = np.array([each.start, each.end]) @ T[:3, :3].T + T[:3, 3]
+        (x, y, z), (u, v, w) = np.round(points, CARRIED).tolist()
+        radius = round(each.radius + 2.0 * 10.0**-CARRIED, CARRIED)
+        found.append(Capsule(each.link, row, (x, y, z), (u, v, w), radius, each.assumed))
+    return replace(bare, capsules=tuple(found), capsules_source=before.capsules_source)
+
+
+def _shifts(before: Robot, robot: Robot) -> list[Array] | None:
+    """What leads from each link's frame of one table to that of the other; None if it is another arm."""
     if [joint.kind for joint in before.joints] != [joint.kind for joint in robot.joints]:
         return None
     zeros = np.zeros((1, robot.n))
@@ -91,16 +139,7 @@ def carried_over(drawing: Drawing, before: Robot, robot: Robot) -> Drawing | Non
         along = max(abs(shift[2, 2] - 1.0), float(np.abs(shift[:2, 2]).max()))
         if along > SAME or np.abs(shift[:2, 3]).max() > close:
             return None
-    if all(np.abs(shift - np.eye(4)).max() < 1e-12 for shift in shifts):
-        return drawing
-    parts = tuple(
-        tuple(_moved(part, shift) for part in link) for link, shift in zip(drawing.parts, shifts, strict=True)
-    )
-    spheres = tuple(
-        np.column_stack([cover[:, :3] @ shift[:3, :3].T + shift[:3, 3], cover[:, 3]])
-        for cover, shift in zip(drawing.spheres, shifts, strict=True)
-    )
-    return Drawing(parts, spheres)
+    return shifts
 
 
 def _moved(part: Part, T: Array) -> Part:

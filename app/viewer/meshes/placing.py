@@ -22,6 +22,26 @@ LOOKED_AT = 20_000  # points of a link among which these are chosen
 MOST_DRAWN = 120_000  # triangles of an arm, its boxes, cylinders and spheres included
 
 
+class Body(NamedTuple):
+    """The collision bodies of one link, which become capsules.
+
+    Attributes:
+        pieces: of each, the name of its shape, its numbers, and the upper three rows of its pose in the link, 12
+            numbers; the first number of a mesh is its path.
+        most: capsules at most.
+    """
+
+    pieces: Sequence[tuple[str, Sequence[object], Sequence[float]]]
+    most: int
+
+
+class Fit(NamedTuple):
+    """The capsules of a link: start, end and radius, 7 numbers each, and what of its bodies is missing."""
+
+    capsules: Sequence[Sequence[float]]
+    missing: Sequence[str]
+
+
 class Piece(NamedTuple):
     """One visible body.
 
@@ -47,12 +67,14 @@ class Shapes:
 
     Attributes:
         solids: boxes, cylinders and spheres.
+        bodies: what becomes capsules.
     """
 
     pieces: Sequence[Piece]
     solids: Sequence[Surface]
     links: int
     reach: float
+    bodies: Sequence[Body] = ()
 
     @property
     def files(self) -> dict[str, int]:

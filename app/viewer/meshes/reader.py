@@ -26,8 +26,10 @@ from app.shared.clients import share_of
 from app.shared.memory.answers import AnswerMemory, MemoryFullError, MemoryShare, Reservation
 from app.shared.threads import DaemonExecutor, lower_priority
 from app.viewer.meshes.archive import MOST_BYTES, MeshError, TooLargeError
+from app.viewer.meshes.fitting import checked
 from app.viewer.meshes.placing import MOST_DRAWN, Shapes
-from app.viewer.meshes.surface import LinkBody, pack, unpack
+from app.viewer.meshes.surface import LinkBody, pack, unpack, unpack_fits
+from kin.files.urdf.collisions import Fitted
 
 MOST_TRIANGLES = 80_000  # of an arm, in the browser
 PATIENCE = 60.0  # seconds for one request, on a busy machine
@@ -48,11 +50,13 @@ class Meshes:
     Attributes:
         triangles: how many there were before they were simplified, each file as often as it is drawn.
         room: the memory they take, given back when they are forgotten.
+        fits: capsules around the collision bodies of each URDF link.
     """
 
     links: list[LinkBody]
     triangles: int
     room: Reservation
+    fits: list[Fitted] = field(default_factory=list)
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,13 +182,14 @@ class MeshReader:
         answer = self._answer(request)
         try:
             links, triangles = unpack(answer, MOST_DRAWN)
+            fits = checked(unpack_fits(answer), request.shapes.bodies)
         except (ValueError, KeyError, TypeError):
             raise too_much() from None
         if len(links) != request.shapes.links:
             raise too_much()
         size = sum(surface.size for link in links for surface in link.surfaces)
         try:
-            return Meshes(links, triangles, request.memory.reserve(size))
+            return Meshes(links, triangles, request.memory.reserve(size), fits)
         except MemoryFullError:
             raise full() from None
 
@@ -224,6 +229,7 @@ def _send(process: subprocess.Popen[bytes], request: _Request) -> None:
     solids = pack([LinkBody(shapes.solids, np.empty((0, 3), np.float32))])
     head: dict[str, object] = {
         "pieces": shapes.pieces,
+        "bodies": shapes.bodies,
         "links": shapes.links,
         "reach": shapes.reach,
         "most": MOST_TRIANGLES,

@@ -57,17 +57,18 @@ class LinkBody(NamedTuple):
     cover: Points
 
 
-def pack(links: Sequence[LinkBody], triangles: int = 0) -> bytes:
+def pack(links: Sequence[LinkBody], triangles: int = 0, fits: Sequence[object] = ()) -> bytes:
     """Finished links as bytes: a line of JSON with all sizes, and the arrays one after the other.
 
     Args:
         triangles: how many there were before they were simplified.
+        fits: more that goes into the line.
     """
     sizes = [
         [len(link.cover), [[surface.color, len(surface.points), len(surface.faces)] for surface in link.surfaces]]
         for link in links
     ]
-    parts = [json.dumps({"triangles": triangles, "links": sizes}).encode(), b"\n"]
+    parts = [json.dumps({"triangles": triangles, "links": sizes, "fits": fits}).encode(), b"\n"]
     for link in links:
         parts.append(np.ascontiguousarray(link.cover, dtype="<f4").tobytes())
         for surface in link.surfaces:
@@ -113,6 +114,11 @@ def unpack(packed: bytes, most: int) -> tuple[list[LinkBody], int]:
     if at != len(data):
         raise ValueError("more than was announced")
     return links, int(sizes["triangles"])
+
+
+def unpack_fits(packed: bytes) -> Any:
+    """The `fits` that `pack` has packed, unchecked; raises `ValueError`."""
+    return json.loads(packed.partition(b"\n")[0])["fits"]
 
 
 def _checked(color: object) -> Rgb | None:

@@ -21,10 +21,21 @@ from kin.dh import SAMPLES, table_of_chain
 from kin.errors import RobotFileError
 from kin.files.home import default_home
 from kin.files.numbers import LARGEST
-from kin.files.read import MAX_REACH, MAX_ROWS, matrix_of
+from kin.files.read import MAX_REACH, MAX_ROWS
+from kin.files.urdf.collisions import (
+    Fit,
+    UrdfBody,
+    collisions_of,
+    said,
+    with_bodies,
+    with_free_home,
+    without_meshes,
+)
 from kin.files.urdf.names import unused
+from kin.files.urdf.poses import motion_of
 from kin.files.urdf.tree import Tip, UrdfJoint, UrdfTree, read_tree
 from kin.fk import fk
+from kin.frames import matrix_of
 from kin.robot import DEFAULT_LIMITS, Joint, Robot
 from kin.transforms import Array
 
@@ -45,6 +56,7 @@ class UrdfReport:
         notes: what was assumed, one sentence each.
         difference: largest difference of any entry of the tool pose from the product of the URDF's transforms.
         samples: the number of random configurations at which it was measured.
+        bodies: what stands for each link in collisions, base first.
     """
 
     base: str
@@ -57,6 +69,12 @@ class UrdfReport:
     notes: tuple[str, ...]
     difference: float
     samples: int
+    bodies: tuple[UrdfBody, ...] = ()
+
+    @property
+    def about_bodies(self) -> str:
+        """Which bodies are from the file and which are assumed: the rest of a sentence "Collisions: …"."""
+        return said(self.bodies)
 
 
 class UrdfRobot(NamedTuple):
@@ -71,20 +89,34 @@ def load_urdf(source: Path | str, base: str | None = None, tip: str | None = Non
     return read_urdf(source, base, tip).robot
 
 
-def read_urdf(source: Path | str, base: str | None = None, tip: str | None = None, file: str = "") -> UrdfRobot:
-    """The serial arm between two links of a URDF, as a standard DH table.
+def read_urdf(
+    source: Path | str,
+    base: str | None = None,
+    tip: str | None = None,
+    file: str = "",
+    fit: Fit | None = None,
+) -> UrdfRobot:
+    """The serial arm between two links of a URDF, as a standard DH table with capsules around its bodies.
+
+    Boxes, cylinders, spheres and capsules of its `<collision>` elements are read here. Meshes are not, unless
+    `fit` reads them: for links with one a tube is assumed.
 
     Args:
         source: a `Path` of a file, or a `str`, which is the text itself and never a path.
         base: the link the arm stands on; by default the root.
         tip: the link that is the tool; needed if several are possible.
         file: the name used in messages.
+        fit: gives the capsules of each URDF link with collision bodies, for an arm with this reach (m).
 
     Raises:
         RobotFileError: the file is invalid, or describes no serial arm; the message names the joint or link.
     """
     tree = _tree(source, file)
-    return _import(tree, tree.chain(base, tip))
+    chain = tree.chain(base, tip)
+    robot, report = _import(tree, chain)
+    links = collisions_of(robot, tree, chain)
+    robot, bodies = with_bodies(robot, links, (fit or without_meshes)(links, robot.reach))
+    return UrdfRobot(with_free_home(robot), replace(report, bodies=bodies))
 
 
 def urdf_tips(source: Path | str, file: str = "") -> tuple[Tip, ...]:
@@ -221,16 +253,3 @@ def _difference(robot: Robot, chain: Sequence[UrdfJoint]) -> float:
             T = T @ motion_of(joint, q[:, i])
             i += 1
     return float(np.abs(fk(robot, q) - T).max())
-
-
-def motion_of(joint: UrdfJoint, values: Array) -> Array:
-    """The motion of a joint ``(k, 4, 4)``, by Rodrigues' formula or along its axis."""
-    x, y, z = axis = np.array(joint.axis())
-    T = np.tile(np.eye(4), (len(values), 1, 1))
-    if joint.kind == "prismatic":
-        T[:, :3, 3] = values[:, None] * axis
-        return T
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    s, c = np.sin(values)[:, None, None], 2.0 * np.sin(0.5 * values)[:, None, None] ** 2
-    T[:, :3, :3] += s * K + c * (K @ K)
-    return T

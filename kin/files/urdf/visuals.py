@@ -9,9 +9,9 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from kin.errors import RobotFileError
-from kin.files.read import matrix_of
-from kin.files.urdf.read import motion_of
-from kin.files.urdf.tree import MOVING, UrdfElement, UrdfJoint, UrdfTree, read_tree
+from kin.files.urdf.poses import poses_of
+from kin.files.urdf.tree import UrdfElement, UrdfTree, read_tree
+from kin.frames import matrix_of
 from kin.transforms import Array
 
 MAX_VISUALS = 300
@@ -78,7 +78,7 @@ def read_visuals(text: str, tip: str | None = None, file: str = "URDF") -> tuple
     """
     tree = read_tree(text, file)
     chain = tree.chain(None, tip)
-    carriers, poses = _poses(tree, chain)
+    carriers, poses = poses_of(tree, chain)
     colors = _colors(tree)
     found: list[Visual] = []
     for element in tree.root.findall("link"):
@@ -96,38 +96,13 @@ def read_visuals(text: str, tip: str | None = None, file: str = "URDF") -> tuple
     return tuple(found)
 
 
-def _poses(tree: UrdfTree, chain: tuple[UrdfJoint, ...]) -> tuple[dict[str, int], dict[str, Array]]:
-    """For each link below the root of the chain: the joints of the chain that move it, and its pose at zero."""
-    moving = {joint.name for joint in chain if joint.moves}
-    children: dict[str, list[UrdfJoint]] = {}
-    for joint in tree.joints:
-        children.setdefault(joint.parent, []).append(joint)
-    links = [chain[0].parent]
-    carriers, poses = {links[0]: 0}, {links[0]: np.eye(4)}
-    for link in links:  # grows meanwhile
-        for joint in children.get(link, ()):
-            T = poses[link] @ np.array(matrix_of(*joint.origin()))
-            if joint.type in MOVING and joint.name not in moving:
-                T = T @ motion_of(joint, np.array([_rest(joint)]))[0]
-            carriers[joint.child] = carriers[link] + (joint.name in moving)
-            poses[joint.child] = T
-            links.append(joint.child)
-    return carriers, poses
-
-
-def _rest(joint: UrdfJoint) -> float:
-    """Zero, or the limit closest to it."""
-    low, high = joint.limits() or (0.0, 0.0)
-    return min(max(0.0, low), high)
-
-
 def _visual(
     fields: UrdfElement, link: str, carrier: int, T_root_link: Array, colors: dict[str, Rgb | None]
 ) -> list[Visual]:
     geometry = fields.element.find("geometry")
     if geometry is None:
         raise fields.refuse("geometry", "nothing", "<geometry> with a box, cylinder, sphere or mesh")
-    shape = _shape(UrdfElement(fields.file, geometry, fields.name))
+    shape = shape_of(UrdfElement(fields.file, geometry, fields.name))
     if shape is None:
         return []
     T = T_root_link @ np.array(matrix_of(*fields.origin()))
@@ -136,8 +111,8 @@ def _visual(
     return [Visual(link, carrier, T, shape, color)]
 
 
-def _shape(fields: UrdfElement) -> Shape | None:
-    """The shape of a visual; None for a capsule or another shape that URDF does not define."""
+def shape_of(fields: UrdfElement) -> Shape | None:
+    """The shape of a `<geometry>`; None for a capsule or another shape that URDF does not define."""
     children = {child.tag for child in fields.element}
     if "mesh" in children:
         return _mesh(fields)

@@ -15,9 +15,11 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import trimesh
+from zips import COLLISIONS, announced, robot_files
 
 import kin
 from app.cli import parser
+from app.cli.bodies import MeshesBeside
 from app.exports import progress
 from app.exports.formats import FORMATS, encode
 from app.shared.clouds import Cloud, Clouds
@@ -514,6 +516,53 @@ def test_import_prints_or_writes_a_robot_file(capsys, tmp_path):
     # The file stands for the robot in other commands.
     code, out, _ = run(capsys, "fk", file, *[0] * 7, "--json")
     assert json.loads(out)["pose"]["position"] == pytest.approx([0.088, 0, 0.926], abs=1e-12)
+
+
+def test_import_reads_the_collision_meshes_beside_the_urdf(capsys, tmp_path):
+    for name, content in robot_files(COLLISIONS).items():
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    urdf = tmp_path / "two/urdf/two.urdf"
+    code, out, _ = run(capsys, "import", urdf)
+    assert code == 0
+    robot = kin.parse_robot(out)
+    assert {c.link for c in robot.capsules} == {0, 1, 2}
+    assert not any(c.assumed for c in robot.capsules)
+    assert robot.capsules_source == "Capsules around the collision bodies of the URDF, for every link."
+    upper = [c for c in robot.capsules if c.link == 1]
+    assert 0.04 <= max(c.radius for c in upper) < 0.09, "half the side of a rod of 80 mm, and its corners"
+    got = answer(capsys, "import", urdf)
+    assert [body["names"] for body in got["report"]["bodies"]] == [["base"], ["upper"], ["fore"]]
+    (tmp_path / "two/meshes/fore.obj").unlink()
+    (tmp_path / "two/meshes/upper.stl").write_bytes(b"noise")
+    code, out, _ = run(capsys, "import", urdf, "-o", tmp_path / "two.toml")
+    assert code == 0
+    (line,) = [line for line in out.splitlines() if line.startswith("bodies ")]
+    assert "link 1 has an assumed tube (upper: upper.stl: " in line
+    assert "link 2 has no body (fore: fore.obj: no such file)" in line, "it has no length either"
+    assert {c.link for c in kin.load_robot(tmp_path / "two.toml").capsules if c.assumed} == {1}
+
+
+def test_a_collision_mesh_beyond_the_limits_refuses_the_import(capsys, tmp_path):
+    files = {**robot_files(COLLISIONS), "two/meshes/upper.stl": announced(10**7) + bytes(50)}
+    for name, content in files.items():
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    code, out, err = run(capsys, "import", tmp_path / "two/urdf/two.urdf")
+    assert (code, out) == (2, "")
+    assert "upper.stl" in err
+    assert "at most 600000" in err
+
+
+ELSEWHERE = ("package:///etc/passwd", "http://127.0.0.1/x.stl", "file:///no.stl", "x", "package://two", "")
+
+
+@pytest.mark.parametrize("named", ELSEWHERE)
+def test_a_mesh_elsewhere_is_not_read(tmp_path, named):
+    """Neither outside of the folders of the URDF's package by an odd path, nor over the network."""
+    assert MeshesBeside(tmp_path / "two.urdf").file_of(named) is None
 
 
 def test_import_offers_the_tips(capsys, tmp_path):

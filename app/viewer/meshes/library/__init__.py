@@ -30,8 +30,8 @@ from app.viewer.scene.bodies import Drawing
 from app.viewer.scene.chain import link_poses
 from kin import Robot, builtin_robots
 from kin.axes import inverse
-from kin.files.read import matrix_of
 from kin.files.urdf.visuals import MeshFile, Visual
+from kin.frames import matrix_of
 
 log = logging.getLogger(__name__)
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import Any
 
 import kin
+from app.viewer.meshes.links import capsules_for
 from app.viewer.own_arm import NAME, OwnArm, own_arm
 from app.viewer.panel.readout import roll_pitch_yaw
 from app.viewer.tabs.robot.expression import ExpressionError, cut, read
@@ -87,22 +88,27 @@ def typed(robot: Robot, own: OwnArm | None, texts: Mapping[Cell, str], units: Un
                 data["rows"][i]["limits"] = "none"
             else:
                 raise EditError((i, "low" if pair[0] is None else "high"), "give both limits, or none")
-    return built(data, start, texts)
+    return built(data, start, robot, texts)
 
 
-def built(data: Fields, start: str, texts: Mapping[Cell, str] | None = None) -> OwnArm:
+def built(data: Fields, start: str, before: Robot, texts: Mapping[Cell, str] | None = None) -> OwnArm:
     """The arm of these fields. A home that is not valid any more is replaced.
+
+    It has the capsules of the arm `before`, as long as every joint moves the same link in the same way.
 
     Raises:
         EditError: with what is wrong; `texts` tells in which cell.
     """
+    data = {key: value for key, value in data.items() if not key.startswith("capsules")}
     try:
         try:
-            return own_arm(data, start)
+            own = own_arm(data, start)
         except RobotFileError as error:
             if not error.field.startswith("home"):
                 raise
-            return own_arm({key: value for key, value in data.items() if key != "home"}, start)
+            own = own_arm({key: value for key, value in data.items() if key != "home"}, start)
+        robot = capsules_for(before, own.robot)
+        return own_arm(kin.robot_to_dict(robot), start) if robot.capsules else own
     except (InputError, RobotFileError) as error:
         cell = _cell_of(error.field, texts or {})
         text = "" if cell is None or texts is None else f"“{cut(texts[cell])}” is not valid: "
@@ -118,7 +124,7 @@ def changed_rows(robot: Robot, own: OwnArm | None, change: Callable[[list[Fields
     moving = [row.get("kind", "revolute") for row in data["rows"] if row.get("kind") != "fixed"]
     if moving != [joint.kind for joint in robot.joints]:
         data.pop("home")
-    return built(data, start)
+    return built(data, start, robot)
 
 
 def add_row(rows: list[Fields], after: int, unit: str) -> None:
@@ -149,7 +155,7 @@ def row_change(action: str, index: int, unit: str) -> Callable[[list[Fields]], N
 def reread(robot: Robot, own: OwnArm | None, convention: str) -> OwnArm:
     """The arm that the same table describes in this convention; raises `EditError`."""
     data, start = fields_of(robot, own)
-    return built({**data, "convention": convention}, start)
+    return built({**data, "convention": convention}, start, robot)
 
 
 def frame_values(robot: Robot, frame: str) -> tuple[float, ...]:
@@ -210,7 +216,7 @@ def converted(robot: Robot, own: OwnArm | None) -> OwnArm:
     """The same arm as a table in the other convention; raises `EditError`."""
     data, start = fields_of(robot, own)
     other = kin.convert(robot, "modified" if robot.convention == "standard" else "standard")
-    return built({**kin.robot_to_dict(other), **{key: data[key] for key in ("name", "source")}}, start)
+    return built({**kin.robot_to_dict(other), **{key: data[key] for key in ("name", "source")}}, start, robot)
 
 
 def part_of(cell: Cell) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import binascii
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -15,6 +16,7 @@ from app.viewer.meshes.reader import full
 from app.viewer.own_arm import OwnArm, own_arm
 from app.viewer.tabs.robot.expression import cut
 from kin import InputError, Robot, RobotFileError
+from kin.files.urdf.collisions import Fitted, LinkPieces, collisions_of, said, with_bodies
 from kin.files.urdf.tree import Tip, read_tree
 
 MOST = 300_000  # characters of a file that is text
@@ -170,13 +172,14 @@ def file_error(name: str, error: MeshError) -> RobotFileError:
     return RobotFileError(name, error.field, error.value, error.expected)
 
 
-def arm_of(name: str, text: str, tip: str | None = None) -> tuple[OwnArm, str]:
+def arm_of(name: str, text: str, tip: str | None = None, reading: bool = False) -> tuple[OwnArm, str]:
     """The arm of a file, and what is to be said about it.
 
     Args:
         name: of the file, for messages.
         text: TOML, or URDF, which begins with ``<``.
         tip: the link of a URDF that is the tool.
+        reading: whether its meshes are read next, and bodies are spoken of then.
 
     Raises:
         kin.KinematicsError: naming the field, the value and what would be valid.
@@ -191,7 +194,22 @@ def arm_of(name: str, text: str, tip: str | None = None) -> tuple[OwnArm, str]:
     words.append(
         f"The table and the URDF differ by at most {report.difference:.1g} (m) in {report.samples} poses."
     )
+    if not reading:
+        words.append(f"Collisions: {report.about_bodies}")
     return own_arm(kin.robot_to_dict(robot, length="mm")), " ".join(words)
+
+
+def bodies_in(name: str, text: str, tip: str | None, robot: Robot) -> list[LinkPieces]:
+    """The collision bodies of a URDF, in the frames of the arm that was read from it."""
+    tree = read_tree(text, name)
+    return collisions_of(robot, tree, tree.chain(None, tip))
+
+
+def with_capsules(own: OwnArm, links: Sequence[LinkPieces], fits: Sequence[Fitted]) -> tuple[OwnArm, str]:
+    """The arm with these capsules around its collision bodies, and what is to be said about them."""
+    robot, bodies = with_bodies(replace(own.robot, capsules=(), capsules_source=""), links, fits)
+    found = own_arm(kin.robot_to_dict(robot), own.start)
+    return replace(found, start=found.robot.id), f"Collisions: {said(bodies)}"
 
 
 def tips_of(name: str, text: str) -> tuple[Tip, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from functools import partial
@@ -17,8 +17,19 @@ from app.viewer.own_arm import OwnArm
 from app.viewer.panel import Post
 from app.viewer.panel.status import Notice
 from app.viewer.scene.bodies import Drawing
-from app.viewer.tabs.robot.files import Busy, Incoming, Source, arm_of, file_error, is_urdf, opened
+from app.viewer.tabs.robot.files import (
+    Busy,
+    Incoming,
+    Source,
+    arm_of,
+    bodies_in,
+    file_error,
+    is_urdf,
+    opened,
+    with_capsules,
+)
 from kin import InputError, KinematicsError, Robot, RobotFileError
+from kin.files.urdf.collisions import LinkPieces, without_meshes
 from kin.files.urdf.visuals import MeshFile, read_visuals
 
 MOST_BACK = 20  # steps that are taken back to the arm that a refused file has replaced
@@ -31,13 +42,20 @@ class _Reading:
 
     Attributes:
         replaced: the id of the robot that was on show before.
+        links: its collision bodies.
     """
 
-    robot: Robot
+    own: OwnArm
     replaced: str
     source: Source
     count: int
+    links: Sequence[LinkPieces]
     done: int = 0
+
+    @property
+    def robot(self) -> Robot:
+        """The arm."""
+        return self.own.robot
 
 
 class Uploads:
@@ -146,7 +164,7 @@ class Uploads:
             return
         name = f"{source.name}: {source.urdf}" if source.urdf else source.name
         try:
-            own, words = arm_of(name, source.text, tip)
+            own, words = arm_of(name, source.text, tip, reading=source.archive is not None)
         except InputError as error:
             raise RobotFileError(name, error.field, error.value, error.expected) from None
         self.last = own = replace(own, start=own.robot.id)
@@ -155,27 +173,29 @@ class Uploads:
         wrong = ""
         if is_urdf(source.text):
             try:
-                words = f"{words} {self._look(own.robot, source, tip)}".rstrip()
+                words = f"{words} {self._look(own, source, tip)}".rstrip()
             except KinematicsError as error:
                 wrong = str(error)
         self._begin(own, words)
         if wrong:
             self._say_wrong(source, wrong)
 
-    def _look(self, robot: Robot, source: Source, tip: str | None) -> str:
+    def _look(self, own: OwnArm, source: Source, tip: str | None) -> str:
         """Draw what the links look like, or have their meshes read; returns what is to be said about it."""
-        visuals = read_visuals(source.text, tip, source.name)
+        robot, visuals = own.robot, read_visuals(source.text, tip, source.name)
         if source.archive is None:
             plain = [visual for visual in visuals if not isinstance(visual.shape, MeshFile)]
             if plain == list(visuals):
                 self._draw_plain(robot, source, shapes_of(robot, plain))
                 return ""
             return "Open it together with its meshes, and they are shown."
-        shapes = shapes_of(robot, visuals)
+        links = bodies_in(source.name, source.text, tip, robot)
+        shapes = shapes_of(robot, visuals, links if any(link.meshes for link in links) else ())
         count = len(shapes.files)
-        if not count:
+        if not count and not shapes.bodies:
             self._draw_plain(robot, source, shapes)
-            return ""
+            _, words = with_capsules(own, links, without_meshes(links, robot.reach))
+            return words
         self._number += 1
         done, read = ("meshes", self._number), ("reading", self._number)
         try:
@@ -184,10 +204,10 @@ class Uploads:
             )
         except MeshError as error:
             raise file_error(source.name, error) from None
-        self._reading = _Reading(robot, self._stage.robot.id, source, count)
+        self._reading = _Reading(own, self._stage.robot.id, source, count, links if shapes.bodies else ())
         future.add_done_callback(partial(self._post, done))
         self._future = future
-        return f"Its {count} meshes are being read."
+        return f"Its {count} meshes are being read." if count else "Its collision meshes are being read."
 
     def note_progress(self, number: int, done: object) -> None:
         """So many meshes of the file have been read."""
@@ -211,11 +231,24 @@ class Uploads:
             known = file_error(source.name, error) if isinstance(error, MeshError) else error
             self._say_wrong(source, str(known))
             return
-        self._stage.redraw_body()
         words = f"{reading.count} meshes with {meshes.triangles} triangles"
         if meshes.triangles > MOST_TRIANGLES:
             words += f", simplified to about {MOST_TRIANGLES}"
-        self._stage.notify(Notice("hand", f"The meshes of {source.name} are shown", f"{words}. {HERE}"))
+        bodies = self._use_capsules(reading, meshes)
+        self._stage.redraw_body()
+        self._stage.notify(Notice("hand", f"The meshes of {source.name} are shown", f"{words}. {HERE} {bodies}"))
+
+    def _use_capsules(self, reading: _Reading, meshes: Meshes) -> str:
+        """Give the arm the capsules of its collision bodies, and say where they are from."""
+        if not reading.links:
+            _, words = with_capsules(reading.own, (), ())
+            return words
+        own, words = with_capsules(reading.own, reading.links, meshes.fits)
+        if self.last == reading.own:
+            self.last = own
+        if self._stage.own == reading.own and self._stage.robot == reading.robot:
+            self._stage.edit_arm(own)
+        return words
 
     def refuse(self, value: object) -> str:
         """Bring back the arm that a refused file has replaced, as undo does.

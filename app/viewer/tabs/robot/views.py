@@ -192,11 +192,18 @@ def _home(found: InspectionAnswer) -> dict[str, str]:
 
 
 def _bodies(found: InspectionAnswer) -> dict[str, str]:
-    """What collisions are judged by: a copy of a built-in arm has lost the capsules that were fitted to it."""
-    if found["bodies"]["assumed"]:
+    """What collisions are judged by."""
+    bodies = found["bodies"]
+    if bodies["assumed"]:
         words = "tubes along the lengths of the table; the real bodies are not known, and may be thicker"
         return _fact("Collisions", words, "assumed:", "kb-amber")
-    return _fact("Collisions", "capsules fitted to the bodies of the links", "known:")
+    known = {each["link"] for each in bodies["capsules"] if not each["assumed"]}
+    assumed = sorted({each["link"] for each in bodies["capsules"] if each["assumed"]})
+    if not assumed:
+        return _fact("Collisions", "capsules around the bodies of the links", "known:")
+    parts = [f"{'what else belongs to ' * (k in known)}link {k}" for k in assumed]
+    words = f"capsules around the bodies of the links; assumed are tubes for {', '.join(parts)}"
+    return _fact("Collisions", words, "partly known:", "kb-amber")
 
 
 def frames(robot: Robot, units: Units, page: Frames, texts: Texts) -> str:

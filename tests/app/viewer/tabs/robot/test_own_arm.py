@@ -36,7 +36,7 @@ def test_every_arm_comes_back_bit_by_bit_from_its_compact_form(robot):
     assert back == own
     assert back.robot.model.tobytes() == robot.model.tobytes()
     assert back.robot.home == robot.home
-    assert len(json.dumps(pack(own), separators=(",", ":"))) < 1500
+    assert len(json.dumps(pack(own), separators=(",", ":"))) < 2500
 
 
 def test_an_arm_has_another_id_after_every_change():
@@ -240,3 +240,45 @@ def test_the_menu_offers_every_robot_whatever_its_name():
     for name, robot in zip(options, (*robots, own.robot), strict=True):
         assert menu.read(name) == robot
         menu.show(robot, own)
+
+
+@pytest.mark.parametrize("robot_id", ["ur5", "panda", "puma560"])
+def test_capsules_are_in_the_link(robot_id: str) -> None:
+    robot = kin.get_robot(robot_id)
+    own = own_arm(kin.robot_to_dict(robot), robot_id)
+    assert own.robot.capsules == robot.capsules
+    text = json.dumps(pack(own))
+    assert len(text) < 3000
+    again = unpack(json.loads(text))
+    assert again == own
+    assert again.robot.capsules_source == robot.capsules_source[: len(again.robot.capsules_source)]
+
+
+def test_capsules_keep_their_rows_when_names_are_cut() -> None:
+    data = kin.robot_to_dict(kin.get_robot("ur5"))
+    long = {row["name"]: row["name"] + " " + "x" * 50 for row in data["rows"]}
+    for row in [*data["rows"], *data["capsules"]]:
+        key = "name" if "name" in row else "row"
+        if key in row:
+            row[key] = long[row[key]]
+    own = own_arm(data)
+    assert max(len(row.name) for row in own.robot.rows) <= 40
+    assert [c.row for c in own.robot.capsules] == [c.row for c in kin.get_robot("ur5").capsules]
+
+
+PLACE = [0, 0, 0, 0, 0, 0]
+ODD = [
+    *(5, [], [0] * 7, [0] * 10, [9, *PLACE, 1], [-2, *PLACE, 1], ["x", *PLACE, 1], [True, *PLACE, 1]),
+    *([0, *PLACE, -1], [0, *PLACE, None], [0, "x", *PLACE[1:], 1]),
+]
+
+
+@pytest.mark.parametrize("capsule", ODD)
+def test_malformed_capsules_of_a_link_are_refused_by_name(capsule: object) -> None:
+    with pytest.raises(kin.KinematicsError, match=r"capsules\[0\]"):
+        unpack({**GOOD, "k": [capsule]})
+
+
+def test_too_many_capsules_of_a_link_are_refused() -> None:
+    with pytest.raises(kin.KinematicsError, match="capsules"):
+        unpack({**GOOD, "k": [[0, 0, 0, 0, 0, 0, 0, 1]] * 65})

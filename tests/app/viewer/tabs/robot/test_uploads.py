@@ -13,7 +13,7 @@ import pytest
 from fake_browser import FakeBrowser
 from live_server import serve_viewer
 from test_robot_tab import STORE, UR5, cell, part, say, shows, type_in
-from zips import TWO_JOINTS, announced, packed, robot_files
+from zips import MESH_AND_BOX, TWO_JOINTS, announced, packed, robot_files
 
 import kin
 from app.service.web.inspection import MAX_MESSAGE
@@ -24,6 +24,7 @@ from app.viewer.meshes import reader as readers
 from app.viewer.meshes.archive import MeshError, TooLargeError
 from app.viewer.meshes.loading import PARSED
 from app.viewer.server import ViewerServer
+from app.viewer.session.state import decode
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -80,6 +81,52 @@ def test_a_zip_shows_the_real_arm_and_undo_brings_back_what_it_replaced(port: in
         assert not meshes(tab)
         tab.say("redo")
         tab.wait(lambda: meshes(tab) == ALL)
+
+
+def kept_arm(tab: FakeBrowser) -> kin.Robot:
+    """The arm of the link."""
+    tab.wait(lambda: bool(tab.kept))
+    own = decode(tab.kept[-1], [UR5]).own
+    assert own is not None
+    return own.robot
+
+
+def test_a_zip_gives_the_arm_the_capsules_of_its_collision_bodies(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        mine = tab.value("Robot")
+        send(tab, "two.zip", packed(robot_files(MESH_AND_BOX)))
+        tab.wait(lambda: "The meshes of two.zip are shown" in tab.html, timeout=90.0)
+        assert "Collisions: capsules around the collision bodies of the URDF, for every link." in tab.html
+        tab.wait(lambda: {c.link for c in kept_arm(tab).capsules} == {1, 2})
+        robot = kept_arm(tab)
+        assert not any(c.assumed for c in robot.capsules)
+        assert "known:" in part(tab, "about")
+        type_in(tab, "tool", "x", "50")
+        tab.wait(lambda: kept_arm(tab).T_last_tool[0, 3] == pytest.approx(0.05))
+        assert kept_arm(tab).capsules == robot.capsules, "the axes are the same"
+        type_in(tab, 0, "a", "450")
+        tab.wait(lambda: kept_arm(tab).capsules == ())
+        assert "assumed:" in part(tab, "about")
+        for _ in range(3):
+            tab.say("undo")
+            tab.settle()
+        assert tab.value("Robot") == mine, "the capsules are no step of their own"
+        tab.say("redo")
+        tab.wait(lambda: kept_arm(tab).capsules == robot.capsules)
+
+
+def test_a_urdf_alone_says_which_bodies_are_assumed(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        say(tab, "upload", value=["two.urdf", True, True, MESH_AND_BOX])
+        assert "link 1 has an assumed tube (upper: upper.stl: its mesh was not sent along)" in html.unescape(
+            tab.html
+        )
+        tab.wait(lambda: {c.link for c in kept_arm(tab).capsules} == {1, 2})
+        assert {c.link for c in kept_arm(tab).capsules if c.assumed} == {1}
+        assert "partly known:" in part(tab, "about")
+        assert "assumed are tubes for link 1" in part(tab, "about")
 
 
 def test_what_is_wanted_of_a_zip_is_asked(port: int) -> None:

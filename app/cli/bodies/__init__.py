@@ -1,0 +1,72 @@
+"""Meshes of collision bodies beside a URDF, for ``kinboard import``.
+
+They are read by the process that parses visitors' meshes, with the same limits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from urllib.parse import unquote
+
+from app.viewer.meshes.archive import MeshError
+from app.viewer.meshes.fitting import bodies_of
+from app.viewer.meshes.placing import Shapes
+from app.viewer.meshes.reader import MeshReader
+from kin import RobotFileError
+from kin.files.urdf.collisions import Fitted, LinkPieces, Piece, without_meshes
+from kin.files.urdf.visuals import MeshFile
+
+ABOVE = 6  # folders above the URDF in which a package is looked for
+_SCHEMES = ("package", "model", "file")
+
+
+@dataclass(frozen=True)
+class MeshesBeside:
+    """Fits capsules to bodies whose meshes are found from the place of a URDF, as `kin.read_urdf` takes it."""
+
+    urdf: Path
+
+    def __call__(self, links: Sequence[LinkPieces], reach: float) -> Sequence[Fitted]:
+        """The capsules of all URDF links; raises `kin.RobotFileError` for a mesh beyond the limits."""
+        if not any(link.meshes for link in links):
+            return without_meshes(links, reach)
+        there = [replace(link, pieces=tuple(map(self._found, link.pieces))) for link in links]
+        reader = MeshReader()
+        try:
+            shapes = Shapes((), (), 0, reach, bodies_of(there))
+            return reader.read_package(shapes, self.urdf.resolve().parent).result().fits
+        except MeshError as error:
+            raise RobotFileError(str(self.urdf), error.field, error.value, error.expected) from None
+        finally:
+            reader.close()
+
+    def _found(self, piece: Piece) -> Piece:
+        """A mesh with the path of its file, as far as there is one."""
+        if not isinstance(piece.shape, MeshFile):
+            return piece
+        path = self.file_of(piece.shape.path)
+        return piece if path is None else Piece(piece.shape._replace(path=str(path)), piece.pose)
+
+    def file_of(self, named: str) -> Path | None:
+        """The file that a URDF names as ``package://NAME/…`` or relative to itself; None if there is none."""
+        scheme, _, rest = named.partition("://")
+        folder = self.urdf.resolve().parent
+        if not rest:
+            path = folder / unquote(named)
+            return path if path.is_file() else None
+        if scheme not in _SCHEMES:
+            return None
+        wanted = unquote(rest)
+        if scheme == "file":
+            return Path(wanted) if Path(wanted).is_file() else None
+        inside = wanted.partition("/")[2]
+        if wanted.startswith("/") or ".." in wanted.split("/"):
+            return None
+        for above in (folder, *folder.parents[:ABOVE]):
+            # The folder of a package may have another name than the package.
+            for path in (above / wanted, above / inside):
+                if inside and path.is_file():
+                    return path
+        return None

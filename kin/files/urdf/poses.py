@@ -1,0 +1,47 @@
+"""Where the links of a URDF are, and what its joints do."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kin.files.urdf.tree import MOVING, UrdfJoint, UrdfTree
+from kin.frames import matrix_of
+from kin.transforms import Array
+
+
+def poses_of(tree: UrdfTree, chain: tuple[UrdfJoint, ...]) -> tuple[dict[str, int], dict[str, Array]]:
+    """For each link below the root of the chain: the joints of the chain that move it, and its pose at zero."""
+    moving = {joint.name for joint in chain if joint.moves}
+    children: dict[str, list[UrdfJoint]] = {}
+    for joint in tree.joints:
+        children.setdefault(joint.parent, []).append(joint)
+    links = [chain[0].parent]
+    carriers, poses = {links[0]: 0}, {links[0]: np.eye(4)}
+    for link in links:  # grows meanwhile
+        for joint in children.get(link, ()):
+            T = poses[link] @ np.array(matrix_of(*joint.origin()))
+            if joint.type in MOVING and joint.name not in moving:
+                T = T @ motion_of(joint, np.array([_rest(joint)]))[0]
+            carriers[joint.child] = carriers[link] + (joint.name in moving)
+            poses[joint.child] = T
+            links.append(joint.child)
+    return carriers, poses
+
+
+def _rest(joint: UrdfJoint) -> float:
+    """Zero, or the limit closest to it."""
+    low, high = joint.limits() or (0.0, 0.0)
+    return min(max(0.0, low), high)
+
+
+def motion_of(joint: UrdfJoint, values: Array) -> Array:
+    """The motion of a joint ``(k, 4, 4)``, by Rodrigues' formula or along its axis."""
+    x, y, z = axis = np.array(joint.axis())
+    T = np.tile(np.eye(4), (len(values), 1, 1))
+    if joint.kind == "prismatic":
+        T[:, :3, 3] = values[:, None] * axis
+        return T
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    s, c = np.sin(values)[:, None, None], 2.0 * np.sin(0.5 * values)[:, None, None] ** 2
+    T[:, :3, :3] += s * K + c * (K @ K)
+    return T
