@@ -18,10 +18,11 @@ import textwrap
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pprint import pformat
+from typing import Any
 
 import numpy as np
 
-from kin import Joint, Robot, Task, builtin_robots, robot_to_dict
+from kin import Joint, Obstacle, Robot, Task, builtin_robots, robot_to_dict
 from kin.transforms import Array, wxyz_from_rotation
 
 DIGITS = 9
@@ -40,6 +41,8 @@ class Moment:
         address: where this service is, with a slash at the end; no character that a shell or a string would mind.
         token: whether the service asks for one.
         own: whether the arm is the visitor's own, which the service does not know.
+        obstacles: what stands around the arm.
+        avoid: whether the arm must touch neither itself nor them; if not, they are in the Python code, unused.
     """
 
     robot: Robot
@@ -49,6 +52,8 @@ class Moment:
     address: str = LOCAL
     token: bool = False
     own: bool = False
+    obstacles: tuple[Obstacle, ...] = ()
+    avoid: bool = False
 
 
 def curl(moment: Moment) -> str:
@@ -72,14 +77,18 @@ def python_requests(moment: Moment) -> str:
     if moment.token:
         top = f"import os\n\n{top}\n" + 'headers = {"Authorization": "Bearer " + os.environ["KINBOARD_TOKEN"]}\n'
         header = ", headers=headers"
-    body = ",\n    ".join(f'"{name}": {json.dumps(value)}' for name, value in _question(moment).items())
+    asked = {name: json.dumps(value) for name, value in _question(moment).items() if name != "obstacles"}
+    asked |= {"avoid_self_collision": "True"} if moment.avoid else {}
+    asked |= {"obstacles": "obstacles"} if moment.avoid and moment.obstacles else {}
+    body = ",\n    ".join(f'"{name}": {value}' for name, value in asked.items())
+    around = _listed(moment, lambda each: repr(_fields_of(each)), '"obstacles": obstacles in the question')
     arm, field, sent = "", "", ""
     if moment.own:
         arm, field, sent = f"arm = {_fields(moment.robot, 6)}\n", '"robot": arm, ', '\n    "robot": arm,'
     return f"""{top}
 robot = {json.dumps(_address(moment))}
 {arm}q = {_list(moment.q)}
-question = {{{sent}
+{around}question = {{{sent}
     {body},
 }}
 
@@ -97,15 +106,20 @@ def python_kin(moment: Moment) -> str:
     """Python, with this package and without any service."""
     robot = moment.robot
     load = robot_code(robot, known=not moment.own)
+    around = _listed(moment, _obstacle, "obstacles=obstacles in solve_ik")
+    if moment.obstacles:
+        around += "print(kin.clearance(robot, q, obstacles))  # metres; negative where something touches\n"
+    options = ", obstacles=obstacles" if moment.avoid and moment.obstacles else ""
+    options += ", avoid_self_collision=True" if moment.avoid else ""
     return f"""import kin
 
 {load}
 q = {_list(moment.q)}
 print(kin.fk(robot, q))  # T_base_tool
-
+{around}
 target = [
 {_rows(moment.target)}]
-result = kin.solve_ik(robot, target, task="{moment.task}", q_seed=q)
+result = kin.solve_ik(robot, target, task="{moment.task}", q_seed=q{options})
 print(result.status, result.reason)
 for solution in result.solutions:
     print(solution.branch, solution.q)
@@ -247,7 +261,34 @@ def _question(moment: Moment) -> dict[str, object]:
     target: dict[str, object] = {"position": _list(moment.target[:3, 3])}
     if moment.task != "position":
         target["wxyz"] = _list(wxyz_from_rotation(moment.target[:3, :3]))
-    return {"target": target, "task": moment.task, "q_seed": _list(moment.q)}
+    question: dict[str, object] = {"target": target, "task": moment.task, "q_seed": _list(moment.q)}
+    if moment.avoid:
+        question["avoid_self_collision"] = True
+    if moment.avoid and moment.obstacles:
+        question["obstacles"] = [_fields_of(each) for each in moment.obstacles]
+    return question
+
+
+def _fields_of(obstacle: Obstacle) -> dict[str, Any]:
+    """The fields of an obstacle, rounded as poses are; without a rotation if it has none."""
+    found = {
+        key: _list(np.array(value)) if isinstance(value, list) else value
+        for key, value in obstacle.as_dict().items()
+    }
+    return found if any(found["rpy"]) else {key: value for key, value in found.items() if key != "rpy"}
+
+
+def _obstacle(obstacle: Obstacle) -> str:
+    """Python that makes an obstacle."""
+    return f"kin.Obstacle({', '.join(f'{key}={value!r}' for key, value in _fields_of(obstacle).items())})"
+
+
+def _listed(moment: Moment, code: Callable[[Obstacle], str], use: str) -> str:
+    """Python that assigns the obstacles, if there are any; `use`: how they are avoided, where they are not."""
+    if not moment.obstacles:
+        return ""
+    hint = "" if moment.avoid else f"  # {use} avoids them"
+    return "obstacles = [" + hint + "\n" + "".join(f"    {code(each)},\n" for each in moment.obstacles) + "]\n"
 
 
 def _product(T: Array, rows: tuple[Joint, ...], convention: str) -> Array:

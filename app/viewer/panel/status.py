@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import viser
@@ -47,6 +47,8 @@ class Notice:
 
 
 READY = Notice("hand", "Ready", "Drag the coloured arrows at the gripper, or move a joint slider.")
+
+READY_IN_CONTACT = "Ready, but something touches"
 
 LOOKING = Notice("hand", "Ready", "You may look: drag the picture to turn the view, and scroll to come closer.")
 
@@ -129,8 +131,15 @@ def _kind(result: IKResult) -> Kind:
 
 
 def html(shown: Notice, warning: str = "", waiting: str = "") -> str:
-    """The notice as a card, which ``static/layout.css`` places over the scene, with what is added to it."""
+    """The notice as a card, which ``static/layout.css`` places over the scene, with what is added to it.
+
+    A notice that all is well is no longer blue or green beside a warning, and the card says both.
+    """
     symbol, color = LOOKS[shown.kind]
+    if warning and shown.kind in ("hand", "reached"):
+        symbol, color = ("!", "kb-amber") if shown.kind == "hand" else (symbol, "kb-amber")
+        if shown.title == READY.title:
+            shown = replace(shown, title=READY_IN_CONTACT)
     return render("panel/status", notice=shown, warning=warning, waiting=waiting, symbol=symbol, color=color)
 
 

@@ -206,7 +206,10 @@ class Persistence:
         page = self._page
         target = kin.fk(page.robot, page.goal) if page.target is None else page.target
         own = page.own is not None and page.own.robot == page.robot
-        moment = Moment(page.robot, page.goal, target, page.task, self._address, self._token, own)
+        avoid = page.view.avoid
+        moment = Moment(
+            page.robot, page.goal, target, page.task, self._address, self._token, own, page.obstacles, avoid
+        )
         self._share.show(f"{self._address}viewer/#s={self._saved}", moment, page.withheld == "table")
 
 

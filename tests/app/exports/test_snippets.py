@@ -242,3 +242,65 @@ def test_an_own_arm_is_built_in_python(capsys):
     assert scope["robot"].name == here.robot.name
     assert np.abs(kin.fk(scope["robot"], here.q) - here.target).max() < 1e-15
     assert "solved" in capsys.readouterr().out
+
+
+CRATE = kin.Obstacle("box", (2.0, 0.1, 0.3), (0.0, 0.0, 0.4), size=(0.2, 0.3, 0.4), name='a "crate"')
+POLE = kin.Obstacle("cylinder", (-1.5, 0.0, 0.5), radius=0.05, height=1.0)
+
+
+def asked_by_requests(code: str) -> dict[str, object]:
+    """The question that the code sends to inverse kinematics."""
+    sent: list[dict[str, object]] = []
+
+    def post(address: str, json: dict[str, object], **_: object) -> object:
+        sent.append(json)
+        answer = {"pose": {"position": [], "wxyz": []}, "status": "", "reason": "", "solutions": []}
+        return SimpleNamespace(json=lambda: answer)
+
+    fake = ModuleType("requests")
+    fake.post = post  # type: ignore[attr-defined]
+    before, sys.modules["requests"] = sys.modules.get("requests"), fake
+    try:
+        exec(code, {})
+    finally:
+        if before is None:
+            del sys.modules["requests"]
+        else:
+            sys.modules["requests"] = before
+    return sent[1]
+
+
+def test_obstacles_that_are_avoided_are_asked_for(client):
+    here = moment(kin.get_robot("ur5"), obstacles=(CRATE, POLE), avoid=True, address="http://testserver/")
+    expected = [kin.obstacle_from_dict(item) for item in (CRATE.as_dict(), POLE.as_dict())]
+    for question in (
+        json.loads(shlex.split(curl(here).replace("\\\n", "").splitlines()[1])[-1]),
+        asked_by_requests(python_requests(here)),
+    ):
+        assert question["avoid_self_collision"] is True
+        assert [kin.obstacle_from_dict(item) for item in question["obstacles"]] == expected
+        answer = client.post("/api/v1/robots/ur5/ik", json=question)
+        assert answer.status_code == 200, answer.text
+    found: dict[str, object] = {}
+    exec(python_kin(here), found)
+    assert found["obstacles"] == list(expected)
+    assert "obstacles=obstacles, avoid_self_collision=True)" in python_kin(here)
+
+
+def test_obstacles_that_are_not_avoided_are_in_the_python_code_only():
+    here = moment(kin.get_robot("ur5"), obstacles=(CRATE,))
+    assert "obstacles" not in curl(here)
+    assert "obstacles" not in asked_by_requests(python_requests(here))
+    found: dict[str, object] = {}
+    exec(python_kin(here), found)
+    assert found["obstacles"] == [CRATE]
+    for code in (python_kin(here), python_requests(here)):
+        assert "avoids them" in code
+        assert "crate" in code
+
+
+def test_without_obstacles_the_code_does_not_speak_of_them():
+    here = moment(kin.get_robot("ur5"))
+    for code in (curl(here), python_requests(here), python_kin(here)):
+        assert "obstacles" not in code
+        assert "avoid" not in code

@@ -5,7 +5,6 @@ Only the visitor's worker calls these methods, one event at a time.
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
@@ -20,7 +19,7 @@ from app.viewer.session.actions.arm import ArmControls
 from app.viewer.session.actions.looks import LookControls
 from app.viewer.session.actions.page import ActionsPage
 from app.viewer.session.actions.typed import TypedInput
-from app.viewer.session.history import LONG_PAUSE, SHORT_PAUSE, History, Step, pause_within, same, without_results
+from app.viewer.session.history import GRADUAL, History, Step, belongs_before, pause_within, same, without_results
 from app.viewer.session.persistence import link_notice
 from app.viewer.session.state import PageState, decode
 from kin.units import Units
@@ -32,8 +31,6 @@ NO_STEP = frozenset(
         *("undo", "redo", "travel", "released", "snap", "text-size", "body", "shown", "news"),
     }
 )
-# Controls that send many values on the way to the one the visitor means: how long (s) a step may pause.
-GRADUAL = {"gizmo": math.inf, "joint": LONG_PAUSE, "redundancy": LONG_PAUSE, "nudge": SHORT_PAUSE}
 MESSAGES = (
     "undo", "redo", "travel", "released", "snap", "nudge", "axes", "field", "target", "fit-arm", "look-from",
     "lesson", "feature", "text-size", "frame",
@@ -139,7 +136,12 @@ class Actions:
     def _continues(self, gesture: tuple[object, ...], value: object, now: float) -> bool:
         """Whether an event belongs to the same step as the one before."""
         name = str(gesture[0])
+        if name == "feature" and belongs_before(gesture[2]):
+            self.history.proceed()
+            return True
         longest = pause_within(gesture[2], value) if name == "feature" else GRADUAL.get(name, 0.0)
+        if name == "feature" and gesture[2] == "grab":
+            self._gesture = None
         if gesture != self._gesture or longest == 0.0 or now - self._changed_at > longest:
             return False
         self._changed_at = now

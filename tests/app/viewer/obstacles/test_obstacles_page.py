@@ -17,6 +17,7 @@ from app.viewer.panel.joints import label
 from app.viewer.panel.view import ViewState
 from app.viewer.scene.bodies.nodes import TOUCHING
 from app.viewer.scene.meshes import body
+from app.viewer.session import history
 from app.viewer.session.state import PageState, decode, encode
 from kin.units import DEFAULT_UNITS
 
@@ -146,6 +147,34 @@ def test_obstacles_are_dragged_with_their_gizmo(port: int) -> None:
         tab.send("TransformControlsDragEndMessage", name=gizmo, owner=owner)
         tab.wait(lambda: bool(kept(tab).obstacles) and kept(tab).obstacles[0].xyz == (0.1, 0.9, 0.5))
         assert tab.script["undo"] == "Drag of an obstacle"
+
+
+def test_a_drag_of_an_obstacle_is_one_step_however_long_it_rests(
+    port: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A pause of the usual length has passed as soon as the next event comes."""
+    monkeypatch.setattr(history, "SHORT_PAUSE", 1e-6)
+    places = [(0.1, 0.9, 0.5), (0.2, 0.9, 0.5), (0.3, 0.9, 0.5), (0.4, 0.9, 0.5)]
+    with FakeBrowser(port, memory=opened(PageState("ur5", obstacles=(WALL,)))) as tab:
+        tab.settle()
+        (node,) = bodies(tab)
+        tab.click(node)
+        tab.wait(lambda: any("obstacle-gizmo" in name for name in tab.nodes))
+        tab.settle()
+        (gizmo,) = (name for name in tab.nodes if "obstacle-gizmo" in name)
+        owner = tab.nodes[gizmo]["owner"]
+        for drag in (places[:2], places[2:]):
+            tab.send("TransformControlsDragStartMessage", name=gizmo, owner=owner)
+            for xyz in drag:
+                place = {"position": xyz, "wxyz": (1.0, 0.0, 0.0, 0.0)}
+                tab.send("TransformControlsUpdateMessage", name=gizmo, owner=owner, **place)
+                tab.settle(quiet=0.05)
+            tab.send("TransformControlsDragEndMessage", name=gizmo, owner=owner)
+            tab.wait(lambda xyz=drag[-1]: bool(kept(tab).obstacles) and kept(tab).obstacles[0].xyz == xyz)
+            tab.settle()
+        for xyz in (places[1], WALL.xyz):
+            tab.say("undo")
+            tab.wait(lambda xyz=xyz: bool(kept(tab).obstacles) and kept(tab).obstacles[0].xyz == xyz)
 
 
 @pytest.mark.parametrize(

@@ -125,3 +125,22 @@ def test_a_sentence_has_the_short_name_of_a_posture() -> None:
     status.show_result(result, DEFAULT_UNITS)
     assert "(front · elbow + · flip) needs joint 4" in element.content
     assert "branch" not in result.reason
+
+
+def test_a_warning_beside_ready_makes_the_card_amber_and_both_are_said() -> None:
+    status, element = line()
+    assert "kb-blue" in element.content
+    status.warn("Link 4 touches the table, 12 mm deep.")
+    assert "kb-amber" in element.content
+    assert "kb-blue" not in element.content
+    assert "<b>Ready, but something touches</b>" in element.content
+    assert "⚠ Link 4 touches the table" in element.content
+    status.show(Notice("error", "Something is wrong"))
+    assert "kb-violet" in element.content, "what is wrong already has a colour of its own"
+    status.show(UNDONE)
+    assert "kb-amber" in element.content
+    assert "<b>Undone: Home</b>" in element.content
+    status.warn("")
+    assert "kb-blue" in element.content
+    status.show(READY)
+    assert "<b>Ready</b>" in element.content
