@@ -139,7 +139,7 @@ def test_a_platform_that_speaks_no_http_does_not_end_the_sending_of_scores(
         root = f"http://127.0.0.1:{server.server_address[1]}"
         platform = Platform("p", root, "c", ("1",), root, f"{root}/token", f"{root}/keys")
         platforms = Platforms((platform,), rsa.generate_private_key(65537, 2048))
-        column = Column(root, "c", f"{root}/columns/5", "user", "swing", 1.0)
+        column = Column(root, "c", f"{root}/columns/5", "user", 1.0, 1, True)
         passback = Passback(platforms, lambda _: column, pauses=(0.0, 0.0))
         for seat in ("one", "two"):
             before = _Babble.asked
