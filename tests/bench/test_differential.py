@@ -40,14 +40,14 @@ def difference(typical, change):
     question, answer = typical
     new = copy.deepcopy(answer)
     change(new)
-    return compare(question, answer, new)
+    return compare(question.robot, question.number, answer, new)
 
 
 @pytest.mark.parametrize("robot", [robot for robot in ROBOTS.values() if robot.id != "sawyer"], ids=lambda r: r.id)
 def test_a_tree_answers_the_same_question_twice_alike(robot):
     for number in NUMBERS:
         answers = [ask(Question.of(robot, number)) for _ in range(2)]
-        verdict = compare(Question.of(robot, number), *answers)
+        verdict = compare(robot, number, *answers)
         assert verdict.grade is Grade.IDENTICAL, f"{number}: {verdict}"
 
 
@@ -150,7 +150,7 @@ def test_an_interval_that_was_missed_before_is_not_a_fault(typical):
     question, answer = typical
     old = copy.deepcopy(answer)
     ranges_of(old, lambda x: [(x[0], 0.5 * (x[0] + x[1]))])
-    verdict = compare(question, old, answer)
+    verdict = compare(PANDA, question.number, old, answer)
     assert verdict.judged
     assert not any(judged.wrong for judged in verdict.judged)
     assert all(judged.new and judged.feasible == 1.0 for judged in verdict.judged)

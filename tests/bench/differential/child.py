@@ -58,9 +58,8 @@ def compare_answers(old: Path, new: Path, shown: bool = False) -> int:
     for (name, numbers, before), (_, _, after) in zip(read_answers(old), read_answers(new), strict=True):
         tally = Tally(name)
         for number, one, other in zip(numbers, before, after, strict=True):
-            question = Question.of(robots[name], number)
-            tally.add(compare(question, one, other))
+            tally.add(compare(robots[name], number, one, other))
             if shown:
-                print(f"{question}\nold: {one}\nnew: {other}\n")
+                print(f"{Question.of(robots[name], number)}\nold: {one}\nnew: {other}\n")
         tallies.append(tally)
     return show(tallies)

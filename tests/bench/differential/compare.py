@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 
@@ -50,8 +51,8 @@ class Verdict:
         return ", ".join(parts)
 
 
-def compare(question: Question, old: Answer, new: Answer) -> Verdict:
-    """What differs between the answers of two trees."""
+def compare(robot: Any, number: int, old: Answer, new: Answer) -> Verdict:
+    """What differs between the answers of two trees. The question is made again only if intervals are judged."""
     grades = {
         "status": _same(old.status, new.status),
         "cause": _same((old.cause, old.solver), (new.cause, new.solver)),
@@ -61,9 +62,9 @@ def compare(question: Question, old: Answer, new: Answer) -> Verdict:
     for name in dict.fromkeys((*old.arrays, *new.arrays)):
         pair = old.arrays.get(name), new.arrays.get(name)
         grades[name] = Grade.DIFFERENT if pair[0] is None or pair[1] is None else grade_of(pair[0], pair[1])
-    verdict = Verdict(question.number, {part: grade for part, grade in grades.items() if grade})
+    verdict = Verdict(number, {part: grade for part, grade in grades.items() if grade})
     if grades["intervals"] is Grade.DIFFERENT or grades["branches"] is Grade.DIFFERENT:
-        verdict.judged = judge(question, old, new)
+        verdict.judged = judge(Question.of(robot, number), old, new)
     return verdict
 
 
